@@ -151,7 +151,7 @@ IDENTIFY = {
     ),
     "flights__identification__summary": "fitted",
     "flights__model__as_text": "text",
-    "flights__model__write_text": None,
+    "studies__engine__store__write_whole": None,
     "flights__pages__render_model": "page",
     "flights__pages__check_page": None,
 }

@@ -6,9 +6,10 @@ import sys
 from pathlib import Path
 
 import pytest
+import typer
 from typer.testing import CliRunner
 
-from beaver_ftc.cli.main import COMMANDS, app
+from beaver_ftc.cli.main import app
 from beaver_ftc.scenario.loader import builtin_names, builtin_path, builtin_sweeps, load_scenario
 from beaver_ftc.scenario.sweeps import load_sweep_text
 
@@ -62,9 +63,9 @@ def test_a_name_that_cannot_be_a_scenarios_is_bad_input(tmp_path, name, status):
 
 
 def test_help_has_examples_on_lines_of_their_own():
-    for name, command in COMMANDS.items():
+    for name, command in typer.main.get_command(app).commands.items():
         shown = [line.strip() for line in _beaver(name, "--help").stdout.splitlines()]
-        assert set(command.examples) <= set(shown)
+        assert set(map(str.strip, (command.epilog or "").splitlines()[2:])) <= set(shown)
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

@@ -67,7 +67,7 @@ def test_the_true_type_is_neither_excluded_nor_named_wrongly(noisy, seed, kind, 
     code = TYPES[kind][1]
     assert not plant.position_excluded(surface)
     assert not plant.fdi["types"]["surface"][surface]["type_excluded"][code]
-    said = found(plant.fdi)
+    said = found(plant.fdi, SURFACES)
     assert said["isolated"] in (SURFACES[surface], None)
     assert said["isolation_type"] in (types.NAMES[code], None)
 
@@ -79,7 +79,7 @@ def test_an_estimate_is_certain_to_lie_in_its_interval(noisy):
     known = plant.fdi["types"]["surface"][0]
     assert known["set_low"][types.STUCK] <= -0.26 <= known["set_high"][types.STUCK]
     assert known["set_high"][types.STUCK] - known["set_low"][types.STUCK] < np.deg2rad(4)
-    assert found(plant.fdi)["isolated"] == "aileron"
+    assert found(plant.fdi, SURFACES)["isolated"] == "aileron"
 
 
 def test_blocks_see_what_frames_do_not():

@@ -93,10 +93,11 @@ import sys
 sys.path.insert(0, {folder!r})
 from design_plant import UNCERTAINTIES, DesignPlant
 from beaver_ftc.diagnosis.types.findings import found
+SURFACES = ("aileron", "elevator", "rudder", "flap")
 reverse = lambda k, u: -u if k >= 20 else u
 plant = DesignPlant(4, 50.0, surface=2, position=reverse, fault_class="all")
-plant.fly(220, UNCERTAINTIES["random"], until=lambda plant: found(plant.fdi)["isolation_type"])
-said = found(plant.fdi)
+plant.fly(220, UNCERTAINTIES["random"], until=lambda plant: found(plant.fdi, SURFACES)["isolation_type"])
+said = found(plant.fdi, SURFACES)
 print(said["isolated"], said["isolation_type"], said["estimate"])
 """
 

@@ -25,7 +25,7 @@ def folder(tmp_path):
     root = tmp_path / "carbonZ"
     root.mkdir()
     topics = {}
-    for i, (_, topic, field, _) in enumerate(alfa._COLUMNS):
+    for i, (topic, field, _) in enumerate(alfa._known()["columns"].values()):
         topics.setdefault(topic, []).append((field, 1500.0 + 10.0 * i if "channels" in field else 1.0 + i))
     for k, (topic, fields) in enumerate(topics.items()):
         header = ",".join(["%time", *(field for field, _ in fields)])

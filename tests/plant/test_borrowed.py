@@ -115,7 +115,7 @@ def test_an_executive_is_run_by_its_address_where_that_is_known(monkeypatch):
     if addresses.available():
         assert found > 0
         assert plant.read("simulation/sim-time-sec") == pytest.approx(before_s + 0.01)
-    for name, wrong in (("run_address", lambda: 0), ("_EXECUTIVE_SIZE", 48)):
+    for name, wrong in (("RUN", "_ZNoSuchThing"), ("_EXECUTIVE_SIZE", 48)):
         with monkeypatch.context() as other:
             other.setattr(addresses, name, wrong)
             assert addresses.executive_address(plant.fdm) == 0
@@ -136,8 +136,8 @@ def test_nodes_are_read_by_address_unless_that_is_not_wanted(monkeypatch, native
 
 
 def test_an_address_that_there_is_not_is_zero():
-    assert addresses._address("_ZNoSuchThing") == 0
-    assert addresses.getter_address() != addresses.setter_address()
-    nodes = addresses._trial_nodes()
-    assert [node.get_double_value() for node in nodes] == [1 / 3, 1 / 4, 1 / 5]
+    assert addresses.address("_ZNoSuchThing") == 0
+    assert len({addresses.address(one) for one in (addresses.GETTER, addresses.SETTER, addresses.RUN)}) == 3
+    nodes = addresses._trial_nodes("abc")
+    assert [node.get_name() for node in nodes] == ["a", "b", "c"]
     assert len({addresses.pointer(node) for node in nodes}) == 3

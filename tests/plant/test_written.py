@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
+from beaver_ftc.loop.cockpit import Cockpit
+from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plant import channels
 from beaver_ftc.plant.adapter import Plant, _Errors, bare, body_axes, probe, translated
-from beaver_ftc.plant.configure import NEVER, GustSchedule, MovingAir, configure, take_off, trim_of
+from beaver_ftc.plant.configure import NEVER, GustSchedule, configure, take_off, trim_of
 from beaver_ftc.plant.model_file import copy_of, package
 from beaver_ftc.plant.state import FlightState
 from beaver_ftc.scenario.environment import Gust
@@ -153,13 +155,11 @@ def test_gusts_are_set_off_in_their_frames(kept):
     assert plant.written["atmosphere/cosine-gust/magnitude-ft_sec"] == pytest.approx(2 / 0.3048)
 
 
-def test_turbulence_turns_with_the_heading_and_still_air_does_not():
+def test_turbulence_turns_with_the_heading():
     plant = Plant(rate_hz=50)
     plant.start(banked())
-    for severity, turned in ((None, plant.read("atmosphere/psiw-rad")), ("light", -1.1)):
-        of = {"turbulence": "dryden", "severity": severity} if severity else {}
-        MovingAir(load({"environment": of}).environment, plant).turn()
-        assert plant.read("atmosphere/psiw-rad") == pytest.approx(turned, abs=1e-6)
+    Cockpit(plant, Loop(load({})).frames).turn_air()
+    assert plant.read("atmosphere/psiw-rad") == pytest.approx(-1.1, abs=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -269,8 +269,8 @@ def test_names_and_units_of_what_is_read_and_logged(kept):
         "further of the beaver": channels.further_channels(load({}).airframe),
         "room": [channels.most_channels(n) for n in (3, 8)],
         "commands": channels.command_properties(aircraft),
-        "log": channels.log_columns(("rudder",), True, True, aircraft, ("h_m",), True),
-        "short log": channels.log_columns((), aircraft=aircraft),
+        "log": channels.log_columns(aircraft, ("rudder",), True, True, ("h_m",), True),
+        "short log": channels.log_columns(aircraft, (), False, False, (), False),
         "places": [channels.AIRSPEED, channels.ALPHA, channels.BETA, channels.QDYN, channels.PHI,
                    channels.LATITUDE, channels.LONGITUDE, channels.ALTITUDE, channels.PDOT,
                    channels.ENVELOPE, channels.POS],

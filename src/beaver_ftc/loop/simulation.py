@@ -309,7 +309,11 @@ class Stepping:
                 self._status = loop.fly_segment(k, stop)
             finally:
                 self._next = k_flown()
-                self._last.append(loop.log[start : rows_flown()].copy())
+                self._note(loop.log[start : rows_flown()])
+
+    def _note(self, rows: Vector) -> None:
+        """Keep the rows just flown, (frames, columns), until the next step."""
+        self._last.append(rows.copy())
 
     def _steer(self, k: int, stop: int, stick_deg_s: Vector | None) -> None:
         """Add the stick, (3,) deg/s, to the references of frames k to stop, all in one chunk of the log.

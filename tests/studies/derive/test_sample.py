@@ -8,8 +8,8 @@ import pytest
 
 from beaver_ftc.aircraft.loading import read
 from beaver_ftc.plant.adapter import Plant
+from beaver_ftc.plant.trim import trim as trimmed
 from beaver_ftc.studies.derive import sample as sampling
-from beaver_ftc.studies.derive.outline import trim_at
 from beaver_ftc.studies.derive.sample import Draw, Envelope, Samples
 from kept import in_short
 
@@ -26,7 +26,7 @@ def plant():
 
 @pytest.fixture(scope="module")
 def trim(plant):
-    return trim_at(plant, 50.0, 1000.0)
+    return trimmed(50.0, 1000.0, plant=plant)
 
 
 def draw(plant, trim, seed=5):

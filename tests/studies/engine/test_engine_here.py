@@ -22,8 +22,8 @@ from beaver_ftc.studies.engine.statistics import (
     wilson_bound,
 )
 from beaver_ftc.studies.engine.store import Parts, RowsAsJson, batches_of, digest, refuse_other
-from beaver_ftc.studies.engine.study import Batch, Batches, Campaign
-from beaver_ftc.studies.engine.workers import Case, LocalWorkers, Outcome, Task, ThisProcess, Work
+from beaver_ftc.studies.engine.study import Batches, Campaign
+from beaver_ftc.studies.engine.workers import Batch, Case, LocalWorkers, Outcome, ThisProcess, Work
 
 
 @pytest.mark.parametrize(
@@ -120,9 +120,9 @@ CASES = tuple(Case(run, 10 + run) for run in range(3))
 def test_this_process_is_one_worker():
     here = ThisProcess(Work(double))
     for number in (1, 2):
-        here.submit(Task(number, CASES[:number]))
+        here.submit(Batch(number, CASES[:number]))
     assert here.slots == 1
-    assert here.outcomes(0.0) == [Outcome(Task(1, CASES[:1]), [{"run": 0, "is": 20}])]
+    assert here.outcomes(0.0) == [Outcome(Batch(1, CASES[:1]), [{"run": 0, "is": 20}])]
     here.close()
     with pytest.raises(IndexError):
         here.outcomes(0.0)
@@ -169,14 +169,14 @@ def test_local_workers_hand_back_rows_and_what_was_lost(hired):
     assert (local.slots, len(hired.all)) == (2, 2)
     hired.errors[:] = [None, BrokenProcessPool()]
     for number in (1, 2):
-        local.submit(Task(number, CASES[:number]))
-    found = {outcome.task.batch: outcome.rows for outcome in local.outcomes(1.0)}
+        local.submit(Batch(number, CASES[:number]))
+    found = {outcome.task.number: outcome.rows for outcome in local.outcomes(1.0)}
     assert found == {1: [{"run": 0, "is": 20}], 2: None}
     assert len(hired.all) == 3  # the one that died is replaced
     hired.errors[:] = [KeyError()]  # it had died while idle
-    local.submit(Task(3, CASES))
-    assert local.outcomes(1.0) == [Outcome(Task(3, CASES), None)]
-    local.submit(Task(4, CASES))
+    local.submit(Batch(3, CASES))
+    assert local.outcomes(1.0) == [Outcome(Batch(3, CASES), None)]
+    local.submit(Batch(4, CASES))
     local.close()
     assert sum(worker.ended for worker in hired.all) == 2
     assert local.outcomes(0.0)[0].rows == [double(case) for case in CASES]
@@ -193,7 +193,7 @@ def test_workers_that_cannot_fly_end_the_study(hired, monkeypatch, starts, error
     monkeypatch.setattr(hired, "starts", starts)
     local = LocalWorkers(Work(double), 1)
     hired.errors[:] = [error]
-    local.submit(Task(1, CASES))
+    local.submit(Batch(1, CASES))
     with pytest.raises(SimulationFailed, match=says):
         local.outcomes(1.0)
     assert len(local._idle) == 1
@@ -321,7 +321,7 @@ def test_tasks_of_a_cluster(ray):
     assert variables == {**workers.ONE_THREAD_EACH, ray_workers.VARIABLE: "somebody:Theirs"}
     assert remote == ("remote", {"num_cpus": 1, "max_retries": 0})
     assert there.slots == 6
-    tasks = [Task(number, CASES[:number]) for number in (1, 2, 3)]
+    tasks = [Batch(number, CASES[:number]) for number in (1, 2, 3)]
     for task in tasks:
         there.submit(task)
     assert there.outcomes(0.5) == [Outcome(tasks[0], [{"run": 0, "is": 20}])]

@@ -168,3 +168,16 @@ def test_who_fails_in_flight_is_blamed_and_when(detector, law, blamed):
     with pytest.raises(SimulationFailed) as failed:
         loop.fly_chunk(0, 20)
     assert str(failed.value) == f"plug-in {blamed} at 0.05 s: step raised LookupError: no more"
+
+
+def test_every_stage_is_called_as_machine_code():
+    """A dispatcher would look up the type of the record at each call: thirty times a frame's time."""
+    for detector, law, called in (
+        (Answers(Verdict()), None, {"begin", "take_verdict", "decide", "command", "finish"}),
+        (None, Answers(np.zeros(4)), {"begin", "diagnose", "decide", "take_command", "finish"}),
+    ):
+        loop = Loop(_scenario(duration_s=0.1), detector, law)
+        assert sum(len(rows) for rows in loop.chunks()) == 10
+        stages = loop.plugin_frame._direct
+        assert {stage.__name__ for stage in stages} == called
+        assert {type(code) for code in stages.values()} == {type(len)}

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from beaver_ftc.compiled import direct
 from beaver_ftc.control.base import Law, Reference
 from beaver_ftc.control.laws import ADAPTIVE, NOMINAL, ORACLE
 from beaver_ftc.design.context import Context, DesignFunctions
@@ -18,7 +19,7 @@ from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
 from beaver_ftc.diagnosis.bounds.variances import declared_of
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.documents.errors import BeaverFtcError, SimulationFailed
-from beaver_ftc.loop import frame as stages
+from beaver_ftc.loop import stepping as stages
 from beaver_ftc.loop.assembly import y_places
 from beaver_ftc.loop.outcome import verdict_of
 from beaver_ftc.plant.sensing import NOT_FINITE
@@ -45,6 +46,7 @@ class PluginFrame:
         begun: "PluginFrame | None",
     ) -> None:
         self.detector, self.law, self.verdict, self._t_s = detector, law, Verdict(), 0.0
+        self._direct: dict[Any, Any] = {}  # machine code of stages: for flights of records of one shape
         self._surfaces = surfaces = scenario.airframe.surfaces
         self._isolated = {None: NOT_ISOLATED, "unanticipated": UNANTICIPATED}
         self._isolated |= {surface: s for s, surface in enumerate(surfaces)}
@@ -63,28 +65,36 @@ class PluginFrame:
     def __call__(self, frames: np.ndarray, references: np.ndarray, log: np.ndarray) -> int:
         """Fly one frame; see `stepping.fly_frame`."""
         frame = frames[0]
-        status = stages.begin(frame)
+        status = self._stage(stages.begin, frames)
         if status == NOT_FINITE:
             return status
         row, measured = int(frame["row"]), measured_of(frame)
         self._t_s = measured.t_s
-        self._diagnose(frame, measured)
-        stages.decide(frame)
-        self._command(frame, references[row], measured)
-        stages.finish(frame, references[row], log[row])
+        self._diagnose(frames, measured)
+        self._stage(stages.decide, frames)
+        self._command(frames, references[row], measured)
+        self._stage(stages.finish, frames, references, log)
         return status
 
-    def _diagnose(self, frame: np.void, measured: Measured) -> None:
+    def _stage(self, stage: Any, *arrays: np.ndarray) -> int:
+        """Call a stage's machine code."""
+        if stage not in self._direct:
+            self._direct[stage] = direct(stage, *arrays)
+        return self._direct[stage](*arrays)
+
+    def _diagnose(self, frames: np.ndarray, measured: Measured) -> None:
+        frame = frames[0]
         if self.detector is None:
-            stages.diagnose(frame)
+            self._stage(stages.diagnose, frames)
             return
         answer = self._ask(self._names[0], self.detector.step, measured, frame["belief"]["u"].copy())
         self.verdict = self._checked(answer, frame["verdict"])
-        stages.take_verdict(frame)
+        self._stage(stages.take_verdict, frames)
 
-    def _command(self, frame: np.void, commanded: np.ndarray, measured: Measured) -> None:
+    def _command(self, frames: np.ndarray, commanded: np.ndarray, measured: Measured) -> None:
+        frame = frames[0]
         if self.law is None or frame["held"]:
-            stages.command(frame)
+            self._stage(stages.command, frames)
             return
         name, model = self._names[1], frame["control"]["reference"]
         reference = Reference(
@@ -92,7 +102,7 @@ class PluginFrame:
         )
         verdict = self.verdict if self.detector is not None else verdict_of(frame, self._surfaces)
         answer = self._ask(name, self.law.step, measured, reference, verdict)
-        stages.take_command(frame, self._a_number_each(name, "the command", answer))
+        self._stage(stages.take_command, frames, self._a_number_each(name, "the command", answer))
 
     def _ask(self, name: str, question: Any, *arguments: Any) -> Any:
         try:

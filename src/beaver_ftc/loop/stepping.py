@@ -1,6 +1,7 @@
 """The compiled frame as Python calls it: whole, many in a row, and what is looked at between two.
 
-Where a plug-in is between (plugin_frame.py), Python calls the frame's own stages.
+Where a plug-in is between (plugin_frame.py), Python calls the frame's stages one by one: here they take
+arrays, since to look up the type of a whole record costs a call from Python a hundred frames.
 
 frames (1,): of `frame_dtype` (assembly.py).
 """
@@ -27,9 +28,46 @@ def begin_watch(frames):
 
 
 @kernel
+def begin(frames):
+    """See frame.py, as of all stages down to `finish`."""
+    return whole.begin(frames[0])
+
+
+@kernel
 def diagnose(frames):
     """The built-in diagnosis alone."""
     whole.diagnose(frames[0])
+
+
+@kernel
+def take_verdict(frames):
+    """In its place a plug-in's."""
+    whole.take_verdict(frames[0])
+
+
+@kernel
+def decide(frames):
+    """What the supervisor makes of the verdict."""
+    whole.decide(frames[0])
+
+
+@kernel
+def command(frames):
+    """The built-in law alone."""
+    whole.command(frames[0])
+
+
+@kernel
+def take_command(frames, deflections):
+    """In its place a plug-in's, (n,) rad."""
+    whole.take_command(frames[0], deflections)
+
+
+@kernel
+def finish(frames, references, log):
+    """The end of a frame; references, log: as in `fly_frame`."""
+    frame = frames[0]
+    whole.finish(frame, row_of(references, frame.row), row_of(log, frame.row))
 
 
 @kernel
@@ -78,7 +116,7 @@ def fly_frame(frames, references, log):
     whole.diagnose(frame)
     whole.decide(frame)
     whole.command(frame)
-    whole.finish(frame, row_of(references, frame.row), row_of(log, frame.row))
+    finish(frames, references, log)
     return status
 
 

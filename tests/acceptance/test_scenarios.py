@@ -25,8 +25,9 @@ def _verdicts(text):
 
 
 def _warnings(stderr):
-    """Its lines, but that of the first flight that uses a part of the code."""
-    return [line for line in stderr.splitlines() if not line.startswith("beaver-ftc: compiling ")]
+    """Its lines, but those of the first flight that uses a part of the code."""
+    first = ("beaver-ftc: compiling ", "beaver-ftc: making ready ")
+    return [line for line in stderr.splitlines() if not line.startswith(first)]
 
 
 def _only_warnings(stderr, names):

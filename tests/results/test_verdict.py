@@ -141,9 +141,11 @@ def test_a_change_in_flight_is_said_with_what_the_diagnosis_before_it_found():
     change = {"law": "adaptive", "scheme": None, "sensors": {}, "time_s": 6.0}
     assert verdict._changed(change) == "law adaptive at 6.00 s"
     assert verdict._changed({**change, "law": None}) == "declared sensors at 6.00 s"
-    said = verdict._changed({**change, "sensors": {"p": 1}, "detection_time_s": 2.5, "isolated": None})
+    found = {"sensors": {"p": 1}, "detection_time_s": 2.5, "isolated": None, "false_alarm": False}
+    said = verdict._changed({**change, **found})
     assert said == "law adaptive, sensors at 6.00 s; the diagnosis before: alarm at 2.50 s, nothing named"
-    assert verdict._changed({**change, "detection_time_s": 2.5, "isolated": "rudder"}).endswith("s, rudder")
+    said = verdict._changed({**change, **found, "isolated": "rudder", "false_alarm": True})
+    assert said.endswith("the diagnosis before: FALSE ALARM at 2.50 s, rudder")
 
 
 def test_stays_outside_the_envelope_are_counted_from_the_first():

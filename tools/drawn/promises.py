@@ -286,10 +286,11 @@ def _tracking_alike(log: Any, metrics: Document, scenario: bf.Scenario) -> Itera
 
 def _words_alike(metrics: Document) -> Iterator[str]:
     """The verdict in words says what the document has."""
-    words = dict(verdict.facts(metrics))
-    detection = metrics["detection"]
-    if ("FALSE ALARM" in words["detection"]) != bool(metrics["false_alarm"] and detection["detected"]):
-        yield f"verdict: {words['detection']!r}, false_alarm {metrics['false_alarm']}"
+    facts, detection = verdict.facts(metrics), metrics["detection"]
+    words = dict(facts)
+    false = [line for _, line in facts if "FALSE ALARM" in line]
+    if bool(false) != metrics["false_alarm"]:
+        yield f"verdict: {false or words['detection']!r}, false_alarm {metrics['false_alarm']}"
     if (words["detection"] == "no alarm") == detection["detected"]:
         yield f"verdict: {words['detection']!r}, detected {detection['detected']}"
 

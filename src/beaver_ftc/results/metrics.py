@@ -49,7 +49,7 @@ def metrics(flight: "Landing") -> Document:
         "detection": _detection(flight, fault),
         "isolation": _isolation(flight, fault),
         # the alarm is latched: there is one a diagnosis
-        "false_alarm": any(fault is None or _before_the_fault(time_s, fault) for time_s in _alarms_s(flight)),
+        "false_alarm": any(_is_false(time_s, fault) for time_s in _alarms_s(flight)),
         "fault_free_s": _number(fault_free_s(flight)),
         "tracking": {
             "pre_fault_rms_deg_s": None if at_once else _per_axis_deg_s(flight.pre_fault_rms_rad_s),
@@ -58,7 +58,7 @@ def metrics(flight: "Landing") -> Document:
             "surface_energy_deg2_s": _rounded(_each_in_deg(_each_in_deg(flight.surface_energy_rad2_s))),
         },
         "supervisor": [_named_values(change, "time_s", "mode") for change in flight.supervisor],
-        "changes": _rounded(flight.changes),
+        "changes": [_judged(_rounded(change), fault) for change in flight.changes],
         "mode_changes_left_out": flight.mode_changes - len(flight.supervisor),
         "envelope_exits": [_named_values(exit, "start_s", "end_s") for exit in flight.envelope_exits],
         "envelope": {
@@ -228,14 +228,22 @@ def fault_free_s(flight: "Landing") -> float:
     return min(ends if fault is None else [*ends, fault["at_s"]])
 
 
-def _before_the_fault(time_s: float, fault: Document) -> bool:
-    """Frame times and declared times carry rounding dust: a fault is in force at its very time."""
-    return time_s < fault["at_s"] - TIME_TOLERANCE_S
+def _judged(change: Document, fault: Document | None) -> Document:
+    """A change in flight, with what to think of the alarm of the diagnosis that it ended."""
+    if change.get("detection_time_s") is None:
+        return change
+    return {**change, "false_alarm": _is_false(change["detection_time_s"], fault)}
+
+
+def _is_false(time_s: float, fault: Document | None) -> bool:
+    """Whether an alarm then is a false one. Frame times and declared times carry rounding dust: a fault is in
+    force at its very time."""
+    return fault is None or time_s < fault["at_s"] - TIME_TOLERANCE_S
 
 
 def _delay(time_s: float | None, fault: Document | None, scenario: "Scenario") -> float | None:
     """Time since the fault's first frame; null without one, or where the event came before it."""
-    if time_s is None or fault is None or _before_the_fault(time_s, fault):
+    if time_s is None or fault is None or _is_false(time_s, fault):
         return None
     first_frame_s = math.ceil((fault["at_s"] - TIME_TOLERANCE_S) * scenario.rate_hz) / scenario.rate_hz
     return _number(max(time_s - first_frame_s, 0.0))

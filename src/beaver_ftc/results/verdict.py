@@ -117,7 +117,8 @@ def _changed(change: Document) -> str:
     if change.get("detection_time_s") is None:
         return f"{said} at {_time(change['time_s'])}"
     found = change["isolated"] or "nothing named"
-    before = f"alarm at {_time(change['detection_time_s'])}, {found}"
+    alarm = "FALSE ALARM" if change["false_alarm"] else "alarm"
+    before = f"{alarm} at {_time(change['detection_time_s'])}, {found}"
     return f"{said} at {_time(change['time_s'])}; the diagnosis before: {before}"
 
 

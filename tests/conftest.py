@@ -9,7 +9,7 @@ from hypothesis import settings
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-import kept as kept_documents
+import kept
 
 # No deadline: a first call compiles. Derandomised: a red build can be repeated.
 settings.register_profile("repeatable", deadline=None, derandomize=True)
@@ -21,15 +21,17 @@ def pytest_addoption(parser):
 
 
 @pytest.fixture
-def kept(request):
-    """kept(document): it is as an earlier revision made it, see tests/kept.py. part: of several of a test."""
+def changed(request):
+    """changed(document): how it differs from what an earlier revision made, kept below tests/kept/; see
+    tests/kept.py. part: of several of a test.
+    """
     file = Path(request.node.path).relative_to(Path(__file__).parent).with_suffix("")
 
-    def hold(document, part=""):
+    def differences(document, part=""):
         name = request.node.name.replace("/", "-") + (f"-{part}" if part else "")
-        kept_documents.hold(f"{file}/{name}", document, request.config.getoption("--keep"))
+        return kept.differences(f"{file}/{name}", document, request.config.getoption("--keep"))
 
-    return hold
+    return differences
 
 
 def pytest_sessionstart(session):

@@ -115,13 +115,13 @@ WRONG = [
 ]  # fmt: skip
 
 
-def test_what_each_mistake_is_called(kept):
+def test_what_each_mistake_is_called(changed):
     found = {}
     for text in WRONG:
         with pytest.raises(ScenarioError) as caught:
             validate(Zoo, parse_document(f"required: 5\n{text}", "f"), "f")
         found[text] = [line[:200] for line in caught.value.lines]
-    kept(found)
+    assert not changed(found)
 
 
 def test_a_key_that_is_missing_is_at_the_line_of_what_is_around_it():

@@ -47,7 +47,7 @@ def test_delays_are_weighed_by_the_evidence_of_ten_minutes():
     np.testing.assert_allclose(huge, [[1.0] * 3, [0.0] * 3], atol=1e-12)
 
 
-def test_what_all_delays_say_together(kept):
+def test_what_all_delays_say_together(changed):
     """The mean of what each alone does, by its weight, sample by sample."""
     samples, bank = small.flight(MODEL, 150, lost=((1, 50, 150, 0.4),)), bank_of(MODEL)
     together = filtering.posterior_of(samples, MODEL, bank)
@@ -58,7 +58,9 @@ def test_what_all_delays_say_together(kept):
         weight = weights.reshape(*weights.shape, *[1] * (each.ndim - 2))
         np.testing.assert_allclose(found, (weight * each).sum(axis=0), atol=1e-12)
     np.testing.assert_allclose(together[0].sum(axis=1), 1.0)
-    kept({"posterior": in_short(together[0]), "state": together[1][-1], "scale": together[2][::30]})
+    assert not changed(
+        {"posterior": in_short(together[0]), "state": together[1][-1], "scale": together[2][::30]}
+    )
 
 
 def test_what_cannot_be_predicted_changes_no_number_to_none():

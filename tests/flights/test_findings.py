@@ -34,8 +34,8 @@ PARTS = {
 
 
 @pytest.mark.parametrize("name", PARTS)
-def test_rows_become_events(kept, name):
-    kept(events_of(small.rows(PARTS[name]), NAMES))
+def test_rows_become_events(changed, name):
+    assert not changed(events_of(small.rows(PARTS[name]), NAMES))
 
 
 def test_an_event_says_what_stood_for_most_of_it():
@@ -68,12 +68,12 @@ def flown(request):
     return model, small.flight(model, **changes)
 
 
-def test_the_document_of_a_verdict(kept, flown):
+def test_the_document_of_a_verdict(changed, flown):
     model, samples = flown
     surfaces = list(model.vehicle.surfaces)
     left = [1.0, 0.5, 0.7][: len(surfaces)]
     rows = small.rows([(8, "", [1.0] * len(left)), (9, "+".join(surfaces[1:]), left)], len(left))
-    kept(verdict_of(samples, model, rows))
+    assert not changed(verdict_of(samples, model, rows))
 
 
 def events(*parts):
@@ -86,7 +86,7 @@ VERDICT = {
 }  # fmt: skip
 
 
-def test_the_text_of_a_verdict(kept):
+def test_the_text_of_a_verdict(changed):
     one, two = events(*PARTS["one"]), events(*PARTS["two in turn"])
     mixed = events(*PARTS["brief before one that lasts"])
     unknown = events(*PARTS["no one knows which"])
@@ -100,7 +100,7 @@ def test_the_text_of_a_verdict(kept):
         VERDICT | {"events": unknown},
         VERDICT | {"events": brief},
     ]
-    kept([as_text(case).splitlines() for case in cases])
+    assert not changed([as_text(case).splitlines() for case in cases])
     assert [looked_at(case) for case in cases[:3]] == [
         "61 s", "42 s, 1 gap in the log left out", "42 s, 2 gaps in the log left out",
     ]  # fmt: skip

@@ -185,8 +185,8 @@ def in_numbers(model):
 ARRAYS = ("intercept", "past", "response", "response_sd", "noise")
 
 
-def test_a_model_is_what_was_fitted(kept, fitted, stretches):
-    kept(in_numbers(fitted))
+def test_a_model_is_what_was_fitted(changed, fitted, stretches):
+    assert not changed(in_numbers(fitted))
     fit = fitting.fit_order(stretches, MODEL.vehicle, fitted.history, fitted.lags)
     past = 1 + 3 * fitted.history
     assert fitted.intercept == fit.coefficients[0].tolist()
@@ -200,8 +200,8 @@ def test_a_model_is_what_was_fitted(kept, fitted, stretches):
     np.testing.assert_allclose(fitted.response, MODEL.response, atol=0.06)
 
 
-def test_settings_are_what_the_flights_say(kept, fitted):
-    kept(fitted.settings.model_dump())
+def test_settings_are_what_the_flights_say(changed, fitted):
+    assert not changed(fitted.settings.model_dump())
 
 
 def test_settings_by_hand(fitted):
@@ -266,10 +266,10 @@ def test_a_flight_alone_is_left_out_by_halves_of_what_is_known():
     assert [kept.use.any() for _, kept, _ in nothing] == [False, False]
 
 
-def test_tests_on_what_was_not_fitted(kept, fitted, stretches):
+def test_tests_on_what_was_not_fitted(changed, fitted, stretches):
     quick = fitted.settings.model_copy(update={"delays_s": [0.0]})
     entries, bounds = fitting.run_tests(stretches, fitted.model_copy(update={"settings": quick}))
-    kept({"entries": entries, "bounds": bounds})
+    assert not changed({"entries": entries, "bounds": bounds})
     assert [entry["left_out"] for entry in entries] == ["second half", "first half"]
     assert all(0.8 < share < 1.0 for entry in entries for share in entry["explained"].values())
     assert all(entry["score"]["classes"] > 0.8 for entry in entries)

@@ -77,13 +77,13 @@ def test_without_labels_a_loss_is_sure_by_five_sd(name):
 
 @pytest.mark.parametrize("name", METHODS)
 @pytest.mark.parametrize("of", ["wing", "tail"])
-def test_rows_of_least_squares(kept, name, of):
+def test_rows_of_least_squares(changed, name, of):
     model = {"wing": WING, "tail": TAIL}[of]
     rows = detectors.diagnose_with(METHODS[name], small.flight(model, 300, lost=LOST), model)
     said = {
         what: in_short(getattr(rows, what)) for what in ("estimate", "low", "high", "probability", "faulty")
     }
-    kept(said | {"named": rows.named[::25]})
+    assert not changed(said | {"named": rows.named[::25]})
 
 
 def logged(*columns):
@@ -153,11 +153,11 @@ def test_a_detector_of_the_loop_knows_three_groups():
         detectors.stream_of(small.flight(model, 20), model)
 
 
-def test_what_a_detector_is_told_before_the_flight(kept):
+def test_what_a_detector_is_told_before_the_flight(changed):
     told = detectors.context_of(WING)
     assert isinstance(told.model, detectors.Linear)
     fields = {name: value for name, value in vars(told).items() if name not in ("model", "declared")}
-    kept(fields | {"declared": vars(told.declared)})
+    assert not changed(fields | {"declared": vars(told.declared)})
     x = np.array([[0.1, 0.2, -0.3], [0.4, 0.0, 0.2]])
     past = np.array(WING.past)[:3]
     np.testing.assert_allclose(told.model.f(x, np.zeros(4)), (x @ past - x) / 0.1)

@@ -29,10 +29,12 @@ def identified():
     return identify([samples], MODEL.vehicle)
 
 
-def test_the_account_of_an_identification(kept, identified):
-    kept({what: told for what, told in identified.identified.items() if what != "output_error"}, part="found")
-    kept(identified.settings.model_dump(), part="settings")
-    kept(summary(identified).splitlines(), part="summary")
+def test_the_account_of_an_identification(changed, identified):
+    assert not changed(
+        {what: told for what, told in identified.identified.items() if what != "output_error"}, part="found"
+    )
+    assert not changed(identified.settings.model_dump(), part="settings")
+    assert not changed(summary(identified).splitlines(), part="summary")
 
 
 FOUND = {
@@ -63,7 +65,7 @@ RUN = {
 }  # fmt: skip
 
 
-def test_an_account_in_lines(kept):
+def test_an_account_in_lines(changed):
     cases = {
         "much": (small.TAIL, FOUND | {"output_error": RUN}),
         "short": (small.WING, FOUND | {"output_error": RUN | {"shorter_than_can_be_told": True}}),
@@ -74,7 +76,7 @@ def test_an_account_in_lines(kept):
         ),
         "one": (small.WING, FOUND | {"collinear": FOUND["collinear"][1:], "tests": []}),
     }
-    kept(
+    assert not changed(
         {name: summary(small.model(of, identified=found)).splitlines() for name, (of, found) in cases.items()}
     )
 
@@ -173,7 +175,7 @@ def lagged(n=1200, lag_s=0.1, delay_s=0.13, seed=4, noise=0.002):
     return Samples(**(vars(samples) | {"rates": rates + noise * rng.standard_normal((n, 3))}))
 
 
-def test_servo_lag_and_delay_are_found(kept):
+def test_servo_lag_and_delay_are_found(changed):
     found = output_error(fitting.stretches_of([lagged()]), [[0], [1]])
     assert found["servo_lag_s"] == pytest.approx(0.1, abs=0.02)
     assert found["delay_s"] == pytest.approx(0.13, abs=0.02)
@@ -181,7 +183,9 @@ def test_servo_lag_and_delay_are_found(kept):
     assert found["shorter_than_can_be_told"] is False
     for what in ("servo_lag", "delay"):
         assert 0.0 < found[f"{what}_sd_s"] < 0.02
-    kept({key: value if isinstance(value, int) else _short(value) for key, value in found.items()})
+    assert not changed(
+        {key: value if isinstance(value, int) else _short(value) for key, value in found.items()}
+    )
 
 
 def _short(value):

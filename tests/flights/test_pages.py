@@ -25,10 +25,10 @@ def flown():
     return small.flight(MODEL, 300, lost=((1, 40, 120, 0.5),)), rows
 
 
-def test_a_flight_in_a_picture(kept, flown):
+def test_a_flight_in_a_picture(changed, flown):
     samples, rows = flown
     figure = pages.picture(samples, MODEL, rows)
-    kept(picture(figure))
+    assert not changed(picture(figure))
     legends = [axis.get_legend() for axis in figure.axes[:3]]
     assert [legend._ncols for legend in legends] == [4, 4, 1]  # at most 4, one for one
     assert figure.get_size_inches().tolist() == pytest.approx([11, 3.4 + 2 * 1.25])
@@ -36,7 +36,7 @@ def test_a_flight_in_a_picture(kept, flown):
     assert heights == [1.2, 1.2, 1.0, 1.0, 1.0]
 
 
-def test_an_alarm_from_the_first_row_is_shaded_from_there(kept, flown):
+def test_an_alarm_from_the_first_row_is_shaded_from_there(changed, flown):
     samples, _ = flown
     rows = small.rows([(5, *HALF), (5, *SOUND)])
     figure = pages.picture(samples, MODEL, rows)
@@ -81,21 +81,21 @@ CASES = {
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_the_page_of_a_flight(kept, monkeypatch, flown, name):
+def test_the_page_of_a_flight(changed, monkeypatch, flown, name):
     monkeypatch.setattr(pages, "_encoded", lambda figure: "QQ==")
     samples, rows = flown[0], small.rows(CASES[name])
     verdict = verdict_of(samples, MODEL, rows) | (
         {"score": {"classes": 0.98765, "rows": 4}} if name == "two" else {}
     )
-    kept(page(pages.render(samples, MODEL, rows, verdict)))
+    assert not changed(page(pages.render(samples, MODEL, rows, verdict)))
 
 
-def test_the_page_of_a_flight_with_gaps_and_surfaces_together(kept, monkeypatch):
+def test_the_page_of_a_flight_with_gaps_and_surfaces_together(changed, monkeypatch):
     monkeypatch.setattr(pages, "_encoded", lambda figure: "QQ==")
     ages = {"roll": 0.126, "pitch": 0.05}
     samples = small.flight(TAIL, gap=100, age_s=ages, notes=("a < remark",), name="a & b")
     rows = small.rows([(20, "", [1.0] * 3), (20, "left_aileron+right_aileron", [0.5, 1.0, 0.5])], 3)
-    kept(page(pages.render(samples, TAIL, rows, verdict_of(samples, TAIL, rows))))
+    assert not changed(page(pages.render(samples, TAIL, rows, verdict_of(samples, TAIL, rows))))
 
 
 def test_a_picture_is_in_the_page(flown):
@@ -166,34 +166,34 @@ IDENTIFIED = {
 }  # fmt: skip
 
 
-def test_the_page_of_an_identification(kept, monkeypatch):
+def test_the_page_of_an_identification(changed, monkeypatch):
     """Of one flight of a wing, with all that can be said; of two of a tail, with little."""
     monkeypatch.setattr(pages, "_encoded", lambda figure: "QQ==")
     wing = small.model(identified=IDENTIFIED)
-    kept(page(pages.render_model([small.flight(wing, 500)], wing)), part="wing")
+    assert not changed(page(pages.render_model([small.flight(wing, 500)], wing)), part="wing")
     short = IDENTIFIED["output_error"] | {"shorter_than_can_be_told": True}
     found = IDENTIFIED | {"flights": IDENTIFIED["flights"] * 2, "collinear": [], "output_error": {}}
     tail = small.model(small.TAIL, identified=found)
     flights = [small.flight(tail, 300, name=name, seed=seed) for seed, name in enumerate("ab")]
-    kept(page(pages.render_model(flights, tail)), part="tail")
+    assert not changed(page(pages.render_model(flights, tail)), part="tail")
     lagless = pages.render_model(flights, small.model(small.TAIL, identified=found | {"output_error": short}))
     assert "Servo lag shorter than this rate can tell" in lagless
 
 
-def test_the_pictures_of_an_identification(kept):
+def test_the_pictures_of_an_identification(changed):
     model = small.model(identified=IDENTIFIED)
     stretches = stretches_of([small.flight(model, 900, lost=((1, 300, 400, 0.5),))])
     fits = pages._fits(stretches, model)
-    kept(picture(fits), part="fits")
+    assert not changed(picture(fits), part="fits")
     assert [axis.get_legend()._ncols for axis in fits.axes if axis.get_legend()] == [3, 3]
     assert fits.get_size_inches().tolist() == pytest.approx([11, 9.2])
     spectrum = pages._spectrum(stretches, model)
-    kept(picture(spectrum), part="spectrum")
+    assert not changed(picture(spectrum), part="spectrum")
     assert spectrum.get_size_inches().tolist() == pytest.approx([7.5, 3.2])
     fit = fit_order(stretches, model.vehicle, model.history, model.lags)
     names = ["constant", *regressor_names(model)]
     correlation = pages._correlation(fit, names)
-    kept(picture(correlation), part="correlation")
+    assert not changed(picture(correlation), part="correlation")
     assert correlation.get_size_inches().tolist() == pytest.approx([3.3 + 0.19 * 13, 2.5 + 0.19 * 13])
 
 

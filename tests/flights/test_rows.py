@@ -126,19 +126,19 @@ def held(rows):
 
 
 @pytest.mark.parametrize("name", SHARES)
-def test_rows_of_probabilities(kept, name):
+def test_rows_of_probabilities(changed, name):
     bank = bank_of(WING)
     shares = posterior(bank, *SHARES[name])
     samples = small.flight(WING, len(shares))
     found = diagnose.rows_of(samples, WING, bank, shares)
-    kept(held(found))
+    assert not changed(held(found))
     assert found.t_s is samples.t_s
 
 
-def test_rows_of_surfaces_together_that_may_be_stuck(kept):
+def test_rows_of_surfaces_together_that_may_be_stuck(changed):
     bank = bank_of(TAIL)
     shares = posterior(bank, *STUCK)
-    kept(held(diagnose.rows_of(small.flight(TAIL, len(shares)), TAIL, bank, shares)))
+    assert not changed(held(diagnose.rows_of(small.flight(TAIL, len(shares)), TAIL, bank, shares)))
 
 
 def test_names_by_hand():
@@ -177,12 +177,12 @@ def test_rows_at_the_stamps_of_a_faster_log():
     (small.WING, {"delays_s": [-0.03, 0.0, 0.04], "levels": {"left": [0.4]}, "trim_shift": 0.02}),
     (small.TAIL, {"alarm": 0.9, "hold_s": 0.3, "noise_memory_s": 5.0}),
 ], ids=["wing", "tail"])  # fmt: skip
-def test_a_short_flight_through_the_bank(kept, of, settings):
+def test_a_short_flight_through_the_bank(changed, of, settings):
     """20 s, weak from the seventh second on, over a gap: of every tenth row all, of the rest in short."""
     model = small.model(of, settings=settings | {"level_step": 0.25})
     samples = small.flight(model, 200, lost=((1, 70, 140, 0.4),), gap=100)
     rows = diagnose.diagnose(samples, model)
-    kept({
+    assert not changed({
         "named": rows.named[::10], "faulty": rows.faulty[::10], "of_a_fault": rows.probability[::10],
         **{name: in_short(getattr(rows, name)) for name in ("estimate", "low", "high", "probability")},
     })  # fmt: skip

@@ -54,16 +54,16 @@ def loop(request):
     flying.release()
 
 
-def test_the_instruments_and_the_watch(loop, kept):
+def test_the_instruments_and_the_watch(loop, changed):
     frame = loop.frames[0]
-    kept(of_record(frame["instruments"]), part="instruments")
-    kept(of_record(frame["fdi"]["watch"]), part="watch")
+    assert not changed(of_record(frame["instruments"]), part="instruments")
+    assert not changed(of_record(frame["fdi"]["watch"]), part="watch")
 
 
-def test_what_is_read_logged_and_told_of_the_start(loop, kept):
+def test_what_is_read_logged_and_told_of_the_start(loop, changed):
     frame, truth = loop.frames[0], loop.frames[0]["truth"]
     fixed = ("n", "declared", "latitude_0", "longitude_0", "ground_m", "radius_m", "parallel_radius_m")
-    kept({
+    assert not changed({
         "truth": {name: truth[name].item() for name in fixed}, "factor": truth["factor"][: truth["n"]],
         "start": loop.start[:40], "logged": of_record(frame["logged"]), "columns": loop.columns,
         "places": y_places(frame), "frames": loop.n_frames, "rows": len(loop.log),
@@ -71,12 +71,12 @@ def test_what_is_read_logged_and_told_of_the_start(loop, kept):
     })  # fmt: skip
 
 
-def test_what_a_plug_in_is_told_before_and_in_flight(loop, kept):
+def test_what_a_plug_in_is_told_before_and_in_flight(loop, changed):
     context = context_of(loop.frames, loop.scenario, loop.start, {"alarm": 3.0})
     told = {name: value for name, value in vars(context).items() if name not in ("model", "declared")}
     loop.fly_chunk(0, 3)
     measured = measured_of(loop.frames[0])
-    kept({
+    assert not changed({
         **told, "leaders": context.leaders, "declared": vars(context.declared),
         "measured": measured._asdict(),
     })  # fmt: skip

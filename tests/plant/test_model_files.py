@@ -107,7 +107,7 @@ WRONG = {
 }  # fmt: skip
 
 
-def test_what_is_wrong_with_a_file(tmp_path, kept):
+def test_what_is_wrong_with_a_file(tmp_path, changed):
     found = {}
     for case, text in WRONG.items():
         put(tmp_path / "m" / "m.xml", text)
@@ -116,7 +116,7 @@ def test_what_is_wrong_with_a_file(tmp_path, kept):
             found[case] = []
         except BadInput as error:
             found[case] = [line.partition("m.xml:")[2].partition(" (")[0] for line in str(error).splitlines()]
-    kept(found)
+    assert not changed(found)
 
 
 def test_what_is_beside_an_aircraft_s_file_is_looked_at(jet):
@@ -153,7 +153,7 @@ def test_systems_are_read_in_and_comments_that_come_first_are_descriptions(jet):
     assert root.find("description").text == " what it is "
 
 
-def test_an_instrumented_copy(jet, tmp_path, kept):
+def test_an_instrumented_copy(jet, tmp_path, changed):
     assert instrumented.surfaces_of(jet) == ("aileron", "elevator")
     assert instrumented.others_of(jet) == ("fcs/spoiler-pos-norm", "gear/gear-pos-norm")
     assert instrumented.engines_of(jet) == 1
@@ -161,11 +161,11 @@ def test_an_instrumented_copy(jet, tmp_path, kept):
     model = instrumented.instrument(
         jet, tmp_path / "copy", travel, ["fcs/spoiler-pos-norm", "gear/gear-pos-norm"]
     )
-    kept(page(model.read_text()), part="model")
-    kept(page((model.parent / "Systems" / "ftc-elevator.xml").read_text()), part="elevator")
-    kept(page((model.parent / "Systems" / "ftc-common.xml").read_text()), part="common")
+    assert not changed(page(model.read_text()), part="model")
+    assert not changed(page((model.parent / "Systems" / "ftc-elevator.xml").read_text()), part="elevator")
+    assert not changed(page((model.parent / "Systems" / "ftc-common.xml").read_text()), part="common")
     told = ("/engines/engine[3]/rpm", "/controls/engines/engine/throttle", "/engines/engine/n1")
-    kept([instrumented.is_told(name) for name in told], part="told")
+    assert not changed([instrumented.is_told(name) for name in told], part="told")
 
 
 @pytest.mark.parametrize(

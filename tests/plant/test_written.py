@@ -54,11 +54,11 @@ def banked(**more):
 
 
 @pytest.mark.parametrize("wind_mps", [(0, 0, 0), (8, -3, 1)])
-def test_a_start_says_everything_of_its_state(wind_mps, kept):
+def test_a_start_says_everything_of_its_state(wind_mps, changed):
     plant = Noted(rate_hz=50)
     plant.run()
     plant.start(banked(), wind_mps)
-    kept({**written(plant), **seen(plant)})
+    assert not changed({**written(plant), **seen(plant)})
 
 
 def test_a_hold_changes_what_it_is_given_and_stands_still():
@@ -105,14 +105,16 @@ TRUTH = {
 }  # fmt: skip
 
 
-def test_a_scenario_s_truth_is_written_and_trimmed_and_takes_off_in_its_air(kept):
+def test_a_scenario_s_truth_is_written_and_trimmed_and_takes_off_in_its_air(changed):
     plant, scenario = Noted(rate_hz=50), load(TRUTH)
     configure(plant, scenario)
-    kept(written(plant), part="truth")
+    assert not changed(written(plant), part="truth")
     point = trim_of(scenario, plant)
-    kept({key: value for key, value in point.as_dict().items() if key != "residual"}, part="trim")
+    assert not changed(
+        {key: value for key, value in point.as_dict().items() if key != "residual"}, part="trim"
+    )
     take_off(plant, scenario, point)
-    kept({**written(plant), **seen(plant)}, part="air")
+    assert not changed({**written(plant), **seen(plant)}, part="air")
 
 
 @pytest.mark.parametrize(
@@ -139,7 +141,7 @@ def test_an_error_of_the_truth_that_an_aircraft_cannot_have_is_refused(uncertain
             configure(plant, scenario)
 
 
-def test_gusts_are_set_off_in_their_frames(kept):
+def test_gusts_are_set_off_in_their_frames(changed):
     plant = Noted(rate_hz=50)
     gusts = [
         Gust(at_s=0.0, velocity_mps=(3, -4, 12), rise_s=0.5, hold_s=0.25, fade_s=0.75),
@@ -150,7 +152,7 @@ def test_gusts_are_set_off_in_their_frames(kept):
     schedule.apply(1)
     assert written(plant) == {}
     schedule.apply(0)
-    kept(written(plant))
+    assert not changed(written(plant))
     schedule.apply(101)
     assert plant.written["atmosphere/cosine-gust/magnitude-ft_sec"] == pytest.approx(2 / 0.3048)
 
@@ -167,8 +169,8 @@ def test_turbulence_turns_with_the_heading():
     [
         ([], "no reason given"),
         (["a\n  b", "c "], "a bc"),
-        (["x Could not open file: /a/b/none.xml here"], "it needs the file none.xml, which is not there"),
-        (["In file /home/you/model.xml: line 3"], "In file model.xml: line 3"),
+        (["x Could not open file: /there/none.xml here"], "it needs the file none.xml, which is not there"),
+        (["In file /there/below/model.xml: line 3"], "In file model.xml: line 3"),
         (["r" * 400], "r" * 300),
     ],
 )
@@ -262,9 +264,9 @@ def test_turbulence_as_the_specification_has_it(severity, exceedence, wind_fps, 
     assert (plant.written["atmosphere/randomseed"], plant.written["atmosphere/turb-type"]) == (1, 4)
 
 
-def test_names_and_units_of_what_is_read_and_logged(kept):
+def test_names_and_units_of_what_is_read_and_logged(changed):
     aircraft = trainer(signals={"dpt": {"property": "aero/dpt"}}, surfaces={"tab": {"travel_rad": [0, 1]}})
-    kept({
+    assert not changed({
         "truth": channels.truth_channels(aircraft), "further": channels.further_channels(aircraft),
         "further of the beaver": channels.further_channels(load({}).airframe),
         "room": [channels.most_channels(n) for n in (3, 8)],

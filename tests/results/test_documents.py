@@ -74,16 +74,16 @@ FLIGHTS = {
 
 
 @pytest.mark.parametrize("name", FLIGHTS)
-def test_the_metrics_of_a_flight(name, kept):
+def test_the_metrics_of_a_flight(name, changed):
     document = metrics(FLIGHTS[name])
     assert document.pop("versions").keys() == {"beaver-ftc", "jsbsim", "numpy", "numba", "python"}
-    kept(document)
+    assert not changed(document)
 
 
 @pytest.mark.parametrize("name", FLIGHTS)
-def test_the_words_of_a_flight(name, kept):
+def test_the_words_of_a_flight(name, changed):
     opened = Opened(FLIGHTS[name].scenario, metrics(FLIGHTS[name]))
-    kept({
+    assert not changed({
         "terminal": verdict.verdict_text(opened.metrics, "runs/x").splitlines(),
         "mood": verdict.mood(opened.metrics), "repr": repr(opened).splitlines(), "html": opened._repr_html_(),
     })  # fmt: skip
@@ -158,18 +158,18 @@ def _written(path, frames=FRAMES, hz=HZ, group=4):
 
 
 @pytest.mark.parametrize("kind", RECORDINGS)
-def test_a_recording_and_its_vehicle_file(kind, tmp_path, kept):
+def test_a_recording_and_its_vehicle_file(kind, tmp_path, changed):
     write_recording(_written(tmp_path / "log.parquet"), TRAVEL_RAD, kind, tmp_path)
     content = (tmp_path / RECORDINGS[kind]).read_bytes()
     said = content.decode().splitlines() if kind == "table" else base64.b64encode(content).decode()
-    kept({"file": said, "vehicle": (tmp_path / "vehicle.yaml").read_text().splitlines()})
+    assert not changed({"file": said, "vehicle": (tmp_path / "vehicle.yaml").read_text().splitlines()})
 
 
-def test_a_tacview_recording(tmp_path, kept):
+def test_a_tacview_recording(tmp_path, changed):
     flown = Flight(scenario=Scenario(name="a, b\\c\nd", faults=(Fault(at_s=0.04),)), frames=FRAMES,
                    detection_time_s=0.06, isolation_time_s=0.2)  # fmt: skip
     write_acmi(_written(tmp_path / "log.parquet"), metrics(flown), tmp_path / "flight.acmi")
-    kept((tmp_path / "flight.acmi").read_text(encoding="utf-8").splitlines())
+    assert not changed((tmp_path / "flight.acmi").read_text(encoding="utf-8").splitlines())
 
 
 @pytest.mark.parametrize(
@@ -201,6 +201,13 @@ def test_a_false_alarm_is_one_before_the_fault_by_more_than_rounding():
     for early_s, false in ((1.5e-9, True), (1e-9, False), (0.5e-9, False)):
         flown = Flight(scenario=Scenario(faults=(Fault(at_s=1.0),)), detection_time_s=1.0 - early_s)
         assert metrics(flown)["false_alarm"] is false
+
+
+def test_a_change_that_ended_a_diagnosis_says_whether_its_alarm_was_false():
+    ended = tuple({"time_s": 9.0, "detection_time_s": at_s, "isolated": None} for at_s in (None, 2.0, 6.0))
+    flown = metrics(Flight(scenario=Scenario(faults=(Fault(at_s=5.0),)), changes=({"time_s": 1.0}, *ended)))
+    assert [change.get("false_alarm") for change in flown["changes"]] == [None, None, True, False]
+    assert flown["false_alarm"] is True
 
 
 def test_numbers_have_nine_decimals_and_texts_their_letters():
@@ -252,12 +259,12 @@ def folders(tmp_path_factory):
     return [_folder(runs / "short", short), _folder(runs / "none", none)]
 
 
-def test_the_data_of_a_report(folders, kept):
+def test_the_data_of_a_report(folders, changed):
     data = _unpacked(_data_of(render(folders, ["one", "two"])))
     assert data["modes"] == [list(pair) for pair in MODE_COLOURS.items()]
-    kept(data["runs"], part="runs")
+    assert not changed(data["runs"], part="runs")
     views = [view | {"panels": view["panels"][:2]} for view in data["views"] if view["name"] != "states"]
-    kept({"views": views, "looks": sorted(data["looks"])}, part="views")
+    assert not changed({"views": views, "looks": sorted(data["looks"])}, part="views")
 
 
 def test_a_long_flight_is_shown_whole_and_around_the_fault(tmp_path):
@@ -286,10 +293,10 @@ def test_a_quiet_flight_is_shown_from_its_first_instant_to_its_last(tmp_path):
     assert (tmp_path / "report.html").read_text(encoding="utf-8") == render([folder])
 
 
-def test_the_page_of_a_report(folders, kept):
+def test_the_page_of_a_report(folders, changed):
     html = render(folders)
     words = html.partition("</style>")[2].partition('<script type="application/json"')[0]
-    kept([line.strip() for line in words.splitlines() if line.strip() and "jsbsim" not in line])
+    assert not changed([line.strip() for line in words.splitlines() if line.strip() and "jsbsim" not in line])
 
 
 def test_a_section_is_shown_once_of_each_run(folders, monkeypatch):

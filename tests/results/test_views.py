@@ -43,10 +43,10 @@ def _panels(view):
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_a_view(name, kept):
+def test_a_view(name, changed):
     view = ALL[name]
     said = {key: value for key, value in asdict(view).items() if key != "panels"}
-    kept(said | {"panels": list(_panels(view)), "columns": view.columns})
+    assert not changed(said | {"panels": list(_panels(view)), "columns": view.columns})
 
 
 def test_which_views_a_log_allows():
@@ -101,8 +101,8 @@ def _series(view):
 
 
 @pytest.mark.parametrize("name", ["tracking", "surfaces", "ratio", "effectiveness", "supervisor"])
-def test_the_figure_of_a_view(name, kept):
-    kept(picture(draw(ALL[name], _series(ALL[name]), INSTANTS, "a case")))
+def test_the_figure_of_a_view(name, changed):
+    assert not changed(picture(draw(ALL[name], _series(ALL[name]), INSTANTS, "a case")))
 
 
 SMALL = View(
@@ -121,7 +121,7 @@ SMALL = View(
 @pytest.mark.parametrize(
     "case", ["whole", "no-marks-in-it", "one-instant", "empty", "nothing-in-it", "never-shaded"]
 )
-def test_the_figure_of_a_small_view(case, kept):
+def test_the_figure_of_a_small_view(case, changed):
     t_s = {"one-instant": T_S[:1], "empty": T_S[:0]}.get(case, T_S)
     many = np.nan if case == "nothing-in-it" else 1.0
     shown = {
@@ -135,7 +135,7 @@ def test_the_figure_of_a_small_view(case, kept):
     if case == "no-marks-in-it":
         shown["t_s"] = shown["t_s"] + 18.5
     figure = draw(SMALL, shown, INSTANTS, case)
-    kept({**picture(figure), "inches": list(figure.get_size_inches())})
+    assert not changed({**picture(figure), "inches": list(figure.get_size_inches())})
 
 
 @pytest.mark.parametrize("entries", [0, 9, 13])

@@ -48,32 +48,32 @@ def rows_made():
     return rows
 
 
-def test_the_survey_as_it_is_shown(kept):
+def test_the_survey_as_it_is_shown(changed):
     rows = rows_made()
-    kept(text(rows).splitlines(), "text")
+    assert not changed(text(rows).splitlines(), "text")
     figure = draw("made", rows)
-    kept(picture(figure), "figure")
+    assert not changed(picture(figure), "figure")
     assert figure.get_size_inches().tolist() == [8.0, 9.0]
     document = document_of("made", [rows[:8], rows[8:]])
     files = files_of(document)
-    kept(files["detectability.csv"].splitlines(), "csv")
+    assert not changed(files["detectability.csv"].splitlines(), "csv")
     assert json.loads(files["detectability.json"]) == {
         "scenario": "made", "detect_within_s": 0.5, "isolate_within_s": 1.0, "points": rows
     }  # fmt: skip
     assert list(files) == ["detectability.json", "detectability.csv", "detectability.png"]
     none = [row | dict.fromkeys(MAGNITUDES) for row in rows[:1]]
-    kept(text(none).splitlines(), "none")
+    assert not changed(text(none).splitlines(), "none")
 
 
-def test_what_is_weighed_along_a_flight(kept):
+def test_what_is_weighed_along_a_flight(changed):
     """Without its faults, from two seconds on, at the frame rate of the scenario."""
     flown = scenario(duration_s=3, rate_hz=50, faults=[loss("elevator", 1.0, 0.5)])
     seen = excitation(flown)
     assert seen.dt == 0.02
     assert {of.shape for of in (*seen.moment.values(), seen.bound)} == {(50, 3)}
-    kept({"moment": {s: [in_short(axis) for axis in of.T] for s, of in seen.moment.items()},
+    assert not changed({"moment": {s: [in_short(axis) for axis in of.T] for s, of in seen.moment.items()},
           "bound": [in_short(axis) for axis in seen.bound.T]})  # fmt: skip
-    kept({fault: judge(seen, fault) for fault in seen.moment}, "judged")
+    assert not changed({fault: judge(seen, fault) for fault in seen.moment}, "judged")
 
 
 def still(n=60, **moments):

@@ -36,22 +36,22 @@ SURFACES = ("aileron", "elevator", "rudder", "flap")
 
 
 @pytest.mark.parametrize("given", [{}, {"substeps": 2, **REAL}], ids=["ideal", "real"])
-def test_the_loop_of_a_scenario(given, kept):
+def test_the_loop_of_a_scenario(given, changed):
     flown = scenario(**{"control": {"law": "fault-tolerant"}, "uncertainty": {}, **given})
     frame = Loop(flown).frames[0]
     linear = differences(*trimmed(flown))
     y = (frame["truth"]["value"] * frame["truth"]["factor"])[y_places(frame)]
     for fault, effectiveness in ("none", np.ones(4)), ("lost", np.array([1.0, 0.1, 1.0, 1.0])):
         loop, law = open_loop(flown, frame, linear, y, effectiveness)
-        kept({"loop": asdict(loop), "law": asdict(law)}, fault)
+        assert not changed({"loop": asdict(loop), "law": asdict(law)}, fault)
         found = loops(loop, law, np.array([0.3, 3.0, 30.0]))
-        kept([found.real, found.imag], f"{fault}-response")
+        assert not changed([found.real, found.imag], f"{fault}-response")
 
 
-def test_the_margins_at_a_flight_condition(kept, monkeypatch):
+def test_the_margins_at_a_flight_condition(changed, monkeypatch):
     monkeypatch.setattr(margins, "N_FREQUENCIES", 60)
     found = list(at(scenario(**REAL, uncertainty={})))
-    kept([list(asdict(each).values()) for each in found])
+    assert not changed([list(asdict(each).values()) for each in found])
 
 
 def test_over_the_envelope(monkeypatch):
@@ -197,9 +197,9 @@ ROWS = [
 ]  # fmt: skip
 
 
-def test_the_margins_as_they_are_shown(kept):
-    kept(as_text(ROWS, (6.0, 45.0)).splitlines(), "text")
-    kept(as_document(ROWS, (6.0, 45.0)))
+def test_the_margins_as_they_are_shown(changed):
+    assert not changed(as_text(ROWS, (6.0, 45.0)).splitlines(), "text")
+    assert not changed(as_document(ROWS, (6.0, 45.0)))
 
 
 @pytest.mark.parametrize(

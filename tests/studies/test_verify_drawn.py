@@ -23,11 +23,11 @@ from beaver_ftc.studies.verify import (
 
 
 @pytest.mark.parametrize("kind", ["healthy", "faulty"])
-def test_every_draw_of_a_seed_is_what_it_was(kind, kept):
+def test_every_draw_of_a_seed_is_what_it_was(kind, changed):
     """A campaign goes on with the flights of an earlier one: they must stay the same flights."""
     drawn = [Draw(11, kind, index).scenario().model_dump(mode="json") for index in (0, 1, 2, 40)]
     parts = ("name", "duration_s", "rate_hz", "substeps", "initial", "reference", "faults", "uncertainty")
-    kept([{part: found[part] for part in parts} for found in drawn])
+    assert not changed([{part: found[part] for part in parts} for found in drawn])
 
 
 @pytest.mark.parametrize("kind", ["healthy", "faulty"])
@@ -170,12 +170,12 @@ def test_a_folder_that_cannot_be_used_is_said(unflown, tmp_path):
         verify._crashed(Draw(3, "faulty", 7), "killed")
 
 
-def test_a_flight_of_each_kind(kept, monkeypatch):
+def test_a_flight_of_each_kind(changed, monkeypatch):
     """Its row to the number; the same fault under each step."""
     monkeypatch.setattr(verify, "HEALTHY_S", 20.0)
     monkeypatch.setattr(verify, "AFTER_FAULT_S", 4.0)
     steps = {name: STEPS[name] for name in ("published", "sharpened", "constant")}
-    kept({kind: fly_draw(Draw(4, kind, 1), steps) for kind in ("healthy", "faulty")})
+    assert not changed({kind: fly_draw(Draw(4, kind, 1), steps) for kind in ("healthy", "faulty")})
 
 
 def test_a_growing_fault_is_not_flown_as_a_constant_one(monkeypatch):

@@ -165,7 +165,7 @@ def _in_short(told):
     return {key: value for key, value in told.items() if key not in ADDED}
 
 
-def test_all_that_pages_are_told(flown, kept):
+def test_all_that_pages_are_told(flown, changed):
     """Two pages; one asks, breaks, hurries, pauses and leaves, and a new flight follows."""
     jam = {"do": "break", "fault": {"type": "stuck", "actuator": "rudder"}, "n": 7}
     wire = flown(
@@ -174,7 +174,7 @@ def test_all_that_pages_are_told(flown, kept):
         (0.6, 1, {"do": "fresh", "scenario": "rudder-stuck", "n": 8}), (0.65, 0, "left 1"),
         (0.7, 2, {"do": "pause", "on": False, "n": 4}), (0.9, 0, "end"),
     )  # fmt: skip
-    kept([[round(at_s, 3), page, _in_short(told)] for at_s, page, told in wire.sent])
+    assert not changed([[round(at_s, 3), page, _in_short(told)] for at_s, page, told in wire.sent])
 
 
 class Died:

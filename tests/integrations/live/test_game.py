@@ -85,7 +85,7 @@ def test_an_answer_needs_a_round_and_a_known_name():
         game.answer("elevatr", NAMES, 1.0)
 
 
-def test_what_is_shown_of_each_phase(kept):
+def test_what_is_shown_of_each_phase(changed):
     rng = np.random.default_rng(3)
     kinds = hidden_faults(("aileron", "elevator", "flap"), ("aileron", "elevator"))
     game = Game().next_round("random", 100.0, kinds, rng)
@@ -102,7 +102,7 @@ def test_what_is_shown_of_each_phase(kept):
     assert not game.settle(5.0, game.due_s + 2.5)
     seen["over"] = game.shown()
     seen["next"] = game.next_round("second", 150.0, kinds, rng).shown()
-    kept(seen)
+    assert not changed(seen)
 
 
 def test_a_round_given_up_is_over_and_one_that_is_over_is_put_away():

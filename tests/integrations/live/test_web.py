@@ -92,11 +92,11 @@ def test_the_token_of_an_address_becomes_a_cookie_once(site):
     assert site.get(f"{room}/static/js/main.js", f"token={site.token()}")[0] == 403
 
 
-def test_the_page_and_its_files_with_what_it_may_do(site, kept):
+def test_the_page_and_its_files_with_what_it_may_do(site, changed):
     room = site.gate.room
     status, headers, body = site.get(f"{room}/", cookie=site.key)
     assert (status, body) == (200, (STATIC / "index.html").read_bytes())
-    kept({name: headers[name] for name in server.HEADERS})
+    assert not changed({name: headers[name] for name in server.HEADERS})
     assert site.get(f"{room}/static/js/main.js", cookie=site.key)[0] == 200
 
 

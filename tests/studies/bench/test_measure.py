@@ -50,14 +50,14 @@ def timed(monkeypatch):
     return asked
 
 
-def test_what_a_benchmark_times_and_says(timed, monkeypatch, kept):
+def test_what_a_benchmark_times_and_says(timed, monkeypatch, changed):
     said, kinds = [], []
     monkeypatch.setattr(measure, "by_kind", lambda rounds: kinds.append(rounds) or {"kind": {}})
     document = measure.bench(24, say=said.append)
     machine = document.pop("machine")
     assert set(machine) == {"processor", "cores", "python", "jsbsim", "numba", "numpy", "native_properties"}
     assert (list(document["parts"]), kinds) == (["calling", *PARTS], [24])
-    kept({"document": document, "asked": timed, "said": said})
+    assert not changed({"document": document, "asked": timed, "said": said})
     timed.clear()
     short = measure.bench(6, with_parts=False)
     assert short["parts"] == short["before_alarm"]["parts"] == {}
@@ -65,7 +65,7 @@ def test_what_a_benchmark_times_and_says(timed, monkeypatch, kept):
     assert measure.bench.__defaults__[0] == 60
 
 
-def test_kinds_of_flights_take_turns_after_a_warm_up(monkeypatch, kept):
+def test_kinds_of_flights_take_turns_after_a_warm_up(monkeypatch, changed):
     flown = []
 
     def fly(sweep, changes, run):
@@ -76,7 +76,7 @@ def test_kinds_of_flights_take_turns_after_a_warm_up(monkeypatch, kept):
     between = []
     found = measure.by_kind(3, lambda: between.append(len(flown)))
     assert between == [0, 4, 8, 12]
-    kept({"found": found, "flown": flown})
+    assert not changed({"found": found, "flown": flown})
 
 
 def test_a_flight_is_taken_apart_at_its_marks(monkeypatch):

@@ -67,34 +67,36 @@ def compared():
     return document_of(trials, entries) | {"versions": {"ours": "1", "theirs": "2"}}
 
 
-def test_all_that_is_found(compared, kept):
-    kept({name: part["lines"] for name, part in compared["sets"].items()}, "lines")
-    kept({n: {k: v for k, v in part.items() if k != "lines"} for n, part in compared["sets"].items()})
+def test_all_that_is_found(compared, changed):
+    assert not changed({name: part["lines"] for name, part in compared["sets"].items()}, "lines")
+    assert not changed(
+        {n: {k: v for k, v in part.items() if k != "lines"} for n, part in compared["sets"].items()}
+    )
 
 
-def test_all_that_is_shown(compared, kept, tmp_path):
-    kept(as_text(compared).splitlines(), "text")
+def test_all_that_is_shown(compared, changed, tmp_path):
+    assert not changed(as_text(compared).splitlines(), "text")
     figure = figure_of(compared)
-    kept(picture(figure), "figure")
+    assert not changed(picture(figure), "figure")
     assert figure.get_size_inches().tolist() == [13.0, 6.8]
     assert all(line.get_visible() for axes in figure.axes for line in axes.xaxis.get_gridlines())
     (tmp_path / "comparison.png").write_bytes(b"a picture")
-    kept(page(page_of(compared, "Comparison: made", tmp_path)), "page")
+    assert not changed(page(page_of(compared, "Comparison: made", tmp_path)), "page")
     write_leaderboard(compared, tmp_path / "board.md")
     text = (tmp_path / "board.md").read_text()
     assert text.startswith(
         f"# Benchmark\n\n{MARK}\n\nMade with ours 1, theirs 2.\n\n## faulty: 5 flights\n\n| scheme "
     )
-    kept([line for line in text.splitlines() if not line.startswith("|")], "board")
+    assert not changed([line for line in text.splitlines() if not line.startswith("|")], "board")
     assert list(files_of(compared, "made")) == ["comparison.json", "comparison.png", "comparison.html"]
 
 
-def test_one_set_without_a_curve_that_came_to_anything(compared, kept):
+def test_one_set_without_a_curve_that_came_to_anything(compared, changed):
     part = compared["sets"]["healthy"]
     part["better_than_ours"], part["errors"] = [], []
     for row in part["lines"]:
         row |= {"ratio_median": None, "ratio_90": None}
-    kept(picture(figure_of({"sets": {"healthy": part}})))
+    assert not changed(picture(figure_of({"sets": {"healthy": part}})))
     assert "could not fly" not in as_text({"sets": {"healthy": part}})
 
 
@@ -165,7 +167,7 @@ def run_of(folder, **changes):
     return run | changes
 
 
-def test_runs_side_by_side(kept, tmp_path):
+def test_runs_side_by_side(changed, tmp_path):
     lost = {"departure": {"signal": "alpha_rad", "time_s": 20.456}, "passed": False, "false_alarm": True}
     healthy = run_of(tmp_path / "b", fault=None, **lost)
     healthy["flown"] = {**healthy["flown"], "faults": []}
@@ -174,11 +176,11 @@ def test_runs_side_by_side(kept, tmp_path):
         "pre_fault_rms_deg_s": {"p": 0.1, "q": 0.2, "r": 0.3},
         "post_fault_rms_deg_s": None,
     }
-    kept(runs.as_text([run_of(tmp_path / "a"), healthy]).splitlines())
+    assert not changed(runs.as_text([run_of(tmp_path / "a"), healthy]).splitlines())
     assert runs.labels([run_of("x/a"), run_of("y/a")]) == ["x/a", "y/a"]
 
 
-def test_tracking_errors_of_runs_in_one_figure(kept, monkeypatch, tmp_path):
+def test_tracking_errors_of_runs_in_one_figure(changed, monkeypatch, tmp_path):
     t = np.linspace(0.0, 20.0, 41_000)
     log = {"t_s": t}
     for i, axis in enumerate("pqr"):
@@ -192,7 +194,7 @@ def test_tracking_errors_of_runs_in_one_figure(kept, monkeypatch, tmp_path):
     monkeypatch.setattr("beaver_ftc.results.log.read", read)
     other = run_of(tmp_path / "b", fault={"at_s": 5.5})
     figure = runs.figure_of([run_of(tmp_path / "a"), other, run_of(tmp_path / "c", fault=None)])
-    kept(picture(figure))
+    assert not changed(picture(figure))
     assert figure.get_size_inches().tolist() == [11.0, 9.0]
     assert {axes.texts[0].xy for axes in figure.axes[:1]} == {(5.5, 1.0)}
     assert [len(line.get_xdata()) for line in figure.axes[0].lines[:1]] == [20_500]

@@ -57,11 +57,13 @@ def test_nothing_is_promised_of_what_is_no_aircraft(monkeypatch, tmp_path, capsy
     assert capsys.readouterr().err == ""
 
 
-def test_states_are_drawn_over_the_envelope_from_engines_just_started(kept):
+def test_states_are_drawn_over_the_envelope_from_engines_just_started(changed):
     trainer = read(TRAINER)
     samples = first_use._samples(trainer, first_use._loaded(trainer))
     assert len(samples) == 800
     assert not samples.age.any()
     low, high = samples.y[:, 2].min(), samples.y[:, 2].max()
     assert (low, high) == pytest.approx(trainer.envelope.airspeed_mps, rel=1e-3)
-    kept({name: in_short(getattr(samples, name)) for name in ("x", "y", "u", "rate", "box", "level")})
+    assert not changed(
+        {name: in_short(getattr(samples, name)) for name in ("x", "y", "u", "rate", "box", "level")}
+    )

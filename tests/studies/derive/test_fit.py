@@ -34,13 +34,13 @@ def test_coefficients_follow_from_the_accelerations_and_errors_from_the_coeffici
     assert one == pytest.approx([size * 10.4 / 1310.0, size * 1.48 / 1890.0, size * 10.4 / 2870.0])
 
 
-def test_what_a_term_may_multiply(kept):
+def test_what_a_term_may_multiply(changed):
     def said(of, surface):
         return " ".join([*([surface] if surface else []), *(f"{name}^{power}" for name, power in of.items())])
 
     found = fit.candidates(("mach", "alpha_rate", "engines_m"), ("elevator", "rudder"))
     assert len({said(*each) for each in found}) == len(found)
-    kept([said(*each) for each in found])
+    assert not changed([said(*each) for each in found])
 
 
 def test_regressors_are_the_products(trainer, samples):
@@ -60,7 +60,7 @@ def columns(seed, n=300, wide=16):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_the_pursuit_as_before(seed, kept):
+def test_the_pursuit_as_before(seed, changed):
     """Coefficients that halve: some explain too little beside noise."""
     A, rng = columns(seed)
     values = 0.5 ** rng.permutation(16)
@@ -73,7 +73,7 @@ def test_the_pursuit_as_before(seed, kept):
     assert products.unexplained(taken) == pytest.approx(least, rel=1e-6)
     assert found == pytest.approx(np.linalg.lstsq(A[:, taken], b, rcond=None)[0])
     assert len(few[0]) == 3
-    kept({
+    assert not changed({
         "pursued": pursued, "exchanged": products.exchanged(pursued, range(16)), "taken": taken,
         "values": found, "few": few, "left": [products.unexplained(pursued[:k]) for k in range(4)],
         "of use": products.of_use([*pursued, *(k for k in range(16) if k not in pursued)], least * 1.3),
@@ -130,7 +130,7 @@ def test_a_column_is_exchanged_for_one_that_leaves_less():
     assert products.exchanged([0], [0]) == [0]
 
 
-def test_terms_are_fitted_with_the_engines_moment_as_it_is(trainer, samples, kept):
+def test_terms_are_fitted_with_the_engines_moment_as_it_is(trainer, samples, changed):
     """The engines' moment is a signal that comes in with 1; the fit finds what else it does."""
     beside = np.zeros((400, 3))
     beside[:, 1] = 1.25 * samples.signals["engines_m"] + 0.02 * samples.signals["mach"]
@@ -140,7 +140,7 @@ def test_terms_are_fitted_with_the_engines_moment_as_it_is(trainer, samples, kep
     assert found["Cm_engines_m"] == pytest.approx(1.25, abs=1e-6)
     assert found["Cm_mach"] == pytest.approx(0.02, abs=1e-6)
     assert found["Cm_0"] == pytest.approx(0.045, abs=1e-6)
-    kept(terms)
+    assert not changed(terms)
     plain = fit.fitted(moving(trainer, samples, [0, 1, 0] * samples.signals["engines_m"][:, None]), trainer)
     assert {term["name"]: term["value"] for term in plain["Cm"]}["Cm_engines_m"] == pytest.approx(1.0)
     few = fit.fitted(made, trainer, 2)
@@ -186,7 +186,7 @@ def test_the_largest_error_within_each_age_box_and_share(samples):
     assert not fit.largest(errors[samples.age == 2], nobody)[:2].any()
 
 
-def test_the_error_map(trainer, samples, kept):
+def test_the_error_map(trainer, samples, changed):
     first = moving(trainer, samples, [0.001, 0.002, 0.003])
     second = moving(trainer, states(trainer, seed=2), [0.002, 0.001, 0.0])
     flown = states(trainer, n=50, seed=3)
@@ -198,7 +198,7 @@ def test_the_error_map(trainer, samples, kept):
     assert worst[:2] == pytest.approx(np.array(errors))
     outermost = [told["boxes"][-1][f"error_{axis}_rad_s2"][0][-1] for axis in "pqr"]
     assert outermost == pytest.approx(1.3 * worst.max(axis=0) + 1e-7, rel=1e-4)
-    kept({"map": told, "worst": worst})
+    assert not changed({"map": told, "worst": worst})
 
 
 @pytest.mark.parametrize(

@@ -50,7 +50,7 @@ def test_three_draws_in_ten_are_at_an_end_of_the_range(plant, trim):
     assert (min(shared), max(shared)) == (2.5, 6.0)
 
 
-def test_states_are_within_their_box(plant, trim, kept):
+def test_states_are_within_their_box(plant, trim, changed):
     """Half way to the ends of the envelope, and as far to either side of trim; bank and climb everywhere."""
     one, seen = draw(plant, trim), []
     for _ in range(200):
@@ -73,21 +73,21 @@ def test_states_are_within_their_box(plant, trim, kept):
     assert (low["thrust_n"], high["thrust_n"]) == pytest.approx((thrust - min(reach), thrust + reach[0]))
     deep = replace(trim, altitude_m=100.0)
     assert min(Draw(1, plant.aircraft, ENVELOPE, deep).start(1.0).altitude_m for _ in range(20)) >= 0.0
-    kept({name: in_short([state[name] for state in seen]) for name in seen[0]})
+    assert not changed({name: in_short([state[name] for state in seen]) for name in seen[0]})
 
 
-def test_samples_of_every_box_share_and_age(plant, trim, kept):
+def test_samples_of_every_box_share_and_age(plant, trim, changed):
     found = sampling.sample(plant, ENVELOPE, trim, 60, 3, PROPERTIES, starts=12)
     assert Counter(found.box.tolist()) == dict.fromkeys(range(4), 15)
     assert Counter(found.level.tolist()) == {0: 24, 1: 12, 2: 12, 3: 12}  # five of each start
     assert Counter(found.age.tolist()) == {0: 40, 1: 20}  # of twelve starts the first three turns of four
-    kept(held(found))
+    assert not changed(held(found))
     fewer = sampling.sample(plant, ENVELOPE, trim, 3, 3, PROPERTIES, (0, 2), starts=8)
     assert (len(fewer), fewer.age.tolist()) == (8, [0, 0, 0, 0, 2, 2, 2, 2])
     assert plant.read("velocities/vt-fps") * 0.3048 == pytest.approx(trim.airspeed_mps)
 
 
-def test_flights_about_trim(plant, trim, kept, monkeypatch):
+def test_flights_about_trim(plant, trim, changed, monkeypatch):
     monkeypatch.setattr(sampling, "FRAMES", 21)
     found = sampling.fly_about(plant, trim, 3, PROPERTIES)
     assert len(found) == 6 * 6
@@ -96,7 +96,7 @@ def test_flights_about_trim(plant, trim, kept, monkeypatch):
     reach = [0.4 * 0.06 * 3, 0.35 * 0.06 * 3, 0.42 * 0.06 * 3]
     there = np.array([trim.surfaces_rad[name] for name in plant.aircraft.surfaces])
     assert (np.abs(found.u - there) <= np.array(reach) + 1e-12).all()
-    kept(held(found))
+    assert not changed(held(found))
 
 
 def test_what_is_not_finite_is_left_out():

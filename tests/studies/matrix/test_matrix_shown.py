@@ -63,12 +63,12 @@ def told(rows):
 
 
 @pytest.mark.parametrize("made", ["plain", "told"])
-def test_the_matrix_as_it_is_shown(made, kept):
+def test_the_matrix_as_it_is_shown(made, changed):
     rows = (
         rows_of(("aileron", "elevator")) if made == "plain" else told(rows_of(("elevator", "rudder", "flap")))
     )
     document = document_of(rows)
-    kept(
+    assert not changed(
         {
             key: value
             for key, value in document.items()
@@ -78,9 +78,9 @@ def test_the_matrix_as_it_is_shown(made, kept):
     assert document["flights"] == rows
     lost = [row for row in rows if row["departure_s"] and not row["oracle_departure_s"]]
     assert document["lost_though_the_oracle_was_not"] == lost != []
-    kept(as_text(document).splitlines(), "text")
+    assert not changed(as_text(document).splitlines(), "text")
     figure = heat_map_of(document)
-    kept(picture(figure), "figure")
+    assert not changed(picture(figure), "figure")
     assert figure.get_size_inches().tolist() == [11.0, 0.5 * len(FAULTS) + 1.8]
     files = files_of(document)
     assert list(files) == ["fault-matrix.json", "fault-matrix.txt", "fault-matrix.png"]
@@ -88,18 +88,18 @@ def test_the_matrix_as_it_is_shown(made, kept):
     assert '"wrong"' in files["fault-matrix.json"]
 
 
-def test_the_flights_of_the_cases(kept):
+def test_the_flights_of_the_cases(changed):
     flown = {fault: scenario_of(FaultCase(fault, "elevator", 45.0), "nominal", -1.5) for fault, _ in FAULTS}
-    kept({fault: found.model_dump(mode="json")["faults"] for fault, found in flown.items()})
-    kept(flown["float"].model_dump(mode="json", exclude_defaults=True), "whole")
+    assert not changed({fault: found.model_dump(mode="json")["faults"] for fault, found in flown.items()})
+    assert not changed(flown["float"].model_dump(mode="json", exclude_defaults=True), "whole")
 
 
-def test_the_flight_with_all_that_is_declared(kept):
+def test_the_flight_with_all_that_is_declared(changed):
     calm, rough = (
         scenario_of(FaultCase("total loss", "rudder", 38.0, True, turbulence=air), "oracle", 0.0)
         for air in ("none", "light")
     )
-    kept(rough.model_dump(mode="json", exclude_defaults=True))
+    assert not changed(rough.model_dump(mode="json", exclude_defaults=True))
     assert (calm.environment.turbulence, calm.fdi.bounds.turbulence) == ("none", "none")
 
 
@@ -139,8 +139,8 @@ def short(monkeypatch):
     ],
     ids=["elevator", "aileron"],
 )
-def test_a_row(case, short, kept):
-    kept(fly_case(case))
+def test_a_row(case, short, changed):
+    assert not changed(fly_case(case))
 
 
 def test_a_jam_is_off_the_trimmed_deflection():

@@ -61,20 +61,20 @@ def surveyed():
     return document_of(GRID, healthy, faulted)
 
 
-def test_the_document(surveyed, kept):
+def test_the_document(surveyed, changed):
     document = dict(surveyed[0])
     assert set(document.pop("versions")) >= {"beaver-ftc", "jsbsim"}
     cells = document.pop("cells")
     assert len(cells) == 2 * 2 * 2 * 2 * len(SCHEMES)
     numbers = [[cell["flights"], cell["median_delay_s"] or -1.0] for cell in cells]
     shares = [[of["value"], of["low"], of["high"]] for cell in cells for of in cell["within"].values()]
-    kept(document | {"first cells": cells[:2], "cells": [in_short(numbers), in_short(shares)]})
+    assert not changed(document | {"first cells": cells[:2], "cells": [in_short(numbers), in_short(shares)]})
 
 
-def test_the_text(surveyed, kept):
-    kept(shown.as_text(surveyed[0]).splitlines())
+def test_the_text(surveyed, changed):
+    assert not changed(shown.as_text(surveyed[0]).splitlines())
     nothing = {name: [] for name in ("levels", "totals", "cells", "limits", "comparison", "failures")}
-    kept(shown.as_text(surveyed[0] | nothing).splitlines(), part="nothing")
+    assert not changed(shown.as_text(surveyed[0] | nothing).splitlines(), part="nothing")
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +85,7 @@ def files(surveyed):
     return flown, shown.files_of((document, flown))
 
 
-def test_every_row_is_written(files, kept):
+def test_every_row_is_written(files, changed):
     flown, written = files
     assert set(written) == {"power.json", "power.txt", "power.parquet", "figures"}
     assert sorted({name.rpartition(".")[0] for name in written["figures"]}) == [
@@ -96,7 +96,7 @@ def test_every_row_is_written(files, kept):
     assert table.to_pylist() == flown
     types = {field.name: str(field.type) for field in table.schema}
     numbers = [name for name, kind in types.items() if kind in ("double", "int64")]
-    kept({
+    assert not changed({
         "types": types, "first": flown[:2],
         "in short": {name: in_short(np.array(table[name].to_pylist(), float)) for name in numbers},
         "false alarms": sum(row["false_alarm"] + 100 * row["own_false_alarm"] for row in flown),
@@ -104,24 +104,24 @@ def test_every_row_is_written(files, kept):
 
 
 @pytest.mark.parametrize("name", ["map-both", "map-a-scheme", "schemes-ideal"])
-def test_the_pictures(files, name, kept):
+def test_the_pictures(files, name, changed):
     figure = files[1]["figures"][f"{name}.png"]
-    kept({**picture(figure), "looks": looks(figure)})
+    assert not changed({**picture(figure), "looks": looks(figure)})
 
 
-def test_a_flight_of_the_survey(kept):
+def test_a_flight_of_the_survey(changed):
     block = Block(GRID.conditions[1], 5.0, 1002)
     at_s = strikes_at_s(block)
     assert 8.0 <= at_s <= 10.0
     flight = scenario_of(block, 14.0, [survey.loss("rudder", 0.25, at_s)])
-    kept(flight.model_dump(mode="json", exclude_unset=True))
+    assert not changed(flight.model_dump(mode="json", exclude_unset=True))
     assert len(GRID.healthy()) == 2 * 8
     assert [one.excitation_deg_s for one in GRID.healthy()[:4]] == [2.0, 5.0, 2.0, 5.0]
     assert [one.seed for one in GRID.healthy()[8:11]] == [1_000_000, 1_000_001, 1_000_002]
     assert [one.seed for one in GRID.faulted()[:7]] == [0, 1, 2, 1000, 1001, 1002, 0]
 
 
-def test_what_comes_of_a_block_in_short_flights(kept, monkeypatch):
+def test_what_comes_of_a_block_in_short_flights(changed, monkeypatch):
     """A quarter of a second after a fault at a tenth, and a second without a fault."""
     monkeypatch.setattr(survey, "STRIKES_S", (0.1, 0.1))
     monkeypatch.setattr(survey, "WATCHED_S", 0.25)
@@ -138,7 +138,7 @@ def test_what_comes_of_a_block_in_short_flights(kept, monkeypatch):
             for scheme, of in found.traces.items()
         }
         document = {"faults": found.faults, "deflections": found.deflections, "traces": traces}
-        kept(document, part="faulted" if faulted else "healthy")
+        assert not changed(document, part="faulted" if faulted else "healthy")
 
 
 def test_a_survey_flies_the_healthy_blocks_first(monkeypatch, tmp_path):

@@ -19,12 +19,12 @@ PAST = np.array(MODEL.past)
 NOISE = np.array(MODEL.noise)
 
 
-def test_the_days_on_which_one_thing_changes(kept):
-    kept([vars(day) for day in grid(MIXER, ["roll", "pitch"])])
+def test_the_days_on_which_one_thing_changes(changed):
+    assert not changed([vars(day) for day in grid(MIXER, ["roll", "pitch"])])
 
 
-def test_drawn_days(kept):
-    kept([vars(day) for day in drawn(2, range(7, 9))])
+def test_drawn_days(changed):
+    assert not changed([vars(day) for day in drawn(2, range(7, 9))])
     assert [list(seeds) for seeds in (other_days.CHOSEN_ON, other_days.JUDGED_ON)] == [
         [0, 1, 2, 3, 4, 5, 6, 7], [8, 9, 10, 11, 12, 13, 14, 15],
     ]  # fmt: skip
@@ -54,9 +54,9 @@ def flown():
 
 
 @pytest.mark.parametrize("name", CHANGES)
-def test_what_a_day_makes_of_a_flight(kept, flown, name):
+def test_what_a_day_makes_of_a_flight(changed, flown, name):
     other = on(replace(nominal(2), **CHANGES[name]), flown, PAST, NOISE)
-    kept({"commands": other.commands[::100], "rates": other.rates[::100],
+    assert not changed({"commands": other.commands[::100], "rates": other.rates[::100],
           "all": [in_short(other.commands), in_short(other.rates)]})  # fmt: skip
 
 
@@ -146,14 +146,14 @@ def data():
     return benchmark.DataSet("set", MODEL.vehicle, (), (flight,))
 
 
-def test_a_labelled_flight_on_other_days(kept, monkeypatch, data):
+def test_a_labelled_flight_on_other_days(changed, monkeypatch, data):
     """As it was: the benchmark's own figures of its halves. Quick settings: one delay, few levels."""
     quick = Settings(delays_s=[0.0], level_step=0.25, levels={"right": [0.4], "left": [0.5]})
     monkeypatch.setattr(benchmark, "settings_of", lambda stretches, data: quick)
     monkeypatch.setattr(other_days, "grid", lambda mixer, commands: [nominal(2)])
     monkeypatch.setattr(other_days, "drawn", lambda surfaces, seeds: drawn(surfaces, seeds[:1]))
     document = other_days._part(data)
-    kept(document)
+    assert not changed(document)
     assert [(row["kind"], row["day"]) for row in document["rows"]] == [
         ("one change", "as it was"), ("drawn, settings chosen on these", "drawn 0"),
         ("drawn, not looked at", "drawn 8"),

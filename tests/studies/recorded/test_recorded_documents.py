@@ -90,9 +90,9 @@ DAYS = {
 
 
 @pytest.mark.parametrize("name", ["flights", "days"])
-def test_tables_of_a_document(kept, name):
+def test_tables_of_a_document(changed, name):
     document = {"flights": DOCUMENT, "days": DAYS}[name]
-    kept(
+    assert not changed(
         {
             "text": benchmark.as_text(document).splitlines(),
             "page": benchmark.as_markdown(document).splitlines(),
@@ -100,9 +100,9 @@ def test_tables_of_a_document(kept, name):
     )
 
 
-def test_the_figure_of_a_document(kept):
+def test_the_figure_of_a_document(changed):
     figure = benchmark.figure_of(DOCUMENT)
-    kept(picture(figure))
+    assert not changed(picture(figure))
     assert figure.get_size_inches().tolist() == pytest.approx([10.0, 7.2])
     hatches = [bars[0].get_hatch() for bars in figure.axes[1].containers]
     assert hatches[0] in (None, "")
@@ -145,12 +145,12 @@ def two_methods(monkeypatch):
     monkeypatch.setattr(benchmark, "detector_names", lambda: names)
 
 
-def test_a_labelled_flight_is_left_out_by_halves(kept, monkeypatch, two_methods):
+def test_a_labelled_flight_is_left_out_by_halves(changed, monkeypatch, two_methods):
     monkeypatch.setattr(fitting, "_DELAYS", (0.0,))  # quick
     flight = small.flight(MODEL, 1000, lost=LOST)
     data = data_set(MODEL, [flight])
     document = benchmark._compare(data)
-    kept(document)
+    assert not changed(document)
     assert [(one["left_out"], one["method"]) for one in document["flights"]] == [
         (half, method)
         for half in ("second half", "first half")
@@ -164,7 +164,7 @@ def test_a_labelled_flight_is_left_out_by_halves(kept, monkeypatch, two_methods)
     assert benchmark.settings_of(stretches, data) == expected
 
 
-def test_flights_with_a_failure_are_left_out_in_turn(kept, monkeypatch, two_methods):
+def test_flights_with_a_failure_are_left_out_in_turn(changed, monkeypatch, two_methods):
     """The freeze rule is there as well where the log has outputs."""
     flights = [
         small.flight(TAIL, 400, seed=1, name="weak", events=(Event(25.0, "elevator"),)),
@@ -172,7 +172,7 @@ def test_flights_with_a_failure_are_left_out_in_turn(kept, monkeypatch, two_meth
         small.flight(TAIL, 400, seed=3, name="sound"),
     ]
     document = benchmark._compare(data_set(TAIL, flights))
-    kept(document)
+    assert not changed(document)
     assert [row["method"] for row in document["rows"]] == [
         "bank of filters (ours)", "sliding least squares, 20 s", "freeze rule, 6 s, on the logged outputs",
     ]  # fmt: skip

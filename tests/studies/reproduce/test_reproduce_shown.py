@@ -62,13 +62,13 @@ def flights():
     return every
 
 
-def test_every_statement_of_made_flights(flights, kept):
-    kept([[claim.statement, claim.measure(flights), claim.remark(flights)] for claim in CLAIMS])
+def test_every_statement_of_made_flights(flights, changed):
+    assert not changed([[claim.statement, claim.measure(flights), claim.remark(flights)] for claim in CLAIMS])
 
 
-def test_what_a_flight_says_of_itself(kept):
+def test_what_a_flight_says_of_itself(changed):
     found = flown("unanticipated", None)
-    kept({
+    assert not changed({
         **{f"before {axis}": found.before_deg_s(axis) for axis in "pqr"},
         **{f"after {axis}": found.after_deg_s(axis) for axis in "pqr"},
         "closest before": found.closest_before_fault(),
@@ -130,33 +130,35 @@ def document(flights):
     return found | {"versions": {"ours": "1"}}
 
 
-def test_the_document_and_its_pages(document, kept, tmp_path):
-    kept({key: value for key, value in document.items() if key not in ("cases", "choices", "sensitivity")})
-    kept(
+def test_the_document_and_its_pages(document, changed, tmp_path):
+    assert not changed(
+        {key: value for key, value in document.items() if key not in ("cases", "choices", "sensitivity")}
+    )
+    assert not changed(
         [(row["variant"], row["missed"]) for row in document["sensitivity"]],
         "variants",
     )
-    kept(reproduction.as_text(document, "out").splitlines(), "text")
+    assert not changed(reproduction.as_text(document, "out").splitlines(), "text")
     (tmp_path / "figures").mkdir()
     for name in (*(view.name for view, _, _ in FIGURES), "sensitivity"):
         (tmp_path / "figures" / f"{name}.png").write_bytes(name.encode())
-    kept(page(reproduction.as_html(document, tmp_path)), "page")
+    assert not changed(page(reproduction.as_html(document, tmp_path)), "page")
     text = reproduction.as_markdown(document, "pictures")
     assert text.count("](pictures/") == len(FIGURES) + 1
     assert text.startswith("# ")
 
 
-def test_how_far_each_statement_is_from_its_limit(document, kept):
+def test_how_far_each_statement_is_from_its_limit(document, changed):
     figure = margins_figure(document)
-    kept(picture(figure))
+    assert not changed(picture(figure))
     assert figure.get_size_inches().tolist() == [12.0, pytest.approx(0.6 + 0.28 * len(CLAIMS))]
 
 
-def test_each_figure_has_its_panels(kept):
-    kept([(asdict(view), case, span) for view, case, span in FIGURES])
+def test_each_figure_has_its_panels(changed):
+    assert not changed([(asdict(view), case, span) for view, case, span in FIGURES])
 
 
-def test_figures_are_drawn_of_their_case_and_span(flights, document, kept, monkeypatch):
+def test_figures_are_drawn_of_their_case_and_span(flights, document, changed, monkeypatch):
     asked = []
     module = "beaver_ftc.studies.reproduce.published_figures"
     monkeypatch.setattr(f"{module}.draw", lambda *given: asked.append(given) or given[0].name)
@@ -166,17 +168,21 @@ def test_figures_are_drawn_of_their_case_and_span(flights, document, kept, monke
         **{f"{view.name}.png": view.name for view, _, _ in FIGURES},
         "sensitivity.png": "margins",
     }
-    kept([
+    assert not changed([
         (view.name, title, series["t_s"][[0, -1]], sorted(series)[:3], series["q_error_rad_s"].sum(), marks)
         for view, series, marks, title in asked
     ])  # fmt: skip
 
 
-def test_the_cases_and_the_choices(kept):
+def test_the_cases_and_the_choices(changed):
     groups = {"published": PUBLISHED, "beside": BESIDE, "variants": VARIANTS}
-    kept({these: [(c.name, c.changes, c.shown_in) for c in cases] for these, cases in groups.items()})
-    kept([asdict(choice) for choice in CHOICES], "choices")
-    kept(scenario("x", {"rate_hz": 50.0}).model_dump(mode="json", exclude_defaults=True), "scenario")
+    assert not changed(
+        {these: [(c.name, c.changes, c.shown_in) for c in cases] for these, cases in groups.items()}
+    )
+    assert not changed([asdict(choice) for choice in CHOICES], "choices")
+    assert not changed(
+        scenario("x", {"rate_hz": 50.0}).model_dump(mode="json", exclude_defaults=True), "scenario"
+    )
 
 
 def test_numbers_of_a_variant_are_of_its_own_flights(monkeypatch):

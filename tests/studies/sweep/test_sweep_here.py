@@ -34,7 +34,7 @@ def hired(monkeypatch, small_batches):
     return asked
 
 
-def test_a_sweep_and_the_worst_of_it(hired, tmp_path, kept, monkeypatch):
+def test_a_sweep_and_the_worst_of_it(hired, tmp_path, changed, monkeypatch):
     tallies, left = [], []
     monkeypatch.setattr(
         one_flight, "keep_flight", lambda sweep, *given, report: left.append((*given, report))
@@ -43,9 +43,9 @@ def test_a_sweep_and_the_worst_of_it(hired, tmp_path, kept, monkeypatch):
     sweep = sweep_of(BRIEF, **{"48": "10"})
     plan, summary = Plan(sweep), run_sweep(sweep, options, lambda counts: tallies.append(dict(counts)))
     folder = tmp_path / "short"
-    kept({key: value for key, value in summary.items() if key not in ("versions", "worst")})
+    assert not changed({key: value for key, value in summary.items() if key not in ("versions", "worst")})
     worst = [{k: v for k, v in flight.items() if k != "replay"} for flight in summary["worst"]]
-    kept(worst, "worst")
+    assert not changed(worst, "worst")
     assert summary["worst"][0]["replay"].endswith(f"--replay {worst[0]['run']}")
     assert [n for _, n in hired] == [7]
     assert tallies[0] == {
@@ -62,10 +62,10 @@ def test_a_sweep_and_the_worst_of_it(hired, tmp_path, kept, monkeypatch):
     assert not (folder / "parts").exists()
     assert not (folder / "report.html").exists()
     table = pq.read_table(folder / "results.parquet").to_pylist()
-    kept({key: value for key, value in table[3].items() if value is not None}, "row")
+    assert not changed({key: value for key, value in table[3].items() if value is not None}, "row")
 
 
-def test_a_search_goes_on_from_generation_to_generation(hired, tmp_path, kept):
+def test_a_search_goes_on_from_generation_to_generation(hired, tmp_path, changed):
     sweep, options = sweep_of(BRIEF, **{"48": "20"}), Options(out=tmp_path, search="tracking", report=False)
     named = campaign.named_for(sweep, "tracking")
     assert assignment_of(named, options, 15).run == 15
@@ -75,7 +75,7 @@ def test_a_search_goes_on_from_generation_to_generation(hired, tmp_path, kept):
     with pytest.raises(SweepStopped, match="short-search-tracking: stopped, 16 of 20 flights are kept"):
         run_sweep(sweep, options, stopped=lambda: len(list(tmp_path.glob("*/parts/*"))) > 0 and next(stops))
     summary = run_sweep(sweep, Options(out=tmp_path, search="tracking", report=False, resume=True))
-    kept(summary["search"])
+    assert not changed(summary["search"])
     assert (summary["expectations"], summary["passed"]) == ([], True)
     table = pq.read_table(tmp_path / "short-search-tracking" / "results.parquet").to_pylist()
     assert table[17]["faults[0].magnitude"] == assignment_of(named, options, 17).values["faults[0].magnitude"]
@@ -148,7 +148,7 @@ def test_a_file_in_the_folders_place_is_left(tmp_path):
 
 
 @pytest.mark.parametrize("sampling", ["random", "lhs", "sobol", "grid"])
-def test_what_is_drawn_is_what_it_was(sampling, kept):
+def test_what_is_drawn_is_what_it_was(sampling, changed):
     """A sweep that is resumed goes on with the same flights."""
     vary = "  duration_s: {linspace: [1, 2, 3]}\n  faults[0].at_s: {loguniform: [0.1, 0.9]}\n"
     if sampling == "grid":
@@ -160,7 +160,7 @@ def test_what_is_drawn_is_what_it_was(sampling, kept):
     sweep = sweep_of(text)
     plan = Plan(sweep)
     indices = [0, 1, 2, 5]
-    kept([list(flight.values.values()) for flight in plan.assignments(indices)])
+    assert not changed([list(flight.values.values()) for flight in plan.assignments(indices)])
     assert plan.assignments([2, 5]) == plan.assignments(indices)[2:]
     assert plan.assignments([]) == []
 
@@ -187,7 +187,7 @@ def test_the_inverse_of_each_distribution(how, u, value):
     assert value_at(Variation(**how), u) == (value if isinstance(value, str) else pytest.approx(value))
 
 
-def test_generations_of_a_search_are_what_they_were(kept):
+def test_generations_of_a_search_are_what_they_were(changed):
     evolution = Evolution(3, 2)
     found = []
     for _ in range(4):
@@ -196,7 +196,7 @@ def test_generations_of_a_search_are_what_they_were(kept):
         assert trials.max() < 1.0
         found.append(trials[[0, 7, 15]])
         evolution.select(-np.abs(trials - 0.9).sum(axis=1)[: 16 if evolution.generation < 3 else 5])
-    kept([*found, evolution._scores[:6]])
+    assert not changed([*found, evolution._scores[:6]])
     assert [members(keys) for keys in (1, 4, 5, 16, 17)] == [16, 16, 20, 64, 64]
 
 
@@ -235,7 +235,7 @@ def test_what_is_the_worst(objective, row, value):
     assert score(objective, whole | row) == value
 
 
-def test_the_row_of_a_made_flight(kept):
+def test_the_row_of_a_made_flight(changed):
     """Each column from its place in the metrics, numbered so that none is like another."""
     numbers = iter(range(1, 1000))
     document = {}
@@ -257,7 +257,7 @@ def test_the_row_of_a_made_flight(kept):
         frames=250, worst_residual_ratio=0.875,
         scenario=SimpleNamespace(rate_hz=50.0, airframe=SimpleNamespace(surfaces=load().surfaces)),
     )  # fmt: skip
-    kept(row_of(Assignment(5, {"a": 1.5}), document, flight))
+    assert not changed(row_of(Assignment(5, {"a": 1.5}), document, flight))
     document |= {"departure": None, "supervisor": modes and [{"mode": "nominal", "time_s": 0.0}]}
     document["isolation"] |= {"estimate_interval": None, "probing_s": None, "candidates": [], "faults": []}
     plain = row_of(Assignment(5, {}), document, flight)

@@ -38,15 +38,15 @@ def shown(request, tmp_path):
     return flights, summarise(flights, sweep), sweep
 
 
-def test_the_summary(shown, kept):
-    kept(shown[1])
+def test_the_summary(shown, changed):
+    assert not changed(shown[1])
 
 
-def test_every_figure(shown, kept):
+def test_every_figure(shown, changed):
     flights, summary, _ = shown
     summary = summary | {"search": SEARCH} if summary["sweep"] == "various" else summary
     drawn = {name: draw(flights, summary) for name, (_, draw) in FIGURES.items()}
-    kept({name: whole(figure) for name, figure in drawn.items() if figure is not None})
+    assert not changed({name: whole(figure) for name, figure in drawn.items() if figure is not None})
 
 
 def whole(figure):
@@ -100,7 +100,7 @@ def test_nothing_is_kept_of_what_no_flight_tells(tmp_path):
         assert (found["passed"], found["of"]) == (False, 0)
 
 
-def test_the_worst_flights_the_page_and_the_text(shown, kept, tmp_path):
+def test_the_worst_flights_the_page_and_the_text(shown, changed, tmp_path):
     flights, summary, sweep = shown
     found = {
         "name": "detection_rate",
@@ -117,14 +117,14 @@ def test_the_worst_flights_the_page_and_the_text(shown, kept, tmp_path):
         "folder": "runs/a",
         "search": SEARCH,
     }
-    kept(worst, "worst")
-    kept(summary_text(summary).splitlines(), "text")
+    assert not changed(worst, "worst")
+    assert not changed(summary_text(summary).splitlines(), "text")
     (tmp_path / "flights" / worst[0]["name"]).mkdir(parents=True)
     (tmp_path / "flights" / worst[0]["name"] / "metrics.json").write_text("{}")
     (tmp_path / "figures").mkdir()
     for name in FIGURES if len(flights) > 12 else ("search", "sensitivity"):
         (tmp_path / "figures" / f"{name}.png").write_bytes(name.encode())
-    kept(page(render(summary | {"versions": {"jsbsim": "1"}}, tmp_path)), "page")
+    assert not changed(page(render(summary | {"versions": {"jsbsim": "1"}}, tmp_path)), "page")
 
 
 def test_what_was_drawn_before_goes(tmp_path):

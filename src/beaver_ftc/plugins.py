@@ -13,7 +13,7 @@ environment variable.
 import os
 import re
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from importlib import import_module
@@ -55,17 +55,43 @@ class Registered:
 
 
 @cache
-def _ours(group: str) -> dict[str, dict[str, str]]:
+def _ours(group: str) -> dict[str, dict[str, Any]]:
     """Our own by name: what is said of each, and its class, if it is not in the compiled frame itself."""
     from beaver_ftc.documents.document import parse
 
-    rows: dict[str, dict[str, str]] = parse(_ROWS.read_text(encoding="utf-8")).data[group]
+    rows: dict[str, dict[str, Any]] = parse(_ROWS.read_text(encoding="utf-8")).data[group]
     return rows
 
 
 def is_compiled(group: str, name: str) -> bool:
     """Whether the compiled frame does this scheme or law itself."""
     return name in _ours(group) and "class" not in _ours(group)[name]
+
+
+def options_of(group: str, name: str) -> dict[str, dict[str, Any]]:
+    """The options of what the compiled frame does itself, as plugins.yaml has them."""
+    return _ours(group)[name].get("options", {})
+
+
+def settings(group: str, name: str, given: Mapping[str, float]) -> dict[str, float]:
+    """Every option of what the compiled frame does itself: as given, else its default."""
+    return {key: row["default"] for key, row in options_of(group, name).items()} | dict(given)
+
+
+def wrong_options(group: str, name: str, given: Mapping[str, float]) -> list[tuple[tuple[str, str], str]]:
+    """What is wrong with the options given to what the compiled frame does itself: where, and what."""
+    known, wrong = options_of(group, name) if is_compiled(group, name) else given, []
+    for key, value in given.items():
+        row = known.get(key)
+        if row is None:
+            says = f"has no such option{suggestion(key, known)}" if known else "has no options, allowed: {}"
+            wrong.append((("options", key), f"{name} {says}"))
+        elif isinstance(row, dict):
+            low, high, whole = row.get("low", 0), row["high"], row.get("whole", False)
+            if not low <= value <= high or (whole and value != int(value)):
+                what = "whole numbers" if whole else "numbers"
+                wrong.append((("options", key), f"{value:g}, allowed: {what} from {low:g} to {high:g}"))
+    return wrong
 
 
 def registered(group: str) -> dict[str, Registered]:

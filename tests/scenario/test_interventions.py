@@ -100,11 +100,12 @@ def test_targets_replace_what_was_to_come_on_their_channels():
 
 def test_stages_keep_the_options_of_what_the_scenario_begins_with():
     scenario = load({
-        "control": {"law": "lqr", "options": {"a": 1.0}}, "fdi": {"scheme": "none", "options": {"b": 2.0}},
+        "control": {"law": "lqr", "options": {"a": 1.0}},
+        "fdi": {"scheme": "rls-monitor", "options": {"b": 2.0}},
         "changes": [
             {"at_s": 1, "law": "nominal", "sensors": "tactical-grade"},
-            {"at_s": 2, "scheme": "rls-monitor", "declared_sensors": "tactical-grade"},
-            {"at_s": 3, "law": "lqr", "scheme": "none"},
+            {"at_s": 2, "scheme": "none", "declared_sensors": "tactical-grade"},
+            {"at_s": 3, "law": "lqr", "scheme": "rls-monitor"},
         ],
     })  # fmt: skip
     found = [
@@ -113,9 +114,9 @@ def test_stages_keep_the_options_of_what_the_scenario_begins_with():
         for change, now in done.stages(scenario)
     ]  # fmt: skip
     assert found == [
-        (1, "nominal", {}, "none", {"b": 2.0}, False, True),
-        (2, "nominal", {}, "rls-monitor", {}, False, False),
-        (3, "lqr", {"a": 1.0}, "none", {"b": 2.0}, False, False),
+        (1, "nominal", {}, "rls-monitor", {"b": 2.0}, False, True),
+        (2, "nominal", {}, "none", {}, False, False),
+        (3, "lqr", {"a": 1.0}, "rls-monitor", {"b": 2.0}, False, False),
     ]
 
 

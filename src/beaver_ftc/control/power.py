@@ -18,7 +18,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.control.laws import FAULT_TOLERANT, ORACLE, law_of
+from beaver_ftc.control.laws import ADAPTING, FAULT_TOLERANT, ORACLE, law_of
 from beaver_ftc.design.engine import engine_power_kw, slipstream
 from beaver_ftc.design.model import AIRSPEED, DPT, QDYN
 from beaver_ftc.diagnosis.state import PITCH, YAW
@@ -42,7 +42,8 @@ POWER = record(
 
 def is_at_hand(scenario: Scenario) -> bool:
     """Whether the built-in law of a scenario may use the engine."""
-    law, every_type = law_of(scenario.control.law)[0], scenario.fdi.fault_class == "all"
+    law, inner = law_of(scenario.control.law)
+    every_type = scenario.fdi.fault_class == "all" and inner != ADAPTING
     wanted = scenario.control.power.enabled and (law == ORACLE or (law == FAULT_TOLERANT and every_type))
     return wanted and _has_piston_engine(scenario.airframe)
 

@@ -8,7 +8,7 @@ from beaver_ftc.compiled import record
 from beaver_ftc.control import accommodation, allocation, power, reference
 from beaver_ftc.control.accommodation import surfaces_dtype
 from beaver_ftc.control.allocation import AXES, PROBE, allocation_dtype, layout_dtype
-from beaver_ftc.control.laws import REJECTING, gains, law_of
+from beaver_ftc.control.laws import ADAPTING, REJECTING, gains, law_of, zhang2005
 from beaver_ftc.control.laws.published import FEEDBACK
 from beaver_ftc.control.laws.rejecting import rejection_dtype
 from beaver_ftc.control.power import POWER
@@ -23,6 +23,7 @@ def control_dtype(n: int) -> np.dtype:
     return record(
         law=int, inner=int,  # laws/__init__.py
         reference=REFERENCE, layout=layout_dtype(n), surfaces=surfaces_dtype(n), feedback=FEEDBACK,
+        adaptation=zhang2005.ADAPTATION,
         rejection=rejection_dtype(n), rival=RIVAL, axes=AXES, allocation=allocation_dtype(n), probe=PROBE,
         power=POWER,
     )  # fmt: skip
@@ -37,6 +38,8 @@ def configure(control: np.void, scenario: Scenario, travel: np.ndarray) -> None:
     control["feedback"]["Kp"], control["feedback"]["Ki"] = config.proportional_per_s, config.integral_per_s2
     allocation.configure(control, config, travel, scenario.airframe)
     allocation.configure_probe(control["probe"], scenario.fdi.probing, dt)
+    if control["inner"] == ADAPTING:
+        zhang2005.configure(control, config, travel)
     power.configure(control["power"], control["layout"], scenario)
 
 

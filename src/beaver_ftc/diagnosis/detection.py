@@ -139,7 +139,14 @@ def detect(bank, conclusion, authority, chances, t):
     axis = alarm(bank) if authority != STATISTICS else -1
     if axis < 0 and authority != WORST_CASE and chances.score > 1.0:
         axis = chances.axis
-    if axis >= 0 and not conclusion.detected:
+    if axis >= 0:
+        note_alarm(conclusion, axis, t)
+
+
+@kernel
+def note_alarm(conclusion, axis, t):
+    """Note an alarm at t s that showed on an axis: the first one counts."""
+    if not conclusion.detected:
         conclusion.detected, conclusion.detected_at_s, conclusion.detected_axis = 1, t, axis
 
 

@@ -28,7 +28,15 @@ from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.diagnosis import membership
 from beaver_ftc.diagnosis.bank import explains, remember
-from beaver_ftc.diagnosis.state import INTERVAL, LOSS, NOT_ISOLATED, POSITION, PUBLISHED, UNANTICIPATED
+from beaver_ftc.diagnosis.state import (
+    CONSTANT,
+    INTERVAL,
+    LOSS,
+    NOT_ISOLATED,
+    POSITION,
+    PUBLISHED,
+    UNANTICIPATED,
+)
 from beaver_ftc.diagnosis.thresholds import bound_step, interval, noise_step, published
 from beaver_ftc.scenario.diagnosis import MAX_POLES, FdiConfig
 
@@ -47,9 +55,11 @@ ESTIMATOR = record(
     across=3, reach_low=(MAX_POLES, 4), reach_high=(MAX_POLES, 4), theta_low=3, theta_high=3,
 )  # fmt: skip
 
-# The isolation estimators, and how the decision among them is sharpened.
+# The isolation estimators, and how the decision among them is sharpened. by_gradient: how they adapt, else by
+# least squares; unprojected: their estimates may leave the known set.
 ISOLATION = record(
     n=int, thresholds=int, forgetting=float, decay=3, memory=int, shared=int, membership=int,
+    by_gradient=int, gradient=float, unprojected=int,
     estimator=(ESTIMATOR, MAX_ESTIMATORS),
 )  # fmt: skip
 
@@ -141,6 +151,8 @@ def start(isolation, noise, x):
         fie.xhat[:], fie.bound_noise[:] = x, noise
         fie.covariance[:] = (fie.high - fie.low) ** 2 / 12.0  # of a uniform distribution
         fie.theta_low[:], fie.theta_high[:] = fie.low, fie.high
+        if isolation.unprojected:
+            fie.theta_low[:], fie.theta_high[:] = -np.inf, np.inf
 
 
 @kernel
@@ -152,6 +164,8 @@ def within_limits(fie, thresholds, x):
         low, high, omega, theta, bound = fie.low, fie.high, fie.omega[i], fie.theta[i], fie.bound[i]
         if thresholds == INTERVAL:
             limits = interval(low, high, fie.rise[i], fie.fall[i], omega, theta, bound)
+        elif thresholds == CONSTANT:
+            limits = -bound, bound
         else:
             limits = published(low, high, omega, theta, bound)
         fie.lower[i], fie.upper[i] = limits
@@ -212,6 +226,15 @@ def correct(fie, i, residual, forgetting, low, high):
 
 
 @kernel
+def descend(fie, i, gain, dt):
+    """thetahat' = P{gain Omega eps}, by a step of dt s [Zhang2005, sec. IV]; returns the step."""
+    before = fie.theta[i]
+    moved = before + dt * gain * fie.omega[i] * fie.residual[i]
+    fie.theta[i] = min(max(moved, fie.theta_low[i]), fie.theta_high[i])
+    return fie.theta[i] - before
+
+
+@kernel
 def adapt_jointly(fie, forgetting):
     """The same for one theta shared by the axes, each correcting what those before have left."""
     total = 0.0
@@ -251,7 +274,9 @@ def adapt(isolation, fie, dt):
     """Move the estimate by the residual the frame began with, and the prediction along Omega[k+1]."""
     joint = adapt_jointly(fie, isolation.forgetting) if isolation.shared else 0.0
     for i in range(3):
-        if isolation.shared:
+        if isolation.by_gradient:
+            step = descend(fie, i, isolation.gradient, dt)
+        elif isolation.shared:
             step = joint
         else:
             step = correct(fie, i, fie.residual[i], isolation.forgetting, fie.theta_low[i], fie.theta_high[i])

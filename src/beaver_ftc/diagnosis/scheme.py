@@ -11,7 +11,7 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import apart, kernel, record
 from beaver_ftc.design.model import AIRSPEED
-from beaver_ftc.diagnosis import air, bank, detection, forces, isolation, state, statistical
+from beaver_ftc.diagnosis import air, bank, detection, forces, isolation, state, statistical, zhang2005
 from beaver_ftc.diagnosis.across import USUAL, Size
 from beaver_ftc.diagnosis.bank import largest_share
 from beaver_ftc.diagnosis.bounds import declared
@@ -32,6 +32,7 @@ def diagnosis_dtype(n: int, size: Size = USUAL) -> np.dtype:
         config=state.CONFIG, bound=bound_dtype(n), bank=bank.BANK, fdae=detection.FDAE,
         verdict=state.conclusion_dtype(n), layout=state.layout_dtype(n), isolation=isolation.ISOLATION,
         types=registry.types_dtype(n), statistical=statistical.statistical_dtype(size), watch=WATCH,
+        published=zhang2005.PUBLISHED,
     )  # fmt: skip
 
 
@@ -47,6 +48,8 @@ def configure(fdi: np.void, belief: np.void, scenario: Scenario, travel: np.ndar
     declared.configure(fdi["bound"], scenario, belief["design"])
     bank.configure(fdi["bank"], config, dt)
     detection.configure(fdi["fdae"], scenario)
+    if config.is_published:
+        zhang2005.configure(fdi, scenario, travel)
     registry.configure(fdi["types"], fdi["layout"], belief["actuators"], scenario, travel)
     fdi["types"]["config"]["own_errors"] = fdi["bound"]["own_errors"]
     conclusion["detected_at_s"] = conclusion["isolated_at_s"] = -1.0

@@ -11,7 +11,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.schema import Scenario
 
 NOT_ISOLATED, UNANTICIPATED = -1, -2
-INTERVAL, PUBLISHED = 0, 1
+INTERVAL, PUBLISHED, CONSTANT = 0, 1, 2  # thresholds
 EITHER, WORST_CASE, STATISTICS = 0, 1, 2  # whose alarms count
 _AUTHORITIES = {"either": EITHER, "worst-case": WORST_CASE, "statistical": STATISTICS}
 LOSS, POSITION = 0, 1  # kinds of hypothesis: isolation.py
@@ -54,7 +54,7 @@ CONFIG = record(enabled=int, authority=int, every_type=int, abrupt=int, instants
 def configure(shared: np.void, scenario: Scenario) -> None:
     """Fill what several stages go by (dtype CONFIG)."""
     config = scenario.fdi
-    shared["enabled"], shared["dt"] = config.is_ours, 1.0 / scenario.rate_hz
+    shared["enabled"], shared["dt"] = config.diagnoses, 1.0 / scenario.rate_hz
     shared["authority"], shared["every_type"] = _AUTHORITIES[config.authority], config.fault_class == "all"
     shared["abrupt"], shared["instants"] = config.fault_profile == "abrupt", scenario.substeps
 

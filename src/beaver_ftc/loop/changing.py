@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from beaver_ftc.control.laws import NOMINAL, ORACLE, REJECTING
+from beaver_ftc.control.laws import ADAPTING, NOMINAL, ORACLE, REJECTING
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.loop.plugin_frame import PluginFrame, named_detector, named_law, plugged
@@ -157,7 +157,7 @@ def take_law(frame: np.void, new: np.void) -> None:
             new["rejection"][name] = control["rejection"][name]
         new["rejection"]["disturbance"] = disturbance
     elif new["feedback"]["Ki"] > 0.0:
-        learns = verdict["detected"] and new["law"] not in (NOMINAL, ORACLE)
+        learns = verdict["detected"] and new["law"] not in (NOMINAL, ORACLE) and new["inner"] != ADAPTING
         learnt = frame["fdi"]["fdae"]["network"]["output"] if learns else 0.0
         new["feedback"]["integral"] = (learnt - disturbance) / new["feedback"]["Ki"]
     frame["control"] = new

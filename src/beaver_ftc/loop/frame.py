@@ -16,12 +16,23 @@ import numpy as np
 
 from beaver_ftc.compiled import apart, kernel
 from beaver_ftc.control import accommodation, allocation, power, reference, supervisor
-from beaver_ftc.control.laws import INDI, LQR, NOMINAL, ORACLE, REJECTING, published, rejecting
+from beaver_ftc.control.laws import ADAPTING, INDI, LQR, NOMINAL, ORACLE, REJECTING, published, rejecting
+from beaver_ftc.control.laws import zhang2005 as adapting
 from beaver_ftc.control.outer.autopilot import judge, steer
 from beaver_ftc.control.rivals import compiled
 from beaver_ftc.control.supervisor import MODE_REALLOCATED
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, unanticipated_pitch
-from beaver_ftc.diagnosis import across, air, bank, detection, instruments, isolation, scheme, statistical
+from beaver_ftc.diagnosis import (
+    across,
+    air,
+    bank,
+    detection,
+    instruments,
+    isolation,
+    scheme,
+    statistical,
+    zhang2005,
+)
 from beaver_ftc.diagnosis.belief import begin_frame, follow_command, foresee, look, look_back, respond
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, STATISTICS, WORST_CASE
 from beaver_ftc.diagnosis.types import examine
@@ -91,7 +102,7 @@ def diagnose(frame):
             predict(frame, k)
         else:
             bank.align(fdi.isolation, frame.belief.G)
-        conclude(fdi, frame.measured, frame.t)
+        conclude(fdi, frame.measured, frame.belief.u, frame.t)
     make_ready(frame, k)
 
 
@@ -135,8 +146,23 @@ def predict(frame, k):
         for i in range(3):
             belief.surprise[i] = (x[i] - x_then[i]) / dt - expected[i]
         statistical.follow_rest(chances.block, chances.air, belief.surprise, dt)
+    if fdi.published.in_use:
+        predict_as_published(fdi, x_then, mean.acceleration)
+        return
     leaking = conclusion.isolated >= 0 or conclusion.lead >= 0
     detection.predict(fdi.fdae, bound, x_then, expected, known, leaking, dt)
+
+
+@apart
+def predict_as_published(fdi, x_then, acceleration):
+    """Bring the FDAE and its network to this frame, as published: x_then (3,) rad/s as the elapsed one began,
+    acceleration (3,) rad/s2 in it."""
+    published, dt = fdi.published, fdi.config.dt
+    zhang2005.approximate(published, fdi.fdae, fdi.verdict.detected, dt)
+    detection.predict(fdi.fdae, fdi.bound, x_then, acceleration, False, False, dt)
+    if published.constant > 0.0:
+        estimators = fdi.isolation.estimator[: fdi.isolation.n]
+        zhang2005.hold_thresholds(published.constant, fdi.bank, fdi.fdae, estimators)
 
 
 @apart
@@ -161,8 +187,8 @@ def compare_likelihoods(frame, k):
 
 
 @kernel
-def conclude(fdi, measured, t):
-    """From residuals to alarm, and from then on to a verdict.
+def conclude(fdi, measured, u, t):
+    """From residuals to alarm, and from then on to a verdict. u (n,) rad: where healthy surfaces are.
 
     Where instruments are watched, a surface waits a frame after the alarm: that much later the attitude shows
     what a gyro did; a blurred one, later. Once an instrument is found broken, no surface is named.
@@ -171,14 +197,19 @@ def conclude(fdi, measured, t):
         return
     known, every_type = fdi.verdict.detected, fdi.config.every_type
     detection.form_residual(fdi.fdae, measured.x)
-    detection.detect(fdi.bank, fdi.verdict, fdi.config.authority, fdi.statistical.alarm, t)
+    if fdi.published.in_use:
+        zhang2005.detect(fdi.fdae, fdi.verdict, t)
+        zhang2005.respond(fdi.published, fdi.fdae, fdi.layout.main, measured.x, measured.y, u)
+    else:
+        detection.detect(fdi.bank, fdi.verdict, fdi.config.authority, fdi.statistical.alarm, t)
     if not fdi.verdict.detected:
         return
     if not known:
         scheme.begin_isolation(fdi.isolation, fdi.types, every_type, fdi.bound.noise, measured.x)
     if instruments.clears_surfaces(fdi.watch, known):
         isolate(fdi, measured.x, t, known)
-    detection.evaluate(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
+    if not fdi.published.in_use:
+        detection.evaluate(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
 
 
 @kernel
@@ -312,6 +343,9 @@ def decide(frame):
 def accommodate(frame):
     """What the law takes each surface for, and the unknown."""
     control, surfaces = frame.control, frame.control.surfaces
+    if control.inner == ADAPTING:
+        adapt(frame)
+        return
     accommodation.accommodate(
         control.law, control.inner, frame.assessment, surfaces, control.rejection, control.layout,
         control.allocation.saturated, frame.faults, frame.belief.u,
@@ -319,6 +353,20 @@ def accommodate(frame):
     if frame.assessment.hedge and control.law != ORACLE:
         control.reference.hedging = 1
     compensate(frame)
+
+
+@apart
+def adapt(frame):
+    """The adaptive law of two parts: what it takes surfaces and the unknown for, brought to this frame."""
+    control, belief, x = frame.control, frame.belief, frame.measured.x
+    adaptation, feedback = control.adaptation, control.feedback
+    if frame.fdi.verdict.detected and adaptation.adapts:
+        adapting.adapt(
+            adaptation, feedback, control.surfaces, control.layout, control.allocation.saturated,
+            control.reference.governed_rate - x, belief.G, belief.u, control.reference.dt,
+        )  # fmt: skip
+    zhang2005.evaluate(adaptation.network, control.layout.main, x, frame.measured.y, belief.u)
+    feedback.fhat[:] = adaptation.network.output
 
 
 @kernel

@@ -228,7 +228,7 @@ def plugged(
     if detector is not None:  # no built-in isolation; instead, one estimator a surface for its verdict
         fdi = frames["fdi"][0]
         fdi["config"]["enabled"] = fdi["config"]["every_type"] = fdi["isolation"]["n"] = 0
-        fdi["statistical"]["tests"]["enabled"] = fdi["watch"]["enabled"] = 0
+        fdi["statistical"]["tests"]["enabled"] = fdi["watch"]["enabled"] = fdi["published"]["in_use"] = 0
         n = fdi["types"]["surface"].size
         fdi["isolation"]["estimator"]["surface"][:n] = range(n)
     if law is not None or frames["control"]["law"][0] != ORACLE:

@@ -28,7 +28,6 @@ AXES = ("p", "q", "r")
 UNANTICIPATED = "unanticipated"
 TIME_TOLERANCE_S = 1e-9
 LOSS_OF_EFFECTIVENESS = "loss_of_effectiveness"
-OURS = "adaptive-estimators"
 TAKEN_OVER, LONG_S = "reallocated", 1.0  # a change of mode that comes later than this is explained
 DRIFT_MPS, DRIFT_M = 5.0, 300.0  # a flight that ends further from where it began has wandered off
 _NOT_SIZE = {"actuator", "sensor", "type", "at_s", "end_s", "profile"}
@@ -320,7 +319,7 @@ def sensor_of(fault: Any) -> Document:
 def hints(flight: "Landing", document: Document) -> list[str]:
     """What would mislead a reader who is not told of it: one sentence each."""
     scenario = flight.scenario
-    of_diagnosis = (_outside_the_class, _several, _too_small) if scenario.fdi.scheme == OURS else ()
+    of_diagnosis = (_outside_the_class, _several, _too_small) if scenario.fdi.diagnoses else ()
     said = [*(says(scenario, document) for says in of_diagnosis), _waited(document), _drift(flight)]
     return [sentence for sentence in said if sentence]
 

@@ -5,8 +5,8 @@ from typing import Annotated, Self
 
 from pydantic import model_validator
 
-from beaver_ftc.documents.base import Section, deny, entry
-from beaver_ftc.plugins import LAWS, refusal
+from beaver_ftc.documents.base import Section, deny, entry, refuse
+from beaver_ftc.plugins import LAWS, refusal, wrong_options
 from beaver_ftc.scenario.airframe import named
 
 Law = Annotated[str, named(partial(refusal, LAWS))]
@@ -87,3 +87,8 @@ class ControlConfig(Section, strict=True):
     least_effectiveness: float = entry(0.1, gt=0, lt=1)
     hand_over_s: float = entry(1.0, gt=0, le=60)
     power: EnginePower = entry(EnginePower)
+
+    @model_validator(mode="after")
+    def _known_options(self) -> Self:
+        refuse(wrong_options(LAWS, self.law, self.options))
+        return self

@@ -7,7 +7,7 @@ from pydantic import AfterValidator, Field, Strict, field_validator, model_valid
 
 from beaver_ftc.documents.base import Section, deny, entry, refuse
 from beaver_ftc.documents.errors import suggestion
-from beaver_ftc.plugins import DETECTORS, refusal
+from beaver_ftc.plugins import DETECTORS, refusal, wrong_options
 from beaver_ftc.scenario.airframe import checked_aircraft, named
 from beaver_ftc.scenario.sensors import Sensors
 
@@ -172,6 +172,21 @@ class FdiConfig(Section, strict=True):
         return self.scheme == "adaptive-estimators"
 
     @property
+    def is_published(self) -> bool:
+        """Whether the published scheme diagnoses, and nothing else."""
+        return self.scheme == "zhang2005"
+
+    @property
+    def diagnoses(self) -> bool:
+        """Whether a scheme that is compiled in diagnoses, ours or the published one."""
+        return self.is_ours or self.is_published
+
+    def with_scheme(self, scheme: str, options: dict[str, float]) -> Self:
+        """The same with another scheme; the published one has nothing that the paper has not."""
+        further = _AS_PUBLISHED if scheme == "zhang2005" else {}
+        return self.model_copy(update={"scheme": scheme, "options": options, **further})
+
+    @property
     def weighs_chance(self) -> bool:
         """Whether our scheme has its statistical detector."""
         return self.statistical is not None and self.is_ours
@@ -188,11 +203,29 @@ class FdiConfig(Section, strict=True):
             deny("pairs of the published class are not known, allowed: true with fault_class: all", "pairs")
         if self.authority == "statistical" and self.statistical is None:
             deny("statistical wants fdi.statistical, e.g. {}, allowed: either, worst-case", "authority")
+        refuse(wrong_options(DETECTORS, self.scheme, self.options))
+        if self.is_published:
+            beyond = [key for key, value in _AS_PUBLISHED.items() if getattr(self, key) != value]
+            refuse(((key,), f"zhang2005 is the paper's alone, allowed: {_AS_SAID[key]}") for key in beyond)
         return self
 
     @model_validator(mode="before")
     @classmethod
     def _published_means_published(cls, given: Any) -> Any:
+        if isinstance(given, dict) and given.get("scheme") == "zhang2005":
+            return {"sharpen": "none", "thresholds": "published", **given}
         if isinstance(given, dict) and given.get("thresholds") == "published":
             return {"sharpen": "none", **given}
         return given
+
+
+# What `scheme: zhang2005` goes with, as values and as a scenario says them.
+_AS_PUBLISHED = {
+    "fault_class": "published", "pairs": False, "sensor_monitor": "auto", "probing": None,
+    "statistical": None, "authority": "either", "thresholds": "published",
+    "sharpen": Sharpen(pole_bank=False, memory=False, shared_effectiveness=False, set_membership=False),
+}  # fmt: skip
+_AS_SAID = {
+    "fault_class": "published", "pairs": "false", "sensor_monitor": "auto", "probing": "null",
+    "statistical": "null", "authority": "either", "thresholds": "published", "sharpen": "none",
+}  # fmt: skip

@@ -130,7 +130,7 @@ def _as_changed(now: Scenario, change: Change, given: Scenario) -> Scenario:
     fdi = now.fdi
     if change.scheme is not None:
         options = given.fdi.options if change.scheme == given.fdi.scheme else {}
-        fdi = fdi.model_copy(update={"scheme": change.scheme, "options": options})
+        fdi = fdi.with_scheme(change.scheme, options)
     if change.declared_sensors is not None:
         bounds = fdi.bounds.model_copy(update={"sensors": change.declared_sensors})
         fdi = fdi.model_copy(update={"bounds": bounds})

@@ -2,11 +2,12 @@
 
 NOMINAL, ADAPTIVE, FAULT_TOLERANT, ORACLE = range(4)
 LAWS = ("nominal", "adaptive", "fault-tolerant", "oracle")  # what use is made of the verdict
-PUBLISHED, REJECTING, INDI, LQR = range(4)  # inner laws: which file makes the demand
+PUBLISHED, REJECTING, INDI, LQR, ADAPTING = range(5)  # inner laws: which file makes the demand
 COMPILED = {
     "nominal": (NOMINAL, PUBLISHED),
     "adaptive": (ADAPTIVE, PUBLISHED),
     "fault-tolerant": (FAULT_TOLERANT, REJECTING),
+    "zhang2005": (FAULT_TOLERANT, ADAPTING),
     "fault-tolerant-published": (FAULT_TOLERANT, PUBLISHED),
     "oracle": (ORACLE, REJECTING),
     "oracle-published": (ORACLE, PUBLISHED),

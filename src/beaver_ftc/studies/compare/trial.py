@@ -10,9 +10,10 @@ from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.documents.paths import data_root
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.loop.outcome import Landing
+from beaver_ftc.plugins import DETECTORS, is_compiled
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.studies.compare.replay import Trace, record, replay
+from beaver_ftc.studies.compare.replay import Trace, record, replay, trace
 
 CALIBRATION = "calibration"
 CALIBRATION_ERRORS = "calibration-errors"
@@ -116,8 +117,7 @@ def entries_of(schemes: Sequence[str], laws: Sequence[str]) -> list[Entry]:
 def with_entry(scenario: Scenario, entry: Entry) -> Scenario:
     """The scenario with this scheme and this law; options are those of the one the scenario names, nobody
     else's."""
-    options = options_for(scenario, entry.scheme)
-    fdi = scenario.fdi.model_copy(update={"scheme": entry.scheme, "options": options})
+    fdi = scenario.fdi.with_scheme(entry.scheme, options_for(scenario, entry.scheme))
     kept = scenario.control.options if entry.law == scenario.control.law else {}
     control = scenario.control.model_copy(update={"law": entry.law, "options": kept})
     return scenario.model_copy(update={"fdi": fdi, "control": control})
@@ -129,7 +129,7 @@ def options_for(scenario: Scenario, scheme: str) -> dict[str, float]:
 
 
 def fly_case(case: SetFlight, entries: Sequence[Entry]) -> Trial:
-    """Fly a case with every entry; record it once under the nominal law for the trade-off of each scheme."""
+    """Fly a case with every entry; record it under the nominal law for the trade-off of each scheme."""
     trial = Trial(case.set, [_fly(case.scenario, entry) for entry in entries])
     try:
         recording = record(case.scenario)
@@ -137,8 +137,14 @@ def fly_case(case: SetFlight, entries: Sequence[Entry]) -> Trial:
         trial.failures.append(str(error))
         return trial
     for scheme in dict.fromkeys(entry.scheme for entry in entries if entry.scheme != "none"):
+        options = options_for(case.scenario, scheme)
         try:
-            trial.traces[scheme] = replay(recording, scheme, options_for(case.scenario, scheme))
+            if is_compiled(DETECTORS, scheme) and scheme != SCHEME:  # its statistic comes with its flight
+                fdi = case.scenario.fdi.with_scheme(scheme, options)
+                own = record(case.scenario.model_copy(update={"fdi": fdi}))
+                trial.traces[scheme] = trace(own, own.built_in)
+            else:
+                trial.traces[scheme] = replay(recording, scheme, options)
         except Exception as error:  # what a plug-in fails over is not the end of the comparison
             trial.failures.append(f"{scheme}, on a recorded flight: {type(error).__name__}: {error}")
     return trial

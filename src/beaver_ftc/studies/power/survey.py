@@ -168,12 +168,15 @@ BUILT_IN: dict[str, dict[str, Any]] = {
     STATISTICAL: {"statistical": {}, "authority": "statistical"},
     BOTH: {"statistical": {}},
 }
+# The same of the published scheme, which is not ours.
+FLOWN_THEMSELVES = BUILT_IN | {"zhang2005": {"scheme": "zhang2005"}}
 
 
 def contenders(names: list[str] | None = None) -> tuple[str, ...]:
     """The schemes to compare: those named, ours first; without names all. Raises BadInput, a line a name."""
     if names is None:
-        names = [name for name in registered(DETECTORS) if not is_compiled(DETECTORS, name)]
+        known = registered(DETECTORS)
+        names = [name for name in known if name in FLOWN_THEMSELVES or not is_compiled(DETECTORS, name)]
     names = list(dict.fromkeys([*BUILT_IN, *names]))
     wrong = [f"--schemes: {says}" for name in names if (says := _refusal(name)) is not None]
     if wrong:
@@ -182,10 +185,11 @@ def contenders(names: list[str] | None = None) -> tuple[str, ...]:
 
 
 def _refusal(name: str) -> str | None:
-    if name in BUILT_IN:
+    if name in FLOWN_THEMSELVES:
         return None
     if is_compiled(DETECTORS, name):
-        return f"scheme {name!r} detects nothing, allowed: {', '.join(BUILT_IN)}, a registered detector"
+        there = ", ".join(FLOWN_THEMSELVES)
+        return f"scheme {name!r} detects nothing, allowed: {there}, a registered detector"
     return refusal(DETECTORS, name)
 
 
@@ -230,12 +234,13 @@ def _watch(watched: Watched, flights: Sequence[Scenario], schemes: Sequence[str]
     seen: list[Recording] = []  # what plug-ins are shown of the flights
     for scheme in schemes:
         try:
-            if scheme in BUILT_IN:
+            if scheme in FLOWN_THEMSELVES:
                 recordings = [replay.record(with_fdi(flight, scheme)) for flight in flights]
-                seen = [
-                    replay.aware_of_the_air(one) if vanes and one.air is not None else one
-                    for one in recordings
-                ]
+                if scheme in BUILT_IN:
+                    seen = [
+                        replay.aware_of_the_air(one) if vanes and one.air is not None else one
+                        for one in recordings
+                    ]
                 traces = [replay.trace(recording, recording.built_in) for recording in recordings]
             else:
                 traces = replay.replay_together(seen, scheme)
@@ -252,7 +257,7 @@ def _watch(watched: Watched, flights: Sequence[Scenario], schemes: Sequence[str]
 def with_fdi(flight: Scenario, scheme: str) -> Scenario:
     """The flight with what a scheme of ours wants of the built-in diagnosis."""
     document = flight.model_dump(mode="json", exclude_none=True)
-    document["fdi"] |= BUILT_IN[scheme]
+    document["fdi"] |= FLOWN_THEMSELVES[scheme]
     return Scenario.model_validate(document)
 
 

@@ -1,0 +1,124 @@
+"""The published law of two parts: what it learns by another road, and that it keeps the aircraft."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.linalg import solve_continuous_lyapunov
+
+from beaver_ftc.control.laws import zhang2005
+from beaver_ftc.scenario.control import ControlConfig
+from flying import flown, loss
+from law_records import new_control
+
+UNANTICIPATED = {"type": "unanticipated", "Cm_alpha3": 10, "at_s": 4.0}
+TRAVEL = np.array([[-0.5] * 4, [0.5] * 4])
+LAW = {"law": "zhang2005"}
+
+
+def law(**options):
+    control = new_control(main=(0, 1, 2), law=2, inner=4, effectiveness=1.0)
+    zhang2005.configure(control, ControlConfig(law="zhang2005", options=options), TRAVEL)
+    return control
+
+
+@given(st.floats(0.5, 6.0), st.floats(0.1, 9.0), st.floats(0.02, 50.0))
+def test_the_signal_is_that_of_lyapunovs_equation(Kp, Ki, q):
+    """A' P + P A = -diag(1, q) by SciPy: the second row of P, over its last element."""
+    control = new_control(main=(0, 1, 2))
+    config = ControlConfig(
+        law="zhang2005", options={"rate_weight": q}, proportional_per_s=Kp, integral_per_s2=Ki
+    )
+    zhang2005.configure(control, config, TRAVEL)
+    A = np.array([[0.0, 1.0], [-Ki, -Kp]])
+    P = solve_continuous_lyapunov(A.T, -np.diag([1.0, q]))
+    assert control["adaptation"]["integral_weight"] == pytest.approx(P[1, 0] / P[1, 1])
+
+
+def adapt(control, error, u=(0.1, -0.2, 0.05, 0.0), dt=0.01):
+    G = np.zeros((3, 4))
+    G[0, 0], G[2, 0], G[1, 1], G[2, 2], G[0, 2] = -8.0, -0.4, -10.0, -5.0, 0.3
+    zhang2005.adapt(
+        control.adaptation, control.feedback, control.surfaces, control.layout,
+        control.allocation.saturated, np.array(error), G, np.array(u), dt,
+    )  # fmt: skip
+    return G, np.array(u)
+
+
+def test_effectiveness_follows_the_gradient_and_stays_in_its_set():
+    control = law(parametric_gain=20.0)
+    control.feedback.integral[:] = 0.02, -0.01, 0.0
+    control.surfaces.effectiveness[:3] = 0.8
+    error = np.array([0.03, -0.02, 0.01])
+    G, u = adapt(control, error)
+    s = error + control.adaptation.integral_weight * control.feedback.integral
+    expected = 0.8 - 0.01 * 20.0 * (s @ (G * u))[:3]
+    np.testing.assert_allclose(control.surfaces.effectiveness[:3], expected)
+    assert control.surfaces.effectiveness[3] == 1.0
+    for _ in range(2000):
+        adapt(control, 9.0 * error)
+    assert ((control.surfaces.effectiveness >= 0.1) & (control.surfaces.effectiveness <= 1.0)).all()
+
+
+def test_what_a_saturated_surface_misses_teaches_nothing():
+    control = law()
+    control.allocation.saturated[1] = 1
+    control.adaptation.network.basis[:] = 0.1
+    adapt(control, (0.0, 0.3, 0.0))
+    assert (control.surfaces.effectiveness == 1.0).all()
+    assert not control.adaptation.network.weights.any()
+
+
+@given(st.floats(-3.0, 3.0), st.floats(-1.0, 1.0))
+def test_the_lyapunov_function_falls(unknown, e0):
+    """e' = -Kp e - Ki int e + fhat - phi, phi constant, in small steps: V with the weights in it."""
+    control, dt = law(), 1e-3
+    q, Gamma, network = 20.0, 60.0, control.adaptation.network
+    network.basis[:, 0] = 1.0
+    A = np.array([[0.0, 1.0], [-1.0, -2.0]])
+    P = solve_continuous_lyapunov(A.T, -np.diag([1.0, q]))
+    e, integral, before = e0, 0.0, np.inf
+    for k in range(3000):
+        control.feedback.integral[1] = integral
+        missed = network.weights[1, 0] - unknown
+        z = np.array([integral, e])
+        V = z @ P @ z / P[1, 1] + missed**2 / Gamma
+        if k % 100 == 0:
+            assert before + 1e-12 >= V * (1.0 - 2e-3)
+            before = V
+        adapt(control, (0.0, e, 0.0), u=np.zeros(4), dt=dt)
+        e, integral = e + dt * (-2.0 * e - integral + network.weights[1, 0] - unknown), integral + dt * e
+    assert abs(e) < 0.05 * (1.0 + abs(unknown) + abs(e0))
+
+
+@pytest.mark.parametrize("airspeed_mps", [38.0, 48.0])
+def test_the_network_alone_keeps_the_unanticipated_case(airspeed_mps):
+    keys = {
+        "initial": {"airspeed_mps": airspeed_mps}, "fdi": {"scheme": "zhang2005"}, "faults": [UNANTICIPATED],
+        "duration_s": 20.0,
+    }  # fmt: skip
+    flight, log = flown(**keys, control=LAW | {"options": {"parametric_gain": 0.0}})
+    assert flight.departure is None
+    assert flight.detection_time_s - 4.0 <= 0.5
+    assert flight.isolated is None or flight.isolated == "unanticipated"
+    assert log.rms_deg_s("q", 6.0) < 0.3
+    without, _ = flown(**keys, control=LAW | {"options": {"network": 0}})
+    assert without.departure is not None
+
+
+def test_after_an_elevator_loss_the_flap_takes_over_unless_it_is_told_not_to():
+    keys = {"fdi": {"scheme": "zhang2005"}, "faults": [loss(at_s=4.0)], "duration_s": 12.0}
+    flight, log = flown(**keys, control=LAW)
+    assert [mode for _, mode in flight.supervisor] == ["nominal", "adaptive", "reallocated"]
+    after = log["t_s"] > 6.0
+    assert np.ptp(log["elevator_cmd_rad"][after]) < 0.2 * np.ptp(log["flap_cmd_rad"][after])
+    assert log.rms_deg_s("q", 6.0) < 0.3
+    kept, log = flown(**keys, control=LAW | {"options": {"hand_over": 0}})
+    assert [mode for _, mode in kept.supervisor] == ["nominal", "adaptive"]
+    assert np.ptp(log["flap_cmd_rad"]) == 0.0
+
+
+def test_before_the_alarm_it_is_the_nominal_law():
+    keys = {"fdi": {"scheme": "zhang2005"}, "duration_s": 3.0}
+    (_, ours), (_, nominal) = flown(**keys, control=LAW), flown(**keys, control={"law": "nominal"})
+    np.testing.assert_array_equal(ours["elevator_cmd_rad"], nominal["elevator_cmd_rad"])

@@ -1,0 +1,254 @@
+"""The published scheme: its network, estimators and thresholds by other roads, and what it must not do."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from beaver_ftc.diagnosis import isolation, zhang2005
+from beaver_ftc.diagnosis.isolation import ISOLATION
+from beaver_ftc.loop.loop import fly
+from beaver_ftc.plugins import DETECTORS, options_of, settings
+from beaver_ftc.scenario.loader import load_text
+from flying import PUBLISHED_UNCERTAINTY, flown, loss, scenario
+
+SCHEME = {"scheme": "zhang2005", "thresholds": "published"}
+TRAVEL = np.array([[-0.52, -0.49, -0.44], [0.52, 0.49, 0.44]])
+MAIN = np.arange(3)
+POLE, DT = 10.0, 0.01
+
+
+def network(gain=60.0, limit=20.0):
+    new = np.zeros(1, zhang2005.NETWORK).view(np.recarray)[0]
+    zhang2005.configure_network(new, gain, limit, TRAVEL)
+    return new
+
+
+def at(new, alpha=0.1, beta=0.0, x=(0.0, 0.0, 0.0), u=(0.0, 0.0, 0.0, 0.0)):
+    zhang2005.evaluate(new, MAIN, np.array(x), np.array([alpha, beta, 45.0, 1000.0, 0.3]), np.array(u))
+    return new
+
+
+def gaussians(centres, value):
+    value = np.clip(value, centres[0], centres[-1])
+    found = np.exp(-0.5 * ((centres - value) / (centres[1] - centres[0])) ** 2)
+    return found / np.linalg.norm(found)
+
+
+@given(st.floats(-0.3, 0.8), st.floats(-1, 1), st.floats(-1, 1), st.floats(-0.7, 0.7))
+def test_the_basis_is_a_product_of_gaussians_of_x_and_u(alpha, beta, rate, deflection):
+    new = at(network(), alpha, beta, (rate, -rate, rate), (deflection, -deflection, deflection, 0.0))
+    for i, (angle, sign) in enumerate(((beta, 1), (alpha, -1), (beta, 1))):
+        centres = np.linspace(-0.1, 0.5, 9) if i == 1 else np.linspace(-0.4, 0.4, 9)
+        shares = np.linspace(TRAVEL[0, i], TRAVEL[1, i], 3)
+        along = gaussians(np.linspace(-0.3, 0.3, 3), sign * rate), gaussians(shares, sign * deflection)
+        expected = np.einsum("a,b,c->abc", gaussians(centres, angle), *along).ravel()
+        np.testing.assert_allclose(new.basis[i], expected, atol=1e-12)
+        assert np.linalg.norm(new.basis[i]) == pytest.approx(1.0)
+
+
+@given(st.lists(st.floats(-5, 5), min_size=3, max_size=3), st.floats(0.1, 3.0))
+def test_the_network_learns_along_its_basis_within_its_limit(signal, limit):
+    new = at(network(gain=50.0, limit=limit), alpha=0.2)
+    weights = np.linspace(-limit, limit, new.weights.size).reshape(new.weights.shape)
+    new.weights[:] = weights
+    zhang2005.learn(new, np.array(signal), 0.02)
+    expected = weights + 0.02 * 50.0 * new.basis * np.array(signal)[:, None]
+    np.testing.assert_allclose(new.weights, np.clip(expected, -limit, limit))
+    at(new, alpha=0.2)
+    np.testing.assert_allclose(new.output, (new.weights * new.basis).sum(axis=1), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("dead_zone", "detected", "residual", "learns"),
+    [(1, 1, 0.02, True), (1, 1, 0.009, False), (1, 0, 0.02, False), (0, 0, 0.009, True)],
+)
+def test_the_network_learns_what_exceeds_the_threshold_once_there_is_an_alarm(
+    dead_zone, detected, residual, learns
+):
+    published = np.zeros(1, zhang2005.PUBLISHED).view(np.recarray)[0]
+    published.dead_zone = dead_zone
+    zhang2005.configure_network(published.network, 60.0, 20.0, TRAVEL)
+    at(published.network)
+    fdae = np.zeros(1, zhang2005_fdae()).view(np.recarray)[0]
+    fdae.residual[:], fdae.threshold[:] = (0.0, residual, -0.001), 0.01
+    zhang2005.approximate(published, fdae, detected, DT)
+    expected = DT * 60.0 * published.network.basis * fdae.residual[:, None] if learns else 0.0
+    np.testing.assert_allclose(published.network.weights, np.broadcast_to(expected, (3, zhang2005.N_NODES)))
+
+
+def zhang2005_fdae():
+    from beaver_ftc.diagnosis.detection import FDAE
+
+    return FDAE
+
+
+@pytest.mark.parametrize(
+    ("residual", "axis"), [((0.02, 0.03, 0.0), 0), ((0.0, -0.03, 0.02), 1), ((0, 0, 0), None)]
+)
+def test_the_alarm_is_of_the_first_axis_beyond_its_threshold(residual, axis):
+    from beaver_ftc.diagnosis.state import conclusion_dtype
+
+    fdae = np.zeros(1, zhang2005_fdae()).view(np.recarray)[0]
+    conclusion = np.zeros(1, conclusion_dtype(4)).view(np.recarray)[0]
+    fdae.residual[:], fdae.threshold[:] = residual, 0.01
+    zhang2005.detect(fdae, conclusion, 3.0)
+    found = (conclusion.detected_axis, conclusion.detected_at_s) if conclusion.detected else None
+    assert found == (None if axis is None else (axis, 3.0))
+
+
+@given(
+    st.floats(-1.0, 0.0),
+    st.floats(0.0, 5000.0),
+    st.lists(st.floats(-3.0, 3.0), min_size=40, max_size=40),
+    st.booleans(),
+)
+def test_the_residual_of_the_true_estimator_is_omega_times_what_the_estimate_misses(theta, gain, Z, projects):
+    """However it adapts: the term Om ths' of the estimator sees to that."""
+    records = np.zeros(1, ISOLATION).view(np.recarray)[0]
+    records.decay[:], records.by_gradient, records.gradient = zhang2005.euler(POLE, DT), 1, gain
+    fie = records.estimator[0]
+    fie.low, fie.high, fie.theta_low[:], fie.theta_high[:] = -1.0, 0.0, -np.inf, np.inf
+    if projects:
+        fie.theta_low[:], fie.theta_high[:] = -1.0, 0.0
+    rate, bound = np.zeros(3), np.zeros(1, BOUND)[0]
+    for z in Z:
+        fie.residual[:] = rate - fie.xhat
+        assert fie.residual == pytest.approx(fie.omega * (theta - fie.theta), abs=1e-9)
+        fie.effect.Z[:] = z, -z, 0.5 * z
+        before = rate.copy()
+        rate = before + DT * theta * fie.effect.Z
+        isolation.predict(records, fie, bound, before, np.zeros(3), DT)
+        if projects:
+            assert ((fie.theta >= -1.0) & (fie.theta <= 0.0)).all()
+
+
+def _bound():
+    from beaver_ftc.diagnosis.bounds.worst_case import bound_dtype
+
+    return bound_dtype(4)
+
+
+BOUND = _bound()
+
+
+def test_residual_and_threshold_of_the_fdae_by_hand_from_the_log():
+    """By Euler's steps from what the log has of the rates, the design model and the declared bound."""
+    flight, log = flown(fdi=SCHEME, duration_s=4.0)
+    assert flight.detection_time_s is None
+    for axis in "pqr":
+        x, F = log[f"{axis}_measured_rad_s"], log[f"{axis}_design_rad_s2"]
+        xhat, threshold = np.empty(len(x)), np.zeros(len(x))
+        xhat[0] = x[0]
+        for k in range(len(x) - 1):
+            xhat[k + 1] = xhat[k] + DT * (F[k + 1] - POLE * (xhat[k] - x[k]))
+            threshold[k + 1] = threshold[k] + DT * (
+                log[f"{axis}_eta_bar_rad_s2"][k + 1] - POLE * threshold[k]
+            )
+        np.testing.assert_allclose(log[f"{axis}_residual_rad_s"], x - xhat, atol=1e-12)
+        # what the model neglects of the round Earth and of rounding is admitted, too
+        assert (log[f"{axis}_threshold_rad_s"] >= threshold - 1e-12).all()
+        np.testing.assert_allclose(log[f"{axis}_threshold_rad_s"], threshold, rtol=1e-6, atol=1e-9)
+        assert not log[f"{axis}_network_rad_s2"].any()
+
+
+@pytest.mark.parametrize(("surface", "at_s"), [("aileron", 5.0), ("elevator", 4.0), ("rudder", 4.0)])
+def test_the_class_is_detected_isolated_and_sized(surface, at_s):
+    flight, log = flown(
+        fdi=SCHEME, control={"law": "zhang2005"}, faults=[loss(surface, at_s=at_s)], duration_s=14.0
+    )
+    assert flight.detection_time_s - at_s <= 0.5
+    assert flight.isolated == surface
+    assert flight.estimate == pytest.approx(-0.4, abs=0.03)
+    for axis in "pqr":  # the norm bound mu is symmetric
+        np.testing.assert_array_equal(
+            log[f"fie_{surface}_{axis}_lower_rad_s"], -log[f"fie_{surface}_{axis}_upper_rad_s"]
+        )
+    assert not log[f"fie_{surface}_excluded"].any()
+
+
+CORNERS = [
+    {**PUBLISHED_UNCERTAINTY, "inertia_coupling": dict(zip("pqr", theta, strict=True))}
+    for theta in product((-0.25, 0.25), repeat=3)
+]
+
+
+@pytest.mark.parametrize("uncertainty", CORNERS)
+def test_no_corner_of_the_published_uncertainty_alarms(uncertainty):
+    flight = fly(scenario(fdi=SCHEME, uncertainty=uncertainty, duration_s=8.0))
+    assert flight.detection_time_s is None
+
+
+@pytest.mark.parametrize(
+    ("options", "found"),
+    [
+        ({"leave_out": 2}, "unanticipated"),
+        ({"adaptive_threshold": 0}, "unanticipated"),
+        ({"adaptation_gain": 0.0}, "elevator"),
+    ],
+)
+def test_what_a_part_is_good_for_shows_without_it(options, found):
+    flight, _ = flown(fdi=SCHEME | {"options": options}, faults=[loss(at_s=4.0)], duration_s=8.0)
+    assert flight.isolated == found
+    assert found == "unanticipated" or flight.estimate == 0.0
+
+
+def test_without_the_dead_zone_the_network_learns_of_healthy_flight():
+    _, log = flown(fdi=SCHEME | {"options": {"dead_zone": 0}}, duration_s=3.0)
+    assert np.abs(log["q_network_rad_s2"]).max() > 1e-3
+
+
+def mistake(fdi):
+    with pytest.raises(Exception, match=r".*") as caught:
+        load_text(f"name: x\nfdi: {fdi}\n", source="s.yaml")
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("fdi", "says"),
+    [
+        ("options: {gain: 3}", "options.gain: zhang2005 has no such option"),
+        ("options: {leave_out: 1.5}", "options.leave_out: 1.5, allowed: whole numbers from 0 to 3"),
+        ("options: {network_gain: -1}", "options.network_gain: -1, allowed: numbers from 0 to 10000"),
+        ("fault_class: all", "fault_class: zhang2005 is the paper's alone, allowed: published"),
+        ("statistical: {}", "statistical: zhang2005 is the paper's alone, allowed: null"),
+        ("thresholds: interval", "thresholds: zhang2005 is the paper's alone, allowed: published"),
+        ("sharpen: all", "sharpen: zhang2005 is the paper's alone, allowed: none"),
+    ],
+)
+def test_what_it_has_not_is_refused_in_a_line(fdi, says):
+    line = mistake(f"{{scheme: zhang2005, {fdi}}}")
+    assert line.startswith("s.yaml:2: fdi." + says)
+    assert "\n" not in line
+
+
+def test_ours_takes_no_options():
+    assert mistake("{options: {a: 1}}").startswith(
+        "s.yaml:2: fdi.options.a: adaptive-estimators has no options, allowed: {}"
+    )
+
+
+def test_every_option_has_a_range_a_meaning_and_an_origin():
+    rows = options_of(DETECTORS, "zhang2005")
+    for row in rows.values():
+        assert row.get("low", 0) <= row["default"] <= row["high"]
+        assert row["says"]
+        assert row["origin"]
+    assert settings(DETECTORS, "zhang2005", {"network_gain": 5.0})["network_gain"] == 5.0
+
+
+def test_it_takes_over_in_flight_from_a_scheme_with_more():
+    document = {"fault_class": "all", "statistical": {}}
+    changed = scenario(
+        fdi=document, changes=[{"at_s": 2.0, "scheme": "zhang2005"}], faults=[loss(at_s=4.0)], duration_s=6.0
+    )
+    flight = fly(changed)
+    assert flight.isolated == "elevator"
+    assert 4.0 < flight.detection_time_s < 4.5
+
+
+def test_a_pole_beyond_the_frame_rate_keeps_nothing():
+    assert zhang2005.euler(10.0, 0.01) == pytest.approx(0.9)
+    assert zhang2005.euler(200.0, 0.01) == 0.0

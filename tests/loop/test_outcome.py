@@ -45,6 +45,11 @@ CASES = {
     "nothing": ({}, {}),
     "alarm-at-once": ({}, ALARM | {"fdi.verdict.detected_at_s": 0.0}),
     "unanticipated": ({}, ALARM | {"fdi.verdict.isolated": UNANTICIPATED, "fdi.verdict.isolated_at_s": 3.0}),
+    "withdrawn": ({}, ALARM | {
+        "fdi.verdict.isolated": UNANTICIPATED, "fdi.verdict.isolated_at_s": 3.0, "fdi.verdict.n_withdrawn": 2,
+        "fdi.verdict.withdrawn.surface": [1, 3, 2], "fdi.verdict.withdrawn.from_s": [2.0, 2.5, 4.0],
+        "fdi.verdict.withdrawn.to_s": [2.25, 3.0, 5.0],
+    }),
     "statistical": ({"fdi": {"statistical": {}}}, ALARM | {
         "fdi.statistical.alarm.detected_at_s": 2.0, "fdi.statistical.alarm.closest": 0.95,
         "fdi.statistical.tests.alarm_level": 6.5,

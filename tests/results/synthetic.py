@@ -122,6 +122,12 @@ class Flight:
     exits: int = 0
     outside_s: float = 0.0
     end: tuple[float, float] | None = None
+    so_far: bool | None = None
+    withdrawn: tuple[dict[str, Any], ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.isolated is not None:
+            self.so_far = self.isolated in SURFACES
 
 
 def rows(flight: Flight) -> np.ndarray:

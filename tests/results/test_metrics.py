@@ -31,7 +31,7 @@ def test_published_case_has_every_key_of_the_contract_in_order():
         "isolated": True, "fault": "elevator", "type": "loss_of_effectiveness",
         "time_s": 12.12, "delay_s": 0.12, "correct": True, "estimate": -0.39, "candidates": ["elevator"],
         "type_correct": True, "type_delay_s": None, "estimate_deg": None, "estimate_interval": None,
-        "frequency_rad_s": None, "probing_s": None, "faults": [],
+        "frequency_rad_s": None, "so_far": True, "withdrawn": [], "probing_s": None, "faults": [],
     }  # fmt: skip
     assert document["false_alarm"] is False
     assert document["supervisor"][1] == {"time_s": 12.07, "mode": "adaptive"}
@@ -55,6 +55,13 @@ def test_every_fault_is_listed_with_its_size():
         "rudder",
     )
     assert second["end_s"] == 20.0
+
+
+def test_what_was_named_before_is_listed_beside_what_is_named_now():
+    gone = {"fault": "elevator", "from_s": 12.02, "to_s": 12.120000000001}
+    found = _of(isolated="unanticipated", withdrawn=(gone,))["isolation"]
+    assert (found["fault"], found["so_far"]) == ("unanticipated", False)
+    assert found["withdrawn"] == [gone | {"to_s": 12.12}]
 
 
 def test_tracking_is_in_degrees():
@@ -217,6 +224,8 @@ def test_each_of_several_faults_is_held_against_its_own_surfaces_first():
         ({"isolated": "aileron"}, "correct", False),
         ({"isolated": "aileron"}, "delay_s", None),
         ({"isolated": None}, "correct", None),
+        ({"isolated": None}, "so_far", None),
+        ({}, "so_far", True),
         ({"isolation_type": "loss_of_effectiveness", "estimate": -0.4}, "estimate_deg", None),
         ({"estimate": None}, "estimate_deg", None),
         ({"estimate_interval": None}, "estimate_interval", None),

@@ -89,6 +89,9 @@ FAULTS = [
         ({}, "elevator after 0.25 s, correct, stuck"),
         ({"delay_s": None, "correct": False}, "elevator, WRONG, stuck"),
         ({"type_correct": False}, "elevator after 0.25 s, WRONG, stuck"),
+        ({"so_far": False}, "elevator after 0.25 s, correct, stuck"),
+        ({"so_far": True}, "elevator so far, after 0.25 s, correct, stuck"),
+        ({"so_far": True, "delay_s": None, "correct": False}, "elevator so far, WRONG, stuck"),
         (
             {"type": None, "candidates": ["stuck", "rate_limit"]},
             "elevator after 0.25 s, correct, stuck or rate limit",
@@ -108,6 +111,27 @@ FAULTS = [
 )
 def test_a_named_fault_in_words(changes, said):
     assert verdict._isolation({"isolation": NAMED | changes, "faults": FAULTS}) == said
+
+
+FIRST, AGAIN, OTHER = (
+    {"fault": name, "from_s": from_s, "to_s": to_s}
+    for name, from_s, to_s in (("elevator", 12.0, 12.25), ("elevator", 14.0, 15.0), ("flap", 13.0, 13.5))
+)
+
+
+@pytest.mark.parametrize(
+    ("gone", "said"),
+    [
+        ([], ""),
+        ([FIRST], "; named before: elevator for 0.25 s"),
+        ([FIRST, OTHER, AGAIN], "; named before: elevator 2 times for 1.25 s in all, flap for 0.50 s"),
+    ],
+)
+def test_what_was_named_before_in_words(gone, said):
+    document = {"isolation": NAMED | {"withdrawn": gone}, "faults": FAULTS}
+    assert verdict._isolation(document) == f"elevator after 0.25 s, correct, stuck{said}"
+    nothing = {"isolated": False, "candidates": [], "withdrawn": gone}
+    assert verdict._isolation({"isolation": nothing, "detection": {"detected": True}}) == f"none{said}"
 
 
 def test_modes_left_out_are_counted_before_the_last():

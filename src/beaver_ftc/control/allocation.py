@@ -40,10 +40,8 @@ def layout_dtype(n: int) -> np.dtype:
 @lru_cache
 def allocation_dtype(n: int) -> np.dtype:
     """n surfaces: effectiveness matrix with what is believed of each in it; the command, rad, and which stand
-    at a stop; how far pitch is handed over, and whether it is handed back, after a change in flight."""
-    return record(
-        G=(3, n), command=n, saturated=(int, n), hand_over=float, hand_over_step=float, hands_back=int,
-    )  # fmt: skip
+    at a stop; how far pitch is handed over, and by how much that changes in a frame."""
+    return record(G=(3, n), command=n, saturated=(int, n), hand_over=float, hand_over_step=float)
 
 
 def configure(control: np.void, config: ControlConfig, travel: np.ndarray, aircraft: Aircraft) -> None:
@@ -144,13 +142,14 @@ def relieve(allocation, layout, demand):
 
 
 @kernel
-def advance_hand_over(allocation, reallocated, at_once, lost, every_type):
-    """Hand the pitch demand to the flap, or back. `at_once`: the share that is lost, by a jam."""
+def advance_hand_over(allocation, reallocated, at_once, lost):
+    """Hand the pitch demand to the flap, or back, as soon as nothing is `reallocated` any more, by the same
+    step. `at_once`: the share that is lost, by a jam."""
     if reallocated:
         allocation.hand_over = min(allocation.hand_over + allocation.hand_over_step, 1.0)
         if at_once:
             allocation.hand_over = max(allocation.hand_over, lost)
-    elif every_type or allocation.hands_back:
+    else:
         allocation.hand_over = max(allocation.hand_over - allocation.hand_over_step, 0.0)
 
 

@@ -53,7 +53,7 @@ def configure(fdi: np.void, belief: np.void, scenario: Scenario, travel: np.ndar
     registry.configure(fdi["types"], fdi["layout"], belief["actuators"], scenario, travel)
     fdi["types"]["config"]["own_errors"] = fdi["bound"]["own_errors"]
     conclusion["detected_at_s"] = conclusion["isolated_at_s"] = -1.0
-    conclusion["isolated"] = NOT_ISOLATED
+    conclusion["isolated"], conclusion["named_from_s"] = NOT_ISOLATED, -1.0
     conclusion["type"] = conclusion["lead"] = conclusion["lead_kind"] = conclusion["type_at_s"] = -1
 
 
@@ -166,6 +166,20 @@ def note_verdict(conclusion, estimators, given, t):
 def isolated_surface(conclusion, estimators):
     """The surface of the isolated fault, or -1."""
     return estimators[conclusion.isolated].surface if conclusion.isolated >= 0 else -1
+
+
+@kernel
+def note_name(conclusion, s, named, t):
+    """Note whether surface s is named, and what is withdrawn; of more than there is room for, the latest
+    stays."""
+    since = conclusion.named_from_s[s]
+    if named and since < 0.0:
+        conclusion.named_from_s[s] = t
+    elif since >= 0.0 and not named:
+        gone = conclusion.withdrawn[min(conclusion.n_withdrawn, state.MAX_WITHDRAWN - 1)]
+        gone.surface, gone.from_s, gone.to_s = s, since, t
+        conclusion.n_withdrawn += 1
+        conclusion.named_from_s[s] = -1.0
 
 
 @kernel

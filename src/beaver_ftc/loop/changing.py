@@ -109,7 +109,6 @@ class Changing:
         if frame["fdi"]["watch"]["enabled"] or frame["instruments"]["engine"] or forces:
             loop.read_more()
         frame["control"]["power"]["enabled"] = new["control"]["power"]["enabled"]
-        frame["control"]["allocation"]["hands_back"] = 1
         before = loop.plugin_frame
         if stage.plugins is not None and before is not None and stage.plugins.detector is before.detector:
             stage.plugins.verdict = before.verdict  # which still stands
@@ -153,7 +152,8 @@ def take_law(frame: np.void, new: np.void) -> None:
         for name in names:
             new[part][name] = control[part][name]
     if new["inner"] == REJECTING:
-        for name in ("begun", "rate"):  # where there is no observer yet it begins with what is measured
+        # Where there is no observer yet it begins with what is measured.
+        for name in ("begun", "rate", "part"):
             new["rejection"][name] = control["rejection"][name]
         new["rejection"]["disturbance"] = disturbance
     elif new["feedback"]["Ki"] > 0.0:

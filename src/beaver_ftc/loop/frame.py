@@ -260,6 +260,18 @@ def make_ready(frame, k):
     begin_frame(belief, fdi.bound, fdi.layout, fdi.config.every_type, frame.measured)
     accounts.follow_guarantee(frame.accounts.guarantee, fdi.bank, fdi.config.dt, belief.share, k, frame.t)
     assess(fdi, frame.assessment)
+    note_names(fdi, frame.t)
+
+
+@kernel
+def note_names(fdi, t):
+    """Note which surfaces are named: those of a pair, or the one isolated; none once an instrument is found
+    broken."""
+    pairs, void = fdi.config.every_type and fdi.types.pair.enabled, instruments.speaks(fdi.watch)
+    only = scheme.isolated_surface(fdi.verdict, fdi.isolation.estimator)
+    for s in range(fdi.types.surface.size):
+        named = fdi.types.surface[s].named if pairs else s == only
+        scheme.note_name(fdi.verdict, s, named and not (void and not fdi.watch.beside), t)
 
 
 @apart
@@ -396,12 +408,12 @@ def in_doubt(frame):
 @kernel
 def hand_over_pitch(frame):
     """Hand the pitch demand to the flap, or back. What a jammed elevator no longer carries goes at once."""
-    control, surfaces, every_type = frame.control, frame.control.surfaces, frame.fdi.config.every_type
+    control, surfaces = frame.control, frame.control.surfaces
     remains, least = surfaces.effectiveness[control.layout.main[PITCH]], surfaces.least_effectiveness
-    at_once = control.reference.hedging or (remains < least and every_type)
+    at_once = control.reference.hedging or (remains < least and frame.fdi.config.every_type)
     reallocated = frame.supervisor.mode == MODE_REALLOCATED
-    allocation.advance_hand_over(control.allocation, reallocated, at_once, 1.0 - remains, every_type)
-    rejecting.hand_over(control.rejection, control.allocation.hand_over, remains, least)
+    allocation.advance_hand_over(control.allocation, reallocated, at_once, 1.0 - remains)
+    rejecting.hand_over(control.rejection, control.allocation.hand_over, reallocated, remains, least)
 
 
 @kernel

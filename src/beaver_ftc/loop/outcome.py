@@ -37,22 +37,25 @@ class Landing:
     start, rates in rad/s, per axis (p, q, r).
 
     isolated: aileron, elevator, rudder, flap, unanticipated, or None while more than one fault fits
-    (`candidates`). estimate: the isolated fault's parameter, theta in [-1, 0] for a loss of effectiveness.
-    guaranteed_delay_s: from the fault to the instant from which detection was certain, None if that never
-    came. worst_residual_ratio: largest |residual| / threshold in healthy flight; closest_approach: the same
-    of each filter of the bank, the published one first. surface_travel_rad: path of each surface, up and
-    down added. engine_power: if pitch was left to the engine, since when and for how long, s, and the lowest
-    and highest manifold pressure, inHg. faults: of several at once (`fdi.pairs`), as in types/findings.py,
-    the first named first. statistical: when the statistical detector would have raised the alarm, its level
-    in standard deviations, and the largest share of it reached in healthy flight. mode_changes, exits: how
-    many there were of `supervisor` and `envelope_exits`, which hold the first and the last; outside_s: time
-    outside the validated envelope, all exits together. end: airspeed, m/s, and altitude, m, at the end.
-    profile: largest deviation from the commanded one by channel of the autopilot, m, m/s, rad; None where it
-    was not flown. arrival: the deviation's mean over the last 10 s, with its sign. limits: of each limit that
-    protection has put on the command since when, on what (airspeed_mps, bank_deg), "at most" or "at least",
-    its value at last, why, and whether it is in force at the end. changes: what was changed in flight:
-    time_s; law and scheme, None for what was not; sensors, True or False; and of a diagnosis that was
-    replaced detection_time_s and isolated. The verdict above is the last diagnosis'.
+    (`candidates`). so_far: whether it is a surface that our schemes name, which they do by exclusion: it is
+    the only one left, until data exclude it as well; None of a plug-in's and of nothing. withdrawn: spells
+    in which a surface was named before, {fault, from_s, to_s}, the last the latest. estimate: the isolated
+    fault's parameter, theta in [-1, 0] for a loss of effectiveness. guaranteed_delay_s: from the fault to the
+    instant from which detection was certain, None if that never came. worst_residual_ratio: largest
+    |residual| / threshold in healthy flight; closest_approach: the same of each filter of the bank, the
+    published one first. surface_travel_rad: path of each surface, up and down added. engine_power: if pitch
+    was left to the engine, since when and for how long, s, and the lowest and highest manifold pressure,
+    inHg. faults: of several at once (`fdi.pairs`), as in types/findings.py, the first named first.
+    statistical: when the statistical detector would have raised the alarm, its level in standard deviations,
+    and the largest share of it reached in healthy flight. mode_changes, exits: how many there were of
+    `supervisor` and `envelope_exits`, which hold the first and the last; outside_s: time outside the
+    validated envelope, all exits together. end: airspeed, m/s, and altitude, m, at the end. profile: largest
+    deviation from the commanded one by channel of the autopilot, m, m/s, rad; None where it was not flown.
+    arrival: the deviation's mean over the last 10 s, with its sign. limits: of each limit that protection has
+    put on the command since when, on what (airspeed_mps, bank_deg), "at most" or "at least", its value at
+    last, why, and whether it is in force at the end. changes: what was changed in flight: time_s; law and
+    scheme, None for what was not; sensors, True or False; and of a diagnosis that was replaced
+    detection_time_s and isolated. The verdict above is the last diagnosis'.
     """
 
     scenario: Scenario
@@ -92,6 +95,8 @@ class Landing:
     arrival: dict[str, float | None] | None = None
     limits: tuple[dict[str, Any], ...] = ()
     changes: tuple[dict[str, Any], ...] = ()
+    so_far: bool | None = None
+    withdrawn: tuple[dict[str, Any], ...] = ()
 
 
 def _instant(seconds: float) -> float | None:
@@ -245,8 +250,18 @@ def _findings(frame: np.void, surfaces: Sequence[str]) -> dict[str, Any]:
     fdi = frame["fdi"]
     broken = instrument_found(fdi["watch"], float(frame["t"]))
     if broken is not None:
-        return {"detection_axis": None, **broken}
-    return _alarm(fdi) | _isolation(fdi, surfaces)
+        return {"detection_axis": None, **broken, "so_far": False if broken["isolated"] else None}
+    said = _alarm(fdi) | _isolation(fdi, surfaces)
+    return said | {"so_far": None if said["isolated"] is None else said["isolated"] in surfaces}
+
+
+def _withdrawn(fdi: np.void, surfaces: Sequence[str]) -> tuple[dict[str, Any], ...]:
+    """Surfaces that were named and are not any more, as many as there is room for."""
+    gone = fdi["verdict"]["withdrawn"][: int(fdi["verdict"]["n_withdrawn"])]
+    return tuple(
+        {"fault": surfaces[int(one["surface"])], "from_s": float(one["from_s"]), "to_s": float(one["to_s"])}
+        for one in gone
+    )
 
 
 def verdict_of(frame: np.void, surfaces: Sequence[str]) -> Verdict:
@@ -346,6 +361,7 @@ def landing_of(
         arrival=_by_channel(frame, "mean_off"),
         limits=_limits(frame, surfaces),
         changes=replaced,
+        withdrawn=_withdrawn(fdi, surfaces),
         surface_travel_rad={s: float(x) for s, x in zip(surfaces, accounts["travelled"], strict=True)},
         surface_energy_rad2_s={s: float(x) for s, x in zip(surfaces, accounts["hurried"], strict=True)},
         **(_findings(frame, surfaces) if verdict is None else _of_verdict(fdi, verdict)),

@@ -1,9 +1,14 @@
 """What a flight amounts to: the document `metrics.json`.
 
 Times are seconds from the start of the flight, rates deg/s. Delays are seconds from the first frame in which
-the fault is there: `at_s`, or up to a frame later. A quantity
-that does not exist is null: a document never holds NaN. Nothing in it depends on the wall clock or the
-machine's name, so that the same scenario and seed give the same file.
+the fault is there: `at_s`, or up to a frame later. A quantity that does not exist is null: a document never
+holds NaN. Nothing in it depends on the wall clock or the machine's name, so that the same scenario and seed
+give the same file.
+
+`isolation.so_far` is true of a surface that is named because every other fault is excluded: no data have
+excluded this one so far, and nothing within the class proves that a fault outside of it does not look alike.
+It is false of `unanticipated` and of an instrument, null of nothing and of what a plug-in names.
+`isolation.withdrawn`: surfaces that were named before, and from when to when.
 """
 
 import json
@@ -118,7 +123,7 @@ def _detection(flight: "Landing", fault: Document | None) -> Document:
 # What the document says of the fault that is named, in its order.
 _NAMED = (
     "fault", "type", "time_s", "delay_s", "correct", "estimate", "candidates", "type_correct", "type_delay_s",
-    "estimate_deg", "estimate_interval", "frequency_rad_s",
+    "estimate_deg", "estimate_interval", "frequency_rad_s", "so_far",
 )  # fmt: skip
 
 
@@ -129,6 +134,7 @@ def _isolation(flight: "Landing", fault: Document | None) -> Document:
     return {
         "isolated": flight.isolated is not None,
         **{key: named[key] for key in _NAMED},
+        "withdrawn": [_rounded(gone) for gone in flight.withdrawn],
         "probing_s": _rounded(flight.probing_s or ()) or None,
         "faults": [_one_of_several(found, flight.scenario) for found in flight.faults],
     }
@@ -140,7 +146,8 @@ def _one_of_several(found: Document, scenario: "Scenario") -> Document:
     declared = _declared_on(surface, scenario)
     correct = None if surface is None else bool(declared)
     type_correct = None if kind is None else any(kind == fault["type"] for fault in declared)
-    return _named(found, declared[0] if declared else None, (correct, type_correct), scenario)
+    of_ours = {**found, "so_far": None if surface is None else True}  # no other diagnosis names several
+    return _named(of_ours, declared[0] if declared else None, (correct, type_correct), scenario)
 
 
 def _named(
@@ -162,6 +169,7 @@ def _named(
         "estimate_deg": None if angle_rad is None else _number(math.degrees(angle_rad)),
         "estimate_interval": _rounded(found.get("estimate_interval") or ()) or None,
         "frequency_rad_s": _number(found.get("frequency_rad_s")),
+        "so_far": found["so_far"],
     }
 
 

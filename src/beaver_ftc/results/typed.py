@@ -45,7 +45,7 @@ class Detection(_Part):
 @dataclass(frozen=True)
 class Isolation(_Part):
     """What was named. estimate: theta in [-1, 0] for a loss of effectiveness, else rad; candidates: the fault
-    types (or surfaces) still possible."""
+    types (or surfaces) still possible. so_far: a surface named by exclusion, which data may yet exclude."""
 
     isolated: bool
     fault: str | None
@@ -58,6 +58,7 @@ class Isolation(_Part):
     estimate_deg: float | None
     estimate_interval: tuple[float, float] | None
     candidates: tuple[str, ...]
+    so_far: bool | None
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ Everything is said from the metrics document, so that the words and `metrics.jso
 """
 
 import io
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.results.metrics import Document
@@ -239,18 +240,37 @@ def _statistical(metrics: Document) -> str:
 
 def _isolation(metrics: Document) -> str:
     isolation = metrics["isolation"]
-    if not isolation["isolated"]:
-        left = isolation["candidates"]
-        return _still_possible(left) if metrics["detection"]["detected"] and left else "none"
-    return _one(isolation, metrics)
+    return "; ".join([_found(isolation, metrics), *_withdrawn(isolation.get("withdrawn", ()))])
+
+
+def _found(isolation: Document, metrics: Document) -> str:
+    if isolation["isolated"]:
+        return _one(isolation, metrics)
+    left = isolation["candidates"]
+    return _still_possible(left) if metrics["detection"]["detected"] and left else "none"
+
+
+def _withdrawn(gone: Sequence[Document]) -> list[str]:
+    """What was named before, for how long, each surface once."""
+    spans: dict[str, list[float]] = {}
+    for one in gone:
+        spans.setdefault(one["fault"], []).append(one["to_s"] - one["from_s"])
+    said = [
+        f"{name} for {_time(times[0])}"
+        if len(times) == 1
+        else f"{name} {len(times)} times for {_time(sum(times))} in all"
+        for name, times in spans.items()
+    ]
+    return [f"named before: {', '.join(said)}"] if said else []
 
 
 def _one(isolation: Document, metrics: Document) -> str:
-    """One named fault."""
-    when = "" if isolation["delay_s"] is None else f" after {_time(isolation['delay_s'])}"
+    """One named fault: `so far` of a surface that data may yet exclude, as they have every other."""
+    far = " so far" if isolation.get("so_far") else ""
+    when = "" if isolation["delay_s"] is None else f"{',' if far else ''} after {_time(isolation['delay_s'])}"
     right = "correct" if isolation["correct"] and isolation["type_correct"] is not False else "WRONG"
     size = _estimate(isolation) + _true(isolation, metrics)
-    return f"{isolation['fault']}{when}, {right}{_type(isolation)}{size}"
+    return f"{isolation['fault']}{far}{when}, {right}{_type(isolation)}{size}"
 
 
 def _probing(metrics: Document) -> str:

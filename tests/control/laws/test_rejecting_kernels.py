@@ -7,7 +7,12 @@ from hypothesis import strategies as st
 
 from beaver_ftc.control import accommodation, allocation, reference
 from beaver_ftc.control.laws import ADAPTIVE, FAULT_TOLERANT, NOMINAL, ORACLE, REJECTING, rejecting
-from beaver_ftc.control.supervisor import MODE_ADAPTIVE, MODE_NOMINAL, MODE_REALLOCATED
+from beaver_ftc.control.supervisor import (
+    MODE_ADAPTIVE,
+    MODE_NOMINAL,
+    MODE_REALLOCATED,
+    MODE_UNANTICIPATED,
+)
 from beaver_ftc.diagnosis.state import NOT_ISOLATED
 from beaver_ftc.diagnosis.types.examine import FIXED, LAGS, LOSES, SHIFTED
 from beaver_ftc.loop import frame as whole
@@ -58,7 +63,7 @@ def test_the_schedule_is_interpolated_and_held_beyond_its_ends(qdyn, lost):
 @pytest.mark.parametrize(("left", "lost"), [(1.0, 0.0), (0.6, 0.4), (0.1, 0.9), (0.09, 1.0), (0.0, 1.0)])
 def test_the_stand_in_carries_what_is_lost_and_takes_it_over_smoothly(given, left, lost):
     control, _ = record()
-    rejecting.hand_over(control["rejection"], given, left, 0.1)
+    rejecting.hand_over(control["rejection"], given, 1, left, 0.1)
     part = 1.0 if left == 0.0 else 3 * given**2 - 2 * given**3
     assert control["rejection"]["lost"] == pytest.approx(part * lost, abs=1e-15)
 
@@ -196,6 +201,21 @@ def test_a_command_leads_a_lagging_actuator_within_the_travel():
     assert command == pytest.approx([0.05 + 3 * 0.05, -0.1, 0.44, 0.5])
 
 
+@given(st.floats(0.0, 1.0), st.floats(0.01, 1.0), st.floats(0.001, 0.1))
+def test_handed_back_the_share_of_the_stand_in_leaps_by_no_more_than_its_step(handed_over, left, step):
+    """Whatever the main surface is believed to be from then on; in the end it carries nothing."""
+    rejection = record()[0]["rejection"]
+    rejecting.hand_over(rejection, handed_over, 1, left, 0.1)
+    shares = [float(rejection["lost"])]
+    while handed_over > 0.0:
+        handed_over = max(handed_over - step, 0.0)
+        rejecting.hand_over(rejection, handed_over, 0, 1.0, 0.1)
+        shares.append(float(rejection["lost"]))
+    assert shares[-1] == 0.0 or len(shares) == 1
+    assert np.all(np.diff(shares) <= 0.0)
+    assert np.all(np.diff(shares) >= -1.5 * step)  # the steepest of 3 s^2 - 2 s^3
+
+
 @pytest.mark.parametrize(
     ("mode", "every_type", "hedging", "left", "before", "after"),
     [
@@ -206,17 +226,19 @@ def test_a_command_leads_a_lagging_actuator_within_the_travel():
         (MODE_REALLOCATED, 0, 0, 0.05, 0.2, 0.3),
         (MODE_ADAPTIVE, 1, 0, 1.0, 0.25, 0.15),
         (MODE_NOMINAL, 1, 0, 1.0, 0.05, 0.0),
-        (MODE_NOMINAL, 0, 0, 1.0, 0.25, 0.25),
+        (MODE_NOMINAL, 0, 0, 1.0, 0.25, 0.15),
+        (MODE_UNANTICIPATED, 0, 1, 0.6, 1.0, 0.9),
     ],
 )
 def test_pitch_is_handed_over_by_steps_and_back(mode, every_type, hedging, left, before, after):
     frame = assemble(scenario(), np.zeros(4), TRAVEL).view(np.recarray)[0]
     control = put(frame["control"], hand_over=before, hand_over_step=0.1, hedging=hedging)
-    control["surfaces"]["effectiveness"][ELEVATOR] = left
+    control["surfaces"]["effectiveness"][ELEVATOR], control["rejection"]["part"] = left, 0.3
     frame["fdi"]["config"]["every_type"], frame["supervisor"]["mode"] = every_type, mode
     whole.hand_over_pitch(frame)
     assert control["allocation"]["hand_over"] == pytest.approx(after)
-    lost = 1.0 - left if left >= 0.1 else 1.0
+    now = 1.0 - left if left >= 0.1 else 1.0
+    lost = now if mode == MODE_REALLOCATED else 0.3
     assert control["rejection"]["lost"] == pytest.approx((3 * after**2 - 2 * after**3) * lost)
 
 

@@ -54,11 +54,12 @@ def rejection_dtype(surfaces: int) -> np.dtype:
     qdyn (N_POINTS,) Pa: the schedule's points, ascending. Kp 1/s, pull 1, learn 1/s (N_LOOPS, N_POINTS):
     feedback, and the observer's corrections of rate and disturbance for what it missed.
     rate (3,) rad/s, disturbance (3,) rad/s2: its estimates. ahead (3,) rad/s: the rate when the command
-    acts. lost: share of pitch that the stand-in carries. lead (n,): command beyond the actuator's position
-    over what is wanted beyond it. at_stop_s, withdrawn (n,): see `withdraw`.
+    acts. lost: share of pitch that the stand-in carries; part: the same once all is handed over. lead (n,):
+    command beyond the actuator's position over what is wanted beyond it. at_stop_s, withdrawn (n,): see
+    `withdraw`.
     """
     return record(
-        begun=int, dt=float, share=float, lost=float, qdyn=N_POINTS, Kp_at=(N_LOOPS, N_POINTS),
+        begun=int, dt=float, share=float, lost=float, part=float, qdyn=N_POINTS, Kp_at=(N_LOOPS, N_POINTS),
         pull_at=(N_LOOPS, N_POINTS), learn_at=(N_LOOPS, N_POINTS), Kp=3, pull=3, learn=3, rate=3,
         disturbance=3, ahead=3, lead=surfaces, at_stop_s=surfaces, withdrawn=(int, surfaces),
         healthy=ANSWER, believed=ANSWER, found=FOUND,
@@ -100,14 +101,16 @@ def between(table, i, j, part):
 
 
 @kernel
-def hand_over(rejection, given, remains, least):
+def hand_over(rejection, given, reallocated, remains, least):
     """The share of pitch its stand-in carries, once `given` is handed over: what the main surface has lost.
 
-    remains: its effectiveness; less than `least` is none.
+    remains: its effectiveness; less than `least` is none. While pitch is handed back, `reallocated` no
+    longer, that of before counts: the main surface may be believed whole at once, and nothing is to leap.
     """
     given = given if remains > 0.0 else 1.0
-    lost = 1.0 - remains if remains >= least else 1.0
-    rejection.lost = given * given * (3.0 - 2.0 * given) * lost
+    if reallocated or remains <= 0.0:
+        rejection.part = 1.0 - remains if remains >= least else 1.0
+    rejection.lost = given * given * (3.0 - 2.0 * given) * rejection.part
 
 
 @kernel

@@ -1,0 +1,74 @@
+"""What a flight remembers of the names that its diagnosis has given, and taken back."""
+
+from itertools import groupby
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from kernels import new_fdi
+
+from beaver_ftc.diagnosis.scheme import note_name
+from beaver_ftc.diagnosis.state import MAX_WITHDRAWN, NOT_ISOLATED
+from beaver_ftc.loop.frame import note_names
+
+AILERON, ELEVATOR, RUDDER, FLAP = range(4)
+
+
+def nameless():
+    fdi = new_fdi()
+    fdi["verdict"]["named_from_s"], fdi["verdict"]["isolated"] = -1.0, NOT_ISOLATED
+    fdi["isolation"]["estimator"]["surface"][:4] = range(4)
+    return fdi
+
+
+def spells(named):
+    """(from, to) of each run of frames with a name that has ended, by frame numbers."""
+    runs, k = [], 0
+    for is_named, frames in groupby(named):
+        length = len(list(frames))
+        if is_named and k + length < len(named):
+            runs.append((k, k + length))
+        k += length
+    return runs
+
+
+@given(st.lists(st.tuples(st.booleans(), st.booleans()), max_size=200))
+def test_every_spell_of_a_name_is_kept_and_of_too_many_the_latest(frames):
+    conclusion = nameless()["verdict"]
+    for k, named in enumerate(frames):
+        for s, is_named in zip((ELEVATOR, FLAP), named, strict=True):
+            note_name(conclusion, s, is_named, float(k))
+    expected = sorted(
+        (to, s, start)
+        for s, column in zip((ELEVATOR, FLAP), zip(*frames, strict=True), strict=False)
+        for start, to in spells(column)
+    )
+    assert conclusion["n_withdrawn"] == len(expected)
+    if len(expected) > MAX_WITHDRAWN:
+        expected = [*expected[: MAX_WITHDRAWN - 1], expected[-1]]
+    kept = conclusion["withdrawn"][: len(expected)]
+    assert [(one["to_s"], one["surface"], one["from_s"]) for one in kept] == expected
+
+
+@pytest.mark.parametrize(
+    ("every_type", "pair", "alarmed", "beside", "named"),
+    [
+        (0, 0, 0, 0, [ELEVATOR]),
+        (1, 0, 0, 0, [ELEVATOR]),
+        (1, 1, 0, 0, [AILERON, RUDDER]),
+        (0, 1, 0, 0, [ELEVATOR]),
+        (1, 1, 1, 0, []),
+        (1, 1, 1, 1, [AILERON, RUDDER]),
+    ],
+)
+def test_which_surfaces_are_named(every_type, pair, alarmed, beside, named):
+    """The one isolated, those of a pair, and none where an instrument has been found instead."""
+    fdi = nameless()
+    fdi["verdict"]["isolated"], fdi["types"]["surface"]["named"][[AILERON, RUDDER]] = ELEVATOR, 1
+    fdi["config"]["every_type"], fdi["types"]["pair"]["enabled"] = every_type, pair
+    fdi["watch"]["enabled"], fdi["watch"]["alarmed"], fdi["watch"]["beside"] = 1, alarmed, beside
+    note_names(fdi, 2.5)
+    since = np.full(4, -1.0)
+    since[named] = 2.5
+    assert fdi["verdict"]["named_from_s"].tolist() == since.tolist()

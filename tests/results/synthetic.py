@@ -32,7 +32,7 @@ COLUMNS = (
             f"fie_{e}_excluded",
         )
     ),
-    *(f"{s}_effectiveness_estimate" for s in SURFACES), "mode", "detected",
+    *(f"{s}_effectiveness_{which}" for which in ("estimate", "used") for s in SURFACES), "mode", "detected",
 )  # fmt: skip
 
 
@@ -193,7 +193,8 @@ def _surfaces(t: np.ndarray, after: np.ndarray) -> dict[str, np.ndarray]:
         out[f"{surface}_cmd_rad"] = out[f"{surface}_pos_rad"] = position
         out[f"{surface}_effective_rad"] = position * np.where((surface == "elevator") & (t >= 12), 0.6, 1.0)
         health = 1 - 0.4 * (1 - np.exp(-after / 0.5)) if surface == "elevator" else np.ones_like(t)
-        out[f"{surface}_effectiveness_estimate"] = health
+        out[f"{surface}_effectiveness_used"] = health
+        out[f"{surface}_effectiveness_estimate"] = np.where(health < 0.99, 0.6, 1.0)
     return out
 
 

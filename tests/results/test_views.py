@@ -234,11 +234,11 @@ def test_of_a_residual_of_nothing_the_upper_bound_counts():
 
 
 def test_there_are_looks_for_eight_surfaces():
-    known = {view.name: view for view in views([f"s{i}_effectiveness_estimate" for i in range(9)]
-                                               + [f"s{i}_cmd_rad" for i in range(9)])}  # fmt: skip
-    assert [trace.role for trace in known["effectiveness"].panels[0].traces] == [
-        f"surface {i}" for i in range(8)
-    ]
+    known = {view.name: view for view in views([f"s{i}_{what}" for i in range(9) for what in (
+        "effectiveness_estimate", "effectiveness_used", "cmd_rad")])}  # fmt: skip
+    for panel, which in zip(known["effectiveness"].panels, ("estimate", "used"), strict=True):
+        looks = [(trace.column, trace.role) for trace in panel.traces]
+        assert looks == [(f"s{i}_effectiveness_{which}", f"surface {i}") for i in range(8)]
 
 
 def test_what_a_figure_looks_like():

@@ -560,7 +560,8 @@ def record(frame, commanded, row):
         if e < fdi.isolation.n:  # else another diagnosis has taken their place
             log_row.record_estimator(fdi.isolation.estimator[e], fdi.verdict.detected, row, column)
         column += log_row.PER_ESTIMATOR
-    column = put(row, column, control.surfaces.effectiveness)
+    column = put(row, column, frame.assessment.effectiveness)
+    column = log_row.record_used(control.surfaces.effectiveness, control.law != NOMINAL, row, column)
     row[column], row[column + 1] = frame.supervisor.mode, fdi.verdict.detected or fdi.watch.alarmed
     column += 2
     if logged.watch:

@@ -70,6 +70,15 @@ def record_alarm(bank, row, column):
 
 
 @kernel
+def record_used(effectiveness, used, row, column):
+    """What the law takes the effectiveness of each surface for: 1 if it makes no use of it. Returns the next
+    column."""
+    for s in range(effectiveness.size):
+        row[column + s] = effectiveness[s] if used else 1.0
+    return column + effectiveness.size
+
+
+@kernel
 def record_watch(watch, row, column):
     """How near a test between the instruments came to its bound in this frame, and which."""
     if watch.enabled and watch.begun:

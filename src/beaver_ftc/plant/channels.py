@@ -125,7 +125,11 @@ def log_columns(
 ) -> tuple[str, ...]:
     """The log's columns in order, for the isolation estimators of these names; watch: the instruments are
     held against one another; power: the law may use the engine; profile: columns of the commanded profile;
-    tests: there is a statistical detector, whose tests are logged as shares of its level."""
+    tests: there is a statistical detector, whose tests are logged as shares of its level.
+
+    Of each surface's effectiveness the `estimate` is the diagnosis', 1 where nothing is estimated; `used` is
+    what the law takes it for, on its way there at a limited rate, and 1 throughout under the nominal law.
+    """
     surfaces = aircraft.surfaces
     return (
         "t_s", *_STATES, *_per_axis("{}dot_rad_s2"), "qdyn_pa", *aircraft.signals, "envelope_valid",
@@ -137,7 +141,7 @@ def log_columns(
         *_per_axis("{}_eta_bar_rad_s2"), *_per_axis("{}_network_rad_s2"),
         *_per_axis("{}_design_rad_s2"),
         *(column for name in estimators for column in _estimator_columns(name)),
-        *(f"{s}_effectiveness_estimate" for s in surfaces),
+        *(f"{s}_effectiveness_{which}" for which in ("estimate", "used") for s in surfaces),
         "mode", "detected",
         *(("watch_share", "watch_test") if watch else ()),
         *(("manifold_pressure_inhg",) if power else ()),

@@ -187,7 +187,7 @@ def fly(
 ) -> Flight:
     """Fly a scenario: a name, a path, a mapping or a Scenario.
 
-    log: keep one row a frame in memory, 0.7 kB each. detector, law: plug-in objects to fly with, in place of
+    log: keep one row a frame in memory, 0.8 kB each. detector, law: plug-in objects to fly with, in place of
     those the scenario names. progress: called with the share flown, 0 to 1. Raises BadInput when the flight
     cannot be trimmed or asks for what there is not, SimulationFailed when a value is not finite.
     """

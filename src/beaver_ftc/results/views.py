@@ -250,10 +250,18 @@ def _spoken(name: str) -> str:
 
 
 def _effectiveness(names: Sequence[str]) -> View:
-    roles = zip(names, SURFACE_ROLES, strict=False)
-    traces = tuple(Trace(f"{surface}_effectiveness_estimate", surface, role) for surface, role in roles)
-    panels = (Panel("effectiveness (1 healthy)", traces, limits=(-0.05, 1.1)),) if traces else ()
-    return View("effectiveness", "Estimated effectiveness of each surface", panels)
+    looks = tuple(zip(names, SURFACE_ROLES, strict=False))
+    panels = tuple(
+        Panel(
+            label,
+            tuple(Trace(f"{s}_effectiveness_{which}", s, role) for s, role in looks),
+            limits=(-0.05, 1.1),
+        )
+        for which, label in (("estimate", "estimated (1 healthy)"), ("used", "used by the law"))
+        if looks
+    )
+    title = "Effectiveness of each surface: the diagnosis' estimate, and what the law uses, rate-limited"
+    return View("effectiveness", title, panels)
 
 
 def _supervisor() -> View:

@@ -95,7 +95,7 @@ def test_a_verdict_drives_supervisor_law_and_metrics():
     assert isolation["estimate"] == -0.4
     modes = [(step["time_s"], step["mode"]) for step in document["supervisor"]]
     assert modes == [(0.0, "nominal"), (3.0, "adaptive"), (3.01, "reallocated")]
-    assert log["elevator_effectiveness_estimate"][-1] == pytest.approx(0.6)
+    assert log["elevator_effectiveness_estimate"][-1] == log["elevator_effectiveness_used"][-1] == 0.6
     assert log["detected"][log["t_s"] >= 3.0].all()
 
 
@@ -134,8 +134,9 @@ def test_estimates_of_every_surface_reach_the_law():
         says = Verdict(True, "q", effectiveness=np.array([0.9, 0.6, 0.8, 1.0]))
 
     _, log = _flown(detector=Estimates())
-    last = [log[f"{s}_effectiveness_estimate"][-1] for s in ("aileron", "elevator", "rudder", "flap")]
-    assert last == pytest.approx([0.9, 0.6, 0.8, 1.0])
+    for which in ("estimate", "used"):
+        last = [log[f"{s}_effectiveness_{which}"][-1] for s in ("aileron", "elevator", "rudder", "flap")]
+        assert last == pytest.approx([0.9, 0.6, 0.8, 1.0])
 
 
 def test_being_told_the_truth_is_worth_the_oracle():

@@ -32,7 +32,10 @@ GUST_S = {"rise_s": 0.5, "hold_s": 1.0, "fade_s": 0.5}
 PATIENCE_S = 10.0  # for the diagnosis, once you have spoken
 INSTRUMENTS = "instruments"
 OF_A_FLIGHT = ("break", "repair", "blow", "aim", "change")  # what is asked of a flight that goes on
-HIDDEN = ("_effective_rad", "_pos_rad", "_excluded", "_effectiveness_estimate", "mode", "detected")
+HIDDEN = (
+    "_effective_rad", "_pos_rad", "_excluded", "_effectiveness_estimate", "_effectiveness_used", "mode",
+    "detected",
+)  # fmt: skip
 
 
 class Session:

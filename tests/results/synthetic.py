@@ -51,7 +51,7 @@ class Fault:
         return {"magnitude": self.magnitude}
 
 
-FDI = SimpleNamespace(scheme="adaptive-estimators", fault_class="published", pairs=False)
+FDI = SimpleNamespace(scheme="adaptive-estimators", diagnoses=True, fault_class="published", pairs=False)
 CONTROL = SimpleNamespace(law="fault-tolerant")
 INITIAL = SimpleNamespace(airspeed_mps=45.0, altitude_m=1828.8)
 

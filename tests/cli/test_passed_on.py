@@ -85,7 +85,7 @@ POWER = {
 }
 REPRODUCE = {
     "studies__reproduce__reproduction__reproduce": {"passed": False},
-    "studies__reproduce__reproduction__as_text": "r",
+    "studies__reproduce__words__as_text": "r",
 }
 VERIFY = {
     "studies__verify__conduct": ["row"],

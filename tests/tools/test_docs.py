@@ -1,17 +1,19 @@
 import re
+from collections import Counter
 from pathlib import Path
 
 import pytest
 from tools.docs import first_figure
-from tools.docs.generate import lighten
+from tools.docs.generate import HEADLINE, lighten
 from tools.docs.properties import as_markdown, meaning_of
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.model_file import with_systems
 from beaver_ftc.results.style import LOOKS
-from beaver_ftc.studies.reproduce.claims import CLAIMS
+from beaver_ftc.studies.reproduce.claims import CLAIMS, NOT_BORNE_OUT, VERDICTS
 from beaver_ftc.studies.reproduce.published_figures import FIGURES
+from beaver_ftc.studies.reproduce.words import headline
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -52,13 +54,17 @@ def test_property_without_a_meaning_is_refused():
         meaning_of("fcs/no-such-thing")
 
 
-def test_reproduction_page_has_every_statement_and_every_figure():
+def test_reproduction_page_has_every_statement_with_its_verdict_and_every_figure():
     text = (DOCS / "reproduction.md").read_text()
+    counts: Counter[str] = Counter()
     for claim in CLAIMS:
-        (row,) = [
-            line for line in text.splitlines() if claim.statement in line and "borne out" in line.lower()
-        ]
-        assert "NOT BORNE OUT" not in row
+        lines = [line for line in text.splitlines() if f"| {claim.statement} |" in line]
+        (verdict,) = (v for v in VERDICTS for line in lines if f"| {v} |" in line)
+        assert verdict != NOT_BORNE_OUT or any(claim.because in line for line in lines)
+        counts[verdict] += 1
+    said = headline({"claims": CLAIMS, "counts": {verdict: counts[verdict] for verdict in VERDICTS}})
+    assert said in text
+    assert f"{HEADLINE[0]}\n{said}\n{HEADLINE[1]}" in (ROOT / "README.md").read_text()
     for view, _, _ in FIGURES:
         assert f"images/reproduction/{view.name}.png" in text
 

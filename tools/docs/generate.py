@@ -6,6 +6,8 @@ from pathlib import Path
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.paths import data_root
 
+HEADLINE = "<!-- what reproduce says -->", "<!-- end -->"  # of README
+
 
 def write_docs(folder: Path | None = None) -> Iterator[Path]:
     """Write every generated page and picture into `folder` (the source tree's `docs/`); yield the files.
@@ -41,19 +43,21 @@ def _write_first_figure(docs: Path) -> Path:
 
 
 def _write_reproduction(docs: Path) -> Iterator[Path]:
-    from beaver_ftc.studies.engine.study import fly_all
-    from beaver_ftc.studies.present.page import write_files
-    from beaver_ftc.studies.reproduce.cases import VARIANTS
+    from beaver_ftc.studies.present.page import replace_between, write_files
     from beaver_ftc.studies.reproduce.published_figures import figures_of
-    from beaver_ftc.studies.reproduce.reproduction import as_markdown, document_of, fly_published, numbers_of
+    from beaver_ftc.studies.reproduce.reproduction import reproduced
+    from beaver_ftc.studies.reproduce.words import as_markdown, headline
 
-    flights = fly_published()
-    document = document_of(flights, fly_all(numbers_of, VARIANTS, workers=2))
+    document, flights = reproduced()
     path = docs / "reproduction.md"
     path.write_text(as_markdown(document, "images/reproduction"), encoding="utf-8")
     yield path
+    readme = docs.parent / "README.md"
+    if readme.is_file():
+        replace_between(readme, *HEADLINE, f"{headline(document)}\n")
+        yield readme
     folder = docs / "images" / "reproduction"
-    figures = figures_of(document, flights)
+    figures = figures_of(document, flights.published)
     write_files(folder, figures)
     yield from (lighten(folder / name) for name in figures)
 

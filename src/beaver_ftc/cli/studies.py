@@ -149,18 +149,20 @@ def reproduce(
 ) -> None:
     """Fly the published study and judge its statements.
 
-    Every figure, and every statement with our number and a verdict.
+    Every figure, every statement with our number, the number without the mechanism it speaks of, and a
+    verdict; the same cases flown by our defaults, side by side.
 
-    Exit status 1 if a statement is not borne out.
+    Exit status 1 if a statement is not borne out and the reason is not known.
 
     Stopped or killed, it goes on where it was with the same command.
 
     out: Folder for the results: `reproduction` in it.
-    workers: Processes for the sensitivity study.
+    workers: Processes that fly them.
     """
-    from beaver_ftc.studies.reproduce.reproduction import NAME, as_text, reproduce
+    from beaver_ftc.studies.reproduce.reproduction import reproduce
+    from beaver_ftc.studies.reproduce.words import NAME, as_text
 
-    with progress_bar("changes to what the paper leaves open") as progress:
+    with progress_bar("ablations, and changes to what the paper leaves open") as progress:
         document = reproduce(out, workers, progress)
     folder = str(out / NAME)
     answer(format, document | {"folder": folder}, lambda: as_text(document, folder, sys.stdout.isatty()))

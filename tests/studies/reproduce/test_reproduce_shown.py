@@ -1,15 +1,14 @@
 """The reproduction of made flights, whole: its statements, document, pages, and what each figure is of."""
 
 from dataclasses import asdict
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from beaver_ftc.studies.reproduce import claims, reproduction
-from beaver_ftc.studies.reproduce.cases import BESIDE, PUBLISHED, VARIANTS, Changed, Flown
+from beaver_ftc.studies.reproduce import beside, measures, reproduction, truth_and_design, words
+from beaver_ftc.studies.reproduce.cases import BEYOND, OURS, PUBLISHED, VARIANTS, Changed, Flown
 from beaver_ftc.studies.reproduce.choices import CHOICES, scenario
-from beaver_ftc.studies.reproduce.claims import CLAIMS
+from beaver_ftc.studies.reproduce.claims import ABLATIONS, CLAIMS, MEASURED
 from beaver_ftc.studies.reproduce.published_figures import FIGURES, figures_of, margins_figure
 from kept import page, picture
 
@@ -28,6 +27,9 @@ def flown(name="elevator", fault="elevator", departure=None, detected_s=12.2, un
             f"{axis}_model_rad_s": rate + 0.002 * i * (1 + struck),
             f"{axis}_residual_rad_s": 0.001 * i * np.cos(t) * (1 + 5 * struck),
             f"{axis}_threshold_rad_s": 0.004 + 0 * t,
+            f"{axis}_network_rad_s2": 0.02 * i * np.sin(t) * struck,
+            f"{axis}_design_rad_s2": 0.01 * i * np.cos(t + 0.1),
+            f"{axis}_eta_bar_rad_s2": 0.02 + 0 * t,
         }
         for j, surface in enumerate(("aileron", "elevator", "rudder"), 1):
             log |= {
@@ -37,33 +39,41 @@ def flown(name="elevator", fault="elevator", departure=None, detected_s=12.2, un
             }  # fmt: skip
     for surface, out_s in (("aileron", 12.25), ("elevator", 14.0), ("rudder", 12.3)):
         log[f"fie_{surface}_excluded"] = ((t >= out_s - 1e-9) & (surface != fault)).astype(float)
+        log[f"{surface}_effectiveness_estimate"] = 1.0 - 0.4 * struck * (surface == fault)
+        log[f"{surface}_effectiveness_used"] = 1.0 + 0.1 * struck * (surface == "rudder" == fault)
     for i, surface in enumerate(("aileron", "elevator", "rudder", "flap"), 1):
         log |= {f"{surface}_{what}_rad": 0.01 * i * np.sin(i * t) for what in ("cmd", "effective")}
-    named = None if fault is None else {"fault": fault, "time_s": 12.31, "estimate": -0.387}
+    named = None if fault is None else {"fault": fault, "time_s": 12.31, "delay_s": 0.31}
     document = {
         "scenario": name, "departure": departure, "fault": {"at_s": 12.0}, "false_alarm": False,
         "detection": {"delay_s": 0.2, "time_s": detected_s},
-        "isolation": named or {"fault": "unanticipated", "time_s": 14.0, "estimate": None},
-        "supervisor": [{"mode": "nominal", "time_s": 0.0}, {"mode": "adaptive", "time_s": detected_s + 0.01}],
+        "isolation": named or {"fault": "unanticipated", "time_s": 14.0, "delay_s": 2.0},
+        "supervisor": [
+            {"mode": "nominal", "time_s": 0.0}, {"mode": "adaptive", "time_s": detected_s + 0.01},
+            {"mode": "reallocated", "time_s": 12.32},
+        ],
+        "flight": {"scheme": f"{name}'s scheme", "law": f"{name}'s law"},
+        "tracking": {
+            "pre_fault_rms_deg_s": {"p": 0.1, "q": 0.2, "r": 0.3},
+            "post_fault_rms_deg_s": {"p": 0.4, "q": 0.5, "r": 0.6} if fault else None,
+            "surface_travel_deg": {"aileron": 10.0, "elevator": 20.0},
+            "surface_energy_deg2_s": {"aileron": 100.0, "elevator": 200.0},
+        },
     }  # fmt: skip
     return Flown(document, log)
 
 
 @pytest.fixture
 def flights():
-    every = {case.name: flown(case.name) for case in (*PUBLISHED, *BESIDE)}
+    every = {case.name: flown(case.name) for case in PUBLISHED}
     lost = {"time_s": 14.567, "signal": "alpha_rad"}
     every["unanticipated-nominal"] = flown("unanticipated-nominal", None, lost, until_s=14.0)
-    every |= {
-        name: flown(name, None)
-        for name in ("unanticipated", "unanticipated-sharpened", "unanticipated-interval")
-    }
-    every |= {name: flown(name, name.split("-")[0]) for name in ("aileron", "rudder", "aileron-sharpened")}
-    return every
+    every |= {name: flown(name, None) for name in ("unanticipated", "unanticipated-network")}
+    return every | {name: flown(name, name) for name in ("aileron", "rudder")}
 
 
-def test_every_statement_of_made_flights(flights, changed):
-    assert not changed([[claim.statement, claim.measure(flights), claim.remark(flights)] for claim in CLAIMS])
+def test_every_measure_of_made_flights(flights, changed):
+    assert not changed([[claim.statement, claim.number(flights)] for claim in MEASURED])
 
 
 def test_what_a_flight_says_of_itself(changed):
@@ -84,48 +94,102 @@ def test_what_a_flight_says_of_itself(changed):
     assert found.between(0.1, 0.13).nonzero()[0].tolist() == [10, 11, 12]
 
 
-NEVER = SimpleNamespace(
-    metrics={"detection": {"delay_s": None, "time_s": None}, "supervisor": [], "departure": {},
-             "isolation": {"fault": None, "estimate": None}},
-    excluded_at_s=lambda name: np.inf, named_s=lambda name: 0.0,
+def without_alarm():
+    """A flight in which nothing is ever detected."""
+    found = flown()
+    silent = {
+        name: 0.0 * column
+        for name, column in found.log.items()
+        if name == "detected" or name.startswith("fie_") or name.endswith("_residual_rad_s")
+    }
+    metrics = found.metrics | {
+        "detection": {"delay_s": None, "time_s": None}, "supervisor": [],
+        "isolation": {"fault": None, "time_s": None},
+    }  # fmt: skip
+    return Flown(metrics, found.log | silent)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["detection", "isolation", "in_charge", "reallocation", "activated_near_10", "alarm_lag", "last_to_go",
+     "conclusion_lag", "exclusion_lag", "activation"],
 )  # fmt: skip
+def test_what_never_happens_is_infinite(name):
+    assert measures.MEASURES[name].of({"elevator": without_alarm()}, "elevator") == np.inf
 
 
-def test_what_never_happens_is_infinite(flights):
-    never = {"elevator": NEVER, "unanticipated": NEVER}
-    assert claims._detection("elevator", never) == np.inf
-    assert claims._isolation("elevator", never) == np.inf
-    assert claims._last_to_go(never) == np.inf
-    assert claims._adaptive_after(never) == np.inf
-    assert claims._said_theta("elevator", never) == ""
-    assert claims._sharpened("elevator", never) == ""
-    assert claims._last_standing(never) == "at no time is a known fault left alone"
+def test_what_is_counted_without_an_alarm():
+    never = {"elevator": without_alarm()}
+    counted = ("detected", "isolated", "handled", "decisions", "order", "residuals", "generalised")
+    assert [measures.MEASURES[name].of(never, "elevator") for name in counted] == [0.0] * 7
+    assert measures.estimators(never, "elevator") == 1
+    assert measures.left(never, "elevator") == 3
+    assert measures.named(never, "elevator") == 0.0
+
+
+def test_an_aircraft_that_is_lost_tracks_nothing(flights):
+    lost = {"elevator": flown(departure={"time_s": 20.0}), "elevator-nominal": flown()}
+    for measure in (measures.worst_tracking, measures.learning, measures.beside_nominal):
+        assert measure(lost, "elevator") == np.inf
+    assert measures.healthy_tracking(lost, "elevator") == measures.unapproximated(lost, "elevator") == np.inf
+    assert measures.tracking(lost, "elevator", "q") == np.inf
+
+
+def test_a_flap_that_stands_still_carries_nothing():
     still = flown()
     still.log["flap_cmd_rad"] = np.zeros_like(T_S)
-    assert claims._share_of_elevator({"elevator": still}) == np.inf
-    assert claims._share_of_elevator({"elevator": flown(until_s=14.9)}) == np.inf
-    lost = flown(departure={"time_s": 20.0})
-    assert claims._tracking("elevator", "q", {"elevator": lost}) == np.inf
-    both = {"unanticipated": flown(fault=None), "unanticipated-interval": flown(fault=None)}
-    assert not claims._last_standing(both).endswith("never names it")
-    assert claims._last_standing(both | {"unanticipated-interval": NEVER}).endswith(
-        "the interval test never names it"
-    )
-    assert claims._lost({"unanticipated-nominal": flown()}) == "tracking lost, aircraft kept"
+    assert measures.share_of_elevator({"elevator": still}, "elevator") == np.inf
+    assert measures.share_of_elevator({"elevator": flown(until_s=14.9)}, "elevator") == np.inf
+    assert measures.decisions({"elevator": still}, "elevator") == 1.0
+
+
+def test_an_estimator_that_is_left_out_has_neither_residuals_nor_an_exclusion():
+    found = flown()
+    found.log["fie_rudder_excluded"][:] = 1.0
+    assert not found.has("rudder")
+    assert found.has("aileron")
+    assert found.excluded_at_s("rudder") == np.inf
+    assert not found.residuals_of("rudder").any()
+    assert found.closest("rudder") == 0.0
+    assert measures.estimators({"elevator": found}, "elevator") == 3
+    assert measures.residuals({"elevator": found}, "elevator") == 6
 
 
 @pytest.mark.parametrize(("at_least", "holds"), [(False, [True, True, False]), (True, [False, True, True])])
-def test_a_reading_holds_up_to_its_limit(at_least, holds):
-    reading = claims.Reading("number", "s", 2.0, at_least)
-    assert [reading.holds(number) for number in (1.9, 2.0, 2.1)] == holds
+def test_a_claim_holds_up_to_its_limit(at_least, holds):
+    claim = MEASURED[0]
+    claim = claim._replace(limit=2.0, measure=claim.measure._replace(at_least=at_least))
+    assert [claim.holds(number) for number in (1.9, 2.0, 2.1)] == holds
 
 
 @pytest.fixture
 def document(flights):
-    well = [c.reading.limit * (2.0 if c.reading.at_least else 0.5) for c in CLAIMS]
-    numbers = [[number * (1 + j / 50) for number in well] for j, _ in enumerate(VARIANTS)]
-    numbers[3][4], numbers[5][0], numbers[7][1] = np.inf, 0.15, 1.5
-    found = reproduction.document_of(flights, numbers)
+    """Statements that hold everywhere, but for a few, and fail without their mechanism, but for one."""
+    well = [c.limit * (2.0 if c.measure.at_least else 0.5) for c in MEASURED]
+    ill = [-1.0 if c.measure.at_least else 2.0 * c.limit + 1.0 for c in MEASURED]
+    rows = {setting.name: list(well) for setting in reproduction.SETTINGS} | {
+        ablation.name: list(ill) for ablation in ABLATIONS
+    }
+    rows[MEASURED[2].ablation][2] = well[2]
+    rows[VARIANTS[3].name][4], rows[BEYOND[5].name][0] = np.inf, 0.15
+    rows["control network_gain halved"][7] = np.inf
+    alarms = [[float(i in (3, 30, 31))] for i in range(54)]
+    both = {
+        (case.name, whose): flown(f"{case.name} {whose}", None if case is beside.HEALTHY else case.name)
+        for case in beside.SHOWN
+        for whose in beside.WHOSE
+    }
+    both["rudder", "paper"].metrics["tracking"]["surface_travel_deg"]["aileron"] = 1.0
+    both["elevator", "ours"].metrics["detection"]["delay_s"] = None
+    both["unanticipated", "paper"] = flown("lost", None, {"time_s": 20.0})
+    designs = [(without_alarm(), flown()), (flown(), flown()), (without_alarm(), without_alarm())]
+    designs[1][1].metrics["false_alarm"] = True
+    every = reproduction.Flights(flights, both, designs)
+    monkey = pytest.MonkeyPatch()
+    ours = dict(zip(MEASURED, well, strict=True))
+    monkey.setattr(type(MEASURED[0]), "number", lambda claim, _: ours[claim])
+    found = reproduction.document_of(every, [*rows.values(), *alarms])
+    monkey.undo()
     assert [case["metrics"] for case in found["cases"]] == [flown.metrics for flown in flights.values()]
     return found | {"versions": {"ours": "1"}}
 
@@ -135,23 +199,39 @@ def test_the_document_and_its_pages(document, changed, tmp_path):
         {key: value for key, value in document.items() if key not in ("cases", "choices", "sensitivity")}
     )
     assert not changed(
-        [(row["variant"], row["missed"]) for row in document["sensitivity"]],
+        [(row["variant"], row["missed"]) for row in document["sensitivity"] if row["missed"]],
         "variants",
     )
-    assert not changed(reproduction.as_text(document, "out").splitlines(), "text")
+    assert not changed(words.as_text(document, "out").splitlines(), "text")
     (tmp_path / "figures").mkdir()
     for name in (*(view.name for view, _, _ in FIGURES), "sensitivity"):
         (tmp_path / "figures" / f"{name}.png").write_bytes(name.encode())
-    assert not changed(page(reproduction.as_html(document, tmp_path)), "page")
-    text = reproduction.as_markdown(document, "pictures")
+    assert not changed(page(words.as_html(document, tmp_path)), "page")
+    text = words.as_markdown(document, "pictures")
     assert text.count("](pictures/") == len(FIGURES) + 1
     assert text.startswith("# ")
+
+
+def test_the_document_says_what_failed(document):
+    by_statement = {claim["statement"]: claim for claim in document["claims"]}
+    assert by_statement[MEASURED[2].statement]["verdict"] == "cannot be judged"
+    assert by_statement[MEASURED[4].statement]["verdict"] == "borne out"
+    assert by_statement[MEASURED[4].statement]["held_in"] == len(reproduction.ELSEWHERE) - 1
+    assert document["beside"]["false_alarms"] == {"paper": 1, "ours": 2}
+    better = {(row["case"], row["quantity"]) for row in document["beside"]["paper_better"]}
+    assert better == {("rudder", "surface travel"), ("elevator", "detection after")}
+    assert [row["alarm_s"] for row in document["truth_and_design"]["designs"]] == [None, 12.2, None]
+    (halved,) = (row for row in document["gains"] if row["key"] == "control.options.network_gain")
+    assert [missed["statement"] for missed in halved["halved"]] == [MEASURED[7].statement]
+    assert halved["doubled"] == []
+    assert document["passed"]
+    assert sum(document["counts"].values()) == len(CLAIMS)
 
 
 def test_how_far_each_statement_is_from_its_limit(document, changed):
     figure = margins_figure(document)
     assert not changed(picture(figure))
-    assert figure.get_size_inches().tolist() == [12.0, pytest.approx(0.6 + 0.28 * len(CLAIMS))]
+    assert figure.get_size_inches().tolist() == [12.0, pytest.approx(0.6 + 0.25 * len(MEASURED))]
 
 
 def test_each_figure_has_its_panels(changed):
@@ -175,9 +255,10 @@ def test_figures_are_drawn_of_their_case_and_span(flights, document, changed, mo
 
 
 def test_the_cases_and_the_choices(changed):
-    groups = {"published": PUBLISHED, "beside": BESIDE, "variants": VARIANTS}
+    groups = {"published": PUBLISHED, "variants": VARIANTS, "ablations": ABLATIONS}
     assert not changed(
         {these: [(c.name, c.changes, c.shown_in) for c in cases] for these, cases in groups.items()}
+        | {"ours": OURS, "beyond": [(c.name, c.changes) for c in BEYOND]}
     )
     assert not changed([asdict(choice) for choice in CHOICES], "choices")
     assert not changed(
@@ -185,14 +266,26 @@ def test_the_cases_and_the_choices(changed):
     )
 
 
-def test_numbers_of_a_variant_are_of_its_own_flights(monkeypatch):
+def test_numbers_of_a_setting_are_of_its_own_flights(monkeypatch):
     asked = []
     monkeypatch.setattr(
         reproduction, "fly_case", lambda case, changes=None: asked.append((case.name, changes)) or flown()
     )
-    found = reproduction.numbers_of(Changed("half", {"rate_hz": 50.0}, ""))
+    found = reproduction.row_of((reproduction.NUMBERS, Changed("half", {"rate_hz": 50.0}, "")))
     assert asked == [(case.name, {"rate_hz": 50.0}) for case in PUBLISHED]
-    assert len(found) == len(CLAIMS)
-    asked.clear()
-    assert list(reproduction.fly_published()) == [case.name for case in (*PUBLISHED, *BESIDE)]
-    assert {changes for _, changes in asked} == {None}
+    assert len(found) == len(MEASURED)
+
+
+def test_what_is_flown_to_be_shown(monkeypatch):
+    asked = []
+    for module in (reproduction, beside, truth_and_design):
+        monkeypatch.setattr(
+            module, "fly_case", lambda case, changes=None: asked.append((case.name, changes)) or case.name
+        )
+    flights = reproduction.fly_published()
+    assert list(flights.published) == [case.name for case in PUBLISHED]
+    assert list(flights.beside.items())[:2] == [
+        (("fault-free", "paper"), "fault-free"), (("fault-free", "ours"), "fault-free"),
+    ]  # fmt: skip
+    assert asked[len(PUBLISHED) + 1] == ("fault-free", OURS)
+    assert flights.designs == [("fault-free", "elevator")] * 3

@@ -2,29 +2,64 @@
 
 import pytest
 
-from beaver_ftc.studies.reproduce import reproduction as words
+from beaver_ftc.studies.reproduce import beside, truth_and_design, words
 
 CLAIMS = [
     {
-        "where": "Fig. 2", "statement": "The alarm is early.", "quantity": "delay", "number": 0.2468,
-        "unit": "s",
-        "limit": 1.0, "at_least": False, "passed": True, "remark": "", "lowest": 0.1, "highest": 123.4,
-        "held_in": 2,
+        "where": "Fig. 2", "statement": "The alarm is early.", "flights": ["elevator", "q"],
+        "quantity": "delay", "number": 0.2468,
+        "unit": "s", "limit": 1.0, "limit_from": "the paper's own", "at_least": False, "none": "never",
+        "without": "the alarm", "number_without": None, "verdict": "stronger than the paper", "because": "",
+        "reason": "", "lowest": 0.1, "highest": 123.4, "held_in": 2, "elsewhere": 2,
     },
     {
-        "where": "Fig. 5", "statement": "Most of it is given.", "quantity": "share", "number": 0.25,
-        "unit": "of the demand", "limit": 0.5, "at_least": True, "passed": False, "remark": "see the text",
-        "lowest": None, "highest": 0.9, "held_in": 1,
+        "where": "Fig. 5", "statement": "Most of it is given.", "flights": ["rudder"],
+        "quantity": "share", "number": 0.25,
+        "unit": "of the demand", "limit": 0.5, "limit_from": "most", "at_least": True, "none": "nothing",
+        "without": "the flap", "number_without": 0.125, "verdict": "not borne out", "because": "see the text",
+        "reason": "", "lowest": None, "highest": 0.9, "held_in": 1, "elsewhere": 2,
+    },
+    {
+        "where": "IV", "statement": "There are others.", "verdict": "cannot be judged", "reason": "of others",
+        "because": "",
     },
 ]  # fmt: skip
+MISSED = {**CLAIMS[1], "number": 0.3}
+PAPER = {
+    "case": "rudder", "flown_by": "paper", "detected_s": 0.28, "named": "rudder", "isolated_s": 0.29,
+    "before_deg_s": 0.084, "after_deg_s": 0.158, "travel_deg": 210.0, "work_deg2_per_s": 864.0,
+    "departed": False,
+}  # fmt: skip
 DOCUMENT = {
+    "counts": {"stronger than the paper": 1, "borne out": 0, "not borne out": 1, "cannot be judged": 1},
     "claims": CLAIMS,
+    "ablations": [
+        {"takes": "the flap", "changes": {"a": 1, "b.c": [], "d": {"p": 0.5}}, "statements": 2, "fail": 1},
+    ],
     "sensitivity": [
-        {"variant": "at 50 Hz", "missed": [{**CLAIMS[1], "number": 0.3}]},
+        {"variant": "at 50 Hz", "missed": [MISSED]},
         {"variant": "no engine", "missed": []},
     ],
     "choices": [{"key": "lambda", "value": {"p": 1.5, "q": [2.0, 3]}, "reason": "not in the paper"}],
-}
+    "gains": [
+        {"key": "control.options.gain", "default": 60.0, "says": "how fast", "origin": "search",
+         "halved": [MISSED], "doubled": []},
+    ],
+    "beside": {
+        "rows": [PAPER, {**PAPER, "flown_by": "ours", "detected_s": None, "named": None, "departed": True}],
+        "healthy_flights": 27, "false_alarms": {"paper": 0, "ours": 3},
+        "paper_better": [
+            {"case": "rudder", "quantity": "isolation after", "unit": "s", "paper": 0.2, "ours": None},
+        ],
+    },
+    "truth_and_design": {
+        "terms": [{"moment": "Cm", "truth": ["Cm_0", "Cm_dpt"], "omitted": ["Cm_dpt"]}],
+        "designs": [
+            {"design": "as printed", "bound": "0.02", "alarm_s": None, "detected_s": 0.1234,
+             "share": {"p": 0.5, "q": 11.22, "r": 2.0}, "false_alarm": False, "named": None},
+        ],
+    },
+}  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -40,48 +75,88 @@ def test_numbers_have_three_digits_and_shares_are_in_percent(value, unit, said):
 
 def test_each_statement_is_a_row_of_the_verdict():
     assert words.verdict_rows(DOCUMENT) == [
-        ("Fig. 2", "The alarm is early.", "delay 0.247 s (at most 1)", "borne out", ""),
         (
-            "Fig. 5", "Most of it is given.", "share 25.0 % of the demand (at least 50 %)", "NOT BORNE OUT",
-            "see the text",
+            "Fig. 2", "The alarm is early.", "elevator, q: delay 0.247 s", "at most 1: the paper's own",
+            "the alarm: never", "stronger than the paper", "",
         ),
+        (
+            "Fig. 5", "Most of it is given.", "rudder: share 25.0 % of the demand",
+            "at least 50 %: most",
+            "the flap: 12.5 % of the demand", "not borne out", "see the text",
+        ),
+        ("IV", "There are others.", "-", "-", "-", "cannot be judged", "of others"),
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("verdict", "because", "said"),
+    [
+        ("borne out", "", "in 1 of 2 settings that the paper did not fly"),
+        ("cannot be judged", "", "holds without it as well"), ("not borne out", "as it is", "as it is"),
+        ("not borne out", "", ""), ("stronger than the paper", "", ""),
+    ],
+)  # fmt: skip
+def test_what_a_verdict_hangs_on(verdict, because, said):
+    assert words.remark({**CLAIMS[1], "verdict": verdict, "because": because}) == said
 
 
 def test_what_changes_make_of_a_statement():
     assert words.sensitivity_rows(DOCUMENT) == [
         ("Fig. 2", "The alarm is early.", "0.1 s", "123 s", "2 of 2"),
-        ("Fig. 5", "Most of it is given.", "never", "90.0 % of the demand", "1 of 2"),
+        ("Fig. 5", "Most of it is given.", "nothing", "90.0 % of the demand", "1 of 2"),
     ]
     assert words.exceptions(DOCUMENT) == ["at 50 Hz: Fig. 5, most of it is given: 30.0 % of the demand"]
     assert words.choice_rows(DOCUMENT) == [("lambda", "p 1.5, q 2; 3", "not in the paper")]
+    assert words.gain_rows(DOCUMENT) == [
+        (
+            "control.options.gain", "60", "how fast", "search",
+            "Fig. 5, most of it is given: 30.0 % of the demand", "none",
+        ),
+    ]  # fmt: skip
+    assert words.ablation_rows(DOCUMENT) == [("the flap", "a: 1; b.c: none; d: p 0.5", "2", "1")]
+
+
+def test_both_schemes_and_both_designs_in_rows():
+    both, designs = DOCUMENT["beside"], DOCUMENT["truth_and_design"]
+    paper, ours = beside.rows_of(both)
+    assert paper == (
+        "rudder", "paper", "0.28 s", "rudder", "0.29 s", "0.084 deg/s", "0.158 deg/s", "210 deg",
+        "864 deg²/s",
+    )  # fmt: skip
+    assert ours[1:4] == ("ours", "-", "-")
+    assert ours[6] == "aircraft lost"
+    assert beside.sentences(both) == ["rudder: isolation after 0.2 s, ours never"]
+    assert beside.alarms_sentence(both).endswith("published uncertainty: 0 by the paper and 3 by ours.")
+    assert truth_and_design.term_rows(designs) == [("Cm", "Cm_0, Cm_dpt", "Cm_0", "Cm_dpt")]
+    assert truth_and_design.flown_rows(designs) == [
+        ("as printed", "0.02", "none", "0.5", "11.2", "2", "0.123 s", "-"),
+    ]
 
 
 def test_the_outcome_in_a_sentence():
-    assert words.summary(DOCUMENT) == (
-        "1 of 2 published statements are borne out; 1 of them under every one of 2 changes to what the paper "
-        "leaves open."
+    assert words.headline(DOCUMENT) == (
+        "3 published statements: 1 stronger than the paper, 0 borne out, 1 not borne out, 1 cannot be judged."
     )
+    assert words.summary(DOCUMENT).endswith("in all of 4 settings that the paper did not fly, too.")
 
 
 def test_the_terminal_shows_the_statements_and_what_excepts_them():
-    lines = words.as_text(DOCUMENT, "out").splitlines()
+    text = words.as_text(DOCUMENT, "out")
+    lines = text.splitlines()
     assert lines[0] == "[Zhang2005] flown again"
     head = next(line for line in lines if "Published" in line)
-    assert [head.index(word) for word in words.VERDICT_HEAD[:4]] == sorted(
-        head.index(word) for word in words.VERDICT_HEAD[:4]
-    )
-    assert any("Fig. 5" in line and "NOT BORNE OUT" in line for line in lines)
-    assert any("see the text" in line for line in lines)
-    assert lines[-4:] == [
-        words.summary(DOCUMENT), "  except at 50 Hz: Fig. 5, most of it is given: 30.0 % of the demand", "",
-        "page: out/reproduction.html",
-    ]  # fmt: skip
+    columns = [head.index(word) for word in ("Published", "Statement", "Our number", "Without", "Verdict")]
+    assert columns == sorted(columns)
+    assert any("Fig. 5" in line and "not borne out" in line for line in lines)
+    assert "see the" in text
+    assert "   1 of others" in lines
+    at = lines.index(words.summary(DOCUMENT))
+    assert lines[at + 1] == "  except at 50 Hz: Fig. 5, most of it is given: 30.0 % of the demand"
+    assert "  rudder: isolation after 0.2 s, ours never" in lines
+    assert lines[-1] == "page: out/reproduction.html"
 
 
-def test_what_is_not_borne_out_is_red_and_where_it_stands_is_not_broken():
+def test_what_is_not_borne_out_is_red_and_where_it_stands_is_there():
     coloured = words.as_text(DOCUMENT, "out", colour=True)
-    assert "\x1b[1;31mNOT BORNE OUT" in coloured
-    assert "\x1b[32mborne out" in coloured
-    long = {**CLAIMS[0], "where": "Figure 2 and section VII", "statement": "word " * 80}
-    assert "Figure 2 and section VII" in words.as_text({**DOCUMENT, "claims": [long]}, "out")
+    assert "\x1b[1;31mnot borne out" in coloured
+    assert "\x1b[32mstronger than the paper" in coloured

@@ -6,6 +6,7 @@ statement held against the flights again.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from beaver_ftc.documents.document import parse
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
 from beaver_ftc.results.metrics import Document, metrics
-from beaver_ftc.studies.reproduce.choices import FAULT_AT_S, scenario
+from beaver_ftc.studies.reproduce.choices import FAULT_AT_S, GIVEN, gains, scenario
 
 ESTIMATORS = ("aileron", "elevator", "rudder")
 SETTLED_S = 2.0  # from rest, or from a fault, to steady tracking: four error time constants
@@ -32,9 +33,26 @@ class Changed:
 
 
 _FILE = parse(Path(__file__).with_name("cases.yaml").read_text(encoding="utf-8")).data
-PUBLISHED, BESIDE, VARIANTS = (
+PUBLISHED, VARIANTS = (
     tuple(Changed(name, changes, _FILE["shown_in"].get(name, "")) for name, changes in _FILE[these].items())
-    for these in ("published", "beside", "variants")
+    for these in ("published", "variants")
+)
+OURS: Mapping[str, Any] = _FILE["ours"]  # what makes the published setting our default scheme and law
+GAINS = tuple(  # every gain of the published scheme and law, halved and doubled
+    Changed(f"{gain.key.split('.')[0]} {gain.name} {how}", {gain.key: share * gain.default}, gain.name)
+    for gain in gains()
+    for how, share in (("halved", 0.5), ("doubled", 2.0))
+)
+CASES = {case.name: case for case in PUBLISHED}
+AIRSPEEDS_MPS = (42.0, 43.0, 44.0, 46.0, 47.0, 48.0)
+CORNERS = tuple(
+    Changed("theta " + ", ".join(f"{theta:+g}" for theta in corner),
+            {"uncertainty.inertia_coupling": dict(zip(AXES, corner, strict=True))}, "")
+    for corner in product((-0.25, 0.0, 0.25), repeat=3)
+)  # fmt: skip
+BEYOND = (
+    *CORNERS,
+    *(Changed(f"airspeed {v:g} m/s", {"initial.airspeed_mps": v}, "") for v in AIRSPEEDS_MPS),
 )
 
 
@@ -44,6 +62,11 @@ class Flown:
 
     metrics: Document
     log: dict[str, np.ndarray]
+
+    @property
+    def frame_s(self) -> float:
+        """Length of a frame, s."""
+        return float(self.log["t_s"][1] - self.log["t_s"][0])
 
     def error_deg_s(self, axis: str) -> np.ndarray:
         """Tracking error of an axis, deg/s."""
@@ -67,39 +90,71 @@ class Flown:
         return (self.log["t_s"] >= start_s) & (self.log["t_s"] < end_s)
 
     def excluded_at_s(self, estimator: str) -> float:
-        """When an isolation estimator was excluded, s; infinite if it never was."""
+        """When an isolation estimator was excluded, s; infinite if it never was, or was not there at all."""
         out = np.flatnonzero(self.log[f"fie_{estimator}_excluded"] == 1)
-        return float(self.log["t_s"][out[0]]) if out.size else np.inf
+        return float(self.log["t_s"][out[0]]) if out.size and self.has(estimator) else np.inf
+
+    def has(self, estimator: str) -> bool:
+        """Whether an isolation estimator is there: one left out is excluded from the first frame on."""
+        return bool(self.log[f"fie_{estimator}_excluded"][0] != 1)
 
     def closest(self, estimator: str) -> float:
         """Largest |residual| / threshold of an isolation estimator, on the residual's side."""
+        return float(np.max(self.shares_of(estimator)))
+
+    def shares_of(self, estimator: str) -> np.ndarray:
+        """|residual| / threshold of an isolation estimator, on the residual's side, (3, frames)."""
         residual, lower, upper = (
             np.array([self.log[f"fie_{estimator}_{axis}_{what}_rad_s"] for axis in AXES])
             for what in ("residual", "lower", "upper")
         )
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = np.abs(residual / np.where(residual < 0, lower, upper))
-        return np.nanmax(np.where(residual == 0, 0.0, ratio))
+        return np.nan_to_num(np.where(residual == 0, 0.0, ratio), posinf=np.inf) * self.has(estimator)
+
+    def shares(self) -> np.ndarray:
+        """|residual| / threshold of the detection estimator, (3, frames); both start from zero."""
+        residual, threshold = (
+            np.array([self.log[f"{axis}_{what}_rad_s"] for axis in AXES])
+            for what in ("residual", "threshold")
+        )
+        zero = residual == 0
+        return np.abs(residual) / np.where(zero, 1.0, threshold)
 
     def closest_before_fault(self) -> float:
         """Largest |residual| / threshold of the detection estimator before the fault."""
-        healthy = self.between(self.log["t_s"][1], FAULT_AT_S)  # residual and threshold start from zero
-        residual, threshold = (
-            np.array([self.log[f"{axis}_{what}_rad_s"][healthy] for axis in AXES])
-            for what in ("residual", "threshold")
-        )
-        return float(np.max(np.abs(residual / threshold)))
+        return float(np.max(self.shares()[:, self.between(0.0, FAULT_AT_S)]))
+
+    def residuals_of(self, estimator: str) -> np.ndarray:
+        """The residuals of an isolation estimator, (3, frames) rad/s; zero while it is not at work."""
+        residuals = [self.log[f"fie_{estimator}_{axis}_residual_rad_s"] for axis in AXES]
+        return np.nan_to_num(residuals) * self.has(estimator)
+
+    def unexplained_rad_s2(self, axis: str) -> np.ndarray:
+        """The acceleration of each frame that the design model does not explain, (frames,) rad/s2."""
+        rate = self.log[f"{axis}_rad_s"]
+        return np.diff(rate, prepend=rate[0]) / self.frame_s - self.log[f"{axis}_design_rad_s2"]
 
     def named_s(self, estimator: str) -> float:
         """For how long this was the only estimator left, s."""
         others = [self.log[f"fie_{name}_excluded"] == 1 for name in ESTIMATORS if name != estimator]
         alone = np.all(others, axis=0) & (self.log[f"fie_{estimator}_excluded"] != 1)
         alone &= self.log["detected"] == 1
-        return float(alone.sum() * (self.log["t_s"][1] - self.log["t_s"][0]))
+        return float(alone.sum() * self.frame_s)
 
 
 def fly_case(case: Changed, changes: Mapping[str, Any] | None = None) -> Flown:
     """Fly a case, with further changes to the choices."""
     log = Columns()
-    flight = fly(scenario(case.name, {**case.changes, **(changes or {})}), log)
+    flight = fly(scenario(case.name, _apt({**case.changes, **(changes or {})})), log)
     return Flown(metrics(flight), log)
+
+
+def _apt(changes: Mapping[str, Any]) -> dict[str, Any]:
+    """The changes without options of the published scheme or law where another one flies."""
+    others = [
+        f"{options}."
+        for chosen, options in (("fdi.scheme", "fdi.options"), ("control.law", "control.options"))
+        if changes.get(chosen, GIVEN[chosen]) != GIVEN[chosen]
+    ]
+    return {key: value for key, value in changes.items() if not key.startswith(tuple(others))}

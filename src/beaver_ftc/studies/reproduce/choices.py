@@ -2,13 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from beaver_ftc.documents.keys import parse_key, with_values
+from beaver_ftc.plugins import DETECTORS, LAWS, options_of
 from beaver_ftc.scenario.schema import Scenario
 
 FAULT_AT_S = 12.0
 AMPLITUDE_DEG_S = 3.0
+ABLATION = "ablation"  # the origin of an option that takes a part of the scheme out
 
 # Section VII: the sinusoids of eta, the uncertainty's bound, and thresholds by the norm bound.
 GIVEN: Mapping[str, Any] = {
@@ -17,9 +19,8 @@ GIVEN: Mapping[str, Any] = {
     "uncertainty.sinusoid.r": {"amplitude_rad_s2": 0.02, "frequency_rad_s": 10},
     "fdi.bounds.inertia_coupling": {"p": 0.25, "q": 0.25, "r": 0.25},
     "fdi.bounds.constant_rad_s2": {"p": 0.02, "q": 0.02, "r": 0.02},
-    "fdi.thresholds": "published",
-    "fdi.sharpen": "none",
-    "control.law": "fault-tolerant-published",
+    "fdi.scheme": "zhang2005",
+    "control.law": "zhang2005",
 }
 
 
@@ -56,16 +57,39 @@ CHOICES = (
     ),
     Choice("fdi.detection_pole_per_s", 10.0, "a few times the bound shows within 0.1 s"),
     Choice("fdi.isolation_pole_per_s", 10.0, "the detection estimator's"),
-    Choice("fdi.forgetting_time_s", 5.0, "the estimate remembers one period of the pitch reference"),
     Choice("control.proportional_per_s", 2.0, "error bandwidth well above the references' 0.25 Hz"),
     Choice("control.integral_per_s2", 1.0, "Kp^2/4: two equal real error poles"),
     Choice(
         "control.reference_natural_frequency_rad_s", 10.0, "faster than the loop, slower than the frame rate"
     ),
     Choice("control.reference_damping", 1.0, "no overshoot"),
-    Choice("control.network_gain_per_s2", 60.0, "a well damped observer with the detection estimator's pole"),
     Choice("control.hand_over_s", 1.0, "continuous, and short beside the reference's period"),
 )
+
+
+class Gain(NamedTuple):
+    """An option of the published scheme or law that is a number to choose: its dotted key and its name, its
+    default, what it is, and how it was chosen."""
+
+    key: str
+    name: str
+    default: float
+    says: str
+    origin: str
+
+
+def gains() -> list[Gain]:
+    """Every such option, from the scheme's and the law's own tables; those that take a part out are not."""
+    tables = (
+        ("fdi.options", options_of(DETECTORS, GIVEN["fdi.scheme"])),
+        ("control.options", options_of(LAWS, GIVEN["control.law"])),
+    )
+    return [
+        Gain(f"{section}.{name}", name, row["default"], row["says"], row["origin"])
+        for section, rows in tables
+        for name, row in rows.items()
+        if row["origin"] != ABLATION
+    ]
 
 
 # Both together, as the sections of a scenario.

@@ -1,0 +1,143 @@
+"""The published cases by the paper's scheme and law and by our defaults, side by side.
+
+What is flown, declared and asked for is the same; only who diagnoses and who controls differs.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from beaver_ftc.results.metrics import Document
+from beaver_ftc.studies.present.tables import number
+from beaver_ftc.studies.reproduce.cases import CASES, CORNERS, OURS, Changed, Flown, fly_case
+from beaver_ftc.studies.reproduce.measures import AXIS
+
+HEALTHY = Changed("fault-free", {}, "")
+SHOWN = (HEALTHY, *(CASES[name] for name in ("elevator", "aileron", "rudder", "unanticipated")))
+WHOSE: Mapping[str, Mapping[str, object]] = {"paper": {}, "ours": OURS}
+HEAD = (
+    "Case", "Flown by", "Detected after", "Isolated as", "after", "RMS before", "RMS after", "Surface travel",
+    "Surface work",
+)  # fmt: skip
+BETTER = "Where the paper's is better, by more than 1 %:"
+MATTERS = 0.01  # a smaller share of a number is no difference
+
+
+class Quantity(NamedTuple):
+    """A number of which less is better: its key in a row, what it is called, its unit."""
+
+    key: str
+    called: str
+    unit: str
+
+
+QUANTITIES = (
+    Quantity("detected_s", "detection after", "s"), Quantity("isolated_s", "isolation after", "s"),
+    Quantity("before_deg_s", "RMS before the fault", "deg/s"),
+    Quantity("after_deg_s", "RMS after the fault", "deg/s"),
+    Quantity("travel_deg", "surface travel", "deg"), Quantity("work_deg2_per_s", "surface work", "deg²/s"),
+)  # fmt: skip
+
+
+def fly_beside() -> dict[tuple[str, str], Flown]:
+    """Every case of SHOWN, flown by both: (case, whose)."""
+    return {(case.name, whose): fly_case(case, how) for case in SHOWN for whose, how in WHOSE.items()}
+
+
+def healthy_settings() -> list[tuple[str, Changed]]:
+    """The corners and edges of the published uncertainty, for both: (whose, the setting)."""
+    return [
+        (whose, Changed(corner.name, {**how, **corner.changes}, ""))
+        for whose, how in WHOSE.items()
+        for corner in CORNERS
+    ]
+
+
+def false_alarm_of(setting: Changed) -> float:
+    """1 if a healthy flight in this setting raises an alarm."""
+    return float(fly_case(HEALTHY, setting.changes).metrics["false_alarm"])
+
+
+def document_of(flights: Mapping[tuple[str, str], Flown], alarms: Sequence[float]) -> Document:
+    """A row a case and scheme, and the false alarms of each; alarms: of each of healthy_settings."""
+    rows = [_row(case, whose, flown) for (case, whose), flown in flights.items()]
+    each = len(CORNERS)
+    counts = [int(sum(alarms[i * each : (i + 1) * each])) for i in range(len(WHOSE))]
+    return {
+        "rows": rows,
+        "healthy_flights": each,
+        "false_alarms": dict(zip(WHOSE, counts, strict=True)),
+        "paper_better": list(_better(rows)),
+    }
+
+
+def _row(case: str, whose: str, flown: Flown) -> Document:
+    found, axis = flown.metrics, AXIS.get(case, "q")
+    tracked, isolation = found["tracking"], found["isolation"] or {}
+    after = tracked["post_fault_rms_deg_s"]
+    return {
+        "case": case,
+        "flown_by": whose,
+        "scheme": found["flight"]["scheme"],
+        "law": found["flight"]["law"],
+        "detected_s": found["detection"]["delay_s"],
+        "named": isolation.get("fault"),
+        "isolated_s": isolation.get("delay_s"),
+        "axis": axis,
+        "before_deg_s": tracked["pre_fault_rms_deg_s"][axis],
+        "after_deg_s": after and after[axis],
+        "travel_deg": sum(tracked["surface_travel_deg"].values()),
+        "work_deg2_per_s": sum(tracked["surface_energy_deg2_s"].values()),
+        "departed": found["departure"] is not None,
+    }
+
+
+def _better(rows: Sequence[Document]) -> list[Document]:
+    """Where the paper's scheme or law does better than ours."""
+    pairs = zip(rows[::2], rows[1::2], strict=True)
+    return [
+        {
+            "case": paper["case"],
+            "quantity": q.called,
+            "unit": q.unit,
+            "paper": paper[q.key],
+            "ours": ours[q.key],
+        }
+        for paper, ours in pairs
+        for q in QUANTITIES
+        if not paper["departed"] and _less(paper[q.key], ours[q.key])
+    ]
+
+
+def _less(one: float | None, other: float | None) -> bool:
+    return one is not None and (other is None or one < (1.0 - MATTERS) * other)
+
+
+def rows_of(document: Document) -> list[tuple[str, ...]]:
+    """A row a flight, for HEAD."""
+    return [
+        (
+            row["case"], row["flown_by"], number(row["detected_s"], "s"), row["named"] or "-",
+            number(row["isolated_s"], "s"), number(row["before_deg_s"], "deg/s"),
+            "aircraft lost" if row["departed"] else number(row["after_deg_s"], "deg/s"),
+            number(row["travel_deg"], "deg"), number(row["work_deg2_per_s"], "deg²/s"),
+        )
+        for row in document["rows"]
+    ]  # fmt: skip
+
+
+def sentences(document: Document) -> list[str]:
+    """Where the paper's does better, a sentence a case and quantity."""
+    return [
+        f"{row['case']}: {row['quantity']} {number(row['paper'], row['unit'])}, ours "
+        f"{number(row['ours'], row['unit'], none='never')}"
+        for row in document["paper_better"]
+    ]
+
+
+def alarms_sentence(document: Document) -> str:
+    """The false alarms in a sentence."""
+    said = " and ".join(f"{count} by {whose}" for whose, count in document["false_alarms"].items())
+    return (
+        f"False alarms in {document['healthy_flights']} healthy flights at the corners and edges of the "
+        f"published uncertainty: {said.replace('by paper', 'by the paper')}."
+    )

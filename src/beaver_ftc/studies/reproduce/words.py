@@ -1,0 +1,230 @@
+"""The document of the reproduction in words: a text for the terminal, a page as Markdown and as HTML."""
+
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from beaver_ftc.documents.document import parse
+from beaver_ftc.results.metrics import Document
+from beaver_ftc.studies.present import page, tables
+from beaver_ftc.studies.present.tables import printed
+from beaver_ftc.studies.reproduce import beside, truth_and_design
+from beaver_ftc.studies.reproduce.claims import BORNE_OUT, CANNOT_BE_JUDGED, NOT_BORNE_OUT, STRONGER
+from beaver_ftc.studies.reproduce.published_figures import FIGURES, SENSITIVITY
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+NAME, WIDTH = "reproduction", 132
+VERDICT_HEAD = ("Published", "Statement", "Our number", "Limit", "Without", "Verdict", "Remark")
+ABLATION_HEAD = ("Taken out", "By", "Statements that speak of it", "Fail without it")
+SENSITIVITY_HEAD = ("Published", "Statement", "From", "To", "Held")
+CHOICES_HEAD = ("Key", "Value", "Reason")
+GAINS_HEAD = (
+    "Option",
+    "Default",
+    "What it is",
+    "Chosen by",
+    "Halved: no longer hold",
+    "Doubled: no longer hold",
+)
+_SAYS = parse(Path(__file__).with_name("page.yaml").read_text(encoding="utf-8")).data
+_STYLE = {STRONGER: "green", BORNE_OUT: "green", NOT_BORNE_OUT: "bold red"}
+_GOOD = {STRONGER: True, BORNE_OUT: True, NOT_BORNE_OUT: False}
+
+
+def number(value: float | None, unit: str = "", none: str = "never") -> str:
+    """A number in three digits with its unit; shares of something in percent."""
+    if value is not None and unit.startswith("of "):
+        return f"{100 * value:.1f} % {unit}"
+    return tables.number(value, unit, none=none)
+
+
+def ours(claim: Document) -> str:
+    """Quantity and number."""
+    return f"{claim['quantity']} {number(claim['number'], claim['unit'], claim['none'])}"
+
+
+def limit(claim: Document) -> str:
+    """The limit that the number must keep."""
+    share = claim["unit"].startswith("of ")
+    said = f"{100 * claim['limit']:.0f} %" if share else tables.number(claim["limit"])
+    return f"{'at least' if claim['at_least'] else 'at most'} {said}"
+
+
+def without(claim: Document) -> str:
+    """What is taken out, and the number then."""
+    return f"{claim['without']}: {number(claim['number_without'], claim['unit'], claim['none'])}"
+
+
+def verdict_rows(document: Document) -> list[tuple[str, ...]]:
+    """One row a statement, for VERDICT_HEAD."""
+    return [
+        (claim["where"], claim["statement"], "-", "-", "-", claim["verdict"], claim["reason"])
+        if claim["reason"]
+        else (
+            claim["where"], claim["statement"], f"{', '.join(claim['flights'])}: {ours(claim)}",
+            f"{limit(claim)}: {claim['limit_from']}",
+            without(claim), claim["verdict"], remark(claim),
+        )
+        for claim in document["claims"]
+    ]  # fmt: skip
+
+
+def remark(claim: Document) -> str:
+    """What the verdict hangs on, where that is not plain."""
+    if claim["verdict"] == BORNE_OUT:
+        return f"in {claim['held_in']} of {claim['elsewhere']} settings that the paper did not fly"
+    return "holds without it as well" if claim["verdict"] == CANNOT_BE_JUDGED else claim["because"]
+
+
+def ablation_rows(document: Document) -> list[tuple[str, ...]]:
+    """One row an ablation, for ABLATION_HEAD."""
+    return [
+        (row["takes"], "; ".join(f"{key}: {_value(value)}" for key, value in row["changes"].items()),
+         str(row["statements"]), str(row["fail"]))
+        for row in document["ablations"]
+    ]  # fmt: skip
+
+
+def sensitivity_rows(document: Document) -> list[tuple[str, ...]]:
+    """One row a measured statement: its number's range over the changes, for SENSITIVITY_HEAD."""
+    return [
+        (
+            claim["where"],
+            claim["statement"],
+            number(claim["lowest"], claim["unit"], claim["none"]),
+            number(claim["highest"], claim["unit"], claim["none"]),
+            f"{claim['held_in']} of {claim['elsewhere']}",
+        )
+        for claim in measured(document)
+    ]
+
+
+def measured(document: Document) -> list[Document]:
+    """The claims that have a measure."""
+    return [claim for claim in document["claims"] if not claim["reason"]]
+
+
+def exceptions(document: Document) -> list[str]:
+    """One sentence for each statement that no longer holds with a variant."""
+    return [
+        f"{row['variant']}: {_said(missed)}" for row in document["sensitivity"] for missed in row["missed"]
+    ]
+
+
+def _said(missed: Document) -> str:
+    """A statement that does not hold, and its number."""
+    statement, found = missed["statement"], number(missed["number"], missed["unit"], missed["none"])
+    return f"{missed['where']}, {statement[:1].lower()}{statement[1:-1]}: {found}"
+
+
+def gain_rows(document: Document) -> list[tuple[str, ...]]:
+    """One row an option, for GAINS_HEAD."""
+    return [
+        (row["key"], _value(row["default"]), row["says"], row["origin"],
+         *("; ".join(map(_said, row[how])) or "none" for how in ("halved", "doubled")))
+        for row in document["gains"]
+    ]  # fmt: skip
+
+
+def choice_rows(document: Document) -> list[tuple[str, ...]]:
+    """One row a choice, for CHOICES_HEAD."""
+    return [(choice["key"], _value(choice["value"]), choice["reason"]) for choice in document["choices"]]
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{key} {_value(part)}" for key, part in value.items())
+    if isinstance(value, list):
+        return "; ".join(_value(part) for part in value) or "none"
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def headline(document: Document) -> str:
+    """How many of the statements there are of each verdict, in a sentence."""
+    said = [f"{count} {verdict}" for verdict, count in document["counts"].items()]
+    return f"{len(document['claims'])} published statements: {', '.join(said)}."
+
+
+def summary(document: Document) -> str:
+    """The outcome in a few sentences."""
+    elsewhere = len(document["sensitivity"]) + 2 * len(document["gains"])
+    return (
+        f"{headline(document)} Borne out: it holds, and fails once its mechanism is taken out. Stronger: it "
+        f"holds in all of {elsewhere} settings that the paper did not fly, too."
+    )
+
+
+def as_text(document: Document, folder: str, colour: bool = False) -> str:
+    """The tables, what the sensitivity study says, and where the rest lies."""
+    both, unjudged = document["beside"], Counter(c["reason"] for c in document["claims"] if c["reason"])
+    side_by_side = tables.plain("Side by side", beside.HEAD, beside.rows_of(both))
+    designs = tables.plain(
+        "Truth and design", truth_and_design.FLOWN_HEAD,
+        truth_and_design.flown_rows(document["truth_and_design"]),
+    )  # fmt: skip
+    lines = [
+        printed([_table(document)], WIDTH, colour), "", "Nothing to measure:",
+        *(f"  {count:2} {reason}" for reason, count in unjudged.items()), "",
+        summary(document), *(f"  except {sentence}" for sentence in exceptions(document)), "",
+        printed([side_by_side], WIDTH, colour), "", beside.alarms_sentence(both), beside.BETTER,
+        *(f"  {sentence}" for sentence in beside.sentences(both) or ["nowhere"]), "",
+        printed([designs], WIDTH, colour), "", f"page: {folder}/reproduction.html",
+    ]  # fmt: skip
+    return "\n".join(lines)
+
+
+def _table(document: Document) -> "Table":
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(title="[Zhang2005] flown again", title_justify="left", box=box.SIMPLE_HEAD)
+    for head in ("Published", "Statement", "Our number", "Without", "Verdict"):
+        table.add_column(head)
+    for claim in measured(document):
+        said, verdict = f"{ours(claim)} ({limit(claim)})", claim["verdict"]
+        more = remark(claim)
+        table.add_row(
+            claim["where"], claim["statement"], f"{said}; {more}" if more else said, without(claim),
+            Text(verdict, _STYLE.get(verdict, "")),
+        )  # fmt: skip
+    return table
+
+
+def as_markdown(document: Document, figures: str) -> str:
+    """The page as Markdown; `figures` is the folder of the pictures, as the page sees it."""
+    return page.as_markdown([f"# {_SAYS['title']}", *_page(document)], figures)
+
+
+def as_html(document: Document, folder: Path) -> str:
+    """The HTML page, with the pictures that are in the folder's `figures`."""
+    whole = [*_page(document), page.versions_line(document["versions"])]
+    return page.as_html(_SAYS["title"], whole, {path.stem: path for path in (folder / "figures").iterdir()})
+
+
+def _page(document: Document) -> list[page.Part]:
+    missed, both, designs = exceptions(document), document["beside"], document["truth_and_design"]
+    changes = "; ".join(row["variant"] for row in document["sensitivity"])
+    return [
+        _SAYS["introduction"], summary(document),
+        page.Table(VERDICT_HEAD, verdict_rows(document), _GOOD),
+        _SAYS["ablations"], page.Table(ABLATION_HEAD, ablation_rows(document)),
+        page.Heading("Beside ours"), _SAYS["beside"],
+        page.Table(beside.HEAD, beside.rows_of(both)), beside.alarms_sentence(both),
+        page.Bullets(beside.BETTER, beside.sentences(both) or ["nowhere"]),
+        page.Heading("Truth and design"), _SAYS["truth"],
+        page.Table(truth_and_design.TERMS_HEAD, truth_and_design.term_rows(designs)), _SAYS["designs"],
+        page.Table(truth_and_design.FLOWN_HEAD, truth_and_design.flown_rows(designs)),
+        page.Heading("Figures"), _SAYS["figures"],
+        page.Pictures([(view.title, view.name) for view, _, _ in FIGURES]),
+        page.Heading("What the conclusions hang on"), _SAYS["sensitivity"],
+        page.Pictures([(_SAYS["margins"], SENSITIVITY)]),
+        page.Table(SENSITIVITY_HEAD, sensitivity_rows(document)),
+        *([page.Bullets("Where one does not:", missed)] if missed else []),
+        f"The changes: {changes}; and each gain below, halved and doubled.",
+        page.Heading("What the paper leaves open"), _SAYS["gains"],
+        page.Table(GAINS_HEAD, gain_rows(document)),
+        _SAYS["choices"], page.Table(CHOICES_HEAD, choice_rows(document)),
+    ]  # fmt: skip

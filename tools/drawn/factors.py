@@ -122,6 +122,12 @@ def grows(schema: Node, kind: str) -> bool:
     return "incipient" in fault_types(schema)[kind]["properties"]["profile"].get("enum", ())
 
 
+# What goes with the published scheme.
+_AS_PUBLISHED = {
+    "detector": ("worst-case",), "fdi.fault_class": (LEFT_OUT, "published"),
+    "fdi.pairs": (LEFT_OUT, "false"), "fdi.sensor_monitor": (LEFT_OUT, "auto"), "fdi.probing": (LEFT_OUT,),
+    "fdi.thresholds": (LEFT_OUT, "published"), "fdi.sharpen": (LEFT_OUT, "none"),
+}  # fmt: skip
 MOVING_AIR = ("air", "gusts", "environment.wind_mps")
 NOISY = ("tactical-grade", "consumer-grade", DRAWN)
 
@@ -168,6 +174,8 @@ class Together:
         """What the schema's own checks refuse."""
         if (name, other) == ("autopilot.heading_deg", "autopilot.bank_deg"):
             return LEFT_OUT not in (level, there)
+        if (name, level) == ("scheme", "zhang2005"):
+            return there not in _AS_PUBLISHED.get(other, (there,))
         return (name, level) == ("fdi.pairs", "true") and cls._not_with_pairs(other, there)
 
     @staticmethod

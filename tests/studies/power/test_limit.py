@@ -36,7 +36,7 @@ def covariance(context, n):
         unexplained = process(context.constant_rad_s2[j] / np.sqrt(2.0), UNEXPLAINED_S)
         accelerations[j, :, j] += unexplained + declared.model_rad_s2[j] ** 2 * np.eye(n)
     summed = DT * np.tril(np.ones((n, n)), -1)
-    rates = np.einsum("kl,albm,nm->akbn", summed, accelerations, summed)
+    rates = np.einsum("kl,albm,nm->akbn", summed, accelerations, summed, optimize=True)
     for i in range(3):
         gyro = declared.gyro_rad_s[i] ** 2 + 1e-10
         rates[i, :, i] += gyro * np.eye(n) + gyro  # noise, and where it began

@@ -157,9 +157,10 @@ def test_what_is_compiled_in():
         for group in (DETECTORS, LAWS)
     }
     assert names == {
-        DETECTORS: {"adaptive-estimators", "none"},
+        DETECTORS: {"adaptive-estimators", "zhang2005", "none"},
         LAWS: {
             "nominal", "adaptive", "fault-tolerant", "fault-tolerant-published", "oracle", "oracle-published",
+            "zhang2005",
         },
     }  # fmt: skip
     assert not plugins.is_compiled(DETECTORS, "oracle")

@@ -15,6 +15,7 @@ from beaver_ftc.studies.reproduce.choices import scenario
 from flying import loss
 
 UNANTICIPATED = {"type": "unanticipated", "Cm_alpha3": 10, "at_s": 12.0}
+OURS = {"fdi.scheme": "adaptive-estimators", "fdi.thresholds": "published", "fdi.sharpen": "none"}
 SHARPENED = {"fdi.thresholds": "interval", "fdi.sharpen": "all"}
 PUBLISHED, DEFAULT = "fault-tolerant-published", "fault-tolerant"
 
@@ -28,7 +29,7 @@ def landed(changes, detector=None):
 
 def unanticipated(law, airspeed_mps, **changes):
     return landed(
-        {"faults": [UNANTICIPATED], "control.law": law, "initial.airspeed_mps": airspeed_mps} | changes
+        {"faults": [UNANTICIPATED], "control.law": law, "initial.airspeed_mps": airspeed_mps} | OURS | changes
     )
 
 

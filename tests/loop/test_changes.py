@@ -154,6 +154,16 @@ def test_a_change_now_before_one_that_is_to_come():
     assert same_log(sim.log, bf.fly(sim.scenario_flown()).log)
 
 
+@pytest.mark.parametrize("seed", [6, 15, 25])
+def test_a_diagnosis_that_begins_in_moving_air_takes_its_gust_for_no_fault(seed):
+    """Not told that the gust of its first frame fades unseen, it alarmed within 0.3 s."""
+    air = {"environment": {"turbulence": "dryden", "severity": "moderate"}, "control": {"law": "nominal"}}
+    fdi = {"fault_class": "all", "statistical": {}, "bounds": {"turbulence": "moderate"}}
+    again = [{"at_s": 3.2, "scheme": "adaptive-estimators"}]
+    of = {"name": "x", "duration_s": 5.0, "rate_hz": 104.0, "seed": seed, "fdi": fdi, "changes": again}
+    assert bf.fly(bf.Scenario.model_validate(of | air)).metrics["detection"]["detected"] is False
+
+
 def test_a_change_that_has_not_been_flown_is_not_kept():
     sim = bf.Simulation(scenario(duration_s=2.0))
     sim.step(frames=50)

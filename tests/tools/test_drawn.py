@@ -73,12 +73,12 @@ def test_the_scenarios_have_every_pair_of_what_the_issue_names():
             "autopilot": bool(scenario.autopilot), "changes": bool(scenario.changes),
             "type": fault and fault.type, "sensor fault": sensor and sensor.type,
         }])  # fmt: skip
-    schemes, laws = len({s for s, in_ in scheme_pairs(found)}), 9
+    schemes, laws = len({s for s, in_ in scheme_pairs(found)}), 10
     types = {dict(pair).get("type") for pair in found if "type" in dict(pair)}
-    assert schemes == 7
+    assert schemes == 8
     assert len(types) == 9  # eight, and none
     of = [dict(pair) for pair in found]
-    assert len({(one["scheme"], one["law"]) for one in of if one.keys() == {"scheme", "law"}}) == 7 * laws
+    assert len({(one["scheme"], one["law"]) for one in of if one.keys() == {"scheme", "law"}}) == 8 * laws
     assert len({(one["type"], one["law"]) for one in of if one.keys() == {"type", "law"}}) == 9 * laws
     assert (
         len({(one["air"], one["sensor fault"]) for one in of if one.keys() == {"air", "sensor fault"}})

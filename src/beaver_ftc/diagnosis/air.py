@@ -49,6 +49,8 @@ AIR = record(
     rolling=float,  # lag of the rolling gust times airspeed, m
     # Scale of the gusts, m; share of a yawing one that turning loses at this instant, and that is lost.
     scale=float, lost=float, turning=float,
+    # Whether the diagnosis begins in air that is moving by then; share of a pitching gust unseen for that.
+    in_flight=int, late=float,
     # How fast the axes of the gusts turn in the body, 1/s, and whether that matters.
     swing=(3, 3), swings=int,
     # Variance of what that moves the accelerations by, (rad/s2)2: in the frame that goes on, in the one
@@ -99,11 +101,13 @@ def advance_axes(air, y, attitude):
 
 @kernel
 def begin(air, y, attitude):
-    """The first frame of a diagnosis, which may begin in flight: no gust has been seen to change yet."""
+    """The first frame of a diagnosis: no gust has been seen to change yet. One that is there already, of a
+    diagnosis that begins in flight, fades unseen."""
     advance_axes(air, y, attitude)
     turn_gusts(air, 0.0, 1.0)
     air.gust[:] = 0.0
-    air.started, air.lost, air.turning = 0, 0.0, 0.0
+    air.started, air.lost = 0, 0.0
+    air.turning = air.late = float(air.in_flight)
     air.leaping[:], air.leapt[:], air.leap[:], air.leaps = 0.0, 0.0, 0.0, 0
 
 
@@ -176,6 +180,7 @@ def observe(air, y, attitude, dt):
     before, air.lost = air.lost, lost_by_turning(air, V, turned / dt)
     lost = max(before, air.lost)
     air.turning = min(max(np.exp(-dt / yawing) * air.turning, lost), 1.0)
+    air.late *= np.exp(-dt / pitching)
     air.gust[1] = np.exp(-dt / pitching) * air.gust[1] + (down - air.velocity[2]) / (V * pitching)
     air.gust[2] = np.exp(-dt / yawing) * air.gust[2]
     if lost < 1.0:
@@ -228,12 +233,18 @@ def look(air, design, x, y, u, attitude, dt):
 
 
 @kernel
+def hidden(air, g):
+    """Share of the gust about axis g that the vanes do not show in this frame."""
+    further = 0.0 if g == 0 else (air.late if g == 1 else air.turning)
+    return min(air.unseen[g] + further, 1.0)
+
+
+@kernel
 def unseen_drift(air, V, i, j):
     """Intensity, (rad/s2)2/s, with which the air's unseen rotation moves accelerations i and j; V m/s."""
     total = 0.0
     for g in range(3):
-        unseen = air.unseen[g] if g != 2 else min(air.unseen[g] + air.turning, 1.0)
-        total += together(air, air.axes, i, j, g) * unseen * air.per_metre[g]
+        total += together(air, air.axes, i, j, g) * hidden(air, g) * air.per_metre[g]
     return total * V
 
 
@@ -287,8 +298,7 @@ def drift_beside(air, V, by_rates, by_forces):
     do: (3,) 1/s each, about the body axes."""
     total = 0.0
     for g in range(3):
-        unseen = air.unseen[g] if g != 2 else min(air.unseen[g] + air.turning, 1.0)
-        of_rates = np.sqrt(unseen) * abs(along(by_rates, air.axes, g))
+        of_rates = np.sqrt(hidden(air, g)) * abs(along(by_rates, air.axes, g))
         total += (of_rates + abs(along(by_forces, air.axes, g))) ** 2 * air.per_metre[g]
     return total * V
 

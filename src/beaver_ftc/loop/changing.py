@@ -176,5 +176,7 @@ def take_diagnosis(frame: np.void, new: np.void, k: int) -> None:
     other["watch"]["past"] = 0  # its first look begins a frame
     if fdi["bank"]["n"] == other["bank"]["n"]:
         other["bank"]["closest"] = fdi["bank"]["closest"]
+    for air in ("air", "inertial_air"):
+        other["statistical"][air]["in_flight"] = k > 0
     other["statistical"]["alarm"]["closest"] = fdi["statistical"]["alarm"]["closest"]
     frame["fdi"], frame["verdict"], frame["since"] = other, new["verdict"], k

@@ -248,6 +248,7 @@ def test_the_row_of_a_made_flight(changed):
     document["isolation"] |= {
         "estimate_interval": [-0.5, -0.3], "probing_s": [13.0, 14.5], "candidates": ["bias", "float"],
         "faults": [{"fault": "flap", "type": "bias"}, {"fault": "rudder", "type": None}, {"fault": None}],
+        "withdrawn": [{"fault": "elevator"}, {"fault": "aileron"}],
     }  # fmt: skip
     modes = [("nominal", 0.0), ("adaptive", 12.1), ("reallocated", 12.5), ("adaptive", 13.0)]
     document["supervisor"] = [{"mode": mode, "time_s": at_s} for mode, at_s in modes]

@@ -74,6 +74,9 @@ _ELSEWHERE: dict[str, Getter] = {
     "isolation.probing_s.to": _end_of_pair("probing_s", 1),
     "isolation.candidates": lambda document, flight: " ".join(document["isolation"]["candidates"]),
     "isolation.faults": _faults,
+    "isolation.withdrawn": lambda document, flight: " ".join(
+        gone["fault"] for gone in document["isolation"]["withdrawn"]
+    ),
     "supervisor.mode": lambda document, flight: document["supervisor"][-1]["mode"],
     "supervisor.adaptive_at_s": _first_entry("adaptive"),
     "supervisor.reallocated_at_s": _first_entry("reallocated"),

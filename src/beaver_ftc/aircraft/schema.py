@@ -10,6 +10,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
+from beaver_ftc.aircraft.channels import ChannelsSection
 from beaver_ftc.documents.base import Conflict, Flag, Number, Section, Whole, number, refuse
 from beaver_ftc.documents.errors import suggestion
 
@@ -250,6 +251,7 @@ class AircraftFile(Section):
     groups: who can stand in for whom, in the order of hand-over
     model_error_rad_s2: added to the declared bound of the uncertainty
     model_error_map: where in the envelope the error is how large, in place of one value
+    channels: which output of an autopilot moves which surface
     """
 
     name: Name
@@ -268,6 +270,7 @@ class AircraftFile(Section):
     model_error_rad_s2: ModelErrorSection = Field(default_factory=ModelErrorSection)
     model_error_map: ErrorMapSection | None = None
     start: StartSection = Field(default_factory=StartSection)
+    channels: ChannelsSection | None = None
 
     @model_validator(mode="after")
     def _parts_fit_together(self) -> Self:
@@ -317,6 +320,9 @@ class AircraftFile(Section):
             if set(box.signals) != set(self.signals):
                 says = "has other signals than the aircraft, allowed: a range for each of them"
                 yield ("model_error_map", "boxes", i, "signals"), says
+        for name in self.channels.surfaces if self.channels else ():
+            if name not in self.surfaces:
+                yield ("channels", "surfaces", name), f"unknown surface{suggestion(name, self.surfaces)}"
         for name in set(self.signals) & {*FLOW_SIGNALS, SIDESLIP_RATE}:
             yield ("signals", name), f"{name} is measured in any case, allowed: another name"
 

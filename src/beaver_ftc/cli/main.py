@@ -39,6 +39,7 @@ COMMANDS = {
     "identify": "recorded:identify",
     "diagnose": "recorded:diagnose",
     "live": "run:live",
+    "sitl": "sitl:command",
 }
 # Those that fly no scenario of the user's choice: no plug-in can be registered for them.
 WITHOUT_PLUGINS = {"schema", "show", "new", "reproduce", "bench", "derive", "verify", "detectability"}

@@ -92,6 +92,7 @@ class Loop:
         self.log = memory.taken((min(CHUNK_ROWS, self.n_frames), len(self.columns)))
         self.references = np.empty((len(self.log), 3))
         self._order = np.zeros(2, np.int64)
+        self._inside = 0  # JSBSim frames of the coming frame that have been flown already
         self.fly_with(self.plugin_frame)
         self.changing: Changing | None = None
         if scenario.changes:
@@ -251,7 +252,22 @@ class Loop:
         status = self.fly_frames(1, 0) if k == 0 else FLYING
         if status != FLYING:
             return status
-        return self.fly_frames(stop - max(k, 1), self.scenario.substeps)
+        runs, self._inside = self.scenario.substeps - self._inside, 0
+        return self.fly_frames(stop - max(k, 1), runs)
+
+    def fly_inside(self, runs: int) -> None:
+        """So many of JSBSim's frames inside the coming frame, fewer than it has: the next segment, of this
+        frame alone, flies the others. The truth is seen at each but not acted upon."""
+        if not (self._inside or self.cockpit.native):
+            self.cockpit.write()
+        for _ in range(runs):
+            if self._turbulent:
+                self.cockpit.turn_air()
+            self.plant.run()
+            if not self.cockpit.native:
+                self.cockpit.read()
+            self._look(self.frames)
+        self._inside += runs
 
     def fly_frames(self, count: int, runs: int) -> int:
         """So many frames of the loop, each of so many JSBSim frames, in which no fault changes."""

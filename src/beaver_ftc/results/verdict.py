@@ -47,6 +47,7 @@ def facts(metrics: Document) -> list[tuple[str, str]]:
         ("authority", _authority(metrics)),
         ("envelope", _envelope(metrics)),
         ("departure", _departure(metrics)),
+        ("link", _link(metrics)),
         ("saturation", _saturation(metrics)),
         *(("note", hint) for hint in metrics.get("hints", ())),
     )
@@ -334,6 +335,27 @@ def _envelope(metrics: Document) -> str:
 def _departure(metrics: Document) -> str:
     departure = metrics["departure"]
     return f"LOST at {_time(departure['time_s'])}: {departure['signal']}" if departure else ""
+
+
+# What of a link's counts is worth a word, if there was any.
+_COUNTED = {
+    "repeated": "sent again", "late": "late", "missed": "never came", "malformed": "malformed",
+    "strangers": "of others", "off_rate": "at another rate", "resets": "times begun anew",
+}  # fmt: skip
+
+
+def _link(metrics: Document) -> str:
+    """How an autopilot was served; nothing where a law of ours flew."""
+    link = metrics.get("link")
+    if not link:
+        return ""
+    latency, interval = link["latency_ms"], link["interval_ms"]
+    odd = "".join(f", {link[name]} {words}" for name, words in _COUNTED.items() if link[name])
+    times = (
+        f"answered in {latency['median']:.2f} ms (99 %: {latency['p99']:.2f}), asked every "
+        f"{interval['mean']:.2f} ms, jitter {interval['jitter_rms']:.2f} ms RMS"
+    )
+    return f"{link['protocol']}, {link['frames']} frames at {link['packets_hz']:g} Hz{odd}; {times}"
 
 
 def _saturation(metrics: Document) -> str:

@@ -1,0 +1,67 @@
+"""What the diagnosis finds in flight, as short texts: MAVLink's STATUSTEXT, and lines for people."""
+
+from typing import Any, NamedTuple
+
+from beaver_ftc.integrations.sitl.vehicle import Flown
+
+EMERGENCY, CRITICAL, WARNING, INFO = 0, 2, 4, 6  # MAV_SEVERITY
+MOST_KEPT = 200
+_PREFIX = "FDI: "
+_LOSS = "loss_of_effectiveness"
+
+
+class Text(NamedTuple):
+    """One finding: when, s of flight; MAV_SEVERITY; words."""
+
+    t_s: float
+    severity: int
+    text: str
+
+
+class Teller:
+    """Notices what is new in the verdict of a flight, from frame to frame."""
+
+    def __init__(self) -> None:
+        self.kept: list[Text] = []
+        self.begin()
+
+    def begin(self) -> None:
+        """A flight begins: nothing has been said of it."""
+        self._said: tuple[Any, ...] = (False, None, None, ())
+        self._lost = False
+        self.kept.clear()
+
+    def news(self, sim: Flown) -> list[Text]:
+        """What is to be said of the frame just flown; mostly nothing."""
+        if not (sim.alarmed or sim.departed):
+            return []
+        texts = [Text(sim.t_s, severity, _PREFIX + text) for severity, text in self._new(sim)]
+        self.kept += texts[: MOST_KEPT - len(self.kept)]
+        return texts
+
+    def _new(self, sim: Flown) -> list[tuple[int, str]]:
+        verdict, found = sim.verdict, []
+        before = self._said
+        self._said = now = verdict.detected, verdict.isolated, verdict.type, verdict.candidates
+        if verdict.detected and not before[0]:
+            where = f"on {verdict.axis}" if verdict.axis else "between the instruments"
+            found.append((WARNING, f"alarm {where}"))
+        if verdict.isolated and before[1:3] != now[1:3]:
+            found.append((CRITICAL, _named(verdict)))
+        elif verdict.detected and not verdict.isolated and verdict.candidates and before[3] != now[3]:
+            found.append((WARNING, " or ".join(verdict.candidates)))
+        if sim.departed and not self._lost:
+            self._lost = True
+            found.append((EMERGENCY, "the aircraft is lost"))
+        return found
+
+
+def _named(verdict: Any) -> str:
+    """Surface and type, with the loss where it is one."""
+    kind = verdict.type
+    if kind is None or kind == verdict.isolated:
+        return str(verdict.isolated)
+    said = kind.replace("_", " ")
+    if kind == _LOSS and verdict.estimate is not None:
+        said = f"{-100.0 * verdict.estimate:.0f} % loss"
+    return f"{verdict.isolated}, {said}"

@@ -1,0 +1,263 @@
+"""The flight an autopilot is the pilot of: outputs in, JSBSim frames flown, an instant out."""
+
+from collections.abc import Sequence
+from math import ceil
+from typing import NamedTuple
+
+import numpy as np
+
+from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.integrations.sitl.outputs import Outputs
+from beaver_ftc.plant.channels import FT
+from beaver_ftc.plant.instruments import AX, SENSORS
+from beaver_ftc.results.log import SpooledLog
+from beaver_ftc.results.simulation import Simulation
+from beaver_ftc.scenario.schema import Scenario
+
+SLOWEST_HZ, FASTEST_HZ = 20.0, 400.0  # of the diagnosis: where its promises are tested
+FASTEST_PACKETS_HZ = 4000.0
+WHOLE = 1e-6  # JSBSim frames: so near a whole number is one
+# The surfaces are the autopilot's, and so is where it flies to.
+THEIRS = {"control.law": "nominal", "control.options": {}, "reference": {}}
+OF_THE_LAW = ("pre_fault_rms_deg_s", "post_fault_rms_deg_s")
+
+Vector = np.ndarray
+
+_NODES = (  # what no instrument of ours measures, of the truth; factors to SI
+    ("velocities/v-north-fps", FT),
+    ("velocities/v-east-fps", FT),
+    ("velocities/v-down-fps", FT),
+    ("position/lat-geod-deg", 1.0),
+    ("position/long-gc-deg", 1.0),
+    ("position/h-sl-ft", FT),
+    ("attitude/phi-rad", 1.0),
+    ("attitude/theta-rad", 1.0),
+    ("attitude/psi-rad", 1.0),
+    ("position/lat-gc-rad", 1.0),
+    ("position/long-gc-rad", 1.0),
+    ("forces/fbx-total-lbs", FT),
+    ("forces/fby-total-lbs", FT),
+    ("forces/fbz-total-lbs", FT),
+    ("inertia/mass-slugs", 1.0),
+)
+_AT = {name: i for i, name in enumerate(SENSORS)}
+
+
+class Instant(NamedTuple):
+    """What the autopilot is told. SI, radians; body axes forward, right, down; earth axes north, east, down.
+
+    As the instruments say it, errors and faults included, and to the diagnosis the same: gyro, force
+    (specific: without gravity), attitude (roll, pitch, yaw), airspeed, sideslip, dynamic pressure, altitude
+    above sea level. True, since no instrument of ours measures them: position from where the flight began,
+    with the autopilot's ground as 0; velocity over the ground, latitude and longitude (deg), height above sea
+    level.
+    """
+
+    t_s: float
+    gyro: tuple[float, ...]
+    force: tuple[float, ...]
+    attitude: tuple[float, ...]
+    airspeed_mps: float
+    beta_rad: float
+    qdyn_pa: float
+    altitude_m: float
+    position: tuple[float, float, float]
+    velocity: tuple[float, ...]
+    latitude_deg: float
+    longitude_deg: float
+    height_m: float
+    true_attitude: tuple[float, ...]
+
+
+class Flown(Simulation):
+    """A flight that another than a law commands, some of JSBSim's frames at a time."""
+
+    def _make_ready(self) -> None:
+        super()._make_ready()
+        self._runs, self._engaged = 0, False  # JSBSim frames flown of the coming frame
+        self._begin()
+        frames, plant = self._loop.frames, self._loop.plant
+        measured, truth = frames["measured"][0], frames["truth"][0]
+        self._signal, self._measured = measured["signal"], measured
+        self._nodes = [(plant.node(name).get_double_value, factor) for name, factor in _NODES]
+        self._origin = float(truth["latitude_0"]), float(truth["longitude_0"])
+        self._radii = float(truth["radius_m"]), float(truth["parallel_radius_m"])
+        self._power = frames["control"]["power"]
+        self._autopilot = frames["autopilot"]
+        self._seen = frames["fdi"]["verdict"], frames["fdi"]["watch"]
+
+    @property
+    def G(self) -> Vector:
+        """What each surface does about each axis now, (3, n) rad/s2 per rad, by the design model."""
+        return np.array(self._frame["belief"]["G"])
+
+    @property
+    def airframe(self) -> Aircraft:
+        """What flies."""
+        return self._loop.aircraft
+
+    @property
+    def alarmed(self) -> bool:
+        """Whether there is an alarm."""
+        verdict, watch = self._seen
+        return bool(verdict["detected"][0] or watch["alarmed"][0]) or self._loop.plugin_frame is not None
+
+    def pilot(self, runs: int, deflections: Vector | None, power: float | None) -> None:
+        """Fly so many of JSBSim's frames, or to the end, with these deflections (n,) rad and this setting of
+        the engine from the next frame of the loop on. None: the law's; the engine stays."""
+        while runs > 0 and not self.done:
+            if self._runs == 0:
+                self._take(deflections, power)
+            left = self._loop.scenario.substeps - self._runs
+            if runs < left:
+                self._inside(runs)
+                return
+            runs -= left
+            self._runs = 0
+            self._last.clear()
+            self._fly_to(self._next + 1)
+
+    def _take(self, deflections: Vector | None, power: float | None) -> None:
+        self._loop.hold(deflections)
+        if deflections is None:
+            return
+        self._by_hand = True
+        if not self._engaged:
+            self._engaged, self._autopilot["enabled"] = True, 0  # outer loops of ours are over
+        if power is not None:
+            self._power["in_use"] = 1
+            self._power["command"][0][0] = power
+            self._loop.plant.write(self._loop.aircraft.trim.throttle, power)
+
+    def _inside(self, runs: int) -> None:
+        if self._runs == 0 and self._next >= self._turn_at:
+            self._turn_at = self._loop.turn_to(self._next)
+        self._loop.fly_inside(runs)
+        self._runs += runs
+
+    def instant(self, ground_m: float) -> Instant:
+        """What is known of the JSBSim frame just flown; ground_m: the autopilot's, above sea level."""
+        signal = self._signal.tolist()
+        true = [read() * factor for read, factor in self._nodes]
+        north = (true[9] - self._origin[0]) * self._radii[0]
+        east = (true[10] - self._origin[1]) * self._radii[1]
+        force = tuple(signal[AX : AX + 3])
+        if not self._measured["inertial"]:
+            force = true[11] / true[14], true[12] / true[14], true[13] / true[14]
+        t_s = self._next_instant_s
+        return Instant(
+            t_s, tuple(signal[:3]), force, tuple(signal[_AT["phi"] : _AT["psi"] + 1]),
+            signal[_AT["V"]], signal[_AT["beta"]], signal[_AT["qdyn"]], signal[_AT["altitude"]],
+            (north, east, ground_m - true[5]), tuple(true[:3]), true[3], true[4], true[5], tuple(true[6:9]),
+        )  # fmt: skip
+
+    @property
+    def _next_instant_s(self) -> float:
+        substeps = self._loop.scenario.substeps
+        return ((self._next - 1) * substeps + self._runs) / (substeps * self.rate_hz)
+
+
+class Vehicle:
+    """The flight, begun at the rate the packets have, and begun anew when they are.
+
+    pulses: as `Outputs` has it. rate_hz: of the packets, whatever they say themselves. hold_s: so long the
+    scenario's own law flies first, level. ground_m: the autopilot's, above sea level. log: whether it keeps one.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        pulses: bool,
+        rate_hz: float | None = None,
+        hold_s: float = 0.0,
+        ground_m: float = 0.0,
+        log: bool = True,
+    ) -> None:
+        self.given, self.hold_s, self._fixed_hz, self._ground_m = scenario, hold_s, rate_hz, ground_m
+        self._pulses, self._log = pulses, log
+        self.sim: Flown | None = None
+        self.scenario = scenario
+        self.packets_hz = 0.0
+        self.off_rate = 0
+        self.begin(rate_hz or scenario.rate_hz)
+
+    def begin(self, packets_hz: float) -> None:
+        """A flight from trim, at this rate of packets. Raises BadInput for one that cannot be flown."""
+        packets_hz = self._fixed_hz or packets_hz
+        if self.sim is not None and packets_hz == self.packets_hz:
+            if self.sim.frames > 1 or self._inside:
+                self.sim.reset()
+        else:
+            before, self.scenario = self.sim, at_rate(self.given, packets_hz)
+            self.sim = Flown(self.scenario, log=SpooledLog() if self._log else False)
+            if before is not None:
+                before.release()
+        self.packets_hz = packets_hz
+        self._jsbsim_hz = self.scenario.rate_hz * self.scenario.substeps
+        self.outputs = Outputs(
+            self.scenario.airframe, self.sim.G, self.sim.trim_rad, self.sim.travel_rad, self._pulses
+        )
+
+    @property
+    def flight(self) -> Flown:
+        """The flight in progress."""
+        assert self.sim is not None
+        return self.sim
+
+    @property
+    def _inside(self) -> bool:
+        return self.sim is not None and self.sim._runs > 0
+
+    @property
+    def over(self) -> bool:
+        """Whether the flight has ended: its duration flown, or the aircraft lost."""
+        return self.flight.done
+
+    def runs_of(self, frame_hz: float) -> int:
+        """JSBSim frames in a frame of this rate; where they are no whole number, those of the rate at which
+        the flight was begun."""
+        wanted = self._jsbsim_hz / frame_hz if frame_hz >= SLOWEST_HZ else 0.0
+        runs = round(wanted)
+        if self._fixed_hz is None and runs >= 1 and abs(wanted - runs) <= WHOLE * runs:
+            return runs
+        if frame_hz != self.packets_hz:
+            self.off_rate += 1
+        return round(self._jsbsim_hz / self.packets_hz)
+
+    def fly(self, outputs: Sequence[float], frame_hz: float, in_charge: bool = True) -> None:
+        """A frame of the autopilot, with these outputs. in_charge: it flies, once `hold_s` are over."""
+        sim, runs = self.flight, self.runs_of(frame_hz)
+        if not in_charge or sim.frames / sim.rate_hz <= self.hold_s:
+            sim.pilot(runs, None, None)
+        else:
+            sim.pilot(runs, self.outputs.deflections(outputs), self.outputs.power(outputs))
+
+    def instant(self) -> Instant:
+        """What is known of the frame just flown."""
+        return self.flight.instant(self._ground_m)
+
+
+def at_rate(scenario: Scenario, packets_hz: float) -> Scenario:
+    """The scenario at the rate of the packets, or at a part of it that the diagnosis keeps up with: then
+    every packet is some of JSBSim's frames, and the outputs of each first of them count. Raises BadInput."""
+    if not SLOWEST_HZ <= packets_hz <= FASTEST_PACKETS_HZ:
+        allowed = f"{SLOWEST_HZ:g} to {FASTEST_PACKETS_HZ:g} Hz, or --rate"
+        raise BadInput(f"{scenario.name}: frames of an autopilot at {packets_hz:g} Hz, allowed: {allowed}")
+    packets = ceil(packets_hz / FASTEST_HZ - 1e-9)  # to a frame of the loop
+    substeps = packets * ceil(scenario.substeps / packets)
+    changes = {**THEIRS, "rate_hz": packets_hz / packets, "substeps": substeps}
+    return scenario.with_(changes)
+
+
+def without_reference(scenario: Scenario) -> tuple[Scenario, list[str]]:
+    """The scenario without what only a law of ours can be expected to do, and a line for each such key.
+
+    Raises BadInput for `changes`, which are of our law and our diagnosis' sensors.
+    """
+    if scenario.changes:
+        raise BadInput(f"{scenario.name}: changes: there are none under an autopilot, allowed: faults")
+    asked = [name for name in OF_THE_LAW if scenario.expect and getattr(scenario.expect, name)]
+    left_out = {f"expect.{name}": None for name in asked}
+    said = [f"expect.{name} is left out: the reference is the autopilot's own" for name in asked]
+    return scenario.with_(left_out) if asked else scenario, said

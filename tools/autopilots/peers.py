@@ -1,0 +1,167 @@
+"""The autopilots' ends of both protocols, around a `Small` or any other that gives outputs."""
+
+import socket
+import struct
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from pymavlink.dialects.v20 import common
+
+from tools.autopilots.reader import read
+from tools.autopilots.small import Told
+
+Outputs = tuple[float, float, float, float]
+Pilot = Callable[[Told], Outputs]
+CENTRED: Outputs = (0.0, 0.0, 0.4, 0.0)
+FORMS = {16: (18458, "<HHI16H"), 32: (29569, "<HHI32H")}
+MOST_BYTES = 65536
+
+
+def pulses(outputs: Outputs) -> list[int]:
+    """Pulses, us, of roll, pitch, throttle, yaw, in the usual channels."""
+    roll, pitch, throttle, yaw = outputs
+    return [round(1500 + 500 * roll), round(1500 + 500 * pitch), round(1000 + 1000 * throttle), round(1500 + 500 * yaw)]
+
+
+def packet(count: int, rate_hz: int, outputs_us: Iterable[int], channels: int = 16) -> bytes:
+    """A datagram of ArduPilot's."""
+    magic, form = FORMS[channels]
+    given = list(outputs_us)
+    return struct.pack(form, magic, rate_hz, count, *given, *[0] * (channels - len(given)))
+
+
+def told(answer: bytes) -> Told:
+    """What ArduPilot makes of an answer."""
+    values = read(answer)
+    (t_s,), (_, _, down), (_, _, sinking) = values["timestamp"], values["position"], values["velocity"]
+    rates, attitude = values["imu/gyro"], values["attitude"]
+    (airspeed,) = values["airspeed"]
+    side = values["imu/accel_body"][1]
+    return Told(t_s, rates, attitude, -down, -sinking, airspeed, side)
+
+
+class Ardupilot:
+    """Counts its frames from 0; without an answer for `patience_s` it sends the same packet again."""
+
+    def __init__(self, pilot: Pilot, rate_hz: int = 100, channels: int = 16) -> None:
+        self._pilot, self.rate_hz, self.channels = pilot, rate_hz, channels
+        self.count, self._outputs = 0, CENTRED
+        self.sent: list[bytes] = []
+
+    def next(self) -> bytes:
+        """The packet of the frame to come."""
+        return packet(self.count, self.rate_hz, pulses(self._outputs), self.channels)
+
+    def hear(self, answer: bytes) -> Told:
+        """An answer: the count goes on."""
+        now = told(answer)
+        self._outputs = self._pilot(now)
+        self.count += 1
+        return now
+
+    def fly(self, address: tuple[str, int], frames: int, patience_s: float = 1.0) -> Told | None:
+        """So many frames over UDP, or until nobody answers any more."""
+        now = None
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:
+            line.settimeout(patience_s)
+            for _ in range(frames):
+                datagram = self.next()
+                answer = self._asked(line, datagram, address)
+                if answer is None:
+                    return now
+                self.sent.append(datagram)
+                now = self.hear(answer)
+        return now
+
+    def _asked(self, line: socket.socket, datagram: bytes, address: tuple[str, int], times: int = 3) -> bytes | None:
+        for _ in range(times):
+            line.sendto(datagram, address)
+            try:
+                return line.recv(MOST_BYTES)
+            except (TimeoutError, ConnectionError):
+                continue
+        return None
+
+
+class Px4:
+    """In lockstep: each HIL_SENSOR is its time, and is answered with HIL_ACTUATOR_CONTROLS of that stamp.
+
+    silent: so many HIL_SENSOR at the start are not answered, as an autopilot that starts; armed_after: so many
+    answers bear no armed bit. texts, acks: what came besides.
+    """
+
+    def __init__(self, pilot: Pilot, silent: int = 5, armed_after: int = 5) -> None:
+        self._pilot, self._silent, self._armed_after = pilot, silent, armed_after
+        self._mav = common.MAVLink(None, srcSystem=1, srcComponent=1)
+        self._mav.robust_parsing = True
+        self._air: Any = None
+        self.state: Any = None
+        self.gps: Any = None
+        self.stamps: list[int] = []
+        self.texts: list[str] = []
+        self.acks: list[tuple[int, int]] = []
+
+    def hear(self, data: bytes) -> bytes:
+        """What it answers to these bytes."""
+        answer = b""
+        for message in self._mav.parse_buffer(data) or []:
+            kind = message.get_type()
+            if kind == "HIL_SENSOR":
+                answer += self._controls(message)
+            elif kind == "HIL_STATE_QUATERNION":
+                self.state = message
+            elif kind == "HIL_GPS":
+                self.gps = message
+            elif kind == "STATUSTEXT":
+                self.texts.append(message.text)
+            elif kind == "COMMAND_ACK":
+                self.acks.append((message.command, message.result))
+        return answer
+
+    def _controls(self, sensor: Any) -> bytes:
+        if len(self.stamps) < self._silent:
+            self.stamps.append(sensor.time_usec)
+            return b""
+        if self.stamps and sensor.time_usec <= self.stamps[-1]:
+            return b""  # said again
+        self.stamps.append(sensor.time_usec)
+        armed = len(self.stamps) > self._silent + self._armed_after
+        outputs = self._pilot(self._told(sensor)) if armed else (0.0, 0.0, 0.0, 0.0)
+        message = common.MAVLink_hil_actuator_controls_message(
+            sensor.time_usec, [*outputs, *[0.0] * 12], 128 * armed + 1, 1
+        )
+        return bytes(message.pack(self._mav))
+
+    def _told(self, sensor: Any) -> Told:
+        """Attitude and climb of the truth, which a filter of its own would estimate; the rest as it is sensed."""
+        from math import asin, atan2
+
+        w, x, y, z = self.state.attitude_quaternion
+        attitude = (
+            atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
+            asin(max(-1.0, min(1.0, 2 * (w * y - z * x)))),
+            atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)),
+        )
+        rates = sensor.xgyro, sensor.ygyro, sensor.zgyro
+        airspeed = self.state.true_airspeed / 100.0
+        climb = -self.state.vz / 100.0
+        return Told(sensor.time_usec / 1e6, rates, attitude, sensor.pressure_alt, climb, airspeed, sensor.yacc)
+
+    def inject(self, unit: int, kind: int, which: int) -> bytes:
+        """MAV_CMD_INJECT_FAILURE."""
+        message = common.MAVLink_command_long_message(1, 191, 420, 0, unit, kind, which, 0, 0, 0, 0)
+        return bytes(message.pack(self._mav))
+
+    def fly(self, address: tuple[str, int], frames: int, patience_s: float = 3.0) -> None:
+        """Connect and answer until so many HIL_SENSOR have come, or the line is closed."""
+        with socket.create_connection(address, timeout=patience_s) as line:
+            while len(self.stamps) < frames:
+                try:
+                    data = line.recv(MOST_BYTES)
+                except (TimeoutError, ConnectionError):
+                    return
+                if not data:
+                    return
+                answer = self.hear(data)
+                if answer:
+                    line.sendall(answer)

@@ -6,28 +6,40 @@
     python benchmarks/sitl.py published
     python benchmarks/sitl.py healthy [--hours 50] [--rate 100]
 
-The autopilots are those of tools/autopilots: neither ArduPilot nor PX4 is needed. Exit status 1 where a bar is missed.
+The autopilots are those of tools/autopilots: neither ArduPilot nor PX4 is needed. Exit status 1 where a bar
+is missed.
 """
 
 import argparse
+import json
+import re
+import signal
+import socket
+import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+from pymavlink.dialects.v20 import common
+
 sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from tools.autopilots import peers, trial
+from tools.autopilots.small import Small
 
 import beaver_ftc as bf
 from beaver_ftc.integrations.sitl.ardupilot import Ardupilot
 from beaver_ftc.integrations.sitl.link import Link
 from beaver_ftc.integrations.sitl.vehicle import Vehicle
-from tools.autopilots import peers
-from tools.autopilots.small import Small
 
+MOST_LATENCY_MS, MOST_GROWTH_MB = 0.5, 2.0
 HEALTHY = "elevator-loss-in-turbulence"  # its air, sensors, servos, tolerances and what is declared of them
 
 
 def healthy(hours: float, rate_hz: int) -> Iterator[str]:
-    """Flights of an hour under the small autopilot in light turbulence, nothing broken: alarms, and how near."""
+    """Flights of an hour under the small autopilot in light turbulence, nothing broken: alarms, and how
+    near."""
     base = bf.load(HEALTHY).with_({"faults": [], "expect": {}, "duration_s": 3600})
     alarms, flown_s, lost, nearest, outside_s = 0, 0.0, 0, 0.0, 0.0
     for seed in range(round(hours)):
@@ -49,18 +61,160 @@ def healthy(hours: float, rate_hz: int) -> Iterator[str]:
         raise SystemExit(1)
 
 
+def lockstep(frames: int) -> Iterator[str]:
+    """A bad line, each protocol, with JSBSim behind it."""
+    base, missed = bf.load("fault-free").with_({"expect": {}, "duration_s": 36_000}), 0
+    for protocol, rate_hz, over in (("ardupilot", None, trial.ardupilot), ("px4", 250.0, trial.px4)):
+        found = over(Vehicle(base, protocol == "ardupilot", rate_hz, log=False), frames, 1)
+        missed += found.twice + found.lost
+        happened = ", ".join(f"{count} {what}" for what, count in found.happened.items())
+        yield f"{protocol}: {found.frames} frames in {len(found.meant)} flights ({happened})"
+        yield f"{protocol}: {found.twice} flown twice, {found.lost} lost"
+    if missed:
+        raise SystemExit(1)
+
+
+def started(*arguments: str) -> tuple[subprocess.Popen, tuple[str, int]]:
+    """The command as a user starts it, and where it listens."""
+    code = "from beaver_ftc.cli.main import main; main()"
+    command = [
+        sys.executable,
+        "-c",
+        code,
+        "sitl",
+        *arguments,
+        "--port",
+        "0",
+        "--no-report",
+        "--format",
+        "json",
+    ]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stderr is not None
+    for line in process.stderr:
+        if found := re.search(r"(?:UDP|TCP) ([\d.]+):(\d+)", line):
+            return process, (found[1], int(found[2]))
+    raise SystemExit(f"sitl has ended: {process.wait()}")
+
+
+def latency(frames: int) -> Iterator[str]:
+    """From a packet to its answer, in another process, at 400 Hz and as fast as it goes."""
+    late = False
+    with tempfile.TemporaryDirectory() as out:
+        file = Path(out) / "long.yaml"
+        file.write_text("name: long\nduration_s: 36000\n", encoding="utf-8")
+        for protocol in ("ardupilot", "px4"):
+            process, address = started(
+                str(file), "--as", protocol, "--rate", "400", "--speed", "0", "--out", out
+            )
+            fly_on(protocol, address, frames)
+            process.send_signal(signal.SIGINT)
+            link = json.loads(process.communicate()[0])["link"]
+            yield f"{protocol}: {link['frames']} frames, answered within {link['latency_ms']} ms"
+            late |= link["latency_ms"]["p99"] > MOST_LATENCY_MS
+    if late:
+        raise SystemExit(1)
+
+
+def fly_on(protocol: str, address: tuple[str, int], frames: int) -> peers.Px4 | None:
+    """So many frames with the small autopilot."""
+    if protocol == "ardupilot":
+        peers.Ardupilot(Small().outputs, 400).fly(address, frames)
+        return None
+    autopilot = peers.Px4(Small().outputs)
+    autopilot.fly(address, frames)
+    return autopilot
+
+
+def memory(frames: int) -> Iterator[str]:
+    """Resident memory while a flight goes on and on, log and all."""
+    base = bf.load("fault-free").with_({"expect": {}, "duration_s": 36_000})
+    vehicle = Vehicle(base, pulses=True)
+    end, autopilot = Ardupilot(vehicle, Link()), peers.Ardupilot(Small().outputs, 100)
+    seen = []
+    for k in range(1, frames + 1):
+        autopilot.hear(end.take(autopilot.next(), "it", 0.001 * k) or b"")
+        if k % (frames // 10) == 0:
+            seen.append(resident_mb())
+            yield f"{k} frames: {seen[-1]:.1f} MB"
+    if seen[-1] - seen[0] > MOST_GROWTH_MB:
+        raise SystemExit(1)
+
+
+def resident_mb() -> float:
+    """Of this process, files it has mapped left out."""
+    text = Path("/proc/self/status").read_text(encoding="utf-8")
+    return int(re.search(r"RssAnon:\s+(\d+)", text)[1]) / 1024
+
+
+def published(_: int) -> Iterator[str]:
+    """The published elevator case, by the command, under both protocols: found, named, and said."""
+    missed = False
+    for protocol in ("ardupilot", "px4"):
+        with tempfile.TemporaryDirectory() as out, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ground:
+            ground.bind(("127.0.0.1", 0))
+            ground.settimeout(0.2)
+            where = f"127.0.0.1:{ground.getsockname()[1]}"
+            arguments = (
+                "elevator-partial-loss",
+                "--as",
+                protocol,
+                "--speed",
+                "0",
+                "--out",
+                out,
+                "--mavlink",
+                where,
+            )
+            process, address = started(*arguments)
+            fly_on(protocol, address, 100_000)
+            document = json.loads(process.communicate()[0])
+            texts = heard(ground)
+            isolation, detection = document["isolation"], document["detection"]
+            yield (
+                f"{protocol}: alarm {detection['delay_s']} s after the fault, {isolation['fault']} named after "
+                f"{isolation['delay_s']} s, estimate {isolation['estimate']:.3f}, STATUSTEXT {texts}, exit {process.returncode}"
+            )
+            missed |= process.returncode != 0 or not any("elevator" in text for text in texts)
+    if missed:
+        raise SystemExit(1)
+
+
+def heard(ground: socket.socket) -> list[str]:
+    """The texts a ground station has been sent."""
+    mav, texts = common.MAVLink(None), []
+    mav.robust_parsing = True
+    while True:
+        try:
+            messages = mav.parse_buffer(ground.recv(65536)) or []
+        except TimeoutError:
+            return texts
+        texts += [message.text for message in messages if message.get_type() == "STATUSTEXT"]
+
+
+# What is measured, and how many frames by itself.
+MEASURED = {
+    "lockstep": (lockstep, 100_000), "latency": (latency, 20_000), "memory": (memory, 1_000_000),
+    "published": (published, 0),
+}  # fmt: skip
+
+
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=("lockstep", "latency", "memory", "published", "healthy"))
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("what", choices=(*MEASURED, "healthy"))
     parser.add_argument("--frames", type=int, default=None)
     parser.add_argument("--hours", type=float, default=50.0)
     parser.add_argument("--rate", type=int, default=100)
     given = parser.parse_args()
-    lines = {
-        "healthy": lambda: healthy(given.hours, given.rate),
-    }
-    for line in lines[given.what]():
+    if given.what == "healthy":
+        lines = healthy(given.hours, given.rate)
+    else:
+        measure, usual = MEASURED[given.what]
+        lines = measure(usual if given.frames is None else given.frames)
+    for line in lines:
         print(line, flush=True)
 
 

@@ -3,6 +3,7 @@
 import socket
 import struct
 from collections.abc import Callable, Iterable
+from math import asin, atan2
 from typing import Any
 
 from pymavlink.dialects.v20 import common
@@ -20,7 +21,12 @@ MOST_BYTES = 65536
 def pulses(outputs: Outputs) -> list[int]:
     """Pulses, us, of roll, pitch, throttle, yaw, in the usual channels."""
     roll, pitch, throttle, yaw = outputs
-    return [round(1500 + 500 * roll), round(1500 + 500 * pitch), round(1000 + 1000 * throttle), round(1500 + 500 * yaw)]
+    return [
+        round(1500 + 500 * roll),
+        round(1500 + 500 * pitch),
+        round(1000 + 1000 * throttle),
+        round(1500 + 500 * yaw),
+    ]
 
 
 def packet(count: int, rate_hz: int, outputs_us: Iterable[int], channels: int = 16) -> bytes:
@@ -63,31 +69,34 @@ class Ardupilot:
         """So many frames over UDP, or until nobody answers any more."""
         now = None
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:
+            line.connect(address)
             line.settimeout(patience_s)
             for _ in range(frames):
                 datagram = self.next()
-                answer = self._asked(line, datagram, address)
+                answer = self._asked(line, datagram)
                 if answer is None:
                     return now
                 self.sent.append(datagram)
                 now = self.hear(answer)
         return now
 
-    def _asked(self, line: socket.socket, datagram: bytes, address: tuple[str, int], times: int = 3) -> bytes | None:
+    def _asked(self, line: socket.socket, datagram: bytes, times: int = 60) -> bytes | None:
         for _ in range(times):
-            line.sendto(datagram, address)
+            line.send(datagram)
             try:
                 return line.recv(MOST_BYTES)
-            except (TimeoutError, ConnectionError):
+            except TimeoutError:
                 continue
+            except ConnectionError:  # nobody is there any more
+                return None
         return None
 
 
 class Px4:
     """In lockstep: each HIL_SENSOR is its time, and is answered with HIL_ACTUATOR_CONTROLS of that stamp.
 
-    silent: so many HIL_SENSOR at the start are not answered, as an autopilot that starts; armed_after: so many
-    answers bear no armed bit. texts, acks: what came besides.
+    silent: so many HIL_SENSOR at the start are not answered, as an autopilot that starts; armed_after: so
+    many answers bear no armed bit. texts, acks: what came besides.
     """
 
     def __init__(self, pilot: Pilot, silent: int = 5, armed_after: int = 5) -> None:
@@ -133,9 +142,8 @@ class Px4:
         return bytes(message.pack(self._mav))
 
     def _told(self, sensor: Any) -> Told:
-        """Attitude and climb of the truth, which a filter of its own would estimate; the rest as it is sensed."""
-        from math import asin, atan2
-
+        """Attitude and climb of the truth, which a filter of its own would estimate; the rest as it is
+        sensed."""
         w, x, y, z = self.state.attitude_quaternion
         attitude = (
             atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
@@ -145,7 +153,9 @@ class Px4:
         rates = sensor.xgyro, sensor.ygyro, sensor.zgyro
         airspeed = self.state.true_airspeed / 100.0
         climb = -self.state.vz / 100.0
-        return Told(sensor.time_usec / 1e6, rates, attitude, sensor.pressure_alt, climb, airspeed, sensor.yacc)
+        return Told(
+            sensor.time_usec / 1e6, rates, attitude, sensor.pressure_alt, climb, airspeed, sensor.yacc
+        )
 
     def inject(self, unit: int, kind: int, which: int) -> bytes:
         """MAV_CMD_INJECT_FAILURE."""

@@ -1,7 +1,7 @@
 """An answer read as ArduPilot reads it: by the first occurrence of a key as text, and what stands behind it.
 
-No JSON is parsed: `strstr` for the section, `strstr` for the key behind it, two characters on (the quote and the
-colon) a number or `[a,b,c]`. reader.c is the same in C, with the C library's own functions.
+No JSON is parsed: `strstr` for the section, `strstr` for the key behind it, two characters on (the quote and
+the colon) a number or `[a,b,c]`. reader.c is the same in C, with the C library's own functions.
 """
 
 import re

@@ -1,7 +1,8 @@
-"""A small autopilot: attitude, altitude, speed and heading by cascaded gains, for an aircraft like the Beaver.
+"""A small autopilot: attitude, altitude, speed and heading by cascaded gains, for an aircraft like the
+Beaver.
 
-What it is told is what the protocols tell; what it gives is outputs: roll, pitch and yaw, -1 to 1, throttle 0 to 1.
-More is: roll right, pitch up, yaw right, more power.
+What it is told is what the protocols tell; what it gives is outputs: roll, pitch and yaw, -1 to 1, throttle 0
+to 1. More is: roll right, pitch up, yaw right, more power.
 """
 
 from dataclasses import dataclass, field
@@ -10,7 +11,14 @@ from math import radians, sin, tan
 G_MPS2 = 9.80665
 LEG_S = 25.0
 # A circuit that is flown over and over: climb m/s, bank deg, speed above the first one m/s.
-CIRCUIT = ((1.0, 0.0, 0.0), (0.0, 12.0, 0.0), (-1.0, 0.0, 1.0), (0.0, -12.0, 0.0), (0.5, 8.0, -1.0), (-0.5, -8.0, 0.0))
+CIRCUIT = (
+    (1.0, 0.0, 0.0),
+    (0.0, 12.0, 0.0),
+    (-1.0, 0.0, 1.0),
+    (0.0, -12.0, 0.0),
+    (0.5, 8.0, -1.0),
+    (-0.5, -8.0, 0.0),
+)
 STEEPEST_MPS = 3.0
 
 
@@ -55,7 +63,12 @@ class Small:
         climb, bank_deg, faster = self.legs[int((told.t_s - self._from.t_s) / LEG_S) % len(self.legs)]
         self._altitude_m += climb * dt
         power = self._to_speed(told, self._from.airspeed_mps + faster, climb, dt)
-        return self._to_bank(told, radians(bank_deg), dt), self._to_path(told, climb, dt), power, self._to_slip(told, dt)
+        return (
+            self._to_bank(told, radians(bank_deg), dt),
+            self._to_path(told, climb, dt),
+            power,
+            self._to_slip(told, dt),
+        )
 
     def _to_bank(self, told: Told, bank: float, dt: float) -> float:
         off = bank - told.attitude[0]
@@ -63,12 +76,18 @@ class Small:
         return clipped(self._roll + 0.8 * off - 0.2 * told.rates[0], 0.6)
 
     def _to_path(self, told: Told, climb: float, dt: float) -> float:
-        """Towards the altitude by climbing, towards the climb by attitude, towards the attitude by the elevator."""
+        """Towards the altitude by climbing, towards the climb by attitude, towards the attitude by the
+        elevator."""
         assert self._from is not None
         wanted = climb + clipped(0.1 * (self._altitude_m - told.altitude_m), STEEPEST_MPS)
         off = (wanted - told.climb_mps) / told.airspeed_mps
         self._level = clipped(self._level + clipped(0.1 * off, 0.01) * dt, 0.06)
-        off = self._from.attitude[1] + self._level + clipped(0.4 * wanted / told.airspeed_mps, 0.1) - told.attitude[1]
+        off = (
+            self._from.attitude[1]
+            + self._level
+            + clipped(0.4 * wanted / told.airspeed_mps, 0.1)
+            - told.attitude[1]
+        )
         self._pitch = clipped(self._pitch + 0.4 * off * dt, 0.5)
         turning = G_MPS2 / told.airspeed_mps * tan(told.attitude[0]) * sin(told.attitude[0])
         return clipped(self._pitch + 1.0 * off - 0.5 * (told.rates[1] - turning), 0.6)

@@ -26,6 +26,7 @@ class Options:
     hold: Annotated[float, typer.Option(min=0, metavar="S")] = 0.0
     ground: Annotated[float, typer.Option(metavar="M")] = 0.0
     mavlink: Annotated[str | None, typer.Option(metavar="HOST:PORT")] = None
+    page: Annotated[int | None, typer.Option(min=0, max=65535, metavar="PORT")] = None
     out: ResultsOption = Path("runs")
     format: FormatOption = Format.text
     no_report: NoReportOption = False
@@ -50,6 +51,7 @@ def command(options: Options) -> None:
     hold: The scenario's own law flies so many seconds first.
     ground: Height of the autopilot's ground above sea level.
     mavlink: A ground station: is told what the diagnosis finds, may inject failures.
+    page: Show the flight on the live page at this port, 0 any: break it there, repair it.
     """
     from beaver_ftc.integrations.sitl.serve import Options as Served
     from beaver_ftc.integrations.sitl.serve import serve
@@ -60,7 +62,7 @@ def command(options: Options) -> None:
         complain(f"{scenario.name}: warning: {warning}")
     served = Served(
         options.protocol, options.host, options.port, options.rate, options.speed, options.hold,
-        options.ground, address(options.mavlink),
+        options.ground, address(options.mavlink), options.page,
     )  # fmt: skip
     flight = serve(scenario, served, lambda line: complain(f"{scenario.name}: {line}"))
     folder = flight.save(options.out, report=not options.no_report)

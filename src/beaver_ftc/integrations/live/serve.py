@@ -46,6 +46,30 @@ def serve(load: "Callable[[], Scenario]", out: Path, port: int, say: Callable[[s
 
 
 @contextlib.contextmanager
+def beside(port: int) -> Iterator[Connection]:
+    """Serve the page from a process of its own, for a flight of this one: the flight's end of the pipe.
+
+    Its first word is `at ADDRESS`; `flying.py` has the others. Raises BadInput for a port in use.
+    """
+    context = multiprocessing.get_context("spawn")
+    with _listening(port) as listener:
+        ours, theirs = context.Pipe()
+        process = context.Process(target=_serve_beside, args=(theirs, listener), daemon=True)
+        process.start()
+        theirs.close()
+    try:
+        yield ours
+    finally:
+        process.terminate()
+        process.join()
+
+
+def _serve_beside(pipe: Connection, listener: socket.socket) -> None:
+    """What that process does."""
+    asyncio.run(_serve(listener, pipe, lambda address: pipe.send((EVERYONE, f"at {address}"))))
+
+
+@contextlib.contextmanager
 def _listening(port: int) -> Iterator[socket.socket]:
     """A socket on the loopback interface; port 0: whichever is free."""
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)

@@ -58,6 +58,10 @@ class Session:
         sim.step()
         if hasattr(self, "sim"):
             self.sim.release()
+        self._take_up(scenario, flown, sim)
+
+    def _take_up(self, scenario: "bf.Scenario", flown: "bf.Scenario", sim: "bf.Simulation") -> None:
+        """Show this flight, of which nothing has been said yet; scenario: what it was made of."""
         self._base, self.scenario, self.sim = scenario, flown, sim
         self.columns = sim.columns
         self.surfaces = tuple(c.removesuffix("_cmd_rad") for c in self.columns if c.endswith("_cmd_rad"))
@@ -319,21 +323,25 @@ def level_turn(phi_rad: float, theta_rad: float, airspeed_mps: float) -> np.ndar
 
 
 def as_live(scenario: "bf.Scenario") -> "bf.Scenario":
-    """The flight of a page: it is long and expects nothing; its diagnosis knows every fault type that can be
-    broken there, and watches the instruments, which can be broken too, unless the scenario says otherwise.
+    """The flight of a page: it is long and expects nothing, and ready for what can be broken there."""
+    stamp = datetime.now(UTC).strftime("%Y%m%d-%H%M%S-%f")[:-3]
+    changes = {"name": f"live-{scenario.name[:60]}-{stamp}", "expect": {}, "duration_s": LONGEST_S}
+    return ready_for_hands(scenario).with_(changes)
+
+
+def ready_for_hands(scenario: "bf.Scenario") -> "bf.Scenario":
+    """Its diagnosis knows every fault type that can be broken by hand, and watches the instruments, which can
+    be broken too, unless the scenario says otherwise.
 
     A watch that began with the first instrument broken would make of the flight before it another than the
     saved scenario's, in which that fault is said from the start.
     """
-    stamp = datetime.now(UTC).strftime("%Y%m%d-%H%M%S-%f")[:-3]
-    changes: dict[str, Any] = {
-        "name": f"live-{scenario.name[:60]}-{stamp}", "expect": {}, "duration_s": LONGEST_S,
-    }  # fmt: skip
+    changes: dict[str, Any] = {}
     if "sensor_monitor" not in scenario.fdi.model_fields_set:
         changes["fdi.sensor_monitor"] = "always"
     if "fault_class" not in scenario.fdi.model_fields_set:
         changes["fdi.fault_class"] = "all"
-    return scenario.with_(changes)
+    return scenario.with_(changes) if changes else scenario
 
 
 def changes_of(request: messages.Fresh) -> dict[str, Any]:

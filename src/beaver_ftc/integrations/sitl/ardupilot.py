@@ -119,7 +119,7 @@ class Ardupilot:
         """Whether somebody new may fly: the first, or an autopilot started again, from another port, once
         nothing has come from the old one for a while."""
         silent = self._link.silent_s(now_s) > self._link.LONG_S
-        return self._peer is None or (packet.number <= self._last and silent)
+        return self._peer is None or (packet.number <= 1 and silent)
 
     def _anew(self, packet: Packet, peer: Hashable) -> bool:
         """Whether the count has begun anew, or at all."""

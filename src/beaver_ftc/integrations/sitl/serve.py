@@ -8,13 +8,17 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from math import inf
+from multiprocessing.connection import Connection
 from typing import Any
 
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.integrations.live.serve import beside
+from beaver_ftc.integrations.live.session import ready_for_hands
 from beaver_ftc.integrations.sitl import PORTS, Protocol, failures
 from beaver_ftc.integrations.sitl.ardupilot import Ardupilot
 from beaver_ftc.integrations.sitl.link import Link
 from beaver_ftc.integrations.sitl.mavlink import GroundLine, Mavlink
+from beaver_ftc.integrations.sitl.page import Shown, Watched
 from beaver_ftc.integrations.sitl.px4 import Px4
 from beaver_ftc.integrations.sitl.telling import Teller, Text
 from beaver_ftc.integrations.sitl.vehicle import Vehicle, without_reference
@@ -32,8 +36,11 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Options:
-    """How the endpoint is set up. port 0: any; speed: times real time, 0 as fast as the autopilot answers;
-    ground: host and port of a ground station. The others as `Vehicle` has them."""
+    """How the endpoint is set up.
+
+    port 0: any. speed: times real time, 0 as fast as the autopilot answers. ground: host and port of a ground
+    station. page: port of the live page, 0 any, None without. The others are `Vehicle`'s.
+    """
 
     protocol: Protocol
     host: str = LOOPBACK
@@ -43,6 +50,7 @@ class Options:
     hold_s: float = 0.0
     ground_m: float = 0.0
     ground: tuple[str, int] | None = None
+    page: int | None = None
 
 
 @dataclass
@@ -84,7 +92,12 @@ class Endpoint:
         speed = options.speed if options.speed is not None else (0.0 if pulses else 1.0)
         self.pace = Pace(speed)
         self._ground = GroundLine(*options.ground) if options.ground else None
+        self._page: Shown | None = None
         self._resets = 0
+
+    def show(self, pipe: Connection) -> None:
+        """Show the flight on the live page, whose server is at the other end of the pipe."""
+        self._page = Shown(pipe, Watched(self.vehicle), self._say)
 
     def after(self, began_s: float) -> list[Text]:
         """What is new after an answer, whose making began at that time of perf_counter; the answer then waits
@@ -98,15 +111,16 @@ class Endpoint:
         for t_s, _, text in news:
             self._say(f"{t_s:.2f} s: {text}")
         if self._ground is not None:
-            if news:
-                self._ground.say(news)
-            self.listen()
+            self._ground.say(news)
+        self.listen()
         self.link.latency.add(time.perf_counter() - began_s)
         self.pace.wait(sim.frames / sim.rate_hz)
         return news
 
     def listen(self) -> None:
-        """Obey the ground station, and let it know that somebody is here."""
+        """Obey the ground station and the page, and let them know how it goes."""
+        if self._page is not None:
+            self._page.tick()
         if self._ground is not None:
             for says in self._ground.serve(time.monotonic(), self.inject):
                 self._say(says)
@@ -154,9 +168,13 @@ def serve(scenario: Scenario, options: Options, say: Say) -> Flight:
     scenario, left_out = without_reference(scenario)
     for line in left_out:
         say(line)
+    if options.page is not None or options.ground is not None:
+        scenario = ready_for_hands(scenario)
     kind = socket.SOCK_DGRAM if options.protocol is Protocol.ardupilot else socket.SOCK_STREAM
-    with _listening(options, kind) as listener:
+    with _listening(options, kind) as listener, contextlib.ExitStack() as besides:
         endpoint = Endpoint(scenario, options, say)
+        if options.page is not None:
+            endpoint.show(besides.enter_context(beside(options.page)))
         host, port = listener.getsockname()[:2]
         say(f"{NAMES[options.protocol]}: {'UDP' if kind == socket.SOCK_DGRAM else 'TCP'} {host}:{port}")
         try:

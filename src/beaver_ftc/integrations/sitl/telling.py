@@ -6,6 +6,7 @@ from beaver_ftc.integrations.sitl.vehicle import Flown
 
 EMERGENCY, CRITICAL, WARNING, INFO = 0, 2, 4, 6  # MAV_SEVERITY
 MOST_KEPT = 200
+ESTIMATED_S = 1.0  # after a loss has been named, its size is said
 _PREFIX = "FDI: "
 _LOSS = "loss_of_effectiveness"
 
@@ -28,7 +29,7 @@ class Teller:
     def begin(self) -> None:
         """A flight begins: nothing has been said of it."""
         self._said: tuple[Any, ...] = (False, None, None, ())
-        self._lost = False
+        self._lost, self._named_s = False, -1.0
         self.kept.clear()
 
     def news(self, sim: Flown) -> list[Text]:
@@ -48,8 +49,12 @@ class Teller:
             found.append((WARNING, f"alarm {where}"))
         if verdict.isolated and before[1:3] != now[1:3]:
             found.append((CRITICAL, _named(verdict)))
+            self._named_s = sim.t_s if verdict.type == _LOSS else -1.0
         elif verdict.detected and not verdict.isolated and verdict.candidates and before[3] != now[3]:
             found.append((WARNING, " or ".join(verdict.candidates)))
+        if 0.0 <= self._named_s <= sim.t_s - ESTIMATED_S and verdict.estimate is not None:
+            self._named_s = -1.0
+            found.append((INFO, f"{verdict.isolated}, {-100.0 * verdict.estimate:.0f} % lost"))
         if sim.departed and not self._lost:
             self._lost = True
             found.append((EMERGENCY, "the aircraft is lost"))
@@ -57,11 +62,8 @@ class Teller:
 
 
 def _named(verdict: Any) -> str:
-    """Surface and type, with the loss where it is one."""
+    """Surface and type."""
     kind = verdict.type
     if kind is None or kind == verdict.isolated:
         return str(verdict.isolated)
-    said = kind.replace("_", " ")
-    if kind == _LOSS and verdict.estimate is not None:
-        said = f"{-100.0 * verdict.estimate:.0f} % loss"
-    return f"{verdict.isolated}, {said}"
+    return f"{verdict.isolated}, {kind.replace('_', ' ')}"

@@ -162,7 +162,7 @@ class Vehicle:
     """The flight, begun at the rate the packets have, and begun anew when they are.
 
     pulses: as `Outputs` has it. rate_hz: of the packets, whatever they say themselves. hold_s: so long the
-    scenario's own law flies first, level. ground_m: the autopilot's, above sea level. log: whether it keeps one.
+    scenario's own law flies first, level. ground_m: the autopilot's, above sea level. log: keep one.
     """
 
     def __init__(
@@ -181,6 +181,14 @@ class Vehicle:
         self.packets_hz = 0.0
         self.off_rate = 0
         self.begin(rate_hz or scenario.rate_hz)
+        self._warm_up()
+
+    def _warm_up(self) -> None:
+        """Have what such a flight uses compiled, before anybody waits for an answer."""
+        flight, substeps = self.flight, self.scenario.substeps
+        flight.pilot(2 * substeps, None, None)
+        flight.pilot(2 * substeps, flight.trim_rad, None)
+        flight.reset()
 
     def begin(self, packets_hz: float) -> None:
         """A flight from trim, at this rate of packets. Raises BadInput for one that cannot be flown."""

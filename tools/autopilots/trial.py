@@ -1,0 +1,238 @@
+"""A bad line between an autopilot and an endpoint: what is flown twice, or lost?
+
+Packets are lost, doubled, overtaken, cut; garbage and strangers come between; either side is silent for
+seconds; the autopilot is started again. The line's own clock runs, so that nothing has to be waited for. Each
+frame bears its number in its outputs; `Spy` keeps what is flown.
+"""
+
+import struct
+from collections import Counter, deque
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from pymavlink.dialects.v20 import common
+
+from beaver_ftc.integrations.sitl.ardupilot import Ardupilot
+from beaver_ftc.integrations.sitl.link import Link
+from beaver_ftc.integrations.sitl.mavlink import Mavlink
+from beaver_ftc.integrations.sitl.px4 import Px4
+from tools.autopilots import peers
+from tools.autopilots.reader import read
+
+AGAIN_S = 1.0  # without an answer an autopilot asks again
+STEP_S = 0.0025
+ODDS = {
+    "lost": 0.01,
+    "doubled": 0.01,
+    "overtaken": 0.01,
+    "garbage": 0.01,
+    "stranger": 0.005,
+    "silence": 0.001,
+}
+
+
+class Spy:
+    """A body that keeps the number each frame bears, and hands it on. flown: a list a flight."""
+
+    def __init__(self, body: Any, number_of: Any) -> None:
+        self._body, self._number_of = body, number_of
+        self.flown: list[list[int]] = []
+        self.unasked = 0  # frames flown while an autopilot started
+
+    @property
+    def over(self) -> bool:
+        return self._body.over
+
+    @property
+    def packets_hz(self) -> float:
+        return self._body.packets_hz
+
+    def begin(self, packets_hz: float) -> None:
+        self.flown.append([])
+        self._body.begin(packets_hz)
+
+    def fly(self, outputs: Any, frame_hz: float, in_charge: bool = True) -> None:
+        if len(outputs):
+            self.flown[-1].append(self._number_of(outputs))
+        else:
+            self.unasked += 1
+        self._body.fly(outputs, frame_hz, in_charge)
+
+    def instant(self) -> Any:
+        return self._body.instant()
+
+
+@dataclass
+class Found:
+    """What came of it. meant: the numbers of the frames asked for, a list a flight; happened: what the line
+    did."""
+
+    meant: list[list[int]] = field(default_factory=list)
+    flown: list[list[int]] = field(default_factory=list)
+    happened: Counter = field(default_factory=Counter)
+    counts: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def frames(self) -> int:
+        """Frames asked for."""
+        return sum(map(len, self.meant))
+
+    @property
+    def twice(self) -> int:
+        """Frames flown that had been flown, or that nobody had asked for in this place."""
+        return sum(len(flown) - len(set(flown)) for flown in self.flown)
+
+    @property
+    def lost(self) -> int:
+        """Frames asked for and never flown, or not in order."""
+        pairs = zip(self.meant, self.flown, strict=False)
+        wrong = sum(list(meant) != list(flown) and len(set(meant) ^ set(flown)) + 1 for meant, flown in pairs)
+        return wrong + abs(len(self.meant) - len(self.flown))
+
+
+class Line:
+    """What happens on it, drawn by a seed."""
+
+    def __init__(self, seed: int) -> None:
+        self.rng, self.now_s, self.happened = np.random.default_rng(seed), 0.0, Counter()
+
+    def does(self, what: str) -> bool:
+        """Whether this happens now."""
+        it_does = bool(self.rng.random() < ODDS[what])
+        self.happened[what] += it_does
+        return it_does
+
+    def wait(self) -> None:
+        """A frame's time passes, now and then seconds."""
+        self.now_s += STEP_S
+        if self.does("silence"):
+            self.now_s += float(self.rng.uniform(1.5, 8.0))
+
+    def noise(self) -> bytes:
+        """Garbage: bytes, or what begins like a packet."""
+        some = self.rng.bytes(int(self.rng.integers(0, 80)))
+        return some if self.rng.random() < 0.5 else struct.pack("<HHI", 18458, 400, 7) + some[:20]
+
+
+def number_in_pulses(outputs: Any) -> int:
+    """The frame's number, in channels 15 and 16."""
+    return int(outputs[14]) + 65536 * int(outputs[15])
+
+
+def ardupilot(body: Any, frames: int, seed: int, rate_hz: int = 400, a_flight: int = 2500) -> Found:
+    """So many frames of ArduPilot's protocol over a bad line, begun anew after about `a_flight` of them."""
+    line, spy, link, found = Line(seed), Spy(body, number_in_pulses), Link(), Found()
+    end, port, done = Ardupilot(spy, link), 1, 0
+    while done < frames:
+        size = min(int(line.rng.integers(a_flight // 2, 2 * a_flight)), frames - done)
+        if found.meant:
+            line.now_s += 0.0 if line.rng.random() < 0.5 else 3.0
+            port += bool(line.rng.random() < 0.5)  # a process started anew mostly has another
+        meant: list[int] = []
+        found.meant.append(meant)
+        _fly_ardupilot(line, end, port, size, rate_hz, meant)
+        done += size
+    found.flown, found.happened, found.counts = spy.flown, line.happened, dict(link.counts)
+    return found
+
+
+def _fly_ardupilot(line: Line, end: Ardupilot, port: int, size: int, rate_hz: int, meant: list[int]) -> None:
+    before: deque[bytes] = deque(maxlen=40)
+    last_s = -1.0
+    for count in range(size):
+        given = [1500, 1500, 1400, 1500, *[0] * 10, count % 65536, count // 65536]
+        datagram = peers.packet(count, rate_hz, given)
+        answer = None
+        while answer is None:
+            answer = _asked(line, end, port, datagram, before)
+            line.now_s += 0.0 if answer else AGAIN_S
+        (t_s,) = read(answer)["timestamp"]
+        assert t_s > last_s, f"time stood still at {t_s}"
+        last_s = t_s
+        meant.append(count)
+        before.append(datagram)
+
+
+def _asked(line: Line, end: Ardupilot, port: int, datagram: bytes, before: deque[bytes]) -> bytes | None:
+    """The answer that gets through to one sending of a packet."""
+    line.wait()
+    if line.does("garbage"):
+        assert end.take(line.noise(), port, line.now_s) is None
+    if line.does("stranger"):
+        assert end.take(datagram, "stranger", line.now_s) is None or line.now_s < 0
+    if line.does("overtaken") and len(before) > 2:
+        old = before[int(line.rng.integers(0, len(before) - 1))]
+        assert end.take(old, port, line.now_s) is None
+    if line.does("lost"):
+        return None
+    answer = end.take(datagram, port, line.now_s)
+    if line.does("doubled"):
+        assert end.take(datagram, port, line.now_s) == answer
+    return None if line.does("lost") else answer
+
+
+def number_in_controls(outputs: Any) -> int:
+    """The frame's number, in the last control."""
+    return round(outputs[15] * 2**20)
+
+
+def px4(body: Any, frames: int, seed: int, a_flight: int = 2500) -> Found:
+    """So many frames of PX4's protocol over a bad line; each flight is a connection."""
+    line, spy, link, found = Line(seed), Spy(body, number_in_controls), Link(), Found()
+    spy.flown.append([])
+    mavlink = Mavlink()
+    end, done = Px4(spy, link, mavlink, lambda params: (3, "")), 0
+    while done < frames:
+        size = min(int(line.rng.integers(a_flight // 2, 2 * a_flight)), frames - done)
+        meant: list[int] = []
+        found.meant.append(meant)
+        _fly_px4(line, end, size, meant)
+        done += size
+    found.flown, found.happened, found.counts = spy.flown, line.happened, dict(link.counts)
+    return found
+
+
+def _fly_px4(line: Line, end: Px4, size: int, meant: list[int]) -> None:
+    mav = common.MAVLink(None, srcSystem=1, srcComponent=1)
+    mav.robust_parsing = True
+    before: deque[bytes] = deque(maxlen=40)
+    coming, known_us, number = end.connect(line.now_s), 0, 0
+    for _ in range(3):  # it starts: time passes, nobody answers
+        line.now_s += STEP_S
+        coming += end.tick(line.now_s, STEP_S)
+    last = b""
+    while True:
+        line.wait()
+        stamps = [m.time_usec for m in mav.parse_buffer(coming) or [] if m.get_type() == "HIL_SENSOR"]
+        new = [stamp for stamp in stamps if stamp > known_us]
+        if new and number == size:
+            return
+        if new:
+            known_us = new[-1]
+            message = common.MAVLink_hil_actuator_controls_message(
+                known_us, [*[0.0] * 15, number / 2**20], 129, 1
+            )
+            last = bytes(message.pack(mav))
+            meant.append(number)
+            number += 1
+            before.append(last)
+        coming = _told(line, end, last if stamps else b"", before)
+
+
+def _told(line: Line, end: Px4, answer: bytes, before: deque[bytes]) -> bytes:
+    """What comes back for an answer, or for none: then time passes until the endpoint says its last again."""
+    coming = b""
+    if line.does("garbage"):
+        coming += end.take(line.noise(), line.now_s)
+    if line.does("overtaken") and len(before) > 2:
+        coming += end.take(before[int(line.rng.integers(0, len(before) - 1))], line.now_s)
+    if answer and not line.does("lost"):
+        cut = int(line.rng.integers(0, len(answer)))  # TCP keeps no messages together
+        coming += end.take(answer[:cut], line.now_s) + end.take(answer[cut:], line.now_s)
+        if line.does("doubled"):
+            coming += end.take(answer, line.now_s)
+    if not coming:
+        line.now_s += AGAIN_S
+        coming += end.tick(line.now_s, STEP_S)
+    return coming

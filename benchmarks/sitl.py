@@ -54,9 +54,9 @@ def healthy(hours: float, rate_hz: int) -> Iterator[str]:
         outside_s += document["envelope"]["outside_s"]
         nearest = max(nearest, (document["detection"]["statistical"] or {}).get("closest_approach") or 0.0)
         vehicle.flight.release()
-        yield f"seed {seed}: {document['flight']['flown_s']:.0f} s, alarm {document['detection']['time_s']}"
+        yield f"seed {seed}: {document['frames']} frames, alarm {document['detection']['time_s']}"
     said = f"{flown_s / 3600:.2f} h at {rate_hz} Hz: {alarms} false alarms, {lost} lost"
-    yield f"{said}, {outside_s:.0f} s outside the envelope, statistical test at most {nearest:.2f} of its level"
+    yield f"{said}, {outside_s:.0f} s outside the envelope, statistical test at most {nearest:.2f} of its bar"
     if alarms or lost:
         raise SystemExit(1)
 
@@ -171,10 +171,9 @@ def published(_: int) -> Iterator[str]:
             document = json.loads(process.communicate()[0])
             texts = heard(ground)
             isolation, detection = document["isolation"], document["detection"]
-            yield (
-                f"{protocol}: alarm {detection['delay_s']} s after the fault, {isolation['fault']} named after "
-                f"{isolation['delay_s']} s, estimate {isolation['estimate']:.3f}, STATUSTEXT {texts}, exit {process.returncode}"
-            )
+            found = f"alarm {detection['delay_s']} s after the fault, {isolation['fault']} named after"
+            estimate = f"{isolation['delay_s']} s, theta {isolation['estimate']:.3f}"
+            yield f"{protocol}: {found} {estimate}, exit {process.returncode}, STATUSTEXT {texts}"
             missed |= process.returncode != 0 or not any("elevator" in text for text in texts)
     if missed:
         raise SystemExit(1)

@@ -221,7 +221,12 @@ def _fly_px4(line: Line, end: Px4, size: int, meant: list[int]) -> None:
 
 
 def _told(line: Line, end: Px4, answer: bytes, before: deque[bytes]) -> bytes:
-    """What comes back for an answer, or for none: then time passes until the endpoint says its last again."""
+    """What comes back for an answer, or for none: then time passes until the endpoint says its last again.
+
+    The first answer gets through: until then the endpoint takes the autopilot for one that starts.
+    """
+    if len(before) == 1:
+        return end.take(answer, line.now_s)
     coming = b""
     if line.does("garbage"):
         coming += end.take(line.noise(), line.now_s)

@@ -33,11 +33,15 @@ class Mavlink:
     """One end of a line: packs and unpacks. malformed: bytes or messages that were none, so far."""
 
     def __init__(self, system: int = 1) -> None:
-        self.messages = dialect()
-        self._mav = self.messages.MAVLink(None, srcSystem=system, srcComponent=COMPONENT)
-        self._mav.robust_parsing = True
+        self.messages, self._system = dialect(), system
         self.malformed = 0
         self._texts = 0
+        self.begin()
+
+    def begin(self) -> None:
+        """A new line: what has come of a message on an old one is let go."""
+        self._mav = self.messages.MAVLink(None, srcSystem=self._system, srcComponent=COMPONENT)
+        self._mav.robust_parsing = True
 
     def pack(self, message: Message) -> bytes:
         """A message as bytes."""

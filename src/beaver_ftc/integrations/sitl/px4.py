@@ -69,6 +69,7 @@ class Px4:
     def connect(self, now_s: float) -> bytes:
         """A new connection is an autopilot started anew, and so is the flight. Returns what to send."""
         self._connections += 1
+        self._mav.begin()
         self._wait()
         if self._connections > 1:
             self._link.counts["resets"] += 1
@@ -145,9 +146,9 @@ def _due(frame: int, hz: float, wanted_hz: float) -> bool:
 
 def sensor(m: Any, now: Instant, stamp_us: int, all_fields: bool) -> Message:
     """HIL_SENSOR: inertial each time, the others when `all_fields`."""
-    magnetic = magnetic_gauss(now.true_attitude)
-    pressure_hpa, celsius = standard_air(now.altitude_m)
     updated = INERTIAL | MAGNETIC | AIR if all_fields else INERTIAL
+    magnetic = magnetic_gauss(now.true_attitude) if all_fields else (0.0, 0.0, 0.0)
+    pressure_hpa, celsius = standard_air(now.altitude_m)
     return m.MAVLink_hil_sensor_message(
         stamp_us, *now.force, *now.gyro, *magnetic, pressure_hpa, now.qdyn_pa / 100.0, now.altitude_m,
         celsius, updated, 0,

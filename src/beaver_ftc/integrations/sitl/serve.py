@@ -168,13 +168,15 @@ def serve(scenario: Scenario, options: Options, say: Say) -> Flight:
     scenario, left_out = without_reference(scenario)
     for line in left_out:
         say(line)
-    if options.page is not None or options.ground is not None:
+    if options.page is not None:
         scenario = ready_for_hands(scenario)
     kind = socket.SOCK_DGRAM if options.protocol is Protocol.ardupilot else socket.SOCK_STREAM
     with _listening(options, kind) as listener, contextlib.ExitStack() as besides:
         endpoint = Endpoint(scenario, options, say)
         if options.page is not None:
             endpoint.show(besides.enter_context(beside(options.page)))
+        if kind == socket.SOCK_STREAM:
+            listener.listen()
         host, port = listener.getsockname()[:2]
         say(f"{NAMES[options.protocol]}: {'UDP' if kind == socket.SOCK_DGRAM else 'TCP'} {host}:{port}")
         try:
@@ -243,7 +245,6 @@ def _serve_datagrams(endpoint: Endpoint, listener: socket.socket, say: Say) -> N
 def _serve_stream(endpoint: Endpoint, listener: socket.socket, say: Say) -> None:
     mavlink = Mavlink()
     protocol = Px4(endpoint.vehicle, endpoint.link, mavlink, endpoint.inject)
-    listener.listen()
     listener.setblocking(False)
     while not endpoint.over:
         endpoint.listen()

@@ -43,15 +43,16 @@ class Teller:
     def _new(self, sim: Flown) -> list[tuple[int, str]]:
         verdict, found = sim.verdict, []
         before = self._said
-        self._said = now = verdict.detected, verdict.isolated, verdict.type, verdict.candidates
+        open_between = tuple(dict.fromkeys(name.partition(":")[0] for name in verdict.candidates))
+        self._said = now = verdict.detected, verdict.isolated, verdict.type, open_between
         if verdict.detected and not before[0]:
             where = f"on {verdict.axis}" if verdict.axis else "between the instruments"
             found.append((WARNING, f"alarm {where}"))
         if verdict.isolated and before[1:3] != now[1:3]:
             found.append((CRITICAL, _named(verdict)))
             self._named_s = sim.t_s if verdict.type == _LOSS else -1.0
-        elif verdict.detected and not verdict.isolated and verdict.candidates and before[3] != now[3]:
-            found.append((WARNING, " or ".join(verdict.candidates)))
+        elif verdict.detected and not verdict.isolated and open_between and before[3] != now[3]:
+            found.append((WARNING, " or ".join(open_between)))
         if 0.0 <= self._named_s <= sim.t_s - ESTIMATED_S and verdict.estimate is not None:
             self._named_s = -1.0
             found.append((INFO, f"{verdict.isolated}, {-100.0 * verdict.estimate:.0f} % lost"))

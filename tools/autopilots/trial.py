@@ -48,9 +48,9 @@ class Spy:
     def packets_hz(self) -> float:
         return self._body.packets_hz
 
-    def begin(self, packets_hz: float) -> None:
+    def begin(self, packets_hz: float, channels: int = 16) -> None:
         self.flown.append([])
-        self._body.begin(packets_hz)
+        self._body.begin(packets_hz, channels)
 
     def fly(self, outputs: Any, frame_hz: float, in_charge: bool = True) -> None:
         if len(outputs):

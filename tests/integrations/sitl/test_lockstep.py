@@ -25,7 +25,7 @@ class Stub:
         self.packets_hz, self.frames, self.begun, self.given = rate_hz, 0, 0, []
         self.over = False
 
-    def begin(self, packets_hz):
+    def begin(self, packets_hz, channels=16):
         if packets_hz < 20:
             raise BadInput(f"{packets_hz} Hz, allowed: 20 to 4000")
         self.packets_hz, self.frames, self.begun = packets_hz, 0, self.begun + 1

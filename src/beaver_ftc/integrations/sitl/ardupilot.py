@@ -38,8 +38,8 @@ class Body(Protocol):
     def over(self) -> bool:
         """Whether the flight has ended."""
 
-    def begin(self, packets_hz: float) -> None:
-        """A flight from trim. Raises BadInput for a rate it cannot be flown at."""
+    def begin(self, packets_hz: float, channels: int) -> None:
+        """A flight from trim. Raises BadInput for a rate it cannot be flown at, or too few outputs."""
 
     def fly(self, outputs: tuple[int, ...], frame_hz: float) -> None:
         """A frame of the autopilot."""
@@ -130,7 +130,7 @@ class Ardupilot:
 
     def _begin(self, packet: Packet, peer: Hashable) -> bool:
         try:
-            self._body.begin(packet.rate_hz)
+            self._body.begin(packet.rate_hz, len(packet.pulses_us))
         except BadInput as error:
             self.complaint = str(error)
             return False

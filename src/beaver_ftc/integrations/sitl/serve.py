@@ -14,7 +14,7 @@ from typing import Any
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.integrations.live.serve import beside
 from beaver_ftc.integrations.live.session import ready_for_hands
-from beaver_ftc.integrations.sitl import PORTS, Protocol, failures
+from beaver_ftc.integrations.sitl import PORTS, Protocol, failures, px4
 from beaver_ftc.integrations.sitl.ardupilot import Ardupilot
 from beaver_ftc.integrations.sitl.link import Link
 from beaver_ftc.integrations.sitl.mavlink import GroundLine, Mavlink
@@ -89,6 +89,8 @@ class Endpoint:
         self.options, self._say, self.ended = options, say, False
         self.link, self._teller = Link(), Teller()
         self.vehicle = Vehicle(scenario, pulses, rate_hz, options.hold_s, options.ground_m)
+        if not pulses:
+            self.vehicle.outputs.check(px4.CHANNELS)
         speed = options.speed if options.speed is not None else (0.0 if pulses else 1.0)
         self.pace = Pace(speed)
         self._ground = GroundLine(*options.ground) if options.ground else None

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.aircraft.channels import MOST_CHANNELS
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.integrations.sitl.outputs import Outputs
 from beaver_ftc.plant.channels import FT
@@ -179,6 +180,7 @@ class Vehicle:
         self.sim: Flown | None = None
         self.scenario = scenario
         self.packets_hz = 0.0
+        self.outputs: Outputs
         self.off_rate = 0
         self.begin(rate_hz or scenario.rate_hz)
         self._warm_up()
@@ -190,8 +192,11 @@ class Vehicle:
         flight.pilot(2 * substeps, flight.trim_rad, None)
         flight.reset()
 
-    def begin(self, packets_hz: float) -> None:
-        """A flight from trim, at this rate of packets. Raises BadInput for one that cannot be flown."""
+    def begin(self, packets_hz: float, channels: int = MOST_CHANNELS) -> None:
+        """A flight from trim, at this rate of packets of so many outputs. Raises BadInput for one that cannot
+        be flown."""
+        if self.sim is not None:
+            self.outputs.check(channels)
         packets_hz = self._fixed_hz or packets_hz
         if self.sim is not None and packets_hz == self.packets_hz:
             if self.sim.frames > 1 or self._inside:

@@ -268,9 +268,6 @@ def _serve_line(
     while not endpoint.over:
         step_s = 1.0 / (vehicle.packets_hz * (endpoint.pace.speed or 1.0))
         ready, _, _ = select.select([line, listener], [], [], step_s)
-        if listener in ready:
-            listener.accept()[0].close()
-            endpoint.link.counts["strangers"] += 1
         began_s = time.perf_counter()
         if line in ready:
             data = line.recv(MOST_BYTES)
@@ -278,6 +275,9 @@ def _serve_line(
                 return
             answer = protocol.take(data, time.monotonic())
         else:
+            if listener in ready:  # and nothing of ours, not even its end
+                listener.accept()[0].close()
+                endpoint.link.counts["strangers"] += 1
             answer = protocol.tick(time.monotonic(), step_s)
         for says in protocol.done:
             endpoint._say(says)

@@ -108,15 +108,18 @@ def test_the_ground_station_breaks_a_servo():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ground:
         ground.bind(("127.0.0.1", 0))
         ground.settimeout(5)
+        small = Small()
+
+        def pilot(told):
+            if told.t_s == 0.2:
+                _, sender = ground.recvfrom(65536)
+                ground.sendto(peers.Px4(None).inject(102, 2, 4), sender)
+            return small.outputs(told)
+
         with served("ardupilot", ground=ground.getsockname(), speed=20.0) as at:
-            autopilot = peers.Ardupilot(Small().outputs, 100)
-            autopilot.fly(at.address, 10)
-            _, sender = ground.recvfrom(65536)
-            ground.sendto(peers.Px4(None).inject(102, 2, 4), sender)
-            autopilot.fly(at.address, 500)
-    assert [(fault["actuator"], fault["type"]) for fault in at.flight.metrics["faults"]] == [
-        ("rudder", "stuck")
-    ]
+            peers.Ardupilot(pilot, 100).fly(at.address, 500)
+    (fault,) = at.flight.metrics["faults"]
+    assert (fault["actuator"], fault["type"]) == ("rudder", "stuck")
     assert "rudder: stuck" in at.said
 
 

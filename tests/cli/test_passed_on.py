@@ -93,6 +93,16 @@ VERIFY = {
     "studies__verify__summary_text": "v",
     "studies__engine__workers__cores": 7,
 }
+
+
+def _flown(scenario, options, say):
+    """A flight that tells the options it was asked with."""
+    metrics = {"scenario": scenario.name, "passed": False, "expectations": []}
+    asked = {name: str(value) for name, value in vars(options).items()}
+    return SimpleNamespace(save=lambda out, report: out / f"report {report}", metrics=metrics | asked)
+
+
+SITL = {"integrations__sitl__serve__serve": _flown, "results__verdict__verdict_text": "verdict"}
 SURVEY = {"studies__detectability__run_survey": {"points": [1]}, "studies__detectability__text": "d"}
 BENCH = {"studies__bench__measure__bench": {"b": 1}, "studies__bench__measure__text_of": "bench"}
 DERIVE = {
@@ -179,6 +189,8 @@ ASKED = [
     ("sweep elevator-effectiveness --replay 0 --format json", SWEEP),
     ("live", LIVE), ("live rudder-stuck --port 80 --out o", LIVE),
     ("live rudder-stuck --aircraft beaver", LIVE),
+    ("sitl fault-free --as ardupilot", SITL), ("sitl fault-free --as px4 --mavlink nowhere", SITL),
+    ("sitl fault-free --as px4 --port 1 --rate 200 --hold 3 --mavlink h:14550 --page 0 --format json", SITL),
     ("mismatch fault-free", MISMATCH), ("mismatch fault-free --variant declared,engine-neglected", MISMATCH),
     ("mismatch fault-free rudder-stuck --map --no-report --format json --out o", MISMATCH),
     ("mismatch fault-free --format json --map", MISMATCH), ("mismatch nothing.yaml --format json", MISMATCH),

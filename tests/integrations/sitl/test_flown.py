@@ -1,6 +1,7 @@
 """The flight under an autopilot: as in process, at any rate of packets, its faults and its instant."""
 
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,11 +9,12 @@ from tools.autopilots import peers
 from tools.autopilots.small import Small
 
 import beaver_ftc as bf
+from beaver_ftc.diagnosis.rivals.rls import RlsMonitor
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.integrations.sitl.ardupilot import Ardupilot
 from beaver_ftc.integrations.sitl.link import Link
 from beaver_ftc.integrations.sitl.px4 import quaternion, rotation, standard_air
-from beaver_ftc.integrations.sitl.vehicle import Vehicle, at_rate, without_reference
+from beaver_ftc.integrations.sitl.vehicle import Flown, Vehicle, at_rate, without_reference
 
 NO_PULSE = 0
 
@@ -75,17 +77,42 @@ def test_recorded_packets_fly_what_the_same_commands_fly_in_process(noisy):
 @pytest.mark.parametrize("packets_hz", [50, 400, 1200])
 def test_the_flight_follows_the_rate_of_the_packets(packets_hz):
     """At most 400 frames of the diagnosis a second: of faster packets the first in each counts."""
+    air = {"duration_s": 1.0, "environment": {"turbulence": "dryden", "severity": "light"}}
     packets, pulses = recorded(round(0.5 * packets_hz), packets_hz)
-    vehicle = Vehicle(scenario(duration_s=1.0), pulses=True)
+    vehicle = Vehicle(scenario(**air), pulses=True)
     log = flown_by(vehicle, packets)
     frames_hz = min(packets_hz, 400)
     each = packets_hz // frames_hz
     assert vehicle.scenario.rate_hz == frames_hz
     assert vehicle.instant().t_s == pytest.approx(0.5)
-    sim = bf.Simulation(scenario(duration_s=1.0, rate_hz=frames_hz, substeps=each))
+    sim = bf.Simulation(scenario(**air, rate_hz=frames_hz, substeps=each))
     for command in commands(pulses[::each], sim.trim_rad):
         sim.step(command)
     assert np.array_equal(log.to_numpy(), sim.log.to_numpy(), equal_nan=True)
+
+
+def test_a_plug_in_sees_whole_frames_however_they_are_flown():
+    flown = at_rate(scenario(duration_s=0.5), 100).with_({"substeps": 4})
+    whole, parts = (Flown(flown, detector=RlsMonitor()) for _ in range(2))
+    for k in range(40):
+        command = whole.trim_rad + 0.01 * np.sin(k)
+        whole.pilot(4, command, None)
+        for runs in (1, 2, 1):
+            parts.pilot(runs, command, None)
+    assert np.array_equal(whole.log.to_numpy(), parts.log.to_numpy(), equal_nan=True)
+
+
+def test_the_example_finds_its_fault_under_the_small_autopilot():
+    """`examples/autopilot`, sooner."""
+    file = Path(__file__).parents[3] / "examples" / "autopilot" / "under-an-autopilot.yaml"
+    base = bf.load(file).with_({"duration_s": 9, "faults[0].at_s": 6})
+    assert base.warnings() == ()
+    vehicle = Vehicle(base, pulses=True, log=False)
+    end, autopilot = Ardupilot(vehicle, Link()), peers.Ardupilot(Small().outputs, 100)
+    while not vehicle.over:
+        autopilot.hear(end.take(autopilot.next(), "it", 0.0))
+    flight = vehicle.flight.land()
+    assert flight.passed, flight
 
 
 def test_packets_inside_a_frame_see_the_truth_move():

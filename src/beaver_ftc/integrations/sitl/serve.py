@@ -275,12 +275,27 @@ def _serve_line(
                 return
             answer = protocol.take(data, time.monotonic())
         else:
-            if listener in ready:  # and nothing of ours, not even its end
-                listener.accept()[0].close()
-                endpoint.link.counts["strangers"] += 1
             answer = protocol.tick(time.monotonic(), step_s)
+        if listener in ready and not _has_gone(line):
+            listener.accept()[0].close()
+            endpoint.link.counts["strangers"] += 1
         for says in protocol.done:
             endpoint._say(says)
         protocol.done.clear()
         if answer:
             line.sendall(mavlink.texts(endpoint.after(began_s)) + answer)
+    _hang_up(line)
+
+
+def _has_gone(line: socket.socket) -> bool:
+    """Whether the other end has hung up, and nothing it said before is left to be read."""
+    readable, _, _ = select.select([line], [], [], 0.0)
+    return bool(readable) and not line.recv(1, socket.MSG_PEEK)
+
+
+def _hang_up(line: socket.socket) -> None:
+    """Close a line of which the other end is to hear the last word: with words unread it would be reset."""
+    line.shutdown(socket.SHUT_WR)
+    line.settimeout(WAIT_S)
+    while line.recv(MOST_BYTES):
+        continue

@@ -54,6 +54,17 @@ TABLE = (
         r"timeout --signal=INT 20 \1 | grep live:.http",
     ),
     Exempt(
+        r"(beaver-ftc sitl \S+ --as ardupilot)",
+        "waits for an autopilot, which tests/integrations/sitl has: its address",
+        r"timeout --signal=INT 20 \1 --port 0 --no-report 2>&1 | grep 127.0.0.1",
+    ),
+    Exempt(
+        r"beaver-ftc sitl .*",
+        "waits for an autopilot and wants pymavlink, both of which tests/integrations/sitl has",
+        "beaver-ftc sitl --help",
+    ),
+    Exempt(r"(sim_vehicle.py|PX4_SIM_MODEL=).*", "needs ArduPilot or PX4"),
+    Exempt(
         r"beaver-ftc compare --flights FOLDER.*",
         "needs the recorded flights, which are not of this project (tests/flights has some of its own)",
     ),
@@ -126,7 +137,12 @@ TABLE = (
 
 def tried(command: Command) -> str | None:
     """What is run for a command that is shown; None where its exception says that nothing is."""
+    return instead(command.line)
+
+
+def instead(line: str) -> str | None:
+    """The same of the line of a command."""
     for exempt in TABLE:
-        if exempt.matches(command.line):
-            return exempt.replaced(command.line)
-    return command.line
+        if exempt.matches(line):
+            return exempt.replaced(line)
+    return line

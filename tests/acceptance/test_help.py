@@ -5,6 +5,7 @@ import re
 import pytest
 
 from .documents import commands_of_help, examples_of_help
+from .exceptions import instead
 from .materials import lay_out
 
 TEXTS = {}
@@ -46,7 +47,8 @@ def test_the_program_says_its_exit_statuses(helps):
 
 def test_examples_of_help_run(helps, installation, tmp_path):
     for name, text in helps.items():
-        for number, line in enumerate(examples_of_help(text)):
+        for number, example in enumerate(examples_of_help(text)):
+            line = instead(example) if example.startswith("beaver-ftc sitl ") else example
             folder = tmp_path / f"{name}-{number}"
             folder.mkdir()
             if " new " not in line:  # which makes the file itself

@@ -45,7 +45,7 @@ OF_A_LAW = {"control.feedback.integral", "control.rejection.disturbance"}
 OWN = {
     "law": OF_A_LAW,
     "observer": OF_A_LAW,
-    "scheme": {"since"},
+    "scheme": {"since", "fdi.statistical.air.in_flight", "fdi.statistical.inertial_air.in_flight"},
     "sensors": {"instruments.taken"},
 }
 

@@ -1,9 +1,12 @@
 """What the vanes know of the air's rotation, held against JSBSim's own gusts, and the algebra behind it."""
 
+import shutil
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -16,8 +19,10 @@ from beaver_ftc.diagnosis import air
 from beaver_ftc.diagnosis.air import AIR
 from beaver_ftc.diagnosis.bounds import variances
 from beaver_ftc.loop.loop import Loop
+from beaver_ftc.scenario.loader import load as load_given
 from flying import scenario
 
+ROOT = Path(__file__).resolve().parents[2]
 MEMORY_S = 0.05  # over which the whitening filter compares, about
 FT = 0.3048
 
@@ -121,6 +126,34 @@ def test_still_air_shows_no_gust():
     flown = Flown("none", duration_s=20)
     assert np.abs(np.diff(flown.seen[:, 1:], axis=0)).max() < 2e-4
     assert np.abs(flown.seen[:, 1:]).max() < 5e-3  # against 0.03 rad/s in light turbulence
+
+
+@pytest.mark.parametrize("told", [False, True])
+def test_of_an_aircraft_whose_forces_nobody_knows_no_gust_is_seen(tmp_path, monkeypatch, told):
+    """A pull-up in still air; told all the same that the vanes show gusts, the detector takes it for one."""
+    shutil.copytree(ROOT / "tests/data/aircraft/trainer", tmp_path / "trainer")
+    file = tmp_path / "trainer/aircraft.yaml"
+    text = yaml.safe_load(file.read_text())
+    del text["forces"]
+    file.write_text(yaml.safe_dump(text))
+    monkeypatch.chdir(tmp_path)
+    loop = Loop(
+        load_given(
+            {
+                "aircraft": "./trainer",
+                "duration_s": 5,
+                "fdi": {"statistical": {}, "bounds": {"turbulence": "light"}},
+                "reference": {"q": [{"sine": {"amplitude_deg_s": 4, "frequency_hz": 0.5}}]},
+            }
+        )
+    )
+    statistical = loop.frames["fdi"]["statistical"][0]
+    if told:
+        statistical["air"]["seen"], statistical["air"]["unseen"] = 1, air.UNSEEN
+    for _ in loop.chunks():
+        pass
+    assert bool(statistical["alarm"]["closest"] > 0.2) is told
+    assert bool(np.any(statistical["air"]["acceleration"])) is told
 
 
 def test_nor_does_it_when_the_force_jumps_between_coarse_frames():

@@ -7,7 +7,8 @@ sideways in yaw [MIL-F-8785C, 3.7]:
 
 Vanes and airspeed give the velocity through the moving air; the forces, attitude and gravity say how that
 through still air would have changed. The difference is the gust's own change. The rolling gust, which
-changes across the span, is seen by no instrument.
+changes across the span, is seen by no instrument; and of an aircraft whose forces nobody knows, as a derived
+one's, no gust is: a change of its own velocity would be taken for one.
 
 Velocity is followed as JSBSim moves it, by Adams and Bashforth's two steps: v' = v + dt (3 a - a_before) / 2.
 """
@@ -36,6 +37,7 @@ LEAST_SWING = 0.01  # of a gust's own intensity: less is not reckoned with
 
 AIR = record(
     moving=int, started=int,  # whether there is turbulence; whether `pull` is known
+    seen=int,  # whether the vanes tell a gust: only where forces are known
     read=int, felt=3,  # whether accelerometers are read; what they say, m/s2
     forces=TABLE, scratch=MAX_MONOMIALS,  # force coefficients
     area_per_mass=float, gravity=float, span=float, velocity=3, force=3, turn=(3, 3), heading=float,
@@ -208,7 +210,8 @@ def effect(air, design, x, y, u):
         specific_force(air, x, y, u, air.force)
     rate_damping(design, x, y, u, air.scratch, air.damping)
     for i in range(3):
-        air.rotation[i] = air.axes[i, 1] * air.gust[1] + air.axes[i, 2] * air.gust[2]
+        known = air.axes[i, 1] * air.gust[1] + air.axes[i, 2] * air.gust[2]
+        air.rotation[i] = known if air.seen else 0.0
     for i in range(3):
         air.acceleration[i] = 0.0
         for j in range(3):
@@ -322,12 +325,12 @@ def together(air, axes, i, j, g):
 
 def set_up_air(air: np.void, turbulence: str, mass: MassProperties, aircraft: Aircraft) -> None:
     span_m = aircraft.geometry.span_m
-    air["moving"] = turbulence != "none"
+    air["moving"], air["seen"] = turbulence != "none", bool(aircraft.measurable_forces)
     fill_table(air["forces"], aircraft, aircraft.measurable_forces, FORCES)
     air["area_per_mass"] = aircraft.geometry.wing_area_m2 / mass.mass_kg
     air["gravity"] = 9.80665  # m/s2, standard; what is constant has no part in a change of the gust
     air["span"] = span_m
-    air["per_metre"], air["unseen"] = gust_drift(turbulence, span_m), UNSEEN
+    air["per_metre"], air["unseen"] = gust_drift(turbulence, span_m), UNSEEN if air["seen"] else 1.0
     air["scale"] = SCALE_M
     air["rolling"] = sqrt(air["scale"] * span_m) / 2.6  # [Yeager1998, eq. 10]
 

@@ -14,7 +14,7 @@ PLAIN := tests/design $(wildcard tests/*/test_*_kernels.py tests/*/*/test_*_kern
   $(addprefix tests/control/test_,decisions.py law_frame.py laws.py supervisor.py compiled_rivals.py) \
   tests/control/laws/test_gains.py tests/diagnosis/rivals/test_filters.py
 
-.PHONY: demo test plain acceptance cost test-fast coverage mutants drawn lint docs site clean help
+.PHONY: demo test plain acceptance cost test-fast coverage mutants drawn lint docs docs-check site clean help
 
 help:
 	@echo "make demo       set up, fly the published elevator case, print the verdict and where the report lies"
@@ -26,7 +26,8 @@ help:
 	@echo "make mutants    100 small defects put into the code on purpose: how many of them do tests find?"
 	@echo "make drawn      600 scenarios drawn from the schema, flown: does each keep every promise?"
 	@echo "make lint       set up and run the linters"
-	@echo "make docs       set up and write the generated pages and pictures of docs/ anew"
+	@echo "make docs       set up and write anew what commands print on the pages: blocks, numbers, pictures"
+	@echo "make docs-check does every page still say what its commands print, and does every name on it exist?"
 	@echo "make site       set up and build docs/, with reference and notebooks, as a web site in site/"
 	@echo "make clean      remove the virtual environment and what runs have written"
 
@@ -75,8 +76,11 @@ lint: $(VENV)/.dev
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
-docs: $(VENV)/.demo
+docs: $(VENV)/.dev
 	$(BIN)/python -m tools.docs
+
+docs-check: $(VENV)/.dev
+	$(BIN)/python -m tools.docs --check
 
 $(VENV)/.site: $(VENV)/.demo
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'

@@ -1,12 +1,85 @@
-"""Write the generated documentation into `docs/` of a source tree: `python -m tools.docs`."""
+"""Documentation that its commands print.
 
+python -m tools.docs [PAGE ...]    write every cheap block, number and picture anew
+python -m tools.docs --check       print what stands otherwise and every wrong name; status 1 if any
+python -m tools.docs table NAME    print a table; `constants` and `properties` print those
+"""
+
+import argparse
+import json
 import sys
 
 from beaver_ftc.documents.errors import BeaverFtcError
-from tools.docs.generate import write_docs
 
-try:
-    for written in write_docs():
-        print(written)
-except BeaverFtcError as error:
-    sys.exit(str(error))
+
+def main() -> int:
+    """Exit status 0 if nothing is wrong."""
+    first = sys.argv[1] if len(sys.argv) > 1 else ""
+    printers = {"table": _table, "constants": _constants, "properties": _properties}
+    try:
+        if first in printers:
+            print(printers[first](*sys.argv[2:]))
+            return 0
+        return _pages(_options())
+    except BeaverFtcError as error:
+        print(error, file=sys.stderr)
+        return error.exit_code
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="python -m tools.docs", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("pages", nargs="*", metavar="PAGE", help="theory, docs/theory.md; all without any")
+    parser.add_argument("--check", action="store_true", help="write nothing, print what differs")
+    parser.add_argument("--dear", action="store_true", help="fly what takes long as well")
+    parser.add_argument("--only", default="", metavar="TEXT", help="of what takes long, commands with this")
+    parser.add_argument("--jobs", type=int, help="processes side by side; as many as cores without it")
+    parser.add_argument("--times", action="store_true", help="print which commands take longest")
+    return parser.parse_args()
+
+
+def _pages(options: argparse.Namespace) -> int:
+    from tools.docs.marks import read
+    from tools.docs.pages import chosen
+    from tools.docs.refresh import Wanted, check, slowest, write
+
+    pages = [read(path) for path in chosen(options.pages)]
+    if options.check:
+        findings, printed = check(pages, options.jobs)
+    else:
+        wanted = Wanted(dear=options.dear, only=options.only)
+        written, findings = write(pages, wanted, options.jobs)
+        print("".join(f"{name}: written\n" for name in written), end="")
+    wrong = [finding for finding in findings if not finding.said]
+    for finding in findings:
+        print(f"{finding}{' (only said)' if finding.said else ''}")
+    if options.check:
+        blocks, numbers = (sum(len(getattr(page, of)) for page in pages) for of in ("blocks", "numbers"))
+        print(f"{len(pages)} pages, {blocks} blocks, {numbers} numbers, {len(printed)} commands:", end=" ")
+        print(f"{len(wrong)} wrong")
+        if options.times:
+            print("\n".join(slowest(printed, 20)))
+    return int(bool(wrong))
+
+
+def _table(name: str = "") -> str:
+    from tools.docs.tables import table
+
+    return table(name)
+
+
+def _constants() -> str:
+    from tools.docs.constants import constants
+
+    return json.dumps(constants(), indent=1)
+
+
+def _properties() -> str:
+    from tools.docs.properties import as_markdown
+
+    return as_markdown()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

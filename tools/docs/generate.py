@@ -5,6 +5,7 @@ from pathlib import Path
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.paths import data_root
+from tools.docs.pictures import lighten
 
 HEADLINE = "<!-- what reproduce says -->", "<!-- end -->"  # of README
 
@@ -60,12 +61,3 @@ def _write_reproduction(docs: Path) -> Iterator[Path]:
     figures = figures_of(document, flights.published)
     write_files(folder, figures)
     yield from (lighten(folder / name) for name in figures)
-
-
-def lighten(picture: Path) -> Path:
-    """Reduce a picture to a palette of 64 colours: a third of the size, and no difference to see."""
-    from PIL import Image
-
-    with Image.open(picture) as image:
-        image.convert("RGB").quantize(64, dither=Image.Dither.NONE).save(picture, optimize=True)
-    return picture

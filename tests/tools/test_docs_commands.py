@@ -1,0 +1,157 @@
+"""Commands of the marks: each once, in a folder of its own, within its time; tables and constants."""
+
+import io
+import json
+from importlib import import_module
+
+import numpy as np
+import pytest
+from PIL import Image
+from tools.docs import commands, pages, pictures, tables
+from tools.docs.commands import Output, outputs
+from tools.docs.constants import constants
+from tools.docs.marks import parsed
+from tools.docs.refresh import Refreshed, Wanted
+
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.plugins import LAWS, options_of
+
+
+def one(line, **options):
+    return outputs([line], **options)[line]
+
+
+def test_a_command_runs_once_in_an_empty_folder(tmp_path):
+    line = f"ls; echo ran >> {tmp_path}/ran; echo end   "
+    assert outputs([line, line])[line].text == "end"
+    assert (tmp_path / "ran").read_text() == "ran\n"
+
+
+def test_a_command_finds_the_files_that_the_pages_show():
+    assert "brief.yaml" in one("ls brief.yaml brief.scenario.yaml").text
+
+
+FAULTS = {
+    "exit 2": "ends with status 2: nothing on standard error",
+    "echo no such thing >&2; exit 3": "ends with status 3: no such thing",
+    "true": "prints nothing",
+    "echo x; python -c 'raise ValueError'": "ends with status 1: ValueError",
+    "pwd": "prints a path of this machine",
+    "echo missed; exit 1": "",
+}
+
+
+def test_what_cannot_be_used_says_why():
+    found = outputs(FAULTS)
+    assert {line: output.fault for line, output in found.items()} == FAULTS
+
+
+def test_a_command_that_takes_too_long_is_to_be_dear(monkeypatch):
+    monkeypatch.setattr(commands, "LONGEST_S", 0.1)
+    monkeypatch.setattr(commands, "PATIENCE", 3.0)
+    busy = "python -c 'import time\nwhile time.process_time() < 0.2: pass\nprint(1)'"
+    for line in ("sleep 20; echo 1", busy):
+        assert "make it dear" in one(line).fault
+    assert outputs([], {busy})[busy].text == "1"
+
+
+def picture(shade, size=40):
+    content = io.BytesIO()
+    Image.fromarray(np.full((size, size, 3), shade, np.uint8)).save(content, "PNG")
+    return content.getvalue()
+
+
+def test_pictures_are_compared_by_what_is_seen(tmp_path):
+    path = tmp_path / "a.png"
+    assert not pictures.look_the_same(path, picture(100))
+    pictures.write(path, picture(100))
+    assert pictures.look_the_same(path, picture(100))
+    assert pictures.look_the_same(path, picture(101))
+    assert not pictures.look_the_same(path, picture(110))
+    assert not pictures.look_the_same(path, picture(100, 41))
+    (tmp_path / "a.svg").write_bytes(b"<svg/>")
+    assert pictures.look_the_same(tmp_path / "a.svg", b"<svg/>")
+    assert not pictures.look_the_same(tmp_path / "a.svg", b"<svg />")
+
+
+def test_a_command_that_draws_otherwise_is_red(tmp_path, monkeypatch):
+    monkeypatch.setattr("tools.docs.refresh.ROOT", tmp_path)
+    text = "<!-- printed: draw -->\n![x](images/a.png)\n<!-- /printed -->\n"
+    output = {"draw": Output("![x](images/a.png)", pictures={"a.png": picture(100)})}
+    made = Refreshed(parsed(text, "docs/page.md"), output, Wanted())
+    assert ["docs/images/a.png" in change.words for change in made.changes] == [True]
+    pictures.write(tmp_path / "docs" / "images" / "a.png", made.drawn["a.png"])
+    assert Refreshed(parsed(text, "docs/page.md"), output, Wanted()).changes == []
+
+
+def test_a_picture_that_a_command_draws_is_taken():
+    made = one("mkdir -p images/of; echo '<svg/>' > images/of/a.svg; echo '![a](images/of/a.svg)'")
+    assert made.pictures == {"of/a.svg": b"<svg/>\n"}
+
+
+def test_a_changed_gain_turns_the_page_that_cites_it_red(monkeypatch):
+    text = (
+        "<!-- from code: python -m tools.docs constants -->\n"
+        "The gain is <!--=code options.laws.zhang2005.network_gain g-->40<!--/-->.\n"
+    )
+    page = parsed(text, "docs/page.md")
+
+    def changes():
+        output = Output(json.dumps(constants()))
+        return Refreshed(page, {"python -m tools.docs constants": output}, Wanted()).changes
+
+    assert changes() == []
+    monkeypatch.setitem(options_of(LAWS, "zhang2005")["network_gain"], "default", 41.0)
+    assert ['stands "40", printed "41"' in str(change) for change in changes()] == [True]
+
+
+def test_constants_are_those_of_the_code():
+    found = json.loads(json.dumps(constants(), allow_nan=False))
+    assert found["defaults"]["initial"]["airspeed_mps"] == 45.0
+    assert found["modules"]["plant.adapter"]
+    assert found["counts"]["commands"] > 20
+
+
+@pytest.fixture
+def own_tables(tmp_path, monkeypatch):
+    monkeypatch.setattr(tables, "__file__", str(tmp_path / "__init__.py"))
+    return tmp_path
+
+
+def test_table_makers_are_found_by_name(own_tables):
+    (own_tables / "page.py").write_text("def my_table(): ...\ndef _helper(): ...\n")
+    assert tables.makers() == {"my-table": "page"}
+    with pytest.raises(BadInput, match="did you mean my-table"):
+        tables.table("my-tabel")
+    (own_tables / "other.py").write_text("def my_table(): ...\n")
+    with pytest.raises(BadInput, match="a second table is called my-table"):
+        tables.makers()
+
+
+def test_every_table_maker_says_what_its_table_shows():
+    for name, module in tables.makers().items():
+        make = getattr(import_module(f"tools.docs.tables.{module}"), name.replace("-", "_"))
+        assert make.__doc__
+
+
+def test_what_tables_share_is_made_once(tmp_path, monkeypatch):
+    made = []
+
+    @tables.shared
+    def dear():
+        made.append(1)
+        return {"x": [1, 2]}
+
+    assert dear() == dear()
+    assert len(made) == 2  # by itself nothing is kept
+    monkeypatch.setenv(commands.SHARED, str(tmp_path))
+    assert dear() == dear() == {"x": [1, 2]}
+    assert len(made) == 3
+
+
+def test_pages_are_named_as_one_likes():
+    (theory,) = pages.chosen(["theory"])
+    assert pages.chosen(["docs/theory.md", "theory.md"]) == [theory, theory]
+    assert pages.chosen([])[0].name == "README.md"
+    with pytest.raises(BadInput, match=r"did you mean docs/theory\.md"):
+        pages.chosen(["docs/teory.md"])

@@ -1,0 +1,105 @@
+"""The constants that prose cites, read from the code: `python -m tools.docs constants`."""
+
+import ast
+import math
+from collections.abc import Iterator
+from contextlib import suppress
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from beaver_ftc.documents.errors import BeaverFtcError
+from tools.docs.pages import ROOT
+
+PACKAGE = "beaver_ftc"
+_LONGEST = 64  # elements of a constant that is shown
+
+
+def constants() -> dict[str, Any]:
+    """The document: defaults of every key, what a key may be, options of plug-ins, the aircraft, constants
+    of modules by the module's path, and how many there are of what can be listed.
+    """
+    from beaver_ftc.cli.catalogue import _available
+    from beaver_ftc.cli.main import COMMANDS
+    from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled, options_of, registered
+    from beaver_ftc.scenario.loader import load_text
+    from beaver_ftc.scenario.schema import Scenario
+
+    plain = load_text("name: default\n")
+    options = {
+        kind: {
+            name: {key: row["default"] for key, row in options_of(group, name).items()}
+            for name in registered(group)
+            if is_compiled(group, name)
+        }
+        for kind, group in (("schemes", DETECTORS), ("laws", LAWS))
+    }
+    counts = {kind: len(list(entries)) for kind, entries in _available().items()}
+    return _plain({
+        "defaults": plain.model_dump(),
+        "sections": Scenario.model_json_schema()["$defs"],
+        "options": options,
+        "aircraft": {name: _aircraft(name) for name in ("beaver",)},
+        "modules": dict(_of_modules()),
+        "counts": {**counts, "commands": len(COMMANDS)},
+    })  # fmt: skip
+
+
+def _aircraft(name: str) -> Any:
+    from beaver_ftc.aircraft import load
+
+    return load(name).file.model_dump()
+
+
+def _of_modules() -> Iterator[tuple[str, dict[str, Any]]]:
+    """(module's path below the package, its constants): names in capitals with numbers, texts, or such."""
+    for path in sorted((ROOT / "src" / PACKAGE).rglob("*.py")):
+        names = _constants_of(path)
+        if names:
+            parts = path.relative_to(ROOT / "src").with_suffix("").parts
+            dotted = ".".join(part for part in parts if part != "__init__")
+            with suppress(ImportError, BeaverFtcError):  # what an optional library would bring
+                module = import_module(dotted)
+                found = {name: getattr(module, name, None) for name in names}
+                shown = {name: value for name, value in found.items() if _is_shown(value)}
+                if shown:
+                    yield dotted.partition(".")[2] or PACKAGE, shown
+
+
+def _constants_of(path: Path) -> list[str]:
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    found: list[str] = []
+    for node in tree.body:
+        targets = node.targets if isinstance(node, ast.Assign) else []
+        targets = [node.target] if isinstance(node, ast.AnnAssign) else targets
+        for target in targets:
+            names = target.elts if isinstance(target, ast.Tuple) else [target]
+            found += [name.id for name in names if isinstance(name, ast.Name) and name.id.isupper()]
+    return found
+
+
+def _is_shown(value: Any) -> bool:
+    if isinstance(value, dict):
+        return len(value) <= _LONGEST and all(map(_is_shown, value.values()))
+    if isinstance(value, list | tuple | set | frozenset | range):
+        return len(value) <= _LONGEST and all(map(_is_shown, value))
+    if isinstance(value, np.ndarray):
+        return value.size <= _LONGEST and value.dtype.kind in "fiu"
+    return isinstance(value, str | bool | int | float | np.number)
+
+
+def _plain(value: Any) -> Any:
+    """As JSON has it."""
+    if isinstance(value, dict):
+        return {str(key): _plain(element) for key, element in value.items()}
+    if isinstance(value, set | frozenset):
+        return sorted(map(_plain, value), key=str)
+    if isinstance(value, list | tuple | range):
+        return [_plain(element) for element in value]
+    if isinstance(value, np.ndarray | np.number):
+        return _plain(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    return value if isinstance(value, str | bool | int | float) or value is None else str(value)

@@ -1,0 +1,219 @@
+"""The marks of a page: which command prints a block, a table or a number, and where it stands.
+
+    <!-- printed: COMMAND -->            a block, up to <!-- /printed -->
+    <!-- from NAME: COMMAND -->          a document in JSON, of which numbers of the page are taken
+    <!--=NAME path.to.value .2f-->0.12<!--/-->
+
+After a command: `| dear | probe: COMMAND | needs NAME | at REVISION DATE DIGEST`. In fenced code, marks are
+text.
+"""
+
+import re
+import shlex
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from tools.docs.pages import ROOT, Finding
+
+_COMMENT = re.compile(r"<!--.*?(?:-->|$)")
+_PRINTED = re.compile(r"<!-- printed: (\S.*?) -->")
+_FROM = re.compile(r"<!-- from ([\w-]+): (\S.*?) -->")
+_END = "<!-- /printed -->"
+_NUMBER = re.compile(r"<!--=(.*?)-->(.*?)<!--/-->")
+_FENCE = re.compile(r" *(`{3,}|~{3,})")
+_BEGINS = re.compile(r"\s*(?:[-*+>]|\d+\.)?\s*<!--=")
+_AT = re.compile(r"at (\S+) (\d{4}-\d\d-\d\d) (\S+)")
+_OPTIONS = "allowed: dear, probe: COMMAND, needs NAME, at REVISION DATE DIGEST"
+_ALLOWED = "allowed: printed: COMMAND, /printed, from NAME: COMMAND, =NAME path format, /"
+
+
+@dataclass(frozen=True)
+class Origin:
+    """What prints something: a command, and if it is dear, what is known of the last time it did.
+
+    probe: a cheap command whose output changes with that of the command. needs: the environment variable that
+    leads to data which the repository has not. at: revision, date, and digest of what the probe printed.
+    """
+
+    command: str
+    dear: bool = False
+    probe: str = ""
+    needs: str = ""
+    at: tuple[str, str, str] | None = None
+
+    def __str__(self) -> str:
+        parts = [self.command]
+        parts += ["dear"] * self.dear
+        parts += [f"probe: {self.probe}"] * bool(self.probe)
+        parts += [f"needs {self.needs}"] * bool(self.needs)
+        parts += [f"at {' '.join(self.at)}"] if self.at else []
+        return " | ".join(parts)
+
+
+@dataclass(frozen=True)
+class Block:
+    """What a command printed: from begin to end of the text, after the mark that begins at `mark`."""
+
+    origin: Origin
+    line: int
+    mark: tuple[int, int]
+    begin: int
+    end: int
+
+
+@dataclass(frozen=True)
+class Document:
+    """The document that a command prints, under the name that the page's numbers call it by."""
+
+    name: str
+    origin: Origin
+    line: int
+    mark: tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number in prose: where it stands, and how it is taken out of a document."""
+
+    name: str
+    path: str
+    factor: float
+    format: str
+    line: int
+    begin: int
+    end: int
+
+
+@dataclass
+class Page:
+    """A page with its marks, and what is wrong with them."""
+
+    name: str
+    text: str
+    blocks: list[Block] = field(default_factory=list)
+    documents: dict[str, Document] = field(default_factory=dict)
+    numbers: list[Number] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
+
+    @property
+    def origins(self) -> list[Origin]:
+        """Of every block and document."""
+        return [made.origin for made in (*self.blocks, *self.documents.values())]
+
+    def wrong(self, line: int, words: str) -> None:
+        """Note what is wrong."""
+        self.findings.append(Finding(self.name, line, words))
+
+
+def read(path: Path, root: Path = ROOT) -> Page:
+    """Read a page and its marks."""
+    return parsed(path.read_text(encoding="utf-8"), path.relative_to(root).as_posix())
+
+
+def parsed(text: str, name: str) -> Page:
+    """The marks of a page's text."""
+    page = Page(name, text)
+    opened: Block | None = None
+    for number, start, line in _outside_fences(text):
+        begins = _PRINTED.fullmatch(line.strip())
+        if opened is not None:
+            if line.strip() == _END:
+                page.blocks.append(replace(opened, end=start))
+                opened = None
+            elif "<!--" in line:
+                page.wrong(number, f"a mark inside what is printed: {line.strip()}, allowed: {_END}")
+            continue
+        if begins:
+            origin = _origin(begins[1], page, number)
+            opened = Block(origin, number, (start, start + len(line)), start + len(line) + 1, 0)
+        else:
+            _read_line(page, number, start, line)
+    if opened is not None:
+        page.wrong(opened.line, f"what is printed has no end, allowed: {_END} on a line of its own")
+    _match_numbers(page)
+    return page
+
+
+def _outside_fences(text: str) -> Iterator[tuple[int, int, str]]:
+    """(number, start, line) of each line that is not of a fenced block."""
+    start, fence = 0, ""
+    for number, line in enumerate(text.split("\n"), 1):
+        opens = _FENCE.match(line)
+        if fence:
+            fence = "" if line.strip() == fence else fence
+        elif opens:
+            fence = opens[1]
+        else:
+            yield number, start, line
+        start += len(line) + 1
+
+
+def _read_line(page: Page, number: int, start: int, line: str) -> None:
+    """The marks of a line outside of what is printed."""
+    document = _FROM.fullmatch(line.strip())
+    if document:
+        if document[1] in page.documents:
+            page.wrong(number, f"a second document is called {document[1]}, allowed: one of each name")
+        origin = _origin(document[2], page, number)
+        made = Document(document[1], origin, number, (start, start + len(line)))
+        page.documents[document[1]] = made
+        return
+    if _BEGINS.match(line):
+        page.wrong(
+            number, "a number's mark begins the line and makes it HTML, allowed: a word or | before it"
+        )
+    for found in _NUMBER.finditer(line):
+        _read_number(page, number, start, found)
+    rest = _NUMBER.sub("", line)
+    for comment in _COMMENT.findall(rest):
+        page.wrong(number, f"no mark: {comment}, {_ALLOWED}")
+
+
+def _read_number(page: Page, line: int, start: int, found: re.Match[str]) -> None:
+    try:
+        name, path, *rest = shlex.split(found[1])
+        path, _, factor = path.partition("*")
+        factors = [factor] * bool(factor) + [word[1:] for word in rest if word.startswith("*")]
+        formats = [word for word in rest if not word.startswith("*")]
+        (factor,), (spec,) = factors or ["1"], formats or [""]
+        page.numbers.append(
+            Number(name, path, float(factor), spec, line, start + found.start(2), start + found.end(2))
+        )
+    except ValueError:
+        page.wrong(line, f"no mark of a number: {found[0]}, allowed: <!--=NAME path.to.value *100 .2f-->")
+
+
+def _origin(text: str, page: Page, line: int) -> Origin:
+    """A command with its options; what is wrong with them is noted."""
+    parts = text.split(" | ")
+    first = next(
+        (i for i, part in enumerate(parts) if part == "dear" or part.startswith("needs ")), len(parts)
+    )
+    origin = Origin(" | ".join(parts[:first]), dear=first < len(parts))
+    for part in parts[first:]:
+        at = _AT.fullmatch(part)
+        if part.startswith("probe: "):
+            origin = replace(origin, probe=part.removeprefix("probe: "))
+        elif re.fullmatch(r"needs [A-Z_]+", part):
+            origin = replace(origin, needs=part.removeprefix("needs "))
+        elif at:
+            origin = replace(origin, at=(at[1], at[2], at[3]))
+        elif part != "dear":
+            page.wrong(line, f"no option of what is dear: {part}, {_OPTIONS}")
+    if origin.dear and not (origin.probe or origin.needs):
+        page.wrong(line, f"dear without a probe: {origin.command}, allowed: | dear | probe: COMMAND")
+    return origin
+
+
+def _match_numbers(page: Page) -> None:
+    """Every number is of a document of the page, every document has a number."""
+    for number in page.numbers:
+        if number.name not in page.documents:
+            known = ", ".join(page.documents) or "none; <!-- from NAME: COMMAND --> makes one"
+            page.wrong(number.line, f"no document is called {number.name}, allowed: {known}")
+    used = {number.name for number in page.numbers}
+    for name, document in page.documents.items():
+        if name not in used:
+            page.wrong(document.line, f"no number is taken from {name}, allowed: a document that one is from")
+    page.numbers = [number for number in page.numbers if number.name in page.documents]

@@ -1,0 +1,45 @@
+"""Where the pages are, and what is known of a place on them."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from beaver_ftc.documents.errors import BadInput, suggestion
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What is wrong at a line of a page, in one line; or, if it is only said, what a reader should know."""
+
+    page: str
+    line: int
+    words: str
+    said: bool = False
+
+    def __str__(self) -> str:
+        return f"{self.page}:{self.line}: {self.words}"
+
+
+def every_page(root: Path = ROOT) -> list[Path]:
+    """README and every page of docs/."""
+    return [root / "README.md", *sorted((root / "docs").rglob("*.md"))]
+
+
+def chosen(names: Iterable[str], root: Path = ROOT) -> list[Path]:
+    """The pages of these names (`docs/theory.md`, `theory.md` or `theory`), all of them without any.
+
+    Raises BadInput for a name that no page has.
+    """
+    known: dict[str, Path] = {}
+    for page in every_page(root):
+        known.update({page.relative_to(root).as_posix(): page})
+        known.setdefault(page.name, page)
+        known.setdefault(page.stem, page)
+    found = list(dict.fromkeys(names))
+    for name in found:
+        if name not in known:
+            pages = [page.relative_to(root).as_posix() for page in every_page(root)]
+            raise BadInput(f"{name}: no such page{suggestion(name, pages)}")
+    return [known[name] for name in found] or every_page(root)

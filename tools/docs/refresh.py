@@ -1,0 +1,273 @@
+"""Pages with what their commands print: written anew, or compared with what stands."""
+
+import hashlib
+import json
+import os
+import re
+import subprocess
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from beaver_ftc.documents.errors import BadInput
+from tools.docs import pictures, values
+from tools.docs.commands import Output, outputs
+from tools.docs.marks import Block, Document, Origin, Page
+from tools.docs.pages import ROOT, Finding
+
+DECIDES = ("src", "aircraft", "scenarios")  # what a number of a flight depends on
+_FENCE = re.compile(r"(`{3,})(\w*)\n((?:\$ .*\n)*)")
+_MARKDOWN = re.compile(r"python -m tools\.docs table [\w-]+")
+_LONGEST = 90  # of what is quoted in a finding
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """Which commands are run: of cheap origins, of dear ones that `dear` says, and probes of the others."""
+
+    dear: bool = False
+    probes: bool = False
+    only: str = ""
+
+    def flies(self, origin: Origin) -> bool:
+        """Whether the command itself is run, not its probe."""
+        return not origin.dear or (self.dear and self.only in origin.command and not missing(origin))
+
+    def commands(self, origins: Iterable[Origin]) -> tuple[list[str], list[str]]:
+        """(cheap, dear) command lines of these origins."""
+        cheap: list[str] = []
+        dear: list[str] = []
+        for origin in origins:
+            if self.flies(origin):
+                (dear if origin.dear else cheap).append(origin.command)
+            if origin.probe and (self.probes or (origin.dear and self.flies(origin))):
+                cheap.append(origin.probe)
+        return cheap, dear
+
+
+def missing(origin: Origin) -> str:
+    """What an origin needs that is not here."""
+    return origin.needs if origin.needs and not os.environ.get(origin.needs) else ""
+
+
+def outputs_of(pages: Sequence[Page], wanted: Wanted, jobs: int | None = None) -> dict[str, Output]:
+    """{command: what it printed} of what the pages' marks want."""
+    cheap, dear = wanted.commands(origin for page in pages for origin in page.origins)
+    return outputs(cheap, set(dear), jobs)
+
+
+class Refreshed:
+    """A page with everything that was printed in its place. changes: where it differs from what stood; drawn:
+    pictures that look otherwise than what lies in docs/images.
+    """
+
+    def __init__(self, page: Page, printed: dict[str, Output], wanted: Wanted) -> None:
+        self.page, self.printed, self.wanted = page, printed, wanted
+        self.findings = list(page.findings)
+        self.changes: list[Finding] = []
+        self.drawn: dict[str, bytes] = {}
+        self._edits: list[tuple[int, int, str]] = []
+        self._documents: dict[str, Any] = {}
+        for block in page.blocks:
+            self._block(block)
+        for document in page.documents.values():
+            self._document(document)
+        for number in page.numbers:
+            self._number(number)
+        self.findings.sort(key=lambda finding: finding.line)
+        self.changes.sort(key=lambda finding: finding.line)
+
+    @property
+    def text(self) -> str:
+        """The page anew."""
+        text = self.page.text
+        for begin, end, new in sorted(self._edits, reverse=True):
+            text = text[:begin] + new + text[end:]
+        return text
+
+    def _block(self, block: Block) -> None:
+        output = self._output(block)
+        if output is None:
+            return
+        old = self.page.text[block.begin : block.end]
+        new = dressed(old, _linked(output.text, self.page.name), block.origin.command)
+        self._put(block.line, block.begin, block.end, new, block.origin.command)
+        self._pictures(block, output)
+
+    def _document(self, document: Document) -> None:
+        output = self._output(document)
+        if output is None:
+            return
+        try:
+            self._documents[document.name] = json.loads(output.text)
+        except json.JSONDecodeError as error:
+            self._wrong(document.line, f"{document.origin.command} prints no JSON: {error}")
+
+    def _number(self, number: Any) -> None:
+        if number.name not in self._documents:
+            return
+        try:
+            new = values.printed(self._documents[number.name], number)
+        except BadInput as error:
+            self._wrong(number.line, f"{number.name} {error}")
+            return
+        command = self.page.documents[number.name].origin.command
+        what = f"{number.name} {number.path} of {command}"
+        self._put(number.line, number.begin, number.end, new, what)
+
+    def _output(self, made: Block | Document) -> Output | None:
+        """What its command printed, if it was run and can be used."""
+        origin = made.origin
+        if origin.dear:
+            self._dear(made)
+        if not self.wanted.flies(origin):
+            return None
+        output = self.printed[origin.command]
+        if output.fault:
+            self._wrong(made.line, f"{origin.command} {output.fault}")
+            return None
+        return output
+
+    def _dear(self, made: Block | Document) -> None:
+        """Flown: when, and by what code. Not flown: whether it is of today's code."""
+        origin, probe = made.origin, self.printed.get(made.origin.probe)
+        if probe is not None and probe.fault:
+            self._wrong(made.line, f"{origin.probe} {probe.fault}")
+            return
+        digest = digest_of(probe.text) if probe else "-"
+        if self.wanted.flies(origin):
+            at = (revision(), datetime.now(UTC).strftime("%Y-%m-%d"), digest)
+            old = self.page.text[slice(*made.mark)]
+            new = old.replace(str(origin), str(replace(origin, at=at)))
+            if new == old and origin.at != at:
+                self._wrong(made.line, "the options of what is dear stand in another order: probe, needs, at")
+            self._edits.append((*made.mark, new))
+        elif missing(origin):
+            self._say(made.line, f"{origin.command} is not checked: it needs {origin.needs}")
+        elif origin.at is None:
+            self._wrong(made.line, f"never printed: python -m tools.docs {self.page.name} --dear")
+        elif probe is not None and origin.at[2] != digest:
+            self._wrong(
+                made.line,
+                f"the probe has changed, {origin.at[2]} stands, {digest} is printed by {origin.probe}: "
+                f"python -m tools.docs {self.page.name} --dear",
+            )
+        elif changed_since(origin.at[0]):
+            self._say(
+                made.line, f"the code has changed since {origin.at[0]} ({origin.at[1]}): {origin.command}"
+            )
+
+    def _put(self, line: int, begin: int, end: int, new: str, command: str) -> None:
+        """Put text in the place of what stands, and note where they differ first."""
+        old = self.page.text[begin:end]
+        self._edits.append((begin, end, new))
+        if old == new:
+            return
+        row, stands, prints = _first_difference(old, new)
+        at = self.page.text.count("\n", 0, begin) + 1 + row
+        words = f"stands {_quoted(stands)}, printed {_quoted(prints)} by {command}"
+        self.changes.append(Finding(self.page.name, at, words))
+
+    def _pictures(self, block: Block, output: Output) -> None:
+        for name, content in output.pictures.items():
+            path = ROOT / "docs" / "images" / name
+            if not pictures.look_the_same(path, content):
+                self.drawn[name] = content
+                words = f"docs/images/{name} is not what is drawn by {block.origin.command}"
+                self.changes.append(Finding(self.page.name, block.line, words))
+
+    def _wrong(self, line: int, words: str) -> None:
+        self.findings.append(Finding(self.page.name, line, words))
+
+    def _say(self, line: int, words: str) -> None:
+        self.findings.append(Finding(self.page.name, line, words, said=True))
+
+
+def dressed(old: str, text: str, command: str) -> str:
+    """What was printed in the dress of what stands: a fence with its language (and lines `$ ...`), or bare.
+
+    Where nothing stands yet, a table is bare and all else is fenced.
+    """
+    fence = _FENCE.match(old)
+    if fence:
+        mark, language, prompts = fence[1], fence[2], fence[3]
+        return f"{mark}{language}\n{prompts}{text}\n{mark}\n"
+    if old.strip() or _MARKDOWN.fullmatch(command):
+        return f"{text}\n"
+    return f"```text\n{text}\n```\n"
+
+
+def _linked(text: str, page: str) -> str:
+    """Links of what is printed are as seen from docs/; README lies above it."""
+    below = len(Path(page).parts) - 2
+    if below < 0:
+        return re.sub(r"\]\((?!\w+:|[#/])", "](docs/", text)
+    return re.sub(r"\]\((?!\w+:|[#/])", "](" + "../" * below, text)
+
+
+def _first_difference(old: str, new: str) -> tuple[int, str, str]:
+    """(row, what stands, what is printed) where two texts differ first."""
+    before, after = old.splitlines(), new.splitlines()
+    for row in range(max(len(before), len(after))):
+        stands, prints = ("".join(rows[row : row + 1]) for rows in (before, after))
+        if stands != prints:
+            return row, stands, prints
+    return 0, old, new
+
+
+def _quoted(text: str) -> str:
+    text = text.strip()
+    return f'"{text[:_LONGEST]}{"..." if len(text) > _LONGEST else ""}"' if text else "nothing"
+
+
+def digest_of(text: str) -> str:
+    """What a mark keeps of what a probe printed."""
+    return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+def _git(*arguments: str) -> subprocess.CompletedProcess:
+    return subprocess.run(["git", *arguments], cwd=ROOT, capture_output=True, text=True, check=False)
+
+
+def revision() -> str:
+    """The last revision of the code that decides numbers; a + where it has changed since."""
+    name = _git("log", "-1", "--format=%h", "--", *DECIDES).stdout.strip() or "unknown"
+    return f"{name}+" if changed_since(name) else name
+
+
+def changed_since(name: str) -> bool:
+    """Whether the code that decides numbers has changed since a revision, as far as git knows."""
+    return _git("diff", "--quiet", name.rstrip("+"), "--", *DECIDES).returncode != 0
+
+
+def write(pages: Sequence[Page], wanted: Wanted, jobs: int | None = None) -> tuple[list[str], list[Finding]]:
+    """Write pages and pictures anew: (files that were written, what could not be)."""
+    printed = outputs_of(pages, wanted, jobs)
+    written: list[str] = []
+    findings: list[Finding] = []
+    for page in pages:
+        anew = Refreshed(page, printed, wanted)
+        findings += anew.findings
+        if anew.text != page.text:
+            (ROOT / page.name).write_text(anew.text, encoding="utf-8")
+            written.append(page.name)
+        for name, content in anew.drawn.items():
+            pictures.write(ROOT / "docs" / "images" / name, content)
+            written.append(f"docs/images/{name}")
+    return written, findings
+
+
+def check(pages: Sequence[Page], jobs: int | None = None) -> tuple[list[Finding], dict[str, Output]]:
+    """What is wrong on the pages, and what is only said; and what every command printed."""
+    wanted = Wanted(probes=True)
+    printed = outputs_of(pages, wanted, jobs)
+    made = [Refreshed(page, printed, wanted) for page in pages]
+    return [finding for page in made for finding in (*page.findings, *page.changes)], printed
+
+
+def slowest(printed: dict[str, Output], count: int) -> list[str]:
+    """The commands that take longest, for whoever wants the check to be quicker."""
+    ranked = sorted(printed.items(), key=lambda entry: -entry[1].processor_s)
+    return [f"{output.processor_s:6.1f} s  {line}" for line, output in ranked[:count]]

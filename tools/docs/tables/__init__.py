@@ -1,0 +1,74 @@
+"""Table makers: every public function of a module of this package that takes nothing and returns Markdown.
+
+`python -m tools.docs table NAME` prints what the function of that name returns (a `-` of NAME is a `_`). It
+calls the package's public names or its commands; no number is typed in. What it draws it saves below
+`images/`, which becomes `docs/images/`, and returns the line that shows it: `![...](images/name.png)`.
+"""
+
+import ast
+import inspect
+import os
+import pickle
+from collections.abc import Callable
+from functools import wraps
+from importlib import import_module
+from pathlib import Path
+from typing import TypeVar
+
+from filelock import FileLock
+
+from beaver_ftc.documents.errors import BadInput, suggestion
+from tools.docs.commands import SHARED
+
+T = TypeVar("T")
+
+
+def makers() -> dict[str, str]:
+    """{name: module} of every table maker; a name that two modules have is refused."""
+    found: dict[str, str] = {}
+    for path in sorted(Path(__file__).parent.glob("*.py")):
+        if path.name == "__init__.py":
+            continue
+        for name in _public_functions(path):
+            if name in found:
+                raise BadInput(f"{path.name}: a second table is called {name}, allowed: one of each name")
+            found[name] = path.stem
+    return found
+
+
+def _public_functions(path: Path) -> list[str]:
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    functions = [node for node in tree.body if isinstance(node, ast.FunctionDef)]
+    return [f.name.replace("_", "-") for f in functions if not f.name.startswith("_")]
+
+
+def table(name: str) -> str:
+    """What the maker of this name returns. Raises BadInput where there is none."""
+    known = makers()
+    name = name.replace("_", "-")
+    if name not in known:
+        raise BadInput(f"{name}: no such table{suggestion(name, known)}")
+    make = getattr(import_module(f"tools.docs.tables.{known[name]}"), name.replace("-", "_"))
+    if inspect.signature(make).parameters:
+        raise BadInput(f"{name}: a table maker takes nothing, allowed: a helper's name that begins with _")
+    return make()
+
+
+def shared(make: Callable[[], T]) -> Callable[[], T]:
+    """What a function returns, made once for all commands of one `make docs`, which each are a process.
+
+    For what takes long and several tables are made of; it must be of data that can be pickled.
+    """
+
+    @wraps(make)
+    def kept() -> T:
+        folder = os.environ.get(SHARED)
+        if folder is None:
+            return make()
+        path = Path(folder, f"{make.__module__}.{make.__qualname__}.pickle")
+        with FileLock(f"{path}.lock"):
+            if not path.exists():
+                path.write_bytes(pickle.dumps(make()))
+        return pickle.loads(path.read_bytes())
+
+    return kept

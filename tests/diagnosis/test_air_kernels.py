@@ -24,7 +24,7 @@ Y = np.array([0.1, 0.03, 45.0, 1036.0, 0.3, 0.0, 0.0, 0.0])
 
 def new_air(**fields):
     record = np.zeros(1, AIR).view(np.recarray)[0]
-    record["span"], record["gravity"], record["moving"] = SPAN, GRAVITY, 1
+    record["span"], record["gravity"], record["moving"], record["seen"] = SPAN, GRAVITY, 1, 1
     record["scale"], record["rolling"] = SCALE, ROLLING
     for name, value in fields.items():
         record[name] = value

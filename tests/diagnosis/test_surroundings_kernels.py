@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from kernels import DT, new_fdi, on
 from scipy.spatial.transform import Rotation
 from statistics_of import Statistical, put
@@ -29,7 +31,7 @@ EITHER = 0
 
 def new_air(**fields):
     record = np.zeros(1, AIR).view(np.recarray)[0]
-    record["span"], record["gravity"], record["moving"] = SPAN, 9.8, 1
+    record["span"], record["gravity"], record["moving"], record["seen"] = SPAN, 9.8, 1, 1
     for name, value in fields.items():
         record[name] = value
     return record
@@ -145,6 +147,33 @@ def test_the_published_bound_and_the_turning_earth():
     assert out == pytest.approx(
         [0.1, 0.2, 0.3] + inertia * coupling + constant + turning + rounding, rel=1e-12
     )
+
+
+COUPLINGS = ("Ppq", "Pqr", "Qpp", "Qpr", "Qrr", "Rpq", "Rqr")
+COMPONENT = st.floats(-1.0, 1.0)
+
+
+@given(
+    constants=st.lists(st.floats(-4.0, 4.0), min_size=7, max_size=7),
+    x=st.tuples(COMPONENT, COMPONENT, COMPONENT),
+    axis=st.tuples(COMPONENT, COMPONENT, COMPONENT).filter(lambda a: np.hypot(np.hypot(*a[:2]), a[2]) > 0.1),
+)
+def test_the_turning_earth_moves_no_aircraft_more_whatever_its_inertia(constants, x, axis):
+    """The coupling is quadratic: of x + e it is that of x, and what both make together; e turns with x."""
+    design, out, earth = design_record().view(np.recarray)[0], np.zeros(3), 7e-5
+    for name, value in zip(COUPLINGS, constants, strict=True):
+        design[name] = value
+    Ppq, Pqr, Qpp, Qpr, Qrr, Rpq, Rqr = constants
+
+    def coupling(p, q, r):
+        return np.array(
+            [Ppq * p * q + Pqr * q * r, Qpp * p * p + Qpr * p * r + Qrr * r * r, Rpq * p * q + Rqr * q * r]
+        )
+
+    e = earth * np.array(axis) / np.linalg.norm(axis)
+    moved = coupling(*(np.array(x) + e)) - coupling(*x) + np.cross(e, x)
+    worst_case.uncertainty_bound(np.array(x), design, np.zeros(3), np.zeros(3), earth, out)
+    assert (np.abs(moved) <= out).all()
 
 
 def test_filters_of_bounds_are_those_of_residuals():

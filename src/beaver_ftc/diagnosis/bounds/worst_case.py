@@ -34,7 +34,8 @@ from beaver_ftc.design.terms import AIRSPEED, DPT, N_SIGNALS, N_Y, QDYN, monomia
 _AIR_DATA = 3  # gyros come first among the signals, then alpha, beta, airspeed, dynamic pressure
 _LEAST_AIRSPEED_SHARE = 0.1
 # Double precision leaves 1e-16 of a rate below 6 rad/s, divided by a frame of 1 ms or more, and of the terms
-# of f + G u, which stay below 100 rad/s2; a few operations each.
+# of f + G u, which stay below 100 rad/s2; a few operations each. Where a frame is of fifty instants it leaves
+# more, 1e-10: the Earth's rate squared, 5e-9, covers that.
 ROUNDING_RAD_S2 = 1e-11
 UNKNOWN_RAD_S2 = 1e6  # terms fitted near trim are off by thousands at 0.5 rad
 # The same to filters that carry a covariance, beside noise of 1e-4: more than any aircraft does, and no more.
@@ -301,14 +302,29 @@ def uncertainty_bound(x, design, inertia, constant, earth_rate, eta_bar):
 
     Published: inertia_i |cross term_i| + constant_i [Zhang2005, sec. VII]. JSBSim integrates rates against
     inertial space and reports them against the Earth: the difference turns with the body, at no more than
-    earth_rate |x| on any axis, and the same again through the inertia coupling, whose constants are below
-    1.
+    earth_rate |x| on any axis, and the inertia coupling makes `coupled` times as much of it.
     """
     p, q, r = x[0], x[1], x[2]
-    earth = earth_rate * (2.0 * (abs(p) + abs(q) + abs(r)) + earth_rate) + ROUNDING_RAD_S2
-    eta_bar[0] += inertia[0] * abs(design.Pqr * q * r) + constant[0] + earth
-    eta_bar[1] += inertia[1] * abs(design.Qpr * p * r) + constant[1] + earth
-    eta_bar[2] += inertia[2] * abs(design.Rpq * p * q) + constant[2] + earth
+    rates = abs(p) + abs(q) + abs(r)
+    roll, pitch, yaw = coupled(design)
+    eta_bar[0] += inertia[0] * abs(design.Pqr * q * r) + constant[0] + by_earth(earth_rate, rates, roll)
+    eta_bar[1] += inertia[1] * abs(design.Qpr * p * r) + constant[1] + by_earth(earth_rate, rates, pitch)
+    eta_bar[2] += inertia[2] * abs(design.Rpq * p * q) + constant[2] + by_earth(earth_rate, rates, yaw)
+
+
+@kernel
+def coupled(design):
+    """How much of one rate times another the inertia coupling makes on each axis, at most; 1 where it is
+    less, as it is of most aircraft."""
+    roll, yaw = abs(design.Ppq) + abs(design.Pqr), abs(design.Rpq) + abs(design.Rqr)
+    pitch = abs(design.Qpr) + 2.0 * max(abs(design.Qpp), abs(design.Qrr))
+    return max(roll, 1.0), max(pitch, 1.0), max(yaw, 1.0)
+
+
+@kernel
+def by_earth(earth_rate, rates, share):
+    """What the Earth's rotation and rounding add on an axis, rad/s2; rates: |p| + |q| + |r|, rad/s."""
+    return earth_rate * ((1.0 + share) * rates + share * earth_rate) + ROUNDING_RAD_S2
 
 
 @kernel

@@ -41,6 +41,14 @@ FAULTS = {
 }
 
 
+def test_a_command_has_a_readers_environment_and_the_data_that_it_needs(monkeypatch):
+    for name in ("BEAVER_FTC_FLIGHTS", "BEAVER_FTC_PLUGINS", "FORCE_COLOR"):
+        monkeypatch.setenv(name, "set")
+    line = "echo $BEAVER_FTC_FLIGHTS-$BEAVER_FTC_PLUGINS-$FORCE_COLOR-$COLUMNS"
+    assert one(line).text == "---80"
+    assert one(line, needed={"BEAVER_FTC_FLIGHTS"}).text == "set---80"
+
+
 def test_what_cannot_be_used_says_why():
     found = outputs(FAULTS)
     assert {line: output.fault for line, output in found.items()} == FAULTS

@@ -40,6 +40,7 @@ def _options() -> argparse.Namespace:
 
 
 def _pages(options: argparse.Namespace) -> int:
+    from tools.docs import names
     from tools.docs.marks import read
     from tools.docs.pages import chosen
     from tools.docs.refresh import Wanted, check, slowest, write
@@ -47,6 +48,7 @@ def _pages(options: argparse.Namespace) -> int:
     pages = [read(path) for path in chosen(options.pages)]
     if options.check:
         findings, printed = check(pages, options.jobs)
+        findings += names.check(pages, every=not options.pages)
     else:
         wanted = Wanted(dear=options.dear, only=options.only)
         written, findings = write(pages, wanted, options.jobs)

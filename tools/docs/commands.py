@@ -17,6 +17,7 @@ from tools.docs.pages import ROOT
 LONGEST_S = 120.0  # of processor, for a command that is not dear
 PATIENCE = 5.0  # so many times longer by the clock, on a busy machine
 SHARED = "BEAVER_FTC_DOCS_SHARED"  # the folder of what table makers share
+_OURS = ("PYTEST", "COV_", "COVERAGE", "BEAVER_FTC", "FORCE_COLOR", "NUMBA_DISABLE")  # no reader has them
 PICTURES = "images"  # what a command draws, below its folder and below docs/
 
 
@@ -33,8 +34,9 @@ class Output:
 class Checkout:
     """The package of this checkout, as the tests of the pages use an installed one."""
 
-    def __init__(self, shared: Path) -> None:
-        inherited = {name: value for name, value in os.environ.items() if not _is_ours(name)}
+    def __init__(self, shared: Path, needed: Collection[str] = ()) -> None:
+        own = {name for name in os.environ if name.startswith(_OURS) and name not in needed}
+        inherited = {name: value for name, value in os.environ.items() if name not in own}
         self.environment = {
             **inherited,
             "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', os.defpath)}",
@@ -71,21 +73,24 @@ class Checkout:
         return subprocess.CompletedProcess(line, status, out, err)
 
 
-def _is_ours(name: str) -> bool:
-    """Whether a variable would make a command behave as no reader sees it."""
-    return name.startswith(("PYTEST", "COV_", "COVERAGE", "BEAVER_FTC", "FORCE_COLOR", "NUMBA_DISABLE"))
-
-
 def _end(group: int) -> None:
     with contextlib.suppress(ProcessLookupError):
         os.killpg(group, signal.SIGKILL)
 
 
-def outputs(cheap: Iterable[str], dear: Collection[str] = (), jobs: int | None = None) -> dict[str, Output]:
-    """{command: what it printed} of each command, once; only those that are dear may take their time."""
+def outputs(
+    cheap: Iterable[str],
+    dear: Collection[str] = (),
+    jobs: int | None = None,
+    needed: Collection[str] = (),
+) -> dict[str, Output]:
+    """{command: what it printed} of each command, once; only those that are dear may take their time.
+
+    needed: environment variables that lead to data.
+    """
     lines = list(dict.fromkeys((*dear, *cheap)))
     with tempfile.TemporaryDirectory() as shared, ThreadPoolExecutor(jobs or os.cpu_count()) as threads:
-        checkout = Checkout(Path(shared))
+        checkout = Checkout(Path(shared), needed)
         limits = [None if line in dear else LONGEST_S for line in lines]
         done = threads.map(lambda line, limit: _output(checkout, line, limit), lines, limits)
         return dict(zip(lines, done, strict=True))

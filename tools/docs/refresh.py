@@ -54,8 +54,9 @@ def missing(origin: Origin) -> str:
 
 def outputs_of(pages: Sequence[Page], wanted: Wanted, jobs: int | None = None) -> dict[str, Output]:
     """{command: what it printed} of what the pages' marks want."""
-    cheap, dear = wanted.commands(origin for page in pages for origin in page.origins)
-    return outputs(cheap, set(dear), jobs)
+    origins = [origin for page in pages for origin in page.origins]
+    cheap, dear = wanted.commands(origins)
+    return outputs(cheap, set(dear), jobs, {origin.needs for origin in origins})
 
 
 class Refreshed:

@@ -1,4 +1,4 @@
-"""What README shows is what the commands print, and what it points to is there."""
+"""The pages that a newcomer reads first: what they show is printed, what they point to is there."""
 
 import re
 from pathlib import Path
@@ -8,11 +8,13 @@ from typer.testing import CliRunner
 from beaver_ftc.cli.main import COMMANDS, app
 
 ROOT = Path(__file__).parents[1]
-README = (ROOT / "README.md").read_text(encoding="utf-8")
+README, START, QUESTIONS = (
+    (ROOT / page).read_text(encoding="utf-8") for page in ("README.md", "docs/start.md", "docs/questions.md")
+)
 
 
 def test_the_verdict_shown_is_the_one_printed(tmp_path):
-    shown = README.split("## How to read the verdict")[1].split("```")[1].strip().splitlines()
+    shown = START.split("```text")[1].split("```")[0].strip().splitlines()
     arguments = ["run", "elevator-partial-loss", "--no-report", "--out", str(tmp_path)]
     printed = CliRunner(env={"COLUMNS": "80"}).invoke(app, arguments).stdout.splitlines()
     assert [line.rstrip() for line in printed[: len(shown)]] == shown
@@ -25,4 +27,4 @@ def test_every_link_leads_somewhere():
 
 
 def test_every_command_is_mentioned():
-    assert [name for name in COMMANDS if f"`{name}" not in README] == []
+    assert [name for name in COMMANDS if f"`{name}" not in QUESTIONS] == []

@@ -8,7 +8,7 @@ import yaml
 
 from flights.synthetic import fly, write_csv
 
-from .documents import yaml_blocks
+from .documents import python_blocks, yaml_blocks
 from .installation import ROOT, Installation
 
 BRIEF = """\
@@ -43,16 +43,15 @@ def _shown(page: str, name: str) -> str:
 
 
 def _my_case(folder: Path) -> None:
-    """README's first scenario with one number changed, as README says."""
-    text = _shown("README.md", "elevator-partial-loss").replace(
-        "name: elevator-partial-loss", "name: my-case"
-    )
-    assert "magnitude: 0.4" in text
-    (folder / "my-case.yaml").write_text(text.replace("magnitude: 0.4", "magnitude: 0.5"))
+    """The first scenario of one's own with the law changed, as the page says."""
+    text = _shown("docs/start.md", "my-case")
+    assert "law: fault-tolerant-published" in text
+    (folder / "my-case.yaml").write_text(text.replace("law: fault-tolerant-published", "law: nominal"))
 
 
-def _jammed_elevator(folder: Path) -> None:
-    (folder / "jammed-elevator.yaml").write_text(_shown("docs/scenarios.md", "jammed-elevator"))
+def _shown_scenario(name: str):
+    """Puts a scenario of docs/scenarios.md into its file."""
+    return lambda folder: (folder / f"{name}.yaml").write_text(_shown("docs/scenarios.md", name))
 
 
 def _my_sweep(folder: Path) -> None:
@@ -75,13 +74,9 @@ def _brief(folder: Path) -> None:
 
 
 def _mine(folder: Path) -> None:
-    """The template's class as a module of the working folder, a scenario and a sweep that name it."""
-    shutil.copyfile(ROOT / "examples/my-detector/src/my_detector/__init__.py", folder / "mine.py")
-    (folder / "mine.yaml").write_text(BRIEF.replace("brief", "mine") + "fdi: {scheme: my-cusum}\n")
-    (folder / "other.yaml").write_text(BRIEF.replace("brief", "other") + "fdi: {scheme: cusum}\n")
-    (folder / "many.yaml").write_text(
-        "name: many\nbase: other.yaml\nruns: 2\nvary: {initial.airspeed_mps: {uniform: [44, 46]}}\n"
-    )
+    """The detector of docs/plugins.md as a module of the working folder, and the scenario that names it."""
+    (folder / "mine.py").write_text(python_blocks(ROOT / "docs/plugins.md")[0])
+    (folder / "mine.yaml").write_text(_shown("docs/plugins.md", "mine"))
 
 
 def _recorded_flights(folder: Path) -> None:
@@ -113,13 +108,14 @@ def _copy(relative: str):
 
 
 _MATERIALS = {
-    r"\bmy-case\b": _my_case,
-    r"\bjammed-elevator\b": _jammed_elevator,
+    r"(?<!new )\bmy-case\b": _my_case,
+    r"\bjammed-elevator\b": _shown_scenario("jammed-elevator"),
+    r"\bwindy\b": _shown_scenario("windy"),
     r"\bmy[-.]sweep\b": _my_sweep,
     r"\bscenarios/": _scenarios,
     r"\bbrief\.yaml\b|^pytest$": _brief,
     r"\b(healthy|suspect)\.csv\b": _recorded_flights,
-    r"\bmine:": _mine,
+    r"\bmine[:.]": _mine,
     r"\bnavion": _own_aircraft,
     r"(?<!\./)\baircraft/": _copy("aircraft"),
     r"\bdocs/": _copy("docs"),

@@ -3,6 +3,7 @@
 python -m tools.docs [PAGE ...]    write every cheap block, number and picture anew
 python -m tools.docs --check       print what stands otherwise and every wrong name; status 1 if any
 python -m tools.docs table NAME    print a table; `constants` and `properties` print those
+python -m tools.docs screens       take the pictures of report and live page anew, with a browser
 """
 
 import argparse
@@ -15,7 +16,7 @@ from beaver_ftc.documents.errors import BeaverFtcError
 def main() -> int:
     """Exit status 0 if nothing is wrong."""
     first = sys.argv[1] if len(sys.argv) > 1 else ""
-    printers = {"table": _table, "constants": _constants, "properties": _properties}
+    printers = {"table": _table, "constants": _constants, "properties": _properties, "screens": _screens}
     try:
         if first in printers:
             print(printers[first](*sys.argv[2:]))
@@ -81,6 +82,13 @@ def _properties() -> str:
     from tools.docs.properties import as_markdown
 
     return as_markdown()
+
+
+def _screens() -> str:
+    from tools.docs.pages import ROOT
+    from tools.docs.screens import write_screens
+
+    return "\n".join(map(str, write_screens(ROOT / "docs" / "images")))
 
 
 if __name__ == "__main__":

@@ -7,8 +7,6 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.paths import data_root
 from tools.docs.pictures import lighten
 
-HEADLINE = "<!-- what reproduce says -->", "<!-- end -->"  # of README
-
 
 def write_docs(folder: Path | None = None) -> Iterator[Path]:
     """Write every generated page and picture into `folder` (the source tree's `docs/`); yield the files.
@@ -18,7 +16,6 @@ def write_docs(folder: Path | None = None) -> Iterator[Path]:
     docs = folder or _docs_of_source_tree()
     (docs / "images").mkdir(exist_ok=True)
     yield _write_properties(docs)
-    yield _write_first_figure(docs)
     yield from _write_reproduction(docs)
 
 
@@ -37,26 +34,16 @@ def _write_properties(docs: Path) -> Path:
     return path
 
 
-def _write_first_figure(docs: Path) -> Path:
-    from tools.docs.first_figure import write_figure
-
-    return lighten(write_figure(docs / "images" / "elevator-partial-loss.png"))
-
-
 def _write_reproduction(docs: Path) -> Iterator[Path]:
-    from beaver_ftc.studies.present.page import replace_between, write_files
+    from beaver_ftc.studies.present.page import write_files
     from beaver_ftc.studies.reproduce.published_figures import figures_of
     from beaver_ftc.studies.reproduce.reproduction import reproduced
-    from beaver_ftc.studies.reproduce.words import as_markdown, headline
+    from beaver_ftc.studies.reproduce.words import as_markdown
 
     document, flights = reproduced()
     path = docs / "reproduction.md"
     path.write_text(as_markdown(document, "images/reproduction"), encoding="utf-8")
     yield path
-    readme = docs.parent / "README.md"
-    if readme.is_file():
-        replace_between(readme, *HEADLINE, f"{headline(document)}\n")
-        yield readme
     folder = docs / "images" / "reproduction"
     figures = figures_of(document, flights.published)
     write_files(folder, figures)

@@ -1,4 +1,4 @@
-"""Pictures of the report and of the live page, taken of a flight flown now: `python -m tools.docs.screens`.
+"""Pictures of the report and of the live page, taken of a flight flown now: `python -m tools.docs screens`.
 
 They want Chromium and playwright, which the tests of the live page want too.
 """
@@ -14,8 +14,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.documents.paths import data_root
-from tools.docs.generate import lighten
+from tools.docs.pictures import lighten
 
 SCENARIO = "elevator-partial-loss"
 ARGUMENTS = ["--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader"]  # without a graphics card
@@ -23,8 +22,8 @@ COMPILED_WITHIN_S = 600.0
 BREAK_AT_S, LOOK_AT_S = 12.0, 20.0
 
 
-def write_screens(docs: Path) -> Iterator[Path]:
-    """Take both pictures into `docs/images`; yield the files. Raises BadInput without a browser."""
+def write_screens(images: Path) -> Iterator[Path]:
+    """Take both pictures into a folder; yield the files. Raises BadInput without a browser."""
     from playwright.sync_api import sync_playwright
 
     chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -32,8 +31,8 @@ def write_screens(docs: Path) -> Iterator[Path]:
         raise BadInput("there is no Chromium on this machine, and the pictures are taken with it")
     with sync_playwright() as driver, TemporaryDirectory() as folder:
         browser = driver.chromium.launch(executable_path=chromium, args=ARGUMENTS)
-        yield _report(browser, Path(folder), docs / "images" / "report.png")
-        yield _live(browser, Path(folder), docs / "images" / "live.png")
+        yield _report(browser, Path(folder), images / "report.png")
+        yield _live(browser, Path(folder), images / "live.png")
         browser.close()
 
 
@@ -82,8 +81,3 @@ def _cockpit(folder: Path) -> Iterator[str]:
     finally:
         process.send_signal(signal.SIGINT)
         process.wait(30)
-
-
-if __name__ == "__main__":
-    for written in write_screens(data_root() / "docs"):
-        print(written)

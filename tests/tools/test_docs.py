@@ -7,6 +7,7 @@ from tools.docs import first_figure
 from tools.docs.pictures import lighten
 from tools.docs.properties import as_markdown, meaning_of
 
+from beaver_ftc.cli.main import COMMANDS
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.model_file import with_systems
@@ -73,6 +74,20 @@ def test_links_lead_somewhere(page):
     links = re.findall(r"\]\(([^)#\s]+)", page.read_text())
     lost = [link for link in links if "://" not in link and not (page.parent / link).exists()]
     assert lost == []
+
+
+def test_every_command_answers_a_question():
+    questions = (DOCS / "questions.md").read_text()
+    assert [name for name in COMMANDS if f"`{name}" not in questions] == []
+
+
+def test_every_box_of_the_diagram_leads_to_a_page_and_its_heading():
+    links = re.findall(r'href="\.\./([\w-]+)\.html(?:#([\w-]+))?"', (DOCS / "images/loop.svg").read_text())
+    assert len(links) > 12
+    for page, place in links:
+        headings = re.findall(r"^#+ (.+)$", (DOCS / f"{page}.md").read_text(), re.MULTILINE)
+        anchors = {re.sub(r"[^\w -]", "", heading).lower().replace(" ", "-") for heading in headings}
+        assert not place or place in anchors, f"{page}#{place}"
 
 
 def test_lightened_picture_is_smaller_and_looks_the_same(tmp_path):

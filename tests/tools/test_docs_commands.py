@@ -118,6 +118,7 @@ def test_constants_are_those_of_the_code():
     assert found["defaults"]["initial"]["airspeed_mps"] == 45.0
     assert found["modules"]["plant.adapter"]
     assert found["counts"]["commands"] > 20
+    assert str(pages.ROOT) not in json.dumps(found)  # where this checkout lies
 
 
 @pytest.fixture

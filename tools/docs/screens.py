@@ -54,7 +54,8 @@ def _live(browser: Any, folder: Path, path: Path) -> Path:
     with _cockpit(folder) as address:
         page = browser.new_page(viewport={"width": 1280, "height": 720})
         page.goto(address)
-        _until(page, f"Boolean(window.cockpit && cockpit.flight.state && cockpit.value('t_s') > {BREAK_AT_S})")
+        _until(page, "Boolean(window.cockpit && cockpit.flight.state)")
+        _until(page, f"cockpit.value('t_s') > {BREAK_AT_S}")
         page.locator("fieldset[data-surface=elevator] >> text=lose 40 %").click()
         _until(page, f"cockpit.value('t_s') > {LOOK_AT_S}")
         page.screenshot(path=path)
@@ -73,7 +74,8 @@ def _until(page: Any, condition: str) -> None:
 @contextmanager
 def _cockpit(folder: Path) -> Iterator[str]:
     """The address of a running live page of a healthy flight."""
-    command = [sys.executable, "-c", "from beaver_ftc.cli.main import main; main()", "live", "--out", str(folder)]
+    code = "from beaver_ftc.cli.main import main; main()"
+    command = [sys.executable, "-c", code, "live", "--out", str(folder)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     try:
         assert process.stdout is not None

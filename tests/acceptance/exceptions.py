@@ -81,7 +81,7 @@ TABLE = (
     Exempt(
         r"beaver-ftc compare --benchmark( --leaderboard \S+)?",
         "minutes: one set, one flight of each sweep",
-        "beaver-ftc compare --benchmark --set published --flights 1 --leaderboard docs/benchmark.md",
+        "beaver-ftc compare --benchmark --set published --flights 1 --leaderboard board.md",
     ),
     Exempt(
         r"beaver-ftc power.*",

@@ -114,6 +114,15 @@ def test_a_command_may_have_bars_of_its_own():
     assert f"<!-- printed: {origin} -->\n" == text
 
 
+def test_a_time_needs_no_probe_and_is_never_compared():
+    text = "<!-- printed: clock | dear | machine | at 1ab 2026-01-02 - -->\n3 s\n<!-- /printed -->\n"
+    page = parsed(text, "docs/page.md")
+    assert page.findings == []
+    assert str(page.origins[0]) == "clock | dear | machine | at 1ab 2026-01-02 -"
+    assert Wanted(probes=True).commands(page.origins) == ([], [])
+    assert Refreshed(page, {}, Wanted(probes=True)).changes == []
+
+
 def test_what_cannot_be_printed_is_a_line_and_leaves_what_stands():
     made = refreshed(PAGE, {name: Output("", "ends with status 2: no such scenario") for name in PRINTED})
     assert made.text == PAGE

@@ -4,8 +4,8 @@
     <!-- from NAME: COMMAND -->          a document in JSON, of which numbers of the page are taken
     <!--=NAME path.to.value .2f-->0.12<!--/-->
 
-After a command: `| dear | probe: COMMAND | needs NAME | at REVISION DATE DIGEST`. In fenced code, marks are
-text.
+After a command: `| dear | probe: COMMAND | needs NAME | machine | at REVISION DATE DIGEST`. In fenced code,
+marks are text.
 """
 
 import re
@@ -24,7 +24,7 @@ _NUMBER = re.compile(r"<!--=(.*?)-->(.*?)<!--/-->")
 _FENCE = re.compile(r" *(`{3,}|~{3,})")
 _BEGINS = re.compile(r"\s*(?:[-*+>]|\d+\.)?\s*<!--=")
 _AT = re.compile(r"at (\S+) (\d{4}-\d\d-\d\d) (\S+)")
-_OPTIONS = "allowed: dear, probe: COMMAND, needs NAME, at REVISION DATE DIGEST"
+_OPTIONS = "allowed: dear, probe: COMMAND, needs NAME, machine, at REVISION DATE DIGEST"
 _ALLOWED = "allowed: printed: COMMAND, /printed, from NAME: COMMAND, =NAME path format, /"
 
 
@@ -33,13 +33,15 @@ class Origin:
     """What prints something: a command, and if it is dear, what is known of the last time it did.
 
     probe: a cheap command whose output changes with that of the command. needs: the environment variable that
-    leads to data which the repository has not. at: revision, date, and digest of what the probe printed.
+    leads to data which the repository has not. machine: whether it is a time, of which another machine prints
+    another, so that nothing can be compared. at: revision, date, and digest of what the probe printed.
     """
 
     command: str
     dear: bool = False
     probe: str = ""
     needs: str = ""
+    machine: bool = False
     at: tuple[str, str, str] | None = None
 
     def __str__(self) -> str:
@@ -47,6 +49,7 @@ class Origin:
         parts += ["dear"] * self.dear
         parts += [f"probe: {self.probe}"] * bool(self.probe)
         parts += [f"needs {self.needs}"] * bool(self.needs)
+        parts += ["machine"] * self.machine
         parts += [f"at {' '.join(self.at)}"] if self.at else []
         return " | ".join(parts)
 
@@ -197,11 +200,13 @@ def _origin(text: str, page: Page, line: int) -> Origin:
             origin = replace(origin, probe=part.removeprefix("probe: "))
         elif re.fullmatch(r"needs [A-Z_]+", part):
             origin = replace(origin, needs=part.removeprefix("needs "))
+        elif part == "machine":
+            origin = replace(origin, machine=True)
         elif at:
             origin = replace(origin, at=(at[1], at[2], at[3]))
         elif part != "dear":
             page.wrong(line, f"no option of what is dear: {part}, {_OPTIONS}")
-    if origin.dear and not (origin.probe or origin.needs):
+    if origin.dear and not (origin.probe or origin.needs or origin.machine):
         page.wrong(line, f"dear without a probe: {origin.command}, allowed: | dear | probe: COMMAND")
     return origin
 

@@ -143,7 +143,9 @@ class Refreshed:
             old = self.page.text[slice(*made.mark)]
             new = old.replace(str(origin), str(replace(origin, at=at)))
             if new == old and origin.at != at:
-                self._wrong(made.line, "the options of what is dear stand in another order: probe, needs, at")
+                self._wrong(
+                    made.line, "options of what is dear stand in another order: probe, needs, machine, at"
+                )
             self._edits.append((*made.mark, new))
         elif missing(origin):
             self._say(made.line, f"{origin.command} is not checked: it needs {origin.needs}")

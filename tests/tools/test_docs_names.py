@@ -5,7 +5,7 @@ import re
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tools.docs import names
+from tools.docs import bare, names
 from tools.docs.known import Code, known
 from tools.docs.marks import parsed
 from tools.docs.names import Names
@@ -142,3 +142,27 @@ def test_what_a_file_defines_is_known_and_what_it_describes_is_not(tmp_path):
     assert not {"gone_function", "gone_key"} & code.words
     assert code.members["Bank"] == {"size", "step"}
     assert [bool(re.fullmatch(pattern, "q_residual")) for pattern in code.patterns] == [True]
+
+
+BARE = {
+    "It takes 0.31 s.": True,
+    "It finds 95 % of them.": True,
+    "| a | 34 dB |": True,
+    "It takes <!--=case detection.delay_s .2f-->0.31<!--/--> s.": False,
+    "<!-- printed: fly -->\n| a | 34 dB |\n<!-- /printed -->": False,
+    "In `duration_s: 0.31` it is.": False,
+    "From $dt=0.01$ s on.": False,
+    "```yaml\nduration_s: 0.31\n```": False,
+    "It is 0.31 s [Zhang2005, sec. IV].": False,
+    "Another cites [Zhang2005]. It takes 0.31 s.": True,
+    "See section 4.2 and equations (14) and (15).": False,
+    "On 2026-11-20 with JSBSim 1.3.3.": False,
+    "One of 4 surfaces.": False,
+    "## 2.5 A heading": False,
+    "[a link](page.md#the-95-percent)": False,
+}
+
+
+@pytest.mark.parametrize("text", BARE)
+def test_a_number_that_no_command_prints_is_counted(text):
+    assert bool(list(bare.numbers(parsed(text, "docs/page.md")))) == BARE[text]

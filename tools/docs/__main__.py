@@ -36,17 +36,22 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--dear", action="store_true", help="fly what takes long as well")
     parser.add_argument("--only", default="", metavar="TEXT", help="of what takes long, commands with this")
     parser.add_argument("--jobs", type=int, help="processes side by side; as many as cores without it")
+    parser.add_argument("--bare", action="store_true", help="print numbers in prose that no command prints")
     parser.add_argument("--times", action="store_true", help="print which commands take longest")
     return parser.parse_args()
 
 
 def _pages(options: argparse.Namespace) -> int:
-    from tools.docs import names
+    from tools.docs import bare, names
     from tools.docs.marks import read
     from tools.docs.pages import chosen
     from tools.docs.refresh import Wanted, check, slowest, write
 
     pages = [read(path) for path in chosen(options.pages)]
+    if options.bare:
+        found = [f"{page.name}:{line}: {words}" for page in pages for line, words in bare.numbers(page)]
+        print("\n".join([*found, f"{len(found)} sentences with numbers that no command prints"]))
+        return 0
     if options.check:
         findings, printed = check(pages, options.jobs)
         findings += names.check(pages, every=not options.pages)

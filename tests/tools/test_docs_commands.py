@@ -37,6 +37,7 @@ FAULTS = {
     "true": "prints nothing",
     "echo x; python -c 'raise ValueError'": "ends with status 1: ValueError",
     "pwd": "prints a path of this machine",
+    f"echo {pages.ROOT}/docs": "prints a path of this machine",
     "echo missed; exit 1": "",
 }
 

@@ -118,7 +118,8 @@ class Known:
     @cached_property
     def words(self) -> frozenset[str]:
         """Single names: of the code, of YAML and TOML files, of files and folders, of scripts of pages."""
-        found = set(self.code.words) | set(self.columns) | set(self.targets)
+        found = set(self.code.words) | set(self.columns)
+        found.update(_NAME.findall((ROOT / "Makefile").read_text(encoding="utf-8")))
         for name in self.files:
             path = ROOT / name
             found.update((path.name, path.stem))

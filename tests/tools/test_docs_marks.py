@@ -172,6 +172,8 @@ def test_what_is_dear_is_written_with_revision_date_and_digest_when_it_is_flown(
     assert again.findings == []
     assert again.page.origins[0].at[0] == "2cd"
     assert refreshed(stale, NEAR, Wanted(dear=True, only="near")).text == stale
+    failed = refreshed(stale, {**NEAR, "fly far": Output("", "prints nothing")}, Wanted(dear=True))
+    assert (failed.text, len(failed.findings)) == (stale, 1)
 
 
 def test_what_needs_data_that_is_not_here_is_said(monkeypatch):

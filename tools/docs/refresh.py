@@ -121,14 +121,12 @@ class Refreshed:
     def _output(self, made: Block | Document) -> Output | None:
         """What its command printed, if it was run and can be used."""
         origin = made.origin
-        if origin.dear:
-            self._dear(made)
-        if not self.wanted.flies(origin):
-            return None
-        output = self.printed[origin.command]
-        if output.fault:
+        output = self.printed[origin.command] if self.wanted.flies(origin) else None
+        if output is not None and output.fault:
             self._wrong(made.line, f"{origin.command} {output.fault}")
             return None
+        if origin.dear:
+            self._dear(made)
         return output
 
     def _dear(self, made: Block | Document) -> None:

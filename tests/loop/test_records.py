@@ -188,14 +188,18 @@ def test_random_numbers_begin_with_the_seed_each_counter_apart():
 
 
 @pytest.mark.parametrize(
-    ("gear", "altitude_m", "ground_m"),
-    [(True, 1800.0, 14.63), (True, 514.0, 14.0), (False, 1800.0, 0.0), (True, 200.0, -300.0)],
-)
-def test_where_the_ground_is(gear, altitude_m, ground_m):
-    """The wheels are down at a wing's span, 48 ft; a flight that begins lower has 500 m below it."""
-    span = SimpleNamespace(geometry=SimpleNamespace(span_m=14.63))
+    ("gear", "told", "altitude_m", "ground_m"),
+    [
+        (True, None, 1800.0, 14.63), (True, None, 514.0, 14.0), (False, None, 1800.0, 0.0),
+        (True, None, 200.0, -300.0), (True, "a section", 1800.0, 0.0),
+    ],
+)  # fmt: skip
+def test_where_the_ground_is(gear, told, altitude_m, ground_m):
+    """The wheels are down at a wing's span, 48 ft, unless they must be told of a ground; a flight that begins
+    lower has 500 m below it."""
+    what = SimpleNamespace(geometry=SimpleNamespace(span_m=14.63), file=SimpleNamespace(ground=told))
     plant = SimpleNamespace(
-        read=lambda name: 0.5 if "lat" in name else 0.25, has=lambda name: gear, aircraft=span
+        read=lambda name: 0.5 if "lat" in name else 0.25, has=lambda name: gear, aircraft=what
     )
     truth = {}
     cockpit.set_origin(truth, plant, altitude_m)

@@ -121,11 +121,12 @@ def test_nor_do_numbers_that_are_none(monkeypatch):
 
 
 def readable(plant):
-    """Every property JSBSim lists, but for its count of frames."""
+    """Every property JSBSim lists, but for its count of frames, and what a wheel that has never touched the
+    ground has in memory."""
     lines = plant.fdm.query_property_catalog("").splitlines()
     names = [line.split(" ")[0] for line in lines if "R" in line.rpartition("(")[2]]
-    counted = ("simulation/frame", "atmosphere/randomseed")
-    return {name: plant.read(name) for name in names if name not in counted and plant.has(name)}
+    counted = ("simulation/frame", "atmosphere/randomseed", "/side_friction_coeff")
+    return {name: plant.read(name) for name in names if not name.endswith(counted) and plant.has(name)}
 
 
 def differing(one, other):

@@ -146,6 +146,7 @@ _PATTERNS: dict[str, Ranged | None] = {
     "initial.engine_rpm": within(1500, 2200),
     "initial.manifold_pressure_inhg": within(16, 24),
     "initial.flap_deg": within(0, 12),
+    "initial.on_ground": None,  # for those who take off: under an autopilot
     "reference.?.csv": _table,
     "reference.*.amplitude_deg_s": _amplitude,
     "reference.*frequency_hz": over_decades(0.1, 1.0),

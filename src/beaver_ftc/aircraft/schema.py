@@ -244,6 +244,17 @@ class StartSection(Section):
     altitude_m: Number | None = number(None, unit="m", says="altitude above sea level", ge=-300, le=30000)
 
 
+class GroundSection(Section):
+    """The ground, of an aircraft that can be told of one: elsewhere it flies on below sea level.
+
+    present: property that is 1 where there is a ground, 0 where there is none
+    """
+
+    present: Property
+    height_m: Number = number(..., unit="m", says="of the centre of gravity, standing", gt=0, le=100)
+    pitch_deg: Number = number(..., unit="deg", says="attitude, standing", ge=-45, le=45)
+
+
 class AircraftFile(Section):
     """The whole file.
 
@@ -252,6 +263,7 @@ class AircraftFile(Section):
     model_error_rad_s2: added to the declared bound of the uncertainty
     model_error_map: where in the envelope the error is how large, in place of one value
     channels: which output of an autopilot moves which surface
+    ground: how it stands; without it no flight begins on the ground
     """
 
     name: Name
@@ -271,6 +283,7 @@ class AircraftFile(Section):
     model_error_map: ErrorMapSection | None = None
     start: StartSection = Field(default_factory=StartSection)
     channels: ChannelsSection | None = None
+    ground: GroundSection | None = None
 
     @model_validator(mode="after")
     def _parts_fit_together(self) -> Self:

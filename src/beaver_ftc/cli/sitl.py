@@ -24,7 +24,7 @@ class Options:
     rate: Annotated[float | None, typer.Option(metavar="HZ")] = None
     speed: Annotated[float | None, typer.Option(min=0, max=1000)] = None
     hold: Annotated[float, typer.Option(min=0, metavar="S")] = 0.0
-    ground: Annotated[float, typer.Option(metavar="M")] = 0.0
+    ground: Annotated[float | None, typer.Option(metavar="M")] = None
     mavlink: Annotated[str | None, typer.Option(metavar="HOST:PORT")] = None
     page: Annotated[int | None, typer.Option(min=0, max=65535, metavar="PORT")] = None
     out: ResultsOption = Path("runs")
@@ -49,7 +49,7 @@ def command(options: Options) -> None:
     rate: Frames a second of the autopilot; by itself what its first packet says, 250 for px4.
     speed: Times real time; 0: as fast as it answers. By itself 0 for ardupilot, which keeps time, 1 for px4.
     hold: The scenario's own law flies so many seconds first.
-    ground: Height of the autopilot's ground above sea level.
+    ground: Height of the autopilot's ground above sea level, by itself 0.
     mavlink: A ground station: is told what the diagnosis finds, may inject failures.
     page: Show the flight on the live page at this port, 0 any: break it there, repair it.
     """

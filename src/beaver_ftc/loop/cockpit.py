@@ -84,7 +84,7 @@ def set_origin(truth: np.void, plant: Plant, altitude_m: float) -> None:
     """Where the flight starts, and where the ground is."""
     truth["latitude_0"] = plant.read(ch.FIXED[ch.LATITUDE][1])
     truth["longitude_0"] = plant.read(ch.FIXED[ch.LONGITUDE][1])
-    has_gear = plant.has("gear/unit[0]/WOW")
+    has_gear = plant.has("gear/unit[0]/WOW") and plant.aircraft.file.ground is None
     wheels_m = plant.aircraft.geometry.span_m if has_gear else 0.0  # height at which it is down
     truth["ground_m"] = min(wheels_m, altitude_m - LEAST_HEIGHT_M)
     truth["radius_m"] = EARTH_RADIUS_M + altitude_m

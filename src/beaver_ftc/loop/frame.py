@@ -74,7 +74,7 @@ def sense(frame):
     measure(truth, frame.instruments, measured)
     if frame.fdi.watch.enabled:
         watch_instruments(frame)
-    status = flight_status(truth.value, truth.ground_m)
+    status = flight_status(truth.value, truth.ground_m, truth.slow_mps)
     if status != NOT_FINITE:
         respond(belief, measured)
         accounts.effect_of_faults(frame.accounts.guarantee, truth, belief, measured.y)

@@ -11,7 +11,7 @@ from beaver_ftc.control import state
 from beaver_ftc.control.outer.setup import set_up_autopilot
 from beaver_ftc.design.variants import anchor, mass_of
 from beaver_ftc.diagnosis import noise_model
-from beaver_ftc.documents.errors import SimulationFailed
+from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.loop import memory, stepping
 from beaver_ftc.loop.assembly import assemble, lay_out, y_places
 from beaver_ftc.loop.cockpit import Cockpit, note_failures, set_origin, travel_rad
@@ -54,7 +54,12 @@ class LogSink(Protocol):
 
 
 class Loop:
-    """One flight in progress. detector, law: plug-ins to fly with, in place of those the scenario names."""
+    """One flight in progress. detector, law: plug-ins to fly with, in place of those the scenario names.
+
+    from_ground: whether somebody flies it who takes off.
+    """
+
+    from_ground = False
 
     def __init__(
         self,
@@ -63,6 +68,9 @@ class Loop:
         law: "Law | None" = None,
         prepare: Callable[[Plant], None] | None = None,
     ) -> None:
+        if scenario.initial.on_ground and not self.from_ground:
+            says = "no law of ours takes off, allowed: false, or an autopilot that does (`beaver-ftc sitl`)"
+            raise BadInput(f"{scenario.name}: initial.on_ground: {says}")
         self.scenario = scenario
         self.aircraft = scenario.airframe
         self.plant, self.trim = ready(scenario)

@@ -40,6 +40,8 @@ class Stepping:
     sink: where the log goes. prepare: called with the trimmed plant just before the flight.
     """
 
+    _loop_type = Loop
+
     def __init__(
         self,
         scenario: Scenario,
@@ -67,7 +69,7 @@ class Stepping:
 
     def _make_ready(self) -> None:
         self._scenario, self._faults = self._given, self._given.faults
-        self._loop = Loop(self._scenario, *self._plug_ins, self._prepare)
+        self._loop = self._loop_type(self._scenario, *self._plug_ins, self._prepare)
         self._frame: np.void = self._loop.frames[0]
         self._k_flown, self._rows_flown = (self._loop.frames[name].item for name in ("k", "row"))
         self._next, self._turn_at, self._written = 0, 0, 0

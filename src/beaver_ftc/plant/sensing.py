@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.design.model import DPT
+from beaver_ftc.design.model import AIRSPEED, DPT
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.instruments import (
     ALTITUDE,
@@ -27,6 +27,7 @@ from beaver_ftc.plant.native import read_nodes, write_nodes
 
 FLYING, DEPARTED, NOT_FINITE = 0, 1, 2
 DEPARTURE_ANGLE_RAD = 0.6
+AT_REST_MPS = 1.0  # of an aircraft on its wheels: as slow as the truth itself reckons
 DEPARTURE_RATE_RAD_S = 6.0
 DEPARTURE_SIGNALS = ("p", "q", "r", "alpha", "beta", "altitude")
 
@@ -40,6 +41,7 @@ def truth_dtype(n: int) -> np.dtype:
         write_pointers=(int, n), engine_pointer=(int, 1),
         factor=room, value=room,  # the first n, in SI: see channels.py
         latitude_0=float, longitude_0=float, radius_m=float, parallel_radius_m=float, ground_m=float,
+        slow_mps=float,  # airspeed at which angles of the flow mean nothing: of an aircraft on wheels, else 0
         # its faults, for the oracle and for the accounts
         faulted=int, fault_at_s=float, immovable=(int, n), Cm_alpha3=float,
     )  # fmt: skip
@@ -119,6 +121,8 @@ def sort(truth, instruments, measured):
     """Put the readings where those who use them look; declared signals without an instrument are ideal."""
     share_out(measured)
     y, first = measured.y, first_signal(truth)
+    if y[AIRSPEED] < AT_REST_MPS and truth.slow_mps > 0.0:
+        y[AIRSPEED] = AT_REST_MPS  # rates over an airspeed stay finite
     for j in range(truth.declared):
         y[DPT + j] = truth.value[first + j]
     if instruments.engine:
@@ -126,7 +130,7 @@ def sort(truth, instruments, measured):
 
 
 @kernel
-def flight_status(value, ground_m):
+def flight_status(value, ground_m, slow_mps):
     """FLYING, NOT_FINITE, or DEPARTED + the index in DEPARTURE_SIGNALS of what left its limits, times ten."""
     for i in range(value.size):
         if not np.isfinite(value[i]):
@@ -134,10 +138,11 @@ def flight_status(value, ground_m):
     for i in range(3):
         if abs(value[i]) > DEPARTURE_RATE_RAD_S:
             return DEPARTED + 10 * i
-    if abs(value[ch.ALPHA]) > DEPARTURE_ANGLE_RAD:
-        return DEPARTED + 30
-    if abs(value[ch.BETA]) > DEPARTURE_ANGLE_RAD:
-        return DEPARTED + 40
+    if value[ch.AIRSPEED] >= slow_mps:
+        if abs(value[ch.ALPHA]) > DEPARTURE_ANGLE_RAD:
+            return DEPARTED + 30
+        if abs(value[ch.BETA]) > DEPARTURE_ANGLE_RAD:
+            return DEPARTED + 40
     if value[ch.ALTITUDE] < ground_m:
         return DEPARTED + 50
     return FLYING

@@ -2,12 +2,12 @@
 
 from functools import lru_cache
 from math import degrees
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
-from pydantic import create_model
+from pydantic import create_model, model_validator
 
 from beaver_ftc.aircraft import Aircraft, load
-from beaver_ftc.documents.base import Number, Section, number
+from beaver_ftc.documents.base import Flag, Number, Section, deny, entry, number
 from beaver_ftc.scenario.airframe import checked_aircraft
 
 
@@ -16,8 +16,17 @@ class Initial(Section):
 
     airspeed_mps: Number = number(45.0, "m/s", "true airspeed, validated from 30 to 55", ge=20, le=70)
     altitude_m: Number = number(1828.8, "m", "altitude above sea level", ge=-300, le=6000)
+    on_ground: Flag | None = entry(
+        None, "true: standing on the ground, which is at altitude_m; under an autopilot alone (`sitl`)"
+    )
 
     _airframe: ClassVar[Aircraft | None] = None
+
+    @model_validator(mode="after")
+    def _can_stand(self) -> Self:
+        if self.on_ground and self._airframe is not None and self._airframe.file.ground is None:
+            deny(f"{self._airframe.name}'s file has no `ground` to stand on, allowed: false", "on_ground")
+        return self
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Classes of a single aircraft are made again where they are read."""

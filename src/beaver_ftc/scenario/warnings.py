@@ -109,7 +109,8 @@ def _air(scenario: Any) -> Iterator[str]:
     environment = scenario.environment
     if any(any(gust.velocity_mps) for gust in environment.gusts):
         yield "environment.gust: what a gust does is covered by fdi.bounds.constant_rad_s2 only"
-    if environment.severity is not None and scenario.initial.altitude_m < LOWEST_TURBULENCE_M:
+    low = scenario.initial.altitude_m < LOWEST_TURBULENCE_M and not scenario.initial.on_ground
+    if environment.severity is not None and low:  # from the ground the diagnosis begins above
         yield (
             f"initial.altitude_m: {scenario.initial.altitude_m:g} is below {LOWEST_TURBULENCE_M:g} m, where "
             "turbulence is not as fdi.bounds.turbulence has it"

@@ -48,7 +48,7 @@ class Options:
     rate_hz: float | None = None
     speed: float | None = None
     hold_s: float = 0.0
-    ground_m: float = 0.0
+    ground_m: float | None = None
     ground: tuple[str, int] | None = None
     page: int | None = None
 
@@ -143,17 +143,27 @@ class Endpoint:
         document = landed.metrics
         document["flight"]["law"] = NAMES[options.protocol]
         document["tracking"] |= dict.fromkeys(("pre_fault_rms_deg_s", "post_fault_rms_deg_s"))
+        self._note_silence(document)
         self.link.counts["off_rate"] = self.vehicle.off_rate
         document["link"] = {
             "protocol": options.protocol.value,
             "packets_hz": self.vehicle.packets_hz,
             "frames_hz": self.vehicle.scenario.rate_hz,
             **self.link.document(),
+            "diagnosed_from_s": sim.listens_from_s,
             "speed": self.pace.speed,
             "late_ms": round(1e3 * self.pace.late_s, 3),
             "said": [text._asdict() for text in self._teller.kept],
         }
         return landed
+
+    def _note_silence(self, document: dict[str, Any]) -> None:
+        """No alarm was certain of what broke before the diagnosis began, near the ground."""
+        from_s, fault = self.vehicle.flight.listens_from_s, document["fault"]
+        if from_s is None:
+            self._say("the diagnosis never began: near the ground nothing is diagnosed")
+        if from_s is None or (fault and fault["at_s"] < from_s):
+            document["detection"]["guaranteed_delay_s"] = None
 
     def close(self) -> None:
         """Hang up."""

@@ -29,14 +29,17 @@ class Teller:
     def begin(self) -> None:
         """A flight begins: nothing has been said of it."""
         self._said: tuple[Any, ...] = (False, None, None, ())
-        self._lost, self._named_s = False, -1.0
+        self._lost, self._named_s, self._listening = False, -1.0, False
         self.kept.clear()
 
     def news(self, sim: Flown) -> list[Text]:
         """What is to be said of the frame just flown; mostly nothing."""
-        if not (sim.alarmed or sim.departed):
+        begins = bool(sim.listens_from_s) and not self._listening
+        if not (begins or sim.alarmed or sim.departed):
             return []
-        texts = [Text(sim.t_s, severity, _PREFIX + text) for severity, text in self._new(sim)]
+        new = [(INFO, "listening")] if begins else []
+        self._listening |= begins
+        texts = [Text(sim.t_s, severity, _PREFIX + text) for severity, text in new + self._new(sim)]
         self.kept += texts[: MOST_KEPT - len(self.kept)]
         return texts
 

@@ -1,23 +1,34 @@
 """The flight an autopilot is the pilot of: outputs in, JSBSim frames flown, an instant out."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import ceil
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.channels import MOST_CHANNELS
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.integrations.sitl.outputs import Outputs
-from beaver_ftc.plant.channels import FT
+from beaver_ftc.integrations.sitl.outputs import Outputs, power_range
+from beaver_ftc.loop.changing import take_diagnosis
+from beaver_ftc.loop.loop import Loop
+from beaver_ftc.plant import ground
+from beaver_ftc.plant.channels import AIRSPEED, ALTITUDE, FT
 from beaver_ftc.plant.instruments import AX, SENSORS
 from beaver_ftc.results.log import SpooledLog
 from beaver_ftc.results.simulation import Simulation
 from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.warnings import LOWEST_TURBULENCE_M
+
+if TYPE_CHECKING:
+    from beaver_ftc.diagnosis.base import Detector
 
 SLOWEST_HZ, FASTEST_HZ = 20.0, 400.0  # of the diagnosis: where its promises are tested
 FASTEST_PACKETS_HZ = 4000.0
+UP_M, DOWN_M = 5.0, 2.0  # wheels so far above the ground: in flight, and not any more
+SLOW_MPS = 10.0
+UNDERNEATH_M = -1e4
 WHOLE = 1e-6  # JSBSim frames: so near a whole number is one
 # The surfaces are the autopilot's, and so is where it flies to.
 THEIRS = {"control.law": "nominal", "control.options": {}, "reference": {}}
@@ -71,12 +82,44 @@ class Instant(NamedTuple):
     true_attitude: tuple[float, ...]
 
 
+class OverGround(Loop):
+    """A flight that may begin, and end, on the ground."""
+
+    from_ground = True
+
+
 class Flown(Simulation):
-    """A flight that another than a law commands, some of JSBSim's frames at a time."""
+    """A flight that another than a law commands, some of JSBSim's frames at a time.
+
+    There is a ground at `ground_m` above sea level, if the aircraft's file knows one. Near it nothing is
+    diagnosed: what wheels do is no fault of a surface, and no declared bound covers it. The diagnosis begins,
+    anew, once the aircraft is up and as fast as its model has been validated for; in declared turbulence once
+    the air is what the declaration means. Its verdict stands when the aircraft comes down. listens_from_s:
+    when it began, None before.
+    """
+
+    _loop_type = OverGround
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        *,
+        detector: "Detector | None" = None,
+        log: bool | SpooledLog = True,
+        ground_m: float = 0.0,
+    ) -> None:
+        self.ground_m = ground_m
+        super().__init__(scenario, detector=detector, log=log)
 
     def _make_ready(self) -> None:
         super()._make_ready()
         self._runs, self._engaged = 0, False  # JSBSim frames flown of the coming frame
+        self.listens_from_s: float | None = 0.0
+        self._listens = True
+        self._fresh: Vector | None = None  # the record as assembled: what a diagnosis begins with
+        self._slowest_mps = self.airframe.envelope.airspeed_mps[0]
+        if self.airframe.file.ground is not None:
+            self._lay_ground()
         self._begin()
         frames, plant = self._loop.frames, self._loop.plant
         measured, truth = frames["measured"][0], frames["truth"][0]
@@ -87,6 +130,63 @@ class Flown(Simulation):
         self._power = frames["control"]["power"]
         self._autopilot = frames["autopilot"]
         self._seen = frames["fdi"]["verdict"], frames["fdi"]["watch"]
+
+    def _lay_ground(self) -> None:
+        loop, frame, file = self._loop, self._frame, self.airframe.file
+        assert file.ground is not None
+        loop._may_fly_again = False  # with a ground to it
+        frame["truth"]["ground_m"], frame["truth"]["slow_mps"] = self.ground_m, SLOW_MPS
+        self._standing_m = self.ground_m + file.ground.height_m
+        gusty = self._scenario.fdi.bounds.turbulence != "none"
+        self._lowest_m = LOWEST_TURBULENCE_M if gusty else DOWN_M
+        self._fresh = loop.frames.copy()
+        if not self._scenario.initial.on_ground:
+            if loop.trim.altitude_m < self._standing_m + UP_M:
+                says = f"{loop.trim.altitude_m:g} is at or below the ground at {self.ground_m:g}"
+                allowed = f"allowed: above {self._standing_m + UP_M:g}, another --ground, or on_ground"
+                raise BadInput(f"{self._scenario.name}: initial.altitude_m: {says}, {allowed}")
+            ground.lay(loop.plant, self.ground_m)
+            return
+        if loop.plugin_frame is not None:
+            says = "that begins in flight, allowed on the ground: one of this package"
+            raise BadInput(f"{self._scenario.name}: fdi.scheme: no plug-in knows {says}")
+        self.idle = power_range(self.airframe)[0]
+        settings = {
+            name: self.idle if setting.property == self.airframe.trim.throttle else loop.trim.settings[name]
+            for name, setting in self.airframe.engine.settings.items()
+        }
+        ground.stand(loop.plant, replace(loop.trim, settings=settings), self.ground_m)
+        frame["held"], frame["held_rad"] = 1, self.trim_rad
+        self._by_hand = True
+        self._stop_listening()
+        self.listens_from_s = None
+
+    def _stop_listening(self) -> None:
+        fdi = self._frame["fdi"]
+        self._listens = fdi["config"]["enabled"] = fdi["watch"]["enabled"] = False
+
+    def _heed_the_ground(self) -> None:
+        """End the diagnosis near the ground, begin it anew in flight unless it has found something."""
+        value = self._frame["truth"]["value"]
+        height_m, airspeed_mps = value[ALTITUDE] - self._standing_m, value[AIRSPEED]
+        if self._listens:
+            if height_m < self._lowest_m:
+                self._stop_listening()
+        elif (
+            height_m > self._lowest_m + UP_M - DOWN_M
+            and airspeed_mps > self._slowest_mps
+            and not self.alarmed
+        ):
+            self._listen()
+
+    def _listen(self) -> None:
+        loop, fresh = self._loop, self._fresh[0]  # type: ignore[index]
+        if loop.sensor_schedule.any:  # broken meanwhile
+            loop.enable_watch(fresh["fdi"])
+        take_diagnosis(self._frame, fresh, self._next)
+        self._listens = True
+        if self.listens_from_s is None:
+            self.listens_from_s = self._now_s
 
     @property
     def G(self) -> Vector:
@@ -117,6 +217,8 @@ class Flown(Simulation):
             runs -= left
             self._runs = 0
             self._last.clear()
+            if self._fresh is not None:
+                self._heed_the_ground()
             self._fly_to(self._next + 1)
 
     def _take(self, deflections: Vector | None, power: float | None) -> None:
@@ -137,8 +239,8 @@ class Flown(Simulation):
         self._loop.fly_inside(runs)
         self._runs += runs
 
-    def instant(self, ground_m: float) -> Instant:
-        """What is known of the JSBSim frame just flown; ground_m: the autopilot's, above sea level."""
+    def instant(self) -> Instant:
+        """What is known of the JSBSim frame just flown."""
         signal = self._signal.tolist()
         true = [read() * factor for read, factor in self._nodes]
         north = (true[9] - self._origin[0]) * self._radii[0]
@@ -150,7 +252,8 @@ class Flown(Simulation):
         return Instant(
             t_s, tuple(signal[:3]), force, tuple(signal[_AT["phi"] : _AT["psi"] + 1]),
             signal[_AT["V"]], signal[_AT["beta"]], signal[_AT["qdyn"]], signal[_AT["altitude"]],
-            (north, east, ground_m - true[5]), tuple(true[:3]), true[3], true[4], true[5], tuple(true[6:9]),
+            (north, east, self.ground_m - true[5]), tuple(true[:3]),
+            true[3], true[4], true[5], tuple(true[6:9]),
         )  # fmt: skip
 
     @property
@@ -163,7 +266,8 @@ class Vehicle:
     """The flight, begun at the rate the packets have, and begun anew when they are.
 
     pulses: as `Outputs` has it. rate_hz: of the packets, whatever they say themselves. hold_s: so long the
-    scenario's own law flies first, level. ground_m: the autopilot's, above sea level. log: keep one.
+    scenario's own law flies first, level. ground_m: the autopilot's, above sea level; by itself 0, and of a
+    flight from the ground its altitude. log: keep one.
     """
 
     def __init__(
@@ -172,11 +276,17 @@ class Vehicle:
         pulses: bool,
         rate_hz: float | None = None,
         hold_s: float = 0.0,
-        ground_m: float = 0.0,
+        ground_m: float | None = None,
         log: bool = True,
     ) -> None:
-        self.given, self.hold_s, self._fixed_hz, self._ground_m = scenario, hold_s, rate_hz, ground_m
-        self._pulses, self._log = pulses, log
+        self.given, self.hold_s, self._fixed_hz = scenario, hold_s, rate_hz
+        self._pulses, self._log, self._on_ground = pulses, log, bool(scenario.initial.on_ground)
+        if self._on_ground and (hold_s or ground_m is not None):
+            what = "--hold" if hold_s else "--ground"
+            says = "has no meaning on the ground, which is at initial.altitude_m, allowed: to leave it out"
+            raise BadInput(f"{scenario.name}: {what} {says}")
+        self._ground_m = scenario.initial.altitude_m if self._on_ground else ground_m or 0.0
+        self._effects = _effects(scenario) if self._on_ground else None
         self.sim: Flown | None = None
         self.scenario = scenario
         self.packets_hz = 0.0
@@ -188,7 +298,8 @@ class Vehicle:
     def _warm_up(self) -> None:
         """Have what such a flight uses compiled, before anybody waits for an answer."""
         flight, substeps = self.flight, self.scenario.substeps
-        flight.pilot(2 * substeps, None, None)
+        if not self._on_ground:
+            flight.pilot(2 * substeps, None, None)
         flight.pilot(2 * substeps, flight.trim_rad, None)
         flight.reset()
 
@@ -203,13 +314,15 @@ class Vehicle:
                 self.sim.reset()
         else:
             before, self.scenario = self.sim, at_rate(self.given, packets_hz)
-            self.sim = Flown(self.scenario, log=SpooledLog() if self._log else False)
+            log = SpooledLog() if self._log else False
+            self.sim = Flown(self.scenario, log=log, ground_m=self._ground_m)
             if before is not None:
                 before.release()
         self.packets_hz = packets_hz
         self._jsbsim_hz = self.scenario.rate_hz * self.scenario.substeps
+        G = self.sim.G if self._effects is None else self._effects
         self.outputs = Outputs(
-            self.scenario.airframe, self.sim.G, self.sim.trim_rad, self.sim.travel_rad, self._pulses
+            self.scenario.airframe, G, self.sim.trim_rad, self.sim.travel_rad, self._pulses
         )
 
     @property
@@ -241,14 +354,24 @@ class Vehicle:
     def fly(self, outputs: Sequence[float], frame_hz: float, in_charge: bool = True) -> None:
         """A frame of the autopilot, with these outputs. in_charge: it flies, once `hold_s` are over."""
         sim, runs = self.flight, self.runs_of(frame_hz)
-        if not in_charge or sim.frames / sim.rate_hz <= self.hold_s:
-            sim.pilot(runs, None, None)
-        else:
+        if in_charge and sim.frames / sim.rate_hz > self.hold_s:
             sim.pilot(runs, self.outputs.deflections(outputs), self.outputs.power(outputs))
+        elif self._on_ground:
+            sim.pilot(runs, sim.trim_rad, sim.idle)
+        else:
+            sim.pilot(runs, None, None)
 
     def instant(self) -> Instant:
         """What is known of the frame just flown."""
-        return self.flight.instant(self._ground_m)
+        return self.flight.instant()
+
+
+def _effects(scenario: Scenario) -> Vector:
+    """What each surface does about each axis in the flight the trim is of: on the ground nothing."""
+    in_flight = Flown(scenario.with_({"initial.on_ground": None}), log=False, ground_m=UNDERNEATH_M)
+    effects = in_flight.G
+    in_flight.release()
+    return effects
 
 
 def at_rate(scenario: Scenario, packets_hz: float) -> Scenario:

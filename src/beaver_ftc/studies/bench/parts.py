@@ -24,7 +24,7 @@ def nothing(*arguments):
     """Stands in for a kernel that fills its arguments."""
 
 
-def flying(truth, ground_m):
+def flying(value, ground_m, slow_mps):
     """Stands in for `sensing.flight_status`: it flies."""
     return 0
 

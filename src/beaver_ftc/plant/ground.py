@@ -1,0 +1,60 @@
+"""The ground under an aircraft that can be told of one: laid out, and stood upon."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import radians
+
+import numpy as np
+
+from beaver_ftc.documents.errors import SimulationFailed
+from beaver_ftc.plant.adapter import FT_PER_M, Plant
+from beaver_ftc.plant.state import FlightState
+
+_AT_REST = ("accelerations/wdot-ft_sec2", "accelerations/qdot-rad_sec2")
+_STEPS = 1e-4, 1e-5  # m, rad: for differences
+_GOAL, _MOST_STEPS = 1e-7, 20  # ft/s2 and rad/s2
+
+
+def lay(plant: Plant, ground_m: float) -> None:
+    """Have a ground from now on, at this height above sea level. The aircraft has a section `ground`."""
+    plant.write(plant.aircraft.file.ground.present, 1.0)  # type: ignore[union-attr]
+    plant.write("position/terrain-elevation-asl-ft", ground_m * FT_PER_M)
+
+
+def stand(plant: Plant, neutral: FlightState, ground_m: float) -> None:
+    """Put the aircraft onto a ground of this height, at rest: surfaces and engine as in `neutral`.
+
+    Height and pitch are where the wheels carry the weight, found by Newton's method from what its file says;
+    along the ground friction holds it. Wings level, heading north, turbulence held back meanwhile.
+    """
+    lay(plant, ground_m)
+    turbulence = plant.read("atmosphere/turb-type")
+    if turbulence:
+        plant.write("atmosphere/turb-type", 0.0)
+    ground = plant.aircraft.file.ground
+    about = np.array([ground_m + ground.height_m, radians(ground.pitch_deg)])  # type: ignore[union-attr]
+    at = replace(neutral, airspeed_mps=0.0, alpha_rad=0.0, beta_rad=0.0, phi_rad=0.0, psi_rad=0.0)
+
+    for name, setting in plant.aircraft.engine.settings.items():
+        plant.write(setting.property, neutral.settings[name])
+
+    def look(x: np.ndarray) -> np.ndarray:
+        plant.hold(replace(at, altitude_m=float(x[0]), theta_rad=float(x[1])))
+        return np.array([plant.read(name) for name in _AT_REST])
+
+    if not _finds_rest(look, about):
+        raise SimulationFailed(f"{plant.aircraft.name} does not come to rest on its wheels")
+    if turbulence:
+        plant.write("atmosphere/turb-type", turbulence)
+
+
+def _finds_rest(look: Callable[[np.ndarray], np.ndarray], x: np.ndarray) -> bool:
+    """Whether Newton's method brings what `look` sees of x, (2,), to nothing."""
+    here = look(x)
+    for _ in range(_MOST_STEPS):
+        if np.abs(here).max() <= _GOAL:
+            return True
+        slopes = [(look(x + step) - here) / step.sum() for step in np.diag(_STEPS)]
+        x = x - np.linalg.solve(np.column_stack(slopes), here)
+        here = look(x)
+    return False

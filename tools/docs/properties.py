@@ -32,7 +32,7 @@ MEANINGS = {
     "oscillation-frequency-rad_sec": "oscillatory failure: angular frequency",
     "manifold-pressure-inhg": "engine setting: manifold pressure",
     "speed-rpm": "engine setting: engine speed",
-    "ground/present": "1: there is a ground, with wheels upon it and thrust at rest; 0: none, at any altitude",
+    "ground/present": "1: there is a ground, with wheels upon it and thrust at rest; 0: none anywhere",
     "Cm-alpha3": "extra pitching moment coefficient on alpha cubed; the published case is 10",
     "inertia-coupling/p": "relative error theta_p of Pqr",
     "inertia-coupling/q": "relative error theta_q of Qpr",

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import yaml
 
+from beaver_ftc.integrations.challenge import folders, grading
 from flights.synthetic import fly, write_csv
 
 from .documents import python_blocks, yaml_blocks
@@ -103,11 +104,19 @@ def _derived(folder: Path, installation: Installation) -> None:
     assert installation.beaver("derive", "navion.xml", "--out", "aircraft", cwd=folder).returncode == 0
 
 
+def _challenge(folder: Path) -> None:
+    """The challenge that the page's first command makes, with a submission."""
+    challenge = folder / "autumn"
+    folders.new(challenge, 4, grading.rules())
+    shutil.copy(challenge / "public" / "detector.py", challenge / "submissions" / "ada-1.py")
+
+
 def _copy(relative: str):
     return lambda folder: shutil.copytree(ROOT / relative, folder / relative)
 
 
 _MATERIALS = {
+    r"challenge (submit|grade)": _challenge,
     r"(?<!new )\bmy-case\b": _my_case,
     r"\bjammed-elevator\b": _shown_scenario("jammed-elevator"),
     r"\bwindy\b": _shown_scenario("windy"),

@@ -4,6 +4,7 @@ import io
 import signal
 import sys
 from dataclasses import dataclass
+from functools import reduce
 from inspect import signature
 from types import SimpleNamespace
 from typing import Annotated, get_args
@@ -74,11 +75,17 @@ def test_the_version_is_asked_before_all_else():
 
 def test_which_commands_fly(changed):
     """Where each is, whether plug-ins can be registered for it, and its examples."""
-    typed = typer.main.get_command(command_line.app).commands
     assert not changed({
-        name: [where, name not in command_line.WITHOUT_PLUGINS, *(typed[name].epilog or "").splitlines()[2:]]
+        name: [where, name not in command_line.WITHOUT_PLUGINS, *(typed(name).epilog or "").splitlines()[2:]]
         for name, where in command_line.COMMANDS.items()
     })  # fmt: skip
+
+
+def typed(name):
+    """The command of this name, or of these names."""
+    return reduce(
+        lambda group, part: group.commands[part], name.split(), typer.main.get_command(command_line.app)
+    )
 
 
 @dataclass(frozen=True)

@@ -40,9 +40,15 @@ COMMANDS = {
     "diagnose": "recorded:diagnose",
     "live": "run:live",
     "sitl": "sitl:command",
+    "challenge new": "challenge:new",
+    "challenge submit": "challenge:submit",
+    "challenge grade": "challenge:grade",
 }
+# Of a command that has commands of its own: what it is for.
+GROUPS = {"challenge": "Grade a class's detectors and laws on hidden flights."}
 # Those that fly no scenario of the user's choice: no plug-in can be registered for them.
 WITHOUT_PLUGINS = {"schema", "show", "new", "reproduce", "bench", "derive", "verify", "detectability"}
+WITHOUT_PLUGINS |= {"challenge new", "challenge submit", "challenge grade"}
 
 app = typer.Typer(
     name="beaver-ftc",
@@ -73,13 +79,21 @@ def options(
     """
 
 
+_groups = {
+    name: typer.Typer(name=name, help=says, no_args_is_help=True, rich_markup_mode=None)
+    for name, says in GROUPS.items()
+}
+for _group in _groups.values():
+    app.add_typer(_group, context_settings={"help_option_names": ["-h", "--help"]})
 for _name, _where in COMMANDS.items():
     _module, _, _function = _where.partition(":")
     _command = getattr(import_module(f"beaver_ftc.cli.{_module}"), _function)
     _read = as_typer_reads(_command, flies=_name not in WITHOUT_PLUGINS)
     # the examples at the end of its help, each on a line of its own
     _read.__doc__, _, _examples = str(_read.__doc__).partition("\n\nExamples:\n")
-    app.command(_name, epilog=f"\b\nExamples:\n{_examples}" if _examples else None)(_read)
+    _above, _, _last = _name.rpartition(" ")
+    _place = _groups.get(_above, app)
+    _place.command(_last, epilog=f"\b\nExamples:\n{_examples}" if _examples else None)(_read)
 
 
 def main() -> NoReturn:

@@ -36,7 +36,7 @@ FILES_OF_A_RESULT = frozenset({
     "detectability.csv", "detectability.png", "fault-matrix.json", "fault-matrix.txt", "fault-matrix.png",
     "power.json", "power.txt", "power.parquet", "pitch-lost.json", "pitch-lost.txt",
     "diagnosis.parquet", "verdict.json", "flights.json", "flights.md", "flights.png",
-    "flight.csv", "flight.ulg", "flight.bin", "vehicle.yaml",
+    "flight.csv", "flight.ulg", "flight.bin", "vehicle.yaml", "grades.json", "grades.md", "grades.html",
     "aircraft",
 })  # fmt: skip
 AIRCRAFT, MODEL_FILES = "aircraft", frozenset({".xml", ".yaml"})  # an own aircraft, to fly it again

@@ -1,0 +1,202 @@
+"""A challenge from beginning to end: what is handed out, what comes in, points, and the same grades again."""
+
+import json
+import os
+import stat
+from dataclasses import replace
+from math import inf
+
+import pytest
+from typer.testing import CliRunner
+
+import beaver_ftc as bf
+from beaver_ftc.cli.main import app
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.integrations.challenge import folders, grading, line
+from beaver_ftc.integrations.challenge.line import Allowance, Stranger
+from beaver_ftc.studies.compare.trial import Entry, Result, with_entry
+
+ENTRY = Entry("adaptive-estimators", "nominal")
+SEEN = Result(ENTRY, False, 8.0, True, delay_s=1.0, correct=True, rms_deg_s=0.4)
+
+
+def beaver(*asked):
+    return CliRunner().invoke(app, ["challenge", *map(str, asked)])
+
+
+def handed_out(challenge, name):
+    return (challenge / "public" / name).read_text()
+
+
+def test_what_is_hidden_is_for_its_owner_and_new_each_time(tmp_path):
+    seeds = set()
+    for name in ("one", "other"):
+        folders.new(tmp_path / name, 8, grading.rules())
+        teacher = tmp_path / name / "teacher"
+        assert stat.S_IMODE(teacher.stat().st_mode) == 0o700
+        for path in teacher.iterdir():
+            assert stat.S_IMODE(path.stat().st_mode) == 0o600
+            seeds.add(path.read_text().partition("seed: ")[2].split()[0])
+        public = "".join(path.read_text() for path in (tmp_path / name / "public").iterdir())
+        assert not [seed for seed in seeds if seed in public]
+        flown = folders.hidden_flights(tmp_path / name)
+        assert [bool(flight.faults) for flight in flown] == [False] * 2 + [True] * 6
+    assert len(seeds) == 4
+    assert min(len(seed) for seed in seeds) > 12
+
+
+def test_students_are_told_the_limits_that_hold(challenge):
+    told = handed_out(challenge, "README.md")
+    for limit in (f"{line.ALL_S:g} s for all", "64 KiB", "1024 MiB", "nothing from 5 s on"):
+        assert limit in told
+    assert "{" not in told
+
+
+def test_nothing_is_replaced(tmp_path, challenge):
+    with pytest.raises(BadInput, match="exists, allowed: a new folder"):
+        folders.new(challenge, 4, grading.rules())
+    texts = ["first", "second", "third"]
+    kept = [folders.keep(text, "ada", challenge) for text in texts]
+    assert [path.name for path in kept] == ["ada-1.py", "ada-2.py", "ada-3.py"]
+    assert [path.read_text() for path in kept] == texts
+    folders.keep("other", "ada-1", challenge)
+    assert [(each.student, each.file.name) for each in folders.submissions(challenge)] == [
+        ("ada", "ada-3.py"),
+        ("ada-1", "ada-1-1.py"),
+    ]
+
+
+def test_hidden_flights_that_others_may_read_are_refused(challenge):
+    (challenge / "teacher" / "loss.yaml").chmod(0o640)
+    with pytest.raises(BadInput, match=r"loss\.yaml: others may read it"):
+        folders.hidden_flights(challenge)
+
+
+def test_hidden_flights_among_what_students_may_read_are_refused(challenge, monkeypatch):
+    monkeypatch.setattr(folders, "readable", lambda: [str(challenge)])
+    with pytest.raises(BadInput, match="lies among Python's packages"):
+        folders.hidden_flights(challenge)
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda at: at.mkdir(), "0 Python files, allowed: one"),
+        (lambda at: at.with_suffix(".txt").write_text(""), "is no Python file"),
+        (lambda at: at.write_bytes(b"#" * 70_000), "larger than allowed: 64 KiB"),
+        (lambda at: at.write_bytes(b"\xff\xfe"), "is not UTF-8 text"),
+        (lambda at: at.symlink_to("/etc/hostname"), "is no Python file"),
+        (os.mkfifo, "is no Python file"),
+    ],
+)
+def test_what_is_no_submission(tmp_path, make, says):
+    path = tmp_path / "mine.py"
+    make(path)
+    done = beaver("submit", path)
+    assert done.exit_code != 0
+    assert says in str(done.exception)
+
+
+def test_a_name_that_is_no_file_s(tmp_path):
+    done = beaver("submit", tmp_path / "mine.py", "--student", "../ada")
+    assert "--student '../ada', allowed: letters, digits" in str(done.exception)
+
+
+def test_a_folder_with_one_file_is_a_submission(tmp_path):
+    (tmp_path / "mine.py").write_text("text")
+    assert folders.source_of(tmp_path) == "text"
+
+
+@pytest.mark.parametrize(
+    ("result", "points"),
+    [
+        (None, 0.0),
+        (SEEN, 40.0 + 50.0),  # 1 s of 5 s late
+        (replace(SEEN, correct=False), 40.0),
+        (replace(SEEN, delay_s=0.0), 100.0),
+        (replace(SEEN, delay_s=7.0), 50.0),
+        (replace(SEEN, delay_s=inf, correct=False), 0.0),
+        (replace(SEEN, false_alarm=True), 0.0),
+        (replace(SEEN, faulted=False, delay_s=inf), 100.0),
+        (replace(SEEN, faulted=False, delay_s=inf, false_alarm=True), 0.0),
+    ],
+)
+def test_points_of_a_detector(result, points):
+    assert grading.points_of_detector(result) == pytest.approx(points)
+
+
+@pytest.mark.parametrize(("error", "points"), [(0.4, 50.0), (0.2, 100.0), (0.1, 100.0), (inf, 0.0)])
+def test_points_of_a_law(error, points):
+    oracle = replace(SEEN, rms_deg_s=0.2)
+    assert grading.points_of_law(replace(SEEN, rms_deg_s=error), oracle) == pytest.approx(points)
+    assert grading.points_of_law(None, oracle) == 0.0
+
+
+def test_a_lost_flight_counts_and_a_barred_submission_has_nothing():
+    row = grading.detectors_row(grading.Graded("ada", results=[SEEN, None]))
+    assert (row["score"], row["flights"]) == (45.0, 1)
+    barred = grading.Graded("bob", reason="no", barred=True, results=[SEEN])
+    assert grading.detectors_row(barred)["score"] == 0.0
+
+
+def test_what_is_built_in_takes_no_place():
+    names = ["ada", grading.DETECTOR, "bob", "eve"]
+    results = [[SEEN], [replace(SEEN, delay_s=0.0)], [SEEN], [None]]
+    rows = [grading.Graded(name, "detector", results=of) for name, of in zip(names, results, strict=True)]
+    rows += [grading.Graded(name, results=[SEEN]) for name in (grading.BUILT_IN_LAW, grading.ORACLE)]
+    document = grading.document_of(rows, 1)
+    assert [(row["place"], row["student"]) for row in document["detectors"]] == [
+        (None, grading.DETECTOR),
+        (1, "ada"),
+        (2, "bob"),
+        (3, "eve"),
+    ]
+    assert [row["student"] for row in document["laws"]] == [grading.BUILT_IN_LAW]
+
+
+def test_a_stranger_s_text_cannot_colour_a_page():
+    assert line.plain("a\x1b[31m<b>\n|`é") == "a??31m?b??????"[:13]
+    assert len(line.plain("x" * 999)) == line.MOST_TEXT
+
+
+@pytest.mark.parametrize("name", ["detector.py", "law.py"])
+def test_it_flies_behind_the_walls_as_it_flies_here(name, challenge):
+    """To the bit: what is measured arrives whole, and so does what is answered."""
+    source, flight = handed_out(challenge, name), folders.hidden_flights(challenge)[-1]
+    with Stranger(source, name, Allowance()) as first:
+        first.look()
+    found = grading.fly_stranger(first, source, name, Allowance(), flight)
+    here = {"bf": bf}
+    exec(source, here)
+    plug_in = here[first.class_name]()
+    given = {"detector": plug_in} if name == "detector.py" else {"law": plug_in}
+    assert grading._flown(with_entry(flight, found.entry), found.entry, **given) == found
+    assert found.rms_deg_s > 0
+
+
+def test_from_beginning_to_end(challenge, monkeypatch):
+    monkeypatch.chdir(challenge / "public")
+    for file, student in (("detector.py", "ada"), ("law.py", "bob")):
+        done = beaver("submit", file, "--student", student, "--to", "..", "--format", "json")
+        assert json.loads(done.stdout)["submitted"] == f"../submissions/{student}-1.py"
+    (challenge / "submissions" / "eve-1.py").write_text("1/0")
+    (challenge / "submissions" / "notes.py").write_text("no submission's name")
+    grades = [
+        json.loads(beaver("grade", "..", "--workers", "1", "--format", "json").stdout) for _ in range(2)
+    ]
+    assert grades[0] == grades[1]
+    places = {row["student"]: row["place"] for kind in ("detectors", "laws") for row in grades[0][kind]}
+    assert places == {"ada": 1, "eve": 2, "bob": 1, grading.DETECTOR: None, grading.BUILT_IN_LAW: None}
+    (lost,) = (row for row in grades[0]["detectors"] if row["student"] == "eve")
+    assert (lost["score"], lost["reason"]) == (0.0, "ZeroDivisionError: division by zero")
+    for page in ("grades.json", "grades.md", "grades.html"):
+        assert "ZeroDivisionError" in (challenge / "grades" / page).read_text()
+    assert "eve" in beaver("grade", "..", "--workers", "1").stdout
+
+
+def test_a_challenge_that_is_none(tmp_path):
+    assert "no such folder" in str(beaver("grade", tmp_path / "no").exception)
+    assert "no hidden flights" in str(beaver("grade", tmp_path).exception)
+    (tmp_path / "mine.py").write_text("")
+    with pytest.raises(BadInput, match="is no challenge"):
+        folders.keep("", "ada", tmp_path)

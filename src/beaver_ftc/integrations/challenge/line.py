@@ -44,7 +44,7 @@ class Barred(Mistake):
 
 @dataclass
 class Allowance:
-    """Seconds a submission may still take, over all its flights."""
+    """Seconds a submission may still take, over all its flights; without those it waits for a processor."""
 
     left_s: float = ALL_S
 
@@ -53,6 +53,29 @@ def plain(text: str) -> str:
     """A stranger's text, fit for a terminal, a page and a table: plain letters of ASCII, not many."""
     shown = "".join(letter if " " <= letter <= "~" and letter not in "<>&|`[]" else "?" for letter in text)
     return shown if len(shown) <= MOST_TEXT else shown[: MOST_TEXT - 3] + "..."
+
+
+class _Queues:
+    """How long a process, and the one that asks it, have waited for a processor that others had: Linux says
+    so. A busy machine is nobody's fault."""
+
+    def __init__(self, pid: int | None) -> None:
+        self._files: list[int] = []
+        with contextlib.suppress(OSError):
+            for whose in () if pid is None or sys.platform != "linux" else (f"{pid}", "thread-self"):
+                self._files.append(os.open(f"/proc/{whose}/schedstat", os.O_RDONLY | os.O_CLOEXEC))
+
+    def waited_s(self) -> float:
+        """Seconds up to now; 0 where nobody counts them."""
+        try:
+            return sum(1e-9 * int(os.pread(file, 80, 0).split()[1]) for file in self._files)
+        except (OSError, IndexError, ValueError):  # it has gone
+            return 0.0
+
+    def close(self) -> None:
+        """Ask no more."""
+        while self._files:
+            os.close(self._files.pop())
 
 
 class Stranger:
@@ -69,7 +92,7 @@ class Stranger:
         self._allowance = allowance
         self._process: subprocess.Popen[bytes] | None = None
         self._deadline, self._late, self._t_s, self._frame = float("inf"), False, 0.0, 0
-        self._last_chance = False
+        self._last_chance, self._queued_s, self._queues = False, 0.0, _Queues(None)
         self.kind, self.class_name, self.walls = "", "", ""
         self._model: Any = None
         self._sizes = (0, 0)
@@ -109,6 +132,7 @@ class Stranger:
             cwd=self._folder.name, env=ONE_THREAD_EACH | {"PYTHONHASHSEED": "0"} | needed,
             close_fds=True, start_new_session=True,
         )  # fmt: skip
+        self._queues = _Queues(self._process.pid)
         threading.Thread(target=self._watch, args=(self._process,), daemon=True).start()
         self._send(pickle.dumps(self._told | {"context": context}))
         self.walls = plain(self._answer(pilot.WALLS, None, START_S, charged=False).decode("ascii", "replace"))
@@ -121,11 +145,14 @@ class Stranger:
     def _watch(self, process: "subprocess.Popen[bytes]") -> None:
         """End a process whose answer is late."""
         while process.poll() is None:
-            if time.monotonic() > self._deadline:
+            if time.monotonic() > self._deadline + self._queue_s() - self._queued_s:
                 self._late = True
                 process.kill()
                 return
             time.sleep(POLL_S)
+
+    def _queue_s(self) -> float:
+        return self._queues.waited_s()
 
     def asked(self, kind: bytes, t_s: float, numbers: list[np.ndarray]) -> np.ndarray:
         """Show it a frame; its answer's numbers, finite or not."""
@@ -140,6 +167,7 @@ class Stranger:
         """The message that must come now, after questions to the design model; length: None is any text's."""
         began = time.monotonic()
         self._last_chance = charged and self._allowance.left_s < within_s
+        self._queued_s = self._queue_s()
         self._deadline = began + (self._allowance.left_s if self._last_chance else within_s)
         try:
             while True:
@@ -159,7 +187,8 @@ class Stranger:
         finally:
             self._deadline = float("inf")
             if charged:
-                self._allowance.left_s -= time.monotonic() - began
+                queued_s = self._queue_s() - self._queued_s
+                self._allowance.left_s -= max(time.monotonic() - began - queued_s, 0.0)
 
     def _refuse(self, said: bytes, text: bytes) -> None:
         what = plain(text.decode(errors="replace"))
@@ -219,6 +248,7 @@ class Stranger:
                 os.killpg(process.pid, signal.SIGKILL)
         process.kill()
         process.wait()
+        self._queues.close()
         for stream in (process.stdin, process.stdout):
             if stream:
                 stream.close()

@@ -35,7 +35,7 @@ def lay_out(line: str, folder: Path, installation: Installation) -> None:
 
 def _fly(name: str, folder: Path, installation: Installation) -> None:
     given = f"{name}.yaml" if (folder / f"{name}.yaml").exists() else name
-    assert installation.beaver("run", given, "--no-report", cwd=folder).returncode == 0
+    assert installation.beaver("run", given, "--no-report", cwd=folder).returncode in (0, 1)  # 1: missed
 
 
 def _shown(page: str, name: str) -> str:
@@ -117,7 +117,7 @@ def _copy(relative: str):
 
 _MATERIALS = {
     r"challenge (submit|grade)": _challenge,
-    r"(?<!new )\bmy-case\b": _my_case,
+    r"^(?!.*\bnew my-case).*\bmy-case\b": _my_case,
     r"\bjammed-elevator\b": _shown_scenario("jammed-elevator"),
     r"\bwindy\b": _shown_scenario("windy"),
     r"\bmy[-.]sweep\b": _my_sweep,

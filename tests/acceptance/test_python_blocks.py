@@ -1,0 +1,23 @@
+"""The Python that the pages show: typed anew, from the wheel, in an empty folder."""
+
+import pytest
+
+from .documents import PAGES, python_blocks
+
+ELLIPSIS = "fdi={...}"  # the overview of every name, which tests/test_interface.py runs
+BLOCKS = [block for page in PAGES for block in python_blocks(page) if ELLIPSIS not in block]
+
+
+def test_the_pages_show_flights_plug_ins_and_environments():
+    shown = "\n".join(BLOCKS)
+    for name in ("bf.fly(", "bf.linearise(", "class MyCusum", "class MyLaw", "make(", "make_vec("):
+        assert name in shown
+
+
+@pytest.mark.parametrize("program", BLOCKS)
+def test_what_the_pages_show_runs_as_it_stands(program, installation, tmp_path):
+    if "gymnasium" in program:
+        pytest.importorskip("gymnasium")
+    (tmp_path / "typed.py").write_text(program)
+    done = installation.run(installation.python, "typed.py", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr

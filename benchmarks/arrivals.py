@@ -98,6 +98,23 @@ def said(fault: Keys) -> str:
     return f"{100 * fault['magnitude']:.0f} % {fault['actuator']} at {fault['at_s']:.0f} s"
 
 
+def fly_seed(campaign: str, seed: int) -> tuple[str, str, tuple[str, ...]]:
+    """A flight of a campaign and its twin without the fault: scenario, fault, and what is missed of each of
+    COUNTED."""
+    draw, limits = CAMPAIGNS[campaign]
+    scenario, fault = draw(np.random.default_rng(seed))
+    scenario = scenario.with_({"seed": seed})
+    flight = bf.fly(scenario.with_({"faults": [fault]}), log=False)
+    healthy = bf.fly(scenario.with_({"faults": []}), log=False)
+    return scenario.name, said(fault), (
+        missed_at_the_end(flight, {key: most for key, most in limits.items() if key != "altitude_m"}),
+        missed_at_the_end(flight, limits),
+        missed(flight, limits),
+        missed(flight, limits, limited=True),
+        missed(healthy, limits),
+    )  # fmt: skip
+
+
 def main() -> None:
     """Fly and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
@@ -105,24 +122,13 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=100)
     parser.add_argument("--first", type=int, default=1)
     args = parser.parse_args()
-    draw, limits = CAMPAIGNS[args.campaign]
     table = Table("seed", "flight", "fault", *COLUMNS)
     held = np.zeros(len(COUNTED), int)
     for seed in range(args.first, args.first + args.seeds):
-        scenario, fault = draw(np.random.default_rng(seed))
-        scenario = scenario.with_({"seed": seed})
-        flight = bf.fly(scenario.with_({"faults": [fault]}), log=False)
-        healthy = bf.fly(scenario.with_({"faults": []}), log=False)
-        words = (
-            missed_at_the_end(flight, {key: most for key, most in limits.items() if key != "altitude_m"}),
-            missed_at_the_end(flight, limits),
-            missed(flight, limits),
-            missed(flight, limits, limited=True),
-            missed(healthy, limits),
-        )
+        flight, fault, words = fly_seed(args.campaign, seed)
         held += [not each for each in words]
         if any(words):
-            table.add_row(str(seed), scenario.name, said(fault), *(each or "held" for each in words))
+            table.add_row(str(seed), flight, fault, *(each or "held" for each in words))
     Console(width=180).print(table)
     counts = ", ".join(f"{count} {how}" for count, how in zip(held, COUNTED, strict=True))
     print(f"{args.campaign}, of {args.seeds}: {counts}")

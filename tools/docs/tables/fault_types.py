@@ -1,0 +1,88 @@
+"""Tables of docs/fault-types.md."""
+
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from beaver_ftc.studies.matrix.fault_matrix import run_matrix
+from beaver_ftc.studies.matrix.pitch_lost import run_pitch_lost
+from tools.docs.compact import compact_table
+
+Document = dict[str, Any]
+
+
+def fault_matrix() -> str:
+    """What `beaver-ftc matrix` finds, with exact instruments."""
+    return _matrix(declared=False)
+
+
+def fault_matrix_declared() -> str:
+    """What it finds with instruments, servos and coefficients that err, and are declared."""
+    return _matrix(declared=True)
+
+
+def fault_matrix_light() -> str:
+    """The same in light turbulence, in words."""
+    return _matrix(declared=True, turbulence="light")
+
+
+def pitch_lost() -> str:
+    """Elevator and flap lost: swing of the pitch attitude without engine power and with it."""
+    with TemporaryDirectory() as folder:
+        flights = run_pitch_lost(Path(folder))["flights"]
+    law = flights[0]["law"]
+    flown = {(row["lost"], row["airspeed_mps"]): _swings(row) for row in flights if row["law"] == law}
+    airspeeds = list(dict.fromkeys(V for _, V in flown))
+    names = dict.fromkeys(name for name, _ in flown)
+    return compact_table(
+        ("lost", *(f"{V:g} m/s" for V in airspeeds)),
+        [(name, *(flown[name, V] for V in airspeeds)) for name in names],
+    )
+
+
+def _swings(row: Document) -> str:
+    return f"{_swing(row['without'])}>{_swing(row['with'])}"
+
+
+def _swing(outcome: Document) -> str:
+    outside = "*" if outcome["outside_share"] else ""
+    return "lost" if outcome["departure"] else f"{outcome['theta_swing_deg']:.1f}{outside}"
+
+
+def _matrix(declared: bool, turbulence: str = "none") -> str:
+    with TemporaryDirectory() as folder:
+        document = run_matrix(Path(folder), declared=declared, turbulence=turbulence)
+    cells = {(cell["fault"], cell["surface"]): cell for cell in document["cells"]}
+    surfaces = list(dict.fromkeys(surface for _, surface in cells))
+    table = compact_table(
+        ("fault", *surfaces),
+        [
+            (fault, *(_verdict(cells[fault, surface]) for surface in surfaces))
+            for fault in dict.fromkeys(name for name, _ in cells)
+        ],
+    )
+    says = " ".join((_summary(document), *([_told(document["told"])] if declared else [])))
+    return says if turbulence != "none" else f"{table}\n\n{says}"
+
+
+def _verdict(cell: Document) -> str:
+    return f"{cell['verdict']}{'*' if cell['lost'] else ''}"
+
+
+def _summary(document: Document) -> str:
+    delays = [row["delay_s"] for row in document["flights"] if row["delay_s"] is not None]
+    lost = len(document["lost_though_the_oracle_was_not"])
+    return (
+        f"{len(document['flights'])} faults flown: {document['wrong']} named wrongly, "
+        f"{document['false_alarms']} false alarms, {lost} lost that the oracle kept. Half of {len(delays)} "
+        f"alarms came within {median(delays):.2f} s."
+    )
+
+
+def _told(told: Document) -> str:
+    each = ", ".join(f"{name} {one['named']} of {one['seen']}" for name, one in told["by_surface"].items())
+    return (
+        f"A test that is told the fault sees {told['seen']} of them. Of these {told['detected']} raise the "
+        f"alarm, and the right surface is named in {told['named']}: {each}."
+    )

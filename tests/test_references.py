@@ -1,22 +1,44 @@
-"""Every short key in the code, the aircraft and the documents has its entry in docs/references.md."""
+"""Every short key in code, aircraft and documents has its entry in docs/references.md, and each is used."""
 
 import re
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[1]
-KEY = re.compile(r"\[([A-Z][A-Za-z]+\d{2,4}|FDC)\]")
-PLACES = ("src/**/*.py", "aircraft/**/*.xml", "docs/*.md", "scenarios/**/*.yaml")
+KEY = re.compile(r"(?<=[\[ ])([A-Z][A-Za-z]*\d{2,4}|FDC|JAWA|MIL-F-8785C|MPU-9250)(?=[\],])")
+BRACKET = re.compile(r"\[[A-Z][\w, .-]*\]|\[[A-Z][\w-]*,")  # one key or several, perhaps with a place in it
+PLACES = (
+    "README.md", "CONTRIBUTING.md", "src/**/*.py", "src/**/*.yaml", "src/**/*.json", "aircraft/**/*.xml",
+    "aircraft/**/*.yaml", "docs/*.md", "scenarios/**/*.yaml", "examples/**/*.py", "benchmarks/*.py",
+)  # fmt: skip
+ENTRIES = re.findall(r"^- \[([^\]]+)\] ", (ROOT / "docs" / "references.md").read_text(encoding="utf-8"), re.M)
+
+
+def keys_in(path):
+    brackets = BRACKET.findall(path.read_text(encoding="utf-8"))
+    return [key for bracket in brackets for key in KEY.findall(bracket)]
 
 
 def used():
     files = (path for place in PLACES for path in ROOT.glob(place) if path.name != "references.md")
-    return {key: path for path in files for key in KEY.findall(path.read_text(encoding="utf-8"))}
-
-
-def known():
-    return set(KEY.findall((ROOT / "docs" / "references.md").read_text(encoding="utf-8")))
+    return {key: path for path in files for key in keys_in(path)}
 
 
 def test_every_key_is_known():
-    assert {"TM88", "Zhang2005", "FDC"} <= used().keys()
-    assert {key: str(path) for key, path in used().items() if key not in known()} == {}
+    assert {"TM88", "Zhang2005", "FDC", "MIL-F-8785C"} <= used().keys()
+    assert {key: str(path) for key, path in used().items() if key not in ENTRIES} == {}
+
+
+@pytest.mark.parametrize("key", ENTRIES)
+def test_every_entry_is_used_and_stands_once(key):
+    assert key in used()
+    assert ENTRIES.count(key) == 1
+
+
+def test_every_entry_has_a_year_or_a_number_and_a_title():
+    text = (ROOT / "docs" / "references.md").read_text(encoding="utf-8")
+    for line in text.splitlines():
+        if line.startswith("- "):
+            assert re.search(r'".{8,}"', line), line
+            assert re.search(r"\b(19|20)\d\d\b|N61-1619", line), line

@@ -105,7 +105,6 @@ TABLE = (
         "hundreds of flights: one of them (test_sweeps.py flies each in short)",
         r"\1 --replay 0 --no-report",
     ),
-    Exempt(r"beaver-ftc (compare|sweep) .*<\w+>.*", "names the command's arguments", r"beaver-ftc \1 --help"),
     Exempt(
         r"beaver-ftc run SCENARIO (--as \w+)", "stands for any", r"beaver-ftc run brief.yaml \1 --no-report"
     ),

@@ -1,0 +1,94 @@
+"""What docs/reproduction.md shows of the study that `beaver-ftc reproduce` flies."""
+
+from pathlib import Path
+from typing import Any
+
+from beaver_ftc.studies.present.page import write_files
+from beaver_ftc.studies.present.tables import markdown_table
+from beaver_ftc.studies.present.tables import number as plain_number
+from beaver_ftc.studies.reproduce import beside
+from beaver_ftc.studies.reproduce.claims import MEASURED, NOT_BORNE_OUT, STRONGER
+from beaver_ftc.studies.reproduce.published_figures import FIGURES, SENSITIVITY, figures_of
+from beaver_ftc.studies.reproduce.reproduction import fly_published, reproduced
+from beaver_ftc.studies.reproduce.words import headline, limit, measured, number, ours, without
+from tools.docs.tables import shared
+
+Document = dict[str, Any]
+FOLDER = "images/reproduction"
+
+
+@shared
+def _document() -> Document:
+    return reproduced()[0]
+
+
+def reproduction_headline() -> str:
+    """How many statements of each verdict there are."""
+    return headline(_document())
+
+
+def reproduction_not_borne_out() -> str:
+    """The statements that do not hold, and why."""
+    return _not_borne_out(_document())
+
+
+def _not_borne_out(document: Document) -> str:
+    return markdown_table(("published", "statement", "ours", "limit", "why"), [
+        (claim["where"], claim["statement"], ours(claim), limit(claim), claim["because"])
+        for claim in measured(document) if claim["verdict"] == NOT_BORNE_OUT
+    ])  # fmt: skip
+
+
+def reproduction_stronger() -> str:
+    """The statements that hold wherever the paper did not fly, too, with their ablation."""
+    return _stronger(_document())
+
+
+def _stronger(document: Document) -> str:
+    return markdown_table(("published", "statement", "ours", "without"), [
+        (claim["where"], claim["statement"].rstrip("."),
+         number(claim["number"], claim["unit"], claim["none"]), without(claim))
+        for claim in measured(document) if claim["verdict"] == STRONGER
+    ])  # fmt: skip
+
+
+def reproduction_beside() -> str:
+    """The published cases by the paper's scheme and law, and by our defaults."""
+    return _beside(_document())
+
+
+def _beside(document: Document) -> str:
+    both = document["beside"]
+    head = ("case, flown by", "isolated after, s", "RMS before, deg/s", "after", "travel, deg", "work")
+    rows = [
+        (
+            f"{row['case']}, {row['flown_by']}",
+            *(plain_number(row[key]) for key in ("isolated_s", "before_deg_s", "after_deg_s")),
+            *(f"{row[key]:.0f}" for key in ("travel_deg", "work_deg2_per_s")),
+        )
+        for row in both["rows"]
+    ]
+    return f"{markdown_table(head, rows)}\n\n{beside.alarms_sentence(both)}"
+
+
+def reproduction_figures() -> str:
+    """One figure for each published one, and how far each number stays from its limit."""
+    write_files(Path("images"), {})
+    write_files(Path(FOLDER), figures_of(_document(), fly_published().published))
+    return _figures()
+
+
+def _figures() -> str:
+    titles = [(view.title, view.name) for view, _, _ in FIGURES]
+    shown = [*titles, ("How far each number stays from its limit", SENSITIVITY)]
+    return "\n\n".join(f"![{title}]({FOLDER}/{name}.png)" for title, name in shown)
+
+
+def reproduction_probe() -> str:
+    """The number of every measured statement in the published flights alone, and ours beside them."""
+    flights = fly_published()
+    said = [f"{claim.statement} {claim.number(flights.published):.6g}" for claim in MEASURED]
+    for (case, whose), flown in flights.beside.items():
+        travel = flown.metrics["tracking"]["surface_travel_deg"]
+        said.append(f"{case}, {whose}: {sum(travel.values()):.6g} deg")
+    return "\n".join(said)

@@ -1,0 +1,62 @@
+"""Tables of docs/performance.md: what a flight, a frame and a command cost, on the machine that measures."""
+
+import re
+import subprocess
+import sys
+
+from beaver_ftc.studies.bench.measure import bench, by_kind
+from beaver_ftc.studies.present.tables import markdown_table
+from tools.docs.pages import ROOT
+
+KINDS = {
+    "published": "published",
+    "class all": "all fault types",
+    "real air, sensors, statistical": "turbulence, sensors, servos, statistical detector",
+    "autopilot": "autopilot",
+}
+ALTERNATIVES = {
+    "properties_through_python": "the same, properties through JSBSim's Python binding",
+    "python_detector": "with the smallest detector in Python plugged in",
+    "python_law": "with a law in Python plugged in",
+    "straightforward": "all in NumPy, properties by name",
+}
+ROUNDS = 40
+
+
+def performance_flights() -> str:
+    """Flights of a sweep, each beside as many of JSBSim's own frames."""
+    kinds = by_kind(ROUNDS)
+    return markdown_table(("flight of 15 s", "frames / bare", "flight / bare", "flight, ms"), [
+        (name, f"{kinds[kind]['frames_ratio']:.2f}", f"{kinds[kind]['flight_ratio']:.2f}",
+         f"{sum(kinds[kind]['parts_ms'].values()):.0f}")
+        for kind, name in KINDS.items()
+    ])  # fmt: skip
+
+
+def performance_frames() -> str:
+    """The closed loop, and other ways to write it, beside the bare aircraft."""
+    found = bench(ROUNDS, with_parts=False)
+    rows = [
+        ("closed loop, before the alarm", found["before_alarm"]["ratio"]),
+        ("closed loop, after the alarm", found["ratio"]),
+        ("whole flight with a log file", found["whole_flight"]["with_log_file_ratio"]),
+        *((name, found["alternatives"][key]["ratio"]) for key, name in ALTERNATIVES.items()),
+    ]
+    return markdown_table(("a frame", "/ bare"), [(name, f"{ratio:.2f}") for name, ratio in rows])
+
+
+def performance_commands() -> str:
+    """Whole processes by the wall, and their peak memory; the first run compiles."""
+    lines = _printed("cold_start.py", "--rounds", "5").splitlines()[1:]
+    found = [re.fullmatch(r"(.+?)\s+([\d.]+) s\s+[\d.]+ s\s+(\d+) MB", line) for line in lines]
+    return markdown_table(("command", "s", "peak, MB"), [(row[1], row[2], row[3]) for row in found if row])
+
+
+def performance_ten_hours() -> str:
+    """A flight of ten hours, its log file written."""
+    return _printed("long_flight.py", "--hours", "10")
+
+
+def _printed(script: str, *arguments: str) -> str:
+    command = [sys.executable, str(ROOT / "benchmarks" / script), *arguments]
+    return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()

@@ -143,7 +143,11 @@ SWEEP = {
     "results__verdict__verdict_text": "verdict",
     "results__junit__write_junit": None,
 }
-LIVE = {"integrations__live__serve__serve": lambda load, out, port, say: say(load().name)}
+LIVE = {
+    "integrations__live__serve__serve": lambda load, out, place, say: say(
+        f"{load().name} at {place}", ["one"][: place.guests]
+    )
+}
 MISMATCH = {
     "studies__mismatch__study__run_mismatch": lambda scenario, *_: ({"m": scenario.name}, "tally"),
     "studies__mismatch__tables__mismatch_text": "split",
@@ -188,7 +192,7 @@ ASKED = [
     ("sweep elevator-effectiveness --replay 3", SWEEP), ("sweep elevator-effectiveness --backend ray", SWEEP),
     ("sweep elevator-effectiveness --replay 0 --format json", SWEEP),
     ("live", LIVE), ("live rudder-stuck --port 80 --out o", LIVE),
-    ("live rudder-stuck --aircraft beaver", LIVE),
+    ("live rudder-stuck --aircraft beaver", LIVE), ("live --guests 1", LIVE), ("live --host 0.0.0.0", LIVE),
     ("sitl fault-free --as ardupilot", SITL), ("sitl fault-free --as px4 --mavlink nowhere", SITL),
     ("sitl fault-free --as px4 --port 1 --rate 200 --hold 3 --mavlink h:14550 --page 0 --format json", SITL),
     ("mismatch fault-free", MISMATCH), ("mismatch fault-free --variant declared,engine-neglected", MISMATCH),

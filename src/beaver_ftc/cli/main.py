@@ -38,7 +38,7 @@ COMMANDS = {
     "detectability": "studies:detectability",
     "identify": "recorded:identify",
     "diagnose": "recorded:diagnose",
-    "live": "run:live",
+    "live": "live:command",
     "sitl": "sitl:command",
     "challenge new": "challenge:new",
     "challenge submit": "challenge:submit",

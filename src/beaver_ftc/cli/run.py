@@ -1,4 +1,4 @@
-"""`beaver-ftc run`: fly scenarios, keep the results, say the verdict; and `live`: fly one in the browser."""
+"""`beaver-ftc run`: fly scenarios, keep the results, say the verdict."""
 
 import sys
 import time
@@ -15,7 +15,6 @@ from beaver_ftc.cli.inputs import (
     JunitOption,
     NoReportOption,
     ResultsOption,
-    ScenarioArgument,
     ScenariosArgument,
     load_all,
 )
@@ -139,41 +138,3 @@ def _run_one(scenario: "Scenario", options: Options, prepare: "Prepare | None") 
     with progress_bar(scenario.name) as progress:
         document = run(scenario, options.out, not options.no_report, progress, exports, prepare, recording)
     return document | {"folder": str(options.out / scenario.name)}
-
-
-def live(
-    scenario: ScenarioArgument = "fault-free",
-    aircraft: Annotated[str | None, typer.Option(metavar="AIRCRAFT")] = None,
-    port: Annotated[int, typer.Option(min=0, max=65535)] = 0,
-    out: Path = Path("runs"),
-    open_browser: Annotated[bool, typer.Option("--open")] = False,
-) -> None:
-    """Fly in the browser: break it and watch the diagnosis.
-
-    Prints an address of this machine that works once; Ctrl-C ends it.
-
-    aircraft: Fly this one, without the scenario's uncertainty.
-    port: Port on the loopback; 0: any.
-    out: Folder in which the page's Save writes.
-    open_browser: Also open the page in a browser.
-    """
-    from beaver_ftc.integrations.live.serve import serve
-
-    serve(lambda: _with(aircraft, scenario), out, port, lambda address: _point_to(address, open_browser))
-
-
-def _with(aircraft: str | None, name: str) -> "Scenario":
-    from beaver_ftc.scenario.loader import load_scenario
-
-    loaded = load_scenario(name)
-    if aircraft is None or aircraft == loaded.aircraft:
-        return loaded
-    return loaded.with_({"aircraft": aircraft, "uncertainty": {}})  # it is of the aircraft that was meant
-
-
-def _point_to(address: str, open_browser: bool) -> None:
-    emit(f"live: {address}\nOpen it in a browser; Ctrl-C ends the flight.")
-    if open_browser:
-        import webbrowser
-
-        webbrowser.open(address)

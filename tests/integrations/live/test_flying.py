@@ -139,6 +139,21 @@ def test_who_asks_is_answered_and_all_are_told_what_happens(flown):
     assert after == [["rudder"]]  # with the next frame
 
 
+def test_a_guest_is_named_in_what_it_does_until_it_leaves(flown):
+    jam = {"do": "break", "fault": {"type": "stuck", "actuator": "rudder"}}
+    loss = {"do": "break", "fault": {"type": "loss_of_effectiveness", "actuator": "flap", "magnitude": 0.5}}
+    wire = flown(
+        (0.0, 0, "joined 1"), (0.0, 0, "joined 2"), (0.1, 0, "called 2 guest 1"),
+        (0.2, 0, "called 2 Ada Lovelace (guest 1)"), (0.3, 2, jam), (0.35, 1, loss),
+        (0.4, 2, {"do": "repair"}), (0.5, 0, "left 2"), (0.6, 0, "joined 2"), (0.7, 2, jam), (0.8, 0, "end"),
+    )  # fmt: skip
+    told = [
+        event for each in wire.of("e") for event in each["events"] if event["kind"] in ("broken", "repaired")
+    ]
+    name = "Ada Lovelace (guest 1)"
+    assert [event.get("by") for event in told] == [name, None, name, None]
+
+
 def test_a_new_flight_is_introduced_to_all_and_goes_on_after_a_pause(flown):
     pause, fresh = {"do": "pause", "on": True}, {"do": "fresh", "scenario": "rudder-stuck"}
     wire = flown((0.0, 0, "joined 1"), (0.5, 1, pause), (1.0, 1, fresh), (1.5, 0, "end"))

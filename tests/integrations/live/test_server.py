@@ -15,7 +15,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from beaver_ftc.integrations.live import messages
-from beaver_ftc.integrations.live.server import MAX_PAGES
+from beaver_ftc.integrations.live.gate import MAX_PAGES
 
 
 @pytest.fixture(scope="module")

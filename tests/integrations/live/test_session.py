@@ -337,6 +337,36 @@ def test_what_broke_and_was_mended_a_hundred_times_and_more_flies_again(session,
     assert np.array_equal(kept.log.to_numpy(), again.log.to_numpy(), equal_nan=True)
 
 
+def test_who_broke_what_is_told_and_kept(session, tmp_path):
+    """Of two guests and whoever flies; repaired and broken again by another; not of the flight after it."""
+    jam = messages.Break(do="break", fault={"type": "stuck", "actuator": "rudder"})
+    session.handle(messages.Break(do="break", fault=LOSS), by="Ada (guest 1)")
+    session.handle(jam, by="guest 2")
+    session.handle(jam, by="guest 3")  # it is jammed already
+    flown(session, 3)
+    by = {fault["actuator"]: fault["by"] for fault in session.state()["faults"]}
+    assert by == {"elevator": "Ada (guest 1)", "rudder": "guest 2"}
+    session.handle(messages.Repair(do="repair", actuator="rudder"), by="guest 3")
+    flown(session, 3)
+    session.handle(jam)
+    flown(session, 3)
+    assert [fault.get("by") for fault in session.state()["faults"]] == ["Ada (guest 1)", None]
+    assert [event.get("by") for event in told(session, "repaired")] == ["guest 3"]
+    assert [event.get("by") for event in told(session, "broken")][:2] == ["Ada (guest 1)", "guest 2"]
+    flight, kept = session.sim.land(), {}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(session.sim, "land", lambda: flight)
+        patch.setattr(bf.Flight, "save", lambda flight, out, report: kept.update(flight.metrics) or out)
+        asked(session, do="save")
+    said = [(fault["actuator"], fault["end_s"], fault.get("by")) for fault in kept["faults"]]
+    assert said == [
+        ("elevator", None, "Ada (guest 1)"), ("rudder", 0.05, "guest 2"), ("rudder", None, None),
+    ]  # fmt: skip
+    asked(session, do="fresh")
+    session.handle(messages.Break(do="break", fault=LOSS))
+    assert [fault.get("by") for fault in session.state()["faults"]] == [None]
+
+
 def test_more_faults_than_a_scenario_holds_are_refused_in_words(session, monkeypatch):
     monkeypatch.setattr("beaver_ftc.loop.simulation.MOST_FAULTS", 3)
     for _ in range(3):

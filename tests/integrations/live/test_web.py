@@ -7,68 +7,13 @@ import socket
 from types import SimpleNamespace
 
 import pytest
+from live_site import HOST, PORT, Site, says
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.integrations.live import EVERYONE, MAX_BYTES, serve, server
-from beaver_ftc.integrations.live.server import STATIC, Gate, Page, Pages, application
-
-PORT = 8000
-HOST = f"127.0.0.1:{PORT}"
-
-
-class Site:
-    """The application of one gate, and a browser's cookie for it."""
-
-    def __init__(self):
-        self.gate, self.pages, self.asked = Gate(PORT), Pages(), []
-        self.app = application(self.gate, self.pages, lambda *words: self.asked.append(words))
-        self.key = f"{self.gate.cookie}={self.gate.redeem(self.token())}"
-
-    def token(self):
-        return self.gate.invitation().rpartition("=")[2]
-
-    def _scope(self, kind, path, cookie, host, **more):
-        headers = {"host": host} | ({"cookie": cookie} if cookie else {}) | more.pop("headers", {})
-        raw = [(name.encode(), value.encode()) for name, value in headers.items()]
-        return {"type": kind, "path": path, "headers": raw, "query_string": b"", "root_path": "", **more}
-
-    def get(self, path, query="", cookie=None, host=HOST):
-        """(status, headers, body)."""
-        told = []
-        scope = self._scope("http", path, cookie, host, method="GET", query_string=query.encode(),
-                            scheme="http", server=("127.0.0.1", PORT))  # fmt: skip
-
-        async def receive():
-            await asyncio.sleep(0)
-            return {"type": "http.request", "body": b"", "more_body": False}
-
-        async def send(message):
-            told.append(message)
-
-        asyncio.run(self.app(scope, receive, send))
-        headers = {name.decode(): value.decode() for name, value in told[0]["headers"]}
-        body = b"".join(message.get("body", b"") for message in told[1:])
-        return told[0]["status"], headers, body
-
-    def talk(self, *said, cookie=None, origin=f"http://{HOST}", then=None):
-        """What a websocket is told while it says these messages."""
-        told, script = [], [{"type": "websocket.connect"}, *said, {"type": "websocket.disconnect"}]
-        scope = self._scope("websocket", f"{self.gate.room}/socket", cookie, HOST, scheme="ws",
-                            headers={"origin": origin}, subprotocols=[])  # fmt: skip
-
-        async def receive():
-            for _ in range(4):
-                await asyncio.sleep(0)
-            if then and len(script) == 1:
-                then(self)
-                await asyncio.sleep(0.001)
-            return script.pop(0)
-
-        async def send(message):
-            told.append(message)
-
-        asyncio.run(self.app(scope, receive, send))
-        return told
+from beaver_ftc.integrations.live.gate import Seat
+from beaver_ftc.integrations.live.serve import Place
+from beaver_ftc.integrations.live.server import STATIC, Page, Pages
 
 
 @pytest.fixture
@@ -76,24 +21,22 @@ def site():
     return Site()
 
 
-def says(**request):
-    return {"type": "websocket.receive", "text": json.dumps(request)}
-
-
 def test_the_token_of_an_address_becomes_a_cookie_once(site):
-    room, token = site.gate.room, site.token()
+    room, token = site.gate.flyer.room, site.token()
     status, headers, _ = site.get(f"{room}/", f"token={token}")
     assert (status, headers["location"]) == (303, f"{room}/")
-    assert headers["set-cookie"] == f"{site.key}; HttpOnly; Path={room}; SameSite=strict"
+    assert headers["set-cookie"] == f"{site.key}; HttpOnly; Path={room}; SameSite=lax"
     status, headers, body = site.get(f"{room}/", f"token={token}")
     assert (status, "set-cookie" in headers, b"has been used" in body) == (403, False, True)
+    (again,) = site.said  # in the terminal, for whoever closed the browser
+    assert site.get(f"{room}/", again.partition("?")[2])[0] == 303
     status, headers, _ = site.get(f"{room}/", f"token={token}", cookie=site.key)
     assert (status, "set-cookie" in headers) == (303, False)  # who is in already is only led to the page
     assert site.get(f"{room}/static/js/main.js", f"token={site.token()}")[0] == 403
 
 
 def test_the_page_and_its_files_with_what_it_may_do(site, changed):
-    room = site.gate.room
+    room = site.gate.flyer.room
     status, headers, body = site.get(f"{room}/", cookie=site.key)
     assert (status, body) == (200, (STATIC / "index.html").read_bytes())
     assert not changed({name: headers[name] for name in server.HEADERS})
@@ -109,19 +52,19 @@ def test_the_page_and_its_files_with_what_it_may_do(site, changed):
     ],
 )  # fmt: skip
 def test_who_is_let_in(site, path, cookie, host, status):
-    assert site.get(site.gate.room + path, cookie=site.key if cookie else None, host=host)[0] == status
+    assert site.get(site.gate.flyer.room + path, cookie=site.key if cookie else None, host=host)[0] == status
 
 
 def test_secrets_are_of_12_24_and_32_bytes_in_base64(site):
-    assert len(site.gate.room) == 1 + 12 * 4 // 3
+    assert len(site.gate.flyer.room) == 1 + 12 * 4 // 3
     assert len(site.token()) == 24 * 4 // 3
     assert len(site.key.partition("=")[2]) == -(-32 * 4 // 3)
 
 
 def test_as_many_addresses_as_are_kept_open(site):
     tokens = [site.token() for _ in range(17)]
-    assert site.gate.redeem(tokens[0]) is None
-    assert all(site.gate.redeem(token) for token in tokens[1:])
+    assert site.gate.flyer.redeem(tokens[0]) is None
+    assert all(site.gate.flyer.redeem(token) for token in tokens[1:])
 
 
 @pytest.mark.parametrize(
@@ -130,7 +73,7 @@ def test_as_many_addresses_as_are_kept_open(site):
 )
 def test_a_socket_is_refused(site, key, origin, others):
     for _ in range(others):
-        site.pages.add(None)
+        site.pages.add(None, site.gate.flyer)
     told = site.talk(cookie=site.key if key else None, origin=origin)
     assert [(message["type"], message["code"]) for message in told] == [("websocket.close", 4403)]
     assert (site.asked, len(site.pages)) == ([], others)
@@ -138,17 +81,17 @@ def test_a_socket_is_refused(site, key, origin, others):
 
 def test_what_a_page_says_goes_to_the_flight_or_is_answered(site):
     for _ in range(19):
-        site.pages.add(None)
+        site.pages.add(None, site.gate.flyer)
     told = site.talk(says(do="save", n=3), says(do="dance"), says(do="invite", n=4), cookie=site.key,
                      then=lambda site: site.pages.tell(20, b'{"k":"f"}'))  # fmt: skip
     assert site.asked == [(0, "joined 20"), (20, says(do="save", n=3)["text"]), (0, "left 20")]
     assert len(site.pages) == 19
-    opened, wrong, address, frame = told
+    opened, _, wrong, address, frame = told
     assert opened["type"] == "websocket.accept"
     wrong, address = json.loads(wrong["text"]), json.loads(address["text"])
     assert (wrong["k"], wrong["n"], wrong["ok"]) == ("ack", 0, False)
     assert (address["n"], address["ok"]) == (4, True)
-    assert site.gate.redeem(address["says"].rpartition("=")[2])
+    assert site.gate.flyer.redeem(address["says"].rpartition("=")[2])
     assert frame["text"] == '{"k":"f"}'
 
 
@@ -173,7 +116,7 @@ class Socket:
 def _sent(*told):
     async def sending():
         socket = Socket()
-        page = Page(1, socket)
+        page = Page(1, socket, Seat())
         for each in told:
             page.tell(each)
         task = asyncio.create_task(page.send())
@@ -210,7 +153,7 @@ def test_a_page_that_takes_nothing_is_let_go():
 
 def test_one_page_or_all_are_told():
     pages, told = Pages(), []
-    added = [pages.add(None) for _ in range(3)]
+    added = [pages.add(None, Seat()) for _ in range(3)]
     for page in added:
         page.tell = lambda text, page=page: told.append((page.number, text))
     pages.remove(added[1])
@@ -222,12 +165,15 @@ def test_one_page_or_all_are_told():
 
 
 def test_a_port_is_had_on_the_loopback_alone():
-    with serve._listening(0) as listener:
+    with serve._listening(Place()) as listener:
         host, port = listener.getsockname()
         assert (host, port > 0) == ("127.0.0.1", True)
         assert listener.getsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR)
         listener.listen()
-        with pytest.raises(BadInput, match=rf"^--port: {port} cannot be had \("), serve._listening(port):
+        with (
+            pytest.raises(BadInput, match=rf"^--port: {port} cannot be had \("),
+            serve._listening(Place(port)),
+        ):
             pytest.fail("two servers have one port")
     assert listener.fileno() == -1
 
@@ -301,10 +247,11 @@ def test_the_server_ends_with_the_flight_and_says_why(monkeypatch, words, ended)
     said, told = [], []
     monkeypatch.setattr(uvicorn, "Server", Stopped)
     monkeypatch.setattr(Pages, "tell", lambda self, number, text: told.append((number, text)))
-    with serve._listening(0) as listener:
+    with serve._listening(Place()) as listener:
         port = listener.getsockname()[1]
-        assert asyncio.run(serve._serve(listener, Pipe(*words), said.append)) == ended
-    (address,) = said
+        assert asyncio.run(serve._serve(listener, Pipe(*words), lambda *said_: said.append(said_))) == ended
+    ((address, guests),) = said
+    assert guests == []
     assert address.startswith(f"http://127.0.0.1:{port}/")
     assert told == [(1, b"frame")]
     config = Stopped.last.config

@@ -1,7 +1,7 @@
 """The flight process: it owns the simulation, keeps its pace by a clock, answers what pages ask.
 
-The pipe carries (page, text) to it, page 0 for the server's own words `joined`, `left` and `end`; and (page,
-text) from it, page 0 for all of them.
+The pipe carries (page, text) to it, page 0 for the server's own words `joined`, `called`, `left` and `end`;
+and (page, text) from it, page 0 for all of them.
 """
 
 import contextlib
@@ -89,6 +89,7 @@ class Flying:
     def __init__(self, connection: Connection, session: Session) -> None:
         self._pipe, self._session = connection, session
         self._pages: set[int] = set()
+        self._names: dict[int, str] = {}  # of guests, by page
         self._steering = EVERYONE  # the page whose stick is not centred
         self._paused, self._ended = False, False
         self._pace = Pace(session.scenario.rate_hz, time.monotonic())
@@ -135,7 +136,7 @@ class Flying:
 
     def _take(self, page: int, text: str) -> None:
         if page == EVERYONE:
-            self._obey(*text.split())
+            self._obey(*text.split(" ", 1))
             return
         n, ok = 0, True
         try:
@@ -161,7 +162,7 @@ class Flying:
         if isinstance(request, messages.Stick):
             self._steering = page
         before = self._session.sim
-        says = self._session.handle(request)
+        says = self._session.handle(request, by=self._names.get(page, ""))
         if self._session.sim is not before:
             self._pace.rate_hz, self._paused = self._session.scenario.rate_hz, False
             self._send(EVERYONE, self._session.hello())
@@ -169,11 +170,14 @@ class Flying:
             self._pace.hold(time.monotonic())  # these take a while: the flight waits
         return says
 
-    def _obey(self, word: str, page: str = "0") -> None:
-        """The server's own words."""
+    def _obey(self, word: str, of: str = "0") -> None:
+        """The server's own words, of a page."""
+        page, _, name = of.partition(" ")
         number = int(page)
         if word == "end":
             self._ended = True
+        elif word == "called":
+            self._names[number] = name
         elif word == "joined":
             self._pages.add(number)
             self._send(number, self._session.hello())
@@ -182,6 +186,7 @@ class Flying:
                 self._pace.hold(time.monotonic())
         elif word == "left":
             self._pages.discard(number)
+            self._names.pop(number, None)
             if self._steering == number:
                 self._session.stick = NO_STICK
 

@@ -9,14 +9,15 @@ from collections.abc import Mapping
 from math import isfinite
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.integrations.live import MAX_BYTES
+from beaver_ftc.integrations.live import MAX_BYTES, MAX_GUESTS
 
 FASTEST = 20.0  # times real time
 STICK_DEG_S = 20.0  # full stick
 WHEN = {"at_s", "end_s"}  # of a fault: not what it is
+MAX_NAME = 24  # letters
 
 Message = dict[str, Any]  # to a page
 
@@ -133,10 +134,33 @@ class Invite(Request):
     do: Literal["invite"]
 
 
+class Let(Request):
+    """Let a guest break things, or all guests; or have them look on again."""
+
+    do: Literal["let"]
+    guest: int | None = Field(None, ge=1, le=MAX_GUESTS)
+    on: bool
+
+
+def _as_one_line(name: str) -> str:
+    """A name on one line. Letters that turn the direction of others or show as nothing are none of it."""
+    one = " ".join(name.split())
+    if not one or not one.isprintable():
+        raise ValueError("letters that can be read are missing, or others are there")
+    return one
+
+
+class CallMe(Request):
+    """What a guest is to be called."""
+
+    do: Literal["name"]
+    name: Annotated[str, AfterValidator(_as_one_line)] = Field(max_length=MAX_NAME)
+
+
 AnyRequest = Annotated[
-    Break | Repair | Blow | Aim | Stick | Speed | Pause | Change | Fresh | Game | Save | Invite,
-    Field(discriminator="do"),
-]
+    Break | Repair | Blow | Aim | Stick | Speed | Pause | Change | Fresh | Game | Save | Invite | Let
+    | CallMe, Field(discriminator="do"),
+]  # fmt: skip
 _ADAPTER: TypeAdapter[Request] = TypeAdapter(AnyRequest)
 
 

@@ -2,14 +2,17 @@
 
 import asyncio
 import contextlib
+import errno
 import multiprocessing
 import signal
 import socket
 import threading
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from ipaddress import ip_address
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.integrations.live import BAD_INPUT, EVERYONE, MAX_BYTES
@@ -22,24 +25,35 @@ if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
 
 LOOPBACK = "127.0.0.1"
+NOBODY = ((socket.AF_INET, "198.51.100.1"), (socket.AF_INET6, "2001:db8::1"))  # addresses for documents
 LAST_WORDS_S = 3.0  # the flight process is given so long to end
 
 Heard = Callable[[int | str, bytes | str], None]  # a page and its message, or why the flight has ended
+Say = Callable[[str, list[str]], None]  # an address for whoever flies, and one for each guest
 
 
-def serve(load: "Callable[[], Scenario]", out: Path, port: int, say: Callable[[str], None]) -> None:
-    """Serve the page until SIGINT or SIGTERM. say: prints the address once a page can be opened.
+@dataclass(frozen=True)
+class Place:
+    """Where to listen, and for whom. host: an address of this machine, or a name of one."""
 
-    load: gives the scenario, while the flight's process gets ready beside. Raises BadInput for a port in use
-    or a flight that cannot be begun, SimulationFailed if the flight's process dies.
+    port: int = 0
+    host: str = LOOPBACK
+    guests: int = 0
+
+
+def serve(load: "Callable[[], Scenario]", out: Path, place: Place, say: Say) -> None:
+    """Serve the page until SIGINT or SIGTERM. say: prints addresses once a page can be opened.
+
+    load: gives the scenario, while the flight's process gets ready beside. Raises BadInput for an address
+    that cannot be had or a flight that cannot be begun, SimulationFailed if the flight's process dies.
     """
-    with _listening(port) as listener, _flight(out) as (process, pipe):
+    with _listening(place) as listener, _flight(out) as (process, pipe):
         try:
             pipe.send(load())
         except BadInput:
             process.terminate()
             raise
-        ended = asyncio.run(_serve(listener, pipe, say))
+        ended = asyncio.run(_serve(listener, pipe, say, place))
     if ended is not None:
         kind, says = ended
         raise BadInput(says) if kind == BAD_INPUT else SimulationFailed(says)
@@ -52,7 +66,7 @@ def beside(port: int) -> Iterator[Connection]:
     Its first word is `at ADDRESS`; `flying.py` has the others. Raises BadInput for a port in use.
     """
     context = multiprocessing.get_context("spawn")
-    with _listening(port) as listener:
+    with _listening(Place(port)) as listener:
         ours, theirs = context.Pipe()
         process = context.Process(target=_serve_beside, args=(theirs, listener), daemon=True)
         process.start()
@@ -66,22 +80,81 @@ def beside(port: int) -> Iterator[Connection]:
 
 def _serve_beside(pipe: Connection, listener: socket.socket) -> None:
     """What that process does."""
-    asyncio.run(_serve(listener, pipe, lambda address: pipe.send((EVERYONE, f"at {address}"))))
+    asyncio.run(_serve(listener, pipe, lambda address, _: pipe.send((EVERYONE, f"at {address}"))))
 
 
 @contextlib.contextmanager
-def _listening(port: int) -> Iterator[socket.socket]:
-    """A socket on the loopback interface; port 0: whichever is free."""
-    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+def _listening(place: Place) -> Iterator[socket.socket]:
+    """A socket at that address; port 0: whichever is free."""
+    family, address = _resolved(place)
+    listener = socket.socket(family, socket.SOCK_STREAM)
     with listener:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        if family == socket.AF_INET6:
+            listener.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, not _is_any(address[0]))
         try:
-            listener.bind((LOOPBACK, port))
+            listener.bind(address)
         except OSError as error:
+            if error.errno not in (errno.EADDRINUSE, errno.EACCES):
+                raise BadInput(f"--host: {place.host} is no address of this machine, {ALLOWED}") from None
             raise BadInput(
-                f"--port: {port} cannot be had ({error.strerror}), allowed: another, 0 for any"
+                f"--port: {place.port} cannot be had ({error.strerror}), allowed: another, 0 for any"
             ) from None
         yield listener
+
+
+ALLOWED = "allowed: one that it has, 0.0.0.0 for all of them"
+
+
+def _resolved(place: Place) -> tuple[socket.AddressFamily, Any]:
+    """What to bind. Raises BadInput for an address that no browser can be sent to."""
+    try:
+        found = socket.getaddrinfo(place.host, place.port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+        family, _, _, _, address = found[0]
+        ip = ip_address(str(address[0]))
+    except (OSError, UnicodeError, ValueError):
+        raise BadInput(f"--host: {place.host!r:.60} is no address, {ALLOWED}") from None
+    if ip.is_multicast or (ip.is_reserved if ip.version == 4 else ip.is_link_local):
+        raise BadInput(f"--host: {place.host} is none that a browser can open, {ALLOWED}")
+    return family, address
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this machine can reach it. Raises BadInput for what is no address."""
+    return ip_address(str(_resolved(Place(host=host))[1][0])).is_loopback
+
+
+def _is_any(address: str) -> bool:
+    """Whether that stands for all addresses of this machine."""
+    return ip_address(address).is_unspecified
+
+
+def names_of(listener: socket.socket, host: str) -> tuple[str, ...]:
+    """By which names browsers may call the server, the one for its links first. Raises BadInput if none."""
+    from beaver_ftc.integrations.live.gate import LOOPBACK_NAMES, as_name
+
+    bound = listener.getsockname()[0]
+    if _is_any(bound):
+        return as_name(_outward()), *LOOPBACK_NAMES
+    own = as_name(bound)
+    given = () if _is_address(host) else (host.lower(),)
+    is_loopback = ip_address(bound).is_loopback
+    return tuple(dict.fromkeys((*given, own, *(LOOPBACK_NAMES[1:] if is_loopback else ()))))
+
+
+def _is_address(host: str) -> bool:
+    with contextlib.suppress(ValueError):
+        return bool(ip_address(host))
+    return False
+
+
+def _outward() -> str:
+    """The address of this machine by which it reaches others. Nothing is sent to find it."""
+    for family, nobody in NOBODY:
+        with contextlib.suppress(OSError), socket.socket(family, socket.SOCK_DGRAM) as probe:
+            probe.connect((nobody, 9))
+            return str(probe.getsockname()[0])
+    raise BadInput("--host: this machine has no way to others, allowed: the address that they know it by")
 
 
 @contextlib.contextmanager
@@ -113,23 +186,27 @@ def _fly(connection: Connection, out: str) -> None:
 
 
 async def _serve(
-    listener: socket.socket, pipe: Connection, say: Callable[[str], None]
+    listener: socket.socket, pipe: Connection, say: Say, place: Place = Place()
 ) -> tuple[str, str] | None:
     """Run the server; returns why it ended, kind and words, None for a signal."""
     import uvicorn
 
-    from beaver_ftc.integrations.live.server import Gate, Pages, application
+    from beaver_ftc.integrations.live.gate import Gate
+    from beaver_ftc.integrations.live.server import Pages, application
 
-    gate, pages = Gate(listener.getsockname()[1]), Pages()
+    bound, port = listener.getsockname()[:2]
+    gate = Gate(port, names_of(listener, place.host), place.guests, any_own=_is_any(bound))
+    pages = Pages()
 
     def ask(page: int, text: str) -> None:
         with contextlib.suppress(OSError):  # it has died: `_listen` says so
             pipe.send((page, text))
 
     config = uvicorn.Config(
-        application(gate, pages, ask),
+        application(gate, pages, ask, lambda address: say(address, [])),
         log_level="error", access_log=False, lifespan="off", server_header=False,
-        ws_max_size=MAX_BYTES, ws_ping_interval=20.0, timeout_graceful_shutdown=2,
+        ws_max_size=MAX_BYTES, ws_ping_interval=20.0, ws_per_message_deflate=False,
+        timeout_graceful_shutdown=2,
     )  # fmt: skip
     server = uvicorn.Server(config)
     # its own raises the signals again at its end
@@ -149,7 +226,8 @@ async def _serve(
     serving = asyncio.create_task(server.serve(sockets=[listener]))
     while not (server.started or serving.done()):
         await asyncio.sleep(0.01)
-    say(gate.invitation())  # the page loads while the flight is being prepared
+    # the page loads while the flight is being prepared
+    say(gate.link(gate.flyer), [gate.link(guest) for guest in gate.guests])
     await serving
     return ended[0] if ended else None
 

@@ -1,38 +1,34 @@
 """The web side: the page, its files, and the websocket; nothing else can be reached.
 
-Who is let in: a one-time token becomes a cookie, and only this server's own page may use it. Cookies know no
-ports: a browser would hand one for 127.0.0.1 to whatever else listens there. So ours is bound to a path
-nobody else can know. Host and Origin are checked against the one address there is, which keeps out pages of
-other ports and names that were made to resolve to this machine.
+Who is let in is the gate's to say (`gate.py`); what a guest may not ask is refused here, before the flight
+hears of it.
 
 Who looks on: a slow page misses frames; it never holds up the flight, nor the others.
 """
 
 import asyncio
-import secrets
+import time
 from collections import deque
 from collections.abc import Callable
-from hmac import compare_digest
 from itertools import count
 from pathlib import Path
 
 from starlette.applications import Starlette
-from starlette.datastructures import Headers
 from starlette.middleware import Middleware
-from starlette.requests import Request
+from starlette.requests import HTTPConnection, Request
 from starlette.responses import FileResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
-from starlette.websockets import WebSocket
+from starlette.websockets import WebSocket, WebSocketClose
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.integrations.live import EVERYONE, messages
+from beaver_ftc.integrations.live.gate import COOKIE, Gate, Seat
 
 STATIC = Path(__file__).parent / "static"
-HOSTS = ("127.0.0.1", "localhost")
-TOKENS_OPEN = 16  # addresses given out and not yet used
-MAX_PAGES = 20
+GUEST_FRAME_S = 0.05  # between the frames that a guest is sent
+SLOW_S, MAX_SLOW = 1.0, 20  # whoever tries tokens waits so long for an answer; so many wait at once
 MAX_WAITING = 1000  # messages that must not be missed; a page that lets more pile up is let go
 FRAME = b'{"k":"f"'
 UNSUPPORTED = 1003  # a websocket's status for a kind of data that is not taken
@@ -40,7 +36,7 @@ REFUSED = 4403  # a websocket's status for "forbidden"
 
 HEADERS = {
     "content-security-policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; "
-    "connect-src 'self' {socket}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    "connect-src 'self'{socket}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
     "x-content-type-options": "nosniff",
     "referrer-policy": "no-referrer",
     "cross-origin-opener-policy": "same-origin",
@@ -49,49 +45,14 @@ HEADERS = {
 }
 
 Ask = Callable[[int, str], None]
-
-
-class Gate:
-    """The secrets of one run of the server."""
-
-    def __init__(self, port: int) -> None:
-        self.port = port
-        self.room = "/" + secrets.token_urlsafe(12)  # the path everything is under
-        self.cookie = "beaver-ftc-live"
-        self._session = secrets.token_urlsafe(32)
-        self._tokens: list[str] = []
-
-    def invitation(self) -> str:
-        """An address that lets one browser in, once."""
-        self._tokens = [*self._tokens, secrets.token_urlsafe(24)][-TOKENS_OPEN:]
-        return f"http://{HOSTS[0]}:{self.port}{self.room}/?token={self._tokens[-1]}"
-
-    def redeem(self, token: str) -> str | None:
-        """The cookie's value for a token that has not been used, else None."""
-        match = [known for known in self._tokens if compare_digest(known.encode(), token.encode())]
-        if not match:
-            return None
-        self._tokens.remove(match[0])
-        return self._session
-
-    def knows(self, cookie: str | None) -> bool:
-        """Whether a cookie is ours."""
-        return cookie is not None and compare_digest(cookie.encode(), self._session.encode())
-
-    def is_addressed(self, headers: Headers) -> bool:
-        """Whether a request is meant for this server by its right name."""
-        return headers.get("host") in {f"{host}:{self.port}" for host in HOSTS}
-
-    def is_own_page(self, headers: Headers) -> bool:
-        """Whether a websocket is opened by a page of this server."""
-        return headers.get("origin") == f"http://{headers.get('host')}" and self.is_addressed(headers)
+Say = Callable[[str], None]
 
 
 class Page:
-    """One page: what it must be told, in order, and the newest frame."""
+    """One page: what it must be told, in order, and the newest frame; seat: by whose link it is here."""
 
-    def __init__(self, number: int, socket: WebSocket) -> None:
-        self.number, self._socket = number, socket
+    def __init__(self, number: int, socket: WebSocket, seat: Seat) -> None:
+        self.number, self._socket, self.seat = number, socket, seat
         self._waiting: deque[bytes] = deque()
         self._frame: bytes | None = None
         self._news = asyncio.Event()
@@ -118,6 +79,8 @@ class Page:
             if self._frame is not None:
                 frame, self._frame = self._frame, None
                 await self._socket.send_text(frame.decode())
+                if self.seat.number:
+                    await asyncio.sleep(GUEST_FRAME_S)
 
 
 class Pages:
@@ -130,15 +93,17 @@ class Pages:
     def __len__(self) -> int:
         return len(self._pages)
 
-    def add(self, socket: WebSocket) -> Page:
+    def add(self, socket: WebSocket, seat: Seat) -> Page:
         """A page more."""
-        page = Page(next(self._numbers), socket)
+        page = Page(next(self._numbers), socket, seat)
         self._pages[page.number] = page
+        seat.pages += 1
         return page
 
     def remove(self, page: Page) -> None:
         """It is gone."""
-        self._pages.pop(page.number, None)
+        if self._pages.pop(page.number, None):
+            page.seat.pages -= 1
 
     def tell(self, number: int, told: bytes) -> None:
         """Tell one page, or with 0 all of them."""
@@ -146,57 +111,110 @@ class Pages:
             if number in (EVERYONE, page.number):
                 page.tell(told)
 
+    def call(self, seat: Seat, ask: Ask) -> None:
+        """Tell the flight who is behind a guest's pages: it says who broke what."""
+        for page in self._pages.values():
+            if seat.number and page.seat is seat:
+                ask(0, f"called {page.number} {seat.label}")
+
+    def tell_class(self, gate: Gate) -> None:
+        """Tell whoever flies who is there, and each guest what it may do."""
+        if not gate.guests:
+            return
+        roster = messages.encode(gate.roster())
+        for page in list(self._pages.values()):
+            page.tell(messages.encode(page.seat.shown()) if page.seat.number else roster)
+
 
 class Doorkeeper:
-    """Refuses what is not addressed to this server or has no cookie, before anything else sees it."""
+    """Refuses what is not addressed to this server or has no cookie, before anything else sees it.
 
-    def __init__(self, app: ASGIApp, gate: Gate) -> None:
-        self._app, self._gate = app, gate
+    Tokens that open nothing are counted and answered slowly, right ones at once.
+    """
+
+    def __init__(self, app: ASGIApp, gate: Gate, pages: Pages, say: Say) -> None:
+        self._app, self._gate, self._pages, self._say = app, gate, pages, say
+        self._slow = 0  # that wait for an answer
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """An HTTP request or a websocket."""
+        request = HTTPConnection(scope)
+        is_addressed = self._gate.is_addressed(request.headers, _came_to(scope))
+        refusal = await self._refusal(request) if is_addressed else UNKNOWN_NAME
         if scope["type"] == "http":
-            request = Request(scope)
-            refusal = self._refusal(request)
-            if refusal is not None:
-                await refusal(scope, receive, send)
-                return
-        await self._app(scope, receive, self._with_headers(scope, send))
+            send = _with_headers(send, request.headers["host"] if is_addressed else None)
+        elif refusal is not None:
+            await WebSocketClose(REFUSED)(scope, receive, send)
+            return
+        await (refusal or self._app)(scope, receive, send)
 
-    def _refusal(self, request: Request) -> Response | None:
-        gate = self._gate
-        if not gate.is_addressed(request.headers):
-            return PlainTextResponse("not this server's name", 421)
-        if "token" in request.query_params and request.url.path == f"{gate.room}/":
-            return self._welcome(request)
-        if not gate.knows(request.cookies.get(gate.cookie)):
-            return PlainTextResponse("Open the address that beaver-ftc live has printed.", 403)
-        return None
+    async def _refusal(self, request: HTTPConnection) -> Response | None:
+        path, cookie = request.scope["path"], request.cookies.get(COOKIE)
+        seat, token = self._gate.seat_of(path), request.query_params.get("token")
+        if seat is not None and token is not None and path == f"{seat.room}/":
+            session = seat.redeem(token)
+            if session is not None or seat.knows(cookie):
+                return _welcome(seat, session)
+            if seat.was_used(token):
+                self._say(self._gate.link(seat))
+                return PlainTextResponse("This address has been used; the terminal shows a new one.", 403)
+        if seat is not None and seat.knows(cookie):
+            return None
+        return await self._slowly(PRINTED) if token or cookie else PRINTED
 
-    def _welcome(self, request: Request) -> Response:
-        """The token for a cookie; it is gone from the address thereafter."""
-        gate, response = self._gate, RedirectResponse(f"{self._gate.room}/", 303)
-        session = gate.redeem(request.query_params["token"])
-        if session is not None:
-            response.set_cookie(gate.cookie, session, path=gate.room, httponly=True, samesite="strict")
-        elif not gate.knows(request.cookies.get(gate.cookie)):
-            return PlainTextResponse("This address has been used; ask for another one in the page.", 403)
-        return response
-
-    def _with_headers(self, scope: Scope, send: Send) -> Send:
-        socket = f"ws://127.0.0.1:{self._gate.port} ws://localhost:{self._gate.port}"
-        extra = [(k.encode(), v.replace("{socket}", socket).encode()) for k, v in HEADERS.items()]
-
-        async def sent(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                message = {**message, "headers": [*message.get("headers", []), *extra]}
-            await send(message)
-
-        return sent if scope["type"] == "http" else send
+    async def _slowly(self, refusal: Response) -> Response:
+        """Count a token or a cookie that opens nothing, and have whoever tries wait."""
+        self._gate.wrong += 1
+        if self._slow >= MAX_SLOW:
+            return PlainTextResponse("too many wrong addresses at once", 429)
+        self._slow += 1
+        try:
+            await asyncio.sleep(SLOW_S)
+        finally:
+            self._slow -= 1
+        self._pages.tell_class(self._gate)
+        return refusal
 
 
-def application(gate: Gate, pages: Pages, ask: Ask) -> Starlette:
-    """The whole of it, below the gate's path. ask: hands a page's words to the flight."""
+UNKNOWN_NAME = PlainTextResponse("not this server's name", 421)
+PRINTED = PlainTextResponse("Open the address that beaver-ftc live has printed.", 403)
+
+
+def _welcome(seat: Seat, session: str | None) -> Response:
+    """The token for a cookie; it is gone from the address thereafter.
+
+    `lax`, not `strict`: a link is followed from a page of another site, a chat, and with `strict` the cookie
+    would not come along. No request but a websocket's changes anything, and that has its Origin checked.
+    """
+    response = RedirectResponse(f"{seat.room}/", 303)
+    if session is not None:
+        response.set_cookie(COOKIE, session, path=seat.room, httponly=True, samesite="lax")
+    return response
+
+
+def _with_headers(send: Send, host: str | None) -> Send:
+    """What sends with the headers that every answer has. host: by which this server was rightly called."""
+    socket = f" ws://{host}" if host else ""
+    extra = [(k.encode(), v.replace("{socket}", socket).encode()) for k, v in HEADERS.items()]
+
+    async def sent(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            message = {**message, "headers": [*message.get("headers", []), *extra]}
+        await send(message)
+
+    return sent
+
+
+def _came_to(scope: Scope) -> str | None:
+    """The address of this machine that a request has reached."""
+    return (scope.get("server") or (None,))[0]
+
+
+def application(gate: Gate, pages: Pages, ask: Ask, say: Say) -> Starlette:
+    """The whole of it, below the paths of the gate's seats.
+
+    ask: hands a page's words to the flight. say: shows whoever flies an address that works, in the terminal.
+    """
 
     async def home(_: Request) -> Response:
         return FileResponse(STATIC / "index.html")
@@ -209,21 +227,25 @@ def application(gate: Gate, pages: Pages, ask: Ask) -> Starlette:
         WebSocketRoute("/socket", socket),
         Mount("/static", StaticFiles(directory=STATIC)),
     ]
-    app = Starlette(routes=[Mount(gate.room, routes=routes)], middleware=[Middleware(Doorkeeper, gate=gate)])
+    door = Middleware(Doorkeeper, gate=gate, pages=pages, say=say)
+    app = Starlette(routes=[Mount("/{room}", routes=routes)], middleware=[door])
     app.router.redirect_slashes = False
     return app
 
 
 async def _serve(websocket: WebSocket, gate: Gate, pages: Pages, ask: Ask) -> None:
     """One page's websocket, from opening to end."""
-    own = gate.is_own_page(websocket.headers) and gate.knows(websocket.cookies.get(gate.cookie))
-    if not own or len(pages) >= MAX_PAGES:
+    seat = gate.seat_of(websocket.scope["path"])
+    own = gate.is_own_page(websocket.headers, _came_to(websocket.scope))
+    if seat is None or not own or seat.is_full:
         await websocket.close(REFUSED)
         return
     await websocket.accept()
-    page = pages.add(websocket)
+    page = pages.add(websocket, seat)
+    pages.tell_class(gate)
     sending = asyncio.create_task(page.send())
     ask(0, f"joined {page.number}")
+    pages.call(seat, ask)
     try:
         while not sending.done():
             message = await websocket.receive()
@@ -232,22 +254,44 @@ async def _serve(websocket: WebSocket, gate: Gate, pages: Pages, ask: Ask) -> No
             if message.get("text") is None:  # a page of ours sends none such
                 await websocket.close(UNSUPPORTED, "a binary message, allowed: JSON as text")
                 break
-            _hear(message["text"], page.number, gate, pages, ask)
+            _hear(message["text"], page, gate, pages, ask)
     finally:
         pages.remove(page)
+        pages.tell_class(gate)
         ask(0, f"left {page.number}")
         sending.cancel()
         await asyncio.gather(sending, return_exceptions=True)
 
 
-def _hear(text: str, number: int, gate: Gate, pages: Pages, ask: Ask) -> None:
-    """What a page says: an address for another browser is the server's to give, the rest is the flight's."""
+def _hear(text: str, page: Page, gate: Gate, pages: Pages, ask: Ask) -> None:
+    """What a page says: who may look on or break is the server's to say, the rest is the flight's."""
+    n = 0
     try:
+        page.seat.check_pace(time.monotonic())
         request = messages.parse(text)
+        n = request.n
+        page.seat.check(request.do)
+        says = _own(request, page, gate, pages, ask)
     except BadInput as error:
-        pages.tell(number, messages.encode(messages.acknowledged(0, False, str(error))))
+        pages.tell(page.number, messages.encode(messages.acknowledged(n, False, str(error))))
         return
+    if says is None:
+        ask(page.number, text)
+        return
+    pages.tell(page.number, messages.encode(messages.acknowledged(n, True, says)))
+
+
+def _own(request: messages.Request, page: Page, gate: Gate, pages: Pages, ask: Ask) -> str | None:
+    """Do what is the server's to do; returns what to say of it, None for what is the flight's."""
     if isinstance(request, messages.Invite):
-        pages.tell(number, messages.encode(messages.acknowledged(request.n, True, gate.invitation())))
+        return gate.link(gate.flyer)
+    if isinstance(request, messages.Let):
+        says = gate.invite(request.guest, request.on)
+    elif isinstance(request, messages.CallMe):
+        page.seat.name = request.name
+        pages.call(page.seat, ask)
+        says = f"you are {page.seat.label}"
     else:
-        ask(number, text)
+        return None
+    pages.tell_class(gate)
+    return says

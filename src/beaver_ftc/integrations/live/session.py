@@ -48,6 +48,7 @@ class Session:
         self._rng = np.random.default_rng(seed)
         self.game = Game()
         self.stick = NO_STICK
+        self._by = ""
         self._flown_stick: tuple[float, ...] | None = None
         self._begin(scenario)
 
@@ -76,6 +77,7 @@ class Session:
         turns = {at_s for fault in flown.faults for at_s in (fault.at_s, fault.end_s) if at_s is not None}
         self._turns_s = deque(sorted(turns))
         self._known: tuple[Any, ...] = ()
+        self._broken_by: dict[str, str] = {}
         self._tell("flight", f"{scenario.name}: trimmed, {flown.control.law} law, {flown.fdi.scheme}")
 
     @property
@@ -134,6 +136,7 @@ class Session:
 
     def _tell(self, kind: str, says: str, secret: bool = False) -> None:
         event = {"t": round(self.sim.t_s, 2), "kind": kind, "says": says, "secret": secret}
+        event |= {"by": self._by} if self._by else {}
         self.events.append(event)
         self.fresh_events.append(event)
 
@@ -147,11 +150,18 @@ class Session:
         self.told.extend(told)
         return told
 
-    def handle(self, request: messages.Request) -> str:
-        """Do what is asked, by the method of its name; returns what to say of it. Raises BadInput."""
+    def handle(self, request: messages.Request, by: str = "") -> str:
+        """Do what is asked, by the method of its name; returns what to say of it. Raises BadInput.
+
+        by: the guest who asks, as others are told.
+        """
         if self.over and request.do in OF_A_FLIGHT:
             raise BadInput("the flight is over, allowed: a new flight")
-        says: str = getattr(self, f"_{request.do}")(request)
+        self._by = by
+        try:
+            says: str = getattr(self, f"_{request.do}")(request)
+        finally:
+            self._by = ""
         return says
 
     def _aim(self, asked: messages.Aim) -> str:
@@ -199,8 +209,10 @@ class Session:
         return self._inject(dict(asked.fault))
 
     def _inject(self, fault: Fault) -> str:
+        before = self.sim.in_force
         self.sim.inject(fault)
         self._known = self.sim.in_force
+        self._broken_by |= {_mark(new): self._by for new in self._known if new not in before and self._by}
         if self.game.hidden:
             self.game.broke(fault, self.sim.t_s)
         says = in_words(fault)
@@ -245,8 +257,12 @@ class Session:
         return ""
 
     def _save(self, asked: messages.Save) -> str:
-        folder = self.sim.save(self._out, report=True)
-        self._tell("saved", str(folder))
+        flight = self.sim.land()
+        declared = sorted(flight.scenario.faults, key=lambda fault: fault.at_s)
+        for fault, document in zip(declared, flight.metrics["faults"], strict=True):
+            document.update(self._by_whom(fault))
+        folder = flight.save(self._out, report=True)
+        self._tell("saved", folder.name)
         return f"saved: {folder}; fly it again: beaver-ftc run {folder / 'scenario.yaml'}"
 
     def frame(self) -> Message:
@@ -276,8 +292,15 @@ class Session:
             "k": "s", "over": self.over, "game": self.game.shown(),
             "gust": self.sim.t_s < self._gust_until_s, "flying": self.flying, "knows": self._knows,
             "broken": sorted({place_of(fault) for fault in there}),
-            "faults": [fault.model_dump(exclude=WHEN, exclude_none=True) for fault in there],
+            "faults": [
+                fault.model_dump(exclude=WHEN, exclude_none=True) | self._by_whom(fault) for fault in there
+            ],
         }  # fmt: skip
+
+    def _by_whom(self, fault: Any) -> Message:
+        """The guest who broke it, if one did."""
+        by = self._broken_by.get(_mark(fault))
+        return {"by": by} if by else {}
 
     @property
     def _knows(self) -> str:
@@ -305,6 +328,11 @@ class Session:
             "stick_deg_s": messages.STICK_DEG_S, "fastest": messages.FASTEST,
             "events": list(self.told), **fault_types(),
         }  # fmt: skip
+
+
+def _mark(fault: Any) -> str:
+    """What a fault stays when it is repaired."""
+    return str(fault.model_dump_json(exclude={"end_s"}))
 
 
 def fault_types() -> Message:

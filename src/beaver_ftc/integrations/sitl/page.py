@@ -75,8 +75,8 @@ class Shown(Flying):
             raise BadInput(f"{request.do}: not under an autopilot, allowed: {', '.join(ALLOWED)}")
         return self._watched.handle(request)
 
-    def _obey(self, word: str, page: str = "0") -> None:
+    def _obey(self, word: str, of: str = "0") -> None:
         if word == "at":
-            self._say(f"live: {page}")
+            self._say(f"live: {of}")
         else:
-            super()._obey(word, page)
+            super()._obey(word, of)

@@ -2,7 +2,7 @@
 
 import { ask } from "./link.js";
 import { notice } from "./panels.js";
-import { flight } from "./state.js";
+import { flight, mayBreak } from "./state.js";
 
 const kinds = () => flight.hello?.breaks ?? []; // [label, fault]: the rows of the fault types
 const byId = (id) => document.getElementById(id);
@@ -67,8 +67,11 @@ export function wireSensors() {
   byId("sensor-repair").addEventListener("click", () => repair(byId("sensor").value));
 }
 
+const inWords = ({ type, by }) => type.replaceAll("_", " ") + (by ? ` by ${by}` : "");
+
 function drawSensors(broken) {
-  const off = (flight.hello?.sensors ?? []).filter((name) => broken.has(name)), says = byId("sensors").querySelector("em");
+  const faults = flight.state?.faults ?? [], by = (name) => faults.find(({ sensor }) => sensor === name)?.by;
+  const off = (flight.hello?.sensors ?? []).filter((name) => broken.has(name)).map((name) => (by(name) ? `${name} by ${by(name)}` : name)), says = byId("sensors").querySelector("em");
   says.hidden = !off.length;
   if (says.textContent !== `✕ ${off.join(", ")}`) says.textContent = `✕ ${off.join(", ")}`;
   byId("sensors").classList.toggle("broken", off.length > 0);
@@ -80,7 +83,7 @@ export function drawBroken() {
   drawLegend([...broken]);
   for (const group of byId("surfaces").children) {
     const surface = group.dataset.surface;
-    const says = broken.has(surface) ? ` ✕ broken: ${[...new Set(faultsOf(surface).map(({ type }) => type.replaceAll("_", " ")))].join(", ")}` : "";
+    const says = broken.has(surface) ? ` ✕ broken: ${[...new Set(faultsOf(surface).map(inWords))].join(", ")}` : "";
     group.classList.toggle("broken", broken.has(surface));
     if (group.querySelector("em").textContent !== says) group.querySelector("em").textContent = says;
     for (const [label, kind] of kinds()) group.querySelector(`[data-label="${label}"]`).setAttribute("aria-pressed", isThere(surface, kind));
@@ -89,7 +92,8 @@ export function drawBroken() {
 
 // What is broken is red in the view; said in words beside it.
 function drawLegend(broken) {
-  const legend = byId("legend"), text = broken.length ? `✕ broken: ${broken.join(", ")}` : "click a surface to break it";
+  const legend = byId("legend"), whole = mayBreak() ? "click a surface to break it" : "nothing is broken";
+  const text = broken.length ? `✕ broken: ${broken.join(", ")}` : whole;
   if (legend.textContent !== text) legend.textContent = text;
   legend.classList.toggle("broken", broken.length > 0);
 }

@@ -3,7 +3,7 @@
 import { openMenu, perform, repair } from "./breaking.js";
 import { ask } from "./link.js";
 import { notice, showTab } from "./panels.js";
-import { flight } from "./state.js";
+import { flight, mayBreak } from "./state.js";
 
 const byId = (id) => document.getElementById(id);
 
@@ -40,7 +40,7 @@ async function invite() {
   try {
     const address = await ask({ do: "invite" });
     await navigator.clipboard?.writeText(address).catch(() => {});
-    notice(`for one other browser of this machine: ${address}`);
+    notice(`for one other browser, which may then do all that you may: ${address}`);
   } catch (error) { notice(error.message); }
 }
 
@@ -114,7 +114,7 @@ function keyDown(event, view, sticks) {
 
 function chooseByKey(i) {
   const surface = flight.hello?.surfaces[i];
-  if (!surface) return;
+  if (!surface || !mayBreak()) return;
   showTab("break");
   openMenu(surface, innerWidth / 3, innerHeight / 4);
 }

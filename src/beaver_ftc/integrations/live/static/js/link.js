@@ -4,6 +4,7 @@ const listeners = new Map();
 const waiting = new Map();
 let socket = null;
 let number = 0;
+let refused = () => ""; // why a request is not this page's to make: the server would refuse it too
 export const traffic = { frames: 0, bytes: 0 };
 
 export function on(kind, listener) {
@@ -13,6 +14,10 @@ export function on(kind, listener) {
 
 function emit(kind, told) {
   for (const listener of listeners.get(kind) ?? []) listener(told);
+}
+
+export function refuseWhat(says) {
+  refused = says;
 }
 
 export function connect() {
@@ -43,6 +48,7 @@ function receive(text) {
 // Ask the flight for something; the promise is its answer in words.
 export function ask(request) {
   if (!socket || socket.readyState !== WebSocket.OPEN) return Promise.reject(new Error("not connected"));
+  if (refused(request.do)) return Promise.reject(new Error(refused(request.do)));
   number += 1;
   const n = number;
   socket.send(JSON.stringify({ ...request, n }));
@@ -51,5 +57,5 @@ export function ask(request) {
 
 // Say something that is not answered: the stick.
 export function say(request) {
-  if (socket && socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(request));
+  if (socket && socket.readyState === WebSocket.OPEN && !refused(request.do)) socket.send(JSON.stringify(request));
 }

@@ -5,14 +5,15 @@ import { Charts } from "./charts.js";
 import { drawControls, meetControls, wireControls } from "./controls.js";
 import { drawGame, meetGame, wireGame } from "./game.js";
 import { Instruments } from "./instruments.js";
+import { wireClass } from "./class.js";
 import { connect, on, traffic } from "./link.js";
 import { addEvents, drawDiagnosis, forgetEvents, meetDiagnosis, notice, wireTabs } from "./panels.js";
 import { View } from "./scene.js";
-import { flight, meet, value } from "./state.js";
+import { flight, mayBreak, meet, value } from "./state.js";
 import { Sticks } from "./sticks.js";
 
 const byId = (id) => document.getElementById(id);
-const view = new View(byId("scene"), openMenu);
+const view = new View(byId("scene"), (...place) => { if (mayBreak()) openMenu(...place); });
 const charts = new Charts(byId("charts"));
 const instruments = new Instruments(byId("attitude"), byId("numbers"));
 const sticks = new Sticks();
@@ -39,13 +40,14 @@ on("s", (state) => {
   drawControls(state);
   drawBroken();
   drawGame();
-  banner(state.over ? "The flight is over. Save it, or press Reset for a new one." : "");
+  const next = flight.you ? "" : " Save it, or press Reset for a new one.";
+  banner(state.over ? `The flight is over.${next}` : "");
 });
 on("e", ({ events }) => addEvents(events));
 on("ack", ({ n, ok, says }) => { if (!n && !ok) notice(says); }); // what went wrong without being asked for
 on("link", ({ up }) => {
   const waiting = flight.hello ? "" : "The flight is being prepared; the first one on a machine is compiled, which takes a while.";
-  banner(up ? waiting : "Not connected: has beaver-ftc live ended?");
+  banner(up ? waiting : "Not connected: the server has ended, or the network is lost; this page tries again.");
 });
 
 function banner(text) {
@@ -87,6 +89,7 @@ wireMenu();
 wireSensors();
 wireGame();
 wireControls(view, sticks);
+wireClass();
 connect();
 requestAnimationFrame(draw);
 

@@ -68,10 +68,10 @@ const MARKS = { alarm: "▲", named: "◆", broken: "✕", repaired: "✓", supe
 
 export function addEvents(events) {
   const list = byId("events");
-  for (const { t, kind, says } of events) {
+  for (const { t, kind, says, by } of events) {
     const item = document.createElement("li");
     const time = Object.assign(document.createElement("time"), { textContent: `${t.toFixed(2)} s` });
-    item.append(time, Object.assign(document.createElement("b"), { textContent: `${MARKS[kind] ?? "·"} ${kind}` }), document.createTextNode(says));
+    item.append(time, Object.assign(document.createElement("b"), { textContent: `${MARKS[kind] ?? "·"} ${kind}` }), document.createTextNode(by ? `${says}, by ${by}` : says));
     list.prepend(item);
   }
   while (list.children.length > 300) list.lastChild.remove();
@@ -93,12 +93,15 @@ export function showTab(name, focus = false) {
 
 export function wireTabs() {
   const tabs = [...document.querySelectorAll("[role=tab]")];
-  tabs.forEach((tab, i) => {
-    const name = (j) => tabs[(j + tabs.length) % tabs.length].id.slice(4);
-    tab.addEventListener("click", () => showTab(name(i)));
+  const beside = (tab, step) => {
+    const shown = tabs.filter((each) => each.offsetParent); // a guest has fewer
+    return shown.at((shown.indexOf(tab) + step) % shown.length).id.slice(4);
+  };
+  tabs.forEach((tab) => {
+    tab.addEventListener("click", () => showTab(tab.id.slice(4)));
     tab.addEventListener("keydown", (event) => {
-      if (event.key === "ArrowRight") showTab(name(i + 1), true);
-      if (event.key === "ArrowLeft") showTab(name(i - 1), true);
+      if (event.key === "ArrowRight") showTab(beside(tab, 1), true);
+      if (event.key === "ArrowLeft") showTab(beside(tab, -1), true);
       if (event.key.startsWith("Arrow")) event.stopPropagation();
     });
   });

@@ -1,6 +1,8 @@
-// What the page knows of the flight: the hello, the newest frame by column, the seldom changing state.
+// What the page knows of the flight: the hello, the newest frame by column, the seldom changing state; and
+// of itself if it is a guest's: number, name, is_invited.
 
-export const flight = { hello: null, frame: null, state: null, at: new Map(), met: 0 };
+export const flight = { hello: null, frame: null, state: null, you: null, at: new Map(), met: 0 };
+export const mayBreak = () => !flight.you || flight.you.is_invited;
 
 export function meet(hello) {
   flight.hello = hello;

@@ -1,6 +1,7 @@
-"""One running cockpit for all tests of a module."""
+"""One running cockpit, and one browser, for all tests of a module."""
 
 import pytest
+from live_browser import ARGUMENTS, CHROMIUM
 from live_cockpit import ended, started
 
 
@@ -10,3 +11,12 @@ def cockpit(tmp_path_factory):
     running = started(tmp_path_factory.mktemp("live"))
     yield running
     assert ended(running) == (0, "")
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    with playwright.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        yield browser
+        browser.close()

@@ -3,21 +3,15 @@
 import functools
 import http.server
 import os
-import shutil
 import threading
 from pathlib import Path
 
 import numpy as np
 import pytest
+from live_browser import CHROMIUM, COMPILED_WITHIN_S, until
 
 import beaver_ftc as bf
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-ARGUMENTS = (  # as on a machine without a graphics card
-    "--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--enable-precise-memory-info",
-    "--js-flags=--expose-gc",
-)  # fmt: skip
-WAIT_S, COMPILED_WITHIN_S = 60.0, 600.0
 SCREENS = {
     "laptop": (1280, 720),
     "small laptop": (1024, 640),
@@ -26,15 +20,6 @@ SCREENS = {
 }
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium on this machine")
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    with playwright.sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-        yield browser
-        browser.close()
 
 
 @pytest.fixture(scope="module")
@@ -64,15 +49,6 @@ def page(context, cockpit):
     yield page
     page.close()
     assert trouble == []
-
-
-def until(page, condition, wait_s=WAIT_S):
-    """Wait for a condition in the page. Not Playwright's own: the page's policy forbids evaluating text."""
-    for _ in range(int(wait_s / 0.05)):
-        if page.evaluate(condition):
-            return
-        page.wait_for_timeout(50)
-    raise AssertionError(f"not in {wait_s:g} s: {condition}")
 
 
 def break_elevator(page):

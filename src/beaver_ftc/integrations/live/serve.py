@@ -204,7 +204,7 @@ async def _serve(
 
     config = uvicorn.Config(
         application(gate, pages, ask, lambda address: say(address, [])),
-        log_level="error", access_log=False, lifespan="off", server_header=False,
+        log_level="error", access_log=False, lifespan="off", server_header=False, proxy_headers=False,
         ws_max_size=MAX_BYTES, ws_ping_interval=20.0, ws_per_message_deflate=False,
         timeout_graceful_shutdown=2,
     )  # fmt: skip

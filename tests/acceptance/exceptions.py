@@ -49,7 +49,7 @@ TABLE = (
     Exempt(r"python -m tools\.(docs|aircraft_table)", "writes the pages of a checkout anew"),
     Exempt(r"pytest tests/\S+", "a part of this suite, in a checkout"),
     Exempt(
-        r"(beaver-ftc live(?: (?!-)\S+)?)( --open)?",
+        r"(beaver-ftc live(?: (?!--open)\S+)*)( --open)?",
         "flies until it is ended, which the page's test does (tests/integrations/live): its address",
         r"timeout --signal=INT 20 \1 | grep live:.http",
     ),

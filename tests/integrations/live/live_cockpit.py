@@ -1,5 +1,6 @@
 """A live cockpit as a user has it: the command, its address, and a browser's cookie."""
 
+import contextlib
 import signal
 import subprocess
 import sys
@@ -8,6 +9,9 @@ from dataclasses import dataclass
 from http.cookiejar import CookieJar
 from pathlib import Path
 from urllib.parse import urlsplit
+
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.integrations.live import serve
 
 
 @dataclass
@@ -50,3 +54,10 @@ def browser():
     """An opener that keeps cookies and follows redirects, as a browser does; and its jar."""
     jar = CookieJar()
     return urllib.request.build_opener(urllib.request.HTTPCookieProcessor(jar)), jar
+
+
+def own_address():
+    """This machine's address for others, if it has one."""
+    with contextlib.suppress(BadInput):
+        return serve._outward()
+    return None

@@ -7,7 +7,7 @@ import time
 import urllib.request
 
 import pytest
-from live_cockpit import browser, ended, started
+from live_cockpit import browser, ended, own_address, started
 from live_site import EVERYTHING
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
@@ -161,13 +161,6 @@ def test_a_guest_who_takes_nothing_holds_nobody_up(cockpit):
             now_s, frames = until(flyer, "f")["v"][0], frames + 1
         took_s = time.monotonic() - from_s
         assert now_s - start_s == pytest.approx(took_s, rel=0.5)
-
-
-def own_address():
-    """This machine's address for others, if it has one."""
-    with contextlib.suppress(BadInput):
-        return serve._outward()
-    return None
 
 
 def status(address, **headers):

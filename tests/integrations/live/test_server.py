@@ -10,7 +10,7 @@ import urllib.error
 import urllib.request
 
 import pytest
-from live_cockpit import browser, ended, started
+from live_cockpit import browser, ended, own_address, started
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
@@ -99,8 +99,8 @@ def test_another_name_for_this_machine_is_refused(cockpit, cookie):
 
 
 def test_it_listens_on_the_loopback_alone(cockpit):
-    own = socket.gethostbyname(socket.gethostname())
-    if own.startswith("127."):
+    own = own_address()
+    if own is None:
         pytest.skip("this machine has no other address")
     with socket.socket() as probe:
         probe.settimeout(2.0)

@@ -246,6 +246,34 @@ class Socket:
         self.sent.append((asyncio.get_running_loop().time(), text))
 
 
+def test_a_guest_who_takes_nothing_holds_up_nobody_and_no_frames_pile_up(site):
+    class Stuck(Socket):
+        async def send_text(self, text):
+            await asyncio.Event().wait()
+
+    async def flown():
+        sockets = [Stuck(), Socket()]
+        pages = [
+            site.pages.add(*each)
+            for each in zip(sockets, (site.gate.guests[0], site.gate.flyer), strict=True)
+        ]
+        tasks = [asyncio.create_task(page.send()) for page in pages]
+        for i in range(300):
+            site.pages.tell(0, b'{"k":"f","v":[%d]}' % i)
+            if i == 150:
+                site.pages.tell(0, b'{"k":"e"}')
+            await asyncio.sleep(0)
+            await asyncio.sleep(0)
+        for task in tasks:
+            task.cancel()
+        return [text for _, text in sockets[1].sent], len(pages[0]._waiting)
+
+    sent, piled_up = asyncio.run(flown())
+    assert [json.loads(text)["v"][0] for text in sent if '"f"' in text] == list(range(300))
+    assert sent.count('{"k":"e"}') == 1
+    assert piled_up == 2  # a frame of before the event, and that
+
+
 @pytest.mark.parametrize("guest", [0, 1])
 def test_a_guest_is_sent_twenty_frames_a_second_at_most_and_every_event(guest, site):
     async def flown():

@@ -243,6 +243,7 @@ def test_which_addresses_are_this_machines_alone(host, alone):
         ("127.0.0.1", ("127.0.0.1", "localhost")), ("127.3.2.1", ("127.3.2.1", "localhost")),
         ("LocalHost", ("localhost", "127.0.0.1")),
         ("0.0.0.0", ("198.51.100.9", "127.0.0.1", "localhost")),
+        ("::", ("198.51.100.9", "127.0.0.1", "localhost")), ("::1", ("[::1]", "localhost")),
     ],
 )  # fmt: skip
 def test_by_which_names_it_is_called(host, names, monkeypatch):
@@ -254,7 +255,7 @@ def test_by_which_names_it_is_called(host, names, monkeypatch):
         assert serve.names_of(listener, host) == names
 
 
-@pytest.mark.parametrize("host", ["127.0.0.1", "::1", "0.0.0.0"])
+@pytest.mark.parametrize("host", ["127.0.0.1", "::1", "0.0.0.0", "::"])
 def test_a_port_in_use_is_said_whatever_the_address(host):
     with serve._listening(Place(host=host)) as listener:
         listener.listen()

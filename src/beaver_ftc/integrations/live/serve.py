@@ -87,12 +87,12 @@ def _serve_beside(pipe: Connection, listener: socket.socket) -> None:
 def _listening(place: Place) -> Iterator[socket.socket]:
     """A socket at that address; port 0: whichever is free."""
     family, address = _resolved(place)
-    listener = socket.socket(family, socket.SOCK_STREAM)
-    with listener:
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        if family == socket.AF_INET6:
-            listener.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, not _is_any(address[0]))
+    with contextlib.ExitStack() as opened:
         try:
+            listener = opened.enter_context(socket.socket(family, socket.SOCK_STREAM))
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            if family == socket.AF_INET6:
+                listener.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, not _is_any(address[0]))
             listener.bind(address)
         except OSError as error:
             if error.errno not in (errno.EADDRINUSE, errno.EACCES):
@@ -138,8 +138,8 @@ def names_of(listener: socket.socket, host: str) -> tuple[str, ...]:
         return as_name(_outward()), *LOOPBACK_NAMES
     own = as_name(bound)
     given = () if _is_address(host) else (host.lower(),)
-    is_loopback = ip_address(bound).is_loopback
-    return tuple(dict.fromkeys((*given, own, *(LOOPBACK_NAMES[1:] if is_loopback else ()))))
+    local = LOOPBACK_NAMES[1:] if ip_address(bound).is_loopback else ()
+    return tuple(dict.fromkeys((*given, own, *local)))
 
 
 def _is_address(host: str) -> bool:

@@ -92,7 +92,7 @@ export function drawBroken() {
 
 // What is broken is red in the view; said in words beside it.
 function drawLegend(broken) {
-  const legend = byId("legend"), whole = mayBreak() ? "click a surface to break it" : "nothing is broken";
+  const legend = byId("legend"), whole = mayBreak() ? "click a surface to break it" : "you look on";
   const text = broken.length ? `✕ broken: ${broken.join(", ")}` : whole;
   if (legend.textContent !== text) legend.textContent = text;
   legend.classList.toggle("broken", broken.length > 0);

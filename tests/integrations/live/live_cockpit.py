@@ -46,7 +46,8 @@ def ended(cockpit, number=signal.SIGINT):
     """End it; (exit status, what it said on standard error, but for a cold machine's word)."""
     cockpit.process.send_signal(number)
     _, says = cockpit.process.communicate(timeout=30)
-    lines = [line for line in says.splitlines() if "compiling" not in line]
+    cold = "compiling", "making ready"
+    lines = [line for line in says.splitlines() if not any(word in line for word in cold)]
     return cockpit.process.returncode, "\n".join(lines)
 
 

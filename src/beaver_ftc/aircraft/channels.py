@@ -13,7 +13,7 @@ from typing import Annotated, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from beaver_ftc.documents.base import Flag, Number, Section, Whole, refuse
+from beaver_ftc.documents.base import Flag, Number, Section, Whole, number, refuse
 
 MOST_CHANNELS = 32  # of the longest packet there is
 PWM_US = (1000.0, 2000.0)
@@ -44,11 +44,15 @@ class OutputSection(Section):
         the lower end
     """
 
-    channel: Whole = Field(ge=1, le=MOST_CHANNELS)
-    share: Annotated[Number, Field(ge=-1, le=1), AfterValidator(_not_nothing)] = 1.0
+    channel: Whole = Field(ge=1, le=MOST_CHANNELS, examples=[1])
+    share: Annotated[Number, Field(ge=-1, le=1), AfterValidator(_not_nothing)] = number(
+        1.0, "share of 1", examples=[-1]
+    )
     reversed: Flag = False
-    pwm_us: Annotated[tuple[_Pulse, _Pulse], AfterValidator(_in_order)] = PWM_US
-    trim_us: _Pulse | None = None
+    pwm_us: Annotated[tuple[_Pulse, _Pulse], AfterValidator(_in_order)] = number(
+        PWM_US, "us", examples=[[1100, 1900]]
+    )
+    trim_us: _Pulse | None = number(None, "us", examples=[1500])
 
     @model_validator(mode="after")
     def _trim_is_in_range(self) -> Self:

@@ -11,7 +11,7 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from beaver_ftc.aircraft.channels import ChannelsSection
-from beaver_ftc.documents.base import Conflict, Flag, Number, Section, Whole, number, refuse
+from beaver_ftc.documents.base import Conflict, Flag, Number, Section, Whole, entry, number, refuse
 from beaver_ftc.documents.errors import suggestion
 
 MAX_SURFACES, MAX_SIGNALS = 8, 6
@@ -59,7 +59,9 @@ def _not_reversed(given: tuple[float, float]) -> tuple[float, float]:
 
 
 NotNegative = Annotated[Number, Field(ge=0)]
-Interval = Annotated[tuple[Number, Number], AfterValidator(_in_order)]
+Interval = Annotated[
+    tuple[Number, Number], AfterValidator(_in_order), Field(json_schema_extra={"range": "rising"})
+]
 _Stop = Annotated[Number, Field(ge=-3.2, le=3.2)]  # rad: no surface turns further, a stop in degrees does
 Stops = Annotated[tuple[_Stop, _Stop], AfterValidator(_in_order)]
 
@@ -67,27 +69,37 @@ Stops = Annotated[tuple[_Stop, _Stop], AfterValidator(_in_order)]
 class SurfaceSection(Section):
     """One control surface: its properties in JSBSim, and how far it goes."""
 
-    command: Property = Field(description="property that commands the deflection")
-    position: Property = Field(description="property of the actuator's output, rad")
-    effective: Property = Field(description="property of what the aerodynamics see, rad")
-    travel_rad: Stops = Field(description="lower and upper stop, rad", json_schema_extra={"unit": "rad"})
+    command: Property = Field(
+        description="property that commands the deflection", examples=["fcs/elevator-cmd-rad"]
+    )
+    position: Property = Field(
+        description="property of the actuator's output, rad", examples=["fcs/elevator-pos-rad"]
+    )
+    effective: Property = Field(
+        description="property of what the aerodynamics see, rad", examples=["fcs/elevator-effective-rad"]
+    )
+    travel_rad: Stops = Field(
+        description="lower and upper stop, rad", json_schema_extra={"unit": "rad"}, examples=[[-0.49, 0.49]]
+    )
 
 
 class SignalSection(Section):
     """A measured dimensionless signal beside rates, alpha, beta, airspeed and dynamic pressure."""
 
-    property: Property = Field(description="property that holds it")
+    property: Property = Field(description="property that holds it", examples=["aero/dpt"])
     sensed: Flag = Field(default=True, description="whether an instrument measures it")
 
 
 class MassSection(Section):
     """Mass and inertia about the centre of gravity, body axes; Jxz enters the tensor with a minus sign."""
 
-    mass_kg: Number | None = number(None, unit="kg", says="mass", gt=0, le=1e7)
-    Ix_kgm2: Number = number(..., unit="kg m2", says="roll inertia", gt=0, le=1e9)
-    Iy_kgm2: Number = number(..., unit="kg m2", says="pitch inertia", gt=0, le=1e9)
-    Iz_kgm2: Number = number(..., unit="kg m2", says="yaw inertia", gt=0, le=1e9)
-    Jxz_kgm2: Number = number(0.0, unit="kg m2", says="product of inertia", ge=-1e9, le=1e9)
+    mass_kg: Number | None = number(None, unit="kg", says="mass", gt=0, le=1e7, examples=[2288.231])
+    Ix_kgm2: Number = number(..., unit="kg m2", says="roll inertia", gt=0, le=1e9, examples=[5368.39])
+    Iy_kgm2: Number = number(..., unit="kg m2", says="pitch inertia", gt=0, le=1e9, examples=[6928.93])
+    Iz_kgm2: Number = number(..., unit="kg m2", says="yaw inertia", gt=0, le=1e9, examples=[11158.75])
+    Jxz_kgm2: Number = number(
+        0.0, unit="kg m2", says="product of inertia", ge=-1e9, le=1e9, examples=[117.64]
+    )
 
     @model_validator(mode="after")
     def _is_a_body(self) -> Self:
@@ -99,24 +111,38 @@ class MassSection(Section):
 class GeometrySection(Section):
     """Reference dimensions."""
 
-    wing_area_m2: Number = number(..., unit="m2", says="wing area", gt=0, le=1e4)
-    span_m: Number = number(..., unit="m", says="wing span", gt=0, le=500)
-    chord_m: Number = number(..., unit="m", says="mean aerodynamic chord", gt=0, le=500)
+    wing_area_m2: Number = number(..., unit="m2", says="wing area", gt=0, le=1e4, examples=[23.23])
+    span_m: Number = number(..., unit="m", says="wing span", gt=0, le=500, examples=[14.63])
+    chord_m: Number = number(..., unit="m", says="mean aerodynamic chord", gt=0, le=500, examples=[1.5875])
 
 
 class TermSection(Section):
-    """One term of a coefficient."""
+    """One term of a coefficient.
 
-    name: Name
-    value: Number = Field(description="per rad of each angle or deflection")
-    of: dict[str, Power] = Field(default_factory=dict, description="power of each signal it multiplies")
-    surface: Name | None = Field(default=None, description="the surface whose deflection it multiplies")
-    source: Text = ""
-    description: Text = ""
+    name: of the term: unique, and what `uncertainty.coefficients` calls it
+    source: where the value is from
+    description: what the term is
+    """
+
+    name: Name = entry(..., examples=["Cm_alpha"])
+    value: Number = number(..., "1", "per rad of each angle or deflection", range="any", examples=[-0.6028])
+    of: dict[str, Power] = Field(
+        default_factory=dict, description="power of each signal it multiplies", examples=[{"alpha": 1}]
+    )
+    surface: Name | None = Field(
+        default=None, description="the surface whose deflection it multiplies", examples=["elevator"]
+    )
+    source: Text = entry("", examples=["TM88"])
+    description: Text = entry("", examples=["static stability"])
 
 
 class Moments(Section):
-    """Terms of the moment coefficients."""
+    """Terms of the moment coefficients.
+
+    Cl: rolling moment
+    Cm: pitching moment
+    Cn: yawing moment
+    """
 
     Cl: tuple[TermSection, ...] = ()
     Cm: tuple[TermSection, ...] = ()
@@ -124,7 +150,12 @@ class Moments(Section):
 
 
 class Forces(Section):
-    """Terms of the force coefficients along the body axes."""
+    """Terms of the force coefficients along the body axes.
+
+    CX: forward
+    CY: to the right
+    CZ: down
+    """
 
     CX: tuple[TermSection, ...] = ()
     CY: tuple[TermSection, ...] = ()
@@ -132,31 +163,50 @@ class Forces(Section):
 
 
 class EnvelopeSection(Section):
-    """Where the terms hold."""
+    """Where the terms hold.
 
-    airspeed_mps: Interval
-    alpha_deg: Interval
+    airspeed_mps: lowest and highest true airspeed, m/s
+    alpha_deg: lowest and highest angle of attack, deg
+    """
+
+    airspeed_mps: Interval = entry(..., examples=[[30, 55]])
+    alpha_deg: Interval = entry(..., examples=[[-5.7, 16]])
 
 
 class TrimSection(Section):
     """What trim may move beside the surfaces."""
 
-    throttle: Property = Field(description="property of the power setting")
+    throttle: Property = Field(
+        description="property of the power setting", examples=["engine/manifold-pressure-inhg"]
+    )
 
 
 class LimitSection(Section):
-    """A property that must stay in a range in trim."""
+    """A property that must stay in a range in trim.
 
-    property: Property
-    says: Text = ""
-    unit: Text = ""
-    range: Interval
+    property: property of JSBSim
+    says: what it is, for messages
+    unit: of the range, for messages
+    range: lowest and highest value
+    """
+
+    property: Property = entry(..., examples=["engine/power-kw"])
+    says: Text = entry("", examples=["engine power"])
+    unit: Text = entry("", examples=["kW"])
+    range: Interval = number(..., "as said", range="rising", examples=[[-40, 400]])
 
 
 class SettingSection(LimitSection):
-    """An engine setting a scenario may give."""
+    """An engine setting a scenario may give.
 
-    default: Number
+    property: property of JSBSim that sets it
+    says: what it is, for messages
+    unit: of the range, for messages
+    range: lowest and highest value
+    default: where a scenario says nothing
+    """
+
+    default: Number = number(..., "as said", range="in `range`", examples=[100])
 
     @model_validator(mode="after")
     def _default_is_in_range(self) -> Self:
@@ -169,6 +219,8 @@ class EngineSection(Section):
     """Settings of the engine, by their key in a scenario's `initial`, and limits of what they yield.
 
     start: how they come to run: at once, by their starters with time to come to speed, or not
+    settings: what a scenario may set
+    limits: what must stay in a range in trim
     """
 
     settings: dict[Name, SettingSection] = Field(default_factory=dict)
@@ -179,12 +231,14 @@ class EngineSection(Section):
 class ModelErrorSection(Section):
     """Largest error of the angular accelerations, as measured where the terms were derived."""
 
-    p: Number = number(0.0, unit="rad/s2", says="roll", ge=0, le=100)
-    q: Number = number(0.0, unit="rad/s2", says="pitch", ge=0, le=100)
-    r: Number = number(0.0, unit="rad/s2", says="yaw", ge=0, le=100)
+    p: Number = number(0.0, unit="rad/s2", says="roll", ge=0, le=100, examples=[0.01])
+    q: Number = number(0.0, unit="rad/s2", says="pitch", ge=0, le=100, examples=[0.01])
+    r: Number = number(0.0, unit="rad/s2", says="yaw", ge=0, le=100, examples=[0.01])
 
 
-Range = Annotated[tuple[Number, Number], AfterValidator(_not_reversed)]
+Range = Annotated[
+    tuple[Number, Number], AfterValidator(_not_reversed), Field(json_schema_extra={"range": "in order"})
+]
 Shares = Annotated[tuple[NotNegative, ...], Field(min_length=1, max_length=MAX_LEVELS)]
 Ages = Annotated[tuple[NotNegative, ...], Field(min_length=1, max_length=MAX_AGES)]
 Errors = Annotated[tuple[Shares, ...], Field(min_length=1, max_length=MAX_AGES)]
@@ -192,19 +246,32 @@ Errors = Annotated[tuple[Shares, ...], Field(min_length=1, max_length=MAX_AGES)]
 
 class ErrorBox(Section):
     """A box of states, and the largest error in it: a row for each age of the flight, in it a value for each
-    share of the surfaces' travel."""
+    share of the surfaces' travel.
 
-    airspeed_mps: Range
-    alpha_rad: Range
-    beta_rad: Range
-    p_rad_s: Range
-    q_rad_s: Range
-    r_rad_s: Range
-    density_kg_m3: Range
-    signals: dict[Name, Range] = Field(default_factory=dict)
-    error_p_rad_s2: Errors
-    error_q_rad_s2: Errors
-    error_r_rad_s2: Errors
+    airspeed_mps: true airspeed, m/s
+    alpha_rad: angle of attack, rad
+    beta_rad: sideslip, rad
+    p_rad_s: roll rate, rad/s
+    q_rad_s: pitch rate, rad/s
+    r_rad_s: yaw rate, rad/s
+    density_kg_m3: of the air, kg/m3
+    signals: a range for each declared signal
+    error_p_rad_s2: largest error of the roll acceleration, rad/s2
+    error_q_rad_s2: largest error of the pitch acceleration, rad/s2
+    error_r_rad_s2: largest error of the yaw acceleration, rad/s2
+    """
+
+    airspeed_mps: Range = entry(..., examples=[[40, 50]])
+    alpha_rad: Range = entry(..., examples=[[0, 0.1]])
+    beta_rad: Range = entry(..., examples=[[-0.1, 0.1]])
+    p_rad_s: Range = entry(..., examples=[[-0.2, 0.2]])
+    q_rad_s: Range = entry(..., examples=[[-0.1, 0.1]])
+    r_rad_s: Range = entry(..., examples=[[-0.1, 0.1]])
+    density_kg_m3: Range = number(..., "kg/m3", range="in order", examples=[[0.9, 1.1]])
+    signals: dict[Name, Range] = number(dict, "1", range="in order", examples=[{"dpt": [0, 1]}])
+    error_p_rad_s2: Errors = entry(..., examples=[[[0.01]]])
+    error_q_rad_s2: Errors = entry(..., examples=[[[0.01]]])
+    error_r_rad_s2: Errors = entry(..., examples=[[[0.01]]])
 
     def ends(self, signals: Iterable[str]) -> list[Range]:
         """Ends of the box: rates, angle of attack, sideslip, airspeed, density, then these signals."""
@@ -217,10 +284,13 @@ class ErrorMapSection(Section):
     """The error of the angular accelerations where it was measured, from the innermost box outwards.
 
     Outside of all boxes nothing is known: no alarm is raised there.
+    boxes: from the innermost outwards
     """
 
-    travel_share: Shares = Field(description="shares of the surfaces' travel, rising")
-    until_s: Ages = Field(description="ages of a flight, s, rising: fuel burns, and the inertia changes")
+    travel_share: Shares = number(..., "share of 1", "shares of the surfaces' travel, rising", examples=[[1]])
+    until_s: Ages = entry(
+        ..., "ages of a flight, rising: fuel burns, and the inertia changes, s", examples=[[600]]
+    )
     boxes: tuple[ErrorBox, ...] = Field(min_length=1, max_length=MAX_BOXES)
 
     @model_validator(mode="after")
@@ -240,8 +310,10 @@ class ErrorMapSection(Section):
 class StartSection(Section):
     """Where a flight starts unless its scenario says otherwise."""
 
-    airspeed_mps: Number | None = number(None, unit="m/s", says="true airspeed", gt=0, le=1000)
-    altitude_m: Number | None = number(None, unit="m", says="altitude above sea level", ge=-300, le=30000)
+    airspeed_mps: Number | None = number(None, unit="m/s", says="true airspeed", gt=0, le=1000, examples=[45])
+    altitude_m: Number | None = number(
+        None, unit="m", says="altitude above sea level", ge=-300, le=30000, examples=[1800]
+    )
 
 
 class GroundSection(Section):
@@ -250,9 +322,11 @@ class GroundSection(Section):
     present: property that is 1 where there is a ground, 0 where there is none
     """
 
-    present: Property
-    height_m: Number = number(..., unit="m", says="of the centre of gravity, standing", gt=0, le=100)
-    pitch_deg: Number = number(..., unit="deg", says="attitude, standing", ge=-45, le=45)
+    present: Property = entry(..., examples=["ground/present"])
+    height_m: Number = number(
+        ..., unit="m", says="of the centre of gravity, standing", gt=0, le=100, examples=[1.5]
+    )
+    pitch_deg: Number = number(..., unit="deg", says="attitude, standing", ge=-45, le=45, examples=[11])
 
 
 class AircraftFile(Section):
@@ -264,13 +338,27 @@ class AircraftFile(Section):
     model_error_map: where in the envelope the error is how large, in place of one value
     channels: which output of an autopilot moves which surface
     ground: how it stands; without it no flight begins on the ground
+    name: of the aircraft
+    description: what it is, in a line
+    surfaces: three or more control surfaces, by name
+    signals: measured dimensionless signals that terms multiply
+    mass: mass and inertia
+    geometry: reference dimensions
+    moments: terms of the moment coefficients
+    forces: terms of the force coefficients; left out: no airspeed can be held
+    envelope: where the terms hold
+    trim: what trim may move beside the surfaces
+    engine: settings and limits of the engine
+    start: where a flight starts unless its scenario says otherwise
     """
 
-    name: Name
-    description: Text = ""
-    jsbsim: str = Field(pattern=FILE_PATTERN, max_length=200)
+    name: Name = entry(..., examples=["beaver"])
+    description: Text = entry("", examples=["DHC-2 Beaver"])
+    jsbsim: str = Field(pattern=FILE_PATTERN, max_length=200, examples=["beaver.xml"])
     surfaces: dict[Name, SurfaceSection] = Field(min_length=3, max_length=MAX_SURFACES)
-    groups: dict[Name, tuple[Name, ...]]
+    groups: dict[Name, tuple[Name, ...]] = entry(
+        ..., examples=[{"pitch": ["elevator", "flap"], "lateral": ["aileron", "rudder"]}]
+    )
     signals: dict[Name, SignalSection] = Field(default_factory=dict, max_length=MAX_SIGNALS)
     mass: MassSection
     geometry: GeometrySection

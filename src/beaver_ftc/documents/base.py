@@ -39,15 +39,18 @@ Flag = Annotated[bool, Strict()]
 
 def entry(default: Any, says: str | None = None, **limits: Any) -> Any:
     """A field and what an editor says of it. default: a value, what makes one, or ... where there is none.
-    says: left out where the section's docstring says it."""
+    says: left out where the section's docstring says it. Besides limits: unit; examples, each a value; range,
+    where limits do not tell it; needs, the keys beside it that the example wants."""
     how = "default_factory" if callable(default) else "default"
     said: dict[str, Any] = {"description": says} if says else {}
+    if shown := {key: limits.pop(key) for key in ("unit", "range", "needs") if key in limits}:
+        said["json_schema_extra"] = shown
     return Field(**{how: default}, **said, **limits)
 
 
 def number(default: Any, unit: str, says: str | None = None, **limits: Any) -> Any:
     """A field of one number, or several alike: the JSON Schema has their unit and meaning."""
-    return entry(default, says and f"{says}, {unit}", json_schema_extra={"unit": unit}, **limits)
+    return entry(default, says and f"{says}, {unit}", unit=unit, **limits)
 
 
 def refuse(conflicts: Iterable[Conflict]) -> None:

@@ -28,36 +28,53 @@ Kind = Literal["loss", "stuck"]
 class Rates(Section):
     """The columns of the three body rates, rad/s."""
 
-    p: ColumnName = Field(description="column of the roll rate, rad/s")
-    q: ColumnName = Field(description="column of the pitch rate, rad/s")
-    r: ColumnName = Field(description="column of the yaw rate, rad/s")
+    p: ColumnName = Field(description="column of the roll rate, rad/s", examples=["p_rad_s"])
+    q: ColumnName = Field(description="column of the pitch rate, rad/s", examples=["q_rad_s"])
+    r: ColumnName = Field(description="column of the yaw rate, rad/s", examples=["r_rad_s"])
 
 
 class Vehicle(Section):
     """What the columns of a vehicle's logs are."""
 
-    name: Name = Field(description="what the vehicle is called")
+    name: Name = Field(description="what the vehicle is called", examples=["flying-wing"])
     reader: Literal["table", "alfa", "ulog", "ardupilot"] | None = Field(
         default=None, description="how its logs are read, where a path does not show it"
     )
     rates: Rates
     commands: list[ColumnName] = Field(
-        min_length=1, max_length=8, description="columns of the commands, upstream of what can fail"
+        min_length=1,
+        max_length=8,
+        description="columns of the commands, upstream of what can fail",
+        examples=[["roll_cmd", "pitch_cmd"]],
     )
     signals: list[ColumnName] = Field(
-        default=[], max_length=12, description="further measured columns the rates depend on"
+        default=[],
+        max_length=12,
+        description="further measured columns the rates depend on",
+        examples=[["roll_rad", "pitch_rad"]],
     )
     surfaces: dict[str, dict[str, Number]] = Field(
-        min_length=1, max_length=8, description="what each healthy surface makes of the commands"
+        min_length=1,
+        max_length=8,
+        description="what each healthy surface makes of the commands: a share of each",
+        json_schema_extra={"unit": "share of 1", "range": "any"},
+        examples=[{"left": {"roll_cmd": 0.5, "pitch_cmd": 0.5}}],
     )
     labels: dict[str, ColumnName] = Field(
-        default={}, description="columns with each surface's true effectiveness: identification and scoring"
+        default={},
+        description="columns with each surface's true effectiveness: identification and scoring",
+        examples=[{"left": "left_truth"}],
     )
     outputs: dict[str, ColumnName] = Field(
-        default={}, description="columns of the servo outputs: read by the freeze rule of a benchmark alone"
+        default={},
+        description="columns of the servo outputs: read by the freeze rule of a benchmark alone",
+        examples=[{"left": "left_pwm"}],
     )
     faults: list[Kind] = Field(
-        default=["loss"], min_length=1, description="what a surface may do: lose effectiveness, be stuck"
+        default=["loss"],
+        min_length=1,
+        description="what a surface may do: lose effectiveness, be stuck",
+        examples=[["loss", "stuck"]],
     )
     max_rate_hz: Number = number(
         20.0, gt=0, le=1000, unit="Hz", says="rate above which the log is averaged to this rate"

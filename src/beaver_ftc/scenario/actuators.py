@@ -20,9 +20,11 @@ class ActuatorDynamics(Section):
     travel_deg: lower and upper stop; left out: the aircraft's own, deg
     """
 
-    bandwidth_rad_s: Number = number(0.0, "rad/s", ge=0, le=10_000)
-    rate_limit_deg_s: Number = number(0.0, "deg/s", ge=0, le=100_000)
-    travel_deg: tuple[Number, Number] | None = number(None, "deg")
+    bandwidth_rad_s: Number = number(0.0, "rad/s", ge=0, le=10_000, examples=[20])
+    rate_limit_deg_s: Number = number(0.0, "deg/s", ge=0, le=100_000, examples=[60])
+    travel_deg: tuple[Number, Number] | None = number(
+        None, "deg", range="rising, -90 to 90", examples=[[-20, 20]]
+    )
 
     @model_validator(mode="after")
     def _stops_are_in_order(self) -> Self:

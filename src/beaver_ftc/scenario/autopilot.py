@@ -17,7 +17,7 @@ _LATEST_S = 360_000.0
 class _Leg(Section):
     """From a time on: a value, or hold what is flown."""
 
-    at_s: Number = number(0.0, "s", "from when on", ge=0, le=_LATEST_S)
+    at_s: Number = number(0.0, "s", "from when on", ge=0, le=_LATEST_S, examples=[10])
     hold: Flag = entry(False, "true: hold what is flown or commanded at that time")
     value: Number | None = None
 
@@ -33,27 +33,27 @@ class _Leg(Section):
 class AltitudeLeg(_Leg):
     """An altitude, reached at a steady climb or descent."""
 
-    value: Number | None = number(None, "m", "altitude above sea level", ge=-300, le=6000)
+    value: Number | None = number(None, "m", "altitude above sea level", ge=-300, le=6000, examples=[1900])
     climb_mps: Number = number(2.5, "m/s", "how fast the command goes there", gt=0, le=10)
 
 
 class AirspeedLeg(_Leg):
     """An airspeed."""
 
-    value: Number | None = number(None, "m/s", "true airspeed", ge=20, le=70)
+    value: Number | None = number(None, "m/s", "true airspeed", ge=20, le=70, examples=[45])
     change_mps2: Number = number(0.2, "m/s2", "how fast the command goes there", gt=0, le=5)
 
 
 class HeadingLeg(_Leg):
     """A true heading, by the shorter turn."""
 
-    value: Number | None = number(None, "deg", "true heading", ge=-360, le=360)
+    value: Number | None = number(None, "deg", "true heading", ge=-360, le=360, examples=[90])
 
 
 class BankLeg(_Leg):
     """A bank angle, right wing down positive."""
 
-    value: Number | None = number(None, "deg", "bank angle", ge=-45, le=45)
+    value: Number | None = number(None, "deg", "bank angle", ge=-45, le=45, examples=[20])
 
 
 def _legs(says: str) -> Any:

@@ -5,7 +5,7 @@ from typing import Annotated, Self
 
 from pydantic import model_validator
 
-from beaver_ftc.documents.base import Section, deny, entry, refuse
+from beaver_ftc.documents.base import Section, deny, entry, number, refuse
 from beaver_ftc.plugins import LAWS, refusal, wrong_options
 from beaver_ftc.scenario.airframe import named
 
@@ -30,14 +30,14 @@ class EnginePower(Section, strict=True):
     """
 
     enabled: bool = True
-    speed_gain_inhg_per_mps: float = entry(3.0, ge=0, le=50)
-    attitude_gain_inhg_per_deg: float = entry(0.9, ge=0, le=50)
+    speed_gain_inhg_per_mps: float = number(3.0, "inHg per m/s", ge=0, le=50)
+    attitude_gain_inhg_per_deg: float = number(0.9, "inHg per deg", ge=0, le=50)
     washout_s: float = entry(20.0, gt=0, le=600)
     attitude_memory_s: float = entry(10.0, gt=0, le=600)
     smoothing_s: float = entry(0.5, ge=0.05, le=10)
     lowest_inhg: float = entry(10.0, ge=0, le=50)
     highest_inhg: float = entry(36.5, ge=0, le=50)
-    rate_inhg_s: float = entry(5.0, gt=0, le=100)
+    rate_inhg_s: float = number(5.0, "inHg/s", gt=0, le=100)
     patience_s: float = entry(1.0, gt=0, le=60)
     release_s: float = entry(10.0, gt=0, le=600)
 
@@ -71,20 +71,22 @@ class ControlConfig(Section, strict=True):
     power: engine power on pitch, when elevator and flap are lost
     """
 
-    law: Law = "fault-tolerant"
-    options: dict[str, float] = entry({})
-    gain_margin_db: float = entry(6.0, gt=0, le=40)
+    law: Law = entry("fault-tolerant", examples=["nominal"])
+    options: dict[str, float] = entry(
+        {}, range="as each option has it", needs={"law": "zhang2005"}, examples=[{"network_gain": 40}]
+    )
+    gain_margin_db: float = number(6.0, "dB", gt=0, le=40)
     phase_margin_deg: float = entry(45.0, gt=0, le=80)
-    noise_share: float = entry(0.5, gt=0, le=1)
+    noise_share: float = number(0.5, "share of 1", gt=0, le=1)
     proportional_per_s: float = entry(2.0, gt=0, le=50)
-    integral_per_s2: float = entry(1.0, ge=0, le=500)
+    integral_per_s2: float = number(1.0, "1/s2", ge=0, le=500)
     reference_natural_frequency_rad_s: float = entry(10.0, gt=0, le=100)
-    reference_damping: float = entry(1.0, ge=0.2, le=5)
-    network_gain_per_s2: float = entry(60.0, ge=0, le=1000)
+    reference_damping: float = number(1.0, "1", ge=0.2, le=5)
+    network_gain_per_s2: float = number(60.0, "1/s2", ge=0, le=1000)
     network_leak_per_s: float = entry(1.0, ge=0, le=50)
     network_weight_limit_rad_s2: float = entry(20.0, gt=0, le=1000)
     effectiveness_rate_per_s: float = entry(4.0, gt=0, le=1000)
-    least_effectiveness: float = entry(0.1, gt=0, lt=1)
+    least_effectiveness: float = number(0.1, "share of 1", gt=0, lt=1)
     hand_over_s: float = entry(1.0, gt=0, le=60)
     power: EnginePower = entry(EnginePower)
 

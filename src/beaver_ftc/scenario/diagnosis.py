@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field, Strict, field_validator, model_validator
 
-from beaver_ftc.documents.base import Section, deny, entry, refuse
+from beaver_ftc.documents.base import Section, deny, entry, number, refuse
 from beaver_ftc.documents.errors import suggestion
 from beaver_ftc.plugins import DETECTORS, refusal, wrong_options
 from beaver_ftc.scenario.airframe import checked_aircraft, named
@@ -22,11 +22,16 @@ Pole = Annotated[float, Field(gt=0, le=DEADBEAT_PER_S)]
 
 
 class PerAxis(Section, strict=True):
-    """One non-negative number for each of p, q and r."""
+    """One non-negative number for each of p, q and r.
 
-    p: Bound = 0.0
-    q: Bound = 0.0
-    r: Bound = 0.0
+    p: of roll
+    q: of pitch
+    r: of yaw
+    """
+
+    p: Bound = entry(0.0, examples=[0.1])
+    q: Bound = entry(0.0, examples=[0.1])
+    r: Bound = entry(0.0, examples=[0.1])
 
     def as_tuple(self) -> tuple[float, float, float]:
         """(p, q, r)"""
@@ -56,12 +61,12 @@ class Bounds(Section, strict=True):
     turbulence: rotation of the air, which no instrument sees: Dryden, above 2000 ft
     """
 
-    inertia_coupling: PerAxis = entry(PerAxis(p=0.25, q=0.25, r=0.25))
+    inertia_coupling: PerAxis = number(PerAxis(p=0.25, q=0.25, r=0.25), "share of 1")
     constant_rad_s2: PerAxis = entry(PerAxis(p=0.02, q=0.02, r=0.02))
-    coefficients: Share | dict[str, Share] = 0.0
-    inertia: Share = 0.0
+    coefficients: Share | dict[str, Share] = number(0.0, "share of 1", examples=[0.05])
+    inertia: Share = number(0.0, "share of 1", examples=[0.05])
     sensors: BoundedSensors = entry(Sensors)
-    deflection_deg: Deflection = 0.0
+    deflection_deg: Deflection = entry(0.0, examples=[0.2])
     turbulence: Literal["none", "light", "moderate", "severe"] = "none"
 
     @field_validator("coefficients")
@@ -81,8 +86,8 @@ class Statistical(Section, strict=True):
     uncertainty_rad_s: how fast an uncertainty that is merely bounded swings, rad/s: as published
     """
 
-    false_alarms_per_h: float = entry(1e-3, gt=0, le=3600)
-    misnaming: float = entry(1e-4, gt=0, lt=0.5)
+    false_alarms_per_h: float = number(1e-3, "1/h", gt=0, le=3600)
+    misnaming: float = number(1e-4, "share of 1", gt=0, lt=0.5)
     uncertainty_rad_s: float = entry(15.0, gt=0, le=1000)
 
 
@@ -145,10 +150,12 @@ class FdiConfig(Section, strict=True):
     fault_profile: what is assumed of the fault's course: nothing, or constant once it is there
     """
 
-    scheme: Scheme = "adaptive-estimators"
-    options: dict[str, float] = entry({})
+    scheme: Scheme = entry("adaptive-estimators", examples=["zhang2005"])
+    options: dict[str, float] = entry(
+        {}, range="as each option has it", needs={"scheme": "zhang2005"}, examples=[{"network_gain": 150}]
+    )
     fault_class: Literal["published", "all"] = "published"
-    pairs: bool = False
+    pairs: bool = entry(False, needs={"fault_class": "all"}, examples=[True])
     sensor_monitor: Literal["auto", "always", "never"] = "auto"
     slowest_oscillation_rad_s: float = entry(1.0, gt=0, le=100)
     slowest_rate_deg_s: float = entry(0.5, gt=0, le=100)
@@ -162,7 +169,7 @@ class FdiConfig(Section, strict=True):
     bounds: Bounds = Bounds()
     sharpen: Sharpen = entry(Sharpen())
     pole_bank_per_s: Annotated[tuple[Pole, ...], Strict(False)] = entry(
-        (DEADBEAT_PER_S,), max_length=MAX_POLES - 1
+        (DEADBEAT_PER_S,), max_length=MAX_POLES - 1, examples=[[20, 100]]
     )
     fault_profile: Literal["any", "abrupt"] = "any"
 

@@ -15,10 +15,12 @@ Wind = Annotated[Number, Field(ge=-100, le=100)]
 class Gust(Section):
     """A one-minus-cosine gust: it rises, stays and fades as JSBSim's own does."""
 
-    at_s: Number = number(..., "s", "when it starts", ge=0, le=360_000)
-    velocity_mps: tuple[Wind, Wind, Wind] = number(..., "m/s", "at its height, towards north, east, down")
+    at_s: Number = number(..., "s", "when it starts", ge=0, le=360_000, examples=[10])
+    velocity_mps: tuple[Wind, Wind, Wind] = number(
+        ..., "m/s", "at its height, towards north, east, down", examples=[[0, 0, -3]]
+    )
     rise_s: Number = number(1.0, "s", "duration of the rise", gt=0, le=3600)
-    hold_s: Number = number(0.0, "s", "time at its height", ge=0, le=3600)
+    hold_s: Number = number(0.0, "s", "time at its height", ge=0, le=3600, examples=[2])
     fade_s: Number = number(1.0, "s", "duration of the decay", gt=0, le=3600)
 
     @property
@@ -50,11 +52,13 @@ class Environment(Section):
     """The air."""
 
     turbulence: Annotated[Literal["none", "dryden"], BeforeValidator(_no_severity)] = entry(
-        "none", "still air or Dryden turbulence"
+        "none", "still air or Dryden turbulence", needs={"severity": "light"}, examples=["dryden"]
     )
-    severity: Severity | None = entry(None, "of the turbulence")
+    severity: Severity | None = entry(
+        None, "of the turbulence", needs={"turbulence": "dryden"}, examples=["light"]
+    )
     wind_mps: tuple[Wind, Wind, Wind] = number(
-        (0.0, 0.0, 0.0), "m/s", "steady wind towards north, east, down"
+        (0.0, 0.0, 0.0), "m/s", "steady wind towards north, east, down", examples=[[5, 0, 0]]
     )
     gust: (
         Annotated[

@@ -45,7 +45,10 @@ def initial_of(aircraft: Aircraft) -> type[Initial]:
         if surface not in aircraft.primary:
             travel, says = aircraft.travel[surface], f"{surface} deflection"
             low, high = degrees(travel.min_rad), degrees(travel.max_rad)
-            keys[f"{surface}_deg"] = Number, number(0.0, "deg", says, ge=low, le=high)
+            keys[f"{surface}_deg"] = (
+                Number,
+                number(0.0, "deg", says, ge=low, le=high, examples=[round(0.25 * high, 1)]),
+            )
     made = create_model("Initial", __base__=Initial, __doc__=Initial.__doc__, **keys)
     made._airframe = aircraft
     return made

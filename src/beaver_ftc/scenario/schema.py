@@ -47,15 +47,15 @@ NAME_PATTERN = r"^[A-Za-z0-9_-]+$"
 class InertiaCoupling(Section):
     """theta_p, theta_q, theta_r: relative errors of Pqr, Qpr, Rpq in the truth (published: within 0.25)."""
 
-    p: Number = number(0.0, "share of 1", "theta_p", ge=-1, le=1)
-    q: Number = number(0.0, "share of 1", "theta_q", ge=-1, le=1)
-    r: Number = number(0.0, "share of 1", "theta_r", ge=-1, le=1)
+    p: Number = number(0.0, "share of 1", "theta_p", ge=-1, le=1, examples=[0.2])
+    q: Number = number(0.0, "share of 1", "theta_q", ge=-1, le=1, examples=[0.2])
+    r: Number = number(0.0, "share of 1", "theta_r", ge=-1, le=1, examples=[0.2])
 
 
 class Sinusoid(Section):
     """amplitude sin(frequency t) added to one angular acceleration."""
 
-    amplitude_rad_s2: Number = number(0.0, "rad/s2", "amplitude", ge=0, le=10)
+    amplitude_rad_s2: Number = number(0.0, "rad/s2", "amplitude", ge=0, le=10, examples=[0.02])
     frequency_rad_s: Number = number(10.0, "rad/s", "angular frequency", gt=0, le=1000)
 
 
@@ -94,7 +94,7 @@ class Uncertainty(Section):
     coefficients: Ratios = entry(dict, examples=[{"Cm_alpha": 1.05}])
     mass: Number = number(1.0, "share of 1", ge=0.5, le=2)
     inertia: TrueInertia = entry(TrueInertia)
-    cg_m: tuple[Offset, Offset, Offset] = number((0.0, 0.0, 0.0), "m")
+    cg_m: tuple[Offset, Offset, Offset] = number((0.0, 0.0, 0.0), "m", examples=[[0.05, 0, 0]])
 
 
 Scale = Annotated[Number, Field(ge=0.1, le=10)]
@@ -131,9 +131,11 @@ class DesignModel(Section):
 class Change(Section):
     """From a time on another law, another diagnosis, other sensors; what is left out stays as it is."""
 
-    at_s: Number = number(..., "s", "from when on", gt=0, le=360_000)
-    law: Law | None = entry(None, "as control.law; surfaces and reference go on from where they are")
-    scheme: Scheme | None = entry(None, "as fdi.scheme; the diagnosis begins anew")
+    at_s: Number = number(..., "s", "from when on", gt=0, le=360_000, examples=[20])
+    law: Law | None = entry(
+        None, "as control.law; surfaces and reference go on from where they are", examples=["nominal"]
+    )
+    scheme: Scheme | None = entry(None, "as fdi.scheme; the diagnosis begins anew", examples=["zhang2005"])
     sensors: Sensors | None = entry(None, "as sensors: a preset, or errors by signal")
     declared_sensors: BoundedSensors | None = entry(None, "as fdi.bounds.sensors; the diagnosis begins anew")
 
@@ -148,17 +150,17 @@ class Change(Section):
 class RmsLimits(Section):
     """Largest RMS tracking error allowed, per axis."""
 
-    p: Number | None = number(None, "deg/s", "roll rate", ge=0, le=1000)
-    q: Number | None = number(None, "deg/s", "pitch rate", ge=0, le=1000)
-    r: Number | None = number(None, "deg/s", "yaw rate", ge=0, le=1000)
+    p: Number | None = number(None, "deg/s", "roll rate", ge=0, le=1000, examples=[1.5])
+    q: Number | None = number(None, "deg/s", "pitch rate", ge=0, le=1000, examples=[1.5])
+    r: Number | None = number(None, "deg/s", "yaw rate", ge=0, le=1000, examples=[1.5])
 
 
 class Arrival(Section):
     """What the flight has come to at its end: deviations from the commanded profile, means over 10 s."""
 
-    altitude_m: Number | None = number(None, "m", "altitude", gt=0, le=10_000)
-    airspeed_mps: Number | None = number(None, "m/s", "airspeed", gt=0, le=100)
-    heading_deg: Number | None = number(None, "deg", "heading", gt=0, le=180)
+    altitude_m: Number | None = number(None, "m", "altitude", gt=0, le=10_000, examples=[10])
+    airspeed_mps: Number | None = number(None, "m/s", "airspeed", gt=0, le=100, examples=[2])
+    heading_deg: Number | None = number(None, "deg", "heading", gt=0, le=180, examples=[5])
     in_envelope: Flag | None = entry(None, "true: inside the validated envelope at the end; false: outside")
 
 
@@ -184,19 +186,19 @@ class Expect(Section):
     arrives: how far it is from the commanded profile at its end; a lost aircraft never arrives
     """
 
-    detected_within_s: Number | None = number(None, "s", ge=0, le=360_000)
-    isolated_as: Nameable | None = None
+    detected_within_s: Number | None = number(None, "s", ge=0, le=360_000, examples=[0.5])
+    isolated_as: Nameable | None = entry(None, examples=["elevator"])
     isolated_type: FaultType | None = None
     candidate_type: FaultType | None = None
-    isolated_within_s: Number | None = number(None, "s", ge=0, le=360_000)
+    isolated_within_s: Number | None = number(None, "s", ge=0, le=360_000, examples=[2])
     no_false_alarm: Flag | None = None
     no_departure: Flag | None = None
     pre_fault_rms_deg_s: RmsLimits | None = None
     post_fault_rms_deg_s: RmsLimits | None = None
-    altitude_within_m: Number | None = number(None, "m", gt=0, le=10_000)
-    airspeed_within_mps: Number | None = number(None, "m/s", gt=0, le=100)
-    airspeed_within_limits_mps: Number | None = number(None, "m/s", gt=0, le=100)
-    heading_within_deg: Number | None = number(None, "deg", gt=0, le=180)
+    altitude_within_m: Number | None = number(None, "m", gt=0, le=10_000, examples=[25])
+    airspeed_within_mps: Number | None = number(None, "m/s", gt=0, le=100, examples=[3.5])
+    airspeed_within_limits_mps: Number | None = number(None, "m/s", gt=0, le=100, examples=[2])
+    heading_within_deg: Number | None = number(None, "deg", gt=0, le=180, examples=[6])
     stays_in_envelope: Flag | None = None
     arrives: Arrival | None = None
 
@@ -227,8 +229,10 @@ class Scenario(Section, title="beaver-ftc scenario"):
     """
 
     name: str = entry(..., pattern=NAME_PATTERN, max_length=100, examples=["elevator-partial-loss"])
-    description: str = entry("", max_length=2000)
-    aircraft: Annotated[str, AfterValidator(known_aircraft)] = entry(DEFAULT, max_length=200)
+    description: str = entry("", max_length=2000, examples=["The elevator loses 40 % of its effectiveness."])
+    aircraft: Annotated[str, AfterValidator(known_aircraft)] = entry(
+        DEFAULT, max_length=200, examples=["beaver"]
+    )
     duration_s: Number = number(DURATION_S, "s", gt=0, le=360_000)
     rate_hz: Number = number(RATE_HZ, "Hz", ge=20, le=1000)
     substeps: Whole = entry(1, ge=1, le=50)

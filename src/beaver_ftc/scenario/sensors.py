@@ -29,10 +29,10 @@ class _Sensor(Section):
     # Keys of noise, bias and resolution, and their unit in SI.
     si: ClassVar[tuple[str, str, str, float]]
 
-    scale_error: Number = number(0.0, "share of 1", ge=-0.9, le=1)
-    delay_s: Number = number(0.0, "s", ge=0, le=1)
-    bandwidth_rad_s: Number = number(0.0, "rad/s", ge=0, le=100_000)
-    dropout_share: Number = number(0.0, "share of 1", ge=0, le=0.99)
+    scale_error: Number = number(0.0, "share of 1", ge=-0.9, le=1, examples=[0.01])
+    delay_s: Number = number(0.0, "s", ge=0, le=1, examples=[0.02])
+    bandwidth_rad_s: Number = number(0.0, "rad/s", ge=0, le=100_000, examples=[60])
+    dropout_share: Number = number(0.0, "share of 1", ge=0, le=0.99, examples=[0.05])
 
     @property
     def is_ideal(self) -> bool:
@@ -69,7 +69,7 @@ def _reads(suffix: str, unit: str, most: float, si: float = 1.0) -> Callable[[ty
     keys = f"noise_std_{suffix}", f"bias_{suffix}", f"quantum_{suffix}"
     meaning = "standard deviation of a sample", "constant error", "resolution"
     fields: dict[str, Any] = {
-        key: (Number, number(0.0, unit, says, ge=least, le=most))
+        key: (Number, number(0.0, unit, says, ge=least, le=most, examples=[most / 1000]))
         for key, says, least in zip(keys, meaning, (0, -most, 0), strict=True)
     }
 
@@ -105,7 +105,9 @@ class DynamicPressure(_Sensor):
 class AttitudeAngle(FlowVane):
     """Roll, pitch or yaw: a vertical or directional gyro, or integrated rates that drift away."""
 
-    drift_deg_h: Number = number(0.0, "deg/h", "growth of the error from the start on", ge=-3600, le=3600)
+    drift_deg_h: Number = number(
+        0.0, "deg/h", "growth of the error from the start on", ge=-3600, le=3600, examples=[10]
+    )
 
     @property
     def drift_rad_s(self) -> float:

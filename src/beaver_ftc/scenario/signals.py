@@ -38,15 +38,15 @@ _FORMAT = "comma-separated text with a header line, times in column t_s, rates i
 
 
 def _amplitude() -> Any:
-    return number(..., "deg/s", "amplitude", ge=-1000, le=1000)
+    return number(..., "deg/s", "amplitude", ge=-1000, le=1000, examples=[3])
 
 
 def _frequency(says: str = "frequency") -> Any:
-    return number(..., "Hz", says, gt=0, le=500)
+    return number(..., "Hz", says, gt=0, le=500, examples=[0.2])
 
 
 def _start() -> Any:
-    return number(0.0, "s", "when it starts", ge=0, le=_LATEST_S)
+    return number(0.0, "s", "when it starts", ge=0, le=_LATEST_S, examples=[5])
 
 
 def _during(tau_s: Samples, length_s: float | None) -> NDArray[np.bool_]:
@@ -59,7 +59,7 @@ class _Window(Section):
     """A signal that is zero outside [start_s, end_s)."""
 
     start_s: Number = _start()
-    end_s: Number | None = number(None, "s", "when it ends; left out: with the flight", gt=0)
+    end_s: Number | None = number(None, "s", "when it ends; left out: with the flight", gt=0, examples=[20])
 
     @model_validator(mode="after")
     def _ends_after_it_starts(self) -> Self:
@@ -76,7 +76,7 @@ class _Wave(_Window):
 
     amplitude_deg_s: Number = _amplitude()
     frequency_hz: Number = _frequency()
-    phase_deg: Number = number(0.0, "deg", "phase at start_s", ge=-360, le=360)
+    phase_deg: Number = number(0.0, "deg", "phase at start_s", ge=-360, le=360, examples=[90])
 
 
 class Sine(_Wave):
@@ -126,7 +126,7 @@ class Square(_Wave):
 class _Closed(_Window):
     """A signal that needs both its ends."""
 
-    end_s: Number = number(..., "s", "when it ends", gt=0, le=_LATEST_S)
+    end_s: Number = number(..., "s", "when it ends", gt=0, le=_LATEST_S, examples=[20])
 
     @property
     def length_s(self) -> float:
@@ -170,10 +170,26 @@ class Csv(Section):
 
     model_config = ConfigDict(json_schema_extra={"required": ["file"]})
 
-    file: str = entry(..., min_length=1, max_length=200)
-    column: str = entry("rate_deg_s", min_length=1, max_length=100)
-    time_s: tuple[Number, ...] = entry(..., min_length=1, max_length=MAX_ROWS)
-    values_deg_s: tuple[Number, ...] = entry(..., min_length=1, max_length=MAX_ROWS)
+    file: str = entry(..., min_length=1, max_length=200, examples=["pilot.csv"])
+    column: str = entry("rate_deg_s", min_length=1, max_length=100, examples=["q_deg_s"])
+    time_s: tuple[Number, ...] = number(
+        ...,
+        "s",
+        min_length=1,
+        max_length=MAX_ROWS,
+        range="rising, 0 to 360000",
+        needs={"values_deg_s": [0, 2]},
+        examples=[[0, 1]],
+    )
+    values_deg_s: tuple[Number, ...] = number(
+        ...,
+        "deg/s",
+        min_length=1,
+        max_length=MAX_ROWS,
+        range="-1000 to 1000",
+        needs={"time_s": [0, 1]},
+        examples=[[0, 2]],
+    )
 
     @model_validator(mode="before")
     @classmethod

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from beaver_ftc.aircraft import Aircraft, load
-from beaver_ftc.documents.base import Conflict, Location, Number, Section, Whole, deny, entry, refuse
+from beaver_ftc.documents.base import Conflict, Location, Number, Section, Whole, deny, entry, number, refuse
 from beaver_ftc.documents.document import Document, Problem
 from beaver_ftc.documents.keys import UnusableKeyError, parse_key, with_values
 from beaver_ftc.documents.paths import inside
@@ -53,12 +53,16 @@ class Variation(Section):
     choice: a list of values, all equally likely
     """
 
-    uniform: Span | None = None
-    loguniform: Span | None = None
-    normal: Span | None = None
-    within: Span | None = None
-    linspace: tuple[Number, Number, Annotated[Whole, Field(ge=1, le=1_000_000)]] | None = None
-    choice: tuple[Any, ...] | None = entry(None, min_length=1, max_length=100_000)
+    uniform: Span | None = number(None, "as the key", range="rising", examples=[[0.2, 0.8]])
+    loguniform: Span | None = number(None, "as the key", range="rising, above 0", examples=[[0.05, 0.5]])
+    normal: Span | None = number(None, "as the key", range="the second above 0", examples=[[0.4, 0.1]])
+    within: Span | None = number(
+        None, "as the key", range="rising", needs={"normal": [0.4, 0.1]}, examples=[[0.2, 0.6]]
+    )
+    linspace: tuple[Number, Number, Annotated[Whole, Field(ge=1, le=1_000_000)]] | None = number(
+        None, "as the key", range="any two, a count of 1 to 1000000", examples=[[0.2, 0.8, 4]]
+    )
+    choice: tuple[Any, ...] | None = entry(None, min_length=1, max_length=100_000, examples=[[0.2, 0.4, 0.8]])
 
     @model_validator(mode="after")
     def _makes_sense(self) -> Self:
@@ -111,9 +115,11 @@ class Level(Section):
     confidence: left out: the estimate itself is held against the bound
     """
 
-    at_least: Number | None = None
-    at_most: Number | None = None
-    confidence: Number | None = entry(None, ge=0.5, lt=1)
+    at_least: Number | None = entry(None, range="any", examples=[0.9])
+    at_most: Number | None = entry(None, range="any", examples=[0.1])
+    confidence: Number | None = number(
+        None, "share of 1", ge=0.5, lt=1, needs={"at_least": 0.9}, examples=[0.95]
+    )
 
     @model_validator(mode="after")
     def _bounds_something(self) -> Self:
@@ -125,7 +131,9 @@ class Level(Section):
 class QuantileLevel(Level):
     """A bound on a quantile over the flights."""
 
-    quantile: Number = entry(0.95, "which quantile, 0.5 is the median", gt=0, lt=1)
+    quantile: Number = number(
+        0.95, "share of 1", "which quantile, 0.5 is the median", gt=0, lt=1, needs={"at_most": 1}
+    )
 
 
 class AxisLevels(Section):
@@ -151,16 +159,16 @@ class SweepExpect(Section):
     tracking_ratio: RMS error after / before the fault; a departure counts as infinite
     """
 
-    detection_rate: Level | None = None
-    isolation_rate: Level | None = None
-    false_alarms_per_hour: Level | None = None
-    departure_rate: Level | None = None
-    failure_rate: Level | None = None
-    pass_rate: Level | None = None
+    detection_rate: Level | None = number(None, "share of 1")
+    isolation_rate: Level | None = number(None, "share of 1")
+    false_alarms_per_hour: Level | None = number(None, "1/h")
+    departure_rate: Level | None = number(None, "share of 1")
+    failure_rate: Level | None = number(None, "share of 1")
+    pass_rate: Level | None = number(None, "share of 1")
     detection_delay_s: QuantileLevel | None = None
     isolation_delay_s: QuantileLevel | None = None
     post_fault_rms_deg_s: AxisLevels | None = None
-    tracking_ratio: AxisLevels | None = None
+    tracking_ratio: AxisLevels | None = number(None, "share of 1")
 
 
 class SweepFile(Section, title="beaver-ftc sweep"):
@@ -177,11 +185,11 @@ class SweepFile(Section, title="beaver-ftc sweep"):
     expect: what the statistics must show
     """
 
-    name: str = entry(..., pattern=NAME_PATTERN, max_length=70)
-    description: str = entry("", max_length=2000)
-    base: str | dict[str, Any]
-    set: dict[str, Any] = entry(dict)
-    runs: Whole | None = entry(None, ge=1, le=MAX_RUNS)
+    name: str = entry(..., pattern=NAME_PATTERN, max_length=70, examples=["loss-of-the-elevator"])
+    description: str = entry("", max_length=2000, examples=["How small a loss is seen."])
+    base: str | dict[str, Any] = entry(..., examples=["elevator-partial-loss"])
+    set: dict[str, Any] = entry(dict, examples=[{"duration_s": 20}])
+    runs: Whole | None = entry(None, ge=1, le=MAX_RUNS, examples=[100])
     seed: Whole = entry(1, ge=0, le=2**63 - 1)
     sampling: Sampling = "random"
     vary: dict[str, Variation] = entry(dict, max_length=200)

@@ -38,8 +38,8 @@ class SurfaceFault(Section):
         type: str
         profile: str
 
-    at_s: Number = number(..., "s", "when the fault starts", ge=0, le=360_000)
-    end_s: Number | None = number(None, "s", "when it is gone; left out: it stays", gt=0)
+    at_s: Number = number(..., "s", "when the fault starts", ge=0, le=360_000, examples=[12])
+    end_s: Number | None = number(None, "s", "when it is gone; left out: it stays", gt=0, examples=[20])
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
@@ -58,14 +58,24 @@ class SurfaceFault(Section):
 class Switched(SurfaceFault):
     """A fault that is either there or not: a jam does not grow."""
 
-    profile: Literal["abrupt"] = entry("abrupt", "this type of fault is always abrupt")
+    profile: Literal["abrupt"] = entry("abrupt", "this type of fault is always abrupt", examples=["abrupt"])
 
 
 class Gradual(SurfaceFault):
     """A fault with a time profile B(t - at_s): a step, or 1 - exp(-kappa (t - at_s)) [Zhang2005]."""
 
-    profile: Literal["abrupt", "incipient"] = entry("abrupt", "a step, or growing as 1 - exp(-kappa t)")
-    kappa_per_s: Number | None = number(None, "1/s", "growth rate of an incipient fault", gt=0, le=1000)
+    profile: Literal["abrupt", "incipient"] = entry(
+        "abrupt", "a step, or growing as 1 - exp(-kappa t)", needs={"kappa_per_s": 2}, examples=["incipient"]
+    )
+    kappa_per_s: Number | None = number(
+        None,
+        "1/s",
+        "growth rate of an incipient fault",
+        gt=0,
+        le=1000,
+        needs={"profile": "incipient"},
+        examples=[2],
+    )
 
     def _conflicts(self) -> list[Conflict]:
         incipient, given = self.profile == "incipient", self.kappa_per_s is not None

@@ -41,9 +41,9 @@ class SensorFault(Section):
     """When an instrument is broken."""
 
     sensor: SensorName
-    at_s: Number = number(..., "s", "when the fault starts", ge=0, le=360_000)
-    end_s: Number | None = number(None, "s", "when it is gone; left out: it stays", gt=0)
-    profile: Literal["abrupt"] = entry("abrupt", "this type of fault is always abrupt")
+    at_s: Number = number(..., "s", "when the fault starts", ge=0, le=360_000, examples=[12])
+    end_s: Number | None = number(None, "s", "when it is gone; left out: it stays", gt=0, examples=[20])
+    profile: Literal["abrupt"] = entry("abrupt", "this type of fault is always abrupt", examples=["abrupt"])
 
     @model_validator(mode="before")
     @classmethod
@@ -65,7 +65,9 @@ class SensorBias(SensorFault):
     """The reading is off by a constant."""
 
     type: Literal["bias"]
-    magnitude: Number = number(..., "the sensor's unit", "added to the reading", ge=-5000, le=5000)
+    magnitude: Number = number(
+        ..., "the sensor's unit", "added to the reading", ge=-5000, le=5000, examples=[2]
+    )
 
 
 class SensorNoise(SensorFault):
@@ -75,7 +77,7 @@ class SensorNoise(SensorFault):
     """
 
     type: Literal["noise"]
-    magnitude: Number = number(..., "the sensor's unit", gt=0, le=5000)
+    magnitude: Number = number(..., "the sensor's unit", gt=0, le=5000, examples=[0.5])
 
 
 class SensorScale(SensorFault):
@@ -85,7 +87,7 @@ class SensorScale(SensorFault):
     """
 
     type: Literal["scale"]
-    magnitude: Number = number(..., "share of 1", ge=-MOST_SCALE, le=MOST_SCALE)
+    magnitude: Number = number(..., "share of 1", ge=-MOST_SCALE, le=MOST_SCALE, examples=[0.2])
 
 
 class SensorFreeze(SensorFault):

@@ -21,7 +21,7 @@ class LossOfEffectiveness(Gradual):
 
     type: Literal["loss_of_effectiveness"]
     actuator: Actuator
-    magnitude: Number = number(..., "share of 1", ge=0, le=1)
+    magnitude: Number = number(..., "share of 1", ge=0, le=1, examples=[0.4])
 
     def strike(self, of: Properties, share: float, was_rad: float) -> None:
         of["effectiveness"] *= 1.0 - share * self.magnitude
@@ -40,7 +40,7 @@ class Stuck(Switched):
 
     type: Literal["stuck"]
     actuator: Actuator
-    position_deg: Number | None = number(None, "deg", ge=-90, le=90)
+    position_deg: Number | None = number(None, "deg", ge=-90, le=90, examples=[3])
 
     def strike(self, of: Properties, share: float, was_rad: float) -> None:
         if of["stuck"] == 0.0:
@@ -86,7 +86,7 @@ class Bias(Gradual):
 
     type: Literal["bias"]
     actuator: Actuator = entry(..., "the surface that fails")
-    bias_deg: Number = number(..., "deg", "added to the actuator's output", ge=-90, le=90)
+    bias_deg: Number = number(..., "deg", "added to the actuator's output", ge=-90, le=90, examples=[2])
 
     def strike(self, of: Properties, share: float, was_rad: float) -> None:
         of["bias-rad"] += share * radians(self.bias_deg)
@@ -100,7 +100,7 @@ class RateLimit(Gradual):
 
     type: Literal["rate_limit"]
     actuator: Actuator = entry(..., "the surface that fails")
-    scale: Number = number(..., "share of 1", "what is left of the rate limit", ge=0, le=1)
+    scale: Number = number(..., "share of 1", "what is left of the rate limit", ge=0, le=1, examples=[0.05])
 
     def strike(self, of: Properties, share: float, was_rad: float) -> None:
         of["rate-scale"] *= 1.0 - share * (1.0 - self.scale)
@@ -119,8 +119,10 @@ class Oscillatory(Gradual):
 
     type: Literal["oscillatory"]
     actuator: Actuator = entry(..., "the surface that fails")
-    amplitude_deg: Number = number(..., "deg", "half of the swing", gt=0, le=90)
-    frequency_rad_s: Number = number(..., "rad/s", "angular frequency of the swing", gt=0, le=1000)
+    amplitude_deg: Number = number(..., "deg", "half of the swing", gt=0, le=90, examples=[2])
+    frequency_rad_s: Number = number(
+        ..., "rad/s", "angular frequency of the swing", gt=0, le=1000, examples=[5]
+    )
 
     def strike(self, of: Properties, share: float, was_rad: float) -> None:
         of["oscillation-amplitude-rad"] = share * radians(self.amplitude_deg)

@@ -20,10 +20,6 @@ DOCS = ROOT / "docs"
 PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md"))]
 
 
-def test_property_page_is_up_to_date():
-    assert (DOCS / "properties.md").read_text() == as_markdown(), "run python -m tools.docs"
-
-
 def test_the_first_picture_can_be_drawn():
     roles = {trace.role for panel in first_figure.VIEW.panels for trace in panel.traces}
     assert roles <= set(LOOKS)

@@ -4,6 +4,7 @@ python -m tools.docs [PAGE ...]    write every cheap block, number and picture a
 python -m tools.docs --check       print what stands otherwise and every wrong name; status 1 if any
 python -m tools.docs table NAME    print a table; `constants` and `properties` print those
 python -m tools.docs screens       take the pictures of report and live page anew, with a browser
+python -m tools.docs reference NAME    print a page of the generated reference, as the web site has it
 """
 
 import argparse
@@ -16,7 +17,13 @@ from beaver_ftc.documents.errors import BeaverFtcError
 def main() -> int:
     """Exit status 0 if nothing is wrong."""
     first = sys.argv[1] if len(sys.argv) > 1 else ""
-    printers = {"table": _table, "constants": _constants, "properties": _properties, "screens": _screens}
+    printers = {
+        "table": _table,
+        "constants": _constants,
+        "properties": _properties,
+        "reference": _reference,
+        "screens": _screens,
+    }
     try:
         if first in printers:
             print(printers[first](*sys.argv[2:]))
@@ -94,6 +101,12 @@ def _screens() -> str:
     from tools.docs.screens import write_screens
 
     return "\n".join(map(str, write_screens(ROOT / "docs" / "images")))
+
+
+def _reference(name: str = "") -> str:
+    from tools.docs.reference import page
+
+    return page(name)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """The pages of recorded flights: of an identification and of a diagnosed flight, with its files."""
 
 from base64 import b64encode
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cache
 from io import BytesIO
 from pathlib import Path
@@ -126,14 +126,17 @@ def _shade(axis: Any, rows: Rows) -> None:
         axis.axvspan(begin_s, end_s, color="#f4d6cc", alpha=0.45, linewidth=0)
 
 
+def columns_of(surfaces: Iterable[str]) -> tuple[str, ...]:
+    """Columns of diagnosis.parquet, by the vehicle's surfaces."""
+    each = (f"{surface}_{what}" for surface in surfaces for what in ("effectiveness", "low", "high"))
+    return ("t_s", "faulty", "named", *each, "fault_probability")
+
+
 def write_diagnosis(out: Path, samples: Samples, model: Model, rows: Rows, verdict: dict[str, Any]) -> Path:
     """Write the folder `out/<flight>` whole or not at all; returns it."""
-    columns: dict[str, Any] = {"t_s": rows.t_s, "faulty": rows.faulty, "named": rows.named.tolist()}
-    for i, surface in enumerate(model.vehicle.surfaces):
-        columns[f"{surface}_effectiveness"] = rows.estimate[:, i]
-        columns[f"{surface}_low"] = rows.low[:, i]
-        columns[f"{surface}_high"] = rows.high[:, i]
-    columns["fault_probability"] = rows.probability
+    each = (column for of in zip(rows.estimate.T, rows.low.T, rows.high.T, strict=True) for column in of)
+    values = rows.t_s, rows.faulty, rows.named.tolist(), *each, rows.probability
+    columns = dict(zip(columns_of(model.vehicle.surfaces), values, strict=True))
     return write_results(out, samples.name, columns, verdict, render(samples, model, rows, verdict))
 
 

@@ -22,9 +22,9 @@ ROWS_PER_GROUP = 16384  # 12 MB of 90 columns: large enough to compress well, sm
 _BLOCK = 256  # rows turned into columns at a time: they fit the processor's cache, four times faster
 _MOST_ROWS_AT_ONCE = 1_000_000
 _UNITS = (  # ending of a column's name, unit; the longest endings first
-    ("_rad_s2", "rad/s2"), ("_deg_s", "deg/s"), ("_rad_s", "rad/s"), ("_per_s", "1/s"), ("_rad", "rad"),
-    ("_deg", "deg"), ("_mps", "m/s"), ("_inhg", "inHg"), ("_pa", "Pa"), ("_hz", "Hz"), ("_m", "m"),
-    ("_s", "s"),
+    ("_rad_s2", "rad/s2"), ("_deg2_s", "deg2 s"), ("_deg_s", "deg/s"), ("_rad_s", "rad/s"),
+    ("_per_s", "1/s"), ("_rad", "rad"), ("_deg", "deg"), ("_mps", "m/s"), ("_inhg", "inHg"), ("_pa", "Pa"),
+    ("_hz", "Hz"), ("_m", "m"), ("_s", "s"),
 )  # fmt: skip
 
 

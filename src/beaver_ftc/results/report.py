@@ -45,15 +45,12 @@ def render(folders: Sequence[Path], names: Sequence[str] = ()) -> str:
 
     documents = [json.loads((folder / "metrics.json").read_text(encoding="utf-8")) for folder in folders]
     texts = [(folder / "scenario.yaml").read_text(encoding="utf-8") for folder in folders]
-    data = json.dumps(_data(folders, documents, names), allow_nan=False, separators=(",", ":"))
     return template(_TEMPLATES / "report.html.j2").render(
         runs=[_words(document, text) for document, text in zip(documents, texts, strict=True)],
         names=names,
         modes=MODE_COLOURS,
         marks={mark.name: mark for document in documents for mark in marks(document)}.values(),
-        data=Markup(data.replace("<", "\\u003c")),  # it cannot end the script element it stands in
-        css=_asset("report.css"),
-        script=_asset("report.js"),
+        **parts(folders, documents, names),
         # what studies have found in a folder, if they have been there
         sections=[Markup("".join(section(folder) for section in _SECTIONS)) for folder in folders],
     )
@@ -80,10 +77,35 @@ def _words(metrics: Document, scenario: str) -> Document:
     }
 
 
-def _data(folders: Sequence[Path], documents: Sequence[Document], names: Sequence[str]) -> Document:
+def parts(
+    folders: Sequence[Path],
+    documents: Sequence[Document],
+    names: Sequence[str] = (),
+    shown: Sequence[View] | None = None,
+) -> Document:
+    """Script, style and data of a page that replays flights.
+
+    documents: their metrics. shown: the views on the page, without them all that the flights have in common.
+    """
+    from markupsafe import Markup
+
+    data = json.dumps(_data(folders, documents, names, shown), allow_nan=False, separators=(",", ":"))
+    return {
+        "data": Markup(data.replace("<", "\\u003c")),  # it cannot end the script element it stands in
+        "css": _asset("report.css"),
+        "script": _asset("report.js"),
+    }
+
+
+def _data(
+    folders: Sequence[Path],
+    documents: Sequence[Document],
+    names: Sequence[str],
+    shown: Sequence[View] | None,
+) -> Document:
     """What the page draws from."""
     logs = [folder / "log.parquet" for folder in folders]
-    shown = _common_views(logs, documents)
+    shown = _common_views(logs, documents) if shown is None else shown
     columns = tuple(dict.fromkeys([*_PATH, "mode", *(name for view in shown for name in view.columns)]))
     # fewer points of each curve the more runs there are: the page stays within a few megabytes
     points = MAX_POINTS if len(logs) <= 2 else max(600, 2 * MAX_POINTS // len(logs))

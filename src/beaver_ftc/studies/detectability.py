@@ -44,6 +44,8 @@ EXCITATIONS = (0.25, 0.5, 1.0, 2.0)  # of the scenario's references
 SETTLED_S = 2.0  # the start of a reference is a step of its own
 BISECTIONS = 16  # magnitudes to 2^-16
 MAGNITUDES = ("detected", "detected_median", "isolated", "isolated_median")
+PLACE = ("airspeed_mps", "altitude_m", "excitation")
+COLUMNS = (*PLACE, "fault", *MAGNITUDES, "confused_with", "why")
 Document = dict[str, Any]
 
 
@@ -166,7 +168,7 @@ def survey_name(scenario: Scenario) -> str:
 
 
 def _point(scenario: Scenario, point: tuple[float, float, float]) -> list[Document]:
-    place = dict(zip(("airspeed_mps", "altitude_m", "excitation"), point, strict=True))
+    place = dict(zip(PLACE, point, strict=True))
     try:
         seen = excitation(at(scenario, *point))
     except BeaverFtcError as error:

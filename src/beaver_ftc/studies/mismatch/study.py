@@ -151,14 +151,18 @@ def _bound(tally: Tally, i: int) -> Document:
     }
 
 
+# Columns of mismatch.csv: which part of which source, and what of it under which key of the document.
+PLACE = ("scenario", "axis", "source", "part")
+FIGURES = {"rms_rad_s2": "rms", "max_rad_s2": "max", "share": "share", "bound_share": "bound_share"}
+
+
 def csv_rows(found: Document) -> Iterator[Document]:
     """One row per axis, source and part of a document."""
-    columns = {"rms_rad_s2": "rms", "max_rad_s2": "max", "share": "share", "bound_share": "bound_share"}
     for axis, sources in found["axes"].items():
         for source, figures in sources.items():
             for part, of in [("", figures), *figures.get("parts", {}).items()]:
-                place = {"scenario": found["scenario"], "axis": axis, "source": source, "part": part}
-                yield place | {column: of[key] for column, key in columns.items()}
+                place = dict(zip(PLACE, (found["scenario"], axis, source, part), strict=True))
+                yield place | {column: of[key] for column, key in FIGURES.items()}
 
 
 def _as_files(found: Document, table: Iterable[Document]) -> Files:

@@ -148,14 +148,15 @@ def files_of(survey: tuple[Document, list[Row]]) -> Files:
     return {
         f"{NAME}.json": as_json(document),
         f"{NAME}.txt": as_text(document) + "\n",
-        f"{NAME}.parquet": _rows_as_parquet(rows),
+        f"{NAME}.parquet": rows_as_parquet(rows),
         "figures": {
             f"{name}.{kind}": figure for name, figure in _figures(document, rows) for kind in ("png", "svg")
         },
     }
 
 
-def _rows_as_parquet(rows: Sequence[Row]) -> bytes:
+def rows_as_parquet(rows: Sequence[Row]) -> bytes:
+    """One row a flight and scheme."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 

@@ -35,6 +35,8 @@ Getter = Callable[[Document, "Landing"], Any]
 
 FLOWN, DEPARTED, BAD_INPUT, FAILED, CRASHED = "flown", "departed", "bad_input", "failed", "crashed"
 RESULTS = (FLOWN, DEPARTED)  # the statuses of a flight that has metrics
+# Columns of every sweep, and their types: what varies stands behind the first.
+FIXED = {"run": "int", "seed": "int", "status": "text", "reason": "text"}
 
 AXES = ("p", "q", "r")
 
@@ -153,12 +155,10 @@ def schema_of(sweep: "Sweep") -> "pa.Schema":
     import pyarrow as pa
 
     types = {"float": pa.float64(), "int": pa.int64(), "flag": pa.bool_(), "text": pa.string()}
+    first, *after = [pa.field(name, types[kind], nullable=name == "reason") for name, kind in FIXED.items()]
     varied = [pa.field(key, types[kind_of(how)]) for key, how in sweep.file.vary.items()]
     metrics = [pa.field(name, types[kind]) for name, kind in columns_of(sweep.aircraft.surfaces).items()]
-    return pa.schema([
-        pa.field("run", pa.int64(), nullable=False), *varied, pa.field("seed", pa.int64(), nullable=False),
-        pa.field("status", pa.string(), nullable=False), pa.field("reason", pa.string()), *metrics,
-    ])  # fmt: skip
+    return pa.schema([first, *varied, *after, *metrics])
 
 
 def table_of(sweep: "Sweep", schema: "pa.Schema", rows: Sequence[Row]) -> "pa.Table":

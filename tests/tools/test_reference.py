@@ -1,0 +1,234 @@
+"""The generated reference: what stands in it is there, each key is whole, and each example loads."""
+
+import json
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import pytest
+import yaml
+from tools.docs.reference import PAGES, columns, commands, keys, page, python_names
+from tools.docs.reference.schema import ITEM, NAME, Key, Sections
+
+import beaver_ftc as bf
+from beaver_ftc.aircraft import load
+from beaver_ftc.aircraft.schema import AircraftFile
+from beaver_ftc.cli.main import COMMANDS
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.flights.vehicle import Vehicle
+from beaver_ftc.scenario.loader import load_text
+from beaver_ftc.scenario.signals import Signal
+from beaver_ftc.scenario.sweeps import Variation, load_sweep_text
+
+ROOT = Path(__file__).parents[2]
+LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4, "at_s": 12}
+PROFILE = {"altitude_m": [{"value": 1900}], "airspeed_mps": [{"value": 45}], "heading_deg": [{"value": 90}]}
+NO_TERMS = {"Cl": [], "Cm": [], "Cn": []}
+# What a file says besides the key in question.
+AROUND = {
+    "scenario-keys": {"": {"name": "x"}, "expect": {"faults": [LOSS], "autopilot": PROFILE}},
+    "sweep-keys": {"": {"name": "x", "runs": 10, "base": "elevator-partial-loss"}},
+    "aircraft-keys": {
+        "": yaml.safe_load((load().folder / "aircraft.yaml").read_text()),
+        "moments": {"moments": NO_TERMS},
+        "forces": {"moments": NO_TERMS, "forces": {}},
+    },
+    "vehicle-keys": {},
+}
+NAMES = {"surfaces": "elevator", "vary": "faults[0].magnitude"}  # what stands for NAME; else any name
+
+
+@cache
+def sections(kind):
+    return Sections(keys.KINDS[kind].schema())
+
+
+EVERY = [
+    pytest.param(kind, section, id=f"{kind}:{section.title}")
+    for kind in keys.KINDS
+    for section in sections(kind)
+]
+
+
+def lacks(section, key):
+    """What is not said of a key: its meaning, its example, range and unit of its numbers."""
+    lacking = [] if key.says else ["meaning"]
+    lacking += [] if key.sections or key.example is not None else ["example"]
+    if key.number is None or key.sections:
+        return lacking
+    lacking += [] if key.range else ["range"]
+    pure = key.number["type"] == "integer" or key.name == "options"  # each option has its own unit
+    return lacking + ([] if pure or all(key.unit(place) for place in section.places) else ["unit"])
+
+
+@pytest.mark.parametrize(("kind", "section"), EVERY)
+def test_each_key_is_whole(kind, section):
+    assert [(key.name, lacking) for key in section.keys if (lacking := lacks(section, key))] == []
+
+
+# Sections that are nothing without one of several keys: what is taken, and the keys that stand without it.
+LEAST = {
+    "Signal": {"step": {"amplitude_deg_s": 2}},
+    "Change": {"law": "nominal"},
+    "AltitudeLeg": {"value": 1900},
+    "AirspeedLeg": {"value": 45},
+    "HeadingLeg": {"value": 90},
+    "BankLeg": {"value": 20},
+    "Variation": {"uniform": [0.2, 0.4]},
+    "ErrorBox": {"signals": {"dpt": [0, 1]}},
+    "Level": {"at_most": 1},
+    "QuantileLevel": {"at_most": 1},
+}
+ALONE = {"hold", *Signal.model_fields, *Variation.model_fields}
+
+
+def required(schema, section):
+    """Examples of the keys that the section cannot do without."""
+    return {key.name: value_of(schema, section, key) for key in section.keys if key.required}
+
+
+def value_of(schema, section, key):
+    """The example of a key; of one that holds sections, the least that may stand there."""
+    if not key.sections:
+        return key.example
+    below, here = schema.found[key.sections[0]], (*section.places[0].path, key.name)
+    value = required(schema, below) | LEAST.get(below.title, {})
+    inside = next(place.path for place in below.places if place.path[: len(here)] == here)[len(here) :]
+    return wrapped(schema, inside, here, value)
+
+
+def wrapped(schema, path, above, value):
+    """A value at a path below `above`, each section on the way with what it cannot do without."""
+    for i in reversed(range(len(path))):
+        before = (*above, *path[:i])
+        if path[i] == ITEM:
+            value = [value]
+        elif path[i] == NAME:
+            value = {NAMES.get(before[-1], "any"): value}
+        else:
+            section = next(one for one in schema if any(place.path == before for place in one.places))
+            value = required(schema, section) | {path[i]: value}
+    return value
+
+
+def document(kind, section, key):
+    """A file that has the key's example at the first place of its section, and what it cannot do without."""
+    schema = sections(kind)
+    least = {} if key.name in ALONE else LEAST.get(section.title, {})
+    value = {**required(schema, section), **least, **key.needs, key.name: value_of(schema, section, key)}
+    path = section.places[0].path
+    around = {**AROUND[kind].get("", {}), **AROUND[kind].get(path[0] if path else "", {})}
+    return merged(around, wrapped(schema, path, (), value))
+
+
+def merged(one, other):
+    """Mappings merged, the second one's values before the first one's."""
+    if not isinstance(one, dict) or not isinstance(other, dict):
+        return other
+    return {**one, **{name: merged(one.get(name), value) for name, value in other.items()}}
+
+
+LOADERS = {
+    "scenario-keys": lambda text, folder: load_text(text, folder=folder),
+    "sweep-keys": lambda text, folder: load_sweep_text(text, folder=folder),
+    "aircraft-keys": lambda text, folder: AircraftFile.model_validate(yaml.safe_load(text)),
+    "vehicle-keys": lambda text, folder: Vehicle.model_validate(yaml.safe_load(text)),
+}
+
+
+@pytest.mark.parametrize(("kind", "section"), EVERY)
+def test_each_example_loads(kind, section, tmp_path):
+    (tmp_path / "pilot.csv").write_text("t_s,q_deg_s,rate_deg_s\n0,0,0\n1,2,2\n")
+    refused = {}
+    for key in section.keys:
+        try:
+            LOADERS[kind](json.dumps(document(kind, section, key)), tmp_path)
+        except (ValueError, BadInput) as error:
+            refused[key.name] = str(error)
+    assert refused == {}
+
+
+def test_an_example_out_of_range_does_not_load(tmp_path):
+    found = sections("scenario-keys").found["LossOfEffectiveness"]
+    key = next(key for key in found.keys if key.name == "magnitude")
+    wrong = replace(key, node={**key.node, "examples": [40]})
+    with pytest.raises(BadInput, match="40 is out of range"):
+        load_text(json.dumps(document("scenario-keys", found, wrong)), folder=tmp_path)
+
+
+def test_a_key_that_says_nothing_is_not_whole():
+    found = sections("scenario-keys").found["LossOfEffectiveness"]
+    bare = Key("size", {"type": "number"}, ({"type": "number"},), True, ())
+    assert lacks(found, bare) == ["meaning", "example", "range", "unit"]
+
+
+def test_every_page_can_be_printed():
+    for name in PAGES:
+        text = page(name)
+        assert text.startswith("# ")
+        assert "?" in text.split("\n\n")[1], name  # the question that the page answers
+        widths = [line.count(" | ") for line in text.splitlines() if line.startswith("| ")]
+        assert widths or name == "python-names"
+        assert 0 not in widths
+
+
+def test_a_page_that_there_is_not():
+    with pytest.raises(BadInput, match="allowed: scenario-keys"):
+        page("scenario")
+
+
+def test_the_command_prints_a_page():
+    printed = subprocess.run(
+        [sys.executable, "-m", "tools.docs", "reference", "vehicle-keys"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert printed.stdout.strip() == page("vehicle-keys").strip()
+
+
+def test_every_command_and_option_is_there():
+    text = commands.page()
+    for name in COMMANDS:
+        section = text.partition(f"\n## {name}\n")[2].partition("\n## ")[0]
+        assert "| option | what it is |" in section, name
+    assert "`--flightgear HOST:PORT`" in text
+    options = [each.name for _, command in commands.leaves(commands.PARSER) for each in command.params]
+    assert text.count("`--format <text") == options.count("format")
+
+
+def test_exit_statuses_are_those_of_the_errors():
+    rows = dict(re.findall(r"^\| `(\d)` \|[^|]*\| (?:`(\w+)`)?", commands.statuses_page(), re.MULTILINE))
+    assert rows == {"0": "", "1": "", "2": "BadInput", "3": "SimulationFailed"}
+    assert (bf.BadInput.exit_code, bf.SimulationFailed.exit_code) == (2, 3)
+
+
+def test_every_column_of_a_log_has_a_meaning():
+    patterns = yaml.safe_load(columns.TEXTS.read_text())["log"]["columns"]
+    for name in ("elevator-partial-loss", "aileron-stuck"):
+        flight = bf.fly(bf.load(name).with_({"duration_s": 0.1, "faults": [], "expect": {}}))
+        for column in flight.log.columns:
+            assert columns.pattern_of(column, patterns), column
+
+
+@pytest.mark.parametrize("table", columns.TABLES)
+def test_every_meaning_is_of_a_column(table):
+    patterns = yaml.safe_load(columns.TEXTS.read_text())[table]["columns"]
+    used = {columns.pattern_of(name, patterns) for name in columns.TABLES[table]()}
+    assert used == set(patterns)
+
+
+def test_a_column_without_a_meaning_is_refused():
+    with pytest.raises(BadInput, match="yaw_rate_rad_s"):
+        columns.pattern_of("yaw_rate_rad_s", ["t_s"])
+
+
+def test_public_names_are_all_there():
+    named = {name for names in python_names.NAMES.values() for name in names}
+    assert set(bf.__all__) - {"__version__", "aircraft"} <= named
+    for name in named:
+        assert python_names.found(name).__doc__, name

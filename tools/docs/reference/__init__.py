@@ -1,0 +1,24 @@
+"""The generated reference: pages made of what they describe, for the web site and for a terminal."""
+
+from collections.abc import Callable
+
+from beaver_ftc.documents.errors import BadInput, suggestion
+from tools.docs import properties
+from tools.docs.reference import columns, commands, keys, python_names
+
+# Name of each page, and what prints it; the order is that of the site.
+PAGES: dict[str, Callable[[], str]] = {
+    **{name: lambda kind=kind: keys.page(kind) for name, kind in keys.KINDS.items()},  # type: ignore[misc]
+    "columns": columns.page,
+    "commands": commands.page,
+    "exit-statuses": commands.statuses_page,
+    "properties": properties.as_markdown,
+    "python-names": python_names.page,
+}
+
+
+def page(name: str) -> str:
+    """The Markdown of a page. Raises BadInput for a name that none has."""
+    if name not in PAGES:
+        raise BadInput(f"reference: there is no page {name[:60]!r}{suggestion(name, PAGES)}")
+    return PAGES[name]()

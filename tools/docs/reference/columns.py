@@ -1,0 +1,123 @@
+"""The columns of the log and of every table that a command writes: from the code that writes them."""
+
+import io
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path
+
+import yaml
+
+from beaver_ftc.aircraft import load
+from beaver_ftc.control.outer.state import COLUMNS as PROFILE
+from beaver_ftc.diagnosis.isolation import estimator_names
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.flights import pages
+from beaver_ftc.plant.channels import log_columns
+from beaver_ftc.results.log import unit_of
+from beaver_ftc.studies import detectability
+from beaver_ftc.studies.mismatch import split, study
+from beaver_ftc.studies.mismatch.sources import SOURCES
+from beaver_ftc.studies.power.shown import rows_as_parquet
+from beaver_ftc.studies.present.tables import markdown_table
+from beaver_ftc.studies.sweep.one_flight import FIXED, columns_of
+
+TEXTS = Path(__file__).with_name("columns.yaml")
+NUMBER, TEXT, FLAG = "number", "text", "true or false"
+_KINDS = {"float": NUMBER, "double": NUMBER, "int": "whole number", "int64": "whole number", "text": TEXT,
+          "string": TEXT, "flag": FLAG, "bool": FLAG}  # fmt: skip
+_WORDS = {
+    "AXIS": "[pqr]",
+    "SURFACE": "|".join((*load().surfaces, "SURFACE")),
+    "ESTIMATOR": "|".join(estimator_names("all", load())),
+    "SIGNAL": "|".join(load().signals),
+    "SOURCE": "|".join(SOURCES),
+    "WITHIN": "[0-9.]+",
+}
+
+Columns = Mapping[str, str]  # name -> type
+
+
+def _log() -> Columns:
+    aircraft = load()
+    names = log_columns(aircraft, estimator_names("all", aircraft), True, True, PROFILE, True)
+    return dict.fromkeys(names, NUMBER)
+
+
+def _sweep() -> Columns:
+    kinds = {**FIXED, **columns_of(load().surfaces)}
+    return {name: _KINDS[kind] for name, kind in kinds.items()}
+
+
+def _power() -> Columns:
+    from pyarrow.parquet import read_schema
+
+    schema = read_schema(io.BytesIO(rows_as_parquet([])))
+    return {name: _KINDS[str(kind)] for name, kind in zip(schema.names, schema.types, strict=True)}
+
+
+def _detectability() -> Columns:
+    texts = ("fault", "confused_with", "why")
+    return {name: TEXT if name in texts else NUMBER for name in detectability.COLUMNS}
+
+
+def _mismatch() -> Columns:
+    return {**dict.fromkeys(study.PLACE, TEXT), **dict.fromkeys(study.FIGURES, NUMBER)}
+
+
+def _mismatch_frames() -> Columns:
+    return dict.fromkeys(split.COLUMNS, NUMBER)
+
+
+def _diagnosis() -> Columns:
+    kinds = {"faulty": FLAG, "named": TEXT}
+    return {name: kinds.get(name, NUMBER) for name in pages.columns_of(["SURFACE"])}
+
+
+TABLES: dict[str, Callable[[], Columns]] = {
+    "log": _log,
+    "sweep": _sweep,
+    "power": _power,
+    "detectability": _detectability,
+    "mismatch": _mismatch,
+    "mismatch-frames": _mismatch_frames,
+    "diagnosis": _diagnosis,
+}
+
+
+def page() -> str:
+    """The page."""
+    says = (
+        "Which columns do the log and the tables have? `AXIS` is p, q and r, `SURFACE` each control surface."
+    )
+    texts = yaml.safe_load(TEXTS.read_text(encoding="utf-8"))
+    return "\n\n".join(["# Columns", says, *(_table(name, texts[name]) for name in TABLES)]) + "\n"
+
+
+def _table(name: str, text: Mapping[str, str]) -> str:
+    rows = markdown_table(("column", "type", "unit", "what it is"), list(_rows(name, text["columns"])))
+    return f"## {text['title']}\n\n{text['says']}\n\n{rows}"
+
+
+def _rows(table: str, meanings: Mapping[str, str]) -> Iterator[tuple[str, ...]]:
+    """A row a pattern, where the first column of it stands."""
+    done = set()
+    for name, kind in TABLES[table]().items():
+        pattern = pattern_of(name, meanings)
+        if pattern not in done:
+            done.add(pattern)
+            yield f"`{pattern}`", kind, unit_of(name) if kind == NUMBER else "", meanings[pattern]
+
+
+def pattern_of(name: str, patterns: Iterable[str]) -> str:
+    """The pattern that a column's name follows, the plainest if several. BadInput for a name with none."""
+    fitting = [pattern for pattern in patterns if re.fullmatch(_regular(pattern), name)]
+    if not fitting:
+        raise BadInput(f"{name}: what this column means is missing in {TEXTS.name}")
+    return min(fitting, key=lambda pattern: sum(word in pattern for word in _WORDS))
+
+
+def _regular(pattern: str) -> str:
+    pattern = re.escape(pattern)
+    for word, names in _WORDS.items():
+        pattern = pattern.replace(word, f"(?:{names})")
+    return pattern

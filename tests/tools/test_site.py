@@ -25,7 +25,7 @@ def site(tmp_path_factory):
 
 
 def test_every_public_name_is_in_the_reference_with_its_source(site):
-    page = (site / "reference.html").read_text(encoding="utf-8")
+    page = (site / "python-names.html").read_text(encoding="utf-8")
     found = set(re.findall(r'id="beaver_ftc\.(?:aircraft\.)?(\w+)"', page))
     assert set(bf.__all__) - {"__version__", "aircraft"} <= found
     assert "load" in found

@@ -1,0 +1,77 @@
+"""Tables of docs/verification.md: what each step of sharpening buys."""
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from beaver_ftc.scenario.loader import load_scenario
+from beaver_ftc.studies.detectability import run_survey
+from beaver_ftc.studies.present.tables import markdown_table, number
+from beaver_ftc.studies.verify import Campaign, conduct, summarise
+
+FAULTS, PROBED = 300, 6
+ROWS = {
+    "true fault excluded": lambda of: str(of["true_fault_exclusions"]),
+    "isolated": lambda of: str(of["isolated"]),
+    "detection delay, median / 90 %": lambda of: _spread(of["delay_s"]),
+    "isolation delay, median / 90 %": lambda of: _spread(of["isolation_delay_s"]),
+}
+
+
+def verification_steps() -> str:
+    """The same random faults by the published scheme and by each step from it to the default and beyond."""
+    return _table(FAULTS)
+
+
+def verification_steps_probe() -> str:
+    """A few of them."""
+    return _table(PROBED)
+
+
+def _table(faults: int) -> str:
+    with TemporaryDirectory() as folder:
+        rows = conduct(Campaign(0.0, faults, 1, steps=True), Path(folder), 2)
+    schemes: dict[str, Any] = summarise(rows)["schemes"]
+    return markdown_table((f"of {faults} faults", *schemes), [
+        (name, *(cell(of) for of in schemes.values())) for name, cell in ROWS.items()
+    ])  # fmt: skip
+
+
+def _spread(of: dict[str, float | None]) -> str:
+    return "/".join(number(of[key], none="never") for key in ("median", "p90"))
+
+
+def verification_map() -> str:
+    """The smallest losses that are certain to be found, over the envelope."""
+    return _surveyed()
+
+
+def verification_map_probe() -> str:
+    """The same at one point of the envelope."""
+    return _surveyed(speeds_mps=(44.0,), altitudes_m=(1000.0,))
+
+
+SCALES = (0.5, 2.0)  # of the references of `fault-free`
+
+
+def _surveyed(**where: Any) -> str:
+    with TemporaryDirectory() as folder:
+        found = run_survey(Path(folder), load_scenario("fault-free"), excitations=SCALES, **where)
+    return _map_of(found["points"])
+
+
+def _map_of(rows: list[dict[str, Any]]) -> str:
+    head = ("loss of", "references times", "certain at", "from", "half the time at", "from")
+    faults = dict.fromkeys(row["fault"] for row in rows)
+    return markdown_table(head, [
+        (fault, f"{scale:g}", *_smallest(rows, fault, scale, "isolated"),
+         *_smallest(rows, fault, scale, "isolated_median"))
+        for fault in faults for scale in SCALES
+    ])  # fmt: skip
+
+
+def _smallest(rows: list[dict[str, Any]], fault: str, scale: float, key: str) -> tuple[str, str]:
+    """At how many points there is such a loss, and from which to which."""
+    here = [row[key] for row in rows if (row["fault"], row["excitation"]) == (fault, scale)]
+    found = [magnitude for magnitude in here if magnitude is not None]
+    return f"{len(found)}/{len(here)}", f"{min(found):.2f}-{max(found):.2f}" if found else "-"

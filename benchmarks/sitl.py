@@ -1,9 +1,11 @@
-"""What `sitl` promises, measured: lockstep, latency, memory, the published case, healthy hours.
+"""What `sitl` promises, measured: lockstep, latency, memory, the published case, a circuit from the ground,
+healthy hours.
 
     python benchmarks/sitl.py lockstep [--frames 100000]
     python benchmarks/sitl.py latency [--frames 20000]
     python benchmarks/sitl.py memory [--frames 1000000]
     python benchmarks/sitl.py published
+    python benchmarks/sitl.py circuit
     python benchmarks/sitl.py healthy [--hours 50] [--rate 100] [--seed 0]
 
 The autopilots are those of tools/autopilots: neither ArduPilot nor PX4 is needed. Exit status 1 where a bar
@@ -26,7 +28,7 @@ from pymavlink.dialects.v20 import common
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from tools.autopilots import peers, trial
-from tools.autopilots.small import Small
+from tools.autopilots.small import Circuit, Small
 
 import beaver_ftc as bf
 from beaver_ftc.integrations.sitl.ardupilot import Ardupilot
@@ -117,12 +119,15 @@ def latency(frames: int) -> Iterator[str]:
         raise SystemExit(1)
 
 
-def fly_on(protocol: str, address: tuple[str, int], frames: int) -> peers.Px4 | None:
-    """So many frames with the small autopilot."""
+def fly_on(
+    protocol: str, address: tuple[str, int], frames: int, small: Small | None = None, rate_hz: int = 400
+) -> peers.Px4 | None:
+    """So many frames with a small autopilot."""
+    small = small or Small()
     if protocol == "ardupilot":
-        peers.Ardupilot(Small().outputs, 400).fly(address, frames)
+        peers.Ardupilot(small.outputs, rate_hz).fly(address, frames)
         return None
-    autopilot = peers.Px4(Small().outputs)
+    autopilot = peers.Px4(small.outputs)
     autopilot.fly(address, frames)
     return autopilot
 
@@ -180,6 +185,27 @@ def published(_: int) -> Iterator[str]:
         raise SystemExit(1)
 
 
+def circuit(_: int) -> Iterator[str]:
+    """From the ground and back by the command, a fault on the way, under both protocols at 100 Hz."""
+    file, missed = Path(__file__).parents[1] / "examples" / "autopilot" / "from-the-ground.yaml", False
+    for protocol in ("ardupilot", "px4"):
+        with tempfile.TemporaryDirectory() as out:
+            process, address = started(
+                str(file), "--as", protocol, "--rate", "100", "--speed", "0", "--out", out
+            )
+            small = Circuit()
+            fly_on(protocol, address, 100_000, small, 100)
+            document = json.loads(process.communicate()[0])
+            link, found = document["link"], document["isolation"]["fault"]
+            delay = f"{found} named {document['isolation']['delay_s']} s after the fault"
+            says = f"diagnosed from {link['diagnosed_from_s']:.1f} s, {delay}"
+            lost = f"false alarm {document['false_alarm']}, departure {document['departure']}"
+            yield f"{protocol}: {small.phase} at the end; {says}, {lost}, exit {process.returncode}"
+            missed |= process.returncode != 0 or small.phase != "stop"
+    if missed:
+        raise SystemExit(1)
+
+
 def heard(ground: socket.socket) -> list[str]:
     """The texts a ground station has been sent."""
     mav, texts = common.MAVLink(None), []
@@ -195,7 +221,7 @@ def heard(ground: socket.socket) -> list[str]:
 # What is measured, and how many frames by itself.
 MEASURED = {
     "lockstep": (lockstep, 100_000), "latency": (latency, 20_000), "memory": (memory, 1_000_000),
-    "published": (published, 0),
+    "published": (published, 0), "circuit": (circuit, 0),
 }  # fmt: skip
 
 

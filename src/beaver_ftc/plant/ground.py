@@ -11,8 +11,9 @@ from beaver_ftc.plant.adapter import FT_PER_M, Plant
 from beaver_ftc.plant.state import FlightState
 
 _AT_REST = ("accelerations/wdot-ft_sec2", "accelerations/qdot-rad_sec2")
+_AIR = ("atmosphere/turb-type", *(f"atmosphere/gust-{axis}-fps" for axis in ("north", "east", "down")))
 _STEPS = 1e-4, 1e-5  # m, rad: for differences
-_GOAL, _MOST_STEPS = 1e-7, 20  # ft/s2 and rad/s2
+_GOAL, _MOST_STEPS = 1e-5, 20  # ft/s2 and rad/s2: JSBSim finds friction to some 1e-7
 
 
 def lay(plant: Plant, ground_m: float) -> None:
@@ -25,12 +26,12 @@ def stand(plant: Plant, neutral: FlightState, ground_m: float) -> None:
     """Put the aircraft onto a ground of this height, at rest: surfaces and engine as in `neutral`.
 
     Height and pitch are where the wheels carry the weight, found by Newton's method from what its file says;
-    along the ground friction holds it. Wings level, heading north, turbulence held back meanwhile.
+    along the ground friction holds it. Wings level, heading north; in still air, the wind comes back after.
     """
     lay(plant, ground_m)
-    turbulence = plant.read("atmosphere/turb-type")
-    if turbulence:
-        plant.write("atmosphere/turb-type", 0.0)
+    air = {name: plant.read(name) for name in _AIR}
+    for name in air:
+        plant.write(name, 0.0)
     ground = plant.aircraft.file.ground
     about = np.array([ground_m + ground.height_m, radians(ground.pitch_deg)])  # type: ignore[union-attr]
     at = replace(neutral, airspeed_mps=0.0, alpha_rad=0.0, beta_rad=0.0, phi_rad=0.0, psi_rad=0.0)
@@ -44,8 +45,8 @@ def stand(plant: Plant, neutral: FlightState, ground_m: float) -> None:
 
     if not _finds_rest(look, about):
         raise SimulationFailed(f"{plant.aircraft.name} does not come to rest on its wheels")
-    if turbulence:
-        plant.write("atmosphere/turb-type", turbulence)
+    for name, value in air.items():
+        plant.write(name, value)
 
 
 def _finds_rest(look: Callable[[np.ndarray], np.ndarray], x: np.ndarray) -> bool:

@@ -34,7 +34,7 @@ def forces_n(sim):
     return [N_PER_LBF * sim.read(f"forces/fb{axis}-gear-lbs") for axis in "xyz"]
 
 
-@pytest.mark.parametrize("altitude_m", [-200.0, 0.0, 2000.0])
+@pytest.mark.parametrize("altitude_m", [-200.0, 0.0, 100.0, 101.0, 2000.0])
 def test_it_stands_where_the_ground_is_and_does_not_move(altitude_m):
     """The wheels carry the weight; accelerometers feel gravity alone; in five seconds nothing moves."""
     vehicle = Vehicle(scenario(altitude_m), pulses=True)

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tools.autopilots import peers
+from tools.autopilots.small import Small
 from typer.testing import CliRunner
 
 from beaver_ftc.aircraft import load
@@ -16,6 +18,9 @@ from beaver_ftc.design.context import DesignFunctions
 from beaver_ftc.design.model import design_record
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.documents.paths import data_root
+from beaver_ftc.integrations.sitl.ardupilot import Ardupilot
+from beaver_ftc.integrations.sitl.link import Link
+from beaver_ftc.integrations.sitl.vehicle import Vehicle
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant import instrumented
 from beaver_ftc.plant.adapter import Plant, bare, probe, translated
@@ -118,6 +123,36 @@ def test_a_loss_is_found_and_named_rightly(derived, surface):
     assert faulty.detection_time_s >= 8.0
     assert faulty.isolated == surface
     assert faulty.departure is None
+
+
+def under_an_autopilot(folder, name):
+    """A flight under the small one, in which half of the elevator goes."""
+    fault = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.5, "at_s": 3}
+    expect = {
+        "isolated_as": "elevator",
+        "detected_within_s": 0.5,
+        "no_false_alarm": True,
+        "no_departure": True,
+    }
+    scenario = load_text(FLIGHT.replace("NAME", name), folder=folder)
+    flown = scenario.with_({"duration_s": 6, "faults": [fault], "expect": expect})
+    vehicle = Vehicle(flown, pulses=True, log=False)
+    end, autopilot = Ardupilot(vehicle, Link()), peers.Ardupilot(Small().outputs)
+    while not vehicle.over:
+        autopilot.hear(end.take(autopilot.next(), "it", 0.0))
+    return vehicle.flight.land()
+
+
+def test_it_flies_under_an_autopilot(derived):
+    _, folder, name = derived
+    landed = under_an_autopilot(folder, name)
+    assert landed.passed, landed
+
+
+def test_it_does_not_stand_on_the_ground(derived):
+    _, folder, name = derived
+    with pytest.raises(BadInput, match=f"{name}'s file has no `ground` to stand on, allowed: false"):
+        load_text(FLIGHT.replace("NAME", name) + "initial: {on_ground: true}", folder=folder)
 
 
 def test_what_leaves_the_envelope_raises_no_alarm(derived):
@@ -316,6 +351,7 @@ def test_the_tutorials_aircraft_is_its_published_table(tmp_path):
         ("Cm", "qh"): -9.96 / 2, ("Cm", "elevator"): -0.923, ("Cn", "beta"): 0.071, ("Cn", "rudder"): -0.072,
     }  # fmt: skip
     assert {key: found[key] for key in book} == pytest.approx(book, rel=1e-3)
+    assert under_an_autopilot(tmp_path, "navion").passed
 
 
 SAME = ["elevator-partial-loss", "aileron-stuck", "rudder-stuck", "unanticipated", "fault-free"]

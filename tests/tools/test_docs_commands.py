@@ -2,6 +2,8 @@
 
 import io
 import json
+import os
+import time
 from importlib import import_module
 
 import numpy as np
@@ -62,6 +64,19 @@ def test_a_command_that_takes_too_long_is_to_be_dear(monkeypatch):
     for line in ("sleep 20; echo 1", busy):
         assert "make it dear" in one(line).fault
     assert outputs([], {busy})[busy].text == "1"
+
+
+def test_what_is_interrupted_leaves_nothing_running(tmp_path, monkeypatch):
+    def interrupted(*_, **__):
+        while not (tmp_path / "pid").exists():
+            time.sleep(0.01)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(commands, "zip", interrupted, raising=False)
+    with pytest.raises(KeyboardInterrupt):
+        outputs([f"echo $$ > {tmp_path}/part; mv {tmp_path}/part {tmp_path}/pid; sleep 60"])
+    with pytest.raises(ProcessLookupError):
+        os.kill(int((tmp_path / "pid").read_text()), 0)
 
 
 def picture(shade, size=40):

@@ -9,6 +9,7 @@ python -m tools.docs reference NAME    print a page of the generated reference, 
 
 import argparse
 import json
+import signal
 import sys
 
 from beaver_ftc.documents.errors import BeaverFtcError
@@ -24,6 +25,7 @@ def main() -> int:
         "reference": _reference,
         "screens": _screens,
     }
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     try:
         if first in printers:
             print(printers[first](*sys.argv[2:]))

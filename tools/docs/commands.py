@@ -35,6 +35,8 @@ class Checkout:
     """The package of this checkout, as the tests of the pages use an installed one."""
 
     def __init__(self, shared: Path, needed: Collection[str] = ()) -> None:
+        self._running: set[int] = set()
+        self._ended = False
         own = {name for name in os.environ if name.startswith(_OURS) and name not in needed}
         inherited = {name: value for name, value in os.environ.items() if name not in own}
         self.environment = {
@@ -58,13 +60,23 @@ class Checkout:
                 stderr=err,
                 start_new_session=True,
             )
+            self._running.add(process.pid)
+            if self._ended:
+                _end(process.pid)
             clock = threading.Timer(PATIENCE * (longest_s or 1e6), _end, (process.pid,))
             clock.start()
             _, status, used = os.wait4(process.pid, 0)  # with the time of its children
             clock.cancel()
+            self._running.discard(process.pid)
             process.returncode = os.waitstatus_to_exitcode(status)
             said = [stream.seek(0) or stream.read().decode(errors="replace") for stream in (out, err)]
         return process.returncode, *said, used.ru_utime + used.ru_stime
+
+    def end(self) -> None:
+        """End what is running, with everything it has started."""
+        self._ended = True
+        for group in list(self._running):
+            _end(group)
 
     def beaver(self, *arguments: str, cwd: Path) -> subprocess.CompletedProcess:
         """Run `beaver-ftc` with these arguments in a folder."""
@@ -89,11 +101,16 @@ def outputs(
     needed: environment variables that lead to data.
     """
     lines = list(dict.fromkeys((*dear, *cheap)))
+    limits = [None if line in dear else LONGEST_S for line in lines]
     with tempfile.TemporaryDirectory() as shared, ThreadPoolExecutor(jobs or os.cpu_count()) as threads:
         checkout = Checkout(Path(shared), needed)
-        limits = [None if line in dear else LONGEST_S for line in lines]
-        done = threads.map(lambda line, limit: _output(checkout, line, limit), lines, limits)
-        return dict(zip(lines, done, strict=True))
+        try:
+            done = threads.map(lambda line, limit: _output(checkout, line, limit), lines, limits)
+            return dict(zip(lines, done, strict=True))
+        except BaseException:  # interrupted: nothing goes on behind us
+            threads.shutdown(wait=False, cancel_futures=True)
+            checkout.end()
+            raise
 
 
 def _output(checkout: Checkout, line: str, longest_s: float | None) -> Output:

@@ -33,7 +33,7 @@ TABLE = (
     ),
     Exempt(r"beaver-ftc derive AIRCRAFT .*", "names the command's arguments", "beaver-ftc derive --help"),
     Exempt(
-        r"pip install (\.|\"\$BEAVER_FTC\" pytest pytest-xdist|'beaver-ftc\[\w+\]')",
+        r"pip install (\.|jupyterlab|\"\$BEAVER_FTC\" pytest pytest-xdist|'beaver-ftc\[\w+\]')",
         "needs the package index; these tests install the wheel themselves",
     ),
     Exempt(r"pip wheel .*", "needs the package index for the build; these tests build the wheel themselves"),

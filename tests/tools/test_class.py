@@ -1,0 +1,39 @@
+"""The class: every exercise has its answer, the answers are flown, and the minutes are ninety."""
+
+import re
+from math import exp
+from pathlib import Path
+
+import pytest
+from tools.docs.tables import class_
+
+PAGE = (Path(__file__).resolve().parents[2] / "docs" / "class.md").read_text(encoding="utf-8")
+SHEETS, _, ANSWERS = PAGE.partition("## Answers")
+
+
+def test_every_exercise_has_an_answer():
+    asked = re.findall(r"^- (\d[a-z])\. ", SHEETS, re.MULTILINE)
+    answered = re.findall(r"\b(\d[a-z])(?: \||:)", ANSWERS)
+    assert len(asked) > 12
+    assert set(asked) == set(answered)
+
+
+def test_the_minutes_are_ninety():
+    parts = [(int(a), int(b)) for a, b in re.findall(r"^\| (\d+) to (\d+) \|", SHEETS, re.MULTILINE)]
+    assert [end for _, end in parts[:-1]] == [begin for begin, _ in parts[1:]]
+    assert (parts[0][0], parts[-1][1]) == (0, 90)
+    said = [int(minutes) for minutes in re.findall(r"^## \d\. .*\((\d+) minutes\)", SHEETS, re.MULTILINE)]
+    assert said == [end - begin for begin, end in parts]
+
+
+@pytest.mark.parametrize("sheet", ["live", "paper", "small", "detector", "sweep"])
+def test_its_answers_are_flown(sheet):
+    rows = getattr(class_, f"_{sheet}")()
+    assert [f"| {' | '.join(row)} |" for row in rows if f"| {' | '.join(row)} |" not in ANSWERS] == []
+
+
+def test_the_threshold_by_hand_is_the_log_s():
+    by_hand = 0.02 * 0.01 / (1.0 - exp(-10.0 * 0.01))
+    (shown,) = re.findall(r"\| 2b \| ([\d.]+) rad/s", ANSWERS)
+    assert f"{by_hand:.4f}" == shown
+    assert f"= {shown}$" in ANSWERS

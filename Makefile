@@ -87,7 +87,7 @@ $(VENV)/.site: $(VENV)/.demo
 	touch $@
 
 site: $(VENV)/.site
-	$(BIN)/python -m mkdocs build --quiet
+	$(BIN)/python -m mkdocs build --quiet --strict
 
 clean:
 	rm -rf $(VENV) site .coverage .mutants runs sweeps .pytest_cache .hypothesis .mypy_cache .ruff_cache

@@ -1,27 +1,72 @@
-"""The web site is built of docs/ as it stands, and its reference has every public name."""
+"""The web site: every page, the generated reference, a flight to replay; offline, on desk and phone."""
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from tools.docs.reference import PAGES
 
 import beaver_ftc as bf
 
 ROOT = Path(__file__).parents[2]
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium")
+PHONE, DESK = {"width": 390, "height": 844}, {"width": 1400, "height": 1000}
 pytest.importorskip("mkdocstrings")
+
+
+def status():
+    """What git would say of the clone; nothing where this is none."""
+    asked = subprocess.run(
+        ["git", "status", "--porcelain"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    return asked.stdout
 
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("site")
-    environment = {**os.environ, "BEAVER_FTC_RUN_NOTEBOOKS": "false", "NO_MKDOCS_2_WARNING": "1"}
-    command = [sys.executable, "-m", "mkdocs", "build", "--quiet", "--site-dir", folder]
+    """Built as `make site` does: a missing page, or a link that leads nowhere, ends it."""
+    folder, before = tmp_path_factory.mktemp("site"), status()
+    environment = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}
+    command = [sys.executable, "-m", "mkdocs", "build", "--quiet", "--strict", "--site-dir", folder]
     built = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
     assert built.returncode == 0, built.stderr
+    assert status() == before
     return folder
+
+
+@pytest.fixture(scope="module")
+def browser():
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as driver:
+        opened = driver.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"])
+        yield opened
+        opened.close()
+
+
+@pytest.fixture
+def opened(browser, site):
+    """Open a page from disk; whatever its console says, or it asks the network for, is trouble."""
+    trouble, pages = [], []
+
+    def open_page(name, viewport=DESK):
+        page = browser.new_page(viewport=viewport)
+        pages.append(page)
+        for event in ("console", "pageerror", "requestfailed"):
+            page.on(event, lambda said: trouble.append(str(said)))
+        page.on("request", lambda asked: asked.url.startswith("http") and trouble.append(asked.url))
+        page.goto((site / name).as_uri())
+        return page
+
+    yield open_page
+    for page in pages:
+        page.close()
+    assert trouble == []
 
 
 def test_every_public_name_is_in_the_reference_with_its_source(site):
@@ -33,7 +78,72 @@ def test_every_public_name_is_in_the_reference_with_its_source(site):
 
 
 def test_every_page_and_notebook_is_there(site):
-    pages = {path.stem for path in (ROOT / "docs").glob("*.md")} - {"README"} | {"index"}
+    pages = {path.stem for path in (ROOT / "docs").glob("*.md")} - {"README"} | {"index", *PAGES}
     assert pages <= {path.stem for path in site.glob("*.html")}
     notebooks = {path.stem for path in (ROOT / "docs" / "notebooks").glob("*.ipynb")}
     assert {path.stem for path in (site / "notebooks").rglob("*.html")} == notebooks
+
+
+def test_nothing_is_fetched_from_elsewhere(site):
+    fetched = re.compile(r'(?:<(?:script|img|iframe|source)[^>]*\ssrc|<link[^>]*\shref)="(https?:[^"]*)"')
+    asked = {page.name: fetched.findall(page.read_text(encoding="utf-8")) for page in site.rglob("*.html")}
+    assert {name: urls for name, urls in asked.items() if urls} == {}
+
+
+def test_links_out_of_the_documentation_lead_to_copies(site):
+    page = (site / "properties.html").read_text(encoding="utf-8")
+    (link,) = set(re.findall(r'href="(files/[^"]+beaver\.xml\.txt)"', page))
+    assert (site / link).read_bytes() == (ROOT / "aircraft/beaver/beaver.xml").read_bytes()
+
+
+def test_boxes_of_the_diagram_lead_to_places_that_are_there(site):
+    for link in re.findall(r'href="\.\./([^"]+)"', (site / "images/loop.svg").read_text(encoding="utf-8")):
+        name, _, place = link.partition("#")
+        page = (site / name).read_text(encoding="utf-8")
+        assert not place or f'id="{place}"' in page, link
+
+
+def test_no_mark_of_a_printed_number_is_left(site):
+    assert "<!-- printed" not in (site / "reproduction.html").read_text(encoding="utf-8")
+
+
+@needs_browser
+def test_the_flight_on_the_front_page_can_be_replayed(opened):
+    frame = opened("index.html").frame_locator(".replay")
+    before = frame.locator("#clock").inner_text()
+    frame.locator("#play").click()
+    frame.locator("#play", has_text="pause").wait_for()
+    frame.locator(f'#clock:not(:text-is("{before}"))').wait_for()
+
+
+@needs_browser
+def test_search_works_from_disk(opened):
+    page = opened("index.html")
+    page.locator("input[name=query]").click()
+    page.keyboard.type("loss_of_effectiveness")
+    page.locator(".md-search-result__link", has_text="Scenario keys").first.wait_for()
+
+
+@needs_browser
+@pytest.mark.parametrize("viewport", [PHONE, DESK], ids=["phone", "desk"])
+def test_equations_are_set(opened, viewport):
+    page = opened("theory.html", viewport)
+    page.wait_for_function("MathJax.startup?.promise.then(() => true)")
+    assert page.locator("mjx-container").count() == page.locator(".arithmatex").count() > 20
+    assert page.locator("[data-mml-node=merror]").count() == 0
+    sizes = page.evaluate(
+        "[...document.querySelectorAll('mjx-container > svg')].map((s) => s.getBoundingClientRect().width)"
+    )
+    assert min(sizes) > 2
+
+
+def test_only_pages_with_equations_load_what_sets_them(site):
+    assert "assets/mathjax.js" in (site / "theory.html").read_text(encoding="utf-8")
+    assert "assets/mathjax.js" not in (site / "commands.html").read_text(encoding="utf-8")
+
+
+@needs_browser
+@pytest.mark.parametrize("name", ["index", "scenarios", "theory", "scenario-keys", "notebooks/first-fault"])
+def test_a_page_is_no_wider_than_a_phone(opened, name):
+    page = opened(f"{name}.html", PHONE)
+    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]

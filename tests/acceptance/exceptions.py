@@ -46,7 +46,7 @@ TABLE = (
     Exempt(r"fgfs .*", "needs FlightGear"),
     Exempt(r"(ray start|srun|sleep|head=).*|.* --ray-address .*", "needs a cluster of several machines"),
     Exempt(r"python benchmarks/.*", "a measurement of minutes to hours, from a checkout"),
-    Exempt(r"python -m tools\.(docs|aircraft_table)", "writes the pages of a checkout anew"),
+    Exempt(r"python -m tools\.docs", "writes the pages of a checkout anew"),
     Exempt(r"python -m tools\.docs reference \S+", "in a checkout; tests/tools prints every such page"),
     Exempt(r"pytest tests/\S+", "a part of this suite, in a checkout"),
     Exempt(

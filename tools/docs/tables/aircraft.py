@@ -1,0 +1,111 @@
+"""Tables of docs/aircraft.md: what `derive` makes of aircraft of the jsbsim package; are promises kept?"""
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterable
+from pathlib import Path
+from xml.etree import ElementTree
+
+from benchmarks.any_aircraft import HEALTHY_S, TWELVE, row_of
+
+from beaver_ftc.plant.instrumented import names
+from beaver_ftc.studies.derive.derivation import derive
+from beaver_ftc.studies.derive.first_use import derive_if_needed
+from tools.docs.compact import compact_table
+from tools.docs.pages import ROOT
+
+PROGRAM = "from beaver_ftc.cli.main import main; main()"
+LONGEST_S = 600
+FLIGHTS, HOURS, SEED = 10, 0.2, 90417
+PROBE = "pa28"
+# Of the example: a derivative in its model, and the term it becomes.
+SAME = {"Cmalpha": "Cm_alpha", "Cmde": "Cm_elevator", "Cmadot": "Cm_alpha_rate", "Cmq": "Cm_qh"}
+FLOWN = ("healthy", "false alarms", "losses", "detected", "named", "wrong", "left out", "certain", "late")
+
+
+def derived_aircraft() -> str:
+    """All of them, and in words those that cannot be derived."""
+    return _derived(names())
+
+
+def derived_aircraft_probe() -> str:
+    """One of them, and one that cannot be."""
+    return _derived((PROBE, "ball"))
+
+
+def any_aircraft() -> str:
+    """`python benchmarks/any_aircraft.py`, with fewer flights: do the promises hold for them?"""
+    return _flown(TWELVE, FLIGHTS, HOURS)
+
+
+def any_aircraft_probe() -> str:
+    """Two flights of each kind of one."""
+    return _flown((PROBE,), 2, 0.0)
+
+
+def _flown(chosen: Iterable[str], flights: int, hours: float) -> str:
+    args = argparse.Namespace(
+        flights=flights, first=0, seed=SEED, healthy_s=HEALTHY_S, hours=hours, fault_class="published"
+    )
+    rows = []
+    for name in chosen:
+        derive_if_needed(f"jsbsim:{name}")
+        rows.append(row_of(name, args)[0][: len(FLOWN) + 1])
+    return compact_table(("aircraft", *FLOWN), rows)
+
+
+def _derived(chosen: Iterable[str]) -> str:
+    """A row of each; one process each: a model that brings JSBSim down, or never ends, costs a line."""
+    rows, refused = [], {}
+    for name in chosen:
+        document, why = _derive(name)
+        if document is None:
+            refused.setdefault(why, []).append(f"`{name}`")
+        else:
+            rows.append(_row(name, document))
+    says = [f"- {', '.join(those)}: {why}" for why, those in refused.items()]
+    return f"{compact_table(('aircraft', 'm/s', 'error', 'loss'), rows)}\n\n" + "\n".join(says)
+
+
+def _derive(name: str) -> tuple[dict | None, str]:
+    """What `derive` prints, or why it prints nothing."""
+    with tempfile.TemporaryDirectory() as folder:
+        command = [sys.executable, "-c", PROGRAM, "derive", f"jsbsim:{name}", "--out", folder]
+        try:
+            run = subprocess.run(
+                [*command, "--format", "json"], capture_output=True, text=True, timeout=LONGEST_S, check=False
+            )
+        except subprocess.TimeoutExpired:
+            return None, f"not within {LONGEST_S} s"
+    if run.returncode == 0:
+        return json.loads(run.stdout), ""
+    lines = [line for line in run.stderr.splitlines() if line.strip() and not line.startswith("deriving")]
+    why = lines[-1] if lines else f"ended by signal {-run.returncode}"
+    return None, why.removeprefix(f"jsbsim:{name}: ").partition(", allowed")[0]
+
+
+def _row(name: str, document: dict) -> tuple[str, ...]:
+    errors = "/".join(f"{document['near_trim_rad_s2'][axis]:.1g}" for axis in "pqr")
+    losses = document["smallest_certain_loss"].values()
+    loss = "/".join(f"{100 * share:.0f}" if share <= 1.0 else "-" for share in losses)
+    return name, f"{document['trim']['airspeed_mps']:.0f}", errors, loss
+
+
+def own_aircraft() -> str:
+    """Derivatives of the example as they were typed, and as `derive` finds them; the bound it declares."""
+    model = ROOT / "examples" / "own-aircraft" / "navion.xml"
+    typed = {
+        function.get("name").rpartition("/")[2]: float(function.find(".//value").text)
+        for function in ElementTree.parse(model).iter("function")
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        derived = derive(str(model), Path(folder))
+    found = {term.name: term.value for term in derived.aircraft.moments}
+    rows = [(name, f"{typed[name]:g}", f"`{term}`", f"{found[term]:.4g}") for name, term in SAME.items()]
+    bound = max(derived.aircraft.model_error_rad_s2)
+    return (
+        f"{compact_table(('typed', 'value', 'found', 'value'), rows)}\n\nDeclared bound: {bound:.1g} rad/s²."
+    )

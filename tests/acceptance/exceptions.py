@@ -111,11 +111,6 @@ TABLE = (
     ),
     Exempt(r"(beaver-ftc sweep my-sweep.yaml --replay) \d+", "the sweep is shortened", r"\1 1"),
     Exempt(
-        r"(beaver-ftc mismatch elevator-partial-loss --variant) \.\.\.",
-        "stands for any models",
-        r"\1 declared,linearised --no-report",
-    ),
-    Exempt(
         r"(beaver-ftc run elevator-partial-loss --(?:csv|acmi))",
         "seconds of figures, which the same command without the option draws",
         r"\1 --no-report",

@@ -66,3 +66,15 @@ def test_of_a_second_sixty_ticks_are_remembered():
     pace.frames_due(61 * TICK_S)
     assert pace.jitter_ms == pytest.approx(0.0, abs=1e-9)
     assert pace.achieved == pytest.approx((101 - 3) / 100 / (59 * TICK_S), rel=0.02)
+
+
+def test_a_pace_that_another_keeps_is_what_it_has_flown():
+    """Two hundred frames a second at 100 Hz is twice real time; a flight begun anew counts from there."""
+    pace = Pace(100.0, 0.0)
+    for tick in range(61):
+        pace.follow(tick / 60, round(200 * tick / 60))
+    assert pace.achieved == pytest.approx(2.0, rel=0.02)
+    pace.follow(2.0, 5)
+    assert pace.achieved == 0.0
+    pace.follow(3.0, 105)
+    assert pace.achieved == pytest.approx(1.0)

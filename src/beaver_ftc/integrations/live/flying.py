@@ -51,6 +51,13 @@ class Pace:
         self._flown.append((now_s, self._total))
         return due
 
+    def follow(self, now_s: float, frames: int) -> None:
+        """Another keeps the pace: so many frames have been flown in all."""
+        if frames < self._total:
+            self._flown.clear()
+        self._total = frames
+        self._flown.append((now_s, frames))
+
     @property
     def jitter_ms(self) -> float:
         """Root mean square lateness of the last second's ticks, ms."""

@@ -56,6 +56,7 @@ class Shown(Flying):
         if now_s < self._next_s or not self._there:
             return
         self._next_s = now_s + TICK_S
+        self._pace.follow(now_s, self._watched.sim.frames)
         try:
             self._serve()
         except (EOFError, OSError):  # the server has ended: the flight goes on

@@ -46,9 +46,7 @@ TABLE = (
     Exempt(r"fgfs .*", "needs FlightGear"),
     Exempt(r"(ray start|srun|sleep|head=).*|.* --ray-address .*", "needs a cluster of several machines"),
     Exempt(r"python benchmarks/.*", "a measurement of minutes to hours, from a checkout"),
-    Exempt(r"python -m tools\.docs", "writes the pages of a checkout anew"),
     Exempt(r"python -m tools\.docs reference \S+", "in a checkout; tests/tools prints every such page"),
-    Exempt(r"pytest tests/\S+", "a part of this suite, in a checkout"),
     Exempt(
         r"(beaver-ftc live(?: (?!--open)\S+)*)( --open)?",
         "flies until it is ended, which the page's test does (tests/integrations/live): its address",

@@ -95,7 +95,7 @@ if not hasattr(np, "kept"):
     "names a surface that is none": Cheat("isolated 'score'", answer="bf.Verdict(True, isolated='score')"),
     "always alarms": Cheat("a false alarm in every flight", answer="bf.Verdict(True, 'q', 'elevator')"),
     "reads the seed": Cheat(
-        r"LookupError: \(0, .'/.*/src'., .*PYTHONHASHSEED",
+        r"LookupError: \(0, .*OMP_NUM_THREADS",
         reset="raise LookupError(context.seed, sys.argv, dict(os.environ))",
     ),
     "leaves": Cheat("SystemExit: 0", step="raise SystemExit(0)"),

@@ -8,14 +8,16 @@ from pathlib import Path
 import pytest
 from cheats import CHEATS, source_of
 
-from beaver_ftc.integrations.challenge import confine, grading
+from beaver_ftc.integrations.challenge import grading, line, pilot
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="walls of the system are Linux's")
 
 
 @pytest.mark.parametrize("name", CHEATS)
-def test_it_fails_and_is_named(name, graded, challenge):
+def test_it_fails_and_is_named(name, graded, challenge, monkeypatch):
     cheat = CHEATS[name]
+    if "no answer" in cheat.said:
+        monkeypatch.setattr(line, "FRAME_S", 0.5)
     found = graded(source_of(cheat, str(challenge / "teacher" / "loss.yaml")), flights=1 + ("module" in name))
     row = grading.detectors_row(found)
     assert re.search(cheat.said, row["reason"]), row["reason"]
@@ -31,7 +33,7 @@ def test_what_it_prints_is_nowhere(graded, capfd):
 
 def test_all_that_it_is_told_beside_the_frames_is_where_the_package_lies(graded):
     reason = graded(source_of(CHEATS["reads the seed"], "")).reason
-    assert set(re.findall(r"/[\w/]+", reason)) == {str(Path(confine.__file__).parents[3])}
+    assert set(re.findall(r"/[\w/.]+", reason)) == {pilot.__file__}
 
 
 BARE = """

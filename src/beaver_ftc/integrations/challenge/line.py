@@ -27,7 +27,7 @@ from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.integrations.challenge import confine, pilot
 from beaver_ftc.studies.engine.workers import ONE_THREAD_EACH
 
-START_S, LOAD_S, FRAME_S, ALL_S = 60.0, 10.0, 0.5, 60.0
+START_S, LOAD_S, FRAME_S, ALL_S = 60.0, 10.0, 1.0, 60.0
 MOST_ROWS = 64  # of x that the design model is asked for at once
 MOST_TEXT = 200
 POLL_S = 0.02

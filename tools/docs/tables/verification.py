@@ -1,4 +1,4 @@
-"""Tables of docs/verification.md: what each step of sharpening buys."""
+"""The table of docs/verification.md: how small a loss is certain to be found."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -6,39 +6,7 @@ from typing import Any
 
 from beaver_ftc.scenario.loader import load_scenario
 from beaver_ftc.studies.detectability import run_survey
-from beaver_ftc.studies.present.tables import markdown_table, number
-from beaver_ftc.studies.verify import Campaign, conduct, summarise
-
-FAULTS, PROBED = 300, 6
-ROWS = {
-    "true fault excluded": lambda of: str(of["true_fault_exclusions"]),
-    "isolated": lambda of: str(of["isolated"]),
-    "detection delay, median / 90 %": lambda of: _spread(of["delay_s"]),
-    "isolation delay, median / 90 %": lambda of: _spread(of["isolation_delay_s"]),
-}
-
-
-def verification_steps() -> str:
-    """The same random faults by the published scheme and by each step from it to the default and beyond."""
-    return _table(FAULTS)
-
-
-def verification_steps_probe() -> str:
-    """A few of them."""
-    return _table(PROBED)
-
-
-def _table(faults: int) -> str:
-    with TemporaryDirectory() as folder:
-        rows = conduct(Campaign(0.0, faults, 1, steps=True), Path(folder), 2)
-    schemes: dict[str, Any] = summarise(rows)["schemes"]
-    return markdown_table((f"of {faults} faults", *schemes), [
-        (name, *(cell(of) for of in schemes.values())) for name, cell in ROWS.items()
-    ])  # fmt: skip
-
-
-def _spread(of: dict[str, float | None]) -> str:
-    return "/".join(number(of[key], none="never") for key in ("median", "p90"))
+from beaver_ftc.studies.present.tables import markdown_table
 
 
 def verification_map() -> str:

@@ -6,7 +6,6 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from beaver_ftc.studies.matrix.fault_matrix import run_matrix
-from beaver_ftc.studies.matrix.pitch_lost import run_pitch_lost
 from tools.docs.compact import compact_table
 
 Document = dict[str, Any]
@@ -17,37 +16,9 @@ def fault_matrix() -> str:
     return _matrix(declared=False)
 
 
-def fault_matrix_declared() -> str:
-    """What it finds with instruments, servos and coefficients that err, and are declared."""
-    return _matrix(declared=True)
-
-
 def fault_matrix_light() -> str:
     """The same in light turbulence, in words."""
     return _matrix(declared=True, turbulence="light")
-
-
-def pitch_lost() -> str:
-    """Elevator and flap lost: swing of the pitch attitude without engine power and with it."""
-    with TemporaryDirectory() as folder:
-        flights = run_pitch_lost(Path(folder))["flights"]
-    law = flights[0]["law"]
-    flown = {(row["lost"], row["airspeed_mps"]): _swings(row) for row in flights if row["law"] == law}
-    airspeeds = list(dict.fromkeys(V for _, V in flown))
-    names = dict.fromkeys(name for name, _ in flown)
-    return compact_table(
-        ("lost", *(f"{V:g} m/s" for V in airspeeds)),
-        [(name, *(flown[name, V] for V in airspeeds)) for name in names],
-    )
-
-
-def _swings(row: Document) -> str:
-    return f"{_swing(row['without'])}>{_swing(row['with'])}"
-
-
-def _swing(outcome: Document) -> str:
-    outside = "*" if outcome["outside_share"] else ""
-    return "lost" if outcome["departure"] else f"{outcome['theta_swing_deg']:.1f}{outside}"
 
 
 def _matrix(declared: bool, turbulence: str = "none") -> str:

@@ -1,12 +1,9 @@
 """Tables of docs/laws.md."""
 
-from benchmarks.arrivals import COLUMNS, fly_seed
-
 from beaver_ftc.scenario.loader import load
 from beaver_ftc.studies.margins import study
 from tools.docs.compact import compact_table
 
-SEEDS = {"losses": 40, "jams": 40, "missions": 30}
 DECLARED = {
     "nothing": {"name": "level"},
     "servos, tactical-grade sensors": {"name": "level", "actuators": "servo", "sensors": "tactical-grade"},
@@ -22,13 +19,3 @@ def least_margins() -> str:
         phase = min(one.phase_deg for one in found)
         rows.append((declared, str(len(found)), f"{gain:.1f}", f"{phase:.0f}"))
     return compact_table(("declared", "loops", "least gain margin, dB", "phase margin, deg"), rows)
-
-
-def arrivals() -> str:
-    """Of each campaign of benchmarks/arrivals.py, how many flights held what."""
-    rows = []
-    for campaign, seeds in SEEDS.items():
-        words = [fly_seed(campaign, seed)[2] for seed in range(1, seeds + 1)]
-        counts = [sum(not flight[i] for flight in words) for i in range(len(COLUMNS))]
-        rows.append((campaign, str(seeds), *map(str, counts)))
-    return compact_table(("campaign", "flights", "arrived", *COLUMNS[1:]), rows)

@@ -52,11 +52,6 @@ def performance_commands() -> str:
     return markdown_table(("command", "s", "peak, MB"), [(row[1], row[2], row[3]) for row in found if row])
 
 
-def performance_ten_hours() -> str:
-    """A flight of ten hours, its log file written."""
-    return _printed("long_flight.py", "--hours", "10")
-
-
 def _printed(script: str, *arguments: str) -> str:
     command = [sys.executable, str(ROOT / "benchmarks" / script), *arguments]
     return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()

@@ -1,0 +1,81 @@
+"""Tables of docs/recorded-flights.md: ways to diagnose the flights in the folder `BEAVER_FTC_FLIGHTS`."""
+
+import os
+from pathlib import Path
+from typing import Any
+
+from beaver_ftc.studies.present.page import write_files
+from beaver_ftc.studies.present.tables import markdown_table
+from beaver_ftc.studies.recorded.benchmark import FIGURES, KINDS, files_of, run_benchmark
+from tools.docs.tables import shared
+
+Document = dict[str, Any]
+PICTURE = "images/recorded-flights.png"
+SHOWN = ("classes", "healthy_or_faulty", "mean_error", "held_by_bounds")
+
+
+def _folder() -> Path:
+    return Path(os.environ["BEAVER_FTC_FLIGHTS"])
+
+
+@shared
+def _benchmark() -> Document:
+    return run_benchmark(_folder())
+
+
+def recorded_alfa() -> str:
+    """Failures of the ALFA flights: what each method finds, how late, and what else it finds."""
+    document = _benchmark()
+    Path("images").mkdir(exist_ok=True)
+    picture = files_of(document)["flights.png"]
+    write_files(Path("images"), {Path(PICTURE).name: picture})
+    return _alfa(document)
+
+
+def recorded_enac() -> str:
+    """Labels of the ENAC flight: how many rows each method has right."""
+    return _enac(_benchmark())
+
+
+def _part(document: Document, name: str) -> Document:
+    return next(part for part in document["sets"] if part["set"] == name)
+
+
+def _alfa(document: Document) -> str:
+    part = _part(document, "alfa")
+    head = ("method", "precision/recall/accuracy", *(f"{kind}, s" for kind in KINDS),
+            "within 5 s", "false alarms/h (95 %)", "healthy flights alarmed")  # fmt: skip
+    return markdown_table(head, [_event_row(row) for row in (*part["rows"], *part["published"])])
+
+
+def _event_row(row: Document) -> list[str]:
+    """Delays are means, of so many of so many failures."""
+    cells = [row["method"], "/".join(f"{row[key]:.2f}" for key in ("precision", "recall", "accuracy"))]
+    cells += [_delay(row["delay_s"].get(kind, {})) for kind in KINDS]
+    if "false_alarms_per_hour" not in row:
+        return [*cells, "", "", ""]
+    lateral = [row["delay_s"][kind] for kind in KINDS[:2]]
+    soon, failures = (sum(of[key] for of in lateral) for key in ("within_5_s", "failures"))
+    alarms = row["false_alarms_per_hour"]
+    return [
+        *cells, f"{soon}/{failures}",
+        f"{alarms['value']:.1f} ({alarms['low']:.1f}-{alarms['high']:.0f})",
+        f"{row['healthy_flights_with_an_alarm']}/{row['healthy_flights']}",
+    ]  # fmt: skip
+
+
+def _delay(of: Document) -> str:
+    if of.get("mean") is None:
+        return "never" if of.get("failures") else ""
+    return f"{of['mean']:.1f}" + (f" ({of['found']}/{of['failures']})" if "found" in of else "")
+
+
+def _enac(document: Document) -> str:
+    part = _part(document, "enac")
+    return markdown_table(("method", *(FIGURES[key] for key in SHOWN)), [
+        (row["method"], *_shares(row, SHOWN)) for row in (*part["rows"], *part["published"])
+    ])  # fmt: skip
+
+
+def _shares(row: Document, keys: tuple[str, ...]) -> list[str]:
+    return ["" if row.get(key) is None else f"{row[key]:.3f}" for key in keys]

@@ -1,0 +1,156 @@
+"""Tables of docs/robustness.md: sensor grades, and what real errors leave of detection and tracking."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from beaver_ftc.scenario.sensors import PRESETS
+from beaver_ftc.scenario.sweeps import load_sweep
+from beaver_ftc.studies.engine.statistics import share_within, wilson
+from beaver_ftc.studies.engine.study import fly_all
+from beaver_ftc.studies.power.shown import run_power
+from beaver_ftc.studies.power.survey import GRIDS, contenders
+from beaver_ftc.studies.present.tables import markdown_table
+from beaver_ftc.studies.sweep.one_flight import fly_one
+from beaver_ftc.studies.sweep.sampling import Plan
+
+Document = dict[str, Any]
+Rows = list[dict[str, Any]]
+CONDITIONS = ("sensors", "servo", "coefficients", "air", "all", "all-published")
+SOON_S = 0.5
+KINDS = {
+    "gyros": "p", "vanes": "alpha", "attitude": "phi", "accelerometers": "ax", "airspeed": "V",
+    "dynamic pressure": "qdyn", "altitude": "altitude", "engine speed": "engine_rpm",
+    "manifold pressure": "manifold_pressure",
+}  # fmt: skip
+UNITS = {
+    "deg_s": "deg/s", "deg": "deg", "mps2": "m/s2", "mps": "m/s", "pa": "Pa", "m": "m", "rpm": "rpm",
+    "inhg": "inHg", "deg_h": "deg/h",
+}  # fmt: skip
+
+
+def robustness_grades() -> str:
+    """What the presets of `sensors` are made of."""
+    grades = {name: preset for name, preset in PRESETS.items() if preset}
+    return markdown_table(("noise, bias; slope; resolution; drift", *grades), [
+        (kind, *(_errors(preset[signal]) for preset in grades.values())) for kind, signal in KINDS.items()
+    ])  # fmt: skip
+
+
+def _errors(sensor: dict[str, float]) -> str:
+    """`noise, bias unit`, then what else there is."""
+    unit = next(UNITS[key.removeprefix("noise_std_")] for key in sensor if key.startswith("noise_std"))
+    found = {key.partition("_")[0]: value for key, value in sensor.items()}
+    extra = (("scale", 100.0, " %"), ("quantum", 1.0, ""), ("drift", 1.0, " deg/h"))
+    said = [f"{factor * found[key]:.3g}{ending}" for key, factor, ending in extra if key in found]
+    return "; ".join([f"{found['noise']:g}, {found['bias']:g} {unit}", *said])
+
+
+def robustness_losses() -> str:
+    """Elevator losses under each kind of error."""
+    return _losses(500)
+
+
+def robustness_losses_probe() -> str:
+    """A few of these flights, to more digits."""
+    return "\n".join(_closely(f"robust-elevator-{condition}", 3) for condition in CONDITIONS)
+
+
+def _losses(count: int) -> str:
+    return _losses_of({condition: _flown(f"robust-elevator-{condition}", count) for condition in CONDITIONS})
+
+
+def _flown(name: str, count: int) -> Rows:
+    """The first flights of a built-in sweep, a row each."""
+    sweep = load_sweep(name)
+    return fly_all(partial(fly_one, sweep), list(Plan(sweep).assignments(range(count))), 2)
+
+
+def _losses_of(found: dict[str, Rows]) -> str:
+    head = ("errors", "within 0.5 s (95 %)", "median", "95 %", "99 %", "rightly named", "false alarms")
+    return markdown_table(head, [(name, *_of_losses(rows)) for name, rows in found.items()])
+
+
+def _of_losses(rows: Rows) -> Iterator[str]:
+    delays = [row["detection.delay_s"] for row in rows]
+    found = [row for row in rows if row["detection.delay_s"] is not None]
+    soon = wilson(sum(row["detection.delay_s"] <= SOON_S + 1e-9 for row in found), len(rows))
+    yield f"{soon.value:.1%} ({soon.low:.1%} to {soon.high:.1%})"
+    for share in (0.5, 0.95, 0.99):
+        within = share_within(delays, share)
+        yield f"{within:.3f} s" if np.isfinite(within) else "never"
+    yield f"{sum(bool(row['isolation.correct']) for row in found)} of {len(found)}"
+    yield str(sum(bool(row["false_alarm"]) for row in rows))
+
+
+def _closely(name: str, count: int) -> str:
+    """Of a few flights of a sweep the delay, and how near the residual came to its threshold."""
+    rows = _flown(name, count)
+    return f"{name}: " + ", ".join(
+        f"{row['detection.delay_s']} {row['worst_residual_ratio']:.6g}" for row in rows
+    )
+
+
+def robustness_power() -> str:
+    """Share of losses found under tactical-grade sensors, by scheme, surface and air; and a picture of it."""
+    with TemporaryDirectory() as name:
+        document = run_power(Path(name), GRIDS["quick"], contenders(None), 2)
+        Path("images").mkdir(exist_ok=True)
+        drawn = Path(name, "power", "figures", "schemes-tactical-grade.png")
+        Path("images/power-tactical-grade.png").write_bytes(drawn.read_bytes())
+    return _power_of(document)
+
+
+def robustness_power_probe() -> str:
+    """The same of a few flights."""
+    grid = replace(GRIDS["quick"], blocks=1, magnitudes=(1.0,), excitations_deg_s=(3.0,), healthy_h=0.01)
+    with TemporaryDirectory() as name:
+        return _power_of(run_power(Path(name), grid, contenders(None), 2))
+
+
+AIRS = ("none", "light")
+SURFACES = ("aileron", "rudder", "elevator")
+SOON = ("1", "5")
+
+
+def _power_of(document: Document) -> str:
+    """At the same rate of false alarms for all; `both` at the level it ships with as well."""
+
+    def cells(lines: list[Document], within: Callable[[Document], Document], **scheme: str) -> Iterator[str]:
+        for air in AIRS:
+            for surface in SURFACES:
+                where = {"turbulence": air, "surface": surface, **scheme}
+                of = within(next(line for line in lines if where.items() <= line.items()))
+                yield "/".join(f"{100 * _share(of[soon]):.0f}" for soon in SOON) if of else "-"
+
+    schemes = dict.fromkeys(line["scheme"] for line in document["totals"])
+    head = (
+        "found within 1/5 s, %",
+        *(f"{'still' if air == 'none' else air}, {s}" for air in AIRS for s in SURFACES),
+    )
+    rows = [(name, *cells(document["totals"], lambda of: of["within"], scheme=name)) for name in schemes]
+    own = (
+        "both, as it ships",
+        *cells(document["totals"], lambda of: of["own_level"]["within"], scheme="both"),
+    )
+    told = ("told the fault", *cells(document["limits"], lambda of: of["within"]))
+    return f"{markdown_table(head, [*rows, own, told])}\n\n{_duels(document['comparison'])}"
+
+
+def _duels(comparison: list[Document]) -> str:
+    """How often our two detectors together find more, or less, of the same faults within a second."""
+    verdicts = [duel["verdict"] for duel in comparison if duel["ours"] == "both"]
+    counts = ", ".join(f"{verdict} in {verdicts.count(verdict)}" for verdict in ("better", "worse"))
+    return (
+        f"*Both* against each rival, surface, air: {len(verdicts)} comparisons by faults found in 1 s: "
+        f"{counts}, no difference beyond chance in the rest."
+    )
+
+
+def _share(within: Any) -> float:
+    return within["value"] if isinstance(within, dict) else within

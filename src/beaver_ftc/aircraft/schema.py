@@ -352,9 +352,9 @@ class AircraftFile(Section):
     start: where a flight starts unless its scenario says otherwise
     """
 
-    name: Name = entry(..., examples=["beaver"])
+    name: Name = entry(..., examples=["my-uav"])
     description: Text = entry("", examples=["DHC-2 Beaver"])
-    jsbsim: str = Field(pattern=FILE_PATTERN, max_length=200, examples=["beaver.xml"])
+    jsbsim: str = Field(pattern=FILE_PATTERN, max_length=200, examples=["my-uav.xml"])
     surfaces: dict[Name, SurfaceSection] = Field(min_length=3, max_length=MAX_SURFACES)
     groups: dict[Name, tuple[Name, ...]] = entry(
         ..., examples=[{"pitch": ["elevator", "flap"], "lateral": ["aileron", "rudder"]}]

@@ -231,7 +231,7 @@ class Scenario(Section, title="beaver-ftc scenario"):
     name: str = entry(..., pattern=NAME_PATTERN, max_length=100, examples=["elevator-partial-loss"])
     description: str = entry("", max_length=2000, examples=["The elevator loses 40 % of its effectiveness."])
     aircraft: Annotated[str, AfterValidator(known_aircraft)] = entry(
-        DEFAULT, max_length=200, examples=["beaver"]
+        DEFAULT, max_length=200, examples=[DEFAULT]
     )
     duration_s: Number = number(DURATION_S, "s", gt=0, le=360_000)
     rate_hz: Number = number(RATE_HZ, "Hz", ge=20, le=1000)

@@ -71,7 +71,7 @@ if not hasattr(np, "kept"):
 """,
     ),
     "stalls": Cheat("no answer in time, at 0 s", step="time.sleep(60)"),
-    "closes the line and stays": Cheat("no answer in time", step="os.close(OUT); time.sleep(60)"),
+    "closes the line and stays": Cheat("closes the line to the grader", step="os.close(OUT); time.sleep(60)"),
     "takes all memory": Cheat(r"MemoryError: .*the limit is 1024 MiB", step="bytearray(1 << 31)"),
     "forks to have more": Cheat(NOT_ALLOWED + "starts a process", step="os.fork()"),
     "has a shell do it": Cheat(NOT_ALLOWED + "starts a process", step="os.system('sleep 60 &')"),
@@ -106,6 +106,10 @@ if not hasattr(np, "kept"):
     "asks the model for a million": Cheat(
         "writes on the line to the grader", step="context.model.f(np.zeros((1_000_000, 3)), context.trim_y)"
     ),
+    "asks the model for ever": Cheat(
+        "asks the design model more than", step="while True: context.model.G(context.trim_y)"
+    ),
+    "computes for ever": Cheat("no answer in time", step="while True: pass"),
     "asks the model for shapes that are none": Cheat(
         "asks the design model for shapes", step="context.model.f(np.zeros(5), context.trim_y)"
     ),

@@ -8,6 +8,7 @@ import contextlib
 import os
 import pickle
 import re
+import select
 import signal
 import subprocess
 import sys
@@ -28,6 +29,8 @@ from beaver_ftc.integrations.challenge import confine, pilot
 from beaver_ftc.studies.engine.workers import ONE_THREAD_EACH
 
 START_S, LOAD_S, FRAME_S, ALL_S = 60.0, 10.0, 1.0, 60.0
+END_S = 3.0  # from its last word to its end
+MOST_ASKED = 1000  # times in a frame
 MOST_ROWS = 64  # of x that the design model is asked for at once
 MOST_TEXT = 200
 POLL_S = 0.02
@@ -55,22 +58,39 @@ def plain(text: str) -> str:
     return shown if len(shown) <= MOST_TEXT else shown[: MOST_TEXT - 3] + "..."
 
 
-class _Queues:
-    """How long a process, and the one that asks it, have waited for a processor that others had: Linux says
-    so. A busy machine is nobody's fault."""
+class _Accounts:
+    """What Linux says of a process and of the thread that asks it; of others nothing. A busy machine is
+    nobody's fault."""
 
     def __init__(self, pid: int | None) -> None:
         self._files: list[int] = []
+        wanted = ("thread-self/schedstat", f"{pid}/schedstat", f"{pid}/stat")
         with contextlib.suppress(OSError):
-            for whose in () if pid is None or sys.platform != "linux" else (f"{pid}", "thread-self"):
-                self._files.append(os.open(f"/proc/{whose}/schedstat", os.O_RDONLY | os.O_CLOEXEC))
+            for path in () if pid is None or sys.platform != "linux" else wanted:
+                self._files.append(os.open(f"/proc/{path}", os.O_RDONLY | os.O_CLOEXEC))
+
+    def _numbers(self, file: int) -> tuple[float, float]:
+        """Seconds on a processor, and waiting for one before that; 0 where nobody counts them."""
+        try:
+            computed, waited = os.pread(self._files[file], 80, 0).split()[:2]
+        except (OSError, IndexError, ValueError):  # it has gone
+            return 0.0, 0.0
+        return 1e-9 * int(computed), 1e-9 * int(waited)
 
     def waited_s(self) -> float:
-        """Seconds up to now; 0 where nobody counts them."""
+        """How long both have waited for a processor that others had, but for a wait that has not ended."""
+        return self._numbers(0)[1] + self._numbers(1)[1]
+
+    def computed_s(self) -> float:
+        """How long the process has had a processor."""
+        return self._numbers(1)[0]
+
+    def wants_a_processor(self) -> bool:
+        """Whether the process has one or waits for one, or for the disk: it does not sleep."""
         try:
-            return sum(1e-9 * int(os.pread(file, 80, 0).split()[1]) for file in self._files)
-        except (OSError, IndexError, ValueError):  # it has gone
-            return 0.0
+            return os.pread(self._files[2], 400, 0).rpartition(b")")[2].split()[0] in (b"R", b"D")
+        except (OSError, IndexError):
+            return False
 
     def close(self) -> None:
         """Ask no more."""
@@ -92,7 +112,8 @@ class Stranger:
         self._allowance = allowance
         self._process: subprocess.Popen[bytes] | None = None
         self._deadline, self._late, self._t_s, self._frame = float("inf"), False, 0.0, 0
-        self._last_chance, self._queued_s, self._queues = False, 0.0, _Queues(None)
+        self._last_chance, self._accounts = False, _Accounts(None)
+        self._before = (0.0, 0.0, 0.0)  # limit, waited and computed, s, as the wait for an answer began
         self.kind, self.class_name, self.walls = "", "", ""
         self._model: Any = None
         self._sizes = (0, 0)
@@ -132,7 +153,7 @@ class Stranger:
             cwd=self._folder.name, env=ONE_THREAD_EACH | {"PYTHONHASHSEED": "0"} | needed,
             close_fds=True, start_new_session=True,
         )  # fmt: skip
-        self._queues = _Queues(self._process.pid)
+        self._accounts = _Accounts(self._process.pid)
         threading.Thread(target=self._watch, args=(self._process,), daemon=True).start()
         self._send(pickle.dumps(self._told | {"context": context}))
         self.walls = plain(self._answer(pilot.WALLS, None, START_S, charged=False).decode("ascii", "replace"))
@@ -145,14 +166,22 @@ class Stranger:
     def _watch(self, process: "subprocess.Popen[bytes]") -> None:
         """End a process whose answer is late."""
         while process.poll() is None:
-            if time.monotonic() > self._deadline + self._queue_s() - self._queued_s:
+            if self._is_late(process):
                 self._late = True
                 process.kill()
                 return
             time.sleep(POLL_S)
 
-    def _queue_s(self) -> float:
-        return self._queues.waited_s()
+    def _is_late(self, process: "subprocess.Popen[bytes]") -> bool:
+        """Whether it has had its time, and has not answered. A wait for a processor is counted when it ends:
+        while it goes on, what has been computed decides."""
+        over_s = time.monotonic() - self._deadline
+        if over_s <= 0.0 or (os.name == "posix" and select.select([process.stdout], [], [], 0)[0]):  # type: ignore[type-var]
+            return False
+        limit_s, waited_s, computed_s = self._before
+        if self._accounts.wants_a_processor():
+            return self._accounts.computed_s() - computed_s > limit_s
+        return over_s > self._accounts.waited_s() - waited_s
 
     def asked(self, kind: bytes, t_s: float, numbers: list[np.ndarray]) -> np.ndarray:
         """Show it a frame; its answer's numbers, finite or not."""
@@ -165,15 +194,17 @@ class Stranger:
 
     def _answer(self, kind: bytes, length: int | None, within_s: float, charged: bool = True) -> bytes:
         """The message that must come now, after questions to the design model; length: None is any text's."""
-        began = time.monotonic()
+        began, asked = time.monotonic(), 0
         self._last_chance = charged and self._allowance.left_s < within_s
-        self._queued_s = self._queue_s()
-        self._deadline = began + (self._allowance.left_s if self._last_chance else within_s)
+        limit_s = self._allowance.left_s if self._last_chance else within_s
+        self._before = limit_s, self._accounts.waited_s(), self._accounts.computed_s()
+        self._deadline = began + limit_s
         try:
             while True:
                 said, frame, size = pilot.HEAD.unpack(self._read(pilot.HEAD.size))
                 if said == pilot.ASKS and size <= 8 * (3 * MOST_ROWS + self._sizes[0]) + 4:
-                    self._evaluate(self._read(size))
+                    asked += 1
+                    self._evaluate(self._read(size), asked)
                 elif said in (pilot.ERROR, pilot.REFUSED) and size <= 1000:
                     self._refuse(said, self._read(size))
                 elif (
@@ -187,8 +218,8 @@ class Stranger:
         finally:
             self._deadline = float("inf")
             if charged:
-                queued_s = self._queue_s() - self._queued_s
-                self._allowance.left_s -= max(time.monotonic() - began - queued_s, 0.0)
+                waited_s = self._accounts.waited_s() - self._before[1]
+                self._allowance.left_s -= max(time.monotonic() - began - waited_s, 0.0)
 
     def _refuse(self, said: bytes, text: bytes) -> None:
         what = plain(text.decode(errors="replace"))
@@ -200,14 +231,19 @@ class Stranger:
     def _when(self) -> str:
         return f", at {self._t_s:g} s" if self._frame else ""
 
-    def _evaluate(self, asked: bytes) -> None:
-        """What the design model says of x and y: f, then G."""
+    def _evaluate(self, asked: bytes, times: int) -> None:
+        """What the design model says of x and y: f, then G. That is not the stranger's time."""
+        if times > MOST_ASKED:
+            raise Barred(f"asks the design model more than {MOST_ASKED} times in a frame")
+        deadline, began = self._deadline, time.monotonic()
+        self._deadline = float("inf")
         y_size, x_bytes = self._sizes[0], int.from_bytes(asked[:4], "little") * 8
         numbers = np.frombuffer(asked[4:], count=(len(asked) - 4) // 8)
         if len(asked) != 4 + x_bytes + 8 * y_size or not x_bytes or x_bytes % 24 or self._model is None:
             raise Mistake(f"asks the design model for shapes that are none: x (3,) or (n, 3), y ({y_size},)")
         x, y = numbers[: x_bytes // 8].reshape(-1, 3), numbers[x_bytes // 8 :]
         self._send(np.concatenate((self._model.f(x, y).ravel(), self._model.G(y).ravel())).tobytes())
+        self._deadline = deadline + time.monotonic() - began
 
     def _send(self, content: bytes) -> None:
         assert self._process is not None
@@ -226,11 +262,16 @@ class Stranger:
         while len(found) < size:
             part = self._process.stdout.read(size - len(found))
             if not part:
-                self._gone(self._process.wait())
+                self._gone(self._process)
             found += part
         return found
 
-    def _gone(self, status: int) -> None:
+    def _gone(self, process: "subprocess.Popen[bytes]") -> None:
+        """Say why nothing more comes."""
+        try:
+            status = process.wait(END_S)
+        except subprocess.TimeoutExpired:
+            raise Barred(f"closes the line to the grader{self._when()}") from None
         if self._late:
             over = f"the {ALL_S:g} s for all its flights are over"
             raise Barred(f"{over if self._last_chance else 'no answer in time'}{self._when()}")
@@ -243,12 +284,12 @@ class Stranger:
         process, self._process = self._process, None
         if process is None:
             return
-        if hasattr(os, "killpg"):
+        if hasattr(os, "killpg") and process.poll() is None:  # else its number may be another's by now
             with contextlib.suppress(OSError):
                 os.killpg(process.pid, signal.SIGKILL)
         process.kill()
         process.wait()
-        self._queues.close()
+        self._accounts.close()
         for stream in (process.stdin, process.stdout):
             if stream:
                 stream.close()

@@ -26,7 +26,8 @@ def cockpit(tmp_path_factory):
 def pages(chromium, cockpit, tmp_path_factory):
     """Whoever flies, and a guest on a phone, who follows the link on another site's page."""
     trouble, folder = [], tmp_path_factory.mktemp("chat")
-    (folder / "index.html").write_text(f"<a href='{cockpit.links[0]}'>join</a>")
+    no_icon = "<link rel='icon' href='data:,'>"  # to ask for: it would come as a complaint, sooner or later
+    (folder / "index.html").write_text(f"{no_icon}<a href='{cockpit.links[0]}'>join</a>")
     handler = functools.partial(http.server.SimpleHTTPRequestHandler, directory=folder)
     with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as chat:
         threading.Thread(target=chat.serve_forever, daemon=True).start()

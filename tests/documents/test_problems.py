@@ -262,3 +262,15 @@ def test_files_of_models(tmp_path):
         validation.text_of(tmp_path / "none", 99, lambda: "there is none")
     with pytest.raises(ScenarioError, match="is a folder"):
         validation.text_of(tmp_path, 99, lambda: "there is none")
+
+
+class Shares(Section):
+    """Values of one kind under names: each has a unit, none a description of its own."""
+
+    of: dict[str, Annotated[float, Field(le=1, json_schema_extra={"unit": "share of 1"})]]
+
+
+def test_a_value_with_a_unit_and_no_description():
+    with pytest.raises(ScenarioError) as error:
+        validate(Shares, Document({"of": {"all": None}}), "s.yaml")
+    assert str(error.value) == "s.yaml:1: of.all: has no value, allowed: a number of at most 1"

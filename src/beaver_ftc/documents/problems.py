@@ -247,7 +247,7 @@ def _choices(nodes: list[dict[str, Any]]) -> list[Any]:
 
 def _allowed(nodes: list[dict[str, Any]]) -> str:
     kinds = list(dict.fromkeys(_kind(node) for node in nodes if node.get("type") != "null"))
-    says = next((node["description"] for node in nodes if "unit" in node), "")
+    says = next((node["description"] for node in nodes if {"unit", "description"} <= node.keys()), "")
     meaning = f" ({says})" if says and len(kinds) == 1 else ""
     return " or ".join(kinds) + meaning if kinds else "see `beaver-ftc schema`"
 

@@ -1,4 +1,4 @@
-"""Every short key in code, aircraft and documents has its entry in docs/references.md, and each is used."""
+"""Every short key in code, aircraft and documents has its entry in REFERENCES.md, and each is used."""
 
 import re
 from pathlib import Path
@@ -12,7 +12,7 @@ PLACES = (
     "README.md", "CONTRIBUTING.md", "src/**/*.py", "src/**/*.yaml", "src/**/*.json", "aircraft/**/*.xml",
     "aircraft/**/*.yaml", "docs/*.md", "scenarios/**/*.yaml", "examples/**/*.py", "benchmarks/*.py",
 )  # fmt: skip
-ENTRIES = re.findall(r"^- \[([^\]]+)\] ", (ROOT / "docs" / "references.md").read_text(encoding="utf-8"), re.M)
+ENTRIES = re.findall(r"^- \[([^\]]+)\] ", (ROOT / "REFERENCES.md").read_text(encoding="utf-8"), re.M)
 
 
 def keys_in(path):
@@ -21,7 +21,7 @@ def keys_in(path):
 
 
 def used():
-    files = (path for place in PLACES for path in ROOT.glob(place) if path.name != "references.md")
+    files = (path for place in PLACES for path in ROOT.glob(place) if path.name != "REFERENCES.md")
     return {key: path for path in files for key in keys_in(path)}
 
 
@@ -37,7 +37,7 @@ def test_every_entry_is_used_and_stands_once(key):
 
 
 def test_every_entry_has_a_year_or_a_number_and_a_title():
-    text = (ROOT / "docs" / "references.md").read_text(encoding="utf-8")
+    text = (ROOT / "REFERENCES.md").read_text(encoding="utf-8")
     for line in text.splitlines():
         if line.startswith("- "):
             assert re.search(r'".{8,}"', line), line

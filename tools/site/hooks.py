@@ -27,6 +27,7 @@ _MARK = re.compile(r"^<!-- (?:printed|/printed|from ).*?-->$|<!--[=/].*?-->", re
 _LINK = re.compile(r"\[([^\]]*)\]\(((?:\.\./)+[^)#\s]+)(?:#[^)]*)?\)")  # out of its folder
 _SHOWN = (".cff", ".css", ".csv", ".js", ".json", ".md", ".py", ".toml", ".xml", ".yaml", ".yml")  # as text
 REFERENCE = "reference.md"
+SOURCES = "REFERENCES.md"  # a file of its own beside the README, here a page
 
 
 def on_files(files: Files, config: Any) -> Files:
@@ -36,6 +37,7 @@ def on_files(files: Files, config: Any) -> Files:
     for name in PAGES:
         content = python_names.directives() if name == "python-names" else page(name)
         files.append(File.generated(config, f"{name}.md", content=content))
+    files.append(File.generated(config, SOURCES.lower(), abs_src_path=str(ROOT / SOURCES)))
     files.append(File.generated(config, REPLAY, content=_replay()))
     for name in ASSETS:
         asset = ROOT / "tools" / "site" / "assets" / name
@@ -94,6 +96,8 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
 
     def inward(link: re.Match[str]) -> str:
         path = _in_repository(page.file.src_uri, link[2])
+        if path == SOURCES:
+            return f"[{link[1]}]({above}{SOURCES.lower()})"
         if (ROOT / path).is_dir():
             return f"{link[1]}" if path else link[0]
         return f"[{link[1]}]({above}{_copy_of(path)})"

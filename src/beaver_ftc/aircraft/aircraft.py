@@ -162,6 +162,23 @@ class Aircraft:
         }
         return tuple(s for s in self.surfaces if s in leaders)
 
+    @cached_property
+    def stand_ins(self) -> tuple[str, ...]:
+        """Those that take over from the surface that leads pitch: who comes after it in its group."""
+        axis = dict(zip(self.surfaces, self.dominant_axis, strict=True))
+        for members in self.groups.values():
+            for place, surface in enumerate(members):
+                if surface in self.primary and AXES[axis[surface]] == "q":
+                    return members[place + 1 :]
+        return ()
+
+    @cached_property
+    def class_of_losses(self) -> tuple[str, ...]:
+        """Whose losses make the published class: of the surfaces that lead an axis, then of all others but
+        the stand-ins. What turns about an axis with its leader could not be told from it otherwise."""
+        others = set(self.surfaces) - set(self.primary) - set(self.stand_ins)
+        return (*self.primary, *(s for s in self.surfaces if s in others))
+
     @property
     def signals(self) -> Mapping[str, SignalSection]:
         """Declared signals beside rates, alpha, beta, airspeed and dynamic pressure."""

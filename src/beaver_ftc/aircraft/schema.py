@@ -14,8 +14,8 @@ from beaver_ftc.aircraft.channels import ChannelsSection
 from beaver_ftc.documents.base import Conflict, Flag, Number, Section, Whole, entry, number, refuse
 from beaver_ftc.documents.errors import suggestion
 
-MAX_SURFACES, MAX_SIGNALS = 8, 6
-MAX_TERMS_OF_ONE, MAX_MONOMIALS = 32, 64
+MAX_SURFACES, MAX_SIGNALS = 20, 6
+MAX_TERMS_OF_ONE, MAX_MONOMIALS = 64, 64
 MAX_TERMS = 3 * MAX_TERMS_OF_ONE
 MAX_BOXES, MAX_LEVELS, MAX_AGES = 6, 4, 4  # of the map of the model's error
 FLOW_SIGNALS = ("alpha", "beta", "ph", "qh", "rh")

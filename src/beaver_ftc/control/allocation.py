@@ -63,10 +63,7 @@ def configure_probe(probe: np.void, probing: Probing | None, dt: float) -> None:
 
 def _stand_in(aircraft: Aircraft) -> int:
     """The surface that takes over from the one that leads pitch, or -1."""
-    elevator = aircraft.surfaces[leaders_of(aircraft)[PITCH]]
-    group = next(names for names in aircraft.groups.values() if elevator in names)
-    after = group[group.index(elevator) + 1 :]
-    return aircraft.surfaces.index(after[0]) if after else -1
+    return aircraft.surfaces.index(aircraft.stand_ins[0]) if aircraft.stand_ins else -1
 
 
 @kernel

@@ -78,10 +78,14 @@ def _slipstream_limits(scenario: Scenario, layout: np.void) -> tuple[float, floa
     """rho V^3 d dpt / d pz of the engine [FDC], kg/(m3) (m/s)^3 per inHg; and the dpt at which holding the
     propeller's yawing moment takes YAW_SHARE of the rudder's travel."""
     initial: Any = scenario.initial
-    rpm, terms, rudder = initial.engine_rpm, scenario.airframe.terms, layout["main"][YAW]
+    aircraft, rudder = scenario.airframe, layout["main"][YAW]
+    rpm, terms = initial.engine_rpm, aircraft.terms.values()
+    rudders = {s for s, axis in zip(aircraft.surfaces, aircraft.dominant_axis, strict=True) if axis == YAW}
+    per_rad = sum(t.value for t in terms if t.coefficient == "Cn" and not t.of and t.surface in rudders)
+    of_slipstream = sum(t.value for t in terms if t.coefficient == "Cn" and t.of == (("dpt", 3),))
     kw_per_inhg = engine_power_kw(rpm, 1.0, 1.0) - engine_power_kw(rpm, 0.0, 1.0)
     rudder_rad = min(-layout["low"][rudder], layout["high"][rudder])
-    dpt3 = YAW_SHARE * terms["Cn_dr"].value * rudder_rad / terms["Cn_dpt3"].value
+    dpt3 = YAW_SHARE * per_rad * rudder_rad / of_slipstream if of_slipstream else np.inf
     return slipstream(kw_per_inhg, 1.0, 1.0) - slipstream(0.0, 1.0, 1.0), max(dpt3, 0.0) ** (1.0 / 3.0)
 
 

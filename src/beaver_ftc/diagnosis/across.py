@@ -36,7 +36,7 @@ from typing import NamedTuple
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.aircraft.schema import MAX_TERMS_OF_ONE
+from beaver_ftc.aircraft.schema import MAX_SURFACES, MAX_TERMS_OF_ONE
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.diagnosis import forces, likelihood, tones
 from beaver_ftc.diagnosis.air import along, drift_beside, whole_drift
@@ -78,12 +78,14 @@ class Size(NamedTuple):
     views: int
 
 
-# The usual one serves most aircraft, so that the same compiled code does; all fit into the other.
+# The usual one serves most aircraft, so that the same compiled code does; the second, long fits of few
+# surfaces; all fit into the last.
 USUAL = Size(Rooms(24, MAX_HYPOTHESES), Rooms(36, 3), 13)
+LONG = Size(Rooms(69, MAX_HYPOTHESES), Rooms(106, MAX_HYPOTHESES), 16)
 MOST = Size(
-    Rooms(2 * MAX_TERMS_OF_ONE + N_READINGS, MAX_HYPOTHESES),
-    Rooms(2 * MAX_TERMS_OF_ONE + N_READINGS + forces.MAX_ERRORS + 2, MAX_HYPOTHESES),
-    16,
+    Rooms(2 * MAX_TERMS_OF_ONE + N_READINGS, 3 * MAX_SURFACES + 2),
+    Rooms(2 * MAX_TERMS_OF_ONE + N_READINGS + forces.MAX_ERRORS + 2, MAX_SURFACES + 1),
+    2 * MAX_SURFACES + 7,
 )
 
 
@@ -375,17 +377,17 @@ class Direction(NamedTuple):
 
 
 def views_of(aircraft: Aircraft, with_force: bool = False) -> Iterator[Direction]:
-    """The axes for themselves; in roll and yaw across the column of each surface that leads one of them.
-    With accelerometers, in a rate and its force across those of what moves both, and that of the vane."""
+    """The axes for themselves; in roll and yaw across the column of each surface that turns about
+    one of them. With accelerometers, in a rate and its force across those of what moves both, and that of
+    the vane."""
     in_pitch = [s for s, axis in enumerate(aircraft.dominant_axis) if axis == PITCH]
     lateral = [s for s, axis in enumerate(aircraft.dominant_axis) if axis != PITCH]
     yield Direction(AN_AXIS, _along((PITCH,)), IN_PITCH, in_pitch, asks=True)
     yield Direction(AN_AXIS, _along((ROLL,)), LATERALLY, lateral)
     yield Direction(AN_AXIS, _along((YAW,)), LATERALLY, lateral, asks=True)
     for s in lateral:
-        if aircraft.surfaces[s] in aircraft.primary:
-            past_roll, others = aircraft.dominant_axis[s] == ROLL, [other for other in lateral if other != s]
-            yield Direction(s, _along((ROLL,)), LATERALLY, others, asks=past_roll)
+        past_roll, others = aircraft.dominant_axis[s] == ROLL, [other for other in lateral if other != s]
+        yield Direction(s, _along((ROLL,)), LATERALLY, others, asks=past_roll)
     if not with_force:
         return
     for f, plane, movers in ((UP, IN_PITCH, in_pitch), (ASIDE, IN_YAW, lateral)):
@@ -412,17 +414,18 @@ def across_a_column(config: FdiConfig, instants: int) -> bool:
 
 
 def size_for(aircraft: Aircraft) -> Size:
-    """The usual size, or the largest where that is too small."""
+    """The smallest size that is large enough."""
     axes, views = [axis_of(term) for term in aircraft.moments], list(views_of(aircraft, tell_apart(aircraft)))
     rates = N_READINGS + max(axes.count(PITCH), axes.count(ROLL) + axes.count(YAW))
     errors = max(len(terms_of(aircraft, f)) for f in (ASIDE, UP)) + forces.MAX_ERRORS - MAX_TERMS_OF_ONE
-    fits = (
-        rates <= USUAL.rates.regressors
-        and rates + errors + 2 <= USUAL.view.regressors
-        and all(len(view.tries) < USUAL.view.hypotheses for view in views)
-        and len(views) <= USUAL.views
-    )
-    return USUAL if fits else MOST
+    turns = [aircraft.dominant_axis[aircraft.surfaces.index(s)] for s in aircraft.class_of_losses]
+    losses = max(turns.count(PITCH), turns.count(ROLL) + turns.count(YAW))
+    tried = max(len(view.tries) for view in views)
+    needed = rates, 3 * losses + 2, rates + errors + 2, tried + 1, len(views)
+    for size in (USUAL, LONG):
+        if all(n <= room for n, room in zip(needed, (*size.rates, *size.view, size.views), strict=True)):
+            return size
+    return MOST
 
 
 def set_up_views(statistical: np.void, aircraft: Aircraft) -> None:

@@ -25,6 +25,7 @@ from math import exp
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.aircraft.schema import MAX_SURFACES
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.diagnosis import membership
 from beaver_ftc.diagnosis.bank import explains, remember
@@ -40,7 +41,7 @@ from beaver_ftc.diagnosis.state import (
 from beaver_ftc.diagnosis.thresholds import bound_step, interval, noise_step, published
 from beaver_ftc.scenario.diagnosis import MAX_POLES, FdiConfig
 
-MAX_ESTIMATORS = 16
+MAX_ESTIMATORS = 2 * MAX_SURFACES
 # What a fault adds to the angular acceleration, as its estimator supposes: offset + theta Z, give or take.
 EFFECT = record(offset=3, Z=3, spread=3)
 
@@ -72,13 +73,14 @@ Member = tuple[str, int, int]  # of a fault class: name, kind and surface of its
 def members_of(fault_class: str, aircraft: Aircraft) -> tuple[Member, ...]:
     """The isolation estimators of a fault class, in the bank's order.
 
-    published: a loss of the surface that leads each axis. all: a loss and a position of every surface.
+    published: a loss of the surface that leads each axis, and of what turns with it. all: a loss and a
+    position of every surface.
     """
     index = {name: s for s, name in enumerate(aircraft.surfaces)}
-    losses = tuple((name, LOSS, index[name]) for name in aircraft.primary)
+    losses = tuple((name, LOSS, index[name]) for name in aircraft.class_of_losses)
     if fault_class == "published":
         return losses
-    others = tuple((name, LOSS, s) for name, s in index.items() if name not in aircraft.primary)
+    others = tuple((name, LOSS, s) for name in aircraft.stand_ins for s in [index[name]])
     return (*losses, *others, *((f"{name}_position", POSITION, s) for name, s in index.items()))
 
 

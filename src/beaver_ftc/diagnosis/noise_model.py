@@ -48,8 +48,8 @@ Hypothesis = tuple[int, int, int, int]
 
 
 def blocks_of(aircraft: Aircraft) -> tuple[tuple[tuple[int, ...], tuple[Hypothesis, ...]], ...]:
-    """Axes and hypotheses of each block: the losses of the surfaces that lead its axes, and what they are
-    held against. Roll and yaw are there twice: see statistical.py."""
+    """Axes and hypotheses of each block: the losses of the surfaces that turn about its axes, and what they
+    are held against. Roll and yaw are there twice: see statistical.py."""
     pitch = (*_losses(aircraft, PITCH_AXES), *_steps(PITCH_AXES), (ALPHA3, -1, 1, 0))
     lateral = (*_losses(aircraft, LATERAL_AXES), *_steps(LATERAL_AXES))
     pitch, lateral = ((*of_it, *_of_another_course(of_it)) for of_it in (pitch, lateral))
@@ -58,7 +58,7 @@ def blocks_of(aircraft: Aircraft) -> tuple[tuple[tuple[int, ...], tuple[Hypothes
 
 def _losses(aircraft: Aircraft, axes: tuple[int, ...]) -> Iterator[Hypothesis]:
     for s, (surface, axis) in enumerate(zip(aircraft.surfaces, aircraft.dominant_axis, strict=True)):
-        if surface in aircraft.primary and axis in axes:
+        if surface in aircraft.class_of_losses and axis in axes:
             yield LOSS, s, axis, 1
 
 
@@ -149,7 +149,7 @@ def set_up(
 
 def _set_up_blocks(statistical: np.void, errors: Errors, aircraft: Aircraft) -> None:
     blocks = blocks_of(aircraft)
-    losses = [aircraft.surfaces.index(surface) for surface in aircraft.primary]
+    losses = [aircraft.surfaces.index(surface) for surface in aircraft.class_of_losses]
     statistical["tests"]["n_columns"] = len(losses) + len(AXES)
     for block, (axes, members) in zip(statistical["block"], blocks, strict=True):
         block["n"], block["n_hypotheses"] = len(axes), len(members)

@@ -73,8 +73,9 @@ def configure_layout(layout: np.void, members: Sequence[tuple[str, int, int]], a
     layout["group"] = [IN_PITCH if axis == PITCH else IN_ROLL_AND_YAW for axis in aircraft.dominant_axis]
     layout["partner"] = layout["loss_of"] = layout["position_of"] = -1
     for names in aircraft.groups.values():
-        for name, other in zip(names, names[::-1], strict=True):
-            layout["partner"][index[name]] = index[other] if other != name else -1
+        if len(names) == 2:
+            one, other = (index[name] for name in names)
+            layout["partner"][one], layout["partner"][other] = other, one
     for e, (_, kind, surface) in enumerate(members):
         layout["loss_of" if kind == LOSS else "position_of"][surface] = e
 

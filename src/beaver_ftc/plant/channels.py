@@ -100,7 +100,7 @@ _STATES = (
 def likelihoods(aircraft: Aircraft) -> tuple[str, ...]:
     """Columns of the statistical detector's tests."""
     return (
-        *(f"{s}_loss_likelihood_share" for s in aircraft.primary),
+        *(f"{s}_loss_likelihood_share" for s in aircraft.class_of_losses),
         *(f"{axis}_step_likelihood_share" for axis in AXES),
     )
 

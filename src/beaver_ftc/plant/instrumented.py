@@ -70,6 +70,10 @@ def _parts() -> Element:
     return ElementTree.fromstring(_template("instrumented.xml"))
 
 
+# Surfaces whose plain commands it has without being told.
+KNOWN_TO_JSBSIM = ("aileron", "elevator", "rudder", "flap", "spoiler", "speedbrake")
+
+
 def actuator_system(surface: str, low_rad: float, high_rad: float, prefix: str = "") -> str:
     """A system file for a surface that travels from low_rad to high_rad, by `aircraft/actuator.xml`.
 
@@ -78,7 +82,7 @@ def actuator_system(surface: str, low_rad: float, high_rad: float, prefix: str =
     """
     template = _template("actuator.xml")
     text = template[template.index("<system") :].replace("fcs/SURFACE-", f"fcs/{prefix}SURFACE-")
-    if prefix:  # JSBSim knows the plain ones without being told
+    if prefix or surface not in KNOWN_TO_JSBSIM:
         command = f'<property value="0"> fcs/{prefix}SURFACE-cmd-norm </property>'
         text = text.replace("<property", f"{command}\n  <property", 1)
     text = text.replace("SURFACE", surface)

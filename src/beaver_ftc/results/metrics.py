@@ -337,11 +337,13 @@ def _outside_the_class(scenario: "Scenario", document: Document) -> str:
         f"{surface_of(fault)} {fault.type.replace('_', ' ')}"
         for fault in scenario.faults
         if surface_of(fault)  # what is on no surface is meant to be outside
-        and (fault.type != LOSS_OF_EFFECTIVENESS or surface_of(fault) not in scenario.airframe.primary)
+        and (
+            fault.type != LOSS_OF_EFFECTIVENESS or surface_of(fault) not in scenario.airframe.class_of_losses
+        )
     ]
     if scenario.fdi.fault_class == "all" or not strange:
         return ""
-    *first, last = scenario.airframe.primary
+    *first, last = scenario.airframe.class_of_losses
     return (
         f"{' and '.join(strange)}: outside the fault class the diagnosis looks for (loss of effectiveness of "
         f"{', '.join(first)} or {last}), so it cannot be named; set fdi.fault_class: all"

@@ -78,7 +78,7 @@ def excitation(scenario: Scenario) -> Excitation:
         both_responses(design, np.zeros(3), row, np.zeros(3), at)
     first = int(SETTLED_S * scenario.rate_hz)
     moment = (G * u[:, None, :])[first:]
-    of = {name: moment[:, :, aircraft.surfaces.index(name)] for name in aircraft.primary}
+    of = {name: moment[:, :, aircraft.surfaces.index(name)] for name in aircraft.class_of_losses}
     return Excitation(of, bound[first:], 1.0 / scenario.rate_hz)
 
 
@@ -172,7 +172,9 @@ def _point(scenario: Scenario, point: tuple[float, float, float]) -> list[Docume
     try:
         seen = excitation(at(scenario, *point))
     except BeaverFtcError as error:
-        return [{**place, "fault": fault, **_nothing(str(error))} for fault in scenario.airframe.primary]
+        return [
+            {**place, "fault": fault, **_nothing(str(error))} for fault in scenario.airframe.class_of_losses
+        ]
     return [{**place, "fault": fault, **judge(seen, fault)} for fault in seen.moment]
 
 

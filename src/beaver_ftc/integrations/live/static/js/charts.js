@@ -4,7 +4,7 @@ import uPlot from "../vendor/uplot.min.js";
 import { AXES, DEG, flight, value } from "./state.js";
 
 const WINDOW_S = 20, POINTS = 320, MARK_S = 4;
-const MARKS = "●■▲◆★✚▼○";
+const MARKS = "●■▲◆★✚▼○□△◇☆✖▽◀▶◁▷◉◈";  // as many as there are surfaces at most; colours come again
 export const COLOURS = ["#6ec1f0", "#f0a830", "#2fbf94", "#dd92c0", "#f0e442", "#ff7a4d", "#b0bec8", "#ffffff"];
 
 // A chart: curves, each with the value it shows now; solid is what is, dashed is what was asked or estimated.
@@ -57,7 +57,7 @@ class Chart {
     title.append(Object.assign(document.createElement("b"), { textContent: this.plan.title }));
     this.plan.names.forEach((name, i) => {
       const key = Object.assign(document.createElement("span"), { className: "key", textContent: `${MARKS[i]} ${name}` });
-      key.style.color = COLOURS[i];
+      key.style.color = COLOURS[i % COLOURS.length];
       title.append(key);
     });
     return title;
@@ -70,7 +70,7 @@ class Chart {
       scales: { x: { time: false, range: () => this.span ?? [0, WINDOW_S] }, y: { range: (_, low, high) => this.range(low, high) } },
       axes: [{ ...axis, size: 20, space: 60 }, { ...axis, size: 38, space: 22 }],
       series: [{}, ...plan.curves.map(({ label, colour, dash }) => ({
-        label, stroke: COLOURS[colour], width: dash ? 1 : 1.5, dash: dash ? [5, 4] : undefined, points: { show: false }, spanGaps: false,
+        label, stroke: COLOURS[colour % COLOURS.length], width: dash ? 1 : 1.5, dash: dash ? [5, 4] : undefined, points: { show: false }, spanGaps: false,
       }))],
       hooks: { draw: [(plot) => this.drawLimits(plot), (plot) => this.drawMarks(plot)] },
     };
@@ -111,7 +111,7 @@ class Chart {
     ctx.textBaseline = "middle";
     this.plan.curves.forEach(({ colour, dash }, i) => {
       if (dash) return;
-      ctx.fillStyle = COLOURS[colour];
+      ctx.fillStyle = COLOURS[colour % COLOURS.length];
       for (const j of places) {
         const y = this.data[i + 1][j];
         if (y !== null && y !== undefined) ctx.fillText(MARKS[colour], plot.valToPos(times[j], "x", true), plot.valToPos(y, "y", true));

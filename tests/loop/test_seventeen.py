@@ -1,0 +1,95 @@
+"""An aircraft of 17 surfaces flies, is diagnosed and is shown, as one of four."""
+
+import numpy as np
+import pytest
+import yaml
+from tests import seventeen
+
+import beaver_ftc as bf
+from beaver_ftc.aircraft import load
+from beaver_ftc.aircraft.schema import MAX_SURFACES
+from beaver_ftc.diagnosis.across import MOST, USUAL, size_for
+from beaver_ftc.diagnosis.isolation import members_of
+from beaver_ftc.plant.adapter import Plant
+from beaver_ftc.plant.trim import trim
+
+AILERONS = {"aileron_right_0", "aileron_right_1", "aileron_right_2"}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("aircraft")
+    seventeen.write(folder)
+    return folder
+
+
+def scenario(folder, **given):
+    sine = {"amplitude_deg_s": 3, "frequency_hz": 0.25}
+    file = folder / "flight.yaml"
+    document = {
+        "name": "flight",
+        "aircraft": f"./{seventeen.NAME}",
+        "duration_s": 4,
+        "reference": {"p": [{"sine": sine}], "q": [{"sine": sine}]},
+        **given,
+    }
+    file.write_text(yaml.safe_dump(document), encoding="utf-8")
+    return bf.load(file)
+
+
+def test_all_parts_moved_as_the_whole_are_the_whole(folder):
+    """At any state: the same accelerations as the Beaver's, to rounding."""
+    rng, whole = np.random.default_rng(1), load()
+    aircraft = load(f"./{seventeen.NAME}", folder)
+    parts = seventeen.parts()
+    for name in ("CX", "CY", "CZ", "Cl", "Cm", "Cn"):
+        of = {signal: rng.uniform(-0.2, 0.2) for signal in (*whole.signal_names, "betadoth")}
+        of |= {surface: rng.uniform(-0.3, 0.3) for surface in whole.surfaces}
+        ways = {part.name: of[s] * np.sign(part.share) for s, of_it in parts.items() for part in of_it}
+        alike = of | ways
+        assert aircraft.coefficient(name, alike) == pytest.approx(whole.coefficient(name, of), abs=1e-9)
+
+
+def test_it_is_trimmed_as_the_whole_where_one_part_does_the_work(folder):
+    aircraft = load(f"./{seventeen.NAME}", folder)
+    point = trim(45.0, 1828.8, plant=Plant(100, aircraft=aircraft))
+    assert point.surfaces_rad["elevator_0"] == pytest.approx(
+        5.0 * trim(45.0, 1828.8).surfaces_rad["elevator"], rel=0.05
+    )
+
+
+def test_every_loss_and_position_has_an_estimator(folder):
+    aircraft = load(f"./{seventeen.NAME}", folder)
+    assert aircraft.n == 17 <= MAX_SURFACES
+    assert len(members_of("all", aircraft)) == 34
+    stand_ins = {part.name for part in seventeen.parts()["flap"]}
+    assert {surface for surface, _, _ in members_of("published", aircraft)} == {
+        *aircraft.surfaces
+    } - stand_ins
+
+
+def test_the_usual_record_is_that_of_the_usual_aircraft(folder):
+    assert size_for(load()) is USUAL
+    assert size_for(load(f"./{seventeen.NAME}", folder)) is MOST
+
+
+def test_a_healthy_flight_raises_no_alarm_and_ends_in_no_departure(folder):
+    flight = bf.fly(scenario(folder, fdi={"fault_class": "all"}))
+    assert not flight.metrics["false_alarm"]
+    assert flight.metrics["departure"] is None
+    assert {f"{surface}_cmd_rad" for surface in load(f"./{seventeen.NAME}", folder).surfaces} <= {*flight.log}
+
+
+def test_a_runaway_on_one_side_leaves_the_ailerons_of_that_side(folder):
+    """They move the rates alike, and pitch with the other sign than those of the other side."""
+    fault = {"actuator": "aileron_right_1", "type": "hardover", "direction": 1, "at_s": 1}
+    flight = bf.fly(scenario(folder, fdi={"fault_class": "all"}, faults=[fault]))
+    left = {candidate.partition(":")[0] for candidate in flight.metrics["isolation"]["candidates"]}
+    assert left == AILERONS
+
+
+def test_noisy_sensors_in_moving_air_raise_no_alarm(folder):
+    air = {"turbulence": "dryden", "severity": "light"}
+    bounds = {"sensors": "tactical-grade", "turbulence": "light"}
+    flight = bf.fly(scenario(folder, sensors="tactical-grade", environment=air, fdi={"bounds": bounds}))
+    assert not flight.metrics["detection"]["detected"]

@@ -1,0 +1,226 @@
+"""Write built-in aircraft whose surfaces are parts of the Beaver's: `beaver-split`, with halves by side.
+
+python -m tools.split
+
+A part has its share of every term of the whole surface, and what the parts of both sides take from one
+another besides: a normal force at its arm rolls, a longitudinal one yaws, and the lift of an aileron comes
+with the pitching moment of its section. Positive is trailing edge down, of the left aileron too: its share is
+negative. All parts moved as the whole moves them are the whole surface, term by term.
+
+[PF]    pilotfriend.com, de Havilland DHC-2: the entire trailing edge of the wing is hinged, flaps inboard,
+        slotted ailerons outboard.
+[JAWA]  Jane's All the World's Aircraft, 1966-67: span 14.63 m, cabin 1.22 m wide.
+[G27]   H. Glauert, Theoretical relationships for an aerofoil with hinged flap, ARC R&M 1095, 1927: of a hinge
+        at E of the chord from the trailing edge, c_l per rad 2 (pi - t + sin t), c_m about the quarter chord
+        per rad -1/2 sin t (1 - cos t), cos t = 2 E - 1.
+Ours, for no source gives them: where flap and aileron meet, 55 % of the half-span, and E, a quarter.
+"""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import acos, cos, pi, sin
+from pathlib import Path
+
+import yaml
+
+from beaver_ftc.aircraft import Aircraft, load
+from beaver_ftc.aircraft import Term as WholeTerm
+from beaver_ftc.plant.instrumented import actuator_system
+
+SPAN_M, CABIN_M, JOINT, HINGE = 14.63, 1.22, 0.55, 0.25
+HALF_SPAN_M = SPAN_M / 2
+AILERON_M = 0.5 * (JOINT + 1.0) * HALF_SPAN_M  # where the middle of an aileron is, from the plane of symmetry
+FLAP_M = 0.5 * (CABIN_M / 2 + JOINT * HALF_SPAN_M)
+SIGNALS = {"alpha": "aero/alpha-rad", "beta": "aero/beta-rad"}
+NAME = "beaver-split"
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of a surface. share: of its terms, negative where it moves against the whole; arm_m: of its
+    lift, to the right, or None in the middle."""
+
+    name: str
+    share: float
+    arm_m: float | None = None
+
+    @property
+    def short(self) -> str:
+        """What its terms are called by, after the name of the whole surface's."""
+        return self.name.partition("_")[2]
+
+
+Parts = Mapping[str, Sequence[Part]]
+
+
+@dataclass(frozen=True)
+class Term:
+    """A term of a part: coefficient, name, value, powers of signals, where from, what it is."""
+
+    coefficient: str
+    name: str
+    value: float
+    of: tuple[tuple[str, int], ...]
+    surface: str
+    source: str
+    says: str
+
+
+HALVES = {
+    "aileron": (Part("aileron_left", -0.5, -AILERON_M), Part("aileron_right", 0.5, AILERON_M)),
+    "flap": (Part("flap_left", 0.5, -FLAP_M), Part("flap_right", 0.5, FLAP_M)),
+}
+GROUPS = {
+    "pitch": ["elevator", "flap_left", "flap_right"],
+    "lateral": ["aileron_left", "aileron_right", "rudder"],
+}
+
+
+def section_moment() -> float:
+    """c_m over c_l of a hinged aerofoil [G27]."""
+    t = acos(2.0 * HINGE - 1.0)
+    return -0.5 * sin(t) * (1.0 - cos(t)) / (2.0 * (pi - t + sin(t)))
+
+
+def terms_of(whole: Aircraft, surface: str, part: Part) -> Iterator[Term]:
+    """Its share of the terms, and what its side does besides."""
+    for term in (term for term in whole.terms.values() if term.surface == surface):
+        value, ending = part.share * term.value, term.name.removeprefix(term.coefficient)
+        found = [(term.name, value, f"{term.source}, shared", f"{term.description}: this part")]
+        if part.arm_m is not None:
+            found += [
+                (f"{c}{ending}", v, "strip theory", says) for c, v, says in of_a_side(term, value, part)
+            ]
+        for name, of_part, source, says in found:
+            yield Term(name[:2], f"{name}_{part.short}", of_part, term.of, part.name, source, says)
+
+
+def of_a_side(whole: WholeTerm, value: float, part: Part) -> Iterator[tuple[str, float, str]]:
+    """What the other side takes back: coefficient, value, and what it is."""
+    arm = (part.arm_m or 0.0) / SPAN_M
+    if whole.coefficient == "Cl":  # an aileron: its lift follows from its roll
+        lift = -value / arm
+        yield "CZ", -lift, "normal force of one side"
+        yield "Cm", section_moment() * lift, "pitching moment of its section"
+    if whole.coefficient == "CZ":
+        yield "Cl", value * arm, "rolling moment of its normal force"
+    if whole.coefficient == "CX":
+        yield "Cn", -value * arm, "yawing moment of its longitudinal force"
+
+
+def terms(whole: Aircraft, parts: Parts) -> list[Term]:
+    """The terms of all parts."""
+    return [t for surface, of_it in parts.items() for part in of_it for t in terms_of(whole, surface, part)]
+
+
+def model(whole: Aircraft, parts: Parts, name: str) -> str:
+    """The JSBSim model: that of the whole with its surfaces' terms and actuators replaced."""
+    text = whole.jsbsim.read_text(encoding="utf-8")
+    made = terms(whole, parts)
+    for surface in parts:
+        for term in (t for t in whole.terms.values() if t.surface == surface):
+            pattern = rf'        <product name="aero/coefficient/{term.name}">.*?</product>\n'
+            text = re.sub(pattern, "", text, flags=re.S)
+            text = text.replace(f'    <property value="1"> uncertainty/{term.name}-scale </property>\n', "")
+        systems = "".join(f'  <system file="{part.name}"/>\n' for part in parts[surface])
+        text = re.sub(rf'  <system file="{surface}"/>[^\n]*\n', systems, text)
+    scales = "".join(f'    <property value="1"> uncertainty/{t.name}-scale </property>\n' for t in made)
+    text = text.replace(
+        '    <property value="0"> uncertainty/inertia-coupling/p',
+        scales + '    <property value="0"> uncertainty/inertia-coupling/p',
+        1,
+    )
+    for coefficient in ("CX", "CY", "CZ", "Cl", "Cm", "Cn"):
+        products = "".join(_product(t) for t in made if t.coefficient == coefficient)
+        start = text.index(f'<function name="aero/coefficient/{coefficient}">')
+        at = text.index("      </sum>", start)
+        text = text[:at] + products + text[at:]
+    return text.replace('name="DHC-2 Beaver"', f'name="{name}"', 1)
+
+
+def _product(term: Term) -> str:
+    signals = "".join(f" <property> {SIGNALS[s]} </property>" for s, power in term.of for _ in range(power))
+    return (
+        f'        <product name="aero/coefficient/{term.name}">\n'
+        f"          <!-- {term.says} -->\n"
+        f"          <value> {term.value:.10g} </value>"
+        f" <property> fcs/{term.surface}-effective-rad </property>"
+        f"{signals} <property> uncertainty/{term.name}-scale </property>\n"
+        "        </product>\n"
+    )
+
+
+def data(
+    whole: Aircraft,
+    parts: Parts,
+    groups: Mapping[str, list[str]],
+    name: str,
+    says: str,
+) -> dict:
+    """What `aircraft.yaml` says."""
+    filed = yaml.safe_load((whole.folder / "aircraft.yaml").read_text(encoding="utf-8"))
+    filed |= {"name": name, "description": says, "jsbsim": f"{name}.xml", "groups": dict(groups)}
+    surfaces = {}
+    for surface, of in filed["surfaces"].items():
+        for part in parts.get(surface, ()):
+            keys = {key: f"fcs/{part.name}-{end}" for key, end in _ENDS.items()}
+            surfaces[part.name] = keys | {"travel_rad": of["travel_rad"]}
+        if surface not in parts:
+            surfaces[surface] = of
+    filed["surfaces"] = surfaces
+    made = terms(whole, parts)
+    for section in ("moments", "forces"):
+        for coefficient, given in filed[section].items():
+            kept = [term for term in given if term.get("surface") not in parts]
+            filed[section][coefficient] = kept + [_filed(t) for t in made if t.coefficient == coefficient]
+    return filed
+
+
+_ENDS = {"command": "cmd-rad", "position": "pos-rad", "effective": "effective-rad"}
+
+
+def _filed(term: Term) -> dict:
+    value = float(f"{term.value:.10g}")
+    keys = {"name": term.name, "value": value, "of": dict(term.of), "surface": term.surface}
+    return keys | {"source": term.source, "description": term.says}
+
+
+def files(
+    whole: Aircraft,
+    parts: Parts,
+    groups: Mapping[str, list[str]],
+    name: str,
+    says: str,
+) -> dict[str, str]:
+    """The files of the folder, by their names."""
+    filed = data(whole, parts, groups, name, says)
+    first = "# Written by `python -m tools.split`, which says where the numbers are from.\n"
+    text = yaml.safe_dump(filed, sort_keys=False, default_flow_style=None, width=200)
+    made = {f"{name}.xml": model(whole, parts, name), "aircraft.yaml": first + text}
+    for surface, of in filed["surfaces"].items():
+        made[f"Systems/{surface}.xml"] = actuator_system(surface, *of["travel_rad"])
+    return made
+
+
+def write(folder: Path, of_it: Mapping[str, str]) -> None:
+    """Write the files of an aircraft into a folder of its name."""
+    for name, text in of_it.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+
+
+def split_beaver() -> dict[str, str]:
+    """The files of `beaver-split`."""
+    says = "DHC-2 Beaver with halves of aileron and flap by side"
+    return files(load(), HALVES, GROUPS, NAME, says)
+
+
+def main() -> None:
+    """Write it."""
+    write(load().folder.parent / NAME, split_beaver())
+
+
+if __name__ == "__main__":
+    main()

@@ -55,6 +55,7 @@ class Options:
     acmi: bool = False
     recording: Annotated[Recording | None, typer.Option("--as")] = None
     flightgear: Annotated[str | None, typer.Option(metavar="HOST:PORT")] = None
+    certificate: bool = False
 
 
 def command(options: Options) -> None:
@@ -71,6 +72,7 @@ def command(options: Options) -> None:
     acmi: Also write flight.acmi, for Tacview.
     recording: Also write the log as a recorder on board would have, with vehicle.yaml.
     flightgear: Show it in FlightGear, at the pace of the clock.
+    certificate: Also write certificate.json, which proves alarm and exclusions (docs/certificates.md).
     """
     try:
         loaded = load_all(options.scenarios)
@@ -136,5 +138,8 @@ def _run_one(scenario: "Scenario", options: Options, prepare: "Prepare | None") 
     exports = [name for name, wanted in (("csv", options.csv), ("acmi", options.acmi)) if wanted]
     recording = options.recording.value if options.recording else None
     with progress_bar(scenario.name) as progress:
-        document = run(scenario, options.out, not options.no_report, progress, exports, prepare, recording)
+        certified = options.certificate
+        document = run(
+            scenario, options.out, not options.no_report, progress, exports, prepare, recording, certified
+        )
     return document | {"folder": str(options.out / scenario.name)}

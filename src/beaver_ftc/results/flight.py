@@ -125,6 +125,15 @@ class Flight:
         series = series_of(self._kept(), known[view].columns, window)
         return draw(known[view], series, instants, self.name)
 
+    def certificate(self) -> Document:
+        """The document of certificate.json: alarm and exclusions, each with the inequality that proves it.
+
+        It is flown once more for it. Raises BadInput for a flight without a log, or not of our scheme.
+        """
+        from beaver_ftc.results.certificates.certificate import certificate
+
+        return certificate(self.scenario, self._kept())
+
     def save(self, out: str | PathLike[str] = "runs", *, report: bool = True) -> Path:
         """Write `out/<name>/` as `beaver-ftc run` does, whole or not at all; returns that folder.
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from uuid import uuid4
 
 from beaver_ftc.documents.errors import SimulationFailed
-from beaver_ftc.results.log import ParquetLog
+from beaver_ftc.results.log import ParquetLog, StoredLog
 from beaver_ftc.results.metrics import Document, as_json, metrics
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ FILES_OF_A_RESULT = frozenset({
     "power.json", "power.txt", "power.parquet", "pitch-lost.json", "pitch-lost.txt",
     "diagnosis.parquet", "verdict.json", "flights.json", "flights.md", "flights.png",
     "flight.csv", "flight.ulg", "flight.bin", "vehicle.yaml", "grades.json", "grades.md", "grades.html",
-    "aircraft",
+    "aircraft", "certificate.json", "separation.json",
 })  # fmt: skip
 AIRCRAFT, MODEL_FILES = "aircraft", frozenset({".xml", ".yaml"})  # an own aircraft, to fly it again
 MARK = "beaver-ftc"  # the software that a picture of ours names in its metadata
@@ -56,16 +56,21 @@ def run(
     exports: Collection[str] = (),
     prepare: "Callable[[Plant], None] | None" = None,
     recording: str | None = None,
+    certified: bool = False,
 ) -> Document:
     """Fly `scenario`, write `out/<name>/` whole or not at all, and return the metrics document.
 
     exports: of "csv" and "acmi". prepare: called with the trimmed plant just before the flight. recording:
-    table, ulog or ardupilot, to write the log as a recorder on board would have. Raises BadInput for a flight
-    that cannot be trimmed, SimulationFailed for one not completed or kept.
+    table, ulog or ardupilot, to write the log as a recorder on board would have. certified: write the
+    certificate of its alarm and exclusions. Raises BadInput for a flight that cannot be trimmed or
+    certified, SimulationFailed for one not completed or kept.
     """
     from beaver_ftc.loop.loop import fly
     from beaver_ftc.results import exports as exporting
+    from beaver_ftc.results.certificates import certificate
 
+    if certified:
+        certificate.check_scheme(scenario)
     with result_folder(out, scenario.name) as folder:
         log_path, aircraft = folder / "log.parquet", scenario.airframe
         with ParquetLog(log_path) as log:
@@ -81,6 +86,8 @@ def run(
         if recording is not None:
             stops_rad = {s: max(abs(to.min_rad), abs(to.max_rad)) for s, to in aircraft.travel.items()}
             exporting.write_recording(log_path, stops_rad, recording, folder)
+        if certified:
+            certificate.write(scenario, StoredLog(log_path), folder)
     return document
 
 

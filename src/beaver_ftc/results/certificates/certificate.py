@@ -1,0 +1,222 @@
+"""certificate.json: for the alarm and for each exclusion the inequality that the data violated, with every
+number it takes. `tools/check_certificate.py` recomputes it from the log.
+"""
+
+import hashlib
+import json
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from math import inf
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from beaver_ftc.design.model import AXES
+from beaver_ftc.diagnosis.bounds.declared import poles_for_noise
+from beaver_ftc.diagnosis.state import LOSS
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.results.certificates import kinds
+from beaver_ftc.results.certificates.inequality import (
+    Document,
+    History,
+    Hypothesis,
+    Term,
+    constant_pair,
+    declared_of,
+    directions,
+    is_violated,
+    nothing,
+    of_one_frame,
+    written,
+)
+from beaver_ftc.results.certificates.tape import Tape, recorded
+from beaver_ftc.results.log import Log
+from beaver_ftc.scenario.diagnosis import MAX_POLES
+from beaver_ftc.scenario.schema import Scenario
+
+Found = tuple[list[Term], Hypothesis] | None
+FILE, FORMAT = "certificate.json", 1
+
+
+def certificate(scenario: Scenario, log: Log) -> Document:
+    """The certificate of a flight, which is flown again for what the log does not hold.
+
+    Raises BadInput where somebody else diagnosed.
+    """
+    check_scheme(scenario)
+    names = [name for name in log.columns if _is_event(name)]
+    columns = _read(log, ["t_s", *names])
+    events = {name: k for name in names if (k := _rise(columns[name])) is not None}
+    document: Document = {
+        "format": FORMAT, "scenario": scenario.name, "rows": len(columns["t_s"]),
+        "dt_s": 1.0 / scenario.rate_hz, "instants": scenario.substeps, "statements": [], "without": [],
+    }  # fmt: skip
+    if events:
+        tape = recorded(scenario, [events["detected"], *events.values()], len(columns["t_s"]))
+        for said in statements(scenario, tape, _history(scenario, log, tape), events):
+            document["statements" if "value" in said else "without"].append(said)
+    return sealed(document)
+
+
+def check_scheme(scenario: Scenario) -> None:
+    """Refuse flights whose alarm is not our scheme's."""
+    if not scenario.fdi.is_ours:
+        says = f"{scenario.fdi.scheme!r} states no bounds that can be recomputed"
+        raise BadInput(
+            f"{scenario.name}: fdi.scheme: {says}, allowed with a certificate: adaptive-estimators"
+        )
+
+
+def sealed(document: Document) -> Document:
+    """The same with the digest of all that is in it."""
+    return document | {"digest": digest(document)}
+
+
+def digest(document: Document) -> str:
+    """SHA-256 of the document in JSON, keys in order, without spaces, its `digest` empty."""
+    text = json.dumps(document | {"digest": ""}, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def write(scenario: Scenario, log: Log, folder: Path) -> None:
+    """Write the certificate of a flight into its result folder."""
+    (folder / FILE).write_text(as_text(certificate(scenario, log)), encoding="utf-8")
+
+
+def as_text(document: Document) -> str:
+    """The file's content."""
+    return json.dumps(document, separators=(",", ":")) + "\n"
+
+
+def _is_event(column: str) -> bool:
+    return column == "detected" or (column.startswith("fie_") and column.endswith("_excluded"))
+
+
+def _rise(flags: np.ndarray) -> int | None:
+    """The row at which a flag that is set at the end was set, None if it is not."""
+    if not flags[-1] > 0.0:
+        return None
+    clear = np.flatnonzero(~(flags > 0.0))
+    return int(clear[-1]) + 1 if len(clear) else 0
+
+
+def _read(log: Log, columns: list[str]) -> dict[str, np.ndarray]:
+    chunks = list(log.read_chunks(columns))
+    return {name: np.concatenate([chunk[name] for chunk in chunks]) for name in columns}
+
+
+def _history(scenario: Scenario, log: Log, tape: Tape) -> History:
+    """What the log says of rates, model and bound, and what was declared."""
+    patterns = ("{}_measured_rad_s", "{}_design_rad_s2", "{}_eta_bar_rad_s2")
+    columns = _read(log, [pattern.format(axis) for pattern in patterns for axis in AXES])
+    x, model, eta_bar = (np.column_stack([columns[p.format(axis)] for axis in AXES]) for p in patterns)
+    return History(
+        1.0 / scenario.rate_hz, 1.0 / scenario.substeps, x, model, eta_bar, declared_of(tape.alarm)
+    )
+
+
+def statements(
+    scenario: Scenario, tape: Tape, history: History, events: dict[str, int]
+) -> Iterator[Document]:
+    """What can be said of each event; one without a `value` says why it cannot be certified."""
+    alarm, fdi = events["detected"], tape.alarm["fdi"]
+    if not fdi["isolation"]["n"] or not fdi["config"]["enabled"] or fdi["published"]["in_use"]:
+        yield {"what": None, "column": "detected", "frame": alarm, "because": "another scheme was in charge"}
+        return
+    watched = fdi["watch"]["alarmed"]
+    because = "instruments, held against one another, raised it" if watched else "chance raised it"
+    found = _of_alarm(scenario, tape, history, alarm)
+    yield _stated(found, history, because, what=None, column="detected", frame=alarm)
+    for e, name in enumerate(tape.names):
+        column = f"fie_{name}_excluded"
+        if column in events:
+            k = events[column]
+            found = _of_exclusion(scenario, tape, history, e, alarm, k)
+            yield _stated(found, history, "chance excluded it", what=name, column=column, frame=k)
+    if scenario.fdi.fault_class == "all":
+        yield from _of_types(scenario, tape, history, alarm)
+
+
+def _of_types(scenario: Scenario, tape: Tape, history: History, alarm: int) -> Iterator[Document]:
+    """Of each type excluded, surface by surface; the log has no column for it."""
+    for s, kind, k in kinds.excluded_types(tape):
+        because, found = kinds.why_not(tape, kind), None
+        if because is None:
+            of = kinds.hypothesis(tape, s, kind)
+            found = _first_violated(kinds.candidates(of, history, alarm, k), of, history, tape)
+        about = {"what": kinds.name_of(scenario.airframe.surfaces[s], kind), "column": None}
+        by = max(term.frame for term in found[0]) if found else k
+        yield _stated(found, history, because or kinds.COURSE, **about, frame=by)
+
+
+def _stated(found: Found, history: History, because: str, **about: Any) -> Document:
+    """A statement, or why there is none."""
+    if found is None:
+        return about | {"because": because}
+    return about | written(*found, history)
+
+
+def _poles(scenario: Scenario) -> list[float]:
+    """Of the detection filters (theory, section 3)."""
+    config = scenario.fdi
+    for_noise = poles_for_noise(config.bounds.sensors, max(config.bounds.constant_rad_s2.as_tuple()))
+    further = (*config.pole_bank_per_s, *for_noise) if config.sharpen.pole_bank else ()
+    return [config.detection_pole_per_s, *further][:MAX_POLES]
+
+
+def _of_alarm(scenario: Scenario, tape: Tape, history: History, k: int) -> Found:
+    """A filter that left its bound at frame k."""
+    if k <= tape.since:
+        return None
+    health = nothing(tape.first, tape.end - tape.first)
+    candidates = [[Term(d, inf, k - 1, k)] for d in directions((0, 1, 2))]
+    candidates += [[Term(d, pole, tape.since, k)] for pole in _poles(scenario) for d in directions((0, 1, 2))]
+    return _first_violated(candidates, health, history, tape)
+
+
+def _first_violated(candidates: Iterable[list[Term]], of: Hypothesis, history: History, tape: Tape) -> Found:
+    """The first inequality that the data violate."""
+    for terms in filter(None, candidates):
+        known = [replace(term, known_from=tape.first) for term in terms]
+        if is_violated(known, of, history):
+            return known, of
+    return None
+
+
+def _of_exclusion(scenario: Scenario, tape: Tape, history: History, e: int, alarm: int, k: int) -> Found:
+    """The test that the fault of estimator e failed at frame k."""
+    fie, config = tape.alarm["fdi"]["isolation"]["estimator"][e], scenario.fdi
+    asked = tuple(i for i in range(3) if not fie["unasked"][i])
+    of = Hypothesis(
+        tape.first, tape.offset[:, e], tape.slope[:, e], tape.spread[:, e], float(fie["low"]),
+        float(fie["high"]), asked=asked,
+    )  # fmt: skip
+    candidates = [*of_one_frame(k, of), *_filtered(scenario, tape, e, fie["across"], asked, k)]
+    if k > alarm:
+        candidates += [[Term(d, config.isolation_pole_per_s, alarm, k)] for d in directions(asked)]
+    found = _first_violated(candidates, of, history, tape)
+    if found is not None:
+        return found
+    lasting = replace(of, constant=True)
+    candidates = []
+    if fie["kind"] == LOSS and config.fault_profile == "abrupt":
+        candidates.append(constant_pair(lasting, history, np.arange(alarm, k + 1)))
+    elif config.thresholds == "published" and k > alarm:
+        candidates += [[Term(d, config.isolation_pole_per_s, alarm, k)] for d in directions(asked)]
+    return _first_violated(candidates, lasting, history, tape)
+
+
+def _filtered(
+    scenario: Scenario, tape: Tape, e: int, across: np.ndarray, asked: tuple[int, ...], k: int
+) -> Iterator[list[Term]]:
+    """The detection filters, and the memory of what the fault can have done to them."""
+    for m, pole in enumerate(_poles(scenario)):
+        for i in asked:
+            for sign, reach in ((1.0, tape.reach_high), (-1.0, -tape.reach_low)):
+                d = np.zeros(3)
+                d[i] = sign
+                yield [Term(d, pole, tape.since, k, before=float(reach[e, m, i]))]
+        if across.any() and len(asked) == 3:
+            for sign, reach in ((1.0, tape.reach_high), (-1.0, -tape.reach_low)):
+                yield [Term(sign * across, pole, tape.since, k, before=float(reach[e, m, 3]))]

@@ -1,0 +1,294 @@
+"""The inequality that an alarm or an exclusion is, and the search for it (docs/certificates.md).
+
+    c_1 (d_1 . E_1[k_1]) + c_2 (d_2 . E_2[k_2]) + ... > the most that hypothesis and declared errors allow
+
+E is the innovation through a filter of pole lam, the frame's own for a pole of infinity; d is a direction.
+With one term the fault's parameter may move as it likes, or the fault be absent, in every frame; with
+`constant` it is one number for all terms.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from math import exp, inf, isinf
+from typing import Any
+
+import numpy as np
+
+from beaver_ftc.diagnosis.bounds.worst_case import ROUNDING_RAD_S2
+
+WINDOW = 16  # frames that are written out; what was before them is the filter's state
+_LEAST = 1e-9  # of a margin, as a share of the limit: more than another order of summation makes
+_LEAST_REST = 1e-13  # rad/s2: less is rounding
+
+Document = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class History:
+    """Rows of a log, (rows, 3): rates x, model, eta_bar; and of the declared errors of gyros what a reading's
+    changes by, noise. declared: what they follow from."""
+
+    dt: float
+    share: float  # one over the instants in a frame
+    x: np.ndarray
+    model: np.ndarray
+    eta_bar: np.ndarray
+    declared: Document
+
+    @cached_property
+    def noise(self) -> np.ndarray:
+        """n of theory, section 2, (rows, 3) rad/s."""
+        gyro = self.declared["gyro"]
+        slope = np.array(gyro["slope"])
+        changing = np.array(gyro["offset_rad_s"]) - gyro["steady_rad_s"]
+        return np.asarray(changing + slope * (np.abs(self.x) + self.off))
+
+    @cached_property
+    def off(self) -> np.ndarray:
+        """How far a rate can be from its reading, (rows, 3) rad/s."""
+        gyro = self.declared["gyro"]
+        slope = np.array(gyro["slope"])
+        return np.asarray((np.array(gyro["offset_rad_s"]) + slope * np.abs(self.x)) / (1.0 - slope))
+
+    def innovation(self, rows: slice) -> np.ndarray:
+        """nu of rows after the first, (rows, 3) rad/s2."""
+        before = slice(rows.start - 1, rows.stop - 1)
+        return np.asarray((self.x[rows] - self.x[before]) / self.dt - self.model[rows])
+
+    def frame_bound(self, rows: slice) -> np.ndarray:
+        """The bound on it, (rows, 3) rad/s2."""
+        before, n = slice(rows.start - 1, rows.stop - 1), self.noise
+        return np.asarray(self.eta_bar[rows] + (n[rows] + n[before]) / self.dt)
+
+    def rest(self, rows: slice) -> np.ndarray:
+        """What of eta_bar is neither published nor the Earth's, nor of the row before; (rows, 3) rad/s2."""
+        declared, f = self.declared, (np.abs(self.x) + self.off)[rows.start - 1 : rows.stop - 1]
+        earth, g = declared["earth_rad_s"], np.array(declared["earth_share"])
+        pairs = np.column_stack((f[:, 1] * f[:, 2], f[:, 0] * f[:, 2], f[:, 0] * f[:, 1]))
+        of_earth = earth * ((1.0 + g) * f.sum(axis=1, keepdims=True) + g * earth) + ROUNDING_RAD_S2
+        coupled = np.array(declared["inertia_coupling"]) * np.abs(declared["coupling"]) * pairs
+        return np.asarray(
+            self.eta_bar[rows] - self.share * (coupled + declared["constant_rad_s2"] + of_earth)
+        )
+
+
+def declared_of(frame: np.void) -> Document:
+    """What a flight's record says of bounds declared, and of the coefficients in them."""
+    bound, design = frame["fdi"]["bound"], frame["belief"]["design"]
+    admitted = bound["admitted"]
+    there = bool(admitted["any"])
+
+    def of(values: np.ndarray) -> list[float]:
+        return [float(value) if there else 0.0 for value in values[:3]]
+
+    d = {name: abs(float(design[name])) for name in ("Ppq", "Pqr", "Rpq", "Rqr", "Qpr", "Qpp", "Qrr")}
+    shares = d["Ppq"] + d["Pqr"], d["Qpr"] + 2.0 * max(d["Qpp"], d["Qrr"]), d["Rpq"] + d["Rqr"]
+    return {
+        "inertia_coupling": bound["inertia"].tolist(),
+        "constant_rad_s2": bound["constant"].tolist(),
+        "coupling": [float(design[name]) for name in ("Pqr", "Qpr", "Rpq")],
+        "earth_rad_s": float(bound["earth_rate"]),
+        "earth_share": [max(share, 1.0) for share in shares],
+        "gyro": {
+            "offset_rad_s": of(admitted["offset"]), "steady_rad_s": of(admitted["steady"]),
+            "slope": of(admitted["slope"]),
+        },
+    }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """What a fault adds to the innovation: offset + theta slope, give or take spread; theta in [low, high].
+
+    Arrays (frames, 3) from frame `first` on. constant: theta is one number; shown: in frames that health does
+    not explain. asked: the axes on which it is held against the data.
+    """
+
+    first: int
+    offset: np.ndarray
+    slope: np.ndarray
+    spread: np.ndarray
+    low: float
+    high: float
+    constant: bool = False
+    shown: bool = False
+    asked: tuple[int, ...] = (0, 1, 2)
+
+
+def nothing(first: int, frames: int) -> Hypothesis:
+    """No fault."""
+    zero = np.zeros((frames, 3))
+    return Hypothesis(first, zero, zero, zero, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Term:
+    """One filter in one direction (3,), up to a frame: begun, with no residual, at frame `since`.
+
+    before: rad/s, what the fault can have done to it by the frame `known_from`, before which nothing is kept.
+    """
+
+    direction: np.ndarray
+    pole_per_s: float
+    since: int
+    frame: int
+    weight: float = 1.0
+    known_from: int = 0
+    before: float = 0.0
+
+    def decay(self, dt: float) -> float:
+        """What a frame leaves of the residual."""
+        return 0.0 if isinf(self.pole_per_s) else exp(-self.pole_per_s * dt)
+
+
+def measure(term: Term, of: Hypothesis, history: History, first: int) -> tuple[float, float, float, float]:
+    """The term's value; the most that it can be, and what a constant theta multiplies in that; and what the
+    fault can have done before frame `first`."""
+    a, d, dt = term.decay(history.dt), term.direction, history.dt
+    size, n = np.abs(d), history.noise @ np.abs(d)
+    past = slice(term.since + 1, term.frame + 1)
+    weight = _weights(a, term.frame - term.since)
+    value = dt * weight @ (history.innovation(past) @ d)
+    noise = a * weight[0] * n[term.since] + (1.0 - a) * weight @ n[term.since : term.frame] + n[term.frame]
+    limit = dt * weight @ (history.eta_bar[past] @ size) + noise
+    here = slice(first - of.first, term.frame + 1 - of.first)
+    offset, slope, spread = of.offset[here] @ d, of.slope[here] @ d, of.spread[here] @ size
+    weight = _weights(a, term.frame + 1 - first)
+    if of.constant:
+        return value, limit + dt * weight @ (offset + spread), float(dt * weight @ slope), 0.0
+    before = _done_before(term, of, dt, first)
+    most = np.maximum(0.0, np.maximum(offset + of.low * slope, offset + of.high * slope)) + spread
+    return value, limit + a * weight[0] * before + dt * weight @ most, 0.0, before
+
+
+def _weights(a: float, n: int) -> np.ndarray:
+    """What is left of the last n frames' inputs."""
+    return np.asarray(a ** np.arange(n - 1.0, -1.0, -1.0))
+
+
+def _done_before(term: Term, of: Hypothesis, dt: float, first: int) -> float:
+    """The most the fault can have done to a filter before frame `first`."""
+    a, d = term.decay(dt), term.direction
+    begin = max(term.since, term.known_from) + 1
+    if first <= begin:
+        return term.before
+    here = slice(begin - of.first, first - of.first)
+    offset, slope, spread = of.offset[here] @ d, of.slope[here] @ d, of.spread[here] @ np.abs(d)
+    most = np.maximum(0.0, np.maximum(offset + of.low * slope, offset + of.high * slope)) + spread
+    weight = _weights(a, first - begin)
+    return float(a * weight[0] * term.before + dt * weight @ most)
+
+
+def sides(terms: list[Term], of: Hypothesis, history: History) -> tuple[float, float, list[float]]:
+    """Both sides of the inequality, and what the fault can have done to each term before it is written."""
+    measured = [measure(term, of, history, _first(term, of)) for term in terms]
+    weights = np.array([term.weight for term in terms])
+    value, limit, slope, _ = (float(weights @ column) for column in zip(*measured, strict=True))
+    return value, limit + max(of.low * slope, of.high * slope), [before for *_, before in measured]
+
+
+def _first(term: Term, of: Hypothesis) -> int:
+    """The first frame that is written out. A constant parameter needs all there are."""
+    whole = term.since + 1 if of.constant else max(term.frame + 1 - WINDOW, term.since + 1)
+    return max(whole, term.known_from + 1)
+
+
+def is_violated(terms: list[Term], of: Hypothesis, history: History) -> bool:
+    """Whether the data are beyond what the hypothesis allows, by more than rounding."""
+    value, limit, _ = sides(terms, of, history)
+    return value - limit > _LEAST * max(abs(limit), abs(value))
+
+
+def written(terms: list[Term], of: Hypothesis, history: History) -> Document:
+    """The inequality with every number it takes."""
+    value, limit, before = sides(terms, of, history)
+    return {
+        "theta": [of.low, of.high],
+        "constant": of.constant,
+        "shown": of.shown,
+        "declared": history.declared,
+        "terms": [_term(*each, of, history) for each in zip(terms, before, strict=True)],
+        "value": value,
+        "limit": limit,
+    }
+
+
+def _term(term: Term, before: float, of: Hypothesis, history: History) -> Document:
+    """A term: axes, filter, what the fault can have done to it before, and its frames."""
+    first, along = _first(term, of), term.direction != 0.0
+    rows, here = slice(first, term.frame + 1), slice(first - of.first, term.frame + 1 - of.first)
+    rest = history.rest(rows)
+    rest[np.abs(rest) < _LEAST_REST] = 0.0
+    frames = {
+        "x": history.x[rows], "model": history.model[rows], "eta_bar": history.eta_bar[rows], "rest": rest,
+        "offset": of.offset[here] * along, "slope": of.slope[here] * along, "spread": of.spread[here] * along,
+    }  # fmt: skip
+    return {
+        "weight": term.weight, "direction": term.direction.tolist(),
+        "pole_per_s": None if isinf(term.pole_per_s) else term.pole_per_s, "since": term.since,
+        "first": first, "frame": term.frame, "fault": before,
+        "frames": {name: array.tolist() for name, array in frames.items() if array.any()},
+    }  # fmt: skip
+
+
+def directions(asked: tuple[int, ...]) -> Iterator[np.ndarray]:
+    """Both ways along each axis."""
+    for i in asked:
+        for sign in (1.0, -1.0):
+            d = np.zeros(3)
+            d[i] = sign
+            yield d
+
+
+def of_one_frame(k: int, of: Hypothesis) -> Iterator[list[Term]]:
+    """The tests of a frame by itself: each axis; two of them such that theta drops out."""
+    for d in directions(of.asked):
+        yield [Term(d, inf, k - 1, k)]
+    Z = of.slope[k - of.first]
+    for i in of.asked:
+        for j in of.asked:
+            if i < j and (Z[i] or Z[j]):
+                d = np.zeros(3)
+                d[i], d[j] = Z[j], -Z[i]
+                d /= np.abs(d).max()
+                yield [Term(d, inf, k - 1, k)]
+                yield [Term(-d, inf, k - 1, k)]
+
+
+def constant_pair(of: Hypothesis, history: History, frames: np.ndarray) -> list[Term]:
+    """Two frames that no one theta explains, or one that none in its set does; empty if there are none.
+
+    frames: those that may be asked.
+    """
+    if not len(frames):
+        return []
+    rows = slice(int(frames[0]), int(frames[-1]) + 1)
+    asked = np.zeros((rows.stop - rows.start, 3), bool)
+    asked[np.ix_(frames - rows.start, np.array(of.asked))] = True
+    here = slice(rows.start - of.first, rows.stop - of.first)
+    Z, room = of.slope[here], history.frame_bound(rows) + of.spread[here]
+    value = history.innovation(rows) - of.offset[here]
+    asked &= Z != 0.0
+    if not asked.any():
+        return []
+    size = np.where(asked, np.abs(Z), 1.0)
+    middle = value * np.sign(Z) / size
+    least = np.where(asked, middle - room / size, -inf)
+    most = np.where(asked, middle + room / size, inf)
+    low, high = np.unravel_index(np.argmax(least), least.shape), np.unravel_index(np.argmin(most), most.shape)
+    terms = []
+    if least[low] > of.low:
+        terms.append(_one_sided(low, 1.0, Z, size, rows.start, history.dt))
+    if most[high] < of.high:
+        terms.append(_one_sided(high, -1.0, Z, size, rows.start, history.dt))
+    return terms
+
+
+def _one_sided(
+    place: tuple[Any, ...], sign: float, Z: np.ndarray, size: np.ndarray, first: int, dt: float
+) -> Term:
+    """The term that bounds theta from one side by one frame on one axis."""
+    k, d = first + int(place[0]), np.zeros(3)
+    d[place[1]] = sign * np.sign(Z[place])
+    return Term(d, inf, k - 1, k, weight=1.0 / (dt * float(size[place])))

@@ -1,0 +1,93 @@
+"""Exclusions of fault types whose parameter one number is: two frames that no such number explains.
+
+Stuck p = c, floating p = 0, a loss p = (1 + theta) u: so is a surface at fault in frames that health does not
+explain. The others are excluded by their course over many frames, and so is what an actuator brings back by
+and by; they are not certified.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from math import inf
+
+import numpy as np
+
+from beaver_ftc.diagnosis.types.registry import CONSTANT_LOSS, FLOAT, NAMES, STUCK, VARYING_LOSS
+from beaver_ftc.results.certificates.inequality import (
+    History,
+    Hypothesis,
+    Term,
+    constant_pair,
+    of_one_frame,
+)
+from beaver_ftc.results.certificates.tape import Tape
+
+COURSE = "it was excluded by its course over many frames"
+RETURN = "its actuator may be bringing the surface back"
+BLOCKS = "frames were examined in blocks"
+
+
+def excluded_types(tape: Tape) -> Iterator[tuple[int, int, int]]:
+    """(surface, type, frame) of each type excluded on a surface that can be at fault."""
+    layout = tape.alarm["fdi"]["layout"]
+    for s, kinds in enumerate(tape.types[-1]):
+        if tape.excluded[-1][layout["position_of"][s]]:
+            continue
+        for kind in np.flatnonzero(kinds):
+            yield s, int(kind), tape.first + int(np.argmax(tape.types[:, s, kind] > 0))
+
+
+def why_not(tape: Tape, kind: int) -> str | None:
+    """Why an exclusion of this type cannot be certified, None if it can."""
+    config = tape.alarm["fdi"]["types"]["config"]
+    if config["length"] > 1:
+        return BLOCKS
+    if kind not in (STUCK, FLOAT, CONSTANT_LOSS, VARYING_LOSS):
+        return COURSE
+    return RETURN if config["returns"] and kind in (STUCK, FLOAT) else None
+
+
+def name_of(surface: str, kind: int) -> str:
+    """What is excluded, in words."""
+    course = " that varies" if kind == VARYING_LOSS else ""
+    return f"{surface} {NAMES[kind]}{course}"
+
+
+def hypothesis(tape: Tape, s: int, kind: int) -> Hypothesis:
+    """What a fault of this type on surface s adds to the innovation."""
+    fdi = tape.alarm["fdi"]
+    e, surface = int(fdi["layout"]["position_of"][s]), fdi["types"]["surface"][s]
+    Gu, G, spread = -tape.offset[:, e], tape.slope[:, e], tape.spread[:, e]
+    asked = tuple(i for i in range(3) if not fdi["isolation"]["estimator"][e]["unasked"][i])
+    low, high = float(surface["travel_low"]), float(surface["travel_high"])
+    if kind == STUCK:
+        return Hypothesis(tape.first, -Gu, G, spread, low, high, True, True, asked)
+    if kind == FLOAT:
+        neutral = min(max(0.0, low), high)
+        return Hypothesis(tape.first, neutral * G - Gu, 0.0 * G, spread, 0.0, 0.0, True, True, asked)
+    loss = Hypothesis(tape.first, 0.0 * G, Gu, spread, -1.0, 0.0, True, True, asked)
+    return loss if kind == CONSTANT_LOSS else replace(loss, constant=False, shown=False)
+
+
+def candidates(of: Hypothesis, history: History, alarm: int, k: int) -> Iterator[list[Term]]:
+    """Inequalities that may exclude it by frame k."""
+    if not of.constant:
+        for frame in (k - 1, k):
+            yield from of_one_frame(frame, of)
+        return
+    frames = np.arange(alarm, k + 1)
+    frames = frames[_wrong(history, frames)]
+    if of.slope.any():
+        yield constant_pair(of, history, frames)
+    for frame in frames[-3:].tolist():
+        yield from ([Term(sign * d, inf, frame - 1, frame)] for d in np.eye(3) for sign in (1.0, -1.0))
+
+
+def _wrong(history: History, frames: np.ndarray) -> np.ndarray:
+    """In which frames health explains nothing; of several instants, nor in those beside them."""
+    rows = slice(int(frames[0]) - 1, int(frames[-1]) + 2)
+    innovation, bound = history.innovation(rows), history.frame_bound(rows)
+    wrong = (np.abs(innovation) > bound).any(axis=1)
+    beside = np.r_[wrong, np.zeros(len(frames) + 2 - len(wrong), bool)]
+    if history.share == 1.0:
+        return np.asarray(beside[1:-1])
+    return np.asarray(beside[:-2] & beside[1:-1] & beside[2:])

@@ -1,0 +1,172 @@
+"""A certificate proves alarm and exclusions to a checker that shares no code with what wrote it."""
+
+import ast
+import copy
+import json
+import subprocess
+import sys
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tools.check_certificate import failures
+from tools.drawn.certificates import altered, places
+
+import beaver_ftc as bf
+from beaver_ftc.cli.main import main
+from beaver_ftc.results.certificates.certificate import as_text, sealed
+from flying import SINES
+
+CHECKER = Path(__file__).parents[2] / "tools/check_certificate.py"
+GYRO = {"noise_std_deg_s": 0.02, "bias_deg_s": 0.05, "scale_error": 1e-3}
+GYROS = {"p": GYRO, "q": GYRO, "r": GYRO}
+LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.5, "at_s": 0.5}
+STUCK = {"type": "stuck", "actuator": "aileron", "position_deg": 5, "at_s": 0.5}
+FLIGHTS = {
+    "loss": {"faults": [LOSS]},
+    "loss with release": {"faults": [LOSS | {"end_s": 0.8}]},
+    "loss, slow filters": {
+        "faults": [LOSS],
+        "fdi": {"sharpen": {"pole_bank": False}},
+    },
+    "loss, as published": {
+        "faults": [LOSS],
+        "fdi": {"thresholds": "published", "sharpen": "none"},
+    },
+    "abrupt loss": {"faults": [LOSS | {"magnitude": 0.1}], "fdi": {"fault_profile": "abrupt"}},
+    "substeps": {"faults": [STUCK], "substeps": 3, "rate_hz": 50, "fdi": {"fault_class": "all"}},
+    "any type": {"faults": [STUCK], "fdi": {"fault_class": "all"}},
+    "any type with release": {"faults": [STUCK | {"end_s": 0.9}], "fdi": {"fault_class": "all"}},
+    "gyros": {"faults": [LOSS], "sensors": GYROS, "fdi": {"bounds": {"sensors": GYROS}}},
+    "tolerances": {
+        "faults": [STUCK],
+        "fdi": {"fault_class": "all", "bounds": {"coefficients": 0.05, "inertia": 0.02}},
+    },
+    "another aircraft": {
+        "aircraft": "jsbsim:c172p",
+        "initial": {"airspeed_mps": 50},
+        "faults": [LOSS],
+    },
+    "no fault": {},
+}
+
+
+@lru_cache
+def flown(name):
+    """A flight's certificate as it is read back, and its log."""
+    flight = bf.fly({"name": "test", "duration_s": 2.0, "reference": SINES, **FLIGHTS[name]})
+    log = {column: flight.log[column].to_numpy() for column in flight.log.columns}
+    return json.loads(as_text(flight.certificate())), log
+
+
+def set_at_end(log):
+    """Columns of the alarm and of the exclusions that are set as the flight ends."""
+    return {name for name in log if name == "detected" or name.endswith("_excluded") if log[name][-1] > 0}
+
+
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_the_checker_accepts_a_flights_certificate(name):
+    certificate, log = flown(name)
+    assert [*failures(certificate, log)] == []
+    stated = {said["column"] for said in certificate["statements"]} - {None}
+    left_out = {said["column"] for said in certificate["without"]} - {None}
+    assert stated | left_out == set_at_end(log)
+    assert bool(stated) == bool(log["detected"].any())
+    assert len(as_text(certificate)) <= 200_000
+
+
+@pytest.mark.parametrize("name", [name for name in FLIGHTS if name not in ("no fault", "gyros")])
+def test_with_exact_gyros_every_alarm_and_exclusion_of_a_surface_is_certified(name):
+    certificate, log = flown(name)
+    assert {said["column"] for said in certificate["statements"]} - {None} == set_at_end(log)
+
+
+def test_what_is_stuck_is_neither_floating_nor_lost_and_a_repair_proves_nothing_against_it():
+    for name in ("any type", "any type with release"):
+        certificate, _ = flown(name)
+        types = {said["what"] for said in certificate["statements"] if said["column"] is None}
+        assert {"aileron float", "aileron loss_of_effectiveness"} <= types
+        assert "aileron stuck" not in types
+
+
+@pytest.mark.parametrize("name", ["loss", "gyros", "loss, slow filters", "any type"])
+def test_whatever_number_is_altered_the_checker_refuses_it(name):
+    certificate, log = flown(name)
+    known = [*places(certificate)]
+    rng = np.random.default_rng(7)
+    for i in rng.choice(len(known), size=min(60, len(known)), replace=False):
+        assert [*failures(altered(certificate, known[i]), log)], known[i]
+
+
+MEASURED = ("x", "model", "eta_bar")
+
+
+@pytest.mark.parametrize("name", ["loss", "gyros", "loss, slow filters", "any type"])
+def test_with_the_digest_written_anew_the_inequality_refuses_it_by_itself(name):
+    """What decides: both sides, measured values, frames, declared constants, weight and direction."""
+    certificate, log = flown(name)
+    n_tried = 0
+    for place in places(certificate):
+        decides = {"value", "limit", "frame", "weight", "constant_rad_s2", *MEASURED} & set(place)
+        if place[0] == "statements" and decides:
+            n_tried += 1
+            assert [*failures(sealed(altered(certificate, place)), log)], place
+    assert n_tried > 20
+
+
+def test_nobody_can_exclude_the_fault_that_is_there():
+    """The numbers of another surface's exclusion say nothing of the true one."""
+    certificate, log = flown("loss")
+    other = copy.deepcopy(certificate)
+    said = next(one for one in other["statements"] if one["what"] == "rudder")
+    said |= {"what": "elevator", "column": "fie_elevator_excluded"}
+    assert [*failures(sealed(other), log)] == ["elevator: fie_elevator_excluded is not set in that frame"]
+
+
+def test_a_smaller_declared_bound_is_not_that_of_the_log():
+    certificate, log = flown("loss")
+    other = copy.deepcopy(certificate)
+    for said in other["statements"]:
+        said["declared"]["constant_rad_s2"] = [0.0, 0.0, 0.0]
+    refused = [*failures(sealed(other), log)]
+    assert len(refused) == len(other["statements"])
+    assert all("eta_bar is not as declared" in line for line in refused)
+
+
+def test_the_checker_is_short_and_takes_numpy_alone():
+    text = CHECKER.read_text()
+    assert len(text.splitlines()) <= 100
+    tree = ast.parse(text)
+    imported = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
+    imported |= {str(node.module) for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+    others = {name.partition(".")[0] for name in imported} - set(sys.stdlib_module_names)
+    assert others == {"numpy", "pyarrow"}  # which opens the log
+
+
+def test_by_the_command_line(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    scenario = {"name": "mine", "duration_s": 1.0, "reference": SINES, "faults": [LOSS]}
+    Path("mine.yaml").write_text(json.dumps(scenario))
+    monkeypatch.setattr(sys, "argv", ["beaver-ftc", "run", "mine.yaml", "--certificate", "--no-report"])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert not ended.value.code
+    checked = subprocess.run(
+        [sys.executable, CHECKER, "runs/mine"], capture_output=True, text=True, check=False
+    )
+    assert (checked.returncode, checked.stdout) == (0, "3 statements hold\n")
+    written = Path("runs/mine/certificate.json")
+    written.write_text(written.read_text().replace('"frame":51', '"frame":52', 1))
+    checked = subprocess.run(
+        [sys.executable, CHECKER, "runs/mine"], capture_output=True, text=True, check=False
+    )
+    assert checked.returncode == 1
+    assert "alarm: " in checked.stderr
+    capsys.readouterr()
+    monkeypatch.setattr(sys, "argv", ["beaver-ftc", "run", "mine.yaml", "--certificate", "--no-report"])
+    Path("mine.yaml").write_text(json.dumps(scenario | {"fdi": {"scheme": "zhang2005"}}))
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 2
+    assert "mine: fdi.scheme: 'zhang2005'" in capsys.readouterr().err

@@ -7,7 +7,13 @@ from beaver_ftc.control.state import control_dtype
 
 def new_control(**fields):
     """All records of a law for four surfaces, in one, zero but for these fields."""
-    return put(np.zeros(1, control_dtype(4)).view(np.recarray)[0], **fields)
+    control = put(np.zeros(1, control_dtype(4)).view(np.recarray)[0], **fields)
+    layout = control["layout"]
+    if "main" in fields:  # one surface leads each axis
+        layout["authority"][range(3), layout["main"]] = 1.0
+    if fields.get("stand_in", -1) >= 0:
+        layout["aside"][layout["stand_in"]] = 1
+    return control
 
 
 def put(control, **fields):

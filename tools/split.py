@@ -7,15 +7,14 @@ another besides: a normal force at its arm rolls, a longitudinal one yaws, and t
 with the pitching moment of its section. Positive is trailing edge down, of the left aileron too: its share is
 negative. All parts moved as the whole moves them are the whole surface, term by term.
 
-[PF]    pilotfriend.com, de Havilland DHC-2: the entire trailing edge of the wing is hinged, flaps inboard,
-        slotted ailerons outboard.
-[JAWA]  Jane's All the World's Aircraft, 1966-67: span 14.63 m, cabin 1.22 m wide.
-[G27]   H. Glauert, Theoretical relationships for an aerofoil with hinged flap, ARC R&M 1095, 1927: of a hinge
-        at E of the chord from the trailing edge, c_l per rad 2 (pi - t + sin t), c_m about the quarter chord
-        per rad -1/2 sin t (1 - cos t), cos t = 2 E - 1.
-Ours, for no source gives them: where flap and aileron meet, 55 % of the half-span, and E, a quarter.
+The wing is rectangular and its whole trailing edge hinged, flaps inboard, ailerons outboard
+(pilotfriend.com, de Havilland DHC 2; the cabin is 1.22 m wide). A section hinged at E of the chord from its
+trailing edge has c_l = 2 (pi - t + sin t) and, about the quarter chord, c_m = -1/2 sin t (1 - cos t) per rad,
+with cos t = 2 E - 1 [Glauert1927]. Ours, for no source gives them: where flap and aileron meet, 55 % of the
+half-span, and E, a quarter.
 """
 
+import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -34,6 +33,11 @@ AILERON_M = 0.5 * (JOINT + 1.0) * HALF_SPAN_M  # where the middle of an aileron 
 FLAP_M = 0.5 * (CABIN_M / 2 + JOINT * HALF_SPAN_M)
 SIGNALS = {"alpha": "aero/alpha-rad", "beta": "aero/beta-rad"}
 NAME = "beaver-split"
+FIRST_LINES = """# Written by `python -m tools.split`, which says more.
+# Each part has its share of the terms of the whole [TM88]; the force of one side rolls and yaws at its arm.
+# An aileron's lift follows from its roll, with the pitching moment of a hinged section [Glauert1927].
+# Positive is trailing edge down, left and right.
+"""
 
 
 @dataclass(frozen=True)
@@ -78,7 +82,7 @@ GROUPS = {
 
 
 def section_moment() -> float:
-    """c_m over c_l of a hinged aerofoil [G27]."""
+    """c_m over c_l of a hinged aerofoil [Glauert1927]."""
     t = acos(2.0 * HINGE - 1.0)
     return -0.5 * sin(t) * (1.0 - cos(t)) / (2.0 * (pi - t + sin(t)))
 
@@ -195,7 +199,8 @@ def files(
 ) -> dict[str, str]:
     """The files of the folder, by their names."""
     filed = data(whole, parts, groups, name, says)
-    first = "# Written by `python -m tools.split`, which says where the numbers are from.\n"
+    first = FIRST_LINES
+    filed = json.loads(json.dumps(filed))  # what is there twice is written twice
     text = yaml.safe_dump(filed, sort_keys=False, default_flow_style=None, width=200)
     made = {f"{name}.xml": model(whole, parts, name), "aircraft.yaml": first + text}
     for surface, of in filed["surfaces"].items():

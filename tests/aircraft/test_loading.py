@@ -27,7 +27,7 @@ def beside(tmp_path, monkeypatch):
         (["x" * 90], "['" + "x" * 58 + " is no aircraft"),
         (
             "bever",
-            "'bever' is not known, did you mean beaver? allowed: beaver, jsbsim:NAME as `beaver-ftc list",
+            "'bever' is not known, did you mean beaver? allowed: beaver, beaver-split, jsbsim:NAME as",
         ),
         (
             "jsbsim:none",

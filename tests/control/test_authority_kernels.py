@@ -137,6 +137,7 @@ def test_pitch_is_lost_when_nothing_acts_or_all_that_does_lacks(control, effecti
 
 def test_without_a_stand_in_the_elevator_alone_decides(control):
     control["layout"]["stand_in"], control["surfaces"]["effectiveness"][[1, FLAP]] = -1, (0.05, 1.0)
+    control["layout"]["aside"][FLAP] = 0
     assert is_lost(control)
 
 

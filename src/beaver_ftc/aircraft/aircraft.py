@@ -119,12 +119,8 @@ class Aircraft:
         return MappingProxyType(dict(self.file.groups))
 
     @cached_property
-    def dominant_axis(self) -> tuple[int, ...]:
-        """Of each surface, the axis (p, q, r) it turns most about, by its terms at `usual_signals`.
-
-        An axis that none turns most about (a rudder high above the wing rolls more than it yaws) is that of
-        the surface that turns most about it, of those that share theirs with another.
-        """
+    def effect(self) -> Mapping[str, list[float]]:
+        """What each surface does about p, q and r at `usual_signals`, up to a factor."""
         mass, geometry = self.mass, self.geometry
         arms = (geometry.span_m / mass.Ix_kg_m2, geometry.chord_m / mass.Iy_kg_m2)
         per_axis = dict(zip(MOMENTS, (*arms, geometry.span_m / mass.Iz_kg_m2), strict=True))
@@ -134,6 +130,16 @@ class Aircraft:
             if term.surface:
                 value = term.value * prod(usual[signal] ** power for signal, power in term.of)
                 effect[term.surface][MOMENTS.index(term.coefficient)] += value * per_axis[term.coefficient]
+        return MappingProxyType(effect)
+
+    @cached_property
+    def dominant_axis(self) -> tuple[int, ...]:
+        """Of each surface, the axis (p, q, r) it turns most about, by its terms at `usual_signals`.
+
+        An axis that none turns most about (a rudder high above the wing rolls more than it yaws) is that of
+        the surface that turns most about it, of those that share theirs with another.
+        """
+        effect = self.effect
         axes = [max(range(3), key=lambda axis: abs(effect[s][axis])) for s in self.surfaces]
         for axis in set(range(3)) - set(axes):
             turns = {s: abs(effect[name][axis]) for s, name in enumerate(self.surfaces)}

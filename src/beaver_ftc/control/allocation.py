@@ -4,6 +4,9 @@ flap, the probe that moves both against each other; and what the surfaces can gi
 The attainable moment set is the image of the travels under G, with what is given up and what is off already
 in it [Durham1993]; here the interval it spans on each axis. A demand outside it no law can meet.
 
+Where more surfaces move than one an axis and a stand-in, least squares with limits and rates take the place
+of these few lines (least_squares.py); the hand-over is there a matter of how willingly each moves.
+
 The probe is active diagnosis: a healthy aircraft feels nothing of it. The flap goes down and back by
 (1 - cos) / 2; the allocation gives the elevator what the flap does not leave. A surface that does not follow
 then shows.
@@ -15,7 +18,9 @@ from math import pi, radians
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.compiled import kernel, record
+from beaver_ftc.compiled import apart, kernel, record
+from beaver_ftc.control import least_squares
+from beaver_ftc.control.least_squares import problem_dtype
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW, leaders_of
 from beaver_ftc.scenario.control import ControlConfig
 from beaver_ftc.scenario.diagnosis import Probing
@@ -23,6 +28,8 @@ from beaver_ftc.scenario.diagnosis import Probing
 # Of each axis, rad/s2: what is demanded, what of it only holds the rates, what of it was not given; and
 # whether not even the rates can be held.
 AXES = record(demand=3, hold=3, shortfall=3, beyond=(int, 3))
+
+RELUCTANT, TINY = 1e-4, 1e-300  # how willingly a stand-in moves that is not asked, beside the others
 
 # deflection rad of the flap, by step rad of phase a frame; frames: how many at most, 0 for no probe at all;
 # probed: those of the present movement.
@@ -33,15 +40,22 @@ PROBE = record(
 
 @lru_cache
 def layout_dtype(n: int) -> np.dtype:
-    """n surfaces: the one that leads each axis, who stands in for pitch's, or -1; trim and stops, rad."""
-    return record(main=(int, 3), stand_in=int, trim=n, low=n, high=n)
+    """n surfaces: the one that leads each axis, who stands in for pitch's, or -1; trim and stops, rad. aside:
+    which of them wait until pitch is handed over; authority: what part of the authority about each axis is
+    whose, those aside without part in pitch. general: there are more than lead or stand in first."""
+    return record(
+        main=(int, 3), stand_in=int, trim=n, low=n, high=n, general=int, aside=(int, n), authority=(3, n)
+    )
 
 
 @lru_cache
 def allocation_dtype(n: int) -> np.dtype:
     """n surfaces: effectiveness matrix with what is believed of each in it; the command, rad, and which stand
-    at a stop; how far pitch is handed over, and by how much that changes in a frame."""
-    return record(G=(3, n), command=n, saturated=(int, n), hand_over=float, hand_over_step=float)
+    at a stop; how far pitch is handed over, and by how much that changes in a frame; the least squares."""
+    return record(
+        G=(3, n), command=n, saturated=(int, n), hand_over=float, hand_over_step=float,
+        problem=problem_dtype(n),
+    )  # fmt: skip
 
 
 def configure(control: np.void, config: ControlConfig, travel: np.ndarray, aircraft: Aircraft) -> None:
@@ -49,6 +63,8 @@ def configure(control: np.void, config: ControlConfig, travel: np.ndarray, aircr
     layout = control["layout"]
     layout["low"], layout["high"] = travel
     layout["main"], layout["stand_in"] = leaders_of(aircraft), _stand_in(aircraft)
+    layout["aside"] = [surface in aircraft.stand_ins for surface in aircraft.surfaces]
+    layout["authority"], layout["general"] = _authority(aircraft, layout), _is_general(aircraft)
     control["allocation"]["hand_over_step"] = control["reference"]["dt"] / config.hand_over_s
 
 
@@ -64,6 +80,34 @@ def configure_probe(probe: np.void, probing: Probing | None, dt: float) -> None:
 def _stand_in(aircraft: Aircraft) -> int:
     """The surface that takes over from the one that leads pitch, or -1."""
     return aircraft.surfaces.index(aircraft.stand_ins[0]) if aircraft.stand_ins else -1
+
+
+def _is_general(aircraft: Aircraft) -> bool:
+    """Whether there are more surfaces than lead an axis or stand in for pitch's leader first."""
+    return aircraft.n > len(aircraft.primary) + min(len(aircraft.stand_ins), 1)
+
+
+def _authority(aircraft: Aircraft, layout: np.void) -> np.ndarray:
+    """(3, n): what part of the authority about each axis is whose, of the surfaces that turn most about it;
+    where one leads each, it has all."""
+    shares = np.zeros((3, aircraft.n))
+    if not _is_general(aircraft):
+        shares[range(3), layout["main"]] = 1.0
+        return shares
+    for s, (surface, axis) in enumerate(zip(aircraft.surfaces, aircraft.dominant_axis, strict=True)):
+        if axis != PITCH or not layout["aside"][s]:
+            travel = aircraft.travel[surface]
+            shares[axis, s] = abs(aircraft.effect[surface][axis]) * (travel.max_rad - travel.min_rad)
+    return shares / shares.sum(axis=1, keepdims=True)
+
+
+@kernel
+def remaining(layout, effectiveness, i):
+    """What part of the authority about axis i is left; effectiveness (n,)."""
+    left = 0.0
+    for s in range(effectiveness.size):
+        left += layout.authority[i, s] * effectiveness[s]
+    return left
 
 
 @kernel
@@ -123,6 +167,54 @@ def allocate(allocation, layout, demand, effectiveness, share, probe):
     """Fill the command (n,) rad for a demand (3,) rad/s2; effectiveness (n,); the rest: see `pitch`."""
     lateral(allocation, layout, demand)
     pitch(allocation, layout, demand[PITCH], effectiveness[layout.main[PITCH]], share, probe)
+
+
+@kernel
+def set_problem(allocation, layout, effectiveness, belief, share, probe):
+    """Say where the surfaces may go within a frame, where they had rather be, and how willingly they leave
+    that; effectiveness (n,); share, probe: as in `pitch`.
+
+    A stand-in gives `share` of what pitch demands beyond the trimmed moments: of two that move pitch alone
+    that is the published hand-over. A probe is held, and the others give what it does not leave.
+    """
+    problem, own, waiting, u = allocation.problem, 0.0, 0.0, belief.u
+    for s in range(u.size):
+        reach = belief.actuators.step[s] / belief.share
+        half, left = 0.5 * (layout.high[s] - layout.low[s]), effectiveness[s]
+        hold = layout.trim[s] / left if left > 0.0 else layout.trim[s]
+        problem.preferred[s] = min(max(hold, layout.low[s]), layout.high[s])
+        problem.willing[s] = half * half
+        problem.low[s] = min(max(layout.low[s], u[s] - reach), layout.high[s])
+        problem.high[s] = max(min(layout.high[s], u[s] + reach), problem.low[s])
+        moment = half * half * allocation.G[PITCH, s] ** 2
+        own, waiting = own + (0.0 if layout.aside[s] else moment), waiting + moment * layout.aside[s]
+    ratio = share * own / max((1.0 - share) * waiting, TINY)
+    for s in range(u.size):
+        if layout.aside[s]:
+            problem.willing[s] *= min(max(ratio, RELUCTANT), 1.0 / RELUCTANT)
+    if probe != 0.0 and layout.stand_in >= 0:
+        f = layout.stand_in
+        held = min(max(layout.trim[f] + probe, problem.low[f]), problem.high[f])
+        problem.preferred[f] = problem.low[f] = problem.high[f] = held
+
+
+@apart
+def allocate_generally(allocation, layout, surfaces, axes, belief, share, probe):
+    """Fill the command (n,) rad for any number of surfaces, within stops and rates (least_squares.py).
+
+    axes: of dtype AXES; share, probe: as in `pitch`. With several elevators the stand-ins take over no
+    more than what they have lost.
+    """
+    left = remaining(layout, surfaces.effectiveness, PITCH)
+    if layout.authority[PITCH, layout.main[PITCH]] < 1.0:
+        share = min(share, 1.0 - left)
+    set_problem(allocation, layout, surfaces.effectiveness, belief, share, probe)
+    least_squares.solve(allocation.problem, allocation.G, axes.demand)
+    for s in range(allocation.command.size):
+        allocation.command[s] = allocation.problem.u[s]
+        at = allocation.problem.at[s]
+        stop = layout.low[s] if at < 0 else layout.high[s]
+        allocation.saturated[s] = at != 0 and allocation.problem.u[s] == stop
 
 
 @kernel

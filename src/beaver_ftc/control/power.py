@@ -18,6 +18,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import kernel, record
+from beaver_ftc.control.allocation import remaining
 from beaver_ftc.control.laws import ADAPTING, FAULT_TOLERANT, ORACLE, law_of
 from beaver_ftc.design.engine import engine_power_kw, slipstream
 from beaver_ftc.design.model import AIRSPEED, DPT, QDYN
@@ -102,10 +103,10 @@ def pitch_is_lost(layout, surfaces, saturated, shortfall):
     A flap that can still act is asked for what the elevator lacks, so a lack says that it has nothing left.
     shortfall (3,) rad/s2; saturated (n,).
     """
-    elevator, flap = layout.main[PITCH], layout.stand_in
-    most = surfaces.effectiveness[elevator]
-    if flap >= 0:
-        most = max(most, surfaces.effectiveness[flap])
+    elevator, most = layout.main[PITCH], remaining(layout, surfaces.effectiveness, PITCH)
+    for s in range(surfaces.effectiveness.size):
+        if layout.aside[s]:
+            most = max(most, surfaces.effectiveness[s])
     lacking = unable(surfaces, saturated, elevator) and abs(shortfall[PITCH]) > LEAST_LACK_RAD_S2
     return most < surfaces.least_effectiveness or lacking
 

@@ -409,7 +409,8 @@ def in_doubt(frame):
 def hand_over_pitch(frame):
     """Hand the pitch demand to the flap, or back. What a jammed elevator no longer carries goes at once."""
     control, surfaces = frame.control, frame.control.surfaces
-    remains, least = surfaces.effectiveness[control.layout.main[PITCH]], surfaces.least_effectiveness
+    remains = allocation.remaining(control.layout, surfaces.effectiveness, PITCH)
+    least = surfaces.least_effectiveness
     at_once = control.reference.hedging or (remains < least and frame.fdi.config.every_type)
     reallocated = frame.supervisor.mode == MODE_REALLOCATED
     allocation.advance_hand_over(control.allocation, reallocated, at_once, 1.0 - remains)
@@ -437,8 +438,11 @@ def allocate(frame):
     wanted, surfaces, rejects = control.axes.demand, control.surfaces, control.inner == REJECTING
     share = control.rejection.lost if rejects else allocation.smooth(out.hand_over)
     probe = control.probe.deflection
-    allocation.allocate(out, layout, wanted, surfaces.effectiveness, share, probe)
-    if rejects and control.law != NOMINAL and frame.assessment.detected:
+    if layout.general:
+        allocation.allocate_generally(out, layout, surfaces, control.axes, frame.belief, share, probe)
+    else:
+        allocation.allocate(out, layout, wanted, surfaces.effectiveness, share, probe)
+    if not layout.general and rejects and control.law != NOMINAL and frame.assessment.detected:
         allocation.relieve(out, layout, wanted[PITCH])
     accommodation.give_up(
         control.law, frame.assessment, surfaces, control.rejection.withdrawn, frame.faults, layout, out,

@@ -49,7 +49,7 @@ def new_control(**fields):
 
 
 def follow(pilot, control, y):
-    loops.follow(pilot, control["layout"]["main"], control["surfaces"], control["allocation"]["saturated"], y)
+    loops.follow(pilot, control["layout"], control["surfaces"], control["allocation"]["saturated"], y)
 
 
 def limit(pilot, control):

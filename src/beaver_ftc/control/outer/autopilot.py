@@ -16,7 +16,7 @@ the airspeed is kept. Where the ailerons no longer act, the roll is flown by sid
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.control.allocation import attainable
+from beaver_ftc.control.allocation import attainable, remaining
 from beaver_ftc.control.outer.holding import protect
 from beaver_ftc.control.outer.state import ALTITUDE, BANK, HEADING, N_CHANNELS, SPEED
 from beaver_ftc.control.power import ceiling
@@ -87,7 +87,7 @@ def steer(autopilot, layout, surfaces, allocation, hold, power, u, measured, une
     if not autopilot.flying:
         take_over(autopilot, y, attitude)
     advance(autopilot, (measured.altitude, y[AIRSPEED], attitude[YAW], attitude[ROLL]), t)
-    follow(autopilot, layout.main, surfaces, allocation.saturated, y)
+    follow(autopilot, layout, surfaces, allocation.saturated, y)
     limit(autopilot, layout, allocation.G, hold)
     protect(autopilot, layout, surfaces, u, unexplained, y, t)
     push = thrust_per_inhg(autopilot, power, y)
@@ -110,16 +110,16 @@ def take_over(autopilot, y, attitude):
 
 
 @kernel
-def follow(autopilot, main, surfaces, saturated, y):
+def follow(autopilot, layout, surfaces, saturated, y):
     """Smooth what is noisy, and note whether the ailerons or the rudder are gone; ailerons at their stop give
-    no more roll, whatever is believed of them. main (3,): who leads each axis."""
+    no more roll, whatever is believed of them."""
     dt, least = autopilot.dt, surfaces.least_effectiveness
     autopilot.alpha += dt / autopilot.gain.alpha_s * (y[ALPHA] - autopilot.alpha)
     autopilot.airspeed += dt / autopilot.gain.airspeed_s * (y[AIRSPEED] - autopilot.airspeed)
-    a = main[ROLL]
-    gone = surfaces.effectiveness[a] < least or saturated[a] == 1
+    at_stop = saturated[layout.main[ROLL]] == 1
+    gone = remaining(layout, surfaces.effectiveness, ROLL) < least or at_stop
     autopilot.jammed += dt / autopilot.gain.jammed_s * (gone - autopilot.jammed)
-    free = surfaces.effectiveness[main[YAW]] < least
+    free = remaining(layout, surfaces.effectiveness, YAW) < least
     autopilot.loose += dt / autopilot.gain.jammed_s * (free - autopilot.loose)
 
 

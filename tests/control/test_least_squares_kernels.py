@@ -1,0 +1,178 @@
+"""Constrained least squares against SciPy's, the optimality conditions, and the published hand-over."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import lsq_linear
+
+from beaver_ftc.control import allocation, least_squares
+from beaver_ftc.control.least_squares import problem_dtype
+from beaver_ftc.diagnosis.belief import belief_dtype
+from law_records import new_control
+
+
+def problem_of(n, rng, at=None):
+    problem = np.zeros(1, problem_dtype(n)).view(np.recarray)[0]
+    problem["low"], problem["high"] = -rng.uniform(0.05, 0.6, n), rng.uniform(0.05, 0.6, n)
+    problem["preferred"] = rng.uniform(-0.2, 0.2, n)
+    problem["willing"] = 10.0 ** rng.uniform(-3, 0, n)
+    problem["at"] = 0 if at is None else at
+    return problem
+
+
+def columns(n, rng, gone=0.2):
+    B = rng.normal(0.0, [[4.0], [3.0], [1.5]], (3, n))
+    return np.where(rng.random(n) < gone, 0.0, B)
+
+
+def by_scipy(problem, B, demand):
+    root = np.sqrt(problem["slack"] / problem["willing"])
+    A = np.vstack([B, np.diag(root)])
+    b = np.concatenate([demand, root * problem["preferred"]])
+    limits = problem["low"], problem["high"]
+    return lsq_linear(A, b, limits, method="bvls", tol=1e-14, max_iter=1000).x
+
+
+def cost(problem, B, demand, u):
+    lack = B @ u - demand
+    away = (u - problem["preferred"]) ** 2 / problem["willing"]
+    return float(lack @ lack + problem["slack"] * away.sum())
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(3, 20), st.integers(0, 2**32 - 1), st.sampled_from([0.3, 3.0, 30.0]))
+def test_it_is_the_minimum_that_scipy_finds(n, seed, size):
+    rng = np.random.default_rng(seed)
+    problem, B, demand = problem_of(n, rng, rng.integers(-1, 2, n)), columns(n, rng), rng.normal(0, size, 3)
+    least_squares.solve(problem, B, demand)
+    other = by_scipy(problem, B, demand)
+    ours, theirs = cost(problem, B, demand, problem["u"]), cost(problem, B, demand, other)
+    assert ours <= theirs * (1.0 + 1e-6) + 1e-9
+    assert B @ problem["u"] == pytest.approx(B @ other, abs=1e-4)
+    assert np.all((problem["low"] <= problem["u"]) & (problem["u"] <= problem["high"]))
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(3, 20), st.integers(0, 2**32 - 1))
+def test_what_can_be_given_is_given(n, seed):
+    """A demand that some deflections inside the limits meet is met, whatever was asked before."""
+    rng = np.random.default_rng(seed)
+    problem, B = problem_of(n, rng), columns(n, rng, gone=0.0)
+    before = rng.normal(0, 30, 3)
+    least_squares.solve(problem, B, before)
+    inside = rng.uniform(0.9 * problem["low"], 0.9 * problem["high"])
+    least_squares.solve(problem, B, B @ inside)
+    assert B @ problem["u"] == pytest.approx(B @ inside, abs=1e-4)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(3, 20), st.integers(0, 2**32 - 1))
+def test_started_from_its_own_solution_one_system_is_solved(n, seed):
+    rng = np.random.default_rng(seed)
+    problem, B, demand = problem_of(n, rng), columns(n, rng), rng.normal(0, 5, 3)
+    least_squares.solve(problem, B, demand)
+    found = problem["u"].copy()
+    least_squares.solve(problem, B, demand)
+    assert problem["steps"] == 1
+    assert problem["u"] == pytest.approx(found, abs=1e-9)
+
+
+def test_with_nothing_left_every_surface_stays_where_it_is_preferred():
+    problem = problem_of(5, np.random.default_rng(1))
+    problem["preferred"] = np.clip(problem["preferred"], problem["low"], problem["high"])
+    least_squares.solve(problem, np.zeros((3, 5)), np.array([1.0, -2.0, 3.0]))
+    assert problem["u"] == pytest.approx(problem["preferred"])
+
+
+def test_an_unwilling_surface_does_not_move():
+    problem, B = problem_of(4, np.random.default_rng(2)), columns(4, np.random.default_rng(3), 0.0)
+    problem["willing"][2], problem["preferred"][2] = 0.0, 0.03
+    least_squares.solve(problem, B, np.array([0.2, 0.1, -0.1]))
+    assert problem["u"][2] == pytest.approx(0.03)
+
+
+# Aileron, elevator, rudder, flap: rad/s2 per rad at 45 m/s, elevator and flap in pitch alone, as a Beaver's.
+G = np.array([[-6.6, 0.0, 0.5, 0.0], [0.0, -10.9, 0.0, 2.3], [-0.2, 0.0, -2.6, 0.0]])
+TRIM, LOWEST, HIGHEST = [0.01, -0.05, 0.02, 0.0], [-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]
+
+
+def beaver_law(left=1.0):
+    control = new_control(main=(0, 1, 2), stand_in=3, least_effectiveness=0.1)
+    layout, allocated = control["layout"], control["allocation"]
+    layout["trim"], layout["low"], layout["high"] = TRIM, LOWEST, HIGHEST
+    control["surfaces"]["effectiveness"] = (1.0, left, 1.0, 1.0)
+    allocated["G"] = G * control["surfaces"]["effectiveness"]
+    belief = np.zeros(1, belief_dtype(4)).view(np.recarray)[0]
+    belief["share"], belief["actuators"]["step"] = 1.0, np.inf
+    return control, belief
+
+
+def published(demand, left, share, probe=0.0):
+    control, _ = beaver_law(left)
+    allocated, layout = control["allocation"], control["layout"]
+    effectiveness = control["surfaces"]["effectiveness"]
+    allocation.allocate(allocated, layout, np.array(demand), effectiveness, share, probe)
+    return allocated["command"].copy()
+
+
+def generally(demand, left, share, probe=0.0, at=None, step=np.inf):
+    control, belief = beaver_law(left)
+    control["axes"]["demand"], belief["actuators"]["step"] = demand, step
+    belief["u"] = TRIM if at is None else at
+    parts = control["allocation"], control["layout"], control["surfaces"], control["axes"]
+    allocation.allocate_generally(*parts, belief, share, probe)
+    return control["allocation"]
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.tuples(st.floats(-0.5, 0.5), st.floats(0.3, 0.7), st.floats(-0.2, 0.2)),
+    st.floats(0.3, 1.0),
+    st.floats(0.0, 1.0),
+)
+def test_the_published_hand_over_is_one_instance(demand, left, share):
+    """Elevator and flap as the published lines have them; up to what a stand-in is never unwilling to do."""
+    expected, found = published(demand, left, share), generally(demand, left, share)["command"]
+    assert found == pytest.approx(expected, abs=1e-3)
+    if 1e-3 < share < 1.0 - 1e-3:
+        assert found == pytest.approx(expected, abs=1e-6)
+
+
+def test_what_a_flap_at_its_stop_cannot_give_goes_back_to_the_elevator():
+    demand = [0.0, 0.2, 0.0]
+    assert published(demand, 0.6, 1.0)[3] == LOWEST[3]
+    assert generally(demand, 0.6, 1.0)["command"] == pytest.approx(published(demand, 0.6, 1.0), abs=1e-3)
+
+
+def test_an_elevator_at_its_stop_is_relieved_by_the_flap():
+    found = generally([0.0, 7.0, 0.0], 1.0, 0.0)
+    assert found["command"][1] == LOWEST[1]
+    assert (G @ found["command"])[1] == pytest.approx(7.0, abs=1e-4)
+    assert found["saturated"].tolist() == [0, 1, 0, 0]
+
+
+def test_a_probe_is_held_and_the_elevator_gives_what_it_does_not_leave():
+    found = generally([0.1, 0.4, 0.0], 1.0, 0.0, probe=0.06)["command"]
+    assert found == pytest.approx(published([0.1, 0.4, 0.0], 1.0, 0.0, probe=0.06), abs=1e-6)
+    assert found[3] == pytest.approx(0.06)
+
+
+def test_no_surface_goes_further_than_its_rate_lets_it():
+    at, step = np.array([0.1, 0.0, -0.1, 0.0]), np.array([0.01, 0.02, 0.01, 0.005])
+    found = generally([3.0, 3.0, 1.0], 1.0, 0.0, at=at, step=step)
+    assert np.all(np.abs(found["command"] - at) <= step + 1e-12)
+    assert found["saturated"].tolist() == [0, 0, 0, 0]
+
+
+def test_both_elevator_and_ailerons_gone_the_rest_gives_what_it_can():
+    """No surface that is left moves pitch or roll but flap and rudder."""
+    control, belief = beaver_law()
+    control["allocation"]["G"] = G * (0.0, 0.0, 1.0, 1.0)
+    control["surfaces"]["effectiveness"] = (0.0, 0.0, 1.0, 1.0)
+    control["axes"]["demand"], belief["u"] = (0.0, 0.5, 0.3), TRIM
+    parts = control["allocation"], control["layout"], control["surfaces"], control["axes"]
+    allocation.allocate_generally(*parts, belief, 0.0, 0.0)
+    given_ = control["allocation"]["G"] @ control["allocation"]["command"]
+    assert given_[1] == pytest.approx(0.5, abs=1e-3)
+    assert control["allocation"]["command"][:2] == pytest.approx(TRIM[:2])

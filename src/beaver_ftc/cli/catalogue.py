@@ -18,8 +18,8 @@ def list_choices(
 ) -> None:
     """List what there is to choose from.
 
-    Built-in scenarios and sweeps, aircraft, diagnosis schemes, control laws, fault types and reference
-    signals.
+    Built-in scenarios, sweeps and plans of evidence, aircraft, diagnosis schemes, control laws, fault types
+    and reference signals.
 
     Examples:
       beaver-ftc list
@@ -36,7 +36,7 @@ def list_choices(
 def _available() -> dict[str, Entries]:
     """Kind -> entries, each a name and a description."""
     from beaver_ftc.plugins import DETECTORS, LAWS
-    from beaver_ftc.scenario.loader import builtin_scenarios, builtin_sweeps
+    from beaver_ftc.scenario.loader import builtin_plans, builtin_scenarios, builtin_sweeps
     from beaver_ftc.scenario.schema import Scenario
     from beaver_ftc.scenario.sweeps import load_sweep
 
@@ -44,6 +44,7 @@ def _available() -> dict[str, Entries]:
     available: dict[str, Iterable[tuple[str, str]]] = {
         "scenarios": ((name, says.strip()) for name, says, _ in builtin_scenarios()),
         "sweeps": ((name, load_sweep(name).file.description.strip()) for name in builtin_sweeps()),
+        "plans": ((name, _described(name)) for name in builtin_plans()),
         "aircraft": _aircraft(),
         "schemes": _registered(DETECTORS),
         "laws": _registered(LAWS),
@@ -54,6 +55,15 @@ def _available() -> dict[str, Entries]:
         kind: [{"name": name, "description": says} for name, says in entries]
         for kind, entries in available.items()
     }
+
+
+def _described(plan: str) -> str:
+    """What a built-in plan of evidence says of itself."""
+    from beaver_ftc.documents.validation import parse_document
+    from beaver_ftc.scenario.loader import read_file, resolve
+
+    path = resolve(plan, "plan")
+    return str(parse_document(read_file(path, plan, "plan"), str(path)).data["description"]).strip()
 
 
 def _aircraft() -> Iterator[tuple[str, str]]:
@@ -106,25 +116,27 @@ def _section(kind: str, entries: Entries) -> str:
 def show(
     name: Annotated[str, typer.Argument(metavar="NAME", autocompletion=complete_names)],
 ) -> None:
-    """Print a built-in scenario or sweep.
+    """Print a built-in scenario, sweep or plan of evidence.
 
-    What is printed is a file that `run` or `sweep` takes.
+    What is printed is a file that `run`, `sweep` or `evidence` takes.
 
     Examples:
       beaver-ftc show elevator-partial-loss
 
-    name: A built-in scenario or sweep.
+    name: A built-in scenario, sweep or plan.
     """
-    from beaver_ftc.scenario.loader import builtin_names, builtin_path, builtin_sweeps, resolve
+    from beaver_ftc.scenario.loader import builtin_names, builtin_plans, builtin_sweeps, resolve
 
-    known = [*builtin_names(), *builtin_sweeps()]
-    if name not in known:
-        raise BadInput(f"show: no built-in scenario or sweep {name[:100]!r}{suggestion(name, known)}")
-    path = builtin_path(name) if name in builtin_names() else resolve(name, "sweep")
+    kinds = {"scenario": builtin_names(), "sweep": builtin_sweeps(), "plan": builtin_plans()}
+    kind = next((kind for kind, names in kinds.items() if name in names), None)
+    if kind is None:
+        known = [each for names in kinds.values() for each in names]
+        raise BadInput(f"show: no built-in scenario, sweep or plan {name[:100]!r}{suggestion(name, known)}")
+    path = resolve(name, kind)
     emit(path.read_text(encoding="utf-8"))
 
 
-def schema(sweep: bool = False) -> None:
+def schema(sweep: bool = False, plan: bool = False) -> None:
     """Print the JSON Schema of a scenario.
 
     Editors that know it complete and check a scenario as it is written.
@@ -133,7 +145,13 @@ def schema(sweep: bool = False) -> None:
       beaver-ftc schema
 
     sweep: Of a sweep file instead of a scenario.
+    plan: Of a plan of evidence instead of a scenario.
     """
+    if plan:
+        from beaver_ftc.studies.evidence.plan import plan_json_schema
+
+        emit_json(plan_json_schema())
+        return
     if sweep:
         from beaver_ftc.scenario.sweeps import sweep_json_schema
 

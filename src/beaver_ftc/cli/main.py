@@ -29,6 +29,7 @@ COMMANDS = {
     "new": "scenarios:new",
     "sweep": "sweep:command",
     "compare": "compare:command",
+    "evidence": "evidence:command",
     "reproduce": "studies:reproduce",
     "matrix": "surveys:matrix",
     "power": "surveys:power",

@@ -33,7 +33,7 @@ expect:                               # what a CI job asserts; each key is optio
 def validate(
     files: Annotated[list[str], typer.Argument(metavar="FILE")], format: FormatOption = Format.text
 ) -> None:
-    """Check scenario and sweep files.
+    """Check scenario and sweep files, and plans of evidence.
 
     Every mistake is one line on standard error, FILE:LINE: key.path: what is wrong, what is allowed.
 
@@ -42,7 +42,7 @@ def validate(
     Examples:
       beaver-ftc validate elevator-partial-loss fault-free
 
-    files: Scenario and sweep files, or names of built-in ones.
+    files: Scenario, sweep and plan files, or names of built-in ones.
     """
     reports = [_check(file) for file in files]
     for report in reports:
@@ -57,7 +57,7 @@ def validate(
 
 
 def _check(file: str) -> Document:
-    from beaver_ftc.scenario.loader import load_scenario
+    from beaver_ftc.scenario.loader import has_key, load_scenario
     from beaver_ftc.scenario.sweeps import is_sweep, load_sweep
 
     errors: list[str] = []
@@ -65,6 +65,10 @@ def _check(file: str) -> Document:
     try:
         if is_sweep(file):
             load_sweep(file)
+        elif has_key(file, "plan", "requirements"):
+            from beaver_ftc.studies.evidence.plan import load_plan
+
+            load_plan(file)
         else:
             scenario = load_scenario(file)
             check_flyable(scenario, file)

@@ -107,15 +107,20 @@ def linearise(scenario: ConditionOf = None, format: FormatOption = Format.text) 
     default law, broken at each surface in turn; healthy, and with losses of each surface that the law
     knows.
 
+    And the handling qualities of the aircraft alone: short period, Dutch roll, roll and spiral mode against
+    the levels of MIL-F-8785C; of a scenario in which something breaks, also where its flight ends.
+
     scenario: Take sensors, actuators and law from it.
     """
     from beaver_ftc.scenario.loader import load
-    from beaver_ftc.studies.margins import as_document, as_text, study
+    from beaver_ftc.studies import handling, margins
 
     given = load({} if scenario is None else scenario)
     asked = given.control.gain_margin_db, given.control.phase_margin_deg
-    found = study(given)
-    answer(format, as_document(found, asked), lambda: as_text(found, asked))
+    found = margins.study(given)
+    modes = handling.over_airspeeds(given)
+    document = margins.as_document(found, asked) | {"handling": handling.as_rows(modes)}
+    answer(format, document, lambda: f"{margins.as_text(found, asked)}\n\n{handling.as_text(modes)}")
 
 
 def derive(

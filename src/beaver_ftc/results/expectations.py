@@ -22,6 +22,15 @@ def evaluate(expect: Any, metrics: Document) -> list[Document]:
     ]
 
 
+def margin(found: Document) -> float | None:
+    """How far inside its limit one entry of `evaluate` is, in the limit's unit and below 0 where it is not
+    met; None of what has no size, and where the quantity does not exist."""
+    expected, actual = found["expected"], found["actual"]
+    if isinstance(expected, bool) or not isinstance(expected, int | float) or actual is None:
+        return None
+    return float(expected - abs(actual))
+
+
 def names(expect: Any) -> list[str]:
     """The names of what a scenario expects, as in `evaluate`."""
     return [name for name, _, _ in _each(expect)]

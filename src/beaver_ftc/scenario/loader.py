@@ -66,9 +66,17 @@ def read_file(path: Path, given: str, kind: str = "scenario") -> str:
     return text_of(path, MAX_BYTES, None if looks_like_a_path(given) else lambda: no_such(given, kind))
 
 
+# What there is built in: where it lies, and the command that flies it.
+_KINDS = {
+    "scenario": ("scenarios", "run"),
+    "sweep": ("scenarios/sweeps", "sweep"),
+    "plan": ("evidence", "evidence"),
+}
+
+
 def _builtin(kind: str) -> dict[str, Path]:
-    """Files of the built-in scenarios, or sweeps, by name; its file's name is a scenario's."""
-    folder = data_root() / "scenarios" / ("sweeps" if kind == "sweep" else "")
+    """Files of the built-in scenarios, sweeps or plans, by name; its file's name is a scenario's."""
+    folder = data_root() / _KINDS[kind][0]
     return dict(sorted((path.stem, path) for path in folder.glob("*.yaml")))
 
 
@@ -80,6 +88,11 @@ def builtin_names() -> list[str]:
 def builtin_sweeps() -> list[str]:
     """Names of the sweeps that come with the project."""
     return list(_builtin("sweep"))
+
+
+def builtin_plans() -> list[str]:
+    """Names of the plans of evidence that come with the project."""
+    return list(_builtin("plan"))
 
 
 def builtin_path(name: str) -> Path:
@@ -94,21 +107,31 @@ def builtin_scenarios() -> list[tuple[str, str, Path]]:
 
 
 def no_such(given: str, kind: str) -> str:
-    """What to say of a name that is no built-in `kind`, "scenario" or "sweep": perhaps it is of the other."""
-    names = {kind: list(_builtin(kind)) for kind in ("scenario", "sweep")}
-    other, flies = ("sweep", "sweep") if kind == "scenario" else ("scenario", "run")
-    if given in names[other]:
-        return f"{given} is a {other}, allowed: a {kind}; `beaver-ftc {flies} {given}` flies it"
+    """What to say of a name that is no built-in `kind`, of _KINDS: perhaps it is of another."""
+    names = {kind: list(_builtin(kind)) for kind in _KINDS}
+    for other, (_, flies) in _KINDS.items():
+        if other != kind and given in names[other]:
+            return f"{given} is a {other}, allowed: a {kind}; `beaver-ftc {flies} {given}` flies it"
     says = f"no such file or built-in {kind}: {given[:100]!r}"
-    near = nearest(given, names[kind] + names[other])
-    if near in names[other]:
-        return f"{says}, did you mean the {other} {near}? allowed: {', '.join(names[kind])}"
+    near = nearest(given, [name for known in (names[kind], *names.values()) for name in known])
+    for other in _KINDS:
+        if near and near not in names[kind] and near in names[other]:
+            return f"{says}, did you mean the {other} {near}? allowed: {', '.join(names[kind])}"
     return f"{says}{suggestion(given, names[kind])}"
 
 
 def resolve(name_or_path: str | Path, kind: str = "scenario") -> Path:
-    """The file a built-in name of a "scenario" or "sweep" stands for; anything else is a path already."""
+    """The file a built-in name of one of _KINDS stands for; anything else is a path already."""
     return _builtin(kind).get(str(name_or_path)) or Path(name_or_path)
+
+
+def has_key(path_or_name: str | Path, kind: str, key: str) -> bool:
+    """Whether a file (or name of a built-in `kind`) that can be read has this key at its top."""
+    path = resolve(path_or_name, kind)
+    try:
+        return path.is_file() and key in parse_document(read_file(path, str(path)), str(path)).data
+    except ScenarioError:
+        return False
 
 
 def looks_like_a_path(given: str) -> bool:

@@ -24,6 +24,7 @@ from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.loader import (
     builtin_names,
     builtin_path,
+    has_key,
     load_scenario,
     looks_like_a_path,
     no_such,
@@ -316,11 +317,7 @@ def validate_sweep(document: Document, source: str = "", folder: Path | None = N
 
 def is_sweep(path_or_name: str | Path) -> bool:
     """Whether a file (or name) that can be read is a sweep: it has a `base`, as no scenario has."""
-    path = resolve(path_or_name, "sweep")
-    try:
-        return path.is_file() and "base" in parse_document(read_file(path, str(path)), str(path)).data
-    except ScenarioError:
-        return False
+    return has_key(path_or_name, "sweep", "base")
 
 
 def _base(

@@ -1,0 +1,240 @@
+"""Signal temporal logic over the columns of a log: what a formula says, and by how much a flight keeps it.
+
+    always[0:10](abs(q_rad_s) <= 0.2)      eventually(detected >= 1)      (a >= 0) until[1:2] (b >= 0)
+
+Comparisons of sums, differences, products and quotients of columns and numbers, joined by `not`, `and`, `or`,
+`implies` (or `->`), `until`, `always`, `eventually`, and for the past `once`, `historically`; intervals in
+seconds, both ends included; without one, to the end of the log. Its robustness is the quantitative semantics
+at the first frame [Donze2010] in discrete time: positive where the formula is kept, negative where it is not,
+and its size the least change of a signal that would turn it over.
+
+The grammar is part of rtamt's, which gives the same numbers (tests). rtamt itself holds the parser's runtime
+to a release of 2017 and Python below 3.13, so it is a check beside this and not what flights are judged by.
+"""
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+MOST_CHARACTERS, MOST_DEPTH = 4000, 40
+
+_TOKEN = re.compile(
+    r"\s*(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?|[A-Za-z_][\w.]*|->|<=|>=|[-+*/()<>\[\]:,])"
+)
+_POWER = {  # how tightly each binds what stands on its left
+    "->": 1, "implies": 1, "or": 2, "and": 3, "until": 4,
+    "<=": 5, ">=": 5, "<": 5, ">": 5, "+": 6, "-": 6, "*": 7, "/": 7,
+}  # fmt: skip
+_TIGHTEST = 8
+_TEMPORAL = ("always", "eventually", "once", "historically")
+_ARITHMETIC = ("+", "-", "*", "/", "abs", "column", "number")
+_WORDS = {*_TEMPORAL, "not", "and", "or", "implies", "until", "abs"}
+
+
+class FormulaError(ValueError):
+    """The text is no formula; the message says why and what is allowed."""
+
+
+class Formula(NamedTuple):
+    """An operator with its parts; interval in s, None for all that is to come; what: a column or a number."""
+
+    operator: str
+    parts: tuple["Formula", ...] = ()
+    interval: tuple[float, float] | None = None
+    what: str | float = ""
+
+    @property
+    def columns(self) -> frozenset[str]:
+        """The columns it is about."""
+        own = {str(self.what)} if self.operator == "column" else set()
+        return frozenset(own.union(*(part.columns for part in self.parts)))
+
+    @property
+    def looks_ahead_s(self) -> float:
+        """How far it looks; infinite where it looks to the end of the log."""
+        ahead = 0.0
+        if self.operator in ("always", "eventually", "until"):
+            ahead = self.interval[1] if self.interval else np.inf
+        return ahead + max((part.looks_ahead_s for part in self.parts), default=0.0)
+
+    def robustness(self, columns: Mapping[str, np.ndarray], rate_hz: float) -> float:
+        """At the first frame of these columns (frames,); NaN where a column it depends on is not a number."""
+        frames = len(next(iter(columns.values())))
+        return float(_values(self, columns, rate_hz, frames)[0])
+
+
+def parse(text: str) -> Formula:
+    """The formula in a text. Raises FormulaError."""
+    if len(text) > MOST_CHARACTERS:
+        raise FormulaError(f"has {len(text)} characters, allowed: at most {MOST_CHARACTERS}")
+    found = _Parser(list(_tokens(text))).whole()
+    if found.operator in _ARITHMETIC:
+        raise FormulaError("says nothing that can be true, allowed: a comparison such as abs(q_rad_s) <= 0.2")
+    return found
+
+
+def _tokens(text: str) -> Iterator[str]:
+    at = 0
+    while text[at:].strip():
+        match = _TOKEN.match(text, at)
+        if match is None:
+            allowed = "names, numbers, + - * / <= < >= > ( ) [ : ] ->"
+            raise FormulaError(f"{text[at:].strip()[:20]!r} is not read, allowed: {allowed}")
+        yield match[1]
+        at = match.end()
+
+
+class _Parser:
+    """Operators by their power [Pratt1973]; bounded in depth, so that no text can exhaust the stack."""
+
+    def __init__(self, tokens: list[str]) -> None:
+        self._tokens, self._at, self._depth = [*tokens, ""], 0, 0
+
+    def whole(self) -> Formula:
+        found = self._operand(0)
+        if self._next:
+            raise FormulaError(f"{self._next!r} is one too many, allowed: the end of the formula")
+        return found
+
+    @property
+    def _next(self) -> str:
+        return self._tokens[self._at]
+
+    def _take(self, expected: str = "") -> str:
+        token = self._next
+        if expected and token != expected:
+            raise FormulaError(f"{token or 'the end'!r} where {expected!r} is due")
+        self._at += 1
+        return token
+
+    def _operand(self, power: int) -> Formula:
+        self._depth += 1
+        if self._depth > MOST_DEPTH:
+            raise FormulaError(f"is nested too deeply, allowed: {MOST_DEPTH} levels")
+        left = self._first()
+        while _POWER.get(self._next, 0) > power:
+            operator = self._take()
+            interval = self._interval() if operator == "until" else None
+            # to the right the same operator: a - b - c is (a - b) - c, but a -> b -> c is a -> (b -> c)
+            right = self._operand(_POWER[operator] - (_POWER[operator] == 1))
+            left = _joined("implies" if operator == "->" else operator, left, right, interval)
+        self._depth -= 1
+        return left
+
+    def _first(self) -> Formula:
+        token = self._take()
+        if token == "(":
+            found = self._operand(0)
+            self._take(")")
+            return found
+        if token == "-":
+            return _of_numbers("-", Formula("number", what=0.0), self._operand(_POWER["*"] - 1))
+        if token == "abs":
+            self._take("(")
+            found = _of_numbers("abs", self._operand(0))
+            self._take(")")
+            return found
+        if token == "not" or token in _TEMPORAL:
+            interval = self._interval() if token in _TEMPORAL else None
+            return _of_truths(token, self._operand(_TIGHTEST), interval=interval)
+        if re.fullmatch(r"[\d.].*", token):
+            return Formula("number", what=float(token))
+        if not token or token in _WORDS or not re.fullmatch(r"[A-Za-z_].*", token):
+            raise FormulaError(f"{token or 'the end'!r} where a column, a number or ( is due")
+        return Formula("column", what=token)
+
+    def _interval(self) -> tuple[float, float] | None:
+        if self._next != "[":
+            return None
+        self._take("[")
+        begin = self._seconds()
+        if self._take() not in (":", ","):
+            raise FormulaError("an interval is due, allowed: [from:to] in seconds")
+        end = self._seconds()
+        self._take("]")
+        if end < begin:
+            raise FormulaError(
+                f"the interval [{begin:g}:{end:g}] is out of order, allowed: [from:to] in seconds"
+            )
+        return begin, end
+
+    def _seconds(self) -> float:
+        token = self._take()
+        if not re.fullmatch(r"[\d.].*", token) or float(token) > 360_000:
+            raise FormulaError(f"{token or 'the end'!r} is no time, allowed: seconds from 0 to 360000")
+        return float(token)
+
+
+def _joined(operator: str, left: Formula, right: Formula, interval: tuple[float, float] | None) -> Formula:
+    of = _of_numbers if _POWER[operator] >= _POWER["<="] else _of_truths
+    return of(operator, left, right, interval=interval)
+
+
+def _of_numbers(operator: str, *parts: Formula, interval: tuple[float, float] | None = None) -> Formula:
+    if any(part.operator not in _ARITHMETIC for part in parts):
+        raise FormulaError(
+            f"{operator!r} is of numbers, and is given what is true or false, allowed: columns and numbers"
+        )
+    return Formula(operator, parts)
+
+
+def _of_truths(operator: str, *parts: Formula, interval: tuple[float, float] | None = None) -> Formula:
+    if any(part.operator in _ARITHMETIC for part in parts):
+        raise FormulaError(f"{operator!r} is of what is true or false, allowed: a comparison, in parentheses")
+    return Formula(operator, parts, interval)
+
+
+_Values = Callable[..., np.ndarray]
+_PLAIN: dict[str, _Values] = {
+    "+": np.add, "-": np.subtract, "*": np.multiply,
+    "/": np.divide,
+    "<=": lambda a, b: b - a, "<": lambda a, b: b - a, ">=": np.subtract, ">": np.subtract,
+    "and": np.minimum, "or": np.maximum, "implies": lambda a, b: np.maximum(-a, b),
+    "abs": np.abs, "not": np.negative,
+}  # fmt: skip
+
+
+def _values(formula: Formula, columns: Mapping[str, np.ndarray], rate_hz: float, frames: int) -> np.ndarray:
+    """What a formula is worth at each frame, (frames,)."""
+    operator = formula.operator
+    if operator in ("number", "column"):
+        return np.full(frames, formula.what) if operator == "number" else columns[str(formula.what)]
+    parts = [_values(part, columns, rate_hz, frames) for part in formula.parts]
+    if operator in _PLAIN:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return _PLAIN[operator](*parts)
+    begin, end = (round(t * rate_hz) for t in formula.interval or (0.0, frames / rate_hz))
+    if operator == "until":
+        return _until(parts[0], parts[1], begin, min(end, frames))
+    past = operator in ("once", "historically")
+    sign = 1.0 if operator in ("always", "historically") else -1.0
+    values = sign * parts[0][:: -1 if past else 1]
+    return sign * _least_ahead(values, begin, end)[:: -1 if past else 1]
+
+
+def _least_ahead(values: np.ndarray, begin: int, end: int) -> np.ndarray:
+    """min(values[k + begin : k + end + 1]) at each k, infinite where that is beyond the log: twice as long a
+    stretch at each step."""
+    frames, width = len(values), min(end, len(values)) - begin + 1
+    if width < 1:
+        return np.full(frames, np.inf)
+    least, span = np.concatenate((values[begin:], np.full(begin + width, np.inf))), 1
+    while 2 * span <= width:
+        least, span = np.minimum(least[:-span], least[span:]), 2 * span
+    return np.minimum(least[:frames], least[width - span :][:frames])
+
+
+def _until(held: np.ndarray, reached: np.ndarray, begin: int, end: int) -> np.ndarray:
+    """max over j in begin..end of min(reached[k + j], min(held[k : k + j])) at each k."""
+    frames = len(held)
+    best, so_far = np.full(frames, -np.inf), np.full(frames, np.inf)
+    for j in range(end + 1):
+        left = frames - j
+        if left <= 0:
+            break
+        if j >= begin:
+            best[:left] = np.maximum(best[:left], np.minimum(so_far[:left], reached[j:]))
+        so_far[:left] = np.minimum(so_far[:left], held[j:])
+    return best

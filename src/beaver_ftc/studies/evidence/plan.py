@@ -1,0 +1,372 @@
+"""The plan of evidence: requirements over scenarios and sweeps, read, and every mistake in it found."""
+
+import contextlib
+import hashlib
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, StringConstraints, model_validator
+
+from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.documents.base import Location, Number, Section, Whole, deny, entry, number
+from beaver_ftc.documents.document import Document, Problem
+from beaver_ftc.documents.errors import BadInput, suggestion
+from beaver_ftc.documents.paths import inside
+from beaver_ftc.documents.problems import ScenarioError
+from beaver_ftc.documents.validation import parse_document, validate
+from beaver_ftc.results.temporal import Formula, FormulaError, parse
+from beaver_ftc.scenario.airframe import checked_against
+from beaver_ftc.scenario.consistency import conflicts
+from beaver_ftc.scenario.dump import to_yaml
+from beaver_ftc.scenario.loader import (
+    builtin_names,
+    builtin_sweeps,
+    is_of_a_sweep,
+    load_scenario,
+    looks_like_a_path,
+    read_file,
+    resolve,
+    validate_scenario,
+)
+from beaver_ftc.scenario.schema import NAME_PATTERN, Expect, Scenario
+from beaver_ftc.scenario.sweeps import Sweep, SweepExpect, is_sweep, load_sweep, validate_sweep
+from beaver_ftc.studies.sweep.one_flight import flight_name, scenario_of
+from beaver_ftc.studies.sweep.sampling import Assignment, Plan
+
+MOST_REQUIREMENTS, MOST_FLIGHTS = 500, 100_000
+_KEYS = "name, flights and requirements"
+Text = Annotated[str, StringConstraints(max_length=2000)]
+
+
+class OfSweep(SweepExpect):
+    """What the statistics of a sweep must show, as its own `expect` says it."""
+
+    type: Literal["sweep"]
+
+
+class OfHandling(Section):
+    """The level of MIL-F-8785C that it must have: where it is trimmed, or where its failure leaves it."""
+
+    type: Literal["handling_qualities"]
+    level: Whole = number(1, "1", "the worst level allowed", ge=1, le=3)
+
+
+class OfMargins(Section):
+    """What each surface's loop must have, healthy and with each loss that the default law knows."""
+
+    type: Literal["margins"]
+    gain_db: Number = number(6.0, "dB", "gain margin up and down", ge=0, le=100)
+    phase_deg: Number = number(45.0, "deg", "phase margin", ge=0, le=180)
+
+
+Bar = Annotated[OfSweep | OfHandling | OfMargins, Field(discriminator="type")]
+
+
+class Requirement(Section):
+    """One requirement: what it says, where it comes from, what is flown for it and what must come out.
+
+    id: what it is called: letters, digits, - and _
+    text: what is required, in words
+    clause: of which regulation or standard, and how it is read here
+    over: names of `flights`, built-in scenarios and sweeps, files in the plan's own folder or below it
+    expect: what must come out of each flight, as a scenario's `expect` says it
+    formula: signal temporal logic over log columns, true of each flight
+    bar: what a study must show
+    """
+
+    id: str = entry(..., pattern=NAME_PATTERN, max_length=40, examples=["JAM-1"])
+    text: Text = entry("", examples=["No jam loses the aircraft."])
+    clause: Text = entry("", examples=["CS 25.671(c)(3)"])
+    over: tuple[str, ...] = entry(..., min_length=1, max_length=200, examples=[["elevator-stuck"]])
+    expect: dict[str, Any] | None = entry(None, min_length=1, examples=[{"no_departure": True}])
+    formula: str | None = entry(None, max_length=4000, examples=["always(abs(q_rad_s) <= 0.5)"])
+    bar: Bar | None = None
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        given = [key for key in ("expect", "formula", "bar") if getattr(self, key) is not None]
+        if len(given) != 1:
+            said = " and ".join(given) or "nothing that can be judged"
+            deny(f"has {said}, allowed: exactly one of expect, formula, bar")
+        return self
+
+
+class PlanFile(Section, title="beaver-ftc plan of evidence"):
+    """Requirements, and the flights that are flown for them.
+
+    name: of the plan: letters, digits, - and _
+    description: what the plan is for
+    flights: scenarios and sweeps of the plan's own, by name
+    requirements: what must hold
+    """
+
+    name: str = entry(..., pattern=NAME_PATTERN, max_length=70, examples=["flight-controls"])
+    description: str = entry("", max_length=4000)
+    flights: dict[Annotated[str, StringConstraints(pattern=NAME_PATTERN, max_length=70)], dict[str, Any]] = (
+        entry(dict, max_length=200)
+    )
+    requirements: tuple[Requirement, ...] = entry(..., min_length=1, max_length=MOST_REQUIREMENTS)
+
+
+def plan_json_schema() -> dict[str, Any]:
+    """The JSON Schema of a plan, for editors."""
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **PlanFile.model_json_schema()}
+
+
+@dataclass(frozen=True)
+class Source:
+    """What is flown under one name: a scenario, or the flights of a sweep. given: as the plan names it."""
+
+    name: str
+    given: str
+    what: Scenario | Sweep
+
+    @property
+    def flights(self) -> int:
+        """How many flights it has."""
+        return self.what.flights if isinstance(self.what, Sweep) else 1
+
+    @property
+    def aircraft(self) -> Aircraft:
+        """What flies."""
+        return self.what.aircraft if isinstance(self.what, Sweep) else self.what.airframe
+
+    def assignment(self, run: int) -> Assignment | None:
+        """What varies in one of a sweep's flights."""
+        return Plan(self.what).assignments([run])[0] if isinstance(self.what, Sweep) else None
+
+    def flight(self, run: int) -> str:
+        """The name of one flight."""
+        return flight_name(self.what, run) if isinstance(self.what, Sweep) else self.name
+
+    def scenario(self, run: int) -> Scenario:
+        """One flight. Raises BadInput if its values contradict each other."""
+        if not isinstance(self.what, Sweep):
+            return self.what
+        assigned = self.assignment(run)
+        assert assigned is not None
+        return scenario_of(self.what, assigned)
+
+    @property
+    def base(self) -> Scenario:
+        """What all of its flights have in common."""
+        return self.what.scenario({}) if isinstance(self.what, Sweep) else self.what
+
+    @property
+    def sha256(self) -> str:
+        """Of all that it says, resolved."""
+        if isinstance(self.what, Sweep):
+            file = self.what.file.model_dump(mode="json", exclude={"base", "set", "description", "expect"})
+            text = repr([file, self.what.base])
+        else:
+            text = to_yaml(self.what)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+@dataclass(frozen=True)
+class EvidencePlan:
+    """A plan ready to fly. expect, formulas: by requirement; over: the names of its sources, by requirement.
+
+    given: as the command line names it. sha256: of the file's text.
+    """
+
+    file: PlanFile
+    sources: dict[str, Source]
+    over: dict[str, tuple[str, ...]]
+    expect: dict[str, Expect]
+    formulas: dict[str, Formula]
+    given: str
+    sha256: str
+
+    @property
+    def cases(self) -> list[tuple[str, int]]:
+        """Every flight once: its source and its number there."""
+        return [(source.name, run) for source in self.sources.values() for run in range(source.flights)]
+
+    def of(self, source: str) -> Iterator[Requirement]:
+        """The requirements that a source is flown for."""
+        return (each for each in self.file.requirements if source in self.over[each.id])
+
+
+def load_plan(path_or_name: str) -> EvidencePlan:
+    """The plan in a file or of a built-in name. Raises ScenarioError with one line a mistake."""
+    path = resolve(path_or_name, "plan")
+    text = read_file(path, path_or_name, "plan")
+    document = parse_document(text, str(path), f"a plan's keys: {_KEYS}")
+    document.data.setdefault("name", re.sub(r"[^A-Za-z0-9_-]", "-", path.stem)[:70])
+    file = validate(PlanFile, document, str(path))
+    return _Reading(file, document, path, path_or_name).plan(hashlib.sha256(text.encode()).hexdigest())
+
+
+class _Reading:
+    """What the requirements name, found and held against them; mistakes are gathered."""
+
+    def __init__(self, file: PlanFile, document: Document, path: Path, given: str) -> None:
+        self._file, self._document, self._path, self._given = file, document, path, given
+        self._problems: list[Problem] = []
+        self._elsewhere: list[str] = []  # lines about other files
+        self._sources: dict[str, Source | None] = {}  # by what the plan calls them
+
+    def plan(self, sha256: str) -> EvidencePlan:
+        over: dict[str, tuple[str, ...]] = {}
+        expect: dict[str, Expect] = {}
+        formulas: dict[str, Formula] = {}
+        for i, requirement in enumerate(self._file.requirements):
+            at = ("requirements", i)
+            if requirement.id in over:
+                self._problem((*at, "id"), f"{requirement.id} is there twice, allowed: each id once")
+            found = [self._source(name, (*at, "over", k)) for k, name in enumerate(requirement.over)]
+            sources = [source for source in found if source is not None]
+            over[requirement.id] = tuple(dict.fromkeys(source.name for source in sources))
+            formula = self._formula(requirement, at)
+            if formula:
+                formulas[requirement.id] = formula
+            for k, source in enumerate(sources):
+                self._fits(requirement, formula, source, at, k)
+                if requirement.expect is not None:
+                    judged = self._expect(requirement.expect, source, (*at, "expect"))
+                    if judged:
+                        expect[requirement.id] = judged
+        self._unused()
+        sources_by_name = self._by_name()
+        self._raise()
+        return EvidencePlan(self._file, sources_by_name, over, expect, formulas, self._given, sha256)
+
+    def _problem(self, at: Location, says: str) -> None:
+        self._problems.append(Problem(self._document.line(at), at, says))
+
+    def _raise(self) -> None:
+        lines = list(ScenarioError(str(self._path), self._problems).lines) if self._problems else []
+        if lines or self._elsewhere:
+            raise BadInput("\n".join(dict.fromkeys([*lines, *self._elsewhere])))
+
+    def _by_name(self) -> dict[str, Source]:
+        found: dict[str, Source] = {}
+        for source in filter(None, self._sources.values()):
+            if source.name in found:
+                both = f"{source.given} and {found[source.name].given}"
+                says = f"{both} are both named {source.name}, allowed: each name once"
+                self._problem(("requirements",), says)
+            found[source.name] = source
+        flights = sum(source.flights for source in found.values())
+        if flights > MOST_FLIGHTS:
+            self._problem(("requirements",), f"{flights} flights, allowed: at most {MOST_FLIGHTS}")
+        return found
+
+    def _unused(self) -> None:
+        for name in self._file.flights:
+            if name not in self._sources:
+                self._source(name, ("flights", name))
+                self._problem(
+                    ("flights", name), "no requirement is over these, allowed: flights that one names"
+                )
+
+    def _source(self, given: str, at: Location) -> Source | None:
+        if given not in self._sources:
+            self._sources[given] = None
+            try:
+                self._sources[given] = self._read(given, at)
+            except ScenarioError as error:
+                if error.source == str(self._path):
+                    self._problems += error.problems
+                else:
+                    self._elsewhere += error.lines
+        return self._sources[given]
+
+    def _read(self, given: str, at: Location) -> Source:
+        if given in self._file.flights:
+            return self._own(given)
+        if given in builtin_names() or given in builtin_sweeps():
+            found: Scenario | Sweep = load_sweep(given) if given in builtin_sweeps() else load_scenario(given)
+            return Source(found.name, given, found)
+        path = inside(self._path.parent, given)
+        if path is None:
+            says = f"{given[:100]!r} is outside, allowed: a file in the plan's own folder or below it"
+        elif not looks_like_a_path(given):
+            known = [*self._file.flights, *builtin_names(), *builtin_sweeps()]
+            says = f"{given[:100]!r} is no flight of the plan and not built in{suggestion(given, known)}"
+        else:
+            with contextlib.suppress(OSError):
+                if path.is_file():
+                    read = load_sweep(path) if is_sweep(path) else load_scenario(path)
+                    return Source(read.name, given, read)
+            says = f"no such file: {given[:100]!r}, allowed: a scenario or sweep file"
+        raise ScenarioError(str(self._path), [Problem(self._document.line(at), at, says)])
+
+    def _own(self, name: str) -> Source:
+        """A scenario or sweep written into the plan."""
+        at, folder = ("flights", name), self._path.parent
+        own = _below(self._document, at)
+        own.data = {"name": name, **own.data}
+        read = validate_sweep if is_of_a_sweep(own.data) else validate_scenario
+        try:
+            found = read(own, str(self._path), folder)
+        except ScenarioError as error:
+            if error.source != str(self._path):
+                raise
+            moved = [Problem(one.line, (*at, *one.location), one.says) for one in error.problems]
+            raise ScenarioError(error.source, moved) from None
+        return Source(found.name, name, found)
+
+    def _formula(self, requirement: Requirement, at: Location) -> Formula | None:
+        if requirement.formula is None:
+            return None
+        try:
+            return parse(requirement.formula)
+        except FormulaError as error:
+            self._problem((*at, "formula"), str(error))
+            return None
+
+    def _fits(
+        self, requirement: Requirement, formula: Formula | None, source: Source, at: Location, place: int
+    ) -> None:
+        """Whether this can be judged over that source."""
+        if isinstance(requirement.bar, OfSweep) and not isinstance(source.what, Sweep):
+            says = f"{source.given} is a scenario, allowed with a bar of type sweep: sweeps"
+            self._problem((*at, "over", place), says)
+        if formula is None:
+            return
+        ahead, base = formula.looks_ahead_s, source.base
+        if base.duration_s < ahead < inf:
+            says = f"looks {ahead:g} s ahead, allowed over {source.given}: at most its {base.duration_s:g} s"
+            self._problem((*at, "formula"), says)
+        columns = _columns(base)
+        for column in sorted(formula.columns.difference(columns)) if columns else ():
+            says = f"{column[:60]!r} is no column of {source.given}'s log{suggestion(column, columns)}"
+            self._problem((*at, "formula"), says)
+
+    def _expect(self, given: dict[str, Any], source: Source, at: Location) -> Expect | None:
+        """What is expected, held against what a flight of this source can show."""
+        base = source.base
+        data = base.model_dump(mode="json", by_alias=True, exclude_unset=True) | {"expect": given}
+        lines = {("expect", *where): n for where, n in _below(self._document, at).lines.items()}
+        try:
+            with checked_against(base.airframe, base.aircraft):
+                return validate(Scenario, Document(data, lines), "", None, conflicts).expect
+        except ScenarioError as error:
+            for one in error.problems:
+                if one.location[:1] == ("expect",):
+                    self._problem((*at, *one.location[1:]), one.says)
+            return None
+
+
+def _below(document: Document, at: Location) -> Document:
+    """A part of a document by itself, with the lines it has there."""
+    data = document.data
+    for part in at:
+        data = data[part]
+    lines = {where[len(at) :]: n for where, n in document.lines.items() if where[: len(at)] == at}
+    return Document(data, lines)
+
+
+def _columns(scenario: Scenario) -> tuple[str, ...]:
+    """The columns of a flight's log; none of what cannot fly, which its row will say."""
+    from beaver_ftc.loop.loop import Loop
+
+    with contextlib.suppress(BadInput):
+        return Loop(scenario).columns
+    return ()

@@ -1,0 +1,156 @@
+"""Handling qualities: short period, Dutch roll, roll and spiral mode against the levels of MIL-F-8785C.
+
+Of the aircraft with its controls fixed, the truth linearised by differences: healthy where it is trimmed,
+degraded where a flight with a failure ends, its surfaces where the failure and the law have brought them. A
+law that holds rates leaves none of these modes to judge; they are what a pilot is left with when the law
+lets go. Class I, flight phase category B (light aircraft; climb, cruise, descent).
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from math import inf, log
+from typing import Any
+
+import numpy as np
+
+from beaver_ftc.documents.errors import SimulationFailed
+from beaver_ftc.plant.conditions import trimmed
+from beaver_ftc.plant.linear import LinearModel, differences
+from beaver_ftc.plant.state import FlightState
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.studies.linear_systems import CLASSICAL, Mode, modes
+from beaver_ftc.studies.present.tables import aligned, finite, number
+
+G_MPS2 = 9.80665
+WORSE = 4  # than level 3
+N_AIRSPEEDS = 5
+_STATES = ("alpha_rad", "beta_rad", "p_rad_s", "q_rad_s", "r_rad_s", "phi_rad", "theta_rad", "psi_rad")
+
+
+@dataclass(frozen=True)
+class Limit:
+    """What levels 1 to 3 ask of one quantity of a mode: (least, most) each [MIL8785C]."""
+
+    mode: str
+    quantity: str
+    unit: str
+    clause: str
+    levels: tuple[tuple[float, float], ...]
+
+    def level(self, value: float) -> int:
+        """The best level whose limits the value keeps."""
+        kept = (i for i, (least, most) in enumerate(self.levels, 1) if least <= value <= most)
+        return next(kept, WORSE)
+
+    def margin(self, value: float, level: int) -> float:
+        """How far inside a level's limits it is."""
+        least, most = self.levels[level - 1]
+        return min(value - least, most - value)
+
+
+LIMITS = (
+    Limit("short period", "damping", "", "3.2.2.1.2", ((0.30, 2.0), (0.20, 2.0), (0.15, inf))),
+    Limit("short period", "CAP", "1/(g s2)", "3.2.2.1.1", ((0.085, 3.6), (0.038, 10.0), (0.038, inf))),
+    Limit("Dutch roll", "damping", "", "3.3.1.1", ((0.08, inf), (0.02, inf), (0.0, inf))),
+    Limit("Dutch roll", "damping x frequency", "rad/s", "3.3.1.1", ((0.15, inf), (0.05, inf), (-inf, inf))),
+    Limit("Dutch roll", "frequency", "rad/s", "3.3.1.1", ((0.4, inf), (0.4, inf), (0.4, inf))),
+    Limit("roll", "time constant", "s", "3.3.1.2", ((0.0, 1.4), (0.0, 3.0), (0.0, 10.0))),
+    Limit("spiral", "time to double", "s", "3.3.1.3", ((20.0, inf), (8.0, inf), (4.0, inf))),
+)
+
+
+@dataclass(frozen=True)
+class Quality:
+    """One quantity of one mode; value: infinite where a mode does not diverge."""
+
+    where: str
+    airspeed_mps: float
+    mode: str
+    quantity: str
+    value: float
+    level: int
+
+
+def of_model(linear: LinearModel, airspeed_mps: float, where: str) -> list[Quality]:
+    """The handling qualities of a linear aircraft."""
+    alpha = linear.states.index("alpha")
+    g_per_rad = -linear.A[alpha, alpha] * airspeed_mps / G_MPS2
+    values = _values(modes(linear.of(CLASSICAL).A), float(g_per_rad))
+    return [
+        Quality(where, airspeed_mps, limit.mode, limit.quantity, value, limit.level(value))
+        for limit, value in zip(LIMITS, values, strict=True)
+    ]
+
+
+def _values(found: Mapping[str, Mode], g_per_rad: float) -> list[float]:
+    """What LIMITS are about, in their order; g_per_rad: load factor per angle of attack."""
+    short, dutch = found["short_period"], found["dutch_roll"]
+    roll, spiral = found["roll"].pole.real, found["spiral"].pole.real
+    cap = short.frequency_rad_s**2 / g_per_rad if g_per_rad > 0.0 else inf
+    swing = dutch.damping * dutch.frequency_rad_s
+    double_s = log(2.0) / spiral if spiral > 0.0 else inf
+    return [short.damping, cap, dutch.damping, swing, dutch.frequency_rad_s, -1.0 / roll, double_s]
+
+
+def where_trimmed(scenario: Scenario) -> list[Quality]:
+    """Of a scenario's aircraft, healthy, at its flight condition. Raises BadInput as a trim does."""
+    plant, point = trimmed(scenario)
+    return of_model(differences(plant, point), point.airspeed_mps, "trimmed")
+
+
+def where_ended(scenario: Scenario, end: Mapping[str, float]) -> list[Quality]:
+    """Of its aircraft where a flight ended: the log's last row, by column; surfaces as effective as they are.
+
+    Raises SimulationFailed where nothing can be linearised there.
+    """
+    plant, point = trimmed(scenario)
+    states: dict[str, Any] = {name: float(end[name]) for name in _STATES}
+    surfaces = {surface: float(end[f"{surface}_effective_rad"]) for surface in scenario.airframe.surfaces}
+    settings = {name: float(end.get(name, value)) for name, value in point.settings.items()}
+    there = FlightState(
+        float(end["airspeed_mps"]), float(end["altitude_m"]),
+        surfaces_rad=surfaces, settings=settings, **states,
+    )  # fmt: skip
+    linear = differences(plant, there)
+    if not np.isfinite(linear.A).all():
+        raise SimulationFailed(f"{scenario.name}: nothing can be linearised where it ended")
+    return of_model(linear, there.airspeed_mps, "at the end")
+
+
+def over_airspeeds(scenario: Scenario) -> list[Quality]:
+    """Of its aircraft, healthy, over the airspeeds of the envelope; and, if anything breaks in the scenario,
+    where its flight ends."""
+    from beaver_ftc.loop.loop import fly
+    from beaver_ftc.results.log import MemoryLog
+
+    speeds = np.linspace(*scenario.airframe.envelope.airspeed_mps, N_AIRSPEEDS)
+    flights = (scenario.with_({"initial.airspeed_mps": float(V)}) for V in speeds)
+    found = [quality for flight in flights for quality in where_trimmed(flight)]
+    if scenario.faults:
+        log = MemoryLog()
+        if fly(scenario, log).departure is None:
+            found += where_ended(scenario, dict(zip(log.columns, log.rows[-1].tolist(), strict=True)))
+    return found
+
+
+def as_rows(found: list[Quality]) -> list[dict[str, Any]]:
+    """For `--format json`; what never happens is null."""
+    return [{key: finite(value) for key, value in asdict(each).items()} for each in found]
+
+
+def as_text(found: list[Quality]) -> str:
+    """A line a flight condition, a column a quantity, the level in brackets; then the worst level."""
+    head = [["aircraft alone,", *(limit.mode for limit in LIMITS), ""]]
+    head += [["airspeed, m/s", *(f"{each.quantity} {each.unit}".strip() for each in LIMITS), "level"]]
+    lines = []
+    for start in range(0, len(found), len(LIMITS)):
+        row = found[start : start + len(LIMITS)]
+        ended = " at the end" if row[0].where == "at the end" else ""
+        cells = [f"{number(each.value)} ({said(each.level)})" for each in row]
+        lines.append([f"{row[0].airspeed_mps:.1f}{ended}", *cells, said(max(each.level for each in row))])
+    return f"{aligned([*head, *lines])}\n\nin brackets: level of MIL-F-8785C, class I, category B"
+
+
+def said(level: int) -> str:
+    """A level in words."""
+    return "none" if level == WORSE else str(level)

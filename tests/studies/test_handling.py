@@ -1,0 +1,105 @@
+"""Handling qualities: closed forms of made-up modes, the levels' edges, and the Beaver's own."""
+
+import math
+
+import numpy as np
+import pytest
+
+from beaver_ftc.loop.loop import fly
+from beaver_ftc.plant.linear import LinearModel
+from beaver_ftc.results.log import MemoryLog
+from beaver_ftc.studies.handling import (
+    LIMITS,
+    WORSE,
+    as_rows,
+    as_text,
+    of_model,
+    over_airspeeds,
+    where_ended,
+    where_trimmed,
+)
+from beaver_ftc.studies.linear_systems import CLASSICAL
+from flying import scenario
+
+G = 9.80665
+
+
+def made_up(short=(3.0, 0.6), dutch=(1.2, 0.2), T_roll=0.5, spiral=-0.02, Z_alpha=-1.5):
+    """A linear aircraft with these modes, (frequency, damping) of two of them."""
+    omega, zeta = short
+    A = np.zeros((8, 8))
+    V, alpha, q, theta, beta, p, r, phi = range(8)
+    A[[V, theta], [V, theta]] = -0.05, -0.02
+    A[alpha, alpha], A[alpha, q] = Z_alpha, 1.0
+    A[q, q] = -2 * zeta * omega - Z_alpha
+    A[q, alpha] = Z_alpha * A[q, q] - omega**2
+    omega, zeta = dutch
+    A[beta, r], A[r, beta], A[r, r] = -1.0, omega**2, -2 * zeta * omega
+    A[p, p], A[phi, phi] = -1.0 / T_roll, spiral
+    return LinearModel(A, np.zeros((8, 0)), CLASSICAL, ())
+
+
+def test_the_quantities_of_made_up_modes():
+    found = of_model(made_up(), 40.0, "trimmed")
+    cap = 9.0 / (1.5 * 40.0 / G)
+    expected = [0.6, cap, 0.2, 0.24, 1.2, 0.5, math.inf]
+    assert [each.value for each in found] == pytest.approx(expected, rel=1e-6)
+    assert [each.level for each in found] == [1] * 7
+    assert [(each.mode, each.quantity) for each in found] == [
+        (limit.mode, limit.quantity) for limit in LIMITS
+    ]
+
+
+@pytest.mark.parametrize(
+    ("changed", "row", "level"),
+    [
+        ({"short": (3.0, 0.29)}, 0, 2), ({"short": (3.0, 0.19)}, 0, 3), ({"short": (3.0, 0.14)}, 0, WORSE),
+        ({"short": (5.0, 0.6)}, 1, 2), ({"short": (0.65, 0.6), "Z_alpha": -1.5}, 1, 2),
+        ({"dutch": (1.2, 0.05)}, 2, 2), ({"dutch": (1.2, 0.01)}, 2, 3), ({"dutch": (1.2, -0.01)}, 2, WORSE),
+        ({"dutch": (0.5, 0.2)}, 3, 2), ({"dutch": (0.39, 0.9)}, 4, WORSE),
+        ({"T_roll": 1.5}, 5, 2), ({"T_roll": 3.1}, 5, 3), ({"T_roll": 11.0}, 5, WORSE),
+        ({"spiral": math.log(2) / 19}, 6, 2), ({"spiral": math.log(2) / 7}, 6, 3),
+        ({"spiral": math.log(2) / 3}, 6, WORSE),
+    ],
+)  # fmt: skip
+def test_levels_as_the_specification_has_them(changed, row, level):
+    assert of_model(made_up(**changed), 40.0, "trimmed")[row].level == level
+
+
+def test_the_margin_is_to_the_nearer_limit():
+    damping, _, _, _, _, _, spiral = LIMITS
+    assert damping.margin(0.5, 1) == pytest.approx(0.2)
+    assert damping.margin(1.9, 1) == pytest.approx(0.1)
+    assert damping.margin(0.1, 2) == pytest.approx(-0.1)
+    assert spiral.margin(math.inf, 1) == math.inf
+
+
+def test_a_jam_leaves_other_modes_than_the_trim():
+    flown = scenario(
+        duration_s=2.0, faults=[{"actuator": "rudder", "type": "stuck", "position_deg": 3, "at_s": 0.2}]
+    )
+    log = MemoryLog()
+    fly(flown, log)
+    end = dict(zip(log.columns, log.rows[-1].tolist(), strict=True))
+    before, after = where_trimmed(flown), where_ended(flown, end)
+    assert {each.where for each in after} == {"at the end"}
+    assert [each.value for each in before] != [each.value for each in after]
+    assert after[0].value == pytest.approx(before[0].value, rel=0.2)  # short period: much the same
+    at_trim = where_ended(flown, _as_row(flown))
+    assert [each.value for each in at_trim] == pytest.approx([each.value for each in before], rel=1e-6)
+
+
+def _as_row(flown):
+    from beaver_ftc.plant.conditions import trim
+
+    point = trim(flown)
+    return {**point.as_dict(), **{f"{s}_effective_rad": angle for s, angle in point.surfaces_rad.items()}}
+
+
+def test_the_beaver_over_its_envelope_as_it_is_shown(changed):
+    found = over_airspeeds(scenario())
+    assert [each.airspeed_mps for each in found[:: len(LIMITS)]] == pytest.approx(
+        [30, 36.25, 42.5, 48.75, 55]
+    )
+    assert not changed(as_text(found).splitlines(), "text")
+    assert not changed(as_rows(found[:7]))

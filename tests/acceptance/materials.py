@@ -63,6 +63,10 @@ def _my_sweep(folder: Path) -> None:
         (folder / name).write_text(text.replace("runs: 2000", "runs: 2"))
 
 
+def _my_plan(folder: Path) -> None:
+    (folder / "my-plan.yaml").write_text(_shown("docs/evidence.md", "my-plan"))
+
+
 def _scenarios(folder: Path) -> None:
     (folder / "scenarios").mkdir()
     for name in ("elevator-partial-loss", "aileron-bias"):
@@ -121,6 +125,7 @@ _MATERIALS = {
     r"\bjammed-elevator\b": _shown_scenario("jammed-elevator"),
     r"\bwindy\b": _shown_scenario("windy"),
     r"\bmy[-.]sweep\b": _my_sweep,
+    r"\bmy-plan\b": _my_plan,
     r"\bscenarios/": _scenarios,
     r"\bbrief\.yaml\b|^pytest$": _brief,
     r"\b(healthy|suspect)\.csv\b": _recorded_flights,

@@ -24,7 +24,7 @@ def test_every_module_comes_from_the_wheel(installation, tmp_path):
 
 def test_the_wheel_carries_the_aircraft_and_the_scenarios_as_they_are_here(installation):
     (data,) = installation.folder.glob("lib/python*/site-packages/beaver_ftc/data")
-    for kind in ("aircraft", "scenarios"):
+    for kind in ("aircraft", "scenarios", "evidence"):
         ours = {
             path.relative_to(ROOT): path.read_bytes() for path in (ROOT / kind).rglob("*") if path.is_file()
         }
@@ -38,6 +38,8 @@ def test_list_names_every_built_in_scenario_and_sweep(beaver):
     done = beaver("list", "--format", "json")
     assert (done.returncode, done.stderr) == (0, "")
     listed = json.loads(done.stdout)
-    for kind, folder in (("scenarios", "scenarios"), ("sweeps", "scenarios/sweeps")):
+    for kind, folder in (
+        ("scenarios", "scenarios"), ("sweeps", "scenarios/sweeps"), ("plans", "evidence")
+    ):  # fmt: skip
         files = {path.stem for path in (ROOT / folder).glob("*.yaml")}
         assert {entry["name"] for entry in listed[kind]} == files

@@ -275,7 +275,9 @@ def test_what_there_is_to_choose_from(beaver, changed):
     document = json.loads(beaver("list --format json")[1])
     for kind in ("schemes", "laws", "faults", "signals"):
         assert not changed(catalogue._section(kind, document[kind]).splitlines(), part=kind)
-    assert list(document) == ["scenarios", "sweeps", "aircraft", "schemes", "laws", "faults", "signals"]
+    assert list(document) == [
+        "scenarios", "sweeps", "plans", "aircraft", "schemes", "laws", "faults", "signals"
+    ]  # fmt: skip
     assert {"name", "description"} == set(document["scenarios"][0])
     names = [entry["name"] for entry in document["aircraft"]]
     assert names[0] == "beaver"

@@ -87,7 +87,7 @@ def _tokens(text: str) -> Iterator[str]:
 
 
 class _Parser:
-    """Operators by their power [Pratt1973]; bounded in depth, so that no text can exhaust the stack."""
+    """Operators by their power; bounded in depth, so that no text can exhaust the stack."""
 
     def __init__(self, tokens: list[str]) -> None:
         self._tokens, self._at, self._depth = [*tokens, ""], 0, 0

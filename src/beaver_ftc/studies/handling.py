@@ -29,7 +29,7 @@ _STATES = ("alpha_rad", "beta_rad", "p_rad_s", "q_rad_s", "r_rad_s", "phi_rad", 
 
 @dataclass(frozen=True)
 class Limit:
-    """What levels 1 to 3 ask of one quantity of a mode: (least, most) each [MIL8785C]."""
+    """What levels 1 to 3 ask of one quantity of a mode: (least, most) each [MIL-F-8785C]."""
 
     mode: str
     quantity: str

@@ -1,11 +1,13 @@
 """Which files a model is made of, which of them is taken, what is wrong with each; instrumented copies."""
 
+from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant import instrumented, model_file
+from beaver_ftc.plant.instrumented import instrument
 from beaver_ftc.plant.model_file import copy_of, files_of, refuse_deeds, with_systems
 from kept import page
 
@@ -201,3 +203,23 @@ def test_aircraft_of_the_package():
         BadInput, match=r"jsbsim:c172z: the jsbsim package has no such aircraft, did you mean c172"
     ):
         instrumented.source_of("c172z")
+
+
+def test_a_copy_has_the_files_it_uses_and_no_others(tmp_path):
+    """Aerodynamics from a file of their own stand in the model by then, and that file is of no use."""
+    source = tmp_path / "own"
+    source.mkdir()
+    navion = Path(__file__).parents[2] / "examples" / "own-aircraft" / "navion.xml"
+    text = navion.read_text(encoding="utf-8")
+    start, end = text.index("<aerodynamics>"), text.index("</aerodynamics>") + len("</aerodynamics>")
+    (source / "aero.xml").write_text(text[start:end], encoding="utf-8")
+    split = text[:start] + '<aerodynamics file="aero.xml"/>' + text[end:]
+    (source / "navion.xml").write_text(split, encoding="utf-8")
+    for name in ("another.xml", "notes.txt"):
+        (source / name).write_text("<fdm_config/>", encoding="utf-8")
+    travel = dict.fromkeys(("aileron", "elevator", "rudder"), (-0.3, 0.3))
+    model = instrument(source / "navion.xml", tmp_path / "copy", travel)
+    there = {str(path.relative_to(tmp_path / "copy")) for path in (tmp_path / "copy").rglob("*.*")}
+    systems = {f"Systems/ftc-{name}.xml" for name in (*travel, "common")}
+    assert there == {"navion.xml", *systems}
+    assert "aero/qbar-psf" in model.read_text(encoding="utf-8")

@@ -15,7 +15,7 @@ from xml.etree.ElementTree import Element
 
 from beaver_ftc.documents.errors import BadInput, suggestion
 from beaver_ftc.documents.paths import data_root
-from beaver_ftc.plant.model_file import SYSTEMS, copy_of, package
+from beaver_ftc.plant.model_file import SYSTEMS, copy_of, files_of, package
 
 PREFIX = "actuated-"
 # What aerodynamics of JSBSim's aircraft call the deflection of each surface, and the sign and shape of it.
@@ -178,6 +178,9 @@ def instrument(
     for i, system in enumerate((*travel_rad, "common")):
         whole.insert(place + i, Element("system", file=f"ftc-{system}"))
     ElementTree.ElementTree(whole).write(model, encoding="utf-8", xml_declaration=True)
+    used = {model, *files_of(model)}
+    for path in [path for path in folder.rglob("*.xml") if path not in used]:
+        path.unlink()  # a file whose content stands in the model by now
     return model
 
 

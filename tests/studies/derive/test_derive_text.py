@@ -12,8 +12,9 @@ DOCUMENT = {
     "largest_error_rad_s2": {
         kind: {axis: 0.01 * (3 * k + i) for i, axis in enumerate("pqr")}
         for k, kind in enumerate(("fitted", "checked", "declared"))
-    },
-    "smallest_certain_loss": {"aileron": 0.25, "elevator": 1.0, "rudder": 1.01},
+    }
+    | {"fitted": {"p": 0.0, "q": 1.5e-5, "r": 0.00212}},
+    "smallest_certain_loss": {"aileron": 0.25, "elevator": 1.0, "rudder": 2.1},
     "own_file": [{"term": "Cm_alpha", "own": -0.6123456, "found": -0.59}],
     "notes": ["no flap", "no engine"], "further_surfaces": {"spoiler": "fcs/spoiler-pos-rad", "slat": "x"},
     "took_s": 12.34,
@@ -26,10 +27,13 @@ def test_a_derivation_as_text():
         " envelope   20 to 45.5 m/s, angle of attack -2 to 12 deg",
         " surfaces   aileron, elevator",
         " largest error, rad/s2            p         q         r",
-        "   states of the fit         0.0000    0.0100    0.0200",
-        "   states not seen           0.0300    0.0400    0.0500",
-        "   declared bound            0.0600    0.0700    0.0800",
-        " certain to be detected at 3 deg: losses from aileron 25%, elevator 100%, rudder none",
+        "   states of the fit              0   1.5e-05    0.0021",
+        "   states not seen             0.03      0.04      0.05",
+        "   declared bound              0.06      0.07      0.08",
+        " certain to be detected    jam, off  loss at 3 deg",
+        "   aileron                 0.75 deg  25%",
+        "   elevator                   3 deg  100%",
+        "   rudder                   6.3 deg  none: a total one needs 6.3 deg",
         " coefficient                 own file       found",
         "   Cm_alpha                  -0.61235       -0.59",
         " note: no flap",
@@ -38,7 +42,7 @@ def test_a_derivation_as_text():
         " written in 12.3 s to out/glider, with a page on it, derived.md",
     ]
     short = derived.text_of({**DOCUMENT, "own_file": None, "notes": [], "further_surfaces": {}}).splitlines()
-    assert len(short) == 9
+    assert len(short) == 12
     assert short[-1].startswith(" written in")
 
 

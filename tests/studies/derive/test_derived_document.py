@@ -67,5 +67,5 @@ def test_a_loss_that_no_deflection_so_small_shows_is_said_with_the_deflection_it
     losses = {"aileron": lost | {"certain_loss": 1.5}, "elevator": lost | {"certain_loss": 1.0}}
     monkeypatch.setattr(derived, "smallest_losses", lambda made: losses)
     page = derived.page_of(stranger[0]).splitlines()
-    assert "| aileron | p | 1 | 0.1 | none: a total one needs 4.5 deg |" in page
-    assert "| elevator | p | 1 | 0.1 | 100% |" in page
+    assert "| aileron | p | 1 | 0.1 | none: a total one needs 4.5 deg | 4.5 deg |" in page
+    assert "| elevator | p | 1 | 0.1 | 100% | 3 deg |" in page

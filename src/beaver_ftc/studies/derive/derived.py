@@ -111,13 +111,28 @@ def _table(*rows: Iterable[str]) -> str:
 def _diagnosed(made: Derived) -> Iterator[str]:
     yield "## What can be diagnosed"
     yield f"At {DEFLECTION_DEG:g} deg from neutral, in the second box below, with the published bound."
-    head = "surface", "shows in", "rad/s2 per rad", "bound, rad/s2", "smallest loss certain to be detected"
+    head = (
+        "surface", "shows in", "rad/s2 per rad", "bound, rad/s2", "smallest loss certain to be detected",
+        "smallest jam, off the command",
+    )  # fmt: skip
     rows = []
     for surface, of in smallest_losses(made).items():
-        loss = of["certain_loss"]
-        says = f"{loss:.0%}" if loss <= 1.0 else f"none: a total one needs {DEFLECTION_DEG * loss:.1f} deg"
-        rows.append((surface, of["axis"], f"{of['per_rad_rad_s2']:.3g}", f"{of['bound_rad_s2']:.3g}", says))
+        certain = _loss_and_jam(of["certain_loss"])
+        sizes = (f"{of[name]:.3g}" for name in ("per_rad_rad_s2", "bound_rad_s2"))
+        rows.append((surface, of["axis"], *sizes, *certain))
     yield _table(head, *rows)
+
+
+def _loss_and_jam(certain_loss: float) -> tuple[str, str]:
+    """The smallest ones certain to be detected, in words: a jam lacks what a total loss lacks at the
+    deflection by which it is off."""
+    jam = f"{_short(DEFLECTION_DEG * certain_loss)} deg"
+    return f"{certain_loss:.0%}" if certain_loss <= 1.0 else f"none: a total one needs {jam}", jam
+
+
+def _short(value: float) -> str:
+    """Two digits that count, and no exponent where a person would write none."""
+    return f"{value:.2g}" if value < 100.0 else f"{value:.0f}"
 
 
 def _not_used(made: Derived) -> Iterator[str]:
@@ -160,6 +175,7 @@ def document_of(made: Derived) -> dict[str, Any]:
     aircraft = made.aircraft
     errors = made.fitted_rad_s2, made.checked_rad_s2, aircraft.model_error_rad_s2
     by_axis = (dict(zip(AXES, map(float, of), strict=True)) for of in errors)
+    losses = {name: of["certain_loss"] for name, of in smallest_losses(made).items()}
     return {
         "aircraft": aircraft.name,
         "folder": str(aircraft.folder),
@@ -169,7 +185,8 @@ def document_of(made: Derived) -> dict[str, Any]:
         "trim": {n: getattr(made.trim, n) for n in _OF_TRIM} | {"settings": dict(made.trim.settings)},
         "largest_error_rad_s2": dict(zip(_KINDS, by_axis, strict=True)),
         "near_trim_rad_s2": near_trim(made),
-        "smallest_certain_loss": {name: of["certain_loss"] for name, of in smallest_losses(made).items()},
+        "smallest_certain_loss": losses,
+        "smallest_certain_jam_deg": {name: DEFLECTION_DEG * loss for name, loss in losses.items()},
         "further_surfaces": dict(made.further),
         "notes": list(made.notes),
         "own_file": differences(made.as_filed, made.aircraft) if made.as_filed else None,
@@ -189,10 +206,11 @@ def text_of(document: dict[str, Any]) -> str:
         f" {'largest error, rad/s2':24}{'p':>10}{'q':>10}{'r':>10}",
     ]
     for kind, errors in document["largest_error_rad_s2"].items():
-        lines.append(f"   {_KINDS[kind]:22}" + "".join(f"{errors[axis]:10.4f}" for axis in AXES))
-    losses = document["smallest_certain_loss"].items()
-    says = ", ".join(f"{name} {f'{loss:.0%}' if loss <= 1.0 else 'none'}" for name, loss in losses)
-    lines.append(f" certain to be detected at {DEFLECTION_DEG:g} deg: losses from {says}")
+        lines.append(f"   {_KINDS[kind]:22}" + "".join(f"{errors[axis]:10.2g}" for axis in AXES))
+    lines.append(f" {'certain to be detected':24}{'jam, off':>10}  loss at {DEFLECTION_DEG:g} deg")
+    for name, certain in document["smallest_certain_loss"].items():
+        loss, jam = _loss_and_jam(certain)
+        lines.append(f"   {name:22}{jam:>10}  {loss}")
     if document["own_file"]:
         lines.append(f" {'coefficient':24}{'own file':>12}{'found':>12}")
         lines += [f"   {of['term']:22}{of['own']:12.5g}{of['found']:12.5g}" for of in document["own_file"]]

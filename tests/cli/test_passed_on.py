@@ -83,6 +83,7 @@ POWER = {
     "studies__power__survey__contenders": lambda names: names,
     "studies__engine__workers__cores": 7,
 }
+CHANCES = {"studies__power__chances__answers": ["found soon"]}
 REPRODUCE = {
     "studies__reproduce__reproduction__reproduce": {"passed": False},
     "studies__reproduce__words__as_text": "r",
@@ -104,6 +105,10 @@ def _flown(scenario, options, say):
 
 SITL = {"integrations__sitl__serve__serve": _flown, "results__verdict__verdict_text": "verdict"}
 SURVEY = {"studies__detectability__run_survey": {"points": [1]}, "studies__detectability__text": "d"}
+SAID = {
+    "studies__detectability__run_survey": {"points": [{"fault": "aileron"}, {"fault": "rudder"}]},
+    "studies__detectability__answers": ["a line"],
+}
 BENCH = {"studies__bench__measure__bench": {"b": 1}, "studies__bench__measure__text_of": "bench"}
 DERIVE = {
     "studies__derive__derivation__derive": "made",
@@ -221,6 +226,11 @@ ASKED = [
     ("reproduce", REPRODUCE), ("reproduce --workers 5 --out o --format json", REPRODUCE),
     ("verify", VERIFY),
     ("verify --hours 0.5 --faults 3 --seed 4 --workers 2 --steps --out o --format json", VERIFY),
+    ("power --surface rudder --airspeed 40 --altitude 900 --aircraft beaver-split", POWER | CHANCES),
+    ("power --surface flap", POWER),
+    ("detectability fault-free --surface rudder --airspeed 40 --airspeed 50 --altitude 0", SAID),
+    ("detectability fault-free --surface flap", SAID),
+    ("detectability fault-free --aircraft beaver-split --format json", SURVEY),
     ("detectability fault-free --out o", SURVEY), ("detectability fault-free --format json", SURVEY),
     ("bench --rounds 3", BENCH), ("bench --no-parts --format json", BENCH), ("bench --rounds 2", BENCH),
     ("derive x", DERIVE), ("derive x --out o --envelope e --format json", DERIVE),
@@ -280,9 +290,9 @@ def test_what_there_is_to_choose_from(beaver, changed):
     ]  # fmt: skip
     assert {"name", "description"} == set(document["scenarios"][0])
     names = [entry["name"] for entry in document["aircraft"]]
-    assert names[0] == "beaver"
+    assert names[:2] == ["beaver", "beaver-split"]
     assert "jsbsim:c172x" in names
-    derived = {entry["description"].partition("package")[2] for entry in document["aircraft"][1:]}
+    derived = {entry["description"].partition("package")[2] for entry in document["aircraft"][2:]}
     assert derived <= {", derived", ": derived at first use"}
 
 

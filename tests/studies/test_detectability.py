@@ -19,6 +19,7 @@ from beaver_ftc.studies import detectability as surveying
 from beaver_ftc.studies.detectability import (
     EXCITATIONS,
     SETTLED_S,
+    answers,
     as_csv,
     at,
     best_in_window,
@@ -29,6 +30,7 @@ from beaver_ftc.studies.detectability import (
     judge,
     mismatch,
     run_survey,
+    with_aircraft,
 )
 from flying import loss, scenario
 
@@ -165,3 +167,45 @@ def test_the_command_leaves_map_csv_and_json(tmp_path, monkeypatch):
     folder = tmp_path / "fault-free-detectability"
     assert json.loads((folder / "detectability.json").read_text())["points"] == document["points"]
     assert {file.suffix for file in folder.iterdir()} == {".json", ".csv", ".png"}
+
+
+ROW = {"airspeed_mps": 50.0, "altitude_m": 1800.0, "excitation": 2.0, "fault": "aileron", "why": "a reason"}
+
+
+def test_an_answer_is_a_line_and_rounds_up():
+    """3 deg/s of roll in the scenario, twice as much here; 0.301 is no longer 30 %."""
+    (found,) = answers(scenario(), [ROW | {"detected": 0.301, "isolated": 0.4}])
+    assert found == (
+        "at 50 m/s and 1800 m, 6 deg/s of roll: a loss of aileron of 31 % and more is certain to be detected "
+        "within 0.5 s, isolated within 1 s from 40 % on"
+    )
+
+
+def test_an_answer_says_what_is_not_certain():
+    detected, nothing = answers(
+        scenario(), [ROW | {"detected": 0.3, "isolated": None}, ROW | {"detected": None, "isolated": None}]
+    )
+    assert detected.endswith("a loss of aileron of 30 % and more is certain to be detected within 0.5 s, "
+                             "none is certain to be isolated")  # fmt: skip
+    assert nothing.endswith(
+        "not even a total loss of aileron is certain to be detected within 0.5 s (a reason)"
+    )
+
+
+def test_what_a_line_promises_holds_in_flight(flight):
+    """At a place of its own, at the size it says, wherever in the reference's period the loss strikes."""
+    here = at(flight, 50.0, 1800.0, 1.0)
+    row = {"airspeed_mps": 50.0, "altitude_m": 1800.0, "excitation": 1.0, "fault": "aileron"}
+    row |= judge(excitation(here), "aileron")
+    size = int(answers(here, [row])[0].partition("aileron of ")[2].partition(" %")[0]) / 100.0
+    for struck_s in (4.0, 5.0, 6.0, 7.0, 8.0):
+        faults = scenario(faults=[loss("aileron", size, struck_s)]).faults
+        flown = fly(here.model_copy(update={"faults": faults}))
+        assert flown.detection_time_s - struck_s <= 0.5 + 1e-9
+
+
+def test_another_aircraft_is_flown_from_where_it_starts():
+    other = with_aircraft(scenario(duration_s=5), "beaver-split")
+    assert other.airframe.name == "beaver-split"
+    assert other.duration_s == 5
+    assert set(excitation(other).moment) == {"aileron_left", "aileron_right", "elevator", "rudder"}

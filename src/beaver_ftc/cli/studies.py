@@ -206,25 +206,46 @@ def verify(
 
 
 def detectability(
-    scenario: ScenarioArgument, out: Path = Path("runs"), format: FormatOption = Format.text
+    scenario: ScenarioArgument,
+    airspeed: Annotated[list[float] | None, typer.Option(min=1, max=1000)] = None,
+    altitude: Annotated[list[float] | None, typer.Option(min=-300, max=30000)] = None,
+    aircraft: str | None = None,
+    surface: str | None = None,
+    out: Path = Path("runs"),
+    format: FormatOption = Format.text,
 ) -> None:
     """Survey the smallest fault that is certain to be found.
 
     Over speed, altitude and excitation: the smallest loss certain to be detected, and to be isolated.
 
     Certain: within 0.5 s and 1 s, whatever the declared uncertainty does, along the scenario's references
-    scaled by 0.25 to 2; `median` where the fault strikes at half of all instants.
+    scaled by 0.25 to 2; `median` where the fault strikes at half of all instants. With --surface it answers
+    in a line for each place.
 
     Stopped or killed, it goes on where it was with the same command.
 
+    airspeed: Airspeed, m/s; once for each.
+    altitude: Altitude above sea level, m; once for each.
+    aircraft: In place of the scenario's: built-in name, jsbsim:NAME, or ./FOLDER in the working directory.
+    surface: The surface to answer for.
     out: Folder for the map, the CSV and the JSON.
     """
     from beaver_ftc.scenario.loader import load_scenario
-    from beaver_ftc.studies.detectability import run_survey, survey_name, text
+    from beaver_ftc.studies.detectability import answers, run_survey, survey_name, text, with_aircraft
 
     loaded = load_scenario(scenario)
+    if aircraft is not None:
+        loaded = with_aircraft(loaded, aircraft)
+    known = loaded.airframe.class_of_losses
+    if surface is not None and surface not in known:
+        raise typer.BadParameter(f"--surface {surface!r:.60}: allowed: {', '.join(known)}")
     name = survey_name(loaded)
     with progress_bar(name) as progress:
-        found = run_survey(out, loaded, progress=progress)
-    folder = str(out / name)
-    answer(format, found | {"folder": folder}, lambda: f"{text(found['points'])}\n{folder}")
+        found = run_survey(out, loaded, airspeed or (), altitude or (), progress=progress)
+    folder, rows = str(out / name), found["points"]
+    if surface is None:
+        answer(format, found | {"folder": folder}, lambda: f"{text(rows)}\n{folder}")
+        return
+    rows = [row for row in rows if row["fault"] == surface]
+    said = answers(loaded, rows)
+    answer(format, found | {"points": rows, "answers": said, "folder": folder}, lambda: "\n".join(said))

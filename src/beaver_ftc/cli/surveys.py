@@ -77,6 +77,10 @@ def power(
     schemes: str | None = None,
     sensors: SensorsName | None = None,
     turbulence: TurbulenceName | None = None,
+    airspeed: Annotated[float | None, typer.Option(min=1, max=1000)] = None,
+    altitude: Annotated[float | None, typer.Option(min=-300, max=30000)] = None,
+    aircraft: str | None = None,
+    surface: str | None = None,
     rates_alone: bool = False,
     workers: WorkersOption = None,
     out: Path = Path("runs"),
@@ -95,16 +99,24 @@ def power(
     schemes: Comma-separated schemes beside ours; all registered ones if left out.
     sensors: Only with these sensors; left out: all of the grid.
     turbulence: Only in this air; left out: all of the grid.
+    airspeed: Airspeed, m/s.
+    altitude: Altitude above sea level, m.
+    aircraft: Built-in name, jsbsim:NAME, or ./FOLDER in the working directory.
+    surface: Only losses of this one, with an answer in a line for each of them.
     rates_alone: Do not show plug-ins the air as our detector sees it by the vanes.
     out: Folder for the results: `power` in it.
     """
     from beaver_ftc.studies.engine.workers import cores
+    from beaver_ftc.studies.power.chances import answers
     from beaver_ftc.studies.power.shown import NAME, as_text, run_power
     from beaver_ftc.studies.power.survey import GRIDS, contenders
 
     chosen = contenders(None if schemes is None else listed(schemes))
     with progress_bar(f"power, {grid.value} grid") as progress:
         survey = replace(GRIDS[grid].only(sensors, turbulence), vanes=not rates_alone)
+        survey = survey.elsewhere(aircraft, airspeed, altitude, surface)
         document = run_power(out, survey, chosen, workers or cores(), progress)
-    folder = str(out / NAME)
-    answer(format, document | {"folder": folder}, lambda: as_text(document) + f"\n\nresults: {folder}")
+    folder, said = str(out / NAME), answers(document, surface) if surface else []
+    document |= {"answers": said} if said else {}
+    text = "\n".join(said) or as_text(document)
+    answer(format, document | {"folder": folder}, lambda: f"{text}\n\nresults: {folder}")

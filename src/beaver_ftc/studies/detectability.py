@@ -19,6 +19,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import combinations, product
+from math import ceil
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,7 @@ from beaver_ftc.design.variants import design_of
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
+from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.engine.statistics import quantile
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
@@ -45,6 +47,7 @@ SETTLED_S = 2.0  # the start of a reference is a step of its own
 BISECTIONS = 16  # magnitudes to 2^-16
 MAGNITUDES = ("detected", "detected_median", "isolated", "isolated_median")
 PLACE = ("airspeed_mps", "altitude_m", "excitation")
+MOTION = {"p": "roll", "q": "pitch", "r": "yaw"}
 COLUMNS = (*PLACE, "fault", *MAGNITUDES, "confused_with", "why")
 Document = dict[str, Any]
 
@@ -160,6 +163,47 @@ def run_survey(
         files_of, row=list[Document], follows_from=scenario,
     )  # fmt: skip
     return run_study(survey, out, progress=progress)
+
+
+def with_aircraft(scenario: Scenario, reference: str) -> Scenario:
+    """The scenario with another aircraft, which starts where its flights do; a folder is looked for in the
+    working directory. Terms of the other aircraft that are wrong are none of this one's."""
+    find_aircraft(reference, Path())
+    document = scenario.model_dump(mode="json", exclude_none=True)
+    document["uncertainty"].pop("coefficients", None)
+    given = {"aircraft": reference, "initial": {}, "actuators": "ideal", "faults": [], "expect": {}}
+    return Scenario.model_validate({**document, **given})
+
+
+def answers(scenario: Scenario, rows: Sequence[Document]) -> list[str]:
+    """A line a row: from which loss on a surface's fault is certain to be found there."""
+    aircraft = scenario.airframe
+    axis_of = dict(zip(aircraft.surfaces, aircraft.dominant_axis, strict=True))
+    return [_answer(scenario, AXES[axis_of[row["fault"]]], row) for row in rows]
+
+
+def _answer(scenario: Scenario, axis: str, row: Document) -> str:
+    asked = _amplitude_deg_s(scenario, axis) * row["excitation"]
+    place = f"at {row['airspeed_mps']:g} m/s and {row['altitude_m']:g} m, {asked:g} deg/s of {MOTION[axis]}"
+    fault, detected, isolated = row["fault"], row["detected"], row["isolated"]
+    soon = f"is certain to be detected within {DETECT_WITHIN_S:g} s"
+    if detected is None:
+        return f"{place}: not even a total loss of {fault} {soon} ({row['why']})"
+    named = "none is certain to be isolated"
+    if isolated is not None:
+        named = f"isolated within {ISOLATE_WITHIN_S:g} s from {_upwards(isolated)} on"
+    return f"{place}: a loss of {fault} of {_upwards(detected)} and more {soon}, {named}"
+
+
+def _upwards(magnitude: float) -> str:
+    """A magnitude for which the promise holds: rounded up to per cent."""
+    return f"{ceil(100.0 * magnitude - 1e-9)} %"
+
+
+def _amplitude_deg_s(scenario: Scenario, axis: str) -> float:
+    """The amplitudes of an axis' reference together; 0 where it asks for nothing that has one."""
+    signals = (signal.shape for signal in getattr(scenario.reference, axis))
+    return sum(float(getattr(shape, "amplitude_deg_s", 0.0)) for shape in signals)
 
 
 def survey_name(scenario: Scenario) -> str:

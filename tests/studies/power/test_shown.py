@@ -11,7 +11,7 @@ import pytest
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.compare.replay import Trace
 from beaver_ftc.studies.power import shown, survey
-from beaver_ftc.studies.power.chances import document_of
+from beaver_ftc.studies.power.chances import answers, document_of
 from beaver_ftc.studies.power.survey import (
     BOTH,
     ESTIMATORS,
@@ -175,3 +175,24 @@ def test_some_conditions_of_a_grid():
     assert GRID.only(None, None) == GRID
     with pytest.raises(BadInput, match="allowed: ideal, none; tactical-grade, light"):
         GRID.only("ideal", "light")
+
+
+def test_a_grid_elsewhere_is_of_another_aircraft_and_one_surface():
+    there = GRID.elsewhere("beaver-split", 40.0, None, "aileron_right")
+    assert there.surfaces == ("aileron_right",)
+    flight = scenario_of(Block(GRID.conditions[0], 5.0, 7), 12.0, where=there.where)
+    assert (flight.airframe.name, flight.initial.airspeed_mps) == ("beaver-split", 40.0)
+    assert GRID.elsewhere(None, None, None, None) == GRID
+    with pytest.raises(BadInput, match="--surface 'flap': allowed: aileron, elevator, rudder"):
+        GRID.elsewhere(None, None, None, "flap")
+
+
+def test_an_answer_is_a_line_for_each_size():
+    cell = {"sensors": "ideal", "turbulence": "none", "surface": "rudder", "scheme": "both", "flights": 8}
+    within = {"0.5": {"value": 0.25}, "1": {"value": 1.0}}
+    document = {"cells": [cell | {"excitation_deg_s": 3.0, "magnitude": 0.4, "within": within}]}
+    assert answers(document, "rudder") == [
+        "ideal sensors, still air, 3 deg/s: a loss of rudder of 40% is found within 0.5 s in 25%, "
+        "within 1 s in 100% of 8 flights"
+    ]
+    assert answers(document, "aileron") == []

@@ -11,7 +11,7 @@ from beaver_ftc.diagnosis.bounds.clairvoyant import chance
 from beaver_ftc.results.metrics import Document, versions
 from beaver_ftc.studies.compare.replay import Trace, alarms_at
 from beaver_ftc.studies.engine.statistics import Estimate, binomial, poisson, share_within, sign_test
-from beaver_ftc.studies.power.survey import BUILT_IN, WATCHED_S, WITHIN_S, Grid, Watched
+from beaver_ftc.studies.power.survey import BOTH, BUILT_IN, WATCHED_S, WITHIN_S, Grid, Watched
 from beaver_ftc.studies.present.tables import finite
 
 
@@ -135,7 +135,7 @@ def document_of(
     levels = {key: level_for(traces, grid.per_h) for key, traces in watched.items()}
     rows = rows_of(faulted, levels)
     document = {
-        "grid": {"bouts" if key == "blocks" else key: value for key, value in asdict(grid).items()},
+        "grid": {"bouts" if key == "blocks" else key: value for key, value in _said(grid)},
         "watched_s": WATCHED_S,
         "false_alarms_per_h": grid.per_h,
         "levels": [
@@ -159,6 +159,26 @@ def document_of(
         "versions": dict(versions()),
     }
     return document, rows
+
+
+def _said(grid: Grid) -> Iterable[tuple[str, Any]]:
+    """What a grid says: nothing of a place where it is the usual one."""
+    return ((key, value) for key, value in asdict(grid).items() if key != "where" or value)
+
+
+def answers(document: Document, surface: str) -> list[str]:
+    """A line for each condition, excitation and magnitude: how many losses of a surface our scheme of both
+    detectors finds how soon."""
+    lines = []
+    for cell in document["cells"]:
+        if cell["surface"] == surface and cell["scheme"] == BOTH:
+            soon = ", ".join(f"within {s} s in {of['value']:.0%}" for s, of in cell["within"].items())
+            air = "still air" if cell["turbulence"] == "none" else f"{cell['turbulence']} turbulence"
+            lines.append(
+                f"{cell['sensors']} sensors, {air}, {cell['excitation_deg_s']:g} deg/s: a loss of {surface} "
+                f"of {cell['magnitude']:.0%} is found {soon} of {cell['flights']} flights"
+            )
+    return lines
 
 
 def _counted(level: Level) -> Document:

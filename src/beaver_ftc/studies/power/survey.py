@@ -12,10 +12,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from pydantic import TypeAdapter
 
-from beaver_ftc.design.fdc import SURFACES
+from beaver_ftc.aircraft import DEFAULT
 from beaver_ftc.diagnosis.bounds.clairvoyant import Whitening
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.plugins import DETECTORS, is_compiled, refusal, registered
+from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc.scenario.environment import air_of
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.compare import replay
@@ -59,6 +60,8 @@ class Grid:
     healthy_flight_s: float
     per_h: float
     vanes: bool = True  # whether plug-ins are shown the air as our statistical detector sees it
+    # what its scenarios say besides: another aircraft, and where it starts
+    where: dict[str, Any] = field(default_factory=dict, hash=False)
 
     @property
     def faults(self) -> tuple[tuple[str, float], ...]:
@@ -76,6 +79,21 @@ class Grid:
             there = "; ".join(map(", ".join, self.conditions))
             raise BadInput(f"power: this grid has no such condition, allowed: {there}")
         return replace(self, conditions=kept)
+
+    def elsewhere(
+        self, aircraft: str | None, airspeed_mps: float | None, altitude_m: float | None, surface: str | None
+    ) -> "Grid":
+        """The same flights with another aircraft, elsewhere, of one surface. Raises BadInput for one that the
+        aircraft has not, or whose loss is outside the class."""
+        known = find_aircraft(aircraft or DEFAULT, Path()).class_of_losses
+        if surface is not None and surface not in known:
+            raise BadInput(f"--surface {surface!r:.60}: allowed: {', '.join(known)}")
+        given = {"airspeed_mps": airspeed_mps, "altitude_m": altitude_m}
+        initial = {name: value for name, value in given.items() if value is not None}
+        where: dict[str, Any] = {"initial": initial} if initial else {}
+        where |= {"aircraft": aircraft} if aircraft else {}
+        surfaces = self.surfaces if aircraft is None else known
+        return replace(self, where=where, surfaces=(surface,) if surface else surfaces)
 
     def faulted(self) -> list[Block]:
         """The blocks with faults; each flies all of them. The same seeds in every condition."""
@@ -100,9 +118,16 @@ class Grid:
 GRIDS = TypeAdapter(dict[str, Grid]).validate_json((Path(__file__).parent / "grids.json").read_bytes())
 
 
-def scenario_of(block: Block, duration_s: float, faults: list[dict[str, Any]] | None = None) -> Scenario:
-    """A flight of a block: everything in it but the fault follows from the block alone."""
+def scenario_of(
+    block: Block,
+    duration_s: float,
+    faults: list[dict[str, Any]] | None = None,
+    where: dict[str, Any] | None = None,
+) -> Scenario:
+    """A flight of a block: everything in it but the fault and where it is flown follows from the block."""
     sensors, turbulence = block.condition
+    if where and "aircraft" in where:
+        find_aircraft(where["aircraft"], Path())  # a folder in the working directory, in each process
     return Scenario.model_validate(
         {
             "name": "power",
@@ -116,6 +141,7 @@ def scenario_of(block: Block, duration_s: float, faults: list[dict[str, Any]] | 
             "faults": faults or [],
             "fdi": {"bounds": {"sensors": sensors, "turbulence": turbulence}},
             "control": {"law": "nominal"},
+            **(where or {}),
         }
     )
 
@@ -200,7 +226,8 @@ def deflections(
     since = [measured for measured, _ in recording.seen if measured.t_s > recording.fault_at_s + 1e-9]
     if not since:
         return [0.0] * len(within_s)
-    moment = np.array([measured.contribution[:, SURFACES.index(surface)] for measured in since])
+    place = recording.context.surfaces.index(surface)
+    moment = np.array([measured.contribution[:, place] for measured in since])
     d = Whitening(recording.context).deflection(-magnitude * moment)
     frames = [round(s / recording.context.dt_s) for s in within_s]
     return [float(d[min(n, len(d)) - 1]) for n in frames]
@@ -224,9 +251,11 @@ def fly_block(case: tuple[Block, bool], grid: Grid, schemes: Sequence[str]) -> W
     """Every fault of the grid in a block, or the one flight of a block without a fault."""
     block, faulted = case
     if not faulted:
-        return _watch(Watched(block), [scenario_of(block, grid.healthy_flight_s)], schemes, grid.vanes)
+        healthy = scenario_of(block, grid.healthy_flight_s, where=grid.where)
+        return _watch(Watched(block), [healthy], schemes, grid.vanes)
     at_s = strikes_at_s(block)
-    flights = [scenario_of(block, at_s + WATCHED_S, [loss(*fault, at_s)]) for fault in grid.faults]
+    faults = ([loss(*fault, at_s)] for fault in grid.faults)
+    flights = [scenario_of(block, at_s + WATCHED_S, one, grid.where) for one in faults]
     return _watch(Watched(block, grid.faults), flights, schemes, grid.vanes)
 
 

@@ -37,6 +37,7 @@ COMMANDS = {
     "derive": "studies:derive",
     "verify": "studies:verify",
     "detectability": "studies:detectability",
+    "separate": "separate:command",
     "identify": "recorded:identify",
     "diagnose": "recorded:diagnose",
     "live": "live:command",

@@ -139,6 +139,12 @@ class Stepping:
         return MODES[int(self._frame["supervisor"]["mode"])]
 
     @property
+    def record(self) -> np.void:
+        """The flight's record, of `frame_dtype`; the flight goes on in it."""
+        self._begin()
+        return self._frame
+
+    @property
     def trim_rad(self) -> Vector:
         """Surfaces in trim, (surfaces,) rad."""
         return np.array(self._frame["control"]["layout"]["trim"])

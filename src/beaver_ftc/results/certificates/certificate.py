@@ -54,7 +54,7 @@ def certificate(scenario: Scenario, log: Log) -> Document:
     }  # fmt: skip
     if events:
         tape = recorded(scenario, [events["detected"], *events.values()], len(columns["t_s"]))
-        for said in statements(scenario, tape, _history(scenario, log, tape), events):
+        for said in statements(scenario, tape, history_of(scenario, log, tape), events):
             document["statements" if "value" in said else "without"].append(said)
     return sealed(document)
 
@@ -106,7 +106,7 @@ def _read(log: Log, columns: list[str]) -> dict[str, np.ndarray]:
     return {name: np.concatenate([chunk[name] for chunk in chunks]) for name in columns}
 
 
-def _history(scenario: Scenario, log: Log, tape: Tape) -> History:
+def history_of(scenario: Scenario, log: Log, tape: Tape) -> History:
     """What the log says of rates, model and bound, and what was declared."""
     patterns = ("{}_measured_rad_s", "{}_design_rad_s2", "{}_eta_bar_rad_s2")
     columns = _read(log, [pattern.format(axis) for pattern in patterns for axis in AXES])

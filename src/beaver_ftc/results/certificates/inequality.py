@@ -256,13 +256,11 @@ def of_one_frame(k: int, of: Hypothesis) -> Iterator[list[Term]]:
                 yield [Term(-d, inf, k - 1, k)]
 
 
-def constant_pair(of: Hypothesis, history: History, frames: np.ndarray) -> list[Term]:
-    """Two frames that no one theta explains, or one that none in its set does; empty if there are none.
-
-    frames: those that may be asked.
-    """
-    if not len(frames):
-        return []
+def by_each_frame(
+    of: Hypothesis, history: History, frames: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What each frame and axis says of a constant theta: at least, at most, and Z; (frames, 3) from the first
+    to the last of `frames`, unlimited where not asked."""
     rows = slice(int(frames[0]), int(frames[-1]) + 1)
     asked = np.zeros((rows.stop - rows.start, 3), bool)
     asked[np.ix_(frames - rows.start, np.array(of.asked))] = True
@@ -270,25 +268,32 @@ def constant_pair(of: Hypothesis, history: History, frames: np.ndarray) -> list[
     Z, room = of.slope[here], history.frame_bound(rows) + of.spread[here]
     value = history.innovation(rows) - of.offset[here]
     asked &= Z != 0.0
-    if not asked.any():
-        return []
     size = np.where(asked, np.abs(Z), 1.0)
     middle = value * np.sign(Z) / size
     least = np.where(asked, middle - room / size, -inf)
     most = np.where(asked, middle + room / size, inf)
+    return least, most, np.where(asked, Z, 1.0)
+
+
+def constant_pair(of: Hypothesis, history: History, frames: np.ndarray) -> list[Term]:
+    """Two frames that no one theta explains, or one that none in its set does; empty if there are none.
+
+    frames: those that may be asked.
+    """
+    if not len(frames):
+        return []
+    least, most, Z = by_each_frame(of, history, frames)
     low, high = np.unravel_index(np.argmax(least), least.shape), np.unravel_index(np.argmin(most), most.shape)
-    terms = []
+    terms, first = [], int(frames[0])
     if least[low] > of.low:
-        terms.append(_one_sided(low, 1.0, Z, size, rows.start, history.dt))
+        terms.append(_one_sided(low, 1.0, Z, first, history.dt))
     if most[high] < of.high:
-        terms.append(_one_sided(high, -1.0, Z, size, rows.start, history.dt))
+        terms.append(_one_sided(high, -1.0, Z, first, history.dt))
     return terms
 
 
-def _one_sided(
-    place: tuple[Any, ...], sign: float, Z: np.ndarray, size: np.ndarray, first: int, dt: float
-) -> Term:
+def _one_sided(place: tuple[Any, ...], sign: float, Z: np.ndarray, first: int, dt: float) -> Term:
     """The term that bounds theta from one side by one frame on one axis."""
     k, d = first + int(place[0]), np.zeros(3)
     d[place[1]] = sign * np.sign(Z[place])
-    return Term(d, inf, k - 1, k, weight=1.0 / (dt * float(size[place])))
+    return Term(d, inf, k - 1, k, weight=1.0 / (dt * abs(float(Z[place]))))

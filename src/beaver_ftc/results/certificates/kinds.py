@@ -11,7 +11,7 @@ from math import inf
 
 import numpy as np
 
-from beaver_ftc.diagnosis.types.registry import CONSTANT_LOSS, FLOAT, NAMES, STUCK, VARYING_LOSS
+from beaver_ftc.diagnosis.types.registry import BIAS, CONSTANT_LOSS, FLOAT, NAMES, STUCK, VARYING_LOSS
 from beaver_ftc.results.certificates.inequality import (
     History,
     Hypothesis,
@@ -64,6 +64,8 @@ def hypothesis(tape: Tape, s: int, kind: int) -> Hypothesis:
     if kind == FLOAT:
         neutral = min(max(0.0, low), high)
         return Hypothesis(tape.first, neutral * G - Gu, 0.0 * G, spread, 0.0, 0.0, True, True, asked)
+    if kind == BIAS:  # away from the stops
+        return Hypothesis(tape.first, 0.0 * G, G, spread, low - high, high - low, True, True, asked)
     loss = Hypothesis(tape.first, 0.0 * G, Gu, spread, -1.0, 0.0, True, True, asked)
     return loss if kind == CONSTANT_LOSS else replace(loss, constant=False, shown=False)
 
@@ -75,19 +77,19 @@ def candidates(of: Hypothesis, history: History, alarm: int, k: int) -> Iterator
             yield from of_one_frame(frame, of)
         return
     frames = np.arange(alarm, k + 1)
-    frames = frames[_wrong(history, frames)]
+    frames = frames[wrong(history, frames)]
     if of.slope.any():
         yield constant_pair(of, history, frames)
     for frame in frames[-3:].tolist():
         yield from ([Term(sign * d, inf, frame - 1, frame)] for d in np.eye(3) for sign in (1.0, -1.0))
 
 
-def _wrong(history: History, frames: np.ndarray) -> np.ndarray:
+def wrong(history: History, frames: np.ndarray) -> np.ndarray:
     """In which frames health explains nothing; of several instants, nor in those beside them."""
-    rows = slice(int(frames[0]) - 1, int(frames[-1]) + 2)
+    rows = slice(int(frames[0]) - 1, min(int(frames[-1]) + 2, len(history.x)))
     innovation, bound = history.innovation(rows), history.frame_bound(rows)
-    wrong = (np.abs(innovation) > bound).any(axis=1)
-    beside = np.r_[wrong, np.zeros(len(frames) + 2 - len(wrong), bool)]
+    beyond = (np.abs(innovation) > bound).any(axis=1)
+    beside = np.r_[beyond, np.zeros(len(frames) + 2 - len(beyond), bool)]
     if history.share == 1.0:
         return np.asarray(beside[1:-1])
     return np.asarray(beside[:-2] & beside[1:-1] & beside[2:])

@@ -21,15 +21,17 @@ AFTER = 1000  # after the last one, where types are excluded one by one
 class Tape:
     """Frames `first` to `first + len(x) - 1` of the flight, rows of its log.
 
-    alarm: the flight's record as it was at the alarm, of `frame_dtype`. since: the frame with which
-    the diagnosis began. Of each frame x (3,) rad/s, model and eta_bar (3,) rad/s2, what a gyro's error
-    changes by noise (3,) rad/s, and of each estimator offset, slope and spread (estimators, 3): rad/s2, and
-    per unit of its parameter. reach (estimators, poles, 4): what a fault can have done to the filters before.
+    alarm, last: the flight's record as it was at the alarm and at the end, of `frame_dtype`. since: the frame
+    with which the diagnosis began. Of each frame x (3,) rad/s, model and eta_bar (3,) rad/s2, what a gyro's
+    error changes by noise (3,) rad/s, and of each estimator offset, slope and spread (estimators, 3): rad/s2,
+    and per unit of its parameter. reach (estimators, poles, 4): what a fault can have done to the filters
+    before.
     """
 
     first: int
     since: int
     alarm: np.void
+    last: np.void
     names: tuple[str, ...]
     reach_low: np.ndarray
     reach_high: np.ndarray
@@ -75,6 +77,7 @@ def _record(loop: Loop, scenario: Scenario, events: Sequence[int], end: int) -> 
         if k == events[0]:
             tape.alarm = memory.copied(loop.frames)[0]
     assert tape is not None
+    tape.last = memory.copied(loop.frames)[0]
     return tape
 
 
@@ -111,5 +114,5 @@ def _begun(frame: np.void, scenario: Scenario) -> tuple[Tape, dict[str, Any]]:
     }  # fmt: skip
     k = int(frame["k"]) - 1
     reach = estimators["reach_low"].copy(), estimators["reach_high"].copy()
-    tape = Tape(k, int(frame["since"]), frame, names, *reach, {name: [] for name in views})
+    tape = Tape(k, int(frame["since"]), frame, frame, names, *reach, {name: [] for name in views})
     return tape, views

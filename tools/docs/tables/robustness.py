@@ -1,4 +1,4 @@
-"""Tables of docs/robustness.md: sensor grades, and what real errors leave of detection and tracking."""
+"""Tables of docs/robustness.md: what real errors leave of detection and tracking."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.scenario.sensors import PRESETS
 from beaver_ftc.scenario.sweeps import load_sweep
 from beaver_ftc.studies.engine.statistics import share_within, wilson
 from beaver_ftc.studies.engine.study import fly_all
@@ -23,32 +22,6 @@ Document = dict[str, Any]
 Rows = list[dict[str, Any]]
 CONDITIONS = ("sensors", "servo", "coefficients", "air", "all", "all-published")
 SOON_S = 0.5
-KINDS = {
-    "gyros": "p", "vanes": "alpha", "attitude": "phi", "accelerometers": "ax", "airspeed": "V",
-    "dynamic pressure": "qdyn", "altitude": "altitude", "engine speed": "engine_rpm",
-    "manifold pressure": "manifold_pressure",
-}  # fmt: skip
-UNITS = {
-    "deg_s": "deg/s", "deg": "deg", "mps2": "m/s2", "mps": "m/s", "pa": "Pa", "m": "m", "rpm": "rpm",
-    "inhg": "inHg", "deg_h": "deg/h",
-}  # fmt: skip
-
-
-def robustness_grades() -> str:
-    """What the presets of `sensors` are made of."""
-    grades = {name: preset for name, preset in PRESETS.items() if preset}
-    return markdown_table(("noise, bias; slope; resolution; drift", *grades), [
-        (kind, *(_errors(preset[signal]) for preset in grades.values())) for kind, signal in KINDS.items()
-    ])  # fmt: skip
-
-
-def _errors(sensor: dict[str, float]) -> str:
-    """`noise, bias unit`, then what else there is."""
-    unit = next(UNITS[key.removeprefix("noise_std_")] for key in sensor if key.startswith("noise_std"))
-    found = {key.partition("_")[0]: value for key, value in sensor.items()}
-    extra = (("scale", 100.0, " %"), ("quantum", 1.0, ""), ("drift", 1.0, " deg/h"))
-    said = [f"{factor * found[key]:.3g}{ending}" for key, factor, ending in extra if key in found]
-    return "; ".join([f"{found['noise']:g}, {found['bias']:g} {unit}", *said])
 
 
 def robustness_losses() -> str:

@@ -25,6 +25,6 @@ def fault_types() -> list[str]:
 
 def test_every_signal_and_fault_is_explained_and_every_expectation_named():
     for name in [*Signal.model_fields, *fault_types()]:
-        assert re.search(rf"^\| `{name}` \|", MANUAL, re.MULTILINE), name
+        assert re.search(rf"^\|`{name}`\|", MANUAL, re.MULTILINE), name
     for name in Expect.model_fields:
         assert re.search(rf"`{name}\b", MANUAL), name

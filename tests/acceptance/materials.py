@@ -103,6 +103,12 @@ def _own_aircraft(folder: Path) -> None:
         shutil.copy(path, folder)
 
 
+def _outer_loops(folder: Path) -> None:
+    """The examples of other aircraft along a profile."""
+    for path in (ROOT / "examples/outer-loops").iterdir():
+        shutil.copy(path, folder)
+
+
 def _derived(folder: Path, installation: Installation) -> None:
     """The folder that the page's command before makes."""
     assert installation.beaver("derive", "navion.xml", "--out", "aircraft", cwd=folder).returncode == 0
@@ -131,6 +137,7 @@ _MATERIALS = {
     r"\b(healthy|suspect)\.csv\b": _recorded_flights,
     r"\bmine[:.]": _mine,
     r"\bnavion": _own_aircraft,
+    r"\bjet\.yaml\b": _outer_loops,
     r"(?<!\./)\baircraft/": _copy("aircraft"),
     r"\bdocs/": _copy("docs"),
     r"\btests/data\b": _copy("tests/data"),

@@ -145,7 +145,9 @@ class Known:
         for name in builtin_names():
             aircraft = load(name)
             estimators = estimator_names("all", aircraft)
-            found.update(dict.fromkeys(log_columns(aircraft, estimators, True, True, COLUMNS, True)))
+            found.update(
+                dict.fromkeys(log_columns(aircraft, estimators, True, aircraft.power_setting, COLUMNS, True))
+            )
         return tuple(found)
 
     @cached_property

@@ -6,7 +6,7 @@ from functools import cached_property
 from math import prod, radians
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Literal
 
 from beaver_ftc.aircraft.schema import (
     FLOW_SIGNALS,
@@ -22,6 +22,8 @@ from beaver_ftc.aircraft.schema import (
 )
 
 AXES = ("p", "q", "r")
+THRUST_TERM = "CX_dpt"  # what the slipstream of a piston engine adds to the force along the body
+LEAST_THRUST, GRAVITY_MPS2 = 0.01, 9.80665  # of the weight: what gives less is no engine to fly by
 MOMENTS, FORCES = ("Cl", "Cm", "Cn"), ("CX", "CY", "CZ")
 
 
@@ -287,6 +289,23 @@ class Aircraft:
     def engine(self) -> EngineSection:
         """Settings of the engine a scenario may give."""
         return self.file.engine
+
+    @property
+    def power_setting(self) -> str:
+        """What a scenario and the log call the engine setting that trim moves; empty where there is none."""
+        found = self.file.power_setting
+        return found[0] if found else ""
+
+    @cached_property
+    def airspeed_by(self) -> Literal["power", "pitch", ""]:
+        """What holds an airspeed: power, where the file says what it gives; pitch, of an aircraft that has
+        none to speak of; nothing where the file is silent."""
+        if THRUST_TERM in self.terms:
+            return "power"
+        if self.engine.thrust is None:
+            return "" if self.engine.settings else "pitch"
+        most_n = min(row[-1] - row[0] for row in self.engine.thrust.force_n)
+        return "power" if most_n > LEAST_THRUST * self.mass.mass_kg * GRAVITY_MPS2 else "pitch"
 
     @property
     def has_engine_instruments(self) -> bool:

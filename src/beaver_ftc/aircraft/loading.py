@@ -20,7 +20,7 @@ DEFAULT = "beaver"
 FILE = "aircraft.yaml"
 BESIDE, FROM_JSBSIM = "./", "jsbsim:"
 DERIVED = "# Written by beaver-ftc derive"
-_FORMAT = 5  # of what is derived: files of another are derived anew
+_FORMAT = 6  # of what is derived: files of another are derived anew
 _MAX_BYTES = 1_000_000
 _ALLOWED = "a built-in name, jsbsim:NAME, or ./FOLDER beside the scenario"
 

@@ -6,6 +6,7 @@ rh = r b/2V, and those the file declares.
 """
 
 from collections.abc import Iterable, Iterator
+from itertools import pairwise
 from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
@@ -18,6 +19,7 @@ MAX_SURFACES, MAX_SIGNALS = 20, 6
 MAX_TERMS_OF_ONE, MAX_MONOMIALS = 64, 64
 MAX_TERMS = 3 * MAX_TERMS_OF_ONE
 MAX_BOXES, MAX_LEVELS, MAX_AGES = 6, 4, 4  # of the map of the model's error
+MAX_THRUST = 8  # airspeeds and settings of the table of thrust
 FLOW_SIGNALS = ("alpha", "beta", "ph", "qh", "rh")
 RATE_SIGNALS = ("ph", "qh", "rh")
 SIDESLIP_RATE = "betadoth"  # betadot b/2V: known to linear analysis, to no instrument
@@ -215,17 +217,59 @@ class SettingSection(LimitSection):
         return self
 
 
+def _rising(given: tuple[float, ...]) -> tuple[float, ...]:
+    if any(after <= before for before, after in pairwise(given)):
+        refuse([((), "values out of order, allowed: rising ones")])
+    return given
+
+
+Steps = Annotated[
+    tuple[Number, ...],
+    Field(min_length=2, max_length=MAX_THRUST, json_schema_extra={"range": "rising"}),
+    AfterValidator(_rising),
+]
+_Force = Annotated[Number, Field(ge=-1e8, le=1e8)]
+_Forces = Annotated[tuple[_Force, ...], Field(min_length=2, max_length=MAX_THRUST)]
+
+
+class ThrustSection(Section):
+    """Steady force that power adds along the body's x axis, by airspeed and by the setting that trim moves.
+
+    airspeed_mps: true airspeeds, m/s
+    setting: of the property that `trim.throttle` names
+    force_n: a row for each airspeed, in it a force for each setting, none less than the one before, N
+    lag_s: until 63 % of a change are there, s
+    """
+
+    airspeed_mps: Steps = entry(..., unit="m/s", examples=[[40, 60]])
+    setting: Steps = entry(..., unit="as the setting has it", examples=[[0, 0.5, 1]])
+    force_n: tuple[_Forces, ...] = number(
+        ..., "N", range="in order", max_length=MAX_THRUST, examples=[[[-100, 900, 2000], [-300, 500, 1500]]]
+    )
+    lag_s: Number = entry(0.0, unit="s", ge=0, le=60, examples=[0.8])
+
+    @model_validator(mode="after")
+    def _is_a_table(self) -> Self:
+        if [len(row) for row in self.force_n] != [len(self.setting)] * len(self.airspeed_mps):
+            refuse([(("force_n",), "is no table of airspeed_mps by setting")])
+        falling = (i for i, row in enumerate(self.force_n) if any(b < a for a, b in pairwise(row)))
+        refuse([(("force_n", i), "falls with the setting, allowed: a force that does not") for i in falling])
+        return self
+
+
 class EngineSection(Section):
     """Settings of the engine, by their key in a scenario's `initial`, and limits of what they yield.
 
     start: how they come to run: at once, by their starters with time to come to speed, or not
     settings: what a scenario may set
     limits: what must stay in a range in trim
+    thrust: what the setting that trim moves gives; left out: an airspeed is held only by what forces say
     """
 
     settings: dict[Name, SettingSection] = Field(default_factory=dict)
     limits: dict[Name, LimitSection] = Field(default_factory=dict)
     start: Literal["steady", "run_up", "off"] = "steady"
+    thrust: ThrustSection | None = None
 
 
 class ModelErrorSection(Section):
@@ -375,7 +419,7 @@ class AircraftFile(Section):
 
     @model_validator(mode="after")
     def _parts_fit_together(self) -> Self:
-        refuse([*self._groups(), *self._terms(), *self._names()])
+        refuse([*self._groups(), *self._terms(), *self._names(), *self._thrust()])
         return self
 
     def _groups(self) -> Iterator[Conflict]:
@@ -426,6 +470,26 @@ class AircraftFile(Section):
                 yield ("channels", "surfaces", name), f"unknown surface{suggestion(name, self.surfaces)}"
         for name in set(self.signals) & {*FLOW_SIGNALS, SIDESLIP_RATE}:
             yield ("signals", name), f"{name} is measured in any case, allowed: another name"
+
+    def _thrust(self) -> Iterator[Conflict]:
+        """What power gives needs a setting to give it by, and a mass to move."""
+        if self.engine.thrust is None:
+            return
+        here, setting = ("engine", "thrust"), self.power_setting
+        if setting is None:
+            yield here, "no setting has the property of trim.throttle, allowed: with one that has"
+        elif not (
+            setting[1].range[0] <= self.engine.thrust.setting[0]
+            and self.engine.thrust.setting[-1] <= setting[1].range[1]
+        ):
+            yield (*here, "setting"), f"leaves the range of {setting[0]}, allowed: settings in it"
+        if self.mass.mass_kg is None:
+            yield here, "wants a mass, allowed: with mass.mass_kg"
+
+    @property
+    def power_setting(self) -> tuple[str, SettingSection] | None:
+        """The engine setting that trim moves, and what a scenario calls it."""
+        return next((of for of in self.engine.settings.items() if of[1].property == self.trim.throttle), None)
 
     def terms(self) -> Iterator[tuple[str, str, int, TermSection]]:
         """(section, coefficient, index, term) of every term in the file."""

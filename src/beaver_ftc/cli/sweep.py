@@ -48,11 +48,9 @@ class Arguments:
     keep_logs: str = "none"
     replay: Annotated[int | None, typer.Option(min=0, metavar="INDEX")] = None
     search: Objective | None = None
-    rare: Annotated[str | None, typer.Option(metavar="EXPECTATION")] = None
     format: FormatOption = Format.text
     no_report: NoReportOption = False
     junit: JunitOption = None
-    certificate: bool = False
 
 
 def command(arguments: Arguments) -> None:
@@ -70,8 +68,6 @@ def command(arguments: Arguments) -> None:
     keep_logs: Flights to keep a result folder of: none, failed, missed, worst, all, or indices 3,17.
     replay: Fly this one flight again, as `run` would.
     search: Look for the worst flight instead of sampling.
-    certificate: Write certificates into the folders kept, of the worst flights if --keep-logs names none.
-    rare: Estimate how likely flights miss this expectation, by subset simulation.
     """
     if arguments.backend is Backend.local and arguments.replay is None:
         from beaver_ftc.studies.engine.workers import start_early
@@ -81,9 +77,6 @@ def command(arguments: Arguments) -> None:
 
     options, replay, format = _options(arguments), arguments.replay, arguments.format
     began = time.perf_counter()
-    if arguments.rare is not None:
-        _rare(load_sweep(arguments.file), arguments)
-        return
     try:
         sweep = load_sweep(arguments.file)
         verdict = _fly(sweep, options, format) if replay is None else _replay(sweep, options, replay, format)
@@ -98,24 +91,6 @@ def command(arguments: Arguments) -> None:
     raise typer.Exit(0 if verdict["passed"] else 1)
 
 
-def _rare(sweep: "Sweep", arguments: Arguments) -> None:
-    """How likely an expectation is not met: a number and its interval."""
-    from beaver_ftc.cli.progress import told
-    from beaver_ftc.studies.engine.workers import cores
-    from beaver_ftc.studies.sweep.rare import as_text, run_rare
-
-    others = ("search", "replay", "junit", "ray_address")
-    given = [name for name in others if getattr(arguments, name) is not None]
-    given += ["backend"] if arguments.backend is not Backend.local else []
-    given += ["keep_logs"] if arguments.keep_logs != "none" else []
-    given += ["certificate"] if arguments.certificate else []
-    if given:
-        raise BadInput(f"--rare and --{given[0].replace('_', '-')} exclude each other, allowed: one of them")
-    with told() as tell:
-        document = run_rare(sweep, str(arguments.rare), arguments.out, arguments.workers or cores(), tell)
-    answer(arguments.format, document, lambda: as_text(document))
-
-
 def _options(arguments: Arguments) -> "Options":
     from beaver_ftc.studies.sweep.campaign import Options
 
@@ -125,20 +100,20 @@ def _options(arguments: Arguments) -> "Options":
         backend=arguments.backend.value,
         address=arguments.ray_address,
         resume=arguments.resume,
-        keep=_keep(arguments.keep_logs, arguments.certificate),
+        keep=_keep(arguments.keep_logs),
         report=not arguments.no_report,
         search=arguments.search.value if arguments.search else None,
         source=arguments.file,
     )
 
 
-def _keep(flights: str, certified: bool = False) -> "Keep":
+def _keep(flights: str) -> "Keep":
     from beaver_ftc.studies.sweep.one_flight import KEEP_POLICIES, Keep
 
     if flights in KEEP_POLICIES:
-        return Keep("worst" if certified and flights == "none" else flights, certified=certified)
+        return Keep(flights)
     try:
-        return Keep("selected", frozenset(int(index) for index in flights.split(",")), certified=certified)
+        return Keep("selected", frozenset(int(index) for index in flights.split(",")))
     except ValueError:
         allowed = ", ".join(KEEP_POLICIES)
         raise BadInput(

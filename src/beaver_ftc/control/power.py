@@ -1,4 +1,5 @@
-"""Engine power, the last that acts on pitch when neither elevator nor flap does.
+"""Engine power: its command, in the units of its setting; and the Beaver's on pitch, the last that acts there
+when neither elevator nor flap does.
 
     pz = pz_trim - k_V (V - Vbar) + k_att att,    T_V Vbar' = V - Vbar,    att' = q - q_ref - att / T_att
 
@@ -26,6 +27,7 @@ from beaver_ftc.diagnosis.state import PITCH, YAW
 from beaver_ftc.scenario.schema import Scenario
 
 LEAST_LACK_RAD_S2 = 0.05  # of pitch acceleration: what 2 to 3 inHg give
+WHOLE_RANGE_S = 5.0  # in which a lever goes from stop to stop
 YAW_SHARE = 0.5  # of the rudder, that engine power may claim: the rest is there to fly with
 
 # Settings, state, and what is reported of it.
@@ -33,10 +35,10 @@ POWER = record(
     enabled=int, impatience=float, forgiveness=float,  # shares per frame
     speed_gain=float, attitude_gain=float,  # inHg per m/s, inHg per rad
     smoothing=float, washout=float, leak=float,  # shares per frame
-    trim=float, low=float, high=float, step=float,  # inHg
+    trim=float, low=float, high=float, step=float,  # in the units of the setting, as is the command
     dpt_factor=float, highest_dpt=float, lost=float, engaged=int, in_use=int, moved=int, speed=float,
     usual_speed=float, attitude=float,
-    command=1,  # inHg
+    command=1,
     from_s=float, frames=int, least=float, greatest=float,
 )  # fmt: skip
 
@@ -51,8 +53,7 @@ def is_at_hand(scenario: Scenario) -> bool:
 
 def _has_piston_engine(aircraft: Aircraft) -> bool:
     """Whether the power law knows the engine: manifold pressure is what it moves."""
-    setting = aircraft.engine.settings.get("manifold_pressure_inhg")
-    return setting is not None and setting.property == aircraft.trim.throttle
+    return aircraft.power_setting == "manifold_pressure_inhg"
 
 
 def configure(power: np.void, layout: np.void, scenario: Scenario) -> None:
@@ -66,13 +67,19 @@ def configure(power: np.void, layout: np.void, scenario: Scenario) -> None:
     lags_s = {"smoothing": config.smoothing_s, "washout": config.washout_s, "leak": config.attitude_memory_s}
     for name, lag_s in lags_s.items():
         power[name] = 1.0 - exp(-dt / lag_s)
-    if not _has_piston_engine(scenario.airframe):
+    named = scenario.airframe.file.power_setting
+    if named is None:
         return
-    trim = initial.manifold_pressure_inhg
+    name, setting = named
+    trim = getattr(initial, name)
     power["trim"] = power["command"] = power["least"] = power["greatest"] = trim
-    power["low"], power["high"] = min(config.lowest_inhg, trim), max(config.highest_inhg, trim)
-    power["step"] = config.rate_inhg_s * dt
-    power["dpt_factor"], power["highest_dpt"] = _slipstream_limits(scenario, layout)
+    power["low"], power["high"] = low, high = setting.range
+    per_s = (high - low) / WHOLE_RANGE_S
+    if _has_piston_engine(scenario.airframe):
+        power["low"], power["high"] = min(config.lowest_inhg, trim), max(config.highest_inhg, trim)
+        power["dpt_factor"], power["highest_dpt"] = _slipstream_limits(scenario, layout)
+        per_s = config.rate_inhg_s
+    power["step"] = per_s * dt
 
 
 def _slipstream_limits(scenario: Scenario, layout: np.void) -> tuple[float, float]:
@@ -142,8 +149,11 @@ def follow(power, reference, x, y):
 def ceiling(power, y, highest_dpt):
     """Highest manifold pressure (inHg) whose slipstream leaves the rudder enough to fly with; y (5,).
 
-    The propeller yaws with dpt^3: slow and at full power, more than the rudder can hold.
+    The propeller yaws with dpt^3: slow and at full power, more than the rudder can hold. No limit where
+    nothing is known of a slipstream.
     """
+    if power.dpt_factor == 0.0:
+        return np.inf
     per_inhg = power.dpt_factor / (2.0 * y[QDYN] * y[AIRSPEED])
     return power.command[0] + (highest_dpt - y[DPT]) / per_inhg
 

@@ -100,7 +100,9 @@ def lay_out(frame: np.void, scenario: Scenario, diagnoses_itself: bool) -> tuple
     estimators = estimator_names(scenario.fdi.fault_class, aircraft) if diagnoses_itself else ()
     logged["estimators"] = fdi["isolation"]["n"] if diagnoses_itself else 0
     watched = logged["watch"] = instrument_records.comes_to_be_watched(scenario)
-    logged["power"] = frame["control"]["power"]["enabled"] or profile
+    moved = frame["control"]["power"]["enabled"] or (profile and aircraft.airspeed_by == "power")
+    power = aircraft.power_setting if moved else ""
+    logged["power"] = bool(power)
     logged["tests"] = tests["n_columns"] if tests["enabled"] else 0
-    power, tested, columns = bool(logged["power"]), bool(tests["enabled"]), COLUMNS if profile else ()
+    tested, columns = bool(tests["enabled"]), COLUMNS if profile else ()
     return ch.log_columns(aircraft, estimators, watched, power, columns, tested)

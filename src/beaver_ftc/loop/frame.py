@@ -573,8 +573,9 @@ def record(frame, commanded, row):
         column += 2
     if logged.power:
         row[column] = control.power.command[0]
+        column += 1
     if frame.autopilot.enabled:
-        log_row.record_profile(frame.autopilot, row, column + 1)
+        log_row.record_profile(frame.autopilot, row, column)
     chances = fdi.statistical
     if logged.tests and chances.tests.enabled:
         views = chances.views[: chances.n_views]

@@ -119,13 +119,14 @@ def log_columns(
     aircraft: Aircraft,
     estimators: tuple[str, ...],
     watch: bool,
-    power: bool,
+    power: str,
     profile: tuple[str, ...],
     tests: bool,
 ) -> tuple[str, ...]:
     """The log's columns in order, for the isolation estimators of these names; watch: the instruments are
-    held against one another; power: the law may use the engine; profile: columns of the commanded profile;
-    tests: there is a statistical detector, whose tests are logged as shares of its level.
+    held against one another; power: the engine setting commanded, empty where none is; profile: columns of
+    the commanded profile; tests: there is a statistical detector, whose tests are logged as shares of its
+    level.
 
     Of each surface's effectiveness the `estimate` is the diagnosis', 1 where nothing is estimated; `used` is
     what the law takes it for, on its way there at a limited rate, and 1 throughout under the nominal law.
@@ -144,7 +145,7 @@ def log_columns(
         *(f"{s}_effectiveness_{which}" for which in ("estimate", "used") for s in surfaces),
         "mode", "detected",
         *(("watch_share", "watch_test") if watch else ()),
-        *(("manifold_pressure_inhg",) if power else ()),
+        *((power,) if power else ()),
         *profile,
         *(likelihoods(aircraft) if tests else ()),
     )  # fmt: skip

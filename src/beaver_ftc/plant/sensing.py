@@ -150,7 +150,7 @@ def flight_status(value, ground_m, slow_mps):
 
 @kernel
 def hand_over(truth, commanded, power):
-    """Write the command (n,) rad, and the manifold pressure where the law uses it, where nodes are native."""
+    """Write the command (n,) rad, and the engine's where it is used, where nodes are native."""
     if truth.native:
         write_nodes(truth.setter, truth.write_pointers, commanded)
         if power.in_use:

@@ -23,6 +23,7 @@ MODES = ("nominal", "adaptive", "reallocated", "unanticipated")
 
 SURFACE_ROLES = tuple(f"surface {i}" for i in range(8))  # looks of the surfaces, in the aircraft's order
 LIMITED = "airspeed_limited_mps"  # the commanded airspeed, as far as it can be held
+BEAVERS_POWER = "manifold_pressure_inhg"
 MAX_POINTS = 4000  # of a curve
 WHOLE = (-math.inf, math.inf)
 Series = dict[str, np.ndarray]
@@ -104,13 +105,21 @@ def surfaces(columns: Sequence[str]) -> tuple[str, ...]:
 
 def views(columns: Sequence[str], power: bool = False) -> tuple[View, ...]:
     """Every view that a log with these columns allows; power: the law has used the engine."""
-    known, moved = set(columns), surfaces(columns)
+    known, moved, engine = set(columns), surfaces(columns), power_column(columns)
     named = (
-        _tracking(), _profile(LIMITED in known), _surfaces(moved), _detection(), _watch(),
+        _tracking(), _profile(LIMITED in known, engine), _surfaces(moved), _detection(), _watch(),
         _likelihood(columns), _isolation(estimators(columns)), _ratio(estimators(columns)),
         _effectiveness(moved), _supervisor(), *((_engine(),) if power else ()), _states(),
     )  # fmt: skip
     return tuple(view for view in named if view.panels and known.issuperset(sources(view.columns)))
+
+
+def power_column(columns: Sequence[str]) -> str:
+    """The log's column of the engine power commanded along a profile; empty where there is none."""
+    if BEAVERS_POWER in columns or "altitude_command_m" not in columns:
+        return BEAVERS_POWER if BEAVERS_POWER in columns else ""
+    before = list(columns)[list(columns).index("altitude_command_m") - 1]
+    return "" if before in ("detected", "watch_test") else before
 
 
 def sources(columns: Iterable[str]) -> tuple[str, ...]:
@@ -149,7 +158,7 @@ def _tracking() -> View:
     return View("tracking", "Tracking: body rates against their reference", panels)
 
 
-def _profile(limited: bool) -> View:
+def _profile(limited: bool, power: str) -> View:
     held = {"airspeed": [(LIMITED, "what can be held", "command")]} if limited else {}
     flown = (
         ("altitude", "altitude_command_m", "altitude_m"),
@@ -161,8 +170,9 @@ def _profile(limited: bool) -> View:
         _panel(label, (command, "commanded", "target"), *held.get(label, ()), (actual, "flown", "actual"))
         for label, command, actual in flown
     )
-    engine = _panel("engine: manifold pressure", ("manifold_pressure_inhg", "flown", "actual"))
-    return View("profile", "Profile: what was commanded, and what was flown", (*panels, engine))
+    words = power.removesuffix("_inhg").replace("_", " ")
+    engine = [_panel(f"engine: {words}", (power, "flown", "actual"))] if power else []
+    return View("profile", "Profile: what was commanded, and what was flown", (*panels, *engine))
 
 
 def _surfaces(names: Sequence[str]) -> View:

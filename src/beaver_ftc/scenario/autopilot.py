@@ -1,16 +1,19 @@
 """What a scenario may say of the flight path (`autopilot:`): altitude, airspeed, heading or bank in time."""
 
 from collections.abc import Iterator
+from functools import lru_cache, partial
 from itertools import pairwise
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
-from pydantic import model_validator
+from pydantic import BeforeValidator, create_model, model_validator
 
+from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.aircraft.aircraft import THRUST_TERM
 from beaver_ftc.documents.base import Conflict, Flag, Number, Section, deny, entry, number, refuse
 from beaver_ftc.scenario.airframe import checked_aircraft
+from beaver_ftc.scenario.initial import airspeeds_of, highest_of
 
 MAX_LEGS = 100
-THRUST_TERM = "CX_dpt"  # what engine power adds to the force along the path, in an aircraft's file
 _LATEST_S = 360_000.0
 
 
@@ -56,6 +59,32 @@ class BankLeg(_Leg):
     value: Number | None = number(None, "deg", "bank angle", ge=-45, le=45, examples=[20])
 
 
+@lru_cache
+def _wide(kind: type[_Leg]) -> type[_Leg]:
+    """A leg of any value."""
+    keys: dict[str, Any] = {"value": (Number | None, number(None, "as said"))}
+    return create_model(kind.__name__, __base__=kind, __doc__=kind.__doc__, **keys)
+
+
+def _checked(kind: type[_Leg], given: Any) -> Any:
+    """A leg whose value the aircraft in question can be asked for."""
+    if isinstance(given, kind):
+        return given
+    leg, aircraft = _wide(kind).model_validate(given), checked_aircraft()
+    low, high = (-300.0, highest_of(aircraft)) if kind is AltitudeLeg else airspeeds_of(aircraft)
+    if leg.value is not None and not low <= leg.value <= high:
+        says = str(kind.model_fields["value"].description)
+        deny(f"{leg.value:g} is out of range, allowed: a number from {low:g} to {high:g} ({says})", "value")
+    return kind.model_construct(leg.model_fields_set, **dict(leg))
+
+
+def channels_of(aircraft: Aircraft) -> tuple[str, ...]:
+    """What can be flown with an aircraft."""
+    by = aircraft.airspeed_by
+    refused = {"power": (), "pitch": ("altitude_m",), "": ("airspeed_mps",)}[by]
+    return tuple(name for name in Autopilot.model_fields if name not in refused)
+
+
 def _legs(says: str) -> Any:
     return entry((), says, max_length=MAX_LEGS)
 
@@ -63,8 +92,12 @@ def _legs(says: str) -> Any:
 class Autopilot(Section):
     """The profile to fly; a channel left out is left to the reference and the trim."""
 
-    altitude_m: tuple[AltitudeLeg, ...] = _legs("altitude in time")
-    airspeed_mps: tuple[AirspeedLeg, ...] = _legs("true airspeed in time, by engine power")
+    altitude_m: tuple[Annotated[AltitudeLeg, BeforeValidator(partial(_checked, AltitudeLeg))], ...] = _legs(
+        "altitude in time"
+    )
+    airspeed_mps: tuple[Annotated[AirspeedLeg, BeforeValidator(partial(_checked, AirspeedLeg))], ...] = _legs(
+        "true airspeed in time, by engine power; by pitch where there is none"
+    )
     heading_deg: tuple[HeadingLeg, ...] = _legs("true heading in time")
     bank_deg: tuple[BankLeg, ...] = _legs("bank angle in time")
 
@@ -82,12 +115,15 @@ class Autopilot(Section):
         if self.heading_deg and self.bank_deg:
             yield ("bank_deg",), "contradicts heading_deg, allowed: one of the two"
         aircraft = checked_aircraft()
-        if self.airspeed_mps and THRUST_TERM not in aircraft.terms:
-            yield (
-                ("airspeed_mps",),
-                f"the file of {aircraft.name} does not say what thrust does (no term {THRUST_TERM} among its "
-                f"forces), so no airspeed can be held, allowed: altitude_m, heading_deg, bank_deg",
-            )
+        known = channels_of(aircraft)
+        why = {
+            "airspeed_mps": f"the file of {aircraft.name} does not say what thrust does (no engine.thrust, "
+            f"and no term {THRUST_TERM} among its forces), so no airspeed can be held",
+            "altitude_m": f"{aircraft.name} has no steady thrust, so it glides: no altitude can be held",
+        }
+        for name in self.channels:
+            if name not in known:
+                yield (name,), f"{why[name]}, allowed: {', '.join(known)}"
 
     @property
     def channels(self) -> tuple[str, ...]:

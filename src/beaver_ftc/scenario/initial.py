@@ -54,17 +54,28 @@ def initial_of(aircraft: Aircraft) -> type[Initial]:
     return made
 
 
+def airspeeds_of(aircraft: Aircraft) -> tuple[float, float]:
+    """The lowest and the highest airspeed that a scenario of an aircraft may name, m/s."""
+    low, high = aircraft.envelope.airspeed_mps
+    return min(20.0, 2.0 / 3.0 * low), max(70.0, 14.0 / 11.0 * high)
+
+
+def highest_of(aircraft: Aircraft) -> float:
+    """The highest altitude that a scenario of an aircraft may name, m."""
+    return max(6000.0, aircraft.file.start.altitude_m or 0.0)
+
+
 def _flow_keys(aircraft: Aircraft) -> dict[str, Any]:
     """Airspeed and altitude, whose range and default make room for the aircraft's own."""
     (low, high), start = aircraft.envelope.airspeed_mps, aircraft.file.start
+    slowest, fastest = airspeeds_of(aircraft)
     default = start.airspeed_mps or (45.0 if low <= 45.0 <= high else 0.5 * (low + high))
     says = f"true airspeed, validated from {low:g} to {high:g}"
-    slowest, fastest = min(20.0, 2.0 / 3.0 * low), max(70.0, 14.0 / 11.0 * high)
     speed = number(default, "m/s", says, ge=slowest, le=fastest)
     keys: dict[str, Any] = {"airspeed_mps": (Number, speed)}
     if start.altitude_m is not None:
-        highest = max(6000.0, start.altitude_m)
-        altitude = number(start.altitude_m, "m", "altitude above sea level", ge=-300, le=highest)
+        most = highest_of(aircraft)
+        altitude = number(start.altitude_m, "m", "altitude above sea level", ge=-300, le=most)
         keys["altitude_m"] = Number, altitude
     return keys
 

@@ -15,11 +15,17 @@ _MOMENTS, _FORCES = ("Cl", "Cm", "Cn"), ("CY", "CZ")
 MASS_TOLERANCE = 0.05  # that accelerometers are judged with: fuel and load, which nobody declares
 _ROUNDING = 1e-9
 LOWEST_TURBULENCE_M = 609.6  # 2000 ft: below, its scales and strengths are others [MIL-F-8785C, 3.7]
+FULL_SHARE = 0.02  # of the range of the power: within it a setting is full power
 
 
 def warnings_of(scenario: Any) -> tuple[str, ...]:
     """One line a warning, `key.path: what`."""
-    return (*_airspeed(scenario), *_too_fast_for_the_frame(scenario), *undeclared(scenario))
+    return (
+        *_airspeed(scenario),
+        *_power(scenario),
+        *_too_fast_for_the_frame(scenario),
+        *undeclared(scenario),
+    )
 
 
 def undeclared(scenario: Any) -> Iterator[str]:
@@ -124,6 +130,20 @@ def _airspeed(scenario: Any) -> Iterator[str]:
         yield (
             f"initial.airspeed_mps: {airspeed_mps:g} is outside the range the aerodynamic model "
             f"was identified in, {lowest:g} to {highest:g} m/s"
+        )
+
+
+def _power(scenario: Any) -> Iterator[str]:
+    """An altitude is wanted of an aircraft that takes all its power to fly level where its flights start."""
+    aircraft, profile = scenario.airframe, scenario.autopilot
+    if not profile or not profile.altitude_m or aircraft.engine.thrust is None:
+        return
+    setting = aircraft.engine.settings[aircraft.power_setting]
+    if setting.default > setting.range[1] - FULL_SHARE * (setting.range[1] - setting.range[0]):
+        yield (
+            f"autopilot.altitude_m: {aircraft.name} takes all the power it has at "
+            f"{aircraft.usual_airspeed_mps:g} m/s and {aircraft.file.start.altitude_m or 0.0:g} m: it sinks "
+            "where that is not enough, and keeps its airspeed"
         )
 
 

@@ -29,8 +29,8 @@ def new_autopilot(*channels, **fields):
     pilot = record(AUTOPILOT)
     pilot["dt"], pilot["gravity"], pilot["airspeed"], pilot["alpha"] = DT, G, V, ALPHA_NOW
     pilot["dihedral"], pilot["slowest_mps"], pilot["steepest_alpha"] = 0.02, 35.0, 0.26
-    pilot["trim_inhg"], pilot["low_inhg"], pilot["high_inhg"], pilot["step_inhg"] = 20.0, 12.0, 28.0, 0.5
-    pilot["allowed_inhg"] = 28.0
+    pilot["trim_power"], pilot["low_power"], pilot["high_power"], pilot["step_power"] = 20.0, 12.0, 28.0, 0.5
+    pilot["allowed_power"] = 28.0
     pilot["most"], pilot["limit"], pilot["most_bank"], pilot["bank_limit"] = (0.2, 0.1, 0.15), 10.0, 0.5, 0.5
     pilot["flying"], pilot["thrust"], pilot["climb_in_trim"] = 1, (0.2, 0.1), 0.01
     for name, gain in GAINS.items():
@@ -137,9 +137,9 @@ def test_thrust_per_inhg_is_the_slope_of_the_thrust():
         return y[QDYN] * (0.2 * dpt + 0.1 * ALPHA_NOW * dpt**2)
 
     numeric = (thrust(1e-4) - thrust(-1e-4)) / 2e-4
-    assert loops.thrust_per_inhg(pilot, control["power"], y) == pytest.approx(numeric, rel=1e-6)
+    assert loops.slope_of(pilot, control["power"], y) == pytest.approx(numeric, rel=1e-6)
     pilot["thrust"] = -1.0, 0.0
-    assert loops.thrust_per_inhg(pilot, control["power"], y) == 1e-3
+    assert loops.slope_of(pilot, control["power"], y) == 1e-3
 
 
 PUSH = 0.2  # m/s2 per inHg
@@ -147,7 +147,7 @@ PUSH = 0.2  # m/s2 per inHg
 
 def test_paths_are_bounded_by_the_engine_and_the_airspeed_there_is():
     pilot = new_autopilot(SPEED)
-    pilot["held"], pilot["full_inhg"] = 43.0, 28.0
+    pilot["held"], pilot["full_power"] = 43.0, 28.0
     low, high = loops.paths(pilot, PUSH)
     # idle is 8 inHg below trim, full 8 above; 44 m/s is 1 below 45 and 3 above 41
     assert low == pytest.approx(max(0.01 - 8 * PUSH / G - 0.02 * 1.0, -0.15))
@@ -160,7 +160,7 @@ def test_paths_are_bounded_by_the_engine_and_the_airspeed_there_is():
 @pytest.mark.parametrize("commanded", [36.0, 43.0])
 def test_nothing_is_climbed_below_the_slowest_airspeed(commanded):
     pilot = new_autopilot(SPEED, airspeed=33.0)
-    pilot["held"], pilot["full_inhg"] = commanded, 28.0
+    pilot["held"], pilot["full_power"] = commanded, 28.0
     slow = max(35.0, commanded - 2.0)
     assert loops.paths(pilot, 0.01)[1] == pytest.approx(0.01 + 0.08 / G - 0.02 * (slow - 33.0), abs=1e-12)
     pilot["airspeed"] = 10.0
@@ -283,7 +283,7 @@ def throttled(path=0.03, y=None, power=(), rudder=1.0, **fields):
     control["power"]["command"][0] = 21.0
     for name, value in dict(power).items():
         control["power"][name] = value
-    pilot["full_inhg"] = full_power(pilot, control, new_y(dpt=0.2) if y is None else y)
+    pilot["full_power"] = full_power(pilot, control, new_y(dpt=0.2) if y is None else y)
     loops.throttle(pilot, control["power"], new_y(dpt=0.2) if y is None else y, path, PUSH)
     return pilot, control["power"]
 
@@ -379,15 +379,15 @@ def test_a_frame_is_its_loops_one_after_the_other():
     # pitch: path 0 + alpha - theta; yaw: the sideslip washed out
     assert pilot["rates"] == pytest.approx([0.0, max(3.0 * -0.01, -0.1), 0.5 * 0.02])
     assert control["power"]["trim"] == pytest.approx(
-        20.0 - G * 0.01 / loops.thrust_per_inhg(pilot, control["power"], measured["y"])
+        20.0 - G * 0.01 / loops.slope_of(pilot, control["power"], measured["y"])
     )
 
 
 def test_a_climb_asks_for_no_more_power_than_a_lost_rudder_leaves():
     """At 15 inHg, all that the propeller's yaw leaves, the path is bounded as if the engine ended there."""
-    pilot = new_autopilot(SPEED, held=43.0, full_inhg=15.0)
+    pilot = new_autopilot(SPEED, held=43.0, full_power=15.0)
     assert loops.paths(pilot, PUSH)[1] == pytest.approx(0.01 - 5 * PUSH / G + 0.02 * 3.0)
-    pilot["full_inhg"] = 5.0  # less than idle is idle
+    pilot["full_power"] = 5.0  # less than idle is idle
     assert loops.paths(pilot, PUSH)[1] == pytest.approx(max(0.01 - 8 * PUSH / G + 0.02 * 3.0, -0.15))
 
 
@@ -412,7 +412,7 @@ def test_power_goes_back_while_the_rudder_stands_at_its_stop():
     assert full_power(pilot, control, y) == pytest.approx(20.0)
     control["allocation"]["saturated"][RUDDER] = 0
     assert full_power(pilot, control, y) == pytest.approx(20.0 + DT)
-    pilot["allowed_inhg"] = 27.9999
+    pilot["allowed_power"] = 27.9999
     assert full_power(pilot, control, y) == 28.0
 
 
@@ -429,8 +429,8 @@ def test_ailerons_at_their_stop_are_gone_whatever_is_believed_of_them():
 @pytest.mark.parametrize("left", [0.9, 0.4, 0.0, -0.2])
 def test_a_weak_rudder_and_sideslip_hold_the_propellers_yaw_together(left):
     """dpt^3 at the ceiling: what is left of the rudder's share, and the sideslip's for what is not."""
-    pilot, control, y = new_autopilot(weathercock=0.2, high_inhg=1e9), new_control(), new_y(dpt=0.4)
-    pilot["allowed_inhg"], control["surfaces"]["effectiveness"][RUDDER] = 1e9, left
+    pilot, control, y = new_autopilot(weathercock=0.2, high_power=1e9), new_control(), new_y(dpt=0.4)
+    pilot["allowed_power"], control["surfaces"]["effectiveness"][RUDDER] = 1e9, left
     control["power"]["command"][0] = 21.0
     dpt = y[DPT] + (full_power(pilot, control, y) - 21.0) * 40.0 / (2.0 * y[QDYN] * y[AIRSPEED])
     assert dpt**3 == pytest.approx(max(left, 0.0) * 0.9**3 + (1.0 - left) * 0.2)

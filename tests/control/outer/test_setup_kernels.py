@@ -91,7 +91,7 @@ def test_each_loop_is_a_few_times_slower_than_the_one_inside_it(filled):
 
 def test_limits_and_the_engines_range_are_taken_over(filled):
     pilot, _ = filled
-    assert [pilot[f"{name}_inhg"] for name in ("trim", "low", "high", "step")] == [20.0, 12.0, 28.0, 0.5]
+    assert [pilot[f"{name}_power"] for name in ("trim", "low", "high", "step")] == [20.0, 12.0, 28.0, 0.5]
     assert pilot["most"] == pytest.approx(np.radians([12.0, 6.0, 10.0]))
     assert (pilot["most_bank"], pilot["steepest_alpha"]) == pytest.approx((radians(30.0), radians(15.0)))
     assert pilot["slowest_mps"] == AIRCRAFT.envelope.airspeed_mps[0] + 2.0
@@ -160,6 +160,7 @@ def made_up(terms, **autopilot):
     """A scenario of an aircraft that has these terms alone."""
     aircraft = SimpleNamespace(
         name="glider",
+        airspeed_by="",
         terms={name: SimpleNamespace(value=value) for name, value in terms.items()},
         geometry=SimpleNamespace(wing_area_m2=20.0, span_m=10.0),
         mass=SimpleNamespace(mass_kg=500.0),

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import beaver_ftc as bf
+from beaver_ftc.aircraft import load
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.integrations.live import messages
 from beaver_ftc.integrations.live.session import Session, as_live, changes_of, fault_types
@@ -127,7 +128,7 @@ def test_a_live_flight_is_an_hour_and_expects_nothing():
     ],
 )  # fmt: skip
 def test_what_a_new_flight_changes(request_, changed):
-    assert not changed(changes_of(messages.parse(json.dumps({"do": "fresh", **request_}))))
+    assert not changed(changes_of(messages.parse(json.dumps({"do": "fresh", **request_})), load()))
 
 
 def test_words_of_what_is_asked(session, tmp_path):

@@ -39,7 +39,9 @@ Columns = Mapping[str, str]  # name -> type
 
 def _log() -> Columns:
     aircraft = load()
-    names = log_columns(aircraft, estimator_names("all", aircraft), True, True, PROFILE, True)
+    names = log_columns(
+        aircraft, estimator_names("all", aircraft), True, aircraft.power_setting, PROFILE, True
+    )
     return dict.fromkeys(names, NUMBER)
 
 

@@ -3,7 +3,8 @@ and body-rate references and an engine setting for that.
 
     climb    gamma_c = (h' + k (hc - h)) / V + what was found missing,   theta_c = gamma_c + alpha (smoothed)
              theta' = k (theta_c - theta)
-    speed    a = V' + k (Vc - V) + what was found missing + g (gamma_c - gamma in trim), by manifold pressure
+    speed    a = V' + k (Vc - V) + what was found missing + g (gamma_c - gamma in trim), by engine power
+    gliding  gamma_c = gamma in trim - (V' + k (Vc - V) + what was found missing) / g: airspeed by pitch
     heading  phi_c = V / g k (psi_c - psi),   phi' = k (phi_c - phi)
     turn     psi' = g tan phi / V: coordinated [Etkin1996, sec. 7.6]; and the body rates of these angles'
              rates, with sideslip washed out by the rudder
@@ -19,8 +20,9 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.control.allocation import attainable, remaining
 from beaver_ftc.control.outer.holding import protect
 from beaver_ftc.control.outer.state import ALTITUDE, BANK, HEADING, N_CHANNELS, SPEED
+from beaver_ftc.control.outer.thrust import gained, look_up, power_for, thrust_per_inhg
 from beaver_ftc.control.power import ceiling
-from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, DPT, QDYN
+from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 
 MOST_PATH_RAD = 0.15
@@ -30,7 +32,6 @@ MOST_DRIFT_RAD_S = 0.1  # of turning that a bank without a turn stands for
 USUAL_S, USUAL_MPS = 20.0, 3.0  # airspeed that power alone can hold: within so much of what it has been
 CUT_INHG_S, RAISE_INHG_S = 8.0, 1.0  # about as fast as the engine follows; and slower than a gust lasts
 INSTANT_S = 1e-9  # frame times are k / rate in floating point
-LEAST_PUSH = 1e-3  # m/s2 per inHg
 SETTLED_S = 30.0  # after a change of heading
 MEAN_S = 10.0  # over which airspeed and arrival are judged: what comes and goes faster is a gust
 
@@ -90,13 +91,13 @@ def steer(autopilot, layout, surfaces, allocation, hold, power, u, measured, une
     follow(autopilot, layout, surfaces, allocation.saturated, y)
     limit(autopilot, layout, allocation.G, hold)
     protect(autopilot, layout, surfaces, u, unexplained, y, t)
-    push = thrust_per_inhg(autopilot, power, y)
+    push = slope_of(autopilot, power, y)
     rudder = layout.main[YAW]
     left, at_stop = surfaces.effectiveness[rudder], allocation.saturated[rudder]
-    autopilot.full_inhg = full_power(autopilot, power, left, at_stop, y)
+    autopilot.full_power = full_power(autopilot, power, left, at_stop, y)
     path = path_of(autopilot, measured, push)
     to_body(autopilot, y, attitude, rolling(autopilot, attitude), pitching(autopilot, y, attitude, path))
-    if autopilot.commanded[SPEED]:
+    if autopilot.commanded[SPEED] and not autopilot.glides:
         throttle(autopilot, power, y, path, push)
 
 
@@ -138,37 +139,41 @@ def limit(autopilot, layout, G, hold):
 
 
 @kernel
-def thrust_per_inhg(autopilot, power, y):
-    """Acceleration along the path per inHg of manifold pressure, m/s2."""
-    dpt_per_inhg = power.dpt_factor / (2.0 * y[QDYN] * autopilot.airspeed)
-    slope = autopilot.thrust[0] + 2.0 * autopilot.thrust[1] * autopilot.alpha * y[DPT]
-    return max(y[QDYN] * slope * dpt_per_inhg, LEAST_PUSH)
+def slope_of(autopilot, power, y):
+    """Acceleration along the path per unit of power, m/s2, where no table has it; the table's are brought to
+    this airspeed."""
+    if autopilot.engine.settings:
+        look_up(autopilot.engine, autopilot.airspeed)
+        return 0.0
+    return thrust_per_inhg(autopilot.thrust, autopilot.alpha, autopilot.airspeed, power, y)
 
 
 @kernel
 def full_power(autopilot, power, left, at_stop, y):
-    """The highest manifold pressure (inHg) with what is left of the rudder: the propeller yaws with dpt^3.
+    """The highest power with what is left of the rudder: the Beaver's propeller yaws with dpt^3.
 
     What the rudder lacks, sideslip makes up for. The slower, the less: a climb beyond it ends in slow flight.
     A rudder at its stop holds no more, whatever is believed of it: power then goes back until it comes off.
     left: effectiveness of the rudder.
     """
-    high = autopilot.high_inhg
+    high = autopilot.high_power
     if at_stop:
         lowest = ceiling(power, y, autopilot.weathercock ** (1.0 / 3.0))
-        cut = min(autopilot.allowed_inhg, power.command[0]) - CUT_INHG_S * autopilot.dt
-        autopilot.allowed_inhg = min(max(cut, lowest), high)
+        cut = min(autopilot.allowed_power, power.command[0]) - CUT_INHG_S * autopilot.dt
+        autopilot.allowed_power = min(max(cut, lowest), high)
     else:
-        autopilot.allowed_inhg = min(autopilot.allowed_inhg + RAISE_INHG_S * autopilot.dt, high)
+        autopilot.allowed_power = min(autopilot.allowed_power + RAISE_INHG_S * autopilot.dt, high)
     if left >= 1.0:
-        return autopilot.allowed_inhg
+        return autopilot.allowed_power
     held = max(left, 0.0) * power.highest_dpt**3 + (1.0 - left) * autopilot.weathercock
-    return min(autopilot.allowed_inhg, ceiling(power, y, held ** (1.0 / 3.0)))
+    return min(autopilot.allowed_power, ceiling(power, y, held ** (1.0 / 3.0)))
 
 
 @kernel
 def path_of(autopilot, measured, push):
     """Path angle to fly, rad; the one that is flown where no altitude is commanded."""
+    if autopilot.glides and autopilot.commanded[SPEED]:
+        return glide_of(autopilot)
     if not autopilot.commanded[ALTITUDE]:
         return measured.attitude[PITCH] - autopilot.alpha
     V = autopilot.airspeed
@@ -183,16 +188,36 @@ def path_of(autopilot, measured, push):
 
 
 @kernel
+def glide_of(autopilot):
+    """Path angle at which gravity brings the airspeed to where it is commanded, rad."""
+    error = autopilot.held - autopilot.airspeed
+    along = autopilot.held_moving + autopilot.throttle + autopilot.gain.speed * error
+    steeper = along / autopilot.gravity
+    limited = clamp(steeper, MOST_PATH_RAD)
+    if limited == steeper:
+        find_missing(autopilot, error)
+    return autopilot.climb_in_trim - limited
+
+
+@kernel
+def find_missing(autopilot, error):
+    """Integrate the acceleration that an airspeed takes beside what is reckoned; error m/s."""
+    found = autopilot.throttle + autopilot.dt * autopilot.gain.speed_i * error
+    autopilot.throttle = clamp(found, MOST_MISSING * autopilot.gravity)
+
+
+@kernel
 def paths(autopilot, push):
     """The steepest descent and climb, rad: what the engine sustains, and what airspeed there is to spare."""
     slow = autopilot.slowest_mps
-    fast, idle, full = np.inf, autopilot.trim_inhg, autopilot.trim_inhg
+    fast, idle, full = np.inf, autopilot.trim_power, autopilot.trim_power
     if autopilot.commanded[SPEED]:
         slow = max(slow, autopilot.held - autopilot.gain.spare_mps)
         fast = autopilot.held + autopilot.gain.spare_mps
-        idle, full = autopilot.low_inhg, max(autopilot.full_inhg, autopilot.low_inhg)
-    at_idle = autopilot.climb_in_trim + push * (idle - autopilot.trim_inhg) / autopilot.gravity
-    at_full = autopilot.climb_in_trim + push * (full - autopilot.trim_inhg) / autopilot.gravity
+        idle, full = autopilot.low_power, max(autopilot.full_power, autopilot.low_power)
+    trim, engine = autopilot.trim_power, autopilot.engine
+    at_idle = autopilot.climb_in_trim + gained(engine, push, trim, idle) / autopilot.gravity
+    at_full = autopilot.climb_in_trim + gained(engine, push, trim, full) / autopilot.gravity
     low = at_idle - autopilot.gain.path_per_mps * (fast - autopilot.airspeed)
     high = at_full + autopilot.gain.path_per_mps * (autopilot.airspeed - slow)
     return max(low, -MOST_PATH_RAD), min(max(high, -MOST_PATH_RAD), MOST_PATH_RAD)
@@ -201,7 +226,7 @@ def paths(autopilot, push):
 @kernel
 def pitching(autopilot, y, attitude, path):
     """The rate of the pitch attitude, rad/s."""
-    if not autopilot.commanded[ALTITUDE]:
+    if not (autopilot.commanded[ALTITUDE] or (autopilot.glides and autopilot.commanded[SPEED])):
         return 0.0
     wanted = path + autopilot.alpha * np.cos(attitude[ROLL]) - attitude[PITCH]
     rate = clamp(autopilot.gain.attitude * wanted, autopilot.limit[PITCH])
@@ -253,7 +278,7 @@ def to_body(autopilot, y, attitude, rolling, pitching):
 
 @kernel
 def throttle(autopilot, power, y, path, push):
-    """Move the manifold pressure; while power stands in for a lost pitch, give its law our airspeed and what
+    """Move the power; while power stands in for a lost pitch, give its law our airspeed and what
     the path takes: it has an airspeed loop of its own."""
     power.in_use = 1
     error = autopilot.held - autopilot.airspeed
@@ -265,16 +290,15 @@ def throttle(autopilot, power, y, path, push):
     else:
         along += autopilot.gain.speed * error
     climbing = autopilot.gravity * (path - autopilot.climb_in_trim)
-    wanted = autopilot.trim_inhg + (along + climbing) / push
-    high = min(autopilot.full_inhg, ceiling(power, y, power.highest_dpt))
-    limited = max(min(wanted, high), autopilot.low_inhg)
+    wanted = power_for(autopilot.engine, push, autopilot.trim_power, along + climbing)
+    high = min(autopilot.full_power, ceiling(power, y, power.highest_dpt))
+    limited = max(min(wanted, high), autopilot.low_power)
     if limited == wanted:
-        found = autopilot.throttle + autopilot.dt * autopilot.gain.speed_i * error
-        autopilot.throttle = clamp(found, MOST_MISSING * autopilot.gravity)
+        find_missing(autopilot, error)
     power.trim = limited
     if not power.enabled:
         before = power.command[0]
-        power.command[0] = min(max(limited, before - autopilot.step_inhg), before + autopilot.step_inhg)
+        power.command[0] = min(max(limited, before - autopilot.step_power), before + autopilot.step_power)
 
 
 @kernel

@@ -13,13 +13,13 @@ from math import inf, nan, radians
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.aircraft.aircraft import GRAVITY_MPS2, THRUST_TERM
 from beaver_ftc.control.outer.state import CHANNELS, GAINS, N_FLAP, N_QDYN
+from beaver_ftc.control.outer.thrust import set_up_engine
 from beaver_ftc.design.engine import SEA_LEVEL_DENSITY_KG_M3
 from beaver_ftc.diagnosis.state import PITCH
-from beaver_ftc.scenario.autopilot import THRUST_TERM
 from beaver_ftc.scenario.schema import Scenario
 
-GRAVITY_MPS2 = 9.80665
 THRUST = "dpt"  # the signal that stands for the engine
 STEP = 1e-30  # of a complex step
 ITERATIONS, CLOSE = 12, 1e-9
@@ -27,8 +27,9 @@ STEEPEST_RAD, MOST_THRUST = 0.5, 3.0  # beyond, the polynomials have solutions t
 PER_FLAP, GUESS = -0.12, (0.1, 0.5, 0.0)  # alpha over flap, and alpha, slipstream, elevator without it
 MOST_DEG_S = (12.0, 6.0, 10.0)  # asked of a healthy aircraft: a transport's manoeuvres
 MOST_BANK_DEG = 30.0
-STEEPEST_ALPHA_DEG = 15.0  # the model is valid to 16
-SPARE_MPS = 2.0  # above the validated airspeeds' end
+STEEPEST_ALPHA_DEG = 15.0
+SPARE_ALPHA_DEG = 1.0, 2.0  # at least and at most, below the highest at which the model is valid
+SPARE_MPS, SPARE_SHARE = 2.0, 0.2  # above the validated airspeeds' end; at most this share of them
 POWER_SIDESLIP_RAD = 0.2  # that full power may lead to with a rudder that is lost; 0.6 is a departure
 # Of 0, 0.7, 1.5 and 3 deg kept of the flap at the end of the airspeeds that can be held, the one with which
 # most jams were kept; and how fast a limit moves the command: about as fast as drag slows the aircraft down.
@@ -45,16 +46,24 @@ def set_up_autopilot(autopilot: np.void, control: np.void, scenario: Scenario) -
     autopilot["enabled"], autopilot["dt"] = 1, 1.0 / scenario.rate_hz
     set_up_profile(autopilot, scenario)
     autopilot["changed_at_s"] = -inf
-    autopilot["gain"] = tuple(GAINS.values())
+    autopilot["gain"] = tuple(_gains(scenario.airframe).values())
     autopilot["gravity"] = GRAVITY_MPS2
     _know(autopilot, scenario)
-    autopilot["steepest_alpha"] = radians(STEEPEST_ALPHA_DEG)
+    less, more = (scenario.airframe.envelope.alpha_deg[1] - spare for spare in SPARE_ALPHA_DEG)
+    autopilot["steepest_alpha"] = radians(min(less, max(STEEPEST_ALPHA_DEG, more)))
     autopilot["most"], autopilot["most_bank"] = np.radians(MOST_DEG_S), radians(MOST_BANK_DEG)
-    for ours, theirs in (("trim_inhg", "trim"), ("low_inhg", "low"), ("high_inhg", "high")):
-        autopilot[ours] = control["power"][theirs]
-    autopilot["step_inhg"], autopilot["allowed_inhg"] = control["power"]["step"], control["power"]["high"]
+    for name in ("trim", "low", "high", "step"):
+        autopilot[f"{name}_power"] = control["power"][name]
+    autopilot["allowed_power"] = control["power"]["high"]
     control["reference"]["steered"] = 1
     _know_what_holds(autopilot["holding"], control["layout"], scenario)
+
+
+def _gains(aircraft: Aircraft) -> dict[str, float]:
+    """The gains; those of the airspeed slower by what the engine lags, which its loop has beside its own."""
+    thrust = aircraft.engine.thrust
+    slower = 1.0 + (thrust.lag_s if thrust and aircraft.airspeed_by == "power" else 0.0) / GAINS["airspeed_s"]
+    return GAINS | {"speed": GAINS["speed"] / slower, "speed_i": GAINS["speed_i"] / slower**2}
 
 
 def set_up_profile(autopilot: np.void, scenario: Scenario) -> None:
@@ -72,8 +81,12 @@ def _know(autopilot: np.void, scenario: Scenario) -> None:
     """What the loops take from the aircraft: thrust, roll by sideslip, slowest airspeed."""
     aircraft = scenario.airframe
     terms = {name: term.value for name, term in aircraft.terms.items()}
-    per_mass = aircraft.geometry.wing_area_m2 / (aircraft.mass.mass_kg * scenario.design_model.mass)
+    mass_kg = aircraft.mass.mass_kg * scenario.design_model.mass
+    per_mass = aircraft.geometry.wing_area_m2 / mass_kg
     autopilot["thrust"] = per_mass * np.array([terms.get(THRUST_TERM, 0.0), terms.get("CX_adpt2", 0.0)])
+    autopilot["glides"] = aircraft.airspeed_by == "pitch"
+    if aircraft.airspeed_by == "power" and THRUST_TERM not in terms:
+        set_up_engine(autopilot["engine"], aircraft.engine.thrust, mass_kg)
     by_sideslip = terms.get("Cl_beta", 0.0) / terms.get("Cl_p", -1.0)
     autopilot["dihedral"] = max(by_sideslip, LEAST_DIHEDRAL) * 2.0 / aircraft.geometry.span_m
     autopilot["weathercock"] = inf
@@ -81,7 +94,8 @@ def _know(autopilot: np.void, scenario: Scenario) -> None:
         beta = POWER_SIDESLIP_RAD
         held = terms.get("Cn_beta", 0.0) * beta + terms.get("Cn_beta3", 0.0) * beta**3
         autopilot["weathercock"] = max(held / abs(terms["Cn_dpt3"]), 0.0)
-    autopilot["slowest_mps"] = aircraft.envelope.airspeed_mps[0] + SPARE_MPS
+    slowest, fastest = aircraft.envelope.airspeed_mps
+    autopilot["slowest_mps"] = slowest + min(SPARE_MPS, SPARE_SHARE * (fastest - slowest))
 
 
 def _know_what_holds(holding: np.void, layout: np.void, scenario: Scenario) -> None:

@@ -1,6 +1,7 @@
 """What the autopilot keeps: the profile to fly, its limits, its memory, and how far it was off."""
 
 from beaver_ftc.compiled import record
+from beaver_ftc.control.outer.thrust import ENGINE
 
 ALTITUDE, SPEED, HEADING, BANK = range(4)
 N_CHANNELS = 4
@@ -49,10 +50,11 @@ AUTOPILOT = record(
     changed_at_s=N_CHANNELS,
     # what is known of the aircraft
     gravity=float, thrust=2,  # m/s2 per dpt and Pa: at no alpha, and per alpha
-    trim_inhg=float, low_inhg=float, high_inhg=float, step_inhg=float,
+    engine=ENGINE, glides=int,  # what else is known of it; whether pitch holds the airspeed
+    trim_power=float, low_power=float, high_power=float, step_power=float,  # in the units of its setting
     climb_in_trim=float,  # rad, with the engine as trimmed
     dihedral=float,  # roll rate per sideslip and airspeed, 1/m
-    full_inhg=float, allowed_inhg=float,  # the highest there is now, and that the rudder allows
+    full_power=float, allowed_power=float,  # the highest there is now, and that the rudder allows
     weathercock=float,  # cube of the dpt whose yawing moment the largest sideslip accepted holds
     slowest_mps=float, steepest_alpha=float,
     most=3,  # rad/s, of the rates asked for with all surfaces healthy

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 import beaver_ftc as bf
+from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.documents.errors import BadInput, suggestion
 from beaver_ftc.integrations.live import messages
 from beaver_ftc.integrations.live.game import NOTHING, Fault, Game, hidden_faults
@@ -17,6 +18,7 @@ from beaver_ftc.loop.cockpit import IMMOVABLE
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled, registered
 from beaver_ftc.results.log import SpooledLog
 from beaver_ftc.scenario.airframe import checked_against
+from beaver_ftc.scenario.autopilot import channels_of
 from beaver_ftc.scenario.faults import TYPES, place_of
 from beaver_ftc.scenario.sensors import sensors_there
 
@@ -228,7 +230,7 @@ class Session:
 
     def _fresh(self, asked: messages.Fresh) -> str:
         base = self._scenario(asked.scenario)
-        changes = changes_of(asked)
+        changes = changes_of(asked, base.airframe)
         self._begin(base.with_(changes) if changes else base)
         self.game.stop()
         return "new flight"
@@ -372,7 +374,7 @@ def ready_for_hands(scenario: "bf.Scenario") -> "bf.Scenario":
     return scenario.with_(changes) if changes else scenario
 
 
-def changes_of(request: messages.Fresh) -> dict[str, Any]:
+def changes_of(request: messages.Fresh, aircraft: Aircraft) -> dict[str, Any]:
     """Dotted keys of the scenario for what a new flight asks. Errors of the air and the sensors are declared
     to the diagnosis as well: it is to live with them, not to be surprised."""
     keys = (
@@ -385,7 +387,8 @@ def changes_of(request: messages.Fresh) -> dict[str, Any]:
     )
     changes: dict[str, Any] = {key: value for key, value in keys if value is not None}
     if request.autopilot is not None:
-        changes["autopilot"] = {channel: [{"hold": True}] for channel in HELD} if request.autopilot else None
+        held = [channel for channel in HELD if channel in channels_of(aircraft)]
+        changes["autopilot"] = {channel: [{"hold": True}] for channel in held} if request.autopilot else None
     if request.turbulence is not None:
         still = request.turbulence == "none"
         changes["environment.turbulence"] = "none" if still else "dryden"

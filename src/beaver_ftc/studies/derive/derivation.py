@@ -18,6 +18,7 @@ import numpy as np
 import yaml
 
 from beaver_ftc.aircraft import loading
+from beaver_ftc.aircraft.aircraft import THRUST_TERM
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_SIGNALS
 from beaver_ftc.design.model import design_record
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
@@ -30,6 +31,7 @@ from beaver_ftc.studies.derive.derived import NAME as PAGE
 from beaver_ftc.studies.derive.derived import Derived, page_of
 from beaver_ftc.studies.derive.fit import MOST_TERMS, engine_signals, fitted, map_of, signals_of_use
 from beaver_ftc.studies.derive.sample import FRESH, SIDESLIP_RAD, Envelope, Samples, fly_about, sample
+from beaver_ftc.studies.derive.thrust import thrust_of
 
 SAMPLES, CHECKED = 6000, 16000
 SPAN_OF_ALPHA_RAD = 0.10
@@ -146,6 +148,10 @@ def derive(
             usual_rad = outline.WIDE_SIDESLIP_RAD if source.folder else SIDESLIP_RAD
             sideslip_rad = radians(wanted.sideslip_deg) if wanted.sideslip_deg else usual_rad
             made = _derived(data, plant, trim, sideslip_rad, folder, tell)
+            if THRUST_TERM not in plant.aircraft.terms:
+                tell("engines")
+                thrust = thrust_of(outline.plant_of(data, folder), trim)
+                data["engine"] |= {"thrust": thrust} if thrust else {}
         aircraft = outline.aircraft_of(data, target)
         as_filed = loading.read(source.folder) if source.folder else None
         took_s = perf_counter() - started_s

@@ -1,4 +1,4 @@
-"""`python tools/check_certificate.py FOLDER` exits 0 if log.parquet proves certificate.json there, else 1.
+"""`python tools/check_certificate.py FOLDER|FILE [LOG]` exits 0 if the log proves certificate.json, else 1.
 
 From docs/theory.md, sections 1 to 4, and docs/certificates.md. NumPy alone; pyarrow opens the log."""
 
@@ -93,7 +93,8 @@ def failures(about, log):
 if __name__ == "__main__":
     from pyarrow.parquet import read_table
 
-    about = json.loads(Path(sys.argv[1], "certificate.json").read_text())
-    table = read_table(Path(sys.argv[1], "log.parquet"))
+    given = Path(sys.argv[1], "certificate.json" if Path(sys.argv[1]).is_dir() else "")
+    about = json.loads(given.read_text())
+    table = read_table(sys.argv[2] if len(sys.argv) > 2 else given.parent / "log.parquet")
     found = "\n".join(failures(about, {name: table[name].to_numpy() for name in table.column_names}))
     sys.exit(found or print(len(about["statements"]), "statements hold"))

@@ -159,7 +159,10 @@ def test_by_the_command_line(tmp_path, monkeypatch, capsys):
     written = Path("runs/mine/certificate.json")
     written.write_text(written.read_text().replace('"frame":51', '"frame":52', 1))
     checked = subprocess.run(
-        [sys.executable, CHECKER, "runs/mine"], capture_output=True, text=True, check=False
+        [sys.executable, CHECKER, "runs/mine/certificate.json", "runs/mine/log.parquet"],
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert checked.returncode == 1
     assert "alarm: " in checked.stderr

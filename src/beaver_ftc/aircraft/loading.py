@@ -18,6 +18,11 @@ from beaver_ftc.documents.validation import parse_document, text_of, validate
 
 DEFAULT = "beaver"
 FILE = "aircraft.yaml"
+# Aircraft of data that others publish: how each comes here.
+IMPORTED = {
+    "gtm": "`beaver-ftc import gtm DATABASE.mat` of NASA's data base, gtm_design/config/"
+    "T2_polynomial_aerodatabase.mat of github.com/nasa/GTM_DesignSim"
+}
 BESIDE, FROM_JSBSIM = "./", "jsbsim:"
 DERIVED = "# Written by beaver-ftc derive"
 _FORMAT = 6  # of what is derived: files of another are derived anew
@@ -63,6 +68,12 @@ def load(reference: str = DEFAULT, beside: Path | None = None) -> Aircraft:
         return read(derived_folder(name))
     if reference.startswith(BESIDE):
         return read(_inside(beside, reference))
+    if reference in IMPORTED:
+        folder = imported_folder(reference)
+        if not (folder / FILE).is_file():
+            says = f"is not here yet, allowed: after {IMPORTED[reference]}"
+            raise UnknownAircraft(f"{reference!r} {says}")
+        return read(folder)
     if reference not in builtin_names():
         raise UnknownAircraft(
             f"{reference!r} is not known{suggestion(reference, builtin_names())}, jsbsim:NAME as "
@@ -75,8 +86,17 @@ def derived_folder(name: str) -> Path:
     """Where `beaver-ftc derive` keeps what it made of an aircraft of the jsbsim package."""
     if not re.fullmatch(r"[A-Za-z0-9_-]{1,60}", name):
         raise UnknownAircraft(f"'jsbsim:{name[:60]}' is no name, allowed: letters, digits, - and _")
+    return _kept() / "aircraft" / name
+
+
+def imported_folder(name: str) -> Path:
+    """Where `beaver-ftc import` keeps what it made of data that others publish."""
+    return _kept() / "imported" / name
+
+
+def _kept() -> Path:
     base = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser())
-    return base / "beaver-ftc" / "aircraft" / name
+    return base / "beaver-ftc"
 
 
 def first_line() -> str:

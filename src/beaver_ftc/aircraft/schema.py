@@ -15,7 +15,7 @@ from beaver_ftc.aircraft.channels import ChannelsSection
 from beaver_ftc.documents.base import Conflict, Flag, Number, Section, Whole, entry, number, refuse
 from beaver_ftc.documents.errors import suggestion
 
-MAX_SURFACES, MAX_SIGNALS = 20, 6
+MAX_SURFACES, MAX_SIGNALS, MAX_DAMAGE = 20, 6, 50
 MAX_TERMS_OF_ONE, MAX_MONOMIALS = 64, 64
 MAX_TERMS = 3 * MAX_TERMS_OF_ONE
 MAX_BOXES, MAX_LEVELS, MAX_AGES = 6, 4, 4  # of the map of the model's error
@@ -373,6 +373,17 @@ class GroundSection(Section):
     pitch_deg: Number = number(..., unit="deg", says="attitude, standing", ge=-45, le=45, examples=[11])
 
 
+class DamageSection(Section):
+    """One case of damage: of several at once the aircraft has the first.
+
+    property: property that is 1 where it is there, 0 where not
+    takes: surfaces that are lost with it
+    """
+
+    property: Property = entry(..., examples=["failures/damage/left-wing-tip-off"])
+    takes: tuple[Name, ...] = entry((), examples=[["left_aileron"]])
+
+
 class AircraftFile(Section):
     """The whole file.
 
@@ -382,6 +393,7 @@ class AircraftFile(Section):
     model_error_map: where in the envelope the error is how large, in place of one value
     channels: which output of an autopilot moves which surface
     ground: how it stands; without it no flight begins on the ground
+    damage: cases of damage that a scenario may inflict, by name
     name: of the aircraft
     description: what it is, in a line
     surfaces: three or more control surfaces, by name
@@ -416,6 +428,7 @@ class AircraftFile(Section):
     start: StartSection = Field(default_factory=StartSection)
     channels: ChannelsSection | None = None
     ground: GroundSection | None = None
+    damage: dict[Name, DamageSection] = Field(default_factory=dict, max_length=MAX_DAMAGE)
 
     @model_validator(mode="after")
     def _parts_fit_together(self) -> Self:
@@ -468,6 +481,10 @@ class AircraftFile(Section):
         for name in self.channels.surfaces if self.channels else ():
             if name not in self.surfaces:
                 yield ("channels", "surfaces", name), f"unknown surface{suggestion(name, self.surfaces)}"
+        for case, damage in self.damage.items():
+            for i, name in enumerate(damage.takes):
+                if name not in self.surfaces:
+                    yield ("damage", case, "takes", i), f"unknown surface{suggestion(name, self.surfaces)}"
         for name in set(self.signals) & {*FLOW_SIGNALS, SIDESLIP_RATE}:
             yield ("signals", name), f"{name} is measured in any case, allowed: another name"
 

@@ -42,15 +42,19 @@ COMMANDS = {
     "diagnose": "recorded:diagnose",
     "live": "live:command",
     "sitl": "sitl:command",
+    "import gtm": "imports:gtm",
     "challenge new": "challenge:new",
     "challenge submit": "challenge:submit",
     "challenge grade": "challenge:grade",
 }
 # Of a command that has commands of its own: what it is for.
-GROUPS = {"challenge": "Grade a class's detectors and laws on hidden flights."}
+GROUPS = {
+    "import": "Make aircraft of data that others publish.",
+    "challenge": "Grade a class's detectors and laws on hidden flights.",
+}
 # Those that fly no scenario of the user's choice: no plug-in can be registered for them.
 WITHOUT_PLUGINS = {"schema", "show", "new", "reproduce", "bench", "derive", "verify", "detectability"}
-WITHOUT_PLUGINS |= {"challenge new", "challenge submit", "challenge grade"}
+WITHOUT_PLUGINS |= {"import gtm", "challenge new", "challenge submit", "challenge grade"}
 
 app = typer.Typer(
     name="beaver-ftc",

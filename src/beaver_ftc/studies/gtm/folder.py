@@ -1,0 +1,204 @@
+"""The aircraft folder: JSBSim model, systems, start, scripts, the licence's notice, and our own file."""
+
+from math import radians
+from pathlib import Path
+from typing import Any
+from xml.sax.saxutils import escape
+
+import numpy as np
+import yaml
+
+from beaver_ftc.aircraft.loading import FILE
+from beaver_ftc.aircraft.schema import MAX_SURFACES
+
+from beaver_ftc.studies.gtm.aerodynamics import aerodynamics
+from beaver_ftc.studies.gtm.database import WHERE, Database
+from beaver_ftc.studies.gtm.masses import LBS_PER_SLUG, mass_balance, mass_of, structural_in
+from beaver_ftc.studies.gtm.parameters import cases, parameters
+from beaver_ftc.studies.gtm.steady import ALTITUDE_FT, HEADING_DEG, LATITUDE_DEG, LONGITUDE_DEG, Steady
+from beaver_ftc.studies.gtm.systems import THROTTLE, damage_property, external_reactions, systems
+
+NAME = "gtm"
+_SAYS = "NASA Generic Transport Model T2: wind-tunnel tables, 17 surfaces, two jets, six cases of damage"
+
+
+def write_model(base: Database, folder: Path) -> Path:
+    """Write model and systems into a folder; returns the model."""
+    (folder / "Systems").mkdir(parents=True, exist_ok=True)
+    files = systems()
+    for name, text in files.items():
+        (folder / "Systems" / f"{name}.xml").write_text(text, encoding="utf-8")
+    of = parameters()["geometry"]
+    reference = structural_in(np.array(of["reference_ft"]))
+    points = "".join(
+        f'<location name="{name}" unit="IN"><x>{float(reference[0])!r}</x><y>{float(reference[1])!r}</y>'
+        f"<z>{float(reference[2])!r}</z></location>"
+        for name in ("AERORP", "EYEPOINT", "VRP")
+    )
+    text = (
+        '<?xml version="1.0"?>\n<fdm_config name="GTM T2" version="2.0" release="PRODUCTION">\n'
+        "<fileheader><author>beaver-ftc</author>"
+        f"<description>{escape(_SAYS)}</description></fileheader>\n"
+        f'<metrics><wingarea unit="FT2">{of["area_ft2"]!r}</wingarea><wingspan unit="FT">{of["span_ft"]!r}</wingspan>'
+        f'<chord unit="FT">{of["chord_ft"]!r}</chord>{points}</metrics>\n'
+        f"{mass_balance()}\n<ground_reactions/>\n{external_reactions()}\n<propulsion/>\n"
+        + "".join(f'<system file="{name}"/>\n' for name in files)
+        + aerodynamics(base)
+        + "\n</fdm_config>\n"
+    )
+    model = folder / f"{NAME}.xml"
+    model.write_text(text, encoding="utf-8")
+    return model
+
+
+_M_PER_FT = 0.3048
+_KG_M2 = 0.45359237 * LBS_PER_SLUG * _M_PER_FT**2  # of a slug ft2
+# Where the design model is found: about level flight, attached flow.
+_ENVELOPE = {"airspeed_mps": [38.0, 58.0], "alpha_deg": [0.0, 7.5]}
+_START = {"airspeed_mps": 50.0, "altitude_m": round(ALTITUDE_FT * _M_PER_FT, 2)}
+_PITCH = ("elevator", "stabiliser")
+
+
+def aircraft_file() -> dict[str, Any]:
+    """Our own file without its terms: as many surfaces as an aircraft may have, what steers first."""
+    surfaces = dict([*parameters()["surfaces"].items()][:MAX_SURFACES])
+    groups: dict[str, list[str]] = {"pitch": [], "lateral": []}
+    for name, of in surfaces.items():
+        groups["pitch" if of["kind"] in _PITCH else "lateral"].append(name)
+    whole, geometry = mass_of(), parameters()["geometry"]
+    inertia = whole.inertia * _KG_M2
+    setting = {"property": THROTTLE, "says": "throttle of both engines", "unit": "share of 1", "default": 0.4}
+    signal = {"property": "aero/thrust-coefficient", "sensed": True}
+    return {
+        "name": NAME,
+        "description": _SAYS,
+        "jsbsim": f"{NAME}.xml",
+        "surfaces": {name: _surface(name, of["travel_deg"]) for name, of in surfaces.items()},
+        "groups": groups,
+        "signals": {"thrust": signal},
+        "mass": {
+            "mass_kg": whole.weight_lbf * 0.45359237,
+            **{f"I{axis}_kgm2": float(inertia[i, i]) for i, axis in enumerate("xyz")},
+            "Jxz_kgm2": -float(inertia[0, 2]),
+        },
+        "geometry": {
+            "wing_area_m2": geometry["area_ft2"] * _M_PER_FT**2,
+            "span_m": geometry["span_ft"] * _M_PER_FT,
+            "chord_m": geometry["chord_ft"] * _M_PER_FT,
+        },
+        "moments": {
+            "Cl": [{"name": "Cl_aileron", "value": -0.05, "surface": "right_aileron"}],
+            "Cm": [{"name": "Cm_elevator", "value": -0.4, "surface": "left_inboard_elevator"}],
+            "Cn": [{"name": "Cn_rudder", "value": -0.05, "surface": "upper_rudder"}],
+        },
+        "envelope": _ENVELOPE,
+        "trim": {"throttle": THROTTLE},
+        "engine": {"settings": {"throttle": setting | {"range": [0.0, 1.0]}}},
+        "start": _START,
+        "damage": {
+            name: {"property": damage_property(name), "takes": [s for s in of["takes"] if s in surfaces]}
+            for name, of in cases().items()
+        },
+    }
+
+
+def _surface(name: str, travel_deg: list[float]) -> dict[str, Any]:
+    says = {kind: f"fcs/{name}-{ending}-rad" for kind, ending in _ENDINGS.items()}
+    return says | {"travel_rad": [round(radians(end), 9) for end in travel_deg]}
+
+
+_ENDINGS = {"command": "cmd", "position": "pos", "effective": "effective"}
+
+
+def write_outline(folder: Path) -> None:
+    """Our own file as far as it is known before the terms are found."""
+    text = yaml.safe_dump(aircraft_file(), sort_keys=False, default_flow_style=None, width=120)
+    (folder / FILE).write_text(text, encoding="utf-8")
+
+
+def write_start(folder: Path, steady: Steady) -> None:
+    """The steady flight that scripts begin with."""
+    u, v, w = steady.velocity_fps
+    places = {
+        "latitude": ("DEG", LATITUDE_DEG), "longitude": ("DEG", LONGITUDE_DEG),
+        "altitudeMSL": ("FT", ALTITUDE_FT), "phi": ("DEG", steady.phi_deg), "theta": ("DEG", steady.theta_deg),
+        "psi": ("DEG", HEADING_DEG), "ubody": ("FT/SEC", u), "vbody": ("FT/SEC", v), "wbody": ("FT/SEC", w),
+    }  # fmt: skip
+    kinds = {"latitude": ' type="geodetic"'}
+    lines = [
+        f'  <{name} unit="{unit}"{kinds.get(name, "")}> {number:.9g} </{name}>'
+        for name, (unit, number) in places.items()
+    ]
+    says = f"<!-- Steady level flight at {steady.alpha_deg:g} deg; surfaces and throttle are set by the script. -->"
+    text = "\n".join(['<?xml version="1.0"?>', says, '<initialize name="reset00">', *lines, "</initialize>\n"])
+    (folder / "reset00.xml").write_text(text, encoding="utf-8")
+
+
+def write_scripts(folder: Path, steady: Steady) -> None:
+    """A doublet of elevators, ailerons and rudders, and each case of damage, for plain JSBSim."""
+    (folder / "scripts").mkdir(exist_ok=True)
+    commands = steady.commands()
+    kinds = (("elevator", -2.0, 1.0), ("rudder", 2.0, 4.0), ("aileron", 2.0, 7.0))
+    events = []
+    for kind, size_deg, at_s in kinds:
+        for name, add_deg, time_s in (("first", size_deg, at_s), ("second", -size_deg, at_s + 0.5), ("end of", 0.0, at_s + 1.0)):
+            values = {
+                command: number + radians(_sign(command) * add_deg)
+                for command, number in commands.items()
+                if command.endswith(f"{kind}-cmd-rad")
+            }
+            events.append(_event(f"{kind} doublet, {name}", time_s, values))
+    _script(folder, "doublets", commands, events, 15.0)
+    for case in cases():
+        _script(folder, case, commands, [_event(case, 10.0, {damage_property(case): 1.0})], 15.0)
+
+
+def _sign(command: str) -> float:
+    return -1.0 if command.startswith("fcs/left_aileron") else 1.0
+
+
+_SAID = ("velocities/vt-fps", "aero/alpha-deg", "aero/beta-deg", *(f"velocities/{x}-rad_sec" for x in "pqr"))
+
+
+def _event(name: str, at_s: float, values: dict[str, float]) -> str:
+    sets = "".join(f'<set name="{prop}" value="{number:.9g}"/>' for prop, number in values.items())
+    said = "".join(f"<property>{prop}</property>" for prop in _SAID)
+    condition = f"<condition>simulation/sim-time-sec ge {at_s - 0.0025:g}</condition>"
+    return f'    <event name="{name}">{condition}{sets}<notify>{said}</notify></event>'
+
+
+def _script(folder: Path, name: str, commands: dict[str, float], events: list[str], end_s: float) -> None:
+    events = [*events, _event("the end", end_s - 0.01, {})]
+    lines = [
+        '<?xml version="1.0"?>',
+        "<!-- For JSBSim's own runner; the root is the folder that has this aircraft in a folder aircraft/. -->",
+        f'<runscript name="GTM {name}">',
+        f'  <use aircraft="{NAME}" initialize="reset00"/>',
+        f'  <run start="0" end="{end_s:g}" dt="0.005">',
+        *(f'    <property value="{number:.9g}">{command}</property>' for command, number in commands.items()),
+        *events,
+        "  </run>",
+        "</runscript>\n",
+    ]
+    (folder / "scripts" / f"{name}.xml").write_text("\n".join(lines), encoding="utf-8")
+
+
+NOTICE = "LICENSE.md"
+_NOTICE = f"""# What this folder is made of
+
+The tables in `{NAME}.xml` are those of NASA's GTM_DesignSim (LAR-17625-1), {WHERE}: extended along straight lines, split and
+rewritten for JSBSim by beaver-ftc. The numbers of mass, engines, actuators and damage are of the same source. These are
+changes; NASA endorses none of them.
+
+The source is under the **NASA Open Source Agreement, version 1.3**, which stands in LicenseAgreement.pdf of that repository
+and must travel with each copy of the software and any part of it: put it beside this file before you pass the folder on. It
+allows use, copying, changing and passing on, royalty-free, and disclaims all warranties.
+
+> Copyright 2009 United States Government as represented by the Administrator of the National and Aeronautics and Space
+> Administration. No copyright is claimed in the United States under Title 17, U.S. Code. All Other Rights Reserved.
+"""
+
+
+def write_notice(folder: Path) -> None:
+    """The licence's notice."""
+    (folder / NOTICE).write_text(_NOTICE, encoding="utf-8")

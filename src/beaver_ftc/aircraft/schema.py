@@ -432,7 +432,7 @@ class AircraftFile(Section):
 
     @model_validator(mode="after")
     def _parts_fit_together(self) -> Self:
-        refuse([*self._groups(), *self._terms(), *self._names(), *self._thrust()])
+        refuse([*self._groups(), *self._terms(), *self._names(), *self._thrust(), *self._damage()])
         return self
 
     def _groups(self) -> Iterator[Conflict]:
@@ -448,6 +448,13 @@ class AircraftFile(Section):
         for surface in self.surfaces:
             if surface not in seen:
                 yield ("groups",), f"{surface} is in no group, allowed: every surface in one"
+
+    def _damage(self) -> Iterator[Conflict]:
+        """Damage takes surfaces there are."""
+        for case, damage in self.damage.items():
+            for i, name in enumerate(damage.takes):
+                if name not in self.surfaces:
+                    yield ("damage", case, "takes", i), f"unknown surface{suggestion(name, self.surfaces)}"
 
     def _terms(self) -> Iterator[Conflict]:
         """Terms multiply signals and surfaces there are."""
@@ -481,10 +488,6 @@ class AircraftFile(Section):
         for name in self.channels.surfaces if self.channels else ():
             if name not in self.surfaces:
                 yield ("channels", "surfaces", name), f"unknown surface{suggestion(name, self.surfaces)}"
-        for case, damage in self.damage.items():
-            for i, name in enumerate(damage.takes):
-                if name not in self.surfaces:
-                    yield ("damage", case, "takes", i), f"unknown surface{suggestion(name, self.surfaces)}"
         for name in set(self.signals) & {*FLOW_SIGNALS, SIDESLIP_RATE}:
             yield ("signals", name), f"{name} is measured in any case, allowed: another name"
 

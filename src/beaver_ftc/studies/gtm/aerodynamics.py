@@ -84,10 +84,16 @@ def _axes() -> str:
     found = []
     for axis, output, length, unit in (
         ("X", "CX", "", "force/X-lbs"), ("Y", "CY", "", "force/Y-lbs"), ("Z", "CZ", "", "force/Z-lbs"),
-        ("ROLL", "Cl", "metrics/bw-ft", "moment/L-lbsft"), ("PITCH", "Cm", "metrics/cbarw-ft", "moment/M-lbsft"),
+        ("ROLL", "Cl", "metrics/bw-ft", "moment/L-lbsft"),
+        ("PITCH", "Cm", "metrics/cbarw-ft", "moment/M-lbsft"),
         ("YAW", "Cn", "metrics/bw-ft", "moment/N-lbsft"),
     ):  # fmt: skip
-        factors = ["aero/qbar-psf", "metrics/Sw-sqft", *([length] if length else []), f"aero/coefficient/{output}"]
+        factors = [
+            "aero/qbar-psf",
+            "metrics/Sw-sqft",
+            *([length] if length else []),
+            f"aero/coefficient/{output}",
+        ]
         body = function(f"aero/{unit}", f"From {output}", do("product", *map(read, factors)))
         found.append(f'<axis name="{axis}">{body}</axis>')
     return "".join(found)
@@ -97,10 +103,14 @@ def _flow(terms: _Terms, static: Table) -> None:
     """Sideslip mirrored; airspeed as the rates' tables have it; whether the static table goes so far."""
     ends = *static.axes["alpha"][[0, -1]], static.axes["beta"][-1]
     of = parameters()["rates"]
-    terms.helper(MIRRORED, "Sideslip as the left half of the wing has it", do("product", value(-1.0), read(BETA)))
+    terms.helper(
+        MIRRORED, "Sideslip as the left half of the wing has it", do("product", value(-1.0), read(BETA))
+    )
     knots = do("product", read("velocities/vt-fps"), value(of["knots_per_ft_s"]))
     within = do("min", value(float(of["most_knots"])), do("max", value(float(of["least_knots"])), knots))
-    says = "Airspeed in the dimensionless rates, ft/s: knots made of ft/s and back with the source's own factors"
+    says = (
+        "Airspeed in the dimensionless rates, ft/s: knots made of ft/s and back with the source's own factors"
+    )
     terms.helper("aero/airspeed-of-rates-fps", says, do("product", within, value(of["ft_s_per_knot"])))
     inside = (
         do("ge", read(ALPHA), value(ends[0])), do("le", read(ALPHA), value(ends[1])),
@@ -159,9 +169,17 @@ def _elevator(terms: _Terms, of: Table) -> None:
             says = f"{output} of a whole elevator that stands as this segment"
             terms.helper(f"aero/elevator/{output}-of-{surface}", says, unless_zero(effective(surface), body))
             before.append(surface)
-    for output, source, sign in (*zip(LONGITUDINAL, LONGITUDINAL, (0, 0, 0)), ("Cl", "CZ", 1), ("Cn", "CX", -1)):
+    for output, source, sign in (
+        *((output, output, 0) for output in LONGITUDINAL),
+        ("Cl", "CZ", 1),
+        ("Cn", "CX", -1),
+    ):
         parts = [
-            do("product", value(sign * of["arm"] if sign else 1.0), read(f"aero/elevator/{source}-of-{surface}"))
+            do(
+                "product",
+                value(sign * of["arm"] if sign else 1.0),
+                read(f"aero/elevator/{source}-of-{surface}"),
+            )
             for surface, of in segments.items()
         ]
         terms.add(output, "elevator", "Four segments", do("product", value(0.25), do("sum", *parts)))
@@ -176,8 +194,15 @@ def _ailerons(terms: _Terms, of: Table) -> None:
             data, alphas, betas = along_angles(of.data[..., i], of.axes["alpha"], of.axes["beta"])
             data, deflections = extended(data, of.axes["ail"], far, 2)
             keys = [(ALPHA, alphas), (MIRRORED if left else BETA, betas)]
-            found = table(data * (MIRROR[i] if left else 1.0), [*keys, (effective(surface), np.radians(deflections))])
-            terms.add(output, surface, f"{surface.replace('_', ' ').capitalize()}", unless_zero(effective(surface), found))
+            found = table(
+                data * (MIRROR[i] if left else 1.0), [*keys, (effective(surface), np.radians(deflections))]
+            )
+            terms.add(
+                output,
+                surface,
+                f"{surface.replace('_', ' ').capitalize()}",
+                unless_zero(effective(surface), found),
+            )
 
 
 def _rudder(terms: _Terms, of: Table) -> None:
@@ -224,7 +249,7 @@ def _spoilers(terms: _Terms, of: Table) -> None:
                 read(name): table(data[..., j], [(ALPHA, alphas), (beta, betas)], name)
                 for j, name in enumerate(names)
             }
-            parts = []
+            parts: list[str] = []
             for surface, about in these.items():
                 body = piecewise(effective(surface), grid, ["", *(read(name) for name in names[1:])])
                 for name in names[1:] if not parts else ():
@@ -268,25 +293,38 @@ def _rates(terms: _Terms, base: Database) -> None:
     for k, (rate, name, hat, outputs, _) in enumerate(_RATES):
         of = base[name]
         grids = of.axes["alpha"], of.axes[hat]
-        keys = [_held(terms, rate, "alpha-deg", ALPHA, grids[0]), _held(terms, rate, "hat", f"aero/{rate}-hat", grids[1])]
+        at_alpha = _held(terms, rate, "alpha-deg", ALPHA, grids[0])
+        at_hat = _held(terms, rate, "hat", f"aero/{rate}-hat", grids[1])
         for i, output in enumerate(outputs):
             data, alphas = extended(of.data[..., i], grids[0], 180.0, 0)
             data, hats = extended(data, grids[1], FAR_HAT, 1)
-            found = table(data, [(keys[0], alphas), (keys[1], hats)])
-            scaled = table(scale.data[:, :, k, OUTPUTS.index(output)], [(ALPHA, scale.axes["alpha"]), (DAMAGE_CASE, _CASES)])
+            found = table(data, [(at_alpha, alphas), (at_hat, hats)])
+            scaled = table(
+                scale.data[:, :, k, OUTPUTS.index(output)],
+                [(ALPHA, scale.axes["alpha"]), (DAMAGE_CASE, _CASES)],
+            )
             body = do("product", found, do("ifthen", _DAMAGED, scaled, value(1.0)))
             terms.add(output, rate, f"Oscillatory part of {rate}", body)
-    parts = []
+    parts: list[str] = []
     for k, (rate, *_) in enumerate(_RATES):
         data, alphas = extended(added.data[:, :, k, OUTPUTS.index("CY")], added.axes["alpha"], 180.0, 0)
-        parts.append(do("product", table(data, [(ALPHA, alphas), (DAMAGE_CASE, _CASES)]), read(f"aero/{rate}-hat")))
-    terms.add("CY", "rates_in_damage", "Side force of the rates in damage", unless_zero(DAMAGE_CASE, do("sum", *parts)))
+        parts.append(
+            do("product", table(data, [(ALPHA, alphas), (DAMAGE_CASE, _CASES)]), read(f"aero/{rate}-hat"))
+        )
+    terms.add(
+        "CY",
+        "rates_in_damage",
+        "Side force of the rates in damage",
+        unless_zero(DAMAGE_CASE, do("sum", *parts)),
+    )
 
 
 def _held(terms: _Terms, rate: str, what: str, key: str, grid: np.ndarray) -> str:
     """A key of a table, in damage within the table's ends."""
     inside = do("min", value(float(grid[-1])), do("max", value(float(grid[0])), read(key)))
-    return terms.helper(f"aero/rates/{rate}-at-{what}", f"{key}, in damage held", do("ifthen", _DAMAGED, inside, read(key)))
+    return terms.helper(
+        f"aero/rates/{rate}-at-{what}", f"{key}, in damage held", do("ifthen", _DAMAGED, inside, read(key))
+    )
 
 
 def _split(terms: _Terms) -> None:
@@ -295,8 +333,14 @@ def _split(terms: _Terms) -> None:
     p, q, r = (read(f"velocities/{axis}-aero-rad_sec") for axis in "pqr")
     cos_alpha, sin_alpha = do("cos", read("aero/alpha-rad")), do("sin", read("aero/alpha-rad"))
     cos_beta, sin_beta = do("cos", read("aero/beta-rad")), do("sin", read("aero/beta-rad"))
-    along_x = read(terms.helper("aero/rates/along-x", "Velocity's direction, forward", do("product", cos_alpha, cos_beta)))
-    along_z = read(terms.helper("aero/rates/along-z", "Velocity's direction, down", do("product", sin_alpha, cos_beta)))
+    along_x = read(
+        terms.helper(
+            "aero/rates/along-x", "Velocity's direction, forward", do("product", cos_alpha, cos_beta)
+        )
+    )
+    along_z = read(
+        terms.helper("aero/rates/along-z", "Velocity's direction, down", do("product", sin_alpha, cos_beta))
+    )
     zero = value(0.0)
 
     def rest(which: str, rate: str, along: str, other: str, along_other: str) -> str:
@@ -304,7 +348,11 @@ def _split(terms: _Terms) -> None:
         kept = do("difference", other, do("product", do("quotient", rate, along), along_other))
         there = do("and", do("nq", rate, zero), do("nq", along, zero))
         return read(
-            terms.helper(f"aero/rates/left-of-{which}", f"{which} beside a rotation", do("ifthen", there, kept, value(1e30)))
+            terms.helper(
+                f"aero/rates/left-of-{which}",
+                f"{which} beside a rotation",
+                do("ifthen", there, kept, value(1e30)),
+            )
         )
 
     def allowed(left: str, of: str) -> str:
@@ -315,11 +363,17 @@ def _split(terms: _Terms) -> None:
     by_p = do("ifthen", allowed(left_of_r, r), do("quotient", p, along_x), zero)
     by_r = do("ifthen", allowed(left_of_p, p), do("quotient", r, along_z), by_p)
     omega = read(
-        terms.helper("aero/rates/rotation-rad_sec", "Rotation about the velocity vector", do("ifthen", _DAMAGED, zero, by_r))
+        terms.helper(
+            "aero/rates/rotation-rad_sec",
+            "Rotation about the velocity vector",
+            do("ifthen", _DAMAGED, zero, by_r),
+        )
     )
     speed2 = do("product", value(2.0), read("aero/airspeed-of-rates-fps"))
     per = {axis: do("quotient", read(length), speed2) for axis, *_, length in _RATES}
     terms.helper("aero/rates/rotation-hat", "Rotation times b/2V", do("product", omega, per["p"]))
     for axis, rate, along in (("p", p, along_x), ("q", q, sin_beta), ("r", r, along_z)):
         rest_of = do("difference", rate, do("product", omega, along))
-        terms.helper(f"aero/{axis}-hat", f"The rest of {axis}, dimensionless", do("product", rest_of, per[axis]))
+        terms.helper(
+            f"aero/{axis}-hat", f"The rest of {axis}, dimensionless", do("product", rest_of, per[axis])
+        )

@@ -31,7 +31,7 @@ START_ALPHA_DEG = 3.0
 
 @dataclass(frozen=True)
 class Imported:
-    """What came of it: the folder, its surfaces, the steady flight its scripts begin with, how long it took."""
+    """What came of it: the folder, its surfaces, the steady flight of its scripts, how long it took."""
 
     folder: Path
     surfaces: tuple[str, ...]
@@ -62,7 +62,7 @@ def convert(database: Path, out: Path | None = None, tell: Tell = lambda line: N
         folder = Path(scratch) / "derived" / NAME
         write_start(folder, steady)
         write_scripts(folder, steady)
-        write_notice(folder)
+        write_notice(folder, database)
         target.parent.mkdir(parents=True, exist_ok=True)
         beside = target.parent / f".{NAME}-{os.getpid()}"
         shutil.move(str(folder), beside)  # whole, before what was there goes
@@ -91,8 +91,9 @@ def text_of(document: dict[str, Any]) -> str:
             f"gtm: {document['folder']}, written in {document['took_s']:.1f} s",
             f" surfaces   {', '.join(document['surfaces'])}",
             f" damage     {', '.join(document['damage'])}",
-            f" trim       {trim['alpha_deg']:g} deg, {trim['eas_kt']:.1f} kt: elevator {trim['elevator_deg']:.3f} deg, "
-            f"aileron {trim['aileron_deg']:.3f} deg, throttle {trim['throttle_percent']:.2f} %",
+            f" trim       {trim['alpha_deg']:g} deg, {trim['eas_kt']:.1f} kt: "
+            f"elevator {trim['elevator_deg']:.3f} deg, aileron {trim['aileron_deg']:.3f} deg, "
+            f"throttle {trim['throttle_percent']:.2f} %",
             f" the licence of NASA's data is in {NOTICE} of the folder",
         ]
     )

@@ -1,4 +1,4 @@
-"""The user's copy of the aerodynamic data base, a MATLAB file of NASA's: read, and held against what it must be.
+"""The user's copy of the aerodynamic data base, a MATLAB file of NASA's: read, and checked.
 
 Every table: coefficients over angles in deg and dimensionless rates, the outputs on the last axis.
 """

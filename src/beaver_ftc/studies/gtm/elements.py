@@ -94,7 +94,9 @@ def table(data: np.ndarray, keys: Sequence[tuple[str, np.ndarray]], name: str = 
 def _rows(data: np.ndarray, grids: Sequence[np.ndarray]) -> str:
     head = [_line(grids[1])] if len(grids) > 1 else []
     rows = data.reshape(len(grids[0]), -1)
-    return "\n" + "\n".join(head + [_line([key, *row]) for key, row in zip(grids[0], rows, strict=True)]) + "\n"
+    return (
+        "\n" + "\n".join(head + [_line([key, *row]) for key, row in zip(grids[0], rows, strict=True)]) + "\n"
+    )
 
 
 def _line(numbers: Iterable[float]) -> str:

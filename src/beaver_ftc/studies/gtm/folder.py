@@ -1,5 +1,6 @@
 """The aircraft folder: JSBSim model, systems, start, scripts, the licence's notice, and our own file."""
 
+import shutil
 from math import radians
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,6 @@ import yaml
 
 from beaver_ftc.aircraft.loading import FILE
 from beaver_ftc.aircraft.schema import MAX_SURFACES
-
 from beaver_ftc.studies.gtm.aerodynamics import aerodynamics
 from beaver_ftc.studies.gtm.database import WHERE, Database
 from beaver_ftc.studies.gtm.masses import LBS_PER_SLUG, mass_balance, mass_of, structural_in
@@ -39,7 +39,8 @@ def write_model(base: Database, folder: Path) -> Path:
         '<?xml version="1.0"?>\n<fdm_config name="GTM T2" version="2.0" release="PRODUCTION">\n'
         "<fileheader><author>beaver-ftc</author>"
         f"<description>{escape(_SAYS)}</description></fileheader>\n"
-        f'<metrics><wingarea unit="FT2">{of["area_ft2"]!r}</wingarea><wingspan unit="FT">{of["span_ft"]!r}</wingspan>'
+        f'<metrics><wingarea unit="FT2">{of["area_ft2"]!r}</wingarea>'
+        f'<wingspan unit="FT">{of["span_ft"]!r}</wingspan>'
         f'<chord unit="FT">{of["chord_ft"]!r}</chord>{points}</metrics>\n'
         f"{mass_balance()}\n<ground_reactions/>\n{external_reactions()}\n<propulsion/>\n"
         + "".join(f'<system file="{name}"/>\n' for name in files)
@@ -121,16 +122,19 @@ def write_start(folder: Path, steady: Steady) -> None:
     u, v, w = steady.velocity_fps
     places = {
         "latitude": ("DEG", LATITUDE_DEG), "longitude": ("DEG", LONGITUDE_DEG),
-        "altitudeMSL": ("FT", ALTITUDE_FT), "phi": ("DEG", steady.phi_deg), "theta": ("DEG", steady.theta_deg),
-        "psi": ("DEG", HEADING_DEG), "ubody": ("FT/SEC", u), "vbody": ("FT/SEC", v), "wbody": ("FT/SEC", w),
+        "altitudeMSL": ("FT", ALTITUDE_FT), "phi": ("DEG", steady.phi_deg),
+        "theta": ("DEG", steady.theta_deg), "psi": ("DEG", HEADING_DEG),
+        "ubody": ("FT/SEC", u), "vbody": ("FT/SEC", v), "wbody": ("FT/SEC", w),
     }  # fmt: skip
     kinds = {"latitude": ' type="geodetic"'}
     lines = [
         f'  <{name} unit="{unit}"{kinds.get(name, "")}> {number:.9g} </{name}>'
         for name, (unit, number) in places.items()
     ]
-    says = f"<!-- Steady level flight at {steady.alpha_deg:g} deg; surfaces and throttle are set by the script. -->"
-    text = "\n".join(['<?xml version="1.0"?>', says, '<initialize name="reset00">', *lines, "</initialize>\n"])
+    says = f"<!-- Steady level flight at {steady.alpha_deg:g} deg; the script sets surfaces and throttle. -->"
+    text = "\n".join(
+        ['<?xml version="1.0"?>', says, '<initialize name="reset00">', *lines, "</initialize>\n"]
+    )
     (folder / "reset00.xml").write_text(text, encoding="utf-8")
 
 
@@ -141,7 +145,11 @@ def write_scripts(folder: Path, steady: Steady) -> None:
     kinds = (("elevator", -2.0, 1.0), ("rudder", 2.0, 4.0), ("aileron", 2.0, 7.0))
     events = []
     for kind, size_deg, at_s in kinds:
-        for name, add_deg, time_s in (("first", size_deg, at_s), ("second", -size_deg, at_s + 0.5), ("end of", 0.0, at_s + 1.0)):
+        for name, add_deg, time_s in (
+            ("first", size_deg, at_s),
+            ("second", -size_deg, at_s + 0.5),
+            ("end of", 0.0, at_s + 1.0),
+        ):
             values = {
                 command: number + radians(_sign(command) * add_deg)
                 for command, number in commands.items()
@@ -171,7 +179,7 @@ def _script(folder: Path, name: str, commands: dict[str, float], events: list[st
     events = [*events, _event("the end", end_s - 0.01, {})]
     lines = [
         '<?xml version="1.0"?>',
-        "<!-- For JSBSim's own runner; the root is the folder that has this aircraft in a folder aircraft/. -->",
+        "<!-- For JSBSim's own runner; the root is the folder above aircraft/gtm. -->",
         f'<runscript name="GTM {name}">',
         f'  <use aircraft="{NAME}" initialize="reset00"/>',
         f'  <run start="0" end="{end_s:g}" dt="0.005">',
@@ -183,22 +191,27 @@ def _script(folder: Path, name: str, commands: dict[str, float], events: list[st
     (folder / "scripts" / f"{name}.xml").write_text("\n".join(lines), encoding="utf-8")
 
 
-NOTICE = "LICENSE.md"
+NOTICE, AGREEMENT = "LICENSE.md", "LicenseAgreement.pdf"
 _NOTICE = f"""# What this folder is made of
 
-The tables in `{NAME}.xml` are those of NASA's GTM_DesignSim (LAR-17625-1), {WHERE}: extended along straight lines, split and
-rewritten for JSBSim by beaver-ftc. The numbers of mass, engines, actuators and damage are of the same source. These are
-changes; NASA endorses none of them.
+The tables in `{NAME}.xml` are those of NASA's GTM_DesignSim (LAR-17625-1),
+{WHERE}:
+extended along straight lines, split and rewritten for JSBSim by beaver-ftc. The numbers of mass, engines,
+actuators and damage are of the same source. These are changes; NASA endorses none of them.
 
-The source is under the **NASA Open Source Agreement, version 1.3**, which stands in LicenseAgreement.pdf of that repository
-and must travel with each copy of the software and any part of it: put it beside this file before you pass the folder on. It
-allows use, copying, changing and passing on, royalty-free, and disclaims all warranties.
+The source is under the **NASA Open Source Agreement, version 1.3**, {AGREEMENT} of that repository, which
+must travel with each copy of the software and any part of it: it is beside this file if it was beside the
+data base, else put it there before you pass the folder on. It allows use, copying, changing and passing on,
+royalty-free, and disclaims all warranties.
 
-> Copyright 2009 United States Government as represented by the Administrator of the National and Aeronautics and Space
-> Administration. No copyright is claimed in the United States under Title 17, U.S. Code. All Other Rights Reserved.
+> Copyright 2009 United States Government as represented by the Administrator of the National and Aeronautics
+> and Space Administration. No copyright is claimed in the United States under Title 17, U.S. Code. All Other
+> Rights Reserved.
 """
 
 
-def write_notice(folder: Path) -> None:
-    """The licence's notice."""
+def write_notice(folder: Path, database: Path) -> None:
+    """The licence's notice, and the agreement where it is beside the data base."""
     (folder / NOTICE).write_text(_NOTICE, encoding="utf-8")
+    if (database.parent / AGREEMENT).is_file():
+        shutil.copyfile(database.parent / AGREEMENT, folder / AGREEMENT)

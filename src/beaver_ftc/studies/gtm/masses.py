@@ -17,7 +17,18 @@ from beaver_ftc.studies.gtm.parameters import DAMAGE_CASE, cases, parameters
 LBS_PER_SLUG = 32.174049  # JSBSim's own
 FIRST = 7  # of the masses; those before it are a scenario's mass and inertia errors
 _PLACES = np.array(
-    [[0, 0, 0], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1], [1, 1, 0], [1, 0, 1], [0, 1, 1]],
+    [
+        [0, 0, 0],
+        [1, 0, 0],
+        [-1, 0, 0],
+        [0, 1, 0],
+        [0, -1, 0],
+        [0, 0, 1],
+        [0, 0, -1],
+        [1, 1, 0],
+        [1, 0, 1],
+        [0, 1, 1],
+    ],
     dtype=float,
 )  # ft from the whole aircraft's centre of gravity
 _PRODUCTS = ("xy", "xz", "yz")
@@ -120,7 +131,8 @@ def mass_balance() -> str:
 
 def _point(name: str, place_ft: np.ndarray) -> str:
     at = _xyz(structural_in(place_ft))
-    return f'<pointmass name="{name}"><weight unit="LBS">0</weight><location unit="IN">{at}</location></pointmass>'
+    weight = '<weight unit="LBS">0</weight>'
+    return f'<pointmass name="{name}">{weight}<location unit="IN">{at}</location></pointmass>'
 
 
 def _xyz(of: np.ndarray) -> str:

@@ -32,4 +32,6 @@ def cases() -> dict[str, dict[str, Any]]:
 
 def can_be_taken() -> tuple[str, ...]:
     """Surfaces that some damage takes away."""
-    return tuple(name for name in parameters()["surfaces"] if any(name in of["takes"] for of in cases().values()))
+    return tuple(
+        name for name in parameters()["surfaces"] if any(name in of["takes"] for of in cases().values())
+    )

@@ -85,7 +85,9 @@ class Bench:
         for number, name in enumerate(cases(), 1):
             self.fdm[damage_property(name)] = float(number == case)
 
-    def place(self, altitude_ft: float, velocity_fps: Any, angles_rad: Any, rates: Any = (0.0, 0.0, 0.0)) -> None:
+    def place(
+        self, altitude_ft: float, velocity_fps: Any, angles_rad: Any, rates: Any = (0.0, 0.0, 0.0)
+    ) -> None:
         """Put it there: velocity along body axes; roll, pitch, heading; body rates."""
         fdm = self.fdm
         fdm["ic/lat-geod-deg"], fdm["ic/long-gc-deg"] = LATITUDE_DEG, LONGITUDE_DEG
@@ -130,7 +132,11 @@ class Bench:
         for name, number in found.commands().items():
             self.fdm[name] = number
         heading = radians(HEADING_DEG)
-        self.place(wanted.altitude_ft, found.velocity_fps, (radians(found.phi_deg), radians(found.theta_deg), heading))
+        self.place(
+            wanted.altitude_ft,
+            found.velocity_fps,
+            (radians(found.phi_deg), radians(found.theta_deg), heading),
+        )
         return self.accelerations()
 
     def _unknowns(self, wanted: Condition, of: Steady) -> np.ndarray:
@@ -149,8 +155,8 @@ class Bench:
             alpha, V = radians(wanted.alpha_deg), first
         theta = pitch_angle(alpha, beta, phi, radians(wanted.gamma_deg))
         eas = V / FT_S_PER_KNOT * thin
-        angles = map(degrees, (alpha, beta, phi, theta, elevator, aileron, rudder))
-        return Steady(V, eas, *angles, 100.0 * throttle, left)
+        angles = [degrees(x) for x in (alpha, beta, phi, theta, elevator, aileron, rudder)]
+        return Steady(V, eas, *angles, 100.0 * throttle, left)  # type: ignore[call-arg]
 
     def density(self, altitude_ft: float) -> float:
         """Of the air, slug/ft3."""
@@ -181,5 +187,3 @@ def pitch_angle(alpha: float, beta: float, phi: float, gamma: float) -> float:
     b = sin(phi) * sin(beta) + cos(phi) * sin(alpha) * cos(beta)
     g = sin(gamma)
     return atan((a * b + g * sqrt(a * a - g * g + b * b)) / (a * a - g * g))
-
-

@@ -57,12 +57,20 @@ def _damage() -> str:
     parts = [component(DAMAGE_CASE, "Number of the damage in force, 0 for none", which)]
     for surface in can_be_taken():
         taking = [number for number, name in enumerate(names, 1) if surface in cases()[name]["takes"]]
-        gone = do("or", *(do("eq", read(DAMAGE_CASE), value(float(number))) for number in (*taking, taking[0])))
-        parts.append(component(present(surface), "Whether damage has left it", do("ifthen", gone, value(0.0), value(1.0))))
+        gone = do(
+            "or", *(do("eq", read(DAMAGE_CASE), value(float(number))) for number in (*taking, taking[0]))
+        )
+        parts.append(
+            component(
+                present(surface), "Whether damage has left it", do("ifthen", gone, value(0.0), value(1.0))
+            )
+        )
     down = do("ifthen", do("ge", read(GEAR), value(0.5)), value(1.0), value(0.0))
     parts.append(component("gear/mass-down", "Whether the gear's mass is down", down))
     for index, weights in weights_by_case().items():
-        says = "Weight of a small mass: together they make mass, centre of gravity and inertia those of the case"
+        says = (
+            "Weight of a small mass: together they make mass, centre of gravity and inertia those of the case"
+        )
         name = f"inertia/damage-mass-{index}-lbs"
         parts.append(component(name, says, weights, f"inertia/pointmass-weight-lbs[{index}]"))
     properties = declared(GEAR) + "".join(declared(damage_property(name)) for name in names)
@@ -98,21 +106,26 @@ def _set(text: str, name: str, number: float) -> str:
 
 
 def _clock() -> str:
-    """When a sample of the commands is due: after 5 ms, or a frame if that is longer; always where time stands
-    still. How many samples ago the delay is."""
+    """When a sample of the commands is due: after 5 ms, or a frame if that is longer, and always where time
+    stands still. How many samples ago the delay is."""
     frame = read("simulation/dt")
     still = do("eq", frame, value(0.0))
-    frames = do("ceil", do("difference", do("quotient", value(_STEP_S), frame), value(1e-6)))
+    more = do("integer", do("difference", do("quotient", value(_STEP_S), frame), value(1e-6)))
+    frames = do("sum", more, value(1.0))
     older = do("sum", read(_AGE), frame)
     due = do("ge", older, do("difference", read(_SPACING), value(1e-9)))
     ago = do("quotient", do("difference", read(DELAY), read(_AGE)), read(_SPACING))
     parts = [
-        component(_SPACING, "Between samples", do("ifthen", still, value(_STEP_S), do("product", frame, frames))),
+        component(
+            _SPACING, "Between samples", do("ifthen", still, value(_STEP_S), do("product", frame, frames))
+        ),
         component(_DUE, "Whether to take a sample", do("or", due, still)),
         component(_AGE, "Since the last sample", do("ifthen", read(_DUE), value(0.0), older)),
         component(_AGO, "How many samples ago the delay is", ago),
     ]
-    return _system("delay", declared(DELAY, parameters()["servo"]["delay_s"]), "".join(parts), f' execute="{DELAY}"')
+    return _system(
+        "delay", declared(DELAY, parameters()["servo"]["delay_s"]), "".join(parts), f' execute="{DELAY}"'
+    )
 
 
 def _delayed(text: str, surface: str) -> str:
@@ -145,7 +158,7 @@ def _lever(engine: str) -> str:
     head, channel, tail = text.partition("<channel")
     tail = tail.replace(own, do("sum", own, read(THROTTLE)))
     extra = declared(THROTTLE) if engine == ENGINES[0] else ""
-    head = head.replace("<property", f'{extra}{declared(f"fcs/{engine}-lever-norm")}\n  <property', 1)
+    head = head.replace("<property", f"{extra}{declared(f'fcs/{engine}-lever-norm')}\n  <property", 1)
     return head + channel + tail
 
 
@@ -162,7 +175,9 @@ def _spools() -> str:
     fade = do("exp", do("product", value(-s), dt))
     parts = [
         component("fcs/spool-cosine", "e^(-s dt) cos(w dt)", do("product", fade, do("cos", turn))),
-        component("fcs/spool-sine", "e^(-s dt) sin(w dt) / w", do("product", value(1.0 / w), fade, do("sin", turn))),
+        component(
+            "fcs/spool-sine", "e^(-s dt) sin(w dt) / w", do("product", value(1.0 / w), fade, do("sin", turn))
+        ),
     ]
     for engine in ENGINES:
         first, second, throttle = (f"fcs/{engine}-spool-{name}" for name in ("rate", "level", "throttle"))
@@ -197,7 +212,9 @@ def _spool(engine: str, names: tuple[str, str, str], damping: float, stiffness: 
     return [
         off_before,
         component(f"{first}-before", "The first state, a frame ago", read(first)),
-        component(first, "First state, settled where time stands still", do("ifthen", still, value(0.0), new_first)),
+        component(
+            first, "First state, settled where time stands still", do("ifthen", still, value(0.0), new_first)
+        ),
         component(second, "Second state", do("ifthen", still, settled, new_second)),
         component(held, "Throttle over the frame to come, %", throttle),
         component(f"fcs/{engine}-lagged-percent", "Throttle as the engine has followed it, %", lagged),
@@ -239,7 +256,7 @@ def external_reactions() -> str:
             f"<direction>{_triple(direction(engine))}</direction></force>"
         )
     rate = {axis: read(f"velocities/{name}-rad_sec") for axis, name in zip("xyz", "pqr", strict=True)}
-    for axis, (one, other) in {"x": "yz", "y": "zx", "z": "xy"}.items():
+    for axis, one, other in ("xyz", "yzx", "zxy"):
         body = do(
             "difference",
             do("product", rate[one], read(f"engine/rotors/h-{other}")),

@@ -1,0 +1,275 @@
+"""Tables and pictures of docs/gtm.md: the converted model beside its specification, `BEAVER_FTC_GTM`."""
+
+import csv
+import os
+import tempfile
+import time
+from collections.abc import Callable
+from functools import cache
+from math import cos, radians, sin
+from pathlib import Path
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from beaver_ftc.aircraft import load
+from beaver_ftc.plant.adapter import bare
+from beaver_ftc.studies.gtm.database import read
+from beaver_ftc.studies.gtm.folder import write_model
+from beaver_ftc.studies.gtm.parameters import OUTPUTS
+from beaver_ftc.studies.gtm.steady import Bench, Condition, Steady
+from beaver_ftc.studies.present.tables import markdown_table
+from tools.docs.tables import shared
+from tools.gtm import flights
+from tools.gtm.flights import ADAMS_BASHFORTH, FINE_S, MOTION, NAMES
+from tools.gtm.specification import DATABASE, SURFACES, Specification
+
+PICTURE = "images/gtm-flights.png"
+SPEEDS_KT = (46, 55, 65, 75, 85, 95, 105, 115, 130)
+ALPHAS_DEG = (2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16)
+BETWEEN_DEG = (3.0, 5.0, 7.0, 8.5, 9.5, 10.5, 11.5)
+DRAWN = 500
+_SHOWN = (
+    ("V, ft/s", None, 1.0),
+    ("p, deg/s", 3, 57.2958),
+    ("q, deg/s", 4, 57.2958),
+    ("r, deg/s", 5, 57.2958),
+)
+
+
+def _where() -> Path:
+    return Path(os.environ["BEAVER_FTC_GTM"])
+
+
+@cache
+def _bench() -> Bench:
+    return flights.bench(_where(), Path(tempfile.mkdtemp(prefix="beaver-ftc-")))
+
+
+@cache
+def _specifications() -> tuple[Specification, Specification]:
+    """With the source's gravity, and with JSBSim's."""
+    source = Specification(_where())
+    return source, Specification(_where(), flights.gravity_of(_bench(), source))
+
+
+@cache
+def _steady(heavy: bool) -> Steady:
+    wanted = Condition(alpha_deg=3.0)
+    return flights.specified_trim(_specifications()[heavy], wanted, _bench().steady(wanted))
+
+
+@shared
+def _flown() -> dict[str, tuple[np.ndarray, ...]]:
+    """Of each manoeuvre: the specification with JSBSim's gravity and with the source's, JSBSim at 1 kHz and
+    at 200 Hz as it comes."""
+    found = {}
+    for k in range(8):
+        mine, source = (_manoeuvre(k, heavy) for heavy in (True, False))
+        of, spec = _specifications(), mine.by_specification
+        rows = spec(of[1]), source.by_specification(of[0])
+        found[mine.name] = (
+            *rows,
+            mine.by_jsbsim(_bench(), FINE_S, ADAMS_BASHFORTH),
+            mine.by_jsbsim(_bench()),
+        )
+    return found
+
+
+def _manoeuvre(k: int, heavy: bool) -> flights.Manoeuvre:
+    if k == 0:
+        return flights.doublets(_steady(heavy))
+    return flights.spin(_specifications()[1]) if k == 1 else flights.damaged(_steady(heavy), k - 1)
+
+
+def gtm_flights() -> str:
+    """Largest differences of u v w p q r, as shares of each signal's span, and the picture."""
+    rows = []
+    for name, (mine, source, fine, usual) in _flown().items():
+        differ = [flights.largest(mine, other)[MOTION].max() for other in (fine, usual, source)]
+        rows.append(
+            [name.replace("-", " "), f"{0.005 * (len(mine) - 1):g}", *(f"{100 * x:.2f}" for x in differ)]
+        )
+    head = ("flight", "s", "JSBSim at 1 kHz, %", "JSBSim at 200 Hz, %", "source's gravity, %")
+    _draw()
+    return markdown_table(head, rows) + f"\n\n![Eight flights by both]({PICTURE})"
+
+
+def _draw() -> None:
+    """A row a flight: the specification as a broad line, JSBSim at 1 kHz as a thin one in it."""
+    flown = _flown()
+    figure, axes = plt.subplots(len(flown), len(_SHOWN), figsize=(11, 1.45 * len(flown)), sharex="row")
+    for row, (name, (mine, _, fine, _)) in zip(axes, flown.items(), strict=True):
+        t = 0.005 * np.arange(len(mine))
+        for axis, (says, column, factor) in zip(row, _SHOWN, strict=True):
+            for of, style in (
+                (mine, {"lw": 3.2, "color": "#9ec9e8"}),
+                (fine, {"lw": 0.9, "color": "#10304d"}),
+            ):
+                values = np.linalg.norm(of[:, :3], axis=1) if column is None else factor * of[:, column]
+                axis.plot(t, values, **style)
+            axis.tick_params(labelsize=7)
+            axis.grid(alpha=0.3)
+            if row is axes[0]:
+                axis.set_title(says, fontsize=9)
+        row[0].set_ylabel(name.replace("-", " ").replace("left outboard", "left outb."), fontsize=7)
+    for axis in axes[-1]:
+        axis.set_xlabel("s", fontsize=8)
+    figure.tight_layout()
+    Path("images").mkdir(exist_ok=True)
+    figure.savefig(PICTURE, dpi=110, metadata={"Software": None})
+    plt.close(figure)
+
+
+def gtm_checks() -> str:
+    """Coefficients, mass properties, trim and modes: the largest differences."""
+    gravity = _specifications()[1].gravity
+    given, drawn = _points()
+    (speed, speeds), (alpha, alphas) = _trims()
+    frequency, damping = _modes()
+    here, there = _bench().steady(Condition(alpha_deg=3.0)), _steady(heavy=False)
+    rows = [
+        ["coefficients at the 60 given points, share of the span", f"{given:.1e}"],
+        [f"at {DRAWN} drawn ones, inside and beyond the tables, every case", f"{drawn:.1e}"],
+        ["weight, centre of gravity and inertia of each case, share", f"{_masses():.1e}"],
+        [f"trim at {speeds} speeds, 46 to 130 kt: surfaces, deg", f"{speed:.3f}"],
+        [f"trim at {alphas} angles of attack, 2 to 16 deg: surfaces, deg", f"{alpha:.3f}"],
+        [f"modes at {len(BETWEEN_DEG)} angles between breakpoints: frequency, %", f"{100 * frequency:.2f}"],
+        ["and damping", f"{damping:.5f}"],
+        ["elevator at the check point, deg", f"{here.elevator_deg:.3f}, {there.elevator_deg:.3f}"],
+        ["throttle there, %", f"{here.throttle_percent:.2f}, {there.throttle_percent:.2f}"],
+        ["gravity there, ft/s2", f"{gravity:.3f}, {_specifications()[0].gravity:.3f}"],
+        ["pressure and density there, largest share", f"{_air():.1e}"],
+    ]  # fmt: skip
+    return markdown_table(("what", "difference or values"), rows)
+
+
+def _air() -> float:
+    _bench().place(800.0, (160.0, 0.0, 8.0), (0.0, 0.05, 0.0))
+    found = np.array([_bench().fdm[f"atmosphere/{name}"] for name in ("P-psf", "rho-slugs_ft3")])
+    return float(np.abs(found / _specifications()[0].air(800.0) - 1.0).max())
+
+
+def _coefficients(
+    alpha: float, beta: float, V: float, rates: np.ndarray, deg: dict[str, float], case: int
+) -> np.ndarray:
+    fdm = _bench().fdm
+    for letters, name in NAMES.items():
+        fdm[f"fcs/{name}-cmd-rad"] = radians(deg[letters])
+    _bench().damage(case)
+    velocity = V * np.array([cos(alpha) * cos(beta), sin(beta), sin(alpha) * cos(beta)])
+    _bench().place(800.0, velocity, (0.0, 0.0, 0.0), rates)
+    return np.array([fdm[f"aero/coefficient/{name}"] for name in OUTPUTS])
+
+
+def _points() -> tuple[float, float]:
+    """Largest differences at the given points and at drawn ones, of the span over the given ones."""
+    with (_where() / "points.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    wanted = np.array([[float(row[name]) for name in OUTPUTS] for row in rows])
+    span, found = np.ptp(wanted, axis=0), []
+    for name in NAMES.values():
+        _bench().fdm[f"actuators/{name}/position-min-rad"] = -1.6
+        _bench().fdm[f"actuators/{name}/position-max-rad"] = 1.6
+    for row in rows:
+        number = {name: float(text) for name, text in row.items()}
+        deg, rates = (
+            {name: number[f"{name}_deg"] for name in SURFACES},
+            [number[f"{axis}_rad_s"] for axis in "pqr"],
+        )
+        _bench().fdm["gear/down"] = number["GEAR"]
+        flow = radians(number["alpha_deg"]), radians(number["beta_deg"]), number["V_ft_s"]
+        found.append(_coefficients(*flow, np.array(rates), deg, int(number["damage"])))
+    _bench().fdm["gear/down"] = 0.0
+    rng, worst = np.random.default_rng(1), 0.0
+    for k in range(DRAWN):
+        deg = {name: float(rng.choice([0.0, rng.uniform(-35, 35)])) for name in SURFACES} | {
+            "STAB": rng.uniform(-12, 4)
+        }
+        alpha, beta = radians(rng.uniform(-15, 95)), radians(rng.uniform(-60, 60))
+        state = alpha, beta, rng.uniform(70, 230), rng.normal(0, [1.5, 0.7, 0.7]), deg, k % 7
+        off = _coefficients(*state) - _specifications()[0].coefficients(*state)
+        worst = max(worst, float((np.abs(off) / span).max()))
+    for name in NAMES.values():
+        _bench().fdm[f"fcs/{name}-cmd-rad"] = 0.0
+    return float((np.abs(found - wanted) / span).max()), worst
+
+
+def _masses() -> float:
+    worst = 0.0
+    for case in range(7):
+        weight, cg, inertia = _specifications()[0].mass(case)
+        _bench().damage(case)
+        _bench().place(800.0, (160.0, 0.0, 8.0), (0.0, 0.05, 0.0))
+        fdm = _bench().fdm
+        names = [*(f"i{x}-slugs_ft2" for x in ("xx", "yy", "zz", "xz")), "weight-lbs", "cg-x-in", "cg-z-in"]
+        found = np.abs([fdm[f"inertia/{name}"] for name in names])
+        wanted = np.abs([*np.diag(inertia), inertia[0, 2], weight, 12 * cg[0], 12 * cg[2]])
+        worst = max(worst, float(np.abs(found / wanted - 1.0).max()))
+    _bench().damage(0)
+    return worst
+
+
+def _trims() -> list[tuple[float, int]]:
+    """Largest difference of a surface, and of how many flights."""
+    sets = [
+        [Condition(eas_kt=float(v)) for v in SPEEDS_KT],
+        [Condition(alpha_deg=float(a)) for a in ALPHAS_DEG],
+    ]
+    found = []
+    for wanted in sets:
+        worst = 0.0
+        for each in wanted:
+            here = _bench().steady(each)
+            there = flights.specified_trim(_specifications()[1], each, here)
+            for name in ("elevator_deg", "aileron_deg", "rudder_deg"):
+                worst = max(worst, abs(getattr(here, name) - getattr(there, name)))
+        found.append((worst, len(wanted)))
+    return found
+
+
+def _modes() -> tuple[float, float]:
+    frequency = damping = 0.0
+    for alpha_deg in BETWEEN_DEG:
+        here = _bench().steady(Condition(alpha_deg=alpha_deg))
+        there = flights.specified_trim(_specifications()[1], Condition(alpha_deg=alpha_deg), here)
+        found = flights.modes(flights.linear_jsbsim(_bench(), here))
+        wanted = flights.modes(flights.linear_specified(_specifications()[1], there))
+        for name, (omega, zeta) in wanted.items():
+            frequency = max(frequency, abs(found[name][0] / omega - 1.0))
+            damping = max(damping, abs(found[name][1] - zeta))
+    return frequency, damping
+
+
+def gtm_cost() -> str:
+    """What a frame costs in frames of the Beaver, and how long loading takes."""
+    folder = Path(tempfile.mkdtemp(prefix="beaver-ftc-")) / "gtm"
+    model = write_model(read(_where() / DATABASE), folder)
+    load_s = min(_processor(lambda: bare(model)) for _ in range(3))
+    bench, beaver = Bench(model), bare(load().jsbsim)
+    flights.begin(bench, flights.state_of(_steady(heavy=True)), flights.of_steady(_steady(heavy=True)))
+    rows = [["steady flight, servos late", _ratio(bench.fdm, beaver)]]
+    for i, name in enumerate(NAMES.values()):
+        bench.fdm[f"fcs/{name}-cmd-rad"] = 0.005 + 0.002 * i
+    rows.append(["no two surfaces alike", _ratio(bench.fdm, beaver)])
+    bench.damage(4)
+    rows.append(["and a wing tip off", _ratio(bench.fdm, beaver)])
+    rows.append(["loading, s", f"{load_s:.2f}"])
+    return markdown_table(("a frame of", "in plain frames of the Beaver"), rows)
+
+
+def _processor(work: Callable[[], object]) -> float:
+    began = time.process_time()
+    work()
+    return time.process_time() - began
+
+
+def _ratio(one: Any, other: Any) -> str:
+    """Medians of short runs, taken in turn."""
+    runs = [
+        [_processor(lambda fdm=fdm: [fdm.run() for _ in range(40)]) for fdm in (one, other)]
+        for _ in range(50)
+    ]
+    mine, plain = np.median(runs, axis=0)
+    return f"{mine / plain:.1f}"

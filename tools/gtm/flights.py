@@ -1,0 +1,311 @@
+"""The same manoeuvres by JSBSim and by the specification: trim, linear modes, doublets, spin, damage."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from math import atan2, cos, degrees, radians, sin
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import fsolve
+
+from beaver_ftc.studies.gtm.database import read
+from beaver_ftc.studies.gtm.folder import write_model
+from beaver_ftc.studies.gtm.steady import HEADING_DEG, Bench, Condition, Steady, pitch_angle
+from tools.gtm.specification import DATABASE, STEP_S, SURFACES, Controls, Servos, Specification, State
+
+# The specification's letters, and the names here.
+NAMES = dict(
+    zip(
+        SURFACES,
+        (
+            "left_outboard_elevator", "left_inboard_elevator",
+            "right_outboard_elevator", "right_inboard_elevator",
+            "left_aileron", "right_aileron", "upper_rudder", "lower_rudder", "left_inboard_spoiler",
+            "left_outboard_spoiler", "right_inboard_spoiler", "right_outboard_spoiler", "left_inboard_flap",
+            "left_outboard_flap", "right_inboard_flap", "right_outboard_flap", "stabiliser",
+        ),
+        strict=True,
+    )
+)  # fmt: skip
+CASES = (
+    "rudder-off",
+    "fin-off",
+    "left-outboard-flap-off",
+    "left-wing-tip-off",
+    "left-elevator-off",
+    "left-stabiliser-off",
+)
+SIGNALS = ("u", "v", "w", "p", "q", "r", "phi", "theta", "psi", "altitude")
+_IN_JSBSIM = (
+    "velocities/u-aero-fps", "velocities/v-aero-fps", "velocities/w-aero-fps",
+    "velocities/p-rad_sec", "velocities/q-rad_sec", "velocities/r-rad_sec",
+    "attitude/phi-rad", "attitude/theta-rad", "attitude/psi-rad", "position/h-sl-ft",
+)  # fmt: skip
+Plan = Callable[[float], Controls]  # commands at a time
+EULER, ADAMS_BASHFORTH = 1, 3  # JSBSim's integrators of body rates: its usual one, and one of second order
+FINE_S = 0.001
+MOTION = slice(0, 6)  # of SIGNALS: u v w p q r
+
+
+@cache
+def bench(where: Path, scratch: Path) -> Bench:
+    """The converted model, written into an empty folder."""
+    return Bench(write_model(read(where / DATABASE), scratch / "gtm"))
+
+
+def of_commands(elevator: float, aileron: float, rudder: float, throttle: float) -> Controls:
+    """Elevators together, ailerons against one another, rudders and throttles together; deg and %."""
+    found = dict.fromkeys(SURFACES, 0.0)
+    found |= dict.fromkeys(("ELLOB", "ELLIB", "ELROB", "ELRIB"), elevator) | dict.fromkeys(
+        ("RUDU", "RUDL"), rudder
+    )
+    return Controls(found | {"AILL": -aileron, "AILR": aileron}, (throttle, throttle))
+
+
+def of_steady(steady: Steady) -> Controls:
+    """What holds a steady flight."""
+    return of_commands(steady.elevator_deg, steady.aileron_deg, steady.rudder_deg, steady.throttle_percent)
+
+
+def state_of(steady: Steady, altitude_ft: float = 800.0) -> State:
+    """Where it is."""
+    angles = radians(steady.phi_deg), radians(steady.theta_deg), radians(HEADING_DEG)
+    return State(*steady.velocity_fps, 0.0, 0.0, 0.0, *angles, altitude_ft)
+
+
+def specified_trim(spec: Specification, wanted: Condition, guess: Steady) -> Steady:
+    """Steady flight by the specification's own equations; wings free, no sideslip."""
+    assert (wanted.case in (1, 2), wanted.gamma_deg) == (False, 0.0), "rudders, level"
+
+    def made(x: np.ndarray) -> Steady:
+        first, phi, elevator, aileron, rudder, throttle = map(float, x)
+        alpha = first if wanted.alpha_deg is None else wanted.alpha_deg
+        dense = (spec.air(wanted.altitude_ft)[1] / 0.0023769) ** 0.5
+        V = first if wanted.alpha_deg is not None else float(wanted.eas_kt or 0.0) / 0.592487 / dense
+        theta = degrees(pitch_angle(radians(alpha), 0.0, radians(phi), 0.0))
+        return Steady(
+            V, V * 0.592487 * dense, alpha, 0.0, phi, theta, elevator, aileron, rudder, throttle, 0.0
+        )
+
+    def off(x: np.ndarray) -> np.ndarray:
+        steady = made(x)
+        return spec.rates_of_change(
+            state_of(steady, wanted.altitude_ft).array(), of_steady(steady), wanted.case
+        )[:6]
+
+    first = guess.alpha_deg if wanted.alpha_deg is None else guess.airspeed_fps
+    start = [
+        first,
+        guess.phi_deg,
+        guess.elevator_deg,
+        guess.aileron_deg,
+        guess.rudder_deg,
+        guess.throttle_percent,
+    ]
+    x, _, good, says = fsolve(off, start, full_output=True, xtol=1e-12)
+    if good != 1 and np.abs(off(x)).max() > 1e-7:
+        raise ValueError(says)
+    return made(x)
+
+
+def by_specification(
+    spec: Specification, start: State, plan: Plan, end_s: float, case: int = 0, onset_s: float = 10.0
+) -> np.ndarray:
+    """SIGNALS at every step, (n, 10)."""
+    servos, x, rows = Servos(spec.of, plan(0.0)), start.array(), []
+    for k in range(round(end_s / STEP_S) + 1):
+        rows.append(x)
+        t = k * STEP_S
+        x = spec.step(x, servos.move(plan(t)), case if t >= onset_s - 1e-9 else 0)
+    return np.array(rows)
+
+
+def by_jsbsim(
+    model: Bench,
+    start: State,
+    plan: Plan,
+    end_s: float,
+    damage: tuple[int, float],
+    dt: float,
+    integrator: int,
+) -> np.ndarray:
+    """The same flight, its rows those of the specification's steps. A command is written for the time at
+    which the frame that reads it ends."""
+    fdm, (case, onset_s) = model.fdm, damage
+    fdm["simulation/integrator/rate/rotational"] = integrator
+    fdm.set_dt(dt)
+    begin(model, start, plan(0.0))
+    every, rows = round(STEP_S / dt), []
+    for k in range(round(end_s / dt) + 1):
+        if k % every == 0:
+            rows.append([fdm[name] for name in _IN_JSBSIM])
+        t = (k + 1) * dt
+        _command(model, plan(t))
+        model.damage(case if t >= onset_s - 1e-9 else 0)
+        fdm.run()
+    model.damage(0)
+    for side in ("left", "right"):
+        fdm[f"fcs/{side}_engine-cmd-norm"] = 0.0
+    found = np.array(rows)
+    for angle in (SIGNALS.index("phi"), SIGNALS.index("psi")):
+        found[:, angle] = np.unwrap(found[:, angle])
+    return found
+
+
+def begin(model: Bench, at: State, controls: Controls) -> None:
+    """Put the converted model there, undamaged, at time 0."""
+    model.damage(0)
+    _command(model, controls)
+    angles = at.phi, at.theta, at.psi
+    model.place(at.altitude, (at.u, at.v, at.w), angles, (at.p, at.q, at.r))
+    model.fdm.set_sim_time(0.0)
+
+
+def _command(model: Bench, controls: Controls) -> None:
+    for letters, name in NAMES.items():
+        model.fdm[f"fcs/{name}-cmd-rad"] = radians(controls.surfaces[letters])
+    for side, throttle in zip(("left", "right"), controls.throttles, strict=True):
+        model.fdm[f"fcs/{side}_engine-cmd-norm"] = throttle / 100.0
+    model.fdm["fcs/throttle-cmd-norm"] = 0.0
+
+
+@dataclass(frozen=True)
+class Manoeuvre:
+    """A name, where it starts, what is commanded, how long, and the damage of it."""
+
+    name: str
+    start: State
+    plan: Plan
+    end_s: float
+    case: int = 0
+    onset_s: float = 10.0
+
+    def by_specification(self, spec: Specification) -> np.ndarray:
+        """SIGNALS at every step of 5 ms."""
+        return by_specification(spec, self.start, self.plan, self.end_s, self.case, self.onset_s)
+
+    def by_jsbsim(self, model: Bench, dt: float = STEP_S, integrator: int = EULER) -> np.ndarray:
+        """The same at the same times."""
+        return by_jsbsim(model, self.start, self.plan, self.end_s, (self.case, self.onset_s), dt, integrator)
+
+
+def doublets(steady: Steady) -> Manoeuvre:
+    """2 deg of elevator at 1 s, rudder at 4 s, ailerons at 7 s, each half a second to either side."""
+
+    def plan(t: float) -> Controls:
+        size = {at: 2.0 * ((at <= t < at + 0.5) - 1.0 * (at + 0.5 <= t < at + 1.0)) for at in (1.0, 4.0, 7.0)}
+        return of_commands(
+            steady.elevator_deg - size[1.0], steady.aileron_deg + size[7.0],
+            steady.rudder_deg + size[4.0], steady.throttle_percent,
+        )  # fmt: skip
+
+    return Manoeuvre("doublets", state_of(steady), plan, 15.0)
+
+
+# Case 2 departs: what is compared ends before two flights that differ by rounding differ by more.
+_ENDS_S = {2: 12.0}
+
+
+def damaged(steady: Steady, case: int) -> Manoeuvre:
+    """In a turn, which an aileron pulse at 6 s begins; damage at 10 s, with the controls as they are."""
+
+    def plan(t: float) -> Controls:
+        pulse = -2.0 if 6.0 <= t < 6.8 else 0.0
+        aileron, throttle = steady.aileron_deg + pulse, steady.throttle_percent
+        return of_commands(steady.elevator_deg, aileron, steady.rudder_deg, throttle)
+
+    return Manoeuvre(CASES[case - 1], state_of(steady), plan, _ENDS_S.get(case, 15.0), case)
+
+
+# What the source's own figures have of a spin in equilibrium, deg and deg/s.
+SPIN = {"alpha": 23.2, "beta": 0.9, "p": -363.0, "q": 27.0, "r": -155.0}
+
+
+def spin(spec: Specification) -> Manoeuvre:
+    """From a steady spin of the specification near the published one: airspeed, attitude and controls
+    as six accelerations of zero want them."""
+    rates = np.array([SPIN[axis] for axis in "pqr"]) * np.pi / 180.0
+    size = float(np.linalg.norm(rates))
+    down = -rates / size  # a steady spin turns about the vertical, this one to the left
+    alpha, beta = radians(SPIN["alpha"]), radians(SPIN["beta"])
+
+    def made(x: np.ndarray) -> tuple[State, Controls]:
+        V, elevator, aileron, rudder, tilt, turn = map(float, x)
+        along = down + np.array([0.0, tilt / 100.0, turn / 100.0])
+        along = along / np.linalg.norm(along)
+        theta, phi = -np.arcsin(along[0]), atan2(along[1], along[2])
+        p, q, r = -along * size
+        u, v, w = V * cos(alpha) * cos(beta), V * sin(beta), V * sin(alpha) * cos(beta)
+        state = State(u, v, w, p, q, r, phi, theta, 0.0, 3000.0)
+        return state, of_commands(elevator, aileron, rudder, 0.0)
+
+    def off(x: np.ndarray) -> np.ndarray:
+        state, controls = made(x)
+        return spec.rates_of_change(state.array(), controls, 0)[:6]
+
+    tries = ((V, rudder) for V in (90.0, 110.0, 130.0) for rudder in (-20.0, 20.0))
+    found = [fsolve(off, [V, -15.0, 0.0, rudder, 0.0, 0.0]) for V, rudder in tries]
+    state, controls = made(min(found, key=lambda x: float(np.abs(off(x)).max())))
+    return Manoeuvre("spin", state, lambda t: controls, 5.0)
+
+
+def linear(of: Callable[[np.ndarray], np.ndarray], x: np.ndarray) -> np.ndarray:
+    """Jacobian (8, 8) of u v w p q r phi theta by differences; `of` gives the six accelerations."""
+
+    def all_of(state: np.ndarray) -> np.ndarray:
+        p, q, r, phi, theta = state[3:8]
+        turn = q * sin(phi) + r * cos(phi)
+        return np.array([*of(state), p + turn * np.tan(theta), q * cos(phi) - r * sin(phi)])
+
+    steps = np.array([1e-3] * 3 + [1e-5] * 3 + [1e-6] * 2)
+    columns = [(all_of(x + h) - all_of(x - h)) / (2.0 * h.sum()) for h in np.diag(steps)]
+    return np.array(columns).T
+
+
+def modes(matrix: np.ndarray) -> dict[str, tuple[float, float]]:
+    """Frequency rad/s and damping: short period and phugoid; the roots of the lateral motion."""
+    longitudinal, lateral = [0, 2, 4, 7], [1, 3, 5, 6]
+    found: dict[str, tuple[float, float]] = {}
+    for kind, states in (("longitudinal", longitudinal), ("lateral", lateral)):
+        roots = np.linalg.eigvals(matrix[np.ix_(states, states)])
+        swings = sorted(
+            {(round(abs(z), 12), round(-z.real / abs(z), 12)) for z in roots if z.imag > 0}, reverse=True
+        )
+        names = ("short period", "phugoid") if kind == "longitudinal" else ("Dutch roll", "lateral phugoid")
+        found |= dict(zip(names, swings, strict=False))
+    return found
+
+
+def linear_jsbsim(model: Bench, steady: Steady) -> np.ndarray:
+    """Of the converted model."""
+    for name, number in steady.commands().items():
+        model.fdm[name] = number
+
+    def of(state: np.ndarray) -> np.ndarray:
+        angles = state[6], state[7], radians(HEADING_DEG)
+        model.place(800.0, state[:3], angles, state[3:6])
+        return model.accelerations()
+
+    return linear(of, state_of(steady).array()[:8])
+
+
+def linear_specified(spec: Specification, steady: Steady) -> np.ndarray:
+    """Of the specification."""
+    controls, whole = of_steady(steady), state_of(steady).array()
+    return linear(lambda x: spec.rates_of_change(np.array([*x, *whole[8:]]), controls, 0)[:6], whole[:8])
+
+
+def gravity_of(model: Bench, spec: Specification) -> float:
+    """What JSBSim's Earth leaves of the weight in the check point's flight, over the mass, ft/s2: of two
+    equal lifts at equal angle of attack the speeds squared are as the weights."""
+    here = model.steady(Condition(alpha_deg=3.0))
+    there = specified_trim(spec, Condition(alpha_deg=3.0), here)
+    return float(spec.gravity * (here.airspeed_fps / there.airspeed_fps) ** 2)
+
+
+def largest(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Largest difference of each signal as a share of its span in the first; of a span below a tenth of the
+    signal's size, as a share of that tenth."""
+    span = np.maximum(np.ptp(one, axis=0), 0.1 * np.abs(one).max(axis=0))
+    return np.asarray(np.abs(one - other).max(axis=0) / np.maximum(span, 1e-9))

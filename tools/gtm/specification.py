@@ -1,0 +1,296 @@
+"""The Generic Transport Model from the words of its specification, with nothing of the converter.
+
+It reads the data base and `parameters.yaml` of one folder (`BEAVER_FTC_GTM`, or ../shared/reference/gtm
+beside the checkout). Tables are interpolated where they are, all axes at once; the flight is integrated by
+Bogacki and Shampine's third-order method at 5 ms, over a flat Earth with the source's gravity, in the US
+standard atmosphere of 1976 below 11 km. Units: ft, slug, lbf, s; angles of tables and surfaces in deg,
+throttles in %.
+"""
+
+import os
+from dataclasses import dataclass, field
+from math import asin, atan2, cos, degrees, pi, radians, sin
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from scipy.io import loadmat
+
+WHERE = "BEAVER_FTC_GTM"
+DATABASE = "T2_polynomial_aerodatabase.mat"
+SURFACES = (
+    "ELLOB", "ELLIB", "ELROB", "ELRIB", "AILL", "AILR", "RUDU", "RUDL",
+    "SPLLIB", "SPLLOB", "SPLRIB", "SPLROB", "FLAPLIB", "FLAPLOB", "FLAPRIB", "FLAPROB", "STAB",
+)  # fmt: skip
+_MIRROR = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
+_LONGITUDINAL, _LATERAL = [0, 2, 4], [1, 3, 5]
+STEP_S = 0.005
+
+
+def folder() -> Path | None:
+    """Where data base and parameters are, if they are."""
+    found = Path(os.environ.get(WHERE) or Path(__file__).parents[3] / "shared" / "reference" / "gtm")
+    there = (found / DATABASE).is_file() and (found / "parameters.yaml").is_file()
+    return found if there else None
+
+
+def multilinear(data: np.ndarray, axes: list[np.ndarray], at: list[float], hold: bool = False) -> np.ndarray:
+    """Between breakpoints; beyond them along the last cell, or held."""
+    for grid, place in zip(axes, at, strict=True):
+        x = float(np.clip(place, grid[0], grid[-1])) if hold else place
+        i = int(np.clip(np.searchsorted(grid, x, side="right") - 1, 0, len(grid) - 2))
+        share = (x - grid[i]) / (grid[i + 1] - grid[i])
+        data = (1.0 - share) * data[i] + share * data[i + 1]
+    return data
+
+
+@dataclass
+class State:
+    """u v w ft/s, p q r rad/s, phi theta psi rad, altitude ft."""
+
+    u: float
+    v: float
+    w: float
+    p: float = 0.0
+    q: float = 0.0
+    r: float = 0.0
+    phi: float = 0.0
+    theta: float = 0.0
+    psi: float = 0.0
+    altitude: float = 800.0
+
+    def array(self) -> np.ndarray:
+        """In this order."""
+        return np.array(list(vars(self).values()))
+
+
+@dataclass
+class Controls:
+    """Where surfaces stand, deg, and throttles as the engines follow them, %."""
+
+    surfaces: dict[str, float] = field(default_factory=lambda: dict.fromkeys(SURFACES, 0.0))
+    throttles: tuple[float, float] = (40.0, 40.0)
+
+
+class Specification:
+    """The aircraft. gravity: ft/s2, the source's unless given."""
+
+    def __init__(self, where: Path, gravity: float | None = None) -> None:
+        self.of: dict[str, Any] = yaml.safe_load((where / "parameters.yaml").read_text(encoding="utf-8"))
+        self.base = loadmat(where / DATABASE, struct_as_record=False, squeeze_me=True)
+        self.gravity = gravity or self.of["mass"]["gravity"]["value"]
+        self._tables: dict[str, tuple[np.ndarray, list[np.ndarray]]] = {}
+
+    def _table(self, name: str, *axes: str) -> tuple[np.ndarray, list[np.ndarray]]:
+        if name not in self._tables:
+            of: Any = self.base
+            for part in name.split("."):
+                of = of[part] if isinstance(of, dict) else getattr(of, part)
+            self._tables[name] = np.asarray(of.data, float), [np.asarray(getattr(of, a), float) for a in axes]
+        return self._tables[name]
+
+    def _look(self, name: str, axes: str, at: list[float], hold: bool = False) -> np.ndarray:
+        data, grids = self._table(name, *axes.split())
+        return multilinear(data, grids, at, hold)
+
+    def coefficients(
+        self, alpha: float, beta: float, V: float, rates: np.ndarray, deg: dict[str, float], case: int = 0,
+        gear: bool = False,
+    ) -> np.ndarray:  # fmt: skip
+        """CX CY CZ Cl Cm Cn; alpha, beta in rad."""
+        a, b = degrees(alpha), degrees(beta)
+        c = self._look("C6_bas", "alpha beta", [a, b])
+        if case:
+            data, grids = self._table("dC6_damage.bas", "alpha", "beta")
+            c = c + multilinear(data[:, :, case - 1], grids, [a, b], hold=True)
+        gone = self.of["damage"]["cases"][case]["gain_0"] if case else []
+        c = c + self._surfaces(a, b, {name: 0.0 if name in gone else deg[name] for name in deg}, deg["STAB"])
+        if gear:
+            c[_LONGITUDINAL] += multilinear(*self._gear(), [a])
+        return c + self._rates(a, b, alpha, beta, V, rates, case)
+
+    def _gear(self) -> tuple[np.ndarray, list[np.ndarray]]:
+        data, grids = self._table("dC3_lgr", "alpha")
+        return data[:, 1], grids
+
+    def _surfaces(self, a: float, b: float, deg: dict[str, float], stab: float) -> np.ndarray:
+        """Increments; a lost surface stands at zero here, `stab` is where the stabiliser really stands."""
+        c = np.zeros(6)
+        shares = self.of["aero_shares"]
+        s0 = self._look("dC3_ele", "alpha beta stab elev", [a, b, stab, 0.0])
+        if deg["STAB"] == stab:
+            c[_LONGITUDINAL] += s0
+        for name, arm in shares["elevator_arm_spans"].items():
+            if deg[name]:
+                part = 0.25 * (self._look("dC3_ele", "alpha beta stab elev", [a, b, stab, deg[name]]) - s0)
+                c[_LONGITUDINAL] += part
+                c[3] += arm * part[1]
+                c[5] -= arm * part[0]
+        c += self._look("dC6_ail", "alpha beta ail", [a, b, deg["AILR"]])
+        c += _MIRROR * self._look("dC6_ail", "alpha beta ail", [a, -b, deg["AILL"]])
+        for name, which in (("RUDU", "upper"), ("RUDL", "lower")):
+            s = -1.0 if deg[name] >= 0.0 else 1.0
+            found = self._look("dC6_rud", "alpha beta rud", [a, s * b, -abs(deg[name])])
+            c += np.where(_MIRROR < 0.0, s, 1.0) * found * shares[f"rudder_{which}"]
+        for name in ("SPLLIB", "SPLLOB", "SPLRIB", "SPLROB"):
+            if deg[name]:
+                left, share = (
+                    name[3] == "L",
+                    shares["spoiler_inboard" if name[4:] == "IB" else "spoiler_outboard"],
+                )
+                found = self._look("dC6_spo", "alpha beta spo", [a, -b if left else b, deg[name]])
+                c += (_MIRROR if left else 1.0) * found * share
+        for name in ("FLAPLIB", "FLAPLOB", "FLAPRIB", "FLAPROB"):
+            c += deg[name] * np.asarray(getattr(self.base["flaps"], name.lower()))
+        return c
+
+    def _rates(
+        self, a: float, b: float, alpha: float, beta: float, V: float, rates: np.ndarray, case: int
+    ) -> np.ndarray:
+        p, _, r = rates
+        knots = min(max(V * 0.592487, 1.0), 10000.0)
+        over = np.array([6.8488, 0.9153, 6.8488]) / (2.0 * knots * 1.689)
+        c = np.zeros(6)
+        if case:
+            hats = rates * over
+            damage = self.base["dC6_damage"]
+            scale = multilinear(
+                np.asarray(damage.ddscale.data)[:, case - 1],
+                [np.asarray(damage.ddscale.alpha, float)],
+                [a],
+                True,
+            )
+            inc = multilinear(
+                np.asarray(damage.ddinc.data)[:, case - 1], [np.asarray(damage.ddinc.alpha, float)], [a]
+            )
+            for k, (name, hat, outputs) in enumerate(_OF_RATES):
+                six = np.zeros(6)
+                six[outputs] = self._look(name, f"alpha {hat}", [a, hats[k]], hold=True)
+                c += six * scale[k]
+            c[1] += inc[:, 1] @ hats
+            return c
+        along = np.array([cos(alpha) * cos(beta), sin(beta), sin(alpha) * cos(beta)])
+        omega = 0.0
+        if along[0] != 0.0 and p != 0.0:
+            left = r - p / along[0] * along[2]
+            omega = p / along[0] if abs(left) <= abs(r) and left * r >= 0.0 else omega
+        if along[2] != 0.0 and r != 0.0:
+            left = p - r / along[2] * along[0]
+            omega = r / along[2] if abs(left) <= abs(p) and left * p >= 0.0 else omega
+        what = float(np.clip(omega * over[0], -0.5, 0.5))
+        c += self._look("dC6_w", "alpha what beta", [a, what, b])
+        hats = (rates - omega * along) * over
+        for k, (name, hat, outputs) in enumerate(_OF_RATES):
+            c[outputs] += self._look(name, f"alpha {hat}", [a, hats[k]])
+        return c
+
+    def mass(self, case: int = 0) -> tuple[float, np.ndarray, np.ndarray]:
+        """Weight lbf, centre of gravity ft, inertia slug ft2, in the source's way."""
+        of = self.of["mass"]
+        i = dict(of["inertia"])
+        for name, polynomial in of["inertia_fuel_polynomials"].items():
+            if name in i:
+                i[name] += polynomial[-1]
+        weight, shift = of["weight"]["value"], np.zeros(3)
+        if case:
+            damage = self.of["damage"]["cases"][case]
+            weight, shift = weight + damage["dweight_lbf"], np.array(damage["dCG_in"]) / 12.0
+            i = {name: i[name] + damage[f"d{name}"] for name in ("Ixx", "Iyy", "Izz", "Ixz", "Iyz", "Ixy")}
+        cg = of["weight"]["value"] * np.array(of["cg"]["value"]) / weight + shift
+        tensor = np.array(
+            [
+                [i["Ixx"], -i["Ixy"], -i["Ixz"]],
+                [-i["Ixy"], i["Iyy"], -i["Iyz"]],
+                [-i["Ixz"], -i["Iyz"], i["Izz"]],
+            ]
+        )
+        return weight, cg, tensor
+
+    def air(self, altitude: float) -> tuple[float, float]:
+        """Pressure lbf/ft2, density slug/ft3."""
+        earth = self.of["constants"]["earth_radius_atmosphere_ft"]
+        warm = 1.0 - 6.8755856e-6 * earth * altitude / (earth + altitude)
+        pressure = 2116.22 * warm**5.2558797
+        return pressure, pressure / (self.of["constants"]["gas_constant"] * 518.67 * warm)
+
+    def rates_of_change(self, x: np.ndarray, controls: Controls, case: int) -> np.ndarray:
+        """Of a state's array."""
+        velocity, omega, (phi, theta, _), altitude = x[:3], x[3:6], x[6:9], x[9]
+        V = float(np.linalg.norm(velocity))
+        alpha, beta = atan2(velocity[2], velocity[0]), asin(velocity[1] / V)
+        weight, cg, inertia = self.mass(case)
+        pressure, density = self.air(altitude)
+        load = 0.5 * density * V * V * 5.9018
+        c = self.coefficients(alpha, beta, V, omega, controls.surfaces, case)
+        force = load * c[:3]
+        moment = load * np.array([6.8488, 0.9153, 6.8488]) * c[3:]
+        moment += np.cross(np.array(self.of["geometry"]["ref_cg"]["value"]) - cg, force)
+        rotors = np.zeros(3)
+        for side, throttle in zip(("left", "right"), controls.throttles, strict=True):
+            push, place, turning = self._engine(side, throttle, pressure, load)
+            force, moment, rotors = force + push, moment + np.cross(place - cg, push), rotors + turning
+        moment += np.cross(omega, rotors)
+        down = np.array([-sin(theta), sin(phi) * cos(theta), cos(phi) * cos(theta)])
+        mass = weight / self.of["mass"]["gravity"]["value"]
+        accelerated = force / mass + self.gravity * down - np.cross(omega, velocity)
+        turned = np.linalg.solve(inertia, moment - np.cross(omega, inertia @ omega))
+        p, q, r = omega
+        heading = (q * sin(phi) + r * cos(phi)) / cos(theta)
+        angles = [p + heading * sin(theta), q * cos(phi) - r * sin(phi), heading]
+        return np.array([*accelerated, *turned, *angles, -float(down @ velocity)])
+
+    def _engine(self, side: str, throttle: float, pressure: float, load: float) -> tuple[np.ndarray, ...]:
+        of = self.of["engines"]
+        rpm = np.polyval(of["rpm_percent"]["polynomial"], throttle)
+        thrust = max(0.0, np.polyval(of["thrust"]["polynomial"], rpm) * pressure / 2116.22 - 0.010 * load)
+        _, a2, a3 = map(radians, of[side]["angles"])
+        along = np.array([cos(a2) * cos(a3), sin(a3), -sin(a2) * cos(a3)])
+        shaft = of["rotor"]
+        inertia = pi * shaft["shaft_dia"] ** 4 / 32.0 * shaft["shaft_len"] * shaft["density"]
+        spin = inertia * 2.0 * pi / 60.0 * rpm / 100.0 * 123000.0
+        return thrust * along, np.array(of[side]["position"]), spin * along
+
+    def step(self, x: np.ndarray, controls: Controls, case: int, dt: float = STEP_S) -> np.ndarray:
+        """One step of Bogacki and Shampine's third-order method."""
+        k1 = self.rates_of_change(x, controls, case)
+        k2 = self.rates_of_change(x + 0.5 * dt * k1, controls, case)
+        k3 = self.rates_of_change(x + 0.75 * dt * k2, controls, case)
+        return np.asarray(x + dt * (2.0 * k1 + 3.0 * k2 + 4.0 * k3) / 9.0)
+
+
+_OF_RATES = (("dC3_p", "phat", _LATERAL), ("dC3_q", "qhat", _LONGITUDINAL), ("dC3_r", "rhat", _LATERAL))
+
+
+class Servos:
+    """Surfaces and engines on their way: 15 ms late, first order at 5 Hz within 300 deg/s and the stops; the
+    engines' spool. Exact for a command that stays for a step, but where the rate is limited."""
+
+    def __init__(self, of: dict[str, Any], command: Controls) -> None:
+        self.limits = {name: ends for name, ends in of["actuators"]["limits"].items() if name in SURFACES}
+        self.at = dict(command.surfaces)
+        self._late = [dict(command.surfaces)] * 3
+        spool = of["engines"]["spool"]
+        A, B = np.array(spool["A"], float), np.array(spool["B"], float)
+        self.C = np.array(spool["C"])
+        grown, powers = np.eye(2), np.eye(2)
+        forced, term = np.zeros((2, 2)), np.eye(2) * STEP_S
+        for n in range(1, 20):  # the matrix exponential, and its integral over the step
+            forced = forced + term
+            powers = powers @ A * STEP_S / n
+            grown, term = grown + powers, powers * STEP_S / (n + 1)
+        self.A, self.B = grown, forced @ B
+        self.spools = [np.array([0.0, throttle / 0.7314]) for throttle in command.throttles]
+
+    def move(self, command: Controls) -> Controls:
+        """One step on."""
+        self._late.append(dict(command.surfaces))
+        asked = self._late.pop(0)
+        share, most = 1.0 - np.exp(-2.0 * pi * 5.0 * STEP_S), 300.0 * STEP_S
+        for name, (low, high) in self.limits.items():
+            wanted = min(max(asked[name], low), high)
+            self.at[name] += float(np.clip((wanted - self.at[name]) * share, -most, most))
+        self.at["STAB"] = asked["STAB"]
+        lagged = tuple(float(self.C @ spool) for spool in self.spools)
+        self.spools = [self.A @ s + self.B * u for s, u in zip(self.spools, command.throttles, strict=True)]
+        return Controls(dict(self.at), (lagged[0], lagged[1]))

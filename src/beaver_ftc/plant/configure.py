@@ -13,6 +13,7 @@ from beaver_ftc.scenario.environment import Gust
 from beaver_ftc.scenario.schema import Scenario
 
 _AXES = ("p", "q", "r")
+DELAY = "actuators/delay-s"
 LB_PER_KG, IN_PER_M = 1.0 / 0.45359237, 12.0 * FT_PER_M
 
 # JSBSim's Dryden turbulence in Tustin's form, whose spectrum does not depend on the frame. Curve of equal
@@ -87,6 +88,8 @@ def take_off(plant: Plant, scenario: Scenario, trim_point: TrimPoint) -> None:
 
 
 def _actuators(plant: Plant, scenario: Scenario) -> None:
+    if plant.has(DELAY):
+        plant.write(DELAY, 0.0)  # of servos as built: a scenario's have none
     for surface in plant.aircraft.surfaces:
         dynamics = getattr(scenario.actuators, surface)
         plant.write(f"actuators/{surface}/bandwidth-rad_sec", dynamics.bandwidth_rad_s)

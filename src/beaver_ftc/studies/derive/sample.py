@@ -223,6 +223,7 @@ def sorted_in(
     where = places(samples, aircraft)
     inside = np.array([((where >= low) & (where <= high)).all(axis=1) for low, high in ends])
     travel = np.array([(t.min_rad, t.max_rad) for t in aircraft.travel.values()])
+    travel[travel == 0.0] = np.inf  # of a surface that goes to one side only
     used = np.maximum(samples.u / travel[:, 1], samples.u / travel[:, 0]).max(axis=1)
     level = np.searchsorted(np.array(shares[:-1]), used)
     return replace(samples, box=inside.argmax(axis=0), level=level).at(np.flatnonzero(inside.any(axis=0)))

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from beaver_ftc.plant.configure import DELAY
 from beaver_ftc.plant.instrumented import actuator_system
 from beaver_ftc.studies.gtm.elements import component, declared, do, function, piecewise, read, value
 from beaver_ftc.studies.gtm.masses import structural_in, weights_by_case
@@ -17,7 +18,6 @@ from beaver_ftc.studies.gtm.parameters import DAMAGE_CASE, GEAR, can_be_taken, c
 ENGINES = ("left_engine", "right_engine")
 THROTTLE = "fcs/throttle-cmd-norm"
 PERCENT = 100.0
-DELAY = "actuators/delay-s"  # of every surface; 0 for none
 _SAMPLES, _STEP_S = 4, 0.005  # of a command that are kept: the last, and three steps of 5 ms before it
 _DUE, _AGE, _SPACING, _AGO = (f"fcs/delay/{name}" for name in ("due", "age-s", "spacing-s", "samples-ago"))
 

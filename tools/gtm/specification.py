@@ -8,6 +8,7 @@ throttles in %.
 """
 
 import os
+from bisect import bisect_right
 from dataclasses import dataclass, field
 from math import asin, atan2, cos, degrees, pi, radians, sin
 from pathlib import Path
@@ -35,11 +36,11 @@ def folder() -> Path | None:
     return found if there else None
 
 
-def multilinear(data: np.ndarray, axes: list[np.ndarray], at: list[float], hold: bool = False) -> np.ndarray:
+def multilinear(data: np.ndarray, axes: list[list[float]], at: list[float], hold: bool = False) -> np.ndarray:
     """Between breakpoints; beyond them along the last cell, or held."""
     for grid, place in zip(axes, at, strict=True):
-        x = float(np.clip(place, grid[0], grid[-1])) if hold else place
-        i = int(np.clip(np.searchsorted(grid, x, side="right") - 1, 0, len(grid) - 2))
+        x = min(max(place, grid[0]), grid[-1]) if hold else place
+        i = min(max(bisect_right(grid, x) - 1, 0), len(grid) - 2)
         share = (x - grid[i]) / (grid[i + 1] - grid[i])
         data = (1.0 - share) * data[i] + share * data[i + 1]
     return data
@@ -80,14 +81,17 @@ class Specification:
         self.of: dict[str, Any] = yaml.safe_load((where / "parameters.yaml").read_text(encoding="utf-8"))
         self.base = loadmat(where / DATABASE, struct_as_record=False, squeeze_me=True)
         self.gravity = gravity or self.of["mass"]["gravity"]["value"]
-        self._tables: dict[str, tuple[np.ndarray, list[np.ndarray]]] = {}
+        self._tables: dict[str, tuple[np.ndarray, list[list[float]]]] = {}
 
-    def _table(self, name: str, *axes: str) -> tuple[np.ndarray, list[np.ndarray]]:
+    def _table(self, name: str, *axes: str) -> tuple[np.ndarray, list[list[float]]]:
         if name not in self._tables:
             of: Any = self.base
             for part in name.split("."):
                 of = of[part] if isinstance(of, dict) else getattr(of, part)
-            self._tables[name] = np.asarray(of.data, float), [np.asarray(getattr(of, a), float) for a in axes]
+            self._tables[name] = (
+                np.asarray(of.data, float),
+                [[float(x) for x in getattr(of, a)] for a in axes],
+            )
         return self._tables[name]
 
     def _look(self, name: str, axes: str, at: list[float], hold: bool = False) -> np.ndarray:
@@ -110,7 +114,7 @@ class Specification:
             c[_LONGITUDINAL] += multilinear(*self._gear(), [a])
         return c + self._rates(a, b, alpha, beta, V, rates, case)
 
-    def _gear(self) -> tuple[np.ndarray, list[np.ndarray]]:
+    def _gear(self) -> tuple[np.ndarray, list[list[float]]]:
         data, grids = self._table("dC3_lgr", "alpha")
         return data[:, 1], grids
 
@@ -154,16 +158,11 @@ class Specification:
         c = np.zeros(6)
         if case:
             hats = rates * over
-            damage = self.base["dC6_damage"]
-            scale = multilinear(
-                np.asarray(damage.ddscale.data)[:, case - 1],
-                [np.asarray(damage.ddscale.alpha, float)],
-                [a],
-                True,
+            (scales, at), (added, of) = (
+                self._table(f"dC6_damage.{x}", "alpha") for x in ("ddscale", "ddinc")
             )
-            inc = multilinear(
-                np.asarray(damage.ddinc.data)[:, case - 1], [np.asarray(damage.ddinc.alpha, float)], [a]
-            )
+            scale = multilinear(scales[:, case - 1], at, [a], hold=True)
+            inc = multilinear(added[:, case - 1], of, [a])
             for k, (name, hat, outputs) in enumerate(_OF_RATES):
                 six = np.zeros(6)
                 six[outputs] = self._look(name, f"alpha {hat}", [a, hats[k]], hold=True)

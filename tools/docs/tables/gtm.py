@@ -111,9 +111,9 @@ def _draw() -> None:
                 axis.plot(t, values, **style)
             axis.tick_params(labelsize=7)
             axis.grid(alpha=0.3)
-            if row is axes[0]:
-                axis.set_title(says, fontsize=9)
         row[0].set_ylabel(name.replace("-", " ").replace("left outboard", "left outb."), fontsize=7)
+    for axis, (says, *_) in zip(axes[0], _SHOWN, strict=True):
+        axis.set_title(says, fontsize=9)
     for axis in axes[-1]:
         axis.set_xlabel("s", fontsize=8)
     figure.tight_layout()

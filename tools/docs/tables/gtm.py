@@ -102,7 +102,7 @@ def _draw() -> None:
     figure, axes = plt.subplots(len(flown), len(_SHOWN), figsize=(11, 1.45 * len(flown)), sharex="row")
     for row, (name, (mine, _, fine, _)) in zip(axes, flown.items(), strict=True):
         t = 0.005 * np.arange(len(mine))
-        for axis, (says, column, factor) in zip(row, _SHOWN, strict=True):
+        for axis, (_, column, factor) in zip(row, _SHOWN, strict=True):
             for of, style in (
                 (mine, {"lw": 3.2, "color": "#9ec9e8"}),
                 (fine, {"lw": 0.9, "color": "#10304d"}),

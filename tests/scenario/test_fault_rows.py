@@ -2,9 +2,11 @@
 
 import pytest
 
+from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.faults import TYPES, fault_name, of_a_sensor, place_of
 from beaver_ftc.scenario.interventions import fault_of
 from beaver_ftc.scenario.sensors import QUANTITIES, Sensors
+from scenario.damageable import damageable
 
 GIVEN = {
     "loss_of_effectiveness": {"magnitude": 0.4},
@@ -15,6 +17,7 @@ GIVEN = {
     "rate_limit": {"scale": 0.2},
     "oscillatory": {"amplitude_deg": 36.0, "frequency_rad_s": 5.0},
     "unanticipated": {"Cm_alpha3": 8.0},
+    "damage": {"case": "tail-off"},
 }
 BEFORE = {
     "effectiveness": 0.8, "stuck": 0.0, "stuck-at-rad": 0.1, "hardover": 0.0, "float": 0.0, "bias-rad": 0.1,
@@ -31,12 +34,14 @@ AFTER = {
     "rate_limit": {"rate-scale": 0.5 * 0.8 * 0.2},
     "oscillatory": {"oscillation-amplitude-rad": PI / 5, "oscillation-frequency-rad_sec": 5.0},
     "unanticipated": {"Cm-alpha3": 3.0 + 2.0 + 8.0},
+    "damage": {"tail-off": 1.0},
 }
 
 
 def fault(kind, **keys):
-    actuator = {} if kind == "unanticipated" else {"actuator": "flap"}
-    return fault_of({"type": kind, **actuator, **keys}, 1.0)
+    actuator = {} if kind in ("unanticipated", "damage") else {"actuator": "flap"}
+    with checked_against(damageable()):
+        return fault_of({"type": kind, **actuator, **keys}, 1.0)
 
 
 @pytest.mark.parametrize("kind", TYPES)

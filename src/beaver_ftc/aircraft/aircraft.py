@@ -12,6 +12,7 @@ from beaver_ftc.aircraft.schema import (
     FLOW_SIGNALS,
     SIDESLIP_RATE,
     AircraftFile,
+    DamageSection,
     EngineSection,
     EnvelopeSection,
     GeometrySection,
@@ -186,6 +187,11 @@ class Aircraft:
         the stand-ins. What turns about an axis with its leader could not be told from it otherwise."""
         others = set(self.surfaces) - set(self.primary) - set(self.stand_ins)
         return (*self.primary, *(s for s in self.surfaces if s in others))
+
+    @property
+    def damage(self) -> Mapping[str, DamageSection]:
+        """Cases of damage that a scenario may inflict, by name."""
+        return MappingProxyType(self.file.damage)
 
     @property
     def signals(self) -> Mapping[str, SignalSection]:

@@ -21,7 +21,7 @@ from beaver_ftc.plant.configure import GustSchedule
 from beaver_ftc.plant.faults import is_there
 from beaver_ftc.scenario import interventions
 from beaver_ftc.scenario.airframe import checked_against
-from beaver_ftc.scenario.faults import MOST_FAULTS, UNANTICIPATED, fault_name, place_of
+from beaver_ftc.scenario.faults import DAMAGE, MOST_FAULTS, UNANTICIPATED, fault_name, place_of
 from beaver_ftc.scenario.interventions import StickTrack, fault_of, is_same_again
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sensors import sensors_there
@@ -199,7 +199,12 @@ class Stepping:
         Faults that are yet to come stay. Raises BadInput for a name that no fault can have.
         """
         with checked_against(self._loop.aircraft):
-            names = (*self._surfaces, *sensors_there(), UNANTICIPATED)
+            names = (
+                *self._surfaces,
+                *sensors_there(),
+                UNANTICIPATED,
+                *([DAMAGE] if self._loop.aircraft.damage else []),
+            )
             actuator = fault_name(actuator, names)
         if actuator is not None and actuator not in names:
             raise BadInput(f"actuator: {actuator!r:.60} is not known{suggestion(str(actuator), names)}")

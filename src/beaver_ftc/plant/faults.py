@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from beaver_ftc.scenario.faults import SensorFault, place_of
+from beaver_ftc.scenario.faults import DAMAGE, SensorFault, place_of
 from beaver_ftc.scenario.sensors import ENGINE, QUANTITIES, Sensors
 
 if TYPE_CHECKING:
@@ -30,6 +30,7 @@ _SENSORS = tuple(Sensors.model_fields)
 OF_THE_SLIPSTREAM = ("V", "qdyn", *ENGINE)  # what dpt is worked out from
 TIME_TOLERANCE_S = 1e-9
 NEVER = sys.maxsize
+OF_DAMAGE = f"failures/{DAMAGE}"
 
 # 1 - exp(-kappa t) is 1 to the last bit from here on: an incipient fault is then as good as an abrupt one.
 _FULLY_GROWN = 37.0
@@ -166,15 +167,24 @@ class FaultSchedule(_Schedule):
     def _wanted(self, k: int) -> dict[str, float]:
         """Failure properties at frame k, of every place a fault of this flight touches."""
         places = {event.place: dict(HEALTHY) for event in self._events}
+        if OF_DAMAGE in places:
+            places[OF_DAMAGE] = dict.fromkeys(self._plant.aircraft.damage, 0.0)
         for event in sorted(self._events, key=lambda event: event.first):
             if event.in_force(k):
                 event.fault.strike(places[event.place], event.share(k), event.was_rad)
-        return {
-            f"{place}/{name}": value
+        found = {
+            self._property(place, name): (value, HEALTHY.get(name, 0.0))
             for place, properties in places.items()
             for name, value in properties.items()
-            if value != HEALTHY[name] or f"{place}/{name}" in self._written
         }
+        return {
+            name: value for name, (value, sound) in found.items() if value != sound or name in self._written
+        }
+
+    def _property(self, place: str, name: str) -> str:
+        """A failure property by its name; that of a case of damage as the aircraft's file has it."""
+        damage = self._plant.aircraft.damage
+        return damage[name].property if place == OF_DAMAGE and name in damage else f"{place}/{name}"
 
 
 class SensorFaultSchedule(_Schedule):

@@ -14,13 +14,13 @@ It is false of `unanticipated` and of an instrument, null of nothing and of what
 import json
 import math
 import platform
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from functools import cache
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.results.expectations import evaluate
-from beaver_ftc.scenario.faults import of_a_sensor
+from beaver_ftc.scenario.faults import DAMAGE, Damage, of_a_sensor
 
 if TYPE_CHECKING:
     from beaver_ftc.loop.outcome import Landing
@@ -129,7 +129,8 @@ _NAMED = (
 
 def _isolation(flight: "Landing", fault: Document | None) -> Document:
     meant = _meant(flight, fault)
-    right = _correct(flight.isolated, meant), _type_correct(flight.isolation_type, meant)
+    correct = _correct(flight.isolated, meant, _takes(flight.scenario))
+    right = correct, _type_correct(flight.isolation_type, meant)
     named = _named(vars(flight), fault, right, flight.scenario)
     return {
         "isolated": flight.isolated is not None,
@@ -145,7 +146,7 @@ def _one_of_several(found: Document, scenario: "Scenario") -> Document:
     surface, kind = found["isolated"], found["isolation_type"]
     declared = _declared_on(surface, scenario)
     correct = None if surface is None else bool(declared)
-    type_correct = None if kind is None else any(kind == fault["type"] for fault in declared)
+    type_correct = None if kind is None else any(bool(_type_correct(kind, fault)) for fault in declared)
     of_ours = {**found, "so_far": None if surface is None else True}  # no other diagnosis names several
     return _named(of_ours, declared[0] if declared else None, (correct, type_correct), scenario)
 
@@ -181,17 +182,32 @@ def _meant(flight: "Landing", fault: Document | None) -> Document | None:
 
 def _declared_on(surface: str | None, scenario: "Scenario") -> list[Document]:
     """The faults declared on a surface, as they strike."""
-    return [fault for fault in faults_of(scenario) if fault["actuator"] == surface]
+    taken = surface in _takes(scenario)
+    return [
+        fault
+        for fault in faults_of(scenario)
+        if fault["actuator"] == surface or (taken and fault["type"] == DAMAGE)
+    ]
 
 
-def _correct(isolated: str | None, fault: Document | None) -> bool | None:
-    """Whether the isolated fault is the declared one; null while nothing is isolated."""
+def _takes(scenario: "Scenario") -> set[str]:
+    """Surfaces that the scenario's damage takes away."""
+    damage = scenario.airframe.damage
+    cases = [fault.case for fault in scenario.faults if isinstance(fault, Damage)]
+    return {surface for case in cases for surface in damage[case].takes}
+
+
+def _correct(isolated: str | None, fault: Document | None, takes: Collection[str] = ()) -> bool | None:
+    """Whether the isolated fault is the declared one; null while nothing is isolated. takes: surfaces that
+    are lost with damage."""
     if isolated is None:
         return None
     if fault is None:
         return False
     if "sensor" in fault:  # outside the class of surface faults is right as well
         return isolated in (f"sensor {fault['sensor']}", UNANTICIPATED)
+    if fault["type"] == DAMAGE:  # outside of every class, unless a surface that it takes
+        return isolated == UNANTICIPATED or isolated in takes
     return isolated == (UNANTICIPATED if fault["type"] == UNANTICIPATED else fault["actuator"])
 
 
@@ -199,6 +215,8 @@ def _type_correct(kind: str | None, fault: Document | None) -> bool | None:
     """Whether the type named is the declared one; null while none is named, as an instrument's never is."""
     if fault is not None and "sensor" in fault:
         return None
+    if fault is not None and fault["type"] == DAMAGE:  # a surface that is gone has lost all its effect
+        return None if kind is None else kind == LOSS_OF_EFFECTIVENESS
     return None if kind is None else fault is not None and kind == fault["type"]
 
 

@@ -174,6 +174,7 @@ _SIZES = {
     "scale": lambda value: f"{100 * value:g} % of its rate",
     "amplitude_deg": lambda value: f"{value:g} deg",
     "frequency_rad_s": lambda value: f"{value:g} rad/s",
+    "case": lambda value: value.replace("-", " "),
     "Cm_alpha3": lambda value: f"Cm_alpha3 {value:g}",
     "kappa_per_s": lambda value: f"growing at {value:g} /s",
 }

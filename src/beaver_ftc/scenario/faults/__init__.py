@@ -13,16 +13,18 @@ from pydantic import Discriminator, Field, Tag
 
 from beaver_ftc.scenario.airframe import among, checked_aircraft
 from beaver_ftc.scenario.faults.base import SurfaceFault
+from beaver_ftc.scenario.faults.damage import Damage
 from beaver_ftc.scenario.faults.sensors import AnySensorFault, SensorFault, fault_name
 from beaver_ftc.scenario.faults.surfaces import Bias, LossOfEffectiveness, Unanticipated
 from beaver_ftc.scenario.sensors import sensor_words, sensors_there
 
 __all__ = [
-    "MOST_FAULTS", "TYPES", "UNANTICIPATED", "Bias", "Fault", "FaultType", "LossOfEffectiveness", "Nameable",
-    "SensorFault", "Unanticipated", "fault_name", "of_a_sensor", "place_of",
+    "DAMAGE", "MOST_FAULTS", "TYPES", "UNANTICIPATED", "Bias", "Damage", "Fault", "FaultType",
+    "LossOfEffectiveness", "Nameable", "SensorFault", "Unanticipated", "fault_name", "of_a_sensor",
+    "place_of",
 ]  # fmt: skip
 
-UNANTICIPATED = "unanticipated"
+UNANTICIPATED, DAMAGE = "unanticipated", "damage"
 MOST_FAULTS = 1000  # of one flight: an hour of breaking and repairing by hand has room
 
 
@@ -43,8 +45,8 @@ TYPES = _rows()
 
 
 def place_of(fault: Any) -> str:
-    """What a fault is of: a surface, a sensor, or the aerodynamics (`unanticipated`)."""
-    return str(getattr(fault, "sensor", getattr(fault, "actuator", UNANTICIPATED)))
+    """What a fault is of: a surface, a sensor, else its type: `unanticipated`, `damage`."""
+    return str(getattr(fault, "sensor", getattr(fault, "actuator", fault.type)))
 
 
 def of_a_sensor(fault: Any) -> bool:

@@ -165,7 +165,7 @@ def fault_effects(m: Models, states: States, G: np.ndarray, healthy: np.ndarray)
 
 def name_of(fault: Any) -> str:
     """A name of a fault's own: surface, type and time."""
-    place = "" if fault.type == UNANTICIPATED else f"{place_of(fault)} "
+    place = "" if place_of(fault) == fault.type else f"{place_of(fault)} "
     return f"{place}{fault.type.replace('_', ' ')} at {fault.at_s:g} s"
 
 

@@ -1,0 +1,94 @@
+"""Damage as a fault: when which property is set, what is refused, what a verdict is held against."""
+
+import pytest
+
+from beaver_ftc import Simulation
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.results.metrics import _correct, _type_correct
+from beaver_ftc.scenario.loader import load
+from scenario.damageable import damageable
+
+CASE = {"type": "damage", "case": "tail-off", "at_s": 0.1}
+
+
+@pytest.fixture
+def written(tmp_path, monkeypatch):
+    """A scenario with faults on an aircraft that can be damaged."""
+    damageable(tmp_path / "plane")
+
+    def of(*faults):
+        text = f"name: broken\naircraft: ./plane\nduration_s: 1\nfaults: {list(faults)!r}\n"
+        (tmp_path / "broken.yaml").write_text(text)
+        return load(tmp_path / "broken.yaml")
+
+    return of
+
+
+def seen(scenario, *names):
+    """The values of properties with which each frame begins."""
+    sim, rows = Simulation(scenario), []
+    while not sim.done:
+        rows.append([sim[name] for name in names])
+        sim.step()
+    return rows
+
+
+def test_a_case_is_there_from_its_frame_to_its_end(written):
+    scenario = written(CASE | {"end_s": 0.3}, {"type": "damage", "case": "dented", "at_s": 0.2})
+    rows = seen(scenario, "failures/damage/tail-off", "failures/damage/dented")
+    assert [row[0] for row in rows] == [float(10 <= k < 30) for k in range(len(rows))]
+    assert [row[1] for row in rows] == [float(k >= 20) for k in range(len(rows))]
+
+
+def test_one_repair_does_not_end_the_same_damage_again_declared(written):
+    scenario = written(CASE | {"end_s": 0.3}, CASE | {"at_s": 0.2})
+    rows = seen(scenario, "failures/damage/tail-off")
+    assert [row[0] for row in rows] == [float(k >= 10) for k in range(len(rows))]
+
+
+def test_in_flight_it_is_inflicted_and_repaired(written):
+    sim = Simulation(written())
+    for _ in range(5):
+        sim.step()
+    sim.inject({"type": "damage", "case": "tail-off"})
+    sim.step()
+    assert sim["failures/damage/tail-off"] == 1.0
+    sim.repair("damage")
+    sim.step()
+    assert sim["failures/damage/tail-off"] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("fault", "says"),
+    [
+        ({"case": "wing-off"}, "'wing-off' is not known"),
+        ({}, "case"),
+        ({"case": "dented", "actuator": "elevator"}, "actuator"),
+        ({"case": "dented", "profile": "incipient"}, "profile"),
+    ],
+)
+def test_what_no_damage_is(written, fault, says):
+    with pytest.raises(BadInput, match=says):
+        written({"type": "damage", "at_s": 0.1} | fault)
+
+
+def test_an_aircraft_without_cases_has_none():
+    with pytest.raises(BadInput, match="beaver declares no damage, allowed: an aircraft that does"):
+        load({"faults": [CASE]})
+
+
+def test_right_is_outside_of_every_class_or_a_surface_that_went_with_it():
+    damage = {"actuator": None, "type": "damage", "at_s": 0.1}
+    taken = {"elevator", "rudder"}
+    names = ("unanticipated", "elevator", "rudder", "aileron", None)
+    assert [_correct(name, damage, taken) for name in names] == [True, True, True, False, None]
+    kinds = ("loss_of_effectiveness", "stuck", None)
+    assert [_type_correct(kind, damage) for kind in kinds] == [True, False, None]
+
+
+def test_the_verdict_says_what_broke(written):
+    from beaver_ftc import fly
+
+    flight = fly(written(CASE), log=False)
+    assert flight.metrics["fault"] == {"actuator": None, "type": "damage", "at_s": 0.1}
+    assert flight.metrics["faults"][0]["size"] == {"case": "tail-off"}

@@ -130,7 +130,7 @@ def test_what_was_meant_is_said_of_a_beginning_a_lone_name_and_a_missing_dash(be
 def test_fault_types_of_surfaces_and_of_sensors_are_told_apart(beaver):
     listed = re.findall(r"^  (\w+) +(of a sensor: )?", beaver("list", "faults")[1], re.MULTILINE)
     assert len(set(listed)) == len(listed)
-    assert [bool(of) for _, of in listed] == [False] * 8 + [True] * 5
+    assert [bool(of) for _, of in listed] == [False] * 9 + [True] * 5
 
 
 def test_an_airspeed_that_nothing_can_hold_is_said_at_its_key_by_validate(beaver):

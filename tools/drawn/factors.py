@@ -106,9 +106,10 @@ def severities(schema: Node) -> tuple[str, ...]:
 
 
 def fault_types(schema: Node) -> dict[str, Node]:
-    """Fault type of a surface, or of the aircraft -> its schema."""
+    """Fault type of a surface, or of the aircraft -> its schema; not damage, which none of these declares."""
     variants = forms_of(schema, schema["properties"]["faults"]["items"])
-    return {one["properties"]["type"]["const"]: one for one in variants if "sensor" not in one["properties"]}
+    of_ours = (one for one in variants if not {"sensor", "case"} & one["properties"].keys())
+    return {one["properties"]["type"]["const"]: one for one in of_ours}
 
 
 def sensor_fault_types(schema: Node) -> dict[str, Node]:

@@ -112,8 +112,8 @@ def test_trim_over_speed_and_angle_of_attack(bench, heavy, wanted):
     there = flights.specified_trim(heavy, wanted, here)
     for name in ("elevator_deg", "aileron_deg", "rudder_deg", "alpha_deg"):
         assert getattr(here, name) == pytest.approx(getattr(there, name), abs=0.02)
-    assert here.throttle_percent == pytest.approx(there.throttle_percent, abs=0.02)
-    assert here.eas_kt == pytest.approx(there.eas_kt, abs=0.01)
+    assert here.throttle_percent == pytest.approx(there.throttle_percent, abs=0.1)
+    assert here.eas_kt == pytest.approx(there.eas_kt, abs=0.05)
 
 
 @pytest.mark.parametrize("alpha_deg", [3.0, 7.0, 11.5])

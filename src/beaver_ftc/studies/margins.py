@@ -175,13 +175,18 @@ def study(scenario: Scenario) -> list[Margin]:
 
     Raises BadInput for another law: its loop is not this one.
     """
+    refuse_other_laws(scenario)
+    airspeeds_mps = np.linspace(*scenario.airframe.envelope.airspeed_mps, N_AIRSPEEDS)
+    flights = (scenario.with_({"initial.airspeed_mps": float(V)}) for V in airspeeds_mps)
+    return [margin for flight in flights for margin in at(flight)]
+
+
+def refuse_other_laws(scenario: Scenario) -> None:
+    """Raise BadInput unless the law is one whose loop this is."""
     allowed = [name for name, (_, inner) in COMPILED.items() if inner == REJECTING]
     if scenario.control.law not in allowed:
         says = f"margins are known of the default law's loop, allowed: {', '.join(allowed)}"
         raise BadInput(f"{scenario.name}: control.law: {scenario.control.law}: {says}")
-    airspeeds_mps = np.linspace(*scenario.airframe.envelope.airspeed_mps, N_AIRSPEEDS)
-    flights = (scenario.with_({"initial.airspeed_mps": float(V)}) for V in airspeeds_mps)
-    return [margin for flight in flights for margin in at(flight)]
 
 
 def at(scenario: Scenario) -> Iterator[Margin]:

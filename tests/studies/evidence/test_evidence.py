@@ -149,6 +149,19 @@ def test_a_lost_aircraft_shows_nothing_beyond_its_loss(tmp_path):
     assert found["D"]["worst"]["says"] == "a column is not a number where it asks"
 
 
+def test_a_study_that_has_nothing_to_say_shows_nothing_and_the_flight_the_rest(tmp_path):
+    asked = [
+        {"id": "A", "over": ["other"], "bar": {"type": "margins"}},
+        {"id": "B", "over": ["other"], "expect": {"no_departure": True}},
+    ]
+    plan = plan_of(
+        tmp_path, flights={"other": {**HEALTHY, "control": {"law": "nominal"}}}, requirements=asked
+    )
+    margins, kept = judged(plan)["requirements"]
+    assert (margins["verdict"], kept["verdict"]) == (NOT_SHOWN, MET)
+    assert "margins are known of the default law's loop" in margins["worst"]["says"]
+
+
 def test_what_is_covered(tmp_path):
     flights = {
         "low": {**FAULTY, "initial": {"airspeed_mps": 33, "altitude_m": 500}},

@@ -147,10 +147,13 @@ def _judged(
     bar, formula = requirement.bar, plan.formulas.get(requirement.id)
     if formula is not None:
         return [_of_formula(requirement.formula or "", formula, scenario.rate_hz, document, log)]
-    if isinstance(bar, OfHandling):
-        return _of_handling(bar, scenario, document, log)
-    if isinstance(bar, OfMargins):
-        return _of_margins(bar, scenario)
+    try:
+        if isinstance(bar, OfHandling):
+            return _of_handling(bar, scenario, document, log)
+        if isinstance(bar, OfMargins):
+            return _of_margins(bar, scenario)
+    except BeaverFtcError as error:  # the study has nothing to say of it, such as of another law
+        return [part("the study", None, None, NOT_SHOWN, says=str(error))]
     if requirement.expect is None:
         return []
     return [
@@ -190,9 +193,12 @@ def _of_handling(bar: OfHandling, scenario: Scenario, document: Row, log: Watche
 
 
 def _of_margins(bar: OfMargins, scenario: Scenario) -> list[Row]:
-    from beaver_ftc.studies.margins import at
+    from beaver_ftc.studies.margins import at, refuse_other_laws
 
+    refuse_other_laws(scenario)
     found = list(at(scenario))
+    if not found:
+        return [part("margins", None, None, NOT_SHOWN, says="no surface has a loop to speak of")]
     asked = (
         ("gain margin, dB", bar.gain_db, min((min(each.up_db, each.down_db), each.fault) for each in found)),
         ("phase margin, deg", bar.phase_deg, min((each.phase_deg, each.fault) for each in found)),

@@ -82,7 +82,7 @@ def events(*parts):
 
 VERDICT = {
     "flight": "one", "gaps": 0, "duration_s": 61.4, "recorded_s": 41.6, "events": [],
-    "can_separate": ["First.", "Second."], "notes": [],
+    "can_separate": ["First.", "Second."], "notes": [], "credible": {"share": 1.0, "reasons": []},
 }  # fmt: skip
 
 
@@ -99,6 +99,7 @@ def test_the_text_of_a_verdict(changed):
         VERDICT | {"events": mixed, "score": score},
         VERDICT | {"events": unknown},
         VERDICT | {"events": brief},
+        VERDICT | {"credible": {"share": 0.0, "reasons": [{"says": "a rate is clipped", "share": 1.0}]}},
     ]
     assert not changed([as_text(case).splitlines() for case in cases])
     assert [looked_at(case) for case in cases[:3]] == [

@@ -121,6 +121,7 @@ def test_the_columns_of_a_diagnosis(tmp_path, monkeypatch, flown):
         its = {"effectiveness": rows.estimate, "low": rows.low, "high": rows.high}
         expected |= {f"{surface}_{what}": values[:, i] for what, values in its.items()}
     expected["fault_probability"] = rows.probability
+    expected["credible"] = [1] * len(rows.t_s)
     assert list(table) == list(expected)
     for name, values in expected.items():
         assert table[name] == list(values)

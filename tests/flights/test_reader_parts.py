@@ -88,7 +88,7 @@ def test_how_a_log_is_read_shows_by_its_name(tmp_path):
     for name, says in (
         (
             "a.xyz",
-            r"cannot be seen, allowed: \.bin, \.csv, \.log, \.parquet, \.ulg, or --reader table, alfa, ulog",
+            r"allowed: \.bin, \.csv, \.log, \.parquet, \.tsv, \.txt, \.ulg, or --reader table, alfa, ulog",
         ),
         ("a.CSV", "is no table"),
     ):

@@ -54,7 +54,8 @@ def test_a_rudder_hard_over_is_found_by_its_effect_alone(real_flights):
     flights = load_flights(folders, vehicle)
     kept = next(one for one in flights if one.name == ALFA)
     model = fit_model(stretches_of([one for one in flights if one is not kept]), vehicle)
-    assert not set(model.vehicle.outputs.values()) & {*model.vehicle.commands, *model.vehicle.signals}
+    read = {*model.vehicle.command_names, *model.vehicle.signal_names}
+    assert not read & {one.column for one in model.vehicle.outputs.values()}
     found = by_event(diagnose(kept, model), kept.events, model.groups)
     assert found["false_alarms"] == 0
     assert found["delay_s"] < 5.0

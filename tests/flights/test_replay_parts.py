@@ -29,7 +29,7 @@ def test_verdicts_as_columns():
     columns = of._columns(T_S, SAID, SURFACES)
     assert list(columns) == [
         "t_s", "faulty", "named",
-        *(f"{name}_{what}" for name in SURFACES for what in ("effectiveness", "low", "high")),
+        *(f"{name}_{what}" for name in SURFACES for what in ("effectiveness", "low", "high")), "credible",
     ]  # fmt: skip
     assert columns["faulty"].tolist() == [0, 1, 1, 1, 1, 1, 1]
     assert columns["named"] == ["", "unknown", "elevator", "rudder", "rudder", "aileron", "unknown"]
@@ -39,6 +39,7 @@ def test_verdicts_as_columns():
     for name in SURFACES:
         assert columns[f"{name}_low"].tolist() == [1, 0, 0, 0, 0, 0, 0]
         assert columns[f"{name}_high"].tolist() == [1] * 7
+    assert columns["credible"].tolist() == [1] * 7
 
 
 def scenario(**sensors):
@@ -56,7 +57,7 @@ def test_whether_a_replay_is_as_flown(tmp_path, beside, as_flown):
     assert of._verdict(tmp_path / "log.parquet", scenario(), log, SAID) == {
         "flight": "one", "replay": True, "duration_s": 3.0, "faulty": True, "detection_s": 0.5,
         "isolation_s": 1.0, "isolated": "elevator", "rows_that_differ": 2, "left_out": [],
-        "as_flown": as_flown,
+        "as_flown": as_flown, "credible": {"share": 1.0, "reasons": []},
     }  # fmt: skip
 
 

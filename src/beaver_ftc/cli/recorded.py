@@ -20,8 +20,9 @@ ReaderOption = Annotated[
 
 def identify(
     flights: FlightsArgument,
-    vehicle: Annotated[str, typer.Option(metavar="FILE")],
-    out: Annotated[Path, typer.Option(metavar="MODEL")],
+    vehicle: Annotated[str | None, typer.Option(metavar="FILE")] = None,
+    out: Annotated[Path | None, typer.Option(metavar="MODEL")] = None,
+    check: bool = False,
     reader: ReaderOption = None,
     format: FormatOption = Format.text,
 ) -> None:
@@ -32,8 +33,15 @@ def identify(
     as a page beside it (MODEL with .html).
 
     vehicle: Vehicle file, or the built-in `alfa`.
-    out: The model file to write.
+    out: The model file to write; with --check the vehicle file that is proposed.
+    check: Fit nothing; say what the logs are, and propose a vehicle file where none is given.
     """
+    if check:
+        _check(flights, vehicle, out, reader, format)
+        return
+    if vehicle is None or out is None:
+        option = "--vehicle" if vehicle is None else "--out"
+        raise BadInput(f"identify: {option} is missing, allowed: --vehicle FILE --out MODEL, or --check")
     from beaver_ftc.flights.identification import identify, summary
     from beaver_ftc.flights.model import as_text
     from beaver_ftc.flights.pages import check_page, render_model
@@ -59,6 +67,37 @@ def identify(
         "settings": model.settings.model_dump(),
     }
     answer(format, document, lambda: f"{summary(model)}\nmodel: {out}\npage: {page}")
+
+
+def _check(
+    flights: list[Path], vehicle: str | None, out: Path | None, reader: str | None, format: Format
+) -> None:
+    from beaver_ftc.flights.check import as_text, as_yaml, check
+    from beaver_ftc.flights.vehicle import load_vehicle
+
+    described = load_vehicle(vehicle) if vehicle is not None else None
+    if out is not None and (out.exists() or described is not None):
+        says = f"{out} exists, allowed: another name" if out.exists() else "a vehicle file is given already"
+        raise BadInput(f"identify: --check --out: {says}")
+    checked = [check(path, described, reader) for path in flights]
+    guess = next((one["vehicle"] for one in checked if one["vehicle"]), None)
+    lines = [as_text(one) for one in checked]
+    if guess is not None and out is not None:
+        _write_new(out, as_yaml(guess))
+        lines.append(f"vehicle file: {out}")
+    elif guess is not None:
+        lines.append(as_yaml(guess))
+    answer(format, {"logs": checked, "vehicle": guess}, lambda: "\n".join(lines))
+    if not all(one["usable"] for one in checked):
+        raise typer.Exit(2)
+
+
+def _write_new(path: Path, text: str) -> None:
+    from beaver_ftc.results.writer import clear_disk_errors
+
+    with clear_disk_errors(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
 
 
 def diagnose(

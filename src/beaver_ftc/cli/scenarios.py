@@ -81,22 +81,29 @@ def _check(file: str) -> Document:
 def new(
     name: Annotated[str, typer.Argument(metavar="NAME")],
     like: Annotated[str | None, typer.Option(metavar="SCENARIO", autocompletion=complete_names)] = None,
+    log: bool = False,
     out: Path = Path(),
 ) -> None:
-    """Write NAME.yaml, a scenario to begin with.
+    """Write NAME.yaml, a scenario to begin with, or sample logs.
 
     It flies as it is; an existing file is never replaced.
 
     Examples:
       beaver-ftc new my-case
       beaver-ftc new my-other-case --like elevator-partial-loss
+      beaver-ftc new my-logs --log
 
     name: Name of the scenario, and of its file.
     like: Begin with a built-in one.
+    log: Write a folder NAME with two recorded flights and their vehicle file, to try `identify` and
+      `diagnose` on.
     out: Folder of the new file; made if need be.
     """
     if not _NAME.fullmatch(name):
         raise BadInput(f"new: {name[:100]!r} is no name, allowed: letters, digits, - and _, at most 100")
+    if log:
+        _sample_logs(out / name, like)
+        return
     text = TEMPLATE.format(name=name) if like is None else _renamed(like, name)
     if out.suffix in (".yaml", ".yml") and not out.is_dir():
         says = f"{str(out)!r} is a file's name, allowed: a folder; the file in it is {name}.yaml"
@@ -104,6 +111,16 @@ def new(
     path = out / f"{name}.yaml"
     _write(path, text)
     emit(f"{path}: written; fly it with `beaver-ftc run {path}`")
+
+
+def _sample_logs(folder: Path, like: str | None) -> None:
+    from beaver_ftc.flights.sample_logs import files
+
+    if like is not None:
+        raise BadInput("new: --like and --log are given, allowed: one of them")
+    for name, text in files().items():
+        _write(folder / name, text)
+    emit(f"{folder}: written; `beaver-ftc identify --check {folder}/healthy.csv` says what it is")
 
 
 def _renamed(like: str, name: str) -> str:

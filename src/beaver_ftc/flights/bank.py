@@ -7,7 +7,8 @@ flights, how often things change.
 Trim, gain, and each group's own gain may differ from the model. All start from it and are bounded, so that a
 fault from the start is not learnt away. The trim differs as another loading or rigging would make it (a shift
 of each group's command) and a little freely; it wanders. Gains return to the model's in time: airspeed varies
-about what it was when the model was identified.
+about what it was when the model was identified. A group's own gain that the fit knows worse than
+to a step between levels is free by as much: few minutes mean wide bounds.
 """
 
 from itertools import combinations, product
@@ -153,7 +154,7 @@ def adaptation_of(model: Model) -> Adaptation:
     covariance = np.zeros((4 + groups, 4 + groups))
     covariance[:3, :3] = np.diag(variance * settings.trim_sd**2) + shift.T @ shift
     covariance[3, 3] = settings.gain_sd**2
-    covariance[range(4, 4 + groups), range(4, 4 + groups)] = settings.own_gain_sd**2
+    covariance[range(4, 4 + groups), range(4, 4 + groups)] = settings.own_gain_sd**2 + _unknown(model)
     times_s = np.array([np.inf] * 3 + [settings.gain_time_s] + [settings.own_gain_time_s] * groups)
     keep = np.exp(-1.0 / (model.rate_hz * times_s))
     walk = (1.0 - keep**2) * np.diag(covariance)
@@ -161,6 +162,14 @@ def adaptation_of(model: Model) -> Adaptation:
     reach = np.array([settings.trim_bound] * 3 + [settings.gain_bound] * (1 + groups))
     mean = np.array([0.0, 0.0, 0.0, 1.0] + [0.0] * groups)
     return Adaptation(mean, covariance, np.sqrt(np.diag(covariance)) * reach, keep, walk)
+
+
+def _unknown(model: Model) -> Floats:
+    """Variance of each group's gain by which it is known worse than to a step between levels, (G,)."""
+    known = np.zeros(len(model.groups))
+    if model.fitted is not None and model.fitted.gain_sd:
+        known += np.array(model.fitted.gain_sd) ** 2
+    return np.maximum(known - model.settings.level_step**2, 0.0)
 
 
 class Noise(NamedTuple):

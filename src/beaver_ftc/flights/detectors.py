@@ -27,11 +27,12 @@ from beaver_ftc.design.model import N_Y
 from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
 from beaver_ftc.documents.errors import BadInput, suggestion
 from beaver_ftc.flights.bank import bank_of
-from beaver_ftc.flights.diagnose import UNKNOWN, Rows, check_rate, diagnose, joined
+from beaver_ftc.flights.diagnose import UNKNOWN, Rows, check_rate, diagnose, joined, silenced
 from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.recording import Floats, Recording
 from beaver_ftc.flights.regression import by_surface, group_indices, predicted
 from beaver_ftc.flights.samples import Samples
+from beaver_ftc.flights.trust import without_dead
 from beaver_ftc.plugins import DETECTORS, is_compiled, made, registered
 
 MEMORY_S = 20.0
@@ -101,13 +102,15 @@ def _told(samples: Samples, named: np.ndarray, estimate: Floats, **known: Floats
     known."""
     faulty = np.array([bool(name) for name in named], dtype=np.int64)
     found = {"low": estimate, "high": estimate, "probability": faulty.astype(float), **known}
-    return Rows(samples.t_s, faulty, named, estimate, **found)
+    low, high, probability = found["low"], found["high"], found["probability"]
+    return Rows(samples.t_s, faulty, named, estimate, low, high, probability)
 
 
 def freeze(recording: Recording, samples: Samples, model: Model) -> Rows | None:
     """The freeze rule on the logged servo outputs; None where the vehicle file names none."""
     names = list(model.vehicle.surfaces)
-    logged = {name: column for name, column in model.vehicle.outputs.items() if column in recording.columns}
+    outputs = model.vehicle.outputs
+    logged = {name: one.column for name, one in outputs.items() if one.column in recording.columns}
     if not logged:
         return None
     still = np.zeros((len(samples.t_s), len(names)), dtype=bool)
@@ -243,7 +246,10 @@ def diagnose_with(name: str, samples: Samples, model: Model) -> Rows:
     """The rows of one detector. Raises BadInput for an unknown name, or a log at another rate."""
     check_detector(name)
     check_rate(samples, model)
+    if name == BANK:
+        return diagnose(samples, model)
+    lived = without_dead(samples, model)
     if name in _OF_FLIGHTS:
-        return _OF_FLIGHTS[name](samples, model)
+        return silenced(samples, model, _OF_FLIGHTS[name](lived, model))
     detector: Detector = made(DETECTORS, name)
-    return run_detector(detector, samples, model)
+    return silenced(samples, model, run_detector(detector, lived, model))

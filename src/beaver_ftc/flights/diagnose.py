@@ -3,14 +3,15 @@
 Everything a row says comes from samples up to its own time.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import compress
 
 import numpy as np
 from numpy.typing import NDArray
 
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.flights import trust
 from beaver_ftc.flights.bank import UNKNOWN as UNKNOWN_OFFSET
 from beaver_ftc.flights.bank import Bank, bank_of
 from beaver_ftc.flights.filtering import posterior_of
@@ -31,7 +32,8 @@ class Rows:
     """A row a sample.
 
     t_s (n,); faulty (n,) 0 or 1; named (n,) text; estimate, low, high (n, S) effectiveness of each surface;
-    probability (n,) of a fault of any surface.
+    probability (n,) of a fault of any surface; credible (n,) 0 or 1, 1 where nothing else is given; reasons:
+    rows that are not, by what is wrong.
     """
 
     t_s: Floats
@@ -41,13 +43,60 @@ class Rows:
     low: Floats
     high: Floats
     probability: Floats
+    credible: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    reasons: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if len(self.credible) != len(self.t_s):
+            object.__setattr__(self, "credible", np.ones(len(self.t_s), dtype=np.int64))
 
 
 def diagnose(samples: Samples, model: Model) -> Rows:
-    """The diagnosis of each sample. Raises BadInput where the log's rate is not the model's."""
+    """The diagnosis of each sample. Raises BadInput where the log's rate or unit is not the model's."""
     check_rate(samples, model)
     bank = bank_of(model)
-    return _at_stamps(samples, rows_of(samples, model, bank, posterior_of(samples, model, bank)[0]))
+    posterior, _, scale = posterior_of(trust.without_dead(samples, model), model, bank)
+    still = posterior[:, bank.idle] > _IDLE
+    return silenced(samples, model, rows_of(samples, model, bank, posterior), scale, still)
+
+
+def silenced(
+    samples: Samples,
+    model: Model,
+    rows: Rows,
+    scale: Floats | None = None,
+    still: NDArray[np.bool_] | None = None,
+) -> Rows:
+    """Rows at the log's own stamps, that say nothing where the model is not credible, and nothing of a group
+    whose effect it does not know. scale (n,): of the noise, 1 where None; still (n,): where nothing answers
+    the commands."""
+    reasons = trust.outside(samples, model, np.ones(len(samples.t_s)) if scale is None else scale)
+    if still is not None and still.any():
+        reasons["nothing answers the commands: on the ground, or these are not what it follows"] = still
+    silent = np.zeros(len(samples.t_s), dtype=bool)
+    for rows_outside in reasons.values():
+        silent |= rows_outside
+    told = by_surface(np.tile(np.array(trust.claimed(model), dtype=float), (len(silent), 1)), model) > 0.0
+    unsaid = silent[:, None] | ~told
+    told_all = replace(
+        rows,
+        faulty=np.where(silent, 0, rows.faulty),
+        named=np.where(silent, "", _without(rows.named, trust.unclaimed(model))),
+        estimate=np.where(unsaid, 1.0, rows.estimate),
+        low=np.where(unsaid, 0.0, rows.low),
+        high=np.where(unsaid, 1.0, rows.high),
+        probability=np.where(silent, 0.0, rows.probability),
+        credible=np.where(silent, 0, 1),
+        reasons=reasons,
+    )
+    return _at_stamps(samples, told_all)
+
+
+def _without(named: NDArray[np.object_], unclaimed: set[str]) -> NDArray[np.object_]:
+    """Names with no surface of which nothing is claimed: `unknown` in their place."""
+    if not unclaimed:
+        return named
+    return np.array([UNKNOWN if unclaimed & set(name.split("+")) else name for name in named], dtype=object)
 
 
 def check_rate(samples: Samples, model: Model) -> None:
@@ -58,6 +107,7 @@ def check_rate(samples: Samples, model: Model) -> None:
             f"{samples.name}: has samples at {rate_hz:.3g} Hz, allowed: within {_RATE_TOLERANCE:.0%} of the "
             f"{model.rate_hz:.3g} Hz the model was identified at"
         )
+    trust.check_units(samples, model.fitted)
 
 
 def rows_of(samples: Samples, model: Model, bank: Bank, posterior: Floats) -> Rows:
@@ -159,5 +209,7 @@ def _at_stamps(samples: Samples, rows: Rows) -> Rows:
     if len(samples.stamps) == len(rows.t_s) and np.array_equal(samples.stamps, rows.t_s):
         return rows
     last = np.maximum(np.searchsorted(rows.t_s, samples.stamps, side="right") - 1, 0)
-    fields = {name: getattr(rows, name)[last] for name in Rows.__dataclass_fields__ if name != "t_s"}
-    return Rows(t_s=samples.stamps, **fields)
+    others = [name for name in Rows.__dataclass_fields__ if name not in ("t_s", "reasons")]
+    reasons = {reason: rows_outside[last] for reason, rows_outside in rows.reasons.items()}
+    fields = {name: getattr(rows, name)[last] for name in others}
+    return Rows(t_s=samples.stamps, reasons=reasons, **fields)

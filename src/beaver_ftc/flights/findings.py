@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from beaver_ftc.flights import trust
 from beaver_ftc.flights.bank import Bank, bank_of
 from beaver_ftc.flights.diagnose import UNKNOWN, Rows
 from beaver_ftc.flights.model import Model
@@ -23,6 +24,8 @@ Document = dict[str, Any]
 BRIEF_S = 3.0
 HORIZONS_S = (5.0, 20.0, 60.0)
 _ALIKE = 0.9
+_LITTLE = 0.1
+"""Share of credible rows below which there is no verdict."""
 _TOGETHER = (
     "{} get proportional commands while they are healthy: no fit of healthy flight tells their effects "
     "apart. A loss in any of them is named as all of them, and the effectiveness given is that of all "
@@ -41,8 +44,9 @@ def verdict_of(samples: Samples, model: Model, rows: Rows) -> Document:
         "gaps": int(samples.run[-1]),
         "rate_hz": 1.0 / samples.dt_s,
         "faulty": bool(rows.faulty.any()),
+        "credible": trust.account(rows.reasons, rows.credible),
         "events": events_of(rows, list(model.vehicle.surfaces)),
-        "can_separate": sentences(found),
+        "can_separate": [*trust.unclaimed_lines(model), *sentences(found)],
         "isolability": found,
         "settings": model.settings.model_dump(),
         "notes": list(samples.notes),
@@ -107,14 +111,35 @@ def lasting(events: list[Document]) -> list[Document]:
 def as_text(verdict: Document) -> str:
     """The verdict in lines for people."""
     shown, every = lasting(verdict["events"]), len(verdict["events"])
-    what = f"{len(shown)} event{'s' if len(shown) > 1 else ''}" if shown else "no fault shows"
+    what = f"{len(shown)} event{'s' if len(shown) > 1 else ''}" if shown else _nothing(verdict)
     lines = [f"{verdict['flight']}: {what} in {looked_at(verdict)}", *map(_event_line, shown)]
+    lines += credible_lines(verdict)
     if brief := every - len(shown):
         lines.append(f"  and {brief} brief alarm{'s' if brief > 1 else ''} of under {BRIEF_S:g} s")
     lines += [f"  {sentence}" for sentence in (*verdict["can_separate"], *verdict["notes"])]
     for key, value in verdict.get("score", {}).items():
         lines.append(f"  {key}: {value:.3f}" if isinstance(value, float) else f"  {key}: {value}")
     return "\n".join(lines)
+
+
+def _nothing(verdict: Document) -> str:
+    """No event: because no fault shows, or because nothing can be said."""
+    share = verdict["credible"]["share"]
+    if share < _LITTLE:
+        return "no verdict"
+    return "no fault shows" if share >= 1.0 else "no fault shows where the model is credible,"
+
+
+def credible_lines(verdict: Document) -> list[str]:
+    """Where nothing is said of a flight, and why."""
+    known = verdict["credible"]
+    if known["share"] >= 1.0:
+        return []
+    reasons = [f"  {one['says']}: {one['share']:.1%} of the rows" for one in known["reasons"]]
+    return [
+        f"  credible in {known['share']:.1%} of the rows; in the others nothing is said, because",
+        *reasons,
+    ]
 
 
 def looked_at(verdict: Document) -> str:

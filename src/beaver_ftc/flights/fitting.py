@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.flights import regression
+from beaver_ftc.flights import regression, trust
 from beaver_ftc.flights.bank import bank_of
 from beaver_ftc.flights.diagnose import Rows, rows_of
 from beaver_ftc.flights.filtering import posterior_of
@@ -51,6 +51,8 @@ _OTHER_DAYS: dict[str, Any] = {
 drift of the trim is what the means of the residual over 30 s show in that flight."""
 _DELAYS = (-0.4, 0.0, 0.4)
 """Delays beside the model's that a flight may have, in samples."""
+_MOST_PARTS, _MOST_GAIN_SD = 4, 0.33
+"""A gain that is known no better than to a third is not known to be there."""
 _PRIOR_CHANGES = 20
 """Changes that count as seen before the labels are read, half of them repairs."""
 Document = dict[str, Any]
@@ -228,6 +230,51 @@ def folds(stretches: Sequence[Stretch]) -> list[tuple[list[Stretch], Stretch, st
     early = np.arange(len(only.use)) < middle
     first, second = (replace(only, use=only.use & half) for half in (early, ~early))
     return [([first], second, "second half"), ([second], first, "first half")]
+
+
+def trusted(stretches: Sequence[Stretch], model: Model) -> Model:
+    """The model with what it was fitted on, and how it did on parts that were left out."""
+    fits = [(fit_like(fitted, model), kept) for fitted, kept in _parts(stretches)]
+    used = [(stretch.samples, stretch.use) for stretch in stretches]
+    scale = max(_noise(tested, kept) for tested, kept in fits)
+    fit = fit_order(stretches, model.vehicle, model.history, model.lags)
+    known = trust.fitted_on(used, model, gain_sd(fit, len(model.groups), model.lags), scale)
+    return model.model_copy(update={"fitted": known})
+
+
+def _parts(stretches: Sequence[Stretch]) -> list[tuple[list[Stretch], list[Stretch]]]:
+    """What is fitted and what is left out: halves of one flight, or every fourth flight."""
+    if len(stretches) == 1:
+        return [(fitted, [kept]) for fitted, kept, _ in folds(stretches)]
+    count = min(len(stretches), _MOST_PARTS)
+    turns = [[i for i in range(len(stretches)) if i % count == turn] for turn in range(count)]
+    return [
+        ([one for i, one in enumerate(stretches) if i not in out], [stretches[i] for i in out])
+        for out in turns
+    ]
+
+
+def _noise(model: Model, kept: Sequence[Stretch]) -> float:
+    """Largest scale of the noise in parts that were left out, by the filter itself."""
+    bank, largest = bank_of(model), 1.0
+    for one in kept:
+        scale = posterior_of(one.samples, model, bank)[2][one.use]
+        largest = max(largest, float(scale.max(initial=1.0)))
+    return largest
+
+
+def gain_sd(fit: regression.Fit, groups: int, lags: int) -> Floats:
+    """Standard error of each group's gain, (G,): of its response summed over lags, along itself, weighed by
+    the noise. The residuals' colour is in it."""
+    first = len(fit.coefficients) - groups * lags
+    noise = np.sqrt(np.maximum(np.diag(fit.covariance), TINY))
+    found = np.zeros(groups)
+    for g in range(groups):
+        part = slice(first + g * lags, first + (g + 1) * lags)
+        own, errors = fit.coefficients[part].sum(axis=0) / noise, fit.standard_errors[part] / noise
+        variance = np.einsum("la,lm,ma->a", errors, fit.correlation[part, part], errors)
+        found[g] = np.sqrt(own**2 @ np.maximum(variance, 0.0)) / max(float(own @ own), TINY)
+    return np.minimum(found, _MOST_GAIN_SD)
 
 
 def run_tests(stretches: Sequence[Stretch], model: Model) -> tuple[list[Document], float]:

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.flights import fitting
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.flights import fitting, trust
 from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.recording import Floats
 from beaver_ftc.flights.regression import group_indices, spectrum, variance_inflation
@@ -27,6 +28,8 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
     stretches = fitting.stretches_of(flights)
     model = fitting.fit_model(stretches, vehicle)
     tests, bounds = fitting.run_tests(stretches, model)
+    check_explains(tests, stretches, model)
+    model = fitting.trusted(stretches, model)
     found = {
         "flights": [_used(stretch) for stretch in stretches],
         "tests": tests,
@@ -37,6 +40,29 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
     }
     settings = model.settings.model_copy(update={"bounds": bounds})
     return model.model_copy(update={"settings": settings, "identified": found})
+
+
+def check_explains(tests: list[Document], stretches: Sequence[fitting.Stretch], model: Model) -> None:
+    """Raise BadInput where a model explains less of an axis than its mean does, on parts not fitted."""
+    known = [test for test in tests if test["samples"]]
+    weights = [test["samples"] for test in known]
+    shares = {axis: [test["explained"][axis] for test in known] for axis in "pqr"}
+    explained = {axis: float(np.average(values, weights=weights)) for axis, values in shares.items() if known}
+    if worse := {axis: share for axis, share in explained.items() if share <= 0.0}:
+        minutes = sum(int(one.use.sum()) * one.samples.dt_s for one in stretches) / 60.0
+        still = min(_movement(stretches, model).items(), key=lambda pair: pair[1])
+        raise BadInput(
+            f"identify: on parts it was not fitted on the model explains less of {', '.join(worse)} than the "
+            f"mean does ({_axes(worse)}), allowed: a model that explains more; what would help: more than "
+            f"these {minutes:.1f} min, commands that move more ({still[0]} has a standard deviation of "
+            f"{still[1]:.2g}), or the commands that this vehicle follows"
+        )
+
+
+def _movement(stretches: Sequence[fitting.Stretch], model: Model) -> dict[str, float]:
+    """Standard deviation of each surface's command."""
+    commands = np.vstack([stretch.samples.commands[stretch.use] for stretch in stretches])
+    return dict(zip(model.vehicle.surfaces, np.nanstd(commands, axis=0).tolist(), strict=True))
 
 
 def _used(stretch: fitting.Stretch) -> Document:
@@ -57,7 +83,7 @@ def collinear(stretches: Sequence[fitting.Stretch], model: Model) -> list[Docume
 def regressor_names(model: Model) -> list[str]:
     """Names of the columns of the fit after the constant, in their order."""
     rates = [f"{rate}[-{k}]" for k in range(1, model.history + 1) for rate in "pqr"]
-    signals = [f"{name}[-1]" for name in model.vehicle.signals]
+    signals = [f"{name}[-1]" for name in model.vehicle.signal_names]
     delays, groups = range(1, model.lags + 1), map("+".join, model.groups)
     return rates + signals + [f"command of {group}[-{k}]" for group in groups for k in delays]
 
@@ -91,6 +117,7 @@ def summary(model: Model) -> str:
         f"{model.vehicle.name}: {used} samples at {model.rate_hz:.3g} Hz, flights: {len(found['flights'])}; "
         f"past samples of the rates: {model.history}, of the commands: {model.lags}",
         *(f"  together, not to be told apart: {', '.join(g)}" for g in model.groups if len(g) > 1),
+        *(f"  {line}" for line in trust.unclaimed_lines(model)),
         *(f"  {flight['name']}: {note}" for flight in found["flights"] for note in flight["notes"]),
         *map(_test_line, found["tests"]),
         f"  the residual's colour widens standard errors by {_axes(found['colour'])}",

@@ -50,6 +50,23 @@ class Settings(Section):
     bounds: Number = Field(0.9, gt=0, lt=1, description="posterior mass inside the bounds")
 
 
+class Fitted(Section):
+    """What a model was fitted on, and how well it explained what it was not: where it may be believed."""
+
+    commands: Matrix = Field(description="least and largest command of each surface, share of travel")
+    rates: Matrix = Field(description="least and largest p, q and r, rad/s")
+    airspeed: Row | None = Field(default=None, description="least and largest airspeed, m/s")
+    spread: Row = Field(default=[], description="standard deviation of p, q and r, rad/s")
+    correlation: Matrix = Field(default=[], description="correlation of the groups' commands")
+    tied: Row = Field(
+        default=[], description="share of each group's effect that past, signals and other groups make up"
+    )
+    gain_sd: Row = Field(default=[], description="standard error of each group's gain")
+    still_s: dict[str, Number] = Field(default={}, description="longest time each column stood still, s")
+    scale: Number = Field(1.0, gt=0, description="largest scale of the noise on parts not fitted")
+    minutes: Number = Field(0.0, ge=0, description="what was fitted, min")
+
+
 class Model(Section):
     """How one vehicle's rates answer their own past and the commands, and how well that is known."""
 
@@ -64,6 +81,7 @@ class Model(Section):
     response_sd: list[Matrix] = Field(description="standard errors of `response`, colour included")
     noise: Matrix = Field(description="covariance of the residual, (3, 3), (rad/s)2")
     settings: Settings = Settings()
+    fitted: Fitted | None = Field(default=None, description="what it was fitted on; None: nothing is known")
     identified: dict[str, object] = Field(default={}, description="what it was found from, and how well")
 
     def arrays(self) -> tuple[Floats, Floats, Floats, Floats]:

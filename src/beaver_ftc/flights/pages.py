@@ -129,13 +129,13 @@ def _shade(axis: Any, rows: Rows) -> None:
 def columns_of(surfaces: Iterable[str]) -> tuple[str, ...]:
     """Columns of diagnosis.parquet, by the vehicle's surfaces."""
     each = (f"{surface}_{what}" for surface in surfaces for what in ("effectiveness", "low", "high"))
-    return ("t_s", "faulty", "named", *each, "fault_probability")
+    return ("t_s", "faulty", "named", *each, "fault_probability", "credible")
 
 
 def write_diagnosis(out: Path, samples: Samples, model: Model, rows: Rows, verdict: dict[str, Any]) -> Path:
     """Write the folder `out/<flight>` whole or not at all; returns it."""
     each = (column for of in zip(rows.estimate.T, rows.low.T, rows.high.T, strict=True) for column in of)
-    values = rows.t_s, rows.faulty, rows.named.tolist(), *each, rows.probability
+    values = rows.t_s, rows.faulty, rows.named.tolist(), *each, rows.probability, rows.credible
     columns = dict(zip(columns_of(model.vehicle.surfaces), values, strict=True))
     return write_results(out, samples.name, columns, verdict, render(samples, model, rows, verdict))
 

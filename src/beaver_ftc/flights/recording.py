@@ -4,9 +4,10 @@ Which rows of an autopilot's log are in order, and what is said of the others.
 """
 
 from bisect import bisect_left
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass, field
+from difflib import SequenceMatcher
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from beaver_ftc.documents.errors import BadInput
 
 Floats = NDArray[np.float64]
 _US = 1e-6
+_NEAREST = 10
 TINY = float(np.sqrt(np.finfo(float).tiny))
 """What a divisor is at least that may be zero."""
 
@@ -48,6 +50,14 @@ class Recording:
     columns: Mapping[str, Column]
     events: tuple[Event, ...] = ()
     notes: tuple[str, ...] = field(default=())
+
+
+def nearest_ten(given: str, names: Iterable[str]) -> str:
+    """The ten names nearest to what was given, and how many there are besides."""
+    known = sorted(names)
+    ranked = sorted(known, key=lambda name: -SequenceMatcher(None, name.lower(), given.lower()).ratio())
+    shown = ", ".join(name if name.isprintable() else repr(name) for name in ranked[:_NEAREST]) or "none"
+    return shown if len(known) <= _NEAREST else f"{shown}, and {len(known) - _NEAREST} more"
 
 
 @contextmanager

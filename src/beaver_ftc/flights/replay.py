@@ -77,6 +77,7 @@ def _columns(t_s: Floats, verdicts: list[Any], surfaces: list[str]) -> dict[str,
         columns[f"{surface}_effectiveness"] = left
         columns[f"{surface}_low"] = np.where(suspected, 0.0, left)
         columns[f"{surface}_high"] = np.ones(len(left))
+    columns["credible"] = np.ones(len(t_s), dtype=np.int64)  # the model is the one that the flight declares
     return columns
 
 
@@ -103,6 +104,7 @@ def _verdict(path: Path, scenario: Any, log: dict[str, Floats], verdicts: list[A
         "replay": True,
         "duration_s": float(t_s[-1] - t_s[0]),
         "faulty": bool(detected),
+        "credible": {"share": 1.0, "reasons": []},
         "detection_s": detected[0] if detected else None,
         "isolation_s": isolation_s,
         "isolated": name,

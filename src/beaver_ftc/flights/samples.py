@@ -7,8 +7,8 @@ that a log has as many as its rows ask for, whatever its clock does.
 """
 
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -16,8 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.flights import physics, signals
 from beaver_ftc.flights.readers import read_flight
-from beaver_ftc.flights.recording import Column, Event, Floats, Recording
+from beaver_ftc.flights.recording import Column, Event, Floats, Recording, nearest_ten
+from beaver_ftc.flights.units import SECONDS
 from beaver_ftc.flights.vehicle import Vehicle
 
 MIN_RATE_HZ, _MAX_RATE_HZ = 4.0, 1e5
@@ -34,7 +36,8 @@ class Samples:
     t_s (n,) s; rates (n, 3) rad/s; commands (n, S) what each healthy surface would make of the commands;
     signals (n, X); labels (n, S) effectiveness, nan where unknown; run (n,) number of the gap-free stretch;
     age_s: mean age of each held column; stamps (m,) the log's own time stamps, s; notes: what is said of the
-    reading.
+    reading; airspeed (n,) m/s, nan where unknown; still_s: for how long each column of rates, commands and
+    signals has been the same, (n,) s; clipped (n,): whether a rate is.
     """
 
     name: str
@@ -49,14 +52,19 @@ class Samples:
     events: tuple[Event, ...]
     stamps: Floats
     notes: tuple[str, ...] = ()
+    airspeed: Floats | None = None
+    still_s: Mapping[str, Floats] = field(default_factory=dict)
+    clipped: NDArray[np.bool_] | None = None
 
 
 def sample(recording: Recording, vehicle: Vehicle) -> Samples:
     """Put a recording on one time base. Raises BadInput with the reason where the log cannot be used."""
-    names = [vehicle.rates.p, vehicle.rates.q, vehicle.rates.r]
-    used = list(dict.fromkeys([*names, *vehicle.commands, *vehicle.signals]))
+    names = [getattr(vehicle.rates, axis).column for axis in "pqr"]
+    used = list(dict.fromkeys([*names, *vehicle.command_names, *vehicle.signal_names]))
+    recording = in_si(recording, vehicle)
     _require(recording, used, rates=names)
-    stamps = recording.columns[vehicle.rates.p].t_s
+    _consistent(recording, vehicle)
+    stamps = recording.columns[names[0]].t_s
     t_s, run, step = _time_base(recording.name, stamps, vehicle.max_rate_hz)
     found = {name: _at_samples(recording.columns[name], t_s, step) for name in used}
 
@@ -67,21 +75,80 @@ def sample(recording: Recording, vehicle: Vehicle) -> Samples:
         name=recording.name,
         t_s=t_s,
         rates=columns(names),
-        commands=np.einsum("nc,sc->ns", columns(vehicle.commands), mixer(vehicle)),
-        signals=columns(vehicle.signals),
+        commands=np.einsum("nc,sc->ns", columns(vehicle.command_names), mixer(vehicle)),
+        signals=columns(vehicle.signal_names),
         labels=_labels(recording, vehicle, t_s),
         run=run,
         dt_s=step,
         age_s={name: age_s for name, (_, age_s) in found.items() if age_s is not None},
         events=recording.events,
         stamps=stamps,
-        notes=(*recording.notes, *dict.fromkeys(filter(None, (recording.columns[x].note for x in used)))),
+        notes=(*recording.notes, *dict.fromkeys(_remarks(recording, used, names))),
+        airspeed=_airspeed(recording, vehicle, t_s, step),
+        still_s={name: _still(recording.columns[name], t_s) for name in used},
+        clipped=_clipped([recording.columns[name] for name in names], t_s),
     )
+
+
+def _remarks(recording: Recording, used: list[str], rates: list[str]) -> Iterator[str]:
+    """What is wrong with the columns that are used, in lines."""
+    for name in used:
+        yield from signals.remarks(name, recording.columns[name], measured=name in rates)
+
+
+def _still(column: Column, t_s: Floats) -> Floats:
+    """For how long a column has been the same at each sample, s, its own age included."""
+    last = _latest(t_s, column.t_s, column.t_s)
+    return np.nan_to_num(_latest(t_s, column.t_s, signals.still_s(column)) + (t_s - last))
+
+
+def _clipped(rates: list[Column], t_s: Floats) -> NDArray[np.bool_]:
+    """Whether a rate is clipped at each sample."""
+    found = [_latest(t_s, rate.t_s, signals.clipped(rate.values).astype(float)) for rate in rates]
+    return np.asarray(np.nan_to_num(found).any(axis=0))
+
+
+def _airspeed(recording: Recording, vehicle: Vehicle, t_s: Floats, step_s: float) -> Floats | None:
+    """The airspeed at each sample, nan where it is unknown; None where the vehicle has none."""
+    column = recording.columns.get(vehicle.airspeed.column) if vehicle.airspeed else None
+    return None if column is None else _at_samples(column, t_s, step_s)[0]
+
+
+def _consistent(recording: Recording, vehicle: Vehicle) -> None:
+    """Raise BadInput where rates, roll and gravity contradict one another: what is in another unit."""
+    rates = [recording.columns[getattr(vehicle.rates, axis).column] for axis in "pqr"]
+    found = vehicle.attitude and recording.columns.get(vehicle.attitude.roll.column)
+    says = None
+    if vehicle.attitude and found:
+        pitch = vehicle.attitude.pitch
+        theta = recording.columns.get(pitch.column) if pitch else None
+        names = [getattr(vehicle.rates, axis).column for axis in "pqr"]
+        if not signals.clipped(rates[0].values).any():
+            says = physics.roll_says(
+                dict(zip(names, rates, strict=True)), found, theta, vehicle.attitude.roll.column
+            )
+    down = vehicle.acceleration and recording.columns.get(vehicle.acceleration.column)
+    if not says and vehicle.acceleration and down:
+        says = physics.gravity_remark(down, vehicle.acceleration.column)
+    if says:
+        raise BadInput(f"{recording.name}: {says}, allowed: what the vehicle file says, or its `unit` mended")
+
+
+def in_si(recording: Recording, vehicle: Vehicle) -> Recording:
+    """A recording with the columns that a vehicle names in SI."""
+    named = {one.column: one for _, one in vehicle.quantities()}
+    named |= {one.column: one for _, _, one in vehicle.judged()}
+    changed = {
+        name: replace(column, values=named[name].si(column.values))
+        for name, column in recording.columns.items()
+        if name in named
+    }
+    return replace(recording, columns={**recording.columns, **changed})
 
 
 def mixer(vehicle: Vehicle) -> Floats:
     """What each surface makes of each command, (surfaces, commands)."""
-    rows = [[row.get(name, 0.0) for name in vehicle.commands] for row in vehicle.surfaces.values()]
+    rows = [[row.get(name, 0.0) for name in vehicle.command_names] for row in vehicle.surfaces.values()]
     return np.array(rows, dtype=float)
 
 
@@ -90,10 +157,9 @@ def _require(recording: Recording, names: list[str], rates: list[str]) -> None:
     another unit."""
     missing = [name for name in names if name not in recording.columns]
     if missing:
-        known = ", ".join(name if name.isprintable() else repr(name) for name in sorted(recording.columns))
-        raise BadInput(
-            f"{recording.name}: no column {missing[0]}, allowed: a log that has it; it has {known or 'none'}"
-        )
+        known = nearest_ten(missing[0], recording.columns)
+        says = f"no column {missing[0]}, allowed: a log that has it; it has {known}"
+        raise BadInput(f"{recording.name}: {says}")
     largest = {}
     for name in names:
         values = recording.columns[name].values
@@ -105,9 +171,10 @@ def _require(recording: Recording, names: list[str], rates: list[str]) -> None:
             raise BadInput(f"{recording.name}: {holds}")
     for name in rates:
         if largest[name] > _FASTEST_RAD_S:
+            deg = f" (deg/s would be {np.deg2rad(largest[name]):.3g} rad/s: `unit: deg/s`)"
             raise BadInput(
                 f"{recording.name}: column {name} reaches {largest[name]:g}, allowed: rates in rad/s, "
-                f"up to {_FASTEST_RAD_S:g}"
+                f"up to {_FASTEST_RAD_S:g}{deg if np.deg2rad(largest[name]) < _FASTEST_RAD_S else ''}"
             )
 
 
@@ -120,7 +187,7 @@ def _time_base(name: str, stamps: Floats, max_rate_hz: float) -> tuple[Floats, N
     if rate_hz < MIN_RATE_HZ:
         raise BadInput(
             f"{name}: rates are logged at {rate_hz:.2g} Hz, allowed: at least {MIN_RATE_HZ:g} Hz to tell "
-            "a surface's effect from the vehicle's own motion"
+            f"a surface's effect from the vehicle's own motion{_in_another_unit(rate_hz)}"
         )
     if rate_hz > _MAX_RATE_HZ:
         raise BadInput(
@@ -129,7 +196,19 @@ def _time_base(name: str, stamps: Floats, max_rate_hz: float) -> tuple[Floats, N
         )
     if rate_hz <= 1.05 * max_rate_hz:
         return stamps, np.cumsum(np.diff(stamps, prepend=stamps[0]) > _GAP * step), step
-    return _regular(stamps, 1.0 / max_rate_hz)
+    base = _regular(stamps, 1.0 / max_rate_hz)
+    if len(base[0]) < _FIRST:
+        raise BadInput(
+            f"{name}: {len(stamps)} rows within {stamps[-1] - stamps[0]:.3g} s are {len(base[0])} samples at "
+            f"{max_rate_hz:g} Hz, allowed: at least {_FIRST}; is time in another unit?"
+        )
+    return base
+
+
+def _in_another_unit(rate_hz: float) -> str:
+    """The units of time in which a log too slow would be one of 10 to 1000 Hz."""
+    fits = [unit for unit, size in SECONDS.items() if unit != "s" and 10.0 <= rate_hz / size <= 1000.0]
+    return f" (time in {fits[0]} would be {rate_hz / SECONDS[fits[0]]:.3g} Hz)" if fits else ""
 
 
 def _regular(stamps: Floats, step: float) -> tuple[Floats, NDArray[np.int64], float]:
@@ -186,9 +265,10 @@ def _labels(recording: Recording, vehicle: Vehicle, t_s: Floats) -> Floats:
     """Labels (n, S) as the log gives them, nan for a surface without one and where the log says nothing."""
     labels = np.full((len(t_s), len(vehicle.surfaces)), np.nan)
     for i, surface in enumerate(vehicle.surfaces):
-        column = recording.columns.get(vehicle.labels.get(surface, ""))
-        if column is not None:
-            labels[:, i] = _latest(t_s, column.t_s, column.values)
+        label = vehicle.labels.get(surface)
+        column = recording.columns.get(label.column) if label else None
+        if label is not None and column is not None:
+            labels[:, i] = _latest(t_s, column.t_s, label.si(column.values))
     return labels
 
 
@@ -199,13 +279,19 @@ def constant_parts(values: Floats) -> list[tuple[int, int]]:
     return list(pairwise([0, *change.tolist(), len(values)]))
 
 
+def read_for(path: Path, vehicle: Vehicle, reader: str | None = None) -> Recording:
+    """What a vehicle's file wants of a log. Raises BadInput with the reason where it cannot be used."""
+    time = (vehicle.time.column, vehicle.time.unit) if vehicle.time else None
+    return read_flight(path, reader or vehicle.reader, time, vehicle.columns())
+
+
 def load_flights(paths: Sequence[Path], vehicle: Vehicle, reader: str | None = None) -> list[Samples]:
     """The flights, each on one time base. Raises BadInput with a line for each that cannot be used."""
     loaded: list[Samples] = []
     mistakes: list[str] = []
     for path in paths:
         try:
-            loaded.append(sample(read_flight(path, reader or vehicle.reader), vehicle))
+            loaded.append(sample(read_for(path, vehicle, reader), vehicle))
         except BadInput as error:
             mistakes.append(str(error))
     for name, count in Counter(samples.name for samples in loaded).items():

@@ -7,13 +7,14 @@ It names columns, not code. Unknown keys and every other mistake are refused wit
 import re
 from collections.abc import Collection, Iterable
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_serializer, model_validator
 
 from beaver_ftc.documents.base import Conflict, Location, Number, Section, number, refuse
 from beaver_ftc.documents.errors import suggestion
 from beaver_ftc.documents.validation import parse_document, text_of, validate
+from beaver_ftc.flights.units import ACCELERATION, ANGLE, RATE, SECONDS, SPEED, UNITS, units_of
 from beaver_ftc.scenario.loader import looks_like_a_path
 
 _MAX_BYTES = 1_000_000
@@ -25,12 +26,72 @@ ColumnName = Annotated[str, Field(min_length=1, max_length=200)]
 Kind = Literal["loss", "stuck"]
 
 
+class Quantity(Section):
+    """A column of the log and what its numbers are: (scale times the number plus offset) in the unit."""
+
+    column: ColumnName = Field(description="the column's name in the log", examples=["gyro_x"])
+    unit: Literal[tuple(UNITS)] | None = Field(  # type: ignore[valid-type]
+        default=None, description="unit of its numbers, SI where left out", examples=["deg/s"]
+    )
+    scale: Number = number(1.0, unit="1", says="what its numbers are multiplied by", examples=[0.01])
+    offset: Number = number(0.0, unit="as the column", says="added after that", examples=[-1.5])
+
+    @model_validator(mode="after")
+    def _holds_something(self) -> "Quantity":
+        refuse(
+            [(("scale",), "0 leaves nothing of the column, allowed: any other number")] * (self.scale == 0)
+        )
+        return self
+
+    @model_serializer(mode="wrap")
+    def _short(self, whole: Any) -> Any:
+        """A name is enough where nothing else is said."""
+        plain = self.unit is None and self.scale == 1.0 and self.offset == 0.0
+        return self.column if plain else whole(self)
+
+    @property
+    def factor(self) -> float:
+        """What the column's numbers are multiplied by to have them in SI."""
+        return self.scale * (UNITS[self.unit][1] if self.unit else 1.0)
+
+    def si(self, values: Any) -> Any:
+        """The column's numbers in SI."""
+        if self.factor == 1.0 and self.offset == 0.0:
+            return values
+        return values * self.factor + self.offset * self.factor / self.scale
+
+
+def _named(given: Any) -> Any:
+    return {"column": given} if isinstance(given, str) else given
+
+
+Logged = Annotated[Quantity, BeforeValidator(_named)]
+
+
+class Time(Section):
+    """The column of a table that holds its time."""
+
+    column: ColumnName = Field(description="the column's name", examples=["TimeUS"])
+    unit: Literal[tuple(SECONDS)] = Field(  # type: ignore[valid-type]
+        default="s", description="unit of its numbers", examples=["us"]
+    )
+
+
 class Rates(Section):
     """The columns of the three body rates, rad/s."""
 
-    p: ColumnName = Field(description="column of the roll rate, rad/s", examples=["p_rad_s"])
-    q: ColumnName = Field(description="column of the pitch rate, rad/s", examples=["q_rad_s"])
-    r: ColumnName = Field(description="column of the yaw rate, rad/s", examples=["r_rad_s"])
+    p: Logged = Field(description="column of the roll rate, rad/s", examples=["p_rad_s"])
+    q: Logged = Field(description="column of the pitch rate, rad/s", examples=["q_rad_s"])
+    r: Logged = Field(description="column of the yaw rate, rad/s", examples=["r_rad_s"])
+
+
+class Attitude(Section):
+    """Columns of the attitude: what the rates are checked against, and nothing else."""
+
+    roll: Logged = Field(description="column of the roll angle, rad", examples=["roll_rad"])
+    pitch: Logged | None = Field(
+        default=None, description="column of the pitch angle, rad", examples=["pitch_rad"]
+    )
 
 
 class Vehicle(Section):
@@ -40,14 +101,15 @@ class Vehicle(Section):
     reader: Literal["table", "alfa", "ulog", "ardupilot"] | None = Field(
         default=None, description="how its logs are read, where a path does not show it"
     )
+    time: Time | None = Field(default=None, description="the time of a table that has no `t_s`")
     rates: Rates
-    commands: list[ColumnName] = Field(
+    commands: list[Logged] = Field(
         min_length=1,
         max_length=8,
         description="columns of the commands, upstream of what can fail",
         examples=[["roll_cmd", "pitch_cmd"]],
     )
-    signals: list[ColumnName] = Field(
+    signals: list[Logged] = Field(
         default=[],
         max_length=12,
         description="further measured columns the rates depend on",
@@ -60,12 +122,25 @@ class Vehicle(Section):
         json_schema_extra={"unit": "share of 1", "range": "any"},
         examples=[{"left": {"roll_cmd": 0.5, "pitch_cmd": 0.5}}],
     )
-    labels: dict[str, ColumnName] = Field(
+    labels: dict[str, Logged] = Field(
         default={},
         description="columns with each surface's true effectiveness: identification and scoring",
         examples=[{"left": "left_truth"}],
     )
-    outputs: dict[str, ColumnName] = Field(
+    attitude: Attitude | None = Field(
+        default=None, description="attitude, against which the rates are checked"
+    )
+    acceleration: Logged | None = Field(
+        default=None,
+        description="column of the acceleration along z, m/s2: 1 g on the mean",
+        examples=["az_m_s2"],
+    )
+    airspeed: Logged | None = Field(
+        default=None,
+        description="column of the airspeed, m/s: a model holds where it was fitted",
+        examples=["airspeed_m_s"],
+    )
+    outputs: dict[str, Logged] = Field(
         default={},
         description="columns of the servo outputs: read by the freeze rule of a benchmark alone",
         examples=[{"left": "left_pwm"}],
@@ -86,11 +161,61 @@ class Vehicle(Section):
         bad = [name for name in self.surfaces if not _NAME.fullmatch(name)]
         conflicts: list[Conflict] = [(("surfaces", name), f"{name!r}: {says}") for name in bad]
         for surface, row in self.surfaces.items():
-            conflicts += _unknown(("surfaces", surface), row, "command", self.commands)
+            conflicts += _unknown(("surfaces", surface), row, "command", self.command_names)
         for key, table in (("labels", self.labels), ("outputs", self.outputs)):
             conflicts += _unknown((key,), table, "surface", self.surfaces)
+        for place, kind, one in self.judged():
+            if one.unit is not None and UNITS[one.unit][0] != kind:
+                says = f"{one.unit!r} is no unit of it, allowed: {', '.join(units_of(kind))}"
+                conflicts.append(((*place, "unit"), says))
+        conflicts += self._twice()
         refuse(conflicts)
         return self
+
+    def judged(self) -> list[tuple[Location, str, Quantity]]:
+        """The quantities whose kind is known, those only looked at among them, and where they stand."""
+        found: list[tuple[Location, str, Quantity]] = [
+            (("rates", axis), RATE, getattr(self.rates, axis)) for axis in "pqr"
+        ]
+        if self.attitude is not None:
+            found.append((("attitude", "roll"), ANGLE, self.attitude.roll))
+            if self.attitude.pitch is not None:
+                found.append((("attitude", "pitch"), ANGLE, self.attitude.pitch))
+        if self.acceleration is not None:
+            found.append((("acceleration",), ACCELERATION, self.acceleration))
+        if self.airspeed is not None:
+            found.append((("airspeed",), SPEED, self.airspeed))
+        return found
+
+    def _twice(self) -> list[Conflict]:
+        """One column read in two ways."""
+        seen: dict[str, Quantity] = {}
+        for at, one in [*self.quantities(), *((at, one) for at, _, one in self.judged())]:
+            if seen.setdefault(one.column, one) != one:
+                return [(at, f"{one.column!r} is read in two ways, allowed: one unit, scale and offset")]
+        return []
+
+    def quantities(self) -> list[tuple[Location, Quantity]]:
+        """Rates, commands and signals as they stand in the file."""
+        found: list[tuple[Location, Quantity]] = [(("rates", x), getattr(self.rates, x)) for x in "pqr"]
+        found += [(("commands", i), one) for i, one in enumerate(self.commands)]
+        return found + [(("signals", i), one) for i, one in enumerate(self.signals)]
+
+    @property
+    def command_names(self) -> list[str]:
+        """The commands' columns."""
+        return [command.column for command in self.commands]
+
+    @property
+    def signal_names(self) -> list[str]:
+        """The further signals' columns."""
+        return [signal.column for signal in self.signals]
+
+    def columns(self) -> list[str]:
+        """Every column of a log that the vehicle may want, its time aside."""
+        wanted = [one for _, one in self.quantities()] + [one for _, _, one in self.judged()]
+        wanted += [*self.labels.values(), *self.outputs.values()]
+        return list(dict.fromkeys(one.column for one in wanted))
 
 
 def _unknown(at: Location, names: Iterable[str], what: str, known: Collection[str]) -> list[Conflict]:

@@ -239,10 +239,18 @@ def _vehicle(topics: Topics, surfaces: list[str], kind: str) -> str:
         f"reader: {kind}",
         f"rates: {{{rates}}}",
         f"commands: [{', '.join(map(repr, commands))}]",
+        f"attitude: {{{', '.join(f'{axis}: {_angle(columns, axis, kind)}' for axis in ('roll', 'pitch'))}}}",
+        f"airspeed: {next(name for name in columns if 'airspeed' in name.lower())!r}",
         "surfaces:",
         *(f"  {s}: {{{command!r}: 1.0}}" for s, command in zip(surfaces, commands, strict=True)),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _angle(columns: list[str], axis: str, kind: str) -> str:
+    """The column of an attitude angle, with its unit where it is not rad."""
+    name = next(one for one in columns if re.search(rf"(^|\.){axis}(_rad)?$", one.lower()))
+    return f"{{column: {name}, unit: deg}}" if kind == "ardupilot" else repr(name)
 
 
 Write = Callable[[Path, NDArray[np.int64], Topics], None]

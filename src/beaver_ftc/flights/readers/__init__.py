@@ -1,5 +1,6 @@
 """Readers of recorded flights, by name. A new format is one file here and one line in `READERS`."""
 
+from collections.abc import Collection
 from importlib import import_module
 from pathlib import Path
 
@@ -7,25 +8,46 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights.recording import Recording
 
 READERS = ("table", "alfa", "ulog", "ardupilot")
-_BY_SUFFIX = {".csv": "table", ".parquet": "table", ".ulg": "ulog", ".bin": "ardupilot", ".log": "ardupilot"}
+_BY_SUFFIX = {
+    ".csv": "table", ".tsv": "table", ".txt": "table", ".parquet": "table",
+    ".ulg": "ulog", ".bin": "ardupilot", ".log": "ardupilot",
+}  # fmt: skip
 
 
-def read_flight(path: Path, reader: str | None = None) -> Recording:
+_STAMPS = {"alfa": ("%time", "ns"), "ulog": ("timestamp", "us"), "ardupilot": ("TimeUS", "us")}
+"""Where time stands in formats that say it themselves."""
+
+
+def read_flight(
+    path: Path,
+    reader: str | None = None,
+    time: tuple[str, str] | None = None,
+    columns: Collection[str] | None = None,
+) -> Recording:
     """The recorded flight in a file or folder.
 
-    reader: one of READERS; by the path's own form where None. Raises BadInput with one line: why the log
-    cannot be used.
+    reader: one of READERS; by the path's own form where None. time: column and unit of a table's time.
+    columns: those that a table is read for, all where None. Raises BadInput with one line: why the log cannot
+    be used.
     """
     if not path.exists():
         raise BadInput(f"{path}: no such file or folder, allowed: a recorded flight")
-    name = reader or _evident(path)
+    name = reader or evident(path)
     if name not in READERS:
         raise BadInput(f"--reader {name}: is not known, allowed: {', '.join(READERS)}")
-    recording: Recording = import_module(f"beaver_ftc.flights.readers.{name}").read(path)
+    module = import_module(f"beaver_ftc.flights.readers.{name}")
+    if name == "table":
+        table: Recording = module.read(path, *(time or ()), columns=columns)
+        return table
+    if time is not None and time != _STAMPS[name]:
+        column, unit = _STAMPS[name]
+        raise BadInput(f"{path}: time: {' in '.join(time)} is not its time, allowed: {column} in {unit}")
+    recording: Recording = module.read(path)
     return recording
 
 
-def _evident(path: Path) -> str:
+def evident(path: Path) -> str:
+    """The reader that a path asks for by its form. Raises BadInput where none does."""
     if path.is_dir():
         return "alfa"
     name = _BY_SUFFIX.get(path.suffix.lower())

@@ -16,11 +16,10 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights import scoring
 from beaver_ftc.flights.detectors import detector_names, diagnose_with, freeze
 from beaver_ftc.flights.diagnose import Rows
-from beaver_ftc.flights.fitting import Stretch, fit_model, folds, run_tests, stretches_of
+from beaver_ftc.flights.fitting import Stretch, fit_model, folds, run_tests, stretches_of, trusted
 from beaver_ftc.flights.model import Model, Settings
-from beaver_ftc.flights.readers import read_flight
 from beaver_ftc.flights.recording import Recording
-from beaver_ftc.flights.samples import Samples, sample
+from beaver_ftc.flights.samples import Samples, read_for, sample
 from beaver_ftc.flights.scoring import ENGINE
 from beaver_ftc.flights.vehicle import Vehicle, load_vehicle
 from beaver_ftc.results.metrics import as_json
@@ -89,7 +88,7 @@ def _data_set(path: Path) -> DataSet | None:
 
 
 def _read(name: str, vehicle: Vehicle, paths: list[Path]) -> DataSet:
-    recordings = tuple(read_flight(path, vehicle.reader) for path in paths)
+    recordings = tuple(read_for(path, vehicle) for path in paths)
     return DataSet(name, vehicle, recordings, tuple(sample(one, vehicle) for one in recordings))
 
 
@@ -114,7 +113,7 @@ def _compare(data: DataSet) -> Document:
     whole = settings_of(stretches, data) if alone else None
     flights: list[Document] = []
     for fitted, kept, name in folds(stretches):
-        model = fit_model(fitted, data.vehicle, whole)
+        model = trusted(fitted, fit_model(fitted, data.vehicle, whole))
         recording = next(one for one in data.recordings if one.name == kept.samples.name)
         flights += [
             {"left_out": name, "method": method, **_score(kept, rows, model)}

@@ -158,7 +158,7 @@ def _part(data: benchmark.DataSet) -> Document:
     whole = fit_model(stretches, data.vehicle, settings)
     surfaces = len(data.vehicle.surfaces)
     kinds = {
-        "one change": grid(mixer(data.vehicle), list(data.vehicle.commands)),
+        "one change": grid(mixer(data.vehicle), data.vehicle.command_names),
         "drawn, settings chosen on these": drawn(surfaces, CHOSEN_ON),
         "drawn, not looked at": drawn(surfaces, JUDGED_ON),
     }

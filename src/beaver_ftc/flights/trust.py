@@ -1,0 +1,253 @@
+"""Credible or silent: where a model may be believed, and why not elsewhere.
+
+What a model was fitted on is in its file (`Fitted`). A row is credible where the commands, rates and
+the airspeed of the last seconds are such as the fit has seen, where every signal lives, and where the noise
+is no larger than on parts that were not fitted. Elsewhere nothing is said: no name, and bounds of 0 and 1.
+A row uses nothing later than its time.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.flights import regression
+from beaver_ftc.flights.model import Fitted, Model
+from beaver_ftc.flights.recording import TINY, Floats
+from beaver_ftc.flights.samples import Samples
+from beaver_ftc.flights.signals import STILL_S
+
+Document = dict[str, Any]
+Mask = NDArray[np.bool_]
+
+_WIDER = 0.5
+"""Share of its span by which a range is passed before a row is outside."""
+_AIRSPEED = 0.15
+_WINDOW_S, _OUTSIDE = 5.0, 0.5
+_STILL_LONGER = 3.0
+_NOISIER, _LEAST_NOISE, _MOST_NOISE = 1.5, 4.0, 5.8
+_CLIPPED_S = 30.0
+_TIED = 0.98
+_UNIT, _SPREAD = 10.0, 1.6
+_RARE = (0.001, 0.999)
+
+
+def fitted_on(flights: Sequence[tuple[Samples, Mask]], model: Model, gain_sd: Floats, scale: float) -> Fitted:
+    """What a model was fitted on. flights: with the samples used; gain_sd (G,) and scale: of parts not
+    fitted."""
+    groups = regression.group_indices(model)
+    rates = np.vstack([samples.rates[use] for samples, use in flights])
+    commands = np.vstack([samples.commands[use] for samples, use in flights])
+    known = [samples.airspeed[use] for samples, use in flights if samples.airspeed is not None]
+    grouped = np.column_stack([commands[:, group].sum(axis=1) for group in groups])
+    return Fitted(
+        commands=_span(commands),
+        rates=_span(rates),
+        airspeed=_span(np.concatenate(known)[:, None])[0] if known else None,
+        spread=np.nanstd(rates, axis=0).tolist(),
+        correlation=_correlation(grouped).tolist(),
+        tied=_tied(flights, model).tolist(),
+        gain_sd=gain_sd.tolist(),
+        still_s=_longest_still(flights),
+        scale=scale,
+        minutes=sum(int(use.sum()) * samples.dt_s for samples, use in flights) / 60.0,
+    )
+
+
+def _span(values: Floats) -> list[list[float]]:
+    """Least and largest of each column but for the rarest, [0, 0] where nothing is known."""
+    if not values.shape[1]:
+        return []
+    known = np.where(np.isfinite(values).any(axis=0), values, 0.0)
+    return np.nanquantile(known, _RARE, axis=0).T.tolist()
+
+
+def _correlation(values: Floats) -> Floats:
+    centred = np.nan_to_num(values - np.nanmean(values, axis=0))
+    size = np.sqrt((centred**2).sum(axis=0))
+    return np.asarray(centred.T @ centred / np.maximum(np.outer(size, size), TINY))
+
+
+def _longest_still(flights: Sequence[tuple[Samples, Mask]]) -> dict[str, float]:
+    names = dict.fromkeys(name for samples, _ in flights for name in samples.still_s)
+    return {
+        name: max((float(one.still_s[name].max(initial=0.0)) for one, _ in flights if name in one.still_s))
+        for name in names
+    }
+
+
+def _tied(flights: Sequence[tuple[Samples, Mask]], model: Model) -> Floats:
+    """Share of each group's effect on the rates that past, signals and the other groups make up, (G,): where
+    it is near 1 the law ties the group to what it answers to, and its effect cannot be told; 1 where the
+    group never moved."""
+    groups = regression.group_indices(model)
+    parts = [regression.build(one, groups, model.history, model.lags, scaled=True) for one, _ in flights]
+    use = [mask & ok for (_, mask), (_, _, ok) in zip(flights, parts, strict=True)]
+    past = np.vstack([part[0][kept] for part, kept in zip(parts, use, strict=True)])
+    commands = np.vstack([part[1][kept] for part, kept in zip(parts, use, strict=True)])
+    response, noise = np.array(model.response), np.array(model.noise)
+    whiten = np.linalg.inv(np.linalg.cholesky(noise)).T
+    found = np.ones(len(groups))
+    for g in range(len(groups)):
+        others = [commands[:, other] for other in range(len(groups)) if other != g]
+        known = np.column_stack([np.ones(len(past)), past, *others])
+        effect = commands[:, g] @ response[g] @ whiten
+        effect = effect - effect.mean(axis=0)
+        power = float((effect**2).sum())
+        if power > 1e-6 * len(effect):
+            rest = effect - known @ np.linalg.lstsq(known, effect, rcond=None)[0]
+            found[g] = 1.0 - float((rest**2).sum()) / power
+    return found
+
+
+def claimed(model: Model) -> list[bool]:
+    """Whether anything is said of each group."""
+    if model.fitted is None or not model.fitted.tied:
+        return [True] * len(model.groups)
+    return [tied < _TIED for tied in model.fitted.tied]
+
+
+def unclaimed(model: Model) -> set[str]:
+    """The surfaces of which nothing is said."""
+    pairs = zip(model.groups, claimed(model), strict=True)
+    return {name for group, told in pairs if not told for name in group}
+
+
+def unclaimed_lines(model: Model) -> list[str]:
+    """Why nothing is said of some groups."""
+    if model.fitted is None:
+        return []
+    says = "of what {} does, {:.1%} follows from the rates, signals and other surfaces of the flights fitted"
+    return [
+        f"{says.format('+'.join(group), tied)}: its effect cannot be told, nothing is said of it"
+        for group, tied, told in zip(model.groups, model.fitted.tied, claimed(model), strict=False)
+        if not told
+    ]
+
+
+def check_units(samples: Samples, fitted: Fitted | None) -> None:
+    """Raise BadInput where all rates spread so much more or less than in the flights of the model that they
+    are in another unit."""
+    if fitted is None or not fitted.spread:
+        return
+    ratio = np.nanstd(samples.rates, axis=0) / np.maximum(fitted.spread, TINY)
+    middle = float(np.exp(np.mean(np.log(np.maximum(ratio, TINY)))))
+    for unit, size in (("deg/s", 180.0 / np.pi), ("cdeg/s", 18000.0 / np.pi), ("mrad/s", 1000.0)):
+        alike = ratio.max() < _UNIT * ratio.min()
+        if alike and 1.0 / _SPREAD**2 < middle / size < _SPREAD**2:
+            raise BadInput(
+                f"{samples.name}: rates spread {middle:.3g} times as widely as in the flights of the model, "
+                f"allowed: rates in rad/s; a factor of {1.0 / size:.4g} (`unit: {unit}`) fits"
+            )
+        if alike and 1.0 / _SPREAD**2 < middle * size < _SPREAD**2:
+            raise BadInput(
+                f"{samples.name}: rates spread {middle:.3g} times as widely as in the flights of the model, "
+                f"allowed: rates in rad/s; a factor of {size:.4g} fits: the model's own were in {unit}?"
+            )
+
+
+def outside(samples: Samples, model: Model, scale: Floats) -> dict[str, Mask]:
+    """Rows that are not credible, by reason. scale (n,): running scale of the noise."""
+    found: dict[str, Mask] = {}
+    for name, most in _most_still(samples, model).items():
+        found[f"{name} stands still, for longer than {most:.3g} s"] = samples.still_s[name] > most
+    if samples.clipped is not None:
+        found[f"a rate was clipped in the last {_CLIPPED_S:g} s"] = _lately(samples.clipped, samples.dt_s)
+    if model.fitted is None:
+        return _any_of(found)
+    found |= _out_of_range(samples, model, model.fitted)
+    limit = noise_limit(model.fitted)
+    found[f"the model explains it worse than parts it was not fitted on (noise over {limit:.2g})"] = (
+        scale > limit
+    )
+    return _any_of(found)
+
+
+def _lately(rows: Mask, dt_s: float) -> Mask:
+    """Whether a condition held in the last half minute."""
+    order = np.arange(len(rows))
+    since = order - np.maximum.accumulate(np.where(rows, order, -len(rows) - round(_CLIPPED_S / dt_s)))
+    return np.asarray(since * dt_s <= _CLIPPED_S)
+
+
+def noise_limit(fitted: Fitted) -> float:
+    """Scale of the noise above which nothing is credible."""
+    return float(min(max(_NOISIER * fitted.scale, _LEAST_NOISE), _MOST_NOISE))
+
+
+def _any_of(found: dict[str, Mask]) -> dict[str, Mask]:
+    return {reason: rows for reason, rows in found.items() if rows.any()}
+
+
+def _out_of_range(samples: Samples, model: Model, fitted: Fitted) -> dict[str, Mask]:
+    names = [f"command of {surface}" for surface in model.vehicle.surfaces]
+    columns = [
+        *zip(names, samples.commands.T, fitted.commands, strict=False),
+        *zip(_rates(model), samples.rates.T, fitted.rates, strict=False),
+    ]
+    found = {}
+    for name, values, (low, high) in columns:
+        more = _WIDER * (high - low) + TINY
+        found[_says(name, low, high)] = _often(~_within(values, low - more, high + more), samples)
+    if fitted.airspeed is not None and samples.airspeed is not None:
+        low, high = fitted.airspeed
+        apart = ~_within(samples.airspeed, (1.0 - _AIRSPEED) * low, (1.0 + _AIRSPEED) * high)
+        found[_says("airspeed", low, high)] = _often(apart, samples)
+    return found
+
+
+def _says(name: str, low: float, high: float) -> str:
+    return f"{name} is outside {low:.3g} to {high:.3g}, where the model was fitted"
+
+
+def _within(values: Floats, low: float, high: float) -> Mask:
+    return np.asarray(~np.isfinite(values) | ((values >= low) & (values <= high)))
+
+
+def _often(rows: Mask, samples: Samples) -> Mask:
+    """Where a condition held in half of the last seconds."""
+    length = max(round(_WINDOW_S / samples.dt_s), 1)
+    total = np.concatenate([[0], np.cumsum(rows)])
+    begin = np.maximum(np.arange(1, len(rows) + 1) - length, 0)
+    return np.asarray(total[1:] - total[begin] > _OUTSIDE * length)
+
+
+def _rates(model: Model) -> list[str]:
+    return [getattr(model.vehicle.rates, axis).column for axis in "pqr"]
+
+
+def _most_still(samples: Samples, model: Model) -> dict[str, float]:
+    """For how long each column may stand still, s: a measured rate hardly, another thrice as long as in the
+    flights of the model."""
+    known = model.fitted.still_s if model.fitted else {}
+    usual = {name: 0.0 if name in _rates(model) else np.inf for name in samples.still_s} | known
+    return {name: max(STILL_S, _STILL_LONGER * usual[name]) for name in samples.still_s}
+
+
+def dead(samples: Samples, model: Model) -> Mask:
+    """Samples with a signal that does not live: what the filter is not to learn from."""
+    found = np.zeros(len(samples.t_s), dtype=bool)
+    for name, most in _most_still(samples, model).items():
+        found |= samples.still_s[name] > most
+    return found if samples.clipped is None else found | samples.clipped
+
+
+def without_dead(samples: Samples, model: Model) -> Samples:
+    """The flight with nothing known where a signal does not live."""
+    lost = dead(samples, model)
+    if not lost.any():
+        return samples
+    return replace(samples, rates=np.where(lost[:, None], np.nan, samples.rates))
+
+
+def account(found: Mapping[str, Mask], credible: NDArray[np.int64]) -> Document:
+    """Of verdict.json: the share of credible rows, and the reasons for the others with their shares."""
+    shares = {reason: float(rows.mean()) for reason, rows in found.items()}
+    ordered = sorted(shares, key=lambda reason: -shares[reason])
+    return {
+        "share": float(credible.mean()) if len(credible) else 0.0,
+        "reasons": [{"says": reason, "share": shares[reason]} for reason in ordered],
+    }

@@ -1,0 +1,33 @@
+"""Units that a vehicle file may name, and what they are in SI; a share of travel has 1."""
+
+from math import pi
+
+RATE, ANGLE, SPEED, ACCELERATION, LENGTH, SHARE, TIME = (
+    "rate", "angle", "speed", "acceleration", "length", "share", "time",
+)  # fmt: skip
+_DEG, _G = pi / 180.0, 9.80665
+UNITS: dict[str, tuple[str, float]] = {
+    "rad/s": (RATE, 1.0), "deg/s": (RATE, _DEG), "cdeg/s": (RATE, 0.01 * _DEG), "mrad/s": (RATE, 1e-3),
+    "rad": (ANGLE, 1.0), "deg": (ANGLE, _DEG), "cdeg": (ANGLE, 0.01 * _DEG), "mrad": (ANGLE, 1e-3),
+    "m/s": (SPEED, 1.0), "cm/s": (SPEED, 0.01), "km/h": (SPEED, 1.0 / 3.6), "kt": (SPEED, 1852.0 / 3600.0),
+    "ft/s": (SPEED, 0.3048), "mph": (SPEED, 0.44704),
+    "m/s2": (ACCELERATION, 1.0), "g": (ACCELERATION, _G), "mg": (ACCELERATION, 1e-3 * _G),
+    "ft/s2": (ACCELERATION, 0.3048),
+    "m": (LENGTH, 1.0), "cm": (LENGTH, 0.01), "ft": (LENGTH, 0.3048),
+    "1": (SHARE, 1.0), "%": (SHARE, 0.01),
+}  # fmt: skip
+"""Of each unit what it measures, and how much of the SI unit it is."""
+SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+"""Units of the time column."""
+
+
+def units_of(kind: str) -> list[str]:
+    """The units of one kind, the SI unit first."""
+    return [name for name, (of, _) in UNITS.items() if of == kind]
+
+
+def nearest_unit(kind: str, factor: float, within: float) -> str | None:
+    """The unit of a kind whose size in SI is this factor, within so many times; None where none is."""
+    ratios = {name: max(factor / UNITS[name][1], UNITS[name][1] / factor) for name in units_of(kind)}
+    best = min(ratios, key=lambda name: ratios[name])
+    return best if ratios[best] <= within else None

@@ -1,0 +1,228 @@
+"""`identify --check`, tables as people write them, and mis-scaled logs, through the command."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from beaver_ftc.cli.main import app
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.flights.readers import read_flight
+from beaver_ftc.flights.vehicle import load_vehicle
+from flights import limited, synthetic
+from flights.test_signals import T_S, turning
+
+PHI, THETA, RATES = turning()
+KINEMATIC = {
+    "t_s": T_S, "p_rad_s": RATES[0], "q_rad_s": RATES[1], "r_rad_s": RATES[2],
+    "roll_cmd": 0.3 * np.sin(T_S), "pitch_cmd": 0.2 * np.cos(1.3 * T_S), "roll_rad": PHI, "pitch_rad": THETA,
+    "az_m_s2": -9.8 + 0.1 * np.sin(2.0 * T_S),
+}  # fmt: skip
+
+
+def run(*arguments):
+    done = CliRunner().invoke(app, [str(argument) for argument in arguments])
+    if done.exception is not None and not isinstance(done.exception, SystemExit):
+        raise done.exception
+    return done
+
+
+def logged(path, names=None, factors=None, delimiter=",", comma=False, above=()):
+    """The kinematic flight as somebody else writes it."""
+    names, factors = names or {}, factors or {}
+    rows = np.column_stack([values * factors.get(name, 1.0) for name, values in KINEMATIC.items()])
+    lines = [*above, delimiter.join(names.get(name, name) for name in KINEMATIC)]
+    lines += [delimiter.join(f"{cell:.9g}" for cell in row) for row in rows]
+    text = "\n".join(lines) + "\n"
+    path.write_text(text.replace(".", ",") if comma else text)
+    return path
+
+
+def test_a_strangers_log_is_told_and_gets_a_vehicle_file(tmp_path):
+    names = {"t_s": "TimeUS", "p_rad_s": "GyrX", "q_rad_s": "GyrY", "r_rad_s": "GyrZ"}
+    factors = dict.fromkeys(names, 57.29578) | {"t_s": 1e6}
+    path = logged(tmp_path / "their log.csv", names, factors, ";", True, ("a logger", "v2"))
+    out = tmp_path / "their.yaml"
+    done = run("identify", "--check", path, "--out", out)
+    assert done.exit_code == 0
+    for said in (
+        "time is in column TimeUS, its steps fit us", "names are in line 3",
+        "semicolons, with a decimal comma", "1200 samples at 20 Hz", "they agree",
+    ):  # fmt: skip
+        assert said in done.stdout
+    vehicle = load_vehicle(out)
+    assert (vehicle.time.column, vehicle.time.unit) == ("TimeUS", "us")
+    assert vehicle.rates.p.unit == "deg/s"
+    assert vehicle.command_names == ["roll_cmd", "pitch_cmd"]
+    again = json.loads(run("identify", "--check", path, "--vehicle", out, "--format", "json").stdout)
+    assert again["logs"][0]["usable"]
+    assert again["vehicle"] is None
+
+
+@pytest.mark.parametrize(("factors", "says"), [
+    ({"p_rad_s": 57.29578, "q_rad_s": 57.29578, "r_rad_s": 57.29578}, "p_rad_s is in deg/s"),
+    ({"roll_rad": 57.29578}, "roll_rad is in deg"),
+    ({"az_m_s2": 1 / 9.80665}, "it is in g, a factor of 9.807 fits"),
+    ({"p_rad_s": -1.0}, "one of them has the other sign"),
+    ({"t_s": 1e-3}, "is time in another unit?"),
+])  # fmt: skip
+def test_a_mis_scaled_column_is_refused_with_the_factor_that_fits(tmp_path, factors, says):
+    (tmp_path / "v.yaml").write_text(
+        "name: k\nrates: {p: p_rad_s, q: q_rad_s, r: r_rad_s}\ncommands: [roll_cmd, pitch_cmd]\n"
+        "surfaces: {a: {roll_cmd: 1}, e: {pitch_cmd: 1}}\nattitude: {roll: roll_rad, pitch: pitch_rad}\n"
+        "acceleration: az_m_s2\n"
+    )
+    path = logged(tmp_path / "k.csv", factors=factors)
+    done = run("identify", "--check", path, "--vehicle", tmp_path / "v.yaml")
+    assert done.exit_code == 2
+    assert says in done.stdout
+    with pytest.raises(BadInput, match="k: ") as error:
+        run("identify", path, "--vehicle", tmp_path / "v.yaml", "--out", tmp_path / "m.json")
+    assert says in str(error.value)
+    assert len(str(error.value).splitlines()) == 1
+
+
+def test_a_log_without_rates_names_what_it_has(tmp_path):
+    path = synthetic.write_csv(
+        tmp_path / "a.csv", {"t_s": T_S, "height": T_S, **{f"c{i}": T_S for i in range(30)}}
+    )
+    done = run("identify", "--check", path)
+    assert done.exit_code == 2
+    assert "no column looks like the rate p" in done.stdout
+
+
+def test_identify_without_check_wants_vehicle_and_out(tmp_path):
+    path = logged(tmp_path / "k.csv")
+    with pytest.raises(BadInput, match="--vehicle is missing"):
+        run("identify", path)
+    with pytest.raises(BadInput, match="--out is missing"):
+        run("identify", path, "--vehicle", "alfa")
+    (tmp_path / "there.yaml").write_text("")
+    with pytest.raises(BadInput, match=r"there.yaml exists, allowed: another name"):
+        run("identify", "--check", path, "--out", tmp_path / "there.yaml")
+
+
+@pytest.mark.parametrize(("change", "notes"), [
+    (lambda t: [x.replace(",", ";") for x in t], ["cells are parted by semicolons"]),
+    (lambda t: [x.replace(",", ";").replace(".", ",") for x in t],
+     ["cells are parted by semicolons, with a decimal comma"]),
+    (lambda t: [x.replace(",", "\t") for x in t], ["cells are parted by tabs"]),
+    (lambda t: ["logger 3", "", *t], ["names are in line 3, what is above is left out"]),
+    (lambda t: [t[0], "s,rad/s" + ",1" * 6, *t[1:]], ["t_s: rows without a number, left out: 1 of 201"]),
+    (lambda t: [*t[:7], t[7] + ",3", *t[8:], "1,2"], ["lines with too few or too many cells, left out: 1"]),
+])  # fmt: skip
+def test_tables_as_people_write_them(tmp_path, change, notes):
+    plain = synthetic.write_csv(tmp_path / "plain.csv", synthetic.fly(20.0))
+    other = tmp_path / "other.csv"
+    other.write_text("\n".join(change(plain.read_text().splitlines()[:-1])) + "\n")
+    read, expected = read_flight(other), read_flight(plain)
+    assert set(notes) <= set(read.notes) or notes[0][:40] in "".join(read.notes)
+    column, same = read.columns["q_rad_s"], expected.columns["q_rad_s"]
+    np.testing.assert_array_equal(column.values, same.values[np.isin(same.t_s, column.t_s)])
+    assert len(column.values) >= 198
+
+
+def test_an_err_in_a_cell_is_that_cell_and_no_more(tmp_path):
+    lines = synthetic.write_csv(tmp_path / "a.csv", synthetic.fly(20.0)).read_text().splitlines()
+    cells = lines[9].split(",")
+    lines[9] = ",".join([cells[0], "ERR", *cells[2:]])
+    (tmp_path / "b.csv").write_text("\n".join(lines) + "\n")
+    column = read_flight(tmp_path / "b.csv").columns["p_rad_s"]
+    assert np.flatnonzero(np.isnan(column.values)).tolist() == [8]
+    assert column.note == "p_rad_s: 1 cell holds no number, the first in row 9: 'ERR'"
+
+
+@pytest.mark.parametrize(("content", "says"), [
+    (b"0.0,1.0\n0.1,2.0\n", "its first line holds numbers and no names"),
+    (bytes(range(256)), "it holds bytes that are no text"),
+    ("t_s,p\n1,2\n".encode("utf-16"), "is written in UTF-16"),
+    (b"a line\nanother\n", "no line of names with a line of as many numbers below it"),
+    (b"t_s,p\n1,2\n1,2,3\n1\n", "2 of 3 lines have another number of cells than the header"),
+])  # fmt: skip
+def test_no_table_says_what_was_found(tmp_path, content, says):
+    (tmp_path / "a.csv").write_bytes(content)
+    with pytest.raises(BadInput, match=says):
+        read_flight(tmp_path / "a.csv")
+
+
+def test_a_jump_of_a_million_seconds_needs_little_memory(tmp_path):
+    """In 3 GB of address space, as a process of its own."""
+    vehicle = tmp_path / "wing.yaml"
+    vehicle.write_text(synthetic.VEHICLE)
+    columns = synthetic.fly(240.0)
+    columns["t_s"][1200:] += 1e6
+    path = synthetic.write_csv(tmp_path / "jump.csv", columns)
+    statuses, said = limited.run([["identify", "--check", path, "--vehicle", vehicle]])
+    assert (statuses, said) == ([0], "")
+
+
+def test_of_a_wide_table_only_what_the_vehicle_names_is_read(tmp_path):
+    path = synthetic.write_csv(tmp_path / "a.csv", synthetic.fly(20.0))
+    columns = read_flight(path, columns=["p_rad_s"]).columns
+    assert np.isfinite(columns["p_rad_s"].values).all()
+    assert np.isnan(columns["q_rad_s"].values).all()
+    assert columns["q_rad_s"].values.strides == (0,)  # one number stands for all
+
+
+def test_columns_of_a_vehicle_have_units_scale_and_offset(tmp_path):
+    (tmp_path / "v.yaml").write_text(
+        "name: w\ntime: {column: ms, unit: ms}\n"
+        "rates: {p: {column: gx, unit: deg/s, scale: 0.1}, q: gy, r: gz}\n"
+        "commands: [{column: pwm, scale: 0.0025, offset: -3.75}, {column: share, unit: '%'}]\n"
+        "surfaces: {a: {pwm: 1}, e: {share: 1}}\n"
+    )
+    from beaver_ftc.flights.samples import load_flights
+
+    n = 200
+    rng = np.random.default_rng(1)
+    spread = {"gx": 30.0, "gy": 1.0, "gz": 1.0, "pwm": 50.0, "share": 20.0}
+    columns = {name: rng.normal(0.0, sd, n) for name, sd in spread.items()}
+    columns = {"ms": np.arange(n) * 100.0, **columns, "pwm": 1500.0 + columns["pwm"]}
+    (samples,) = load_flights(
+        [synthetic.write_csv(tmp_path / "a.csv", columns)], load_vehicle(tmp_path / "v.yaml")
+    )
+    assert samples.dt_s == pytest.approx(0.1)
+    np.testing.assert_allclose(samples.rates[:, 0], np.deg2rad(0.1 * columns["gx"]))
+    np.testing.assert_allclose(samples.commands[:, 0], (columns["pwm"] - 1500.0) / 400.0, atol=1e-12)
+    np.testing.assert_allclose(samples.commands[:, 1], columns["share"] / 100.0)
+
+
+@pytest.mark.parametrize(("keys", "says"), [
+    ("rates: {p: {column: a, unit: deg}, q: b, r: c}", "rates.p.unit: 'deg' is no unit of it, allowed:"),
+    ("rates: {p: {column: a, scale: 0}, q: b, r: c}", "rates.p.scale: 0 leaves nothing of the column"),
+    ("rates: {p: a, q: {column: a, unit: deg/s}, r: c}", "rates.q: 'a' is read in two ways"),
+    ("rates: {p: a, q: b, r: c}\ntime: {column: t, unit: min}", "time.unit: 'min' is not known, allowed: s,"),
+])  # fmt: skip
+def test_a_mistaken_unit_is_a_line(tmp_path, keys, says):
+    (tmp_path / "v.yaml").write_text(f"name: w\n{keys}\ncommands: [u]\nsurfaces: {{x: {{u: 1}}}}\n")
+    with pytest.raises(BadInput) as error:
+        load_vehicle(tmp_path / "v.yaml")
+    assert says in str(error.value)
+
+
+def test_a_log_that_says_its_time_itself_is_asked_for_no_other(tmp_path):
+    (tmp_path / "a.log").write_text("")
+    with pytest.raises(BadInput, match="time: t in s is not its time, allowed: TimeUS in us"):
+        read_flight(tmp_path / "a.log", None, ("t", "s"))
+
+
+def test_the_sample_logs_are_followed_from_check_to_diagnosis(tmp_path):
+    """The whole way of the page: the weak elevon is named, and nothing before it."""
+    run("new", "mine", "--log", "--out", tmp_path)
+    folder = tmp_path / "mine"
+    vehicle, model = folder / "vehicle.yaml", folder / "model.json"
+    checked = run("identify", "--check", folder / "healthy.csv", "--vehicle", vehicle)
+    assert "they agree" in checked.stdout
+    run("identify", folder / "healthy.csv", "--vehicle", vehicle, "--out", model)
+    done = run(
+        "diagnose", folder / "suspect.csv", "--model", model, "--out", tmp_path / "out", "--format", "json"
+    )
+    (verdict,) = json.loads(done.stdout)["flights"]
+    assert verdict["credible"] == {"share": 1.0, "reasons": []}
+    assert {event["named"] for event in verdict["events"]} == {"left"}
+    assert 90.0 < verdict["events"][0]["from_s"] < 110.0
+    with pytest.raises(BadInput, match="exists, allowed: another name"):
+        run("new", "mine", "--log", "--out", tmp_path)
+    with pytest.raises(BadInput, match="--like and --log are given"):
+        run("new", "other", "--log", "--like", "fault-free")

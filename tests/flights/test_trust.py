@@ -1,0 +1,208 @@
+"""A model is believed where it was fitted, and silent elsewhere."""
+
+import numpy as np
+import pytest
+
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.flights import fitting, identification, trust
+from beaver_ftc.flights.bank import adaptation_of
+from beaver_ftc.flights.diagnose import diagnose, silenced
+from beaver_ftc.flights.findings import as_text, verdict_of
+from flights import small
+
+HEALTHY = small.flight(small.model(), n=1200, seed=2)
+
+
+def trusted(flown=HEALTHY, **changes):
+    """A model by hand that knows what it was fitted on."""
+    model = small.model(**changes)
+    stretches = fitting.stretches_of([flown])
+    return fitting.trusted(stretches, model)
+
+
+@pytest.fixture(scope="module")
+def model():
+    return trusted()
+
+
+def silent(rows):
+    """Rows that say nothing at all."""
+    return (
+        (rows.named == "")
+        & (rows.faulty == 0)
+        & (rows.low == 0.0).all(axis=1)
+        & (rows.high == 1.0).all(axis=1)
+    )
+
+
+def test_a_flight_like_those_fitted_is_credible(model):
+    rows = diagnose(small.flight(model, n=600, lost=((1, 300, 600, 0.3),), seed=8), model)
+    assert rows.credible.mean() == 1.0
+    assert rows.reasons == {}
+    assert "left" in set(rows.named[450:])
+
+
+@pytest.mark.parametrize(("change", "says"), [
+    (lambda f: f.commands.__setitem__((slice(300, None), 0), f.commands[300:, 0] * 8.0),
+     "command of right is outside"),
+    (lambda f: f.rates.__setitem__((slice(300, None), 1), f.rates[300:, 1] + 9.0), "q_rad_s is outside"),
+])  # fmt: skip
+def test_where_it_was_not_fitted_it_says_nothing(model, change, says):
+    flown = small.flight(model, n=600, seed=4)
+    change(flown)
+    rows = diagnose(flown, model)
+    assert rows.credible[:300].all()
+    out = rows.credible == 0
+    assert out[-50:].all()
+    assert silent(rows)[out].all()
+    assert any(says in reason for reason in rows.reasons)
+    verdict = verdict_of(flown, model, rows) | {"score": {}}
+    assert verdict["credible"]["share"] == pytest.approx(1.0 - out.mean())
+    assert says in as_text(verdict)
+
+
+def test_what_it_explains_worse_than_held_out_parts_is_not_credible(model):
+    """Rates that answer nothing: the scale of the noise grows within its memory of a minute."""
+    flown = small.flight(model, n=1500, seed=4)
+    flown.rates[300:] = np.random.default_rng(1).normal(0.0, 0.6, (1200, 3))
+    rows = diagnose(flown, model)
+    assert rows.credible[:300].all()
+    assert silent(rows)[-50:].all()
+    assert "the model explains it worse than parts it was not fitted on (noise over 4)" in rows.reasons
+
+
+def test_a_signal_that_stands_still_is_named_and_not_learnt_from(model):
+    still = np.zeros(600)
+    still[300:400] = 0.1 * np.arange(100)
+    flown = small.flight(model, n=600, seed=4, still_s={"q_rad_s": still})
+    rows = diagnose(flown, model)
+    assert (rows.credible == 0).tolist() == (still > 1.5).tolist()
+    assert list(rows.reasons) == ["q_rad_s stands still, for longer than 1.5 s"]
+
+
+def test_a_command_may_stand_still_thrice_as_long_as_it_did(model):
+    trained = model.fitted.model_copy(update={"still_s": {"roll": 4.0}})
+    known = model.model_copy(update={"fitted": trained})
+    for longest, share in ((11.9, 1.0), (12.5, 0.98)):
+        flown = small.flight(
+            model, n=600, seed=4, still_s={"roll": np.where(np.arange(600) < 12, longest, 0.0)}
+        )
+        assert diagnose(flown, known).credible.mean() == pytest.approx(share)
+
+
+def test_rows_use_nothing_later(model):
+    flown = small.flight(model, n=600, seed=4)
+    flown.rates[300:] += 5.0
+    whole = diagnose(flown, model)
+    part = {
+        name: getattr(flown, name)[:350]
+        for name in ("t_s", "rates", "commands", "signals", "labels", "run", "stamps")
+    }
+    cut = diagnose(small.flight(model, n=600, seed=4, **part), model)
+    np.testing.assert_array_equal(cut.credible, whole.credible[:350])
+    np.testing.assert_array_equal(cut.low, whole.low[:350])
+
+
+@pytest.mark.parametrize(("factor", "says"), [
+    (57.29578, r"a factor of 0\.01745 \(`unit: deg/s`\) fits"),
+    (1.0 / 57.29578, r"a factor of 57\.3 fits"),
+    (3.0, None),
+])  # fmt: skip
+def test_rates_in_another_unit_than_the_models_own(model, factor, says):
+    flown = small.flight(model, n=300, seed=4, rates=HEALTHY.rates[:300] * factor)
+    if says is None:
+        trust.check_units(flown, model.fitted)
+        return
+    with pytest.raises(BadInput, match=says):
+        diagnose(flown, model)
+
+
+def test_what_the_law_ties_together_is_not_claimed(model):
+    """The right surface follows the rates of the sample, the left one moves by itself."""
+    flown = small.flight(model, n=2000, seed=3)
+    follows = np.vstack([np.zeros(3), flown.rates[:-1]]) @ [0.4, -0.3, 0.2]
+    commands = np.column_stack([follows, flown.commands[:, 1]])
+    share = trust._tied(
+        [(small.flight(model, n=2000, commands=commands, rates=flown.rates), np.ones(2000, bool))],
+        small.model(history=4, lags=3),
+    )
+    assert share[0] > 0.98
+    assert share[1] < 0.9
+
+
+def test_a_surface_that_never_moved_is_not_claimed(model):
+    still = small.flight(model, n=1200, seed=2)
+    still.commands[:, 0] = 0.2
+    known = trusted(still)
+    assert trust.claimed(known) == [False, True]
+    rows = diagnose(small.flight(model, n=600, lost=((0, 200, 600, 0.0),), seed=8), known)
+    assert (rows.low[:, 0] == 0.0).all()
+    assert (rows.high[:, 0] == 1.0).all()
+    assert not any("right" in name for name in rows.named)
+    (line,) = trust.unclaimed_lines(known)
+    assert line.startswith("of what right does, 100.0%")
+
+
+def test_few_minutes_mean_wide_bounds():
+    """Standard errors of gains fall as the root of the time."""
+    errors = []
+    for n in (400, 6400):
+        flown = small.flight(small.model(), n=n, seed=6)
+        model = fitting.fit_model(fitting.stretches_of([flown]), small.vehicle())
+        errors.append(np.array(fitting.trusted(fitting.stretches_of([flown]), model).fitted.gain_sd))
+    assert (errors[0] / errors[1] > 2.0).all()
+    assert (errors[0] / errors[1] < 8.0).all()
+
+
+def test_a_model_that_explains_less_than_the_mean_is_refused():
+    tests = [
+        {"samples": 100, "explained": {"p": -71.0, "q": 0.5, "r": 0.1}},
+        {"samples": 300, "explained": {"p": 0.5, "q": -0.1, "r": 0.1}},
+    ]
+    stretches = fitting.stretches_of([HEALTHY])
+    with pytest.raises(BadInput) as error:
+        identification.check_explains(tests, stretches, small.model())
+    said = str(error.value)
+    assert "explains less of p than the mean does (p -17.375)" in said
+    assert "more than these 1.9 min" in said
+    identification.check_explains(
+        tests[1:] + [tests[1] | {"explained": {"p": 0.5, "q": 0.2, "r": 0.1}}] * 3, stretches, small.model()
+    )
+
+
+def test_a_gain_known_worse_than_a_step_of_the_levels_is_free_by_as_much(model):
+    def spread(*errors):
+        known = model.fitted.model_copy(update={"gain_sd": list(errors)})
+        given = model.model_copy(update={"fitted": known})
+        return np.diag(adaptation_of(given).covariance)[4:]
+
+    step, own = model.settings.level_step, model.settings.own_gain_sd
+    assert spread(0.0, step) == pytest.approx([own**2, own**2])
+    assert spread(0.3, 0.2) == pytest.approx([own**2 + 0.09 - step**2, own**2 + 0.04 - step**2])
+
+
+def test_a_model_that_was_fitted_on_little_says_little(model):
+    """A weak surface from the start, or a gain less than the fit says? Bounds hold both."""
+    flown = small.flight(model, n=600, lost=((1, 0, 600, 0.5),), seed=8)
+    widths = []
+    for error in (0.0, 0.3):
+        known = model.fitted.model_copy(update={"gain_sd": [error, error]})
+        rows = diagnose(flown, model.model_copy(update={"fitted": known}))
+        widths.append((rows.high - rows.low)[100:].mean())
+    assert widths[1] > 1.5 * widths[0]
+
+
+def test_commands_that_nothing_follows_are_not_credible(model):
+    flown = small.flight(model, n=600, seed=4)
+    still = np.arange(600) >= 400
+    rows = silenced(flown, model, diagnose(flown, model), still=still)
+    assert (rows.credible == 0).tolist() == still.tolist()
+    assert silent(rows)[still].all()
+    assert [reason.split(":")[0] for reason in rows.reasons] == ["nothing answers the commands"]
+
+
+def test_after_a_clipped_rate_nothing_is_said_for_half_a_minute(model):
+    clipped = np.arange(600) == 100
+    rows = diagnose(small.flight(model, n=600, seed=4, clipped=clipped), model)
+    assert np.flatnonzero(rows.credible == 0).tolist() == list(range(100, 401))
+    assert list(rows.reasons) == ["a rate was clipped in the last 30 s"]

@@ -242,7 +242,7 @@ class ThrustSection(Section):
     """
 
     airspeed_mps: Steps = entry(..., unit="m/s", examples=[[40, 60]])
-    setting: Steps = entry(..., unit="as the setting has it", examples=[[0, 0.5, 1]])
+    setting: Steps = entry(..., unit="as the setting has it", examples=[[10, 20, 30]])
     force_n: tuple[_Forces, ...] = number(
         ..., "N", range="in order", max_length=MAX_THRUST, examples=[[[-100, 900, 2000], [-300, 500, 1500]]]
     )

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from beaver_ftc.diagnosis import isolation, zhang2005
-from beaver_ftc.diagnosis.isolation import ISOLATION
+from beaver_ftc.diagnosis.isolation import isolation_dtype
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plugins import DETECTORS, options_of, settings
 from beaver_ftc.scenario.loader import load_text
@@ -107,7 +107,7 @@ def test_the_alarm_is_of_the_first_axis_beyond_its_threshold(residual, axis):
 )
 def test_the_residual_of_the_true_estimator_is_omega_times_what_the_estimate_misses(theta, gain, Z, projects):
     """However it adapts: the term Om ths' of the estimator sees to that."""
-    records = np.zeros(1, ISOLATION).view(np.recarray)[0]
+    records = np.zeros(1, isolation_dtype(4)).view(np.recarray)[0]
     records.decay[:], records.by_gradient, records.gradient = zhang2005.euler(POLE, DT), 1, gain
     fie = records.estimator[0]
     fie.low, fie.high, fie.theta_low[:], fie.theta_high[:] = -1.0, 0.0, -np.inf, np.inf

@@ -20,12 +20,12 @@ The sharpened tests (bank.py, membership.py) exclude beside it, each by its own 
 by the first test that fails.
 """
 
+from functools import lru_cache
 from math import exp
 
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.aircraft.schema import MAX_SURFACES
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.diagnosis import membership
 from beaver_ftc.diagnosis.bank import explains, remember
@@ -41,7 +41,6 @@ from beaver_ftc.diagnosis.state import (
 from beaver_ftc.diagnosis.thresholds import bound_step, interval, noise_step, published
 from beaver_ftc.scenario.diagnosis import MAX_POLES, FdiConfig
 
-MAX_ESTIMATORS = 2 * MAX_SURFACES
 # What a fault adds to the angular acceleration, as its estimator supposes: offset + theta Z, give or take.
 EFFECT = record(offset=3, Z=3, spread=3)
 
@@ -56,13 +55,18 @@ ESTIMATOR = record(
     across=3, reach_low=(MAX_POLES, 4), reach_high=(MAX_POLES, 4), theta_low=3, theta_high=3,
 )  # fmt: skip
 
-# The isolation estimators, and how the decision among them is sharpened. by_gradient: how they adapt, else by
-# least squares; unprojected: their estimates may leave the known set.
-ISOLATION = record(
-    n=int, thresholds=int, forgetting=float, decay=3, memory=int, shared=int, membership=int,
-    by_gradient=int, gradient=float, unprojected=int,
-    estimator=(ESTIMATOR, MAX_ESTIMATORS),
-)  # fmt: skip
+
+@lru_cache
+def isolation_dtype(surfaces: int) -> np.dtype:
+    """The isolation estimators, a loss and a position of each surface at most, and how the decision among
+    them is sharpened. by_gradient: how they adapt, else by least squares; unprojected: their estimates may
+    leave the known set."""
+    return record(
+        n=int, thresholds=int, forgetting=float, decay=3, memory=int, shared=int, membership=int,
+        by_gradient=int, gradient=float, unprojected=int,
+        estimator=(ESTIMATOR, 2 * surfaces),
+    )  # fmt: skip
+
 
 PARAMETER_SET = {LOSS: (-1.0, 0.0)}
 _THRESHOLDS = {"interval": INTERVAL, "published": PUBLISHED}

@@ -30,7 +30,8 @@ def diagnosis_dtype(n: int, size: Size = USUAL) -> np.dtype:
     """The stages of the diagnosis of an aircraft with n surfaces; size: of its statistical record."""
     return record(
         config=state.CONFIG, bound=bound_dtype(n), bank=bank.BANK, fdae=detection.FDAE,
-        verdict=state.conclusion_dtype(n), layout=state.layout_dtype(n), isolation=isolation.ISOLATION,
+        verdict=state.conclusion_dtype(n), layout=state.layout_dtype(n),
+        isolation=isolation.isolation_dtype(n),
         types=registry.types_dtype(n), statistical=statistical.statistical_dtype(size), watch=WATCH,
         published=zhang2005.PUBLISHED,
     )  # fmt: skip

@@ -1,6 +1,6 @@
 """Surveys of faults: `beaver-ftc matrix`, each type on each surface; `power`, how likely each is found."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -72,20 +72,25 @@ def matrix(
     raise typer.Exit(0 if document["passed"] else 1)
 
 
-def power(
-    grid: GridName = GridName.quick,
-    schemes: str | None = None,
-    sensors: SensorsName | None = None,
-    turbulence: TurbulenceName | None = None,
-    airspeed: Annotated[float | None, typer.Option(min=1, max=1000)] = None,
-    altitude: Annotated[float | None, typer.Option(min=-300, max=30000)] = None,
-    aircraft: str | None = None,
-    surface: str | None = None,
-    rates_alone: bool = False,
-    workers: WorkersOption = None,
-    out: Path = Path("runs"),
-    format: FormatOption = Format.text,
-) -> None:
+@dataclass(frozen=True)
+class Surveyed:
+    """What is flown where, and who watches."""
+
+    grid: GridName = GridName.quick
+    schemes: str | None = None
+    sensors: SensorsName | None = None
+    turbulence: TurbulenceName | None = None
+    airspeed: Annotated[float | None, typer.Option(min=1, max=1000)] = None
+    altitude: Annotated[float | None, typer.Option(min=-300, max=30000)] = None
+    aircraft: str | None = None
+    surface: str | None = None
+    rates_alone: bool = False
+    workers: WorkersOption = None
+    out: Path = Path("runs")
+    format: FormatOption = Format.text
+
+
+def power(asked: Surveyed) -> None:
     """Map how likely and how soon faults are detected.
 
     Over surface, magnitude, excitation, sensors and turbulence.
@@ -111,12 +116,12 @@ def power(
     from beaver_ftc.studies.power.shown import NAME, as_text, run_power
     from beaver_ftc.studies.power.survey import GRIDS, contenders
 
-    chosen = contenders(None if schemes is None else listed(schemes))
-    with progress_bar(f"power, {grid.value} grid") as progress:
-        survey = replace(GRIDS[grid].only(sensors, turbulence), vanes=not rates_alone)
-        survey = survey.elsewhere(aircraft, airspeed, altitude, surface)
-        document = run_power(out, survey, chosen, workers or cores(), progress)
-    folder, said = str(out / NAME), answers(document, surface) if surface else []
+    chosen = contenders(None if asked.schemes is None else listed(asked.schemes))
+    with progress_bar(f"power, {asked.grid.value} grid") as progress:
+        survey = replace(GRIDS[asked.grid].only(asked.sensors, asked.turbulence), vanes=not asked.rates_alone)
+        survey = survey.elsewhere(asked.aircraft, asked.airspeed, asked.altitude, asked.surface)
+        document = run_power(asked.out, survey, chosen, asked.workers or cores(), progress)
+    folder, said = str(asked.out / NAME), answers(document, asked.surface) if asked.surface else []
     document |= {"answers": said} if said else {}
     text = "\n".join(said) or as_text(document)
-    answer(format, document | {"folder": folder}, lambda: f"{text}\n\nresults: {folder}")
+    answer(asked.format, document | {"folder": folder}, lambda: f"{text}\n\nresults: {folder}")

@@ -51,6 +51,7 @@ class Arguments:
     format: FormatOption = Format.text
     no_report: NoReportOption = False
     junit: JunitOption = None
+    certificate: bool = False
 
 
 def command(arguments: Arguments) -> None:
@@ -68,6 +69,7 @@ def command(arguments: Arguments) -> None:
     keep_logs: Flights to keep a result folder of: none, failed, missed, worst, all, or indices 3,17.
     replay: Fly this one flight again, as `run` would.
     search: Look for the worst flight instead of sampling.
+    certificate: Write certificates into the folders kept, of the worst flights if --keep-logs names none.
     """
     if arguments.backend is Backend.local and arguments.replay is None:
         from beaver_ftc.studies.engine.workers import start_early
@@ -100,20 +102,20 @@ def _options(arguments: Arguments) -> "Options":
         backend=arguments.backend.value,
         address=arguments.ray_address,
         resume=arguments.resume,
-        keep=_keep(arguments.keep_logs),
+        keep=_keep(arguments.keep_logs, arguments.certificate),
         report=not arguments.no_report,
         search=arguments.search.value if arguments.search else None,
         source=arguments.file,
     )
 
 
-def _keep(flights: str) -> "Keep":
+def _keep(flights: str, certified: bool = False) -> "Keep":
     from beaver_ftc.studies.sweep.one_flight import KEEP_POLICIES, Keep
 
     if flights in KEEP_POLICIES:
-        return Keep(flights)
+        return Keep("worst" if certified and flights == "none" else flights, certified=certified)
     try:
-        return Keep("selected", frozenset(int(index) for index in flights.split(",")))
+        return Keep("selected", frozenset(int(index) for index in flights.split(",")), certified=certified)
     except ValueError:
         allowed = ", ".join(KEEP_POLICIES)
         raise BadInput(

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from tools.check_certificate import failures
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
@@ -57,12 +58,28 @@ def test_a_sweep_and_the_worst_of_it(hired, tmp_path, changed, monkeypatch):
     }
     assert tallies[-1]["done"] == 10
     runs = [flight["run"] for flight in worst]
-    assert left == [(flight, folder / "flights", True) for run in runs for flight in plan.assignments([run])]
+    assert left == [
+        (flight, Keep("worst", folder=folder / "flights"), True)
+        for run in runs
+        for flight in plan.assignments([run])
+    ]
     assert json.loads((folder / "summary.json").read_text())["versions"] == summary["versions"]
     assert not (folder / "parts").exists()
     assert not (folder / "report.html").exists()
     table = pq.read_table(folder / "results.parquet").to_pylist()
     assert not changed({key: value for key, value in table[3].items() if value is not None}, "row")
+
+
+def test_the_flights_kept_have_their_certificates_if_asked(hired, tmp_path):
+    sweep = sweep_of(BRIEF, **{"48": "4"})
+    kept = Keep("selected", frozenset({1}), certified=True)
+    run_sweep(sweep, Options(out=tmp_path, keep=kept, source="brief.yaml", report=False))
+    (folder,) = (tmp_path / "short" / "flights").iterdir()
+    certificate = json.loads((folder / "certificate.json").read_text())
+    table = pq.read_table(folder / "log.parquet")
+    log = {name: table[name].to_numpy() for name in table.column_names}
+    assert [*failures(certificate, log)] == []
+    assert bool(certificate["statements"]) == bool(log["detected"].any())
 
 
 def test_a_search_goes_on_from_generation_to_generation(hired, tmp_path, changed):
@@ -292,15 +309,15 @@ def test_of_a_flight_that_fails_the_scenario_is_kept(short, tmp_path, monkeypatc
     (flight,) = Plan(short).assignments([7])
     given = []
 
-    def fail(scenario, folder, report):
+    def fail(scenario, folder, report, certified):
         given.append((scenario.name, report))
         raise RuntimeError
 
     monkeypatch.setattr("beaver_ftc.results.writer.run", fail)
-    one_flight.keep_flight(short, flight, tmp_path)
+    one_flight.keep_flight(short, flight, Keep(folder=tmp_path))
     assert [path.name for path in (tmp_path / "short-0007").iterdir()] == ["scenario.yaml"]
     assert given == [("short-0007", False)]
-    one_flight.keep_flight(short, Assignment(3, {"faults[0].at_s": 2.0}), tmp_path)
+    one_flight.keep_flight(short, Assignment(3, {"faults[0].at_s": 2.0}), Keep(folder=tmp_path))
     assert len(given) == 1
     assert one_flight.flight_name(SimpleNamespace(name="x", flights=10_001), 3) == "x-00003"
     assert one_flight.flight_name(SimpleNamespace(name="x", flights=10_000), 3) == "x-0003"

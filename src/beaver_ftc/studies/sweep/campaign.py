@@ -157,7 +157,7 @@ def conclude(sweep: Sweep, options: Options, store: Store) -> Document:
     document["versions"] = dict(versions())
     for flight in document["worst"] if options.keep.policy == "worst" else ():
         kept = assignment_of(sweep, options, flight["run"])
-        one_flight.keep_flight(sweep, kept, options.keep.folder, report=True)
+        one_flight.keep_flight(sweep, kept, options.keep, report=True)
     if options.report:
         _draw(sweep, flights, document, store)
     store.write("summary.json", as_json(document))
@@ -196,7 +196,7 @@ def replay(sweep: Sweep, options: Options, index: int) -> Document:
     sweep = named_for(sweep, options.search)
     folder = options.out / sweep.name
     scenario = one_flight.scenario_of(sweep, assignment_of(sweep, options, index))
-    document = run(scenario, folder / "flights", options.report)
+    document = run(scenario, folder / "flights", options.report, certified=options.keep.certified)
     if (folder / "report.html").exists():  # let it lead to the flight
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
         write_whole(folder / "report.html", render(summary, folder).encode("utf-8"))

@@ -192,11 +192,12 @@ KEEP_POLICIES = ("none", "failed", "missed", "worst", "all")
 
 @dataclass(frozen=True)
 class Keep:
-    """Which flights leave a result folder of their own, and where."""
+    """Which flights leave a result folder of their own, and where; certified: with their certificates."""
 
     policy: str = "none"
     runs: frozenset[int] = field(default_factory=frozenset)
     folder: Path = Path()
+    certified: bool = False
 
     def wants(self, row: Row) -> bool:
         """Whether the flight of this row is to be kept."""
@@ -238,7 +239,7 @@ def fly_one(sweep: Sweep, assignment: Assignment, keep: Keep | None = None) -> R
     except Exception as error:  # a plug-in may raise anything: one flight's end, not the sweep's
         row = row_of_failure(sweep, assignment, FAILED, f"{type(error).__name__}: {error}")
     if keep and keep.wants(row):
-        keep_flight(sweep, assignment, keep.folder)
+        keep_flight(sweep, assignment, keep)
     return row
 
 
@@ -256,7 +257,7 @@ def warm_up(sweep: Sweep) -> None:
         fly(base.model_copy(update={"duration_s": 2.0 / base.rate_hz, "faults": ()}))
 
 
-def keep_flight(sweep: Sweep, assignment: Assignment, folder: Path, report: bool = False) -> None:
+def keep_flight(sweep: Sweep, assignment: Assignment, keep: Keep, report: bool = False) -> None:
     """Fly one flight as `run` would, into a result folder of its own; of a failure, keep the scenario."""
     from beaver_ftc.results.writer import result_folder, run
     from beaver_ftc.scenario.dump import to_yaml
@@ -266,7 +267,7 @@ def keep_flight(sweep: Sweep, assignment: Assignment, folder: Path, report: bool
     except BadInput:
         return  # there is no such scenario: the row says why
     try:
-        run(scenario, folder, report)
+        run(scenario, keep.folder, report, certified=keep.certified and scenario.fdi.is_ours)
     except Exception:  # as in its row, which says why
-        with result_folder(folder, scenario.name) as partial:
+        with result_folder(keep.folder, scenario.name) as partial:
             (partial / "scenario.yaml").write_text(to_yaml(scenario), encoding="utf-8")

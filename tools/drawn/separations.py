@@ -4,8 +4,8 @@
 
 Until N flights end with two candidates or more: losses, jams, biases and floating surfaces shortly after they
 strike, small references, both classes, several frame rates and substeps. Each proposal is flown. Counted are
-those that leave both candidates, those that exclude the true one, exits from the envelope, and how long the
-proposals of a flight take, once scipy is there. Exit status 1 for any of the first three.
+those that leave both candidates where one is true, those that exclude the true one, exits from the envelope,
+and how long the proposals of a flight take, once scipy is there. Exit status 1 for any of the first three.
 """
 
 import argparse
@@ -50,10 +50,10 @@ def main() -> None:
             names = [(one["surface"], one["type"]) for one in pair["candidates"]]
             left = [(one["surface"], one["type"]) for one in pair["left"]]
             count["proposed"] += 1
-            if len(left) == 2:
+            true = (fault.actuator, fault.type)
+            if len(left) == 2 and true in names:
                 count["both left"] += 1
                 print(f"{count['flights']}: {fault}, {names}, {pair['needs']}", flush=True)
-            true = (fault.actuator, fault.type)
             count["true one excluded"] += true in names and true not in left
             count["envelope exits"] += pair["envelope_exits"]
     print(*(f"{word} {n}" for word, n in count.items()), sep=", ")

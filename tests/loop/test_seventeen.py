@@ -12,6 +12,7 @@ from beaver_ftc.diagnosis.across import MOST, USUAL, size_for
 from beaver_ftc.diagnosis.isolation import members_of
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.trim import trim
+from beaver_ftc.results.verdict import verdict_text
 
 AILERONS = {"aileron_right_0", "aileron_right_1", "aileron_right_2"}
 
@@ -93,3 +94,18 @@ def test_noisy_sensors_in_moving_air_raise_no_alarm(folder):
     bounds = {"sensors": "tactical-grade", "turbulence": "light"}
     flight = bf.fly(scenario(folder, sensors="tactical-grade", environment=air, fdi={"bounds": bounds}))
     assert not flight.metrics["detection"]["detected"]
+
+
+def test_what_is_left_of_an_axis_is_computed_and_said():
+    """Of the Beaver with halves the left aileron is lost: ailerons, flaps and rudder roll, by their terms."""
+    sine = {"amplitude_deg_s": 3, "frequency_hz": 0.25}
+    lost = {"actuator": "aileron_left", "type": "loss_of_effectiveness", "magnitude": 1.0, "at_s": 2}
+    document = {"aircraft": "beaver-split", "duration_s": 8, "reference": {"p": [{"sine": sine}]}}
+    flight = bf.fly(bf.load(document | {"faults": [lost]}))
+    halves, of = load("beaver-split"), flight.metrics["authority"]["p"]
+    spans = {s: (t.max_rad - t.min_rad) * abs(halves.effect[s][0]) for s, t in halves.travel.items()}
+    expected = 1.0 - spans["aileron_left"] / sum(spans.values())
+    whole = of["healthy_greatest_rad_s2"] - of["healthy_least_rad_s2"]
+    assert (of["greatest_rad_s2"] - of["least_rad_s2"]) / whole == pytest.approx(expected, abs=0.03)
+    assert "of what all surfaces together give" in verdict_text(flight.metrics, "here")
+    assert flight.metrics["tracking"]["post_fault_rms_deg_s"]["p"] < 0.2

@@ -19,6 +19,7 @@ from beaver_ftc.studies import detectability as surveying
 from beaver_ftc.studies.detectability import (
     EXCITATIONS,
     SETTLED_S,
+    alike,
     answers,
     as_csv,
     at,
@@ -27,9 +28,11 @@ from beaver_ftc.studies.detectability import (
     draw,
     excitation,
     exclusion_magnitude,
+    geometry,
     judge,
     mismatch,
     run_survey,
+    told_apart_rad,
     with_aircraft,
 )
 from flying import loss, scenario
@@ -209,3 +212,38 @@ def test_another_aircraft_is_flown_from_where_it_starts():
     assert other.airframe.name == "beaver-split"
     assert other.duration_s == 5
     assert set(excitation(other).moment) == {"aileron_left", "aileron_right", "elevator", "rudder"}
+
+
+@settings(max_examples=100)
+@given(moments, moments, bounds)
+def test_what_is_told_apart_no_deflection_of_the_other_explains(column, other, bound):
+    """By brute force over deflections of the other: below the least one some explains it, above it none."""
+    column, other, bound = map(np.array, (column, other, bound))
+    if np.abs(column).max() < 0.05 or np.abs(other).max() < 0.05:
+        return
+    least = min(told_apart_rad(column, other, bound), 1e3)
+    tried = np.linspace(-60.0, 60.0, 24001)[:, None]
+
+    def unexplained(rad):
+        return np.abs((column * rad - tried * other) / (2.0 * bound)).max(axis=1).min()
+
+    if least < 10.0 and np.abs(column).max() * least / np.abs(other).max() < 50.0:
+        assert unexplained(1.02 * least) > 1.0
+        assert unexplained(0.9 * least) < 1.0
+
+
+def test_the_rates_never_tell_elevator_from_flap_and_accelerometers_do():
+    (pair,) = alike(scenario())
+    assert pair["surfaces"] == ("elevator", "flap")
+    assert geometry([pair]) == [
+        "elevator and flap move the rates alike: the rates never tell them apart, accelerometers do"
+    ]
+
+
+def test_halves_of_an_aileron_are_told_apart_by_their_pitch():
+    """Each pitches 3.7 % of what it rolls, the other way: the bound in pitch, 0.02 rad/s2, hides 8 deg."""
+    pairs = {pair["surfaces"]: pair for pair in alike(with_aircraft(scenario(), "beaver-split"))}
+    told = pairs["aileron_left", "aileron_right"]["told_apart_from_deg"]
+    assert told["aileron_left"] == pytest.approx(8.8, abs=1.0)
+    assert told["aileron_right"] == pytest.approx(told["aileron_left"], rel=0.02)
+    assert ("elevator", "flap_left") not in pairs

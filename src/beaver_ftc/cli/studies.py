@@ -231,7 +231,15 @@ def detectability(
     out: Folder for the map, the CSV and the JSON.
     """
     from beaver_ftc.scenario.loader import load_scenario
-    from beaver_ftc.studies.detectability import answers, run_survey, survey_name, text, with_aircraft
+    from beaver_ftc.studies.detectability import (
+        alike,
+        answers,
+        geometry,
+        run_survey,
+        survey_name,
+        text,
+        with_aircraft,
+    )
 
     loaded = load_scenario(scenario)
     if aircraft is not None:
@@ -244,7 +252,9 @@ def detectability(
         found = run_survey(out, loaded, airspeed or (), altitude or (), progress=progress)
     folder, rows = str(out / name), found["points"]
     if surface is None:
-        answer(format, found | {"folder": folder}, lambda: f"{text(rows)}\n{folder}")
+        pairs = alike(loaded)
+        whole = "\n".join([text(rows), *geometry(pairs), folder])
+        answer(format, found | {"alike": pairs, "folder": folder}, lambda: whole)
         return
     rows = [row for row in rows if row["fault"] == surface]
     said = answers(loaded, rows)

@@ -45,6 +45,7 @@ def facts(metrics: Document) -> list[tuple[str, str]]:
         ("profile", _profile(metrics)),
         *(("limited", _limit(limit)) for limit in metrics.get("limits", ())),
         ("authority", _authority(metrics)),
+        ("left", _left(metrics)),
         ("envelope", _envelope(metrics)),
         ("departure", _departure(metrics)),
         ("link", _link(metrics)),
@@ -313,6 +314,9 @@ def _engine_power(metrics: Document) -> str:
     return f"took over pitch at {_time(power['from_s'])}, for {_time(power['in_charge_s'])} in all, {span}"
 
 
+MUCH_LEFT = 0.995  # of an axis: nothing to be said
+
+
 def _authority(metrics: Document) -> str:
     """For how long no law could have held a rate, if long enough to matter."""
     axes = metrics.get("authority") or {}
@@ -323,6 +327,19 @@ def _authority(metrics: Document) -> str:
         return ""
     said = ", ".join(f"{axis} for {_time(time)}" for axis, time in beyond_s.items())
     return f"no deflection at all could hold the rate: {said}"
+
+
+def _left(metrics: Document) -> str:
+    """What the surfaces can still do about each axis, where it is less than if all were healthy."""
+    said = []
+    for axis, of in (metrics.get("authority") or {}).items():
+        if "least_rad_s2" in of:
+            whole = of["healthy_greatest_rad_s2"] - of["healthy_least_rad_s2"]
+            share = (of["greatest_rad_s2"] - of["least_rad_s2"]) / whole
+            if share < MUCH_LEFT:
+                span = f"{of['least_rad_s2']:.2g} to {of['greatest_rad_s2']:.2g} rad/s2"
+                said.append(f"{axis} {share:.0%}, {span}")
+    return f"of what all surfaces together give: {'; '.join(said)}" if said else ""
 
 
 def _envelope(metrics: Document) -> str:

@@ -16,10 +16,10 @@ the loop's answer to the fault within the window is neglected.
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from itertools import combinations, product
-from math import ceil
+from math import ceil, degrees, inf
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,7 @@ import numpy as np
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.model import AXES, N_Y, both_responses
 from beaver_ftc.design.variants import design_of
+from beaver_ftc.diagnosis.forces import ASIDE, UP, separated_by_force
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
@@ -47,6 +48,7 @@ SETTLED_S = 2.0  # the start of a reference is a step of its own
 BISECTIONS = 16  # magnitudes to 2^-16
 MAGNITUDES = ("detected", "detected_median", "isolated", "isolated_median")
 PLACE = ("airspeed_mps", "altitude_m", "excitation")
+ALIKE_DEG = 3.0  # told apart from no less on: the rates move alike
 MOTION = {"p": "roll", "q": "pitch", "r": "yaw"}
 COLUMNS = (*PLACE, "fault", *MAGNITUDES, "confused_with", "why")
 Document = dict[str, Any]
@@ -55,12 +57,14 @@ Document = dict[str, Any]
 @dataclass(frozen=True)
 class Excitation:
     """Along a flight of n frames: the moment of each surface that leads an axis, (n, 3) rad/s2 by its name,
-    the bound on the uncertainty (n, 3) rad/s2, and the length of a frame dt s.
+    the bound on the uncertainty (n, 3) rad/s2, and the length of a frame dt s. G: as it begins, (3, surfaces)
+    rad/s2 per rad.
     """
 
     moment: Mapping[str, np.ndarray]
     bound: np.ndarray
     dt: float
+    G: np.ndarray = field(default_factory=lambda: np.zeros((3, 0)))
 
 
 def excitation(scenario: Scenario) -> Excitation:
@@ -82,7 +86,7 @@ def excitation(scenario: Scenario) -> Excitation:
     first = int(SETTLED_S * scenario.rate_hz)
     moment = (G * u[:, None, :])[first:]
     of = {name: moment[:, :, aircraft.surfaces.index(name)] for name in aircraft.class_of_losses}
-    return Excitation(of, bound[first:], 1.0 / scenario.rate_hz)
+    return Excitation(of, bound[first:], 1.0 / scenario.rate_hz, G[first])
 
 
 def detection_magnitude(z: np.ndarray, bound: np.ndarray) -> np.ndarray:
@@ -163,6 +167,45 @@ def run_survey(
         files_of, row=list[Document], follows_from=scenario,
     )  # fmt: skip
     return run_study(survey, out, progress=progress)
+
+
+def told_apart_rad(column: np.ndarray, other: np.ndarray, bound: np.ndarray) -> float:
+    """The least deflection off its command, rad, of a surface with this column of G (3,) that a frame's rates
+    are certain to tell from every deflection of another; inf where the columns are parallel. bound (3,)."""
+    a, b = (each[None, :] / (2.0 * bound) for each in (column, other))
+    tried = np.concatenate([each for each in _corners(a, b) if np.all(np.isfinite(each))])
+    least = np.abs(a - tried[:, None] * b).max(axis=1).min()
+    return 1.0 / float(least) if least > 1e-9 * np.abs(a).max() else inf
+
+
+def alike(scenario: Scenario) -> list[Document]:
+    """Pairs of surfaces that move the rates alike: from which deflection on, deg, each is certain to be told
+    from the other, None where none is; and whether the accelerometers of this diagnosis weigh them."""
+    short = scenario.model_copy(update={"duration_s": SETTLED_S + 1.0})
+    seen, aircraft = excitation(short), scenario.airframe
+    by_force = [{*separated_by_force(aircraft, f)} for f in (ASIDE, UP)]
+    found = []
+    for s, other in combinations(range(aircraft.n), 2):
+        pairs = ((s, other), (other, s))
+        apart = [degrees(told_apart_rad(seen.G[:, i], seen.G[:, j], seen.bound[0])) for i, j in pairs]
+        if max(apart) > ALIKE_DEG:
+            names = aircraft.surfaces[s], aircraft.surfaces[other]
+            from_deg = dict(zip(names, (x if x < inf else None for x in apart), strict=True))
+            forces = any({s, other} <= weighed for weighed in by_force)
+            found.append({"surfaces": names, "told_apart_from_deg": from_deg, "by_forces": forces})
+    return found
+
+
+def geometry(pairs: Sequence[Document]) -> list[str]:
+    """A line a pair."""
+    lines = []
+    for pair in pairs:
+        apart = [(name, x) for name, x in pair["told_apart_from_deg"].items() if x is not None]
+        told = " and ".join(f"{name} from {x:.2g} deg off its command on" for name, x in apart)
+        forces = ", accelerometers do" if pair["by_forces"] and not told else ""
+        says = f"the rates tell {told}" if told else f"the rates never tell them apart{forces}"
+        lines.append(f"{' and '.join(pair['surfaces'])} move the rates alike: {says}")
+    return lines
 
 
 def with_aircraft(scenario: Scenario, reference: str) -> Scenario:

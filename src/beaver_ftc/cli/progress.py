@@ -53,6 +53,21 @@ def live_progress(name: str) -> Iterator[Callable[[Counter[str]], None]]:
         progress.end()
 
 
+@contextlib.contextmanager
+def told() -> Iterator[Callable[[str], None]]:
+    """Yield what a study calls with a line on how far it has come: shown on a terminal only."""
+    shown = sys.stderr.isatty()
+
+    def tell(line: str) -> None:
+        if shown:
+            sys.stderr.write(f"\r\033[K{line}")
+            sys.stderr.flush()
+
+    yield tell
+    if shown:
+        sys.stderr.write("\r\033[K")
+
+
 class _Progress:
     def __init__(self, name: str, terminal: bool) -> None:
         self._name, self._terminal = name, terminal

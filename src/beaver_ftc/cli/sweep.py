@@ -48,6 +48,7 @@ class Arguments:
     keep_logs: str = "none"
     replay: Annotated[int | None, typer.Option(min=0, metavar="INDEX")] = None
     search: Objective | None = None
+    rare: Annotated[str | None, typer.Option(metavar="EXPECTATION")] = None
     format: FormatOption = Format.text
     no_report: NoReportOption = False
     junit: JunitOption = None
@@ -70,6 +71,7 @@ def command(arguments: Arguments) -> None:
     replay: Fly this one flight again, as `run` would.
     search: Look for the worst flight instead of sampling.
     certificate: Write certificates into the folders kept, of the worst flights if --keep-logs names none.
+    rare: Estimate how likely flights miss this expectation, by subset simulation.
     """
     if arguments.backend is Backend.local and arguments.replay is None:
         from beaver_ftc.studies.engine.workers import start_early
@@ -79,6 +81,9 @@ def command(arguments: Arguments) -> None:
 
     options, replay, format = _options(arguments), arguments.replay, arguments.format
     began = time.perf_counter()
+    if arguments.rare is not None:
+        _rare(load_sweep(arguments.file), arguments)
+        return
     try:
         sweep = load_sweep(arguments.file)
         verdict = _fly(sweep, options, format) if replay is None else _replay(sweep, options, replay, format)
@@ -91,6 +96,24 @@ def command(arguments: Arguments) -> None:
         raise failure from failure.__cause__
     write_junit([verdict | {"took_s": time.perf_counter() - began}], arguments.junit)
     raise typer.Exit(0 if verdict["passed"] else 1)
+
+
+def _rare(sweep: "Sweep", arguments: Arguments) -> None:
+    """How likely an expectation is not met: a number and its interval."""
+    from beaver_ftc.cli.progress import told
+    from beaver_ftc.studies.engine.workers import cores
+    from beaver_ftc.studies.sweep.rare import as_text, run_rare
+
+    others = ("search", "replay", "junit", "ray_address")
+    given = [name for name in others if getattr(arguments, name) is not None]
+    given += ["backend"] if arguments.backend is not Backend.local else []
+    given += ["keep_logs"] if arguments.keep_logs != "none" else []
+    given += ["certificate"] if arguments.certificate else []
+    if given:
+        raise BadInput(f"--rare and --{given[0].replace('_', '-')} exclude each other, allowed: one of them")
+    with told() as tell:
+        document = run_rare(sweep, str(arguments.rare), arguments.out, arguments.workers or cores(), tell)
+    answer(arguments.format, document, lambda: as_text(document))
 
 
 def _options(arguments: Arguments) -> "Options":

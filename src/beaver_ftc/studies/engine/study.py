@@ -151,13 +151,47 @@ def run_study(study: Study, out: Path, workers: int = 1, progress: Progress | No
 @contextlib.contextmanager
 def flown(study: Study, out: Path, workers: int = 1, progress: Progress | None = None) -> Iterator[list[Any]]:
     """Yield the rows of all cases, in their order whatever the number of workers; on success they go."""
+    with _keeping(study, out) as parts:
+        yield _all_rows(study.fly, study.cases, workers, progress, parts, study.lost)
+
+
+FlyRound = Callable[[int, Sequence[Any]], list[Any]]
+
+
+@contextlib.contextmanager
+def in_rounds(study: Study, out: Path, workers: int = 1) -> Iterator[FlyRound]:
+    """Yield what flies one round of cases after the other, by its number, and gives their rows in order: what
+    to fly next may follow from the rows before. Kept round by round; on success they go."""
+    with _keeping(study, out) as parts, contextlib.ExitStack() as at_work:
+        flying: list[Workers] = []
+
+        def fly(number: int, cases: Sequence[Any]) -> list[Any]:
+            found: list[Any] | None = parts.landed(number, range(len(cases)))
+            if found is None:
+                if not flying:
+                    work = Work(partial(_fly_case, study.fly))
+                    made = LocalWorkers(work, workers) if workers > 1 else ThisProcess(work)
+                    flying.append(at_work.enter_context(contextlib.closing(made)))
+                batch = Batch(number, tuple(Case(n, case) for n, case in enumerate(cases)))
+                batches = Batches(iter([batch]), len(cases), lambda _, rows: parts.land(number, rows))
+                Campaign(batches, flying[0], study.lost or _fail).fly()
+                found = parts.landed(number, range(len(cases)))
+            assert found is not None
+            return found
+
+        yield fly
+
+
+@contextlib.contextmanager
+def _keeping(study: Study, out: Path) -> Iterator[store.Parts]:
+    """The parts of a study while it is under way; on success they go, without any so does the folder."""
     kept, new = out / f".{study.name}.flown", not out.exists()
     with clear_disk_errors(kept):
         kept.mkdir(parents=True, exist_ok=True)
     with store.locked(kept):
         parts = _begin(kept, study)
         try:
-            yield _all_rows(study.fly, study.cases, workers, progress, parts, study.lost)
+            yield parts
         except BaseException:
             if not parts:  # nothing to go on with
                 shutil.rmtree(kept, ignore_errors=True)

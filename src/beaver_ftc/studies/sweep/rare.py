@@ -1,0 +1,294 @@
+"""The probability that an expectation is not met, where plain flights would take a million to see it once.
+
+Subset simulation [AuBeck2001]: levels of a score that rises towards the event, each reached by a tenth of the
+flights that reached the one before; these are continued as Markov chains in the space of standard normals
+behind the varied keys, by conditional sampling [Papaioannou2015]. A step draws the flight's own seed anew, so
+sensors and air are part of the chain. It is done in independent runs: their mean is the estimate, and what
+they differ by the interval, that of a lognormal mean [Cox, in Land1972].
+"""
+
+import hashlib
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
+from pathlib import Path
+from statistics import NormalDist
+from typing import Any
+
+import numpy as np
+
+from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFailed, suggestion
+from beaver_ftc.results.expectations import evaluate
+from beaver_ftc.results.metrics import as_json, metrics, versions
+from beaver_ftc.results.writer import result_folder
+from beaver_ftc.scenario.dump import to_yaml
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.sweeps import Sweep
+from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial
+from beaver_ftc.studies.engine.study import FlyRound, Study, in_rounds
+from beaver_ftc.studies.present.page import write_files
+from beaver_ftc.studies.present.tables import finite, number
+from beaver_ftc.studies.sweep.one_flight import scenario_of
+from beaver_ftc.studies.sweep.sampling import Assignment, value_at
+from beaver_ftc.studies.sweep.store import identity_of
+
+RUNS, MEMBERS = 8, 220  # independent runs, flights of each a level: 10^-5 by a hundredth of 10^6 flights
+SHARE = 0.1  # of the flights of a level that reach the next one
+STEP = 0.8  # how much of a point a chain's next one keeps
+MOST_LEVELS = 10  # down to 10^-10
+_OF_RARE = 3
+_BEFORE = -1e-12  # the score of what has just not happened
+_NORMAL = NormalDist()
+
+Scores = np.ndarray
+FlyPoints = Callable[[int, np.ndarray], Scores]
+"""From a round's number and points (flights, keys), standard normals, to scores (flights,); events from 0."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A probability with its two-sided interval. why: what it lacks, if anything."""
+
+    probability: float
+    low: float
+    high: float
+    flights: int
+    levels: int
+    plain: dict[str, Any]
+    why: str
+
+
+class Chains:
+    """Independent runs of subset simulation abreast: points (runs, members, keys), scores (runs, members)."""
+
+    def __init__(self, keys: int, seed: int, runs: int = RUNS, members: int = MEMBERS) -> None:
+        words = np.random.SeedSequence(seed, spawn_key=(0, 0, _OF_RARE))
+        self._generator = np.random.Generator(np.random.PCG64(words))
+        self.points = self._generator.standard_normal((runs, members, keys))
+        self.scores = np.full((runs, members), -math.inf)
+        self.share, self.reached = np.ones(runs), np.zeros(runs, bool)
+        self.stuck, self.flights, self.levels = False, 0, 0
+        self.design: tuple[float, int, np.ndarray] | None = (
+            None  # the likeliest event: distance, flight, point
+        )
+        self._round = 0
+
+    def go(self, fly: FlyPoints) -> None:
+        """Fly until every run has reached the event, or cannot."""
+        self.scores[:] = self._flown(fly, self.points)
+        self.plain = int((self.scores >= 0.0).sum()), self.scores.size
+        for _ in range(MOST_LEVELS):
+            going = [run for run in range(len(self.scores)) if not self.reached[run]]
+            levels = {run: self._level(run) for run in going}
+            going = [run for run in going if not self.reached[run]]
+            if not going or self.stuck:
+                break
+            self.levels += 1
+            self._continue(going, np.array([levels[run] for run in going]), fly)
+
+    def _level(self, run: int) -> float:
+        """The next level of a run, whose share of flights goes into its probability."""
+        scores = self.scores[run]
+        level = float(np.sort(scores)[-max(1, round(SHARE * scores.size))])
+        if level >= 0.0 or not math.isfinite(level):
+            level, self.reached[run] = 0.0, level >= 0.0
+            self.stuck |= not self.reached[run]
+        share = float((scores >= level).mean())
+        self.stuck |= share == 1.0 and not self.reached[run]  # all alike: nothing leads on
+        self.share[run] *= share
+        return level
+
+    def _continue(self, going: list[int], levels: np.ndarray, fly: FlyPoints) -> None:
+        """Chains from the flights that reached their level, all runs abreast."""
+        members = self.scores.shape[1]
+        seeds = max(1, round(SHARE * members))
+        at = np.array([
+            self._generator.choice(np.flatnonzero(self.scores[run] >= level), seeds, replace=False)
+            for run, level in zip(going, levels, strict=True)
+        ])  # fmt: skip
+        rows = np.array(going)[:, None]
+        here, scores = self.points[rows, at], self.scores[rows, at]
+        kept, values = [here], [scores]
+        for _ in range(math.ceil(members / seeds) - 1):
+            moved = STEP * here + math.sqrt(1.0 - STEP**2) * self._generator.standard_normal(here.shape)
+            found = self._flown(fly, moved)
+            better = found >= levels[:, None]
+            here, scores = np.where(better[..., None], moved, here), np.where(better, found, scores)
+            kept.append(here)
+            values.append(scores)
+        self.points[going] = np.concatenate(kept, axis=1)[:, :members]
+        self.scores[going] = np.concatenate(values, axis=1)[:, :members]
+
+    def _flown(self, fly: FlyPoints, points: np.ndarray) -> Scores:
+        flat = points.reshape(-1, points.shape[-1])
+        scores = fly(self._round, flat)
+        self._round += 1
+        for i in np.flatnonzero(scores >= 0.0).tolist():
+            distance = float(np.linalg.norm(flat[i]))
+            if self.design is None or distance < self.design[0]:
+                self.design = distance, self.flights + i, flat[i].copy()
+        self.flights += len(flat)
+        return scores.reshape(points.shape[:-1])
+
+    def estimate(self) -> Estimate:
+        """What the runs amount to."""
+        events, of = self.plain
+        plain = {"events": events, "of": of, **asdict(binomial(events, of))}
+        if not self.reached.all():
+            says = "the score stops rising before the event" if self.stuck else "too rare for so many levels"
+            return Estimate(math.nan, 0.0, float(self.share.max()), self.flights, self.levels, plain, says)
+        return Estimate(*lognormal_mean(self.share), self.flights, self.levels, plain, "")
+
+
+def lognormal_mean(values: np.ndarray) -> tuple[float, float, float]:
+    """Mean of some lognormal values (n,) and its two-sided interval, Cox's with Student's t."""
+    from scipy.stats import t
+
+    logs = np.log(values)
+    spread, n = float(logs.var(ddof=1)), len(values)
+    half = float(t.ppf(0.5 + 0.5 * CONFIDENCE, n - 1)) * math.sqrt(spread / n + spread**2 / (2 * (n - 1)))
+    middle = float(logs.mean()) + 0.5 * spread
+    return float(values.mean()), math.exp(middle - half), min(1.0, math.exp(middle + half))
+
+
+def scored(sweep: Sweep) -> list[str]:
+    """The expectations of a sweep's base scenario whose failure has a score that rises towards it."""
+    found: list[str] = []
+    for name, expected in sweep.scenario({}).expect.model_dump(exclude_none=True).items():
+        several = expected.items() if isinstance(expected, dict) else ()
+        for full_name, one in [(f"{name}.{part}", one) for part, one in several] or [(name, expected)]:
+            is_limit = isinstance(one, float | int) and not isinstance(one, bool)
+            if is_limit or (full_name in ("no_departure", "no_false_alarm") and one is True):
+                found.append(full_name)
+    return found
+
+
+def check(sweep: Sweep, expectation: str) -> None:
+    """Raise BadInput unless the base scenario expects this, it can be scored, and something varies."""
+    known = scored(sweep)
+    if expectation not in known:
+        allowed = suggestion(expectation, known) if known else ", allowed: a base scenario with `expect`"
+        raise BadInput(f"--rare: {expectation[:60]!r} is nothing that {sweep.name} expects{allowed}")
+    if not sweep.keys:
+        raise BadInput(f"{sweep.name}: vary: nothing varies, allowed with --rare: at least one key")
+
+
+def score_of(scenario: Scenario, expectation: str) -> float:
+    """Fly, and say how near it came to what is not expected: below 0 before, 0 and above once it has come."""
+    from beaver_ftc.loop.loop import fly
+    from beaver_ftc.plant.sensing import DEPARTURE_ANGLE_RAD, DEPARTURE_RATE_RAD_S
+    from beaver_ftc.studies.evidence.flown import Watched
+
+    limits = {f"{axis}_rad_s": DEPARTURE_RATE_RAD_S for axis in "pqr"}
+    limits |= {"alpha_rad": DEPARTURE_ANGLE_RAD, "beta_rad": DEPARTURE_ANGLE_RAD}
+    log = Watched(list(limits)) if expectation == "no_departure" else None
+    flight = fly(scenario, log)
+    document = metrics(flight)
+    found = next(one for one in evaluate(scenario.expect, document) if one["name"] == expectation)
+    if log is not None:
+        score = max(float(np.abs(log.columns[name]).max()) / limit for name, limit in limits.items()) - 1.0
+    elif expectation == "no_false_alarm":
+        score = flight.worst_residual_ratio - 1.0
+    elif found["actual"] is not None:
+        score = abs(found["actual"]) / found["expected"] - 1.0 if found["expected"] else abs(found["actual"])
+    else:  # it never came: the later it could have, the worse
+        score = max(0.0, flight.frames / scenario.rate_hz - (document["fault"] or {"at_s": 0.0})["at_s"])
+    return min(score, _BEFORE) if found["passed"] else max(score, 0.0)
+
+
+def values_at(sweep: Sweep, point: Sequence[float]) -> dict[str, Any]:
+    """The varied keys at a point of standard normals."""
+    units = [min(_NORMAL.cdf(u), 1.0 - 2.0**-53) for u in point]
+    return {key: value_at(how, u) for (key, how), u in zip(sweep.file.vary.items(), units, strict=True)}
+
+
+def scenario_at(sweep: Sweep, run: int, point: Sequence[float]) -> Scenario:
+    """The flight at a point of standard normals; its number gives its seed."""
+    return scenario_of(sweep, Assignment(run, values_at(sweep, point)))
+
+
+def _fly(sweep: Sweep, expectation: str, case: tuple[int, list[float]]) -> dict[str, Any]:
+    """The row of one flight; one that cannot be flown is no event."""
+    try:
+        return {"score": score_of(scenario_at(sweep, *case), expectation), "failed": False}
+    except BeaverFtcError:
+        return {"score": -math.inf, "failed": True}
+
+
+def run_rare(
+    sweep: Sweep, expectation: str, out: Path, workers: int = 1, tell: Callable[[str], None] = lambda _: None
+) -> dict[str, Any]:
+    """Estimate the probability that a sweep's flights do not meet an expectation of its base scenario; write
+    `out/<sweep>-rare-<expectation>/` and return its document.
+
+    tell: told how far it has come. Raises BadInput for what the base does not expect, SimulationFailed if no
+    flight could be flown.
+    """
+    check(sweep, expectation)
+    name = f"{sweep.name}-rare-{expectation.replace('.', '-')}"
+    chains, failed = Chains(len(sweep.keys), sweep.file.seed), 0
+
+    def fly(number: int, points: np.ndarray, flies: FlyRound) -> Scores:
+        nonlocal failed
+        rows = flies(number, [(chains.flights + i, point.tolist()) for i, point in enumerate(points)])
+        failed += sum(row["failed"] for row in rows)
+        scores = np.array([row["score"] for row in rows])
+        if number == 0 and failed == len(rows):
+            raise SimulationFailed(f"{sweep.name}: no flight could be flown")
+        tell(f"{name}: {chains.flights + len(rows)} flights, level {chains.levels}")
+        return scores
+
+    study = Study(
+        name, (), partial(_fly, sweep, expectation), lambda rows: None, lambda document: {},
+        follows_from=[identity_of(sweep, expectation), RUNS, MEMBERS],
+        lost=lambda case, why: {"score": -math.inf, "failed": True},
+    )  # fmt: skip
+    with in_rounds(study, out, workers) as flies:
+        chains.go(lambda number, points: fly(number, points, flies))
+        document = _document(sweep, expectation, chains, failed)
+        files = {"rare.json": as_json(document)}
+        if chains.design is not None:
+            _, run, point = chains.design
+            files["flight.yaml"] = to_yaml(scenario_at(sweep, run, point.tolist()))
+        with result_folder(out, name) as folder:
+            write_files(folder, files)
+    return document | {"folder": str(out / name)}
+
+
+def _document(sweep: Sweep, expectation: str, chains: Chains, failed: int) -> dict[str, Any]:
+    found = asdict(chains.estimate())
+    said = {key: finite(value) for key, value in found.items() if key != "plain"}
+    likeliest = None
+    if chains.design is not None:
+        distance, run, point = chains.design
+        likeliest = {"run": run, "distance": distance, "values": values_at(sweep, point.tolist())}
+    return {
+        "sweep": sweep.name, "expectation": expectation, "confidence": CONFIDENCE, **said,
+        "plain": {key: finite(value) for key, value in found["plain"].items()},
+        "failed": failed, "likeliest": likeliest,
+        "sweep_sha256": hashlib.sha256(repr(sweep.file).encode()).hexdigest(), "versions": dict(versions()),
+    }  # fmt: skip
+
+
+def as_text(document: dict[str, Any]) -> str:
+    """For a terminal."""
+    plain, likeliest, p = document["plain"], document["likeliest"], document["probability"]
+    said = f"{p:.2g}" if p is not None else f"not known: {document['why']}"
+    lines = [
+        f"{document['sweep']}: {document['expectation']} not met",
+        f"  probability  {said}, {_between(document)}, {document['flights']} flights",
+        f"  plain        {plain['events']} of {plain['of']} flights, {_between(plain)}",
+    ]
+    if likeliest:
+        values = likeliest["values"].items()
+        listed = ", ".join(f"{key} {number(value, digits=4)}" for key, value in values)
+        lines += [
+            f"  likeliest    {listed}",
+            f"  flies it     beaver-ftc run {document['folder']}/flight.yaml",
+        ]
+    return "\n".join([*lines, f"\nresults: {document['folder']}"])
+
+
+def _between(found: dict[str, Any]) -> str:
+    return f"95 % {found['low']:.2g} to {found['high']:.2g}"

@@ -1,0 +1,219 @@
+"""Subset simulation: known normal tails, their intervals, what it says when it cannot, and flights."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+import yaml
+from scipy.stats import chi2, norm
+
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.results.flight import fly
+from beaver_ftc.scenario.sweeps import load_sweep
+from beaver_ftc.studies.engine import study
+from beaver_ftc.studies.sweep import rare
+from beaver_ftc.studies.sweep.rare import Chains, as_text, lognormal_mean, run_rare, scored
+
+ANALYTIC = {
+    "a sum of two": (lambda u: u.sum(1) / math.sqrt(2) - norm.isf(1e-5), 2, 1e-5),
+    "a sum of ten": (lambda u: u.sum(1) / math.sqrt(10) - norm.isf(1e-5), 10, 1e-5),
+    "two sides": (lambda u: np.abs(u[:, 0]) - norm.isf(5e-5), 3, 1e-4),
+    "a sphere": (lambda u: (u**2).sum(1) - chi2.isf(1e-5, 4), 4, 1e-5),
+    "in steps": (lambda u: np.floor(8 * (u[:, 0] - norm.isf(1e-3))) / 8, 2, 1e-3),
+}
+
+
+@pytest.mark.parametrize("problem", ANALYTIC)
+def test_intervals_hold_in_ninety_of_a_hundred_repeats(problem):
+    score, keys, probability = ANALYTIC[problem]
+    held = near = flights = 0
+    for seed in range(100):
+        chains = Chains(keys, seed)
+        chains.go(lambda _, points: score(points))
+        found = chains.estimate()
+        held += found.low <= probability <= found.high
+        near += 0.5 < found.probability / probability < 2
+        flights += found.flights
+    assert held >= 90
+    assert near >= 93
+    assert flights <= 100 * 0.01 * 10 / 1e-5  # a hundredth of the plain flights that see ten such events
+
+
+def test_the_same_seed_gives_the_same_numbers():
+    score, keys, _ = ANALYTIC["a sum of two"]
+    found = []
+    for _ in range(2):
+        chains = Chains(keys, 7)
+        chains.go(lambda _, points: score(points))
+        found.append(chains.estimate())
+    assert found[0] == found[1]
+    assert found[0].plain["of"] == rare.RUNS * rare.MEMBERS
+
+
+def test_the_likeliest_event_is_near_the_design_point():
+    chains = Chains(2, 1)
+    chains.go(lambda _, points: points.sum(1) / math.sqrt(2) - 4.0)
+    distance, _, point = chains.design
+    assert 4.0 <= distance < 4.3
+    assert point == pytest.approx([4 / math.sqrt(2)] * 2, abs=0.8)
+
+
+def test_a_frequent_event_needs_no_levels():
+    chains = Chains(1, 3)
+    chains.go(lambda _, points: points[:, 0])
+    found = chains.estimate()
+    assert (found.levels, found.flights) == (0, rare.RUNS * rare.MEMBERS)
+    assert found.low < 0.5 < found.high
+    assert found.plain["events"] == pytest.approx(880, abs=90)
+
+
+@pytest.mark.parametrize(
+    ("score", "why"),
+    [
+        (lambda points: np.full(len(points), -1.0), "the score stops rising before the event"),
+        (lambda points: np.full(len(points), -np.inf), "the score stops rising before the event"),
+        (lambda points: points[:, 0] - 20.0, "too rare for so many levels"),
+    ],
+)
+def test_where_it_cannot_get_there_it_says_so(score, why):
+    chains = Chains(2, 1)
+    chains.go(lambda _, points: score(points))
+    found = chains.estimate()
+    assert (math.isnan(found.probability), found.low, found.why) == (True, 0.0, why)
+    assert chains.design is None
+
+
+def test_the_mean_of_lognormals_in_its_interval():
+    rng, held = np.random.default_rng(1), 0
+    for _ in range(200):
+        _, low, high = lognormal_mean(np.exp(0.7 * rng.standard_normal(8) - 0.245))
+        held += low <= 1.0 <= high
+    assert held >= 180
+
+
+SWEEP = {
+    "name": "drift",
+    "base": {
+        "name": "drift", "duration_s": 1.0, "rate_hz": 50, "control": {"law": "nominal"},
+        "faults": [{"actuator": "elevator", "type": "bias", "bias_deg": 0.1, "at_s": 0.2}],
+        "expect": {
+            "no_departure": True, "detected_within_s": 0.5, "isolated_as": "elevator",
+            "post_fault_rms_deg_s": {"q": 12},
+        },
+    },
+    "runs": 1,
+    "vary": {"faults[0].bias_deg": {"normal": [0, 1]}, "initial.airspeed_mps": {"uniform": [40, 50]}},
+}  # fmt: skip
+
+
+@pytest.fixture
+def drift(tmp_path):
+    (tmp_path / "drift.yaml").write_text(yaml.safe_dump(SWEEP))
+    return load_sweep(tmp_path / "drift.yaml")
+
+
+def test_flights_give_a_number_an_interval_and_the_likeliest_of_them(drift, tmp_path, monkeypatch):
+    monkeypatch.setattr(rare, "RUNS", 3)
+    monkeypatch.setattr(rare, "MEMBERS", 20)
+    monkeypatch.setattr(Chains.__init__, "__defaults__", (3, 20))
+    said = []
+    document = run_rare(drift, "post_fault_rms_deg_s.q", tmp_path / "runs", tell=said.append)
+    folder = tmp_path / "runs" / "drift-rare-post_fault_rms_deg_s-q"
+    assert document["folder"] == str(folder)
+    assert json.loads((folder / "rare.json").read_text())["probability"] == document["probability"]
+    assert 0.0 < document["probability"] < 0.3
+    assert document["low"] < document["high"]
+    assert document["flights"] == int(said[-1].split(": ")[1].split()[0])
+    again = fly(str(folder / "flight.yaml"))
+    missed = {one.name for one in again.expectations if not one.passed}
+    assert "post_fault_rms_deg_s.q" in missed
+    assert sorted(path.name for path in (tmp_path / "runs").iterdir()) == [folder.name]
+    text = as_text(document)
+    assert f"beaver-ftc run {folder}/flight.yaml" in text
+    assert "plain" in text
+
+
+def test_what_is_stopped_goes_on_where_it_was(drift, tmp_path, monkeypatch):
+    monkeypatch.setattr(Chains.__init__, "__defaults__", (2, 10))
+    whole = run_rare(drift, "post_fault_rms_deg_s.q", tmp_path / "whole")
+    flown = []
+
+    def stopped(*case):
+        flown.append(case)
+        if len(flown) == 22:
+            raise KeyboardInterrupt
+        return rare.score_of(rare.scenario_at(drift, *case[2]), case[1])
+
+    monkeypatch.setattr(
+        rare, "_fly", lambda sweep, name, case: {"score": stopped(sweep, name, case), "failed": False}
+    )
+    with pytest.raises(KeyboardInterrupt):
+        run_rare(drift, "post_fault_rms_deg_s.q", tmp_path / "parts")
+    before = len(flown)
+    parts = run_rare(drift, "post_fault_rms_deg_s.q", tmp_path / "parts")
+    assert {**parts, "folder": 0} == {**whole, "folder": 0}
+    assert len(flown) - before < whole["flights"]
+
+
+def test_which_expectations_have_a_score(drift):
+    assert scored(drift) == ["detected_within_s", "no_departure", "post_fault_rms_deg_s.q"]
+
+
+@pytest.mark.parametrize("name", ["isolated_as", "no_departur", "", "x" * 500])
+def test_what_the_base_does_not_expect_is_refused(name, drift, tmp_path):
+    with pytest.raises(BadInput, match=r"^--rare: .* is nothing that drift expects.* allowed: detected_"):
+        run_rare(drift, name, tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["drift.yaml"]
+
+
+def test_nothing_varies(tmp_path):
+    (tmp_path / "still.yaml").write_text(yaml.safe_dump({**SWEEP, "vary": {}}))
+    with pytest.raises(BadInput, match="vary: nothing varies"):
+        run_rare(load_sweep(tmp_path / "still.yaml"), "no_departure", tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "bias", "event"),
+    [
+        ("no_departure", 0.5, False), ("no_departure", 25.0, True),
+        ("detected_within_s", 3.0, False), ("detected_within_s", 0.0, True),
+        ("post_fault_rms_deg_s.q", 0.2, False), ("post_fault_rms_deg_s.q", 9.0, True),
+    ],
+)  # fmt: skip
+def test_a_score_is_below_zero_until_the_event_has_come(name, bias, event, drift):
+    base = {"duration_s": 4.0} if name == "no_departure" else {}
+    flown = drift.scenario({"faults[0].bias_deg": bias}, name="x", seed=1, **base)
+    assert (rare.score_of(flown, name) >= 0.0) is event
+
+
+def test_a_score_rises_towards_the_event(drift):
+    scores = [
+        rare.score_of(drift.scenario({"faults[0].bias_deg": bias}, name="x", seed=1), name)
+        for name in ("no_departure", "post_fault_rms_deg_s.q")
+        for bias in (0.5, 1.0, 2.0)
+    ]
+    assert scores[:3] == sorted(scores[:3])
+    assert scores[3:] == sorted(scores[3:])
+
+
+def test_rounds_are_flown_once(tmp_path):
+    flown = []
+
+    def fly_it(case):
+        flown.append(case)
+        return {"x": case}
+
+    def stopped():
+        with study.in_rounds(asked, tmp_path) as fly_round:
+            assert fly_round(0, [1, 2]) == [{"x": 1}, {"x": 2}]
+            raise RuntimeError
+
+    asked = study.Study("s", (), fly_it, lambda rows: None, lambda document: {})
+    with pytest.raises(RuntimeError):
+        stopped()
+    with study.in_rounds(asked, tmp_path) as fly_round:
+        assert fly_round(0, [1, 2]) == [{"x": 1}, {"x": 2}]
+        assert fly_round(1, [3]) == [{"x": 3}]
+    assert flown == [1, 2, 3]
+    assert list(tmp_path.iterdir()) == []

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import yaml
 
+from beaver_ftc.flights import sample_logs
 from beaver_ftc.integrations.challenge import folders, grading
 from flights.synthetic import fly, write_csv
 
@@ -91,6 +92,13 @@ def _recorded_flights(folder: Path) -> None:
     write_csv(folder / "suspect.csv", fly(seed=2, parts=[(60.0, 120.0, 0.5, 1.0)]))
 
 
+def _sample_logs(folder: Path) -> None:
+    """The logs that the page's command before writes."""
+    (folder / "my-logs").mkdir()
+    for name, text in sample_logs.files().items():
+        (folder / "my-logs" / name).write_text(text)
+
+
 def _identified(folder: Path, installation: Installation) -> None:
     """The model that the page's command before makes."""
     given = "identify healthy.csv --vehicle flying-wing.yaml --out wing.json"
@@ -134,7 +142,8 @@ _MATERIALS = {
     r"\bmy-plan\b": _my_plan,
     r"\bscenarios/": _scenarios,
     r"\bbrief\.yaml\b|^pytest$": _brief,
-    r"\b(healthy|suspect)\.csv\b": _recorded_flights,
+    r"(?<!/)\b(healthy|suspect)\.csv\b": _recorded_flights,
+    r"\bmy-logs/": _sample_logs,
     r"\bmine[:.]": _mine,
     r"\bnavion": _own_aircraft,
     r"\bjet\.yaml\b": _outer_loops,

@@ -226,3 +226,19 @@ def test_the_sample_logs_are_followed_from_check_to_diagnosis(tmp_path):
         run("new", "mine", "--log", "--out", tmp_path)
     with pytest.raises(BadInput, match="--like and --log are given"):
         run("new", "other", "--log", "--like", "fault-free")
+
+
+def test_a_path_that_cannot_be_checked_is_a_line(tmp_path):
+    (tmp_path / "folder.csv").mkdir()
+    for name, says in (
+        ("none.csv", "no such file or folder"),
+        ("folder.csv", r"no mavros-imu-data_raw topic|is a directory"),
+        ("none.xyz", "no such file or folder"),
+    ):
+        with pytest.raises(BadInput, match=says) as error:
+            run("identify", "--check", tmp_path / name)
+        assert len(str(error.value).splitlines()) == 1
+    with pytest.raises(BadInput, match="is a directory"):
+        run("identify", "--check", tmp_path / "folder.csv", "--reader", "table")
+    with pytest.raises(BadInput, match="--reader what: is not known"):
+        run("identify", "--check", logged(tmp_path / "k.csv"), "--reader", "what")

@@ -14,7 +14,7 @@ import numpy as np
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights import physics
-from beaver_ftc.flights.readers import evident, read_flight
+from beaver_ftc.flights.readers import check_exists, evident, read_flight
 from beaver_ftc.flights.readers.table import TIME, names_of, read_numbers
 from beaver_ftc.flights.recording import Column, Floats, Recording, nearest_ten
 from beaver_ftc.flights.samples import Samples, read_for, sample
@@ -97,6 +97,7 @@ def _si(columns: Any, quantity: Any) -> Column:
 
 def _guessed(path: Path, reader: str | None, lines: list[str]) -> tuple[Recording, Document | None]:
     """The recording, and the keys of a vehicle file for it; None where rates or commands are not found."""
+    check_exists(path)
     kind = reader or evident(path)
     time = _time(path, lines) if kind == "table" else None
     wanted = _candidates(names_of(path)) if kind == "table" else None

@@ -30,8 +30,7 @@ def read_flight(
     columns: those that a table is read for, all where None. Raises BadInput with one line: why the log cannot
     be used.
     """
-    if not path.exists():
-        raise BadInput(f"{path}: no such file or folder, allowed: a recorded flight")
+    check_exists(path)
     name = reader or evident(path)
     if name not in READERS:
         raise BadInput(f"--reader {name}: is not known, allowed: {', '.join(READERS)}")
@@ -44,6 +43,12 @@ def read_flight(
         raise BadInput(f"{path}: time: {' in '.join(time)} is not its time, allowed: {column} in {unit}")
     recording: Recording = module.read(path)
     return recording
+
+
+def check_exists(path: Path) -> None:
+    """Raise BadInput where there is no log."""
+    if not path.exists():
+        raise BadInput(f"{path}: no such file or folder, allowed: a recorded flight")
 
 
 def evident(path: Path) -> str:

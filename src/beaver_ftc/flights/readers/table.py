@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.flights.readers.text import layout_of, read_cells, remarks
+from beaver_ftc.flights.readers.text import Layout, layout_of, read_cells, remarks
 from beaver_ftc.flights.recording import Column, Floats, Recording, nearest_ten
 from beaver_ftc.flights.units import SECONDS
 
@@ -61,9 +61,15 @@ def read_numbers(path: Path, columns: Sequence[str] | None = None) -> Table:
 
 def names_of(path: Path) -> list[str]:
     """The names of a table's columns. Raises BadInput where it is no table."""
-    if path.suffix.lower() != ".parquet":
-        return list(layout_of(path).names)
-    return list(_read(path, [])[0])
+    return list(_read(path, [])[0]) if path.suffix.lower() == ".parquet" else list(_layout(path).names)
+
+
+def _layout(path: Path) -> Layout:
+    try:
+        return layout_of(path)
+    except OSError as error:
+        says = (error.strerror or str(error)).lower()
+        raise BadInput(f"{path}: is no table that can be read ({says}), allowed: CSV or Parquet") from None
 
 
 def _read(path: Path, columns: Collection[str] | None) -> tuple[Table, dict[str, str]]:

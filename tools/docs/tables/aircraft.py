@@ -48,7 +48,13 @@ def any_aircraft_probe() -> str:
 
 def _flown(chosen: Iterable[str], flights: int, hours: float) -> str:
     args = argparse.Namespace(
-        flights=flights, first=0, seed=SEED, healthy_s=HEALTHY_S, hours=hours, fault_class="published"
+        flights=flights,
+        first=0,
+        seed=SEED,
+        healthy_s=HEALTHY_S,
+        hours=hours,
+        fault_class="published",
+        declared=False,
     )
     rows = []
     for name in chosen:

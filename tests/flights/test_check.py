@@ -8,7 +8,9 @@ from typer.testing import CliRunner
 
 from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.flights.check import _angle_unit
 from beaver_ftc.flights.readers import read_flight
+from beaver_ftc.flights.recording import Column
 from beaver_ftc.flights.vehicle import load_vehicle
 from flights import limited, synthetic
 from flights.test_signals import T_S, turning
@@ -242,3 +244,11 @@ def test_a_path_that_cannot_be_checked_is_a_line(tmp_path):
         run("identify", "--check", tmp_path / "folder.csv", "--reader", "table")
     with pytest.raises(BadInput, match="--reader what: is not known"):
         run("identify", "--check", logged(tmp_path / "k.csv"), "--reader", "what")
+
+
+@pytest.mark.parametrize(("name", "kind", "size", "unit"), [
+    ("ATT.Roll", "ardupilot", 3.0, "deg"), ("roll_deg", "table", 3.0, "deg"), ("roll", "table", 40.0, "deg"),
+    ("roll", "table", 3.0, "rad"),
+])  # fmt: skip
+def test_the_unit_of_a_small_roll_angle_is_told_by_its_log_or_name(name, kind, size, unit):
+    assert _angle_unit(name, Column(T_S, size * np.sin(T_S)), kind) == unit

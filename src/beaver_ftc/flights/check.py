@@ -123,7 +123,8 @@ def _proposed(
 ) -> Document:
     columns = recording.columns
     roll = columns[found["roll"]] if found["roll"] else None
-    unit = _rate_unit(recording, [str(found[axis]) for axis in "pqr"], roll)
+    turned = _angle_unit(str(found["roll"]), roll, kind) if roll is not None else "rad"
+    unit = _rate_unit(recording, [str(found[axis]) for axis in "pqr"], roll, UNITS[turned][1])
     vehicle: Document = {"name": _plain(recording.name), "reader": kind}
     if time and time != (TIME, "s"):
         vehicle["time"] = {"column": time[0], "unit": time[1]}
@@ -132,7 +133,6 @@ def _proposed(
     vehicle["surfaces"] = {_plain(name): {name: 1.0} for name in commands}
     angles = {axis: found[axis] for axis in ("roll", "pitch") if found[axis]}
     if roll is not None:
-        turned = "deg" if _largest(roll.values) > 2.0 * np.pi else "rad"
         vehicle["attitude"] = {axis: _column(str(name), turned, "rad") for axis, name in angles.items()}
     if name := found["az"]:
         size = float(np.nanmedian(np.abs(columns[name].values)))
@@ -191,12 +191,19 @@ def _fits(rate_hz: float) -> bool:
     return _RATE_HZ[0] <= rate_hz <= _RATE_HZ[1]
 
 
-def _rate_unit(recording: Recording, names: list[str], roll: Column | None) -> str:
-    """The unit of the rates: by the roll angle, by their name, or by their size."""
+def _angle_unit(name: str, roll: Column, kind: str) -> str:
+    """The unit of the attitude: an ArduPilot's is degrees; by its name; by its size."""
+    if kind == "ardupilot" or "deg" in name.lower() or _largest(roll.values) > 2.0 * np.pi:
+        return "deg"
+    return "rad"
+
+
+def _rate_unit(recording: Recording, names: list[str], roll: Column | None, rad: float) -> str:
+    """The unit of the rates: by the roll angle, by their name, or by their size. rad: what the roll
+    angle's numbers are multiplied by."""
     rates = [recording.columns[name] for name in names]
     if roll is not None:
-        turn = 2.0 * np.pi / physics.full_turn(roll)
-        found = physics.roll_of(rates, replace(roll, values=roll.values * turn), None)
+        found = physics.roll_of(rates, replace(roll, values=roll.values * rad), None)
         if found is not None and abs(found.correlation) > _AGREE:
             return nearest_unit(RATE, abs(found.slope), 1.5) or "rad/s"
     hint = next((unit for text, unit in _HINTS.items() if text in names[0].lower()), None)

@@ -113,11 +113,6 @@ def roll_remark(found: Roll, rate: str, roll: str) -> str | None:
     return f"{fits}: a factor of {size:.4g} on {rate} fits"
 
 
-def full_turn(roll: Column) -> float:
-    """A full circle in the unit that a column of angles seems to have."""
-    return _turn(roll.values)
-
-
 def gravity_remark(acceleration: Column, name: str) -> str | None:
     """What is wrong with the acceleration along z by its mean, and which unit fits; None where nothing is."""
     values = acceleration.values[np.isfinite(acceleration.values)]

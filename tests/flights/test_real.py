@@ -43,7 +43,10 @@ def test_cutting_a_real_flight_short_changes_no_earlier_row(enac):
     whole = diagnose(samples, model)
     for n in (2873, 9071):
         fields = ("t_s", "rates", "commands", "signals", "labels", "run", "stamps")
-        short = diagnose(replace(samples, **{name: getattr(samples, name)[:n] for name in fields}), model)
+        cut = {name: getattr(samples, name)[:n] for name in (*fields, "clipped")}
+        still_s = {name: still[:n] for name, still in samples.still_s.items()}
+        short = diagnose(replace(samples, still_s=still_s, **cut), model)
+        assert np.array_equal(short.credible, whole.credible[:n])
         assert np.array_equal(short.estimate, whole.estimate[:n])
         assert np.array_equal(short.probability, whole.probability[:n])
 

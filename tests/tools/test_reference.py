@@ -22,10 +22,12 @@ from beaver_ftc.flights.vehicle import Vehicle
 from beaver_ftc.scenario.loader import load_text
 from beaver_ftc.scenario.signals import Signal
 from beaver_ftc.scenario.sweeps import Variation, load_sweep_text
+from scenario.damageable import damageable
 
 ROOT = Path(__file__).parents[2]
 LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4, "at_s": 12}
 PROFILE = {"altitude_m": [{"value": 1900}], "airspeed_mps": [{"value": 45}], "heading_deg": [{"value": 90}]}
+CASE = "left-wing-tip-off"  # the example's
 NO_TERMS = {"Cl": [], "Cm": [], "Cn": []}
 # What a file says besides the key in question.
 AROUND = {
@@ -92,7 +94,7 @@ def required(schema, section):
 
 def value_of(schema, section, key):
     """The example of a key; of one that holds sections, the least that may stand there."""
-    if not key.sections:
+    if not key.sections or key.example is not None:
         return key.example
     below, here = schema.found[key.sections[0]], (*section.places[0].path, key.name)
     value = required(schema, below) | LEAST.get(below.title, {})
@@ -121,7 +123,11 @@ def document(kind, section, key):
     value = {**required(schema, section), **least, **key.needs, key.name: value_of(schema, section, key)}
     path = section.places[0].path
     around = {**AROUND[kind].get("", {}), **AROUND[kind].get(path[0] if path else "", {})}
-    return merged(around, wrapped(schema, path, (), value))
+    made = merged(around, wrapped(schema, path, (), value))
+    damaged = any(
+        fault.get("type") == "damage" for fault in made.get("faults", ()) if kind == "scenario-keys"
+    )
+    return made | ({"aircraft": "./plane"} if damaged else {})
 
 
 def merged(one, other):
@@ -142,6 +148,7 @@ LOADERS = {
 @pytest.mark.parametrize(("kind", "section"), EVERY)
 def test_each_example_loads(kind, section, tmp_path):
     (tmp_path / "pilot.csv").write_text("t_s,q_deg_s,rate_deg_s\n0,0,0\n1,2,2\n")
+    damageable(tmp_path / "plane", {CASE: {"property": f"failures/damage/{CASE}"}})
     refused = {}
     for key in section.keys:
         try:

@@ -381,7 +381,7 @@ class DamageSection(Section):
     """
 
     property: Property = entry(..., examples=["failures/damage/left-wing-tip-off"])
-    takes: tuple[Name, ...] = entry((), examples=[["left_aileron"]])
+    takes: tuple[Name, ...] = entry((), examples=[["aileron"]])
 
 
 class AircraftFile(Section):

@@ -33,8 +33,10 @@ class Quantity(Section):
     unit: Literal[tuple(UNITS)] | None = Field(  # type: ignore[valid-type]
         default=None, description="unit of its numbers, SI where left out", examples=["deg/s"]
     )
-    scale: Number = number(1.0, unit="1", says="what its numbers are multiplied by", examples=[0.01])
-    offset: Number = number(0.0, unit="as the column", says="added after that", examples=[-1.5])
+    scale: Number = number(
+        1.0, unit="1", says="what its numbers are multiplied by", range="not 0", examples=[0.01]
+    )
+    offset: Number = number(0.0, unit="as the column", says="added after that", range="any", examples=[-1.5])
 
     @model_validator(mode="after")
     def _holds_something(self) -> "Quantity":

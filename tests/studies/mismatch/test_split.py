@@ -36,7 +36,12 @@ def largest(values):
     return float(np.abs(values).max())
 
 
-STILL_AIR = [name for name in builtin_names() if load_scenario(name).environment.severity is None]
+FLOWN = {name: load_scenario(name) for name in builtin_names()}
+STILL_AIR = [
+    name
+    for name, one in FLOWN.items()
+    if one.environment.severity is None and one.airframe.name == "beaver"  # the split is by its terms
+]
 
 
 @pytest.mark.parametrize("name", STILL_AIR)

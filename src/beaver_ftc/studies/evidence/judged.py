@@ -15,7 +15,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.results.metrics import versions
-from beaver_ftc.scenario.faults import TYPES, UNANTICIPATED
+from beaver_ftc.scenario.faults import DAMAGE, TYPES, UNANTICIPATED
 from beaver_ftc.scenario.sweeps import Sweep, SweepExpect
 from beaver_ftc.studies.engine.store import fingerprint, plug_ins
 from beaver_ftc.studies.evidence.flown import ALTITUDES_M, BANDS, MET, NOT_MET, NOT_SHOWN, Row, part
@@ -215,7 +215,7 @@ def _coverage(name: str, plan: EvidencePlan, rows: Sequence[Row]) -> Document:
         {"surface": surface, "type": kind, "flights": [counts[surface, kind, k] for k in range(len(bands))]}
         for surface, kind in sorted({key[:2] for key in counts})
     ]
-    types, surfaces = [kind for kind in TYPES if kind != UNANTICIPATED], list(aircraft.surfaces)
+    types, surfaces = [kind for kind in TYPES if kind not in (DAMAGE, UNANTICIPATED)], list(aircraft.surfaces)
     with_fault = sum(n > 0 and key[0] != "none" for key, n in counts.items())
     return {
         "aircraft": name, "cells": bands, "flown": flown, "combinations": with_fault,

@@ -139,6 +139,7 @@ def test_a_surface_that_never_moved_is_not_claimed(model):
     assert (rows.low[:, 0] == 0.0).all()
     assert (rows.high[:, 0] == 1.0).all()
     assert not any("right" in name for name in rows.named)
+    assert not (rows.faulty & (rows.named == "")).any()
     (line,) = trust.unclaimed_lines(known)
     assert line.startswith("of what right does, 100.0%")
 
@@ -206,3 +207,13 @@ def test_after_a_clipped_rate_nothing_is_said_for_half_a_minute(model):
     rows = diagnose(small.flight(model, n=600, seed=4, clipped=clipped), model)
     assert np.flatnonzero(rows.credible == 0).tolist() == list(range(100, 401))
     assert list(rows.reasons) == ["a rate was clipped in the last 30 s"]
+
+
+def test_a_model_that_claims_nothing_says_nothing(model):
+    """Neither a name nor an alarm in a flight whose surfaces' effects are all made up by the rates."""
+    fitted = model.fitted.model_copy(update={"tied": [0.99, 1.0]})
+    known = model.model_copy(update={"fitted": fitted})
+    rows = diagnose(small.flight(model, n=600, lost=((1, 200, 600, 0.0),), seed=8), known)
+    assert silent(rows).all()
+    assert not rows.credible.any()
+    assert list(rows.reasons) == ["of no surface is the effect known from the flights fitted"]

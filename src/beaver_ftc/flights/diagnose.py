@@ -73,30 +73,33 @@ def silenced(
     reasons = trust.outside(samples, model, np.ones(len(samples.t_s)) if scale is None else scale)
     if still is not None and still.any():
         reasons["nothing answers the commands: on the ground, or these are not what it follows"] = still
+    if not any(trust.claimed(model)):
+        reasons["of no surface is the effect known from the flights fitted"] = np.ones(
+            len(rows.t_s), dtype=bool
+        )
     silent = np.zeros(len(samples.t_s), dtype=bool)
     for rows_outside in reasons.values():
         silent |= rows_outside
+    unnamed = silent | _of(rows.named, trust.unclaimed(model))
     told = by_surface(np.tile(np.array(trust.claimed(model), dtype=float), (len(silent), 1)), model) > 0.0
     unsaid = silent[:, None] | ~told
     told_all = replace(
         rows,
-        faulty=np.where(silent, 0, rows.faulty),
-        named=np.where(silent, "", _without(rows.named, trust.unclaimed(model))),
+        faulty=np.where(unnamed, 0, rows.faulty),
+        named=np.where(unnamed, "", rows.named),
         estimate=np.where(unsaid, 1.0, rows.estimate),
         low=np.where(unsaid, 0.0, rows.low),
         high=np.where(unsaid, 1.0, rows.high),
-        probability=np.where(silent, 0.0, rows.probability),
+        probability=np.where(unnamed, 0.0, rows.probability),
         credible=np.where(silent, 0, 1),
         reasons=reasons,
     )
     return _at_stamps(samples, told_all)
 
 
-def _without(named: NDArray[np.object_], unclaimed: set[str]) -> NDArray[np.object_]:
-    """Names with no surface of which nothing is claimed: `unknown` in their place."""
-    if not unclaimed:
-        return named
-    return np.array([UNKNOWN if unclaimed & set(name.split("+")) else name for name in named], dtype=object)
+def _of(named: NDArray[np.object_], unclaimed: set[str]) -> NDArray[np.bool_]:
+    """Which rows name a surface of which nothing is claimed."""
+    return np.array([bool(unclaimed & set(name.split("+"))) for name in named], dtype=bool)
 
 
 def check_rate(samples: Samples, model: Model) -> None:

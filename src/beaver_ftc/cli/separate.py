@@ -15,7 +15,7 @@ def command(
     out: Path = Path("runs"),
     format: FormatOption = Format.text,
 ) -> None:
-    """Propose the smallest doublet that is certain to tell the candidates left apart.
+    """Propose the smallest doublet that separates candidates.
 
     Flies the scenario to its end. For each two candidates left: which surfaces go how far, there and back,
     after what time they are told apart for certain, or why no doublet within travel, actuators, rates and

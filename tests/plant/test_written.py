@@ -128,7 +128,7 @@ def test_a_scenario_s_truth_is_written_and_trimmed_and_takes_off_in_its_air(chan
 def test_an_error_of_the_truth_that_an_aircraft_cannot_have_is_refused(uncertainty, says):
     class Without(Plant):
         def has(self, name):
-            return not name.startswith("uncertainty/")
+            return not name.startswith("uncertainty/") and super().has(name)
 
     plant = Without(rate_hz=50, aircraft=trainer(start={"altitude_m": 500}))
     neutral = {"coefficients": dict.fromkeys(uncertainty.get("coefficients", ()), 1.0)}

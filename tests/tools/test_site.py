@@ -114,6 +114,7 @@ def test_the_flight_on_the_front_page_can_be_replayed(opened):
     frame.locator("#play").click()
     frame.locator("#play", has_text="pause").wait_for()
     frame.locator(f'#clock:not(:text-is("{before}"))').wait_for()
+    assert frame.locator("#clock").inner_text() != before
 
 
 @needs_browser
@@ -121,7 +122,9 @@ def test_search_works_from_disk(opened):
     page = opened("index.html")
     page.locator("input[name=query]").click()
     page.keyboard.type("loss_of_effectiveness")
-    page.locator(".md-search-result__link", has_text="Scenario keys").first.wait_for()
+    found = page.locator(".md-search-result__link", has_text="Scenario keys").first
+    found.wait_for()
+    assert "loss_of_effectiveness" in found.locator("xpath=..").inner_text()
 
 
 @needs_browser

@@ -1,11 +1,10 @@
 """Tables of pages without the blanks beside their bars, which a reader of the page does not see."""
 
 import re
-from collections.abc import Sequence
 
-from beaver_ftc.studies.present.tables import Rows, markdown_table
+_ROW = re.compile(r"^\|.*\|$", re.MULTILINE)
 
 
-def compact_table(head: Sequence[str], rows: Rows) -> str:
-    """A table in Markdown."""
-    return re.sub(r" ?(?<!\\)\| ?", "|", markdown_table(head, rows))
+def compact(text: str) -> str:
+    """A text in Markdown, its tables narrower."""
+    return _ROW.sub(lambda row: re.sub(r" ?(?<!\\)\| ?", "|", row[0]), text)

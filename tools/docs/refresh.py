@@ -14,6 +14,7 @@ from typing import Any
 from beaver_ftc.documents.errors import BadInput
 from tools.docs import pictures, values
 from tools.docs.commands import Output, outputs
+from tools.docs.compact import compact
 from tools.docs.marks import Block, Document, Origin, Page
 from tools.docs.pages import ROOT, Finding
 
@@ -196,7 +197,7 @@ def dressed(old: str, text: str, command: str) -> str:
         mark, language, prompts = fence[1], fence[2], fence[3]
         return f"{mark}{language}\n{prompts}{text}\n{mark}\n"
     if old.strip() or _MARKDOWN.fullmatch(command):
-        return f"{text}\n"
+        return f"{compact(text)}\n"
     return f"```text\n{text}\n```\n"
 
 

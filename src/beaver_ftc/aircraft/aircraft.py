@@ -21,10 +21,11 @@ from beaver_ftc.aircraft.schema import (
     TermSection,
     TrimSection,
 )
+from beaver_ftc.aircraft.units import GRAVITY_MPS2
 
 AXES = ("p", "q", "r")
 THRUST_TERM = "CX_dpt"  # what the slipstream of a piston engine adds to the force along the body
-LEAST_THRUST, GRAVITY_MPS2 = 0.01, 9.80665  # of the weight: what gives less is no engine to fly by
+LEAST_THRUST = 0.01  # of the weight: what gives less is no engine to fly by
 MOMENTS, FORCES = ("Cl", "Cm", "Cn"), ("CX", "CY", "CZ")
 
 

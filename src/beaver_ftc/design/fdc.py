@@ -14,6 +14,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import Term, load
 from beaver_ftc.aircraft.aircraft import FORCES, MOMENTS
+from beaver_ftc.aircraft.units import GRAVITY_MPS2
 from beaver_ftc.design.engine import engine_power_kw, slipstream
 from beaver_ftc.design.model import inertia_coefficients
 
@@ -32,7 +33,6 @@ _SEA_LEVEL_PRESSURE_PA = 101325.0
 _LAPSE_K_PER_M = 0.0065
 _GAS_J_PER_KG_K = 287.053
 # Gravity as FDC has it: the standard value, falling with the square of the distance.
-_GRAVITY_MPS2 = 9.80665
 _EARTH_RADIUS_M = 6371020.0
 _STEP = 1e-30  # complex
 
@@ -65,7 +65,7 @@ def atmosphere(altitude_m):
 
 def gravity(altitude_m):
     """Gravity m/s2 at an altitude m [FDC]."""
-    return _GRAVITY_MPS2 * (_EARTH_RADIUS_M / (_EARTH_RADIUS_M + altitude_m)) ** 2
+    return GRAVITY_MPS2 * (_EARTH_RADIUS_M / (_EARTH_RADIUS_M + altitude_m)) ** 2
 
 
 def aerodynamic_coefficients(

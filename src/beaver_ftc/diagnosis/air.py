@@ -20,6 +20,7 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft, MassProperties
 from beaver_ftc.aircraft.aircraft import FORCES
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS
+from beaver_ftc.aircraft.units import GRAVITY_MPS2
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.model import rate_damping
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, QDYN, TABLE, evaluate, fill_table, whole_sum
@@ -328,7 +329,7 @@ def set_up_air(air: np.void, turbulence: str, mass: MassProperties, aircraft: Ai
     air["moving"], air["seen"] = turbulence != "none", bool(aircraft.measurable_forces)
     fill_table(air["forces"], aircraft, aircraft.measurable_forces, FORCES)
     air["area_per_mass"] = aircraft.geometry.wing_area_m2 / mass.mass_kg
-    air["gravity"] = 9.80665  # m/s2, standard; what is constant has no part in a change of the gust
+    air["gravity"] = GRAVITY_MPS2  # standard; what is constant has no part in a change of the gust
     air["span"] = span_m
     air["per_metre"], air["unseen"] = gust_drift(turbulence, span_m), UNSEEN if air["seen"] else 1.0
     air["scale"] = SCALE_M

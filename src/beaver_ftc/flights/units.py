@@ -2,18 +2,20 @@
 
 from math import pi
 
+from beaver_ftc.aircraft.units import GRAVITY_MPS2, M_PER_FT
+
 RATE, ANGLE, SPEED, ACCELERATION, LENGTH, SHARE, TIME = (
     "rate", "angle", "speed", "acceleration", "length", "share", "time",
 )  # fmt: skip
-_DEG, _G = pi / 180.0, 9.80665
+_DEG = pi / 180.0
 UNITS: dict[str, tuple[str, float]] = {
     "rad/s": (RATE, 1.0), "deg/s": (RATE, _DEG), "cdeg/s": (RATE, 0.01 * _DEG), "mrad/s": (RATE, 1e-3),
     "rad": (ANGLE, 1.0), "deg": (ANGLE, _DEG), "cdeg": (ANGLE, 0.01 * _DEG), "mrad": (ANGLE, 1e-3),
     "m/s": (SPEED, 1.0), "cm/s": (SPEED, 0.01), "km/h": (SPEED, 1.0 / 3.6), "kt": (SPEED, 1852.0 / 3600.0),
-    "ft/s": (SPEED, 0.3048), "mph": (SPEED, 0.44704),
-    "m/s2": (ACCELERATION, 1.0), "g": (ACCELERATION, _G), "mg": (ACCELERATION, 1e-3 * _G),
-    "ft/s2": (ACCELERATION, 0.3048),
-    "m": (LENGTH, 1.0), "cm": (LENGTH, 0.01), "ft": (LENGTH, 0.3048),
+    "ft/s": (SPEED, M_PER_FT), "mph": (SPEED, 0.44704),
+    "m/s2": (ACCELERATION, 1.0), "g": (ACCELERATION, GRAVITY_MPS2), "mg": (ACCELERATION, 1e-3 * GRAVITY_MPS2),
+    "ft/s2": (ACCELERATION, M_PER_FT),
+    "m": (LENGTH, 1.0), "cm": (LENGTH, 0.01), "ft": (LENGTH, M_PER_FT),
     "1": (SHARE, 1.0), "%": (SHARE, 0.01),
 }  # fmt: skip
 """Of each unit what it measures, and how much of the SI unit it is."""

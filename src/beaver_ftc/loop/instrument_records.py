@@ -4,6 +4,7 @@ from math import exp
 
 import numpy as np
 
+from beaver_ftc.aircraft.units import GRAVITY_MPS2
 from beaver_ftc.design.context import DesignFunctions
 from beaver_ftc.diagnosis.accelerometers import NEVER_STILL
 from beaver_ftc.diagnosis.across import across_a_column
@@ -19,7 +20,7 @@ from beaver_ftc.scenario.faults import of_a_sensor
 from beaver_ftc.scenario.interventions import stages
 from beaver_ftc.scenario.schema import Scenario
 
-GRAVITY_M_S2, EARTH_RADIUS_M = 9.80665, 6_371_000.0
+EARTH_RADIUS_M = 6_371_000.0
 FASTER = 1.4  # than at the start a flight may become
 TAKEN_OVER_PER_S = 3.0  # by the attitude, of a rate it stands in for, where its own noise is declared
 # What sets the counters of random numbers apart: OF_THE_FIRST, OF_THE_FURTHER, OF_FAULTS, OF_FORCES.
@@ -114,7 +115,7 @@ def configure_watch(watch: np.void, scenario: Scenario, h: float) -> None:
     step, sensors, initial = watch["step"], scenario.fdi.bounds.sensors, scenario.initial
     errors = Errors(sensors)
     step["h"], step["decay"] = h, [exp(-pole * h) for pole in POLES_PER_S]
-    step["gravity"] = GRAVITY_M_S2 * (1.0 + initial.altitude_m / EARTH_RADIUS_M) ** -2
+    step["gravity"] = GRAVITY_MPS2 * (1.0 + initial.altitude_m / EARTH_RADIUS_M) ** -2
     step["gust"], step["gusts"] = gusts_seen(scenario.fdi.bounds.turbulence, initial.airspeed_mps, h)
     step["swift"] = FASTER * initial.airspeed_mps
     if watch["engine"]:  # whose keys the aircraft names

@@ -12,14 +12,15 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft import load as load_aircraft
+from beaver_ftc.aircraft.units import M_PER_FT, N_PER_LBF
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.documents.paths import data_root
 from beaver_ftc.plant.model_file import refuse_deeds, shared
 from beaver_ftc.plant.state import START_LATITUDE_DEG, FlightState
 
-FT_PER_M = 1.0 / 0.3048
+FT_PER_M = 1.0 / M_PER_FT
 _LONGEST_REASON = 300
-PA_PER_PSF = 4.4482216152605 / 0.3048**2
+PA_PER_PSF = N_PER_LBF / M_PER_FT**2
 
 _AT_REST = str(data_root() / "aircraft" / "at_rest.xml")
 

@@ -9,8 +9,8 @@ from functools import lru_cache
 
 from beaver_ftc.aircraft import AXES, Aircraft, load
 from beaver_ftc.aircraft.schema import MAX_SIGNALS
+from beaver_ftc.aircraft.units import M_PER_FT
 
-FT = 0.3048  # m, exact
 PSF = 47.88025898033584  # Pa per lbf/ft2
 
 Channel = tuple[str, str, float]
@@ -22,14 +22,14 @@ FIXED: tuple[Channel, ...] = (
     ("r_rad_s", "velocities/r-rad_sec", 1.0),
     ("alpha_rad", "aero/alpha-rad", 1.0),
     ("beta_rad", "aero/beta-rad", 1.0),
-    ("airspeed_mps", "velocities/vt-fps", FT),
+    ("airspeed_mps", "velocities/vt-fps", M_PER_FT),
     ("qdyn_pa", "aero/qbar-psf", PSF),
     ("phi_rad", "attitude/phi-rad", 1.0),
     ("theta_rad", "attitude/theta-rad", 1.0),
     ("psi_rad", "attitude/psi-rad", 1.0),
     ("latitude_rad", "position/lat-gc-rad", 1.0),
     ("longitude_rad", "position/long-gc-rad", 1.0),
-    ("altitude_m", "position/h-sl-ft", FT),
+    ("altitude_m", "position/h-sl-ft", M_PER_FT),
     ("pdot_rad_s2", "accelerations/pdot-rad_sec2", 1.0),
     ("qdot_rad_s2", "accelerations/qdot-rad_sec2", 1.0),
     ("rdot_rad_s2", "accelerations/rdot-rad_sec2", 1.0),
@@ -60,9 +60,9 @@ def truth_channels(aircraft: Aircraft) -> tuple[Channel, ...]:
 
 # What further instruments would read, where somebody asks for them: m/s2 times slug, slug; then the engine's.
 _INERTIAL: tuple[Channel, ...] = (
-    ("force_x", "forces/fbx-total-lbs", FT),
-    ("force_y", "forces/fby-total-lbs", FT),
-    ("force_z", "forces/fbz-total-lbs", FT),
+    ("force_x", "forces/fbx-total-lbs", M_PER_FT),
+    ("force_y", "forces/fby-total-lbs", M_PER_FT),
+    ("force_z", "forces/fbz-total-lbs", M_PER_FT),
     ("mass_slug", "inertia/mass-slugs", 1.0),
 )
 _ENGINE = ("engine_rpm", "manifold_pressure_inhg")

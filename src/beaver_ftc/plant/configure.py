@@ -6,6 +6,7 @@ Turbulence and one-minus-cosine gusts are JSBSim's own models.
 from collections.abc import Sequence
 from math import ceil, radians
 
+from beaver_ftc.aircraft.units import KG_PER_LB
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.adapter import FT_PER_M, Plant
 from beaver_ftc.plant.trim import TrimPoint, trim
@@ -14,7 +15,7 @@ from beaver_ftc.scenario.schema import Scenario
 
 _AXES = ("p", "q", "r")
 DELAY = "actuators/delay-s"
-LB_PER_KG, IN_PER_M = 1.0 / 0.45359237, 12.0 * FT_PER_M
+LB_PER_KG, IN_PER_M = 1.0 / KG_PER_LB, 12.0 * FT_PER_M
 
 # JSBSim's Dryden turbulence in Tustin's form, whose spectrum does not depend on the frame. Curve of equal
 # probability of exceedence, and wind at 20 ft for what is below 2000 ft (15, 30, 45 kt) [MIL-F-8785C, 3.7].

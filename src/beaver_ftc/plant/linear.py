@@ -21,8 +21,9 @@ import jsbsim
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.aircraft.units import M_PER_FT
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
-from beaver_ftc.plant.adapter import FT_PER_M, Plant
+from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.configure import configure
 from beaver_ftc.plant.model_file import copy_of
 from beaver_ftc.plant.state import FlightState
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
     from control import StateSpace
 
-M_PER_FT = 1.0 / FT_PER_M
 _EARTH_RADIUS_M = 6371000.0
 
 # State by our name, with its unit (a field of FlightState, but for north and east), and by JSBSim's, with the

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from beaver_ftc.aircraft.units import GRAVITY_MPS2
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.plant.conditions import trimmed
 from beaver_ftc.plant.linear import LinearModel, differences
@@ -21,7 +22,6 @@ from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.linear_systems import CLASSICAL, Mode, modes
 from beaver_ftc.studies.present.tables import aligned, finite, number
 
-G_MPS2 = 9.80665
 WORSE = 4  # than level 3
 N_AIRSPEEDS = 5
 _STATES = ("alpha_rad", "beta_rad", "p_rad_s", "q_rad_s", "r_rad_s", "phi_rad", "theta_rad", "psi_rad")
@@ -74,7 +74,7 @@ class Quality:
 def of_model(linear: LinearModel, airspeed_mps: float, where: str) -> list[Quality]:
     """The handling qualities of a linear aircraft."""
     alpha = linear.states.index("alpha")
-    g_per_rad = -linear.A[alpha, alpha] * airspeed_mps / G_MPS2
+    g_per_rad = -linear.A[alpha, alpha] * airspeed_mps / GRAVITY_MPS2
     values = _values(modes(linear.of(CLASSICAL).A), float(g_per_rad))
     return [
         Quality(where, airspeed_mps, limit.mode, limit.quantity, value, limit.level(value))

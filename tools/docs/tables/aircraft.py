@@ -14,7 +14,7 @@ from benchmarks.any_aircraft import HEALTHY_S, TWELVE, row_of
 from beaver_ftc.plant.instrumented import names
 from beaver_ftc.studies.derive.derivation import derive
 from beaver_ftc.studies.derive.first_use import derive_if_needed
-from tools.docs.compact import compact_table
+from beaver_ftc.studies.present.tables import markdown_table
 from tools.docs.pages import ROOT
 
 PROGRAM = "from beaver_ftc.cli.main import main; main()"
@@ -60,7 +60,7 @@ def _flown(chosen: Iterable[str], flights: int, hours: float) -> str:
     for name in chosen:
         derive_if_needed(f"jsbsim:{name}")
         rows.append(row_of(name, args)[0][: len(FLOWN) + 1])
-    return compact_table(("aircraft", *FLOWN), rows)
+    return markdown_table(("aircraft", *FLOWN), rows)
 
 
 def _derived(chosen: Iterable[str]) -> str:
@@ -73,7 +73,7 @@ def _derived(chosen: Iterable[str]) -> str:
         else:
             rows.append(_row(name, document))
     says = [f"- {', '.join(those)}: {why}" for why, those in refused.items()]
-    return f"{compact_table(('aircraft', 'm/s', 'error', 'loss'), rows)}\n\n" + "\n".join(says)
+    return f"{markdown_table(('aircraft', 'm/s', 'error', 'loss'), rows)}\n\n" + "\n".join(says)
 
 
 def _derive(name: str) -> tuple[dict | None, str]:
@@ -113,5 +113,5 @@ def own_aircraft() -> str:
     rows = [(name, f"{typed[name]:g}", f"`{term}`", f"{found[term]:.4g}") for name, term in SAME.items()]
     bound = max(derived.aircraft.model_error_rad_s2)
     return (
-        f"{compact_table(('typed', 'value', 'found', 'value'), rows)}\n\nDeclared bound: {bound:.1g} rad/s²."
+        f"{markdown_table(('typed', 'value', 'found', 'value'), rows)}\n\nDeclared bound: {bound:.1g} rad/s²."
     )

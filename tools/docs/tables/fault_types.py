@@ -6,7 +6,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from beaver_ftc.studies.matrix.fault_matrix import run_matrix
-from tools.docs.compact import compact_table
+from beaver_ftc.studies.present.tables import markdown_table
 
 Document = dict[str, Any]
 
@@ -26,7 +26,7 @@ def _matrix(declared: bool, turbulence: str = "none") -> str:
         document = run_matrix(Path(folder), declared=declared, turbulence=turbulence)
     cells = {(cell["fault"], cell["surface"]): cell for cell in document["cells"]}
     surfaces = list(dict.fromkeys(surface for _, surface in cells))
-    table = compact_table(
+    table = markdown_table(
         ("fault", *surfaces),
         [
             (fault, *(_verdict(cells[fault, surface]) for surface in surfaces))

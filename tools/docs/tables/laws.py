@@ -2,7 +2,7 @@
 
 from beaver_ftc.scenario.loader import load
 from beaver_ftc.studies.margins import study
-from tools.docs.compact import compact_table
+from beaver_ftc.studies.present.tables import markdown_table
 
 DECLARED = {
     "nothing": {"name": "level"},
@@ -18,4 +18,4 @@ def least_margins() -> str:
         gain = min(min(one.up_db, one.down_db) for one in found)
         phase = min(one.phase_deg for one in found)
         rows.append((declared, str(len(found)), f"{gain:.1f}", f"{phase:.0f}"))
-    return compact_table(("declared", "loops", "least gain margin, dB", "phase margin, deg"), rows)
+    return markdown_table(("declared", "loops", "least gain margin, dB", "phase margin, deg"), rows)

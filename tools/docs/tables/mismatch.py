@@ -8,7 +8,7 @@ import tempfile
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.scenario.loader import load
 from beaver_ftc.studies.mismatch.linear import analyse, linear_document
-from tools.docs.compact import compact_table
+from beaver_ftc.studies.present.tables import markdown_table
 
 DESIGNS = ("declared", "engine-neglected", "linearised", "frozen-alpha", "heavy")
 CONDITIONS = ((30.0, 0.0), (35.0, 1829.0), (45.0, 1829.0), (50.0, 3000.0), (55.0, 4000.0))
@@ -24,7 +24,7 @@ def mismatch_designs() -> str:
     flights = {}
     for found in json.loads(run.stdout)["runs"]:
         flights[found["scenario"].removeprefix("elevator-partial-loss").lstrip("-") or "declared"] = found
-    return compact_table(
+    return markdown_table(
         ("design model", *AXES, "largest", "false alarm"),
         [
             (
@@ -55,7 +55,7 @@ def mismatch_modes() -> str:
         )
         rows.append((f"{airspeed_mps:g}/{altitude_m:g}", *of_it, *(f"{share:.2%}" for share in worst)))
     names = (name.replace("_", " ") for name in modes)
-    return compact_table(("m/s/m", *names, "FDC", "JSBSim"), rows)
+    return markdown_table(("m/s/m", *names, "FDC", "JSBSim"), rows)
 
 
 def _said(mode: dict[str, float]) -> str:

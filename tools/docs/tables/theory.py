@@ -6,7 +6,7 @@ from beaver_ftc.diagnosis import likelihood, noise_model, redundancy, statistica
 from beaver_ftc.diagnosis.bounds import declared, worst_case
 from beaver_ftc.plant import instruments
 from beaver_ftc.scenario.diagnosis import FdiConfig, Statistical
-from tools.docs.compact import compact_table
+from beaver_ftc.studies.present.tables import markdown_table
 
 CONSTANTS = (  # (section, symbol on the page, module, name there, unit)
     (2, r"$\omega_E$", declared, "EARTH_RATE_RAD_S", "rad/s"),
@@ -45,7 +45,7 @@ def theory_constants() -> str:
     """The constants of the page, and the defaults of its keys, by section."""
     rows = [(at, symbol, name, getattr(module, name), unit) for at, symbol, module, name, unit in CONSTANTS]
     rows += [(at, symbol, key, getattr(section, key), unit) for at, symbol, key, section, unit in SETTINGS]
-    return compact_table(
+    return markdown_table(
         ("section", "symbol", "name", "value"),
         [
             (str(at), symbol, f"`{name}`", f"{_said(value)} {unit}".strip())

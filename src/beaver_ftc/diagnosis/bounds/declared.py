@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from beaver_ftc.aircraft import AXES, Aircraft, MassProperties
+from beaver_ftc.aircraft.units import M_PER_FT
 from beaver_ftc.design.engine import power_error_kw
 from beaver_ftc.design.model import inertia_coefficients
 from beaver_ftc.design.variants import mass_of
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
 # Largest vertical gust (standard deviation) above 2000 ft and its scale [MIL-F-8785C, fig. 7, 3.7.2].
 GUST_FT_S = {"none": 0.0, "light": 7.4, "moderate": 10.6, "severe": 23.6}
 SCALE_FT = 1750.0
-M_PER_FT = 0.3048
 SCALE_M = M_PER_FT * SCALE_FT
 ROLLING = 1.9  # of the rotating gusts the strongest [Yeager1998, eq. 8]; pitching and yawing are weaker
 GUST_LIMIT_SIGMA = 6.0  # once in 5e8 samples beyond, were they independent
@@ -76,7 +76,7 @@ def gust_mps(turbulence: str) -> float:
 
 def gust_sigma_rad_s(turbulence: str, span_m: float) -> float:
     """Standard deviation of the air's rotation, rad/s, on any axis of an aircraft of this span."""
-    span_ft = span_m / 0.3048
+    span_ft = span_m / M_PER_FT
     return ROLLING * GUST_FT_S[turbulence] / sqrt(SCALE_FT * span_ft)
 
 

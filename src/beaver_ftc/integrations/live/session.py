@@ -10,6 +10,7 @@ import numpy as np
 
 import beaver_ftc as bf
 from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.aircraft.units import GRAVITY_MPS2
 from beaver_ftc.documents.errors import BadInput, suggestion
 from beaver_ftc.integrations.live import messages
 from beaver_ftc.integrations.live.game import NOTHING, Fault, Game, hidden_faults
@@ -27,7 +28,6 @@ HELD = ("altitude_m", "airspeed_mps", "heading_deg")  # by the autopilot that th
 EVENTS_KEPT = 400
 STICK_FRAMES = 10  # a coordinated turn is seen to so often
 TURN_STEP = np.radians(0.1)  # rad/s
-G_MPS2 = 9.80665
 ATTITUDE = ("phi_rad", "theta_rad", "airspeed_mps")
 NO_STICK = messages.Stick(do="stick", rates_deg_s=(0.0, 0.0, 0.0))
 GUST_S = {"rise_s": 0.5, "hold_s": 1.0, "fade_s": 0.5}
@@ -348,7 +348,7 @@ def fault_types() -> Message:
 
 def level_turn(phi_rad: float, theta_rad: float, airspeed_mps: float) -> np.ndarray:
     """Body rates (3,) rad/s of a coordinated level turn: psi' = g tan(phi) / V, seen in body axes."""
-    turn = G_MPS2 * tan(phi_rad) / airspeed_mps
+    turn = GRAVITY_MPS2 * tan(phi_rad) / airspeed_mps
     return turn * np.array([-sin(theta_rad), sin(phi_rad) * cos(theta_rad), cos(phi_rad) * cos(theta_rad)])
 
 

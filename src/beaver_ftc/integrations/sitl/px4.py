@@ -15,6 +15,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from beaver_ftc.aircraft.units import GRAVITY_MPS2
 from beaver_ftc.integrations.sitl.link import Link
 from beaver_ftc.integrations.sitl.mavlink import Inject, Mavlink
 from beaver_ftc.integrations.sitl.vehicle import Instant
@@ -27,7 +28,7 @@ INERTIAL, MAGNETIC, AIR = 0b111111, 0b111000000, 0b1111000000000  # bits of fiel
 # The Earth's field where all flights start, 45 N 0 E: declination, inclination, deg; gauss [WMM, 2023].
 DECLINATION_DEG, INCLINATION_DEG, FIELD_GAUSS = 1.2, 60.5, 0.467
 T0_K, LAPSE_K_M, P0_HPA, SCALE, STRATOSPHERE_M = 288.15, 0.0065, 1013.25, 5.2558797, 11000.0  # [ISA]
-R_AIR, G0 = 287.05287, 9.80665
+R_AIR = 287.05287
 NO_YAW = 0
 
 Message = Any
@@ -168,7 +169,7 @@ def state(m: Any, now: Instant, stamp_us: int) -> Message:
     """HIL_STATE_QUATERNION: the truth, for logs."""
     velocity = (round(100.0 * v) for v in now.velocity)
     speed = round(100.0 * now.airspeed_mps)
-    force = (max(min(round(1000.0 * a / G0), 32767), -32768) for a in now.force)
+    force = (max(min(round(1000.0 * a / GRAVITY_MPS2), 32767), -32768) for a in now.force)
     indicated = round(100.0 * sqrt(max(2.0 * now.qdyn_pa / 1.225, 0.0)))
     return m.MAVLink_hil_state_quaternion_message(
         stamp_us, quaternion(*now.true_attitude), *now.gyro, *_place(now), *velocity, indicated, speed, *force
@@ -196,7 +197,7 @@ def standard_air(altitude_m: float) -> tuple[float, float]:
     low_m = min(altitude_m, STRATOSPHERE_M)
     kelvin = T0_K - LAPSE_K_M * low_m
     pressure = P0_HPA * (kelvin / T0_K) ** SCALE
-    return pressure * exp(-G0 * (altitude_m - low_m) / (R_AIR * kelvin)), kelvin - 273.15
+    return pressure * exp(-GRAVITY_MPS2 * (altitude_m - low_m) / (R_AIR * kelvin)), kelvin - 273.15
 
 
 def magnetic_gauss(attitude: tuple[float, ...]) -> tuple[float, float, float]:

@@ -9,12 +9,13 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.channels import MOST_CHANNELS
+from beaver_ftc.aircraft.units import M_PER_FT
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.integrations.sitl.outputs import Outputs, power_range
 from beaver_ftc.loop.changing import take_diagnosis
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plant import ground
-from beaver_ftc.plant.channels import AIRSPEED, ALTITUDE, FT
+from beaver_ftc.plant.channels import AIRSPEED, ALTITUDE
 from beaver_ftc.plant.instruments import AX, SENSORS
 from beaver_ftc.results.log import SpooledLog
 from beaver_ftc.results.simulation import Simulation
@@ -37,20 +38,20 @@ OF_THE_LAW = ("pre_fault_rms_deg_s", "post_fault_rms_deg_s")
 Vector = np.ndarray
 
 _NODES = (  # what no instrument of ours measures, of the truth; factors to SI
-    ("velocities/v-north-fps", FT),
-    ("velocities/v-east-fps", FT),
-    ("velocities/v-down-fps", FT),
+    ("velocities/v-north-fps", M_PER_FT),
+    ("velocities/v-east-fps", M_PER_FT),
+    ("velocities/v-down-fps", M_PER_FT),
     ("position/lat-geod-deg", 1.0),
     ("position/long-gc-deg", 1.0),
-    ("position/h-sl-ft", FT),
+    ("position/h-sl-ft", M_PER_FT),
     ("attitude/phi-rad", 1.0),
     ("attitude/theta-rad", 1.0),
     ("attitude/psi-rad", 1.0),
     ("position/lat-gc-rad", 1.0),
     ("position/long-gc-rad", 1.0),
-    ("forces/fbx-total-lbs", FT),
-    ("forces/fby-total-lbs", FT),
-    ("forces/fbz-total-lbs", FT),
+    ("forces/fbx-total-lbs", M_PER_FT),
+    ("forces/fby-total-lbs", M_PER_FT),
+    ("forces/fbz-total-lbs", M_PER_FT),
     ("inertia/mass-slugs", 1.0),
 )
 _AT = {name: i for i, name in enumerate(SENSORS)}

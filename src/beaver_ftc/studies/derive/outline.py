@@ -18,19 +18,18 @@ import yaml
 from beaver_ftc.aircraft import AXES, Aircraft
 from beaver_ftc.aircraft.loading import read
 from beaver_ftc.aircraft.schema import AircraftFile, Interval
+from beaver_ftc.aircraft.units import KG_PER_SLUG, M_PER_FT
 from beaver_ftc.documents.base import Number, Section, number
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFailed
 from beaver_ftc.documents.validation import read_file
 from beaver_ftc.plant import instrumented
 from beaver_ftc.plant.adapter import Plant, bare, translated
-from beaver_ftc.plant.channels import FT
 from beaver_ftc.plant.model_file import copy_of
 from beaver_ftc.plant.state import FlightState
 from beaver_ftc.plant.trim import TrimPoint, trim
 from beaver_ftc.scenario.initial import initial_of
 
-SLUG = 0.45359237 * 9.80665 / FT  # kg
-SLUG_FT2 = SLUG * FT**2
+SLUG_FT2 = KG_PER_SLUG * M_PER_FT**2
 OUTLINE = Path(__file__).with_name("outline.yaml")
 DENSITY_KG_M3 = 1.058  # at the altitude there
 SPAN_OF_SPEED = (0.8, 1.25)
@@ -120,7 +119,7 @@ def _settled(model: Path, given: Mapping[str, float], names: Sequence[str]) -> l
 def outline(name: str, model: Path, travel: Travel, lift: float) -> Data:
     """The file without its terms; lift: the lift coefficient at the speed the envelope is built about."""
     fdm = bare(model)
-    area, mass_kg = fdm["metrics/Sw-sqft"] * FT**2, fdm["inertia/mass-slugs"] * SLUG
+    area, mass_kg = fdm["metrics/Sw-sqft"] * M_PER_FT**2, fdm["inertia/mass-slugs"] * KG_PER_SLUG
     speed_mps = (2.0 * mass_kg * 9.81 / (DENSITY_KG_M3 * area * lift)) ** 0.5
     data: Data = yaml.safe_load(OUTLINE.read_text(encoding="utf-8"))
     data["name"] = name if name[0].isalpha() else f"a{name}"
@@ -129,7 +128,7 @@ def outline(name: str, model: Path, travel: Travel, lift: float) -> Data:
         data["surfaces"][surface]["travel_rad"] = list(ends)
     inertia = {f"I{a}_kgm2": fdm[f"inertia/i{a}{a}-slugs_ft2"] * SLUG_FT2 for a in "xyz"}
     data["mass"] = {"mass_kg": mass_kg, **inertia, "Jxz_kgm2": -fdm["inertia/ixz-slugs_ft2"] * SLUG_FT2}
-    span_m, chord_m = fdm["metrics/bw-ft"] * FT, fdm["metrics/cbarw-ft"] * FT
+    span_m, chord_m = fdm["metrics/bw-ft"] * M_PER_FT, fdm["metrics/cbarw-ft"] * M_PER_FT
     data["geometry"] = {"wing_area_m2": area, "span_m": span_m, "chord_m": chord_m}
     data["envelope"]["airspeed_mps"] = [speed_mps * share for share in SPAN_OF_SPEED]
     return data

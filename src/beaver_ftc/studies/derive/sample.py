@@ -14,8 +14,8 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES, Aircraft
 from beaver_ftc.aircraft.schema import FLOW_SIGNALS
+from beaver_ftc.aircraft.units import M_PER_FT
 from beaver_ftc.plant.adapter import PA_PER_PSF, Plant
-from beaver_ftc.plant.channels import FT
 from beaver_ftc.plant.state import FlightState
 
 REACHES = (0.25, 0.5, 0.75, 1.0)  # of the boxes, as shares of the envelope's half widths
@@ -172,7 +172,7 @@ def seen_at(plant: Plant, properties: Mapping[str, str]) -> Iterator[list[float]
     """x, y, signals, u, rate where the aircraft is."""
     read = plant.read
     yield [read(f"velocities/{axis}-rad_sec") for axis in AXES]
-    flow = [read("aero/alpha-rad"), read("aero/beta-rad"), read("velocities/vt-fps") * FT]
+    flow = [read("aero/alpha-rad"), read("aero/beta-rad"), read("velocities/vt-fps") * M_PER_FT]
     yield [*flow, read("aero/qbar-psf") * PA_PER_PSF]
     yield [read(name) for name in properties.values()]
     yield [read(surface.effective) for surface in plant.aircraft.surface.values()]

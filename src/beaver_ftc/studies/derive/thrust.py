@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from beaver_ftc.aircraft.units import N_PER_LBF
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.state import FlightState
 
-N_PER_LBF = 0.45359237 * 9.80665
 OF_ENGINES, FORCE = (
     "forces/fbx-prop-lbs",
     "forces/fbx-total-lbs",

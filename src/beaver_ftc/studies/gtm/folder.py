@@ -11,6 +11,7 @@ import yaml
 
 from beaver_ftc.aircraft.loading import FILE
 from beaver_ftc.aircraft.schema import MAX_SURFACES
+from beaver_ftc.aircraft.units import KG_PER_LB, M_PER_FT
 from beaver_ftc.studies.gtm.aerodynamics import aerodynamics
 from beaver_ftc.studies.gtm.database import WHERE, Database
 from beaver_ftc.studies.gtm.masses import LBS_PER_SLUG, mass_balance, mass_of, structural_in
@@ -52,11 +53,10 @@ def write_model(base: Database, folder: Path) -> Path:
     return model
 
 
-_M_PER_FT = 0.3048
-_KG_M2 = 0.45359237 * LBS_PER_SLUG * _M_PER_FT**2  # of a slug ft2
+_KG_M2 = KG_PER_LB * LBS_PER_SLUG * M_PER_FT**2  # of a slug ft2
 # Where the design model is found: about level flight, attached flow.
 _ENVELOPE = {"airspeed_mps": [38.0, 58.0], "alpha_deg": [0.0, 7.5]}
-_START = {"airspeed_mps": 50.0, "altitude_m": round(ALTITUDE_FT * _M_PER_FT, 2)}
+_START = {"airspeed_mps": 50.0, "altitude_m": round(ALTITUDE_FT * M_PER_FT, 2)}
 _PITCH = ("elevator", "stabiliser")
 
 
@@ -78,14 +78,14 @@ def aircraft_file() -> dict[str, Any]:
         "groups": groups,
         "signals": {"thrust": signal},
         "mass": {
-            "mass_kg": whole.weight_lbf * 0.45359237,
+            "mass_kg": whole.weight_lbf * KG_PER_LB,
             **{f"I{axis}_kgm2": float(inertia[i, i]) for i, axis in enumerate("xyz")},
             "Jxz_kgm2": -float(inertia[0, 2]),
         },
         "geometry": {
-            "wing_area_m2": geometry["area_ft2"] * _M_PER_FT**2,
-            "span_m": geometry["span_ft"] * _M_PER_FT,
-            "chord_m": geometry["chord_ft"] * _M_PER_FT,
+            "wing_area_m2": geometry["area_ft2"] * M_PER_FT**2,
+            "span_m": geometry["span_ft"] * M_PER_FT,
+            "chord_m": geometry["chord_ft"] * M_PER_FT,
         },
         "moments": {
             "Cl": [{"name": "Cl_aileron", "value": -0.05, "surface": "right_aileron"}],

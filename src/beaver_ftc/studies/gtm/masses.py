@@ -11,6 +11,7 @@ from itertools import product
 
 import numpy as np
 
+from beaver_ftc.aircraft.units import M_PER_FT
 from beaver_ftc.studies.gtm.elements import table
 from beaver_ftc.studies.gtm.parameters import DAMAGE_CASE, cases, parameters
 
@@ -122,7 +123,7 @@ def mass_balance() -> str:
     names = ("mass", "fore", "aft", "right", "left", "up", "down")
     metre = [np.zeros(3), *(sign * np.eye(3)[axis] for axis, sign in product(range(3), (1, -1)))]
     for name, way in zip(names, metre, strict=True):
-        place = whole.cg_ft + way / 0.3048
+        place = whole.cg_ft + way / M_PER_FT
         parts.append(_point(name, place))
     for i, way in enumerate(_PLACES):
         parts.append(_point(f"damage {i}", whole.cg_ft + way))

@@ -64,12 +64,16 @@ def test_the_aircraft_moves_and_is_drawn(page):
 
 
 def test_frames_are_drawn_as_the_screen_asks(page):
-    """Sixty a second; half of that passes, for a machine that does other things too."""
+    """Each time it asks, however often that is here; half of that passes."""
     page.wait_for_timeout(1000)
-    start = page.evaluate("[performance.now(), cockpit.drawn.frames]")
-    page.wait_for_timeout(4000)
-    end = page.evaluate("[performance.now(), cockpit.drawn.frames]")
-    assert 1e3 * (end[1] - start[1]) / (end[0] - start[0]) > 30
+    asked, drawn = page.evaluate("""() => new Promise((done) => {
+        const before = cockpit.drawn.frames;
+        let asked = 0;
+        const count = () => ++asked < 60
+            ? requestAnimationFrame(count) : done([asked, cockpit.drawn.frames - before]);
+        requestAnimationFrame(count);
+    })""")
+    assert drawn > asked / 2
 
 
 def test_a_broken_surface_is_detected_named_and_repaired(page):

@@ -104,9 +104,14 @@ def _flown(scenario, options, say):
 
 
 SITL = {"integrations__sitl__serve__serve": _flown, "results__verdict__verdict_text": "verdict"}
-SURVEY = {"studies__detectability__run_survey": {"points": [1]}, "studies__detectability__text": "d"}
+SURVEY = {
+    "studies__detectability__run_survey": {"points": [1], "pairs": [2]},
+    "studies__detectability__text": "d",
+}
 SAID = {
-    "studies__detectability__run_survey": {"points": [{"fault": "aileron"}, {"fault": "rudder"}]},
+    "studies__detectability__run_survey": {
+        what: [{"fault": "aileron"}, {"fault": "rudder"}] for what in ("points", "pairs")
+    },
     "studies__detectability__answers": ["a line"],
 }
 BENCH = {"studies__bench__measure__bench": {"b": 1}, "studies__bench__measure__text_of": "bench"}

@@ -169,7 +169,7 @@ def test_the_command_leaves_map_csv_and_json(tmp_path, monkeypatch):
     document = json.loads(result.stdout)
     folder = tmp_path / "fault-free-detectability"
     assert json.loads((folder / "detectability.json").read_text())["points"] == document["points"]
-    assert {file.suffix for file in folder.iterdir()} == {".json", ".csv", ".png"}
+    assert {file.suffix for file in folder.iterdir()} == {".json", ".csv", ".png", ".html"}
 
 
 ROW = {"airspeed_mps": 50.0, "altitude_m": 1800.0, "excitation": 2.0, "fault": "aileron", "why": "a reason"}

@@ -1,6 +1,8 @@
 """What the detectability survey says and draws of rows made by hand; known moments; one flight."""
 
 import json
+import re
+from itertools import permutations
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +10,7 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.loader import load_text
-from beaver_ftc.studies import detectability
+from beaver_ftc.studies import detectability, isolability
 from beaver_ftc.studies.detectability import (
     ALTITUDES_M,
     MAGNITUDES,
@@ -26,6 +28,8 @@ from beaver_ftc.studies.detectability import (
     survey_name,
     text,
 )
+from beaver_ftc.studies.isolability import DOUBLET, SHOWN
+from beaver_ftc.studies.present.page import write_files
 from flying import loss, scenario
 from kept import in_short, picture
 
@@ -48,19 +52,52 @@ def rows_made():
     return rows
 
 
-def test_the_survey_as_it_is_shown(changed):
+def pairs_made():
+    """Of two places and three excitations: always at one place, never by a doublet at the other."""
+    found = []
+    for fault, other in (("aileron", "elevator"), ("elevator", "aileron")):
+        for j, (V, scale) in enumerate((V, s) for V in (38.0, 45.5) for s in (0.5, 1.0, 2.0)):
+            seen = None if j == 4 else 0.3 + j / 10, 0.2 + j / 20, None if j == 4 else 0.4, 0.1
+            told = (None, None, "no travel") if V == 45.5 and scale == 2.0 else (1.25 + j, 0.03, "")
+            place = {
+                "airspeed_mps": V,
+                "altitude_m": 0.0,
+                "excitation": scale,
+                "fault": fault,
+                "other": other,
+            }
+            values = dict(zip((*SHOWN, *DOUBLET), (*seen, *told), strict=True))
+            found.append(place | values)
+    return found
+
+
+def test_the_map_of_isolability_as_it_is_shown(changed):
+    assert not changed(text(rows_made()[:1], pairs_made()).splitlines(), "text")
+    figure = isolability.draw("made", pairs_made())
+    assert not changed(picture(figure), "figure")
+
+
+def test_the_survey_as_it_is_shown(changed, tmp_path):
     rows = rows_made()
     assert not changed(text(rows).splitlines(), "text")
     figure = draw("made", rows)
     assert not changed(picture(figure), "figure")
     assert figure.get_size_inches().tolist() == [8.0, 9.0]
-    document = document_of("made", [rows[:8], rows[8:]])
+    pairs = pairs_made()
+    parts = {"points": rows[:8], "pairs": pairs[:6]}, {"points": rows[8:], "pairs": pairs[6:]}
+    document = document_of("made", parts)
     files = files_of(document)
     assert not changed(files["detectability.csv"].splitlines(), "csv")
     assert json.loads(files["detectability.json"]) == {
-        "scenario": "made", "detect_within_s": 0.5, "isolate_within_s": 1.0, "points": rows
+        "scenario": "made", "detect_within_s": 0.5, "isolate_within_s": 1.0, "points": rows, "pairs": pairs
     }  # fmt: skip
-    assert list(files) == ["detectability.json", "detectability.csv", "detectability.png"]
+    assert list(files) == [f"{name}.{kind}" for name, kind in (
+        ("detectability", "json"), ("detectability", "csv"), ("isolability", "csv"), ("detectability", "png"),
+        ("isolability", "png"), ("detectability", "html"),
+    )]  # fmt: skip
+    write_files(tmp_path, files)
+    page = re.sub(r"base64,[^\"]*", "", (tmp_path / "detectability.html").read_text())
+    assert not changed(page.partition("<body>")[2].splitlines(), "page")
     none = [row | dict.fromkeys(MAGNITUDES) for row in rows[:1]]
     assert not changed(text(none).splitlines(), "none")
 
@@ -173,7 +210,9 @@ def test_elsewhere_only_the_place_and_the_references_change():
 def pointed(monkeypatch):
     """The points a survey flies, none of them flown."""
     seen = []
-    monkeypatch.setattr(detectability, "_point", lambda given, point: seen.append(point) or [])
+    monkeypatch.setattr(
+        detectability, "_point", lambda given, point: seen.append(point) or {"points": [], "pairs": []}
+    )
     monkeypatch.setattr(detectability, "files_of", lambda document: {})
     return seen
 
@@ -206,7 +245,12 @@ def test_a_point_that_cannot_be_flown_says_so_of_every_surface(monkeypatch):
     found = detectability._point(scenario(), (40.0, 5.0, 1.5))
     nothing = dict.fromkeys((*MAGNITUDES, "confused_with")) | {"why": "no trim"}
     place = {"airspeed_mps": 40.0, "altitude_m": 5.0, "excitation": 1.5}
-    assert found == [{**place, "fault": s, **nothing} for s in ("aileron", "elevator", "rudder")]
+    assert found["points"] == [{**place, "fault": s, **nothing} for s in ("aileron", "elevator", "rudder")]
+    assert {(row["fault"], row["other"]) for row in found["pairs"]} == {
+        *permutations(scenario().airframe.class_of_losses, 2)
+    }
+    nothing = dict.fromkeys((*SHOWN, *DOUBLET)) | {"why": "no trim"}
+    assert all(row | place | nothing == row for row in found["pairs"])
 
 
 @pytest.mark.parametrize(

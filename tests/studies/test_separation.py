@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import linprog
 
 import beaver_ftc as bf
 from beaver_ftc.cli.main import main
@@ -146,3 +147,86 @@ def test_by_the_command_line(tmp_path, monkeypatch, capsys):
     written = json.loads(Path("runs/open-separation/separation.json").read_text())
     assert answered == written | {"folder": "runs/open-separation"}
     assert "aileron" in as_text(written)
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    st.sampled_from([1, 2, 3]), st.floats(0.05, 1.0), st.lists(st.floats(-0.3, 0.3), min_size=1, max_size=6)
+)
+def test_what_a_surface_has_left_of_its_way(instants, approach, commands):
+    """Instant by instant, against what the linear programme takes of a frame."""
+    from beaver_ftc.studies.separation import _left_behind
+
+    at = replace(PLAIN, instants=instants, approach=np.full(4, approach))
+    left, mean_left = _left_behind(at, 0)
+    p = end = 0.0
+    for command in commands:
+        seen = []
+        for _ in range(instants):
+            if instants == 1:
+                p += approach * (command - p)
+            seen.append(p)
+            if instants > 1:
+                p += approach * (command - p)
+        assert (1 - mean_left) * command + mean_left * end == pytest.approx(np.mean(seen), abs=1e-12)
+        end = (1 - left) * command + left * end
+        assert end == pytest.approx(p, abs=1e-12)
+
+
+def flown_by_hand(command, at):
+    """Mean deflection of surface 0 in each frame, and the rates after it."""
+    p, moved = 0.0, []
+    for c in command:
+        seen = []
+        for instant in range(at.instants):
+            if at.instants == 1 or instant:
+                p += at.approach[0] * (c - p)
+            seen.append(p)
+        if at.instants > 1:
+            p += at.approach[0] * (c - p)
+        moved.append(np.mean(seen))
+    return np.array(moved), at.dt * np.outer(at.G[:, 0], np.cumsum(moved))
+
+
+@settings(max_examples=12, deadline=None)
+@given(
+    st.floats(0.02, 0.25),
+    st.sampled_from([1, 2]),
+    st.floats(0.1, 1.0),
+    st.floats(0.02, 0.1),
+    st.floats(5, 20),
+)
+def test_the_amplitude_is_that_of_the_programme_without_states(target, instants, approach, step, rate):
+    """The same limits as full matrices of the commands alone, from impulses flown by hand."""
+    at = replace(
+        PLAIN, instants=instants, approach=np.full(4, approach), step=np.full(4, step), rate=radians(rate)
+    )
+    found = doublet({0: target}, at)
+    tells = [t for t in (1, 4, 16) if found is None or t <= found[1] - at.held + 1]
+    least = [by_impulses(target, at, t) for t in tells]
+    assert least[:-1] == [None] * (len(least) - 1)
+    if found is None:
+        assert least[-1] is None
+    else:
+        assert abs(found[0]).max() == pytest.approx(least[-1], rel=1e-6)
+
+
+def by_impulses(target, at, tells):
+    frames = 2 * (tells + at.held - 1)
+    pulses = [flown_by_hand(row, at) for row in np.eye(frames)]
+    moved, rates = (np.moveaxis(np.array(each), 0, -1) for each in zip(*pulses, strict=True))
+    pitch, there = at.dt * np.cumsum(rates[1], axis=0), slice(tells - 1, tells + at.held - 1)
+    pace = np.diff(moved, axis=0, prepend=0.0)
+    parts = [(-moved[there], -target), (pace, at.step[0] * at.instants), (-pace, at.step[0] * at.instants)]
+    parts += [(sign * each, at.rate) for each in rates for sign in (1, -1)]
+    parts += [(pitch, at.alpha_range[1] - at.alpha), (-pitch, at.alpha - at.alpha_range[0])]
+    rows = [np.hstack([part, np.zeros((len(part), 1))]) for part, _ in parts]
+    rows += [np.hstack([sign * np.eye(frames), -np.ones((frames, 1))]) for sign in (1, -1)]
+    most = np.concatenate([*(np.full(len(part), limit) for part, limit in parts), np.zeros(2 * frames)])
+    same = np.vstack([rates[[0, 2], -1], np.diff(np.eye(frames)[there], axis=0)])
+    same = np.hstack([same, np.zeros((len(same), 1))])
+    found = linprog(
+        np.r_[np.zeros(frames), 1.0], np.vstack(rows), most, same, np.zeros(len(same)),
+        [(-0.3, 0.3)] * frames + [(0, None)],
+    )  # fmt: skip
+    return found.x[-1] if found.status == 0 else None

@@ -222,13 +222,16 @@ def detectability(
     scaled by 0.25 to 2; `median` where the fault strikes at half of all instants. With --surface it answers
     in a line for each place.
 
+    And the map of isolability: which loss is told from which other surface, how small and how soon, and
+    by which doublet.
+
     Stopped or killed, it goes on where it was with the same command.
 
     airspeed: Airspeed, m/s; once for each.
     altitude: Altitude above sea level, m; once for each.
     aircraft: In place of the scenario's: built-in name, jsbsim:NAME, or ./FOLDER in the working directory.
     surface: The surface to answer for.
-    out: Folder for the map, the CSV and the JSON.
+    out: Folder for the maps, a page, CSV and JSON.
     """
     from beaver_ftc.scenario.loader import load_scenario
     from beaver_ftc.studies.detectability import (
@@ -253,9 +256,9 @@ def detectability(
     folder, rows = str(out / name), found["points"]
     if surface is None:
         pairs = alike(loaded)
-        whole = "\n".join([text(rows), *geometry(pairs), folder])
+        whole = "\n".join([text(rows, found["pairs"]), *geometry(pairs), folder])
         answer(format, found | {"alike": pairs, "folder": folder}, lambda: whole)
         return
-    rows = [row for row in rows if row["fault"] == surface]
-    said = answers(loaded, rows)
-    answer(format, found | {"points": rows, "answers": said, "folder": folder}, lambda: "\n".join(said))
+    of = {what: [row for row in found[what] if row["fault"] == surface] for what in ("points", "pairs")}
+    said = answers(loaded, of["points"])
+    answer(format, found | of | {"answers": said, "folder": folder}, lambda: "\n".join(said))

@@ -17,7 +17,7 @@ the loop's answer to the fault within the window is neglected.
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from itertools import combinations, product
 from math import ceil, degrees, inf
 from pathlib import Path
@@ -34,11 +34,12 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
 from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.studies import isolability
 from beaver_ftc.studies.engine.statistics import quantile
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.present.figures import heat_map, label_edges, panels
-from beaver_ftc.studies.present.page import Files
-from beaver_ftc.studies.present.tables import as_csv
+from beaver_ftc.studies.present.page import Files, Heading, Part, Pictures, Table, as_html
+from beaver_ftc.studies.present.tables import aligned, as_csv
 
 DETECT_WITHIN_S, ISOLATE_WITHIN_S = 0.5, 1.0
 SPEEDS_MPS, ALTITUDES_M = (36.0, 40.0, 44.0, 48.0, 52.0), (0.0, 1000.0, 2000.0, 3000.0)
@@ -49,8 +50,12 @@ BISECTIONS = 16  # magnitudes to 2^-16
 MAGNITUDES = ("detected", "detected_median", "isolated", "isolated_median")
 PLACE = ("airspeed_mps", "altitude_m", "excitation")
 ALIKE_DEG = 3.0  # told apart from no less on: the rates move alike
+TOO_SHORT = "the flight ends before a fault could be isolated"
 MOTION = {"p": "roll", "q": "pitch", "r": "yaw"}
 COLUMNS = (*PLACE, "fault", *MAGNITUDES, "confused_with", "why")
+PAIRS = (*PLACE, "fault", "other", *isolability.SHOWN, *isolability.DOUBLET)
+SUMMARY = ("fault", "excit.", "certain at", "from", "half the time at", "from")
+CERTAIN = "certain: detected and isolated in time, from some magnitude on; of so many grid points"
 Document = dict[str, Any]
 
 
@@ -65,6 +70,17 @@ class Excitation:
     bound: np.ndarray
     dt: float
     G: np.ndarray = field(default_factory=lambda: np.zeros((3, 0)))
+
+    @cached_property
+    def excluding(self) -> dict[str, dict[str, np.ndarray]]:
+        """Of each fault and each other the least magnitude (n,) from which each frame excludes the other."""
+        return {
+            fault: {
+                other: exclusion_magnitude(z, of, self.bound)
+                for other, of in self.moment.items() if other != fault
+            }
+            for fault, z in self.moment.items()
+        }  # fmt: skip
 
 
 def excitation(scenario: Scenario) -> Excitation:
@@ -144,7 +160,8 @@ def run_survey(
     excitations: Sequence[float] = EXCITATIONS,
     progress: Progress | None = None,
 ) -> Document:
-    """Write `out/<scenario>-detectability/`; return the document: one row a fault and grid point.
+    """Write `out/<scenario>-detectability/`; return the document: a row a fault and grid point, and one a
+    fault, other surface and grid point.
 
     Raises BadInput if another scheme than the sharpened one diagnoses.
     """
@@ -164,7 +181,7 @@ def run_survey(
     points = list(product(speeds_mps, altitudes_m, excitations))
     survey = Study(
         survey_name(scenario), points, partial(_point, scenario), partial(document_of, scenario.name),
-        files_of, row=list[Document], follows_from=scenario,
+        files_of, row=dict[str, list[Document]], follows_from=scenario,
     )  # fmt: skip
     return run_study(survey, out, progress=progress)
 
@@ -254,15 +271,19 @@ def survey_name(scenario: Scenario) -> str:
     return f"{scenario.name[:86]}-detectability"
 
 
-def _point(scenario: Scenario, point: tuple[float, float, float]) -> list[Document]:
-    place = dict(zip(PLACE, point, strict=True))
+def _point(scenario: Scenario, point: tuple[float, float, float]) -> dict[str, list[Document]]:
+    place, there = dict(zip(PLACE, point, strict=True)), at(scenario, *point)
     try:
-        seen = excitation(at(scenario, *point))
+        seen = excitation(there)
+        doublets = isolability.doublets(at(there, *point[:2], 0.0), SETTLED_S)
     except BeaverFtcError as error:
-        return [
-            {**place, "fault": fault, **_nothing(str(error))} for fault in scenario.airframe.class_of_losses
-        ]
-    return [{**place, "fault": fault, **judge(seen, fault)} for fault in seen.moment]
+        faults = scenario.airframe.class_of_losses
+        none = [{"fault": fault, **_nothing(str(error))} for fault in faults]
+        found = {"points": none, "pairs": isolability.nothing(faults, str(error))}
+    else:
+        pairs = [row | doublets[row["fault"], row["other"]] for row in pairs_of(seen)]
+        found = {"points": [{"fault": fault, **judge(seen, fault)} for fault in seen.moment], "pairs": pairs}
+    return {what: [place | row for row in rows] for what, rows in found.items()}
 
 
 def at(scenario: Scenario, speed_mps: float, altitude_m: float, excitation: float) -> Scenario:
@@ -287,15 +308,11 @@ def judge(seen: Excitation, fault: str) -> Document:
     None: not even a total loss. confused_with: the fault that survives longest; why: in words.
     """
     z = seen.moment[fault]
-    detect, isolate = (max(round(s / seen.dt), 1) for s in (DETECT_WITHIN_S, ISOLATE_WITHIN_S))
+    detect, isolate = _windows(seen)
     if len(z) < isolate:
-        return _nothing("the flight ends before a fault could be isolated")
+        return _nothing(TOO_SHORT)
     found = best_in_window(detection_magnitude(z, seen.bound), detect)
-    excluded = {
-        other: best_in_window(exclusion_magnitude(z, of_other, seen.bound), isolate)
-        for other, of_other in seen.moment.items()
-        if other != fault
-    }
+    excluded = {other: best_in_window(least, isolate) for other, least in seen.excluding[fault].items()}
     isolated = np.maximum(found[: len(z) - isolate + 1], np.max(list(excluded.values()), axis=0))
     rival = max(excluded, key=lambda other: (excluded[other].max(), np.median(excluded[other])))
     least = [of(each) for each in (found, isolated) for of in (np.max, lambda m: quantile(np.sort(m), 0.5))]
@@ -304,6 +321,23 @@ def judge(seen: Excitation, fault: str) -> Document:
         "confused_with": rival,
         "why": _why(seen, fault, rival, found.max(), excluded[rival], isolate),
     }
+
+
+def _windows(seen: Excitation) -> tuple[int, int]:
+    """The frames in which a fault is to be detected, and isolated."""
+    detect, isolate = (max(round(s / seen.dt), 1) for s in (DETECT_WITHIN_S, ISOLATE_WITHIN_S))
+    return detect, isolate
+
+
+def pairs_of(seen: Excitation) -> list[Document]:
+    """Of each fault and each other, what a flight shows: how small, and how soon."""
+    if len(seen.bound) < _windows(seen)[1]:
+        return isolability.nothing([*seen.moment], TOO_SHORT)
+    return [
+        {"fault": fault, "other": other, **isolability.shown(least, _windows(seen)[1], seen.dt)}
+        for fault, of_others in seen.excluding.items()
+        for other, least in of_others.items()
+    ]
 
 
 def _why(seen: Excitation, fault: str, rival: str, detected: float, excluded: np.ndarray, frames: int) -> str:
@@ -322,24 +356,42 @@ def _why(seen: Excitation, fault: str, rival: str, detected: float, excluded: np
     return "isolated once detected" if as_soon else f"{rival} explains smaller ones"
 
 
-def document_of(name: str, points: Sequence[Sequence[Document]]) -> Document:
+def document_of(name: str, points: Sequence[Mapping[str, Sequence[Document]]]) -> Document:
     """What the command answers and `detectability.json` holds."""
     return {
         "scenario": name,
         "detect_within_s": DETECT_WITHIN_S,
         "isolate_within_s": ISOLATE_WITHIN_S,
-        "points": [row for point in points for row in point],
+        **{what: [row for point in points for row in point[what]] for what in ("points", "pairs")},
     }
 
 
 def files_of(document: Document) -> Files:
-    """The document, its rows and their map; a cell is empty where nothing is certain."""
-    rows = document["points"]
+    """The document, its rows and their maps, and a page; a cell is empty where nothing is certain."""
+    name, rows, pairs = (document[key] for key in ("scenario", "points", "pairs"))
     return {
         "detectability.json": json.dumps(document, indent=1) + "\n",
         "detectability.csv": as_csv(rows),
-        "detectability.png": draw(document["scenario"], rows),
+        "isolability.csv": as_csv(pairs),
+        "detectability.png": draw(name, rows),
+        "isolability.png": isolability.draw(name, pairs),
+        "detectability.html": partial(_page, document),
     }
+
+
+def _page(document: Document, folder: Path) -> str:
+    parts: list[Part] = [
+        f"The smallest loss of effectiveness certain to be detected within {DETECT_WITHIN_S:g} s and "
+        f"isolated within {ISOLATE_WITHIN_S:g} s, whatever the declared uncertainty does.",
+        Pictures([("how small a loss is certain to be found", "detectability")]),
+        Table(SUMMARY, _summary(document["points"])),
+        Heading("Isolability"),
+        isolability.SAYS,
+        Pictures([("which losses are told apart", "isolability")]),
+        Table(isolability.HEAD, isolability.table(document["pairs"])),
+    ]
+    figures = {stem: folder / f"{stem}.png" for stem in ("detectability", "isolability")}
+    return as_html(f"Detectability: {document['scenario']}", parts, figures)
 
 
 def draw(name: str, rows: Sequence[Document]) -> Any:
@@ -384,25 +436,28 @@ def _short(magnitude: float | None) -> str:
     return "-" if magnitude is None else f"{magnitude:.2f}"
 
 
-def text(rows: Sequence[Document]) -> str:
-    """A line a fault and grid point, then one a fault and excitation."""
+def text(rows: Sequence[Document], pairs: Sequence[Document] = ()) -> str:
+    """A line a fault and grid point, one a fault and excitation, and one a pair and excitation."""
     place = f"{'fault':<10}{'m/s':>6}{'m':>7}{'excit.':>8}"
     head = f"{place}{'detected':>10}{'median':>8}{'isolated':>10}{'median':>8}   why"
-    return "\n".join([head, *map(_line, rows), "", *_summary(rows)])
+    lines = [head, *map(_line, rows), "", aligned([SUMMARY, *_summary(rows)]), CERTAIN]
+    if pairs:
+        lines += ["", aligned([isolability.HEAD, *isolability.table(pairs)]), isolability.SAYS]
+    return "\n".join(lines)
 
 
-def _summary(rows: Sequence[Document]) -> list[str]:
-    """How many grid points each fault is certain at, and from which magnitudes on."""
-    lines = [f"{'fault':<10}{'excit.':>8}{'certain at':>12}{'from':>13}{'half the time at':>18}{'from':>13}"]
+def _summary(rows: Sequence[Document]) -> list[tuple[str, ...]]:
+    """How many grid points each fault is certain at, and from which magnitudes on; below SUMMARY."""
+    lines = []
     for fault, scale in product(_faults(rows), _sorted(rows, "excitation")):
-        line = f"{fault:<10}{scale:>8g}"
-        for key, width in (("isolated", 12), ("isolated_median", 18)):
+        cells = [fault, f"{scale:g}"]
+        for key in ("isolated", "isolated_median"):
             magnitudes = [row[key] for row in _chosen(rows, fault, scale)]
             certain = [magnitude for magnitude in magnitudes if magnitude is not None]
             span = f"{min(certain):.2f} - {max(certain):.2f}" if certain else "-"
-            line += f"{f'{len(certain)} of {len(magnitudes)}':>{width}}{span:>13}"
-        lines.append(line)
-    return [*lines, "certain: detected and isolated in time, from some magnitude on; of so many grid points"]
+            cells += [f"{len(certain)} of {len(magnitudes)}", span]
+        lines.append(tuple(cells))
+    return lines
 
 
 def _line(row: Document) -> str:

@@ -28,7 +28,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.loop.simulation import Stepping
 from beaver_ftc.results.certificates.certificate import check_scheme, history_of
-from beaver_ftc.results.certificates.inequality import History, Hypothesis, by_each_frame
+from beaver_ftc.results.certificates.inequality import History, Hypothesis, by_each_frame, declared_of
 from beaver_ftc.results.certificates.kinds import hypothesis, wrong
 from beaver_ftc.results.certificates.tape import Tape, recorded
 from beaver_ftc.results.log import MemoryLog
@@ -109,7 +109,7 @@ def separate(scenario: Scenario, rate_deg_s: float = LARGEST_RATE_DEG_S) -> Docu
     if landing.detection_time_s is None:
         raise BadInput(f"{scenario.name}: no alarm was raised, allowed with separate: a flight with one")
     tape, history = _seen(scenario, log)
-    situation, left = situation_of(tape, history, scenario, radians(rate_deg_s)), [*candidates(tape, history)]
+    situation, left = situation_of(tape, scenario, radians(rate_deg_s)), [*candidates(tape, history)]
     names = scenario.airframe.surfaces
     if len(left) < 2:
         raise BadInput(f"{scenario.name}: one candidate or none is left, allowed with separate: two at least")
@@ -187,18 +187,23 @@ def _seen(scenario: Scenario, log: MemoryLog) -> tuple[Tape, History]:
     return tape, history_of(scenario, log, tape)
 
 
-def situation_of(tape: Tape, history: History, scenario: Scenario, rate: float) -> Situation:
+def situation_of(tape: Tape, scenario: Scenario, rate: float) -> Situation:
     """What is known of the aircraft as the flight ends; rate: rad/s at most."""
     frame, aircraft = tape.last, scenario.airframe
-    belief, bound, declared = frame["belief"], frame["fdi"]["bound"], history.declared
+    belief, bound, declared, dt = (
+        frame["belief"],
+        frame["fdi"]["bound"],
+        declared_of(frame),
+        1.0 / scenario.rate_hz,
+    )
     coupled = np.array(declared["inertia_coupling"]) * np.abs(declared["coupling"]) * rate**2
     actuators = belief["actuators"]
     return Situation(
         G=belief["means"]["G"].copy(), u=belief["u"].copy(), x=frame["measured"]["x"].copy(), rate=rate,
-        bound=MARGIN * (bound["eta_bar"] + coupled + 2.0 * bound["noise"] / history.dt),
+        bound=MARGIN * (bound["eta_bar"] + coupled + 2.0 * bound["noise"] / dt),
         stops=np.array([actuators["low"], actuators["high"]]), approach=actuators["approach"].copy(),
         step=actuators["step"].copy(), instants=scenario.substeps,
-        in_blocks=int(frame["fdi"]["types"]["config"]["length"]) > 1, dt=history.dt,
+        in_blocks=int(frame["fdi"]["types"]["config"]["length"]) > 1, dt=dt,
         alpha=float(frame["measured"]["y"][0]), alpha_range=_radians(aircraft.envelope.alpha_deg),
     )  # fmt: skip
 
@@ -353,63 +358,103 @@ def doublet(targets: dict[int, float], at: Situation) -> tuple[np.ndarray, int] 
 def _least_amplitude(targets: dict[int, float], at: Situation, tells: int) -> np.ndarray | None:
     """The linear programme, with the frame that tells given: commands (frames, n) rad there and back.
 
-    Unknown: commands less the present deflection, surface by surface and frame by frame, then the amplitude.
+    Unknown, frame by frame: of each surface the command and where it is at the frame's end, less the present
+    deflection; the rates, less the present ones, and pitch; then the amplitude. A row has a few of them, so
+    that many frames stay quick.
     """
-    from scipy.optimize import linprog
-
+    if (np.abs(at.x) > at.rate).any() or not at.alpha_range[0] <= at.alpha <= at.alpha_range[1]:
+        return None
     frames, surfaces = 2 * (tells + at.held - 1), [*targets]
-    there = slice(tells - 1, tells + at.held - 1)
-    n = frames * len(surfaces)
-    turned = np.zeros((3, frames, n + 1))
-    rows: list[np.ndarray] = []
-    most: list[np.ndarray] = []
-    steady: list[np.ndarray] = []
+    n, there = len(surfaces), np.arange(tells - 1, tells + at.held - 1)
+    every, equal, above = np.arange(frames), _Rows(frames), _Rows(frames)
+    turning = [{(2 * n + i, 0): 1.0, (2 * n + i, -1): -1.0} for i in range(3)]
+    stops, rates = [(at.stops[:, s] - at.u[s]) for s in surfaces], [(-at.rate - x, at.rate - x) for x in at.x]
     for j, s in enumerate(surfaces):
-        own, away = np.zeros((frames, n + 1)), targets[s] - at.u[s]
-        own[:, j * frames : (j + 1) * frames] = np.eye(frames)
-        moved = _response(frames, at, s) @ own
-        amplitude = np.zeros((frames, n + 1))
-        amplitude[:, -1] = 1.0
-        rows += [own - amplitude, -own - amplitude, -np.sign(away) * moved[there]]
-        most += [np.zeros(2 * frames), np.full(at.held, -abs(away))]
-        steady.append(np.diff(own[there], axis=0))
-        if np.isfinite(at.step[s]):
-            pace = np.diff(moved, axis=0, prepend=0.0)
-            rows += [pace, -pace]
-            most.append(np.full(2 * frames, at.step[s] * at.instants))
-        turned += at.dt * at.G[:, s, None, None] * np.cumsum(moved, axis=0)
-    pitched = at.dt * np.cumsum(turned[1], axis=0)
-    limits = [(turned[i], at.rate - at.x[i], at.rate + at.x[i]) for i in range(3)]
-    limits.append((pitched, at.alpha_range[1] - at.alpha, at.alpha - at.alpha_range[0]))
-    for course, above, below in limits:
-        rows += [course, -course]
-        most += [np.full(frames, above), np.full(frames, below)]
-    equal = np.vstack([turned[:, -1][np.abs(turned[:, -1]).max(axis=1) > 0.0], *steady])
-    stops = [(at.stops[0, s] - at.u[s], at.stops[1, s] - at.u[s]) for s in surfaces for _ in range(frames)]
-    result = linprog(
-        np.r_[np.zeros(n), 1.0], np.vstack(rows), np.concatenate(most), equal, np.zeros(len(equal)),
-        [*stops, (0.0, None)], method="highs",
-    )  # fmt: skip
-    if result.status != 0:
+        away, (left, mean_left) = targets[s] - at.u[s], _left_behind(at, s)
+        equal.add(every, {(j, 0): left - 1.0, (n + j, 0): 1.0, (n + j, -1): -left})
+        equal.add(there[1:], {(j, 0): 1.0, (j, -1): -1.0})
+        moved = {(j, 0): 1.0 - mean_left, (n + j, -1): mean_left}
+        before = {(j, -1): mean_left - 1.0, (n + j, -2): -mean_left}
+        above.add(there, {k: -np.sign(away) * v for k, v in moved.items()}, -abs(away))
+        for sign in (1.0, -1.0):
+            above.add(every, {(j, 0): sign}, amplitude=-1.0)
+            if np.isfinite(at.step[s]):
+                pace = {k: sign * v for k, v in (moved | before).items()}
+                above.add(every, pace, at.step[s] * at.instants)
+        for row, g in zip(turning, at.G[:, s], strict=True):
+            row |= {k: -at.dt * g * v for k, v in moved.items() if g}
+    for row in (*turning, {(2 * n + 3, 0): 1.0, (2 * n + 3, -1): -1.0, (2 * n + 1, 0): -at.dt}):
+        equal.add(every, row)
+    angles = np.subtract(at.alpha_range, at.alpha)
+    ends = [*stops, *[(-inf, inf)] * n, *rates, angles]
+    bounds = np.vstack([np.repeat(ends, frames, axis=0), (0.0, inf)])
+    bounds[[(2 * n + i + 1) * frames - 1 for i in range(3)]] = 0.0
+    found = _solved(equal, above, bounds)
+    if found is None:
         return None
     commands = np.tile(at.u, (frames, 1))
-    commands[:, surfaces] += result.x[:n].reshape(len(surfaces), frames).T
+    commands[:, surfaces] += found[: n * frames].reshape(n, frames).T
     return commands
 
 
-def _response(frames: int, at: Situation, s: int) -> np.ndarray:
-    """Mean deflection of a surface in each frame, (frames, frames), by the command in each, while its rate
-    limit holds nothing back: of several instants the first has it where it was."""
-    step, p = np.zeros(frames), 0.0
-    for k in range(frames):
-        for instant in range(at.instants):
-            if at.instants == 1 or instant > 0:
-                p += at.approach[s] * (1.0 - p)
-            step[k] += p / at.instants
-        if at.instants > 1:
-            p += at.approach[s] * (1.0 - p)
-    pulse = np.diff(step, prepend=0.0)
-    return np.array([[pulse[k - j] if k >= j else 0.0 for j in range(frames)] for k in range(frames)])
+class _Rows:
+    """Rows of a linear programme over blocks of unknowns, of so many frames each, and an amplitude after."""
+
+    def __init__(self, frames: int) -> None:
+        self.frames, self.height = frames, 0
+        self.parts: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+        self.limits: list[np.ndarray] = []
+
+    def add(
+        self,
+        at: np.ndarray,
+        weights: dict[tuple[int, int], float],
+        limit: float = 0.0,
+        amplitude: float = 0.0,
+    ) -> None:
+        """A row for each of these frames: of (block, lag) the weight of the unknown so many frames from it,
+        0 before the first; and of the amplitude."""
+        rows = self.height + np.arange(len(at))
+        for (block, lag), weight in weights.items():
+            there = at + lag >= 0
+            columns = block * self.frames + (at + lag)[there]
+            self.parts.append((rows[there], columns, np.full(len(columns), weight)))
+        if amplitude:
+            self.parts.append((rows, np.full(len(at), -1), np.full(len(at), amplitude)))
+        self.height += len(at)
+        self.limits.append(np.full(len(at), limit))
+
+    def matrix(self, width: int) -> Any:
+        """All of them, sparse."""
+        from scipy.sparse import csc_array
+
+        rows, columns, values = (np.concatenate(part) for part in zip(*self.parts, strict=True))
+        return csc_array((values, (rows, columns % width)), shape=(self.height, width))
+
+
+def _solved(equal: _Rows, above: _Rows, bounds: np.ndarray) -> np.ndarray | None:
+    """The unknowns with the least amplitude; None where there are none within the limits."""
+    from scipy.optimize import linprog
+
+    width = len(bounds)
+    weight = np.r_[np.zeros(width - 1), 1.0]
+    for method in ("highs-ds", "highs-ipm"):  # the second where rounding stops the first
+        result = linprog(
+            weight, above.matrix(width), np.concatenate(above.limits),
+            equal.matrix(width), np.concatenate(equal.limits), bounds, method=method,
+        )  # fmt: skip
+        if result.status in (0, 2):
+            break
+    return np.asarray(result.x) if result.status == 0 else None
+
+
+def _left_behind(at: Situation, s: int) -> tuple[float, float]:
+    """Of a surface's way to its command, while its rate limit holds nothing back: the share left at the end
+    of a frame, and its mean over the frame. Of several instants the first has the surface where it was."""
+    stays = 1.0 - at.approach[s]
+    if at.instants == 1:
+        return stays, stays
+    return stays**at.instants, float(np.mean(stays ** np.arange(at.instants)))
 
 
 def _words(one: Candidate, names: Sequence[str]) -> Document:

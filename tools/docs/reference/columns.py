@@ -62,6 +62,11 @@ def _detectability() -> Columns:
     return {name: TEXT if name in texts else NUMBER for name in detectability.COLUMNS}
 
 
+def _isolability() -> Columns:
+    texts = ("fault", "other", "why")
+    return {name: TEXT if name in texts else NUMBER for name in detectability.PAIRS}
+
+
 def _mismatch() -> Columns:
     return {**dict.fromkeys(study.PLACE, TEXT), **dict.fromkeys(study.FIGURES, NUMBER)}
 
@@ -80,6 +85,7 @@ TABLES: dict[str, Callable[[], Columns]] = {
     "sweep": _sweep,
     "power": _power,
     "detectability": _detectability,
+    "isolability": _isolability,
     "mismatch": _mismatch,
     "mismatch-frames": _mismatch_frames,
     "diagnosis": _diagnosis,

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from tools.check_certificate import failures
 from tools.drawn.certificates import altered, places
+from tools.drawn.reader import doubts
 
 import beaver_ftc as bf
 from beaver_ftc.cli.main import main
@@ -69,6 +70,7 @@ def set_at_end(log):
 def test_the_checker_accepts_a_flights_certificate(name):
     certificate, log = flown(name)
     assert [*failures(certificate, log)] == []
+    assert [*doubts(certificate, log)] == []
     stated = {said["column"] for said in certificate["statements"]} - {None}
     left_out = {said["column"] for said in certificate["without"]} - {None}
     assert stated | left_out == set_at_end(log)
@@ -90,29 +92,20 @@ def test_what_is_stuck_is_neither_floating_nor_lost_and_a_repair_proves_nothing_
         assert "aileron stuck" not in types
 
 
-@pytest.mark.parametrize("name", ["loss", "gyros", "loss, slow filters", "any type"])
+ALTERED = ["loss", "gyros", "substeps", "tolerances", "another aircraft"]
+
+
+@pytest.mark.parametrize("name", ALTERED)
 def test_whatever_number_is_altered_the_checker_refuses_it(name):
+    """As it is, and with the digest written anew: no number is there that decides nothing."""
     certificate, log = flown(name)
     known = [*places(certificate)]
     rng = np.random.default_rng(7)
     for i in rng.choice(len(known), size=min(60, len(known)), replace=False):
-        assert [*failures(altered(certificate, known[i]), log)], known[i]
-
-
-MEASURED = ("x", "model", "eta_bar")
-
-
-@pytest.mark.parametrize("name", ["loss", "gyros", "loss, slow filters", "any type"])
-def test_with_the_digest_written_anew_the_inequality_refuses_it_by_itself(name):
-    """What decides: both sides, measured values, frames, declared constants, weight and direction."""
-    certificate, log = flown(name)
-    n_tried = 0
-    for place in places(certificate):
-        decides = {"value", "limit", "frame", "weight", "constant_rad_s2", *MEASURED} & set(place)
-        if place[0] == "statements" and decides:
-            n_tried += 1
-            assert [*failures(sealed(altered(certificate, place)), log)], place
-    assert n_tried > 20
+        other = altered(certificate, known[i])
+        assert [*failures(other, log)], known[i]
+        assert [*failures(sealed(other), log)], known[i]
+        assert [*doubts(sealed(other), log)], known[i]
 
 
 def test_nobody_can_exclude_the_fault_that_is_there():
@@ -127,8 +120,7 @@ def test_nobody_can_exclude_the_fault_that_is_there():
 def test_a_smaller_declared_bound_is_not_that_of_the_log():
     certificate, log = flown("loss")
     other = copy.deepcopy(certificate)
-    for said in other["statements"]:
-        said["declared"]["constant_rad_s2"] = [0.0, 0.0, 0.0]
+    other["declared"]["b"] = {}
     refused = [*failures(sealed(other), log)]
     assert len(refused) == len(other["statements"])
     assert all("eta_bar is not as declared" in line for line in refused)

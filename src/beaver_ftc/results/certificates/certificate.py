@@ -23,6 +23,7 @@ from beaver_ftc.results.certificates.inequality import (
     Hypothesis,
     Term,
     constant_pair,
+    declaration,
     declared_of,
     directions,
     is_violated,
@@ -36,7 +37,7 @@ from beaver_ftc.scenario.diagnosis import MAX_POLES
 from beaver_ftc.scenario.schema import Scenario
 
 Found = tuple[list[Term], Hypothesis] | None
-FILE, FORMAT = "certificate.json", 1
+FILE, FORMAT = "certificate.json", 2
 
 
 def certificate(scenario: Scenario, log: Log) -> Document:
@@ -50,12 +51,22 @@ def certificate(scenario: Scenario, log: Log) -> Document:
     events = {name: k for name in names if (k := _rise(columns[name])) is not None}
     document: Document = {
         "format": FORMAT, "scenario": scenario.name, "rows": len(columns["t_s"]),
-        "dt_s": 1.0 / scenario.rate_hz, "instants": scenario.substeps, "statements": [], "without": [],
+        "statements": [], "without": [],
     }  # fmt: skip
     if events:
         tape = recorded(scenario, [events["detected"], *events.values()], len(columns["t_s"]))
-        for said in statements(scenario, tape, history_of(scenario, log, tape), events):
+        history = history_of(scenario, log, tape)
+        for said in statements(scenario, tape, history, events):
             document["statements" if "value" in said else "without"].append(said)
+        if document["statements"]:
+            terms = [one for said in document["statements"] for one in said["terms"]]
+            rows = np.concatenate([np.arange(one["first"], one["frame"] + 1) for one in terms])
+            document |= {
+                "dt_s": history.dt, "instants": scenario.substeps, "since": tape.since,
+                "declared": declaration(history, rows),
+            }  # fmt: skip
+            if rows.max() > tape.since + 1:  # before that no filter has a past
+                document["declared"]["pole_per_s"] = scenario.fdi.detection_pole_per_s
     return sealed(document)
 
 
@@ -145,9 +156,10 @@ def _of_types(scenario: Scenario, tape: Tape, history: History, alarm: int) -> I
         if because is None:
             of = kinds.hypothesis(tape, s, kind)
             found = _first_violated(kinds.candidates(of, history, alarm, k), of, history, tape)
-        about = {"what": kinds.name_of(scenario.airframe.surfaces[s], kind), "column": None}
-        by = max(term.frame for term in found[0]) if found else k
-        yield _stated(found, history, because or kinds.COURSE, **about, frame=by)
+        about: Document = {"what": kinds.name_of(scenario.airframe.surfaces[s], kind), "column": None}
+        if found:
+            about["frame"] = max(term.frame for term in found[0])
+        yield _stated(found, history, because or kinds.COURSE, **about)
 
 
 def _stated(found: Found, history: History, because: str, **about: Any) -> Document:

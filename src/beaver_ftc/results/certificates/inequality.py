@@ -15,11 +15,15 @@ from typing import Any
 
 import numpy as np
 
+from beaver_ftc.design.model import AXES
 from beaver_ftc.diagnosis.bounds.worst_case import ROUNDING_RAD_S2
 
 WINDOW = 16  # frames that are written out; what was before them is the filter's state
 _LEAST = 1e-9  # of a margin, as a share of the limit: more than another order of summation makes
-_LEAST_REST = 1e-13  # rad/s2: less is rounding
+_ROUNDING = 4e-15  # of a bound: a smaller part of it is rounding
+_LEAST_EFFECT = 1e-12  # rad/s2, of a fault: less is rounding
+_LEAST_SLOPE = 1e-12  # of a theta that two terms let drop out
+_FORGOTTEN = 16.0  # time constants of a filter: of what is older e^-16 is left
 
 Document = dict[str, Any]
 
@@ -97,6 +101,26 @@ def declared_of(frame: np.void) -> Document:
     }  # fmt: skip
 
 
+def declaration(history: History, rows: np.ndarray) -> Document:
+    """What the certificate says of it, in the letters of theory, section 2, by axis: what is not zero, and
+    adds anything to the bounds of these rows."""
+    declared, f = history.declared, (np.abs(history.x) + history.off)[rows - 1]
+    pairs = np.column_stack((f[:, 1] * f[:, 2], f[:, 0] * f[:, 2], f[:, 0] * f[:, 1]))
+    c = np.array(declared["inertia_coupling"]) * np.abs(declared["coupling"])
+    c[(c * pairs * history.share <= _ROUNDING * history.eta_bar[rows]).all(axis=0)] = 0.0
+    gyro = declared["gyro"]
+    of = {
+        "c": c, "b": declared["constant_rad_s2"],
+        "g": declared["earth_share"] if declared["earth_rad_s"] else [0.0] * 3,
+        "o": gyro["offset_rad_s"], "B": gyro["steady_rad_s"], "m": gyro["slope"],
+    }  # fmt: skip
+    by_axis = {
+        name: {axis: float(v) for axis, v in zip(AXES, values, strict=True) if v}
+        for name, values in of.items()
+    }
+    return by_axis | {"omega_E": declared["earth_rad_s"]}
+
+
 @dataclass(frozen=True)
 class Hypothesis:
     """What a fault adds to the innovation: offset + theta slope, give or take spread; theta in [low, high].
@@ -155,11 +179,17 @@ def measure(term: Term, of: Hypothesis, history: History, first: int) -> tuple[f
     here = slice(first - of.first, term.frame + 1 - of.first)
     offset, slope, spread = of.offset[here] @ d, of.slope[here] @ d, of.spread[here] @ size
     weight = _weights(a, term.frame + 1 - first)
-    if of.constant:
-        return value, limit + dt * weight @ (offset + spread), float(dt * weight @ slope), 0.0
     before = _done_before(term, of, dt, first)
-    most = np.maximum(0.0, np.maximum(offset + of.low * slope, offset + of.high * slope)) + spread
+    if of.constant:
+        done = a * weight[0] * before + dt * weight @ (offset + spread)
+        return value, limit + done, float(dt * weight @ slope), before
+    most = _most(offset + of.low * slope, offset + of.high * slope) + spread
     return value, limit + a * weight[0] * before + dt * weight @ most, 0.0, before
+
+
+def _most(low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """The most that a fault between these does, if it may be absent."""
+    return np.asarray(np.maximum(0.0, np.maximum(low, high)))
 
 
 def _weights(a: float, n: int) -> np.ndarray:
@@ -175,61 +205,89 @@ def _done_before(term: Term, of: Hypothesis, dt: float, first: int) -> float:
         return term.before
     here = slice(begin - of.first, first - of.first)
     offset, slope, spread = of.offset[here] @ d, of.slope[here] @ d, of.spread[here] @ np.abs(d)
-    most = np.maximum(0.0, np.maximum(offset + of.low * slope, offset + of.high * slope)) + spread
+    most = _most(offset + of.low * slope, offset + of.high * slope) + spread
     weight = _weights(a, first - begin)
     return float(a * weight[0] * term.before + dt * weight @ most)
 
 
-def sides(terms: list[Term], of: Hypothesis, history: History) -> tuple[float, float, list[float]]:
-    """Both sides of the inequality, and what the fault can have done to each term before it is written."""
-    measured = [measure(term, of, history, _first(term, of)) for term in terms]
+def sides(terms: list[Term], of: Hypothesis, history: History) -> tuple[float, float]:
+    """Both sides of the inequality."""
+    measured = [measure(term, of, history, _first(term, of, history.dt)) for term in terms]
     weights = np.array([term.weight for term in terms])
     value, limit, slope, _ = (float(weights @ column) for column in zip(*measured, strict=True))
-    return value, limit + max(of.low * slope, of.high * slope), [before for *_, before in measured]
+    return value, limit + max(of.low * slope, of.high * slope)
 
 
-def _first(term: Term, of: Hypothesis) -> int:
-    """The first frame that is written out. A constant parameter needs all there are."""
-    whole = term.since + 1 if of.constant else max(term.frame + 1 - WINDOW, term.since + 1)
-    return max(whole, term.known_from + 1)
+def _first(term: Term, of: Hypothesis, dt: float) -> int:
+    """The first frame that is written out: what is forgotten would decide nothing. A constant parameter needs
+    all there are."""
+    longest = term.frame - term.since if of.constant else WINDOW
+    known = 1 if isinf(term.pole_per_s) else int(_FORGOTTEN / (term.pole_per_s * dt))
+    return max(term.frame + 1 - max(min(longest, known), 1), term.since + 1, term.known_from + 1)
 
 
 def is_violated(terms: list[Term], of: Hypothesis, history: History) -> bool:
     """Whether the data are beyond what the hypothesis allows, by more than rounding."""
-    value, limit, _ = sides(terms, of, history)
+    value, limit = sides(terms, of, history)
     return value - limit > _LEAST * max(abs(limit), abs(value))
 
 
 def written(terms: list[Term], of: Hypothesis, history: History) -> Document:
-    """The inequality with every number it takes."""
-    value, limit, before = sides(terms, of, history)
+    """The inequality with every number it takes, and none that decides nothing."""
+    theta = ("constant while it shows" if of.shown else "constant") if of.constant else "any"
+    said = [_term(term, of, history) for term in terms]
+    slope = sum(one["weight"] * one.pop("slope") for one in said)
+    value, limit = (sum(one["weight"] * one.pop(side) for one in said) for side in ("value", "limit"))
+    decides = [one.pop("decides") for one in said]
+    most = max(of.low * slope, of.high * slope) if of.constant and abs(slope) > _LEAST_SLOPE else 0.0
+    ends = {"least": of.low, "most": of.high}
+    if of.constant:
+        looked_at = {"least": most and slope < 0.0, "most": most and slope > 0.0}
+        if abs(slope) > _LEAST_SLOPE and not most:  # a fault of this size does nothing
+            for one in said:
+                one.pop("Z", None)
+    else:
+        looked_at = {end: any(each[end] for each in decides) for end in ends}
     return {
-        "theta": [of.low, of.high],
-        "constant": of.constant,
-        "shown": of.shown,
-        "declared": history.declared,
-        "terms": [_term(*each, of, history) for each in zip(terms, before, strict=True)],
+        "theta": theta,
+        **{end: number for end, number in ends.items() if looked_at[end]},
+        "terms": said,
         "value": value,
-        "limit": limit,
+        "limit": limit + most,
     }
 
 
-def _term(term: Term, before: float, of: Hypothesis, history: History) -> Document:
-    """A term: axes, filter, what the fault can have done to it before, and its frames."""
-    first, along = _first(term, of), term.direction != 0.0
+def _term(term: Term, of: Hypothesis, history: History) -> Document:
+    """A term: filter, direction, what the fault can have done to it before, its frames; and what they add up
+    to: value, limit, slope; and which end of theta `decides`, in any frame."""
+    first = _first(term, of, history.dt)
+    value, limit, slope, fault = measure(term, of, history, first)
     rows, here = slice(first, term.frame + 1), slice(first - of.first, term.frame + 1 - of.first)
+    d, filters = term.direction, not isinf(term.pole_per_s)
+    h, Z, r = of.offset[here] @ d, of.slope[here] @ d, of.spread[here] @ np.abs(d)
     rest = history.rest(rows)
-    rest[np.abs(rest) < _LEAST_REST] = 0.0
-    frames = {
-        "x": history.x[rows], "model": history.model[rows], "eta_bar": history.eta_bar[rows], "rest": rest,
-        "offset": of.offset[here] * along, "slope": of.slope[here] * along, "spread": of.spread[here] * along,
-    }  # fmt: skip
-    return {
-        "weight": term.weight, "direction": term.direction.tolist(),
-        "pole_per_s": None if isinf(term.pole_per_s) else term.pole_per_s, "since": term.since,
-        "first": first, "frame": term.frame, "fault": before,
-        "frames": {name: array.tolist() for name, array in frames.items() if array.any()},
-    }  # fmt: skip
+    rest[np.abs(rest) < _ROUNDING * history.eta_bar[rows]] = 0.0
+    low, high = h + of.low * Z, h + of.high * Z
+    adds = np.ones(len(h), bool) if of.constant else np.maximum(low, high) > _LEAST_EFFECT
+    rounding = np.where(adds, 0.0, _most(low, high))
+    limit -= float(history.dt * _weights(term.decay(history.dt), len(h)) @ rounding)
+    said: Document = {"weight": term.weight, "d": d.tolist()}
+    if filters:
+        said |= {"pole_per_s": term.pole_per_s, "since": term.since}
+    said |= {"first": first, "frame": term.frame}
+    if filters and fault:
+        said["fault"] = fault
+    said |= {name: values[rows].tolist() for name, values in
+             (("x", history.x), ("F", history.model), ("eta_bar", history.eta_bar))}  # fmt: skip
+    if rest.any():
+        said["rest"] = rest.tolist()
+    for name, values in (("h", h), ("Z", Z)):
+        if (values * adds).any():
+            said[name] = [float(v) if there else None for v, there in zip(values, adds, strict=True)]
+    if r.any():
+        said["r"] = r.tolist()
+    decides = {"least": bool((adds & (low > high)).any()), "most": bool((adds & (high > low)).any())}
+    return said | {"value": value, "limit": limit, "slope": slope, "decides": decides}
 
 
 def directions(asked: tuple[int, ...]) -> Iterator[np.ndarray]:

@@ -1,0 +1,217 @@
+"""A second reader of certificates, written from docs/theory.md alone: its recursions, frame by frame.
+
+It shares no code with tools/check_certificate.py, which sums what is left of each frame; the two must agree.
+"""
+
+from collections.abc import Iterator
+from hashlib import sha256
+from itertools import pairwise
+from json import dumps
+from math import exp, isclose
+from typing import Any
+
+import numpy as np
+
+Document = dict[str, Any]
+Columns = dict[str, np.ndarray]
+Vector = list[float]
+ROUNDING_RAD_S2 = 1e-11  # rho
+OTHER_TWO = ((1, 2), (0, 2), (0, 1))
+PUBLISHED_TO_SHARE, SIDES_TO_SHARE = 3e-14, 1e-12
+
+
+class Doubtful(Exception):
+    """What a certificate says is not so."""
+
+
+class Flight:
+    """What a log says, and what follows from the declared errors, one frame at a time."""
+
+    def __init__(self, document: Document, log: Columns) -> None:
+        declared = document["declared"]
+        self.log, self.rows, self.dt = log, len(log["t_s"]), document["dt_s"]
+        self.instants, self.since = document["instants"], document["since"]
+        self.declared = {name: _by_axis(declared[name]) for name in ("c", "b", "g", "o", "B", "m")}
+        self.earth, self.pole = declared["omega_E"], declared.get("pole_per_s", 0.0)
+
+    def logged(self, quantity: str, k: int) -> Vector:
+        """p, q, r of a column in row k."""
+        return [float(self.log[f"{axis}_{quantity}"][k]) for axis in "pqr"]
+
+    def innovation(self, k: int) -> Vector:
+        """nu of section 1."""
+        now, then = self.logged("measured_rad_s", k), self.logged("measured_rad_s", k - 1)
+        F = self.logged("design_rad_s2", k)
+        return [(x1 - x0) / self.dt - f for x1, x0, f in zip(now, then, F, strict=True)]
+
+    def true_rates(self, k: int) -> Vector:
+        """|x| + e of section 2: how large the rates can be."""
+        x, o, m = self.logged("measured_rad_s", k), self.declared["o"], self.declared["m"]
+        return [abs(x[i]) + (o[i] + m[i] * abs(x[i])) / (1.0 - m[i]) for i in range(3)]
+
+    def noise(self, k: int) -> Vector:
+        """n of section 2."""
+        f, o, steady, m = self.true_rates(k), self.declared["o"], self.declared["B"], self.declared["m"]
+        return [o[i] - steady[i] + m[i] * f[i] for i in range(3)]
+
+    def bound(self, k: int) -> Vector:
+        """Of section 2's bound the first terms, as the frame that ends with row k began."""
+        f, found = self.true_rates(k - 1), []
+        for i, (j, other) in enumerate(OTHER_TWO):
+            c, b, g = (self.declared[name][i] for name in "cbg")
+            turning = self.earth * ((1.0 + g) * sum(f) + g * self.earth)
+            found.append((c * f[j] * f[other] + b + turning + ROUNDING_RAD_S2) / self.instants)
+        return found
+
+    def unhealthy(self, k: int) -> bool:
+        """Whether more than the bound was at work in the frame that ends with row k."""
+        nu, eta, now, then = (
+            self.innovation(k),
+            self.logged("eta_bar_rad_s2", k),
+            self.noise(k),
+            self.noise(k - 1),
+        )
+        return any(abs(nu[i]) > eta[i] + (now[i] + then[i]) / self.dt for i in range(3))
+
+
+def _by_axis(given: dict[str, float]) -> Vector:
+    return [float(given.get(axis, 0.0)) for axis in "pqr"]
+
+
+def doubts(document: Document, log: Columns) -> Iterator[str]:
+    """Why not to believe a certificate; nothing where it holds."""
+    unsigned = {**document, "digest": ""}
+    text = dumps(unsigned, sort_keys=True, separators=(",", ":"))
+    if sha256(text.encode()).hexdigest() != document["digest"]:
+        yield "the digest is of another document"
+    if document["rows"] != len(log["t_s"]) or document["format"] != 2:
+        yield "the document is of another log, or of another format"
+    for said in document["without"]:
+        if said["column"] is not None and not _sets(log[said["column"]], said["frame"]):
+            yield f"{said['column']} is not set then"
+    if document["statements"]:
+        try:
+            flight = Flight(document, log)
+            _thresholds(flight, max(one["frame"] for one in document["statements"]))
+            for said in document["statements"]:
+                _statement(said, flight)
+        except (Doubtful, KeyError, IndexError, TypeError, ValueError, ZeroDivisionError) as why:
+            yield str(why)
+
+
+def _sets(column: np.ndarray, k: int) -> bool:
+    """Whether a flag is set from row k to the end, and not before."""
+    return k > 0 and column[k - 1] == 0.0 and all(flag == 1.0 for flag in column[k:])
+
+
+def _thresholds(flight: Flight, last: int) -> None:
+    """Section 3: filter 0's threshold, from the frame with which the diagnosis began."""
+    a, zero = exp(-flight.pole * flight.dt), [0.0, 0.0, 0.0]
+    for k, (t0, t1) in enumerate(pairwise(flight.log["t_s"])):
+        if not isclose(t0, k * flight.dt, abs_tol=1e-6) or not isclose(t1, (k + 1) * flight.dt, abs_tol=1e-6):
+            raise Doubtful(f"row {k} is of another time")
+    if flight.logged("threshold_rad_s", flight.since) != zero:
+        raise Doubtful("the diagnosis had begun before")
+    H, N = [0.0] * 3, flight.noise(flight.since)
+    for k in range(flight.since + 1, last + 1):
+        before, now = flight.noise(k - 1), flight.noise(k)
+        eta, T = flight.logged("eta_bar_rad_s2", k), flight.logged("threshold_rad_s", k)
+        for i in range(3):
+            H[i] = a * H[i] + flight.dt * eta[i]
+            N[i] = a * N[i] + (1.0 - a) * before[i]
+            if not isclose(H[i] + N[i] + now[i], T[i], rel_tol=1e-10):
+                raise Doubtful(f"the threshold of row {k} is another")
+
+
+def _statement(said: Document, flight: Flight) -> None:
+    """One inequality."""
+    k, what, column = said["frame"], said["what"], said["column"]
+    if column is None:
+        if what is None or k != max(one["frame"] for one in said["terms"]):
+            raise Doubtful(f"{what}: of another frame")
+    elif column != ("detected" if what is None else f"fie_{what}_excluded") or not _sets(
+        flight.log[column], k
+    ):
+        raise Doubtful(f"{what}: {column} is not set then")
+    value = limit = slope = 0.0
+    for one in said["terms"]:
+        if one["weight"] <= 0.0 or one["frame"] > k:
+            raise Doubtful(f"{what}: a term of no use")
+        E, most, S = _followed(one, said, flight)
+        value, limit, slope = (
+            value + one["weight"] * E,
+            limit + one["weight"] * most,
+            slope + one["weight"] * S,
+        )
+    if abs(slope) > 1e-12:
+        end = said["most"] if slope > 0.0 else said["least"]
+        limit += end * slope
+    agree = isclose(value, said["value"], rel_tol=SIDES_TO_SHARE) and isclose(
+        limit, said["limit"], rel_tol=SIDES_TO_SHARE
+    )
+    if not agree or not value > limit:
+        raise Doubtful(f"{what}: {value} > {limit} is not what it says, or not so")
+
+
+def _followed(one: Document, said: Document, flight: Flight) -> tuple[float, float, float]:
+    """A filter along d, frame by frame: E; T with what the fault can have done; what theta multiplies."""
+    first, last, d = one["first"], one["frame"], one["d"]
+    a = exp(-one["pole_per_s"] * flight.dt) if "pole_per_s" in one else 0.0
+    since = one["since"] if "pole_per_s" in one else last - 1
+    alarm = next(k for k, flag in enumerate(flight.log["detected"]) if flag)
+    if "pole_per_s" in one and since not in (flight.since, alarm):
+        raise Doubtful("a filter begins nowhere")
+    if not 0 <= since < first <= last or one.get("fault", 0.0) < 0.0:
+        raise Doubtful("frames or effects out of order")
+    _written_frames(one, flight, first, last)
+    E = H = S = 0.0
+    N, U = _along(d, flight.noise(since), size=True), one.get("fault", 0.0)
+    for k in range(since + 1, last + 1):
+        E = a * E + flight.dt * _along(d, flight.innovation(k))
+        H = a * H + flight.dt * _along(d, flight.logged("eta_bar_rad_s2", k), size=True)
+        N = a * N + (1.0 - a) * _along(d, flight.noise(k - 1), size=True)
+        if k >= first:
+            effect, multiplied = _effect(one, said, k - first)
+            U, S = a * U + flight.dt * effect, a * S + flight.dt * multiplied
+    if said["theta"] == "constant while it shows":
+        beside = range(last - 1, last + 2) if flight.instants > 1 else range(last, last + 1)
+        if not all(flight.unhealthy(k) for k in beside if k < flight.rows):
+            raise Doubtful("health explains a frame")
+    return E, H + N + _along(d, flight.noise(last), size=True) + U, S
+
+
+def _written_frames(one: Document, flight: Flight, first: int, last: int) -> None:
+    """The numbers that stand in the log as well, and the bound of section 2."""
+    lengths = {len(one[name]) for name in ("x", "F", "eta_bar", "rest", "h", "Z", "r") if name in one}
+    if lengths != {last + 1 - first}:
+        raise Doubtful("frames are missing")
+    for k in range(first, last + 1):
+        place, eta = k - first, flight.logged("eta_bar_rad_s2", k)
+        rest, published = one["rest"][place] if "rest" in one else [0.0] * 3, flight.bound(k)
+        for name, column in (("x", "measured_rad_s"), ("F", "design_rad_s2"), ("eta_bar", "eta_bar_rad_s2")):
+            if one[name][place] != flight.logged(column, k):
+                raise Doubtful(f"{name} of row {k} is another")
+        for i in range(3):
+            if not isclose(published[i] + rest[i], eta[i], rel_tol=PUBLISHED_TO_SHARE):
+                raise Doubtful(f"the bound of row {k} is another")
+
+
+def _effect(one: Document, said: Document, place: int) -> tuple[float, float]:
+    """What the fault can do at most in a frame, and what a theta that is one number multiplies."""
+    h, Z, r = (one[name][place] if name in one else 0.0 for name in "hZr")
+    if r < 0.0 or (said["what"] is None and (h, Z, r) != (0.0, 0.0, 0.0)):
+        raise Doubtful("an effect that is none")
+    if said["theta"] != "any":
+        return h + r, Z
+    if h is None or Z is None:
+        return r, 0.0
+    products = [said[end] * Z for end in ("least", "most") if end in said and Z]
+    unlimited = ("most" not in said and Z > 0.0) or ("least" not in said and Z < 0.0)
+    if unlimited:
+        raise Doubtful("theta is not limited")
+    return max(0.0, *(h + product for product in products or [0.0])) + r, 0.0
+
+
+def _along(d: Vector, values: Vector, size: bool = False) -> float:
+    """The sum of a vector's parts along d, or of their sizes."""
+    return sum((abs(part) if size else part) * value for part, value in zip(d, values, strict=True))

@@ -13,12 +13,14 @@ import copy
 import json
 from collections import Counter
 from collections.abc import Iterator
+from time import process_time
 from typing import Any
 
 import numpy as np
 
 import beaver_ftc as bf
-from beaver_ftc.results.certificates.certificate import as_text, sealed
+from beaver_ftc.results.certificates.certificate import as_text, certificate_of, events_of, sealed
+from beaver_ftc.results.certificates.tape import recorded
 from tools.check_certificate import failures
 from tools.drawn.campaign import AIRCRAFT
 from tools.drawn.compose import OURS, PLAIN, drawn_flights
@@ -26,6 +28,7 @@ from tools.drawn.reader import doubts
 
 Document = dict[str, Any]
 Columns = dict[str, np.ndarray]
+Times = list[tuple[float, float]]
 SCALED = 1.01  # times a number that is altered
 
 
@@ -37,7 +40,8 @@ def main() -> None:
     parser.add_argument("--altered", type=int, default=100)
     args = parser.parse_args()
     rng, count, sizes, unseen = np.random.default_rng(args.seed), Counter(), [0], Counter()
-    for index, certificate, log in certified(args.seed, args.flights):
+    ms: Times = []
+    for index, certificate, log in certified(args.seed, args.flights, ms):
         refused = [*failures(certificate, log)]
         count["flights"] += 1
         count["statements"] += len(certificate["statements"])
@@ -60,25 +64,39 @@ def main() -> None:
             if accepts:
                 unseen[" ".join(str(part) for part in place if not isinstance(part, int))] += 1
     print(*(f"{word} {n}" for word, n in count.items()), f"largest {max(sizes)} bytes", sep=", ")
+    again, wrote = np.median(ms, axis=0) if ms else (0.0, 0.0)
+    print(f"written in {wrote:.1f} ms of the processor (median), after {again:.0f} ms to fly it again")
     print(f"with the digest written anew {unseen.total()} accepted:", dict(unseen.most_common()))
     wrong = ("refused", "doubted by a second reader", "accepted", "readers disagree")
     raise SystemExit(1 if any(count[word] for word in wrong) or unseen else 0)
 
 
-def certified(seed: int, flights: int) -> Iterator[tuple[int, Document, Columns]]:
-    """So many flights of our scheme: number, certificate as it is read back, log."""
+def certified(seed: int, flights: int, ms: Times) -> Iterator[tuple[int, Document, Columns]]:
+    """So many flights of our scheme: number, certificate as it is read back, log. ms: what they took."""
     found = 0
     for drawn in drawn_flights(seed, AIRCRAFT, kinds=(OURS, PLAIN, PLAIN)):
         try:
             flight = bf.fly(drawn.scenario())
         except bf.BadInput:
             continue
-        certificate = json.loads(as_text(flight.certificate()))
+        certificate = json.loads(as_text(timed(flight, ms)))
         table = flight.log
         yield drawn.index, certificate, {name: table[name].to_numpy() for name in table.columns}
         found += 1
         if found == flights:
             return
+
+
+def timed(flight: bf.Flight, ms: Times) -> Document:
+    """The certificate of a flight; ms: of the processor, to fly it again and to write it."""
+    log, start = flight._kept(), process_time()
+    if not (events := events_of(log)):
+        return flight.certificate()
+    tape = recorded(flight.scenario, [events["detected"], *events.values()], log.row_count())
+    flown = process_time()
+    document = certificate_of(flight.scenario, log, events, tape)
+    ms.append((1e3 * (flown - start), 1e3 * (process_time() - flown)))
+    return document
 
 
 def places(node: Any, place: tuple = ()) -> Iterator[tuple]:

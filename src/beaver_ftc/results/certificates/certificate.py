@@ -46,28 +46,39 @@ def certificate(scenario: Scenario, log: Log) -> Document:
     Raises BadInput where somebody else diagnosed.
     """
     check_scheme(scenario)
-    names = [name for name in log.columns if _is_event(name)]
-    columns = _read(log, ["t_s", *names])
-    events = {name: k for name in names if (k := _rise(columns[name])) is not None}
+    events = events_of(log)
+    tape = recorded(scenario, [events["detected"], *events.values()], log.row_count()) if events else None
+    return certificate_of(scenario, log, events, tape)
+
+
+def events_of(log: Log) -> dict[str, int]:
+    """Of the alarm and of each exclusion that stands at the end: column of the log, and row."""
+    columns = _read(log, [name for name in log.columns if _is_event(name)])
+    return {name: k for name, flags in columns.items() if (k := _rise(flags)) is not None}
+
+
+def certificate_of(scenario: Scenario, log: Log, events: dict[str, int], tape: Tape | None) -> Document:
+    """The certificate of a flight with these events; tape: what it leaves if it is flown again."""
     document: Document = {
-        "format": FORMAT, "scenario": scenario.name, "rows": len(columns["t_s"]),
-        "statements": [], "without": [],
+        "format": FORMAT, "scenario": scenario.name, "rows": log.row_count(), "statements": [], "without": [],
     }  # fmt: skip
-    if events:
-        tape = recorded(scenario, [events["detected"], *events.values()], len(columns["t_s"]))
+    if tape is not None:
         history = history_of(scenario, log, tape)
         for said in statements(scenario, tape, history, events):
             document["statements" if "value" in said else "without"].append(said)
         if document["statements"]:
-            terms = [one for said in document["statements"] for one in said["terms"]]
-            rows = np.concatenate([np.arange(one["first"], one["frame"] + 1) for one in terms])
-            document |= {
-                "dt_s": history.dt, "instants": scenario.substeps, "since": tape.since,
-                "declared": declaration(history, rows),
-            }  # fmt: skip
-            if rows.max() > tape.since + 1:  # before that no filter has a past
-                document["declared"]["pole_per_s"] = scenario.fdi.detection_pole_per_s
+            document |= _declared(scenario, tape, history, document["statements"])
     return sealed(document)
+
+
+def _declared(scenario: Scenario, tape: Tape, history: History, said: list[Document]) -> Document:
+    """What all these statements go by."""
+    terms = [term for one in said for term in one["terms"]]
+    rows = np.concatenate([np.arange(term["first"], term["frame"] + 1) for term in terms])
+    declared = declaration(history, rows)
+    if rows.max() > tape.since + 1:  # before that no filter has a past
+        declared["pole_per_s"] = scenario.fdi.detection_pole_per_s
+    return {"dt_s": history.dt, "instants": scenario.substeps, "since": tape.since, "declared": declared}
 
 
 def check_scheme(scenario: Scenario) -> None:

@@ -22,17 +22,20 @@ from beaver_ftc.flights.vehicle import Vehicle
 from beaver_ftc.scenario.loader import load_text
 from beaver_ftc.scenario.signals import Signal
 from beaver_ftc.scenario.sweeps import Variation, load_sweep_text
+from beaver_ftc.studies.evidence.plan import load_plan
 from scenario.damageable import damageable
 
 ROOT = Path(__file__).parents[2]
 LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4, "at_s": 12}
 PROFILE = {"altitude_m": [{"value": 1900}], "airspeed_mps": [{"value": 45}], "heading_deg": [{"value": 90}]}
 CASE = "left-wing-tip-off"  # the example's
+REQUIREMENT = {"id": "A", "over": ["elevator-stuck"], "expect": {"no_departure": True}}
 NO_TERMS = {"Cl": [], "Cm": [], "Cn": []}
 # What a file says besides the key in question.
 AROUND = {
     "scenario-keys": {"": {"name": "x"}, "expect": {"faults": [LOSS], "autopilot": PROFILE}},
     "sweep-keys": {"": {"name": "x", "runs": 10, "base": "elevator-partial-loss"}},
+    "plan-keys": {"": {"name": "x", "requirements": [REQUIREMENT]}},
     "aircraft-keys": {
         "": yaml.safe_load((load().folder / "aircraft.yaml").read_text()),
         "moments": {"moments": NO_TERMS},
@@ -81,10 +84,11 @@ LEAST = {
     "BankLeg": {"value": 20},
     "Variation": {"uniform": [0.2, 0.4]},
     "ErrorBox": {"signals": {"dpt": [0, 1]}},
+    "Requirement": {"expect": {"no_departure": True}},
     "Level": {"at_most": 1},
     "QuantileLevel": {"at_most": 1},
 }
-ALONE = {"hold", *Signal.model_fields, *Variation.model_fields}
+ALONE = {"hold", "expect", "formula", "bar", *Signal.model_fields, *Variation.model_fields}
 
 
 def required(schema, section):
@@ -137,9 +141,19 @@ def merged(one, other):
     return {**one, **{name: merged(one.get(name), value) for name, value in other.items()}}
 
 
+def loaded_plan(text, folder):
+    if '"type": "sweep"' in text:  # such a bar is of a sweep
+        text = text.replace('"elevator-stuck"', '"certain-aileron-loss"')
+    for name in json.loads(text).get("flights", {}):  # each is flown for a requirement
+        text = text.replace('"elevator-stuck"', f'"{name}"')
+    (folder / "plan.yaml").write_text(text)
+    return load_plan(str(folder / "plan.yaml"))
+
+
 LOADERS = {
     "scenario-keys": lambda text, folder: load_text(text, folder=folder),
     "sweep-keys": lambda text, folder: load_sweep_text(text, folder=folder),
+    "plan-keys": loaded_plan,
     "aircraft-keys": lambda text, folder: AircraftFile.model_validate(yaml.safe_load(text)),
     "vehicle-keys": lambda text, folder: Vehicle.model_validate(yaml.safe_load(text)),
 }

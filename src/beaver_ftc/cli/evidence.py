@@ -1,14 +1,15 @@
 """`beaver-ftc evidence`: fly a plan of requirements, and write what it shows."""
 
 import sys
+import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from beaver_ftc.cli.inputs import NoReportOption, WorkersOption
-from beaver_ftc.cli.output import Format, FormatOption, answer
+from beaver_ftc.cli.inputs import JunitOption, NoReportOption, WorkersOption
+from beaver_ftc.cli.output import Format, FormatOption, answer, emit_json, failure_of, write_junit
 from beaver_ftc.cli.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -25,6 +26,7 @@ class Arguments:
     replay: Annotated[str | None, typer.Option(metavar="FLIGHT")] = None
     format: FormatOption = Format.text
     no_report: NoReportOption = False
+    junit: JunitOption = None
 
 
 def command(arguments: Arguments) -> None:
@@ -44,35 +46,52 @@ def command(arguments: Arguments) -> None:
     out: Folder for the evidence. Default: runs/ and the plan's name.
     replay: Fly this one flight again, as `run` would, and judge it.
     """
-    from beaver_ftc.studies.engine.workers import cores
     from beaver_ftc.studies.evidence.plan import load_plan
-    from beaver_ftc.studies.evidence.shown import as_text, run_plan
 
-    plan = load_plan(arguments.plan)
+    began = time.perf_counter()
+    try:
+        plan = load_plan(arguments.plan)
+        verdict = _fly(plan, arguments) if arguments.replay is None else _replay(plan, arguments)
+    except Exception as error:
+        failure = failure_of(error)
+        if arguments.format is Format.json:
+            emit_json({"passed": False, "errors": str(failure).splitlines()})
+        failed = {"scenario": arguments.plan, "error": str(failure)}
+        write_junit([failed | {"took_s": time.perf_counter() - began}], arguments.junit)
+        raise failure from failure.__cause__
+    write_junit([verdict | {"took_s": time.perf_counter() - began}], arguments.junit)
+    raise typer.Exit(0 if verdict["passed"] else 1)
+
+
+def _fly(plan: "EvidencePlan", arguments: Arguments) -> dict[str, Any]:
+    """Fly and judge all of it; what JUnit XML says of it."""
+    from beaver_ftc.studies.engine.workers import cores
+    from beaver_ftc.studies.evidence.shown import as_expectations, as_text, run_plan
+
     folder = Path("runs") / plan.file.name if arguments.out is None else arguments.out
-    if arguments.replay is not None:
-        raise typer.Exit(_replay(plan, arguments))
     with progress_bar(plan.file.name) as progress:
         document = run_plan(plan, folder.absolute(), arguments.workers or cores(), progress)
     said = document | {"folder": str(folder)}
     answer(arguments.format, said, lambda: as_text(document, str(folder), sys.stdout.isatty()))
-    raise typer.Exit(0 if document["passed"] else 1)
+    expectations = as_expectations(document)
+    return {"scenario": plan.file.name, "passed": document["passed"], "expectations": expectations}
 
 
-def _replay(plan: "EvidencePlan", arguments: Arguments) -> int:
-    """Fly one flight into a result folder of its own; the exit status."""
+def _replay(plan: "EvidencePlan", arguments: Arguments) -> dict[str, Any]:
+    """Fly one flight into a result folder of its own; what JUnit XML says of it."""
     from beaver_ftc.results.verdict import verdict_text
     from beaver_ftc.results.writer import run
     from beaver_ftc.studies.evidence.shown import of_flight
 
-    scenario, judged, meets = of_flight(plan, str(arguments.replay))
+    scenario, judged = of_flight(plan, str(arguments.replay))
     out = Path("runs") if arguments.out is None else arguments.out
     document = run(scenario, out, not arguments.no_report)
-    folder = str(out / scenario.name)
-    said = document | {"folder": folder, "requirements": judged, "passed": meets}
+    folder, meets = str(out / scenario.name), all(each["passed"] for each in judged)
+    lines = [f"{each['name']} {each['actual']}" for each in judged]
+    said = document | {"folder": folder, "requirements": lines, "passed": meets}
 
     def text() -> str:
-        return "\n".join([verdict_text(document, folder, sys.stdout.isatty()).rstrip(), *judged])
+        return "\n".join([verdict_text(document, folder, sys.stdout.isatty()).rstrip(), *lines])
 
     answer(arguments.format, said, text)
-    return 0 if meets else 1
+    return {"scenario": scenario.name, "passed": meets, "expectations": judged}

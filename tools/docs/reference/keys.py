@@ -1,4 +1,4 @@
-"""The keys of scenario, sweep, aircraft and vehicle files: each as the schema has it that loads the file."""
+"""The keys of scenario, sweep, plan, aircraft and vehicle files: each as the schema has it that loads it."""
 
 import re
 from collections.abc import Callable, Iterator, Mapping
@@ -12,6 +12,7 @@ from beaver_ftc.plugins import DETECTORS, LAWS, options_of, registered
 from beaver_ftc.scenario import actuators, sensors
 from beaver_ftc.scenario.schema import json_schema
 from beaver_ftc.scenario.sweeps import sweep_json_schema
+from beaver_ftc.studies.evidence.plan import plan_json_schema
 from beaver_ftc.studies.present.tables import markdown_table
 from tools.docs.reference.schema import Key, Node, Place, Section, Sections, dotted
 
@@ -198,6 +199,11 @@ KINDS = {
     ),
     "sweep-keys": Kind(
         sweep_json_schema, "Sweep keys", f"Which keys does a sweep file have? {_AS_SCHEMA.format(' --sweep')}"
+    ),
+    "plan-keys": Kind(
+        plan_json_schema,
+        "Plan keys",
+        f"Which keys does a plan of evidence have? {_AS_SCHEMA.format(' --plan')}",
     ),
     "aircraft-keys": Kind(
         AircraftFile.model_json_schema, "Aircraft file keys", "Which keys does an `aircraft.yaml` have?"

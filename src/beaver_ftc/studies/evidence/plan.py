@@ -105,9 +105,9 @@ class PlanFile(Section, title="beaver-ftc plan of evidence"):
     """
 
     name: str = entry(..., pattern=NAME_PATTERN, max_length=70, examples=["flight-controls"])
-    description: str = entry("", max_length=4000)
+    description: str = entry("", max_length=4000, examples=["The flight controls after one failure."])
     flights: dict[Annotated[str, StringConstraints(pattern=NAME_PATTERN, max_length=70)], dict[str, Any]] = (
-        entry(dict, max_length=200)
+        entry(dict, max_length=200, examples=[{"own": {"duration_s": 30}}])
     )
     requirements: tuple[Requirement, ...] = entry(..., min_length=1, max_length=MOST_REQUIREMENTS)
 

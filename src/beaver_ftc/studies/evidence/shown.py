@@ -223,8 +223,25 @@ def as_text(document: Document, folder: str, colour: bool = False) -> str:
     return "\n\n".join(filter(None, (lines, "\n".join(again), counted(document), f"results: {folder}")))
 
 
-def of_flight(plan: EvidencePlan, name: str) -> tuple[Any, list[str], bool]:
-    """A flight by name: its scenario, what each requirement over it says, and whether it meets them all.
+def as_expectations(document: Document) -> list[Document]:
+    """What JUnit XML says of each requirement, and of one that is not met which command flies it again."""
+    return [
+        _expectation(
+            each["id"], _asked(each["asked"]), each["verdict"], each["worst"], each["worst"]["command"]
+        )
+        for each in document["requirements"]
+    ]
+
+
+def _expectation(
+    name: str, expected: str, verdict: str, found: Document, again: str | None = None
+) -> Document:
+    actual = f"{verdict}: {_found(found)}" + (f"; again: {again}" if again else "")
+    return {"name": name, "passed": verdict == MET, "expected": expected, "actual": actual}
+
+
+def of_flight(plan: EvidencePlan, name: str) -> tuple[Any, list[Document]]:
+    """A flight by name: its scenario, and what each requirement over it says, part by part.
 
     Raises BadInput for a name that the plan does not have.
     """
@@ -235,8 +252,9 @@ def of_flight(plan: EvidencePlan, name: str) -> tuple[Any, list[str], bool]:
         raise BadInput(
             f"--replay: {plan.given} has no flight {name[:100]!r}{suggestion(name, list(named)[:50])}"
         )
-    row = fly_flight(plan, named[name])
-    lines = [f"{id} {one['verdict']}: {_found(one)}" for id, parts in row["found"].items() for one in parts]
-    meets = all(one["verdict"] == MET for parts in row["found"].values() for one in parts)
-    source, run = named[name]
-    return plan.sources[source].scenario(run), lines, meets
+    found, (source, run) = fly_flight(plan, named[name])["found"], named[name]
+    judged = [
+        _expectation(id, said(one["expected"]), one["verdict"], one)
+        for id, parts in found.items() for one in parts
+    ]  # fmt: skip
+    return plan.sources[source].scenario(run), judged

@@ -27,7 +27,7 @@ def flown():
 
 def test_a_flight_in_a_picture(changed, flown):
     samples, rows = flown
-    figure = pages.picture(samples, MODEL, rows)
+    figure = pages.picture(samples, list(MODEL.vehicle.surfaces), rows)
     assert not changed(picture(figure))
     legends = [axis.get_legend() for axis in figure.axes[:3]]
     assert [legend._ncols for legend in legends] == [4, 4, 1]  # at most 4, one for one
@@ -39,7 +39,7 @@ def test_a_flight_in_a_picture(changed, flown):
 def test_an_alarm_from_the_first_row_is_shaded_from_there(changed, flown):
     samples, _ = flown
     rows = small.rows([(5, *HALF), (5, *SOUND)])
-    figure = pages.picture(samples, MODEL, rows)
+    figure = pages.picture(samples, list(MODEL.vehicle.surfaces), rows)
     spans = [patch.get_extents().transformed(axis.transData.inverted())
              for axis in figure.axes for patch in axis.patches]  # fmt: skip
     assert [(span.x0, span.x1) for span in spans] == [pytest.approx((10.0, 12.5))] * 5
@@ -54,7 +54,7 @@ def test_a_spike_of_the_rates_does_not_flatten_the_flight(flown):
     commands = np.zeros((len(rates), 2))
     for size, limit in ((1.0, 13.0), (0.001, 1.0)):
         spiked = changed(samples, rates=rates * size, t_s=t_s, commands=commands)
-        figure = pages.picture(spiked, MODEL, flown[1])
+        figure = pages.picture(spiked, list(MODEL.vehicle.surfaces), flown[1])
         assert figure.axes[0].get_ylim() == pytest.approx((-limit, limit))
 
 
@@ -68,7 +68,7 @@ def test_a_long_flight_is_drawn_by_every_so_many_points(flown, count, drawn):
     values = np.zeros((count, 3))
     long = changed(flown[0], t_s=t_s, rates=values, commands=values[:, :2])
     rows = small.rows([(count, *SOUND)])
-    figure = pages.picture(long, MODEL, rows)
+    figure = pages.picture(long, list(MODEL.vehicle.surfaces), rows)
     assert {len(line.get_xdata()) for axis in figure.axes for line in axis.lines} == {drawn}
 
 

@@ -9,6 +9,7 @@ import pytest
 from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights import replay as of
+from beaver_ftc.flights import stepped
 from beaver_ftc.scenario.schema import Sensors
 from flights import synthetic
 
@@ -25,21 +26,35 @@ SAID = [
 T_S = np.arange(len(SAID)) * 0.5
 
 
+ALONE = (np.tile([0.9, 0.5, 0.7, 0.0], (len(SAID), 1)), np.tile([1.0, 0.7, 0.8, 1.0], (len(SAID), 1)))
+
+
 def test_verdicts_as_columns():
-    columns = of._columns(T_S, SAID, SURFACES)
+    fdi = SimpleNamespace(is_ours=True, pairs=False)
+    rows = stepped.rows_of(T_S, stepped.Stepped(SAID, *ALONE), SURFACES, fdi)
+    columns = of.columns(rows, SURFACES)
     assert list(columns) == [
         "t_s", "faulty", "named",
         *(f"{name}_{what}" for name in SURFACES for what in ("effectiveness", "low", "high")), "credible",
     ]  # fmt: skip
-    assert columns["faulty"].tolist() == [0, 1, 1, 1, 1, 1, 1]
+    columns = {name: list(values) for name, values in columns.items()}
+    assert columns["faulty"] == [0, 1, 1, 1, 1, 1, 1]
     assert columns["named"] == ["", "unknown", "elevator", "rudder", "rudder", "aileron", "unknown"]
-    assert columns["elevator_effectiveness"].tolist() == [1, 1, 0.6, 1, 1, 1, 1]
-    assert columns["rudder_effectiveness"].tolist() == [1, 1, 1, 0.75, 1, 1, 1]
-    assert columns["aileron_effectiveness"].tolist() == [1] * 7
-    for name in SURFACES:
-        assert columns[f"{name}_low"].tolist() == [1, 0, 0, 0, 0, 0, 0]
-        assert columns[f"{name}_high"].tolist() == [1] * 7
-    assert columns["credible"].tolist() == [1] * 7
+    assert columns["elevator_effectiveness"] == [1, 1, 0.6, 1, 1, 1, 1]
+    assert columns["rudder_effectiveness"] == [1, 1, 1, 0.75, 1, 1, 1]
+    assert columns["aileron_effectiveness"] == [1] * 7
+    lows = [
+        [0.9, 0, 1, 1, 1, 0, 0],
+        [0.5, 0, 0.5, 1, 1, 1, 0],
+        [0.7, 0, 1, 0, 0, 1, 0],
+        [0, 0, 1, 1, 1, 1, 0],
+    ]
+    highs = [[1] * 7, [1, 1, 0.7, 1, 1, 1, 1], [1] * 7, [1] * 7]
+    highs[0][5], lows[0][5] = 1.0, 0.9
+    for name, low, high in zip(SURFACES, lows, highs, strict=True):
+        assert columns[f"{name}_low"] == low, name
+        assert columns[f"{name}_high"] == high, name
+    assert columns["credible"] == [1] * 7
 
 
 def scenario(**sensors):
@@ -113,7 +128,7 @@ def test_columns_that_a_log_must_have(tmp_path):
     with pytest.raises(BadInput, match=r"no column c, allowed: a log\.parquet as `run` writes it"):
         of._columns_of(path, ["t_s", "c"])
     aircraft = SimpleNamespace(signals=["dpt"], surfaces=SURFACES)
-    assert of._inputs(aircraft) == (
+    assert stepped.inputs_of(aircraft) == (
         ["p_measured_rad_s", "q_measured_rad_s", "r_measured_rad_s"],
         ["alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", "dpt"],
         [f"{name}_cmd_rad" for name in SURFACES],

@@ -143,7 +143,7 @@ ANGLES, ROOM = (
 )
 TRAVEL_RAD = {"elevator": 0.4, "flap": 1.0}
 LOGGED = (
-    "t_s", *ROOM, *ANGLES, "airspeed_mps", "flap_pos_rad", *(f"{a}_measured_rad_s" for a in "pqr"),
+    "t_s", *ROOM, *ANGLES, "airspeed_mps", "qdyn_pa", "flap_pos_rad", *(f"{a}_measured_rad_s" for a in "pqr"),
     *(f"{s}_cmd_rad" for s in TRAVEL_RAD),
 )  # fmt: skip
 

@@ -25,7 +25,7 @@ COLUMNS = (
     "north_m", "east_m", "altitude_m", "phi_rad", "theta_rad", "psi_rad", "airspeed_mps", "alpha_rad",
     "beta_rad", "p_measured_rad_s", "q_measured_rad_s", "r_measured_rad_s", "aileron_cmd_rad",
     "elevator_cmd_rad", "rudder_cmd_rad", "flap_cmd_rad", "aileron_pos_rad", "elevator_pos_rad",
-    "rudder_pos_rad", "flap_pos_rad",
+    "rudder_pos_rad", "flap_pos_rad", "qdyn_pa", "dpt",
 )  # fmt: skip
 
 
@@ -91,24 +91,28 @@ def test_every_property_of_the_tacview_recording(path, columns, flight, tmp_path
 _SHARES = {name: (f"{name}_cmd_rad", 1.0 / travel) for name, travel in TRAVEL_RAD.items()}
 _RATES = [(f"{axis}_measured_rad_s", 1.0) for axis in "pqr"]
 _ANGLES = {"roll": "phi_rad", "pitch": "theta_rad", "yaw": "psi_rad"}
+_FLOW = ("alpha_rad", "beta_rad", "qdyn_pa", "dpt")
 RECORDED = {
     "table": {
         **dict(zip(("p_rad_s", "q_rad_s", "r_rad_s"), _RATES, strict=True)),
         **{f"{name}_command": share for name, share in _SHARES.items()},
         **{f"{angle}_rad": (column, 1.0) for angle, column in _ANGLES.items()},
         "airspeed_mps": ("airspeed_mps", 1.0),
+        **{name: (name, 1.0) for name in _FLOW},
     },
     "ulog": {
         **{f"vehicle_angular_velocity.xyz[{i}]": rate for i, rate in enumerate(_RATES)},
         **{f"actuator_servos.control[{i}]": share for i, share in enumerate(_SHARES.values())},
         "airspeed.true_airspeed_m_s": ("airspeed_mps", 1.0),
         **{f"attitude.{angle}_rad": (column, 1.0) for angle, column in _ANGLES.items()},
+        **{f"flow.{name}": (name, 1.0) for name in _FLOW},
     },
     "ardupilot": {
         **{f"IMU.Gyr{x}": rate for x, rate in zip("XYZ", _RATES, strict=True)},
         **{f"SRFC.C{i + 1}": share for i, share in enumerate(_SHARES.values())},
         "ARSP.Airspeed": ("airspeed_mps", 1.0),
         **{f"ATT.{angle.title()}": (column, DEG) for angle, column in _ANGLES.items()},
+        **{f"FL{i}.V": (name, 1.0) for i, name in enumerate(_FLOW)},
     },
 }
 
@@ -117,7 +121,7 @@ RECORDED = {
 def test_every_field_of_a_recording(path, columns, tmp_path, kind):
     pytest.importorskip("pyulog")
     pytest.importorskip("pymavlink")
-    write_recording(path, TRAVEL_RAD, kind, tmp_path)
+    write_recording(path, TRAVEL_RAD, kind, tmp_path, ("dpt",))
     found = read_flight(tmp_path / RECORDINGS[kind]).columns
     assert found.keys() == RECORDED[kind].keys()
     for name, (column, factor) in RECORDED[kind].items():

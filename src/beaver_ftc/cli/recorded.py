@@ -103,22 +103,32 @@ def _write_new(path: Path, text: str) -> None:
 def diagnose(
     flights: FlightsArgument,
     model: Annotated[Path | None, typer.Option(metavar="MODEL")] = None,
+    aircraft: Annotated[str | None, typer.Option(metavar="NAME")] = None,
+    scenario: Annotated[str | None, typer.Option(metavar="SCENARIO")] = None,
+    vehicle: Annotated[str | None, typer.Option(metavar="FILE")] = None,
     out: Path = Path("diagnoses"),
     score: bool = False,
     detector: Annotated[str, typer.Option(metavar="NAME")] = "bank-of-filters",
     reader: ReaderOption = None,
     format: FormatOption = Format.text,
 ) -> None:
-    """Diagnose recorded flights with an identified model.
+    """Diagnose recorded flights with an identified model, or an aircraft's own.
 
     Writes DIR/<flight>/diagnosis.parquet (a row a sample), verdict.json and report.html. A row uses nothing
     later than its time. The log.parquet of a run of ours needs no model: it is diagnosed as it was in flight.
 
     model: The model file `identify` has written; none for our own logs.
+    aircraft: The aircraft by whose own model it is diagnosed, as the loop does, instead of an identified one.
+    scenario: With --aircraft: whose fdi, actuators, design_model and substeps say what errors are declared.
+    vehicle: With --aircraft: the vehicle file, if it is not vehicle.yaml beside the log.
     out: Folder for the results.
     score: Compare with the log's labels, after the fact.
     detector: Who diagnoses: bank-of-filters, or a rival by its name.
     """
+    _check_options(model, aircraft, {"--scenario": scenario, "--vehicle": vehicle}, detector)
+    if aircraft is not None:
+        _by_aircraft(flights, (aircraft, scenario, vehicle), out, score, reader, format)
+        return
     if model is None:
         _replay(flights, out, format)
         return
@@ -138,6 +148,52 @@ def diagnose(
         {"flights": verdicts},
         lambda: "\n".join(f"{as_text(each)}\n  report: {each['folder']}/report.html" for each in verdicts),
     )
+
+
+def _check_options(
+    model: Path | None, aircraft: str | None, only: dict[str, str | None], detector: str
+) -> None:
+    """Raise BadInput for options that contradict one another."""
+    if aircraft is None:
+        for option, given in only.items():
+            if given is not None:
+                raise BadInput(f"diagnose: {option} {given}: allowed: only with --aircraft NAME")
+        return
+    if model is not None:
+        raise BadInput("diagnose: --model and --aircraft: allowed: one of them")
+    if detector != "bank-of-filters":
+        says = f"--detector {detector}: allowed: none, fdi.scheme of --scenario names it"
+        raise BadInput(f"diagnose: --aircraft with {says}")
+
+
+def _by_aircraft(
+    flights: list[Path],
+    told: tuple[str, str | None, str | None],
+    out: Path,
+    scored: bool,
+    reader: str | None,
+    format: Format,
+) -> None:
+    """told: aircraft, scenario and vehicle file as given."""
+    from beaver_ftc.flights.by_aircraft import as_text, diagnose_as, known
+    from beaver_ftc.flights.pages import write_by_aircraft
+    from beaver_ftc.flights.samples import read_for
+    from beaver_ftc.flights.scoring import score
+    from beaver_ftc.flights.vehicle import load_vehicle
+
+    by = known(told[0], told[1])
+    verdicts = []
+    for path in flights:
+        beside = path.with_name("vehicle.yaml")
+        if told[2] is None and not beside.is_file():
+            raise BadInput(f"{path}: no vehicle.yaml beside it, allowed: --vehicle FILE")
+        described = load_vehicle(told[2] or str(beside))
+        samples, rows, verdict = diagnose_as(read_for(path, described, reader), described, by)
+        if scored:
+            verdict["score"] = score(samples, rows, [[name] for name in by.aircraft.surfaces])
+        folder = write_by_aircraft(out, samples, by.aircraft.surfaces, rows, verdict)
+        verdicts.append(verdict | {"folder": str(folder)})
+    answer(format, {"flights": verdicts}, lambda: "\n".join(map(as_text, verdicts)))
 
 
 def _replay(flights: list[Path], out: Path, format: Format) -> None:

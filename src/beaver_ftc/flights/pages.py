@@ -18,6 +18,7 @@ from beaver_ftc.flights.identification import regressor_names
 from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.recording import Floats
 from beaver_ftc.flights.regression import Fit, spectrum
+from beaver_ftc.flights.replay import columns
 from beaver_ftc.flights.samples import Samples
 from beaver_ftc.results.metrics import as_json
 from beaver_ftc.results.style import SERIES
@@ -44,19 +45,32 @@ def template(name: str) -> "Template":
 
 def render(samples: Samples, model: Model, rows: Rows, verdict: dict[str, Any]) -> str:
     """The report as HTML text."""
+    quiet = f"The probability of a fault stayed below the alarm level of {model.settings.alarm}."
+    predicts = (
+        f"The model was identified at {model.rate_hz:.3g} Hz; it predicts a sample from past ones, "
+        f"{model.history} of the rates and {model.lags} of the commands."
+    )
+    words = {"bounds": "90 % bounds", "quiet": quiet, "predicts": predicts}
+    return _page(samples, list(model.vehicle.surfaces), rows, verdict, words)
+
+
+def _page(
+    samples: Samples, surfaces: Sequence[str], rows: Rows, verdict: dict[str, Any], words: dict[str, str]
+) -> str:
+    """A flight's page. words: what its bounds are called, what is said without an event, and of the model."""
     return template("flight.html.j2").render(
         verdict=verdict,
         looked_at=looked_at(verdict),
         events=lasting(verdict["events"]),
         brief_s=BRIEF_S,
-        model=model,
-        picture=_encoded(picture(samples, model, rows)),
+        words=words,
+        picture=_encoded(picture(samples, surfaces, rows, words["bounds"])),
         ages=samples.age_s,
-        notes=_notes(samples, model),
+        notes=[*_notes(samples), words["predicts"]],
     )
 
 
-def _notes(samples: Samples, model: Model) -> list[str]:
+def _notes(samples: Samples) -> list[str]:
     gaps = int(samples.run[-1])
     many = "1 gap" if gaps == 1 else f"{gaps} gaps"
     said = [f"{len(samples.t_s)} samples at {1.0 / samples.dt_s:.3g} Hz, {many} in the log."]
@@ -64,27 +78,23 @@ def _notes(samples: Samples, model: Model) -> list[str]:
         f"{name} has its own stamps: its last value is held, {age:.2f} s old on average."
         for name, age in samples.age_s.items()
     ]
-    predicts = (
-        f"The model was identified at {model.rate_hz:.3g} Hz; it predicts a sample from past ones, "
-        f"{model.history} of the rates and {model.lags} of the commands."
-    )
-    return [*said, *samples.notes, predicts]
+    return [*said, *samples.notes]
 
 
-def picture(samples: Samples, model: Model, rows: Rows) -> Any:
-    """The flight on one page: commands, rates, effectiveness with bounds, probability of a fault."""
-    surfaces = list(model.vehicle.surfaces)
+def picture(samples: Samples, surfaces: Sequence[str], rows: Rows, bounds: str = "90 % bounds") -> Any:
+    """The flight on one page: commands, rates, effectiveness with bounds, probability of a fault. bounds:
+    what they are called."""
     figure = _figure(11, 3.4 + 1.25 * len(surfaces))
     heights = [1.2, 1.2, *[1.0] * (len(surfaces) + 1)]
     axes = figure.subplots(len(heights), sharex=True, height_ratios=heights)
     _lines(axes[0], samples.t_s, np.rad2deg(samples.rates), ["p", "q", "r"], "rates, deg/s")
     limit = float(np.rad2deg(np.nanpercentile(np.abs(samples.rates), 99.9))) * 1.3
     axes[0].set_ylim(-max(limit, 1.0), max(limit, 1.0))  # a landing's spike does not flatten the flight
-    _lines(axes[1], samples.t_s, samples.commands, surfaces, "healthy surfaces'\nshare of travel")
+    _lines(axes[1], samples.t_s, samples.commands, list(surfaces), "healthy surfaces'\nshare of travel")
     _lines(axes[2], rows.t_s, rows.probability[:, None], ["a fault"], "probability")
     axes[2].set_ylim(-0.05, 1.05)
     for i, surface in enumerate(surfaces):
-        _effectiveness(axes[3 + i], rows, i)
+        _effectiveness(axes[3 + i], rows, i, bounds)
         _dress(axes[3 + i], f"{surface}\neffectiveness")
     for axis in axes:
         _shade(axis, rows)
@@ -108,11 +118,11 @@ def _lines(axis: Any, t_s: np.ndarray, values: np.ndarray, names: list[str], lab
     _dress(axis, label)
 
 
-def _effectiveness(axis: Any, rows: Rows, surface: int) -> None:
+def _effectiveness(axis: Any, rows: Rows, surface: int, bounds: str) -> None:
     kept = slice(None, None, max(len(rows.t_s) // _MOST_POINTS, 1))
     axis.fill_between(
         rows.t_s[kept], rows.low[kept, surface], rows.high[kept, surface], color="#9cc4e4", step="post",
-        linewidth=0, label="90 % bounds",
+        linewidth=0, label=bounds,
     )  # fmt: skip
     axis.step(rows.t_s[kept], rows.estimate[kept, surface], where="post", color="#0b3d66", linewidth=1.1)
     axis.set_ylim(-0.05, 1.08)
@@ -138,6 +148,22 @@ def write_diagnosis(out: Path, samples: Samples, model: Model, rows: Rows, verdi
     values = rows.t_s, rows.faulty, rows.named.tolist(), *each, rows.probability, rows.credible
     columns = dict(zip(columns_of(model.vehicle.surfaces), values, strict=True))
     return write_results(out, samples.name, columns, verdict, render(samples, model, rows, verdict))
+
+
+def write_by_aircraft(
+    out: Path, samples: Samples, surfaces: Sequence[str], rows: Rows, verdict: dict[str, Any]
+) -> Path:
+    """The same of a flight that an aircraft's own model diagnosed."""
+    from beaver_ftc.flights.stepped import STANDS_S
+
+    words = {
+        "bounds": "bounds",
+        "quiet": "No residual left the bound of the errors declared.",
+        "predicts": f"The model is that of {verdict['aircraft']}; the bounds hold while one surface alone "
+        f"is at fault, has stood for {STANDS_S:g} s, and the errors declared hold.",
+    }
+    page = _page(samples, surfaces, rows, verdict, words)
+    return write_results(out, samples.name, columns(rows, surfaces), verdict, page)
 
 
 def write_results(

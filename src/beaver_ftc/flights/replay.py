@@ -6,6 +6,7 @@ bit.
 """
 
 import json
+from collections.abc import Sequence
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -18,9 +19,6 @@ from beaver_ftc.flights.recording import Floats
 
 Document = dict[str, Any]
 
-_FLOW = ("alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa")
-_UNKNOWN = "unknown"
-
 
 def is_own_log(path: Path) -> bool:
     """Whether a path is the log of one of our runs, with its scenario beside it."""
@@ -30,30 +28,19 @@ def is_own_log(path: Path) -> bool:
 def replay(path: Path) -> tuple[dict[str, Any], Document]:
     """Step the diagnosis through a log: columns of diagnosis.parquet by name, and the document of
     verdict.json. Raises BadInput where the flight's diagnosis was none of ours."""
+    from beaver_ftc.flights import stepped
     from beaver_ftc.loop.stream import Diagnosis
     from beaver_ftc.scenario.loader import load_scenario
 
     scenario = load_scenario(path.with_name("scenario.yaml"))
     aircraft = scenario.airframe
-    inputs = _inputs(aircraft)
+    inputs = stepped.inputs_of(aircraft)
     log = _columns_of(path, ["t_s", *chain.from_iterable(inputs)])
-    keys = scenario.model_dump(mode="json", exclude_unset=True)
-    others = {key: keys[key] for key in ("actuators", "design_model") if key in keys}
-    diagnosis = Diagnosis(aircraft, scenario.rate_hz, keys.get("fdi"), **others)
-    given = [np.ascontiguousarray(np.column_stack([log[name] for name in names])) for names in inputs]
-    verdicts = [diagnosis.step(*frame) for frame in zip(*given, strict=True)]
-    columns = _columns(log["t_s"], verdicts, list(aircraft.surfaces))
-    return columns, _verdict(path, scenario, log, verdicts)
-
-
-def _inputs(aircraft: Any) -> tuple[list[str], ...]:
-    """Columns of what the diagnosis is given at each frame: rates, signals, commands, attitude."""
-    return (
-        [f"{axis}_measured_rad_s" for axis in "pqr"],
-        [*_FLOW, *aircraft.signals],
-        [f"{name}_cmd_rad" for name in aircraft.surfaces],
-        ["phi_rad", "theta_rad", "psi_rad"],
-    )
+    diagnosis = Diagnosis(aircraft, scenario.rate_hz, **stepped.declared_of(scenario))
+    given = [np.column_stack([log[name] for name in names]) for names in inputs]
+    found = stepped.step_through(diagnosis, given, scenario.rate_hz)
+    rows = stepped.rows_of(log["t_s"], found, aircraft.surfaces, scenario.fdi)
+    return columns(rows, aircraft.surfaces), _verdict(path, scenario, log, found.verdicts)
 
 
 def _columns_of(path: Path, names: list[str]) -> dict[str, Floats]:
@@ -66,30 +53,14 @@ def _columns_of(path: Path, names: list[str]) -> dict[str, Floats]:
     return log
 
 
-def _columns(t_s: Floats, verdicts: list[Any], surfaces: list[str]) -> dict[str, Any]:
+def columns(rows: Any, surfaces: Sequence[str]) -> dict[str, Any]:
     """The columns of diagnosis.parquet. Where the diagnosis says nothing of a surface's effectiveness, its
     bounds are 0 and 1."""
-    suspected = np.array([verdict.detected for verdict in verdicts])
-    named = [_name(verdict, surfaces) for verdict in verdicts]
-    columns: dict[str, Any] = {"t_s": t_s, "faulty": suspected.astype(np.int64), "named": named}
-    for surface in surfaces:
-        left = np.array([_effectiveness(verdict, surface) for verdict in verdicts])
-        columns[f"{surface}_effectiveness"] = left
-        columns[f"{surface}_low"] = np.where(suspected, 0.0, left)
-        columns[f"{surface}_high"] = np.ones(len(left))
-    columns["credible"] = np.ones(len(t_s), dtype=np.int64)  # the model is the one that the flight declares
-    return columns
-
-
-def _name(verdict: Any, surfaces: list[str]) -> str:
-    if not verdict.detected:
-        return ""
-    return str(verdict.isolated) if verdict.isolated in surfaces else _UNKNOWN
-
-
-def _effectiveness(verdict: Any, surface: str) -> float:
-    lost = verdict.isolated == surface and verdict.type in (None, "loss_of_effectiveness")
-    return 1.0 + float(verdict.estimate) if lost and verdict.estimate is not None else 1.0
+    found: dict[str, Any] = {"t_s": rows.t_s, "faulty": rows.faulty, "named": rows.named.tolist()}
+    for i, surface in enumerate(surfaces):
+        found[f"{surface}_effectiveness"] = rows.estimate[:, i]
+        found[f"{surface}_low"], found[f"{surface}_high"] = rows.low[:, i], rows.high[:, i]
+    return found | {"credible": rows.credible}
 
 
 def _verdict(path: Path, scenario: Any, log: dict[str, Floats], verdicts: list[Any]) -> Document:

@@ -66,7 +66,7 @@ def sample(recording: Recording, vehicle: Vehicle) -> Samples:
     _consistent(recording, vehicle)
     stamps = recording.columns[names[0]].t_s
     t_s, run, step = _time_base(recording.name, stamps, vehicle.max_rate_hz)
-    found = {name: _at_samples(recording.columns[name], t_s, step) for name in used}
+    found = {name: at_samples(recording.columns[name], t_s, step) for name in used}
 
     def columns(names: list[str]) -> Floats:
         return np.column_stack([found[name][0] for name in names]) if names else np.empty((len(t_s), 0))
@@ -111,7 +111,7 @@ def _clipped(rates: list[Column], t_s: Floats) -> NDArray[np.bool_]:
 def _airspeed(recording: Recording, vehicle: Vehicle, t_s: Floats, step_s: float) -> Floats | None:
     """The airspeed at each sample, nan where it is unknown; None where the vehicle has none."""
     column = recording.columns.get(vehicle.airspeed.column) if vehicle.airspeed else None
-    return None if column is None else _at_samples(column, t_s, step_s)[0]
+    return None if column is None else at_samples(column, t_s, step_s)[0]
 
 
 def _consistent(recording: Recording, vehicle: Vehicle) -> None:
@@ -137,6 +137,7 @@ def _consistent(recording: Recording, vehicle: Vehicle) -> None:
 def in_si(recording: Recording, vehicle: Vehicle) -> Recording:
     """A recording with the columns that a vehicle names in SI."""
     named = {one.column: one for _, one in vehicle.quantities()}
+    named |= {one.column: one for one in vehicle.flow.values()}
     named |= {one.column: one for _, _, one in vehicle.judged()}
     changed = {
         name: replace(column, values=named[name].si(column.values))
@@ -226,7 +227,7 @@ def _step(stamps: Floats) -> float:
     return float(np.median(np.diff(stamps[:_FIRST]))) if len(stamps) > 1 else float("inf")
 
 
-def _at_samples(column: Column, t_s: Floats, step_s: float) -> tuple[Floats, float | None]:
+def at_samples(column: Column, t_s: Floats, step_s: float) -> tuple[Floats, float | None]:
     """A column's values at given times, and how old they are on average, s; None: it has these very times."""
     if len(column.t_s) == len(t_s) and np.array_equal(column.t_s, t_s):
         return column.values, None

@@ -88,12 +88,13 @@ class Rates(Section):
 
 
 class Attitude(Section):
-    """Columns of the attitude: what the rates are checked against, and nothing else."""
+    """Columns of the attitude: rates are checked against it; in turbulence an aircraft's model wants it."""
 
     roll: Logged = Field(description="column of the roll angle, rad", examples=["roll_rad"])
     pitch: Logged | None = Field(
         default=None, description="column of the pitch angle, rad", examples=["pitch_rad"]
     )
+    yaw: Logged | None = Field(default=None, description="column of the yaw angle, rad", examples=["yaw_rad"])
 
 
 class Vehicle(Section):
@@ -142,6 +143,17 @@ class Vehicle(Section):
         description="column of the airspeed, m/s: a model holds where it was fitted",
         examples=["airspeed_m_s"],
     )
+    flow: dict[str, Logged] = Field(
+        default={},
+        description="columns of what else an aircraft's own model is given, by the aircraft's names",
+        examples=[{"alpha_rad": "alpha", "beta_rad": "beta", "qdyn_pa": "qbar"}],
+    )
+    full_deflection_rad: dict[str, Number] = Field(
+        default={},
+        description="deflection of each surface at 1, rad, for an aircraft's own model; 1 where left out",
+        json_schema_extra={"unit": "rad", "range": "any"},
+        examples=[{"left": 0.4}],
+    )
     outputs: dict[str, Logged] = Field(
         default={},
         description="columns of the servo outputs: read by the freeze rule of a benchmark alone",
@@ -164,7 +176,12 @@ class Vehicle(Section):
         conflicts: list[Conflict] = [(("surfaces", name), f"{name!r}: {says}") for name in bad]
         for surface, row in self.surfaces.items():
             conflicts += _unknown(("surfaces", surface), row, "command", self.command_names)
-        for key, table in (("labels", self.labels), ("outputs", self.outputs)):
+        of_surfaces: dict[str, Collection[str]] = {
+            "labels": self.labels,
+            "outputs": self.outputs,
+            "full_deflection_rad": self.full_deflection_rad,
+        }
+        for key, table in of_surfaces.items():
             conflicts += _unknown((key,), table, "surface", self.surfaces)
         for place, kind, one in self.judged():
             if one.unit is not None and UNITS[one.unit][0] != kind:
@@ -181,12 +198,16 @@ class Vehicle(Section):
         ]
         if self.attitude is not None:
             found.append((("attitude", "roll"), ANGLE, self.attitude.roll))
-            if self.attitude.pitch is not None:
-                found.append((("attitude", "pitch"), ANGLE, self.attitude.pitch))
+            for angle in ("pitch", "yaw"):
+                if (one := getattr(self.attitude, angle)) is not None:
+                    found.append((("attitude", angle), ANGLE, one))
         if self.acceleration is not None:
             found.append((("acceleration",), ACCELERATION, self.acceleration))
         if self.airspeed is not None:
             found.append((("airspeed",), SPEED, self.airspeed))
+        for name in ("alpha_rad", "beta_rad"):
+            if name in self.flow:
+                found.append((("flow", name), ANGLE, self.flow[name]))
         return found
 
     def _twice(self) -> list[Conflict]:
@@ -216,7 +237,7 @@ class Vehicle(Section):
     def columns(self) -> list[str]:
         """Every column of a log that the vehicle may want, its time aside."""
         wanted = [one for _, one in self.quantities()] + [one for _, _, one in self.judged()]
-        wanted += [*self.labels.values(), *self.outputs.values()]
+        wanted += [*self.flow.values(), *self.labels.values(), *self.outputs.values()]
         return list(dict.fromkeys(one.column for one in wanted))
 
 

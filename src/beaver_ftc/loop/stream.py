@@ -18,6 +18,7 @@ from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.loop.outcome import estimate_now, verdict_of
 from beaver_ftc.plugins import DETECTORS, is_compiled
 from beaver_ftc.scenario.airframe import checked_against
+from beaver_ftc.scenario.diagnosis import FdiConfig
 from beaver_ftc.scenario.loader import load
 
 Vector = NDArray[np.float64]
@@ -34,8 +35,9 @@ class Diagnosis:
 
     aircraft: whose surfaces and stops. rate_hz: samples a second, evenly spaced. fdi: as in a scenario file.
     actuators, design_model: likewise, if they are not ideal. start: rates, signals and surfaces of the trim
-    that what is linearised or statistical holds on to; the first sample, if it is left out. Raises BadInput
-    that names the key. Everything it remembers is one record of fixed size.
+    that what is linearised or statistical holds on to; the first sample, if it is left out. substeps: so many
+    times in a frame a surface can have moved. Raises BadInput that names the key. Everything it remembers is
+    one record of fixed size.
     """
 
     def __init__(
@@ -47,12 +49,13 @@ class Diagnosis:
         actuators: Any = "ideal",
         design_model: Mapping[str, Any] | None = None,
         start: Start | None = None,
+        substeps: int = 1,
     ) -> None:
         if not isinstance(aircraft, Aircraft):
             raise BadInput(f"aircraft: {aircraft!r:.60} is none, allowed: what aircraft() gives")
         given = {
             "name": "stream", "rate_hz": rate_hz, "fdi": fdi or {}, "actuators": actuators,
-            "design_model": design_model or {},
+            "design_model": design_model or {}, "substeps": substeps,
         }  # fmt: skip
         with checked_against(aircraft):
             self._scenario = load(given)
@@ -122,6 +125,17 @@ class Diagnosis:
         elif self._said.estimate is not None:
             self._said = self._said._replace(estimate=self._estimate())
         return self._said
+
+    @property
+    def config(self) -> FdiConfig:
+        """What it goes by: `fdi` with all defaults."""
+        return self._scenario.fdi
+
+    def surprise(self) -> tuple[Vector, Vector, Vector]:
+        """What no healthy surface explains of the frame that ended with the last sample: the innovation (3,),
+        its declared bound (3,), and what each surface was expected to give (3, surfaces), rad/s2."""
+        innovation, bound = self._fdi["bank"]["innovation"], self._fdi["bound"]["frame"]
+        return innovation.copy(), bound.copy(), self._frame["belief"]["means"]["Gu"].copy()
 
     def _estimate(self) -> float | None:
         if self._scenario.fdi.fault_class == "published":

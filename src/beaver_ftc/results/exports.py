@@ -1,8 +1,9 @@
 """The log for other tools: as CSV, as a flight recording for Tacview, and as a recorder on board would have
 written it, which is a table, a PX4 ULog or a dataflash log.
 
-Of the last, only what an autopilot knows: measured rates, attitude, airspeed and the commands to the surfaces
-as shares of travel. `vehicle.yaml` beside it names the columns for `identify` and `diagnose`.
+Of the last, only what an autopilot knows: measured rates, attitude, flow, what else the aircraft measures,
+and the commands to the surfaces as shares of travel. `vehicle.yaml` beside it names the columns for
+`identify` and `diagnose`.
 
 ULog: https://docs.px4.io/main/en/dev_log/ulog_file_format; dataflash: FMT messages, then packed ones.
 """
@@ -37,6 +38,8 @@ Topics = dict[str, Columns]
 
 RECORDINGS = {"table": "flight.csv", "ulog": "flight.ulg", "ardupilot": "flight.bin"}
 _RATES, _ATTITUDE = ("p", "q", "r"), {"Roll": "phi", "Pitch": "theta", "Yaw": "psi"}
+_FLOW = ("alpha_rad", "beta_rad", "qdyn_pa")
+_ANGLES = ("roll", "pitch", "yaw")
 _BOOT_US = 1_000_000
 """A clock on board does not start with the log."""
 
@@ -115,21 +118,46 @@ def _properties(row: dict[str, float], full_flap_rad: float | None) -> str:
     return air if full_flap_rad is None else f"{air},Flaps={row[f'{FLAP}_pos_rad'] / full_flap_rad:.4f}"
 
 
-def write_recording(log_path: Path, travel_rad: dict[str, float], kind: str, folder: Path) -> None:
+def write_recording(
+    log_path: Path, travel_rad: dict[str, float], kind: str, folder: Path, signals: Sequence[str] = ()
+) -> None:
     """Write a flight's log as `kind` (of RECORDINGS) with its vehicle.yaml into a folder.
 
-    travel_rad: the farther stop of each surface.
+    travel_rad: the farther stop of each surface. signals: what the aircraft measures beside rates and flow.
     """
     names = [*(f"{axis}_measured_rad_s" for axis in _RATES), "phi_rad", "theta_rad", "psi_rad"]
     commands = [f"{surface}_cmd_rad" for surface in travel_rad]
-    chunks = list(log.read_chunks(log_path, ["t_s", *names, "airspeed_mps", *commands]))
+    further = [*_FLOW, *signals]
+    chunks = list(log.read_chunks(log_path, ["t_s", *names, "airspeed_mps", *further, *commands]))
     known = {name: np.concatenate([chunk[name] for chunk in chunks]) for name in chunks[0]}
     shares = {s: known[f"{s}_cmd_rad"] / travel for s, travel in travel_rad.items()}
     write, named = _FORMATS[kind]
     topics = named(known, shares)
+    for topic, fields in _further(known, further, kind).items():
+        topics[topic] = topics.get(topic, {}) | fields
     t_us = np.round(known["t_s"] * 1e6).astype(np.int64) + _BOOT_US
     write(folder / RECORDINGS[kind], t_us, topics)
-    (folder / "vehicle.yaml").write_text(_vehicle(topics, list(shares), kind), encoding="utf-8")
+    flow = _flow_columns(further, kind)
+    text = (
+        _vehicle(topics, travel_rad, kind) + f"flow: {{{', '.join(f'{k}: {v}' for k, v in flow.items())}}}\n"
+    )
+    (folder / "vehicle.yaml").write_text(text, encoding="utf-8")
+
+
+def _further(known: Columns, names: Sequence[str], kind: str) -> Topics:
+    """What the aircraft's own model is given besides, in a message of its own each; in a table as columns."""
+    found = {name: known[name] for name in names}
+    if kind == "table":
+        return {"": found}
+    if kind == "ulog":
+        return {"flow": found}
+    return {f"FL{i}": {"V": values} for i, values in enumerate(found.values())}
+
+
+def _flow_columns(names: Sequence[str], kind: str) -> dict[str, str]:
+    """Where `_further` has put each."""
+    forms = {"table": "{name}", "ulog": "flow.{name}", "ardupilot": "FL{i}.V"}
+    return {name: forms[kind].format(name=name, i=i) for i, name in enumerate(names)}
 
 
 def _as_table(known: Columns, shares: Columns) -> Topics:
@@ -228,10 +256,11 @@ def _in_turn(topics: Sequence[np.ndarray]) -> bytes:
     return np.hstack(rows).tobytes()
 
 
-def _vehicle(topics: Topics, surfaces: list[str], kind: str) -> str:
+def _vehicle(topics: Topics, travel_rad: dict[str, float], kind: str) -> str:
     """The vehicle file: which column is what."""
     columns = [f"{topic}.{field}" if topic else field for topic, fields in topics.items() for field in fields]
     commands = [name for name in columns if re.search(r"command|\.control\[|^SRFC", name)]
+    full = ", ".join(f"{surface}: {stop!r}" for surface, stop in travel_rad.items())
     rates = ", ".join(f"{axis}: {name!r}" for axis, name in zip(_RATES, columns, strict=False))
     lines = [
         "# Written with the log beside it: which column is what. Commands are shares of travel.",
@@ -239,10 +268,11 @@ def _vehicle(topics: Topics, surfaces: list[str], kind: str) -> str:
         f"reader: {kind}",
         f"rates: {{{rates}}}",
         f"commands: [{', '.join(map(repr, commands))}]",
-        f"attitude: {{{', '.join(f'{axis}: {_angle(columns, axis, kind)}' for axis in ('roll', 'pitch'))}}}",
+        f"attitude: {{{', '.join(f'{axis}: {_angle(columns, axis, kind)}' for axis in _ANGLES)}}}",
         f"airspeed: {next(name for name in columns if 'airspeed' in name.lower())!r}",
         "surfaces:",
-        *(f"  {s}: {{{command!r}: 1.0}}" for s, command in zip(surfaces, commands, strict=True)),
+        *(f"  {s}: {{{command!r}: 1.0}}" for s, command in zip(travel_rad, commands, strict=True)),
+        f"full_deflection_rad: {{{full}}}",
     ]
     return "\n".join(lines) + "\n"
 

@@ -87,7 +87,7 @@ def run(
             exporting.write_acmi(log_path, document, folder / "flight.acmi", aircraft)
         if recording is not None:
             stops_rad = {s: max(abs(to.min_rad), abs(to.max_rad)) for s, to in aircraft.travel.items()}
-            exporting.write_recording(log_path, stops_rad, recording, folder)
+            exporting.write_recording(log_path, stops_rad, recording, folder, tuple(aircraft.signals))
         if certified:
             certificate.write(scenario, StoredLog(log_path), folder)
     return document

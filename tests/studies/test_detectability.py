@@ -207,6 +207,12 @@ def test_what_a_line_promises_holds_in_flight(flight):
         assert flown.detection_time_s - struck_s <= 0.5 + 1e-9
 
 
+def test_another_aircraft_has_its_own_errors():
+    """One of plain JSBSim has no property for the errors of the Beaver's truth."""
+    coupled = scenario(duration_s=2.5).with_({"uncertainty.inertia_coupling.p": 0.2})
+    assert set(excitation(with_aircraft(coupled, "jsbsim:c172p")).moment) == {"aileron", "elevator", "rudder"}
+
+
 def test_another_aircraft_is_flown_from_where_it_starts():
     other = with_aircraft(scenario(duration_s=5), "beaver-split")
     assert other.airframe.name == "beaver-split"

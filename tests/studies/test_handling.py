@@ -24,27 +24,38 @@ from flying import scenario
 G = 9.80665
 
 
-def made_up(short=(3.0, 0.6), dutch=(1.2, 0.2), T_roll=0.5, spiral=-0.02, Z_alpha=-1.5):
-    """A linear aircraft with these modes, (frequency, damping) of two of them."""
+def made_up(
+    short=(3.0, 0.6),
+    dutch=(1.2, 0.2),
+    T_roll=0.5,
+    spiral=-0.02,
+    Z_alpha=-1.5,
+    phugoid=(0.2, 0.1),
+    coupled=0.0,
+):
+    """A linear aircraft with these modes, (frequency, damping) of three; coupled: imaginary part, rad/s."""
     omega, zeta = short
     A = np.zeros((8, 8))
     V, alpha, q, theta, beta, p, r, phi = range(8)
-    A[[V, theta], [V, theta]] = -0.05, -0.02
+    omega_p, zeta_p = phugoid
+    A[V, V], A[V, theta], A[theta, V] = -2 * zeta_p * omega_p, -omega_p, omega_p
     A[alpha, alpha], A[alpha, q] = Z_alpha, 1.0
     A[q, q] = -2 * zeta * omega - Z_alpha
     A[q, alpha] = Z_alpha * A[q, q] - omega**2
     omega, zeta = dutch
     A[beta, r], A[r, beta], A[r, r] = -1.0, omega**2, -2 * zeta * omega
     A[p, p], A[phi, phi] = -1.0 / T_roll, spiral
+    if coupled:
+        A[[p, phi], [p, phi]], A[p, phi], A[phi, p] = spiral, coupled, -coupled
     return LinearModel(A, np.zeros((8, 0)), CLASSICAL, ())
 
 
 def test_the_quantities_of_made_up_modes():
     found = of_model(made_up(), 40.0, "trimmed")
     cap = 9.0 / (1.5 * 40.0 / G)
-    expected = [0.6, cap, 0.2, 0.24, 1.2, 0.5, math.inf]
+    expected = [0.6, cap, 0.2, 0.24, 1.2, 0.5, math.inf, 0.1, math.inf, math.inf]
     assert [each.value for each in found] == pytest.approx(expected, rel=1e-6)
-    assert [each.level for each in found] == [1] * 7
+    assert [each.level for each in found] == [1] * 10
     assert [(each.mode, each.quantity) for each in found] == [
         (limit.mode, limit.quantity) for limit in LIMITS
     ]
@@ -60,6 +71,12 @@ def test_the_quantities_of_made_up_modes():
         ({"T_roll": 1.5}, 5, 2), ({"T_roll": 3.1}, 5, 3), ({"T_roll": 11.0}, 5, WORSE),
         ({"spiral": math.log(2) / 19}, 6, 2), ({"spiral": math.log(2) / 7}, 6, 3),
         ({"spiral": math.log(2) / 3}, 6, WORSE),
+        ({"phugoid": (0.2, 0.05)}, 7, 1), ({"phugoid": (0.2, 0.03)}, 7, 2), ({"phugoid": (0.2, -0.01)}, 7, 3),
+        ({"phugoid": (0.2, -math.log(2) / 0.2 / 56)}, 8, 1),
+        ({"phugoid": (0.2, -math.log(2) / 0.2 / 54)}, 8, WORSE),
+        ({"coupled": 0.9, "spiral": -0.6}, 9, 1), ({"coupled": 0.9, "spiral": -0.4}, 9, 2),
+        ({"coupled": 0.9, "spiral": -0.2}, 9, 3), ({"coupled": 0.9, "spiral": -0.1}, 9, WORSE),
+        ({"coupled": 0.9, "spiral": -0.2}, 5, 1), ({"coupled": 0.9, "spiral": 0.1}, 6, 1),
     ],
 )  # fmt: skip
 def test_levels_as_the_specification_has_them(changed, row, level):
@@ -67,7 +84,7 @@ def test_levels_as_the_specification_has_them(changed, row, level):
 
 
 def test_the_margin_is_to_the_nearer_limit():
-    damping, _, _, _, _, _, spiral = LIMITS
+    damping, spiral = LIMITS[0], LIMITS[6]
     assert damping.margin(0.5, 1) == pytest.approx(0.2)
     assert damping.margin(1.9, 1) == pytest.approx(0.1)
     assert damping.margin(0.1, 2) == pytest.approx(-0.1)
@@ -102,4 +119,4 @@ def test_the_beaver_over_its_envelope_as_it_is_shown(changed):
         [30, 36.25, 42.5, 48.75, 55]
     )
     assert not changed(as_text(found).splitlines(), "text")
-    assert not changed(as_rows(found[:7]))
+    assert not changed(as_rows(found[: len(LIMITS)]))

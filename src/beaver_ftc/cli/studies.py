@@ -107,8 +107,8 @@ def linearise(scenario: ConditionOf = None, format: FormatOption = Format.text) 
     default law, broken at each surface in turn; healthy, and with losses of each surface that the law
     knows.
 
-    And the handling qualities of the aircraft alone: short period, Dutch roll, roll and spiral mode against
-    the levels of MIL-F-8785C; of a scenario in which something breaks, also where its flight ends.
+    And the handling qualities of the aircraft alone: short period, phugoid, Dutch roll, roll and spiral mode
+    against the levels of MIL-F-8785C; of a scenario in which something breaks, also where its flight ends.
 
     scenario: Take sensors, actuators and law from it.
     """

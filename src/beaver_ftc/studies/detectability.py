@@ -227,12 +227,11 @@ def geometry(pairs: Sequence[Document]) -> list[str]:
 
 def with_aircraft(scenario: Scenario, reference: str) -> Scenario:
     """The scenario with another aircraft, which starts where its flights do; a folder is looked for in the
-    working directory. Terms of the other aircraft that are wrong are none of this one's."""
+    working directory. What is wrong with the other aircraft's truth is not with this one's."""
     find_aircraft(reference, Path())
     document = scenario.model_dump(mode="json", exclude_none=True)
-    document["uncertainty"].pop("coefficients", None)
-    given = {"aircraft": reference, "initial": {}, "actuators": "ideal", "faults": [], "expect": {}}
-    return Scenario.model_validate({**document, **given})
+    given = {"aircraft": reference, "initial": {}, "uncertainty": {}, "actuators": "ideal"}
+    return Scenario.model_validate({**document, **given, "faults": [], "expect": {}})
 
 
 def answers(scenario: Scenario, rows: Sequence[Document]) -> list[str]:

@@ -1,9 +1,10 @@
-"""Handling qualities: short period, Dutch roll, roll and spiral mode against the levels of MIL-F-8785C.
+"""Handling qualities: short period, phugoid, Dutch roll, roll and spiral mode against MIL-F-8785C's levels.
 
 Of the aircraft with its controls fixed, the truth linearised by differences: healthy where it is trimmed,
 degraded where a flight with a failure ends, its surfaces where the failure and the law have brought them. A
 law that holds rates leaves none of these modes to judge; they are what a pilot is left with when the law
-lets go. Class I, flight phase category B (light aircraft; climb, cruise, descent).
+lets go. Class I, flight phase category B (light aircraft; climb, cruise, descent). Of the Dutch roll's limits
+the addition for large ratios of bank to sideslip (3.3.1.1, above 20 rad2/s2) is left out.
 """
 
 from collections.abc import Mapping
@@ -35,6 +36,7 @@ class Limit:
     quantity: str
     unit: str
     clause: str
+    table: str  # or figure
     levels: tuple[tuple[float, float], ...]
 
     def level(self, value: float) -> int:
@@ -49,13 +51,32 @@ class Limit:
 
 
 LIMITS = (
-    Limit("short period", "damping", "", "3.2.2.1.2", ((0.30, 2.0), (0.20, 2.0), (0.15, inf))),
-    Limit("short period", "CAP", "1/(g s2)", "3.2.2.1.1", ((0.085, 3.6), (0.038, 10.0), (0.038, inf))),
-    Limit("Dutch roll", "damping", "", "3.3.1.1", ((0.08, inf), (0.02, inf), (0.0, inf))),
-    Limit("Dutch roll", "damping x frequency", "rad/s", "3.3.1.1", ((0.15, inf), (0.05, inf), (-inf, inf))),
-    Limit("Dutch roll", "frequency", "rad/s", "3.3.1.1", ((0.4, inf), (0.4, inf), (0.4, inf))),
-    Limit("roll", "time constant", "s", "3.3.1.2", ((0.0, 1.4), (0.0, 3.0), (0.0, 10.0))),
-    Limit("spiral", "time to double", "s", "3.3.1.3", ((20.0, inf), (8.0, inf), (4.0, inf))),
+    Limit("short period", "damping", "", "3.2.2.1.2", "table IV", ((0.30, 2.0), (0.20, 2.0), (0.15, inf))),
+    Limit(
+        "short period",
+        "CAP",
+        "1/(g s2)",
+        "3.2.2.1.1",
+        "figure 2",
+        ((0.085, 3.6), (0.038, 10.0), (0.038, inf)),
+    ),
+    Limit("Dutch roll", "damping", "", "3.3.1.1", "table VI", ((0.08, inf), (0.02, inf), (0.0, inf))),
+    Limit(
+        "Dutch roll",
+        "damping x frequency",
+        "rad/s",
+        "3.3.1.1",
+        "table VI",
+        ((0.15, inf), (0.05, inf), (-inf, inf)),
+    ),
+    Limit("Dutch roll", "frequency", "rad/s", "3.3.1.1", "table VI", ((0.4, inf), (0.4, inf), (0.4, inf))),
+    Limit("roll", "time constant", "s", "3.3.1.2", "table VII", ((0.0, 1.4), (0.0, 3.0), (0.0, 10.0))),
+    Limit("spiral", "time to double", "s", "3.3.1.3", "table VIII", ((20.0, inf), (8.0, inf), (4.0, inf))),
+    Limit("phugoid", "damping", "", "3.2.1.2", "", ((0.04, inf), (0.0, inf), (-inf, inf))),
+    Limit("phugoid", "time to double", "s", "3.2.1.2", "", ((55.0, inf), (55.0, inf), (55.0, inf))),
+    Limit(
+        "roll-spiral", "damping x frequency", "rad/s", "3.3.1.4", "", ((0.5, inf), (0.3, inf), (0.15, inf))
+    ),
 )
 
 
@@ -84,12 +105,21 @@ def of_model(linear: LinearModel, airspeed_mps: float, where: str) -> list[Quali
 
 def _values(found: Mapping[str, Mode], g_per_rad: float) -> list[float]:
     """What LIMITS are about, in their order; g_per_rad: load factor per angle of attack."""
-    short, dutch = found["short_period"], found["dutch_roll"]
-    roll, spiral = found["roll"].pole.real, found["spiral"].pole.real
+    short, dutch, phugoid = found["short_period"], found["dutch_roll"], found["phugoid"]
+    roll, spiral = found["roll"].pole, found["spiral"].pole.real
     cap = short.frequency_rad_s**2 / g_per_rad if g_per_rad > 0.0 else inf
     swing = dutch.damping * dutch.frequency_rad_s
-    double_s = log(2.0) / spiral if spiral > 0.0 else inf
-    return [short.damping, cap, dutch.damping, swing, dutch.frequency_rad_s, -1.0 / roll, double_s]
+    coupled = -roll.real if roll.imag else inf  # then neither is a mode of its own
+    constant_s = 0.0 if roll.imag else -1.0 / roll.real
+    return [
+        short.damping, cap, dutch.damping, swing, dutch.frequency_rad_s, constant_s,
+        inf if roll.imag else _double_s(spiral), phugoid.damping, _double_s(phugoid.pole.real), coupled,
+    ]  # fmt: skip
+
+
+def _double_s(real: float) -> float:
+    """In which time it doubles, s; infinite where it does not diverge. real: of its pole, 1/s."""
+    return log(2.0) / real if real > 0.0 else inf
 
 
 def where_trimmed(scenario: Scenario) -> list[Quality]:
@@ -148,7 +178,9 @@ def as_text(found: list[Quality]) -> str:
         ended = " at the end" if row[0].where == "at the end" else ""
         cells = [f"{number(each.value)} ({said(each.level)})" for each in row]
         lines.append([f"{row[0].airspeed_mps:.1f}{ended}", *cells, said(max(each.level for each in row))])
-    return f"{aligned([*head, *lines])}\n\nin brackets: level of MIL-F-8785C, class I, category B"
+    clauses = ", ".join(dict.fromkeys(f"{each.clause} {each.table}".strip() for each in LIMITS))
+    says = f"in brackets: level of MIL-F-8785C, class I, category B:\n{clauses}"
+    return f"{aligned([*head, *lines])}\n\n{says}"
 
 
 def said(level: int) -> str:

@@ -6,7 +6,8 @@ import math
 import numpy as np
 import pytest
 import yaml
-from scipy.stats import chi2, norm
+from tools.drawn.rare import ANALYTIC, EXPECTATION, FAR, NEAR, repeated
+from tools.drawn.rare import SWEEP as BIASED
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.flight import fly
@@ -15,29 +16,30 @@ from beaver_ftc.studies.engine import study
 from beaver_ftc.studies.sweep import rare
 from beaver_ftc.studies.sweep.rare import Chains, as_text, lognormal_mean, run_rare, scored
 
-ANALYTIC = {
-    "a sum of two": (lambda u: u.sum(1) / math.sqrt(2) - norm.isf(1e-5), 2, 1e-5),
-    "a sum of ten": (lambda u: u.sum(1) / math.sqrt(10) - norm.isf(1e-5), 10, 1e-5),
-    "two sides": (lambda u: np.abs(u[:, 0]) - norm.isf(5e-5), 3, 1e-4),
-    "a sphere": (lambda u: (u**2).sum(1) - chi2.isf(1e-5, 4), 4, 1e-5),
-    "in steps": (lambda u: np.floor(8 * (u[:, 0] - norm.isf(1e-3))) / 8, 2, 1e-3),
-}
-
 
 @pytest.mark.parametrize("problem", ANALYTIC)
 def test_intervals_hold_in_ninety_of_a_hundred_repeats(problem):
-    score, keys, probability = ANALYTIC[problem]
-    held = near = flights = 0
-    for seed in range(100):
-        chains = Chains(keys, seed)
-        chains.go(lambda _, points: score(points))
-        found = chains.estimate()
-        held += found.low <= probability <= found.high
-        near += 0.5 < found.probability / probability < 2
-        flights += found.flights
+    held, near, flights = repeated(problem, 100)
     assert held >= 90
     assert near >= 93
     assert flights <= 100 * 0.01 * 10 / 1e-5  # a hundredth of the plain flights that see ten such events
+
+
+@pytest.fixture
+def biased(tmp_path):
+    (tmp_path / "biased.yaml").write_text(yaml.safe_dump(BIASED))
+    return load_sweep(tmp_path / "biased.yaml")
+
+
+@pytest.mark.parametrize("corner", [(8, -8), (8, 8), (-8, -8), (-8, 8)])
+def test_the_event_that_plain_flights_are_drawn_for_grows_with_the_bias(biased, corner):
+    """At the corners of airspeed and altitude: no event up to FAR, and the score rises with the bias."""
+    scores = [
+        rare.score_of(rare.scenario_at(biased, 0, (bias, *corner)), EXPECTATION)
+        for bias in (0.5, -1.5, 2.5, -FAR, 6.5)
+    ]
+    assert scores == sorted(scores)
+    assert scores[-2] < NEAR
 
 
 def test_the_same_seed_gives_the_same_numbers():

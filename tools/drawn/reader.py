@@ -30,9 +30,9 @@ class Flight:
     def __init__(self, document: Document, log: Columns) -> None:
         declared = document["declared"]
         self.log, self.rows, self.dt = log, len(log["t_s"]), document["dt_s"]
-        self.instants, self.since = document["instants"], document["since"]
+        self.instants, self.since = document.get("instants", 1), document["since"]
         self.declared = {name: _by_axis(declared[name]) for name in ("c", "b", "g", "o", "B", "m")}
-        self.earth, self.pole = declared["omega_E"], declared.get("pole_per_s", 0.0)
+        self.earth, self.pole = document.get("omega_E", 0.0), document.get("pole_per_s", 0.0)
 
     def logged(self, quantity: str, k: int) -> Vector:
         """p, q, r of a column in row k."""
@@ -86,13 +86,10 @@ def doubts(document: Document, log: Columns) -> Iterator[str]:
         yield "the digest is of another document"
     if document["rows"] != len(log["t_s"]) or document["format"] != 2:
         yield "the document is of another log, or of another format"
-    for said in document["without"]:
-        if said["column"] is not None and not _sets(log[said["column"]], said["frame"]):
-            yield f"{said['column']} is not set then"
     if document["statements"]:
         try:
             flight = Flight(document, log)
-            _thresholds(flight, max(one["frame"] for one in document["statements"]))
+            _thresholds(flight, max(one["frame"] for one in document["statements"] if one["column"]))
             for said in document["statements"]:
                 _statement(said, flight)
         except (Doubtful, KeyError, IndexError, TypeError, ValueError, ZeroDivisionError) as why:
@@ -125,32 +122,34 @@ def _thresholds(flight: Flight, last: int) -> None:
 
 def _statement(said: Document, flight: Flight) -> None:
     """One inequality."""
-    k, what, column = said["frame"], said["what"], said["column"]
+    k, what, column = said.get("frame", flight.rows), said["what"], said["column"]
     if column is None:
-        if what is None or k != max(one["frame"] for one in said["terms"]):
-            raise Doubtful(f"{what}: of another frame")
+        if what is None:
+            raise Doubtful("an alarm without a column")
     elif column != ("detected" if what is None else f"fie_{what}_excluded") or not _sets(
         flight.log[column], k
     ):
         raise Doubtful(f"{what}: {column} is not set then")
-    value = limit = slope = 0.0
-    for one in said["terms"]:
-        if one["weight"] <= 0.0 or one["frame"] > k:
-            raise Doubtful(f"{what}: a term of no use")
-        E, most, S = _followed(one, said, flight)
-        value, limit, slope = (
-            value + one["weight"] * E,
-            limit + one["weight"] * most,
-            slope + one["weight"] * S,
-        )
-    if abs(slope) > 1e-12:
-        end = said["most"] if slope > 0.0 else said["least"]
-        limit += end * slope
-    agree = isclose(value, said["value"], rel_tol=SIDES_TO_SHARE) and isclose(
-        limit, said["limit"], rel_tol=SIDES_TO_SHARE
+    value, limit = _weighed(said, flight) if "likelihood" in said else _added(said, flight)
+    agree = all(
+        isclose(*pair, rel_tol=SIDES_TO_SHARE) for pair in zip((value, limit), said["sides"], strict=True)
     )
     if not agree or not value > limit:
         raise Doubtful(f"{what}: {value} > {limit} is not what it says, or not so")
+
+
+def _added(said: Document, flight: Flight) -> tuple[float, float]:
+    """Both sides of a sum over filters."""
+    value = limit = slope = 0.0
+    for one in said["terms"]:
+        if one["weight"] <= 0.0 or one["frame"] > said.get("frame", flight.rows):
+            raise Doubtful(f"{said['what']}: a term of no use")
+        E, most, S = _followed(one, said, flight)
+        value, limit = value + one["weight"] * E, limit + one["weight"] * most
+        slope += one["weight"] * S
+    if abs(slope) > 1e-12:
+        limit += (said["most"] if slope > 0.0 else said["least"]) * slope
+    return value, limit
 
 
 def _followed(one: Document, said: Document, flight: Flight) -> tuple[float, float, float]:
@@ -158,7 +157,7 @@ def _followed(one: Document, said: Document, flight: Flight) -> tuple[float, flo
     first, last, d = one["first"], one["frame"], one["d"]
     a = exp(-one["pole_per_s"] * flight.dt) if "pole_per_s" in one else 0.0
     since = one["since"] if "pole_per_s" in one else last - 1
-    alarm = next(k for k, flag in enumerate(flight.log["detected"]) if flag)
+    alarm = 1 + max(k for k, flag in enumerate(flight.log["detected"]) if not flag)
     if "pole_per_s" in one and since not in (flight.since, alarm):
         raise Doubtful("a filter begins nowhere")
     if not 0 <= since < first <= last or one.get("fault", 0.0) < 0.0:
@@ -215,3 +214,61 @@ def _effect(one: Document, said: Document, place: int) -> tuple[float, float]:
 def _along(d: Vector, values: Vector, size: bool = False) -> float:
     """The sum of a vector's parts along d, or of their sizes."""
     return sum((abs(part) if size else part) * value for part, value in zip(d, values, strict=True))
+
+
+class Whitening:
+    """Section 7's filter on one axis: what it makes of the innovation, of a fault and of constants."""
+
+    def __init__(self, said: Document, i: int) -> None:
+        n = len(said["axes"])
+        P = [[value or 0.0 for value in row] for row in said["P"]]
+        others = [P[a][b] for a in range(2 * n) for b in range(2 * n) if a % n != b % n]
+        if any(others) or P[i][n + i] != P[n + i][i]:
+            raise Doubtful("axes that go together")
+        self.xx, self.xd, self.dd, self.noise = P[i][i], P[i][n + i], P[n + i][n + i], said["R"][i] or 0.0
+        rates, drifts = ([value or 0.0 for value in said["Y"][row]] for row in (i, n + i))
+        self.e, self.d = [rates[0], 0.0, *rates[1:]], [-drifts[0], 0.0, *(-value for value in drifts[1:])]
+
+    def take(self, inputs: Vector, jitter: float, drift: float, dt: float) -> tuple[Vector, float, float]:
+        """The whitened g of each input, its variance S, and the gain K_d of the drift."""
+        self.xx, self.dd = self.xx + jitter, self.dd + drift
+        self.xx, self.xd = self.xx + 2.0 * dt * self.xd + dt * dt * self.dd, self.xd + dt * self.dd
+        S = self.xx + self.noise
+        of_rate, of_drift = self.xx / S, self.xd / S
+        self.dd -= of_drift * self.xd
+        self.xx, self.xd = self.noise * of_rate, self.noise * of_drift
+        g = [e + dt * (nu - d) for e, nu, d in zip(self.e, inputs, self.d, strict=True)]
+        self.e = [(1.0 - of_rate) * value for value in g]
+        self.d = [d + of_drift * value for d, value in zip(self.d, g, strict=True)]
+        return g, S, of_drift
+
+
+def _weighed(said: Document, flight: Flight) -> tuple[float, float]:
+    """The evidence for a fault, and what it must exceed: the level, or half of it beside bounds."""
+    filters = [Whitening(said, i) for i in range(len(said["axes"]))]
+    N, D, R = 0.0, 0.0, [0.0] * len(said["tolerance"])
+    weights = [0.0] * len(filters)
+    swinging = pacing = last = 0.0
+    if said["first"] + len(said["frames"]) - 1 != said["frame"]:
+        raise Doubtful("frames are missing")
+    for k, its in enumerate(said["frames"], said["first"]):
+        nu, n, last = flight.innovation(k), len(filters), 0.0
+        for i, axis in enumerate(said["axes"]):
+            seen = nu[axis] - (its["air"][i] if "air" in its else 0.0)
+            inputs = [seen, its["signature"][i], *(known[i] for known in its.get("known", []))]
+            g, S, of_drift = filters[i].take(inputs, its["Q"][i], its["Q"][n + i], flight.dt)
+            before, weights[i] = weights[i], g[1] / S
+            N, D = N + weights[i] * g[0], D + weights[i] * g[1]
+            R = [total + weights[i] * value for total, value in zip(R, g[2:], strict=True)]
+            if "bounded" in its:
+                most = 1.2 * its["bounded"][i] / abs(of_drift)
+                swinging += most * abs(weights[i] - before)
+                last += most * abs(weights[i])
+                pacing += most * abs(weights[i]) * said.get("pace", 1e9)
+    evidence = -N if said["sense"] == "less" else abs(N)
+    evidence -= sum(tol * abs(total) for tol, total in zip(said["tolerance"], R, strict=True))
+    level = said["level"] * D**0.5
+    limit = max(level, min(swinging + last, pacing) + 0.5 * level)
+    if evidence / limit > float(flight.log[said["likelihood"]][said["frame"]]) * (1.0 + 1e-9):
+        raise Doubtful("the log has a smaller share")
+    return evidence, limit

@@ -16,7 +16,7 @@ from beaver_ftc.design.model import AXES
 from beaver_ftc.diagnosis.bounds.declared import poles_for_noise
 from beaver_ftc.diagnosis.state import LOSS
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.results.certificates import kinds
+from beaver_ftc.results.certificates import chance, kinds
 from beaver_ftc.results.certificates.inequality import (
     Document,
     History,
@@ -65,20 +65,30 @@ def certificate_of(scenario: Scenario, log: Log, events: dict[str, int], tape: T
     if tape is not None:
         history = history_of(scenario, log, tape)
         for said in statements(scenario, tape, history, events):
-            document["statements" if "value" in said else "without"].append(said)
+            certain = "sides" in said
+            document["statements" if certain else "without"].append(said if certain else _without(said))
         if document["statements"]:
             document |= _declared(scenario, tape, history, document["statements"])
     return sealed(document)
 
 
+def _without(said: Document) -> Document:
+    """What is not certified; no number stands there, since nothing could prove it."""
+    return {name: said[name] for name in ("what", "column", "because")}
+
+
 def _declared(scenario: Scenario, tape: Tape, history: History, said: list[Document]) -> Document:
     """What all these statements go by."""
-    terms = [term for one in said for term in one["terms"]]
-    rows = np.concatenate([np.arange(term["first"], term["frame"] + 1) for term in terms])
-    declared = declaration(history, rows)
-    if rows.max() > tape.since + 1:  # before that no filter has a past
-        declared["pole_per_s"] = scenario.fdi.detection_pole_per_s
-    return {"dt_s": history.dt, "instants": scenario.substeps, "since": tape.since, "declared": declared}
+    terms = [term for one in said for term in one.get("terms", [])]
+    frames = [np.arange(term["first"], term["frame"] + 1) for term in terms]
+    about: Document = {"dt_s": history.dt, "since": tape.since, "declared": declaration(history, frames)}
+    if terms:
+        about |= {"instants": scenario.substeps, "omega_E": history.declared["earth_rad_s"]}
+    if (
+        max(one["frame"] for one in said if one["column"]) > tape.since + 2
+    ):  # before that no filter has a past
+        about["pole_per_s"] = scenario.fdi.detection_pole_per_s
+    return about
 
 
 def check_scheme(scenario: Scenario) -> None:
@@ -147,9 +157,14 @@ def statements(
         yield {"what": None, "column": "detected", "frame": alarm, "because": "another scheme was in charge"}
         return
     watched = fdi["watch"]["alarmed"]
-    because = "instruments, held against one another, raised it" if watched else "chance raised it"
+    because = "instruments, held against one another, raised it" if watched else chance.NOT_STATED
     found = _of_alarm(scenario, tape, history, alarm)
-    yield _stated(found, history, because, what=None, column="detected", frame=alarm)
+    said = _stated(found, history, because, what=None, column="detected", frame=alarm)
+    if found is None and not watched and scenario.fdi.statistical:
+        said |= chance.of_alarm(tape, history, scenario.airframe.surfaces, alarm) or {}
+        if "sides" in said:
+            del said["because"]
+    yield said
     for e, name in enumerate(tape.names):
         column = f"fie_{name}_excluded"
         if column in events:
@@ -168,8 +183,6 @@ def _of_types(scenario: Scenario, tape: Tape, history: History, alarm: int) -> I
             of = kinds.hypothesis(tape, s, kind)
             found = _first_violated(kinds.candidates(of, history, alarm, k), of, history, tape)
         about: Document = {"what": kinds.name_of(scenario.airframe.surfaces[s], kind), "column": None}
-        if found:
-            about["frame"] = max(term.frame for term in found[0])
         yield _stated(found, history, because or kinds.COURSE, **about)
 
 

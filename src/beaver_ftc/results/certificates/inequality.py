@@ -7,7 +7,7 @@ With one term the fault's parameter may move as it likes, or the fault be absent
 `constant` it is one number for all terms.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import exp, inf, isinf
@@ -101,24 +101,27 @@ def declared_of(frame: np.void) -> Document:
     }  # fmt: skip
 
 
-def declaration(history: History, rows: np.ndarray) -> Document:
+def declaration(history: History, frames: list[np.ndarray]) -> Document:
     """What the certificate says of it, in the letters of theory, section 2, by axis: what is not zero, and
-    adds anything to the bounds of these rows."""
-    declared, f = history.declared, (np.abs(history.x) + history.off)[rows - 1]
+    adds anything to the bounds of these rows; without any, what gyros err."""
+    declared, gyro = history.declared, history.declared["gyro"]
+    of = {"o": gyro["offset_rad_s"], "B": gyro["steady_rad_s"], "m": gyro["slope"]}
+    if not frames:
+        return _by_axis(of | {"c": [], "b": [], "g": []})
+    rows = np.concatenate(frames)
+    f = (np.abs(history.x) + history.off)[rows - 1]
     pairs = np.column_stack((f[:, 1] * f[:, 2], f[:, 0] * f[:, 2], f[:, 0] * f[:, 1]))
     c = np.array(declared["inertia_coupling"]) * np.abs(declared["coupling"])
     c[(c * pairs * history.share <= _ROUNDING * history.eta_bar[rows]).all(axis=0)] = 0.0
-    gyro = declared["gyro"]
-    of = {
-        "c": c, "b": declared["constant_rad_s2"],
-        "g": declared["earth_share"] if declared["earth_rad_s"] else [0.0] * 3,
-        "o": gyro["offset_rad_s"], "B": gyro["steady_rad_s"], "m": gyro["slope"],
-    }  # fmt: skip
-    by_axis = {
-        name: {axis: float(v) for axis, v in zip(AXES, values, strict=True) if v}
+    g = declared["earth_share"] if declared["earth_rad_s"] else []
+    return _by_axis(of | {"c": c, "b": declared["constant_rad_s2"], "g": g})
+
+
+def _by_axis(of: Mapping[str, Sequence[float] | np.ndarray]) -> Document:
+    return {
+        name: {axis: float(v) for axis, v in zip(AXES, values, strict=False) if v}
         for name, values in of.items()
     }
-    return by_axis | {"omega_E": declared["earth_rad_s"]}
 
 
 @dataclass(frozen=True)
@@ -252,8 +255,7 @@ def written(terms: list[Term], of: Hypothesis, history: History) -> Document:
         "theta": theta,
         **{end: number for end, number in ends.items() if looked_at[end]},
         "terms": said,
-        "value": value,
-        "limit": limit + most,
+        "sides": [value, limit + most],
     }
 
 

@@ -14,6 +14,7 @@ from beaver_ftc.loop.loop import CHUNK_ROWS, FLYING, Loop
 from beaver_ftc.scenario.schema import Scenario
 
 BEFORE = 40  # frames kept before the first event: what was before them is in the filters
+BEFORE_CHANCE = 130  # with the statistical detector, whose evidence builds up
 AFTER = 1000  # after the last one, where types are excluded one by one
 
 
@@ -68,12 +69,16 @@ def _record(loop: Loop, scenario: Scenario, events: Sequence[int], end: int) -> 
     """Fly to frame `end`, keeping those from some before the first event on."""
     tape: Tape | None = None
     views: dict[str, Any] = {}
-    for k in _flown(loop, max(min(events) - BEFORE, 0), end):
+    chance = scenario.fdi.statistical is not None
+    for k in _flown(loop, max(min(events) - (BEFORE_CHANCE if chance else BEFORE), 0), end):
         frame = loop.frames[0]
         if tape is None or tape.since != int(frame["since"]):  # another diagnosis has begun
             tape, views = _begun(frame, scenario)
         for name, view in views.items():
             tape.kept[name].append(view.copy())
+        if chance and k <= events[0]:
+            tape.kept.setdefault("blocks", []).append(frame["fdi"]["statistical"]["block"].copy())
+            tape.kept.setdefault("bounded", []).append(frame["fdi"]["statistical"]["noise"]["bounded"].copy())
         if k == events[0]:
             tape.alarm = memory.copied(loop.frames)[0]
     assert tape is not None

@@ -25,7 +25,8 @@ def read(about, log):
     log["nu"], log["n"] = np.diff(x, axis=0, prepend=x[:1]) / dt - log["F"], (n := o - beta + m * f)
     log["wrong"] = (abs(log["nu"]) > eta + (n + np.roll(n, 1, axis=0)) / dt).any(axis=1)
     require(np.flatnonzero(~log["T"][:end].any(axis=1))[-1] == since, "the diagnosis began in another frame")
-    H, now, then = log["T"] - n, slice(since + 2, end + 1), slice(since + 1, end)  # H + N of section 3
+    log["T"][since] = 2 * n[since]  # as if H = 0 and N = n had been logged
+    H, now, then = log["T"] - n, slice(since + 1, end + 1), slice(since, end)  # H + N of section 3
     require(np.allclose(H[now] - a * H[then], dt * eta[now] + (1 - a) * n[then], 1e-11, 0), "thresholds")
 
 
@@ -64,7 +65,7 @@ def score(said, about, log):
         room += np.array([swing @ abs(w - before), said.get("pace", 1e9) * swing @ abs(w)])
         Y, P = Y - K @ Y[:n], P - K @ P[:n]
     N = (abs(sums[0]) if said["sense"] == "either" else -sums[0]) - said["tolerance"] @ abs(sums[2:])
-    most = max(z := said["level"] * np.sqrt(sums[1]), min(room[0] + swing @ abs(w), room[1]) + z / 2)
+    most = max(z := said["level"] * np.sqrt(abs(sums[1])), min(room[0] + swing @ abs(w), room[1]) + z / 2)
     require(N / most <= log[said["likelihood"]][said["frame"]] * (1 + 1e-9), "more than the log's share")
     return N, most, 0
 

@@ -84,9 +84,8 @@ def _declared(scenario: Scenario, tape: Tape, history: History, said: list[Docum
     about: Document = {"dt_s": history.dt, "since": tape.since, "declared": declaration(history, frames)}
     if terms:
         about |= {"instants": scenario.substeps, "omega_E": history.declared["earth_rad_s"]}
-    if (
-        max(one["frame"] for one in said if one["column"]) > tape.since + 2
-    ):  # before that no filter has a past
+    last = max(one["frame"] for one in said if one["column"])
+    if last > tape.since + 1:  # before that no filter has a past
         about["pole_per_s"] = scenario.fdi.detection_pole_per_s
     return about
 

@@ -3,8 +3,9 @@
 What the log does not hold is kept frame by frame: signature, what declared constants multiply, variances.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from beaver_ftc.results.certificates.inequality import Document, History
 from beaver_ftc.results.certificates.tape import Tape
 
 _AS_LOGGED = 1e-9  # of the alarm's score: more than another order of summation makes
-_FORGOTTEN = 1e-11  # of the limit
+_FORGOTTEN = 1e-10  # of the limit
 NOISE, SWINGS, PACE = range(3)  # what the evidence must exceed: chance alone, or bounded uncertainty besides
 NOT_STATED = "chance raised it: an onset long before, a tone, a force, or moving air"
 
@@ -50,12 +51,18 @@ def _leave_out(said: Document, history: History) -> None:
             del its["bounded"]
     if decides != PACE:
         del said["pace"]
-    for name in "YPR":
-        for i, given in enumerate(said[name]):
-            said[name][i] = [None] * len(given) if isinstance(given, list) else None
-            without = sides(said, history)
-            if max(abs(value - without[0]), abs(limit - without[1])) > _FORGOTTEN * limit:
-                said[name][i] = given
+    for place, i in _parts(said):
+        given = place[i]
+        place[i] = [None] * len(given) if isinstance(given, list) else None
+        without = sides(said, history)
+        if max(abs(value - without[0]), abs(limit - without[1])) > _FORGOTTEN * limit:
+            place[i] = given
+
+
+def _parts(said: Document) -> Iterator[tuple[list[Any], int]]:
+    """Rows of Y, and entries of P and R."""
+    for place in (said["Y"], *said["P"], said["R"]):
+        yield from ((place, i) for i in range(len(place)))
 
 
 def _loudest(chances: np.void) -> tuple[int, int, int]:

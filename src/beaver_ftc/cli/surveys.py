@@ -40,16 +40,17 @@ def matrix(
     airspeed: Airspeed, m/s; once for each.
     workers: Processes.
     pitch_lost: Elevator and flap lost at once instead, with engine power and without.
-    declared: With tactical-grade sensors, servos and 5 % wrong moment coefficients, and told so.
+    declared: With tactical-grade sensors, servos and, where the model lets them be, 5 % wrong moment
+      coefficients, and told so.
     turbulence: Of --declared: flown, and told so.
     aircraft: Built-in name, jsbsim:NAME, or ./FOLDER in the working directory.
     """
     if pitch_lost and declared:
         raise typer.BadParameter("--pitch-lost and --declared exclude each other, allowed: one of them")
-    if aircraft and (pitch_lost or declared):
+    if aircraft and pitch_lost:
         raise typer.BadParameter(
-            "--pitch-lost needs a flap and engine power that stand in for the elevator, --declared terms "
-            "that the model lets be wrong: the built-in aircraft has these, allowed: without --aircraft"
+            "--pitch-lost needs a flap and engine power in place of the elevator: the built-in aircraft "
+            "has these, allowed: without --aircraft"
         )
     if turbulence is not TurbulenceName.none and not declared:
         raise typer.BadParameter("--turbulence is declared or not flown, allowed: with --declared")

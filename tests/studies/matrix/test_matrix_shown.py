@@ -103,6 +103,25 @@ def test_the_flight_with_all_that_is_declared(changed):
     assert (calm.environment.turbulence, calm.fdi.bounds.turbulence) == ("none", "none")
 
 
+def test_of_a_truth_whose_coefficients_cannot_be_wrong_all_else_is_declared(monkeypatch):
+    monkeypatch.chdir(Path(__file__).parents[2] / "data" / "aircraft")
+    adjustable = fault_matrix.adjustable_terms.__wrapped__
+    assert "Cl_aileron" in adjustable(TRAINER)
+    assert "Cl_constant" not in adjustable(TRAINER)  # it has none
+
+    class Fixed(fault_matrix.Plant):
+        def has(self, name):
+            return not name.startswith("uncertainty/") and super().has(name)
+
+    monkeypatch.setattr(fault_matrix, "Plant", Fixed)
+    monkeypatch.setattr(fault_matrix, "adjustable_terms", adjustable)
+    flown = fault_matrix.declared("light", TRAINER)
+    assert flown["uncertainty"] == {}
+    assert flown["fdi"]["bounds"] == {
+        "coefficients": 0.0, "sensors": "tactical-grade", "turbulence": "light"
+    }  # fmt: skip
+
+
 TRAINER = "./trainer"
 
 

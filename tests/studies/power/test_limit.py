@@ -77,6 +77,8 @@ def test_beside_unknown_constants_as_in_the_whole_flight_at_once(context):
     found = whitening.deflection_beside(phi, regressors, sigma)
     assert found == pytest.approx(expected, rel=0.01)
     assert found < 0.98 * whitening.deflection(phi)[-1]
+    nothing = whitening.deflection_beside(phi, regressors[..., :0], sigma[:0])
+    assert nothing == pytest.approx(whitening.deflection(phi)[-1])
 
 
 def test_twice_the_fault_stands_out_twice_as_much_and_only_grows(context):

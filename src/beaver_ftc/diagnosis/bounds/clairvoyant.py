@@ -86,7 +86,8 @@ class Whitening:
     def deflection_beside(self, phi: np.ndarray, regressors: np.ndarray, sigma: np.ndarray) -> float:
         """d of a fault phi (n, 3) rad/s2 beside unknown constants of standard deviation sigma (m,) > 0 times
         regressors (n, 3, m), from all frames."""
-        s, R = self.respond(phi).ravel(), self.respond(regressors).reshape(-1, sigma.size) * sigma
+        s = self.respond(phi).ravel()
+        R = self.respond(regressors).reshape(s.size, sigma.size) * sigma
         explained = R.T @ s
         d2 = s @ s - explained @ np.linalg.solve(R.T @ R + np.eye(sigma.size), explained)
         return float(np.sqrt(max(d2, 0.0)))

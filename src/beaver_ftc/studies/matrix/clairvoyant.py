@@ -47,7 +47,8 @@ def seen_when_told(scenario: "Scenario", kept: Columns, surface: str) -> Documen
     unknown = [(t, c) for t, c in zip(aircraft.moments, coefficients, strict=True) if c > 0.0]
     regressors = [accelerations(aircraft, t, kept, kept.get(f"{t.surface}_cmd_rad")) for t, _ in unknown]
     sigma = np.array([c for _, c in unknown]) / sqrt(3.0)
-    d = Whitening(context).deflection_beside(phi, np.stack(regressors, axis=-1), sigma)
+    beside = np.stack(regressors, axis=-1) if unknown else np.zeros((*phi.shape, 0))
+    d = Whitening(context).deflection_beside(phi, beside, sigma)
     rate = scenario.fdi.statistical.false_alarms_per_h
     return {"told_deflection": d, "told_chance": chance(d, scenario.duration_s - at_s, rate)}
 

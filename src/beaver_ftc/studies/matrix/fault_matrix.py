@@ -90,20 +90,31 @@ def cases(
 
 
 def declared(turbulence: str = "none", aircraft: str = DEFAULT) -> dict[str, Any]:
-    """Real sensors, servos, coefficients at the ends of their tolerance by turns, air: all of it declared."""
-    names = [term.name for term in aircraft_of(aircraft).moments]
+    """Real sensors, servos, air, and coefficients at the ends of their tolerance by turns, where the truth
+    lets them be wrong: all of it declared.
+    """
+    names = adjustable_terms(aircraft)
     wrong = {name: 1.0 + (TOLERANCE if i % 2 else -TOLERANCE) for i, name in enumerate(names)}
+    bounds = {"coefficients": TOLERANCE if wrong else 0.0, "sensors": SENSORS, "turbulence": turbulence}
     return {
-        "uncertainty": UNCERTAINTY | {"coefficients": wrong},
+        "uncertainty": UNCERTAINTY | {"coefficients": wrong} if wrong else {},
         "sensors": SENSORS,
         "actuators": "servo",
         "environment": air_of(turbulence),
         "fdi": {
             "fault_class": "all",
-            "bounds": {"coefficients": TOLERANCE, "sensors": SENSORS, "turbulence": turbulence},
+            "bounds": bounds,
             "statistical": {},
         },
     }
+
+
+@lru_cache
+def adjustable_terms(aircraft: str) -> tuple[str, ...]:
+    """Names of an aircraft's terms that its truth lets be wrong; none of a derived one."""
+    flown = aircraft_of(aircraft)
+    plant = Plant(100, aircraft=flown)
+    return tuple(t.name for t in flown.moments if plant.has(f"uncertainty/{t.name}-scale"))
 
 
 def scenario_of(case: FaultCase, law: str, trimmed_deg: float) -> Scenario:

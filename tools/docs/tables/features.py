@@ -1,0 +1,146 @@
+"""The table feature x aircraft of docs/aircraft.md: what can be done with which aircraft, or why not."""
+
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from beaver_ftc.aircraft import DEFAULT
+from beaver_ftc.documents.errors import BeaverFtcError
+from beaver_ftc.integrations.live import messages
+from beaver_ftc.integrations.live.session import Session
+from beaver_ftc.scenario.loader import load
+from beaver_ftc.studies.derive.first_use import derive_if_needed
+from beaver_ftc.studies.matrix.fault_matrix import FAULTS, FaultCase, airspeeds_of, fly_case
+from beaver_ftc.studies.present.tables import markdown_table
+from tools.docs.tables.aircraft import PROGRAM
+
+PLANES = {
+    "beaver": "built in",
+    "beaver-split": "halves by side",
+    "jsbsim:c172p": "propeller",
+    "jsbsim:737": "jets",
+    "jsbsim:SGS": "glider",
+}
+LONGEST_S = 900
+YES, NO = "✓", "✗"
+
+
+@dataclass(frozen=True)
+class Feature:
+    """How something is tried: keys of the scenario, and the command line that flies it as `S.yaml`."""
+
+    name: str
+    line: str = "run S.yaml --no-report"
+    keys: tuple[tuple[str, Any], ...] = ()
+
+
+_SENSED = (
+    ("sensors", "tactical-grade"), ("actuators", "servo"),
+    ("environment", {"turbulence": "dryden", "severity": "light"}),
+    ("fdi", {"bounds": {"sensors": "tactical-grade", "turbulence": "light"}, "statistical": {}}),
+)  # fmt: skip
+FEATURES = (
+    Feature("`run`, certificate", "run S.yaml --no-report --certificate"),
+    Feature("sensors, servos and turbulence, declared", keys=_SENSED),
+    Feature("hold altitude", keys=(("autopilot", {"altitude_m": [{"hold": True}]}),)),
+    Feature("hold airspeed and heading", keys=(
+        ("autopilot", {"airspeed_mps": [{"hold": True}], "heading_deg": [{"hold": True}]}),
+    )),
+    Feature("`sweep`", "sweep W.yaml"),
+    Feature("`compare --sweep`", "compare --sweep W.yaml --schemes observer-constant --laws nominal"),
+    Feature("`detectability`", "detectability S.yaml --surface elevator --airspeed {speed:.0f}"),
+    Feature("`power`", "power --aircraft {plane} --surface elevator --sensors tactical-grade --turbulence none "
+            "--schemes observer-constant --workers 2"),
+    Feature("`separate`", "separate S.yaml", keys=(
+        ("faults", [{"actuator": "elevator", "type": "float", "at_s": 3}]), ("fdi", {"fault_class": "all"}),
+    )),
+    Feature("`linearise`", "linearise S.yaml"),
+    Feature("`mismatch`", "mismatch S.yaml --no-report"),
+)  # fmt: skip
+
+
+def features() -> str:
+    """All that the documents speak of, on one aircraft of each kind."""
+    return _table(PLANES)
+
+
+def features_probe() -> str:
+    """On the aircraft that is built in."""
+    return _table([DEFAULT])
+
+
+def _table(planes: Sequence[str] | dict[str, str]) -> str:
+    reasons: list[str] = []
+    rows = [[feature.name] for feature in FEATURES] + [
+        ["`matrix`"],
+        ["`matrix --declared`"],
+        ["`live`, changes in flight"],
+    ]
+    for plane in planes:
+        if plane.startswith("jsbsim:"):
+            derive_if_needed(plane)
+        said = [_tried(feature, plane) for feature in FEATURES]
+        said += [_matrix(plane, declared=told) for told in (False, True)] + [_live(plane)]
+        for row, why in zip(rows, said, strict=True):
+            if why and why not in reasons:
+                reasons.append(why)
+            row.append(f"{NO} {reasons.index(why) + 1}" if why else YES)
+    head = [f"`{plane}`, {PLANES[plane]}" for plane in planes]
+    notes = "\n".join(f"{i}. {why}" for i, why in enumerate(reasons, 1))
+    return markdown_table(("", *head), rows) + (f"\n\n{notes}" if notes else "")
+
+
+def _tried(feature: Feature, plane: str) -> str:
+    """Why it cannot be done; nothing if it can."""
+    speed_mps = load({"name": "S", "aircraft": plane}).initial.airspeed_mps
+    line = feature.line.format(plane=plane, speed=speed_mps)
+    fault = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.6, "at_s": 3}
+    flight = {"name": "S", "aircraft": plane, "duration_s": 6, "faults": [fault]} | dict(feature.keys)
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "S.yaml").write_text(json.dumps(flight))
+        (Path(folder) / "W.yaml").write_text(json.dumps({"name": "W", "base": "S.yaml", "runs": 2}))
+        run = subprocess.run(
+            [sys.executable, "-c", PROGRAM, *line.split()],
+            cwd=folder, capture_output=True, text=True, timeout=LONGEST_S, check=False,
+        )  # fmt: skip
+    if run.returncode in (0, 1):
+        return ""
+    return run.stderr.strip().splitlines()[-1].removeprefix("S: ").removeprefix("S.yaml: ")
+
+
+def _matrix(plane: str, declared: bool) -> str:
+    """One fault of the table, of the elevator."""
+    case = FaultCase(FAULTS[0][0], "elevator", airspeeds_of(plane)[1], declared, plane)
+    try:
+        row = fly_case(case)
+    except BeaverFtcError as error:
+        return str(error)
+    return "the verdict is wrong" if row["verdict"] == "WRONG" else ""
+
+
+def _live(plane: str) -> str:
+    """A flight of the live page in which all changes: a fault, a gust, law and sensors, a repair."""
+    asked = (
+        {"do": "break", "fault": {"actuator": "elevator", "type": "stuck"}},
+        {"do": "blow", "velocity_mps": [0.0, 3.0, -2.0]},
+        {"do": "change", "law": "nominal", "scheme": "observer-constant", "sensors": "tactical-grade"},
+        {"do": "repair"},
+    )
+    scenario = load({"name": "S", "aircraft": plane})
+    with tempfile.TemporaryDirectory() as folder:
+        session = Session(scenario, Path(folder))
+        try:
+            for request in asked:
+                session.handle(messages.parse(json.dumps(request)))
+                for _ in range(50):
+                    session.step()
+        except BeaverFtcError as error:
+            return str(error)
+        finally:
+            session.sim.release()
+    return ""

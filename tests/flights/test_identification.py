@@ -1,6 +1,7 @@
 """What an identification says of itself: documents, lines for people, and the free runs by another road."""
 
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from beaver_ftc.flights import fitting, identification
 from beaver_ftc.flights.fitting import Stretch
 from beaver_ftc.flights.identification import (
+    by_pressure,
     identify,
     output_error,
     regressor_names,
@@ -16,7 +18,7 @@ from beaver_ftc.flights.identification import (
     summary,
 )
 from beaver_ftc.flights.pages import template
-from beaver_ftc.flights.samples import Samples
+from beaver_ftc.flights.samples import Samples, with_pressure
 from beaver_ftc.results.metrics import as_json
 from flights import small
 
@@ -27,6 +29,34 @@ MODEL = small.model()
 def identified():
     samples = small.flight(MODEL, 1100, lost=((1, 300, 400, 0.5), (0, 600, 700, 0.4)), notes=("a remark",))
     return identify([samples], MODEL.vehicle)
+
+
+def pressed(flight, seed=3):
+    """The flight as it would be at airspeeds of 15 to 25 m/s, if its commands stood at what they do."""
+    speeds = 20.0 + 5.0 * np.sin(0.05 * np.arange(len(flight.t_s)) + seed)
+    return replace(flight, airspeed=speeds, commands=flight.commands / ((speeds / 20.0) ** 2)[:, None])
+
+
+def test_commands_count_with_the_dynamic_pressure_where_that_explains_more():
+    flight, its = small.flight(MODEL, 1100), MODEL.vehicle.model_copy(update={"airspeed": "V"})
+    (anew,), described = by_pressure([pressed(flight)], its)
+    assert described.reference_airspeed_mps == pytest.approx(20.0, rel=0.02)
+    ratio = (20.0 / described.reference_airspeed_mps) ** 2
+    assert anew.commands == pytest.approx(ratio * flight.commands)
+    wind = replace(flight, airspeed=pressed(flight).airspeed)
+    for plain in ([wind], [flight]):
+        assert by_pressure(plain, its) == (plain, its)
+    told = its.model_copy(update={"reference_airspeed_mps": 20.0})
+    assert by_pressure([pressed(flight)], told)[1] is told
+
+
+def test_where_the_airspeed_is_unknown_commands_count_as_they_are():
+    flight = replace(small.flight(MODEL, 100), airspeed=np.where(np.arange(100) < 50, np.nan, 10.0))
+    found = with_pressure(flight, 20.0)
+    assert found.commands[:50] == pytest.approx(flight.commands[:50])
+    assert found.commands[50:] == pytest.approx(flight.commands[50:] / 4.0)
+    stopped = with_pressure(replace(flight, airspeed=np.zeros(100)), 20.0)
+    assert stopped.commands == pytest.approx(0.1 * flight.commands)
 
 
 def test_the_account_of_an_identification(changed, identified):

@@ -94,7 +94,7 @@ def test_a_wrong_unit_of_rate_or_roll_is_found_by_kinematics(rate, angle, says):
     if pitch is not None:
         assert found.slope == pytest.approx(1.0 / rate, rel=2e-3)
         assert abs(found.correlation) > 0.9999
-    said = physics.roll_remark(found, "p", "roll")
+    said = physics.angle_remark(found, "p", "roll")
     assert (said is None) if says is None else (says in said)
 
 
@@ -115,7 +115,24 @@ def test_the_mean_of_the_specific_force_is_one_g(mean, says):
 def test_swapped_rates_are_found_by_the_roll_they_make():
     phi, theta, (p, q, r) = turning()
     swapped = {"gx": Column(T_S, q), "gy": Column(T_S, p), "gz": Column(T_S, r)}
-    said = physics.roll_says(swapped, Column(T_S, phi), Column(T_S, theta), "roll")
+    names = ("roll", "pitch")
+    said = physics.attitude_says(swapped, Column(T_S, phi), Column(T_S, theta), names)
     assert said.endswith("gy is the roll rate")
     right = {"gx": Column(T_S, p), "gy": Column(T_S, q), "gz": Column(T_S, r)}
-    assert physics.roll_says(right, Column(T_S, phi), Column(T_S, theta), "roll") is None
+    assert physics.attitude_says(right, Column(T_S, phi), Column(T_S, theta), names) is None
+
+
+@pytest.mark.parametrize(("factor", "angle", "says"), [
+    (1.0, 1.0, None),
+    (180 / np.pi, 1.0, "gy is in deg/s, a factor of 0.01745 fits"),
+    (1.0, 180 / np.pi, "pitch is in deg, a factor of 0.01745 fits"),
+    (np.pi / 180, 1.0, "a factor of 57.3 on gy fits, or of 0.01745 on pitch"),
+    (-1.0, 1.0, "the change of pitch is -1 times the integral of gy: one of them has the other sign"),
+])  # fmt: skip
+def test_a_wrong_pitch_rate_alone_is_found_by_the_pitch_angle(factor, angle, says):
+    phi, theta, (p, q, r) = turning()
+    found = physics.pitch_of([Column(T_S, one) for one in (p, q, r)], Column(T_S, phi), Column(T_S, theta))
+    assert (found.slope, found.correlation) == (pytest.approx(1.0, rel=2e-3), pytest.approx(1.0, abs=1e-3))
+    rates = {"gx": Column(T_S, p), "gy": Column(T_S, factor * q), "gz": Column(T_S, r)}
+    said = physics.attitude_says(rates, Column(T_S, phi), Column(T_S, angle * theta), ("roll", "pitch"))
+    assert (said is None) if says is None else (says in said)

@@ -42,7 +42,7 @@ def identify(
     if vehicle is None or out is None:
         option = "--vehicle" if vehicle is None else "--out"
         raise BadInput(f"identify: {option} is missing, allowed: --vehicle FILE --out MODEL, or --check")
-    from beaver_ftc.flights.identification import identify, summary
+    from beaver_ftc.flights.identification import by_pressure, identify, summary
     from beaver_ftc.flights.model import as_text
     from beaver_ftc.flights.pages import check_page, render_model
     from beaver_ftc.flights.samples import load_flights
@@ -53,7 +53,7 @@ def identify(
     page = out.with_suffix(".html")
     check_page(page)
     described = load_vehicle(vehicle)
-    loaded = load_flights(flights, described, reader)
+    loaded, described = by_pressure(load_flights(flights, described, reader), described)
     model = identify(loaded, described)
     shown = render_model(loaded, model)
     for path, text in ((out, as_text(model)), (page, shown)):

@@ -71,7 +71,9 @@ def diagnose_as(recording: Recording, vehicle: Vehicle, by: Known) -> tuple[Samp
     from beaver_ftc.loop.stream import Diagnosis
 
     _check(recording, vehicle, by.aircraft)
-    samples = sample(recording, vehicle.model_copy(update={"max_rate_hz": _FASTEST_HZ}))
+    samples = sample(
+        recording, vehicle.model_copy(update={"max_rate_hz": _FASTEST_HZ, "reference_airspeed_mps": None})
+    )
     rate_hz = _rate_hz(samples)
     diagnosis = Diagnosis(by.aircraft, rate_hz, **by.declared)
     fdi = diagnosis.config

@@ -27,13 +27,16 @@ _NAMES = {
     "p": r"p_rad_s|p|roll_?(rate|speed)\w*|.*gyr(o|_)?_?x\w*|wx|omega_?x|rate\.r|.*velocity\.(x|xyz\[0\])",
     "q": r"q_rad_s|q|pitch_?(rate|speed)\w*|.*gyr(o|_)?_?y\w*|wy|omega_?y|rate\.p|.*velocity\.(y|xyz\[1\])",
     "r": r"r_rad_s|r|yaw_?(rate|speed)\w*|.*gyr(o|_)?_?z\w*|wz|omega_?z|rate\.y|.*velocity\.(z|xyz\[2\])",
-    "roll": r"(.*\.)?(roll|phi)(_?(rad|deg|angle))?(_\w+)?",
+    "roll": r"(.*\.)?(roll|phi|bank)(_?(rad|deg|angle))?(_\w+)?",
     "pitch": r"(.*\.)?(pitch|theta)(_?(rad|deg|angle))?(_\w+)?",
-    "az": r"(.*[._])?(az|acc_?z|accel_?z|linear_acceleration\.z|accelerometer_m_s2\[2\])(_\w+)?",
-    "airspeed": r"(.*\.)?(true_)?(airspeed|tas|ias)(_\w+)?",
-    "time": r"%?t(ime)?(_?(s|ms|us|ns|usec|stamp|boot))?\w*",
+    "az": r"(.*[._])?(az|acc_?z|accel_?z|acc_?down|linear_acceleration\.z|accelerometer_m_s2\[2\])(_\w+)?",
+    "airspeed": r"(.*\.)?(true_)?(airspeed|[kect]?[tice]as)(_\w+)?",
+    "time": r"%?t(ime)?(_?(s|ms|us|ns|usec|stamp|boot))?\w*|(milli|micro|nano)?s(ec(ond)?s?)?|millis|micros",
 }
-_COMMAND = r"cmd|command|control\[|setpoint|_sp$|^srfc|^rcou|servo|actuator|aileron|elevator|rudder|elevon"
+_COMMAND = (
+    r"^d(elta_?)?[aer]$|cmd|command|control\[|setpoint|_sp$|^srfc|^rcou|servo|actuator|"
+    r"aileron|elevator|rudder|elevon"
+)
 _NO_COMMAND = r"truth|effectiveness|position|_pos|feedback|measured|error|failure"
 _HINTS = {"rad_s": "rad/s", "rad/s": "rad/s", "deg_s": "deg/s", "deg/s": "deg/s", "dps": "deg/s"}
 _PWM = (700.0, 2300.0)
@@ -73,7 +76,7 @@ def _size(samples: Samples) -> str:
 
 
 def _physics(recording: Recording, vehicle: Vehicle) -> list[str]:
-    """That rates and roll agree, or that nothing could be compared."""
+    """That rates and angles agree, or that nothing could be compared."""
     columns, attitude = recording.columns, vehicle.attitude
     if attitude is None or attitude.roll.column not in columns:
         return ["no roll angle is named: whether the rates are in rad/s is not checked"]
@@ -83,11 +86,19 @@ def _physics(recording: Recording, vehicle: Vehicle) -> list[str]:
     found = physics.roll_of(rates, _si(columns, attitude.roll), known)
     if found is None:
         return ["too little moves to compare the rates with the roll angle"]
+    lines = [_agreement(found, attitude.roll.column, vehicle.rates.p.column)]
+    if pitch is not None and known is not None:
+        pitching = physics.pitch_of(rates, _si(columns, attitude.roll), known)
+        lines += [_agreement(pitching, pitch.column, vehicle.rates.q.column)] if pitching else []
+    return lines
+
+
+def _agreement(found: physics.Followed, angle: str, rate: str) -> str:
     agree = "they agree" if abs(found.correlation) > _AGREE else "they tell nothing of one another"
-    return [
-        f"the change of {attitude.roll.column} is {found.slope:.3f} times the integral of "
-        f"{vehicle.rates.p.column} (correlation {found.correlation:.2f}): {agree}"
-    ]
+    return (
+        f"the change of {angle} is {found.slope:.3f} times the integral of {rate} "
+        f"(correlation {found.correlation:.2f}): {agree}"
+    )
 
 
 def _si(columns: Any, quantity: Any) -> Column:

@@ -106,7 +106,13 @@ def fit_like(stretches: Sequence[Stretch], model: Model) -> Model:
 
 
 def choose_order(stretches: Sequence[Stretch], vehicle: Vehicle) -> tuple[int, int]:
-    """Past samples of rates and commands by the Bayesian information criterion.
+    """Past samples of rates and commands by the Bayesian information criterion."""
+    scores = criteria(stretches, vehicle)
+    return min(scores, key=lambda order: scores[order])
+
+
+def criteria(stretches: Sequence[Stretch], vehicle: Vehicle) -> dict[tuple[int, int], float]:
+    """The Bayesian information criterion of each number of past samples of rates and commands.
 
     Every order's regressors are among those of the largest: one matrix of products serves all.
     """
@@ -120,7 +126,7 @@ def choose_order(stretches: Sequence[Stretch], vehicle: Vehicle) -> tuple[int, i
             found = np.linalg.lstsq(products[np.ix_(columns, columns)], cross[columns], rcond=1e-12)[0]
             log_det = np.linalg.slogdet((own - cross[columns].T @ found) / len(y))[1]
             scores[history, lags] = len(y) * log_det + 3 * len(columns) * np.log(len(y))
-    return min(scores, key=lambda order: scores[order])
+    return scores
 
 
 def _columns(vehicle: Vehicle, history: int, lags: int) -> list[int]:

@@ -11,12 +11,14 @@ from beaver_ftc.flights import fitting, trust
 from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.recording import Floats
 from beaver_ftc.flights.regression import group_indices, spectrum, variance_inflation
-from beaver_ftc.flights.samples import Samples
+from beaver_ftc.flights.samples import Samples, with_pressure
 from beaver_ftc.flights.vehicle import Vehicle
 
 Document = dict[str, Any]
 
 _COLLINEAR = 10.0
+_DECISIVE = 10.0
+"""By how much a criterion must be less: odds of 150 to 1 [Kass1995, section 3.2]."""
 _BANDS_HZ = ((0.0, 0.1), (0.1, 0.5), (0.5, 1.0), (1.0, 2.0), (2.0, 5.0), (5.0, 10.0))
 WINDOW_S = 2.0
 _MOST_WINDOWS = 400
@@ -40,6 +42,23 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
     }
     settings = model.settings.model_copy(update={"bounds": bounds})
     return model.model_copy(update={"settings": settings, "identified": found})
+
+
+def by_pressure(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Sequence[Samples], Vehicle]:
+    """Flights with commands times the dynamic pressure, and the vehicle that says so, where the airspeed is
+    known and this explains more; else both as they are."""
+    known = [one.airspeed[np.isfinite(one.airspeed)] for one in flights if one.airspeed is not None]
+    speeds_mps = np.concatenate(known) if known else np.empty(0)
+    reference_mps = float(np.median(speeds_mps)) if speeds_mps.size else 0.0
+    if vehicle.reference_airspeed_mps is not None or reference_mps <= 0.0:
+        return flights, vehicle
+    pressed = [with_pressure(one, reference_mps) for one in flights]
+    plain, better = (
+        min(fitting.criteria(fitting.stretches_of(each), vehicle).values()) for each in (flights, pressed)
+    )
+    if plain - better < _DECISIVE:
+        return flights, vehicle
+    return pressed, vehicle.model_copy(update={"reference_airspeed_mps": reference_mps})
 
 
 def check_explains(tests: list[Document], stretches: Sequence[fitting.Stretch], model: Model) -> None:
@@ -117,6 +136,7 @@ def summary(model: Model) -> str:
         f"{model.vehicle.name}: {used} samples at {model.rate_hz:.3g} Hz, flights: {len(found['flights'])}; "
         f"past samples of the rates: {model.history}, of the commands: {model.lags}",
         *(f"  together, not to be told apart: {', '.join(g)}" for g in model.groups if len(g) > 1),
+        *_pressure_lines(model),
         *(f"  {line}" for line in trust.unclaimed_lines(model)),
         *(f"  {flight['name']}: {note}" for flight in found["flights"] for note in flight["notes"]),
         *map(_test_line, found["tests"]),
@@ -136,6 +156,12 @@ def summary(model: Model) -> str:
             f"{_COLLINEAR:g} times), most {worst['regressor']} ({_times(worst['inflation'])})"
         )
     return "\n".join(lines)
+
+
+def _pressure_lines(model: Model) -> list[str]:
+    if (reference_mps := model.vehicle.reference_airspeed_mps) is None:
+        return []
+    return [f"  surfaces work with the dynamic pressure, 1 at {reference_mps:.4g} m/s"]
 
 
 def _test_line(test: Document) -> str:

@@ -1,7 +1,8 @@
-"""What mechanics says of a log's units: the integral of p is the change of roll, and the mean of the specific
-force is 1 g.
+"""What mechanics says of a log's units: the integrals of p and q are the changes of roll and pitch, and the
+mean of the specific force is 1 g.
 
     phi' = p + tan(theta) (q sin(phi) + r cos(phi))        [SL03, eq. 1.4-4]
+    theta' = q cos(phi) - r sin(phi)
 """
 
 from dataclasses import dataclass
@@ -16,18 +17,22 @@ _SURE, _APART = 0.7, 1.5
 _NEAR, _APART_FROM = 1.3, 0.4
 _G = UNITS["g"][1]
 _GRAVITY = (0.5, 2.0)
+_CIRCLE_RAD, _FAST_RAD_S = 1.02 * 2.0 * np.pi, 12.0
 
 
 @dataclass(frozen=True)
-class Roll:
-    """slope: change of roll over the integral of p; correlation of the two; windows: how many were seen."""
+class Followed:
+    """slope: change of an angle over the integral of its rate; correlation of the two; windows: how many were
+    seen; angle, rate: the largest, as the log says."""
 
     slope: float
     correlation: float
     windows: int
+    angle: float
+    rate: float
 
 
-def roll_of(rates: list[Column], roll: Column, pitch: Column | None) -> Roll | None:
+def roll_of(rates: list[Column], roll: Column, pitch: Column | None) -> Followed | None:
     """How the roll angle follows the rates; None where too little moves. All of them as the log says, in SI.
 
     rates: p, q, r.
@@ -36,27 +41,51 @@ def roll_of(rates: list[Column], roll: Column, pitch: Column | None) -> Roll | N
     p, q, r = (_at(column, t_s) for column in rates)
     phi, full = _at(roll, t_s), _turn(roll.values)
     angle = phi * 2.0 * np.pi / full  # the circle is known whatever the unit
-    rate = p
+    terms = [p]
     if pitch is not None:
         theta = _at(pitch, t_s) * 2.0 * np.pi / _turn(np.append(4.0 * pitch.values, roll.values))
-        rate = p + np.tan(np.clip(theta, -1.0, 1.0)) * (q * np.sin(angle) + r * np.cos(angle))
+        slope = np.tan(np.clip(theta, -1.0, 1.0))
+        terms += [slope * q * np.sin(angle), slope * r * np.cos(angle)]
+    return _followed(t_s, phi, terms, full)
+
+
+def pitch_of(rates: list[Column], roll: Column, pitch: Column) -> Followed | None:
+    """How the pitch angle follows the rates, as `roll_of`."""
+    t_s = rates[0].t_s
+    _, q, r = (_at(column, t_s) for column in rates)
+    angle = _at(roll, t_s) * 2.0 * np.pi / _turn(roll.values)
+    return _followed(t_s, _at(pitch, t_s), [q * np.cos(angle), -r * np.sin(angle)])
+
+
+def _followed(t_s: Floats, angle: Floats, terms: list[Floats], full: float | None = None) -> Followed | None:
+    """How an angle follows the first term of its rate of change, window by window, the others in whatever
+    unit they are; full: a circle, where it may go round."""
     step = np.diff(t_s)
-    integral = np.concatenate([[0.0], np.cumsum(np.where(step < _WINDOW_S, step, 0.0) * _mean(rate))])
+    gaps_out = np.where(step < _WINDOW_S, step, 0.0)
+    integrals = np.vstack(
+        [np.zeros(len(terms)), np.cumsum([gaps_out * _mean(one) for one in terms], axis=1).T]
+    )
     length = max(round(_WINDOW_S / max(float(np.median(step)), 1e-9)), 1)
     begin, end = np.arange(0, len(t_s) - length, length), np.arange(length, len(t_s), length)
     whole = (t_s[end] - t_s[begin]) < 2.0 * _WINDOW_S
-    turned, moved = (phi[end] - phi[begin])[whole], (integral[end] - integral[begin])[whole]
-    turned = (turned + 0.5 * full) % full - 0.5 * full
-    known = np.isfinite(turned) & np.isfinite(moved)
-    return _slope(moved[known], turned[known])
-
-
-def _slope(moved: Floats, turned: Floats) -> Roll | None:
+    turned, moved = (angle[end] - angle[begin])[whole], (integrals[end] - integrals[begin])[whole]
+    if full is not None:
+        turned = (turned + 0.5 * full) % full - 0.5 * full
+    known = np.isfinite(turned) & np.isfinite(moved).all(axis=1)
+    turned, moved = turned[known], moved[known]
+    by_terms = np.linalg.lstsq(moved, turned, rcond=None)[0]
+    turned, moved = turned - moved[:, 1:] @ by_terms[1:], moved[:, 0]
     power, answer = float(moved @ moved), float(turned @ turned)
     if len(moved) < _LEAST_WINDOWS or not power * answer > 0.0:
         return None
     cross = float(moved @ turned)
-    return Roll(np.sign(cross) * np.sqrt(answer / power), cross / np.sqrt(power * answer), len(moved))
+    return Followed(
+        slope=np.sign(cross) * np.sqrt(answer / power),
+        correlation=cross / np.sqrt(power * answer),
+        windows=len(moved),
+        angle=float(np.nanmax(np.abs(angle))),
+        rate=float(np.nanmax(np.abs(terms[0]))),
+    )
 
 
 def _mean(values: Floats) -> Floats:
@@ -78,12 +107,23 @@ def _turn(roll: Floats) -> float:
     return next((full for full in (2.0 * np.pi, 360.0) if largest <= 1.02 * full), 36000.0)
 
 
-def roll_says(rates: dict[str, Column], roll: Column, pitch: Column | None, name: str) -> str | None:
-    """What is wrong with the rates (p, q, r by column) or the roll angle `name`; None where nothing is."""
-    (p, *others), columns = list(rates), list(rates.values())
+def attitude_says(
+    rates: dict[str, Column], roll: Column, pitch: Column | None, names: tuple[str, str]
+) -> str | None:
+    """What is wrong with the rates (p, q, r by column) or the angles, roll and pitch of these names; None
+    where nothing is."""
+    (p, q, _), columns = list(rates), list(rates.values())
     found = roll_of(columns, roll, pitch)
-    if found is None or abs(found.correlation) >= _APART_FROM:
-        return None if found is None else roll_remark(found, p, name)
+    if found is not None and abs(found.correlation) < _APART_FROM:
+        return _another_is(rates, roll, names[0], found)
+    pitching = pitch_of(columns, roll, pitch) if pitch else None
+    says = angle_remark(found, p, names[0]) if found else None
+    return says or (angle_remark(pitching, q, names[1]) if pitching else None)
+
+
+def _another_is(rates: dict[str, Column], roll: Column, name: str, found: Followed) -> str | None:
+    """That the roll angle follows another rate, where it does."""
+    (p, *others), columns = list(rates), list(rates.values())
     for other in others:
         moved = roll_of([rates[other], *(one for one in columns if one is not rates[other])], roll, None)
         if moved is not None and abs(moved.correlation) > _SURE:
@@ -94,23 +134,24 @@ def roll_says(rates: dict[str, Column], roll: Column, pitch: Column | None, name
     return None
 
 
-def roll_remark(found: Roll, rate: str, roll: str) -> str | None:
-    """What is wrong with p or roll by their proportion, and which factor fits; None where nothing is.
+def angle_remark(found: Followed, rate: str, angle: str) -> str | None:
+    """What is wrong with a rate or its angle by their proportion, and which factor fits; None where nothing
+    is. rate, angle: their columns.
 
-    rate, roll: their columns.
+    Either may be; an angle that goes round more than once is, and a rate that no vehicle turns at.
     """
     size = abs(found.slope)
     near = 1.0 / _APART < size < _APART
     if abs(found.correlation) < _SURE or (near and found.slope > 0.0):
         return None
-    fits = f"the change of {roll} is {found.slope:.4g} times the integral of {rate}"
+    fits = f"the change of {angle} is {found.slope:.4g} times the integral of {rate}"
     if near:
         return f"{fits}: one of them has the other sign, `scale: -1` fits"
-    if size > 1.0 and (unit := nearest_unit(ANGLE, 1.0 / size, _NEAR)):
-        return f"{fits}: {roll} is in {unit}, a factor of {UNITS[unit][1]:.4g} fits"
-    if size < 1.0 and (unit := nearest_unit(RATE, size, _NEAR)):
+    if found.angle > _CIRCLE_RAD and (unit := nearest_unit(ANGLE, 1.0 / size, _NEAR)):
+        return f"{fits}: {angle} is in {unit}, a factor of {UNITS[unit][1]:.4g} fits"
+    if found.rate > _FAST_RAD_S and (unit := nearest_unit(RATE, size, _NEAR)):
         return f"{fits}: {rate} is in {unit}, a factor of {UNITS[unit][1]:.4g} fits"
-    return f"{fits}: a factor of {size:.4g} on {rate} fits"
+    return f"{fits}: a factor of {size:.4g} on {rate} fits, or of {1.0 / size:.4g} on {angle}"
 
 
 def gravity_remark(acceleration: Column, name: str) -> str | None:

@@ -25,6 +25,8 @@ from beaver_ftc.flights.vehicle import Vehicle
 MIN_RATE_HZ, _MAX_RATE_HZ = 4.0, 1e5
 _FIRST = 50
 _LARGEST, _FASTEST_RAD_S = 1e6, 60.0
+_PRESSURES = (0.1, 10.0)
+"""Least and largest dynamic pressure over that at the reference, whatever the airspeed says."""
 _GAP = 3.5
 """A step of more than this many usual steps is a gap: nothing is predicted across it."""
 
@@ -71,7 +73,7 @@ def sample(recording: Recording, vehicle: Vehicle) -> Samples:
     def columns(names: list[str]) -> Floats:
         return np.column_stack([found[name][0] for name in names]) if names else np.empty((len(t_s), 0))
 
-    return Samples(
+    samples = Samples(
         name=recording.name,
         t_s=t_s,
         rates=columns(names),
@@ -88,6 +90,17 @@ def sample(recording: Recording, vehicle: Vehicle) -> Samples:
         still_s={name: _still(recording.columns[name], t_s) for name in used},
         clipped=_clipped([recording.columns[name] for name in names], t_s),
     )
+    reference_mps = vehicle.reference_airspeed_mps
+    return samples if reference_mps is None else with_pressure(samples, reference_mps)
+
+
+def with_pressure(samples: Samples, reference_mps: float) -> Samples:
+    """The flight with commands times the dynamic pressure over that at a reference airspeed; as it is where
+    the airspeed is unknown."""
+    if samples.airspeed is None:
+        return samples
+    ratio = np.nan_to_num(samples.airspeed / reference_mps, nan=1.0) ** 2
+    return replace(samples, commands=samples.commands * np.clip(ratio, *_PRESSURES)[:, None])
 
 
 def _remarks(recording: Recording, used: list[str], rates: list[str]) -> Iterator[str]:
@@ -124,9 +137,8 @@ def _consistent(recording: Recording, vehicle: Vehicle) -> None:
         theta = recording.columns.get(pitch.column) if pitch else None
         names = [getattr(vehicle.rates, axis).column for axis in "pqr"]
         if not signals.clipped(rates[0].values).any():
-            says = physics.roll_says(
-                dict(zip(names, rates, strict=True)), found, theta, vehicle.attitude.roll.column
-            )
+            angles = (vehicle.attitude.roll.column, pitch.column if pitch else "")
+            says = physics.attitude_says(dict(zip(names, rates, strict=True)), found, theta, angles)
     down = vehicle.acceleration and recording.columns.get(vehicle.acceleration.column)
     if not says and vehicle.acceleration and down:
         says = physics.gravity_remark(down, vehicle.acceleration.column)

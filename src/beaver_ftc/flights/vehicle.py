@@ -154,6 +154,14 @@ class Vehicle(Section):
         json_schema_extra={"unit": "rad", "range": "any"},
         examples=[{"left": 0.4}],
     )
+    reference_airspeed_mps: Number | None = Field(
+        default=None,
+        gt=0,
+        description="surfaces work with the dynamic pressure: commands count (airspeed / this)^2 times; "
+        "`identify` finds by itself whether that explains more",
+        json_schema_extra={"unit": "m/s"},
+        examples=[20.0],
+    )
     outputs: dict[str, Logged] = Field(
         default={},
         description="columns of the servo outputs: read by the freeze rule of a benchmark alone",

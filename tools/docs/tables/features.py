@@ -4,12 +4,10 @@ import json
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from beaver_ftc.aircraft import DEFAULT
 from beaver_ftc.documents.errors import BeaverFtcError
 from beaver_ftc.integrations.live import messages
 from beaver_ftc.integrations.live.session import Session
@@ -54,8 +52,8 @@ FEATURES = (
     Feature("`sweep`", "sweep W.yaml"),
     Feature("`compare --sweep`", "compare --sweep W.yaml --schemes observer-constant --laws nominal"),
     Feature("`detectability`", "detectability S.yaml --surface elevator --airspeed {speed:.0f}"),
-    Feature("`power`", "power --aircraft {plane} --surface elevator --sensors tactical-grade --turbulence none "
-            "--schemes observer-constant --workers 2"),
+    Feature("`power`", "power --aircraft {plane} --surface elevator --sensors tactical-grade "
+            "--turbulence none --schemes observer-constant --workers 2"),
     Feature("`separate`", "separate S.yaml", keys=(
         ("faults", [{"actuator": "elevator", "type": "float", "at_s": 3}]), ("fdi", {"fault_class": "all"}),
     )),
@@ -66,22 +64,13 @@ FEATURES = (
 
 def features() -> str:
     """All that the documents speak of, on one aircraft of each kind."""
-    return _table(PLANES)
-
-
-def features_probe() -> str:
-    """On the aircraft that is built in."""
-    return _table([DEFAULT])
-
-
-def _table(planes: Sequence[str] | dict[str, str]) -> str:
     reasons: list[str] = []
     rows = [[feature.name] for feature in FEATURES] + [
         ["`matrix`"],
         ["`matrix --declared`"],
         ["`live`, changes in flight"],
     ]
-    for plane in planes:
+    for plane in PLANES:
         if plane.startswith("jsbsim:"):
             derive_if_needed(plane)
         said = [_tried(feature, plane) for feature in FEATURES]
@@ -90,7 +79,7 @@ def _table(planes: Sequence[str] | dict[str, str]) -> str:
             if why and why not in reasons:
                 reasons.append(why)
             row.append(f"{NO} {reasons.index(why) + 1}" if why else YES)
-    head = [f"`{plane}`, {PLANES[plane]}" for plane in planes]
+    head = [f"`{plane}`, {kind}" for plane, kind in PLANES.items()]
     notes = "\n".join(f"{i}. {why}" for i, why in enumerate(reasons, 1))
     return markdown_table(("", *head), rows) + (f"\n\n{notes}" if notes else "")
 

@@ -170,6 +170,7 @@ MISMATCH = {
 IDENTIFY = {
     "flights__vehicle__load_vehicle": "vehicle",
     "flights__samples__load_flights": ["flight"],
+    "flights__identification__by_pressure": (["pressed"], "described"),
     "flights__identification__identify": SimpleNamespace(
         identified={"i": 1}, settings=SimpleNamespace(model_dump=lambda: {"s": 2})
     ),

@@ -192,9 +192,9 @@ def test_what_needs_data_that_is_not_here_is_said(monkeypatch):
 def test_a_block_keeps_its_dress():
     assert dressed("```console\n$ fly\nold\n```\n", "new", "fly") == "```console\n$ fly\nnew\n```\n"
     assert dressed("````yaml\nold\n````\n", "new: 1", "fly") == "````yaml\nnew: 1\n````\n"
-    assert dressed("| old |\n", "| new |", "fly") == "| new |\n"
+    assert dressed("|old|\n", "| new | a \\| b |", "fly") == "|new|a \\| b|\n"
     assert dressed("", "new", "fly") == "```text\nnew\n```\n"
-    assert dressed("", "| new |", "python -m tools.docs table new") == "| new |\n"
+    assert dressed("", "| new |", "python -m tools.docs table new") == "|new|\n"
 
 
 def test_links_of_what_is_printed_are_as_the_page_sees_them():

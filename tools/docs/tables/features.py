@@ -1,6 +1,7 @@
 """The table feature x aircraft of docs/aircraft.md: what can be done with which aircraft, or why not."""
 
 import json
+import re
 import subprocess
 import sys
 import tempfile
@@ -99,7 +100,7 @@ def _tried(feature: Feature, plane: str) -> str:
         )  # fmt: skip
     if run.returncode in (0, 1):
         return ""
-    return run.stderr.strip().splitlines()[-1].removeprefix("S: ").removeprefix("S.yaml: ")
+    return re.sub(r"^S(\.yaml)?(:\d+)?: ", "", run.stderr.strip().splitlines()[-1])
 
 
 def _matrix(plane: str, declared: bool) -> str:

@@ -206,7 +206,7 @@ def _documented(name):
     """Field -> shape as text, of one of the tables of docs/plugins.md."""
     page = (ROOT / "docs/plugins.md").read_text()
     table = page.partition(f"`{name}` (`beaver_ftc")[2].partition("|\n\n")[0]
-    for names, says in re.findall(r"^\| (`[^|]*) \| (.*) \|$", f"{table}|", re.MULTILINE):
+    for names, says in re.findall(r"^\| ?(`[^|]*?) ?\| ?(.*?) ?\|$", f"{table}|", re.MULTILINE):
         fields, shapes = (
             re.findall(r"`(\w+)`", names),
             re.findall(r"(\((?:\d|\w+ \+ \w+|surfaces),[\w ]*\))", says),

@@ -26,8 +26,8 @@ def read(about, log):
     log["wrong"] = (abs(log["nu"]) > eta + (n + np.roll(n, 1, axis=0)) / dt).any(axis=1)
     require(np.flatnonzero(~log["T"][:end].any(axis=1))[-1] == since, "the diagnosis began in another frame")
     log["T"][since] = 2 * n[since]  # as if H = 0 and N = n had been logged
-    H, now, then = log["T"] - n, slice(since + 1, end + 1), slice(since, end)  # H + N of section 3
-    require(np.allclose(H[now] - a * H[then], dt * eta[now] + (1 - a) * n[then], 1e-11, 0), "thresholds")
+    H, now, then, least = log["T"] - n, slice(since + 1, end + 1), slice(since, end), 1e-14 * log["T"].max()
+    require(np.allclose(H[now] - a * H[then], dt * eta[now] + (1 - a) * n[then], 1e-11, least), "thresholds")
 
 
 def sides(one, said, to, about, log):

@@ -3,9 +3,8 @@
 What the log does not hold is kept frame by frame: signature, what declared constants multiply, variances.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
@@ -45,24 +44,36 @@ def of_alarm(tape: Tape, history: History, surfaces: Sequence[str], k: int) -> D
 
 def _leave_out(said: Document, history: History) -> None:
     """Take out what decides nothing: what the filter has forgotten, and of the bounds on what is no noise."""
-    value, limit, decides = sides(said, history)
+    _, limit, decides = sides(said, history)
     if decides == NOISE:
         for its in said["frames"]:
             del its["bounded"]
     if decides != PACE:
         del said["pace"]
-    for place, i in _parts(said):
-        given = place[i]
-        place[i] = [None] * len(given) if isinstance(given, list) else None
+    sums, *_ = _followed(said, history)
+    m = len(said["tolerance"])
+    matters = [j for j in range(m) if said["tolerance"][j] * abs(sums[2 + j]) > _FORGOTTEN * limit]
+    said["tolerance"] = [said["tolerance"][j] for j in matters]
+    said["Y"] = [[row[0], *(row[1 + j] for j in matters)] for row in said["Y"]]
+    for its in said["frames"]:
+        if "known" in its:
+            its["known"] = [its["known"][j] for j in matters]
+    for row, felt in zip(said["Y"], sums[2 + m :], strict=True):
+        for c, tolerance in enumerate((1.0, *said["tolerance"])):
+            if abs(felt * row[c]) * tolerance < _FORGOTTEN * limit:
+                row[c] = None
+    for place in (*said["P"], said["R"]):
+        _leave_out_of(place, said, history)
+
+
+def _leave_out_of(place: list[float | None], said: Document, history: History) -> None:
+    """The same of one list of variances in a statement."""
+    value, limit, _ = sides(said, history)
+    for i, given in enumerate(place):
+        place[i] = None
         without = sides(said, history)
         if max(abs(value - without[0]), abs(limit - without[1])) > _FORGOTTEN * limit:
             place[i] = given
-
-
-def _parts(said: Document) -> Iterator[tuple[list[Any], int]]:
-    """Rows of Y, and entries of P and R."""
-    for place in (said["Y"], *said["P"], said["R"]):
-        yield from ((place, i) for i in range(len(place)))
 
 
 def _loudest(chances: np.void) -> tuple[int, int, int]:
@@ -122,17 +133,28 @@ def _input(then: np.ndarray, response: np.ndarray, dt: float) -> np.ndarray:
 
 def sides(said: Document, history: History) -> tuple[float, float, int]:
     """Evidence, what it must exceed, and which of NOISE, SWINGS, PACE that follows from."""
+    sums, swings, drifts = _followed(said, history)
+    N, D, R = sums[0], sums[1], sums[2 : 2 + len(said["tolerance"])]
+    evidence = (-N if said["sense"] == "less" else abs(N)) - np.array(said["tolerance"]) @ np.abs(R)
+    root = said["level"] * np.sqrt(D)
+    of_swings, of_pace = (room + CHANCE * root for room in (swings, drifts))
+    decides = NOISE if root >= min(of_swings, of_pace) else (SWINGS if of_swings <= of_pace else PACE)
+    return float(evidence), float(max(root, min(of_swings, of_pace))), decides
+
+
+def _followed(said: Document, history: History) -> tuple[np.ndarray, float, float]:
+    """N, D, each R, and what N owes to each state before the first frame, (2 + constants + 2 n,); what a
+    bounded uncertainty adds as it swings, and at its pace."""
     axes, dt = said["axes"], history.dt
     n = len(axes)
-    sums, w = np.zeros(2 + len(said["tolerance"])), np.zeros(n)
     Y, P, R = (np.nan_to_num(np.array(said[name], float)) for name in "YPR")
-    Y, pace = np.insert(Y, 1, 0.0, axis=1), said.get("pace", 1e9)
-    A = np.kron([[1.0, dt], [0.0, 1.0]], np.eye(n))
+    Y, pace = np.column_stack([Y[:, 0], np.zeros(2 * n), Y[:, 1:], np.eye(2 * n)]), said.get("pace", 1e9)
+    A, sums, w = np.kron([[1.0, dt], [0.0, 1.0]], np.eye(n)), np.zeros(Y.shape[1]), np.zeros(n)
     swings = drifts = last = 0.0
     for r, its in enumerate(said["frames"], said["first"]):
         seen = history.innovation(slice(r, r + 1))[0, axes] - its.get("air", 0.0)
         Y, P = A @ Y, A @ (P + np.diag(its["Q"])) @ A.T
-        Y[:n] += dt * np.column_stack([seen, its["signature"], *its.get("known", [])])
+        Y[:n, : -2 * n] += dt * np.column_stack([seen, its["signature"], *its.get("known", [])])
         inverse = np.linalg.inv(P[:n, :n] + np.diag(R))
         G, K = Y[:n].copy(), P[:, :n] @ inverse
         Y, P, before, w = Y - K @ G, P - K @ P[:n], w, inverse @ G[:, 1]
@@ -140,9 +162,4 @@ def sides(said: Document, history: History) -> tuple[float, float, int]:
         swing = RINGING * np.abs(np.linalg.pinv(K[n:])) @ its.get("bounded", np.zeros(n))
         swings, drifts = swings + swing @ np.abs(w - before), drifts + pace * swing @ np.abs(w)
         last = swing @ np.abs(w)
-    N, D, R = sums[0], sums[1], sums[2:]
-    evidence = (-N if said["sense"] == "less" else abs(N)) - np.array(said["tolerance"]) @ np.abs(R)
-    root = said["level"] * np.sqrt(D)
-    of_swings, of_pace = (room + CHANCE * root for room in (swings + last, drifts))
-    decides = NOISE if root >= min(of_swings, of_pace) else (SWINGS if of_swings <= of_pace else PACE)
-    return float(evidence), float(max(root, min(of_swings, of_pace))), decides
+    return sums, float(swings + last), float(drifts)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.flights import trust
+from beaver_ftc.flights import energy, trust
 from beaver_ftc.flights.bank import UNKNOWN as UNKNOWN_OFFSET
 from beaver_ftc.flights.bank import Bank, bank_of
 from beaver_ftc.flights.filtering import posterior_of
@@ -80,6 +80,7 @@ def silenced(
     silent = np.zeros(len(samples.t_s), dtype=bool)
     for rows_outside in reasons.values():
         silent |= rows_outside
+    rows = _without_power(samples, model, rows)
     unnamed = silent | _of(rows.named, trust.unclaimed(model))
     told = by_surface(np.tile(np.array(trust.claimed(model), dtype=float), (len(silent), 1)), model) > 0.0
     unsaid = silent[:, None] | ~told
@@ -95,6 +96,22 @@ def silenced(
         reasons=reasons,
     )
     return _at_stamps(samples, told_all)
+
+
+def _without_power(samples: Samples, model: Model, rows: Rows) -> Rows:
+    """Rows in which no surface is named where an engine may have failed."""
+    lowest = model.fitted.energy_climb if model.fitted is not None else None
+    if lowest is None or samples.energy_climb is None:
+        return rows
+    named = energy.renamed(rows.t_s, rows.faulty, rows.named, samples.energy_climb, lowest)
+    doubted = (named != rows.named)[:, None]
+    return replace(
+        rows,
+        named=named,
+        estimate=np.where(doubted, 1.0, rows.estimate),
+        low=np.where(doubted, 0.0, rows.low),
+        high=np.where(doubted, 1.0, rows.high),
+    )
 
 
 def _of(named: NDArray[np.object_], unclaimed: set[str]) -> NDArray[np.bool_]:

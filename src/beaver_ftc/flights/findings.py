@@ -14,6 +14,7 @@ import numpy as np
 from beaver_ftc.flights import trust
 from beaver_ftc.flights.bank import Bank, bank_of
 from beaver_ftc.flights.diagnose import UNKNOWN, Rows
+from beaver_ftc.flights.energy import ENGINE
 from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.recording import TINY, Floats
 from beaver_ftc.flights.regression import predicted
@@ -86,7 +87,7 @@ def _event(rows: Rows, begin: int, end: int, surfaces: list[str]) -> Document:
     """One event; name and effectiveness as they stood for most of it."""
     names, count = np.unique(rows.named[begin:end].astype(str), return_counts=True)
     named = str(names[count.argmax()])
-    mentioned = surfaces if named == UNKNOWN else named.split("+")
+    mentioned = surfaces if named in (UNKNOWN, ENGINE) else named.split("+")
     known = {"estimate": rows.estimate, "low": rows.low, "high": rows.high}
     middles = {key: np.median(values[begin:end], axis=0) for key, values in known.items()}
     return {

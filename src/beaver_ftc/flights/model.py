@@ -64,6 +64,9 @@ class Fitted(Section):
     gain_sd: Row = Field(default=[], description="standard error of each group's gain")
     still_s: dict[str, Number] = Field(default={}, description="longest time each column stood still, s")
     scale: Number = Field(1.0, gt=0, description="largest scale of the noise on parts not fitted")
+    energy_climb: Number | None = Field(
+        default=None, description="rate of the energy height as without power, m/s"
+    )
     minutes: Number = Field(0.0, ge=0, description="what was fitted, min")
 
 

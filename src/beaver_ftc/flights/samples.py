@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.flights import physics, signals
+from beaver_ftc.flights import energy, physics, signals
 from beaver_ftc.flights.readers import read_flight
 from beaver_ftc.flights.recording import Column, Event, Floats, Recording, nearest_ten
 from beaver_ftc.flights.units import SECONDS
@@ -39,7 +39,8 @@ class Samples:
     signals (n, X); labels (n, S) effectiveness, nan where unknown; run (n,) number of the gap-free stretch;
     age_s: mean age of each held column; stamps (m,) the log's own time stamps, s; notes: what is said of the
     reading; airspeed (n,) m/s, nan where unknown; still_s: for how long each column of rates, commands and
-    signals has been the same, (n,) s; clipped (n,): whether a rate is.
+    signals has been the same, (n,) s; clipped (n,): whether a rate is; energy_climb (n,) m/s: rate of
+    the energy height over the last seconds, None where it is not logged.
     """
 
     name: str
@@ -57,6 +58,7 @@ class Samples:
     airspeed: Floats | None = None
     still_s: Mapping[str, Floats] = field(default_factory=dict)
     clipped: NDArray[np.bool_] | None = None
+    energy_climb: Floats | None = None
 
 
 def sample(recording: Recording, vehicle: Vehicle) -> Samples:
@@ -89,6 +91,7 @@ def sample(recording: Recording, vehicle: Vehicle) -> Samples:
         airspeed=_airspeed(recording, vehicle, t_s, step),
         still_s={name: _still(recording.columns[name], t_s) for name in used},
         clipped=_clipped([recording.columns[name] for name in names], t_s),
+        energy_climb=_energy_climb(recording, vehicle, (t_s, run, step)),
     )
     reference_mps = vehicle.reference_airspeed_mps
     return samples if reference_mps is None else with_pressure(samples, reference_mps)
@@ -125,6 +128,19 @@ def _airspeed(recording: Recording, vehicle: Vehicle, t_s: Floats, step_s: float
     """The airspeed at each sample, nan where it is unknown; None where the vehicle has none."""
     column = recording.columns.get(vehicle.airspeed.column) if vehicle.airspeed else None
     return None if column is None else at_samples(column, t_s, step_s)[0]
+
+
+def _energy_climb(
+    recording: Recording, vehicle: Vehicle, base: tuple[Floats, NDArray[np.int64], float]
+) -> Floats | None:
+    """As in Samples; base: times, stretches and step of the samples."""
+    wanted = [vehicle.energy.altitude, vehicle.energy.airspeed] if vehicle.energy else []
+    known = [recording.columns[one.column] for one in wanted if one.column in recording.columns]
+    if len(known) < 2 or not all(len(column.t_s) > 1 for column in known):
+        return None
+    t_s, run, step = base
+    altitude, airspeed = (at_samples(column, t_s, step)[0] for column in known)
+    return energy.climb_of(t_s, altitude, airspeed, run)
 
 
 def _consistent(recording: Recording, vehicle: Vehicle) -> None:

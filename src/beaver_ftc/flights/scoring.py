@@ -100,4 +100,5 @@ def _right_group(named: dict[str, float], surfaces: list[str], groups: list[list
     if not actual or not names:
         return None
     longest = set(max(names, key=lambda name: names[name]).split("+"))
-    return {index for index, group in enumerate(groups) if longest & set(group)} <= actual
+    found = {index for index, group in enumerate(groups) if longest & set(group)}
+    return bool(found) and found <= actual

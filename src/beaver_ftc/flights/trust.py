@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.flights import regression
+from beaver_ftc.flights import energy, regression
 from beaver_ftc.flights.model import Fitted, Model
 from beaver_ftc.flights.recording import TINY, Floats
 from beaver_ftc.flights.samples import Samples
@@ -53,8 +53,17 @@ def fitted_on(flights: Sequence[tuple[Samples, Mask]], model: Model, gain_sd: Fl
         gain_sd=gain_sd.tolist(),
         still_s=_longest_still(flights),
         scale=scale,
+        energy_climb=_unpowered(flights),
         minutes=sum(int(use.sum()) * samples.dt_s for samples, use in flights) / 60.0,
     )
+
+
+def _unpowered(flights: Sequence[tuple[Samples, Mask]]) -> float | None:
+    """How fast the energy height falls in the lowest part of healthy flight, m/s; None where nobody knows."""
+    known = [one.energy_climb[use] for one, use in flights if one.energy_climb is not None]
+    values = np.concatenate(known) if known else np.empty(0)
+    values = values[np.isfinite(values)]
+    return float(np.quantile(values, energy.LOWEST)) if values.size else None
 
 
 def _span(values: Floats) -> list[list[float]]:

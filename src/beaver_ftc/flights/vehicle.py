@@ -14,7 +14,7 @@ from pydantic import BeforeValidator, Field, model_serializer, model_validator
 from beaver_ftc.documents.base import Conflict, Location, Number, Section, number, refuse
 from beaver_ftc.documents.errors import suggestion
 from beaver_ftc.documents.validation import parse_document, text_of, validate
-from beaver_ftc.flights.units import ACCELERATION, ANGLE, RATE, SECONDS, SPEED, UNITS, units_of
+from beaver_ftc.flights.units import ACCELERATION, ANGLE, LENGTH, RATE, SECONDS, SPEED, UNITS, units_of
 from beaver_ftc.scenario.loader import looks_like_a_path
 
 _MAX_BYTES = 1_000_000
@@ -97,6 +97,13 @@ class Attitude(Section):
     yaw: Logged | None = Field(default=None, description="column of the yaw angle, rad", examples=["yaw_rad"])
 
 
+class Energy(Section):
+    """Columns by which it shows whether power is there."""
+
+    altitude: Logged = Field(description="column of the altitude, m", examples=["altitude_m"])
+    airspeed: Logged = Field(description="column of the airspeed, m/s", examples=["airspeed_m_s"])
+
+
 class Vehicle(Section):
     """What the columns of a vehicle's logs are."""
 
@@ -142,6 +149,9 @@ class Vehicle(Section):
         default=None,
         description="column of the airspeed, m/s: a model holds where it was fitted",
         examples=["airspeed_m_s"],
+    )
+    energy: Energy | None = Field(
+        default=None, description="altitude and airspeed: an engine failure is not named as a surface"
     )
     flow: dict[str, Logged] = Field(
         default={},
@@ -213,6 +223,9 @@ class Vehicle(Section):
             found.append((("acceleration",), ACCELERATION, self.acceleration))
         if self.airspeed is not None:
             found.append((("airspeed",), SPEED, self.airspeed))
+        if self.energy is not None:
+            found.append((("energy", "altitude"), LENGTH, self.energy.altitude))
+            found.append((("energy", "airspeed"), SPEED, self.energy.airspeed))
         for name in ("alpha_rad", "beta_rad"):
             if name in self.flow:
                 found.append((("flow", name), ANGLE, self.flow[name]))

@@ -56,6 +56,7 @@ def read(path: Path) -> Recording:
     origin_ns = float(topics[_RAW][_TIME][ordered[_RAW][0][0]])
     columns = dict(_columns(topics, ordered, origin_ns))
     _add_errors(columns)
+    _add_airspeed(columns)
     events = sorted(_events(topics, origin_ns), key=lambda event: event.t_s)
     return Recording(path.name, columns, tuple(events))
 
@@ -86,6 +87,21 @@ def _add_errors(columns: dict[str, Column]) -> None:
         command, measured = columns.get(f"{axis}_command_rad"), columns.get(f"{axis}_rad")
         if command is not None and measured is not None:
             columns[f"{axis}_error_rad"] = Column(command.t_s, command.values - measured.values, command.note)
+
+
+def _add_airspeed(columns: dict[str, Column]) -> None:
+    """Ground speed less the wind last estimated, m/s: most flights have no airspeed of their own."""
+    names = [f"{what}_{to}_m_s" for to in ("north", "east") for what in ("ground", "wind")]
+    if any(name not in columns or not len(columns[name].t_s) for name in names):
+        return
+    stamps = columns[names[0]].t_s
+
+    def held(name: str) -> Floats:
+        column = columns[name]
+        return column.values[np.maximum(np.searchsorted(column.t_s, stamps, side="right") - 1, 0)]
+
+    north, east = (held(names[i]) - held(names[i + 1]) for i in (0, 2))
+    columns["airspeed_by_wind_m_s"] = Column(stamps, np.hypot(north, east))
 
 
 def _events(topics: dict[str, Table], origin_ns: float) -> Iterator[Event]:

@@ -1,0 +1,41 @@
+"""Whether power is there: an engine that fails changes trim and motion, and looks like a surface that fails.
+
+The energy height altitude + V^2 / 2g falls as fast as drag takes it where no engine works against it; lift,
+whatever the surfaces do to it, takes none. Where an alarm is raised while it falls as fast as in the lowest
+part of healthy flight, with the engine idling, no surface is named: `unknown`, and `engine` where it goes on.
+"""
+
+import numpy as np
+
+from beaver_ftc.flights.recording import Floats
+
+ENGINE, UNKNOWN = "engine", "unknown"
+LOWEST = 0.15
+"""Share of healthy flight in which energy falls as fast as without power."""
+_WINDOW_S, _GOES_ON_S = 5.0, 3.0
+_G_M_S2 = 9.80665
+
+
+def climb_of(t_s: Floats, altitude: Floats, airspeed: Floats, run: np.ndarray) -> Floats:
+    """Rate of the energy height over the last seconds, m/s, (n,); nan before they have passed."""
+    height = altitude + airspeed**2 / (2.0 * _G_M_S2)
+    first = np.searchsorted(t_s, t_s - _WINDOW_S, side="right") - 1
+    known = (first >= 0) & (run[np.maximum(first, 0)] == run)
+    first = np.maximum(first, 0)
+    lasted_s = np.where(known, t_s - t_s[first], 1.0)
+    return np.asarray(np.where(known, (height - height[first]) / lasted_s, np.nan))
+
+
+def renamed(t_s: Floats, faulty: np.ndarray, named: np.ndarray, climb: Floats, lowest: float) -> np.ndarray:
+    """The names of rows (n,), without a surface where energy falls as without power, or did at the alarm.
+
+    A row uses nothing later than its time.
+    """
+    falls, found = climb <= lowest, named.copy()
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], faulty, [0]])))
+    for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        share = np.cumsum(falls[begin:end]) / np.arange(1, end - begin + 1)
+        goes_on = falls[begin] & (share > 0.5) & (t_s[begin:end] - t_s[begin] >= _GOES_ON_S)
+        doubted = np.where(np.logical_or.accumulate(goes_on), ENGINE, UNKNOWN)
+        found[begin:end] = np.where(falls[begin] | falls[begin:end], doubted, named[begin:end])
+    return found

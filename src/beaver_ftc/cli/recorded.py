@@ -119,7 +119,7 @@ def diagnose(
 
     model: The model file `identify` has written; none for our own logs.
     aircraft: The aircraft by whose own model it is diagnosed, as the loop does, instead of an identified one.
-    scenario: With --aircraft: whose fdi, actuators, design_model and substeps say what errors are declared.
+    scenario: With --aircraft: whose fdi, actuators and design_model say what errors are declared.
     vehicle: With --aircraft: the vehicle file, if it is not vehicle.yaml beside the log.
     out: Folder for the results.
     score: Compare with the log's labels, after the fact.

@@ -20,7 +20,7 @@ from beaver_ftc.loop.stream import FLOW, Diagnosis
 LOSS = "loss_of_effectiveness"
 STANDS_S = 1.0
 _ROUNDING, _ROUNDING_RAD_S2 = 1e-9, 1e-12
-_KEPT = ("fdi", "actuators", "design_model", "substeps")
+_KEPT = ("fdi", "actuators", "design_model")  # between samples a log has no instants
 
 
 @dataclass(frozen=True)

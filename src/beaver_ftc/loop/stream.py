@@ -35,9 +35,8 @@ class Diagnosis:
 
     aircraft: whose surfaces and stops. rate_hz: samples a second, evenly spaced. fdi: as in a scenario file.
     actuators, design_model: likewise, if they are not ideal. start: rates, signals and surfaces of the trim
-    that what is linearised or statistical holds on to; the first sample, if it is left out. substeps: so many
-    times in a frame a surface can have moved. Raises BadInput that names the key. Everything it remembers is
-    one record of fixed size.
+    that what is linearised or statistical holds on to; the first sample, if it is left out. Raises BadInput
+    that names the key. Everything it remembers is one record of fixed size.
     """
 
     def __init__(
@@ -49,13 +48,12 @@ class Diagnosis:
         actuators: Any = "ideal",
         design_model: Mapping[str, Any] | None = None,
         start: Start | None = None,
-        substeps: int = 1,
     ) -> None:
         if not isinstance(aircraft, Aircraft):
             raise BadInput(f"aircraft: {aircraft!r:.60} is none, allowed: what aircraft() gives")
         given = {
             "name": "stream", "rate_hz": rate_hz, "fdi": fdi or {}, "actuators": actuators,
-            "design_model": design_model or {}, "substeps": substeps,
+            "design_model": design_model or {},
         }  # fmt: skip
         with checked_against(aircraft):
             self._scenario = load(given)

@@ -109,14 +109,15 @@ def _thresholds(flight: Flight, last: int) -> None:
             raise Doubtful(f"row {k} is of another time")
     if flight.logged("threshold_rad_s", flight.since) != zero:
         raise Doubtful("the diagnosis had begun before")
-    H, N = [0.0] * 3, flight.noise(flight.since)
+    H, N, largest = [0.0] * 3, flight.noise(flight.since), 0.0
     for k in range(flight.since + 1, last + 1):
         before, now = flight.noise(k - 1), flight.noise(k)
         eta, T = flight.logged("eta_bar_rad_s2", k), flight.logged("threshold_rad_s", k)
         for i in range(3):
             H[i] = a * H[i] + flight.dt * eta[i]
             N[i] = a * N[i] + (1.0 - a) * before[i]
-            if not isclose(H[i] + N[i] + now[i], T[i], rel_tol=1e-10):
+            largest = max(largest, T[i])
+            if not isclose(H[i] + N[i] + now[i], T[i], rel_tol=1e-10, abs_tol=1e-14 * largest):
                 raise Doubtful(f"the threshold of row {k} is another")
 
 

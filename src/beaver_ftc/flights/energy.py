@@ -7,18 +7,18 @@ part of healthy flight, with the engine idling, no surface is named: `unknown`, 
 
 import numpy as np
 
+from beaver_ftc.aircraft.units import GRAVITY_MPS2
 from beaver_ftc.flights.recording import Floats
 
 ENGINE, UNKNOWN = "engine", "unknown"
 LOWEST = 0.15
 """Share of healthy flight in which energy falls as fast as without power."""
 _WINDOW_S, _GOES_ON_S = 5.0, 3.0
-_G_M_S2 = 9.80665
 
 
 def climb_of(t_s: Floats, altitude: Floats, airspeed: Floats, run: np.ndarray) -> Floats:
     """Rate of the energy height over the last seconds, m/s, (n,); nan before they have passed."""
-    height = altitude + airspeed**2 / (2.0 * _G_M_S2)
+    height = altitude + airspeed**2 / (2.0 * GRAVITY_MPS2)
     first = np.searchsorted(t_s, t_s - _WINDOW_S, side="right") - 1
     known = (first >= 0) & (run[np.maximum(first, 0)] == run)
     first = np.maximum(first, 0)

@@ -222,7 +222,7 @@ def candidates(tape: Tape, history: History) -> Iterator[Candidate]:
     for s, kind in _left(tape):
         of = hypothesis(tape, s, kind)
         if kind == FLOAT:
-            yield Candidate(s, kind, of.offset[0, 0] * 0.0, 0.0)
+            yield Candidate(s, kind, 0.0, 0.0)
             continue
         low, high = _interval(of, history, shown)
         if low <= high:

@@ -14,6 +14,7 @@ from beaver_ftc.results.temporal import Formula
 from beaver_ftc.scenario.dump import to_yaml
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.evidence.plan import EvidencePlan, OfHandling, OfMargins, Requirement
+from beaver_ftc.studies.present.tables import finite
 from beaver_ftc.studies.sweep.one_flight import (
     BAD_INPUT,
     CRASHED,
@@ -186,8 +187,8 @@ def _of_handling(bar: OfHandling, scenario: Scenario, document: Row, log: Watche
         inside = limit.margin(each.value, bar.level)
         found.append(part(
             f"{limit.mode} {limit.quantity}", {key: v for key, v in asked.items() if v is not None},
-            _finite(each.value), MET if each.level <= bar.level else NOT_MET,
-            _finite(inside), f"level {each.level}" if each.level <= 3 else "no level",
+            finite(each.value), MET if each.level <= bar.level else NOT_MET,
+            finite(inside), f"level {each.level}" if each.level <= 3 else "no level",
         ))  # fmt: skip
     return found
 
@@ -204,14 +205,10 @@ def _of_margins(bar: OfMargins, scenario: Scenario) -> list[Row]:
         ("phase margin, deg", bar.phase_deg, min((each.phase_deg, each.fault) for each in found)),
     )
     return [
-        part(name, {"at_least": bound}, _finite(least), MET if least >= bound else NOT_MET,
-             _finite(least - bound), f"fault: {fault}")
+        part(name, {"at_least": bound}, finite(least), MET if least >= bound else NOT_MET,
+             finite(least - bound), f"fault: {fault}")
         for name, bound, (least, fault) in asked
     ]  # fmt: skip
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def cells(columns: dict[str, np.ndarray], scenario: Scenario) -> list[int]:

@@ -85,6 +85,12 @@ def test_a_mis_scaled_column_is_refused_with_the_factor_that_fits(tmp_path, fact
     assert len(str(error.value).splitlines()) == 1
 
 
+def test_a_log_whose_gyro_is_dead_cannot_be_used(tmp_path):
+    done = run("identify", "--check", logged(tmp_path / "k.csv", factors={"q_rad_s": 0.0}))
+    assert done.exit_code == 2
+    assert "rate q does not move: nothing can be identified or diagnosed" in done.stdout
+
+
 def test_a_log_without_rates_names_what_it_has(tmp_path):
     path = synthetic.write_csv(
         tmp_path / "a.csv", {"t_s": T_S, "height": T_S, **{f"c{i}": T_S for i in range(30)}}

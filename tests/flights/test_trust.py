@@ -1,5 +1,7 @@
 """A model is believed where it was fitted, and silent elsewhere."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -160,11 +162,13 @@ def test_a_model_that_explains_less_than_the_mean_is_refused():
         {"samples": 100, "explained": {"p": -71.0, "q": 0.5, "r": 0.1}},
         {"samples": 300, "explained": {"p": 0.5, "q": -0.1, "r": 0.1}},
     ]
-    stretches = fitting.stretches_of([HEALTHY])
+    frozen = replace(HEALTHY, notes=("q_rad_s: stands still for 600 s", "pitch: another"))
+    stretches = fitting.stretches_of([frozen])
     with pytest.raises(BadInput) as error:
         identification.check_explains(tests, stretches, small.model())
     said = str(error.value)
     assert "explains less of p than the mean does (p -17.375)" in said
+    assert said.endswith("follows; q_rad_s: stands still for 600 s")
     assert "more than these 1.9 min" in said
     identification.check_explains(
         tests[1:] + [tests[1] | {"explained": {"p": 0.5, "q": 0.2, "r": 0.1}}] * 3, stretches, small.model()

@@ -65,7 +65,11 @@ def check(path: Path, vehicle: Vehicle | None, reader: str | None) -> Document:
     except BadInput as error:
         return {"log": str(path), "usable": False, "lines": [*lines, str(error)], "vehicle": guess}
     lines += [_size(samples), *samples.notes, *_physics(recording, vehicle)]
-    return {"log": str(path), "usable": True, "lines": lines, "vehicle": guess}
+    dead = [
+        axis for axis, of in zip("pqr", samples.rates.T, strict=True) if np.ptp(of[np.isfinite(of)]) == 0.0
+    ]
+    lines += [f"rate {axis} does not move: nothing can be identified or diagnosed" for axis in dead]
+    return {"log": str(path), "usable": not dead, "lines": lines, "vehicle": guess}
 
 
 def _size(samples: Samples) -> str:

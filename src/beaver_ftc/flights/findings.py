@@ -155,7 +155,8 @@ def _event_line(event: Document) -> str:
         f"{name} {known['estimate']:.2f} ({known['low']:.2f} to {known['high']:.2f})"
         for name, known in event["effectiveness"].items()
     )
-    return f"  {event['from_s']:.1f} to {event['to_s']:.1f} s  {event['named']}  effectiveness {left}"
+    brief = "  (brief)" if event["brief"] else ""
+    return f"  {event['from_s']:.1f} to {event['to_s']:.1f} s  {event['named']}  effectiveness {left}{brief}"
 
 
 def statement(samples: Samples, model: Model) -> dict[str, Any]:

@@ -74,8 +74,15 @@ def check_explains(tests: list[Document], stretches: Sequence[fitting.Stretch], 
             f"identify: on parts it was not fitted on the model explains less of {', '.join(worse)} than the "
             f"mean does ({_axes(worse)}), allowed: a model that explains more; what would help: more than "
             f"these {minutes:.1f} min, commands that move more ({still[0]} has a standard deviation of "
-            f"{still[1]:.2g}), or the commands that this vehicle follows"
+            f"{still[1]:.2g}), or the commands that this vehicle follows{_of_rates(stretches, model)}"
         )
+
+
+def _of_rates(stretches: Sequence[fitting.Stretch], model: Model) -> str:
+    """What the reading has found wrong with the rates, each after a semicolon."""
+    rates = tuple(f"{getattr(model.vehicle.rates, axis).column}:" for axis in "pqr")
+    notes = [note for one in stretches for note in one.samples.notes if note.startswith(rates)]
+    return "".join(f"; {note}" for note in notes)
 
 
 def _movement(stretches: Sequence[fitting.Stretch], model: Model) -> dict[str, float]:

@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -65,13 +66,22 @@ FEATURES = (
 
 def features() -> str:
     """All that the documents speak of, on one aircraft of each kind."""
+    return _table(PLANES)
+
+
+def features_probe() -> str:
+    """On the aircraft that is built in."""
+    return _table(("beaver",))
+
+
+def _table(planes: Iterable[str]) -> str:
     reasons: list[str] = []
     rows = [[feature.name] for feature in FEATURES] + [
         ["`matrix`"],
         ["`matrix --declared`"],
         ["`live`, changes in flight"],
     ]
-    for plane in PLANES:
+    for plane in planes:
         if plane.startswith("jsbsim:"):
             derive_if_needed(plane)
         said = [_tried(feature, plane) for feature in FEATURES]
@@ -80,7 +90,7 @@ def features() -> str:
             if why and why not in reasons:
                 reasons.append(why)
             row.append(f"{NO} {reasons.index(why) + 1}" if why else YES)
-    head = [f"`{plane}`, {kind}" for plane, kind in PLANES.items()]
+    head = [f"`{plane}`, {PLANES[plane]}" for plane in planes]
     notes = "\n".join(f"{i}. {why}" for i, why in enumerate(reasons, 1))
     return markdown_table(("", *head), rows) + (f"\n\n{notes}" if notes else "")
 

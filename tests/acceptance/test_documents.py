@@ -14,7 +14,7 @@ TRIED = list(dict.fromkeys(line for line in map(tried, SHOWN) if line is not Non
 # No second time in JSON: another line of the same command is shorter, or there is no such option.
 TEXT_ONLY = re.compile(
     "power|bench|compare --|detectability|--backend|--flightgear|--search|--out|--help|schema|"
-    "--map|--variant [^ ]*,[^ ]*,|matrix --[dp]|ftc new|challenge new"
+    "--map|--variant [^ ]*,[^ ]*,|matrix --[dp]|ftc new|challenge new|&&"
 )
 PLUGIN = next(line for line in TRIED if "--target plugins" in line)
 

@@ -112,7 +112,7 @@ def diagnose(
     reader: ReaderOption = None,
     format: FormatOption = Format.text,
 ) -> None:
-    """Diagnose recorded flights with an identified model, or an aircraft's own.
+    """Diagnose recorded flights by a model or an aircraft.
 
     Writes DIR/<flight>/diagnosis.parquet (a row a sample), verdict.json and report.html. A row uses nothing
     later than its time. The log.parquet of a run of ours needs no model: it is diagnosed as it was in flight.

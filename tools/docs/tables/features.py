@@ -110,7 +110,7 @@ def _tried(feature: Feature, plane: str) -> str:
         )  # fmt: skip
     if run.returncode in (0, 1):
         return ""
-    return re.sub(r"^S(\.yaml)?(:\d+)?: ", "", run.stderr.strip().splitlines()[-1])
+    return re.sub(r"^S(\.yaml)?(:\d+)?: |`", "", run.stderr.strip().splitlines()[-1])
 
 
 def _matrix(plane: str, declared: bool) -> str:

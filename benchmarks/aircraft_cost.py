@@ -54,7 +54,7 @@ def without_bias_and_oscillation(root: ET.Element) -> None:
 
 def without_surfaces(root: ET.Element) -> None:
     """No flight control system: the commands go to the aerodynamics."""
-    for system in root.findall("system"):
+    for system in root.findall("system") + root.findall("flight_control"):
         root.remove(system)
     control = ET.SubElement(root, "flight_control")
     for s in SURFACES:

@@ -1,7 +1,6 @@
 """`beaver-ftc evidence`: fly a plan of requirements, and write what it shows."""
 
 import sys
-import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -9,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from beaver_ftc.cli.inputs import JunitOption, NoReportOption, WorkersOption
-from beaver_ftc.cli.output import Format, FormatOption, answer, emit_json, failure_of, write_junit
+from beaver_ftc.cli.output import Format, FormatOption, answer, judged
 from beaver_ftc.cli.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -48,19 +47,11 @@ def command(arguments: Arguments) -> None:
     """
     from beaver_ftc.studies.evidence.plan import load_plan
 
-    began = time.perf_counter()
-    try:
+    def fly() -> dict[str, Any]:
         plan = load_plan(arguments.plan)
-        verdict = _fly(plan, arguments) if arguments.replay is None else _replay(plan, arguments)
-    except Exception as error:
-        failure = failure_of(error)
-        if arguments.format is Format.json:
-            emit_json({"passed": False, "errors": str(failure).splitlines()})
-        failed = {"scenario": arguments.plan, "error": str(failure)}
-        write_junit([failed | {"took_s": time.perf_counter() - began}], arguments.junit)
-        raise failure from failure.__cause__
-    write_junit([verdict | {"took_s": time.perf_counter() - began}], arguments.junit)
-    raise typer.Exit(0 if verdict["passed"] else 1)
+        return _fly(plan, arguments) if arguments.replay is None else _replay(plan, arguments)
+
+    judged(arguments.plan, arguments.format, arguments.junit, fly)
 
 
 def _fly(plan: "EvidencePlan", arguments: Arguments) -> dict[str, Any]:
@@ -83,15 +74,15 @@ def _replay(plan: "EvidencePlan", arguments: Arguments) -> dict[str, Any]:
     from beaver_ftc.results.writer import run
     from beaver_ftc.studies.evidence.shown import of_flight
 
-    scenario, judged = of_flight(plan, str(arguments.replay))
+    scenario, requirements = of_flight(plan, str(arguments.replay))
     out = Path("runs") if arguments.out is None else arguments.out
     document = run(scenario, out, not arguments.no_report)
-    folder, meets = str(out / scenario.name), all(each["passed"] for each in judged)
-    lines = [f"{each['name']} {each['actual']}" for each in judged]
+    folder, meets = str(out / scenario.name), all(each["passed"] for each in requirements)
+    lines = [f"{each['name']} {each['actual']}" for each in requirements]
     said = document | {"folder": folder, "requirements": lines, "passed": meets}
 
     def text() -> str:
         return "\n".join([verdict_text(document, folder, sys.stdout.isatty()).rstrip(), *lines])
 
     answer(arguments.format, said, text)
-    return {"scenario": scenario.name, "passed": meets, "expectations": judged}
+    return {"scenario": scenario.name, "passed": meets, "expectations": requirements}

@@ -2,12 +2,13 @@
 
 import os
 import sys
+import time
 import traceback
 from collections.abc import Callable
 from contextlib import suppress
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NoReturn
 
 import typer
 
@@ -95,6 +96,26 @@ def write_junit(runs: list[Document], path: Path | None) -> None:
 
     if path is not None:
         junit.write_junit(runs, path)
+
+
+def judged(what: str, format: Format, junit: Path | None, fly: Callable[[], Document]) -> NoReturn:
+    """Fly what is judged as a whole, and end with its status: what fails is told in JSON and JUnit XML too.
+
+    what: the file it is of, where no verdict came to be.
+    fly: flies and answers; the verdict, as JUnit XML says it.
+    """
+    began = time.perf_counter()
+    try:
+        verdict = fly()
+    except Exception as error:
+        failure = failure_of(error)
+        if format is Format.json:
+            emit_json({"passed": False, "errors": str(failure).splitlines()})
+        failed = {"scenario": what, "error": str(failure), "took_s": time.perf_counter() - began}
+        write_junit([failed], junit)
+        raise failure from failure.__cause__
+    write_junit([verdict | {"took_s": time.perf_counter() - began}], junit)
+    raise typer.Exit(0 if verdict["passed"] else 1)
 
 
 def failure_of(error: Exception) -> BeaverFtcError:

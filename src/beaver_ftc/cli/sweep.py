@@ -2,7 +2,6 @@
 
 import signal
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -13,16 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from beaver_ftc.cli.inputs import JunitOption, NoReportOption
-from beaver_ftc.cli.output import (
-    Document,
-    Format,
-    FormatOption,
-    answer,
-    complain,
-    emit_json,
-    failure_of,
-    write_junit,
-)
+from beaver_ftc.cli.output import Document, Format, FormatOption, answer, complain, judged
 from beaver_ftc.documents.errors import BadInput
 
 if TYPE_CHECKING:
@@ -80,22 +70,15 @@ def command(arguments: Arguments) -> None:
     from beaver_ftc.scenario.sweeps import load_sweep
 
     options, replay, format = _options(arguments), arguments.replay, arguments.format
-    began = time.perf_counter()
     if arguments.rare is not None:
         _rare(load_sweep(arguments.file), arguments)
         return
-    try:
+
+    def fly() -> Document:
         sweep = load_sweep(arguments.file)
-        verdict = _fly(sweep, options, format) if replay is None else _replay(sweep, options, replay, format)
-    except Exception as error:
-        failure = failure_of(error)
-        if format is Format.json:
-            emit_json({"passed": False, "errors": str(failure).splitlines()})
-        failed = {"scenario": arguments.file, "error": str(failure)}
-        write_junit([failed | {"took_s": time.perf_counter() - began}], arguments.junit)
-        raise failure from failure.__cause__
-    write_junit([verdict | {"took_s": time.perf_counter() - began}], arguments.junit)
-    raise typer.Exit(0 if verdict["passed"] else 1)
+        return _fly(sweep, options, format) if replay is None else _replay(sweep, options, replay, format)
+
+    judged(arguments.file, format, arguments.junit, fly)
 
 
 def _rare(sweep: "Sweep", arguments: Arguments) -> None:

@@ -50,6 +50,7 @@ CANNOT = [
     "fdi: {pairs: true}",
     "fdi: {authority: statistical}",
     "fdi: {bounds: {sensors: {p: {delay_s: 0.1}, q: {bias_deg_s: 1}, r: {dropout_share: 0.1}}}}",
+    "fdi: {bounds: {sensors: {q: {scale_error: 1}, r: {scale_error: 0.9}}}}",
     "fdi: {bounds: {coefficients: {Cm_alfa: 0.1, CZ_alpha: 0.1, Cm_q: 0.1}}}",
     "fdi: {scheme: rls}",
     "uncertainty: {coefficients: {Cm_alfa: 1, " + ", ".join(f"C{i}: 1" for i in range(70)) + "}}",

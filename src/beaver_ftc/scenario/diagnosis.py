@@ -42,6 +42,9 @@ def _can_be_bounded(given: Sensors) -> Sensors:
     """Errors that have a bound, or a refusal."""
     loose = [name for name, sensor in given if not sensor.is_bounded]
     refuse([((name,), "a lag, a delay or a lost sample has no bound, allowed: 0") for name in loose])
+    blind = [name for name, sensor in given if sensor.scale_error >= 1.0]
+    says = "1 would admit an instrument that always reads 0, allowed: less than 1"
+    refuse([((name, "scale_error"), says) for name in blind])
     return given
 
 

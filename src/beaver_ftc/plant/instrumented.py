@@ -54,6 +54,7 @@ SIGNALS = {
     "mach": "velocities/mach",
 }
 
+GEAR, RETRACTED = "gear/gear-pos-norm", "gear/retracted-pos-norm"
 _OF_THE_FLOW = ("alpha_rate", "beta_rate")  # an aircraft without engines has not the properties of others
 
 # What stands before all functions in aerodynamics, by JSBSim's own schema.
@@ -153,11 +154,13 @@ def is_told(name: str) -> bool:
 
 
 def instrument(
-    source: Path, folder: Path, travel_rad: dict[str, tuple[float, float]], absent: Iterable[str] = ()
-) -> Path:
+    source: Path, folder: Path, travel_rad: dict[str, tuple[float, float]], absent: Iterable[str] = (),
+    gear_up: bool = False,
+) -> Path:  # fmt: skip
     """Write the instrumented copy of a model and what is beside it into an empty folder; returns its model.
 
     travel_rad: of each surface. absent: properties its files read that JSBSim alone does not give: 0 here.
+    gear_up: its aerodynamics see a landing gear that is retracted, wherever its own flight control has it.
 
     Raises BadInput where the failures cannot be put in, naming what is in the way.
     """
@@ -169,6 +172,10 @@ def instrument(
     (folder / SYSTEMS).mkdir(exist_ok=True)
     read = "".join(path.read_text("utf-8", "replace") for path in sorted(folder.rglob("*.xml")))
     aerodynamics = _aerodynamics(whole, source)
+    if gear_up:
+        absent = (*absent, RETRACTED)
+        for element in aerodynamics.iter("property"):
+            element.text = (element.text or "").replace(GEAR, RETRACTED)
     _put_in(aerodynamics, folder, travel_rad)
     _add_signals(aerodynamics, _engines(whole))
     _add_pitch_fault(aerodynamics, source.stem)

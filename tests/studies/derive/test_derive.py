@@ -236,6 +236,23 @@ def test_other_stops_leave_a_deflection_its_moment(tmp_path):
     assert seen == pytest.approx([0.5, 0.5])
 
 
+def test_a_retracted_gear_drags_as_little_as_in_the_aircraft_itself(tmp_path):
+    """Against plain JSBSim with the gear up; down, it is more than half of the C310's drag."""
+    source = instrumented.source_of("c310")
+    copy = bare(instrumented.instrument(source, tmp_path, {}, gear_up=True))
+    plain = bare(source)
+    down = drag_of(plain)
+    plain["gear/gear-cmd-norm"] = plain["gear/gear-pos-norm"] = 0.0
+    assert drag_of(copy) == pytest.approx(drag_of(plain), rel=1e-9)
+    assert down > 2.0 * drag_of(copy)
+
+
+def drag_of(fdm):
+    fdm["ic/vt-fps"], fdm["ic/h-sl-ft"] = 237.0, 5000.0
+    fdm.run_ic()
+    return fdm["forces/fwx-aero-lbs"]
+
+
 def test_what_flightgear_gives_is_there_in_the_copy_and_said(tmp_path):
     """Its model does not run without five properties of FlightGear's pushback and gear."""
     source = source_of("jsbsim:dr1")

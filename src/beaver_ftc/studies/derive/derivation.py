@@ -193,8 +193,16 @@ def _prepared(
         if wanted.airspeed_mps is not None:
             data["envelope"]["airspeed_mps"] = list(wanted.airspeed_mps)
     tell("trim")
-    tried = outlines[: 1 if wanted.airspeed_mps else None]
-    return outline.level_flight(tried, folder, notes)
+    tried, said = outlines[: 1 if wanted.airspeed_mps else None], list[str]()
+    level = outline.level_flight(tried, folder, said)
+    sinks = level[2].gamma_rad <= -outline.LEVEL_RAD and level[1].n_engines
+    if sinks and instrumented.GEAR in instrumented.seen_by_aerodynamics(source.model):
+        shutil.rmtree(folder)
+        instrumented.instrument(source.model, folder, travel, absent, gear_up=True)
+        said = ["its landing gear is retracted in the copy: with it, its power does not hold it level"]
+        level = outline.level_flight(tried, folder, said)
+    notes += said
+    return level
 
 
 def _derived(

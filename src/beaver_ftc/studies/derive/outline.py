@@ -53,7 +53,7 @@ Level = tuple[Data, Plant, TrimPoint]  # of an aircraft about to be sampled
 LIFT_COEFFICIENTS = (0.45, 0.3, 0.2, 0.12, 0.7)  # of the speeds to be tried
 _THROTTLES = (0.05, 1.0)
 _HALVINGS = 9
-_LEVEL_RAD = 0.01
+LEVEL_RAD = 0.01
 _POWER = 0.7  # at which engines are tried
 _GUESS_RAD = 0.05
 _SAME_THRUST = 0.05
@@ -269,7 +269,7 @@ def level_flight(outlines: list[Data], folder: Path, notes: list[str]) -> Level:
             continue
         plant = plant_of(data, folder)
         notes += choices
-        if plant.n_engines and abs(point.gamma_rad) >= _LEVEL_RAD:
+        if plant.n_engines and abs(point.gamma_rad) >= LEVEL_RAD:
             way, slope_deg = "climbs" if point.gamma_rad > 0.0 else "sinks", abs(degrees(point.gamma_rad))
             notes.append(f"in trim it {way} at {slope_deg:.1f} deg: its power goes no further")
         return data, plant, point

@@ -1,4 +1,4 @@
-"""What a flight costs beside flying: taken apart, in four kinds of flight, in units of JSBSim's plain frame.
+"""What a flight costs beside flying: taken apart, in five kinds of flight, in units of JSBSim's plain frame.
 
     python benchmarks/flight_cost.py [--rounds N] [--record FILE | --check FILE]
 
@@ -39,7 +39,7 @@ PAIRS = 4
 
 
 def measure(rounds: int) -> dict[str, Any]:
-    """The unit, us, and what `by_kind` gives, the loop's own part in units."""
+    """The unit, us, and what `by_kind` gives, frames and the loop's own part of them in units."""
     plain: list[float] = []
     with tempfile.TemporaryDirectory() as folder:
         unit = Variant(write_variant(Path(folder) / "plain", jsbsim_alone), trim())
@@ -53,7 +53,8 @@ def measure(rounds: int) -> dict[str, Any]:
         kinds = by_kind(rounds, fly_plain)
     unit_us = 1e6 * float(np.median(plain[1:]))
     for of in kinds.values():
-        of["own_part_units"] = round(of.pop("own_part_us") / unit_us, 3)
+        for part in ("own_part", "frame"):
+            of[f"{part}_units"] = round(of.pop(f"{part}_us") / unit_us, 3)
     return {"unit_us": unit_us, "kinds": kinds}
 
 
@@ -136,7 +137,7 @@ def main() -> int:
         print(f"{kind}: {parts}; bare frames {of['bare_ms']:.2f}")
         print(
             f"    frames / bare {of['frames_ratio']:.3f}, flight / bare {of['flight_ratio']:.3f}, "
-            f"the loop's own part {of['own_part_units']:.2f} units a JSBSim frame"
+            f"a frame {of['frame_units']:.2f} units, the loop's own part {of['own_part_units']:.2f} of them"
         )
     if given.record:
         revision = git("rev-parse", "HEAD").decode().strip() if (ROOT / ".git").exists() else None

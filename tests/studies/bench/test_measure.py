@@ -75,7 +75,7 @@ def test_kinds_of_flights_take_turns_after_a_warm_up(monkeypatch, changed):
     monkeypatch.setattr(measure, "_flown", fly)
     between = []
     found = measure.by_kind(3, lambda: between.append(len(flown)))
-    assert between == [0, 4, 8, 12]
+    assert between == [0, 5, 10, 15]
     assert not changed({"found": found, "flown": flown})
 
 

@@ -12,6 +12,7 @@ KINDS = {
     "published": "published",
     "class all": "all fault types",
     "real air, sensors, statistical": "turbulence, sensors, servos, statistical detector",
+    "class all, every error declared": "all fault types, consumer-grade sensors, every error declared",
     "autopilot": "autopilot",
 }
 ALTERNATIVES = {

@@ -146,6 +146,17 @@ KINDS: dict[str, tuple[str, dict[str, Any]]] = {
     "published": ("elevator-effectiveness", {}),
     "class all": ("elevator-effectiveness", {"fdi.fault_class": "all"}),
     "real air, sensors, statistical": ("robust-elevator-all", {}),
+    "class all, every error declared": (
+        "robust-elevator-all",
+        {
+            "fdi.fault_class": "all",
+            "fdi.sensor_monitor": "always",
+            "sensors": "consumer-grade",
+            "fdi.bounds.sensors": "consumer-grade",
+            "fdi.bounds.inertia": 0.05,
+            "fdi.bounds.deflection_deg": 0.2,
+        },
+    ),
     "autopilot": (
         "elevator-effectiveness",
         {"autopilot": {"altitude_m": [{"hold": True}], "heading_deg": [{"hold": True}]}},
@@ -158,8 +169,8 @@ def by_kind(rounds: int, between: Callable[[], object] = lambda: None) -> dict[s
     """What a flight of each kind costs, all kinds in each round; `between` is called before every round.
 
     Processor time: `parts_ms` by part, `bare_ms` for JSBSim's frames alone, `frames_ratio` and `flight_ratio`
-    to those, and `own_part_us`, what the loop adds to a JSBSim frame. Ratios are formed within a round; all
-    are medians over the rounds.
+    to those, `frame_us`, a frame of the loop, and `own_part_us`, what it adds to one of JSBSim. Ratios are
+    formed within a round; all are medians over the rounds.
     """
     sweeps = {kind: load_sweep(name) for kind, (name, _) in KINDS.items()}
     seen: dict[str, list[Taken]] = {kind: [] for kind in KINDS}
@@ -210,6 +221,7 @@ def _medians(rows: list[Taken]) -> Document:
         "bare_ms": round(1e3 * float(np.median(alone)), 3),
         "frames_ratio": round(float(np.median(frames_s / alone)), 3),
         "flight_ratio": round(float(np.median(parts.sum(axis=1) / alone)), 3),
+        "frame_us": round(1e6 * float(np.median(frames_s / runs)), 3),
         "own_part_us": round(1e6 * float(np.median((frames_s - alone) / runs)), 3),
     }
 

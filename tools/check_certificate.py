@@ -1,100 +1,100 @@
 """`python tools/check_certificate.py FOLDER|FILE [LOG]` exits 0 if the log proves certificate.json, else 1.
-
 From docs/theory.md and docs/certificates.md, whose letters it takes. NumPy alone; pyarrow opens the log."""
 
-import hashlib
-import json
+from hashlib import sha256
+from json import dumps, loads
 from pathlib import Path
 from sys import argv, exit
 
 import numpy as np
 from numpy.testing import assert_ as require  # raises AssertionError, with -O as well
+from pyarrow.parquet import read_table
 
 
-def read(about, log):
-    """Sections 1 to 3: nu, n and what is published of eta_bar, of each row; T is as declared."""
-    ends = {"x": "measured_rad_s", "F": "design_rad_s2", "eta_bar": "eta_bar_rad_s2", "T": "threshold_rad_s"}
-    log |= {name: np.column_stack([log[f"{axis}_{end}"] for axis in "pqr"]) for name, end in ends.items()}
-    said, dt, since, omega = about["declared"], about["dt_s"], about["since"], about.get("omega_E", 0)
-    end = max(one["frame"] for one in about["statements"] if one["column"])
-    c, b, g, o, beta, m = (np.array([said[name].get(axis, 0.0) for axis in "pqr"]) for name in "cbgoBm")
-    x, eta, a = log["x"], log["eta_bar"], np.exp(-about.get("pole_per_s", 0) * dt)
-    f = abs(x) + (o + m * abs(x)) / (1 - m)
-    earth = omega * ((1 + g) * f.sum(axis=1, keepdims=True) + g * omega) + 1e-11
-    log["bound"] = np.roll(c * f[:, [1, 0, 0]] * f[:, [2, 2, 1]] + b + earth, 1, 0) / about.get("instants", 1)
-    log["nu"], log["n"] = np.diff(x, axis=0, prepend=x[:1]) / dt - log["F"], (n := o - beta + m * f)
-    log["wrong"] = (abs(log["nu"]) > eta + (n + np.roll(n, 1, axis=0)) / dt).any(axis=1)
-    require(np.flatnonzero(~log["T"][:end].any(axis=1))[-1] == since, "the diagnosis began in another frame")
-    log["T"][since] = 2 * n[since]  # as if H = 0 and N = n had been logged
-    H, now, then, least = log["T"] - n, slice(since + 1, end + 1), slice(since, end), 1e-14 * log["T"].max()
-    require(np.allclose(H[now] - a * H[then], dt * eta[now] + (1 - a) * n[then], 1e-11, least), "thresholds")
+class Flight:
+    def __init__(self, about, log):  # sections 1 and 2, by row: nu, n, the published eta_bar, health's most
+        ends, self.log, self.dt = ("measured_rad_s", "design_rad_s2", "eta_bar_rad_s2"), log, about["dt_s"]
+        self.x, self.F, self.eta_bar = (np.column_stack([log[f"{i}_{end}"] for i in "pqr"]) for end in ends)
+        x, said, omega, parts = self.x, about["declared"], about.get("omega_E", 0), about.get("instants", 1)
+        c, b, g, o, beta, m = (np.array([said[name].get(axis, 0.0) for axis in "pqr"]) for name in "cbgoBm")
+        f, self.late = abs(x) + (o + m * abs(x)) / (1 - m), int(parts > 1)
+        earth = omega * ((1 + g) * f.sum(axis=1, keepdims=True) + g * omega) + 1e-11
+        self.bound = np.roll(c * f[:, [1, 0, 0]] * f[:, [2, 2, 1]] + b + earth, 1, 0) / parts
+        self.nu, self.n = np.diff(x, axis=0, prepend=x[:1]) / self.dt - self.F, o - beta + m * f
+        self.most = self.eta_bar + (self.n + np.roll(self.n, 1, axis=0)) / self.dt
+        shows = (abs(self.nu) > self.most).any(axis=1) & (self.bound < self.eta_bar * (1 + 1e-13)).all(1)
+        self.shows = shows & np.roll(shows, self.late) & np.roll(shows, -self.late)
+
+    def sides(self, one, said, to):  # section 4, a filter along d: value, limit, what theta multiplies
+        k, dt, d, fault = one["frame"], self.dt, np.array(one["d"]), one.get("fault", 0)
+        a, since = np.exp(-one.get("pole_per_s", np.inf) * dt), one.get("since", k - 1)
+        rows, past, n = slice(one["first"], k + 1), slice(since + 1, k + 1), self.n @ abs(d)
+        logged = all(np.array_equal(one[it], vars(self)[it][rows]) for it in ("x", "F", "eta_bar"))
+        fits = logged and np.allclose(self.bound[rows] + one.get("rest", 0), one["eta_bar"], 1e-14, 0)
+        h, Z, r = (np.array(one.get(name, [0] * len(one["x"])), float) for name in "hZr")
+        fits &= min(*r, fault) >= 0 and (self.shows[k] or "shows" not in said["theta"])
+        fits = fits and 0 <= since < one["first"] <= k <= said.get("frame", k)
+        require(fits and (said["what"] or not np.any([h, Z])), "not so logged, or not to be admitted")
+        h, Z = (np.fmax(0, np.fmax(h + to[0] * Z, h + to[1] * Z)), 0) if said["theta"] == "any" else (h, Z)
+        w = a ** np.arange(k - since - 1.0, -1, -1)
+        most = w @ (dt * self.eta_bar[past] @ abs(d) + (1 - a) * n[since:k]) + a * w[0] * n[since] + n[k]
+        most += dt * w[-len(h) :] @ (h + r) + a ** len(h) * fault
+        return np.array([w @ (dt * self.nu[past] @ d), most, dt * sum(w[-len(h) :] * Z)])
+
+    def course(self, said):  # fault-types.md: frames bound a deflection; pairs: more than a type allows
+        found, get, (_, kind, *how) = [], said.get, said["what"].split()
+        for one in said["bounds"]:
+            k, (d, h, Z, r) = np.arange(one["first"], one["frame"] + 1), (np.array(one[i]) for i in "dhZr")
+            theta = (self.nu[k] @ d - h - self.most[k] @ abs(d) - r) / Z
+            found.append([k, Z, np.where(self.shows[k] & (r >= 0), theta, np.nan), theta + h / Z])
+        below = (rows := np.concatenate(found, axis=1))[1] > 0
+        (k, _, q, off), (K, _, o, away) = rows[:, below], rows[:, ~below].sum(axis=1)  # one from above
+        ahead, stops, inc = q - get("ordered", 0), get("stops", [0]), "grows" in how
+        pairs = [(off[0], 0), (off[0], away), (q[0], stops[0]), (stops[-1], o), (K, k[0])]
+        pairs += [(q[0] + get("pace_rad_s", 0) * self.dt * (K - k[0] - self.late), o)]
+        pairs += [(len(q) - 1, np.pi / get("slowest_rad_s", 1) / self.dt), (min(ahead), 0), (sum(ahead), 0)]
+        pairs += [(q[-1], o - get("step", 0) * (len(q) - 2)), (q[-1], get("near", 0)), (1, abs(K - k[0]))]
+        at = {"bias": (1 - inc, 4 + inc), "hardover": (3, 6), "oscillatory": (6, 9), "rate_limit": (7, 12)}
+        require(sum(~below) == (kind != "oscillatory") and np.all(np.diff(k) == 1), "frames do not follow")
+        return *np.transpose(pairs[slice(*at[kind])]), 0
+
+    def score(self, said):  # section 7: evidence, what it must exceed; Y: columns nu, signature, constants
+        A, sums, room, w = np.kron([[1, self.dt], [0, 1]], np.eye(n := len(axes := said["axes"]))), 0, 0, 0
+        Y, P, R = (np.nan_to_num(np.array(said[name], float)) for name in "YPR")  # null: it decides nothing
+        for k, its in enumerate(said["frames"], said["first"]):
+            u = np.stack([self.nu[k, axes] - its.get("air", 0), its["signature"], *its.get("known", [])], 1)
+            Y, P = A @ Y + self.dt * np.eye(2 * n, n) @ u, A @ (P + np.diag(its["Q"])) @ A.T
+            K = P[:, :n] @ (inverse := np.linalg.inv(P[:n, :n] + np.diag(R)))
+            before, w, sums = w, inverse @ Y[:n, 1], sums + inverse @ Y[:n, 1] @ Y[:n]
+            swing = 1.2 * abs(np.linalg.pinv(K[n:])) @ its.get("bounded", np.zeros(n))
+            room += np.array([swing @ abs(w - before), said.get("pace", 1e9) * swing @ abs(w)])
+            Y, P = Y - K @ Y[:n], P - K @ P[:n]
+        N = (abs(sums[0]) if said["sense"] == "either" else -sums[0]) - said["tolerance"] @ abs(sums[2:])
+        most = max(z := said["level"] * np.sqrt(abs(sums[1])), min(room[0] + swing @ abs(w), room[1]) + z / 2)
+        logged = self.log[said["likelihood"]][said["frame"]] * (1 + 1e-9)
+        return *np.transpose([(N, most), (logged, N / most)]), 0
 
 
-def sides(one, said, to, about, log):
-    """Section 4, of one filter in one direction: its value, its limit, and what theta multiplies in that."""
-    first, last, dt, d = one["first"], one["frame"], about["dt_s"], np.array(one["d"])
-    a, since = np.exp(-one["pole_per_s"] * dt) if "pole_per_s" in one else 0.0, one.get("since", last - 1)
-    begins = not a or since in (about["since"], np.flatnonzero(log["detected"] == 0)[-1] + 1)
-    require(begins and 0 <= since < first <= last <= said.get("frame", last), "frames do not follow")
-    rows, past, n = slice(first, last + 1), slice(since + 1, last + 1), log["n"] @ abs(d)
-    require(all(np.array_equal(one[it], log[it][rows]) for it in ("x", "F", "eta_bar")), "not so logged")
-    require(np.allclose(log["bound"][rows] + one.get("rest", 0), one["eta_bar"], 1e-14, 0), "another bound")
-    h, Z, r = (np.array(one.get(name, [0] * len(one["x"])), float) for name in "hZr")
-    fault = one.get("fault", 0)
-    require(min(*r, fault) >= 0 and (said["what"] or not any([*h, *Z, *r, fault])), "not to be admitted")
-    wrong = log["wrong"][last - 1 : last + 2] if about["instants"] > 1 else log["wrong"][last]
-    require(np.all(wrong) or said["theta"] != "constant while it shows", "health explains the frame")
-    h, Z = (np.fmax(0, np.fmax(h + to[0] * Z, h + to[1] * Z)), 0 * r) if said["theta"] == "any" else (h, Z)
-    w = a ** np.arange(last - since - 1.0, -1, -1)
-    most = w @ (dt * log["eta_bar"][past] @ abs(d) + (1 - a) * n[since:last]) + a * w[0] * n[since] + n[last]
-    most += dt * w[-len(h) :] @ (h + r) + a ** len(h) * fault
-    return np.array([w @ (dt * log["nu"][past] @ d), most, dt * w[-len(h) :] @ Z])
-
-
-def score(said, about, log):
-    """Section 7: evidence, and what it must exceed. Columns of Y: nu, signature, constants; rows: e, -d."""
-    dt, axes, n = about["dt_s"], said["axes"], len(said["axes"])
-    Y, P, R = (np.nan_to_num(np.array(said[name], float)) for name in "YPR")  # null: it decides nothing
-    A, Y, sums, room, w = np.kron([[1, dt], [0, 1]], np.eye(n)), np.insert(Y, 1, 0, axis=1), 0, 0, np.zeros(n)
-    for k, its in enumerate(said["frames"], said["first"]):
-        u = np.column_stack([log["nu"][k, axes] - its.get("air", 0), its["signature"], *its.get("known", [])])
-        Y, P = A @ Y + dt * np.eye(2 * n, n) @ u, A @ (P + np.diag(its["Q"])) @ A.T
-        K = P[:, :n] @ (inverse := np.linalg.inv(P[:n, :n] + np.diag(R)))
-        before, w, sums = w, inverse @ Y[:n, 1], sums + inverse @ Y[:n, 1] @ Y[:n]
-        swing = 1.2 * abs(np.linalg.pinv(K[n:])) @ its.get("bounded", np.zeros(n))
-        room += np.array([swing @ abs(w - before), said.get("pace", 1e9) * swing @ abs(w)])
-        Y, P = Y - K @ Y[:n], P - K @ P[:n]
-    N = (abs(sums[0]) if said["sense"] == "either" else -sums[0]) - said["tolerance"] @ abs(sums[2:])
-    most = max(z := said["level"] * np.sqrt(abs(sums[1])), min(room[0] + swing @ abs(w), room[1]) + z / 2)
-    require(N / most <= log[said["likelihood"]][said["frame"]] * (1 + 1e-9), "more than the log's share")
-    return N, most, 0
-
-
-def failures(about, log):
-    """A line for each statement that does not hold; log: column -> values."""
-    text = json.dumps(about | {"digest": ""}, sort_keys=True, separators=(",", ":"))
-    written = hashlib.sha256(text.encode()).hexdigest(), len(log["t_s"]), 2
-    if written != (about["digest"], about["rows"], about["format"]):
+def failures(about, log):  # a line for each statement that does not hold; log: column -> values
+    text = dumps(about | {"digest": ""}, sort_keys=True, separators=(",", ":")).encode()
+    if (sha256(text).hexdigest(), len(log["t_s"]), 3) != (about["digest"], about["rows"], about["format"]):
         yield "this is not what was written, or not of this log"
     for said in about["statements"]:
-        name, what, k, log = said["column"], said["what"], said.get("frame"), dict(log)
+        name, what, k = said["column"], said["what"], said.get("frame")
         try:
             require(name in ((None, f"fie_{what}_excluded") if what else ("detected",)), "of another column")
             require(not name or log[name][k:].all() > log[name][k - 1], f"{name} is not set in that frame")
-            read(about, log)
-            ends = said.get("least", -1e99), said.get("most", 1e99)  # no limit where an end decides nothing
-            parts = [abs(one["weight"]) * sides(one, said, ends, about, log) for one in said.get("terms", [])]
-            value, limit, slope = sum(parts) if parts else score(said, about, log)
-            limit += abs(slope) > 1e-12 and max(ends[0] * slope, ends[1] * slope)
-            require(value > limit and np.allclose([value, limit], said["sides"], 1e-12, 0), "not so")
+            to, its = (said.get("least", -1e99), said.get("most", 1e99)), Flight(about, log)
+            sums = [abs(one["weight"]) * its.sides(one, said, to) for one in said.get("terms", [])]
+            value, limit, slope = sum(sums) if sums else (its.course if "bounds" in said else its.score)(said)
+            limit += abs(slope) > 1e-12 and max(to[0] * slope, to[1] * slope)
+            require(np.all(value > limit) and np.allclose([value, limit], said["sides"], 1e-12, 0), "not so")
         except (AssertionError, ValueError, KeyError, IndexError, TypeError) as why:
             yield f"{what or 'alarm'}: {why}"
 
 
 if __name__ == "__main__":
-    from pyarrow.parquet import read_table
-
-    about = json.loads((file := Path(argv[1], "certificate.json" * Path(argv[1]).is_dir())).read_text())
+    about = loads((file := Path(argv[1], "certificate.json" * Path(argv[1]).is_dir())).read_text())
     table = read_table(argv[2] if len(argv) > 2 else file.parent / "log.parquet")
     found = "\n".join(failures(about, {name: table[name].to_numpy() for name in table.column_names}))
     exit(found or print(len(about["statements"]), "statements hold"))

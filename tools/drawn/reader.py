@@ -5,7 +5,6 @@ It shares no code with tools/check_certificate.py, which sums what is left of ea
 
 from collections.abc import Iterator
 from hashlib import sha256
-from itertools import pairwise
 from json import dumps
 from math import exp, isclose
 from typing import Any
@@ -30,9 +29,9 @@ class Flight:
     def __init__(self, document: Document, log: Columns) -> None:
         declared = document["declared"]
         self.log, self.rows, self.dt = log, len(log["t_s"]), document["dt_s"]
-        self.instants, self.since = document.get("instants", 1), document["since"]
+        self.instants = document.get("instants", 1)
         self.declared = {name: _by_axis(declared[name]) for name in ("c", "b", "g", "o", "B", "m")}
-        self.earth, self.pole = document.get("omega_E", 0.0), document.get("pole_per_s", 0.0)
+        self.earth = document.get("omega_E", 0.0)
 
     def logged(self, quantity: str, k: int) -> Vector:
         """p, q, r of a column in row k."""
@@ -84,12 +83,12 @@ def doubts(document: Document, log: Columns) -> Iterator[str]:
     text = dumps(unsigned, sort_keys=True, separators=(",", ":"))
     if sha256(text.encode()).hexdigest() != document["digest"]:
         yield "the digest is of another document"
-    if document["rows"] != len(log["t_s"]) or document["format"] != 2:
+    if document["rows"] != len(log["t_s"]) or document["format"] != 3:
         yield "the document is of another log, or of another format"
     if document["statements"]:
         try:
             flight = Flight(document, log)
-            _thresholds(flight, max(one["frame"] for one in document["statements"] if one["column"]))
+            _times(flight)
             for said in document["statements"]:
                 _statement(said, flight)
         except (Doubtful, KeyError, IndexError, TypeError, ValueError, ZeroDivisionError) as why:
@@ -101,24 +100,11 @@ def _sets(column: np.ndarray, k: int) -> bool:
     return k > 0 and column[k - 1] == 0.0 and all(flag == 1.0 for flag in column[k:])
 
 
-def _thresholds(flight: Flight, last: int) -> None:
-    """Section 3: filter 0's threshold, from the frame with which the diagnosis began."""
-    a, zero = exp(-flight.pole * flight.dt), [0.0, 0.0, 0.0]
-    for k, (t0, t1) in enumerate(pairwise(flight.log["t_s"])):
-        if not isclose(t0, k * flight.dt, abs_tol=1e-6) or not isclose(t1, (k + 1) * flight.dt, abs_tol=1e-6):
+def _times(flight: Flight) -> None:
+    """Rows are frames of dt."""
+    for k, t in enumerate(flight.log["t_s"]):
+        if not isclose(t, k * flight.dt, abs_tol=1e-6):
             raise Doubtful(f"row {k} is of another time")
-    if flight.logged("threshold_rad_s", flight.since) != zero:
-        raise Doubtful("the diagnosis had begun before")
-    H, N, largest = [0.0] * 3, flight.noise(flight.since), 0.0
-    for k in range(flight.since + 1, last + 1):
-        before, now = flight.noise(k - 1), flight.noise(k)
-        eta, T = flight.logged("eta_bar_rad_s2", k), flight.logged("threshold_rad_s", k)
-        for i in range(3):
-            H[i] = a * H[i] + flight.dt * eta[i]
-            N[i] = a * N[i] + (1.0 - a) * before[i]
-            largest = max(largest, T[i])
-            if not isclose(H[i] + N[i] + now[i], T[i], rel_tol=1e-10, abs_tol=1e-14 * largest):
-                raise Doubtful(f"the threshold of row {k} is another")
 
 
 def _statement(said: Document, flight: Flight) -> None:
@@ -131,15 +117,17 @@ def _statement(said: Document, flight: Flight) -> None:
         flight.log[column], k
     ):
         raise Doubtful(f"{what}: {column} is not set then")
-    value, limit = _weighed(said, flight) if "likelihood" in said else _added(said, flight)
-    agree = all(
-        isclose(*pair, rel_tol=SIDES_TO_SHARE) for pair in zip((value, limit), said["sides"], strict=True)
-    )
-    if not agree or not value > limit:
-        raise Doubtful(f"{what}: {value} > {limit} is not what it says, or not so")
+    how = _weighed if "likelihood" in said else _compared if said["theta"] == "course" else _added
+    found = how(said, flight)
+    stated = said["sides"] if how is not _added else [[side] for side in said["sides"]]
+    for value, limit, *two in zip(*zip(*found, strict=True), *stated, strict=True):
+        if not value > limit or not all(
+            isclose(*pair, rel_tol=SIDES_TO_SHARE) for pair in zip((value, limit), two, strict=True)
+        ):
+            raise Doubtful(f"{what}: {value} > {limit} is not what it says, or not so")
 
 
-def _added(said: Document, flight: Flight) -> tuple[float, float]:
+def _added(said: Document, flight: Flight) -> list[tuple[float, float]]:
     """Both sides of a sum over filters."""
     value = limit = slope = 0.0
     for one in said["terms"]:
@@ -150,7 +138,7 @@ def _added(said: Document, flight: Flight) -> tuple[float, float]:
         slope += one["weight"] * S
     if abs(slope) > 1e-12:
         limit += (said["most"] if slope > 0.0 else said["least"]) * slope
-    return value, limit
+    return [(value, limit)]
 
 
 def _followed(one: Document, said: Document, flight: Flight) -> tuple[float, float, float]:
@@ -158,9 +146,6 @@ def _followed(one: Document, said: Document, flight: Flight) -> tuple[float, flo
     first, last, d = one["first"], one["frame"], one["d"]
     a = exp(-one["pole_per_s"] * flight.dt) if "pole_per_s" in one else 0.0
     since = one["since"] if "pole_per_s" in one else last - 1
-    alarm = 1 + max(k for k, flag in enumerate(flight.log["detected"]) if not flag)
-    if "pole_per_s" in one and since not in (flight.since, alarm):
-        raise Doubtful("a filter begins nowhere")
     if not 0 <= since < first <= last or one.get("fault", 0.0) < 0.0:
         raise Doubtful("frames or effects out of order")
     _written_frames(one, flight, first, last)
@@ -217,6 +202,53 @@ def _along(d: Vector, values: Vector, size: bool = False) -> float:
     return sum((abs(part) if size else part) * value for part, value in zip(d, values, strict=True))
 
 
+def _compared(said: Document, flight: Flight) -> list[tuple[float, float]]:
+    """What single frames say of a deflection, pair by pair, of the type that is excluded."""
+    at_least, at_most = {}, {}
+    for one in said["bounds"]:
+        for place, k in enumerate(range(one["first"], one["frame"] + 1)):
+            beside = range(k - 1, k + 2) if flight.instants > 1 else (k,)
+            if one["r"][place] < 0.0 or not all(flight.unhealthy(j) for j in beside):
+                raise Doubtful(f"frame {k} says nothing")
+            said_of = at_least if one["Z"][place] > 0.0 else at_most
+            said_of[k] = (_deflection(one, place, k, flight), -one["h"][place] / one["Z"][place])
+    first, last = min(at_least), max(at_least)
+    frames = range(first, last + 1)
+    if [*at_least] != [*frames] or len(at_most) > 1:
+        raise Doubtful("frames do not follow")
+    low, command = at_least[first]
+    above = next(iter(at_most), first)
+    high, commanded = at_most.get(above, (float("nan"), float("nan")))
+    kind = said["what"].split(" ", 1)[1]
+    if kind.startswith("bias"):
+        lowest, highest = said["stops"]
+        pairs = [(low - command, high - commanded), (low, lowest), (highest, high)]
+        return [(low - command, 0.0), *pairs, (above, first)] if kind == "bias that grows" else pairs
+    if kind.startswith("hardover"):
+        spare = 1 if flight.instants > 1 else 0
+        reached = low + said["pace_rad_s"] * (above - first - spare) * flight.dt
+        return [(said["stops"][0], high), (above, first), (reached, high)]
+    if kind == "oscillatory":
+        off = [theta for theta, _ in at_least.values()]
+        return [(last - first, np.pi / said["slowest_rad_s"] / flight.dt), (min(off), 0.0), (sum(off), 0.0)]
+    if kind != "rate_limit" or above != first:
+        raise Doubtful(f"{kind} is no type, or begins elsewhere")
+    off = [theta - told for (theta, _), told in zip(at_least.values(), said["ordered"], strict=True)]
+    here, come = at_least[last][0], said["step"] * (last - first - 1) if "step" in said else 0.0
+    return [(min(off), 0.0), (sum(off), 0.0), (here, high - come), (here, said["near"]), (1.0, 0.0)]
+
+
+def _deflection(one: Document, place: int, k: int, flight: Flight) -> float:
+    """The least, or the greatest, theta with which nu = h + theta Z in frame k, give or take all there is."""
+    now, then, published = flight.noise(k), flight.noise(k - 1), flight.bound(k)
+    eta = flight.logged("eta_bar_rad_s2", k)
+    if any(published[i] > eta[i] * (1.0 + 1e-13) for i in range(3)):
+        raise Doubtful(f"the bound of row {k} is another")
+    most = [eta[i] + (now[i] + then[i]) / flight.dt for i in range(3)]
+    value = _along(one["d"], flight.innovation(k)) - one["h"][place]
+    return (value - _along(one["d"], most, size=True) - one["r"][place]) / one["Z"][place]
+
+
 class Whitening:
     """Section 7's filter on one axis: what it makes of the innovation, of a fault and of constants."""
 
@@ -228,7 +260,7 @@ class Whitening:
             raise Doubtful("axes that go together")
         self.xx, self.xd, self.dd, self.noise = P[i][i], P[i][n + i], P[n + i][n + i], said["R"][i] or 0.0
         rates, drifts = ([value or 0.0 for value in said["Y"][row]] for row in (i, n + i))
-        self.e, self.d = [rates[0], 0.0, *rates[1:]], [-drifts[0], 0.0, *(-value for value in drifts[1:])]
+        self.e, self.d = rates, [-value for value in drifts]
 
     def take(self, inputs: Vector, jitter: float, drift: float, dt: float) -> tuple[Vector, float, float]:
         """The whitened g of each input, its variance S, and the gain K_d of the drift."""
@@ -244,7 +276,7 @@ class Whitening:
         return g, S, of_drift
 
 
-def _weighed(said: Document, flight: Flight) -> tuple[float, float]:
+def _weighed(said: Document, flight: Flight) -> list[tuple[float, float]]:
     """The evidence for a fault, and what it must exceed: the level, or half of it beside bounds."""
     filters = [Whitening(said, i) for i in range(len(said["axes"]))]
     N, D, R = 0.0, 0.0, [0.0] * len(said["tolerance"])
@@ -270,6 +302,5 @@ def _weighed(said: Document, flight: Flight) -> tuple[float, float]:
     evidence -= sum(tol * abs(total) for tol, total in zip(said["tolerance"], R, strict=True))
     level = said["level"] * D**0.5
     limit = max(level, min(swinging + last, pacing) + 0.5 * level)
-    if evidence / limit > float(flight.log[said["likelihood"]][said["frame"]]) * (1.0 + 1e-9):
-        raise Doubtful("the log has a smaller share")
-    return evidence, limit
+    logged = float(flight.log[said["likelihood"]][said["frame"]]) * (1.0 + 1e-9)
+    return [(evidence, limit), (logged, evidence / limit)]

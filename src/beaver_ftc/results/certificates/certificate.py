@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from itertools import chain
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from beaver_ftc.design.model import AXES
 from beaver_ftc.diagnosis.bounds.declared import poles_for_noise
 from beaver_ftc.diagnosis.state import LOSS
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.results.certificates import chance, kinds
+from beaver_ftc.results.certificates import chance, courses, kinds
 from beaver_ftc.results.certificates.inequality import (
     Document,
     History,
@@ -37,7 +38,7 @@ from beaver_ftc.scenario.diagnosis import MAX_POLES
 from beaver_ftc.scenario.schema import Scenario
 
 Found = tuple[list[Term], Hypothesis] | None
-FILE, FORMAT = "certificate.json", 2
+FILE, FORMAT = "certificate.json", 3
 
 
 def certificate(scenario: Scenario, log: Log) -> Document:
@@ -68,7 +69,7 @@ def certificate_of(scenario: Scenario, log: Log, events: dict[str, int], tape: T
             certain = "sides" in said
             document["statements" if certain else "without"].append(said if certain else _without(said))
         if document["statements"]:
-            document |= _declared(scenario, tape, history, document["statements"])
+            document |= _declared(scenario, history, document["statements"])
     return sealed(document)
 
 
@@ -77,16 +78,15 @@ def _without(said: Document) -> Document:
     return {name: said[name] for name in ("what", "column", "because")}
 
 
-def _declared(scenario: Scenario, tape: Tape, history: History, said: list[Document]) -> Document:
+def _declared(scenario: Scenario, history: History, said: list[Document]) -> Document:
     """What all these statements go by."""
-    terms = [term for one in said for term in one.get("terms", [])]
-    frames = [np.arange(term["first"], term["frame"] + 1) for term in terms]
-    about: Document = {"dt_s": history.dt, "since": tape.since, "declared": declaration(history, frames)}
-    if terms:
+    spans = [span for one in said for span in (*one.get("terms", ()), *one.get("bounds", ()))]
+    frames = [np.arange(span["first"], span["frame"] + 1) for span in spans]
+    shown = any("shows" in one.get("theta", "") or "bounds" in one for one in said)  # which asks all axes
+    asked = np.array([shown or any(span["d"][i] for span in spans) for i in range(3)])
+    about: Document = {"dt_s": history.dt, "declared": declaration(history, frames, asked)}
+    if frames:
         about |= {"instants": scenario.substeps, "omega_E": history.declared["earth_rad_s"]}
-    last = max(one["frame"] for one in said if one["column"])
-    if last > tape.since + 1:  # before that no filter has a past
-        about["pole_per_s"] = scenario.fdi.detection_pole_per_s
     return about
 
 
@@ -178,10 +178,14 @@ def _of_types(scenario: Scenario, tape: Tape, history: History, alarm: int) -> I
     """Of each type excluded, surface by surface; the log has no column for it."""
     for s, kind, k in kinds.excluded_types(tape):
         because, found = kinds.why_not(tape, kind), None
+        about: Document = {"what": kinds.name_of(scenario.airframe.surfaces[s], kind), "column": None}
         if because is None:
             of = kinds.hypothesis(tape, s, kind)
+            if kind in courses.RULES:
+                said = courses.excludes(scenario, tape, history, of, s, kind, alarm)
+                yield about | (said or {"because": kinds.COURSE})
+                continue
             found = _first_violated(kinds.candidates(of, history, alarm, k), of, history, tape)
-        about: Document = {"what": kinds.name_of(scenario.airframe.surfaces[s], kind), "column": None}
         yield _stated(found, history, because or kinds.COURSE, **about)
 
 
@@ -205,9 +209,10 @@ def _of_alarm(scenario: Scenario, tape: Tape, history: History, k: int) -> Found
     if k <= tape.since:
         return None
     health = nothing(tape.first, tape.end - tape.first)
-    candidates = [[Term(d, inf, k - 1, k)] for d in directions((0, 1, 2))]
-    candidates += [[Term(d, pole, tape.since, k)] for pole in _poles(scenario) for d in directions((0, 1, 2))]
-    return _first_violated(candidates, health, history, tape)
+    of_frame = ([Term(d, inf, k - 1, k)] for d in directions((0, 1, 2)))
+    filters = ((pole, d) for pole in _poles(scenario) for d in directions((0, 1, 2)))
+    filtered = ([Term(d, pole, tape.since, k)] for pole, d in filters)
+    return _first_violated(chain(of_frame, filtered), health, history, tape)
 
 
 def _first_violated(candidates: Iterable[list[Term]], of: Hypothesis, history: History, tape: Tape) -> Found:
@@ -227,14 +232,13 @@ def _of_exclusion(scenario: Scenario, tape: Tape, history: History, e: int, alar
         tape.first, tape.offset[:, e], tape.slope[:, e], tape.spread[:, e], float(fie["low"]),
         float(fie["high"]), asked=asked,
     )  # fmt: skip
-    candidates = [*of_one_frame(k, of), *_filtered(scenario, tape, e, fie["across"], asked, k)]
-    if k > alarm:
-        candidates += [[Term(d, config.isolation_pole_per_s, alarm, k)] for d in directions(asked)]
-    found = _first_violated(candidates, of, history, tape)
+    since_alarm = ([Term(d, config.isolation_pole_per_s, alarm, k)] for d in directions(asked) if k > alarm)
+    filtered = _filtered(scenario, tape, e, fie["across"], asked, k)
+    found = _first_violated(chain(of_one_frame(k, of), filtered, since_alarm), of, history, tape)
     if found is not None:
         return found
     lasting = replace(of, constant=True)
-    candidates = []
+    candidates: list[list[Term]] = []
     if fie["kind"] == LOSS and config.fault_profile == "abrupt":
         candidates.append(constant_pair(lasting, history, np.arange(alarm, k + 1)))
     elif config.thresholds == "published" and k > alarm:

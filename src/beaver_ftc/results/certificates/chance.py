@@ -24,7 +24,7 @@ def of_alarm(tape: Tape, history: History, surfaces: Sequence[str], k: int) -> D
     """The statement that chance raised the alarm at row k; None where it is not one onset's, or too old."""
     chances = tape.alarm["fdi"]["statistical"]
     b, h, slot = _loudest(chances)
-    blocks = [frame[b] for frame in tape.kept["blocks"]]
+    blocks = [frame[b] for frame in tape.chances["blocks"]]
     first = next((r for r in range(k, tape.first, -1) if slot_to_start(r - tape.since) == slot), None)
     if first is None:
         return None
@@ -39,7 +39,8 @@ def of_alarm(tape: Tape, history: History, surfaces: Sequence[str], k: int) -> D
     score = float(hypothesis["score"] / chances["tests"]["alarm_level"])
     if not (value > limit and abs(value / limit - score) <= _AS_LOGGED * score):
         return None
-    return {"likelihood": f"{of}_likelihood_share", **said, "sides": [value, limit]}
+    pairs = [value, score * (1.0 + _AS_LOGGED)], [limit, value / limit]
+    return {"likelihood": f"{of}_likelihood_share", **said, "sides": [*pairs]}
 
 
 def _leave_out(said: Document, history: History) -> None:
@@ -54,12 +55,12 @@ def _leave_out(said: Document, history: History) -> None:
     m = len(said["tolerance"])
     matters = [j for j in range(m) if said["tolerance"][j] * abs(sums[2 + j]) > _FORGOTTEN * limit]
     said["tolerance"] = [said["tolerance"][j] for j in matters]
-    said["Y"] = [[row[0], *(row[1 + j] for j in matters)] for row in said["Y"]]
+    said["Y"] = [[row[0], None, *(row[2 + j] for j in matters)] for row in said["Y"]]
     for its in said["frames"]:
         if "known" in its:
             its["known"] = [its["known"][j] for j in matters]
     for row, felt in zip(said["Y"], sums[2 + m :], strict=True):
-        for c, tolerance in enumerate((1.0, *said["tolerance"])):
+        for c, tolerance in ((0, 1.0), *enumerate(said["tolerance"], 2)):
             if abs(felt * row[c]) * tolerance < _FORGOTTEN * limit:
                 row[c] = None
     for place in (*said["P"], said["R"]):
@@ -108,13 +109,14 @@ def _written(tape: Tape, history: History, blocks: list[np.void], h: int, first:
             "signature": now["hypothesis"][h]["signature"][felt],
             "known": [_input(known_then[j], responses[j], dt) for j in known],
             "Q": [*dt * dt * then["jitter"][felt], *grown],
-            "bounded": tape.kept["bounded"][r - 1 - tape.first][axes],
+            "bounded": tape.chances["bounded"][r - 1 - tape.first][axes],
         }
         grown = dt * np.diag(then["drift"])[felt]
         if bool(tape.alarm["fdi"]["statistical"]["air"]["moving"]):
             its["air"] = history.innovation(slice(r, r + 1))[0, axes] - seen
         frames.append({name: np.asarray(values).tolist() for name, values in its.items() if len(values)})
-    Y = np.array([start["state"][states], *(start["regressor_state"][j, states] for j in known)]).T
+    of_known = (start["regressor_state"][j, states] for j in known)
+    Y = np.array([start["state"][states], np.zeros(len(states)), *of_known]).T
     xx, xd, dd = (np.diag(np.diag(start[name])[felt]) for name in ("P_xx", "P_xd", "P_dd"))
     Y, P = np.vstack([Y[: len(felt)], -Y[len(felt) :]]), np.block([[xx, xd], [xd, dd]])
     return {
@@ -148,7 +150,7 @@ def _followed(said: Document, history: History) -> tuple[np.ndarray, float, floa
     axes, dt = said["axes"], history.dt
     n = len(axes)
     Y, P, R = (np.nan_to_num(np.array(said[name], float)) for name in "YPR")
-    Y, pace = np.column_stack([Y[:, 0], np.zeros(2 * n), Y[:, 1:], np.eye(2 * n)]), said.get("pace", 1e9)
+    Y, pace = np.column_stack([Y, np.eye(2 * n)]), said.get("pace", 1e9)
     A, sums, w = np.kron([[1.0, dt], [0.0, 1.0]], np.eye(n)), np.zeros(Y.shape[1]), np.zeros(n)
     swings = drifts = last = 0.0
     for r, its in enumerate(said["frames"], said["first"]):

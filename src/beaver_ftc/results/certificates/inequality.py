@@ -101,13 +101,13 @@ def declared_of(frame: np.void) -> Document:
     }  # fmt: skip
 
 
-def declaration(history: History, frames: list[np.ndarray]) -> Document:
+def declaration(history: History, frames: list[np.ndarray], asked: np.ndarray) -> Document:
     """What the certificate says of it, in the letters of theory, section 2, by axis: what is not zero, and
-    adds anything to the bounds of these rows; without any, what gyros err."""
+    adds anything to the bounds of these rows, on the axes `asked` (3,)."""
     declared, gyro = history.declared, history.declared["gyro"]
-    of = {"o": gyro["offset_rad_s"], "B": gyro["steady_rad_s"], "m": gyro["slope"]}
+    of = {"o": gyro["offset_rad_s"], "B": gyro["steady_rad_s"] * asked, "m": gyro["slope"]}
     if not frames:
-        return _by_axis(of | {"c": [], "b": [], "g": []})
+        return _by_axis({name: [] for name in "cbgoBm"})
     rows = np.concatenate(frames)
     f = (np.abs(history.x) + history.off)[rows - 1]
     pairs = np.column_stack((f[:, 1] * f[:, 2], f[:, 0] * f[:, 2], f[:, 0] * f[:, 1]))

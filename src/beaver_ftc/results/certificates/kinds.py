@@ -1,8 +1,8 @@
 """Exclusions of fault types whose parameter one number is: two frames that no such number explains.
 
 Stuck p = c, floating p = 0, a loss p = (1 + theta) u: so is a surface at fault in frames that health does not
-explain. The others are excluded by their course over many frames, and so is what an actuator brings back by
-and by; they are not certified.
+explain. The others are excluded by their course over many frames (courses.py). What an actuator brings back
+by and by is not certified.
 """
 
 from collections.abc import Iterator
@@ -11,7 +11,17 @@ from math import inf
 
 import numpy as np
 
-from beaver_ftc.diagnosis.types.registry import BIAS, CONSTANT_LOSS, FLOAT, NAMES, STUCK, VARYING_LOSS
+from beaver_ftc.diagnosis.types.registry import (
+    CONSTANT_LOSS,
+    DOWN,
+    FLOAT,
+    GROWING_BIAS,
+    NAMES,
+    OSCILLATORY,
+    STUCK,
+    UP,
+    VARYING_LOSS,
+)
 from beaver_ftc.results.certificates.inequality import (
     History,
     Hypothesis,
@@ -21,9 +31,11 @@ from beaver_ftc.results.certificates.inequality import (
 )
 from beaver_ftc.results.certificates.tape import Tape
 
-COURSE = "it was excluded by its course over many frames"
+COURSE = "frames of quiet excluded it, or what several say together"
+SWING = "of several instants a frame, a swing that a stop cuts off may keep its sign"
 RETURN = "its actuator may be bringing the surface back"
 BLOCKS = "frames were examined in blocks"
+_COURSES = {VARYING_LOSS: " that varies", GROWING_BIAS: " that grows", UP: " up", DOWN: " down"}
 
 
 def excluded_types(tape: Tape) -> Iterator[tuple[int, int, int]]:
@@ -41,15 +53,14 @@ def why_not(tape: Tape, kind: int) -> str | None:
     config = tape.alarm["fdi"]["types"]["config"]
     if config["length"] > 1:
         return BLOCKS
-    if kind not in (STUCK, FLOAT, CONSTANT_LOSS, VARYING_LOSS):
-        return COURSE
-    return RETURN if config["returns"] and kind in (STUCK, FLOAT) else None
+    if kind == OSCILLATORY and not config["whole"]:
+        return SWING
+    return RETURN if config["returns"] and kind in (STUCK, FLOAT, UP, DOWN) else None
 
 
 def name_of(surface: str, kind: int) -> str:
     """What is excluded, in words."""
-    course = " that varies" if kind == VARYING_LOSS else ""
-    return f"{surface} {NAMES[kind]}{course}"
+    return f"{surface} {NAMES[kind]}{_COURSES.get(kind, '')}"
 
 
 def hypothesis(tape: Tape, s: int, kind: int) -> Hypothesis:
@@ -59,13 +70,11 @@ def hypothesis(tape: Tape, s: int, kind: int) -> Hypothesis:
     Gu, G, spread = -tape.offset[:, e], tape.slope[:, e], tape.spread[:, e]
     asked = tuple(i for i in range(3) if not fdi["isolation"]["estimator"][e]["unasked"][i])
     low, high = float(surface["travel_low"]), float(surface["travel_high"])
-    if kind == STUCK:
+    if kind not in (FLOAT, CONSTANT_LOSS, VARYING_LOSS):  # held somewhere, as far as a frame goes
         return Hypothesis(tape.first, -Gu, G, spread, low, high, True, True, asked)
     if kind == FLOAT:
         neutral = min(max(0.0, low), high)
         return Hypothesis(tape.first, neutral * G - Gu, 0.0 * G, spread, 0.0, 0.0, True, True, asked)
-    if kind == BIAS:  # away from the stops
-        return Hypothesis(tape.first, 0.0 * G, G, spread, low - high, high - low, True, True, asked)
     loss = Hypothesis(tape.first, 0.0 * G, Gu, spread, -1.0, 0.0, True, True, asked)
     return loss if kind == CONSTANT_LOSS else replace(loss, constant=False, shown=False)
 

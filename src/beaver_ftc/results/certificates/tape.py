@@ -15,7 +15,7 @@ from beaver_ftc.scenario.schema import Scenario
 
 BEFORE = 40  # frames kept before the first event: what was before them is in the filters
 BEFORE_CHANCE = 130  # with the statistical detector, whose evidence builds up
-AFTER = 1000  # after the last one, where types are excluded one by one
+AFTER_S = 10.0  # after the last one, where types are excluded one by one
 
 
 @dataclass
@@ -36,19 +36,20 @@ class Tape:
     names: tuple[str, ...]
     reach_low: np.ndarray
     reach_high: np.ndarray
-    kept: dict[str, list[np.ndarray]] = field(default_factory=dict)
+    kept: dict[str, np.ndarray]
+    frames: int = 0
+    chances: dict[str, list[np.ndarray]] = field(default_factory=dict)
 
     def __getattr__(self, name: str) -> np.ndarray:
         """A quantity over the frames, (frames, ...)."""
         if name.startswith("_") or name not in self.kept:
             raise AttributeError(name)
-        self.__dict__[name] = array = np.array(self.kept[name])
-        return array
+        return self.kept[name][: self.frames]
 
     @property
     def end(self) -> int:
         """The frame after the last."""
-        return self.first + len(self.kept["x"])
+        return self.first + self.frames
 
     def at(self, k: int) -> int:
         """The place of frame k."""
@@ -59,7 +60,7 @@ def recorded(scenario: Scenario, events: Sequence[int], rows: int) -> Tape:
     """Fly again and keep the frames around these, of so many rows; the first of them is the alarm's."""
     loop = Loop(scenario)
     try:
-        after = AFTER if scenario.fdi.fault_class == "all" else 1
+        after = round(AFTER_S * scenario.rate_hz) if scenario.fdi.fault_class == "all" else 1
         return _record(loop, scenario, events, min(max(events) + after, rows))
     finally:
         loop.release()
@@ -73,12 +74,15 @@ def _record(loop: Loop, scenario: Scenario, events: Sequence[int], end: int) -> 
     for k in _flown(loop, max(min(events) - (BEFORE_CHANCE if chance else BEFORE), 0), end):
         frame = loop.frames[0]
         if tape is None or tape.since != int(frame["since"]):  # another diagnosis has begun
-            tape, views = _begun(frame, scenario)
+            tape, views = _begun(frame, scenario, end - k)
         for name, view in views.items():
-            tape.kept[name].append(view.copy())
+            tape.kept[name][tape.frames] = view
+        tape.frames += 1
         if chance and k <= events[0]:
-            tape.kept.setdefault("blocks", []).append(frame["fdi"]["statistical"]["block"].copy())
-            tape.kept.setdefault("bounded", []).append(frame["fdi"]["statistical"]["noise"]["bounded"].copy())
+            tape.chances.setdefault("blocks", []).append(frame["fdi"]["statistical"]["block"].copy())
+            tape.chances.setdefault("bounded", []).append(
+                frame["fdi"]["statistical"]["noise"]["bounded"].copy()
+            )
         if k == events[0]:
             tape.alarm = memory.copied(loop.frames)[0]
     assert tape is not None
@@ -104,8 +108,8 @@ def _flown(loop: Loop, first: int, end: int) -> Iterator[int]:
                 return
 
 
-def _begun(frame: np.void, scenario: Scenario) -> tuple[Tape, dict[str, Any]]:
-    """A tape that begins with this frame, and where in the record each quantity stands."""
+def _begun(frame: np.void, scenario: Scenario, n: int) -> tuple[Tape, dict[str, Any]]:
+    """A tape of n frames that begins with this one, and where in the record each quantity stands."""
     fdi, isolation = frame["fdi"], frame["fdi"]["isolation"]
     config = scenario.fdi
     estimators = isolation["estimator"][: int(isolation["n"])]
@@ -117,7 +121,12 @@ def _begun(frame: np.void, scenario: Scenario) -> tuple[Tape, dict[str, Any]]:
         "spread": estimators["effect"]["spread"], "excluded": estimators["excluded"],
         "types": fdi["types"]["surface"]["type_excluded"],
     }  # fmt: skip
+    if config.fault_class == "all":  # what the surfaces were told, and where healthy ones were
+        orders = fdi["types"]["surface"]["orders"]
+        views |= {"told_least": orders["low"], "told_most": orders["high"]}
+        views |= {name: orders[name] for name in ("least", "greatest")}
     k = int(frame["k"]) - 1
     reach = estimators["reach_low"].copy(), estimators["reach_high"].copy()
-    tape = Tape(k, int(frame["since"]), frame, frame, names, *reach, {name: [] for name in views})
+    kept = {name: np.empty((n, *view.shape), view.dtype) for name, view in views.items()}
+    tape = Tape(k, int(frame["since"]), frame, frame, names, *reach, kept)
     return tape, views

@@ -1,5 +1,7 @@
 """`beaver-ftc identify` and `diagnose`: from recorded flights to a model, and to what broke in a flight."""
 
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -100,18 +102,24 @@ def _write_new(path: Path, text: str) -> None:
         path.write_text(text, encoding="utf-8")
 
 
-def diagnose(
-    flights: FlightsArgument,
-    model: Annotated[Path | None, typer.Option(metavar="MODEL")] = None,
-    aircraft: Annotated[str | None, typer.Option(metavar="NAME")] = None,
-    scenario: Annotated[str | None, typer.Option(metavar="SCENARIO")] = None,
-    vehicle: Annotated[str | None, typer.Option(metavar="FILE")] = None,
-    out: Path = Path("diagnoses"),
-    score: bool = False,
-    detector: Annotated[str, typer.Option(metavar="NAME")] = "bank-of-filters",
-    reader: ReaderOption = None,
-    format: FormatOption = Format.text,
-) -> None:
+@dataclass(frozen=True)
+class Options:
+    """What is asked of `diagnose`."""
+
+    flights: FlightsArgument
+    model: Annotated[Path | None, typer.Option(metavar="MODEL")] = None
+    aircraft: Annotated[str | None, typer.Option(metavar="NAME")] = None
+    scenario: Annotated[str | None, typer.Option(metavar="SCENARIO")] = None
+    vehicle: Annotated[str | None, typer.Option(metavar="FILE")] = None
+    out: Path = Path("diagnoses")
+    score: bool = False
+    detector: Annotated[str, typer.Option(metavar="NAME")] = "bank-of-filters"
+    certificate: bool = False
+    reader: ReaderOption = None
+    format: FormatOption = Format.text
+
+
+def diagnose(options: Options) -> None:
     """Diagnose recorded flights by a model or an aircraft.
 
     Writes DIR/<flight>/diagnosis.parquet (a row a sample), verdict.json and report.html. A row uses nothing
@@ -124,12 +132,14 @@ def diagnose(
     out: Folder for the results.
     score: Compare with the log's labels, after the fact.
     detector: Who diagnoses: bank-of-filters, or a rival by its name.
+    certificate: With --aircraft: also write certificate.json and log.parquet, which prove the alarm.
     """
-    _check_options(model, aircraft, {"--scenario": scenario, "--vehicle": vehicle}, detector)
-    if aircraft is not None:
-        _by_aircraft(flights, (aircraft, scenario, vehicle), out, score, reader, format)
+    _check_options(options)
+    flights, out, format = options.flights, options.out, options.format
+    if options.aircraft is not None:
+        _by_aircraft(options)
         return
-    if model is None:
+    if options.model is None:
         _replay(flights, out, format)
         return
     from beaver_ftc.flights.detectors import check_detector
@@ -137,11 +147,11 @@ def diagnose(
     from beaver_ftc.flights.model import load_model
     from beaver_ftc.flights.samples import load_flights
 
-    check_detector(detector)
-    known = load_model(model)
+    check_detector(options.detector)
+    known = load_model(options.model)
     verdicts = [
-        _diagnose(flight, known, out, score, detector)
-        for flight in load_flights(flights, known.vehicle, reader)
+        _diagnose(flight, known, out, options.score, options.detector)
+        for flight in load_flights(flights, known.vehicle, options.reader)
     ]
     answer(
         format,
@@ -150,50 +160,48 @@ def diagnose(
     )
 
 
-def _check_options(
-    model: Path | None, aircraft: str | None, only: dict[str, str | None], detector: str
-) -> None:
+def _check_options(options: Options) -> None:
     """Raise BadInput for options that contradict one another."""
-    if aircraft is None:
+    if options.aircraft is None:
+        only = {"--scenario": options.scenario, "--vehicle": options.vehicle}
+        only |= {"--certificate": "" if options.certificate else None}
         for option, given in only.items():
             if given is not None:
-                raise BadInput(f"diagnose: {option} {given}: allowed: only with --aircraft NAME")
+                raise BadInput(
+                    f"diagnose: {f'{option} {given}'.rstrip()}: allowed: only with --aircraft NAME"
+                )
         return
-    if model is not None:
+    if options.model is not None:
         raise BadInput("diagnose: --model and --aircraft: allowed: one of them")
-    if detector != "bank-of-filters":
-        says = f"--detector {detector}: allowed: none, fdi.scheme of --scenario names it"
+    if options.detector != "bank-of-filters":
+        says = f"--detector {options.detector}: allowed: none, fdi.scheme of --scenario names it"
         raise BadInput(f"diagnose: --aircraft with {says}")
 
 
-def _by_aircraft(
-    flights: list[Path],
-    told: tuple[str, str | None, str | None],
-    out: Path,
-    scored: bool,
-    reader: str | None,
-    format: Format,
-) -> None:
-    """told: aircraft, scenario and vehicle file as given."""
-    from beaver_ftc.flights.by_aircraft import as_text, diagnose_as, known
+def _by_aircraft(options: Options) -> None:
+    from beaver_ftc.flights import certified
+    from beaver_ftc.flights.by_aircraft import as_text, diagnosed, known, take
     from beaver_ftc.flights.pages import write_by_aircraft
     from beaver_ftc.flights.samples import read_for
     from beaver_ftc.flights.scoring import score
     from beaver_ftc.flights.vehicle import load_vehicle
 
-    by = known(told[0], told[1])
+    by = known(str(options.aircraft), options.scenario)
     verdicts = []
-    for path in flights:
+    for path in options.flights:
         beside = path.with_name("vehicle.yaml")
-        if told[2] is None and not beside.is_file():
+        if options.vehicle is None and not beside.is_file():
             raise BadInput(f"{path}: no vehicle.yaml beside it, allowed: --vehicle FILE")
-        described = load_vehicle(told[2] or str(beside))
-        samples, rows, verdict = diagnose_as(read_for(path, described, reader), described, by)
-        if scored:
-            verdict["score"] = score(samples, rows, [[name] for name in by.aircraft.surfaces])
-        folder = write_by_aircraft(out, samples, by.aircraft.surfaces, rows, verdict)
+        described = load_vehicle(options.vehicle or str(beside))
+        taken = take(read_for(path, described, options.reader), described, by)
+        rows, verdict = diagnosed(taken, by)
+        samples, surfaces = taken.samples, by.aircraft.surfaces
+        if options.score:
+            verdict["score"] = score(samples, rows, [[name] for name in surfaces])
+        proof = partial(certified.write, taken, rows) if options.certificate else None
+        folder = write_by_aircraft(options.out, samples, surfaces, rows, verdict, proof)
         verdicts.append(verdict | {"folder": str(folder)})
-    answer(format, {"flights": verdicts}, lambda: "\n".join(map(as_text, verdicts)))
+    answer(options.format, {"flights": verdicts}, lambda: "\n".join(map(as_text, verdicts)))
 
 
 def _replay(flights: list[Path], out: Path, format: Format) -> None:

@@ -8,7 +8,7 @@ fault excluded. Outside the aircraft's envelope, after a gap and where a number 
 from dataclasses import dataclass, field, replace
 from math import pi
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,9 @@ from beaver_ftc.flights.recording import Floats, Recording, nearest_ten
 from beaver_ftc.flights.samples import Samples, at_samples, in_si, sample
 from beaver_ftc.flights.stepped import Stepped, declared_of, rows_of, step_through
 from beaver_ftc.flights.vehicle import Quantity, Vehicle
+
+if TYPE_CHECKING:
+    from beaver_ftc.loop.stream import Diagnosis
 
 Document = dict[str, Any]
 Mask = NDArray[np.bool_]
@@ -66,8 +69,22 @@ def known(reference: str, scenario: str | None = None) -> Known:
     return Known(given.airframe, declared_of(given))
 
 
-def diagnose_as(recording: Recording, vehicle: Vehicle, by: Known) -> tuple[Samples, Rows, Document]:
-    """The samples, the rows and the document of verdict.json. Raises BadInput for what the log lacks."""
+@dataclass(frozen=True)
+class Taken:
+    """What a log gives the diagnosis: as `stepped.inputs_of`; the mean age of what is held, s; and begin and
+    end of each stretch that is diagnosed in one."""
+
+    samples: Samples
+    diagnosis: "Diagnosis"
+    rate_hz: float
+    inputs: list[Floats]
+    ages: dict[str, float]
+    unknown: Mask
+    parts: list[tuple[int, int]]
+
+
+def take(recording: Recording, vehicle: Vehicle, by: Known) -> Taken:
+    """Read what the diagnosis is given. Raises BadInput for what the log lacks."""
     from beaver_ftc.loop.stream import Diagnosis
 
     _check(recording, vehicle, by.aircraft)
@@ -80,22 +97,34 @@ def diagnose_as(recording: Recording, vehicle: Vehicle, by: Known) -> tuple[Samp
     inputs, ages = _inputs(samples, recording, vehicle, by.aircraft, turning=fdi.bounds.turbulence != "none")
     _plausible(samples.name, inputs, by.aircraft)
     unknown = np.asarray(~np.isfinite(np.hstack(inputs)).all(axis=1))
-    parts, found = _stretches(samples, unknown, rate_hz), []
+    parts = _stretches(samples, unknown, rate_hz)
     if not parts:
         raise BadInput(
             f"{samples.name}: has no {_FEW} samples in turn, evenly spaced and without a missing number, "
             f"allowed: all signals logged at one rate of {_SLOWEST_HZ:g} to {_FASTEST_HZ:g} Hz"
         )
-    for begin, end in parts:
-        diagnosis.reset()
-        found.append(step_through(diagnosis, [part[begin:end] for part in inputs], rate_hz))
-    stepped = _whole(len(samples.t_s), len(by.aircraft.surfaces), parts, found)
-    rows = rows_of(samples.t_s, stepped, by.aircraft.surfaces, fdi)
-    reasons = _outside(inputs[1], by.aircraft, unknown, parts) | _misled(samples.t_s, parts, stepped)
-    rows = _silenced(rows, _since(parts, rows, reasons))
     order = _order(vehicle, by.aircraft)
     samples = replace(samples, commands=samples.commands[:, order], labels=samples.labels[:, order])
-    return samples, rows, _verdict(samples, rows, stepped, by, ages)
+    return Taken(samples, diagnosis, rate_hz, inputs, ages, unknown, parts)
+
+
+def diagnose_as(recording: Recording, vehicle: Vehicle, by: Known) -> tuple[Samples, Rows, Document]:
+    """The samples, the rows and the document of verdict.json. Raises BadInput for what the log lacks."""
+    taken = take(recording, vehicle, by)
+    return taken.samples, *diagnosed(taken, by)
+
+
+def diagnosed(taken: Taken, by: Known) -> tuple[Rows, Document]:
+    """The rows and the document of verdict.json."""
+    samples, diagnosis, inputs, parts, found = taken.samples, taken.diagnosis, taken.inputs, taken.parts, []
+    for begin, end in parts:
+        diagnosis.reset()
+        found.append(step_through(diagnosis, [part[begin:end] for part in inputs], taken.rate_hz))
+    stepped = _whole(len(samples.t_s), len(by.aircraft.surfaces), parts, found)
+    rows = rows_of(samples.t_s, stepped, by.aircraft.surfaces, diagnosis.config)
+    reasons = _outside(inputs[1], by.aircraft, taken.unknown, parts) | _misled(samples.t_s, parts, stepped)
+    rows = _silenced(rows, _since(parts, rows, reasons))
+    return rows, _verdict(samples, rows, stepped, by, taken.ages)
 
 
 def _check(recording: Recording, vehicle: Vehicle, aircraft: Aircraft) -> None:

@@ -1,7 +1,7 @@
 """The pages of recorded flights: of an identification and of a diagnosed flight, with its files."""
 
 from base64 import b64encode
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import cache
 from io import BytesIO
 from pathlib import Path
@@ -151,9 +151,14 @@ def write_diagnosis(out: Path, samples: Samples, model: Model, rows: Rows, verdi
 
 
 def write_by_aircraft(
-    out: Path, samples: Samples, surfaces: Sequence[str], rows: Rows, verdict: dict[str, Any]
+    out: Path,
+    samples: Samples,
+    surfaces: Sequence[str],
+    rows: Rows,
+    verdict: dict[str, Any],
+    further: Callable[[Path], None] | None = None,
 ) -> Path:
-    """The same of a flight that an aircraft's own model diagnosed."""
+    """The same of a flight that an aircraft's own model diagnosed; further: writes into the folder, too."""
     from beaver_ftc.flights.stepped import STANDS_S
 
     words = {
@@ -163,11 +168,16 @@ def write_by_aircraft(
         f"is at fault, has stood for {STANDS_S:g} s, and the errors declared hold.",
     }
     page = _page(samples, surfaces, rows, verdict, words)
-    return write_results(out, samples.name, columns(rows, surfaces), verdict, page)
+    return write_results(out, samples.name, columns(rows, surfaces), verdict, page, further)
 
 
 def write_results(
-    out: Path, name: str, columns: dict[str, Any], verdict: dict[str, Any], page: str | None = None
+    out: Path,
+    name: str,
+    columns: dict[str, Any],
+    verdict: dict[str, Any],
+    page: str | None = None,
+    further: Callable[[Path], None] | None = None,
 ) -> Path:
     """Write `out/<name>` with diagnosis.parquet, verdict.json and report.html, whole or not at all."""
     import pyarrow as pa
@@ -178,6 +188,8 @@ def write_results(
         (folder / "verdict.json").write_text(as_json(verdict), encoding="utf-8")
         if page is not None:
             (folder / "report.html").write_text(page, encoding="utf-8")
+        if further is not None:
+            further(folder)
     return out / name
 
 

@@ -20,6 +20,7 @@ from beaver_ftc.plugins import DETECTORS, is_compiled
 from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.diagnosis import FdiConfig
 from beaver_ftc.scenario.loader import load
+from beaver_ftc.scenario.schema import Scenario
 
 Vector = NDArray[np.float64]
 FLOW = ("alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa")  # signals every aircraft measures
@@ -134,6 +135,10 @@ class Diagnosis:
         its declared bound (3,), and what each surface was expected to give (3, surfaces), rad/s2."""
         innovation, bound = self._fdi["bank"]["innovation"], self._fdi["bound"]["frame"]
         return innovation.copy(), bound.copy(), self._frame["belief"]["means"]["Gu"].copy()
+
+    def inside(self) -> tuple[np.ndarray, Scenario]:
+        """Its record, of `frame_dtype`, since the last reset, and the scenario it stands for."""
+        return self._frames, self._scenario
 
     def _estimate(self) -> float | None:
         if self._scenario.fdi.fault_class == "published":

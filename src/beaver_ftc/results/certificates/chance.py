@@ -3,7 +3,7 @@
 What the log does not hold is kept frame by frame: signature, what declared constants multiply, variances.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -32,15 +32,27 @@ def of_alarm(tape: Tape, history: History, surfaces: Sequence[str], k: int) -> D
     if said is None:
         return None
     hypothesis = blocks[k - tape.first]["hypothesis"][h]
-    step = hypothesis["kind"] == STEP
-    of = f"{AXES[hypothesis['axis']]}_step" if step else f"{surfaces[hypothesis['surface']]}_loss"
     _leave_out(said, history)
     value, limit, _ = sides(said, history)
     score = float(hypothesis["score"] / chances["tests"]["alarm_level"])
     if not (value > limit and abs(value / limit - score) <= _AS_LOGGED * score):
         return None
     pairs = [value, score * (1.0 + _AS_LOGGED)], [limit, value / limit]
-    return {"likelihood": f"{of}_likelihood_share", **said, "sides": [*pairs]}
+    return {"likelihood": _column(hypothesis, surfaces), **said, "sides": [*pairs]}
+
+
+def shares(chances: np.void, surfaces: Sequence[str]) -> Iterator[tuple[str, float]]:
+    """Column, and share of the level, of each hypothesis that raises alarms, where drifts do not return."""
+    for block in chances["block"][:RETURNING]:
+        for hypothesis in block["hypothesis"][: block["n_hypotheses"]]:
+            if hypothesis["alarms"]:
+                yield _column(hypothesis, surfaces), hypothesis["score"] / chances["tests"]["alarm_level"]
+
+
+def _column(hypothesis: np.void, surfaces: Sequence[str]) -> str:
+    step = hypothesis["kind"] == STEP
+    of = f"{AXES[hypothesis['axis']]}_step" if step else f"{surfaces[hypothesis['surface']]}_loss"
+    return f"{of}_likelihood_share"
 
 
 def _leave_out(said: Document, history: History) -> None:

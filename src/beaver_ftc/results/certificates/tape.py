@@ -2,7 +2,7 @@
 bit. So the first flight pays nothing for its certificate.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -60,19 +60,27 @@ def recorded(scenario: Scenario, events: Sequence[int], rows: int) -> Tape:
     """Fly again and keep the frames around these, of so many rows; the first of them is the alarm's."""
     loop = Loop(scenario)
     try:
-        after = round(AFTER_S * scenario.rate_hz) if scenario.fdi.fault_class == "all" else 1
-        return _record(loop, scenario, events, min(max(events) + after, rows))
+        first, end = span(scenario, events, rows)
+        return record(loop.frames, _flown(loop, first, end), scenario, events, end)
     finally:
         loop.release()
 
 
-def _record(loop: Loop, scenario: Scenario, events: Sequence[int], end: int) -> Tape:
-    """Fly to frame `end`, keeping those from some before the first event on."""
+def span(scenario: Scenario, events: Sequence[int], rows: int) -> tuple[int, int]:
+    """The first frame to keep around these, of so many rows, and the one after the last."""
+    before = BEFORE if scenario.fdi.statistical is None else BEFORE_CHANCE
+    after = round(AFTER_S * scenario.rate_hz) if scenario.fdi.fault_class == "all" else 1
+    return max(min(events) - before, 0), min(max(events) + after, rows)
+
+
+def record(
+    frames: np.ndarray, flown: Iterable[int], scenario: Scenario, events: Sequence[int], end: int
+) -> Tape:
+    """Keep what stands in the record `frames` (1,) after each frame that has been flown, up to `end`."""
     tape: Tape | None = None
     views: dict[str, Any] = {}
-    chance = scenario.fdi.statistical is not None
-    for k in _flown(loop, max(min(events) - (BEFORE_CHANCE if chance else BEFORE), 0), end):
-        frame = loop.frames[0]
+    chance, frame = scenario.fdi.statistical is not None, frames[0]
+    for k in flown:
         if tape is None or tape.since != int(frame["since"]):  # another diagnosis has begun
             tape, views = _begun(frame, scenario, end - k)
         for name, view in views.items():
@@ -84,9 +92,9 @@ def _record(loop: Loop, scenario: Scenario, events: Sequence[int], end: int) -> 
                 frame["fdi"]["statistical"]["noise"]["bounded"].copy()
             )
         if k == events[0]:
-            tape.alarm = memory.copied(loop.frames)[0]
+            tape.alarm = memory.copied(frames)[0]
     assert tape is not None
-    tape.last = memory.copied(loop.frames)[0]
+    tape.last = memory.copied(frames)[0]
     return tape
 
 

@@ -48,9 +48,9 @@ def test_a_gap_ends_what_is_known():
     np.testing.assert_allclose(climb[T_S > 15.05], -2.0)
 
 
-def named_of(faulty, falls):
+def named_of(faulty, falls, since_s=0.0):
     names = np.where(faulty == 1, "left", "").astype(object)
-    return energy.renamed(T_S, faulty, names, np.where(falls, -2.0, 0.0), -1.0)
+    return energy.renamed(T_S, faulty, names, np.where(falls, -2.0, 0.5), -1.0, T_S - since_s)
 
 
 def test_an_alarm_while_energy_falls_names_no_surface():
@@ -61,22 +61,35 @@ def test_an_alarm_while_energy_falls_names_no_surface():
     assert set(named[(T_S < 4.95) | (T_S > 15.05)]) == {""}
 
 
-def test_an_alarm_in_powered_flight_keeps_its_name_but_where_energy_falls():
+def test_an_alarm_in_powered_flight_has_its_name_after_the_window_but_where_energy_falls():
     faulty = (T_S >= 5.0).astype(int)
-    named = named_of(faulty, (T_S >= 9.95) & (T_S < 12.0))
-    assert set(named[(T_S >= 5.0) & (T_S < 9.9)]) == {"left"}
-    assert set(named[(T_S > 10.0) & (T_S < 11.9)]) == {"unknown"}  # a dive after the alarm is no engine
-    assert set(named[T_S > 12.05]) == {"left"}
+    named = named_of(faulty, (T_S >= 11.95) & (T_S < 14.0))
+    assert set(named[(T_S >= 5.0) & (T_S < 9.9)]) == {"unknown"}  # the window reaches to before the fault
+    assert set(named[(T_S > 10.05) & (T_S < 11.9)]) == {"left"}
+    assert set(named[(T_S > 12.0) & (T_S < 13.9)]) == {"unknown"}  # a dive after the alarm is no engine
+    assert set(named[T_S > 14.05]) == {"left"}
+
+
+def test_energy_that_has_fallen_since_the_evidence_began_names_no_surface_until_it_rises():
+    faulty = (T_S >= 12.0).astype(int)
+    falls = (T_S >= 8.0) & (T_S < 10.0)
+    climb = np.where(falls, -2.0, np.where(T_S < 16.0, -0.5, 0.5))  # neither without power, nor with it
+    names = np.where(faulty == 1, "left", "").astype(object)
+    named = energy.renamed(T_S, faulty, names, climb, -1.0, T_S - 6.0)
+    assert set(named[(T_S >= 12.0) & (T_S < 15.9)]) == {"unknown"}
+    assert set(named[T_S > 16.05]) == {"left"}
+    assert set(energy.renamed(T_S, faulty, names, climb, -1.0, T_S)[T_S > 17.05]) == {"left"}
 
 
 @given(st.lists(st.tuples(st.booleans(), st.booleans()), min_size=2, max_size=60), st.data())
 def test_a_name_uses_nothing_later(rows, data):
     faulty = np.array([int(one) for one, _ in rows])
-    climb = np.array([-2.0 if falls else 0.0 for _, falls in rows])
+    climb = np.array([-2.0 if falls else 0.5 for _, falls in rows])
     names, t_s = np.where(faulty == 1, "left", "").astype(object), np.arange(len(rows)) * 0.5
     cut = data.draw(st.integers(1, len(rows)))
-    whole = energy.renamed(t_s, faulty, names, climb, -1.0)
-    short = energy.renamed(t_s[:cut], faulty[:cut], names[:cut], climb[:cut], -1.0)
+    since_s = np.maximum(t_s - 2.0, 0.0)
+    whole = energy.renamed(t_s, faulty, names, climb, -1.0, since_s)
+    short = energy.renamed(t_s[:cut], faulty[:cut], names[:cut], climb[:cut], -1.0, since_s[:cut])
     assert whole[:cut].tolist() == short.tolist()
     assert all((name == "") == (flag == 0) for name, flag in zip(whole, faulty, strict=True))
 

@@ -212,7 +212,7 @@ def test_settings_by_hand(fitted):
     assert settings.changes_per_hour == pytest.approx(np.sqrt((4 + 1) / (use / 36000.0) * 12.0))
     assert settings.repair_share == pytest.approx((2 + 10) / (4 + 20))
     assert settings.delays_s == pytest.approx([-0.04, 0.0, 0.04])
-    stuck = fitting.prior(fitting.stretches_of([small.flight(TAIL, 200)]), TAIL)
+    stuck = fitting.prior(fitting.stretches_of([small.flight(TAIL, 400)]), TAIL)
     assert (stuck.alarm, stuck.hold_s, stuck.power, stuck.levels) == (0.995, 0.3, 0.9, {})
     given = settings.model_copy(update={"alarm": 0.7})
     stretches = fitting.stretches_of([small.flight(MODEL, 300)])

@@ -67,7 +67,19 @@ def test_the_account_of_an_identification(changed, identified):
     assert not changed(summary(identified).splitlines(), part="summary")
 
 
+DAY = {
+    "classes": {"mean": 0.9, "worst": 0.8},
+    "healthy_or_faulty": {"mean": 0.95, "worst": 0.9},
+    "mean_error": {"mean": 0.01, "worst": 0.02},
+    "held_by_bounds": {"mean": 0.9, "worst": 0.85},
+    "false_alarms_per_hour": {"asked": 2.0, "value": 2.0, "low": 0.3, "high": 5.6},
+    "minutes_left_out": 11.1,
+    "minutes_missing": 78.9,
+    "parts": 2,
+    "alarmed": 1,
+}
 FOUND = {
+    "another_day": DAY,
     "flights": [
         {"name": "one", "samples": 250, "of": 300, "notes": ["a remark", "another"]},
         {"name": "two", "samples": 30, "of": 300, "notes": []},

@@ -25,6 +25,7 @@ def identify(
     vehicle: Annotated[str | None, typer.Option(metavar="FILE")] = None,
     out: Annotated[Path | None, typer.Option(metavar="MODEL")] = None,
     check: bool = False,
+    false_alarms_per_hour: Annotated[float | None, typer.Option(metavar="RATE")] = None,
     reader: ReaderOption = None,
     format: FormatOption = Format.text,
 ) -> None:
@@ -37,6 +38,7 @@ def identify(
     vehicle: Vehicle file, or the built-in `alfa`.
     out: The model file to write; with --check the vehicle file that is proposed.
     check: Fit nothing; say what the logs are, and propose a vehicle file where none is given.
+    false_alarms_per_hour: Alarms that `diagnose` may raise in healthy flight, instead of the vehicle file's.
     """
     if check:
         _check(flights, vehicle, out, reader, format)
@@ -48,13 +50,15 @@ def identify(
     from beaver_ftc.flights.model import as_text
     from beaver_ftc.flights.pages import check_page, render_model
     from beaver_ftc.flights.samples import load_flights
-    from beaver_ftc.flights.vehicle import load_vehicle
+    from beaver_ftc.flights.vehicle import asking, load_vehicle
     from beaver_ftc.results.writer import clear_disk_errors
     from beaver_ftc.studies.engine.store import write_whole
 
     page = out.with_suffix(".html")
     check_page(page)
     described = load_vehicle(vehicle)
+    if false_alarms_per_hour is not None:
+        described = asking(described, false_alarms_per_hour)
     loaded, described = by_pressure(load_flights(flights, described, reader), described)
     model = identify(loaded, described)
     shown = render_model(loaded, model)

@@ -123,7 +123,7 @@ def diagnosed(taken: Taken, by: Known) -> tuple[Rows, Document]:
     stepped = _whole(len(samples.t_s), len(by.aircraft.surfaces), parts, found)
     rows = rows_of(samples.t_s, stepped, by.aircraft.surfaces, diagnosis.config)
     reasons = _outside(inputs[1], by.aircraft, taken.unknown, parts) | _misled(samples.t_s, parts, stepped)
-    rows = _silenced(rows, _since(parts, rows, reasons))
+    rows = rows.silent(_since(parts, rows, reasons))
     return rows, _verdict(samples, rows, stepped, by, taken.ages)
 
 
@@ -279,23 +279,6 @@ def _since(parts: list[tuple[int, int]], rows: Rows, reasons: dict[str, Mask]) -
             since[alarmed[0] : end] = True
     reasons = reasons | {"the alarm was raised where nothing can be said": since & ~gone}
     return {says: mask for says, mask in reasons.items() if mask.any()}
-
-
-def _silenced(rows: Rows, reasons: dict[str, Mask]) -> Rows:
-    silent = np.zeros(len(rows.t_s), dtype=bool)
-    for mask in reasons.values():
-        silent |= mask
-    return replace(
-        rows,
-        faulty=np.where(silent, 0, rows.faulty),
-        named=np.where(silent, "", rows.named),
-        estimate=np.where(silent[:, None], 1.0, rows.estimate),
-        low=np.where(silent[:, None], 0.0, rows.low),
-        high=np.where(silent[:, None], 1.0, rows.high),
-        probability=np.where(silent, 0.0, rows.probability),
-        credible=np.where(silent, 0, 1),
-        reasons=reasons,
-    )
 
 
 def _verdict(samples: Samples, rows: Rows, stepped: Stepped, by: Known, ages: dict[str, float]) -> Document:

@@ -14,7 +14,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights import energy, trust
 from beaver_ftc.flights.bank import UNKNOWN as UNKNOWN_OFFSET
 from beaver_ftc.flights.bank import Bank, bank_of
-from beaver_ftc.flights.filtering import posterior_of
+from beaver_ftc.flights.filtering import accumulated, evidence, posterior_of
 from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.recording import TINY, Floats
 from beaver_ftc.flights.regression import by_surface
@@ -32,8 +32,9 @@ class Rows:
     """A row a sample.
 
     t_s (n,); faulty (n,) 0 or 1; named (n,) text; estimate, low, high (n, S) effectiveness of each surface;
-    probability (n,) of a fault of any surface; credible (n,) 0 or 1, 1 where nothing else is given; reasons:
-    rows that are not, by what is wrong.
+    probability (n,) of a fault of any surface; credible (n,) 0 or 1, 1 where nothing else is given; since_s
+    (n,) when the evidence for a fault began to gather, t_s where nothing else is given; reasons: rows that
+    are not credible, by what is wrong.
     """
 
     t_s: Floats
@@ -44,11 +45,41 @@ class Rows:
     high: Floats
     probability: Floats
     credible: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    since_s: Floats = field(default_factory=lambda: np.empty(0))
     reasons: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        if len(self.since_s) != len(self.t_s):
+            object.__setattr__(self, "since_s", self.t_s)
         if len(self.credible) != len(self.t_s):
             object.__setattr__(self, "credible", np.ones(len(self.t_s), dtype=np.int64))
+
+    def unbounded(self, where: NDArray[np.bool_]) -> "Rows":
+        """The rows with nothing said of effectiveness where (n,) or (n, S) is true."""
+        here = where if where.ndim == 2 else where[:, None]
+        return replace(
+            self,
+            estimate=np.where(here, 1.0, self.estimate),
+            low=np.where(here, 0.0, self.low),
+            high=np.where(here, 1.0, self.high),
+        )
+
+    def quiet(self, where: NDArray[np.bool_]) -> "Rows":
+        """The rows without alarm and name where (n,) is true."""
+        return replace(
+            self,
+            faulty=np.where(where, 0, self.faulty),
+            named=np.where(where, "", self.named),
+            probability=np.where(where, 0.0, self.probability),
+        )
+
+    def silent(self, reasons: Mapping[str, NDArray[np.bool_]]) -> "Rows":
+        """The rows that say nothing where one of the reasons, (n,) each, is true."""
+        gone = np.zeros(len(self.t_s), dtype=bool)
+        for where in reasons.values():
+            gone |= where
+        rows = self.unbounded(gone).quiet(gone)
+        return replace(rows, credible=np.where(gone, 0, 1), reasons=reasons)
 
 
 def diagnose(samples: Samples, model: Model) -> Rows:
@@ -77,25 +108,11 @@ def silenced(
         reasons["of no surface is the effect known from the flights fitted"] = np.ones(
             len(rows.t_s), dtype=bool
         )
-    silent = np.zeros(len(samples.t_s), dtype=bool)
-    for rows_outside in reasons.values():
-        silent |= rows_outside
     rows = _without_power(samples, model, rows)
-    unnamed = silent | _of(rows.named, trust.unclaimed(model))
-    told = by_surface(np.tile(np.array(trust.claimed(model), dtype=float), (len(silent), 1)), model) > 0.0
-    unsaid = silent[:, None] | ~told
-    told_all = replace(
-        rows,
-        faulty=np.where(unnamed, 0, rows.faulty),
-        named=np.where(unnamed, "", rows.named),
-        estimate=np.where(unsaid, 1.0, rows.estimate),
-        low=np.where(unsaid, 0.0, rows.low),
-        high=np.where(unsaid, 1.0, rows.high),
-        probability=np.where(unnamed, 0.0, rows.probability),
-        credible=np.where(silent, 0, 1),
-        reasons=reasons,
-    )
-    return _at_stamps(samples, told_all)
+    told = np.array(trust.claimed(model), dtype=float)[None]
+    unknown = np.broadcast_to(by_surface(told, model) == 0.0, rows.low.shape)
+    rows = rows.quiet(_of(rows.named, trust.unclaimed(model))).unbounded(unknown)
+    return _at_stamps(samples, rows.silent(reasons))
 
 
 def _without_power(samples: Samples, model: Model, rows: Rows) -> Rows:
@@ -103,15 +120,9 @@ def _without_power(samples: Samples, model: Model, rows: Rows) -> Rows:
     lowest = model.fitted.energy_climb if model.fitted is not None else None
     if lowest is None or samples.energy_climb is None:
         return rows
-    named = energy.renamed(rows.t_s, rows.faulty, rows.named, samples.energy_climb, lowest)
-    doubted = (named != rows.named)[:, None]
-    return replace(
-        rows,
-        named=named,
-        estimate=np.where(doubted, 1.0, rows.estimate),
-        low=np.where(doubted, 0.0, rows.low),
-        high=np.where(doubted, 1.0, rows.high),
-    )
+    climb = samples.energy_climb
+    named = energy.renamed(rows.t_s, rows.faulty, rows.named, climb, lowest, rows.since_s)
+    return replace(rows.unbounded(named != rows.named), named=named)
 
 
 def _of(named: NDArray[np.object_], unclaimed: set[str]) -> NDArray[np.bool_]:
@@ -136,7 +147,13 @@ def rows_of(samples: Samples, model: Model, bank: Bank, posterior: Floats) -> Ro
     probability = posterior[:, bank.faults].sum(axis=1)
     answering = posterior[:, : bank.idle] / np.maximum(1.0 - idle, TINY)[:, None]
     well = posterior[:, 0] + idle > 0.5
-    faulty = _latched(_standing(probability >= model.settings.alarm, model), well).astype(np.int64)
+    threshold = model.settings.threshold
+    gathered = accumulated(evidence(posterior, bank), threshold or np.inf)
+    raised = _standing(probability >= model.settings.alarm, model)
+    if threshold is not None:
+        raised = (gathered >= threshold) & ~well
+    faulty = _latched(raised, well).astype(np.int64)
+    began = np.maximum.accumulate(np.where(gathered <= 0.0, np.arange(len(gathered)), 0))
     by_group = [_of_group(bank, answering, g, model) for g in range(len(model.groups))]
     estimate, low, high = (np.column_stack(part) for part in zip(*by_group, strict=True))
     still = idle > _IDLE
@@ -149,6 +166,7 @@ def rows_of(samples: Samples, model: Model, bank: Bank, posterior: Floats) -> Ro
         low=by_surface(low, model),
         high=by_surface(high, model),
         probability=probability,
+        since_s=samples.t_s[began],
     )
 
 

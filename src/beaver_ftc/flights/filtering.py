@@ -46,6 +46,25 @@ def posterior_of(samples: Samples, model: Model, bank: Bank) -> tuple[Floats, Fl
     return np.asarray(posterior), np.asarray(state), np.asarray(scale)
 
 
+def evidence(posterior: Floats, bank: Bank) -> Floats:
+    """What each sample adds to the log odds of a fault, beyond what a change at random does, (n,): the sum of
+    it is the log of a likelihood ratio, in which one who believes in no fault gains nothing on the mean."""
+    fault = np.clip(posterior[:, bank.faults].sum(axis=1), _FLOOR, 1.0 - _FLOOR)
+    changes = bank.change * bank.weight[bank.faults].sum() / bank.weight.sum()
+    before = np.concatenate([[bank.start[bank.faults].sum()], (1.0 - bank.change) * fault[:-1] + changes])
+    return np.asarray(np.log(fault / (1.0 - fault)) - np.log(before / (1.0 - before)))
+
+
+@kernel
+def accumulated(gained, most):
+    """Page's sum of gained (n,): never below zero, where it starts anew, and never above most, (n,)."""
+    total, found = 0.0, np.zeros(len(gained))
+    for k in range(len(gained)):
+        total = min(max(total + gained[k], 0.0), most)
+        found[k] = total
+    return found
+
+
 def _later(samples: Samples, delay_s: float) -> Samples:
     """The flight with commands that act by so much later, less than a sample, than the model says.
 

@@ -7,20 +7,20 @@ flights the fit did not see. One flight is cut in two halves of what is known of
 out in turn.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby
+from itertools import groupby, pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.flights import regression, trust
+from beaver_ftc.flights import extremes, regression, trust
 from beaver_ftc.flights.bank import bank_of
 from beaver_ftc.flights.diagnose import Rows, rows_of
-from beaver_ftc.flights.filtering import posterior_of
-from beaver_ftc.flights.model import Model, Settings
+from beaver_ftc.flights.filtering import accumulated, evidence, posterior_of
+from beaver_ftc.flights.model import Fitted, Model, Settings
 from beaver_ftc.flights.recording import TINY, Floats
 from beaver_ftc.flights.samples import Samples, constant_parts
 from beaver_ftc.flights.scoring import by_labels
@@ -36,7 +36,11 @@ _COLOUR_S = 2.0
 _STILL_RAD_S = 1e-6
 _AFTER_EVENT_S = 1.0
 _SURE, _HOLD_S, _POWER_ALONE = 0.995, 0.3, 0.9
-"""Where no labels say how often things break, an alarm asks for more: for how much, the benchmark decided."""
+"""Where no labels say how often things break, an alarm asks for more: for how much, the benchmark decided.
+With parts enough that are not fitted, the rate of false alarms decides instead."""
+_PER_HOUR = 1.0
+_DRIFT_S = (2.0, 8.0)
+"""Spans whose means tell the drift of the trim from the residual's colour."""
 _POWER = 0.8
 """A coloured residual tells less than a white one: by how much, blocked tests decided."""
 _OTHER_DAYS: dict[str, Any] = {
@@ -51,7 +55,7 @@ _OTHER_DAYS: dict[str, Any] = {
 drift of the trim is what the means of the residual over 30 s show in that flight."""
 _DELAYS = (-0.4, 0.0, 0.4)
 """Delays beside the model's that a flight may have, in samples."""
-_MOST_PARTS, _MOST_GAIN_SD = 4, 0.33
+_MOST_PARTS, _MOST_GAIN_SD = 12, 0.33
 """A gain that is known no better than to a third is not known to be there."""
 _PRIOR_CHANGES = 20
 """Changes that count as seen before the labels are read, half of them repairs."""
@@ -103,6 +107,15 @@ def fit_like(stretches: Sequence[Stretch], model: Model) -> Model:
     """Another fit of the same order and settings to other stretches."""
     fitted = _model(stretches, model.vehicle, model.history, model.lags)
     return fitted.model_copy(update={"settings": model.settings})
+
+
+def _left_out(stretches: Sequence[Stretch], model: Model) -> Iterator[tuple[Model, Sequence[Stretch]]]:
+    """Fits like the model to parts of the stretches, with how well each knows its gains; and the rest."""
+    for fitted, kept in _parts(stretches):
+        like = fit_like(fitted, model)
+        fit = fit_order(fitted, model.vehicle, model.history, model.lags)
+        own = Fitted(commands=[], rates=[], gain_sd=gain_sd(fit, len(model.groups), model.lags).tolist())
+        yield like.model_copy(update={"fitted": own}), kept
 
 
 def choose_order(stretches: Sequence[Stretch], vehicle: Vehicle) -> tuple[int, int]:
@@ -208,7 +221,8 @@ def prior(stretches: Sequence[Stretch], model: Model) -> Settings:
         repairs += sum(int(level == 1.0) for flight in seen for level in flight[1:])
     levels = {name: found for name, found in levels.items() if found}
     if not levels:
-        return Settings(alarm=_SURE, hold_s=_HOLD_S, power=_POWER_ALONE)
+        walk = _drift(stretches, model)
+        return Settings(alarm=_SURE, hold_s=_HOLD_S, power=_POWER_ALONE, trim_walk=walk)
     return Settings(
         levels=levels,
         changes_per_hour=float(np.sqrt((changes + 1) / hours * Settings().changes_per_hour)),
@@ -217,6 +231,38 @@ def prior(stretches: Sequence[Stretch], model: Model) -> Settings:
         repair_share=(repairs + _PRIOR_CHANGES / 2) / (changes + _PRIOR_CHANGES),
         power=_POWER,
     )
+
+
+def _drift(stretches: Sequence[Stretch], model: Model) -> list[float]:
+    """Drift of the trim a sample, in residual sd, that parts left out show; the usual at least.
+
+    Means of n samples of a random walk, with steps of variance w, and of noise whose mean has the variance
+    c / n differ from the next with the variance 2 c / n + 2 n w / 3: two n tell w from c.
+    """
+    squares, counts, lengths = np.zeros((2, 3)), np.zeros(2), np.round(np.array(_DRIFT_S) * model.rate_hz)
+    for fitted, kept in _parts(stretches):
+        like = fit_like(fitted, model)
+        for one in kept:
+            rows, residual = residuals(like, one)
+            white = residual / np.sqrt(np.maximum(np.diag(np.array(like.noise)), TINY))
+            for begin, end in _runs(rows):
+                for i, n in enumerate(lengths.astype(int).tolist()):
+                    means = white[begin:end][: (end - begin) // n * n].reshape(-1, n, 3).mean(axis=1)
+                    squares[i] += (np.diff(means, axis=0) ** 2).sum(axis=0)
+                    counts[i] += max(len(means) - 1, 0)
+    least = np.array(Settings().trim_walk)
+    if not counts.all():
+        return least.tolist()
+    short, long = squares / counts[:, None]
+    n, m = lengths
+    walk = 1.5 * (m * long - n * short) / (m**2 - n**2)
+    return np.maximum(np.sqrt(np.maximum(walk, 0.0)), least).tolist()
+
+
+def _runs(rows: NDArray[np.int64]) -> list[tuple[int, int]]:
+    """Begin and end of what of increasing places follows one another."""
+    edges = [0, *(np.flatnonzero(np.diff(rows) > 1) + 1).tolist(), len(rows)]
+    return list(pairwise(edges))
 
 
 def _levels(stretch: Stretch, column: int) -> list[float]:
@@ -239,17 +285,70 @@ def folds(stretches: Sequence[Stretch]) -> list[tuple[list[Stretch], Stretch, st
 
 
 def trusted(stretches: Sequence[Stretch], model: Model) -> Model:
-    """The model with what it was fitted on, and how it did on parts that were left out."""
-    fits = [(fit_like(fitted, model), kept) for fitted, kept in _parts(stretches)]
+    """The model with what it was fitted on, and how it did on parts that were left out: how noisy they were,
+    and at which evidence of a fault they would alarm as often as declared."""
     used = [(stretch.samples, stretch.use) for stretch in stretches]
-    scale = max(_noise(tested, kept) for tested, kept in fits)
+    scale, parts = 1.0, list[extremes.Part]()
+    for tested, kept in _left_out(stretches, model):
+        for one in kept:
+            noise, part = _in_health(tested, one)
+            scale = max(scale, noise)
+            parts.append(part)
     fit = fit_order(stretches, model.vehicle, model.history, model.lags)
     known = trust.fitted_on(used, model, gain_sd(fit, len(model.groups), model.lags), scale)
-    return model.model_copy(update={"fitted": known})
+    asked = model.vehicle.false_alarms_per_hour
+    per_hour = _PER_HOUR if asked is None and not model.settings.levels else asked
+    tail = extremes.tail_of(parts)
+    if tail is None and asked is not None:
+        says = f"{_minutes(parts):.1f} min of health left out have too few peaks of the evidence to tell"
+        more = extremes.SHOWN * 60.0 / asked - _minutes(parts)
+        raise BadInput(f"identify: false_alarms_per_hour {asked:g}: {says}, allowed: {more:.0f} min more")
+    threshold = extremes.threshold_for(tail, per_hour) if tail and per_hour else None
+    settings = {"false_alarms_per_hour": per_hour, "threshold": threshold}
+    return model.model_copy(
+        update={
+            "fitted": known.model_copy(update={"tail": tail}),
+            "settings": model.settings.model_copy(update=settings),
+            "identified": dict(_alone(parts, per_hour)),
+        }
+    )
+
+
+def _minutes(parts: Sequence[extremes.Part]) -> float:
+    return 60.0 * sum(hours for _, hours in parts)
+
+
+def _alone(parts: Sequence[extremes.Part], per_hour: float | None) -> Document:
+    """What parts left out say of another day: how many would have alarmed, each at the threshold that the
+    others ask for, and how often."""
+    tails = [extremes.tail_of([*parts[:i], *parts[i + 1 :]]) for i in range(len(parts))]
+    if per_hour is None or len(parts) < 2 or not all(tails):
+        return {}
+    limits = [extremes.threshold_for(tail, per_hour) for tail in tails if tail]
+    alarms = [int((peaks >= limit).sum()) for (peaks, _), limit in zip(parts, limits, strict=True)]
+    return {
+        "parts": len(parts),
+        "minutes": _minutes(parts),
+        "alarmed": sum(count > 0 for count in alarms),
+        "alarms": sum(alarms),
+    }
+
+
+def _in_health(model: Model, kept: Stretch) -> tuple[float, extremes.Part]:
+    """Of a part left out the largest scale of the noise, the peaks of the alarm statistic in health, and its
+    healthy hours."""
+    bank = bank_of(model)
+    posterior, _, scale = posterior_of(kept.samples, model, bank)
+    gained, labels = evidence(posterior, bank), kept.samples.labels
+    well = kept.use & ~(labels < 1.0).any(axis=1) & (posterior[:, bank.idle] < 0.5)
+    rows = np.flatnonzero(well)
+    sums = [accumulated(gained[rows[begin:end]], np.inf) for begin, end in _runs(rows)]
+    peaks = np.concatenate([extremes.peaks_of(one) for one in sums])
+    return float(scale[kept.use].max(initial=1.0)), (peaks, len(rows) * kept.samples.dt_s / 3600.0)
 
 
 def _parts(stretches: Sequence[Stretch]) -> list[tuple[list[Stretch], list[Stretch]]]:
-    """What is fitted and what is left out: halves of one flight, or every fourth flight."""
+    """What is fitted and what is left out: halves of one flight, or each flight; of many every twelfth."""
     if len(stretches) == 1:
         return [(fitted, [kept]) for fitted, kept, _ in folds(stretches)]
     count = min(len(stretches), _MOST_PARTS)
@@ -258,15 +357,6 @@ def _parts(stretches: Sequence[Stretch]) -> list[tuple[list[Stretch], list[Stret
         ([one for i, one in enumerate(stretches) if i not in out], [stretches[i] for i in out])
         for out in turns
     ]
-
-
-def _noise(model: Model, kept: Sequence[Stretch]) -> float:
-    """Largest scale of the noise in parts that were left out, by the filter itself."""
-    bank, largest = bank_of(model), 1.0
-    for one in kept:
-        scale = posterior_of(one.samples, model, bank)[2][one.use]
-        largest = max(largest, float(scale.max(initial=1.0)))
-    return largest
 
 
 def gain_sd(fit: regression.Fit, groups: int, lags: int) -> Floats:
@@ -281,6 +371,14 @@ def gain_sd(fit: regression.Fit, groups: int, lags: int) -> Floats:
         variance = np.einsum("la,lm,ma->a", errors, fit.correlation[part, part], errors)
         found[g] = np.sqrt(own**2 @ np.maximum(variance, 0.0)) / max(float(own @ own), TINY)
     return np.minimum(found, _MOST_GAIN_SD)
+
+
+def explained(stretches: Sequence[Stretch], model: Model) -> list[Document]:
+    """What the model explains of parts left out, one entry a fold."""
+    return [
+        {"left_out": name, **prediction(fit_like(fitted, model), kept)}
+        for fitted, kept, name in folds(stretches)
+    ]
 
 
 def run_tests(stretches: Sequence[Stretch], model: Model) -> tuple[list[Document], float]:

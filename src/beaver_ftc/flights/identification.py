@@ -1,13 +1,14 @@
 """The whole of an identification: the fit, its tests on what it did not see, and what is said about both."""
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from math import isfinite
 from typing import Any
 
 import numpy as np
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.flights import fitting, trust
+from beaver_ftc.flights import extremes, fitting, trust
 from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.recording import Floats
 from beaver_ftc.flights.regression import group_indices, spectrum, variance_inflation
@@ -17,6 +18,10 @@ from beaver_ftc.flights.vehicle import Vehicle
 Document = dict[str, Any]
 
 _COLLINEAR = 10.0
+_FIGURES = {
+    "classes": "classes", "healthy_or_faulty": "healthy or faulty", "mean_error": "mean error",
+    "held_by_bounds": "held by bounds",
+}  # fmt: skip
 _DECISIVE = 10.0
 """By how much a criterion must be less: odds of 150 to 1 [Kass1995, section 3.2]."""
 _BANDS_HZ = ((0.0, 0.1), (0.1, 0.5), (0.5, 1.0), (1.0, 2.0), (2.0, 5.0), (5.0, 10.0))
@@ -29,12 +34,13 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
     """The model of a vehicle from its flights, with its own account of how good it is in `identified`."""
     stretches = fitting.stretches_of(flights)
     model = fitting.fit_model(stretches, vehicle)
-    tests, bounds = fitting.run_tests(stretches, model)
-    check_explains(tests, stretches, model)
+    check_explains(fitting.explained(stretches, model), stretches, model)
     model = fitting.trusted(stretches, model)
+    tests, bounds = fitting.run_tests(stretches, model)
     found = {
         "flights": [_used(stretch) for stretch in stretches],
         "tests": tests,
+        "another_day": another_day(tests, model),
         "collinear": collinear(stretches, model),
         "colour": colour(stretches, model),
         "spectrum": residual_spectrum(stretches, model),
@@ -42,6 +48,30 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
     }
     settings = model.settings.model_copy(update={"bounds": bounds})
     return model.model_copy(update={"settings": settings, "identified": found})
+
+
+def another_day(tests: list[Document], model: Model) -> Document:
+    """What to expect of a day that was not fitted, by parts left out: worst and mean of every figure of
+    merit, false alarms an hour and how sure that is, and how many minutes would show it."""
+    scores = [test["score"] for test in tests if "score" in test]
+    figures = {key: [score[key] for score in scores] for key in _FIGURES if scores}
+    found: Document = {
+        key: {"mean": float(np.mean(values)), "worst": float((max if key == "mean_error" else min)(values))}
+        for key, values in figures.items()
+    }
+    known, settings = model.fitted, model.settings
+    if known is None or known.tail is None or settings.threshold is None:
+        return found
+    per_hour = settings.false_alarms_per_hour or 0.0
+    return found | {
+        "false_alarms_per_hour": {
+            "asked": per_hour,
+            **asdict(extremes.expected(known.tail, settings.threshold)),
+        },
+        "minutes_left_out": known.tail.minutes,
+        "minutes_missing": extremes.minutes_missing(known.tail, per_hour),
+        **model.identified,
+    }
 
 
 def by_pressure(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Sequence[Samples], Vehicle]:
@@ -147,6 +177,7 @@ def summary(model: Model) -> str:
         *(f"  {line}" for line in trust.unclaimed_lines(model)),
         *(f"  {flight['name']}: {note}" for flight in found["flights"] for note in flight["notes"]),
         *map(_test_line, found["tests"]),
+        *_another_day_lines(found["another_day"]),
         f"  the residual's colour widens standard errors by {_axes(found['colour'])}",
     ]
     run = found["output_error"]
@@ -163,6 +194,27 @@ def summary(model: Model) -> str:
             f"{_COLLINEAR:g} times), most {worst['regressor']} ({_times(worst['inflation'])})"
         )
     return "\n".join(lines)
+
+
+def _another_day_lines(found: Document) -> list[str]:
+    lines = []
+    if "classes" in found:
+        says = [
+            f"{name} {found[key]['mean']:.3f} ({found[key]['worst']:.3f})" for key, name in _FIGURES.items()
+        ]
+        lines.append(f"  expect on another day, mean (worst) of what was left out: {', '.join(says)}")
+    if "false_alarms_per_hour" in found:
+        rate, missing = found["false_alarms_per_hour"], found["minutes_missing"]
+        lines.append(
+            f"  false alarms: {rate['asked']:g} an hour asked for, {rate['low']:.2g} to {rate['high']:.2g} "
+            f"at 90 %, by {found['minutes_left_out']:.1f} min of health left out"
+        )
+        if missing:
+            lines.append(f"  to show this rate without a fitted tail {missing:.0f} min of health are missing")
+        if found.get("parts"):
+            alarmed = f"{found['alarmed']} of {found['parts']} parts left out alarm"
+            lines.append(f"  at the threshold of the others {alarmed}")
+    return lines
 
 
 def _pressure_lines(model: Model) -> list[str]:

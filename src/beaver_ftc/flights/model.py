@@ -10,6 +10,7 @@ from pydantic import Field
 
 from beaver_ftc.documents.base import Number, Section, Whole
 from beaver_ftc.documents.validation import read_file
+from beaver_ftc.flights.extremes import Tail
 from beaver_ftc.flights.recording import Floats
 from beaver_ftc.flights.vehicle import Vehicle
 
@@ -46,6 +47,10 @@ class Settings(Section):
     noise_memory_s: Number = Field(60.0, gt=0, description="memory of the running scale of the residual, s")
     alarm: Number = Field(0.5, gt=0, lt=1, description="probability of a fault that raises the alarm")
     hold_s: Number = Field(0.0, ge=0, description="for how long the probability must stand, s")
+    false_alarms_per_hour: Number | None = Field(None, gt=0, description="the rate that was asked for")
+    threshold: Number | None = Field(
+        None, gt=0, description="evidence for a fault that raises the alarm, instead of both: for that rate"
+    )
     level_step: Number = Field(0.1, gt=0, le=0.5, description="step of the grid of effectiveness")
     bounds: Number = Field(0.9, gt=0, lt=1, description="posterior mass inside the bounds")
 
@@ -68,6 +73,7 @@ class Fitted(Section):
         default=None, description="rate of the energy height as without power, m/s"
     )
     minutes: Number = Field(0.0, ge=0, description="what was fitted, min")
+    tail: Tail | None = Field(default=None, description="highest alarm statistic on parts not fitted")
 
 
 class Model(Section):

@@ -12,12 +12,13 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_serializer, model_validator
 
 from beaver_ftc.documents.base import Conflict, Location, Number, Section, number, refuse
-from beaver_ftc.documents.errors import suggestion
+from beaver_ftc.documents.errors import BadInput, suggestion
 from beaver_ftc.documents.validation import parse_document, text_of, validate
 from beaver_ftc.flights.units import ACCELERATION, ANGLE, LENGTH, RATE, SECONDS, SPEED, UNITS, units_of
 from beaver_ftc.scenario.loader import looks_like_a_path
 
 _MAX_BYTES = 1_000_000
+MOST_PER_HOUR = 1000.0
 _FOLDER = Path(__file__).parent / "vehicles"
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=100)]
@@ -115,7 +116,7 @@ class Vehicle(Section):
     rates: Rates
     commands: list[Logged] = Field(
         min_length=1,
-        max_length=8,
+        max_length=20,
         description="columns of the commands, upstream of what can fail",
         examples=[["roll_cmd", "pitch_cmd"]],
     )
@@ -127,7 +128,7 @@ class Vehicle(Section):
     )
     surfaces: dict[str, dict[str, Number]] = Field(
         min_length=1,
-        max_length=8,
+        max_length=20,
         description="what each healthy surface makes of the commands: a share of each",
         json_schema_extra={"unit": "share of 1", "range": "any"},
         examples=[{"left": {"roll_cmd": 0.5, "pitch_cmd": 0.5}}],
@@ -176,6 +177,13 @@ class Vehicle(Section):
         default={},
         description="columns of the servo outputs: read by the freeze rule of a benchmark alone",
         examples=[{"left": "left_pwm"}],
+    )
+    false_alarms_per_hour: Number | None = number(
+        None,
+        gt=0,
+        le=MOST_PER_HOUR,
+        unit="1/h",
+        says="alarms in healthy flight that are accepted; 1 without labels",
     )
     faults: list[Kind] = Field(
         default=["loss"],
@@ -279,3 +287,11 @@ def load_vehicle(path_or_name: str | Path) -> Vehicle:
         text = text_of(given, _MAX_BYTES, lambda: unknown)
     path = str(Path(given))
     return validate(Vehicle, parse_document(text, path), path)
+
+
+def asking(vehicle: Vehicle, per_hour: float) -> Vehicle:
+    """The vehicle with a rate of false alarms that is accepted. Raises BadInput for one that is none."""
+    if not 0.0 < per_hour <= MOST_PER_HOUR:
+        says = f"allowed: more than 0, up to {MOST_PER_HOUR:g} an hour"
+        raise BadInput(f"identify: --false-alarms-per-hour {per_hour:g}: {says}")
+    return vehicle.model_copy(update={"false_alarms_per_hour": per_hour})

@@ -173,6 +173,19 @@ class Aircraft:
         return tuple(s for s in self.surfaces if s in leaders)
 
     @cached_property
+    def together(self) -> Mapping[str, tuple[tuple[str, float], ...]]:
+        """Of each surface that leads an axis, what trim moves: itself, and what share of the way others."""
+        also = {s: self.file.trim.together.get(s, {}).items() for s in self.primary}
+        others = {s: [(f, share) for f, share in of if f not in self.primary] for s, of in also.items()}
+        return MappingProxyType({s: ((s, 1.0), *others[s]) for s in self.primary})
+
+    @cached_property
+    def left_by_trim(self) -> tuple[str, ...]:
+        """Surfaces that trim leaves where they are."""
+        moved = {surface for of in self.together.values() for surface, _ in of}
+        return tuple(s for s in self.surfaces if s not in moved)
+
+    @cached_property
     def stand_ins(self) -> tuple[str, ...]:
         """Those that take over from the surface that leads pitch: who comes after it in its group."""
         axis = dict(zip(self.surfaces, self.dominant_axis, strict=True))

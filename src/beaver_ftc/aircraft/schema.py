@@ -18,7 +18,7 @@ from beaver_ftc.documents.errors import suggestion
 MAX_SURFACES, MAX_SIGNALS, MAX_DAMAGE = 20, 6, 50
 MAX_TERMS_OF_ONE, MAX_MONOMIALS = 64, 64
 MAX_TERMS = 3 * MAX_TERMS_OF_ONE
-MAX_BOXES, MAX_LEVELS, MAX_AGES = 6, 4, 4  # of the map of the model's error
+MAX_BOXES, MAX_LEVELS, MAX_AGES = 20, 4, 4  # of the map of the model's error
 MAX_THRUST = 8  # airspeeds and settings of the table of thrust
 FLOW_SIGNALS = ("alpha", "beta", "ph", "qh", "rh")
 RATE_SIGNALS = ("ph", "qh", "rh")
@@ -175,11 +175,19 @@ class EnvelopeSection(Section):
     alpha_deg: Interval = entry(..., examples=[[-5.7, 16]])
 
 
+_Share = Annotated[Number, Field(ge=-1, le=1)]
+
+
 class TrimSection(Section):
-    """What trim may move beside the surfaces."""
+    """What trim moves beside the surfaces that lead an axis."""
 
     throttle: Property = Field(
         description="property of the power setting", examples=["engine/manifold-pressure-inhg"]
+    )
+    together: dict[Name, dict[Name, _Share]] = Field(
+        default_factory=dict,
+        description="of a surface that leads an axis: others that go with it, and what share of the way",
+        examples=[{"right_aileron": {"left_aileron": -1}}],
     )
 
 
@@ -332,6 +340,9 @@ class ErrorMapSection(Section):
     """
 
     travel_share: Shares = number(..., "share of 1", "shares of the surfaces' travel, rising", examples=[[1]])
+    stand_ins: Number = number(
+        1.0, unit="share of 1", says="of these but the last, for surfaces that stand in", gt=0, le=1
+    )
     until_s: Ages = entry(
         ..., "ages of a flight, rising: fuel burns, and the inertia changes, s", examples=[[600]]
     )
@@ -432,7 +443,7 @@ class AircraftFile(Section):
 
     @model_validator(mode="after")
     def _parts_fit_together(self) -> Self:
-        refuse([*self._groups(), *self._terms(), *self._names(), *self._thrust(), *self._damage()])
+        refuse([*self._groups(), *self._terms(), *self._names(), *self._thrust(), *self._taken()])
         return self
 
     def _groups(self) -> Iterator[Conflict]:
@@ -449,8 +460,19 @@ class AircraftFile(Section):
             if surface not in seen:
                 yield ("groups",), f"{surface} is in no group, allowed: every surface in one"
 
-    def _damage(self) -> Iterator[Conflict]:
-        """Damage takes surfaces there are."""
+    def _taken(self) -> Iterator[Conflict]:
+        """Damage takes surfaces there are, and trim moves them together."""
+        led: set[str] = set(self.trim.together)
+        for name, of in self.trim.together.items():
+            here = ("trim", "together", name)
+            if name not in self.surfaces:
+                yield here, f"unknown surface{suggestion(name, self.surfaces)}"
+            for surface in of:
+                if surface not in self.surfaces:
+                    yield (*here, surface), f"unknown surface{suggestion(surface, self.surfaces)}"
+                elif surface in led:
+                    yield (*here, surface), "goes with another or leads itself, allowed: one of it"
+                led.add(surface)
         for case, damage in self.damage.items():
             for i, name in enumerate(damage.takes):
                 if name not in self.surfaces:

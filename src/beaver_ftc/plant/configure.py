@@ -105,7 +105,7 @@ def trim_of(scenario: Scenario, plant: Plant) -> TrimPoint:
     """The scenario's trim, on its truth with the coefficient errors; BadInput when there is none."""
     initial, aircraft = scenario.initial, plant.aircraft
     given = {name: getattr(initial, name) for name in aircraft.engine.settings}
-    free = (surface for surface in aircraft.surfaces if surface not in aircraft.primary)
+    free = aircraft.left_by_trim
     given |= {f"{surface}_rad": radians(getattr(initial, f"{surface}_deg")) for surface in free}
     return trim(initial.airspeed_mps, initial.altitude_m, plant=plant, **given)
 

@@ -76,7 +76,7 @@ def trim(airspeed_mps: float, altitude_m: float, plant: Plant | None = None, **g
     _check_request(wanted, aircraft)
     truth.forget_conditions()  # of what was flown before, which would show in the last bits
     with _travel_lifted(truth) as travel:
-        for surface in set(aircraft.surfaces) - set(aircraft.primary):
+        for surface in aircraft.left_by_trim:
             allowed = travel[surface].min_rad, travel[surface].max_rad
             _check(surface, wanted.surfaces_rad[surface], allowed, "rad")
         solution, residual = _solve(truth, _first_guess(wanted, truth))
@@ -161,18 +161,21 @@ def _solve(truth: Plant, state: FlightState) -> tuple[FlightState, np.ndarray]:
 
     Returns the state, left in `truth`, and its accelerations.
     """
-    names = (*_FLOW_UNKNOWNS, *(f"{surface}_rad" for surface in truth.aircraft.primary))
+    together = truth.aircraft.together
+    names = (*_FLOW_UNKNOWNS, *(f"{surface}_rad" for surface in together))
     x = np.array([getattr(state, name) for name in names])
 
     def state_at(x: Vector) -> FlightState:
-        return replace(state, **dict(zip(names, x.tolist(), strict=True)))
+        flow, led = x[:3].tolist(), zip(x[3:].tolist(), together.values(), strict=True)
+        moved = {f"{name}_rad": share * rad for rad, of in led for name, share in of}
+        return replace(state, **dict(zip(_FLOW_UNKNOWNS, flow, strict=True)), **moved)
 
     def look(x: Vector) -> Vector:
         truth.start(state_at(x))
         return np.array([truth.read(name) * factor for name, factor in ACCELERATIONS])
 
     if not truth.n_engines:
-        near = _approach(_looking(truth, state, names), x)
+        near = _approach(_looking(truth, state), x)
         if np.isfinite(near).all():
             x = x + (near - x)  # which is not `near` to the last bit
     here = look(x)
@@ -219,12 +222,13 @@ def _shortened(step: Vector) -> Vector:
     return step * min(1.0, MAX_CHANGE_RAD / max(np.abs(step).max(), STEP_RAD))
 
 
-def _looking(truth: Plant, state: FlightState, names: tuple[str, ...]) -> Look:
-    """The six accelerations, m/s2 and rad/s2, as a function of the unknowns `names` of a state at which the
-    truth has been started: alpha, beta, theta, then `<surface>_rad`."""
+def _looking(truth: Plant, state: FlightState) -> Look:
+    """The six accelerations, m/s2 and rad/s2, as a function of the unknowns of a state at which the truth has
+    been started: alpha, beta, theta, then the surfaces that lead."""
     fdm, speed_fps = truth.fdm, state.airspeed_mps * FT_PER_M
     theta_place, *flow = (truth.input(name) for name in ("ic/theta-rad", *_RATES_AND_FLOW))
-    surfaces = [truth.input(truth.aircraft.surface[name.removesuffix("_rad")].command) for name in names[3:]]
+    led = [(k, name, share) for k, of in enumerate(truth.aircraft.together.values()) for name, share in of]
+    surfaces = [truth.input(truth.aircraft.surface[name].command) for _, name, _ in led]
     puts = [node.set_double_value for node in (theta_place, *flow, *surfaces)]
     gets = [truth.node(name).get_double_value for name, _ in ACCELERATIONS]
     factors = np.array([factor for _, factor in ACCELERATIONS])
@@ -233,7 +237,8 @@ def _looking(truth: Plant, state: FlightState, names: tuple[str, ...]) -> Look:
         alpha, beta, theta, *deflections = x.tolist()
         along = speed_fps * cos(beta)
         flow_fps = along * cos(alpha), speed_fps * sin(beta), along * sin(alpha)
-        for put, value in zip(puts, (theta, *flow_fps, *deflections), strict=True):
+        moved = [share * deflections[k] for k, _, share in led]
+        for put, value in zip(puts, (theta, *flow_fps, *moved), strict=True):
             put(value)
         if not fdm.run_ic():
             raise SimulationFailed("JSBSim cannot initialise the flight")

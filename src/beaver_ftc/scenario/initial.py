@@ -41,14 +41,11 @@ def initial_of(aircraft: Aircraft) -> type[Initial]:
         low, high = setting.range
         says = setting.says or name
         keys[name] = Number, number(setting.default, setting.unit, says, ge=low, le=high)
-    for surface in aircraft.surfaces:
-        if surface not in aircraft.primary:
-            travel, says = aircraft.travel[surface], f"{surface} deflection"
-            low, high = degrees(travel.min_rad), degrees(travel.max_rad)
-            keys[f"{surface}_deg"] = (
-                Number,
-                number(0.0, "deg", says, ge=low, le=high, examples=[round(0.25 * high, 1)]),
-            )
+    for surface in aircraft.left_by_trim:
+        travel, says = aircraft.travel[surface], f"{surface} deflection"
+        low, high = degrees(travel.min_rad), degrees(travel.max_rad)
+        of = number(0.0, "deg", says, ge=low, le=high, examples=[round(0.25 * high, 1)])
+        keys[f"{surface}_deg"] = Number, of
     made = create_model("Initial", __base__=Initial, __doc__=Initial.__doc__, **keys)
     made._airframe = aircraft
     return made

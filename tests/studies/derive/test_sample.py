@@ -144,7 +144,7 @@ def test_a_state_is_in_the_innermost_box_that_has_it_and_in_its_share_of_the_tra
     wide = np.array([-1.0, 0.2, 1.0, 1.0, 1.0, 60.0, 2.0])
     ends = [np.array([[-1, -0.1, -1, -1, -1, 40, 0], [1, 0.1, 1, 1, 1, 60, 2]]), np.array([-wide, wide])]
     ends[1][0, 0], ends[1][1, 0] = -1.0, 1.0
-    found = sampling.sorted_in(samples, ends, trainer, shares)
+    found = sampling.sorted_in(samples, ends, trainer, sampling.Moves(shares))
     assert found.rate[:, 0].tolist() == [0, 3, 6, 9, 12, 15], "the last is in no box"
     assert found.box.tolist() == [0, 0, 0, 1, 1, 1]
     assert found.level.tolist() == [0, 1, 1, 3, 2, 3]

@@ -16,9 +16,10 @@ however fast the frames.
 
 The error of a derived design model, where in the envelope the aircraft is, is measured, and looked up here.
 Its map is a few boxes of states, one inside the other, with the largest error found in each for surfaces
-within a share of their travel. A surface that has lost effectiveness gives no more than what it is taken to
-be at, so its error is within the same share; one that is stuck may be anywhere, so that the whole travel
-counts where such faults are in question. Outside of all boxes nobody has measured: nothing is concluded.
+within a share of their travel, those that stand in within less. A surface that has lost effectiveness gives
+no more than what it is taken to be at, so its error is within the same share; one that is stuck may be
+anywhere, so that the whole travel counts where such faults are in question. Outside of all boxes nobody has
+measured: nothing is concluded.
 """
 
 from functools import lru_cache
@@ -93,8 +94,9 @@ def fill_error_map(error_map: np.void, aircraft: Aircraft, whole: bool) -> None:
     error_map["whole"], error_map["n_boxes"] = whole, len(given.boxes)
     error_map["n_levels"], error_map["n_ages"] = n_levels, n_ages
     error_map["until_s"][:n_ages], error_map["share"][:n_levels] = given.until_s, given.travel_share
-    error_map["travel_low"] = [travel.min_rad for travel in aircraft.travel.values()]
-    error_map["travel_high"] = [travel.max_rad for travel in aircraft.travel.values()]
+    least = np.array([given.stand_ins if s in aircraft.stand_ins else 1.0 for s in aircraft.surfaces])
+    error_map["travel_low"] = least * [travel.min_rad for travel in aircraft.travel.values()]
+    error_map["travel_high"] = least * [travel.max_rad for travel in aircraft.travel.values()]
     for k, box in enumerate(given.boxes):
         ends = np.array(box.ends(aircraft.signals))
         error_map["low"][k, : len(ends)], error_map["high"][k, : len(ends)] = ends.T

@@ -7,7 +7,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from math import degrees, radians
@@ -19,21 +19,41 @@ import yaml
 
 from beaver_ftc.aircraft import loading
 from beaver_ftc.aircraft.aircraft import THRUST_TERM
-from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_SIGNALS
+from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_SIGNALS, MAX_TERMS_OF_ONE
 from beaver_ftc.design.model import design_record
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.plant import instrumented
 from beaver_ftc.plant.adapter import Plant, translated
 from beaver_ftc.plant.model_file import copy_of, refuse_deeds
 from beaver_ftc.plant.trim import TrimPoint
+from beaver_ftc.plant.trim import trim as trim_at
 from beaver_ftc.studies.derive import outline
 from beaver_ftc.studies.derive.derived import NAME as PAGE
 from beaver_ftc.studies.derive.derived import Derived, page_of
-from beaver_ftc.studies.derive.fit import MOST_TERMS, engine_signals, fitted, map_of, signals_of_use
-from beaver_ftc.studies.derive.sample import FRESH, SIDESLIP_RAD, Envelope, Samples, fly_about, sample
+from beaver_ftc.studies.derive.fit import (
+    MOST_TERMS,
+    engine_signals,
+    fitted,
+    map_of,
+    nearness,
+    signals_of_use,
+)
+from beaver_ftc.studies.derive.sample import (
+    FRESH,
+    SIDESLIP_RAD,
+    USUAL,
+    Envelope,
+    Moves,
+    Region,
+    Samples,
+    fly_about,
+    joined,
+    sample_all,
+)
 from beaver_ftc.studies.derive.thrust import thrust_of
 
 SAMPLES, CHECKED = 6000, 16000
+CHECKED_OF_REGIONS = 18000
 SPAN_OF_ALPHA_RAD = 0.10
 FEWEST_TERMS = 6
 Tell = Callable[[str], None]
@@ -121,10 +141,12 @@ def _failure(source: Source, absent: list[str]) -> str | None:
 
 
 def derive(
-    reference: str, out: Path | None = None, envelope: Path | None = None, tell: Tell = lambda line: None
-) -> Derived:
+    reference: str, out: Path | None = None, envelope: Path | None = None, tell: Tell = lambda line: None,
+    regions: Sequence[Envelope] = (), moves: Moves = USUAL,
+) -> Derived:  # fmt: skip
     """Derive the file of an aircraft; `out`: the folder to put its folder into, if not the cache;
-    `envelope`: a YAML file that says where to sample.
+    `envelope`: a YAML file that says where to sample; `regions`: parts of it, each about a steady flight of
+    its own, where the terms shall hold best near neutral surfaces; `moves`: how far these go.
 
     Raises BadInput, naming what is in the way, if its failures cannot be put in or it cannot be trimmed, and
     SimulationFailed if JSBSim cannot fly it.
@@ -147,7 +169,8 @@ def derive(
                 _set_envelope(data, trim, wanted)
             usual_rad = outline.WIDE_SIDESLIP_RAD if source.folder else SIDESLIP_RAD
             sideslip_rad = radians(wanted.sideslip_deg) if wanted.sideslip_deg else usual_rad
-            made = _derived(data, plant, trim, sideslip_rad, folder, tell)
+            about = _regions(data, plant, trim, sideslip_rad, regions)
+            made = _derived(data, plant, about, moves, folder, tell)
             if THRUST_TERM not in plant.aircraft.terms:
                 tell("engines")
                 thrust = thrust_of(outline.plant_of(data, folder), trim)
@@ -205,40 +228,57 @@ def _prepared(
     return level
 
 
+def _regions(
+    data: outline.Data, plant: Plant, trim: TrimPoint, sideslip_rad: float, wanted: Sequence[Envelope]
+) -> list[Region]:
+    """Where to sample: the whole envelope about the trim, or parts of it, each about a trim of its own."""
+    low, high = map(radians, data["envelope"]["alpha_deg"])
+    whole = Envelope(tuple(data["envelope"]["airspeed_mps"]), (low, high), sideslip_rad)
+    if not wanted:
+        return [Region(whole, trim)]
+    middles = [0.5 * sum(of.airspeed_mps) for of in wanted]
+    trims = [trim_at(middle, trim.altitude_m, plant, **trim.settings) for middle in middles]
+    return [Region(of, point) for of, point in zip(wanted, trims, strict=True)]
+
+
 def _derived(
-    data: outline.Data, plant: Plant, trim: TrimPoint, sideslip_rad: float, folder: Path, tell: Tell
+    data: outline.Data, plant: Plant, about: Sequence[Region], moves: Moves, folder: Path, tell: Tell
 ) -> tuple[np.ndarray, np.ndarray]:
     """Sample, fit and check; the data get their terms and errors. Returns the largest errors, (3,) rad/s2."""
-    low, high = map(radians, data["envelope"]["alpha_deg"])
-    where = Envelope(tuple(data["envelope"]["airspeed_mps"]), (low, high), sideslip_rad)
     declared = {name: of["property"] for name, of in data["signals"].items()}
     known = {name: of for name, of in instrumented.SIGNALS.items() if plant.has(of)}
     properties = declared or known
     tell("sample")
-    flown = fly_about(plant, trim, 3, properties)
-    first = sample(plant, where, trim, SAMPLES, 1, properties, FRESH)
+    flown = joined([fly_about(plant, of.trim, 3, properties) for of in about])
+    first = sample_all(plant, about, SAMPLES, 1, properties, FRESH, moves)
     if not declared:
         wanted = engine_signals(flown, plant.aircraft)
         useful = signals_of_use(first, plant.aircraft, MAX_SIGNALS, wanted)
         data["signals"] = {name: {"property": properties[name]} for name in useful}
     tell("fit")
-    data["moments"] = outline.named_as(plant.aircraft, _moments(first, data, folder))
+    weight = nearness(first, len(about), moves) if len(about) > 1 else None
+    data["moments"] = outline.named_as(plant.aircraft, _moments(first, data, folder, weight))
     tell("check")
-    other = sample(plant, where, trim, CHECKED, 2, properties)
+    other = sample_all(
+        plant, about, CHECKED if weight is None else CHECKED_OF_REGIONS, 2, properties, moves=moves
+    )
     aircraft = outline.aircraft_of(data, folder)
-    data["model_error_map"], (of_fit, of_check, _) = map_of(aircraft, (first, other), flown)
-    outermost = data["model_error_map"]["boxes"][-1]
-    data["model_error_rad_s2"] = {axis: outermost[f"error_{axis}_rad_s2"][0][-1] for axis in "pqr"}
+    data["model_error_map"], (of_fit, of_check, _) = map_of(
+        aircraft, (first, other), flown, len(about), moves
+    )
+    outermost = data["model_error_map"]["boxes"][-len(about) :]
+    largest = {axis: max(box[f"error_{axis}_rad_s2"][0][-1] for box in outermost) for axis in "pqr"}
+    data["model_error_rad_s2"] = largest
     return of_fit, of_check
 
 
-def _moments(samples: Samples, data: outline.Data, folder: Path) -> outline.Data:
+def _moments(samples: Samples, data: outline.Data, folder: Path, weight: np.ndarray | None) -> outline.Data:
     """The terms: as many as the evaluator has room for."""
     bare = {name: value for name, value in data.items() if name != "model_error_map"}
     any_term = {"name": "Cl_any", "value": 1.0, "surface": next(iter(data["surfaces"]))}
     aircraft = outline.aircraft_of(bare | {"moments": {"Cl": [any_term]}}, folder)
-    for most in range(MOST_TERMS, FEWEST_TERMS - 1, -4):
-        terms = fitted(samples, aircraft, most)
+    for most in range(MOST_TERMS if weight is None else MAX_TERMS_OF_ONE, FEWEST_TERMS - 1, -4):
+        terms = fitted(samples, aircraft, most, weight)
         with suppress(ValueError):  # too many products
             design_record(outline.aircraft_of(bare | {"moments": terms}, folder))
             return terms

@@ -33,7 +33,7 @@ from beaver_ftc.scenario.diagnosis import Bounds
 from beaver_ftc.studies.derive.derivation import derive, source_of
 from beaver_ftc.studies.derive.fit import errors_of
 from beaver_ftc.studies.derive.outline import usual_start
-from beaver_ftc.studies.derive.sample import FRESH, SIDESLIP_RAD, Envelope, Samples, sample, sorted_in
+from beaver_ftc.studies.derive.sample import FRESH, SIDESLIP_RAD, Envelope, Moves, Samples, sample, sorted_in
 from beaver_ftc.studies.engine.store import write_whole
 
 STATES, STARTS, SEED = 800, 8, 11
@@ -142,7 +142,7 @@ def _samples(aircraft: Aircraft, plant: Plant) -> Samples:
     if error_map is None:
         return samples
     ends = [np.array(box.ends(aircraft.signals)).T for box in error_map.boxes]
-    return sorted_in(samples, ends, aircraft, error_map.travel_share)
+    return sorted_in(samples, ends, aircraft, Moves(error_map.travel_share, error_map.stand_ins))
 
 
 def _declared(aircraft: Aircraft, samples: Samples) -> np.ndarray:

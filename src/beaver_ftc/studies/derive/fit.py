@@ -17,7 +17,17 @@ from scipy.linalg import lstsq
 from beaver_ftc.aircraft import AXES, Aircraft, MassProperties
 from beaver_ftc.aircraft.aircraft import MOMENTS
 from beaver_ftc.design.model import inertia_coefficients, inertial
-from beaver_ftc.studies.derive.sample import AGES_S, REACHES, SHARES, Samples, places, quantities, sorted_in
+from beaver_ftc.studies.derive.sample import (
+    AGES_S,
+    REACHES,
+    SHARES,
+    USUAL,
+    Moves,
+    Samples,
+    places,
+    quantities,
+    sorted_in,
+)
 
 MOST_TERMS = 26
 LEAST_GAIN = 3e-3  # of what is left, for another term to be taken
@@ -151,15 +161,31 @@ def pursue(A: np.ndarray, b: np.ndarray, most: int = MOST_TERMS) -> tuple[list[i
     return taken, lstsq(A[:, taken] / scale, b)[0] / scale if taken else np.empty(0)
 
 
-def fitted(samples: Samples, aircraft: Aircraft, most: int = MOST_TERMS) -> dict[str, list[Term]]:
-    """The terms of Cl, Cm and Cn, as an aircraft file has them, with the signals the aircraft declares."""
+def nearness(samples: Samples, regions: int, moves: Moves) -> np.ndarray:
+    """How much samples count where terms need not hold alike everywhere, (n,): as one over what is expected
+    to be left of them, which grows with the box and with the square of what surfaces do from neutral."""
+    weight: np.ndarray = 1.0 / (
+        np.array(REACHES)[samples.box // regions] * np.array(moves.shares)[samples.level] ** 2
+    )
+    return weight
+
+
+def fitted(
+    samples: Samples, aircraft: Aircraft, most: int = MOST_TERMS, weight: np.ndarray | None = None
+) -> dict[str, list[Term]]:
+    """The terms of Cl, Cm and Cn, as an aircraft file has them, with the signals the aircraft declares.
+
+    weight: of each sample, (n,); left out: all alike.
+    """
     known = candidates(tuple(aircraft.signals), aircraft.surfaces)
     A = regressors(samples, aircraft, known)
     C = moment_coefficients(samples, aircraft.mass, aircraft)
+    w = np.ones(len(samples)) if weight is None else weight
+    A = A * w[:, None]
     terms: dict[str, list[Term]] = {}
     for axis, (name, engines) in enumerate(EXACT_TERMS.items()):
         exact = engines in aircraft.signals
-        taken, values = pursue(A, C[:, axis] - (samples.signals[engines] if exact else 0.0), most)
+        taken, values = pursue(A, w * (C[:, axis] - (samples.signals[engines] if exact else 0.0)), most)
         coefficients = dict(zip(taken, values, strict=True))
         if exact:
             linear = known.index(({engines: 1}, None))
@@ -226,32 +252,44 @@ def errors_of(aircraft: Aircraft, samples: Samples) -> np.ndarray:
     return error
 
 
-def largest(errors: np.ndarray, samples: Samples) -> np.ndarray:
+def within(samples: Samples, box: int, regions: int) -> np.ndarray:
+    """Which samples are of a box or of one inside it, (n,); boxes of several regions take turns."""
+    inside: np.ndarray = (samples.box <= box) & (samples.box % regions == box % regions)
+    return inside
+
+
+def largest(errors: np.ndarray, samples: Samples, regions: int = 1) -> np.ndarray:
     """The largest error within each age, box and share of the travel, (ages, boxes, shares, 3) rad/s2."""
-    table = np.zeros((len(AGES_S), len(REACHES), len(SHARES), 3))
+    table = np.zeros((len(AGES_S), len(REACHES) * regions, len(SHARES), 3))
     for age, box, level in np.ndindex(table.shape[:3]):
-        inside = (samples.age <= age) & (samples.box <= box) & (samples.level <= level)
+        inside = (samples.age <= age) & within(samples, box, regions) & (samples.level <= level)
         table[age, box, level] = errors[inside].max(axis=0, initial=0.0)
     return table
 
 
-def map_of(aircraft: Aircraft, sets: Sequence[Samples], flown: Samples) -> tuple[dict[str, Any], np.ndarray]:
+def map_of(
+    aircraft: Aircraft, sets: Sequence[Samples], flown: Samples, regions: int = 1, moves: Moves = USUAL
+) -> tuple[dict[str, Any], np.ndarray]:
     """The section `model_error_map` of the aircraft's file, and the largest error of each set, (sets, 3).
 
     sets: of random states, that make the boxes; flown: states of flights, of which those in a box count.
     """
-    ends = [_ends(aircraft, sets, box) for box in range(len(REACHES))]
-    sets = [*sets, sorted_in(flown, ends, aircraft, SHARES)]
-    tables = np.array([largest(errors_of(aircraft, samples), samples) for samples in sets])
+    every = range(len(REACHES) * regions)
+    ends = [_ends(aircraft, sets, box, regions) for box in every]
+    sets = [*sets, sorted_in(flown, ends, aircraft, moves)]
+    tables = np.array([largest(errors_of(aircraft, samples), samples, regions) for samples in sets])
     table = MARGIN * tables.max(axis=0) + ROUNDING_RAD_S2
-    boxes = [_box(aircraft, ends[box], table[:, box]) for box in range(len(REACHES))]
-    return {"travel_share": list(SHARES), "until_s": list(AGES_S), "boxes": boxes}, tables[:, 0, -1, -1]
+    boxes = [_box(aircraft, ends[box], table[:, box]) for box in every]
+    of_all = tables[:, 0, -regions:, -1].max(axis=1)
+    seldom = {"stand_ins": moves.stand_ins} if moves.stand_ins != 1.0 else {}
+    return {"travel_share": list(moves.shares), **seldom, "until_s": list(AGES_S), "boxes": boxes}, of_all
 
 
-def _ends(aircraft: Aircraft, sets: Sequence[Samples], box: int) -> np.ndarray:
+def _ends(aircraft: Aircraft, sets: Sequence[Samples], box: int, regions: int) -> np.ndarray:
     """The least and the greatest of every quantity in a box, (2, 7 + declared), rounded outwards."""
-    within = np.concatenate([places(samples, aircraft)[samples.box <= box] for samples in sets])
-    low, high = within.min(axis=0).tolist(), within.max(axis=0).tolist()
+    there = [places(samples, aircraft)[within(samples, box, regions)] for samples in sets]
+    inside = np.concatenate(there)
+    low, high = inside.min(axis=0).tolist(), inside.max(axis=0).tolist()
     return np.array([[_rounded(v, np.floor) for v in low], [_rounded(v, np.ceil) for v in high]])
 
 

@@ -37,11 +37,37 @@ _SPEEDS = (1.0, 1.0, 0.95, 1.05, 1.0, 1.0)  # as shares of the trim's
 
 @dataclass(frozen=True)
 class Envelope:
-    """Where states are drawn: between these ends, and so far to either side in sideslip."""
+    """Where states are drawn: between these ends, and so far to either side in sideslip. altitude_m:
+    left out, about the trim's; given, it is alike in all boxes, and so is the airspeed."""
 
     airspeed_mps: tuple[float, float]
     alpha_rad: tuple[float, float]
     beta_rad: float
+    altitude_m: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Moves:
+    """How far surfaces are moved: shares of their travel, four, rising to 1; of these but the last, how much
+    those that stand in use."""
+
+    shares: tuple[float, ...] = SHARES
+    stand_ins: float = 1.0
+
+    def seldom(self, aircraft: Aircraft) -> np.ndarray:
+        """Of each surface, how much of a share that is not the last, (surfaces,)."""
+        return np.array([self.stand_ins if s in aircraft.stand_ins else 1.0 for s in aircraft.surfaces])
+
+
+USUAL = Moves()
+
+
+@dataclass(frozen=True)
+class Region:
+    """Part of what an aircraft flies, about a steady flight of its own."""
+
+    envelope: Envelope
+    trim: FlightState
 
 
 @dataclass(frozen=True)
@@ -70,8 +96,11 @@ class Samples:
 class Draw:
     """Random states of an aircraft about its trim, often at the ends of their ranges."""
 
-    def __init__(self, seed: int, aircraft: Aircraft, envelope: Envelope, trim: FlightState) -> None:
+    def __init__(
+        self, seed: int, aircraft: Aircraft, envelope: Envelope, trim: FlightState, moves: Moves = USUAL
+    ) -> None:
         self.rng = np.random.default_rng(seed)
+        self.seldom = dict(zip(aircraft.surfaces, moves.seldom(aircraft).tolist(), strict=True))
         self.aircraft, self.envelope, self.trim = aircraft, envelope, trim
 
     def between(self, low: float, high: float) -> float:
@@ -90,6 +119,10 @@ class Draw:
         low, high = (middle + reach * (end - middle) for end in ends)
         return self.between(low, high)
 
+    def wide(self, reach: float) -> float:
+        """The reach in what is alike in all boxes of a region."""
+        return reach if self.envelope.altitude_m is None else 1.0
+
     def start(self, reach: float) -> FlightState:
         """Where the engines come to run, and the aircraft there."""
         trim, settings = self.trim, {}
@@ -97,8 +130,9 @@ class Draw:
             (low, high), middle = setting.range, trim.settings[name]
             half = _THROTTLE * (high - low)
             settings[name] = self.share(middle, (max(low, middle - half), min(high, middle + half)), reach)
-        airspeed_mps = self.share(trim.airspeed_mps, self.envelope.airspeed_mps, reach)
-        altitude_m = max(self.around(trim.altitude_m, reach * _ALTITUDE_M), 0.0)
+        airspeed_mps = self.share(trim.airspeed_mps, self.envelope.airspeed_mps, self.wide(reach))
+        about = trim.altitude_m - reach * _ALTITUDE_M, trim.altitude_m + reach * _ALTITUDE_M
+        altitude_m = max(self.between(*(self.envelope.altitude_m or about)), 0.0)
         return replace(trim, airspeed_mps=airspeed_mps, altitude_m=altitude_m, settings=settings)
 
     def state(self, started: FlightState, reach: float, share: float) -> FlightState:
@@ -109,9 +143,11 @@ class Draw:
             f"{axis}_rad_s": self.around(0.0, reach * half)
             for axis, half in zip(AXES, RATES_RAD_S, strict=True)
         }
-        surfaces = {n: share * self.between(t.min_rad, t.max_rad) for n, t in self.aircraft.travel.items()}
+        used = {n: share * (self.seldom[n] if share < 1.0 else 1.0) for n in self.aircraft.surfaces}
+        travel = self.aircraft.travel.items()
+        surfaces = {n: used[n] * self.between(t.min_rad, t.max_rad) for n, t in travel}
         return FlightState(
-            self.share(trim.airspeed_mps, envelope.airspeed_mps, reach), started.altitude_m,
+            self.share(trim.airspeed_mps, envelope.airspeed_mps, self.wide(reach)), started.altitude_m,
             alpha_rad=alpha, beta_rad=self.around(trim.beta_rad, reach * envelope.beta_rad),
             phi_rad=self.around(trim.phi_rad, _BANK_RAD),
             theta_rad=trim.theta_rad - trim.alpha_rad + alpha + self.around(0.0, _CLIMB_RAD),
@@ -121,11 +157,11 @@ class Draw:
 
 def sample(
     plant: Plant, envelope: Envelope, trim: FlightState, n: int, seed: int, properties: Mapping[str, str],
-    ages: tuple[int, ...] = EVERY_AGE, starts: int = STARTS,
+    ages: tuple[int, ...] = EVERY_AGE, starts: int = STARTS, moves: Moves = USUAL,
 ) -> Samples:  # fmt: skip
     """So many random states; properties: of each signal to be read there; ages: of the flights; starts: how
     often the engines are started anew."""
-    draw, rows = Draw(seed, plant.aircraft, envelope, trim), []
+    draw, rows = Draw(seed, plant.aircraft, envelope, trim, moves), []
     tanks = Tanks(plant, trim)
     for k in range(starts):
         box, age = k % len(REACHES), ages[(k // len(REACHES)) % len(ages)]
@@ -134,11 +170,32 @@ def sample(
         plant.start(started)
         for i in range(max(1, n // starts)):
             level = i % len(SHARES)
-            plant.hold(draw.state(started, REACHES[box], SHARES[level]))
+            plant.hold(draw.state(started, REACHES[box], moves.shares[level]))
             rows.append((*seen_at(plant, properties), box, level, age))
     tanks.fill(0.0)
     plant.start(trim)
     return as_arrays(rows, tuple(properties))
+
+
+def sample_all(
+    plant: Plant, regions: Sequence[Region], n: int, seed: int, properties: Mapping[str, str],
+    ages: tuple[int, ...] = EVERY_AGE, moves: Moves = USUAL,
+) -> Samples:  # fmt: skip
+    """So many random states of all regions together; boxes are numbered reach by reach."""
+    few, many = STARTS // len(regions), n // len(regions)
+    parts = [
+        sample(plant, of.envelope, of.trim, many, seed + 10 * k, properties, ages, few, moves)
+        for k, of in enumerate(regions)
+    ]
+    return joined([replace(of, box=len(parts) * of.box + k) for k, of in enumerate(parts)])
+
+
+def joined(parts: Sequence[Samples]) -> Samples:
+    """Samples one after the other."""
+    names = [name for name in vars(parts[0]) if name != "signals"]
+    arrays = {name: np.concatenate([getattr(of, name) for of in parts]) for name in names}
+    signals = {name: np.concatenate([of.signals[name] for of in parts]) for name in parts[0].signals}
+    return Samples(signals=signals, **arrays)
 
 
 def as_arrays(rows: list[tuple], names: tuple[str, ...]) -> Samples:
@@ -213,9 +270,7 @@ def _move(plant: Plant, trim: FlightState, phases: np.ndarray, t_s: float) -> No
         plant.write(surface.command, float(np.clip(there, travel.min_rad, travel.max_rad)))
 
 
-def sorted_in(
-    samples: Samples, ends: Sequence[np.ndarray], aircraft: Aircraft, shares: Sequence[float]
-) -> Samples:
+def sorted_in(samples: Samples, ends: Sequence[np.ndarray], aircraft: Aircraft, moves: Moves) -> Samples:
     """Samples with the innermost box each is in, and its share of the travel; those in no box are left out.
 
     ends: of each box (2, 7 + declared), in the order of `places`.
@@ -223,9 +278,10 @@ def sorted_in(
     where = places(samples, aircraft)
     inside = np.array([((where >= low) & (where <= high)).all(axis=1) for low, high in ends])
     travel = np.array([(t.min_rad, t.max_rad) for t in aircraft.travel.values()])
+    travel *= moves.seldom(aircraft)[:, None]
     travel[travel == 0.0] = np.inf  # of a surface that goes to one side only
     used = np.maximum(samples.u / travel[:, 1], samples.u / travel[:, 0]).max(axis=1)
-    level = np.searchsorted(np.array(shares[:-1]), used)
+    level = np.searchsorted(np.array(moves.shares[:-1]), used)
     return replace(samples, box=inside.argmax(axis=0), level=level).at(np.flatnonzero(inside.any(axis=0)))
 
 

@@ -14,8 +14,10 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.derive.derivation import derive
 from beaver_ftc.studies.gtm.database import read
 from beaver_ftc.studies.gtm.folder import (
+    MOVES,
     NAME,
     NOTICE,
+    regions,
     write_model,
     write_notice,
     write_outline,
@@ -58,7 +60,7 @@ def convert(database: Path, out: Path | None = None, tell: Tell = lambda line: N
         write_outline(bare)
         tell("trim")
         steady = Bench(model).steady(Condition(alpha_deg=START_ALPHA_DEG))
-        made = derive(str(bare), Path(scratch) / "derived", tell=tell)
+        made = derive(str(bare), Path(scratch) / "derived", tell=tell, regions=regions(), moves=MOVES)
         folder = Path(scratch) / "derived" / NAME
         write_start(folder, steady)
         write_scripts(folder, steady)

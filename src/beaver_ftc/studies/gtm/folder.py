@@ -12,6 +12,7 @@ import yaml
 from beaver_ftc.aircraft.loading import FILE
 from beaver_ftc.aircraft.schema import MAX_SURFACES
 from beaver_ftc.aircraft.units import KG_PER_LB, M_PER_FT
+from beaver_ftc.studies.derive.sample import Envelope, Moves
 from beaver_ftc.studies.gtm.aerodynamics import aerodynamics
 from beaver_ftc.studies.gtm.database import WHERE, Database
 from beaver_ftc.studies.gtm.masses import LBS_PER_SLUG, mass_balance, mass_of, structural_in
@@ -55,17 +56,47 @@ def write_model(base: Database, folder: Path) -> Path:
 
 _KG_M2 = KG_PER_LB * LBS_PER_SLUG * M_PER_FT**2  # of a slug ft2
 # Where the design model is found: about level flight, attached flow.
-_ENVELOPE = {"airspeed_mps": [38.0, 58.0], "alpha_deg": [0.0, 7.5]}
+_ENVELOPE = {"airspeed_mps": [33.0, 60.0], "alpha_deg": [-1.0, 12.0]}
+# Parts of it, airspeed in m/s and angle of attack in deg: from half the weight to a turn of 45 deg.
+_REGIONS = (
+    ((33.0, 39.0), (2.5, 12.0)), ((38.0, 44.0), (1.5, 9.5)), ((43.0, 49.0), (0.5, 8.0)),
+    ((48.0, 54.0), (-0.5, 6.5)), ((53.0, 60.0), (-1.0, 5.5)),
+)  # fmt: skip
+_SIDESLIP_RAD, _ALTITUDE_M = 0.2, (0.0, 1500.0)
+
+
+# Tables of elevators and rudders are straight to a third of their travel, of ailerons to half of it; what
+# stands in stays within a twentieth of that.
+MOVES = Moves((0.12, 1.0 / 3.0, 0.5, 1.0), 0.05)
+
+
+def regions() -> list[Envelope]:
+    """Parts of the envelope, each about a steady flight of its own."""
+    return [
+        Envelope(speed, (radians(low), radians(high)), _SIDESLIP_RAD, _ALTITUDE_M)
+        for speed, (low, high) in _REGIONS
+    ]
+
+
 _START = {"airspeed_mps": 50.0, "altitude_m": round(ALTITUDE_FT * M_PER_FT, 2)}
-_PITCH = ("elevator", "stabiliser")
+_LEADS = {
+    "left_inboard_elevator": dict.fromkeys(
+        ("right_inboard_elevator", "left_outboard_elevator", "right_outboard_elevator"), 1.0
+    ),
+    "right_aileron": {"left_aileron": -1.0},
+    "upper_rudder": {"lower_rudder": 1.0},
+}
+_STEERS = ("elevator", "aileron", "rudder")
 
 
 def aircraft_file() -> dict[str, Any]:
     """Our own file without its terms: as many surfaces as an aircraft may have, what steers first."""
     surfaces = dict([*parameters()["surfaces"].items()][:MAX_SURFACES])
-    groups: dict[str, list[str]] = {"pitch": [], "lateral": []}
-    for name, of in surfaces.items():
-        groups["pitch" if of["kind"] in _PITCH else "lateral"].append(name)
+    # In flight spoilers, flaps and stabiliser stay where they are until what steers has been lost.
+    steers = [name for name, of in surfaces.items() if of["kind"] in _STEERS and name not in _LEADS]
+    first, *others = _LEADS
+    groups = {"steers": [*others, *steers]}
+    groups["stands_in"] = [first, *(s for s in surfaces if s not in groups["steers"] and s != first)]
     whole, geometry = mass_of(), parameters()["geometry"]
     inertia = whole.inertia * _KG_M2
     setting = {"property": THROTTLE, "says": "throttle of both engines", "unit": "share of 1", "default": 0.4}
@@ -93,7 +124,7 @@ def aircraft_file() -> dict[str, Any]:
             "Cn": [{"name": "Cn_rudder", "value": -0.05, "surface": "upper_rudder"}],
         },
         "envelope": _ENVELOPE,
-        "trim": {"throttle": THROTTLE},
+        "trim": {"throttle": THROTTLE, "together": _LEADS},
         "engine": {"settings": {"throttle": setting | {"range": [0.0, 1.0]}}},
         "start": _START,
         "damage": {

@@ -67,13 +67,16 @@ def _described(plan: str) -> str:
 
 
 def _aircraft() -> Iterator[tuple[str, str]]:
-    """The built-in aircraft, and those of the jsbsim package that have been derived or can be."""
+    """The built-in aircraft, those that are imported or can be, and those of the jsbsim package."""
     from beaver_ftc.aircraft import builtin_names, load
-    from beaver_ftc.aircraft.loading import is_derived
+    from beaver_ftc.aircraft.loading import FILE, IMPORTED, imported_folder, is_derived
     from beaver_ftc.plant.instrumented import names
 
     for name in builtin_names():
         yield name, load(name).file.description
+    for name, how in IMPORTED.items():
+        here = (imported_folder(name) / FILE).is_file()
+        yield name, load(name).file.description if here else f"not here yet: after {how}"
     for name in names():
         made = ", derived" if is_derived(name) else ": derived at first use"
         yield f"jsbsim:{name}", f"of the jsbsim package{made}"

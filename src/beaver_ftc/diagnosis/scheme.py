@@ -44,6 +44,8 @@ def configure(fdi: np.void, belief: np.void, scenario: Scenario, travel: np.ndar
     state.configure(fdi["config"], scenario)
     state.configure_layout(fdi["layout"], members, aircraft)
     isolation.configure(fdi["isolation"], config, dt, members, travel)
+    # Damage is outside the class: who is merely left when chance has excluded the others is not yet at fault.
+    fdi["isolation"]["estimator"]["doubted"] = config.weighs_chance and bool(aircraft.damage)
     if config.pairs:
         _ask_each_plane(fdi, aircraft)
     declared.configure(fdi["bound"], scenario, belief["design"])

@@ -216,7 +216,7 @@ def _type_correct(kind: str | None, fault: Document | None) -> bool | None:
     if fault is not None and "sensor" in fault:
         return None
     if fault is not None and fault["type"] == DAMAGE:  # a surface that is gone has lost all its effect
-        return None if kind is None else kind == LOSS_OF_EFFECTIVENESS
+        return None if kind in (None, UNANTICIPATED) else kind == LOSS_OF_EFFECTIVENESS
     return None if kind is None else fault is not None and kind == fault["type"]
 
 

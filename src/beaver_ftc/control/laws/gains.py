@@ -158,7 +158,7 @@ def fastest(
     values, speeds = candidates(loop, *margin)
     if noise_rad_s <= 0.0:
         return float(values[-1])
-    allowed = abs(G) * speed_rad_s / noise_rad_s
+    allowed = max(abs(G) * speed_rad_s / noise_rad_s, float(speeds[0]))
     return float(np.exp(np.interp(np.log(allowed), np.log(speeds), np.log(values))))
 
 

@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pyarrow.parquet import read_table
 from scipy.optimize import linprog
+from tools.check_certificate import failures
 
 import beaver_ftc as bf
 from beaver_ftc.cli.main import main
 from beaver_ftc.diagnosis.types.registry import BIAS, CONSTANT_LOSS, FLOAT, STUCK
-from beaver_ftc.studies.separation import Candidate, Situation, as_text, doublet, separate, tell_apart
+from beaver_ftc.studies.separation import Candidate, Situation, as_text, doublet, separate, tell_apart, write
 
 SMALL = {
     "p": [{"sine": {"amplitude_deg_s": 1, "frequency_hz": 0.5}}],
@@ -37,6 +39,24 @@ def ambiguous(**more):
     return bf.load(
         {"name": "open", "duration_s": 1.1, "fdi": fdi, "reference": SMALL, "faults": [STUCK_AILERON], **more}
     )
+
+
+def test_a_doublet_that_was_flown_leaves_log_and_certificate(tmp_path):
+    """What it excluded is proved by its own log."""
+    scenario = ambiguous(fdi={"probing": {}})
+    document = separate(scenario)
+    folder = write(document, scenario, tmp_path)
+    flown = [place for place, pair in enumerate(document["pairs"]) if "left" in pair]
+    assert [int(one.name) for one in sorted((folder / "flown").iterdir())] == flown
+    for place in flown:
+        own, pair = folder / "flown" / str(place), document["pairs"][place]
+        proof, table = json.loads((own / "certificate.json").read_text()), read_table(own / "log.parquet")
+        log = {name: table[name].to_numpy() for name in table.column_names}
+        assert [*failures(proof, log)] == []
+        said = {one["what"] for one in proof["statements"]}
+        gone = [one for one in pair["candidates"] if one not in pair["left"]]
+        assert gone
+        assert {f"{one['surface']} {one['type']}" for one in gone} <= said
 
 
 @pytest.mark.parametrize("substeps", [1, 3])

@@ -47,10 +47,11 @@ def main() -> None:
         count["statements"] += len(certificate["statements"])
         count["not certified"] += len(certificate["without"])
         count["refused"] += bool(refused)
-        count["doubted by a second reader"] += bool([*doubts(certificate, log)])
+        doubted = [*doubts(certificate, log)]
+        count["doubted by a second reader"] += bool(doubted)
         sizes.append(len(as_text(certificate)))
-        if refused:
-            print(f"{index}: {'; '.join(refused)[:300]}", flush=True)
+        if refused or doubted:
+            print(f"{index}: {'; '.join([*refused, *doubted])[:300]}", flush=True)
         due = -(-args.altered * count["flights"] // args.flights) - count["altered"]
         for place in drawn_places(rng, certificate, due):
             count["altered"] += 1

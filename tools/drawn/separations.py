@@ -6,10 +6,11 @@ Until N flights end with two candidates or more: losses, jams, biases and floati
 strike, small references, both classes, several frame rates and substeps. Each proposal is flown. Counted are
 those that leave both candidates where one is true, those that exclude the true one, exits from the envelope,
 and how much processor time a proposal takes, and all of a flight, once scipy is there. Exit status 1 for any
-of the first three.
+of the first three, and for a certificate of a doublet that is refused.
 """
 
 import argparse
+import json
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -17,11 +18,14 @@ from collections.abc import Callable
 import numpy as np
 
 import beaver_ftc as bf
+from beaver_ftc.results.certificates.certificate import as_text
 from beaver_ftc.studies import separation
+from tools.check_certificate import failures
 
 SURFACES = ("aileron", "elevator", "rudder", "flap")
 LOSS = "loss_of_effectiveness"
 PARAMETERS = {LOSS: ("magnitude", 0.1, 1.0), "stuck": ("position_deg", -3.0, 3.0), "float": None}
+WRONG = "both left", "true one excluded", "envelope exits", "certificates refused"
 PARAMETERS |= {"bias": ("bias_deg", -3.0, 3.0)}
 
 
@@ -59,6 +63,15 @@ def main() -> None:
                 print(f"{count['flights']}: {fault}, {names}, {pair['needs']}", flush=True)
             count["true one excluded"] += true in names and true not in left
             count["envelope exits"] += pair["envelope_exits"]
+            log, proof = separation.certified(scenario, pair)
+            columns = dict(zip(log.columns, log.rows.T, strict=True))
+            count["certificates"] += 1
+            count["certificates refused"] += bool([*failures(json.loads(as_text(proof)), columns)])
+            said = {one["what"] for one in proof["statements"]}
+            gone = [f"{surface} {kind}" for surface, kind in names if (surface, kind) not in left]
+            proved = [what in said or what.split()[0] in said for what in gone]
+            count["exclusions"] += len(gone)
+            count["proved"] += sum(proved)
     print(*(f"{word} {n}" for word, n in count.items()), sep=", ")
     for name, words in (
         ("tell_apart", "a proposal, or that there is none"),
@@ -66,7 +79,7 @@ def main() -> None:
     ):
         took_ms = 1e3 * np.array(took_s[name])
         print(f"{words}: median {np.median(took_ms):.1f} ms, at most {took_ms.max():.1f} ms")
-    raise SystemExit(any(count[word] for word in ("both left", "true one excluded", "envelope exits")))
+    raise SystemExit(any(count[word] for word in WRONG))
 
 
 def timed(function: Callable, took_s: list[float]) -> Callable:

@@ -19,7 +19,8 @@ def command(
 
     Flies the scenario to its end. For each two candidates left: which surfaces go how far, there and back,
     after what time they are told apart for certain, or why no doublet within travel, actuators, rates and
-    angle of attack does it. With `fdi.probing` the doublets are flown, and what is left is said.
+    angle of attack does it. With `fdi.probing` the doublets are flown, what is left is said, and
+    flown/N/ has log and certificate of the flight with doublet N.
 
     Exit status 1 if one that was flown left both.
 
@@ -31,6 +32,6 @@ def command(
 
     loaded = load_scenario(scenario)
     document = separation.separate(loaded, rate_deg_s)
-    folder = str(separation.write(document, out))
+    folder = str(separation.write(document, loaded, out))
     answer(format, document | {"folder": folder}, lambda: f"{separation.as_text(document)}\n{folder}")
     raise typer.Exit(0 if document["passed"] else 1)

@@ -145,6 +145,12 @@ class Stepping:
         return self._frame
 
     @property
+    def records(self) -> np.ndarray:
+        """The same as an array (1,)."""
+        self._begin()
+        return self._loop.frames
+
+    @property
     def trim_rad(self) -> Vector:
         """Surfaces in trim, (surfaces,) rad."""
         return np.array(self._frame["control"]["layout"]["trim"])

@@ -38,7 +38,7 @@ FILES_OF_A_RESULT = frozenset({
     "power.json", "power.txt", "power.parquet", "pitch-lost.json", "pitch-lost.txt",
     "diagnosis.parquet", "verdict.json", "flights.json", "flights.md", "flights.png",
     "flight.csv", "flight.ulg", "flight.bin", "vehicle.yaml", "grades.json", "grades.md", "grades.html",
-    "aircraft", "certificate.json", "separation.json",
+    "aircraft", "certificate.json", "separation.json", "flown",
     "rare.json", "flight.yaml", "evidence.json", "evidence.html", "evidence.pdf",
 })  # fmt: skip
 AIRCRAFT, MODEL_FILES = "aircraft", frozenset({".xml", ".yaml"})  # an own aircraft, to fly it again

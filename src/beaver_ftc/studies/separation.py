@@ -27,6 +27,7 @@ from beaver_ftc.diagnosis.types.registry import BIAS, CONSTANT_LOSS, FLOAT, NAME
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.loop.simulation import Stepping
+from beaver_ftc.results.certificates import proved
 from beaver_ftc.results.certificates.certificate import check_scheme, history_of
 from beaver_ftc.results.certificates.inequality import History, Hypothesis, by_each_frame, declared_of
 from beaver_ftc.results.certificates.kinds import hypothesis, wrong
@@ -35,7 +36,7 @@ from beaver_ftc.results.log import MemoryLog
 from beaver_ftc.results.writer import result_folder
 from beaver_ftc.scenario.schema import Scenario
 
-FILE = "separation.json"
+FILE, FLOWN = "separation.json", "flown"
 MARGIN = 1.1  # on what is asked: the aircraft flies on while the doublet is flown
 LONGEST_S = 0.5  # until the frame that tells
 LARGEST_RATE_DEG_S = 20.0
@@ -140,23 +141,54 @@ def propose(left: Sequence[Candidate], at: Situation, names: Sequence[str]) -> l
 
 def _flown(scenario: Scenario, pair: Document, candidates: Sequence[Candidate]) -> Document:
     """Which of two candidates are left once the doublet has been flown, and exits from the envelope in it."""
-    frames, dt = round(scenario.duration_s * scenario.rate_hz), 1.0 / scenario.rate_hz
-    longer = scenario.model_copy(update={"duration_s": scenario.duration_s + pair["duration_s"] + 10.0 * dt})
-    flight = Stepping(longer)
+    flight = _longer(scenario, pair)
     try:
-        flight.step(frames=frames - 1)
-        belief, names = flight.record["belief"], list(scenario.airframe.surfaces)
-        rest, before = belief["u"].copy(), int(flight.record["accounts"]["envelope"]["n_exits"])
-        for k in range(round(pair["time_s"] / dt) + 1):
-            command = rest.copy()
-            for name, course in pair["commands_rad"].items():
-                command[names.index(name)] = course[k] if k < len(course) else rest[names.index(name)]
-            flight.step(command)
+        before = 0
+        for k in _with_doublet(flight, scenario, pair):
+            if k == round(scenario.duration_s * scenario.rate_hz) - 1:
+                before = int(flight.record["accounts"]["envelope"]["n_exits"])
         fdi, both = flight.record["fdi"], zip(candidates, pair["candidates"], strict=True)
         exits = int(flight.record["accounts"]["envelope"]["n_exits"]) - before
         return {"left": [words for one, words in both if not _gone(one, fdi)], "envelope_exits": exits}
     finally:
         flight.release()
+
+
+def _longer(scenario: Scenario, pair: Document) -> Stepping:
+    """The flight, with time for the doublet."""
+    spare_s = pair["duration_s"] + 10.0 / scenario.rate_hz
+    return Stepping(scenario.model_copy(update={"duration_s": scenario.duration_s + spare_s}))
+
+
+def _with_doublet(flight: Stepping, scenario: Scenario, pair: Document) -> Iterator[int]:
+    """Fly on to the scenario's end, then the doublet; yields the frame just flown."""
+    frames, names = round(scenario.duration_s * scenario.rate_hz), list(scenario.airframe.surfaces)
+    yield 0
+    for k in range(1, frames):
+        flight.step()
+        yield k
+    rest = flight.record["belief"]["u"].copy()
+    for k in range(round(pair["time_s"] * scenario.rate_hz) + 1):
+        command = rest.copy()
+        for name, course in pair["commands_rad"].items():
+            command[names.index(name)] = course[k] if k < len(course) else rest[names.index(name)]
+        flight.step(command)
+        yield frames + k
+
+
+def certified(scenario: Scenario, pair: Document) -> tuple[MemoryLog, Document]:
+    """Log and certificate of the flight with its doublet, which is flown again for both."""
+    flights: list[Stepping] = []
+
+    def begin() -> tuple[np.ndarray, Iterator[int]]:
+        flights.append(flight := _longer(scenario, pair))
+        return flight.records, _with_doublet(flight, scenario, pair)
+
+    try:
+        return proved.proved(scenario, begin)
+    finally:
+        for flight in flights:
+            flight.release()
 
 
 def _gone(one: Candidate, fdi: np.void) -> bool:
@@ -168,10 +200,15 @@ def _gone(one: Candidate, fdi: np.void) -> bool:
     return whole or bool(fdi["types"]["surface"][one.surface]["type_excluded"][one.kind])
 
 
-def write(document: Document, out: Path) -> Path:
-    """Write separation.json into its result folder; returns that."""
+def write(document: Document, scenario: Scenario, out: Path) -> Path:
+    """Write separation.json into its result folder, and of each doublet that was flown log and certificate,
+    flown/PLACE/; returns that."""
     name = f"{document['scenario'][:88]}-separation"
     with result_folder(out, name) as folder:
+        for place, pair in enumerate(document["pairs"]):
+            if "left" in pair:
+                (folder / FLOWN / str(place)).mkdir(parents=True)
+                proved.write(*certified(scenario, pair), folder / FLOWN / str(place))
         (folder / FILE).write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
     return out / name
 

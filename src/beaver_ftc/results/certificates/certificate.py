@@ -65,12 +65,21 @@ def certificate_of(scenario: Scenario, log: Log, events: dict[str, int], tape: T
     }  # fmt: skip
     if tape is not None:
         history = history_of(scenario, log, tape)
-        for said in statements(scenario, tape, history, events):
+        for found in statements(scenario, tape, history, events):
+            said = _beside_the_log(found, log)
             certain = "sides" in said
             document["statements" if certain else "without"].append(said if certain else _without(said))
         if document["statements"]:
             document |= _declared(scenario, history, document["statements"])
     return sealed(document)
+
+
+def _beside_the_log(said: Document, log: Log) -> Document:
+    """The statement; one of chance with what the log has of it."""
+    if "likelihood" not in said:
+        return said
+    shares = _read(log, [said["likelihood"]])[said["likelihood"]]
+    return chance.with_share(said, float(shares[said["frame"]]))
 
 
 def _without(said: Document) -> Document:

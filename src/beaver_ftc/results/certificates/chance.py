@@ -37,8 +37,13 @@ def of_alarm(tape: Tape, history: History, surfaces: Sequence[str], k: int) -> D
     score = float(hypothesis["score"] / chances["tests"]["alarm_level"])
     if not (value > limit and abs(value / limit - score) <= _AS_LOGGED * score):
         return None
-    pairs = [value, score * (1.0 + _AS_LOGGED)], [limit, value / limit]
-    return {"likelihood": _column(hypothesis, surfaces), **said, "sides": [*pairs]}
+    return {"likelihood": _column(hypothesis, surfaces), **said, "sides": [[value], [limit]]}
+
+
+def with_share(said: Document, logged: float) -> Document:
+    """The statement with the share that the log has: as large, or larger where another view has more."""
+    (value,), (limit,) = said["sides"]
+    return said | {"sides": [[value, logged * (1.0 + _AS_LOGGED)], [limit, value / limit]]}
 
 
 def shares(chances: np.void, surfaces: Sequence[str]) -> Iterator[tuple[str, float]]:

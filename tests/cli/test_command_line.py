@@ -11,6 +11,8 @@ import pandas as pd
 import pytest
 import yaml
 
+from beaver_ftc.cli.output import status_of_stop
+
 BEAVER = Path(sys.executable).with_name("beaver-ftc")
 SHORT = """
 name: short
@@ -417,3 +419,14 @@ def test_runs_of_one_name_at_once_leave_one_whole_result(short):
     assert [run.wait(timeout=120) for run in runs] == [0, 0, 0]
     assert _names(short / "runs") == ["short"]
     assert len(pd.read_parquet(short / "runs/short/log.parquet")) == 600
+
+
+@pytest.mark.parametrize(
+    ("stop", "status"), [(KeyboardInterrupt(), 130), (SystemExit(143), 143), (None, None)]
+)
+def test_a_signal_in_compiled_code_is_a_stop(stop, status):
+    """Compiled code that a signal ends raises a SystemError whose cause is what the signal raised."""
+    error = SystemError("returned a result with an exception set")
+    error.__cause__ = stop
+    assert status_of_stop(error) == status
+    assert status_of_stop(ValueError()) is None

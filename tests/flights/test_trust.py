@@ -10,6 +10,7 @@ from beaver_ftc.flights import fitting, identification, trust
 from beaver_ftc.flights.bank import adaptation_of
 from beaver_ftc.flights.diagnose import diagnose, silenced
 from beaver_ftc.flights.findings import as_text, verdict_of
+from beaver_ftc.flights.model import Fitted
 from flights import small
 
 HEALTHY = small.flight(small.model(), n=1200, seed=2)
@@ -221,3 +222,20 @@ def test_a_model_that_claims_nothing_says_nothing(model):
     assert silent(rows).all()
     assert not rows.credible.any()
     assert list(rows.reasons) == ["of no surface is the effect known from the flights fitted"]
+
+
+@pytest.mark.parametrize(
+    ("factor", "turned", "refused"),
+    [(57.3, 1.0, True), (0.01, 1.0, True), (5.0, 1.0, False), (57.3, 5.0, False), (0.0, 1.0, False)],
+)
+def test_a_command_in_another_unit_is_refused_where_rates_move_alike(factor, turned, refused):
+    n = np.arange(2000)
+    rates = np.column_stack([np.sin(0.01 * (k + 1) * n) for k in range(3)])
+    commands = np.column_stack([np.sin(0.03 * n), np.cos(0.02 * n)])
+    fitted = Fitted(commands=trust.span(commands), rates=trust.span(rates))
+    flown = commands * [1.0, factor], rates * [1.0, turned, 1.0]
+    if refused:
+        with pytest.raises(BadInput, match=rf"log: the command of elevator moves {factor:g} times"):
+            trust.check_commands("log", *flown, fitted, ["aileron", "elevator"])
+    else:
+        trust.check_commands("log", *flown, fitted, ["aileron", "elevator"])

@@ -14,7 +14,7 @@ import typer
 
 from beaver_ftc import __version__
 from beaver_ftc.cli.inputs import as_typer_reads
-from beaver_ftc.cli.output import failure_of, report_last
+from beaver_ftc.cli.output import failure_of, report_last, status_of_stop
 
 # Where each is: a module of this package, and its function there.
 COMMANDS = {
@@ -114,5 +114,5 @@ def main() -> NoReturn:
     try:
         app()
     except Exception as error:
-        sys.exit(report_last(failure_of(error)))
+        sys.exit(status_of_stop(error) or report_last(failure_of(error)))
     sys.exit(0)

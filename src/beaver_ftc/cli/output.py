@@ -1,6 +1,7 @@
 """What all commands share about their output: text for people, one JSON document for machines."""
 
 import os
+import signal
 import sys
 import time
 import traceback
@@ -130,6 +131,14 @@ def failure_of(error: Exception) -> BeaverFtcError:
     failed = SimulationFailed(text)
     failed.__cause__ = error
     return failed
+
+
+def status_of_stop(error: Exception) -> int | None:
+    """The exit status where a signal stopped compiled code, whose caller sees it as a SystemError alone."""
+    cause = error.__cause__ if isinstance(error, SystemError) else None
+    if isinstance(cause, KeyboardInterrupt):
+        return 128 + signal.SIGINT
+    return cause.code if isinstance(cause, SystemExit) and isinstance(cause.code, int) else None
 
 
 def _discard_stdout() -> None:

@@ -139,6 +139,9 @@ def check_rate(samples: Samples, model: Model) -> None:
             f"{model.rate_hz:.3g} Hz the model was identified at"
         )
     trust.check_units(samples, model.fitted)
+    if model.fitted is not None and model.fitted.commands:
+        surfaces = list(model.vehicle.surfaces)
+        trust.check_commands(samples.name, samples.commands, samples.rates, model.fitted, surfaces)
 
 
 def rows_of(samples: Samples, model: Model, bank: Bank, posterior: Floats) -> Rows:

@@ -9,7 +9,7 @@ import numpy as np
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights import extremes, fitting, trust
-from beaver_ftc.flights.model import Model
+from beaver_ftc.flights.model import Fitted, Model
 from beaver_ftc.flights.recording import Floats
 from beaver_ftc.flights.regression import group_indices, spectrum, variance_inflation
 from beaver_ftc.flights.samples import Samples, with_pressure
@@ -33,6 +33,7 @@ _MOST_DELAY_S, _LEAST_LAG_S, _MOST_LAG_S = 0.6, 0.005, 1.0
 def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
     """The model of a vehicle from its flights, with its own account of how good it is in `identified`."""
     stretches = fitting.stretches_of(flights)
+    _check_commands(flights, vehicle)
     model = fitting.fit_model(stretches, vehicle)
     check_explains(fitting.explained(stretches, model), stretches, model)
     model = fitting.trusted(stretches, model)
@@ -106,6 +107,13 @@ def check_explains(tests: list[Document], stretches: Sequence[fitting.Stretch], 
             f"these {minutes:.1f} min, commands that move more ({still[0]} has a standard deviation of "
             f"{still[1]:.2g}), or the commands that this vehicle follows{_of_rates(stretches, model)}"
         )
+
+
+def _check_commands(flights: Sequence[Samples], vehicle: Vehicle) -> None:
+    """Raise BadInput where a flight's command is in another unit than that of the first."""
+    first = Fitted(commands=trust.span(flights[0].commands), rates=trust.span(flights[0].rates))
+    for other in flights[1:]:
+        trust.check_commands(other.name, other.commands, other.rates, first, list(vehicle.surfaces))
 
 
 def _of_rates(stretches: Sequence[fitting.Stretch], model: Model) -> str:

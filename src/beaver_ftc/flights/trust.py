@@ -32,6 +32,7 @@ _NOISIER, _LEAST_NOISE, _MOST_NOISE = 1.5, 4.0, 5.8
 _CLIPPED_S = 30.0
 _TIED = 0.98
 _UNIT, _SPREAD = 10.0, 1.6
+_ALIKE, _OTHER_UNIT = 3.0, 20.0
 _RARE = (0.001, 0.999)
 
 
@@ -44,9 +45,9 @@ def fitted_on(flights: Sequence[tuple[Samples, Mask]], model: Model, gain_sd: Fl
     known = [samples.airspeed[use] for samples, use in flights if samples.airspeed is not None]
     grouped = np.column_stack([commands[:, group].sum(axis=1) for group in groups])
     return Fitted(
-        commands=_span(commands),
-        rates=_span(rates),
-        airspeed=_span(np.concatenate(known)[:, None])[0] if known else None,
+        commands=span(commands),
+        rates=span(rates),
+        airspeed=span(np.concatenate(known)[:, None])[0] if known else None,
         spread=np.nanstd(rates, axis=0).tolist(),
         correlation=_correlation(grouped).tolist(),
         tied=_tied(flights, model).tolist(),
@@ -66,7 +67,7 @@ def _unpowered(flights: Sequence[tuple[Samples, Mask]]) -> float | None:
     return float(np.quantile(values, energy.LOWEST)) if values.size else None
 
 
-def _span(values: Floats) -> list[list[float]]:
+def span(values: Floats) -> list[list[float]]:
     """Least and largest of each column but for the rarest, [0, 0] where nothing is known."""
     if not values.shape[1]:
         return []
@@ -156,6 +157,30 @@ def check_units(samples: Samples, fitted: Fitted | None) -> None:
                 f"{samples.name}: rates spread {middle:.3g} times as widely as in the flights of the model, "
                 f"allowed: rates in rad/s; a factor of {size:.4g} fits: the model's own were in {unit}?"
             )
+
+
+def check_commands(
+    name: str, commands: Floats, rates: Floats, fitted: Fitted, surfaces: Sequence[str]
+) -> None:
+    """Raise BadInput where a command moves so much more or less than in the flights of the model, while every
+    rate moves alike, that it is in another unit.
+
+    Shapes: commands (n, S), rates (n, 3).
+    """
+    turned = _reach(span(rates)) / np.maximum(_reach(fitted.rates), TINY)
+    if turned.min() < 1.0 / _ALIKE or turned.max() > _ALIKE:
+        return
+    ratios = _reach(span(commands)) / np.maximum(_reach(fitted.commands), TINY)
+    for surface, ratio in zip(surfaces, ratios.tolist(), strict=True):
+        if ratio > 0.0 and not 1.0 / _OTHER_UNIT < ratio < _OTHER_UNIT and 1e-4 < ratio < 1e4:
+            raise BadInput(
+                f"{name}: the command of {surface} moves {ratio:.3g} times as much as in the other flights, "
+                "and the rates alike, allowed: one unit (57.3 is deg for rad, 100 percent: `unit`, `scale`)"
+            )
+
+
+def _reach(span: Sequence[Sequence[float]]) -> Floats:
+    return np.ptp(np.array(span, dtype=float).reshape(-1, 2), axis=1)
 
 
 def outside(samples: Samples, model: Model, scale: Floats) -> dict[str, Mask]:

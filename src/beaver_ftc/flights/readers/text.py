@@ -133,7 +133,9 @@ def read_cells(path: Path, columns: Collection[str] | None, most_rows: int) -> t
         many = f"{found.broken} of {rows + found.broken} lines have another number of cells than the header"
         raise _no_table(path, f"{many}, {len(layout.names)}: the first {broken[0]!r}")
     nothing = np.broadcast_to(np.nan, rows)
-    numbers = {name: np.concatenate(parts[name]) if parts[name] else np.empty(0) for name in wanted}
+    numbers = {
+        name: np.concatenate([*parts.pop(name), np.empty(0)]) for name in wanted
+    }  # one column twice at most
     found.numbers = {name: numbers.get(name, nothing) for name in layout.names}
     return layout, found
 

@@ -99,6 +99,17 @@ def rows(of: list[Document]) -> Iterator[list[Any]]:
         ]  # fmt: skip
 
 
+def fly_all(flights: int, seed: int, calm: bool, out: Path) -> list[Document]:
+    """The rows of so many flights: those in the file, and the others, added to it."""
+    done = [json.loads(line) for line in out.read_text().splitlines()] if out.is_file() else []
+    with out.open("a", encoding="utf-8") as file:
+        for k in sorted(set(range(flights)) - {each["k"] for each in done}):
+            done.append(flown(seed, k, calm))
+            file.write(json.dumps(done[-1]) + "\n")
+            file.flush()
+    return sorted((each for each in done if each["k"] < flights), key=lambda each: each["k"])
+
+
 def main() -> None:
     """Fly what the file lacks, print the table."""
     parser = argparse.ArgumentParser(
@@ -115,15 +126,9 @@ def main() -> None:
         drawn = given.seed, given.flight, given.calm
         print(json.dumps(scenario(*drawn)), json.dumps(flown(*drawn)), sep="\n")
         return
-    done = [json.loads(line) for line in given.out.read_text().splitlines()] if given.out.is_file() else []
-    with given.out.open("a", encoding="utf-8") as file:
-        for k in sorted(set(range(given.flights)) - {each["k"] for each in done}):
-            done.append(flown(given.seed, k, given.calm))
-            file.write(json.dumps(done[-1]) + "\n")
-            file.flush()
-    of = sorted((each for each in done if each["k"] < given.flights), key=lambda each: each["k"])
-    table = [list(map(str, row)) for row in rows(of)]
-    print(json.dumps(of) if given.form == "json" else markdown_table(HEAD, table))
+    done = fly_all(given.flights, given.seed, given.calm, given.out)
+    table = [list(map(str, row)) for row in rows(done)]
+    print(json.dumps(done) if given.form == "json" else markdown_table(HEAD, table))
 
 
 if __name__ == "__main__":

@@ -1,0 +1,112 @@
+"""What docs/gtm.md prints of damage: where it can be flown, what flies there, what is found of it."""
+
+import os
+import tempfile
+from functools import cache
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import yaml
+from benchmarks import gtm_damage as campaign
+
+import beaver_ftc as bf
+from beaver_ftc.studies.gtm.conversion import convert
+from beaver_ftc.studies.gtm.parameters import cases
+from beaver_ftc.studies.gtm.steady import Bench
+from beaver_ftc.studies.present.tables import markdown_table
+from tools.gtm.envelope import BANKS_DEG, SIDESLIPS_DEG, SPEEDS_KT, Envelope, Turn
+from tools.gtm.specification import DATABASE
+
+PICTURE = "images/gtm-envelope.png"
+LAWS = ("fault-tolerant", "oracle", "nominal")
+FLIGHTS, CALM = 600, 120
+FLOWN_KT = (80, 95, 110)
+DURATION_S, AT_S, TURN_S, TURN_DEG = 70.0, 10.0, 30.0, 15.0
+
+
+@cache
+def _folder() -> Path:
+    """Where the aircraft folder `gtm` is, imported for these tables alone."""
+    folder = Path(tempfile.mkdtemp(prefix="beaver-ftc-"))
+    convert(Path(os.environ["BEAVER_FTC_GTM"]) / DATABASE, folder)
+    return folder
+
+
+def gtm_envelope() -> str:
+    """Level turns that can be held, of each case, and flights of 60 s with it; and the picture."""
+    bench = Bench(_folder() / "gtm" / "gtm.xml")
+    of = {name: list(Envelope(bench, k).turns()) for k, name in enumerate(("whole", *cases()))}
+    rows = []
+    for name, turns in of.items():
+        held = [turn for turn in turns if turn.held]
+        level = [turn.speed_kt for turn in held if turn.bank_deg == 0]
+        flown = "" if name == "whole" else "/".join(str(_flown(name, law)) for law in LAWS)
+        rows.append([name, f"{len(held)}/{len(turns)}", f"{min(level)}", flown])
+    _draw(of)
+    head = ("case", "points held", "slowest level, kt", f"flown of {len(FLOWN_KT)}, ours/oracle/nominal")
+    return markdown_table(head, rows) + f"\n\n![Level turns held]({PICTURE})"
+
+
+def _flown(case: str, law: str) -> int:
+    """At how many speeds it is still flown 60 s after the damage: airspeed within 5 kt, bank within 5 deg."""
+    kept = 0
+    for knots in FLOWN_KT:
+        speed_mps = knots * campaign.M_S_PER_KT
+        hold = [{"hold": True}]
+        given = {
+            "name": "held", "aircraft": "./gtm", "duration_s": DURATION_S, "control": {"law": law},
+            "initial": {"airspeed_mps": round(speed_mps, 2)},
+            "autopilot": {"airspeed_mps": hold, "altitude_m": hold,
+                          "bank_deg": [{"value": 0}, {"at_s": TURN_S, "value": TURN_DEG}]},
+            "faults": [{"type": "damage", "case": case, "at_s": AT_S}],
+        }  # fmt: skip
+        path = _folder() / "held.yaml"
+        path.write_text(yaml.safe_dump(given), encoding="utf-8")
+        flight = bf.fly(bf.load(path))
+        log, metrics = flight.log, flight.metrics
+        late = log[log["t_s"] > DURATION_S - 10.0]
+        bank_off = np.abs(np.degrees(late["phi_rad"]) - TURN_DEG).max()
+        speed_off = np.abs(late["airspeed_mps"] - speed_mps).max() / campaign.M_S_PER_KT
+        kept += bool(not metrics.get("departure") and bank_off < 5.0 and speed_off < 5.0)
+    return kept
+
+
+def _draw(of: dict[str, list[Turn]]) -> None:
+    """A panel a case: speed against bank, and how many of the sideslips asked for can be held."""
+    figure, axes = plt.subplots(1, len(of), figsize=(13, 2.6), sharey=True)
+    for axis, (name, turns) in zip(axes, of.items(), strict=True):
+        asked = len(turns) // (len(SPEEDS_KT) * len(BANKS_DEG))
+        share = np.zeros((len(SPEEDS_KT), len(BANKS_DEG)))
+        for turn in turns:
+            share[SPEEDS_KT.index(turn.speed_kt), BANKS_DEG.index(turn.bank_deg)] += turn.held / asked
+        drawn = axis.pcolormesh(BANKS_DEG, SPEEDS_KT, share, cmap="YlGn", vmin=0, vmax=1, shading="nearest")
+        for (i, j), part in np.ndenumerate(share):
+            if part == 0.0:
+                axis.text(BANKS_DEG[j], SPEEDS_KT[i], "x", ha="center", va="center", color="#b00", fontsize=8)
+        says = "any" if asked == 1 else f"{len(SIDESLIPS_DEG)} sideslips"
+        axis.set_title(f"{name.replace('left-outboard-', '').replace('left-', '')}\n{says}", fontsize=8)
+        axis.set_xlabel("bank, deg", fontsize=8)
+        axis.set_xticks((-45, 0, 45))
+        axis.tick_params(labelsize=7)
+    axes[0].set_ylabel("speed, kt", fontsize=8)
+    bar = figure.colorbar(drawn, ax=axes, fraction=0.015, pad=0.01)
+    bar.set_label("share held", fontsize=8)
+    bar.ax.tick_params(labelsize=7)
+    Path("images").mkdir(exist_ok=True)
+    figure.savefig(PICTURE, dpi=110, bbox_inches="tight", metadata={"Software": None})
+    plt.close(figure)
+
+
+def gtm_damage() -> str:
+    """The campaign of `benchmarks/gtm_damage.py`; and of calm air what is found within 1 s, and wrong names.
+
+    `BEAVER_FTC_GTM_ROWS`: a folder with rows flown before by that benchmark, which are not flown again.
+    """
+    kept = Path(os.environ.get("BEAVER_FTC_GTM_ROWS") or tempfile.mkdtemp(prefix="beaver-ftc-"))
+    real = campaign.fly_all(FLIGHTS, 1, False, kept / "full.jsonl")
+    calm = campaign.fly_all(CALM, 1, True, kept / "calm.jsonl")
+    within = {row[0]: f"{row[3]}/{row[1]}/{row[11]}" for row in campaign.rows(calm)}
+    shown = [1, 2, 3, 4, 5, 7, 8, 9, 10, 11]
+    rows = [[row[0], *(str(row[k]) for k in shown), within[row[0]]] for row in campaign.rows(real)]
+    return markdown_table(("case", *(campaign.HEAD[k] for k in shown), "calm: within/wrong"), rows)

@@ -68,6 +68,10 @@ def test_zeros_of_a_transfer_function_slowest_first():
     found = zeros(T @ a @ np.linalg.inv(T), T @ np.array([1.0, 0.0, 0.0]), 0)
     np.testing.assert_allclose(found, [-0.5, 3.0], atol=1e-9)
     assert zeros(A, B, 0).size == 0
+    # s^2 + 2 s + 5 over s^3 + 6 s^2 + 11 s + 6: -1 +- 2j, in the order of every machine
+    T[0] = [1.0, 2.0, 5.0]
+    pair = zeros(T @ a @ np.linalg.inv(T), T @ np.array([1.0, 0.0, 0.0]), 0)
+    np.testing.assert_allclose(pair, [-1.0 + 2.0j, -1.0 - 2.0j], atol=1e-9)
     np.testing.assert_allclose(zeros(A, B, 1), [0.0], atol=1e-9)
 
 

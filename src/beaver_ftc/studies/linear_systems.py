@@ -58,7 +58,7 @@ def response(A: np.ndarray, b: np.ndarray, row: int, frequency_rad_s: np.ndarray
 
 
 def zeros(A: np.ndarray, b: np.ndarray, row: int) -> np.ndarray:
-    """Transmission zeros from input column b to state `row`, slowest first.
+    """Transmission zeros from input column b to state `row`, slowest first, of a pair the upper one first.
 
     The finite generalised eigenvalues of [[A, b], [c, 0]] against [[I, 0], [0, 0]].
     """
@@ -70,7 +70,8 @@ def zeros(A: np.ndarray, b: np.ndarray, row: int) -> np.ndarray:
     descriptor = np.diag([1.0] * n + [0.0])
     found = eigvals(system, descriptor)
     finite = found[np.isfinite(found) & (np.abs(found) < 1e6)]
-    return finite[np.argsort(np.abs(finite))]
+    size = [float(f"{each:.6g}") for each in np.abs(finite)]  # the last digits of a pair differ by machine
+    return finite[np.lexsort((-finite.imag, size))]
 
 
 def held_over_frame(A: np.ndarray, B: np.ndarray, dt_s: float) -> tuple[np.ndarray, np.ndarray]:

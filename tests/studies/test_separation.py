@@ -41,6 +41,14 @@ def ambiguous(**more):
     )
 
 
+def test_what_is_left_of_a_bias_holds_the_true_one():
+    bias = {"type": "bias", "actuator": "aileron", "bias_deg": 2.0, "at_s": 1}
+    pairs = separate(ambiguous(faults=[bias], duration_s=1.03))["pairs"]
+    left = [one["deg"] for pair in pairs for one in pair["candidates"] if one["type"] == "bias"]
+    assert left
+    assert all(low <= 2.0 <= high for low, high in left)
+
+
 def test_a_doublet_that_was_flown_leaves_log_and_certificate(tmp_path):
     """What it excluded is proved by its own log."""
     scenario = ambiguous(fdi={"probing": {}})

@@ -16,6 +16,7 @@ import numpy as np
 from beaver_ftc.design.model import AXES
 from beaver_ftc.diagnosis.bounds.declared import poles_for_noise
 from beaver_ftc.diagnosis.state import LOSS
+from beaver_ftc.diagnosis.types.registry import STUCK
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.certificates import chance, courses, kinds
 from beaver_ftc.results.certificates.inequality import (
@@ -189,8 +190,9 @@ def _of_types(scenario: Scenario, tape: Tape, history: History, alarm: int) -> I
         because, found = kinds.why_not(tape, kind), None
         about: Document = {"what": kinds.name_of(scenario.airframe.surfaces[s], kind), "column": None}
         if because is None:
-            of = kinds.hypothesis(tape, s, kind)
-            if kind in courses.RULES:
+            followed = kind in courses.RULES  # by where the surface was, as if it were held there
+            of = kinds.hypothesis(tape, s, STUCK if followed else kind)
+            if followed:
                 said = courses.excludes(scenario, tape, history, of, s, kind, alarm)
                 yield about | (said or {"because": kinds.COURSE})
                 continue

@@ -12,6 +12,7 @@ from math import inf
 import numpy as np
 
 from beaver_ftc.diagnosis.types.registry import (
+    BIAS,
     CONSTANT_LOSS,
     DOWN,
     FLOAT,
@@ -70,11 +71,13 @@ def hypothesis(tape: Tape, s: int, kind: int) -> Hypothesis:
     Gu, G, spread = -tape.offset[:, e], tape.slope[:, e], tape.spread[:, e]
     asked = tuple(i for i in range(3) if not fdi["isolation"]["estimator"][e]["unasked"][i])
     low, high = float(surface["travel_low"]), float(surface["travel_high"])
-    if kind not in (FLOAT, CONSTANT_LOSS, VARYING_LOSS):  # held somewhere, as far as a frame goes
+    if kind == STUCK:
         return Hypothesis(tape.first, -Gu, G, spread, low, high, True, True, asked)
     if kind == FLOAT:
         neutral = min(max(0.0, low), high)
         return Hypothesis(tape.first, neutral * G - Gu, 0.0 * G, spread, 0.0, 0.0, True, True, asked)
+    if kind == BIAS:  # away from the stops
+        return Hypothesis(tape.first, 0.0 * G, G, spread, low - high, high - low, True, True, asked)
     loss = Hypothesis(tape.first, 0.0 * G, Gu, spread, -1.0, 0.0, True, True, asked)
     return loss if kind == CONSTANT_LOSS else replace(loss, constant=False, shown=False)
 

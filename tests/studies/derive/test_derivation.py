@@ -19,7 +19,8 @@ from .known import TRAINER
 def test_there_are_as_many_terms_as_the_evaluator_has_room_for(room, tried, monkeypatch):
     asked = []
 
-    def fitted(samples, aircraft, most):
+    def fitted(samples, aircraft, most, weight):
+        assert weight is None
         asked.append(most)
         return {"Cl": [{"name": "Cl_any", "value": 1.0, "surface": "aileron"}], "most": most}
 
@@ -37,10 +38,10 @@ def test_there_are_as_many_terms_as_the_evaluator_has_room_for(room, tried, monk
     data = {"surfaces": {"aileron": {}}, "model_error_map": {}}
     if tried is None:
         with pytest.raises(BadInput, match=r"^trainer: its terms need more than \d+ products of signals"):
-            derivation._moments(None, data, Path())
+            derivation._moments(None, data, Path(), None)
         assert asked == [26, 22, 18, 14, 10, 6]
     else:
-        assert derivation._moments(None, data, Path())["most"] == tried[-1]
+        assert derivation._moments(None, data, Path(), None)["most"] == tried[-1]
         assert asked == tried
 
 
@@ -169,7 +170,8 @@ def test_a_wish_for_speed_and_altitude_is_in_every_outline_that_is_tried(monkeyp
     monkeypatch.setattr(
         outline, "outline", lambda name, model, travel, lift: {"lift": lift, "start": {}, "envelope": {}}
     )
-    monkeypatch.setattr(outline, "level_flight", lambda of, folder, notes: tried.append(of))
+    level = None, None, SimpleNamespace(gamma_rad=0.0)
+    monkeypatch.setattr(outline, "level_flight", lambda of, folder, notes: tried.append(of) or level)
     source, folder, told = Source("mine", Path("mine.xml")), tmp_path / "new" / "mine", []
     notes = []
     derivation._prepared(source, folder, outline.EnvelopeFile(), notes, told.append)

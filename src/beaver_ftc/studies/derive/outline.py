@@ -298,6 +298,7 @@ def level_as_filed(source: Path, folder: Path, envelope: EnvelopeFile) -> Level:
     aircraft = read(source)
     copy_of(aircraft.jsbsim, folder)
     data = aircraft.file.model_dump(mode="json", exclude_none=True, exclude={"moments"})
+    data["trim"] = {key: of for key, of in data["trim"].items() if of}
     data["envelope"] |= envelope.model_dump(
         mode="json", exclude_none=True, include={"airspeed_mps", "alpha_deg"}
     )

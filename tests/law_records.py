@@ -17,12 +17,12 @@ def new_control(**fields):
 
 
 def put(control, **fields):
-    """Put each value where a field of that name is, but for what observer, rivals and engine keep."""
+    """Put each value where a field of that name is, but for what observer, rivals and engines keep."""
     for name, value in fields.items():
         if name in control.dtype.names:
             control[name] = value
             continue
-        own = (part for part in control.dtype.names if part not in ("rival", "rejection", "power"))
+        own = (part for part in control.dtype.names if part not in ("rival", "rejection", "power", "engines"))
         parts = [part for part in own if name in (control[part].dtype.names or ())]
         assert len(parts) == 1, (name, parts)
         control[parts[0]][name] = value

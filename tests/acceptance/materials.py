@@ -29,6 +29,8 @@ def lay_out(line: str, folder: Path, installation: Installation) -> None:
         _identified(folder, installation)
     if "navion" in line and "derive" not in line:
         _derived(folder, installation)
+    if "engines-alone" in line:
+        _with_engines(folder, installation)
     for name in re.findall(r"\bruns/([\w-]+)", line):
         if line.startswith("beaver-ftc compare"):
             _fly(name, folder, installation)
@@ -105,16 +107,15 @@ def _identified(folder: Path, installation: Installation) -> None:
     assert installation.beaver(*given.split(), cwd=folder).returncode == 0
 
 
-def _own_aircraft(folder: Path) -> None:
-    """The tutorial's files; the aircraft's folder is the page's own doing."""
-    for path in (ROOT / "examples/own-aircraft").iterdir():
-        shutil.copy(path, folder)
+def _examples(of: str):
+    """Puts the files of one folder of the examples there."""
+    return lambda folder: [shutil.copy(path, folder) for path in (ROOT / "examples" / of).iterdir()]
 
 
-def _outer_loops(folder: Path) -> None:
-    """The examples of other aircraft along a profile."""
-    for path in (ROOT / "examples/outer-loops").iterdir():
-        shutil.copy(path, folder)
+def _with_engines(folder: Path, installation: Installation) -> None:
+    """The folder that the page's command before makes."""
+    given = ("derive", "jsbsim:737", "--engines", "--out", "aircraft")
+    assert installation.beaver(*given, cwd=folder).returncode == 0
 
 
 def _derived(folder: Path, installation: Installation) -> None:
@@ -145,8 +146,9 @@ _MATERIALS = {
     r"(?<!/)\b(healthy|suspect)\.csv\b": _recorded_flights,
     r"\bmy-logs/": _sample_logs,
     r"\bmine[:.]": _mine,
-    r"\bnavion": _own_aircraft,
-    r"\bjet\.yaml\b": _outer_loops,
+    r"\bnavion": _examples("own-aircraft"),
+    r"\bjet\.yaml\b": _examples("outer-loops"),
+    r"engines-alone": _examples("engines"),
     r"(?<!\./)\baircraft/": _copy("aircraft"),
     r"\bdocs/": _copy("docs"),
     r"\btests/data\b": _copy("tests/data"),

@@ -32,12 +32,14 @@ CASE = "left-wing-tip-off"  # the example's
 REQUIREMENT = {"id": "A", "over": ["elevator-stuck"], "expect": {"no_departure": True}}
 NO_TERMS = {"Cl": [], "Cm": [], "Cn": []}
 # What a file says besides the key in question.
+BEAVER = yaml.safe_load((load().folder / "aircraft.yaml").read_text())
+THRUST = {"airspeed_mps": [40, 60], "setting": [10, 20], "force_n": [[0, 900], [0, 500]]}
 AROUND = {
     "scenario-keys": {"": {"name": "x"}, "expect": {"faults": [LOSS], "autopilot": PROFILE}},
     "sweep-keys": {"": {"name": "x", "runs": 10, "base": "elevator-partial-loss"}},
     "plan-keys": {"": {"name": "x", "requirements": [REQUIREMENT]}},
     "aircraft-keys": {
-        "": yaml.safe_load((load().folder / "aircraft.yaml").read_text()),
+        "": BEAVER | {"engine": BEAVER["engine"] | {"thrust": THRUST}},
         "moments": {"moments": NO_TERMS},
         "forces": {"moments": NO_TERMS, "forces": {}},
     },

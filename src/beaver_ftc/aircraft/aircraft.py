@@ -13,6 +13,7 @@ from beaver_ftc.aircraft.schema import (
     SIDESLIP_RATE,
     AircraftFile,
     DamageSection,
+    EffectorSection,
     EngineSection,
     EnvelopeSection,
     GeometrySection,
@@ -309,6 +310,11 @@ class Aircraft:
     def engine(self) -> EngineSection:
         """Settings of the engine a scenario may give."""
         return self.file.engine
+
+    @property
+    def effectors(self) -> Mapping[str, EffectorSection]:
+        """Engines that turn it where surfaces no longer reach, by name."""
+        return MappingProxyType(self.file.effectors)
 
     @property
     def power_setting(self) -> str:

@@ -19,6 +19,8 @@ MAX_SURFACES, MAX_SIGNALS, MAX_DAMAGE = 20, 6, 50
 MAX_TERMS_OF_ONE, MAX_MONOMIALS = 64, 64
 MAX_TERMS = 3 * MAX_TERMS_OF_ONE
 MAX_BOXES, MAX_LEVELS, MAX_AGES = 20, 4, 4  # of the map of the model's error
+MAX_EFFECTORS = 8
+MAX_LEVERS = 1 + MAX_EFFECTORS  # that of all engines first
 MAX_THRUST = 8  # airspeeds and settings of the table of thrust
 FLOW_SIGNALS = ("alpha", "beta", "ph", "qh", "rh")
 RATE_SIGNALS = ("ph", "qh", "rh")
@@ -280,6 +282,20 @@ class EngineSection(Section):
     thrust: ThrustSection | None = None
 
 
+class EffectorSection(Section):
+    """An engine that the law may move alone: what it gives along the body's x axis turns the aircraft about
+    the centre of gravity by its arms.
+
+    throttle: property that is added to the power lever of this engine alone, in the units of its setting
+    share: of the thrust of all, `engine.thrust`
+    """
+
+    throttle: Property = entry(..., examples=["fcs/actuated-throttle-0-difference"])
+    share: Number = number(..., "1", "of the thrust of all engines", gt=0, le=1, examples=[0.5])
+    right_m: Number = number(..., "m", "of the centre of gravity", ge=-100, le=100, examples=[-4.9])
+    down_m: Number = number(0.0, "m", "of the centre of gravity", ge=-100, le=100, examples=[1.1])
+
+
 class ModelErrorSection(Section):
     """Largest error of the angular accelerations, as measured where the terms were derived."""
 
@@ -416,6 +432,7 @@ class AircraftFile(Section):
     envelope: where the terms hold
     trim: what trim may move beside the surfaces
     engine: settings and limits of the engine
+    effectors: engines that turn the aircraft where surfaces no longer reach, by name
     start: where a flight starts unless its scenario says otherwise
     """
 
@@ -434,6 +451,7 @@ class AircraftFile(Section):
     envelope: EnvelopeSection
     trim: TrimSection
     engine: EngineSection = Field(default_factory=EngineSection)
+    effectors: dict[Name, EffectorSection] = Field(default_factory=dict, max_length=MAX_EFFECTORS)
     model_error_rad_s2: ModelErrorSection = Field(default_factory=ModelErrorSection)
     model_error_map: ErrorMapSection | None = None
     start: StartSection = Field(default_factory=StartSection)
@@ -516,7 +534,11 @@ class AircraftFile(Section):
     def _thrust(self) -> Iterator[Conflict]:
         """What power gives needs a setting to give it by, and a mass to move."""
         if self.engine.thrust is None:
+            if self.effectors:
+                yield ("effectors",), "want what their thrust is, allowed: with engine.thrust"
             return
+        if sum(of.share for of in self.effectors.values()) > 1.001:
+            yield ("effectors",), "shares add up to more than 1, allowed: at most 1"
         here, setting = ("engine", "thrust"), self.power_setting
         if setting is None:
             yield here, "no setting has the property of trim.throttle, allowed: with one that has"

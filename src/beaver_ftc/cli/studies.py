@@ -127,6 +127,7 @@ def derive(
     aircraft: Annotated[str, typer.Argument(metavar="AIRCRAFT")],
     envelope: Path | None = None,
     out: Path | None = None,
+    engines: bool = False,
     format: FormatOption = Format.text,
 ) -> None:
     """Derive an aircraft's design model from JSBSim.
@@ -138,11 +139,16 @@ def derive(
     aircraft: jsbsim:NAME of the installed jsbsim package, a JSBSim model, or an aircraft's folder.
     envelope: YAML with airspeed_mps, alpha_deg, altitude_m, sideslip_deg: where to sample.
     out: Folder to write the aircraft's folder into, if not the cache.
+    engines: Each engine is an effector as well, with a lever of its own: it turns the aircraft where
+    surfaces no longer reach. With --out.
     """
+    from beaver_ftc.documents.errors import BadInput
     from beaver_ftc.studies.derive.derivation import derive
     from beaver_ftc.studies.derive.derived import document_of, text_of
 
-    made = derive(aircraft, out, envelope, tell=lambda what: complain(f"deriving: {what}"))
+    if engines and out is None:
+        raise BadInput("--engines: wants a folder of its own, allowed: with --out")
+    made = derive(aircraft, out, envelope, lambda what: complain(f"deriving: {what}"), engines=engines)
     document = document_of(made)
     answer(format, document, lambda: text_of(document))
 

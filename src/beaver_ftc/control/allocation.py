@@ -42,9 +42,18 @@ PROBE = record(
 def layout_dtype(n: int) -> np.dtype:
     """n surfaces: the one that leads each axis, who stands in for pitch's, or -1; trim and stops, rad. aside:
     which of them wait until pitch is handed over; authority: what part of the authority about each axis is
-    whose, those aside without part in pitch. general: there are more than lead or stand in first."""
+    whose, those aside without part in pitch; beside: the least and the greatest that engines give about each
+    axis, rad/s2. general: there are more than lead or stand in first."""
     return record(
-        main=(int, 3), stand_in=int, trim=n, low=n, high=n, general=int, aside=(int, n), authority=(3, n)
+        main=(int, 3),
+        stand_in=int,
+        trim=n,
+        low=n,
+        high=n,
+        general=int,
+        aside=(int, n),
+        authority=(3, n),
+        beside=(2, 3),
     )
 
 
@@ -245,7 +254,7 @@ def advance_hand_over(allocation, reallocated, at_once, lost):
 @kernel
 def attainable(G, layout, i):
     """Least and greatest acceleration of axis i, rad/s2, within the travel; G (3, n)."""
-    least, greatest = 0.0, 0.0
+    least, greatest = layout.beside[0, i], layout.beside[1, i]
     for s in range(layout.low.size):
         one, other = G[i, s] * layout.low[s], G[i, s] * layout.high[s]
         least += min(one, other)

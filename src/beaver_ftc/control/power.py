@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.aircraft.schema import MAX_LEVERS
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.control.allocation import remaining
 from beaver_ftc.control.laws import ADAPTING, FAULT_TOLERANT, ORACLE, law_of
@@ -38,7 +39,7 @@ POWER = record(
     trim=float, low=float, high=float, step=float,  # in the units of the setting, as is the command
     dpt_factor=float, highest_dpt=float, lost=float, engaged=int, in_use=int, moved=int, speed=float,
     usual_speed=float, attitude=float,
-    command=1,
+    command=MAX_LEVERS,  # of all engines, then what each that is an effector has beside it (engines.py)
     from_s=float, frames=int, least=float, greatest=float,
 )  # fmt: skip
 
@@ -72,7 +73,7 @@ def configure(power: np.void, layout: np.void, scenario: Scenario) -> None:
         return
     name, setting = named
     trim = getattr(initial, name)
-    power["trim"] = power["command"] = power["least"] = power["greatest"] = trim
+    power["trim"] = power["command"][0] = power["least"] = power["greatest"] = trim
     power["low"], power["high"] = low, high = setting.range
     per_s = (high - low) / WHOLE_RANGE_S
     if _has_piston_engine(scenario.airframe):

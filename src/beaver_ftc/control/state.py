@@ -5,9 +5,10 @@ from functools import lru_cache
 import numpy as np
 
 from beaver_ftc.compiled import record
-from beaver_ftc.control import accommodation, allocation, power, reference
+from beaver_ftc.control import accommodation, allocation, engines, power, reference
 from beaver_ftc.control.accommodation import surfaces_dtype
 from beaver_ftc.control.allocation import AXES, PROBE, allocation_dtype, layout_dtype
+from beaver_ftc.control.engines import ENGINES
 from beaver_ftc.control.laws import ADAPTING, REJECTING, gains, law_of, zhang2005
 from beaver_ftc.control.laws.published import FEEDBACK
 from beaver_ftc.control.laws.rejecting import rejection_dtype
@@ -25,7 +26,7 @@ def control_dtype(n: int) -> np.dtype:
         reference=REFERENCE, layout=layout_dtype(n), surfaces=surfaces_dtype(n), feedback=FEEDBACK,
         adaptation=zhang2005.ADAPTATION,
         rejection=rejection_dtype(n), rival=RIVAL, axes=AXES, allocation=allocation_dtype(n), probe=PROBE,
-        power=POWER,
+        power=POWER, engines=ENGINES,
     )  # fmt: skip
 
 
@@ -41,6 +42,7 @@ def configure(control: np.void, scenario: Scenario, travel: np.ndarray) -> None:
     if control["inner"] == ADAPTING:
         zhang2005.configure(control, config, travel)
     power.configure(control["power"], control["layout"], scenario)
+    engines.configure(control["engines"], scenario)
 
 
 def anchor(control: np.void, belief: np.void, scenario: Scenario, y: np.ndarray) -> None:

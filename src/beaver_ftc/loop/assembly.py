@@ -22,7 +22,7 @@ from beaver_ftc.plant.sensing import truth_dtype
 from beaver_ftc.scenario.dump import texts_of
 from beaver_ftc.scenario.schema import Scenario
 
-# What the log has columns for: estimators, the watch, the engine, statistical tests.
+# What the log has columns for: estimators, the watch, the engine, statistical tests; power: how many.
 LOGGED = record(estimators=int, watch=int, power=int, tests=int)
 
 
@@ -101,8 +101,9 @@ def lay_out(frame: np.void, scenario: Scenario, diagnoses_itself: bool) -> tuple
     logged["estimators"] = fdi["isolation"]["n"] if diagnoses_itself else 0
     watched = logged["watch"] = instrument_records.comes_to_be_watched(scenario)
     moved = frame["control"]["power"]["enabled"] or (profile and aircraft.airspeed_by == "power")
+    moved |= bool(frame["control"]["engines"]["n"])
     power = aircraft.power_setting if moved else ""
-    logged["power"] = bool(power)
+    logged["power"] = 1 + len(aircraft.effectors) if power else 0
     logged["tests"] = tests["n_columns"] if tests["enabled"] else 0
     tested, columns = bool(tests["enabled"]), COLUMNS if profile else ()
     return ch.log_columns(aircraft, estimators, watched, power, columns, tested)

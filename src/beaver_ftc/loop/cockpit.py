@@ -34,7 +34,8 @@ class Cockpit:
         truth["getter"], truth["setter"] = address(GETTER), address(SETTER)
         truth["read_pointers"][: truth["n"]] = self._read.pointers
         truth["write_pointers"] = self._write.pointers
-        truth["engine_pointer"] = self._engine.pointers
+        truth["levers"] = len(self._engine.nodes)
+        truth["lever_pointers"][: truth["levers"]] = self._engine.pointers
         running["run"], running["executive"] = address(RUN), plant.executive
         running["getter"], running["setter"] = truth["getter"], truth["setter"]
         running["heading_pointer"], running["axes_pointer"] = self._air.pointers
@@ -49,7 +50,7 @@ class Cockpit:
         self._write.write(self._frames["belief"]["commanded"][0])
         power = self._frames["control"]["power"]
         if power["in_use"][0]:
-            self._engine.write(power["command"][0])
+            self._engine.write(power["command"][0, : len(self._engine.nodes)])
 
     def turn_air(self) -> None:
         """Turn the turbulence with the aircraft's heading, as its spectra are meant [MIL-F-8785C, 3.7.1].
@@ -62,14 +63,15 @@ class Cockpit:
 
 
 def _banks(plant: Plant, n: int) -> tuple[NodeBank, ...]:
-    """What is read of the truth, n channels; where the command goes, and the engine's; heading and axes of
+    """What is read of the truth, n channels; where the command goes, and the engines'; heading and axes of
     the turbulence."""
     aircraft = plant.aircraft
+    differences = [effector.throttle for effector in aircraft.effectors.values()]
     channels = (*ch.truth_channels(aircraft), *ch.further_channels(aircraft))[:n]
     return (
         NodeBank([plant.node(name) for _, name, _ in channels]),
         NodeBank([plant.input(name) for name in ch.command_properties(aircraft)]),
-        NodeBank([plant.input(aircraft.trim.throttle)]),
+        NodeBank([plant.input(name) for name in (aircraft.trim.throttle, *differences)]),
         NodeBank([plant.node("attitude/psi-rad"), plant.input("atmosphere/psiw-rad")]),
     )
 

@@ -15,7 +15,7 @@ effect from the next on.
 import numpy as np
 
 from beaver_ftc.compiled import apart, kernel
-from beaver_ftc.control import accommodation, allocation, power, reference, supervisor
+from beaver_ftc.control import accommodation, allocation, engines, power, reference, supervisor
 from beaver_ftc.control.laws import ADAPTING, INDI, LQR, NOMINAL, ORACLE, REJECTING, published, rejecting
 from beaver_ftc.control.laws import zhang2005 as adapting
 from beaver_ftc.control.outer.autopilot import judge, steer
@@ -455,12 +455,16 @@ def note_what_is_missing(frame):
     """Whether the demand is met; what is missing in pitch is left to the engine."""
     control, measured, engine = frame.control, frame.measured, frame.control.power
     detected, saturated = frame.assessment.detected, control.allocation.saturated
-    if frame.faults.present or control.reference.hedging or (engine.enabled and detected):
+    used = detected and (engine.enabled or control.engines.n > 0)
+    if frame.faults.present or control.reference.hedging or used:
         allocation.note_shortfall(control.axes, control.allocation, control.layout, control.surfaces.lag)
     if engine.enabled:
         watched, lacking = detected or control.law == ORACLE, control.axes.shortfall
         lost = watched and power.pitch_is_lost(control.layout, control.surfaces, saturated, lacking)
         power.steer(engine, control.reference, measured.x, measured.y, watched, lost, frame.t)
+    if control.engines.n > 0 and detected:
+        state, given, speed_mps = control.surfaces, control.allocation, measured.y[AIRSPEED]
+        engines.steer(control.engines, engine, control.axes, control.layout, given, state, speed_mps, frame.t)
 
 
 @apart
@@ -571,9 +575,7 @@ def record(frame, commanded, row):
     if logged.watch:
         log_row.record_watch(fdi.watch, row, column)
         column += 2
-    if logged.power:
-        row[column] = control.power.command[0]
-        column += 1
+    column = put(row, column, control.power.command[: logged.power])
     if frame.autopilot.enabled:
         log_row.record_profile(frame.autopilot, row, column)
     chances = fdi.statistical

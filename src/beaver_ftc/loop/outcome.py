@@ -161,7 +161,7 @@ def _probing_s(frame: np.void) -> tuple[float, float] | None:
 def _authority(frame: np.void) -> dict[str, dict[str, float]] | None:
     """Per axis, after the fault: share of the demanded acceleration given, and for how long what holds the
     rates was beyond what the surfaces can give. Where they are more than lead the axes also what is left at
-    the end, as far as the law knows, and what a healthy aircraft has there."""
+    the end, as far as the law knows, and what a healthy aircraft has there; with engines as effectors too."""
     if not frame["accounts"]["tracking"]["frames_since"]:
         return None
     authority, sums = {}, frame["accounts"]["authority"]
@@ -169,7 +169,8 @@ def _authority(frame: np.void) -> dict[str, dict[str, float]] | None:
     for axis, asked, lack, beyond in each:
         share = 1.0 - float(lack / asked) if asked > 0.0 else 1.0
         authority[axis] = {"given_share": share, "beyond_s": int(beyond) * float(frame["dt"])}
-    if frame["control"]["layout"]["general"] and np.any(frame["control"]["allocation"]["G"]):
+    control = frame["control"]
+    if (control["layout"]["general"] or control["engines"]["n"]) and np.any(control["allocation"]["G"]):
         for i, axis in enumerate(AXES):
             authority[axis] |= _left(frame, i)
     return authority
@@ -177,16 +178,18 @@ def _authority(frame: np.void) -> dict[str, dict[str, float]] | None:
 
 def _left(frame: np.void, i: int) -> dict[str, float]:
     """What all surfaces together give about axis i at most, either way, rad/s2: what is believed to be left,
-    and healthy."""
+    and healthy; and what the engines give beside them, where they are effectors."""
     stops = frame["control"]["layout"]["low"], frame["control"]["layout"]["high"]
     left = np.array([frame["control"]["allocation"]["G"][i] * stop for stop in stops])
     healthy = np.array([frame["belief"]["G"][i] * stop for stop in stops])
+    engines = frame["control"]["layout"]["beside"][:, i]
+    given = {"engines_least_rad_s2": float(engines[0]), "engines_greatest_rad_s2": float(engines[1])}
     return {
         "least_rad_s2": float(left.min(axis=0).sum()),
         "greatest_rad_s2": float(left.max(axis=0).sum()),
         "healthy_least_rad_s2": float(healthy.min(axis=0).sum()),
         "healthy_greatest_rad_s2": float(healthy.max(axis=0).sum()),
-    }
+    } | (given if frame["control"]["engines"]["n"] else {})
 
 
 def _engine_power(frame: np.void) -> dict[str, float] | None:

@@ -124,9 +124,9 @@ def log_columns(
     tests: bool,
 ) -> tuple[str, ...]:
     """The log's columns in order, for the isolation estimators of these names; watch: the instruments are
-    held against one another; power: the engine setting commanded, empty where none is; profile: columns of
-    the commanded profile; tests: there is a statistical detector, whose tests are logged as shares of its
-    level.
+    held against one another; power: the engine setting commanded, empty where none is, and what each engine
+    that is an effector has beside it; profile: columns of the commanded profile; tests: there is a
+    statistical detector, whose tests are logged as shares of its level.
 
     Of each surface's effectiveness the `estimate` is the diagnosis', 1 where nothing is estimated; `used` is
     what the law takes it for, on its way there at a limited rate, and 1 throughout under the nominal law.
@@ -145,7 +145,7 @@ def log_columns(
         *(f"{s}_effectiveness_{which}" for which in ("estimate", "used") for s in surfaces),
         "mode", "detected",
         *(("watch_share", "watch_test") if watch else ()),
-        *((power,) if power else ()),
+        *((power, *(f"{engine}_difference" for engine in aircraft.effectors)) if power else ()),
         *profile,
         *(likelihoods(aircraft) if tests else ()),
     )  # fmt: skip

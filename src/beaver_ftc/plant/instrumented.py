@@ -54,6 +54,7 @@ SIGNALS = {
     "mach": "velocities/mach",
 }
 
+LEVER, DIFFERENCE = "fcs/actuated-throttle-norm", "fcs/actuated-throttle-{i}-difference"
 GEAR, RETRACTED = "gear/gear-pos-norm", "gear/retracted-pos-norm"
 _OF_THE_FLOW = ("alpha_rate", "beta_rate")  # an aircraft without engines has not the properties of others
 
@@ -118,12 +119,16 @@ def source_of(name: str) -> Path:
     return package() / "aircraft" / name / f"{name}.xml"
 
 
-def _common(engines: int, read: str, absent: Iterable[str]) -> Element:
+def _common(engines: int, read: str, absent: Iterable[str], apart: bool) -> Element:
     """Envelope, the unanticipated fault, and one power lever for all engines; read: the aircraft's files;
-    absent: what they read and nothing gives."""
+    absent: what they read and nothing gives; apart: each engine has a difference of its own."""
     parts = _parts()
-    system, levers = parts.find("system"), parts.findall("lever/*")
+    system, levers = parts.find("system"), parts.findall("each/*" if apart else "lever/*")
     assert system is not None
+    if apart:
+        absent = (*absent, *(DIFFERENCE.format(i=i) for i in range(engines)))
+        for read_it in parts.iterfind("told//property"):
+            read_it.text = (read_it.text or "").replace(LEVER, "fcs/actuated-throttle-{i}-norm")
     for name in reversed(tuple(absent)):
         zero = Element("property", value="0")
         zero.text = name
@@ -155,12 +160,13 @@ def is_told(name: str) -> bool:
 
 def instrument(
     source: Path, folder: Path, travel_rad: dict[str, tuple[float, float]], absent: Iterable[str] = (),
-    gear_up: bool = False,
+    gear_up: bool = False, apart: bool = False,
 ) -> Path:  # fmt: skip
     """Write the instrumented copy of a model and what is beside it into an empty folder; returns its model.
 
     travel_rad: of each surface. absent: properties its files read that JSBSim alone does not give: 0 here.
     gear_up: its aerodynamics see a landing gear that is retracted, wherever its own flight control has it.
+    apart: the power lever of each engine has a difference of its own.
 
     Raises BadInput where the failures cannot be put in, naming what is in the way.
     """
@@ -179,7 +185,7 @@ def instrument(
     _put_in(aerodynamics, folder, travel_rad)
     _add_signals(aerodynamics, _engines(whole))
     _add_pitch_fault(aerodynamics, source.stem)
-    common = ElementTree.ElementTree(_common(_engines(whole), read, absent))
+    common = ElementTree.ElementTree(_common(_engines(whole), read, absent, apart))
     common.write(folder / SYSTEMS / "ftc-common.xml", encoding="utf-8", xml_declaration=True)
     place = list(whole).index(next(iter(whole.iter("aerodynamics"))))
     for i, system in enumerate((*travel_rad, "common")):

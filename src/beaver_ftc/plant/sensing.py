@@ -8,6 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from beaver_ftc.aircraft.schema import MAX_LEVERS
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.model import AIRSPEED, DPT
 from beaver_ftc.plant import channels as ch
@@ -38,7 +39,7 @@ def truth_dtype(n: int) -> np.dtype:
     room = ch.most_channels(n)
     return record(
         native=int, getter=int, setter=int, n=int, declared=int, read_pointers=(int, room),
-        write_pointers=(int, n), engine_pointer=(int, 1),
+        write_pointers=(int, n), levers=int, lever_pointers=(int, MAX_LEVERS),
         factor=room, value=room,  # the first n, in SI: see channels.py
         latitude_0=float, longitude_0=float, radius_m=float, parallel_radius_m=float, ground_m=float,
         slow_mps=float,  # airspeed at which angles of the flow mean nothing: of an aircraft on wheels, else 0
@@ -154,4 +155,4 @@ def hand_over(truth, commanded, power):
     if truth.native:
         write_nodes(truth.setter, truth.write_pointers, commanded)
         if power.in_use:
-            write_nodes(truth.setter, truth.engine_pointer, power.command)
+            write_nodes(truth.setter, truth.lever_pointers[: truth.levers], power.command[: truth.levers])

@@ -336,9 +336,11 @@ def _left(metrics: Document) -> str:
         if "least_rad_s2" in of:
             whole = of["healthy_greatest_rad_s2"] - of["healthy_least_rad_s2"]
             share = (of["greatest_rad_s2"] - of["least_rad_s2"]) / whole
-            if share < MUCH_LEFT:
+            most = of.get("engines_greatest_rad_s2", 0.0)
+            if share < MUCH_LEFT or most:
                 span = f"{of['least_rad_s2']:.2g} to {of['greatest_rad_s2']:.2g} rad/s2"
-                said.append(f"{axis} {share:.0%}, {span}")
+                engines = f", and engines {of['engines_least_rad_s2']:.2g} to {most:.2g}" if most else ""
+                said.append(f"{axis} {share:.0%}, {span}{engines}")
     return f"of what all surfaces together give: {'; '.join(said)}" if said else ""
 
 

@@ -162,7 +162,7 @@ def test_a_wish_for_speed_and_altitude_is_in_every_outline_that_is_tried(monkeyp
     tried = []
     names = "surfaces_of", "instrument"
     monkeypatch.setattr(derivation.instrumented, names[0], lambda model: ["aileron", "elevator", "rudder"])
-    monkeypatch.setattr(derivation.instrumented, names[1], lambda *of: Path("copy.xml"))
+    monkeypatch.setattr(derivation.instrumented, names[1], lambda *of, **how: Path("copy.xml"))
     monkeypatch.setattr(derivation.instrumented, "is_told", lambda name: name == "of/told")
     monkeypatch.setattr(derivation, "try_out", lambda source: ("of/told", "of/other"))
     monkeypatch.setattr(outline, "travel_of", lambda *of: {})

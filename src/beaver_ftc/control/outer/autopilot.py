@@ -31,6 +31,8 @@ MOST_MISSING = 0.1  # rad of path angle, and times gravity of acceleration
 MOST_DRIFT_RAD_S = 0.1  # of turning that a bank without a turn stands for
 USUAL_S, USUAL_MPS = 20.0, 3.0  # airspeed that power alone can hold: within so much of what it has been
 CUT_INHG_S, RAISE_INHG_S = 8.0, 1.0  # about as fast as the engine follows; and slower than a gust lasts
+KEPT_ASIDE = 0.15  # of the power's range at either end, for engines that alone yaw the aircraft
+PACE_BY_POWER, BY_POWER_S = 0.25, 5.0  # of the loops of bank and heading there, and since when it counts
 INSTANT_S = 1e-9  # frame times are k / rate in floating point
 SETTLED_S = 30.0  # after a change of heading
 MEAN_S = 10.0  # over which airspeed and arrival are judged: what comes and goes faster is a gust
@@ -122,6 +124,9 @@ def follow(autopilot, layout, surfaces, saturated, y):
     autopilot.jammed += dt / autopilot.gain.jammed_s * (gone - autopilot.jammed)
     free = remaining(layout, surfaces.effectiveness, YAW) < least
     autopilot.loose += dt / autopilot.gain.jammed_s * (free - autopilot.loose)
+    if layout.beside[1, YAW] > 0.0:  # there are engines for it
+        by_power = free or saturated[layout.main[YAW]] == 1
+        autopilot.by_power += dt / BY_POWER_S * (by_power - autopilot.by_power)
 
 
 @kernel
@@ -235,23 +240,24 @@ def pitching(autopilot, y, attitude, path):
 
 @kernel
 def rolling(autopilot, attitude):
-    """The rate of the bank angle, rad/s."""
+    """The rate of the bank angle, rad/s; slower where engines alone yaw and roll."""
+    pace = 1.0 - autopilot.jammed * autopilot.by_power * (1.0 - PACE_BY_POWER)
     if autopilot.commanded[HEADING]:
         error = turn(autopilot.command[HEADING] - attitude[YAW])
         left = 1.0 - autopilot.loose * (1.0 - autopilot.gain.loose)
         found = autopilot.drift + autopilot.dt * autopilot.loose * autopilot.gain.heading_i * error
         autopilot.drift = autopilot.loose * clamp(found, MOST_DRIFT_RAD_S)
-        turning = left * autopilot.gain.heading * error + autopilot.moving[HEADING] + autopilot.drift
+        turning = pace * left * autopilot.gain.heading * error + autopilot.moving[HEADING] + autopilot.drift
         bank = autopilot.airspeed / autopilot.gravity * turning
     elif autopilot.commanded[BANK]:
         bank = autopilot.command[BANK]
     else:
         return 0.0
     away = clamp(bank, autopilot.bank_limit) - attitude[ROLL]
-    wanted = autopilot.gain.bank * away + autopilot.jammed * autopilot.rolled
+    wanted = pace * autopilot.gain.bank * away + autopilot.jammed * autopilot.rolled
     rate = clamp(wanted, autopilot.limit[ROLL])
     if rate == wanted:
-        autopilot.rolled += autopilot.jammed * autopilot.dt * autopilot.gain.bank_i * away
+        autopilot.rolled += autopilot.jammed * autopilot.dt * pace * autopilot.gain.bank_i * away
     return rate
 
 
@@ -292,7 +298,8 @@ def throttle(autopilot, power, y, path, push):
     climbing = autopilot.gravity * (path - autopilot.climb_in_trim)
     wanted = power_for(autopilot.engine, push, autopilot.trim_power, along + climbing)
     high = min(autopilot.full_power, ceiling(power, y, power.highest_dpt))
-    limited = max(min(wanted, high), autopilot.low_power)
+    room = KEPT_ASIDE * autopilot.by_power * (autopilot.high_power - autopilot.low_power)
+    limited = max(min(wanted, high - room), autopilot.low_power + room)
     if limited == wanted:
         find_missing(autopilot, error)
     power.trim = limited

@@ -67,6 +67,7 @@ AUTOPILOT = record(
     throttle=float, rolled=float,  # m/s2, rad/s: found missing
     jammed=float,  # share of roll that rudder and dihedral carry
     loose=float,  # 1: nothing acts in yaw
+    by_power=float,  # share of the time of late in which engines alone act there
     rates=3, gain=GAIN,
     held=float, held_moving=float, holding=HOLDING,  # airspeed to fly, m/s, and its change
     # how far off, at most; and the mean deviation of late, from what is commanded and, airspeed, held

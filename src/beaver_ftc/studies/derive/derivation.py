@@ -50,7 +50,7 @@ from beaver_ftc.studies.derive.sample import (
     joined,
     sample_all,
 )
-from beaver_ftc.studies.derive.thrust import thrust_of
+from beaver_ftc.studies.derive.thrust import LEAST_ARM_M, effectors_of, thrust_of
 
 SAMPLES, CHECKED = 6000, 16000
 CHECKED_OF_REGIONS = 18000
@@ -143,10 +143,12 @@ def _failure(source: Source, absent: list[str]) -> str | None:
 def derive(
     reference: str, out: Path | None = None, envelope: Path | None = None, tell: Tell = lambda line: None,
     regions: Sequence[Envelope] = (), moves: Moves = USUAL,
+    engines: bool = False,
 ) -> Derived:  # fmt: skip
     """Derive the file of an aircraft; `out`: the folder to put its folder into, if not the cache;
     `envelope`: a YAML file that says where to sample; `regions`: parts of it, each about a steady flight of
-    its own, where the terms shall hold best near neutral surfaces; `moves`: how far these go.
+    its own, where the terms shall hold best near neutral surfaces; `moves`: how far these go;
+    `engines`: each is an effector.
 
     Raises BadInput, naming what is in the way, if its failures cannot be put in or it cannot be trimmed, and
     SimulationFailed if JSBSim cannot fly it.
@@ -157,7 +159,7 @@ def derive(
     with tempfile.TemporaryDirectory(prefix="beaver-ftc-") as scratch:
         folder = Path(scratch) / "new" / source.name
         with translated(source.model):
-            data, plant, trim = _prepared(source, folder, wanted, notes, tell)
+            data, plant, trim = _prepared(source, folder, wanted, notes, tell, engines)
             notes += outline.not_affine(plant, trim)
             further = {} if source.folder else outline.further_surfaces(source.model, plant)
             if moving := outline.moved_by_itself(plant.aircraft, trim, tuple(further)):
@@ -191,10 +193,17 @@ def derive(
 
 
 def _prepared(
-    source: Source, folder: Path, wanted: outline.EnvelopeFile, notes: list[str], tell: Tell
+    source: Source,
+    folder: Path,
+    wanted: outline.EnvelopeFile,
+    notes: list[str],
+    tell: Tell,
+    engines: bool = False,
 ) -> outline.Level:
-    """An aircraft in level flight, instrumented if need be."""
+    """An aircraft in level flight, instrumented if need be; engines: these as effectors."""
     if source.folder is not None:
+        if engines:
+            raise BadInput(f"{source.says}: has a file, allowed: `effectors` in it, or a JSBSim model alone")
         tell("trim")
         return outline.level_as_filed(source.folder, folder, wanted)
     tell("instrument")
@@ -208,7 +217,7 @@ def _prepared(
     own = instrumented.instrument(source.model, folder.parent.parent / "own", {}, absent)
     travel = outline.travel_of(source.model, own, notes)
     notes += outline.own_control(source.model, own)
-    model = instrumented.instrument(source.model, folder, travel, absent)
+    model = instrumented.instrument(source.model, folder, travel, absent, apart=engines)
     outlines = [outline.outline(source.name, model, travel, lift) for lift in outline.LIFT_COEFFICIENTS]
     for data in outlines:
         if wanted.altitude_m is not None:
@@ -221,11 +230,23 @@ def _prepared(
     sinks = level[2].gamma_rad <= -outline.LEVEL_RAD and level[1].n_engines
     if sinks and instrumented.GEAR in instrumented.seen_by_aerodynamics(source.model):
         shutil.rmtree(folder)
-        instrumented.instrument(source.model, folder, travel, absent, gear_up=True)
+        instrumented.instrument(source.model, folder, travel, absent, gear_up=True, apart=engines)
         said = ["its landing gear is retracted in the copy: with it, its power does not hold it level"]
         level = outline.level_flight(tried, folder, said)
     notes += said
-    return level
+    return _with_engines(source, level, folder) if engines else level
+
+
+def _with_engines(source: Source, level: outline.Level, folder: Path) -> outline.Level:
+    """The same with its engines as effectors. Raises BadInput where they do not turn it."""
+    data, plant, trim = level
+    thrust = thrust_of(plant, trim)
+    found = effectors_of(plant, trim) if thrust and max(map(max, thrust["force_n"])) > 0.0 else {}
+    if not any(abs(of["right_m"]) > LEAST_ARM_M for of in found.values()):
+        raise BadInput(f"{source.says}: its engines do not yaw it, allowed: engines beside one another")
+    data["engine"] |= {"thrust": thrust}
+    data["effectors"] = found
+    return data, outline.plant_of(data, folder), trim
 
 
 def _regions(

@@ -28,6 +28,7 @@ EVERY_AGE = (0, 0, 1, 0, 0, 2)
 STARTS = 48
 AT_AN_END = 0.3  # share of the draws that are at an end of their range: corners are where errors are large
 _BANK_RAD, _CLIMB_RAD, _ALTITUDE_M, _THROTTLE = 1.0, 0.3, 600.0, 0.35  # half widths beside the envelope's
+_APART, _APART_RAD_S = 0.6, 0.8  # of engines that are effectors: their levers, and how they swing in flight
 _MOST_BURNT = 0.9  # of the fuel
 FRAMES, EVERY = 800, 4
 _SHARE_OF_TRAVEL = 0.06
@@ -167,12 +168,15 @@ def sample(
         box, age = k % len(REACHES), ages[(k // len(REACHES)) % len(ages)]
         tanks.fill(draw.between(0.0, AGES_S[age]))
         started = draw.start(REACHES[box])
+        for effector in plant.aircraft.effectors.values():
+            plant.write(effector.throttle, draw.around(0.0, REACHES[box] * _APART))
         plant.start(started)
         for i in range(max(1, n // starts)):
             level = i % len(SHARES)
             plant.hold(draw.state(started, REACHES[box], moves.shares[level]))
             rows.append((*seen_at(plant, properties), box, level, age))
     tanks.fill(0.0)
+    _together(plant)
     plant.start(trim)
     return as_arrays(rows, tuple(properties))
 
@@ -196,6 +200,12 @@ def joined(parts: Sequence[Samples]) -> Samples:
     arrays = {name: np.concatenate([getattr(of, name) for of in parts]) for name in names}
     signals = {name: np.concatenate([of.signals[name] for of in parts]) for name in parts[0].signals}
     return Samples(signals=signals, **arrays)
+
+
+def _together(plant: Plant) -> None:
+    """All engines at the common lever."""
+    for effector in plant.aircraft.effectors.values():
+        plant.write(effector.throttle, 0.0)
 
 
 def as_arrays(rows: list[tuple], names: tuple[str, ...]) -> Samples:
@@ -256,6 +266,7 @@ def fly_about(plant: Plant, trim: FlightState, seed: int, properties: Mapping[st
                 rows.append((*seen_at(plant, properties), 0, 0, 0))
             _move(plant, trim, phases, k * plant.dt_s)
             plant.run()
+        _together(plant)
     plant.start(trim)
     return as_arrays(rows, tuple(properties))
 
@@ -268,6 +279,9 @@ def _move(plant: Plant, trim: FlightState, phases: np.ndarray, t_s: float) -> No
         reach = _SHARE_OF_TRAVEL * min(-travel.min_rad, travel.max_rad)
         there = trim.surfaces_rad[name] + reach * float(wave)
         plant.write(surface.command, float(np.clip(there, travel.min_rad, travel.max_rad)))
+    for effector in plant.aircraft.effectors.values():
+        side = np.sign(effector.right_m) * np.sin(_APART_RAD_S * t_s)
+        plant.write(effector.throttle, _APART * REACHES[0] * float(side))
 
 
 def sorted_in(samples: Samples, ends: Sequence[np.ndarray], aircraft: Aircraft, moves: Moves) -> Samples:

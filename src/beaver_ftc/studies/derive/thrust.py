@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.aircraft.units import N_PER_LBF
+from beaver_ftc.aircraft.units import M_PER_FT, N_PER_LBF
 from beaver_ftc.plant.adapter import Plant
+from beaver_ftc.plant.instrumented import DIFFERENCE
 from beaver_ftc.plant.state import FlightState
 
 OF_ENGINES, FORCE = (
@@ -23,6 +24,9 @@ SPEEDS, SETTINGS = 5, 6
 SETTLED_S, LONGEST_S = 6.0, 8.0  # after a step of the power; and of the step that shows the lag
 _FROM, _TO = 0.4, 0.7  # of the range: that step
 _BETWEEN_S = 0.1
+_STEP = 0.2  # of one engine's lever
+_MOMENTS = ("moments/m-prop-lbsft", "moments/n-prop-lbsft")
+LEAST_ARM_M = 0.2  # beside the centre of gravity
 _WHOLE = 1.0 - np.exp(-1.0)  # of a first-order change after its time constant
 
 
@@ -47,6 +51,32 @@ def thrust_of(plant: Plant, trim: FlightState) -> dict[str, Any] | None:
     return {
         "airspeed_mps": _rounded(airspeed_mps), "setting": _rounded(setting),
         "force_n": [_rounded(row) for row in rows], "lag_s": round(lag_s, 2),
+    }  # fmt: skip
+
+
+def effectors_of(plant: Plant, trim: FlightState) -> dict[str, dict[str, Any]]:
+    """The section `effectors`: of each engine its share of a change of thrust, and its arms, by what its own
+    lever changes of the engines' moments about the centre of gravity. The plant is left in trim."""
+    changes = []
+    for i in range(plant.n_engines):
+        seen = []
+        for difference in (0.0, -_STEP):
+            plant.start(trim)
+            plant.write(DIFFERENCE.format(i=i), difference)
+            for _ in _settling(plant, trim, plant.read(plant.aircraft.trim.throttle), SETTLED_S):
+                pass
+            seen.append(np.array([plant.read(name) for name in (OF_ENGINES, *_MOMENTS)]))
+        plant.write(DIFFERENCE.format(i=i), 0.0)
+        changes.append(seen[0] - seen[1])
+    plant.start(trim)
+    whole = sum(force for force, _, _ in changes)
+    return {
+        f"engine_{i + 1}": {
+            "throttle": DIFFERENCE.format(i=i), "share": round(float(force / whole), 4),
+            "right_m": round(float(-yaw / force) * M_PER_FT, 3),
+            "down_m": round(float(pitch / force) * M_PER_FT, 3),
+        }
+        for i, (force, pitch, yaw) in enumerate(changes)
     }  # fmt: skip
 
 

@@ -177,7 +177,7 @@ class EnvelopeSection(Section):
     alpha_deg: Interval = entry(..., examples=[[-5.7, 16]])
 
 
-_Share = Annotated[Number, Field(ge=-1, le=1)]
+_Share = Annotated[Number, Field(ge=-1, le=1, json_schema_extra={"unit": "share of 1"})]
 
 
 class TrimSection(Section):
@@ -189,7 +189,7 @@ class TrimSection(Section):
     together: dict[Name, dict[Name, _Share]] = Field(
         default_factory=dict,
         description="of a surface that leads an axis: others that go with it, and what share of the way",
-        examples=[{"right_aileron": {"left_aileron": -1}}],
+        examples=[{"aileron": {"rudder": 0.2}}],
     )
 
 

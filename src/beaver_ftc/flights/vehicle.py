@@ -184,6 +184,7 @@ class Vehicle(Section):
         le=MOST_PER_HOUR,
         unit="1/h",
         says="alarms in healthy flight that are accepted; 1 without labels",
+        examples=[2],
     )
     faults: list[Kind] = Field(
         default=["loss"],

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.aircraft import load
+from beaver_ftc.aircraft.schema import MAX_EFFECTORS
 from beaver_ftc.diagnosis.across import size_for
 from beaver_ftc.diagnosis.isolation import estimator_names
 from beaver_ftc.diagnosis.rivals.rls import RlsMonitor
@@ -118,7 +119,8 @@ EXPECTED = {
     "control.power.forgiveness": DT / 8.0, "control.power.speed_gain": 0.7,
     "control.power.attitude_gain": 0.3 * 180 / pi, "control.power.smoothing": 1 - exp(-DT / 0.4),
     "control.power.washout": 1 - exp(-DT / 9.0), "control.power.leak": 1 - exp(-DT / 7.0),
-    "control.power.trim": 21.0, "control.power.command": 21.0, "control.power.least": 21.0,
+    "control.power.trim": 21.0, "control.power.command": [21.0, *MAX_EFFECTORS * [0.0]],
+    "control.power.least": 21.0,
     "control.power.greatest": 21.0, "control.power.low": 11.0, "control.power.high": 30.0,
     "control.power.step": 4.0 * DT,
     # half of the rudder's smaller travel holds the propeller: 0.08265 0.3 / 2 = 0.003026 dpt^3 [TM88]

@@ -136,7 +136,7 @@ def test_a_quick_look_is_the_full_start_s_accelerations():
     truth = Plant(rate_hz=100)
     point = trim(45.0, 1000.0, plant=truth)
     names = ("alpha_rad", "beta_rad", "theta_rad", "aileron_rad", "elevator_rad", "rudder_rad")
-    look = steps._looking(truth, point, names)
+    look = steps._looking(truth, point)
     off = np.array([0.01, 0.02, -0.03, 0.04, -0.05, 0.06])
     x = np.array([getattr(point, name) for name in names]) + off
     for _ in range(3):  # the side force of betadot lags a look

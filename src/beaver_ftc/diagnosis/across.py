@@ -36,7 +36,7 @@ from typing import NamedTuple
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.aircraft.schema import MAX_SURFACES, MAX_TERMS_OF_ONE
+from beaver_ftc.aircraft.schema import MAX_BOXES, MAX_SURFACES, MAX_TERMS_OF_ONE
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.diagnosis import forces, likelihood, tones
 from beaver_ftc.diagnosis.air import along, drift_beside, whole_drift
@@ -71,21 +71,23 @@ AN_AXIS, THE_VANE = -1, -2
 
 
 class Size(NamedTuple):
-    """What a statistical record has room for: of a block of the rates, of a view, and views."""
+    """What a record has room for: of a block of the rates, of a view, and views; boxes of the error map."""
 
     rates: Rooms
     view: Rooms
     views: int
+    boxes: int
 
 
 # The usual one serves most aircraft, so that the same compiled code does; the second, long fits of few
 # surfaces; all fit into the last.
-USUAL = Size(Rooms(24, MAX_HYPOTHESES), Rooms(36, 3), 13)
-LONG = Size(Rooms(69, MAX_HYPOTHESES), Rooms(106, MAX_HYPOTHESES), 16)
+USUAL = Size(Rooms(24, MAX_HYPOTHESES), Rooms(36, 3), 13, 6)
+LONG = Size(Rooms(69, MAX_HYPOTHESES), Rooms(106, MAX_HYPOTHESES), 16, 6)
 MOST = Size(
     Rooms(2 * MAX_TERMS_OF_ONE + N_READINGS, 3 * MAX_SURFACES + 2),
     Rooms(2 * MAX_TERMS_OF_ONE + N_READINGS + forces.MAX_ERRORS + 2, MAX_SURFACES + 1),
     2 * MAX_SURFACES + 7,
+    MAX_BOXES,
 )
 
 
@@ -421,9 +423,12 @@ def size_for(aircraft: Aircraft) -> Size:
     turns = [aircraft.dominant_axis[aircraft.surfaces.index(s)] for s in aircraft.class_of_losses]
     losses = max(turns.count(PITCH), turns.count(ROLL) + turns.count(YAW))
     tried = max(len(view.tries) for view in views)
-    needed = rates, 3 * losses + 2, rates + errors + 2, tried + 1, len(views)
+    error_map = aircraft.file.model_error_map
+    boxes = len(error_map.boxes) if error_map else 0
+    needed = rates, 3 * losses + 2, rates + errors + 2, tried + 1, len(views), boxes
     for size in (USUAL, LONG):
-        if all(n <= room for n, room in zip(needed, (*size.rates, *size.view, size.views), strict=True)):
+        rooms = (*size.rates, *size.view, size.views, size.boxes)
+        if all(n <= room for n, room in zip(needed, rooms, strict=True)):
             return size
     return MOST
 

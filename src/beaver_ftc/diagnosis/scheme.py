@@ -27,9 +27,9 @@ from beaver_ftc.scenario.schema import Scenario
 
 @lru_cache
 def diagnosis_dtype(n: int, size: Size = USUAL) -> np.dtype:
-    """The stages of the diagnosis of an aircraft with n surfaces; size: of its statistical record."""
+    """The stages of the diagnosis of an aircraft with n surfaces; size: rooms of its record."""
     return record(
-        config=state.CONFIG, bound=bound_dtype(n), bank=bank.BANK, fdae=detection.FDAE,
+        config=state.CONFIG, bound=bound_dtype(n, size.boxes), bank=bank.BANK, fdae=detection.FDAE,
         verdict=state.conclusion_dtype(n), layout=state.layout_dtype(n),
         isolation=isolation.isolation_dtype(n),
         types=registry.types_dtype(n), statistical=statistical.statistical_dtype(size), watch=WATCH,

@@ -63,25 +63,25 @@ def admitted_dtype(n: int) -> np.dtype:
 
 
 @lru_cache
-def error_map_dtype(n: int) -> np.dtype:
+def error_map_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
     """The map for an aircraft with n surfaces. whole: surfaces may be anywhere. outside: of all boxes. now:
     the error here, rad/s2."""
     return record(
         n_boxes=int, n_levels=int, n_ages=int, whole=int, outside=int, time_s=float, until_s=MAX_AGES,
-        low=(MAX_BOXES, _N), high=(MAX_BOXES, _N), share=MAX_LEVELS,
-        error=(MAX_AGES, MAX_BOXES, MAX_LEVELS, 3), travel_low=n, travel_high=n, place=_N, now=3,
+        low=(boxes, _N), high=(boxes, _N), share=MAX_LEVELS,
+        error=(MAX_AGES, boxes, MAX_LEVELS, 3), travel_low=n, travel_high=n, place=_N, now=3,
     )  # fmt: skip
 
 
 @lru_cache
-def bound_dtype(n: int) -> np.dtype:
+def bound_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
     """Bounds on the uncertainty. eta_bar, eta_bar_now: over the elapsed frame and at this instant, rad/s2.
     noise: on what a gyro's error changes by, rad/s. frame: on one frame's innovation, rad/s2. own: of the
     errors of n surfaces' own terms, per rad of deflection and at the command, means over the frame."""
     return record(
-        inertia=3, constant=3, earth_rate=float, admitted=admitted_dtype(n), error_map=error_map_dtype(n),
-        eta_bar=3, eta_bar_now=3, noise=3, noise_then=3, frame=3, own_errors=int, own_per_rad=(3, n),
-        own=(3, n),
+        inertia=3, constant=3, earth_rate=float, admitted=admitted_dtype(n),
+        error_map=error_map_dtype(n, boxes), eta_bar=3, eta_bar_now=3, noise=3, noise_then=3, frame=3,
+        own_errors=int, own_per_rad=(3, n), own=(3, n),
     )  # fmt: skip
 
 

@@ -147,9 +147,9 @@ def _mix(mu, m, p, bank, walk):
     for h in range(hypotheses):
         mean += mu[h] * m[h]
     for h in range(hypotheses):
-        away = m[h] - mean
         for i in range(states):
-            spread[i] += mu[h] * (p[h, i] + away[i] * away)
+            for j in range(states):
+                spread[i, j] += mu[h] * (p[h, i, j] + (m[h, i] - mean[i]) * (m[h, j] - mean[j]))
     prior = np.empty(hypotheses)
     total = 0.0
     for h in range(hypotheses):
@@ -165,12 +165,14 @@ def _merge(own, m, p, mean, spread, offset, walk):
 
     m (N,) and p (N, N) are replaced; who comes from elsewhere brings the offset (3,) along.
     """
-    rest = 1.0 - own
-    away = m - mean
-    for i in range(len(m)):
-        p[i] = own * p[i] + rest * spread[i] + own * rest * (away[i] * away)
+    rest, states = 1.0 - own, len(m)
+    for i in range(states):
+        for j in range(states):
+            away = (m[i] - mean[i]) * (m[j] - mean[j])
+            p[i, j] = own * p[i, j] + rest * spread[i, j] + own * rest * away
         p[i, i] += walk[i]
-    m[:] = own * m + rest * mean
+    for i in range(states):
+        m[i] = own * m[i] + rest * mean[i]
     for i in range(len(offset)):
         p[i, i] += rest * offset[i]
 
@@ -179,9 +181,10 @@ def _merge(own, m, p, mean, spread, offset, walk):
 def _relax(m, p, own):
     """Let all trims and gains return towards the model's; m (H, N) and p (H, N, N) are replaced."""
     for h in range(len(m)):
-        m[h] = own.mean + own.keep * (m[h] - own.mean)
         for i in range(len(own.keep)):
-            p[h, i] *= own.keep[i] * own.keep
+            m[h, i] = own.mean[i] + own.keep[i] * (m[h, i] - own.mean[i])
+            for j in range(len(own.keep)):
+                p[h, i, j] *= own.keep[i] * own.keep[j]
 
 
 @kernel
@@ -244,24 +247,28 @@ def _update(m, p, y, seen, noise, dof):
     s = noise.copy()
     v = y.copy()
     for i in range(states):
-        v -= m[i] * seen[i]
-        for k in range(states):
-            cross[i] += p[i, k] * seen[k]
+        for j in range(3):
+            v[j] -= m[i] * seen[i, j]
+            for k in range(states):
+                cross[i, j] += p[i, k] * seen[k, j]
     for i in range(states):
         for j in range(3):
-            s[j] += seen[i, j] * cross[i]
+            for k in range(3):
+                s[j, k] += seen[i, j] * cross[i, k]
     inverse, determinant = _inverse(s)
     gain = np.zeros((states, 3))
     square = 0.0
     for j in range(3):
         for k in range(3):
             square += v[j] * inverse[j, k] * v[k]
-            gain[:, j] += cross[:, k] * inverse[k, j]
+            for i in range(states):
+                gain[i, j] += cross[i, k] * inverse[k, j]
     gain *= min(1.0, (dof + 3.0) / (dof + square))
     for j in range(3):
-        m += gain[:, j] * v[j]
         for i in range(states):
-            p[i] -= gain[i, j] * cross[:, j]
+            m[i] += gain[i, j] * v[j]
+            for k in range(states):
+                p[i, k] -= gain[i, j] * cross[k, j]
     return square, np.log(determinant)
 
 

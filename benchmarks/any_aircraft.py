@@ -8,8 +8,9 @@ more of each surface, at random speeds, frame rates, references, magnitudes, tim
 published bound declared and no error but the aircraft's own. There is no autopilot, so that some flights end
 early, out of the altitudes that are simulated: `--hours` flies further healthy ones, with the numbers that
 follow, until so many hours are full. `--flights 0 --first 200 --hours 2.5` flies these alone.
-`--declared` draws air, sensors, actuators and class besides, declares them, and watches with the statistical
-detector, too; there is no `certain` then.
+`--declared` draws whole scenarios: turbulence, steady wind, gusts, sensors, actuators, class, and what an
+autopilot holds or turns to; declares what can be declared, and watches with the statistical detector, too;
+there is no `certain` then. A name may be a folder, `./aircraft/737`: with engines as effectors, say.
 
 A row an aircraft: hours flown in health and their false alarms; of each fault how many were detected, named,
 named wrongly, and how often the true surface was left out of what is still possible; how many the theory of
@@ -20,6 +21,7 @@ these were not (`late`).
 import argparse
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,8 +32,9 @@ from beaver_ftc import load
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import fault_free_s
+from beaver_ftc.scenario.airframe import find_aircraft
+from beaver_ftc.scenario.autopilot import channels_of
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.studies.derive.first_use import derive_if_needed
 from beaver_ftc.studies.detectability import DETECT_WITHIN_S, SETTLED_S, detection_magnitude, excitation
 
 TWELVE = ("737", "A4", "B747", "MD11", "c172p", "c310", "J3Cub", "L410", "OV10", "T37", "pa28", "p51d")
@@ -68,13 +71,23 @@ def signal(rng: np.random.Generator) -> dict[str, Any]:
     return {"step": {"amplitude_deg_s": 0.2 * size, "start_s": start_s, "end_s": start_s + 3.0}}
 
 
+def reference_of(name: str) -> str:
+    """What a scenario calls it."""
+    return name if name.startswith("./") else f"jsbsim:{name}"
+
+
+def plain_of(name: str) -> Scenario:
+    """A flight with nothing in it."""
+    find_aircraft(reference_of(name), Path())
+    return load({"name": "plain", "aircraft": reference_of(name)})
+
+
 def scenario(
     name: str, surface: str | None, seed: int, index: int, healthy_s: float, fault_class: str
 ) -> Scenario:
     """Flight number `index` of an aircraft: healthy, or with a loss of `surface`."""
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(index, len(surface or ""))))
-    reference = f"jsbsim:{name}"
-    plain = load({"name": "plain", "aircraft": reference})
+    reference, plain = reference_of(name), plain_of(name)
     low, high = plain.airframe.envelope.airspeed_mps
     middle = plain.initial.airspeed_mps
     rate_hz = int(np.exp(rng.uniform(np.log(25), np.log(200))))
@@ -102,14 +115,56 @@ def everything(scenario: Scenario, seed: int, index: int) -> Scenario:
     grade = str(rng.choice(("ideal", "tactical-grade", "consumer-grade")))
     moves = severity != "none" and rng.random() < 0.8  # what is declared need not come
     bounds: dict[str, Any] = {"turbulence": severity} | ({"sensors": grade} if grade != "ideal" else {})
+    own_alone = rng.random() < 0.5  # the error of its own model is all there is
+    bounds |= (
+        dict.fromkeys(("constant_rad_s2", "inertia_coupling"), dict.fromkeys("pqr", 0.0)) if own_alone else {}
+    )
+    turbulence = {"turbulence": "dryden", "severity": severity} if moves else {}
     return scenario.with_({
-        "environment": {"turbulence": "dryden", "severity": severity} if moves else {},
+        "environment": turbulence | wind(rng), "autopilot": outer_loops(rng, scenario),
         "sensors": grade, "actuators": str(rng.choice(("ideal", "servo"))),
         "fdi": {
-            "fault_class": str(rng.choice(("published", "all"))), "statistical": {}, "bounds": bounds,
+            "fault_class": str(rng.choice(("published", "all"))), "bounds": bounds,
+            "statistical": {"uncertainty_rad_s": 5.0} if own_alone else {},
             "fault_profile": "abrupt" if is_abrupt(scenario) and rng.random() < 0.5 else "any",
         },
     })  # fmt: skip
+
+
+def wind(rng: np.random.Generator) -> dict[str, Any]:
+    """Steady wind, now and then, and up to three gusts of any shape: there is no bound that covers them."""
+    air: dict[str, Any] = {}
+    if rng.random() < 0.3:
+        air["wind_mps"] = [*rng.uniform(-12.0, 12.0, 2).tolist(), float(rng.uniform(-1.0, 1.0))]
+    if rng.random() < 0.5:
+        air["gust"], at_s = [], 0.0
+        for _ in range(rng.integers(1, 4)):
+            at_s += float(rng.uniform(1.0, 8.0))
+            way = rng.normal(size=3)
+            rise_s, hold_s, fade_s = np.exp(rng.uniform(np.log(0.2), np.log(4.0), 3)).tolist()
+            air["gust"].append({
+                "at_s": at_s, "velocity_mps": (rng.uniform(0.5, 6.0) * way / np.linalg.norm(way)).tolist(),
+                "rise_s": rise_s, "hold_s": hold_s, "fade_s": fade_s,
+            })  # fmt: skip
+            at_s += rise_s + hold_s + fade_s
+    return air
+
+
+def outer_loops(rng: np.random.Generator, scenario: Scenario) -> dict[str, Any]:
+    """Half of the time an autopilot: each of its channels held, or asked for something else on the way."""
+    known = channels_of(scenario.airframe)
+    if rng.random() < 0.5:
+        return {}
+    V, at_s = scenario.initial.airspeed_mps, float(rng.uniform(2.0, 12.0))
+    legs = {
+        "altitude_m": {"value": float(scenario.initial.altitude_m + rng.uniform(-40.0, 40.0))},
+        "airspeed_mps": {"value": float(V * rng.uniform(0.95, 1.05))},
+        str(rng.choice(("heading_deg", "bank_deg"))): {"value": float(rng.uniform(-30.0, 30.0))},
+    }
+    return {
+        name: [{"hold": True}] + ([{"at_s": at_s, **leg}] if rng.random() < 0.5 else [])
+        for name, leg in legs.items() if name in known and rng.random() < 0.8
+    }  # fmt: skip
 
 
 def is_abrupt(scenario: Scenario) -> bool:
@@ -119,7 +174,7 @@ def is_abrupt(scenario: Scenario) -> bool:
 
 def flown(name: str, args: argparse.Namespace) -> Iterator[tuple[str | None, Any]]:
     """Surface, or None in health, and what came of the flight; None where it has no trim."""
-    surfaces = load({"name": "plain", "aircraft": f"jsbsim:{name}"}).airframe.surfaces
+    surfaces = plain_of(name).airframe.surfaces
     for surface in (None, *surfaces):
         index, flown_s, refused = args.first, 0.0, 0
         wanted_s = 3600.0 * args.hours if surface is None else 0.0
@@ -207,7 +262,7 @@ def main() -> None:
     args = parser.parse_args()
     table, broken = Table(*COLUMNS), []
     for name in args.names:
-        derive_if_needed(f"jsbsim:{name}")
+        find_aircraft(reference_of(name), Path())
         row, said = row_of(name, args)
         table.add_row(*row)
         broken += said

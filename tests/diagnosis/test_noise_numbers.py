@@ -11,9 +11,10 @@ from beaver_ftc.aircraft import load
 from beaver_ftc.design.fdc import MASS
 from beaver_ftc.design.model import design_record, inertia_coefficients
 from beaver_ftc.design.variants import coefficient_slopes, jacobian
-from beaver_ftc.diagnosis import air, noise_model
+from beaver_ftc.diagnosis import air, noise_model, statistical
 from beaver_ftc.diagnosis.bounds import variances
 from beaver_ftc.diagnosis.bounds.declared import Errors, gust_sigma_rad_s, inertia_slack
+from beaver_ftc.diagnosis.bounds.worst_case import error_map_dtype
 from beaver_ftc.diagnosis.likelihood import ALPHA3, ENDING, GROWING, N_SLOTS, STEP
 from beaver_ftc.diagnosis.state import LOSS
 from beaver_ftc.diagnosis.statistical import statistical_dtype
@@ -78,8 +79,7 @@ def test_a_bound_of_zero_is_reckoned_with_as_a_small_one():
 def returning(rapidity, moving=1, rolling=200.0, rate_hz=50.0):
     record = np.zeros(1, statistical_dtype())[0]
     record["noise"]["rapidity"], record["tests"]["alarm_level"] = rapidity, 6.0
-    record["air"]["moving"], record["air"]["rolling"] = moving, rolling
-    return noise_model.returning_length(record, V, rate_hz)
+    return noise_model.returning_length(record, V, rate_hz, moving * rolling)
 
 
 def test_a_drift_returns_so_soon_that_a_swing_takes_half_the_level():
@@ -172,7 +172,7 @@ def test_the_second_view_returns_with_a_gust_as_strong_where_it_is_slow(alone):
     air, last = alone.detector["air"], alone.blocks[-1]
     rolling = sqrt(0.3048 * 1750.0 * SPAN_M) / 2.6
     assert air["rolling"] == pytest.approx(rolling)
-    assert last["lag"] == pytest.approx(noise_model.returning_length(alone.detector, V, 50.0))
+    assert last["lag"] == pytest.approx(noise_model.returning_length(alone.detector, V, 50.0, rolling))
     assert last["stronger"] == pytest.approx((rolling / last["lag"]) ** 2)
     assert [float(block["stronger"]) for block in alone.blocks[:-1]] == [1.0, 1.0]
     assert air["moving"] == 1
@@ -377,3 +377,37 @@ def test_what_an_aircrafts_terms_are_off_may_change_sides_within_a_frame(error, 
     """A square wave of the frame rate, -1 and 1 by turns: its largest change is twice its bound."""
     aircraft = SimpleNamespace(model_error_rad_s2=error)
     assert noise_model.pace_of(Statistical(uncertainty_rad_s=15.0), aircraft, 0.02) == pytest.approx(pace)
+
+
+def test_where_no_vane_shows_it_pitch_reckons_with_a_gust_no_weaker_at_any_frequency():
+    """Dryden's vertical velocity, its slope lagged [MIL-F-8785C], beside the drift that stands for it."""
+    lag_m, omega = float(variances.length_of_gusts(SPAN_M)[1]), np.geomspace(1e-3, 1e3, 400)
+    assert lag_m == pytest.approx(4.0 * SPAN_M / pi)
+    sigma, L, tau = 0.3048 * 7.4, 0.3048 * 1750.0, lag_m / V
+    x = (L * omega / V) ** 2
+    velocity = sigma**2 * L / (pi * V) * (1.0 + 3.0 * x) / (1.0 + x) ** 2
+    rotation = (omega / V) ** 2 * velocity / (1.0 + (tau * omega) ** 2)
+    intensity = variances.drift("light", SPAN_M)[1] * V
+    stands_for_it = intensity * tau**2 / pi / (1.0 + (tau * omega) ** 2)
+    assert (rotation <= stands_for_it * (1.0 + 1e-9)).all()
+    assert rotation[-1] == pytest.approx(stands_for_it[-1], rel=1e-4)
+
+
+def test_an_error_crosses_its_bound_within_a_quarter_of_a_surfaces_travel():
+    """An error that goes with a surface from one end of its bound to the other in that quarter, in any number
+    of frames: the pace covers each step, and no frame more than the whole way."""
+    record = np.zeros(1, statistical_dtype()).view(np.recarray)[0]
+    error_map = np.zeros(1, error_map_dtype(3)).view(np.recarray)[0]
+    error_map.travel_low, error_map.travel_high = (-0.3, -0.2, -0.4), (0.1, 0.2, 0.4)
+    record.noise.pace = 0.02
+    rng = np.random.default_rng(1)
+    steps = rng.dirichlet(np.ones(20)) * 0.25
+    for step, way in zip(steps, rng.permutation(3)[[0] * 20], strict=True):
+        u = error_map.before.copy()
+        u[way] += step * (error_map.travel_high - error_map.travel_low)[way]
+        statistical.follow_surfaces(record.noise, record.block, error_map, u)
+        assert [block.pace for block in record.block] == pytest.approx([0.02 + 2.0 * step / 0.25] * 3)
+    statistical.follow_surfaces(record.noise, record.block, error_map, error_map.before.copy())
+    assert record.block[0].pace == pytest.approx(0.02)
+    statistical.follow_surfaces(record.noise, record.block, error_map, error_map.travel_low.copy())
+    assert record.block[0].pace == 2.0

@@ -22,7 +22,7 @@ from beaver_ftc.diagnosis import likelihood
 from beaver_ftc.diagnosis.across import AN_AXIS, Direction, across_a_column, set_up_views, views_of
 from beaver_ftc.diagnosis.air import BY_FORCE, UNSEEN, set_up_air, set_up_jitter
 from beaver_ftc.diagnosis.bounds.declared import Errors
-from beaver_ftc.diagnosis.bounds.variances import axis_of, steady_tolerance
+from beaver_ftc.diagnosis.bounds.variances import axis_of, length_of_gusts, steady_tolerance
 from beaver_ftc.diagnosis.forces import set_up_forces
 from beaver_ftc.diagnosis.likelihood import ALPHA3, ENDING, GROWING, LATERAL, N_READINGS, N_SLOTS, STEP
 from beaver_ftc.diagnosis.state import LOSS, SIDE
@@ -137,13 +137,18 @@ def set_up(
             statistical["inertial_air"]["moving"] *= air["read"]
             statistical["inertial_air"]["unseen"] = np.minimum(np.add(UNSEEN, BY_FORCE), 1.0)
         set_up_views(statistical, aircraft)
-    block = statistical["block"][-1]
-    block["lag"] = returning_length(statistical, airspeed_mps, rate_hz)
+    last, pitch = statistical["block"][-1], statistical["block"][likelihood.PITCH_BLOCK]
+    rolling = float(air["rolling"]) if air["moving"] else 0.0
+    last["lag"] = returning_length(statistical, airspeed_mps, rate_hz, rolling)
     if air["moving"]:
         # the filters that reckon with no gust: as the others begin, and with a drift that goes anywhere
         for name in ("n", "keep", "noise", "P_xx", "P_dd"):
             statistical["block"]["calm"][name] = statistical["block"][name]
-        block["stronger"] = (air["rolling"] / block["lag"]) ** 2
+        last["stronger"] = (rolling / last["lag"]) ** 2
+        if not air["seen"]:
+            pitching = float(length_of_gusts(air["span"])[1])
+            pitch["lag"] = returning_length(statistical, airspeed_mps, rate_hz, pitching)
+            pitch["stronger"] = (pitching / pitch["lag"]) ** 2
         set_up_jitter(statistical, errors, design, *start[1:], dt_s)
 
 
@@ -172,7 +177,8 @@ def pace_of(given: Statistical, aircraft: Aircraft, dt_s: float) -> float:
     """By what share of its bound an uncertainty that is merely bounded changes within a frame, at most.
 
     What an aircraft's own terms are off moves with its surfaces, which a law may throw from frame to frame:
-    there from one end of the bound to the other.
+    there from one end of the bound to the other. Where the error is mapped, that is followed in flight
+    (`statistical.follow_surfaces`).
     """
     return 2.0 if any(aircraft.model_error_rad_s2) else given.uncertainty_rad_s * dt_s
 
@@ -197,6 +203,7 @@ def _set_up_noise(
     noise = float(errors[:3].max())
     largest = max(bounds.constant_rad_s2.as_tuple())
     level = float(statistical["tests"]["alarm_level"])
+    statistical["noise"]["pace"] = given.uncertainty_rad_s * dt_s
     statistical["noise"]["rapidity"] = rapidity(largest, given.uncertainty_rad_s, noise, level, dt_s)
     _, G, f_x, f_y = jacobian(design, *start)
     statistical["noise"]["own_jitter"] = f_x**2 @ errors[:3] ** 2
@@ -222,21 +229,21 @@ def rapidity(eta_bar: float, omega: float, noise: float, level: float, dt_s: flo
     return max(hypot(walk, ramp), swing * dt_s) / eta_bar**2
 
 
-def returning_length(statistical: np.void, airspeed_mps: float, rate_hz: float) -> float:
-    """Within which distance flown, m, the drift of the second view of roll and yaw returns.
+def returning_length(statistical: np.void, airspeed_mps: float, rate_hz: float, gust_m: float) -> float:
+    """Within which distance flown, m, a drift returns beside a gust that returns within gust_m, 0 in still
+    air: that of the second view of roll and yaw, and of pitch where no vane shows its gust.
 
     As soon as a bounded uncertainty allows: over the longest window, T, one that swings along with the fault
     moves a test for a drift of intensity i and lag tau by eta_bar sqrt(T / 2 i) / tau, and half the alarm
-    level is left for it; and no later than the rolling gust does. A gust that returns later is taken for a
+    level is left for it; and no later than the gust does. A gust that returns later is taken for a
     stronger one, with the same power where it is slow and more where it is fast.
     """
-    rolling = float(statistical["air"]["rolling"]) if statistical["air"]["moving"] else 0.0
     if statistical["noise"]["rapidity"] == 0.0:
-        return rolling  # 0 in still air: nothing is declared that drifts, and the two views are one
+        return gust_m  # 0 in still air: nothing is declared that drifts, and the two views are one
     longest_s = 2 ** (N_SLOTS - 1) / rate_hz
     level = float(statistical["tests"]["alarm_level"])
     lag_s = sqrt(2.0 * longest_s / statistical["noise"]["rapidity"]) / level
-    return min(airspeed_mps * lag_s, rolling or np.inf)
+    return min(airspeed_mps * lag_s, gust_m or np.inf)
 
 
 def _set_up_tolerances(statistical: np.void, aircraft: Aircraft, tolerance: np.ndarray) -> None:

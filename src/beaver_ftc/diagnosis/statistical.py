@@ -2,8 +2,9 @@
 
 Pitch is one block, roll and yaw another, whose noise goes together. Roll and yaw are looked at twice: by a
 drift that may go anywhere, which is quick and knows nothing of constants, and by one that returns, which
-gathers evidence for longer. The declared rate of false alarms holds for the declared noise; the worst-case
-scheme beside it needs no probability at all. `fdi.config.authority` says whose alarms and exclusions count.
+gathers evidence for longer; pitch by the latter alone, where no vane shows its gust. The declared rate of
+false alarms holds for the declared noise; the worst-case scheme beside it needs no probability at all.
+`fdi.config.authority` says whose alarms and exclusions count.
 """
 
 from functools import lru_cache
@@ -26,6 +27,11 @@ from beaver_ftc.diagnosis.tones import LISTENING
 # Of what the best explanation explains, the part that a constant theta leaves to a loss that grows is larger
 # for every rate of growth (docs/theory.md, section 7).
 LEAST_PART = 0.25
+# The error of a model goes from one end of its bound to the other, 2, while a surface moves by a quarter of
+# its travel, and no sooner.
+WITHIN_TRAVEL = 0.25
+FROM_END_TO_END = 2.0 / WITHIN_TRAVEL
+LEAST_TRAVEL_RAD = 1e-6
 
 # What the scenario asks of the tests: whether there are any, levels, what of the evidence a frame after the
 # alarm leaves, columns of the log, whether constants are tolerated; one over the instants in a frame.
@@ -34,11 +40,12 @@ TESTS = record(
 )  # fmt: skip
 
 # What moves the rates besides a fault. rapidity, 1/s: intensity of the drift of an uncertainty over its bound
-# squared; bounded, rad/s2: that bound now; deflection: its part by that of the surfaces; jitter, (rad/s2)2:
-# noise of the model's own inputs, `own_jitter` what of it is none of the air data's. read: whether errors of
-# the air data count. The last are scratch.
+# squared; pace: by what share of its bound it changes in a frame in which no surface moves; bounded, rad/s2:
+# that bound now; deflection: its part by that of the surfaces; jitter, (rad/s2)2: noise of the model's own
+# inputs, `own_jitter` what of it is none of the air data's. read: whether errors of the air data count. The
+# last are scratch.
 NOISE = record(
-    rapidity=float, bounded=3, deflection=3, jitter=3, own_jitter=3, read=int, reading=N_READINGS,
+    rapidity=float, pace=float, bounded=3, deflection=3, jitter=3, own_jitter=3, read=int, reading=N_READINGS,
     terms=MAX_TERMS, direction=N_SIGNALS, slope=MAX_MONOMIALS, moved=3,
 )  # fmt: skip
 
@@ -261,8 +268,22 @@ def prepare(tests, noise, blocks, air, bound, design, measured, u, dt):
             block.regressor[:] = 0.0
         constants(tests.share, noise, blocks, bound.admitted, design, measured, u)
     drifts(noise, blocks, air, bound, design, measured, dt)
+    if bound.error_map.n_boxes > 0:
+        follow_surfaces(noise, blocks, bound.error_map, u)
     if air.moving:
         gusts.begin_frame(air, y[AIRSPEED], tests.share * dt)
+
+
+@kernel
+def follow_surfaces(noise, blocks, error_map, u):
+    """Bring the pace to the frame to come: what a model's own terms are off moves with its surfaces."""
+    moved = 0.0
+    for s in range(u.size):
+        travel = max(error_map.travel_high[s] - error_map.travel_low[s], LEAST_TRAVEL_RAD)
+        moved = max(moved, abs(u[s] - error_map.before[s]) / travel)
+        error_map.before[s] = u[s]
+    for block in blocks:
+        block.pace = min(noise.pace + FROM_END_TO_END * moved, FROM_END_TO_END * WITHIN_TRAVEL)
 
 
 @kernel

@@ -19,6 +19,11 @@ _GYRO_OF = dict(zip(RATE_SIGNALS, AXES, strict=True))
 _AIR_DATA = 3  # gyros come first among the signals, then alpha, beta, airspeed, dynamic pressure
 
 
+def length_of_gusts(span_m: float) -> np.ndarray:
+    """Way flown within which the rolling, pitching and yawing gust returns, (3,) m [Yeager1998]."""
+    return np.array([sqrt(SCALE_M * span_m) / 2.6, 4.0 * span_m / pi, 3.0 * span_m / pi])
+
+
 def gusts(turbulence: str, airspeed_mps: float, span_m: float) -> tuple[np.ndarray, np.ndarray]:
     """Standard deviation (3,) rad/s and correlation time (3,) s of the air's rotation [Yeager1998].
 
@@ -26,8 +31,7 @@ def gusts(turbulence: str, airspeed_mps: float, span_m: float) -> tuple[np.ndarr
     and the lateral gusts along the flight path, s / V / (1 + tau s) of each; through Dryden's spectrum the
     variance is sigma^2 / 2 L^2 (3 / (k (1 + k)) - 1 / (1 + k)^2) with k = tau V / L. Above 2000 ft.
     """
-    sigma, L, b = gust_mps(turbulence), SCALE_M, span_m
-    length = np.array([sqrt(L * b) / 2.6, 4.0 * b / pi, 3.0 * b / pi])  # of each gust, m
+    sigma, L, b, length = gust_mps(turbulence), SCALE_M, span_m, length_of_gusts(span_m)
     k = length / L
     rotation = sigma / L * np.sqrt(1.5 / (k * (1.0 + k)) - 0.5 / (1.0 + k) ** 2)
     rotation[0] = ROLLING * sigma / sqrt(L * b)

@@ -64,12 +64,12 @@ def admitted_dtype(n: int) -> np.dtype:
 
 @lru_cache
 def error_map_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
-    """The map for an aircraft with n surfaces. whole: surfaces may be anywhere. outside: of all boxes. now:
-    the error here, rad/s2."""
+    """The map for an aircraft with n surfaces. whole: surfaces may be anywhere. outside: of all boxes.
+    before: the surfaces in the frame before, rad. now: the error here, rad/s2."""
     return record(
         n_boxes=int, n_levels=int, n_ages=int, whole=int, outside=int, time_s=float, until_s=MAX_AGES,
         low=(boxes, _N), high=(boxes, _N), share=MAX_LEVELS,
-        error=(MAX_AGES, boxes, MAX_LEVELS, 3), travel_low=n, travel_high=n, place=_N, now=3,
+        error=(MAX_AGES, boxes, MAX_LEVELS, 3), travel_low=n, travel_high=n, before=n, place=_N, now=3,
     )  # fmt: skip
 
 

@@ -28,14 +28,17 @@ def of_alarm(tape: Tape, history: History, surfaces: Sequence[str], k: int) -> D
     first = next((r for r in range(k, tape.first, -1) if slot_to_start(r - tape.since) == slot), None)
     if first is None:
         return None
-    said = _written(tape, history, [blocks[r - tape.first] for r in range(first - 1, k + 1)], h, first)
+    since = [blocks[r - tape.first] for r in range(first - 1, k + 1)]
+    said = _written(tape, history, since, h, first)
     if said is None:
         return None
     hypothesis = blocks[k - tape.first]["hypothesis"][h]
     _leave_out(said, history)
     value, limit, _ = sides(said, history)
     score = float(hypothesis["score"] / chances["tests"]["alarm_level"])
-    if not (value > limit and abs(value / limit - score) <= _AS_LOGGED * score):
+    exact = len({float(block["pace"]) for block in since}) == 1  # or less is said than was seen
+    as_logged = (1.0 - _AS_LOGGED if exact else 0.0) * score <= value / limit <= (1.0 + _AS_LOGGED) * score
+    if not (value > limit and as_logged):
         return None
     return {"likelihood": _column(hypothesis, surfaces), **said, "sides": [[value], [limit]]}
 
@@ -107,10 +110,10 @@ def _loudest(chances: np.void) -> tuple[int, int, int]:
 
 def _written(tape: Tape, history: History, blocks: list[np.void], h: int, first: int) -> Document | None:
     """The statement, with the frames from `first` on; blocks: from the row before that. None in moving air
-    that moves several axes together."""
+    that moves several axes together, or whose drift returns."""
     start, dt = blocks[0], history.dt
     both = range(int(start["n"]))
-    if any(
+    if start["lag"] > 0.0 or any(
         block[name][0, 1] for block in blocks for name in ("P_xx", "P_xd", "P_dd", "drift") if len(both) > 1
     ):
         return None
@@ -138,7 +141,8 @@ def _written(tape: Tape, history: History, blocks: list[np.void], h: int, first:
     Y, P = np.vstack([Y[: len(felt)], -Y[len(felt) :]]), np.block([[xx, xd], [xd, dd]])
     return {
         "level": float(tape.alarm["fdi"]["statistical"]["tests"]["alarm_level"]), "axes": axes,
-        "sense": "less" if start["lane"]["sense"][h * N_SLOTS] else "either", "pace": float(start["pace"]),
+        "sense": "less" if start["lane"]["sense"][h * N_SLOTS] else "either",
+        "pace": max(float(block["pace"]) for block in blocks),
         "tolerance": [float(start["tolerance"][j]) for j in known], "R": start["noise"][felt].tolist(),
         "Y": Y.tolist(), "P": P.tolist(), "first": first, "frames": frames,
     }  # fmt: skip

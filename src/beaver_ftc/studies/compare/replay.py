@@ -7,7 +7,7 @@ the fault, and each value after it that was larger than all before.
 
 from collections.abc import Sequence
 from copy import deepcopy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import inf, isfinite, isnan
 from time import process_time
 
@@ -78,14 +78,16 @@ def alarms_at(traces: Sequence[Trace], level: float) -> tuple[int, float]:
 class Recording:
     """A flight under the nominal law as a detector sees it, with the built-in statistic beside it.
 
-    With `fdi.statistical`: air (frames, 3) rad/s2, what the vanes' view of the air explains of each elapsed
-    frame, and air_noise (3,) rad/s2, the standard deviation of its noise.
+    known (frames,): whether the design model's error is, where the aircraft is then. With `fdi.statistical`,
+    where the aircraft's forces are known: air (frames, 3) rad/s2, what the vanes' view of the air explains of
+    each elapsed frame, and air_noise (3,) rad/s2, the standard deviation of its noise.
     """
 
     context: Context
     seen: list[tuple[Measured, np.ndarray]]
     built_in: np.ndarray
     fault_at_s: float
+    known: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
     air: np.ndarray | None = None
     air_noise: np.ndarray | None = None
 
@@ -93,9 +95,11 @@ class Recording:
 def record(scenario: Scenario) -> Recording:
     """Fly a scenario under the nominal law and keep what a detector would see."""
     nominal = scenario.control.model_copy(update={"law": "nominal"})
-    recorder, built_in, air = Recorder(), list[float](), list[np.ndarray]()
+    recorder, built_in = Recorder(), list[float]()
+    air, known = list[np.ndarray](), list[bool]()
     loop = Loop(scenario.model_copy(update={"control": nominal}), recorder)
     statistical, fly_frame = loop.frames["fdi"]["statistical"], loop.plugin_frame
+    error_map = loop.frames["fdi"]["bound"]["error_map"]
     statistical["tests"]["enabled"] = scenario.fdi.statistical is not None
     assert fly_frame is not None
 
@@ -103,14 +107,15 @@ def record(scenario: Scenario) -> Recording:
         air.append(statistical["air"]["acceleration"][0].copy())
         status = fly_frame(frames, references, log)
         built_in.append(built_in_statistic(frames))
+        known.append(not error_map["outside"][0])
         return status
 
     loop.fly_frame = fly_and_note
     for _ in loop.chunks():
         pass
     fault_at_s = min((fault.at_s for fault in scenario.faults), default=inf)
-    recording = Recording(recorder.context, recorder.seen, np.array(built_in), fault_at_s)
-    if scenario.fdi.statistical is not None:
+    recording = Recording(recorder.context, recorder.seen, np.array(built_in), fault_at_s, np.array(known))
+    if scenario.fdi.statistical is not None and statistical["air"]["seen"]:
         recording.air, recording.air_noise = np.array(air), np.sqrt(statistical["noise"]["jitter"][0])
     return recording
 

@@ -8,6 +8,7 @@ from statistics import fmean
 from typing import Any
 
 from beaver_ftc.diagnosis.bounds.clairvoyant import chance
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.metrics import Document, versions
 from beaver_ftc.studies.compare.replay import Trace, alarms_at
 from beaver_ftc.studies.engine.statistics import Estimate, binomial, poisson, share_within, sign_test
@@ -130,8 +131,11 @@ JUDGED_S = 1.0
 def document_of(
     grid: Grid, healthy: Sequence[Watched], faulted: Sequence[Watched]
 ) -> tuple[Document, list[Row]]:
-    """The document, and the rows behind it."""
+    """The document, and the rows behind it. Raises BadInput where not one flight could be judged."""
     watched, struck = _by_condition(healthy), _by_condition(faulted)
+    failures = sorted({failure for one in (*healthy, *faulted) for failure in one.failures})
+    if failures and not watched:
+        raise BadInput(f"power: no flight could be judged: {failures[0]}")
     levels = {key: level_for(traces, grid.per_h) for key, traces in watched.items()}
     rows = rows_of(faulted, levels)
     document = {
@@ -155,7 +159,7 @@ def document_of(
         "cells": _lines(rows, CELL, summary),
         "limits": _lines(rows, PLACE, lambda of: {"within": limit(of, grid.per_h)}),
         "comparison": _comparison(rows),
-        "failures": sorted({failure for one in (*healthy, *faulted) for failure in one.failures}),
+        "failures": failures,
         "versions": dict(versions()),
     }
     return document, rows

@@ -124,10 +124,11 @@ def scenario_of(
     faults: list[dict[str, Any]] | None = None,
     where: dict[str, Any] | None = None,
 ) -> Scenario:
-    """A flight of a block: everything in it but the fault and where it is flown follows from the block."""
+    """A flight of a block: everything in it but the fault and where it is flown follows from the block.
+    Another aircraft than the Beaver has the error of its own model, and none is added."""
     sensors, turbulence = block.condition
-    if where and "aircraft" in where:
-        find_aircraft(where["aircraft"], Path())  # a folder in the working directory, in each process
+    aircraft = (where or {}).get("aircraft", DEFAULT)
+    find_aircraft(aircraft, Path())  # a folder in the working directory, in each process
     return Scenario.model_validate(
         {
             "name": "power",
@@ -135,7 +136,7 @@ def scenario_of(
             "rate_hz": _RATE_HZ,
             "seed": block.seed,
             "reference": _reference(block),
-            "uncertainty": _uncertainty(block),
+            "uncertainty": _uncertainty(block) if aircraft == DEFAULT else {},
             "sensors": sensors,
             "environment": air_of(turbulence),
             "faults": faults or [],
@@ -271,8 +272,10 @@ def _watch(watched: Watched, flights: Sequence[Scenario], schemes: Sequence[str]
                         for one in recordings
                     ]
                 traces = [replay.trace(recording, recording.built_in) for recording in recordings]
-            else:
+            elif seen:
                 traces = replay.replay_together(seen, scheme)
+            else:  # why our own could not fly them has been said
+                continue
             watched.traces[scheme] = traces
         except BeaverFtcError as error:
             watched.failures.append(f"{scheme}: {error}")
@@ -285,9 +288,7 @@ def _watch(watched: Watched, flights: Sequence[Scenario], schemes: Sequence[str]
 
 def with_fdi(flight: Scenario, scheme: str) -> Scenario:
     """The flight with what a scheme of ours wants of the built-in diagnosis."""
-    document = flight.model_dump(mode="json", exclude_none=True)
-    document["fdi"] |= FLOWN_THEMSELVES[scheme]
-    return Scenario.model_validate(document)
+    return flight.with_({f"fdi.{key}": value for key, value in FLOWN_THEMSELVES[scheme].items()})
 
 
 def lost(case: Case, why: str) -> Watched:

@@ -1,67 +1,105 @@
-"""Our own logs, diagnosed by the aircraft's own model: bounds, names and alarms where the truth is known.
+"""Our own logs, diagnosed by two models: bounds, names and alarms where the truth is known.
 
-    python benchmarks/own_logs.py [--flights 1] [--seed 1] [--as table]
+    python benchmarks/own_logs.py [--flights 1] [--seed 1] [--as table] [--aircraft beaver] [--type TYPE]
+        [--air none] [--by identified]
 
 Three laws, two airspeeds, references drawn by the seed (sines and doublets on three axes), admitted errors of
 inertia and air drawn as well, gyros ideal or with declared noise. Healthy flights, and losses of 0.3, 0.6 and
-0.9 of aileron, elevator and rudder. Each flight is written as a recorder on board would have, read again, and
-diagnosed as `diagnose --aircraft` does. Prints a row for each size of the loss: flights, alarms before the
-fault, found, named rightly, named wrongly, share of samples and surfaces whose effectiveness the bounds hold,
-share of those of which more is said than 0 to 1, their width, and the share of credible samples.
+0.9 of whatever turns the aircraft, or with `--type` another fault of it. Each flight is written as a recorder
+on board would have, read again, and diagnosed as `diagnose --aircraft` does (`by` aircraft), and by a model
+that `identify` has of twelve healthy flights of a minute: two of the laws, other airspeeds, other days.
+`--air light` flies in turbulence, declared to the aircraft's own model.
+
+Prints a row for each model and size: flights, alarms before the fault, found, named rightly, named wrongly in
+any row, share of samples and surfaces whose effectiveness the bounds hold, share of those of which more is
+said than 0 to 1, their width, and the share of credible samples.
 """
 
 import argparse
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 import beaver_ftc as bf
 from beaver_ftc.flights.by_aircraft import diagnose_as, known
-from beaver_ftc.flights.samples import read_for
-from beaver_ftc.flights.vehicle import load_vehicle
+from beaver_ftc.flights.diagnose import Rows, diagnose
+from beaver_ftc.flights.identification import by_pressure, identify
+from beaver_ftc.flights.model import Model
+from beaver_ftc.flights.samples import load_flights, read_for, sample
+from beaver_ftc.flights.vehicle import Vehicle, load_vehicle
 from beaver_ftc.results.exports import RECORDINGS
 from beaver_ftc.results.writer import run
 from beaver_ftc.studies.present.tables import markdown_table
 
-LAWS = ("nominal", "adaptive", "fault-tolerant")
-AIRSPEEDS_MPS = (38.0, 48.0)
-SURFACES = ("aileron", "elevator", "rudder")
-LOSSES = (0.3, 0.6, 0.9)
+Document = dict[str, Any]
+LAWS, TRAINING_LAWS = ("nominal", "adaptive", "fault-tolerant"), ("nominal", "adaptive")
+TESTED, TRAINED = (38.0 / 45.0, 48.0 / 45.0), (40.0 / 45.0, 46.0 / 45.0)
+"""Airspeeds, of the usual one."""
 LOSS = "loss_of_effectiveness"
+TYPES: dict[str, list[Document]] = {
+    LOSS: [{"magnitude": size} for size in (0.3, 0.6, 0.9)],
+    "stuck": [{"position_deg": size} for size in (-4.0, 2.0, 6.0)],
+    "bias": [{"bias_deg": size} for size in (1.0, -3.0, 6.0)],
+    "float": [{}],
+    "oscillatory": [{"amplitude_deg": size, "frequency_rad_s": 6.0} for size in (0.5, 2.0, 4.0)],
+}
 DURATION_S, FAULT_S = 20.0, 10.0
 HEALTHY = 5  # of each law and airspeed
+TRAINING, TRAINING_S = 12, 60.0
 NOISE = {"noise_std_deg_s": 0.05}
 HEAD = [
-    "loss", "flights", "false alarms", "found", "named rightly", "named wrongly", "held by bounds",
+    "by", "fault", "flights", "false alarms", "found", "named rightly", "named wrongly", "held by bounds",
     "said of", "median width", "credible",
 ]  # fmt: skip
-Document = dict[str, Any]
 
 
-def scenarios(count: int, seed: int) -> Iterator[Document]:
-    """Scenario after scenario: every law and airspeed, healthy and with each loss of each surface."""
+class Campaign(NamedTuple):
+    """What is flown: a reference of an aircraft, moving air, the type of the faults, and how it is drawn."""
+
+    aircraft: str = "beaver"
+    air: str = "none"
+    type: str = LOSS
+    count: int = 1
+    seed: int = 1
+
+
+def scenarios(of: Campaign) -> Iterator[Document]:
+    """Scenario after scenario: every law and airspeed, healthy and with each fault of each surface."""
+    plain = bf.load({"name": "plain", "aircraft": of.aircraft})
     for law in LAWS:
-        for airspeed_mps in AIRSPEEDS_MPS:
-            for i in range(HEALTHY * count):
-                yield _drawn(law, airspeed_mps, (seed, i), [])
-            for surface in SURFACES:
-                for loss in LOSSES:
-                    fault = {"actuator": surface, "type": LOSS, "magnitude": loss, "at_s": FAULT_S}
-                    for i in range(count):
-                        yield _drawn(
-                            law, airspeed_mps, (seed, SURFACES.index(surface), i, round(10 * loss)), [fault]
-                        )
+        for share in TESTED:
+            airspeed_mps = plain.initial.airspeed_mps * share
+            for i in range(HEALTHY * of.count):
+                yield _drawn(of, law, airspeed_mps, (of.seed, i), [])
+            for place, surface in enumerate(plain.airframe.primary):
+                for size, fault in enumerate(TYPES[of.type]):
+                    whole = {"actuator": surface, "type": of.type, "at_s": FAULT_S, **fault}
+                    for i in range(of.count):
+                        drawn_by = (of.seed, place, i, (3, 6, 9)[size])
+                        yield _drawn(of, law, airspeed_mps, drawn_by, [whole])
 
 
-def _drawn(law: str, airspeed_mps: float, drawn_by: tuple[int, ...], faults: list[Document]) -> Document:
+def training(of: Campaign) -> Iterator[Document]:
+    """Healthy flights of other days, by some of the laws at other airspeeds."""
+    usual_mps = bf.load({"name": "plain", "aircraft": of.aircraft}).initial.airspeed_mps
+    for i in range(TRAINING):
+        law, share = TRAINING_LAWS[i % 2], TRAINED[i // 2 % 2]
+        drawn = _drawn(of, law, usual_mps * share, (of.seed + 4, 777, i), [])
+        yield drawn | {"name": f"day-{i}", "duration_s": TRAINING_S}
+
+
+def _drawn(
+    of: Campaign, law: str, airspeed_mps: float, drawn_by: tuple[int, ...], faults: list[Document]
+) -> Document:
     rng = np.random.default_rng([*drawn_by, LAWS.index(law), round(airspeed_mps)])
-    noisy = rng.uniform() < 0.5
-    fdi: Document = {"bounds": {"sensors": dict.fromkeys("pqr", NOISE)}} if noisy else {}
+    noisy, moves = rng.uniform() < 0.5, of.air != "none"
+    bounds: Document = {"sensors": dict.fromkeys("pqr", NOISE)} if noisy else {}
     return {
         "name": f"own-{'-'.join(map(str, rng.integers(0, 1_000_000, 2)))}",
+        "aircraft": of.aircraft,
         "duration_s": DURATION_S,
         "seed": int(rng.integers(1, 1_000_000)),
         "initial": {"airspeed_mps": airspeed_mps},
@@ -70,8 +108,12 @@ def _drawn(law: str, airspeed_mps: float, drawn_by: tuple[int, ...], faults: lis
             "inertia_coupling": {axis: float(rng.uniform(-0.25, 0.25)) for axis in "pqr"},
             "sinusoid": {axis: _sinusoid(rng) for axis in "pqr"},
         },
+        "environment": {"turbulence": "dryden", "severity": of.air} if moves else {},
         "sensors": dict.fromkeys("pqr", NOISE) if noisy else "ideal",
-        "fdi": fdi,
+        "fdi": {
+            "fault_class": "published" if of.type == LOSS else "all",
+            "bounds": bounds | ({"turbulence": of.air} if moves else {}),
+        },
         "control": {"law": law},
         "faults": faults,
     }
@@ -90,53 +132,107 @@ def _sinusoid(rng: np.random.Generator) -> Document:
     return {"amplitude_rad_s2": size, "frequency_rad_s": frequency}
 
 
-def judged(document: Document, kind: str, folder: Path) -> Document:
-    """Fly it, write it as a log, diagnose the log: what was right."""
+class Log(NamedTuple):
+    """A flight as a recorder on board has written it, with its scenario beside it."""
+
+    flown: Any
+    folder: Path
+    path: Path
+
+
+def recorded(document: Document, kind: str, folder: Path) -> Log:
+    """Fly it, and write its log."""
     scenario = bf.load(document)
     run(scenario, folder, report=False, recording=kind)
     place = folder / scenario.name
-    vehicle = load_vehicle(str(place / "vehicle.yaml"))
-    recording = read_for(place / RECORDINGS[kind], vehicle)
-    samples, rows, verdict = diagnose_as(recording, vehicle, known("beaver", str(place / "scenario.yaml")))
-    truth = np.ones_like(rows.low)
-    for fault in scenario.faults:
-        surface = list(scenario.airframe.surfaces).index(fault.actuator)
-        truth[samples.t_s >= fault.at_s - 1e-6, surface] = 1.0 - fault.magnitude
-    said = rows.high - rows.low < 1.0
-    held = (rows.low <= truth) & (truth <= rows.high)
-    actual = scenario.faults[0].actuator if scenario.faults else None
-    began_s = scenario.faults[0].at_s if scenario.faults else np.inf
-    found_s = verdict["detection_s"]
-    names = set(rows.named[rows.faulty == 1]) - {"unknown"}
+    return Log(scenario, place, place / RECORDINGS[kind])
+
+
+Said = tuple[Rows, str | None]
+"""The rows, and the surface that is named in the end."""
+
+
+def by_aircraft(log: Log, of: Campaign) -> Said:
+    """As `diagnose --aircraft`."""
+    vehicle = load_vehicle(str(log.folder / "vehicle.yaml"))
+    told = known(of.aircraft, str(log.folder / "scenario.yaml"))
+    _, rows, verdict = diagnose_as(read_for(log.path, vehicle), vehicle, told)
+    return rows, verdict["isolated"]
+
+
+def identified(of: Campaign, kind: str, folder: Path) -> Model:
+    """As `identify`, from healthy flights of other days."""
+    logs = [recorded(one, kind, folder) for one in training(of)]
+    vehicle: Vehicle = load_vehicle(str(logs[0].folder / "vehicle.yaml"))
+    if of.type != LOSS:
+        vehicle = vehicle.model_copy(update={"faults": ["loss", "stuck"]})
+    named = [log.path.rename(log.path.with_stem(log.flown.name)) for log in logs]
+    return identify(*by_pressure(load_flights(named, vehicle), vehicle))
+
+
+def by_model(log: Log, model: Model) -> Said:
+    """As `diagnose --model`."""
+    rows = diagnose(sample(read_for(log.path, model.vehicle), model.vehicle), model)
+    names, count = np.unique(rows.named[rows.faulty == 1].astype(str), return_counts=True)
+    return rows, str(names[count.argmax()]) if len(names) else None
+
+
+def judged(by: str, log: Log, said_of: Said) -> Document:
+    """What was right."""
+    (rows, isolated), faults = said_of, log.flown.faults
+    truth, actual, began_s = np.ones_like(rows.low), None, np.inf
+    for fault in faults:
+        actual, began_s = fault.actuator, fault.at_s
+        surface = list(log.flown.airframe.surfaces).index(actual)
+        left = 1.0 - fault.magnitude if fault.type == LOSS else np.nan
+        truth[rows.t_s >= began_s - 1e-6, surface] = left
+    known = np.isfinite(truth)
+    said = (rows.high - rows.low < 0.999) & known
+    held = (rows.low <= truth + 1e-9) & (truth <= rows.high + 1e-9)
+    alarmed = rows.t_s[rows.faulty == 1]
+    named = {one for name in rows.named[rows.faulty == 1] for one in name.split("+")}
     return {
-        "loss": scenario.faults[0].magnitude if scenario.faults else 0.0,
-        "false": found_s is not None and found_s < began_s - 1e-6,
-        "found": found_s is not None and found_s >= began_s - 1e-6,
-        "right": actual is not None and verdict["isolated"] == actual,
-        "wrong": bool(names - {actual}),
+        "by": by,
+        "size": _size(faults),
+        "false": bool((alarmed < began_s - 1e-6).any()),
+        "found": bool((alarmed >= began_s - 1e-6).any()),
+        "right": actual is not None and isolated == actual,
+        "wrong": bool(named - {actual, "unknown", "unanticipated", ""}),
         "held": int(held[said].sum()),
         "said": int(said.sum()),
-        "samples": said.size,
+        "samples": int(known.sum()),
         "width": (rows.high - rows.low)[said],
         "credible": float(rows.credible.mean()),
     }
 
 
+def _size(faults: Any) -> str:
+    if not faults:
+        return "none"
+    one = next((fault for fault in TYPES[faults[0].type] if _is(faults[0], fault)), {})
+    return f"{faults[0].type} {next(iter(one.values())):g}" if one else str(faults[0].type)
+
+
+def _is(fault: Any, keys: Document) -> bool:
+    return all(abs(getattr(fault, key) - value) < 1e-9 for key, value in keys.items())
+
+
 def table(results: list[Document]) -> list[list[str]]:
-    """A row for each size of the loss."""
+    """A row for each model and size of the fault."""
     rows = []
-    for loss in (0.0, *LOSSES):
-        of = [one for one in results if abs(one["loss"] - loss) < 1e-9]
+    for by, size in dict.fromkeys((one["by"], one["size"]) for one in results):
+        of = [one for one in results if (one["by"], one["size"]) == (by, size)]
         said = sum(one["said"] for one in of)
+        widths = np.concatenate([one["width"] for one in of])
         rows.append([
-            f"{loss:g}" if loss else "none", str(len(of)),
+            by, size, str(len(of)),
             *(str(sum(one[key] for one in of)) for key in _COUNTED),
             f"{sum(one['held'] for one in of) / max(said, 1):.3f}",
             f"{said / max(sum(one['samples'] for one in of), 1):.2f}",
-            f"{np.median(np.concatenate([one['width'] for one in of])):.3f}",
+            f"{np.median(widths):.3f}" if len(widths) else "",
             f"{np.mean([one['credible'] for one in of]):.2f}",
         ])  # fmt: skip
-    return rows
+    return sorted(rows, key=lambda row: row[0])
 
 
 _COUNTED = ("false", "found", "right", "wrong")
@@ -145,13 +241,25 @@ _COUNTED = ("false", "found", "right", "wrong")
 def main() -> None:
     """Fly, write, read, diagnose, print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--flights", type=int, default=1, help="of each law, airspeed, surface and loss")
+    parser.add_argument("--flights", type=int, default=1, help="of each law, airspeed, surface and fault")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--as", dest="kind", choices=sorted(RECORDINGS), default="table")
+    parser.add_argument("--aircraft", default="beaver")
+    parser.add_argument("--air", choices=("none", "light", "moderate", "severe"), default="none")
+    parser.add_argument("--type", choices=TYPES, default=LOSS)
+    parser.add_argument("--by", choices=("aircraft", "identified"), nargs="*")
     asked = parser.parse_args()
+    of = Campaign(asked.aircraft, asked.air, asked.type, asked.flights, asked.seed)
     with tempfile.TemporaryDirectory() as folder:
-        each = [judged(one, asked.kind, Path(folder)) for one in scenarios(asked.flights, asked.seed)]
-    print(markdown_table(HEAD, table(each)))
+        ways: dict[str, Callable[[Log], Said]] = {"aircraft": lambda log: by_aircraft(log, of)}
+        if "identified" in (asked.by or ["identified"]):
+            model = identified(of, asked.kind, Path(folder))
+            ways["identified"] = lambda log: by_model(log, model)
+        results = []
+        for document in scenarios(of):
+            log = recorded(document, asked.kind, Path(folder))
+            results += [judged(by, log, ways[by](log)) for by in asked.by or ways]
+    print(markdown_table(HEAD, table(results)))
 
 
 if __name__ == "__main__":

@@ -76,3 +76,12 @@ def test_a_stuck_surface_offsets_the_axes_it_moves_most():
         share = np.clip(moved[group] / moved[group].max(), 0.3, 1.0)
         np.testing.assert_allclose(found, [[0.0] * 3, noise * (1.7 * share) ** 2], rtol=1e-12)
     np.testing.assert_allclose(bank.offset[bank.kind == UNKNOWN], [noise * 1.7**2], rtol=1e-12)
+
+
+def test_a_group_of_which_nothing_is_said_has_no_hypothesis():
+    told = {"commands": [], "rates": [], "tied": [1.0, 0.2]}
+    bank = bank_of(small.model(settings=SETTINGS, fitted=told))
+    assert (bank.effectiveness[:-1, 0] == 1.0).all()
+    assert bank.weight.sum() == pytest.approx(1.0)
+    nothing = bank_of(small.model(settings=SETTINGS, fitted=told | {"tied": [1.0, 1.0]}))
+    assert len(nothing.weight) == len(bank_of(small.model(settings=SETTINGS)).weight)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.flights.bank import adaptation_of, bank_of
-from beaver_ftc.flights.filtering import _later, _weights, posterior_of
+from beaver_ftc.flights.filtering import _later, _update, _weights, posterior_of
 from beaver_ftc.flights.samples import load_flights
 from flights import synthetic
 
@@ -126,3 +126,14 @@ def test_the_scale_of_the_noise_has_the_memory_of_the_settings(healthy, wing_mod
     grown = np.log(scale[end] / scale[begin])
     assert scale[end] < 6.0
     assert grown == pytest.approx(0.4 * (3.0 - 0.93) * answering, rel=0.02)
+
+
+def test_a_covariance_stays_symmetric_to_the_bit():
+    """As (P^-1 + H' R^-1 H)^-1; rounding that leaves it unsymmetric grows over a flight until it is none."""
+    rng = np.random.default_rng(4)
+    root, seen, noise = rng.standard_normal((5, 5)), rng.standard_normal((5, 3)), np.diag([0.2, 0.3, 0.1])
+    p = root @ root.T + 0.1 * np.eye(5)
+    expected = np.linalg.inv(np.linalg.inv(p) + seen @ np.linalg.inv(noise) @ seen.T)
+    _update(np.zeros(5), p, np.zeros(3), seen, noise, 1e9)
+    assert (p == p.T).all()
+    assert p == pytest.approx(expected, rel=1e-9)

@@ -57,6 +57,8 @@ def test_where_the_airspeed_is_unknown_commands_count_as_they_are():
     assert found.commands[50:] == pytest.approx(flight.commands[50:] / 4.0)
     stopped = with_pressure(replace(flight, airspeed=np.zeros(100)), 20.0)
     assert stopped.commands == pytest.approx(0.1 * flight.commands)
+    assert (found.signals[:50] == 0.0).all()
+    assert found.signals[50:] == pytest.approx(-0.5 * flight.rates[50:])
 
 
 def test_the_account_of_an_identification(changed, identified):

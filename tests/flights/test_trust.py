@@ -125,7 +125,7 @@ def test_what_the_law_ties_together_is_not_claimed(model):
     flown = small.flight(model, n=2000, seed=3)
     follows = np.vstack([np.zeros(3), flown.rates[:-1]]) @ [0.4, -0.3, 0.2]
     commands = np.column_stack([follows, flown.commands[:, 1]])
-    share = trust._tied(
+    share = trust.tied(
         [(small.flight(model, n=2000, commands=commands, rates=flown.rates), np.ones(2000, bool))],
         small.model(history=4, lags=3),
     )

@@ -18,6 +18,7 @@ import numpy as np
 
 from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.recording import TINY, Floats
+from beaver_ftc.flights.trust import claimed
 
 HEALTHY, GROUP, PAIR, UNKNOWN, IDLE = range(5)
 _PAIR_SHARE = 0.02
@@ -59,20 +60,22 @@ class Bank(NamedTuple):
 
 
 def bank_of(model: Model) -> Bank:
-    """The hypotheses of a model."""
+    """The hypotheses of a model: none of a group of which nothing is said, where something is said of any."""
     count, settings = len(model.groups), model.settings
+    told = claimed(model)
+    known = [group for group in range(count) if told[group] or not any(told)]
     rows: list[Hypothesis] = [(np.ones(count), HEALTHY, settings.repair_share, np.zeros(3))]
-    surfaces = sum(len(group) for group in model.groups)
+    surfaces = sum(len(model.groups[group]) for group in known)
     stuck = "stuck" in model.vehicle.faults
-    pairs = count > 1
+    pairs = len(known) > 1
     single = 1.0 - (_PAIR_SHARE if pairs else 0.0) - (_UNKNOWN_SHARE if stuck else 0.0)
-    for group in range(count):
+    for group in known:
         levels, weights = _levels(model, group)
         share = single * len(model.groups[group]) / surfaces / len(model.vehicle.faults)
         for offset in _offsets(model, group):
             for level, weight in zip(levels, weights, strict=True):
                 rows.append((_with(count, {group: level}), GROUP, share * weight, offset))
-    rows += _pairs(count)
+    rows += _pairs(count, known)
     if stuck:
         unknown = np.diag(np.array(model.noise)) * settings.jam_sd**2
         rows.append((np.ones(count), UNKNOWN, _UNKNOWN_SHARE, unknown))
@@ -113,9 +116,9 @@ def _offsets(model: Model, group: int) -> list[Floats]:
     return [kinds[kind] for kind in model.vehicle.faults]
 
 
-def _pairs(count: int) -> list[Hypothesis]:
-    """Two groups at once, on a coarse grid."""
-    both = list(product(combinations(range(count), 2), product(_PAIR_LEVELS, repeat=2)))
+def _pairs(count: int, known: list[int]) -> list[Hypothesis]:
+    """Two of the known groups at once, on a coarse grid."""
+    both = list(product(combinations(known, 2), product(_PAIR_LEVELS, repeat=2)))
     return [
         (_with(count, dict(zip(groups, levels, strict=True))), PAIR, _PAIR_SHARE / len(both), np.zeros(3))
         for groups, levels in both

@@ -267,8 +267,9 @@ def _update(m, p, y, seen, noise, dof):
     for j in range(3):
         for i in range(states):
             m[i] += gain[i, j] * v[j]
-            for k in range(states):
+            for k in range(i + 1):  # mirrored: what rounding makes of an unsymmetric p grows without bound
                 p[i, k] -= gain[i, j] * cross[k, j]
+                p[k, i] = p[i, k]
     return square, np.log(determinant)
 
 

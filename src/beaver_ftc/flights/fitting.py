@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights import extremes, regression, trust
-from beaver_ftc.flights.bank import bank_of
+from beaver_ftc.flights.bank import adaptation_of, bank_of
 from beaver_ftc.flights.diagnose import Rows, rows_of
 from beaver_ftc.flights.filtering import accumulated, evidence, posterior_of
 from beaver_ftc.flights.model import Fitted, Model, Settings
@@ -55,6 +55,7 @@ _OTHER_DAYS: dict[str, Any] = {
 drift of the trim is what the means of the residual over 30 s show in that flight."""
 _DELAYS = (-0.4, 0.0, 0.4)
 """Delays beside the model's that a flight may have, in samples."""
+_ALIKE = 1e-9
 _MOST_PARTS, _MOST_GAIN_SD = 12, 0.33
 """A gain that is known no better than to a third is not known to be there."""
 _PRIOR_CHANGES = 20
@@ -109,12 +110,16 @@ def fit_like(stretches: Sequence[Stretch], model: Model) -> Model:
     return fitted.model_copy(update={"settings": model.settings})
 
 
-def _left_out(stretches: Sequence[Stretch], model: Model) -> Iterator[tuple[Model, Sequence[Stretch]]]:
-    """Fits like the model to parts of the stretches, with how well each knows its gains; and the rest."""
+def _left_out(
+    stretches: Sequence[Stretch], model: Model, tied: list[float]
+) -> Iterator[tuple[Model, Sequence[Stretch]]]:
+    """Fits like the model to parts of the stretches, with how well each knows its gains; and the rest. tied:
+    of the whole, as in `Fitted`."""
     for fitted, kept in _parts(stretches):
         like = fit_like(fitted, model)
         fit = fit_order(fitted, model.vehicle, model.history, model.lags)
-        own = Fitted(commands=[], rates=[], gain_sd=gain_sd(fit, len(model.groups), model.lags).tolist())
+        known = gain_sd(fit, len(model.groups), model.lags).tolist()
+        own = Fitted(commands=[], rates=[], gain_sd=known, tied=tied)
         yield like.model_copy(update={"fitted": own}), kept
 
 
@@ -145,7 +150,7 @@ def criteria(stretches: Sequence[Stretch], vehicle: Vehicle) -> dict[tuple[int, 
 def _columns(vehicle: Vehicle, history: int, lags: int) -> list[int]:
     """Columns of the largest design that an order has."""
     first = 1 + 3 * max(HISTORIES)
-    commands = first + len(vehicle.signals)
+    commands = first + len(vehicle.past_names)
     starts = [commands + group * max(LAGS) for group in range(len(regression.groups_of(vehicle)))]
     delayed = [start + lag for start in starts for lag in range(lags)]
     return [*range(1 + 3 * history), *range(first, commands), *delayed]
@@ -220,17 +225,53 @@ def prior(stretches: Sequence[Stretch], model: Model) -> Settings:
         changes += sum(max(len(flight) - 1, 0) for flight in seen)
         repairs += sum(int(level == 1.0) for flight in seen for level in flight[1:])
     levels = {name: found for name, found in levels.items() if found}
+    delays_s = [share / model.rate_hz for share in _DELAYS]
     if not levels:
         walk = _drift(stretches, model)
-        return Settings(alarm=_SURE, hold_s=_HOLD_S, power=_POWER_ALONE, trim_walk=walk)
+        usual = model.model_copy(update={"settings": Settings(trim_walk=walk)})
+        power = min(_POWER_ALONE, 1.0 / dispersion(stretches, usual))
+        return Settings(alarm=_SURE, hold_s=_HOLD_S, power=power, trim_walk=walk, delays_s=delays_s)
     return Settings(
         levels=levels,
         changes_per_hour=float(np.sqrt((changes + 1) / hours * Settings().changes_per_hour)),
         **_OTHER_DAYS,
-        delays_s=[share / model.rate_hz for share in _DELAYS],
+        delays_s=delays_s,
         repair_share=(repairs + _PRIOR_CHANGES / 2) / (changes + _PRIOR_CHANGES),
         power=_POWER,
     )
+
+
+def dispersion(stretches: Sequence[Stretch], model: Model) -> float:
+    """How many times as far, in squares, the gains of parts left out are from 1 as the filter believes.
+
+    Residuals e = F (g - 1) + noise of a part give the gains g of its groups, least squares with trims aside.
+    Were the noise white and flights alike, the squares of g - 1 in the covariance (F' F)^-1 + S would be as
+    many as gains, on average; S is what the filter leaves free. What flights differ in and colour make more:
+    so much less does a sample tell of an effectiveness [McCullagh1989, section 4.5]. One part counts as seen
+    that is as believed.
+    """
+    whole = [(stretch.samples, stretch.use) for stretch in stretches]
+    squares = number = float(len(model.groups))
+    for tested, kept in _left_out(stretches, model, trust.tied(whole, model).tolist()):
+        told, free = np.array(trust.claimed(tested)), adaptation_of(tested).covariance[3:, 3:]
+        between = free[0, 0] + np.diag(np.diag(free)[1:][told])
+        for one in kept:
+            x, e = _answers(tested, one)
+            information, score = x[:, told].T @ x[:, told], x[:, told].T @ e
+            gains = np.linalg.lstsq(information, score, rcond=_ALIKE)[0]
+            squares += float(score @ np.linalg.solve(np.eye(len(gains)) + between @ information, gains))
+            number += np.linalg.matrix_rank(information, tol=_ALIKE * np.trace(information))
+    return squares / number
+
+
+def _answers(model: Model, kept: Stretch) -> tuple[Floats, Floats]:
+    """Each group's answers (3 n, G) and the residuals (3 n,) of a part in sd of the noise, without means."""
+    rows, residual = residuals(model, kept)
+    _, _, answers = regression.predicted(kept.samples, model, scaled=True)
+    whiten = np.linalg.inv(np.linalg.cholesky(np.array(model.noise))).T
+    x, e = answers[rows] @ whiten, residual @ whiten
+    x, e = x - x.mean(axis=0), e - e.mean(axis=0)
+    return x.transpose(0, 2, 1).reshape(-1, len(model.groups)), e.ravel()
 
 
 def _drift(stretches: Sequence[Stretch], model: Model) -> list[float]:
@@ -289,7 +330,7 @@ def trusted(stretches: Sequence[Stretch], model: Model) -> Model:
     and at which evidence of a fault they would alarm as often as declared."""
     used = [(stretch.samples, stretch.use) for stretch in stretches]
     scale, parts = 1.0, list[extremes.Part]()
-    for tested, kept in _left_out(stretches, model):
+    for tested, kept in _left_out(stretches, model, trust.tied(used, model).tolist()):
         for one in kept:
             noise, part = _in_health(tested, one)
             scale = max(scale, noise)

@@ -84,12 +84,12 @@ def by_pressure(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Sequence[
     if vehicle.reference_airspeed_mps is not None or reference_mps <= 0.0:
         return flights, vehicle
     pressed = [with_pressure(one, reference_mps) for one in flights]
+    faster = vehicle.model_copy(update={"reference_airspeed_mps": reference_mps})
     plain, better = (
-        min(fitting.criteria(fitting.stretches_of(each), vehicle).values()) for each in (flights, pressed)
+        min(fitting.criteria(fitting.stretches_of(each), of).values())
+        for each, of in ((flights, vehicle), (pressed, faster))
     )
-    if plain - better < _DECISIVE:
-        return flights, vehicle
-    return pressed, vehicle.model_copy(update={"reference_airspeed_mps": reference_mps})
+    return (flights, vehicle) if plain - better < _DECISIVE else (pressed, faster)
 
 
 def check_explains(tests: list[Document], stretches: Sequence[fitting.Stretch], model: Model) -> None:
@@ -147,7 +147,7 @@ def collinear(stretches: Sequence[fitting.Stretch], model: Model) -> list[Docume
 def regressor_names(model: Model) -> list[str]:
     """Names of the columns of the fit after the constant, in their order."""
     rates = [f"{rate}[-{k}]" for k in range(1, model.history + 1) for rate in "pqr"]
-    signals = [f"{name}[-1]" for name in model.vehicle.signal_names]
+    signals = [f"{name}[-1]" for name in model.vehicle.past_names]
     delays, groups = range(1, model.lags + 1), map("+".join, model.groups)
     return rates + signals + [f"command of {group}[-{k}]" for group in groups for k in delays]
 

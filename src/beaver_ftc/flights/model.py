@@ -6,9 +6,9 @@ JSON; every key is checked when it is read, as in any other file a user names.
 from pathlib import Path
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from beaver_ftc.documents.base import Number, Section, Whole
+from beaver_ftc.documents.base import Number, Section, Whole, refuse
 from beaver_ftc.documents.validation import read_file
 from beaver_ftc.flights.extremes import Tail
 from beaver_ftc.flights.recording import Floats
@@ -85,13 +85,20 @@ class Model(Section):
     history: Whole = Field(ge=1, le=50)
     lags: Whole = Field(ge=1, le=50)
     intercept: Row = Field(min_length=3, max_length=3)
-    past: Matrix = Field(description="(3 history + signals, 3)")
+    past: Matrix = Field(description="(3 history + past_names of the vehicle, 3)")
     response: list[Matrix] = Field(description="(groups, lags, 3), a share of command to rad/s a sample")
     response_sd: list[Matrix] = Field(description="standard errors of `response`, colour included")
     noise: Matrix = Field(description="covariance of the residual, (3, 3), (rad/s)2")
     settings: Settings = Settings()
     fitted: Fitted | None = Field(default=None, description="what it was fitted on; None: nothing is known")
     identified: dict[str, object] = Field(default={}, description="what it was found from, and how well")
+
+    @model_validator(mode="after")
+    def _fits(self) -> "Model":
+        rows = 3 * self.history + len(self.vehicle.past_names)
+        says = f"has {len(self.past)} rows, allowed: {rows}, as `identify` writes them: identify it anew"
+        refuse([(("past",), says)] * (len(self.past) != rows))
+        return self
 
     def arrays(self) -> tuple[Floats, Floats, Floats, Floats]:
         """intercept (3,), past (m, 3), response (G, L, 3) and noise (3, 3) as arrays."""

@@ -98,12 +98,14 @@ def sample(recording: Recording, vehicle: Vehicle) -> Samples:
 
 
 def with_pressure(samples: Samples, reference_mps: float) -> Samples:
-    """The flight with commands times the dynamic pressure over that at a reference airspeed; as it is where
-    the airspeed is unknown."""
-    if samples.airspeed is None:
-        return samples
-    ratio = np.nan_to_num(samples.airspeed / reference_mps, nan=1.0) ** 2
-    return replace(samples, commands=samples.commands * np.clip(ratio, *_PRESSURES)[:, None])
+    """The flight with what the airspeed V does of its own: commands times (V / reference)^2, and, as further
+    signals, rates and signals times V / reference - 1, since damping and stability grow with it; as at the
+    reference where the airspeed is unknown."""
+    airspeed = np.full(len(samples.t_s), np.nan) if samples.airspeed is None else samples.airspeed
+    pressure = np.clip(np.nan_to_num(airspeed / reference_mps, nan=1.0) ** 2, *_PRESSURES)[:, None]
+    moved = np.column_stack([samples.rates, samples.signals]) * (np.sqrt(pressure) - 1.0)
+    signals = np.column_stack([samples.signals, moved])
+    return replace(samples, commands=samples.commands * pressure, signals=signals)
 
 
 def _remarks(recording: Recording, used: list[str], rates: list[str]) -> Iterator[str]:

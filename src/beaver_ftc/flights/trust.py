@@ -30,7 +30,8 @@ _WINDOW_S, _OUTSIDE = 5.0, 0.5
 _STILL_LONGER = 3.0
 _NOISIER, _LEAST_NOISE, _MOST_NOISE = 1.5, 4.0, 5.8
 _CLIPPED_S = 30.0
-_TIED = 0.98
+_TIED, _PLAIN = 0.98, 12.5
+"""Of an effect of so many variances of the noise a sample, a fiftieth is half a standard deviation."""
 _UNIT, _SPREAD = 10.0, 1.6
 _ALIKE, _OTHER_UNIT = 3.0, 20.0
 _RARE = (0.001, 0.999)
@@ -50,7 +51,7 @@ def fitted_on(flights: Sequence[tuple[Samples, Mask]], model: Model, gain_sd: Fl
         airspeed=span(np.concatenate(known)[:, None])[0] if known else None,
         spread=np.nanstd(rates, axis=0).tolist(),
         correlation=_correlation(grouped).tolist(),
-        tied=_tied(flights, model).tolist(),
+        tied=tied(flights, model).tolist(),
         gain_sd=gain_sd.tolist(),
         still_s=_longest_still(flights),
         scale=scale,
@@ -89,10 +90,10 @@ def _longest_still(flights: Sequence[tuple[Samples, Mask]]) -> dict[str, float]:
     }
 
 
-def _tied(flights: Sequence[tuple[Samples, Mask]], model: Model) -> Floats:
+def tied(flights: Sequence[tuple[Samples, Mask]], model: Model) -> Floats:
     """Share of each group's effect on the rates that past, signals and the other groups make up, (G,): where
     it is near 1 the law ties the group to what it answers to, and its effect cannot be told; 1 where the
-    group never moved."""
+    group never moved. An effect far above the noise may be made up to a larger share: what is left counts."""
     groups = regression.group_indices(model)
     parts = [regression.build(one, groups, model.history, model.lags, scaled=True) for one, _ in flights]
     use = [mask & ok for (_, mask), (_, _, ok) in zip(flights, parts, strict=True)]
@@ -109,7 +110,7 @@ def _tied(flights: Sequence[tuple[Samples, Mask]], model: Model) -> Floats:
         power = float((effect**2).sum())
         if power > 1e-6 * len(effect):
             rest = effect - known @ np.linalg.lstsq(known, effect, rcond=None)[0]
-            found[g] = 1.0 - float((rest**2).sum()) / power
+            found[g] = max(1.0 - float((rest**2).sum()) / min(power, _PLAIN * len(effect)), 0.0)
     return found
 
 

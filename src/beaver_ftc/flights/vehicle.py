@@ -264,6 +264,14 @@ class Vehicle(Section):
         """The further signals' columns."""
         return [signal.column for signal in self.signals]
 
+    @property
+    def past_names(self) -> list[str]:
+        """What the rates depend on beside their own past: signals, and what they and the rates do by
+        airspeed (`samples.with_pressure`)."""
+        rates = [getattr(self.rates, axis).column for axis in "pqr"]
+        more = rates + self.signal_names if self.reference_airspeed_mps is not None else []
+        return self.signal_names + [f"{name} by airspeed" for name in more]
+
     def columns(self) -> list[str]:
         """Every column of a log that the vehicle may want, its time aside."""
         wanted = [one for _, one in self.quantities()] + [one for _, _, one in self.judged()]

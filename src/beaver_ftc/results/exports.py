@@ -38,7 +38,8 @@ Topics = dict[str, Columns]
 
 RECORDINGS = {"table": "flight.csv", "ulog": "flight.ulg", "ardupilot": "flight.bin"}
 _RATES, _ATTITUDE = ("p", "q", "r"), {"Roll": "phi", "Pitch": "theta", "Yaw": "psi"}
-_FLOW = ("alpha_rad", "beta_rad", "qdyn_pa")
+_PRESSURE = "qdyn_pa"
+_FLOW = ("alpha_rad", "beta_rad", _PRESSURE)
 _ANGLES = ("roll", "pitch", "yaw")
 _BOOT_US = 1_000_000
 """A clock on board does not start with the log."""
@@ -138,9 +139,9 @@ def write_recording(
     t_us = np.round(known["t_s"] * 1e6).astype(np.int64) + _BOOT_US
     write(folder / RECORDINGS[kind], t_us, topics)
     flow = _flow_columns(further, kind)
-    text = (
-        _vehicle(topics, travel_rad, kind) + f"flow: {{{', '.join(f'{k}: {v}' for k, v in flow.items())}}}\n"
-    )
+    felt = ", ".join(column for name, column in flow.items() if name != _PRESSURE)
+    text = _vehicle(topics, travel_rad, kind) + f"signals: [{felt}]\n"
+    text += f"flow: {{{', '.join(f'{k}: {v}' for k, v in flow.items())}}}\n"
     (folder / "vehicle.yaml").write_text(text, encoding="utf-8")
 
 

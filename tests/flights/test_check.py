@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 
 from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.flights import physics
 from beaver_ftc.flights.check import _angle_unit
 from beaver_ftc.flights.readers import read_flight
 from beaver_ftc.flights.recording import Column
@@ -258,3 +259,14 @@ def test_a_path_that_cannot_be_checked_is_a_line(tmp_path):
 ])  # fmt: skip
 def test_the_unit_of_a_small_roll_angle_is_told_by_its_log_or_name(name, kind, size, unit):
     assert _angle_unit(name, Column(T_S, size * np.sin(T_S)), kind) == unit
+
+
+def test_angles_and_rates_scaled_alike_are_found_by_the_pitch_angle():
+    """No ratio tells; that no pitch angle passes a right angle does."""
+    t_s = np.arange(200) * 0.05
+    for factor, unit in ((180.0 / np.pi, "deg"), (18000.0 / np.pi, "cdeg")):
+        pitch = Column(t_s, factor * 0.2 * np.sin(t_s))
+        says = physics.pitch_remark(pitch, "theta")
+        assert says is not None
+        assert f"it is in {unit}, a factor of {1.0 / factor:.4g} fits" in says
+    assert physics.pitch_remark(Column(t_s, 1.6 * np.sin(t_s)), "theta") is None

@@ -35,7 +35,7 @@ def identify(
     effectiveness the labels tell. What the fit did not see tells how good it is: in the model file, and
     as a page beside it (MODEL with .html).
 
-    vehicle: Vehicle file, or the built-in `alfa`.
+    vehicle: Vehicle file, or the built-in `alfa`; `beaver-ftc new NAME --log` writes one that says every key.
     out: The model file to write; with --check the vehicle file that is proposed.
     check: Fit nothing; say what the logs are, and propose a vehicle file where none is given.
     false_alarms_per_hour: Alarms that `diagnose` may raise in healthy flight, instead of the vehicle file's.

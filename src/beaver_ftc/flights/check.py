@@ -19,7 +19,7 @@ from beaver_ftc.flights.readers.table import TIME, names_of, read_numbers
 from beaver_ftc.flights.recording import Column, Floats, Recording, nearest_ten
 from beaver_ftc.flights.samples import Samples, read_for, sample
 from beaver_ftc.flights.units import ACCELERATION, RATE, SECONDS, UNITS, nearest_unit
-from beaver_ftc.flights.vehicle import Vehicle
+from beaver_ftc.flights.vehicle import Vehicle, further_keys
 
 Document = dict[str, Any]
 
@@ -255,7 +255,8 @@ def as_yaml(vehicle: Document) -> str:
         "# Guessed from a log by `identify --check`. Look at it: commands must stand upstream of what can\n"
     )
     head += "# fail, and a surface may answer several of them, `left: {roll_cmd: 0.5, pitch_cmd: -0.5}`.\n"
-    return head + str(yaml.safe_dump(vehicle, sort_keys=False, allow_unicode=True, default_flow_style=None))
+    told = str(yaml.safe_dump(vehicle, sort_keys=False, allow_unicode=True, default_flow_style=None))
+    return head + told + further_keys(vehicle)
 
 
 def as_text(checked: Document) -> str:

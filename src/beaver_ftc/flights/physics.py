@@ -18,6 +18,7 @@ _NEAR, _APART_FROM = 1.3, 0.4
 _G = UNITS["g"][1]
 _GRAVITY = (0.5, 2.0)
 _CIRCLE_RAD, _FAST_RAD_S = 1.02 * 2.0 * np.pi, 12.0
+_UPRIGHT_RAD = 1.02 * 0.5 * np.pi
 
 
 @dataclass(frozen=True)
@@ -113,6 +114,8 @@ def attitude_says(
     """What is wrong with the rates (p, q, r by column) or the angles, roll and pitch of these names; None
     where nothing is."""
     (p, q, _), columns = list(rates), list(rates.values())
+    if pitch is not None and (says := pitch_remark(pitch, names[1])):
+        return says
     found = roll_of(columns, roll, pitch)
     if found is not None and abs(found.correlation) < _APART_FROM:
         return _another_is(rates, roll, names[0], found)
@@ -152,6 +155,17 @@ def angle_remark(found: Followed, rate: str, angle: str) -> str | None:
     if found.rate > _FAST_RAD_S and (unit := nearest_unit(RATE, size, _NEAR)):
         return f"{fits}: {rate} is in {unit}, a factor of {UNITS[unit][1]:.4g} fits"
     return f"{fits}: a factor of {size:.4g} on {rate} fits, or of {1.0 / size:.4g} on {angle}"
+
+
+def pitch_remark(pitch: Column, name: str) -> str | None:
+    """What is wrong with a pitch angle by its size, and which unit fits; None where nothing is: it says what
+    no comparison can, where rates and angles are scaled alike."""
+    largest = float(np.nanmax(np.abs(pitch.values), initial=0.0))
+    if largest <= _UPRIGHT_RAD:
+        return None
+    unit = next((one for one in ("deg", "cdeg") if largest * UNITS[one][1] <= _UPRIGHT_RAD), None)
+    fits = f"it is in {unit}, a factor of {UNITS[unit][1]:.4g} fits" if unit else "no unit fits"
+    return f"{name} reaches {largest:.4g} rad, a pitch angle at most 1.571: {fits}; look at the rates' too"
 
 
 def gravity_remark(acceleration: Column, name: str) -> str | None:

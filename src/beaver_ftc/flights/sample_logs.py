@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from beaver_ftc.flights.recording import Floats
+from beaver_ftc.flights.vehicle import further_keys
 
 Left = Callable[[float], float]
 """How much of the left elevon is there at a time, s."""
@@ -35,11 +36,13 @@ surfaces:                                       # what each elevon makes of them
 attitude: {roll: roll_rad, pitch: pitch_rad}    # what the rates are checked against
 """
 
+_GIVEN = ("name", "time", "rates", "commands", "surfaces", "attitude")
+
 
 def files() -> dict[str, str]:
     """Names and texts of the sample files."""
     return {
-        "vehicle.yaml": VEHICLE,
+        "vehicle.yaml": VEHICLE + further_keys(_GIVEN),
         "healthy.csv": _table(HEALTHY_S, seed=1, left=lambda t_s: 1.0),
         "suspect.csv": _table(SUSPECT_S, seed=2, left=lambda t_s: WEAK if t_s >= WEAK_FROM_S else 1.0),
     }

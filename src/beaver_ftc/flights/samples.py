@@ -24,7 +24,7 @@ from beaver_ftc.flights.vehicle import Vehicle
 
 MIN_RATE_HZ, _MAX_RATE_HZ = 4.0, 1e5
 _FIRST = 50
-_LARGEST, _FASTEST_RAD_S = 1e6, 60.0
+_LARGEST, _FASTEST_RAD_S, _WILD_RAD_S = 1e6, 60.0, 3.0
 _PRESSURES = (0.1, 10.0)
 """Least and largest dynamic pressure over that at the reference, whatever the airspeed says."""
 _GAP = 3.5
@@ -112,6 +112,11 @@ def _remarks(recording: Recording, used: list[str], rates: list[str]) -> Iterato
     """What is wrong with the columns that are used, in lines."""
     for name in used:
         yield from signals.remarks(name, recording.columns[name], measured=name in rates)
+        if name in rates and (spread := float(np.nanstd(recording.columns[name].values))) > _WILD_RAD_S:
+            yield (
+                f"{name}: spreads {spread:.3g} rad/s, as hardly an aircraft does: is it in deg/s? a factor "
+                "of 0.01745 fits (`unit: deg/s`)"
+            )
 
 
 def _still(column: Column, t_s: Floats) -> Floats:

@@ -285,6 +285,16 @@ def _unknown(at: Location, names: Iterable[str], what: str, known: Collection[st
     return [((*at, name), f"{name!r} is no {what}{suggestion(name, known)}") for name in unknown]
 
 
+def further_keys(given: Collection[str]) -> str:
+    """Comments for the end of a vehicle file: each key that it has not, with an example, and what it says."""
+    lines = ["# Further keys:"]
+    for name, field in Vehicle.model_fields.items():
+        if name not in given:
+            like = f"   for example {field.examples[0]}" if field.examples else ""
+            lines.append(f"# {name}: {field.description}{like}")
+    return "\n".join(lines) + "\n"
+
+
 def load_vehicle(path_or_name: str | Path) -> Vehicle:
     """The vehicle in a file or of a built-in name. Raises ScenarioError with one line a mistake."""
     given, known = str(path_or_name), sorted(path.stem for path in _FOLDER.glob("*.yaml"))

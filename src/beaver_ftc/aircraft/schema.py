@@ -18,7 +18,7 @@ from beaver_ftc.documents.errors import suggestion
 MAX_SURFACES, MAX_SIGNALS, MAX_DAMAGE = 20, 6, 50
 MAX_TERMS_OF_ONE, MAX_MONOMIALS = 64, 64
 MAX_TERMS = 3 * MAX_TERMS_OF_ONE
-MAX_BOXES, MAX_LEVELS, MAX_AGES = 20, 4, 4  # of the map of the model's error
+MAX_BOXES, MAX_LEVELS, MAX_AGES = 20, 6, 4  # of the map of the model's error
 MAX_EFFECTORS = 8
 MAX_LEVERS = 1 + MAX_EFFECTORS  # that of all engines first
 MAX_THRUST = 8  # airspeeds and settings of the table of thrust

@@ -7,8 +7,9 @@ sideways in yaw [MIL-F-8785C, 3.7]:
 
 Vanes and airspeed give the velocity through the moving air; the forces, attitude and gravity say how that
 through still air would have changed. The difference is the gust's own change. The rolling gust, which
-changes across the span, is seen by no instrument; and of an aircraft whose forces nobody knows, as a derived
-one's, no gust is: a change of its own velocity would be taken for one.
+changes across the span, is seen by no instrument. Where the design model has no forces, as a derived
+aircraft's, accelerometers say them; without these no gust is seen: a change of the aircraft's own velocity
+would be taken for one.
 
 Velocity is followed as JSBSim moves it, by Adams and Bashforth's two steps: v' = v + dt (3 a - a_before) / 2.
 """
@@ -38,7 +39,7 @@ LEAST_SWING = 0.01  # of a gust's own intensity: less is not reckoned with
 
 AIR = record(
     moving=int, started=int,  # whether there is turbulence; whether `pull` is known
-    seen=int,  # whether the vanes tell a gust: only where forces are known
+    modelled=int, seen=int,  # whether the design model has forces; whether the vanes tell a gust
     read=int, felt=3,  # whether accelerometers are read; what they say, m/s2
     forces=TABLE, scratch=MAX_MONOMIALS,  # force coefficients
     area_per_mass=float, gravity=float, span=float, velocity=3, force=3, turn=(3, 3), heading=float,
@@ -237,6 +238,21 @@ def look(air, design, x, y, u, attitude, dt):
 
 
 @kernel
+def no_longer_read(air):
+    """Do without the accelerometers from now on. A gust that they alone showed is there, unseen: its whole
+    variance counts."""
+    air.read = 0
+    if air.seen and not air.modelled:
+        air.seen, air.unseen[:] = 0, 1.0
+        pitching, yawing = 2.0 * air.span / pi, 1.5 * air.span / pi  # half the lag times airspeed, m
+        for i in range(3):
+            for j in range(3):
+                air.leaping[i, j] += pitching * air.per_metre[1] * together(air, air.axes, i, j, 1)
+                air.leaping[i, j] += yawing * air.per_metre[2] * together(air, air.axes, i, j, 2)
+        air.leaps = 3
+
+
+@kernel
 def hidden(air, g):
     """Share of the gust about axis g that the vanes do not show in this frame."""
     further = 0.0 if g == 0 else (air.late if g == 1 else air.turning)
@@ -326,7 +342,8 @@ def together(air, axes, i, j, g):
 
 def set_up_air(air: np.void, turbulence: str, mass: MassProperties, aircraft: Aircraft) -> None:
     span_m = aircraft.geometry.span_m
-    air["moving"], air["seen"] = turbulence != "none", bool(aircraft.measurable_forces)
+    air["moving"], air["modelled"] = turbulence != "none", bool(aircraft.measurable_forces)
+    air["seen"] = air["modelled"] or air["read"]  # only where forces are known
     fill_table(air["forces"], aircraft, aircraft.measurable_forces, FORCES)
     air["area_per_mass"] = aircraft.geometry.wing_area_m2 / mass.mass_kg
     air["gravity"] = GRAVITY_MPS2  # standard; what is constant has no part in a change of the gust
@@ -342,10 +359,10 @@ def set_up_jitter(
     """What noise adds to the gust that is followed: that of the vanes, and of the force that moves the air's
     velocity on from frame to frame; where the flow follows from the forces, that of the forces too."""
     flow, span_m = flow_noise(errors, y[AIRSPEED]), float(statistical["air"]["span"])
+    if statistical["forces"]["known"] or statistical["air"]["read"]:
+        flow += TWO_STEPS * errors.each("random", ("az", "ay")) * dt_s / y[AIRSPEED]
     if statistical["forces"]["known"]:
         forces = statistical["forces"]["component"][::-1]  # normal to the body, and across
-        felt = errors.each("random", ("az", "ay"))
-        flow += TWO_STEPS * felt * dt_s / y[AIRSPEED]
         by_force = np.sqrt(forces["felt"]) / np.abs(forces["vane"][:, 1])
         statistical["forces"]["blurred"] = jitter(by_force, design, y, u, span_m)
     for name in ("own_jitter", "jitter"):

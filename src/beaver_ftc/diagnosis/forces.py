@@ -22,6 +22,7 @@ from beaver_ftc.aircraft.schema import MAX_SURFACES, MAX_TERMS_OF_ONE, SIDESLIP_
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.engine import slipstream_slopes
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, DPT, N_Y, QDYN, evaluate
+from beaver_ftc.diagnosis.air import no_longer_read
 from beaver_ftc.diagnosis.bounds.declared import Errors, gust_mps
 from beaver_ftc.diagnosis.redundancy import FALLING_M_S2
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
@@ -108,7 +109,8 @@ def without_vanes(forces, rotation, y):
 @kernel
 def do_without(forces, air, inertial_air):
     """Weigh no force from now on, and follow the gust without accelerometers."""
-    forces.known = air.read = inertial_air.moving = 0
+    no_longer_read(air)
+    forces.known = inertial_air.moving = 0
 
 
 @kernel

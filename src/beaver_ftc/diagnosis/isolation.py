@@ -60,10 +60,11 @@ ESTIMATOR = record(
 def isolation_dtype(surfaces: int) -> np.dtype:
     """The isolation estimators, a loss and a position of each surface at most, and how the decision among
     them is sharpened. by_gradient: how they adapt, else by least squares; unprojected: their estimates may
-    leave the known set."""
+    leave the known set. patience_s: for so long the one left is not named yet; taken: surfaces that damage
+    may take, besides."""
     return record(
         n=int, thresholds=int, forgetting=float, decay=3, memory=int, shared=int, membership=int,
-        by_gradient=int, gradient=float, unprojected=int,
+        by_gradient=int, gradient=float, unprojected=int, patience_s=float, taken=(int, surfaces),
         estimator=(ESTIMATOR, 2 * surfaces),
     )  # fmt: skip
 
@@ -199,13 +200,18 @@ def possible(isolation, fie, bank, frame_bound, abrupt, x, started):
 def decide(isolation, conclusion, t):
     """The generalised observer scheme: the one left is the fault; none left means it is outside the class.
 
-    One that is doubted and does not show by itself is not named.
+    One that is doubted and does not show by itself is not named, nor, of an aircraft that declares damage,
+    one that has not yet been the only one left for a while.
     """
-    left, last = 0, NOT_ISOLATED
+    left, last, since_s = 0, NOT_ISOLATED, -np.inf
     for s, fie in enumerate(isolation.estimator[: isolation.n]):
-        if not fie.excluded:
+        if fie.excluded:
+            since_s = max(since_s, fie.excluded_at_s)
+        else:
             left += 1
             last = NOT_ISOLATED if fie.doubted and not fie.shown else s
+    if t - since_s < isolation.patience_s:
+        last = NOT_ISOLATED
     named = NOT_ISOLATED if left > 1 else (last if left == 1 else UNANTICIPATED)
     if named != conclusion.isolated:
         conclusion.isolated = named

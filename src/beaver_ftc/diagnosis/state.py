@@ -11,6 +11,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.schema import Scenario
 
 NOT_ISOLATED, UNANTICIPATED = -1, -2
+BESIDE_DAMAGE = 2  # an estimator doubted for the damage that the aircraft declares
 INTERVAL, PUBLISHED, CONSTANT = 0, 1, 2  # thresholds
 EITHER, WORST_CASE, STATISTICS = 0, 1, 2  # whose alarms count
 _AUTHORITIES = {"either": EITHER, "worst-case": WORST_CASE, "statistical": STATISTICS}

@@ -21,7 +21,7 @@ from beaver_ftc.diagnosis.air import AIR
 from beaver_ftc.diagnosis.bounds.worst_case import UNKNOWN_TO_FILTERS_RAD_S2, uncertainty_bound
 from beaver_ftc.diagnosis.forces import FORCES_FELT
 from beaver_ftc.diagnosis.likelihood import ENDING, GROWING, LATERAL, N_BLOCKS, N_READINGS, STEP, block_dtype
-from beaver_ftc.diagnosis.state import LOSS
+from beaver_ftc.diagnosis.state import BESIDE_DAMAGE, LOSS
 from beaver_ftc.diagnosis.tones import LISTENING
 
 # Of what the best explanation explains, the part that a constant theta leaves to a loss that grows is larger
@@ -173,18 +173,18 @@ def is_open(estimators, loss_of, surface):
 
 
 @kernel
-def best_alternative(block, estimators, loss_of, surface):
+def best_alternative(block, estimators, loss_of, surface, every=False):
     """The greatest log likelihood ratio that any hypothesis but the loss of a surface has at least.
 
     What has been excluded is no alternative: as the evidence for that fades, uncertainty that goes along with
-    the commands may gather some for it.
+    the commands may gather some for it. `every`: it is all the same.
     """
     best = 0.0
     for hypothesis in block.hypothesis[: block.n_hypotheses]:
         if hypothesis.kind in (GROWING, ENDING):
             continue
         other = hypothesis.surface
-        if hypothesis.kind != LOSS or (other != surface and is_open(estimators, loss_of, other)):
+        if hypothesis.kind != LOSS or (other != surface and (every or is_open(estimators, loss_of, other))):
             best = max(best, hypothesis.at_least)
     return best
 
@@ -204,14 +204,16 @@ def at_most(block, surface, ending):
 def shows(tests, blocks, estimators, loss_of, surface):
     """Whether a loss of this surface explains the flight better than all else, by the naming level.
 
-    estimators: of isolation; loss_of (surfaces,): which of them is of a surface's loss, or -1.
+    estimators: of isolation; loss_of (surfaces,): which of them is of a surface's loss, or -1. Of one that is
+    BESIDE_DAMAGE every other loss counts: damage excludes what it took as well.
     """
+    every = loss_of[surface] >= 0 and estimators[loss_of[surface]].doubted == BESIDE_DAMAGE
     for block in blocks:
         least = 0.0
         for hypothesis in block.hypothesis[: block.n_hypotheses]:
             if hypothesis.surface == surface and hypothesis.kind in (LOSS, GROWING):
                 least = max(least, hypothesis.at_least)
-        if least - best_alternative(block, estimators, loss_of, surface) > tests.naming_level:
+        if least - best_alternative(block, estimators, loss_of, surface, every) > tests.naming_level:
             return True
     return False
 

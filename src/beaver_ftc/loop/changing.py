@@ -105,7 +105,8 @@ class Changing:
             for name in OF_INSTRUMENTS:  # the random numbers go on, lags and delays begin with what is there
                 frame["instruments"][name] = new["instruments"][name]
             frame["instruments"]["taken"] = 0
-        forces = frame["fdi"]["statistical"]["forces"]["known"]
+        statistical = frame["fdi"]["statistical"]
+        forces = statistical["forces"]["known"] or statistical["air"]["read"]
         if frame["fdi"]["watch"]["enabled"] or frame["instruments"]["engine"] or forces:
             loop.read_more()
         frame["control"]["power"]["enabled"] = new["control"]["power"]["enabled"]

@@ -56,10 +56,17 @@ def weighs_forces(scenario: Scenario) -> bool:
     return scenario.fdi.weighs_chance and across and tell_apart(scenario.airframe)
 
 
+def feels_air(scenario: Scenario) -> bool:
+    """Whether accelerometers are read to tell a gust from what moves the aircraft: where the design model has
+    no forces, and no watch may find them broken."""
+    moving = scenario.fdi.weighs_chance and scenario.fdi.bounds.turbulence != "none"
+    return moving and not scenario.airframe.measurable_forces and not is_watched(scenario)
+
+
 def truth_read(scenario: Scenario) -> tuple[ch.Channel, ...]:
     """What is read from the truth in this flight."""
     usual = ch.truth_channels(scenario.airframe)
-    reasons = is_watched, breaks_instruments, has_real_engine, weighs_forces
+    reasons = is_watched, breaks_instruments, has_real_engine, weighs_forces, feels_air
     further = any(reason(scenario) for reason in reasons)
     return (*usual, *ch.further_channels(scenario.airframe)) if further else usual
 
@@ -70,6 +77,7 @@ def configure(frame: np.void, scenario: Scenario, dt: float) -> None:
     instruments["real"] = not scenario.sensors.is_ideal
     instruments["engine"] = has_real_engine(scenario)
     frame["fdi"]["statistical"]["forces"]["known"] = weighs_forces(scenario)
+    frame["fdi"]["statistical"]["air"]["read"] = feels_air(scenario)
     for i, name in enumerate(SENSORS):
         sensor = getattr(scenario.sensors, name)
         instruments["noise"][i], instruments["bias"][i], instruments["quantum"][i] = sensor.noise_bias_quantum

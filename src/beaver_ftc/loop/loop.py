@@ -11,6 +11,7 @@ from beaver_ftc.control import state
 from beaver_ftc.control.outer.setup import set_up_autopilot
 from beaver_ftc.design.variants import anchor, mass_of
 from beaver_ftc.diagnosis import noise_model
+from beaver_ftc.diagnosis.air import no_longer_read
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.loop import memory, stepping
 from beaver_ftc.loop.assembly import assemble, lay_out, y_places
@@ -233,7 +234,8 @@ class Loop:
         wanted = self.scenario.fdi.sensor_monitor != "never" and fdi["config"]["enabled"]
         if not wanted or fdi["watch"]["enabled"]:
             return False
-        fdi["watch"]["enabled"], fdi["statistical"]["air"]["read"] = 1, 0
+        fdi["watch"]["enabled"] = 1
+        no_longer_read(fdi["statistical"]["air"])
         fdi["statistical"]["inertial_air"]["moving"] = 0
         anchor_watch(fdi["watch"], np.array([self.frames[0]["belief"]["design"]]), self._trimmed[1])
         return True

@@ -37,23 +37,24 @@ class Landing:
     start, rates in rad/s, per axis (p, q, r).
 
     isolated: aileron, elevator, rudder, flap, unanticipated, or None while more than one fault fits
-    (`candidates`). so_far: whether it is a surface that our schemes name, which they do by exclusion: it is
-    the only one left, until data exclude it as well; None of a plug-in's and of nothing. withdrawn: spells
-    in which a surface was named before, {fault, from_s, to_s}, the last the latest. estimate: the isolated
-    fault's parameter, theta in [-1, 0] for a loss of effectiveness. guaranteed_delay_s: from the fault to the
-    instant from which detection was certain, None if that never came. worst_residual_ratio: largest
-    |residual| / threshold in healthy flight; closest_approach: the same of each filter of the bank, the
-    published one first. surface_travel_rad: path of each surface, up and down added. engine_power: if pitch
-    was left to the engine, since when and for how long, s, and the lowest and highest manifold pressure,
-    inHg. faults: of several at once (`fdi.pairs`), as in types/findings.py, the first named first.
-    statistical: when the statistical detector would have raised the alarm, its level in standard deviations,
-    and the largest share of it reached in healthy flight. mode_changes, exits: how many there were of
-    `supervisor` and `envelope_exits`, which hold the first and the last; outside_s: time outside the
-    validated envelope, all exits together. end: airspeed, m/s, and altitude, m, at the end. profile: largest
-    deviation from the commanded one by channel of the autopilot, m, m/s, rad; None where it was not flown.
-    arrival: the deviation's mean over the last 10 s, with its sign. limits: of each limit that protection has
-    put on the command since when, on what (airspeed_mps, bank_deg), "at most" or "at least", its value at
-    last, why, and whether it is in force at the end. changes: what was changed in flight: time_s; law and
+    (`candidates`; with them what damage that the aircraft declares may have taken). so_far: whether it is a
+    surface that our schemes name, which they do by exclusion: it is the only one left, until data exclude it
+    as well; None of a plug-in's and of nothing. withdrawn: spells in which a surface was named before,
+    {fault, from_s, to_s}, the last the latest. estimate: the isolated fault's parameter, theta in [-1, 0]
+    for a loss of effectiveness. guaranteed_delay_s: from the fault to the instant from which detection
+    was certain, None if that never came. worst_residual_ratio: largest |residual| / threshold in healthy
+    flight; closest_approach: the same of each filter of the bank, the published one first.
+    surface_travel_rad: path of each surface, up and down added. engine_power: if pitch was left to the
+    engine, since when and for how long, s, and the lowest and highest manifold pressure, inHg. faults: of
+    several at once (`fdi.pairs`), as in types/findings.py, the first named first. statistical: when the
+    statistical detector would have raised the alarm, its level in standard deviations, and the largest
+    share of it reached in healthy flight. mode_changes, exits: how many there were of `supervisor` and
+    `envelope_exits`, which hold the first and the last; outside_s: time outside the validated envelope,
+    all exits together. end: airspeed, m/s, and altitude, m, at the end. profile: largest deviation from
+    the commanded one by channel of the autopilot, m, m/s, rad; None where it was not flown. arrival: the
+    deviation's mean over the last 10 s, with its sign. limits: of each limit that protection has put on
+    the command since when, on what (airspeed_mps, bank_deg), "at most" or "at least", its value at last,
+    why, and whether it is in force at the end. changes: what was changed in flight: time_s; law and
     scheme, None for what was not; sensors, True or False; and of a diagnosis that was replaced
     detection_time_s and isolated. The verdict above is the last diagnosis'.
     """
@@ -132,7 +133,10 @@ def _isolation(fdi: np.void, surfaces: Sequence[str]) -> dict[str, Any]:
         said |= {"isolated": "unanticipated", "isolation_type": "unanticipated"}
     else:
         estimators = fdi["isolation"]["estimator"][: int(fdi["isolation"]["n"])]
-        said["candidates"] = tuple(surfaces[int(fie["surface"])] for fie in estimators if not fie["excluded"])
+        left = [surfaces[int(fie["surface"])] for fie in estimators if not fie["excluded"]]
+        if isolated == NOT_ISOLATED:  # a loss that is excluded is no damage excluded
+            left += [s for s, taken in zip(surfaces, fdi["isolation"]["taken"], strict=True) if taken]
+        said["candidates"] = tuple(dict.fromkeys(left))
     if isolated >= 0:
         surface = int(fdi["isolation"]["estimator"][isolated]["surface"])
         said |= {"isolated": surfaces[surface], "isolation_type": "loss_of_effectiveness"}

@@ -20,7 +20,6 @@ from beaver_ftc.design.model import inertia_coefficients, inertial
 from beaver_ftc.studies.derive.sample import (
     AGES_S,
     REACHES,
-    SHARES,
     USUAL,
     Moves,
     Samples,
@@ -258,9 +257,9 @@ def within(samples: Samples, box: int, regions: int) -> np.ndarray:
     return inside
 
 
-def largest(errors: np.ndarray, samples: Samples, regions: int = 1) -> np.ndarray:
+def largest(errors: np.ndarray, samples: Samples, regions: int = 1, moves: Moves = USUAL) -> np.ndarray:
     """The largest error within each age, box and share of the travel, (ages, boxes, shares, 3) rad/s2."""
-    table = np.zeros((len(AGES_S), len(REACHES) * regions, len(SHARES), 3))
+    table = np.zeros((len(AGES_S), len(REACHES) * regions, len(moves.shares), 3))
     for age, box, level in np.ndindex(table.shape[:3]):
         inside = (samples.age <= age) & within(samples, box, regions) & (samples.level <= level)
         table[age, box, level] = errors[inside].max(axis=0, initial=0.0)
@@ -277,7 +276,7 @@ def map_of(
     every = range(len(REACHES) * regions)
     ends = [_ends(aircraft, sets, box, regions) for box in every]
     sets = [*sets, sorted_in(flown, ends, aircraft, moves)]
-    tables = np.array([largest(errors_of(aircraft, samples), samples, regions) for samples in sets])
+    tables = np.array([largest(errors_of(aircraft, samples), samples, regions, moves) for samples in sets])
     table = MARGIN * tables.max(axis=0) + ROUNDING_RAD_S2
     boxes = [_box(aircraft, ends[box], table[:, box]) for box in every]
     of_all = tables[:, 0, -regions:, -1].max(axis=1)

@@ -49,7 +49,7 @@ class Envelope:
 
 @dataclass(frozen=True)
 class Moves:
-    """How far surfaces are moved: shares of their travel, four, rising to 1; of these but the last, how much
+    """How far surfaces are moved: shares of their travel, rising to 1; of these but the last, how much
     those that stand in use."""
 
     shares: tuple[float, ...] = SHARES
@@ -172,7 +172,7 @@ def sample(
             plant.write(effector.throttle, draw.around(0.0, REACHES[box] * _APART))
         plant.start(started)
         for i in range(max(1, n // starts)):
-            level = i % len(SHARES)
+            level = i % len(moves.shares)
             plant.hold(draw.state(started, REACHES[box], moves.shares[level]))
             rows.append((*seen_at(plant, properties), box, level, age))
     tanks.fill(0.0)

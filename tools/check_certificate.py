@@ -1,5 +1,4 @@
-"""`python tools/check_certificate.py FOLDER|FILE [LOG]` exits 0 if the log proves certificate.json, else 1.
-From docs/theory.md and docs/certificates.md, whose letters it takes. NumPy alone; pyarrow opens the log."""
+"""`check_certificate.py FOLDER|FILE [LOG]` exits 0 if the log proves it. Letters: docs/certificates.md."""
 
 from hashlib import sha256
 from json import dumps, loads
@@ -59,25 +58,26 @@ class Flight:
         return *np.transpose(pairs[slice(*at[kind])]), 0
 
     def score(self, said):  # section 7: evidence, what it must exceed; Y: columns nu, signature, constants
-        A, sums, room, w = np.kron([[1, self.dt], [0, 1]], np.eye(n := len(axes := said["axes"]))), 0, 0, 0
+        S, room, w, dt, eye = 0, 0, 0, self.dt, np.eye(2 * (n := len(axes := said["axes"])), n)
         Y, P, R = (np.nan_to_num(np.array(said[name], float)) for name in "YPR")  # null: it decides nothing
         for k, its in enumerate(said["frames"], said["first"]):
             u = np.stack([self.nu[k, axes] - its.get("air", 0), its["signature"], *its.get("known", [])], 1)
-            Y, P = A @ Y + self.dt * np.eye(2 * n, n) @ u, A @ (P + np.diag(its["Q"])) @ A.T
-            K = P[:, :n] @ (inverse := np.linalg.inv(P[:n, :n] + np.diag(R)))
-            before, w, sums = w, inverse @ Y[:n, 1], sums + inverse @ Y[:n, 1] @ Y[:n]
-            swing = 1.2 * abs(np.linalg.pinv(K[n:])) @ its.get("bounded", np.zeros(n))
-            room += np.array([swing @ abs(w - before), said.get("pace", 1e9) * swing @ abs(w)])
+            Q = np.pad(np.diag(its["jitter"]), (0, n)) + np.pad(its["drift"], (n, 0))
+            c, b = 1 - its.get("keep", 1), np.array(its.get("bounded", [0] * n))
+            Y, P = (A := np.kron([[1, dt], [0, 1 - c]], eye[:n])) @ Y + dt * eye @ u, A @ (P + Q) @ A.T
+            K, before, w = P[:, :n] @ (inv := np.linalg.inv(P[:n, :n] + np.diag(R))), w, inv @ Y[:n, 1]
+            S = S + w @ np.column_stack([Y[:n], its.get("foreseen", np.zeros(n))])
+            swing, stay = 1.2 * abs(np.linalg.pinv(K[n:])) @ b, c * b / (np.diag(K) * c / dt + np.diag(K[n:]))
+            room += np.array([swing @ abs(w - before), its.get("pace", 1e9) * swing @ abs(w)]) + stay @ abs(w)
             Y, P = Y - K @ Y[:n], P - K @ P[:n]
-        N = (abs(sums[0]) if said["sense"] == "either" else -sums[0]) - said["tolerance"] @ abs(sums[2:])
-        most = max(z := said["level"] * np.sqrt(abs(sums[1])), min(room[0] + swing @ abs(w), room[1]) + z / 2)
-        logged = self.log[said["likelihood"]][said["frame"]] * (1 + 1e-9)
-        return *np.transpose([(N, most), (logged, N / most)]), 0
+        N = max(min(0, S[-1]) - S[0], S[0] * (said["sense"] == "either")) - said["tolerance"] @ abs(S[2:-1])
+        most = max(z := said["level"] * np.sqrt(abs(S[1])), min(room[0] + swing @ abs(w), room[1]) + z / 2)
+        return *np.transpose([(N, most), (self.log[said["likelihood"]][k] * (1 + 1e-5), N / most)]), 0
 
 
 def failures(about, log):  # a line for each statement that does not hold; log: column -> values
     text = dumps(about | {"digest": ""}, sort_keys=True, separators=(",", ":")).encode()
-    if (sha256(text).hexdigest(), len(log["t_s"]), 3) != (about["digest"], about["rows"], about["format"]):
+    if (sha256(text).hexdigest(), len(log["t_s"]), 4) != (about["digest"], about["rows"], about["format"]):
         yield "this is not what was written, or not of this log"
     for said in about["statements"]:
         name, what, k = said["column"], said["what"], said.get("frame")

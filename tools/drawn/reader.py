@@ -83,7 +83,7 @@ def doubts(document: Document, log: Columns) -> Iterator[str]:
     text = dumps(unsigned, sort_keys=True, separators=(",", ":"))
     if sha256(text.encode()).hexdigest() != document["digest"]:
         yield "the digest is of another document"
-    if document["rows"] != len(log["t_s"]) or document["format"] != 3:
+    if document["rows"] != len(log["t_s"]) or document["format"] != 4:
         yield "the document is of another log, or of another format"
     if document["statements"]:
         try:
@@ -250,57 +250,58 @@ def _deflection(one: Document, place: int, k: int, flight: Flight) -> float:
 
 
 class Whitening:
-    """Section 7's filter on one axis: what it makes of the innovation, of a fault and of constants."""
+    """Section 7's filter: what it makes of the innovation, of a fault and of constants."""
 
-    def __init__(self, said: Document, i: int) -> None:
+    def __init__(self, said: Document) -> None:
         n = len(said["axes"])
-        P = [[value or 0.0 for value in row] for row in said["P"]]
-        others = [P[a][b] for a in range(2 * n) for b in range(2 * n) if a % n != b % n]
-        if any(others) or P[i][n + i] != P[n + i][i]:
-            raise Doubtful("axes that go together")
-        self.xx, self.xd, self.dd, self.noise = P[i][i], P[i][n + i], P[n + i][n + i], said["R"][i] or 0.0
-        rates, drifts = ([value or 0.0 for value in said["Y"][row]] for row in (i, n + i))
-        self.e, self.d = rates, [-value for value in drifts]
+        P, Y = (np.array([[value or 0.0 for value in row] for row in said[name]]) for name in "PY")
+        if not np.array_equal(P, P.T):
+            raise Doubtful("variances that are none")
+        self.xx, self.xd, self.dd = P[:n, :n], P[:n, n:], P[n:, n:]
+        self.noise = np.diag([value or 0.0 for value in said["R"]])
+        self.e, self.d = Y[:n], -Y[n:]
 
-    def take(self, inputs: Vector, jitter: float, drift: float, dt: float) -> tuple[Vector, float, float]:
-        """The whitened g of each input, its variance S, and the gain K_d of the drift."""
-        self.xx, self.dd = self.xx + jitter, self.dd + drift
-        self.xx, self.xd = self.xx + 2.0 * dt * self.xd + dt * dt * self.dd, self.xd + dt * self.dd
+    def take(
+        self, inputs: np.ndarray, its: Document, dt: float
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """The whitened g (n, inputs), its covariance S, and the gains K_x and K_d."""
+        alpha, self.dd = its.get("keep", 1.0), self.dd + np.array(its["drift"])
+        self.xx = self.xx + np.diag(its["jitter"]) + dt * (self.xd + self.xd.T) + dt * dt * self.dd
+        self.xd, self.dd = alpha * (self.xd + dt * self.dd), alpha * alpha * self.dd
         S = self.xx + self.noise
-        of_rate, of_drift = self.xx / S, self.xd / S
-        self.dd -= of_drift * self.xd
-        self.xx, self.xd = self.noise * of_rate, self.noise * of_drift
-        g = [e + dt * (nu - d) for e, nu, d in zip(self.e, inputs, self.d, strict=True)]
-        self.e = [(1.0 - of_rate) * value for value in g]
-        self.d = [d + of_drift * value for d, value in zip(self.d, g, strict=True)]
-        return g, S, of_drift
+        K_x, K_d = np.linalg.solve(S, self.xx).T, np.linalg.solve(S, self.xd).T
+        g = self.e + dt * (inputs - self.d)
+        self.e, self.d = g - K_x @ g, alpha * self.d + K_d @ g
+        left = np.linalg.solve(S, self.noise).T  # 1 - K_x
+        self.xx, self.dd, self.xd = left @ self.xx, self.dd - K_d @ self.xd, left @ self.xd
+        return g, S, K_x, K_d
 
 
 def _weighed(said: Document, flight: Flight) -> list[tuple[float, float]]:
     """The evidence for a fault, and what it must exceed: the level, or half of it beside bounds."""
-    filters = [Whitening(said, i) for i in range(len(said["axes"]))]
-    N, D, R = 0.0, 0.0, [0.0] * len(said["tolerance"])
-    weights = [0.0] * len(filters)
-    swinging = pacing = last = 0.0
+    axes, tolerance, filters = said["axes"], np.array(said["tolerance"]), Whitening(said)
+    N, D, R, foretold, w = 0.0, 0.0, np.zeros(len(tolerance)), 0.0, np.zeros(len(axes))
+    swinging = pacing = last = staying = 0.0
     if said["first"] + len(said["frames"]) - 1 != said["frame"]:
         raise Doubtful("frames are missing")
     for k, its in enumerate(said["frames"], said["first"]):
-        nu, n, last = flight.innovation(k), len(filters), 0.0
-        for i, axis in enumerate(said["axes"]):
-            seen = nu[axis] - (its["air"][i] if "air" in its else 0.0)
-            inputs = [seen, its["signature"][i], *(known[i] for known in its.get("known", []))]
-            g, S, of_drift = filters[i].take(inputs, its["Q"][i], its["Q"][n + i], flight.dt)
-            before, weights[i] = weights[i], g[1] / S
-            N, D = N + weights[i] * g[0], D + weights[i] * g[1]
-            R = [total + weights[i] * value for total, value in zip(R, g[2:], strict=True)]
-            if "bounded" in its:
-                most = 1.2 * its["bounded"][i] / abs(of_drift)
-                swinging += most * abs(weights[i] - before)
-                last += most * abs(weights[i])
-                pacing += most * abs(weights[i]) * said.get("pace", 1e9)
-    evidence = -N if said["sense"] == "less" else abs(N)
-    evidence -= sum(tol * abs(total) for tol, total in zip(said["tolerance"], R, strict=True))
+        nu = np.array([flight.innovation(k)[axis] for axis in axes]) - its.get("air", 0.0)
+        inputs = np.column_stack([nu, its["signature"], *its.get("known", [])])
+        g, S, K_x, K_d = filters.take(inputs, its, flight.dt)
+        before, w = w, np.linalg.solve(S, g[:, 1])
+        N, D, R = N + w @ g[:, 0], D + w @ g[:, 1], R + w @ g[:, 2:]
+        foretold += w @ its.get("foreseen", np.zeros(len(axes)))
+        if "bounded" in its:
+            most, returns = 1.2 * np.abs(np.linalg.inv(K_d)) @ its["bounded"], 1.0 - its.get("keep", 1.0)
+            swinging, last = swinging + most @ abs(w - before), most @ abs(w)
+            pacing += last * its.get("pace", 1e9)
+            for K, of_drift, bound, weight in zip(np.diag(K_x), np.diag(K_d), its["bounded"], w, strict=True):
+                staying += flight.dt * returns / (K * returns + flight.dt * of_drift) * bound * abs(weight)
+    evidence = -N - max(0.0, -foretold) if said["sense"] == "less" else abs(N)
+    evidence -= tolerance @ abs(R)
+    if D < 0.0:
+        raise Doubtful("information that is none")
     level = said["level"] * D**0.5
-    limit = max(level, min(swinging + last, pacing) + 0.5 * level)
-    logged = float(flight.log[said["likelihood"]][said["frame"]]) * (1.0 + 1e-9)
+    limit = max(level, staying + min(swinging + last, pacing) + 0.5 * level)
+    logged = float(flight.log[said["likelihood"]][said["frame"]]) * (1.0 + 1e-5)
     return [(evidence, limit), (logged, evidence / limit)]

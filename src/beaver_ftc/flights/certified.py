@@ -29,11 +29,9 @@ def write(taken: Taken, rows: Rows, folder: Path) -> None:
             diagnosis.step(*sample)
             yield k
 
-    def begin() -> tuple[np.ndarray, Iterator[int]]:
-        diagnosis.reset()
-        return diagnosis.inside()[0], stepped()
-
-    scenario = diagnosis.inside()[1].model_copy(update={"name": taken.samples.name})
-    log, document = by_frames.proved(scenario, begin)
+    diagnosis.reset()
+    frames, scenario = diagnosis.inside()
+    named = scenario.model_copy(update={"name": taken.samples.name})
+    log, document = by_frames.proved(named, frames, stepped())
     document = certificate.sealed(document | {"begins_s": float(taken.samples.t_s[start])})
     by_frames.write(log, document, folder)

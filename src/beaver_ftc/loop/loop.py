@@ -102,6 +102,7 @@ class Loop:
         self.references = np.empty((len(self.log), 3))
         self._order = np.zeros(2, np.int64)
         self._inside = 0  # JSBSim frames of the coming frame that have been flown already
+        self.after_frame: Callable[[], None] | None = None  # called once a frame has been flown
         self.fly_with(self.plugin_frame)
         self.changing: Changing | None = None
         if scenario.changes:
@@ -289,18 +290,28 @@ class Loop:
         for _ in range(count):
             advance()
             status = fly_frame(frames, references, log)
+            if self.after_frame is not None:
+                self.after_frame()
             if status:
                 return self._landed(status)
         return FLYING
 
     def _fly_compiled(self, count: int, runs: int) -> int:
         """The same without leaving compiled code, but for an instant now and then: others wait for it."""
-        order = self._order
-        order[1] = runs
+        order, fly_on, status = self._order, self.fly_on, FLYING
+        taken = self.frames, self.references, self.log, order
+        order[0], order[1] = 1, runs
+        if self.after_frame is not None:
+            for _ in range(count):
+                status = fly_on(*taken)
+                self.after_frame()
+                if status:
+                    break
+            return self._landed(status) if status else FLYING
         while count > 0:
             order[0] = now = count if count < AT_ONCE else AT_ONCE
             count -= now
-            status = self.fly_on(self.frames, self.references, self.log, order)
+            status = fly_on(*taken)
             if status:
                 return self._landed(status)
         return FLYING
@@ -350,17 +361,19 @@ def fly(
     detector: "Detector | None" = None,
     law: "Law | None" = None,
     prepare: Callable[[Plant], None] | None = None,
+    watch: Callable[[Loop], Callable[[], None]] | None = None,
 ) -> Landing:
     """Fly a scenario. The log goes to `sink`; `progress` is called with the share flown, chunk by chunk.
 
     detector, law: plug-ins to fly with, in place of those the scenario names. prepare: called with the
-    trimmed plant just before the flight.
+    trimmed plant just before the flight. watch: called with the flight; what it returns, as that ends.
 
     Raises BadInput when the flight cannot be trimmed or asks for what there is not, SimulationFailed when a
     value is not finite.
     """
     loop = Loop(scenario, detector, law, prepare)
     try:
+        over = None if watch is None else watch(loop)
         if sink is not None:
             sink.open(loop.columns)
         for rows in loop.chunks():
@@ -368,6 +381,8 @@ def fly(
                 sink.write(rows)
             if progress is not None:
                 progress(loop.frames["k"][0] / loop.n_frames)
+        if over is not None:
+            over()
         if sink is not None:
             sink.close()
         return loop.land()

@@ -70,13 +70,16 @@ def run(
     from beaver_ftc.loop.loop import fly
     from beaver_ftc.results import exports as exporting
     from beaver_ftc.results.certificates import certificate
+    from beaver_ftc.results.certificates.tape import Recorder
 
+    recorder = Recorder(scenario) if certified else None
+    watch = recorder.watch if recorder else None
     if certified:
         certificate.check_scheme(scenario)
     with result_folder(out, scenario.name) as folder:
         log_path, aircraft = folder / "log.parquet", scenario.airframe
         with ParquetLog(log_path) as log:
-            flight = fly(scenario, log, progress, prepare=prepare)
+            flight = fly(scenario, log, progress, prepare=prepare, watch=watch)
         document = metrics(flight)
         write_documents(folder, scenario, document)
         if report:
@@ -88,8 +91,8 @@ def run(
         if recording is not None:
             stops_rad = {s: max(abs(to.min_rad), abs(to.max_rad)) for s, to in aircraft.travel.items()}
             exporting.write_recording(log_path, stops_rad, recording, folder, tuple(aircraft.signals))
-        if certified:
-            certificate.write(scenario, StoredLog(log_path), folder)
+        if recorder:
+            certificate.write(scenario, StoredLog(log_path), recorder, folder)
     return document
 
 

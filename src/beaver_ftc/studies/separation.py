@@ -28,10 +28,10 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.loop.simulation import Stepping
 from beaver_ftc.results.certificates import proved
-from beaver_ftc.results.certificates.certificate import check_scheme, history_of
+from beaver_ftc.results.certificates.certificate import check_scheme, history_of, logged
 from beaver_ftc.results.certificates.inequality import History, Hypothesis, by_each_frame, declared_of
 from beaver_ftc.results.certificates.kinds import hypothesis, wrong
-from beaver_ftc.results.certificates.tape import Tape, recorded
+from beaver_ftc.results.certificates.tape import Recorder, Tape
 from beaver_ftc.results.log import MemoryLog
 from beaver_ftc.results.writer import result_folder
 from beaver_ftc.scenario.schema import Scenario
@@ -105,11 +105,11 @@ def separate(scenario: Scenario, rate_deg_s: float = LARGEST_RATE_DEG_S) -> Docu
     check_scheme(scenario)
     if scenario.fdi.pairs:
         raise BadInput(f"{scenario.name}: fdi.pairs: two faults leave no one parameter, allowed: false")
-    log = MemoryLog()
-    landing = fly(scenario, log)
+    log, recorder = MemoryLog(), Recorder(scenario)
+    landing = fly(scenario, log, watch=recorder.watch)
     if landing.detection_time_s is None:
         raise BadInput(f"{scenario.name}: no alarm was raised, allowed with separate: a flight with one")
-    tape, history = _seen(scenario, log)
+    tape, history = _seen(scenario, log, recorder)
     situation, left = situation_of(tape, scenario, radians(rate_deg_s)), [*candidates(tape, history)]
     names = scenario.airframe.surfaces
     if len(left) < 2:
@@ -177,18 +177,12 @@ def _with_doublet(flight: Stepping, scenario: Scenario, pair: Document) -> Itera
 
 
 def certified(scenario: Scenario, pair: Document) -> tuple[MemoryLog, Document]:
-    """Log and certificate of the flight with its doublet, which is flown again for both."""
-    flights: list[Stepping] = []
-
-    def begin() -> tuple[np.ndarray, Iterator[int]]:
-        flights.append(flight := _longer(scenario, pair))
-        return flight.records, _with_doublet(flight, scenario, pair)
-
+    """Log and certificate of the flight with its doublet."""
+    flight = _longer(scenario, pair)
     try:
-        return proved.proved(scenario, begin)
+        return proved.proved(scenario, flight.records, _with_doublet(flight, scenario, pair))
     finally:
-        for flight in flights:
-            flight.release()
+        flight.release()
 
 
 def _gone(one: Candidate, fdi: np.void) -> bool:
@@ -213,15 +207,15 @@ def write(document: Document, scenario: Scenario, out: Path) -> Path:
     return out / name
 
 
-def _seen(scenario: Scenario, log: MemoryLog) -> tuple[Tape, History]:
+def _seen(scenario: Scenario, log: MemoryLog, recorder: Recorder) -> tuple[Tape, History]:
     """What the flight has shown since the alarm."""
     detected = log.rows[:, log.columns.index("detected")] > 0.0
     clear = np.flatnonzero(~detected)
     alarm = int(clear[-1]) + 1 if len(clear) else 0
     if alarm >= len(detected) - 1:
         raise BadInput(f"{scenario.name}: the flight ends with its alarm, allowed: a longer duration_s")
-    tape = recorded(scenario, [alarm, len(detected) - 1], len(detected))
-    return tape, history_of(scenario, log, tape)
+    tape = recorder.tape([alarm, len(detected) - 1], len(detected))
+    return tape, history_of(scenario, logged(log), tape)
 
 
 def situation_of(tape: Tape, scenario: Scenario, rate: float) -> Situation:

@@ -4,6 +4,7 @@ number it takes. `tools/check_certificate.py` recomputes it from the log.
 
 import hashlib
 import json
+import re
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import chain
@@ -33,41 +34,59 @@ from beaver_ftc.results.certificates.inequality import (
     of_one_frame,
     written,
 )
-from beaver_ftc.results.certificates.tape import Tape, recorded
+from beaver_ftc.results.certificates.tape import MOST_AFTER, Recorder, Tape, recorded
 from beaver_ftc.results.log import Log
 from beaver_ftc.scenario.diagnosis import MAX_POLES
 from beaver_ftc.scenario.schema import Scenario
 
 Found = tuple[list[Term], Hypothesis] | None
-FILE, FORMAT = "certificate.json", 3
+Columns = dict[str, np.ndarray]
+FILE, FORMAT = "certificate.json", 4
+MEASURED_MODEL_BOUND = "measured_rad_s", "design_rad_s2", "eta_bar_rad_s2"  # columns of each axis
+_OF_AXES = {f"{axis}_{of}" for axis in AXES for of in MEASURED_MODEL_BOUND}
+_EVENT, _SHARE = re.compile("detected|fie_.*_excluded"), "_likelihood_share"  # columns of events, of shares
+LATE = f"more than {MOST_AFTER} frames after the alarm, or with another diagnosis begun anew"
 
 
-def certificate(scenario: Scenario, log: Log) -> Document:
-    """The certificate of a flight, which is flown again for what the log does not hold.
+def certificate(scenario: Scenario, log: Log, recorder: Recorder | None = None) -> Document:
+    """The certificate of a flight. recorder: what has kept what the log does not hold; without one the flight
+    is flown again.
 
     Raises BadInput where somebody else diagnosed.
     """
     check_scheme(scenario)
-    events = events_of(log)
-    tape = recorded(scenario, [events["detected"], *events.values()], log.row_count()) if events else None
-    return certificate_of(scenario, log, events, tape)
+    rows = logged(log)
+    if not (events := events_of(rows)):
+        return certificate_of(scenario, rows, events, None)
+    known, n = [events["detected"], *events.values()], len(rows["detected"])
+    tape = recorder.tape(known, n) if recorder else recorded(scenario, known, n)
+    return certificate_of(scenario, rows, events, tape)
 
 
-def events_of(log: Log) -> dict[str, int]:
+def logged(log: Log) -> Columns:
+    """The columns of a log that certificates take, (rows,)."""
+    taken = _OF_AXES.union(name for name in log.columns if _EVENT.fullmatch(name) or name.endswith(_SHARE))
+    columns = [name for name in log.columns if name in taken]
+    chunks = list(log.read_chunks(columns))
+    return {name: np.concatenate([chunk[name] for chunk in chunks]) for name in columns}
+
+
+def events_of(rows: Columns) -> dict[str, int]:
     """Of the alarm and of each exclusion that stands at the end: column of the log, and row."""
-    columns = _read(log, [name for name in log.columns if _is_event(name)])
-    return {name: k for name, flags in columns.items() if (k := _rise(flags)) is not None}
+    events = filter(_EVENT.fullmatch, rows)
+    return {name: k for name in events if (k := _rise(rows[name])) is not None}
 
 
-def certificate_of(scenario: Scenario, log: Log, events: dict[str, int], tape: Tape | None) -> Document:
-    """The certificate of a flight with these events; tape: what it leaves if it is flown again."""
+def certificate_of(scenario: Scenario, rows: Columns, events: dict[str, int], tape: Tape | None) -> Document:
+    """The certificate of a flight with these events; rows: as of `logged`, tape: what was kept of it."""
     document: Document = {
-        "format": FORMAT, "scenario": scenario.name, "rows": log.row_count(), "statements": [], "without": [],
+        "format": FORMAT, "scenario": scenario.name, "rows": len(rows["detected"]), "statements": [],
+        "without": [],
     }  # fmt: skip
     if tape is not None:
-        history = history_of(scenario, log, tape)
+        history = history_of(scenario, rows, tape)
         for found in statements(scenario, tape, history, events):
-            said = _beside_the_log(found, log)
+            said = _beside_the_log(found, rows)
             certain = "sides" in said
             document["statements" if certain else "without"].append(said if certain else _without(said))
         if document["statements"]:
@@ -75,12 +94,11 @@ def certificate_of(scenario: Scenario, log: Log, events: dict[str, int], tape: T
     return sealed(document)
 
 
-def _beside_the_log(said: Document, log: Log) -> Document:
+def _beside_the_log(said: Document, rows: Columns) -> Document:
     """The statement; one of chance with what the log has of it."""
     if "likelihood" not in said:
         return said
-    shares = _read(log, [said["likelihood"]])[said["likelihood"]]
-    return chance.with_share(said, float(shares[said["frame"]]))
+    return chance.with_share(said, float(rows[said["likelihood"]][said["frame"]]))
 
 
 def _without(said: Document) -> Document:
@@ -120,18 +138,14 @@ def digest(document: Document) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def write(scenario: Scenario, log: Log, folder: Path) -> None:
+def write(scenario: Scenario, log: Log, recorder: Recorder, folder: Path) -> None:
     """Write the certificate of a flight into its result folder."""
-    (folder / FILE).write_text(as_text(certificate(scenario, log)), encoding="utf-8")
+    (folder / FILE).write_text(as_text(certificate(scenario, log, recorder)), encoding="utf-8")
 
 
 def as_text(document: Document) -> str:
     """The file's content."""
     return json.dumps(document, separators=(",", ":")) + "\n"
-
-
-def _is_event(column: str) -> bool:
-    return column == "detected" or (column.startswith("fie_") and column.endswith("_excluded"))
 
 
 def _rise(flags: np.ndarray) -> int | None:
@@ -142,16 +156,11 @@ def _rise(flags: np.ndarray) -> int | None:
     return int(clear[-1]) + 1 if len(clear) else 0
 
 
-def _read(log: Log, columns: list[str]) -> dict[str, np.ndarray]:
-    chunks = list(log.read_chunks(columns))
-    return {name: np.concatenate([chunk[name] for chunk in chunks]) for name in columns}
-
-
-def history_of(scenario: Scenario, log: Log, tape: Tape) -> History:
+def history_of(scenario: Scenario, rows: Columns, tape: Tape) -> History:
     """What the log says of rates, model and bound, and what was declared."""
-    patterns = ("{}_measured_rad_s", "{}_design_rad_s2", "{}_eta_bar_rad_s2")
-    columns = _read(log, [pattern.format(axis) for pattern in patterns for axis in AXES])
-    x, model, eta_bar = (np.column_stack([columns[p.format(axis)] for axis in AXES]) for p in patterns)
+    x, model, eta_bar = (
+        np.column_stack([rows[f"{axis}_{of}"] for axis in AXES]) for of in MEASURED_MODEL_BOUND
+    )
     return History(
         1.0 / scenario.rate_hz, 1.0 / scenario.substeps, x, model, eta_bar, declared_of(tape.alarm)
     )
@@ -177,9 +186,9 @@ def statements(
     for e, name in enumerate(tape.names):
         column = f"fie_{name}_excluded"
         if column in events:
-            k = events[column]
-            found = _of_exclusion(scenario, tape, history, e, alarm, k)
-            yield _stated(found, history, "chance excluded it", what=name, column=column, frame=k)
+            k, because = events[column], "chance excluded it" if events[column] < tape.end else LATE
+            found = None if because == LATE else _of_exclusion(scenario, tape, history, e, alarm, k)
+            yield _stated(found, history, because, what=name, column=column, frame=k)
     if scenario.fdi.fault_class == "all":
         yield from _of_types(scenario, tape, history, alarm)
 

@@ -3,42 +3,42 @@
 What the log does not hold is kept frame by frame: signature, what declared constants multiply, variances.
 """
 
-from collections.abc import Iterator, Sequence
-from itertools import pairwise
+from collections.abc import Mapping, Sequence
+from math import nan, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
 from beaver_ftc.aircraft import AXES
-from beaver_ftc.diagnosis.likelihood import N_SLOTS, RETURNING, RINGING, STEP, slot_to_start
+from beaver_ftc.compiled import kernel
+from beaver_ftc.diagnosis import likelihood
+from beaver_ftc.diagnosis.likelihood import N_SLOTS, STEP, Rooms, block_dtype, slot_to_start
 from beaver_ftc.diagnosis.noise_model import CHANCE
 from beaver_ftc.results.certificates.inequality import Document, History
-from beaver_ftc.results.certificates.tape import Tape
+from beaver_ftc.results.certificates.tape import OF_BLOCK, Tape
 
-_AS_LOGGED = 1e-9  # of the alarm's score: more than another order of summation makes
-_FORGOTTEN = 1e-10  # of the limit
+_AS_LOGGED = 1e-5  # of the alarm's score: more than all that is left out makes
+_FORGOTTEN = 1e-7  # of the limit
+_LONGEST = 520  # frames: of more a certificate would have over 200 kB
 NOISE, SWINGS, PACE = range(3)  # what the evidence must exceed: chance alone, or bounded uncertainty besides
-NOT_STATED = "chance raised it: an onset long before, a tone, a force, or moving air"
+OF_FRAME = JITTER, FORESEEN, BOUNDED, COURSE = range(4)  # the last: keep, and pace
+NOT_STATED = "chance raised it: an onset long before, a tone, or a force"
 
 
 def of_alarm(tape: Tape, history: History, surfaces: Sequence[str], k: int) -> Document | None:
     """The statement that chance raised the alarm at row k; None where it is not one onset's, or too old."""
     chances = tape.alarm["fdi"]["statistical"]
     b, h, slot = _loudest(chances)
-    blocks = [frame[b] for frame in tape.chances["blocks"]]
     first = next((r for r in range(k, tape.first, -1) if slot_to_start(r - tape.since) == slot), None)
-    if first is None:
+    if first is None or k - first > _LONGEST:
         return None
-    since = [blocks[r - tape.first] for r in range(first - 1, k + 1)]
-    said = _written(tape, history, since, h, first)
-    if said is None:
-        return None
-    hypothesis = blocks[k - tape.first]["hypothesis"][h]
-    _leave_out(said, history)
-    value, limit, _ = sides(said, history)
+    hypothesis = chances["block"][b]["hypothesis"][h]
     score = float(hypothesis["score"] / chances["tests"]["alarm_level"])
-    exact = len({float(block["pace"]) for block in since}) == 1  # or less is said than was seen
-    as_logged = (1.0 - _AS_LOGGED if exact else 0.0) * score <= value / limit <= (1.0 + _AS_LOGGED) * score
-    if not (value > limit and as_logged):
+    said = _written(tape, history, (b, h), range(first, k + 1))
+    if score > 1.0 + _AS_LOGGED:
+        _leave_out(said, history)
+    value, limit, _ = sides(said, history)
+    if not (value > limit and abs(value / limit - score) <= _AS_LOGGED * score):
         return None
     return {"likelihood": _column(hypothesis, surfaces), **said, "sides": [[value], [limit]]}
 
@@ -49,12 +49,18 @@ def with_share(said: Document, logged: float) -> Document:
     return said | {"sides": [[value, logged * (1.0 + _AS_LOGGED)], [limit, value / limit]]}
 
 
-def shares(chances: np.void, surfaces: Sequence[str]) -> Iterator[tuple[str, float]]:
-    """Column, and share of the level, of each hypothesis that raises alarms, where drifts do not return."""
-    for block in chances["block"][:RETURNING]:
+def shares(chances: np.void, surfaces: Sequence[str]) -> dict[str, float]:
+    """Column, and largest share of the level, of each hypothesis that raises alarms."""
+    found: dict[str, float] = {}
+    for block in chances["block"]:
         for hypothesis in block["hypothesis"][: block["n_hypotheses"]]:
             if hypothesis["alarms"]:
-                yield _column(hypothesis, surfaces), hypothesis["score"] / chances["tests"]["alarm_level"]
+                column, share = (
+                    _column(hypothesis, surfaces),
+                    hypothesis["score"] / chances["tests"]["alarm_level"],
+                )
+                found[column] = max(found.get(column, 0.0), float(share))
+    return found
 
 
 def _column(hypothesis: np.void, surfaces: Sequence[str]) -> str:
@@ -65,42 +71,53 @@ def _column(hypothesis: np.void, surfaces: Sequence[str]) -> str:
 
 def _leave_out(said: Document, history: History) -> None:
     """Take out what decides nothing: what the filter has forgotten, and of the bounds on what is no noise."""
-    _, limit, decides = sides(said, history)
-    if decides == NOISE:
-        for its in said["frames"]:
+    sums = _followed(said, _frames(said, history), *_variances(said))
+    _, limit, decides = _weighed(said, sums)
+    for its in said["frames"]:
+        if decides == NOISE:
             del its["bounded"]
-    if decides != PACE:
-        del said["pace"]
-    sums, *_ = _followed(said, history)
+        if decides != PACE:
+            del its["pace"]
     m = len(said["tolerance"])
-    matters = [j for j in range(m) if said["tolerance"][j] * abs(sums[2 + j]) > _FORGOTTEN * limit]
+    matters = [j for j in range(m) if said["tolerance"][j] * abs(sums.of[2 + j]) > _FORGOTTEN * limit]
     said["tolerance"] = [said["tolerance"][j] for j in matters]
     said["Y"] = [[row[0], None, *(row[2 + j] for j in matters)] for row in said["Y"]]
     for its in said["frames"]:
         if "known" in its:
             its["known"] = [its["known"][j] for j in matters]
-    for row, felt in zip(said["Y"], sums[2 + m :], strict=True):
+        if "foreseen" in its and sums.foreseen >= 0.0:
+            del its["foreseen"]
+    for row, felt in zip(said["Y"], sums.owed, strict=True):
         for c, tolerance in ((0, 1.0), *enumerate(said["tolerance"], 2)):
             if abs(felt * row[c]) * tolerance < _FORGOTTEN * limit:
                 row[c] = None
-    for place in (*said["P"], said["R"]):
-        _leave_out_of(place, said, history)
+    _leave_out_variances(said, history)
 
 
-def _leave_out_of(place: list[float | None], said: Document, history: History) -> None:
-    """The same of one list of variances in a statement."""
-    value, limit, _ = sides(said, history)
-    for i, given in enumerate(place):
-        place[i] = None
-        without = sides(said, history)
-        if max(abs(value - without[0]), abs(limit - without[1])) > _FORGOTTEN * limit:
-            place[i] = given
+def _leave_out_variances(said: Document, history: History) -> None:
+    """The same of R, and of P with what stands opposite."""
+    frames, (P, R) = _frames(said, history), _variances(said)
+    value, limit, _ = _weighed(said, _followed(said, frames, P, R))
+
+    def decides(P: np.ndarray, R: np.ndarray) -> bool:
+        without, least, _ = _weighed(said, _followed(said, frames, P, R))  # nan: no covariance without it
+        return not max(abs(without - value), abs(least - limit)) <= _FORGOTTEN * limit
+
+    for i in range(len(P)):
+        for j in range(i, len(P)):
+            left = P.copy()
+            left[i, j] = left[j, i] = 0.0
+            if not decides(left, R):
+                said["P"][i][j] = said["P"][j][i] = None
+    for i in range(len(R)):
+        if not decides(P, np.where(np.arange(len(R)) == i, 0.0, R)):
+            said["R"][i] = None
 
 
 def _loudest(chances: np.void) -> tuple[int, int, int]:
-    """Block, hypothesis and slot of the largest score that raises alarms, where drifts do not return."""
+    """Block, hypothesis and slot of the largest score that raises alarms."""
     best, found = -1.0, (0, 0, 0)
-    for b, block in enumerate(chances["block"][:RETURNING]):
+    for b, block in enumerate(chances["block"]):
         for h, hypothesis in enumerate(block["hypothesis"][: block["n_hypotheses"]]):
             if hypothesis["alarms"] and hypothesis["score"] > best:
                 lanes = block["lane"]["score"][h * N_SLOTS : (h + 1) * N_SLOTS]
@@ -108,81 +125,169 @@ def _loudest(chances: np.void) -> tuple[int, int, int]:
     return found
 
 
-def _written(tape: Tape, history: History, blocks: list[np.void], h: int, first: int) -> Document | None:
-    """The statement, with the frames from `first` on; blocks: from the row before that. None in moving air
-    that moves several axes together, or whose drift returns."""
-    start, dt = blocks[0], history.dt
-    both = range(int(start["n"]))
-    if start["lag"] > 0.0 or any(
-        block[name][0, 1] for block in blocks for name in ("P_xx", "P_xd", "P_dd", "drift") if len(both) > 1
-    ):
-        return None
-    felt = [i for i in both if any(block["hypothesis"][h]["signature"][i] for block in blocks[1:])]
-    axes, states = [int(start["axis"][i]) for i in felt], [*felt, *(2 + i for i in felt)]
-    known = [j for j in range(start["n_regressors"]) if start["tolerance"][j] > 0.0]
-    known = [j for j in known if any(block["regressor_response"][j, felt].any() for block in blocks[1:])]
-    frames, grown = [], np.zeros(len(felt))  # of the drift's variance: it is felt a frame later
-    for r, (then, now) in enumerate(pairwise(blocks), first):
-        known_then, responses = then["regressor_state"][:, states], now["regressor_response"][:, felt]
-        seen = _input(then["state"][states], now["innovation"][felt], dt)
-        its = {
-            "signature": now["hypothesis"][h]["signature"][felt],
-            "known": [_input(known_then[j], responses[j], dt) for j in known],
-            "Q": [*dt * dt * then["jitter"][felt], *grown],
-            "bounded": tape.chances["bounded"][r - 1 - tape.first][axes],
-        }
-        grown = dt * np.diag(then["drift"])[felt]
-        if bool(tape.alarm["fdi"]["statistical"]["air"]["moving"]):
-            its["air"] = history.innovation(slice(r, r + 1))[0, axes] - seen
-        frames.append({name: np.asarray(values).tolist() for name, values in its.items() if len(values)})
-    of_known = (start["regressor_state"][j, states] for j in known)
-    Y = np.array([start["state"][states], np.zeros(len(states)), *of_known]).T
-    xx, xd, dd = (np.diag(np.diag(start[name])[felt]) for name in ("P_xx", "P_xd", "P_dd"))
-    Y, P = np.vstack([Y[: len(felt)], -Y[len(felt) :]]), np.block([[xx, xd], [xd, dd]])
+def _written(tape: Tape, history: History, test: tuple[int, int], rows: range) -> Document:
+    """The statement of a test, block and hypothesis, with these frames."""
+    (b, h), dt, chances = test, history.dt, tape.alarm["fdi"]["statistical"]
+    block, here = chances["block"][b], slice(rows[0] - 1 - tape.first, rows[-1] + 1 - tape.first)
+    of = {name: tape.chances[name][here, b] for name in (*OF_BLOCK, "signature")}
+    then, now = ({name: values[part] for name, values in of.items()} for part in (np.s_[:-1], np.s_[1:]))
+    felt = _felt(of, now["signature"][:, h], int(block["n"]))
+    n, states, axes = len(felt), [*felt, *(2 + i for i in felt)], [int(block["axis"][i]) for i in felt]
+    square = np.ix_(range(len(rows)), felt, felt)
+    known = [j for j in np.flatnonzero(block["tolerance"][: block["n_regressors"]] > 0.0).tolist()
+             if now["regressor_response"][:, j][:, felt].any()]  # fmt: skip
+    drift = dt * then["drift"][square]  # which is felt a frame later
+    drift[1:], drift[0] = drift[:-1].copy(), 0.0
+    before, response = (
+        then["regressor_state"][:, known][..., states],
+        now["regressor_response"][:, known][..., felt],
+    )
+    its = {
+        "signature": now["signature"][:, h][:, felt], "jitter": dt * dt * then["jitter"][:, felt],
+        "drift": drift, "bounded": tape.chances["bounded"][here][:-1][:, axes], "pace": then["pace"],
+    }  # fmt: skip
+    if block["lag"] > 0.0:
+        its["keep"] = then["keep"]
+    if known:
+        its["known"] = (response - before[..., :n]) / dt + before[..., n:]  # that gave this response
+    if chances["air"]["moving"]:
+        its["air"] = tape.chances["air"][here][1:][:, axes]
+        drift += block["stronger"] * tape.chances["leap"][here][1:][np.ix_(range(len(rows)), axes, axes)]
+    loss = bool(block["lane"]["sense"][h * N_SLOTS])
+    if loss and block["calm"]["n"]:
+        its["foreseen"] = now["foreseen"][:, felt]
+    state = then["state"][0, states]
+    Y = np.array([state, np.zeros(2 * n), *before[0]]).T
+    xx, xd, dd = (of[name][0][np.ix_(felt, felt)] for name in ("P_xx", "P_xd", "P_dd"))
+    Y, P = np.vstack([Y[:n], -Y[n:]]), np.block([[xx, xd], [xd.T, dd]])
+    lists = zip(*(values.tolist() for values in its.values()), strict=True)
+    frames = [dict(zip(its, row, strict=True)) for row in lists]
     return {
-        "level": float(tape.alarm["fdi"]["statistical"]["tests"]["alarm_level"]), "axes": axes,
-        "sense": "less" if start["lane"]["sense"][h * N_SLOTS] else "either",
-        "pace": max(float(block["pace"]) for block in blocks),
-        "tolerance": [float(start["tolerance"][j]) for j in known], "R": start["noise"][felt].tolist(),
-        "Y": Y.tolist(), "P": P.tolist(), "first": first, "frames": frames,
+        "level": float(chances["tests"]["alarm_level"]), "axes": axes, "sense": "less" if loss else "either",
+        "tolerance": [float(block["tolerance"][j]) for j in known],
+        "R": of["noise"][0, felt].tolist(), "Y": Y.tolist(),
+        "P": (0.5 * (P + P.T)).tolist(),  # else rounding sets both sides apart
+        "first": rows[0], "frames": frames,
     }  # fmt: skip
 
 
-def _input(then: np.ndarray, response: np.ndarray, dt: float) -> np.ndarray:
-    """The acceleration (n,) that gave this response of a filter in this state (2 n,) a frame before."""
-    n = len(response)
-    return np.asarray((response - then[:n]) / dt + then[n:])
+def _felt(of: Mapping[str, np.ndarray], signature: np.ndarray, n: int) -> list[int]:
+    """The axes of a block of n that the fault moves; both where what is not known moves them together."""
+    together = n > 1 and any(of[name][..., 0, 1].any() for name in ("P_xx", "P_xd", "P_dd", "drift"))
+    return [i for i in range(n) if together or signature[:, i].any()]
 
 
 def sides(said: Document, history: History) -> tuple[float, float, int]:
     """Evidence, what it must exceed, and which of NOISE, SWINGS, PACE that follows from."""
-    sums, swings, drifts = _followed(said, history)
-    N, D, R = sums[0], sums[1], sums[2 : 2 + len(said["tolerance"])]
-    evidence = (-N if said["sense"] == "less" else abs(N)) - np.array(said["tolerance"]) @ np.abs(R)
-    root = said["level"] * np.sqrt(D)
-    of_swings, of_pace = (room + CHANCE * root for room in (swings, drifts))
+    return _weighed(said, _followed(said, _frames(said, history), *_variances(said)))
+
+
+def _variances(said: Document) -> tuple[np.ndarray, np.ndarray]:
+    """P (2 n, 2 n) and R (n,), zero where nothing stands."""
+    P, R = (np.nan_to_num(np.array(said[name], float)) for name in "PR")
+    return P, R
+
+
+class _Frames(NamedTuple):
+    """What the filter takes, of two axes, the second zero where there is one: of each frame inputs, columns
+    as of Y and one for each state before the first; the drift's variance; and OF_FRAME."""
+
+    inputs: np.ndarray
+    drift: np.ndarray
+    of_frame: np.ndarray
+    dt: float
+
+
+class _Sums(NamedTuple):
+    """N, D, each R (2 + constants,); what N owes to each state before the first frame (2 n,); of N what calm
+    air foretells; what a bounded uncertainty adds as it swings, and at its pace."""
+
+    of: np.ndarray
+    owed: np.ndarray
+    foreseen: float
+    swings: float
+    drifts: float
+
+
+def _frames(said: Document, history: History) -> _Frames:
+    """The frames of a statement."""
+    frames, axes, dt = said["frames"], said["axes"], history.dt
+    n, m, k = len(axes), 2 + len(said["tolerance"]), len(frames)
+    found = _Frames(np.zeros((k, m + 2 * n, 2)), np.zeros((k, 2, 2)), np.zeros((k, len(OF_FRAME), 2)), dt)
+    first = said["first"]
+    found.inputs[:, 0, :n] = history.innovation(slice(first, first + k))[:, axes]
+    found.inputs[:, 1, :n] = [its["signature"] for its in frames]
+    found.drift[:, :n, :n] = [its["drift"] for its in frames]
+    found.of_frame[:, COURSE] = [(its.get("keep", 1.0), its.get("pace", 1e9)) for its in frames]
+    if "air" in frames[0]:
+        found.inputs[:, 0, :n] -= [its["air"] for its in frames]
+    if "known" in frames[0] and m > 2:
+        found.inputs[:, 2:m, :n] = [its["known"] for its in frames]
+    for place, name in ((JITTER, "jitter"), (FORESEEN, "foreseen"), (BOUNDED, "bounded")):
+        if name in frames[0]:
+            found.of_frame[:, place, :n] = [its[name] for its in frames]
+    found.of_frame[:, JITTER] /= dt * dt
+    return found
+
+
+def _followed(said: Document, frames: _Frames, P: np.ndarray, R: np.ndarray) -> _Sums:
+    """Run the filter; P, R: variances before the first frame, and of gyros."""
+    n, m = len(R), 2 + len(said["tolerance"])
+    block, states = np.zeros(1, block_dtype(Rooms(1, 1))), np.zeros((m + 2 * n, 4))
+    filters = block[0]
+    filters["n"], filters["axis"] = n, (0, 1)
+    of = [slice(0, n), slice(n, 2 * n)]
+    for name, rows, columns in (("P_xx", 0, 0), ("P_xd", 0, 1), ("P_dd", 1, 1)):
+        filters[name][:n, :n] = P[of[rows], of[columns]]
+    filters["noise"][:n] = R
+    Y = np.column_stack([np.nan_to_num(np.array(said["Y"], float)), np.eye(2 * n)]).T
+    states[:, :n], states[:, 2 : 2 + n] = Y[:, :n], -Y[:, n:]
+    sums, room = np.zeros(m + 2 * n), np.zeros(5)
+    follow(block, *frames[:3], states, sums, room, frames.dt)
+    swings, drifts, last, stays, foreseen = room.tolist()
+    return _Sums(sums[:m], sums[m:], foreseen, stays + swings + last, stays + drifts)
+
+
+@kernel
+def follow(blocks, inputs, drift, of_frame, states, sums, room, dt):
+    """Run a filter, blocks (1,), over `_Frames`, and add what it makes of each input to `sums`, weighed by
+    what it makes of the second, as `likelihood.respond` does.
+
+    states (columns, 4): advanced in place. room (5,): what a bounded uncertainty can add as it swings, at its
+    pace, in the last frame, as it stays; and of the first of `sums` what calm air foretells.
+    """
+    block, g, w = blocks[0], np.zeros((len(states), 2)), np.zeros(2)
+    for k in range(len(inputs)):
+        given = of_frame[k]
+        block.keep = given[COURSE, 0]
+        for i in range(block.n):
+            block.jitter[i] = given[JITTER, i]
+            for j in range(block.n):
+                block.P_dd[i, j] += drift[k, i, j]
+        likelihood.advance(block, dt)
+        likelihood.reach(block, given[BOUNDED], dt)
+        for c in range(len(states)):
+            likelihood.whiten(block, states[c], inputs[k, c], dt, g[c])
+        room[2] = 0.0
+        for i in range(block.n):
+            before, w[i] = w[i], 0.0
+            for j in range(block.n):
+                w[i] += block.S_inverse[i, j] * g[1, j]
+            room[0] += block.swing[i] * abs(w[i] - before)
+            room[1] += given[COURSE, 1] * block.swing[i] * abs(w[i])
+            room[2] += block.swing[i] * abs(w[i])
+            room[3] += block.stay[i] * abs(w[i])
+            room[4] += w[i] * given[FORESEEN, i]
+            for c in range(len(states)):
+                sums[c] += w[i] * g[c, i]
+
+
+def _weighed(said: Document, sums: _Sums) -> tuple[float, float, int]:
+    """As of `sides`."""
+    N, D, *R = sums.of.tolist()
+    root = said["level"] * sqrt(D) if D >= 0.0 else nan
+    of_swings, of_pace = (room + CHANCE * root for room in (sums.swings, sums.drifts))
     decides = NOISE if root >= min(of_swings, of_pace) else (SWINGS if of_swings <= of_pace else PACE)
-    return float(evidence), float(max(root, min(of_swings, of_pace))), decides
-
-
-def _followed(said: Document, history: History) -> tuple[np.ndarray, float, float]:
-    """N, D, each R, and what N owes to each state before the first frame, (2 + constants + 2 n,); what a
-    bounded uncertainty adds as it swings, and at its pace."""
-    axes, dt = said["axes"], history.dt
-    n = len(axes)
-    Y, P, R = (np.nan_to_num(np.array(said[name], float)) for name in "YPR")
-    Y, pace = np.column_stack([Y, np.eye(2 * n)]), said.get("pace", 1e9)
-    A, sums, w = np.kron([[1.0, dt], [0.0, 1.0]], np.eye(n)), np.zeros(Y.shape[1]), np.zeros(n)
-    swings = drifts = last = 0.0
-    for r, its in enumerate(said["frames"], said["first"]):
-        seen = history.innovation(slice(r, r + 1))[0, axes] - its.get("air", 0.0)
-        Y, P = A @ Y, A @ (P + np.diag(its["Q"])) @ A.T
-        Y[:n, : -2 * n] += dt * np.column_stack([seen, its["signature"], *its.get("known", [])])
-        inverse = np.linalg.inv(P[:n, :n] + np.diag(R))
-        G, K = Y[:n].copy(), P[:, :n] @ inverse
-        Y, P, before, w = Y - K @ G, P - K @ P[:n], w, inverse @ G[:, 1]
-        sums = sums + w @ G
-        swing = RINGING * np.abs(np.linalg.pinv(K[n:])) @ its.get("bounded", np.zeros(n))
-        swings, drifts = swings + swing @ np.abs(w - before), drifts + pace * swing @ np.abs(w)
-        last = swing @ np.abs(w)
-    return sums, float(swings + last), float(drifts)
+    evidence = -N - max(0.0, -sums.foreseen) if said["sense"] == "less" else abs(N)
+    evidence -= sum(tol * abs(total) for tol, total in zip(said["tolerance"], R, strict=True))
+    return evidence, max(root, min(of_swings, of_pace)), decides

@@ -55,10 +55,13 @@ class History:
         slope = np.array(gyro["slope"])
         return np.asarray((np.array(gyro["offset_rad_s"]) + slope * np.abs(self.x)) / (1.0 - slope))
 
+    @cached_property
+    def _nu(self) -> np.ndarray:
+        return np.asarray(np.diff(self.x, axis=0, prepend=self.x[:1]) / self.dt - self.model)
+
     def innovation(self, rows: slice) -> np.ndarray:
         """nu of rows after the first, (rows, 3) rad/s2."""
-        before = slice(rows.start - 1, rows.stop - 1)
-        return np.asarray((self.x[rows] - self.x[before]) / self.dt - self.model[rows])
+        return self._nu[rows]
 
     def frame_bound(self, rows: slice) -> np.ndarray:
         """The bound on it, (rows, 3) rad/s2."""

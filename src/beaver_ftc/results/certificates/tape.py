@@ -1,35 +1,43 @@
-"""What the diagnosis supposed, frame by frame: kept by flying the same flight again, which is the same to the
-bit. So the first flight pays nothing for its certificate.
+"""What the diagnosis supposed, frame by frame, kept while it flies: of the frames before an alarm, which may
+come at any time, the last, and all after it.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
+from beaver_ftc.compiled import direct, kernel
 from beaver_ftc.diagnosis.isolation import estimator_names
+from beaver_ftc.diagnosis.likelihood import N_SLOTS
 from beaver_ftc.loop import memory
-from beaver_ftc.loop.loop import CHUNK_ROWS, FLYING, Loop
+from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.scenario.schema import Scenario
 
-BEFORE = 40  # frames kept before the first event: what was before them is in the filters
-BEFORE_CHANCE = 130  # with the statistical detector, whose evidence builds up
-AFTER_S = 10.0  # after the last one, where types are excluded one by one
+BEFORE = 40  # frames kept before the alarm: what was before them is in the filters
+BEFORE_CHANCE = 2**N_SLOTS + 2  # with the statistical detector: its oldest onset
+AFTER_S = 10.0  # after the last event, where types are excluded one by one
+MOST_AFTER = 1 << 16  # frames kept after the alarm
+_AT_ONCE = 1 << 10  # so many at first
+OF_BLOCK = (
+    "keep", "pace", "state", "P_xx", "P_xd", "P_dd", "drift", "jitter", "noise", "foreseen",
+    "regressor_state", "regressor_response",
+)  # fmt: skip
 
 
 @dataclass
 class Tape:
-    """Frames `first` to `first + len(x) - 1` of the flight, rows of its log.
+    """Frames `first` to `first + frames - 1` of the flight, rows of its log.
 
     alarm, last: the flight's record as it was at the alarm and at the end, of `frame_dtype`. since: the frame
     with which the diagnosis began. Of each frame x (3,) rad/s, model and eta_bar (3,) rad/s2, what a gyro's
     error changes by noise (3,) rad/s, and of each estimator offset, slope and spread (estimators, 3): rad/s2,
-    and per unit of its parameter. reach (estimators, poles, 4): what a fault can have done to the filters
-    before.
+    and per unit of its parameter. chances: of each up to the alarm what the statistics reckon with.
+    reach (estimators, poles, 4): what a fault can have done to the filters before.
     """
 
     first: int
+    frames: int
     since: int
     alarm: np.void
     last: np.void
@@ -37,14 +45,13 @@ class Tape:
     reach_low: np.ndarray
     reach_high: np.ndarray
     kept: dict[str, np.ndarray]
-    frames: int = 0
-    chances: dict[str, list[np.ndarray]] = field(default_factory=dict)
+    chances: dict[str, np.ndarray]
 
     def __getattr__(self, name: str) -> np.ndarray:
         """A quantity over the frames, (frames, ...)."""
         if name.startswith("_") or name not in self.kept:
             raise AttributeError(name)
-        return self.kept[name][: self.frames]
+        return self.kept[name]
 
     @property
     def end(self) -> int:
@@ -56,85 +63,156 @@ class Tape:
         return k - self.first
 
 
-def recorded(scenario: Scenario, events: Sequence[int], rows: int) -> Tape:
-    """Fly again and keep the frames around these, of so many rows; the first of them is the alarm's."""
-    loop = Loop(scenario)
-    try:
-        first, end = span(scenario, events, rows)
-        return record(loop.frames, _flown(loop, first, end), scenario, events, end)
-    finally:
-        loop.release()
+class _Places:
+    """Where in a record quantities stand, as numbers of its words; and what they are again."""
+
+    def __init__(self, views: dict[str, np.ndarray]) -> None:
+        """views: of a record each word of which is its own number."""
+        found = {name: np.ascontiguousarray(view) for name, view in views.items()}
+        self.words = np.concatenate([view.view(np.int64).ravel() for view in found.values()])
+        self._what = {name: (view.dtype, view.shape, view.nbytes // 8) for name, view in found.items()}
+
+    def read(self, rows: np.ndarray) -> dict[str, np.ndarray]:
+        """The quantities, (frames, ...), that were kept as rows (frames, words)."""
+        found, place = {}, 0
+        for name, (dtype, shape, n) in self._what.items():
+            words = np.ascontiguousarray(rows[:, place : place + n])
+            found[name], place = words.view(dtype).reshape(len(rows), *shape), place + n
+        return found
 
 
-def span(scenario: Scenario, events: Sequence[int], rows: int) -> tuple[int, int]:
-    """The first frame to keep around these, of so many rows, and the one after the last."""
-    before = BEFORE if scenario.fdi.statistical is None else BEFORE_CHANCE
-    after = round(AFTER_S * scenario.rate_hz) if scenario.fdi.fault_class == "all" else 1
-    return max(min(events) - before, 0), min(max(events) + after, rows)
+class Recorder:
+    """Keeps what a tape takes of a flight's record, frames (1,) of `frame_dtype`, at each `keep`."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._scenario = scenario
+
+    def watch(self, loop: Loop) -> Callable[[], None]:
+        """Keep every frame of a flight; to be called as it ends: what is returned."""
+        self.begin(loop.frames)
+        loop.after_frame = self.keep
+        return self.land
+
+    def begin(self, frames: np.ndarray) -> None:
+        """Begin to keep frames of the record `frames`, the first of them number 0."""
+        numbers = memory.taken((1,), frames.dtype)
+        _words_of(numbers)[:] = np.arange(frames.nbytes // 8)
+        n, config, fdi = int(frames["fdi"]["isolation"]["n"][0]), self._scenario.fdi, numbers[0]["fdi"]
+        self._always = _Places(_always(numbers[0], n, config.fault_class == "all"))
+        self._early = _Places(_early(fdi, n, config.statistical is not None))
+        self._state = np.array([0, -1, 0, fdi["verdict"]["detected"], fdi["watch"]["alarmed"]])
+        memory.give_back(numbers)
+        ring = 1 + (BEFORE if config.statistical is None else BEFORE_CHANCE)
+        self._ring = np.empty((ring, len(self._early.words)), np.int64)
+        self._kept = np.empty((ring + _AT_ONCE, len(self._always.words)), np.int64)
+        self._frames, self._alarm = frames, memory.copied(frames)
+        self._take_arguments()
+
+    def land(self) -> None:
+        """Keep the record as it is at the end."""
+        self._last = memory.copied(self._frames)
+
+    def _take_arguments(self) -> None:
+        words, alarm = _words_of(self._frames), _words_of(self._alarm)
+        places = self._always.words, self._early.words
+        self._arguments = words, *places, self._kept, self._ring, alarm, self._state
+        self._note = direct(note, *self._arguments)
+
+    def keep(self) -> None:
+        """Keep what stands in the record."""
+        if self._note(*self._arguments) and len(self._kept) < MOST_AFTER:
+            self._kept = np.resize(self._kept, (2 * len(self._kept), self._kept.shape[1]))
+            self._take_arguments()
+
+    def tape(self, events: Sequence[int], rows: int) -> Tape:
+        """The frames around these, of so many rows; the first of them is the alarm's, if one was raised."""
+        last, config = self._last[0], self._scenario.fdi
+        seen, alarm, clear = self._state[:3].tolist()
+        ring, raised = len(self._ring), alarm >= 0
+        alarm, at_alarm = (alarm, self._alarm[0]) if raised else (seen - 1, last)
+        since, anew = int(at_alarm["since"]), int(last["since"])
+        after = round(AFTER_S * self._scenario.rate_hz) if config.fault_class == "all" else 1
+        first = max(min(events) - ring + 1, alarm - ring + 1, since, clear, 0)
+        end = min(max(events) + after, rows, alarm + 1 + len(self._kept) - ring)
+        if anew > alarm:  # another diagnosis began
+            end = min(end, anew)
+        before = np.arange(first, min(alarm + 1, end)) % ring
+        early = self._early.read(self._ring[before])
+        return Tape(
+            first=first, frames=end - first, since=since, alarm=at_alarm, last=last,
+            names=estimator_names(config.fault_class, self._scenario.airframe),
+            reach_low=early.pop("reach_low")[0], reach_high=early.pop("reach_high")[0],
+            kept=self._always.read(self._kept[np.r_[before, ring : ring + end - first - len(before)]]),
+            chances=early,
+        )  # fmt: skip
 
 
-def record(
-    frames: np.ndarray, flown: Iterable[int], scenario: Scenario, events: Sequence[int], end: int
-) -> Tape:
-    """Keep what stands in the record `frames` (1,) after each frame that has been flown, up to `end`."""
-    tape: Tape | None = None
-    views: dict[str, Any] = {}
-    chance, frame = scenario.fdi.statistical is not None, frames[0]
-    for k in flown:
-        if tape is None or tape.since != int(frame["since"]):  # another diagnosis has begun
-            tape, views = _begun(frame, scenario, end - k)
-        for name, view in views.items():
-            tape.kept[name][tape.frames] = view
-        tape.frames += 1
-        if chance and k <= events[0]:
-            tape.chances.setdefault("blocks", []).append(frame["fdi"]["statistical"]["block"].copy())
-            tape.chances.setdefault("bounded", []).append(
-                frame["fdi"]["statistical"]["noise"]["bounded"].copy()
-            )
-        if k == events[0]:
-            tape.alarm = memory.copied(frames)[0]
-    assert tape is not None
-    tape.last = memory.copied(frames)[0]
-    return tape
+@kernel
+def note(record, always, early, kept, ring, alarm, state):
+    """Keep what stands at the places `always` and, up to the alarm, `early` of a record (words,): in a ring
+    of rows up to the alarm, of which `alarm` becomes a copy of the record; in rows of `kept` beyond it later.
+
+    state: frames seen; the alarm's, or -1; since which frame there is none, where one was; the two places
+    that say so. Returns whether the next row has no room.
+    """
+    k, rows = state[0], len(ring)
+    state[0] = k + 1
+    if record[state[3]] == 0 and record[state[4]] == 0:
+        if state[1] >= 0:
+            state[1], state[2] = -1, k
+    elif state[1] < 0:
+        state[1] = k
+        alarm[:] = record
+    after = k - state[1] if state[1] >= 0 else 0
+    row = k % rows if after == 0 else rows - 1 + after
+    if row >= len(kept):
+        return True
+    for j in range(len(always)):
+        kept[row, j] = record[always[j]]
+    if after == 0:
+        for j in range(len(early)):
+            ring[row, j] = record[early[j]]
+    return row + 1 == len(kept)
 
 
-def _flown(loop: Loop, first: int, end: int) -> Iterator[int]:
-    """Fly to frame `end`; yield after each frame from `first` on."""
-    turn_at = 0
-    for start in range(0, end, CHUNK_ROWS):
-        k, stop = start, min(start + CHUNK_ROWS, end)
-        loop.sample_references(start, min(CHUNK_ROWS, loop.n_frames - start))
-        while k < stop:
-            if k >= turn_at:
-                turn_at = loop.turn_to(k)
-            to = min(turn_at, stop, max(k + 1, first))
-            status = loop.fly_segment(k, to)
-            k = to
-            if k > first:
-                yield k - 1
-            if status != FLYING:
-                return
+def _words_of(frames: np.ndarray) -> np.ndarray:
+    """The words of a record that `memory` gave."""
+    assert frames.base is not None
+    return frames.base[: frames.nbytes].view(np.int64)
 
 
-def _begun(frame: np.void, scenario: Scenario, n: int) -> tuple[Tape, dict[str, Any]]:
-    """A tape of n frames that begins with this one, and where in the record each quantity stands."""
-    fdi, isolation = frame["fdi"], frame["fdi"]["isolation"]
-    config = scenario.fdi
-    estimators = isolation["estimator"][: int(isolation["n"])]
-    names = estimator_names(config.fault_class, scenario.airframe)
+def _always(record: np.void, n: int, every_type: bool) -> dict[str, np.ndarray]:
+    """What is kept of every frame, of n estimators."""
+    fdi = record["fdi"]
+    estimators = fdi["isolation"]["estimator"][:n]
     views = {
-        "x": frame["measured"]["x"], "model": frame["belief"]["means"]["acceleration"],
+        "x": record["measured"]["x"], "model": record["belief"]["means"]["acceleration"],
         "eta_bar": fdi["bound"]["eta_bar"], "noise": fdi["bound"]["noise"],
         "offset": estimators["effect"]["offset"], "slope": estimators["effect"]["Z"],
         "spread": estimators["effect"]["spread"], "excluded": estimators["excluded"],
         "types": fdi["types"]["surface"]["type_excluded"],
     }  # fmt: skip
-    if config.fault_class == "all":  # what the surfaces were told, and where healthy ones were
+    if every_type:  # what the surfaces were told, and where healthy ones were
         orders = fdi["types"]["surface"]["orders"]
         views |= {"told_least": orders["low"], "told_most": orders["high"]}
         views |= {name: orders[name] for name in ("least", "greatest")}
-    k = int(frame["k"]) - 1
-    reach = estimators["reach_low"].copy(), estimators["reach_high"].copy()
-    kept = {name: np.empty((n, *view.shape), view.dtype) for name, view in views.items()}
-    tape = Tape(k, int(frame["since"]), frame, frame, names, *reach, kept)
-    return tape, views
+    return views
+
+
+def _early(fdi: np.void, n: int, chance: bool) -> dict[str, np.ndarray]:
+    """What is kept of frames up to the alarm besides."""
+    views = {name: fdi["isolation"]["estimator"][name][:n] for name in ("reach_low", "reach_high")}
+    if chance:
+        chances = fdi["statistical"]
+        blocks = chances["block"]
+        views |= {name: blocks[name] for name in OF_BLOCK}
+        views |= {"signature": blocks["hypothesis"]["signature"], "bounded": chances["noise"]["bounded"]}
+        views |= {"air": chances["air"]["mean"], "leap": chances["air"]["leap"]}
+    return views
+
+
+def recorded(scenario: Scenario, events: Sequence[int], rows: int) -> Tape:
+    """Fly again and keep the frames around these, of so many rows; the first of them is the alarm's."""
+    recorder = Recorder(scenario)
+    fly(scenario, watch=recorder.watch)
+    return recorder.tape(events, rows)

@@ -10,7 +10,8 @@ early, out of the altitudes that are simulated: `--hours` flies further healthy 
 follow, until so many hours are full. `--flights 0 --first 200 --hours 2.5` flies these alone.
 `--declared` draws whole scenarios: turbulence, steady wind, gusts, sensors, actuators, class, and what an
 autopilot holds or turns to; declares what can be declared, and watches with the statistical detector, too;
-there is no `certain` then. A name may be a folder, `./aircraft/737`: with engines as effectors, say.
+there is no `certain` then. A name may be a folder, `./aircraft/737`: of `derive --engines`, say, whose
+engines fail besides. These have a row of their own, where only `unanticipated` is a name that is not wrong.
 
 A row an aircraft: hours flown in health and their false alarms; of each fault how many were detected, named,
 named wrongly, and how often the true surface was left out of what is still possible; how many the theory of
@@ -20,7 +21,7 @@ these were not (`late`).
 
 import argparse
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -95,7 +96,9 @@ def scenario(
         "actuator": surface, "type": "loss_of_effectiveness", "magnitude": float(rng.uniform(0.4, 1.0)),
         "at_s": float(rng.uniform(3.0, 10.0)),
     }  # fmt: skip
-    if rng.random() < 0.3:
+    if surface in plain.airframe.damage:
+        fault = {"type": "damage", "case": surface, "at_s": fault["at_s"]}
+    elif rng.random() < 0.3:
         fault |= {"profile": "incipient", "kappa_per_s": float(np.exp(rng.uniform(-1.0, 2.0)))}
     speed_mps = middle + 0.6 * (rng.uniform(low, high) - middle)
     return load({
@@ -172,10 +175,11 @@ def is_abrupt(scenario: Scenario) -> bool:
     return all(fault.profile == "abrupt" for fault in scenario.faults)
 
 
-def flown(name: str, args: argparse.Namespace) -> Iterator[tuple[str | None, Any]]:
-    """Surface, or None in health, and what came of the flight; None where it has no trim."""
-    surfaces = plain_of(name).airframe.surfaces
-    for surface in (None, *surfaces):
+def flown(
+    name: str, faulty: Iterable[str | None], args: argparse.Namespace
+) -> Iterator[tuple[str | None, Any]]:
+    """What is faulty, or None in health, and what came of the flight; None where it has no trim."""
+    for surface in faulty:
         index, flown_s, refused = args.first, 0.0, 0
         wanted_s = 3600.0 * args.hours if surface is None else 0.0
         while index < args.first + args.flights or (flown_s < wanted_s and refused < MOST_REFUSED):
@@ -210,10 +214,19 @@ def is_certain(faulty: Scenario) -> bool:
     return bool((fault.magnitude * grown > needed[there]).any())
 
 
-def row_of(name: str, args: argparse.Namespace) -> tuple[list[str], list[str]]:
-    """A row of the table, and a line on each broken promise."""
+def rows_of(name: str, args: argparse.Namespace) -> Iterator[tuple[list[str], list[str]]]:
+    """The rows of an aircraft: of its surfaces, and of engines that may fail."""
+    yield row_of(name, args)
+    aircraft = plain_of(name).airframe
+    if aircraft.effectors:
+        yield row_of(name, args, tuple(aircraft.damage))
+
+
+def row_of(name: str, args: argparse.Namespace, damage: tuple[str, ...] = ()) -> tuple[list[str], list[str]]:
+    """A row of the table, of health and surfaces, or of damage; and a line on each broken promise."""
+    faulty = damage or (None, *plain_of(name).airframe.surfaces)
     start, count, said = time.perf_counter(), dict.fromkeys(COLUMNS, 0), []
-    for surface, flight in flown(name, args):
+    for surface, flight in flown(name, faulty, args):
         detected = flight.detection_time_s is not None
         label = f"{name} {flight.scenario.name}"
         if flight.departure is not None:
@@ -227,16 +240,18 @@ def row_of(name: str, args: argparse.Namespace) -> tuple[list[str], list[str]]:
             continue
         fault = flight.scenario.faults[0]
         early = detected and flight.detection_time_s < fault.at_s
-        wrong = flight.isolated is not None and flight.isolated != surface
+        unknown = fault.type == "damage"
+        name_of_it = "unanticipated" if unknown else surface
+        wrong = flight.isolated is not None and flight.isolated != name_of_it
         left = {candidate.partition(":")[0] for candidate in flight.candidates}
-        left_out = detected and not wrong and flight.isolated is None and surface not in left
-        certain = not args.declared and is_certain(flight.scenario)
+        left_out = detected and not unknown and flight.isolated is None and surface not in left
+        certain = not (args.declared or unknown) and is_certain(flight.scenario)
         in_time = detected and flight.detection_time_s <= fault.at_s + DETECT_WITHIN_S
         count["losses"] += 1
         count["certain"] += certain
         count["late"] += certain and not in_time
         count["detected"] += detected
-        count["named"] += flight.isolated == surface
+        count["named"] += flight.isolated == name_of_it
         count["wrong"] += wrong
         count["left out"] += left_out
         count["false"] += early
@@ -263,10 +278,10 @@ def main() -> None:
     table, broken = Table(*COLUMNS), []
     for name in args.names:
         find_aircraft(reference_of(name), Path())
-        row, said = row_of(name, args)
-        table.add_row(*row)
-        broken += said
-        print("  ".join(row), *said, sep="\n   ", flush=True)
+        for row, said in rows_of(name, args):
+            table.add_row(*row)
+            broken += said
+            print("  ".join(row), *said, sep="\n   ", flush=True)
     Console(width=120).print(table)
     print("\n".join(broken) or "every promise held")
 

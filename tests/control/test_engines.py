@@ -146,6 +146,31 @@ def test_a_transport_without_ailerons_and_rudder_is_turned_by_its_engines(jet):
     assert held.metrics["authority"]["r"]["engines_greatest_rad_s2"] > 0.0
 
 
+def test_engines_together_hold_the_altitude_of_a_jammed_elevator(jet):
+    keys = {
+        "duration_s": 200,
+        "autopilot": {"altitude_m": [{"hold": True}], "airspeed_mps": [{"hold": True}]},
+        "faults": [{"actuator": "elevator", "type": "stuck", "at_s": 20}],
+        "fdi": {"fault_class": "all"},
+    }
+    held = bf.fly(scenario(jet, **keys))
+    without = bf.fly(scenario(jet, **keys, control={"power": {"enabled": False}}))
+    later_m = [np.ptp(flight.log["altitude_m"].iloc[10_000:]) for flight in (held, without)]
+    assert later_m[0] < 0.2 * later_m[1]  # the phugoid has died out
+    together = held.log[["engine_1_difference", "engine_2_difference"]].to_numpy()
+    assert np.corrcoef(together.T)[0, 1] > 0.99
+
+
+def test_an_engine_that_fails_is_no_surface(jet):
+    """It goes to idle, as JSBSim's own thrust says, turns the aircraft, and nothing is named."""
+    keys = {"duration_s": 25, "fdi": {"fault_class": "all", "statistical": {}}}
+    flight = bf.fly(scenario(jet, **keys, faults=[{"type": "damage", "case": "engine_1-at-idle", "at_s": 5}]))
+    thrust, turning = (flight.log[name].to_numpy() for name in ("thrust", "engines_n"))
+    assert thrust[-1] < 0.7 * thrust[400]
+    assert abs(turning[-1] - turning[400]) > 0.2 * thrust[400] * 4.902 / 28.88 / 2.0
+    assert flight.metrics["isolation"]["fault"] is None
+
+
 @pytest.mark.parametrize(
     ("change", "says"),
     [

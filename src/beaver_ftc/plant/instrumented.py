@@ -55,6 +55,7 @@ SIGNALS = {
 }
 
 LEVER, DIFFERENCE = "fcs/actuated-throttle-norm", "fcs/actuated-throttle-{i}-difference"
+AT_IDLE = "failures/engine-{i}-at-idle"
 GEAR, RETRACTED = "gear/gear-pos-norm", "gear/retracted-pos-norm"
 _OF_THE_FLOW = ("alpha_rate", "beta_rate")  # an aircraft without engines has not the properties of others
 
@@ -126,7 +127,7 @@ def _common(engines: int, read: str, absent: Iterable[str], apart: bool) -> Elem
     system, levers = parts.find("system"), parts.findall("each/*" if apart else "lever/*")
     assert system is not None
     if apart:
-        absent = (*absent, *(DIFFERENCE.format(i=i) for i in range(engines)))
+        absent = (*absent, *(of.format(i=i) for i in range(engines) for of in (DIFFERENCE, AT_IDLE)))
         for read_it in parts.iterfind("told//property"):
             read_it.text = (read_it.text or "").replace(LEVER, "fcs/actuated-throttle-{i}-norm")
     for name in reversed(tuple(absent)):

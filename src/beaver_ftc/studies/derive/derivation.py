@@ -246,6 +246,9 @@ def _with_engines(source: Source, level: outline.Level, folder: Path) -> outline
         raise BadInput(f"{source.says}: its engines do not yaw it, allowed: engines beside one another")
     data["engine"] |= {"thrust": thrust}
     data["effectors"] = found
+    data["damage"] = {
+        f"{name}-at-idle": {"property": instrumented.AT_IDLE.format(i=i)} for i, name in enumerate(found)
+    }
     return data, outline.plant_of(data, folder), trim
 
 

@@ -7,8 +7,8 @@ sideways in yaw [MIL-F-8785C, 3.7]:
 
 Vanes and airspeed give the velocity through the moving air; the forces, attitude and gravity say how that
 through still air would have changed. The difference is the gust's own change. The rolling gust, which
-changes across the span, is seen by no instrument. Where the design model has no forces, as a derived
-aircraft's, accelerometers say them; without these no gust is seen: a change of the aircraft's own velocity
+changes across the span, is seen by no instrument. Where the design model has no forces, as the
+GTM's, accelerometers say them; without these no gust is seen: a change of the aircraft's own velocity
 would be taken for one.
 
 Velocity is followed as JSBSim moves it, by Adams and Bashforth's two steps: v' = v + dt (3 a - a_before) / 2.

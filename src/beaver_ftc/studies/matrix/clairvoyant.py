@@ -54,15 +54,16 @@ def seen_when_told(scenario: "Scenario", kept: Columns, surface: str) -> Documen
 
 
 def _declared(scenario: "Scenario") -> tuple[Context, np.ndarray]:
-    """What is declared of a flight but the coefficients, the air as the vanes show it; and their tolerances,
-    absolute."""
+    """What is declared of a flight but the coefficients, the air as the vanes show it, if they
+    do; and their tolerances, absolute."""
     from beaver_ftc.loop.loop import Loop
     from beaver_ftc.loop.plugin_frame import context_of
 
     loop = Loop(scenario)
     exact = scenario.with_({"fdi.bounds.coefficients": 0.0})
     coefficients = context_of(loop.frames, scenario, loop.start, {}).declared.coefficients
-    noise_rad_s2 = np.sqrt(loop.frames["fdi"]["statistical"]["noise"]["jitter"][0])
-    context = aware_of_the_air(context_of(loop.frames, exact, loop.start, {}), noise_rad_s2)
+    context, statistical = context_of(loop.frames, exact, loop.start, {}), loop.frames["fdi"]["statistical"]
+    if statistical["air"]["seen"][0]:
+        context = aware_of_the_air(context, np.sqrt(statistical["noise"]["jitter"][0]))
     loop.release()
     return context, coefficients

@@ -125,7 +125,7 @@ def test_swapped_rates_are_found_by_the_roll_they_make():
 @pytest.mark.parametrize(("factor", "angle", "says"), [
     (1.0, 1.0, None),
     (180 / np.pi, 1.0, "gy is in deg/s, a factor of 0.01745 fits"),
-    (1.0, 180 / np.pi, "pitch is in deg, a factor of 0.01745 fits"),
+    (1.0, 180 / np.pi, "it is in deg, a factor of 0.01745 fits"),
     (np.pi / 180, 1.0, "a factor of 57.3 on gy fits, or of 0.01745 on pitch"),
     (-1.0, 1.0, "the change of pitch is -1 times the integral of gy: one of them has the other sign"),
 ])  # fmt: skip

@@ -49,7 +49,8 @@ def _log(frames: np.ndarray, flown: Iterable[int], scenario: Scenario, recorder:
         of_frame = frame["measured"]["x"], frame["belief"]["means"]["acceleration"], fdi["bound"]["eta_bar"]
         if scenario.fdi.statistical:
             shares = chance.shares(fdi["statistical"], surfaces)
-        values = [fdi["verdict"]["detected"], *estimators["excluded"], *shares.values()]
+        alarm = fdi["verdict"]["detected"] or fdi["watch"]["alarmed"]  # as in a log of ours
+        values = [alarm, *estimators["excluded"], *shares.values()]
         rows.append(np.concatenate([[k / scenario.rate_hz], *of_frame, values]))
     log.open([*columns, *shares])
     log.write(np.array(rows))

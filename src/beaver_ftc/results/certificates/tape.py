@@ -58,10 +58,6 @@ class Tape:
         """The frame after the last."""
         return self.first + self.frames
 
-    def at(self, k: int) -> int:
-        """The place of frame k."""
-        return k - self.first
-
 
 class _Places:
     """Where in a record quantities stand, as numbers of its words; and what they are again."""

@@ -12,11 +12,11 @@ from pyarrow.parquet import read_table
 
 class Flight:
     def __init__(self, about, log):  # sections 1 and 2, by row: nu, n, the published eta_bar, health's most
-        ends, self.log, self.dt = ("measured_rad_s", "design_rad_s2", "eta_bar_rad_s2"), log, about["dt_s"]
+        ends, self.log = ("measured_rad_s", "design_rad_s2", "eta_bar_rad_s2"), log
         self.x, self.F, self.eta_bar = (np.column_stack([log[f"{i}_{end}"] for i in "pqr"]) for end in ends)
         x, said, omega, parts = self.x, about["declared"], about.get("omega_E", 0), about.get("instants", 1)
         c, b, g, o, beta, m = (np.array([said[name].get(axis, 0.0) for axis in "pqr"]) for name in "cbgoBm")
-        f, self.late = abs(x) + (o + m * abs(x)) / (1 - m), int(parts > 1)
+        f, self.late, self.dt = abs(x) + (o + m * abs(x)) / (1 - m), int(parts > 1), about.get("dt_s", 1)
         earth = omega * ((1 + g) * f.sum(axis=1, keepdims=True) + g * omega) + 1e-11
         self.bound = np.roll(c * f[:, [1, 0, 0]] * f[:, [2, 2, 1]] + b + earth, 1, 0) / parts
         self.nu, self.n = np.diff(x, axis=0, prepend=x[:1]) / self.dt - self.F, o - beta + m * f
@@ -25,20 +25,18 @@ class Flight:
         self.shows = shows & np.roll(shows, self.late) & np.roll(shows, -self.late)
 
     def sides(self, one, said, to):  # section 4, a filter along d: value, limit, what theta multiplies
-        k, dt, d, fault = one["frame"], self.dt, np.array(one["d"]), one.get("fault", 0)
+        k, dt, d, fault, theta = one["frame"], self.dt, np.array(one["d"]), one.get("fault", 0), said["theta"]
         a, since = np.exp(-one.get("pole_per_s", np.inf) * dt), one.get("since", k - 1)
         rows, past, n = slice(one["first"], k + 1), slice(since + 1, k + 1), self.n @ abs(d)
-        logged = all(np.array_equal(one[it], vars(self)[it][rows]) for it in ("x", "F", "eta_bar"))
-        fits = logged and np.allclose(self.bound[rows] + one.get("rest", 0), one["eta_bar"], 1e-14, 0)
+        fits = [np.array_equal(one[it], vars(self)[it][rows]) for it in ("x", "F", "eta_bar")]
+        fits += [np.allclose(self.bound[rows] + one.get("rest", 0), one["eta_bar"], 1e-14, 0)]
         h, Z, r = (np.array(one.get(name, [0] * len(one["x"])), float) for name in "hZr")
-        fits &= min(*r, fault) >= 0 and (self.shows[k] or "shows" not in said["theta"])
-        fits = fits and 0 <= since < one["first"] <= k <= said.get("frame", k)
-        require(fits and (said["what"] or not np.any([h, Z])), "not so logged, or not to be admitted")
-        h, Z = (np.fmax(0, np.fmax(h + to[0] * Z, h + to[1] * Z)), 0) if said["theta"] == "any" else (h, Z)
-        w = a ** np.arange(k - since - 1.0, -1, -1)
+        fits += [0 <= since < one["first"] <= k <= said.get("frame", k), said["what"] or not np.any([h, Z])]
+        require(all(fits) and min(*r, fault) >= 0 and (self.shows[k] or "shows" not in theta), "not logged")
+        h, Z = (np.fmax(0, np.fmax(h + to[0] * Z, h + to[1] * Z)), 0) if theta == "any" else (h, Z)
+        w, v = a ** np.arange(k - since - 1.0, -1, -1), dt * a ** np.arange(len(h) - 1.0, -1, -1)
         most = w @ (dt * self.eta_bar[past] @ abs(d) + (1 - a) * n[since:k]) + a * w[0] * n[since] + n[k]
-        most += dt * w[-len(h) :] @ (h + r) + a ** len(h) * fault
-        return np.array([w @ (dt * self.nu[past] @ d), most, dt * sum(w[-len(h) :] * Z)])
+        return np.array([w @ (dt * self.nu[past] @ d), most + v @ (h + r) + a ** len(h) * fault, sum(v * Z)])
 
     def course(self, said):  # fault-types.md: frames bound a deflection; pairs: more than a type allows
         found, get, (_, kind, *how) = [], said.get, said["what"].split()
@@ -79,14 +77,16 @@ def failures(about, log):  # a line for each statement that does not hold; log: 
     text = dumps(about | {"digest": ""}, sort_keys=True, separators=(",", ":")).encode()
     if (sha256(text).hexdigest(), len(log["t_s"]), 4) != (about["digest"], about["rows"], about["format"]):
         yield "this is not what was written, or not of this log"
-    for said in about["statements"]:
-        name, what, k = said["column"], said["what"], said.get("frame")
+    every = [about["statements"][0] | i if "as" in i else i for i in about["statements"]]  # as the alarm
+    for said, name, what, k in ((i, i["column"], i["what"], i.get("frame")) for i in every):
         try:
             require(name in ((None, f"fie_{what}_excluded") if what else ("detected",)), "of another column")
             require(not name or log[name][k:].all() > log[name][k - 1], f"{name} is not set in that frame")
             to, its = (said.get("least", -1e99), said.get("most", 1e99)), Flight(about, log)
             sums = [abs(one["weight"]) * its.sides(one, said, to) for one in said.get("terms", [])]
+            sums += [np.array([z - foretold, may, 0]) for z, foretold, may in said.get("looks", [])]  # 9
             value, limit, slope = sum(sums) if sums else (its.course if "bounds" in said else its.score)(said)
+            require("looks" not in said or log["watch_share"][k] * (1 + 1e-9) > value / limit, "not logged")
             limit += abs(slope) > 1e-12 and max(to[0] * slope, to[1] * slope)
             require(np.all(value > limit) and np.allclose([value, limit], said["sides"], 1e-12, 0), "not so")
         except (AssertionError, ValueError, KeyError, IndexError, TypeError) as why:

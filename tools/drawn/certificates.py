@@ -41,12 +41,14 @@ def main() -> None:
     parser.add_argument("--altered", type=int, default=100)
     args = parser.parse_args()
     rng, count, sizes, unseen = np.random.default_rng(args.seed), Counter(), [0], Counter()
+    without: Counter[str] = Counter()
     ms: Times = []
     for index, certificate, log in certified(args.seed, args.flights, ms):
         refused = [*failures(certificate, log)]
         count["flights"] += 1
         count["statements"] += len(certificate["statements"])
         count["not certified"] += len(certificate["without"])
+        without.update(f"{_kind(said)}: {said['because']}" for said in certificate["without"])
         count["refused"] += bool(refused)
         doubted = [*doubts(certificate, log)]
         count["doubted by a second reader"] += bool(doubted)
@@ -68,9 +70,16 @@ def main() -> None:
     print(*(f"{word} {n}" for word, n in count.items()), f"largest {max(sizes)} bytes", sep=", ")
     kept, wrote = np.median(ms, axis=0) if ms else (0.0, 0.0)
     print(f"of the processor {kept:.1f} ms to keep the frames, {wrote:.1f} ms to write it (medians)")
+    for reason, n in without.most_common():
+        print(f"{n:6d} without: {reason}")
     print(f"with the digest written anew {unseen.total()} accepted:", dict(unseen.most_common()))
     wrong = ("refused", "doubted by a second reader", "accepted", "readers disagree")
     raise SystemExit(1 if any(count[word] for word in wrong) or unseen else 0)
+
+
+def _kind(said: Document) -> str:
+    """Of which kind an event is."""
+    return "alarm" if said["what"] is None else "exclusion" if said["column"] else "type"
 
 
 def certified(seed: int, flights: int, ms: Times) -> Iterator[tuple[int, Document, Columns]]:

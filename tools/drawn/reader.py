@@ -16,6 +16,8 @@ Columns = dict[str, np.ndarray]
 Vector = list[float]
 ROUNDING_RAD_S2 = 1e-11  # rho
 OTHER_TWO = ((1, 2), (0, 2), (0, 1))
+_ANGLES = "turning p", "turning q", "turning r", "phi", "theta", "psi"
+TESTS = (*_ANGLES, "V", "alpha", "beta", "density", "altitude", "engine_rpm", "manifold_pressure")
 PUBLISHED_TO_SHARE, SIDES_TO_SHARE = 3e-14, 1e-12
 
 
@@ -28,7 +30,7 @@ class Flight:
 
     def __init__(self, document: Document, log: Columns) -> None:
         declared = document["declared"]
-        self.log, self.rows, self.dt = log, len(log["t_s"]), document["dt_s"]
+        self.log, self.rows, self.dt = log, len(log["t_s"]), document.get("dt_s")
         self.instants = document.get("instants", 1)
         self.declared = {name: _by_axis(declared[name]) for name in ("c", "b", "g", "o", "B", "m")}
         self.earth = document.get("omega_E", 0.0)
@@ -90,9 +92,18 @@ def doubts(document: Document, log: Columns) -> Iterator[str]:
             flight = Flight(document, log)
             _times(flight)
             for said in document["statements"]:
-                _statement(said, flight)
+                _statement(_in_full(said, document["statements"][0]), flight)
         except (Doubtful, KeyError, IndexError, TypeError, ValueError, ZeroDivisionError) as why:
             yield str(why)
+
+
+def _in_full(said: Document, alarm: Document) -> Document:
+    """A statement; of a fault that moves nothing where chance raised the alarm, with the alarm's evidence."""
+    if "as" not in said:
+        return said
+    if alarm["what"] is not None or "likelihood" not in alarm or alarm["frame"] > said["frame"]:
+        raise Doubtful(f"{said['what']}: no alarm of chance before")
+    return {**alarm, **said}
 
 
 def _sets(column: np.ndarray, k: int) -> bool:
@@ -103,7 +114,7 @@ def _sets(column: np.ndarray, k: int) -> bool:
 def _times(flight: Flight) -> None:
     """Rows are frames of dt."""
     for k, t in enumerate(flight.log["t_s"]):
-        if not isclose(t, k * flight.dt, abs_tol=1e-6):
+        if flight.dt is not None and not isclose(t, k * flight.dt, abs_tol=1e-6):
             raise Doubtful(f"row {k} is of another time")
 
 
@@ -117,9 +128,10 @@ def _statement(said: Document, flight: Flight) -> None:
         flight.log[column], k
     ):
         raise Doubtful(f"{what}: {column} is not set then")
-    how = _weighed if "likelihood" in said else _compared if said["theta"] == "course" else _added
+    how = _weighed if "likelihood" in said else _read if "looks" in said else _added
+    how = _compared if said.get("theta") == "course" else how
     found = how(said, flight)
-    stated = said["sides"] if how is not _added else [[side] for side in said["sides"]]
+    stated = said["sides"] if how in (_weighed, _compared) else [[side] for side in said["sides"]]
     for value, limit, *two in zip(*zip(*found, strict=True), *stated, strict=True):
         if not value > limit or not all(
             isclose(*pair, rel_tol=SIDES_TO_SHARE) for pair in zip((value, limit), two, strict=True)
@@ -139,6 +151,20 @@ def _added(said: Document, flight: Flight) -> list[tuple[float, float]]:
     if abs(slope) > 1e-12:
         limit += (said["most"] if slope > 0.0 else said["least"]) * slope
     return [(value, limit)]
+
+
+def _read(said: Document, flight: Flight) -> list[tuple[float, float]]:
+    """A residual of section 9 and its bound: what the look before left of both, and what this one adds."""
+    k, residual, bound = said["frame"], 0.0, 0.0
+    for reading, foretold, most in reversed(said["looks"]):
+        if most < 0.0:
+            raise Doubtful("sound instruments that differ by less than nothing")
+        residual, bound = residual + reading - foretold, bound + most
+    if said["what"] is not None or TESTS[int(flight.log["watch_test"][k])] != said["test"]:
+        raise Doubtful(f"row {k} is of another test")
+    if residual / bound > flight.log["watch_share"][k] * (1.0 + 1e-9):  # the largest of the row's looks
+        raise Doubtful(f"the share in row {k} is smaller")
+    return [(residual, bound)]
 
 
 def _followed(one: Document, said: Document, flight: Flight) -> tuple[float, float, float]:
@@ -282,7 +308,8 @@ def _weighed(said: Document, flight: Flight) -> list[tuple[float, float]]:
     axes, tolerance, filters = said["axes"], np.array(said["tolerance"]), Whitening(said)
     N, D, R, foretold, w = 0.0, 0.0, np.zeros(len(tolerance)), 0.0, np.zeros(len(axes))
     swinging = pacing = last = staying = 0.0
-    if said["first"] + len(said["frames"]) - 1 != said["frame"]:
+    last_row = said["first"] + len(said["frames"]) - 1
+    if last_row > said["frame"] or (last_row != said["frame"] and "as" not in said):
         raise Doubtful("frames are missing")
     for k, its in enumerate(said["frames"], said["first"]):
         nu = np.array([flight.innovation(k)[axis] for axis in axes]) - its.get("air", 0.0)
@@ -303,5 +330,5 @@ def _weighed(said: Document, flight: Flight) -> list[tuple[float, float]]:
         raise Doubtful("information that is none")
     level = said["level"] * D**0.5
     limit = max(level, staying + min(swinging + last, pacing) + 0.5 * level)
-    logged = float(flight.log[said["likelihood"]][said["frame"]]) * (1.0 + 1e-5)
+    logged = float(flight.log[said["likelihood"]][last_row]) * (1.0 + 1e-5)
     return [(evidence, limit), (logged, evidence / limit)]

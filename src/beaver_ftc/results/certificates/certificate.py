@@ -19,7 +19,7 @@ from beaver_ftc.diagnosis.bounds.declared import poles_for_noise
 from beaver_ftc.diagnosis.state import LOSS
 from beaver_ftc.diagnosis.types.registry import STUCK
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.results.certificates import chance, courses, kinds
+from beaver_ftc.results.certificates import chance, courses, instruments_say, kinds
 from beaver_ftc.results.certificates.inequality import (
     Document,
     History,
@@ -87,7 +87,7 @@ def certificate_of(scenario: Scenario, rows: Columns, events: dict[str, int], ta
         history = history_of(scenario, rows, tape)
         for found in statements(scenario, tape, history, events):
             said = _beside_the_log(found, rows)
-            certain = "sides" in said
+            certain = "sides" in said or "as" in said
             document["statements" if certain else "without"].append(said if certain else _without(said))
         if document["statements"]:
             document |= _declared(scenario, history, document["statements"])
@@ -112,7 +112,9 @@ def _declared(scenario: Scenario, history: History, said: list[Document]) -> Doc
     frames = [np.arange(span["first"], span["frame"] + 1) for span in spans]
     shown = any("shows" in one.get("theta", "") or "bounds" in one for one in said)  # which asks all axes
     asked = np.array([shown or any(span["d"][i] for span in spans) for i in range(3)])
-    about: Document = {"dt_s": history.dt, "declared": declaration(history, frames, asked)}
+    about: Document = {"declared": declaration(history, frames, asked)}
+    if not all("looks" in one for one in said):
+        about["dt_s"] = history.dt
     if frames:
         about |= {"instants": scenario.substeps, "omega_E": history.declared["earth_rad_s"]}
     return about
@@ -175,20 +177,26 @@ def statements(
         yield {"what": None, "column": "detected", "frame": alarm, "because": "another scheme was in charge"}
         return
     watched = fdi["watch"]["alarmed"]
-    because = "instruments, held against one another, raised it" if watched else chance.NOT_STATED
+    because = instruments_say.NOT_STATED if watched else chance.NOT_STATED
     found = _of_alarm(scenario, tape, history, alarm)
     said = _stated(found, history, because, what=None, column="detected", frame=alarm)
-    if found is None and not watched and scenario.fdi.statistical:
+    if found is None and watched:
+        said |= instruments_say.of_alarm(fdi["watch"])
+    elif found is None and scenario.fdi.statistical:
         said |= chance.of_alarm(tape, history, scenario.airframe.surfaces, alarm) or {}
-        if "sides" in said:
-            del said["because"]
+    if "sides" in said:
+        said.pop("because", None)
     yield said
     for e, name in enumerate(tape.names):
         column = f"fie_{name}_excluded"
         if column in events:
-            k, because = events[column], "chance excluded it" if events[column] < tape.end else LATE
+            k, because = events[column], chance.NOT_EXCLUDED if events[column] < tape.end else LATE
             found = None if because == LATE else _of_exclusion(scenario, tape, history, e, alarm, k)
-            yield _stated(found, history, because, what=name, column=column, frame=k)
+            about: Document = {"what": name, "column": column, "frame": k}
+            if found is None and because != LATE and chance.says_nothing_of(tape, e, said):
+                yield about | {"as": "alarm"}
+                continue
+            yield _stated(found, history, because, **about)
     if scenario.fdi.fault_class == "all":
         yield from _of_types(scenario, tape, history, alarm)
 

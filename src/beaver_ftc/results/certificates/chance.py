@@ -19,9 +19,11 @@ from beaver_ftc.results.certificates.tape import OF_BLOCK, Tape
 
 _AS_LOGGED = 1e-5  # of the alarm's score: more than all that is left out makes
 _FORGOTTEN = 1e-7  # of the limit
+_CONSTANTS = 6  # of more in each frame a certificate would have over 200 kB too
 _LONGEST = 520  # frames: of more a certificate would have over 200 kB
 NOISE, SWINGS, PACE = range(3)  # what the evidence must exceed: chance alone, or bounded uncertainty besides
 OF_FRAME = JITTER, FORESEEN, BOUNDED, COURSE = range(4)  # the last: keep, and pace
+NOT_EXCLUDED = "chance excluded it, weighing every onset of every fault: more than a certificate can hold"
 NOT_STATED = "chance raised it: an onset long before, a tone, or a force"
 
 
@@ -41,6 +43,15 @@ def of_alarm(tape: Tape, history: History, surfaces: Sequence[str], k: int) -> D
     if not (value > limit and abs(value / limit - score) <= _AS_LOGGED * score):
         return None
     return {"likelihood": _column(hypothesis, surfaces), **said, "sides": [[value], [limit]]}
+
+
+def says_nothing_of(tape: Tape, e: int, alarm: Document) -> bool:
+    """Whether chance raised the alarm where the fault of estimator e moves nothing: then it is excluded."""
+    if "likelihood" not in alarm:
+        return False
+    here = slice(alarm["first"] - 1 - tape.first, alarm["frame"] + 1 - tape.first)
+    moved = [values[here, e][:, alarm["axes"]].any() for values in (tape.slope, tape.offset, tape.spread)]
+    return not any(moved)
 
 
 def with_share(said: Document, logged: float) -> Document:
@@ -80,6 +91,9 @@ def _leave_out(said: Document, history: History) -> None:
             del its["pace"]
     m = len(said["tolerance"])
     matters = [j for j in range(m) if said["tolerance"][j] * abs(sums.of[2 + j]) > _FORGOTTEN * limit]
+    if len(matters) > _CONSTANTS:
+        _add_up(said, np.array(said["tolerance"]) * np.sign(sums.of[2:]))
+        matters = [0]
     said["tolerance"] = [said["tolerance"][j] for j in matters]
     said["Y"] = [[row[0], None, *(row[2 + j] for j in matters)] for row in said["Y"]]
     for its in said["frames"]:
@@ -92,6 +106,14 @@ def _leave_out(said: Document, history: History) -> None:
             if abs(felt * row[c]) * tolerance < _FORGOTTEN * limit:
                 row[c] = None
     _leave_out_variances(said, history)
+
+
+def _add_up(said: Document, worst: np.ndarray) -> None:
+    """Put one constant in the place of many: all at their `worst`, which is linear in them."""
+    said["tolerance"] = [1.0]
+    said["Y"] = [[*row[:2], float(worst @ row[2:])] for row in said["Y"]]
+    for its in said["frames"]:
+        its["known"] = [(worst @ np.array(its["known"])).tolist()]
 
 
 def _leave_out_variances(said: Document, history: History) -> None:

@@ -43,13 +43,15 @@ def _log(frames: np.ndarray, flown: Iterable[int], scenario: Scenario, recorder:
     columns = ["t_s", *(f"{axis}_{what}" for what in MEASURED_MODEL_BOUND for axis in AXES), "detected"]
     columns += [f"fie_{name}_excluded" for name in names]
     shares: dict[str, float] = {}
-    rows = []
+    watch, rows = fdi["watch"], []
     for k in flown:
         recorder.keep()
         of_frame = frame["measured"]["x"], frame["belief"]["means"]["acceleration"], fdi["bound"]["eta_bar"]
         if scenario.fdi.statistical:
             shares = chance.shares(fdi["statistical"], surfaces)
-        alarm = fdi["verdict"]["detected"] or fdi["watch"]["alarmed"]  # as in a log of ours
+        if watch["enabled"]:
+            shares |= {"watch_share": watch["share"], "watch_test": watch["furthest"]}
+        alarm = fdi["verdict"]["detected"] or watch["alarmed"]  # as in a log of ours
         values = [alarm, *estimators["excluded"], *shares.values()]
         rows.append(np.concatenate([[k / scenario.rate_hz], *of_frame, values]))
     log.open([*columns, *shares])

@@ -135,7 +135,8 @@ def everything(scenario: Scenario, seed: int, index: int) -> Scenario:
 
 
 def wind(rng: np.random.Generator) -> dict[str, Any]:
-    """Steady wind, now and then, and up to three gusts of any shape: there is no bound that covers them."""
+    """Steady wind, now and then, and up to three gusts of any shape. They do not rotate: the air data show
+    all that they do, and nothing declares them."""
     air: dict[str, Any] = {}
     if rng.random() < 0.3:
         air["wind_mps"] = [*rng.uniform(-12.0, 12.0, 2).tolist(), float(rng.uniform(-1.0, 1.0))]

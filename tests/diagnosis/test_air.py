@@ -42,7 +42,8 @@ class Flown:
         environment |= keys.pop("environment", {})
         bounds = {"turbulence": turbulence if turbulence != "none" else "light"}
         fdi = {"statistical": {}, "bounds": bounds}
-        given = scenario(**{"uncertainty": {}, "environment": environment, "fdi": fdi, **keys})
+        keys = {"uncertainty": {}, "environment": environment, "fdi": fdi, **keys}
+        given = load_given(keys) if "aircraft" in keys else scenario(**keys)
         loop = Loop(given)
         loop.sample_references(0, loop.n_frames)
         nodes = [loop.plant.node(f"atmosphere/{axis}-turb-rad_sec") for axis in "pqr"]
@@ -62,7 +63,7 @@ class Flown:
         self.seen, self.true = rows[:, 0:3], rows[:, 3:6]
         self.airspeed, self.heading = rows[:, 6].mean(), np.unwrap(rows[:, 7])
         self.force, self.felt = rows[:, 8:11], rows[:, 11:14]
-        self.rate_hz, self.turbulence = given.rate_hz, turbulence
+        self.rate_hz, self.turbulence, self.record = given.rate_hz, turbulence, record
 
     def intensity(self, signal, over_s=MEMORY_S):
         """Of the random walk that differs as much over so long (3,), as a share of what is declared."""
@@ -161,6 +162,27 @@ def test_where_no_model_has_the_forces_only_accelerometers_tell_a_gust(tmp_path,
     seen = float(np.abs(statistical["air"]["acceleration"]).max())
     assert (seen == 0.0) is (forces == "nobody's")
     assert (seen > 0.05) is (forces == "claimed")
+
+
+def test_where_no_model_has_the_forces_the_vanes_show_a_gust_roughly_for_a_law_that_answers_them(
+    tmp_path, monkeypatch
+):
+    """As JSBSim has it, in turns and climbs, over a filter's memory; the innovation keeps all of it."""
+    shutil.copytree(ROOT / "tests/data/aircraft/trainer", tmp_path / "trainer")
+    file = tmp_path / "trainer/aircraft.yaml"
+    text = yaml.safe_load(file.read_text())
+    del text["forces"]
+    file.write_text(yaml.safe_dump(text))
+    monkeypatch.chdir(tmp_path)
+    sine = {"sine": {"amplitude_deg_s": 4, "frequency_hz": 0.2}}
+    flown = Flown(
+        "moderate", aircraft="./trainer", duration_s=20, seed=3, reference={"p": [sine], "q": [sine]}
+    )
+    seen, true = (gust[5:, 1:] - gust[:-5, 1:] for gust in (flown.seen, flown.true))
+    for axis in (0, 1):
+        assert np.corrcoef(seen[:, axis], true[:, axis])[0, 1] > 0.95
+    record = flown.record
+    assert np.abs(record["shown"]).max() > 0.0 == np.abs(record["acceleration"]).max()
 
 
 def test_nor_does_it_when_the_force_jumps_between_coarse_frames():

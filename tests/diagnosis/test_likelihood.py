@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from innovations import block_of, bounded_all, by_onset, covariance, drawn, weigh_all, with_hypotheses
+from scipy.signal import lfilter
 from scipy.stats import kstest
 
 from beaver_ftc.diagnosis import likelihood
@@ -270,10 +271,12 @@ def _beside(block):
     return block
 
 
-def _largest_share(block, innovations, moments):
-    """Largest evidence for a loss, in standard deviations, innovations and moments (k,) rad/s2."""
+def _largest_share(block, innovations, moments, shown=None):
+    """Largest evidence for a loss, in standard deviations, innovations and moments (k,) rad/s2; shown: of a
+    gust, by the vanes."""
     block["level"], most = 0.0, 0.0
     for k, (nu, moment) in enumerate(zip(innovations, moments, strict=True)):
+        block["shown"][0] = 0.0 if shown is None else shown[k]
         likelihood.start(block, likelihood.slot_to_start(k))
         block["scratch"][0], block["hypothesis"][0]["signature"][0] = nu, moment
         if block["calm"]["n"]:
@@ -301,6 +304,26 @@ def test_a_law_that_answers_noise_shows_no_loss_in_air_calmer_than_declared():
     answered = _shares(20, True, 0.0, lambda gyro: 2.5 * gyro[:-1])
     assert _shares(20, False, 0.0, lambda gyro: 2.5 * gyro[:-1]).min() > 5.0  # the evidence, were it not so
     assert answered.max() < 3.5
+
+
+def _answers_the_vanes(shown):
+    """Largest shares of 20 flights: surfaces that answer a vane, whose gust pitches as it changes."""
+    rng, shares = np.random.default_rng(6), []
+    lag = np.exp(-FRAME_S / 0.15)
+    for _ in range(20):
+        flow = lfilter([1.0], [1.0, -np.exp(-FRAME_S / 2.0)], rng.standard_normal(601))
+        pitching = 10.0 * lfilter([1.0 - lag], [1.0, -lag], np.diff(flow))
+        block = with_hypotheses(block_of(GUSTS, [QUIET_RAD_S]), LOSS)
+        block["glimpsed"] = shown
+        noise = np.diff(QUIET_RAD_S * rng.standard_normal(601)) / FRAME_S
+        innovations = pitching + noise
+        shares.append(_largest_share(block, innovations, -flow[:-1], pitching))
+    return np.array(shares)
+
+
+def test_a_law_that_answers_the_vanes_shows_no_loss_where_what_they_show_pitches():
+    assert _answers_the_vanes(shown=False).min() > 6.0  # the evidence, were it not so
+    assert _answers_the_vanes(shown=True).max() < 3.5
 
 
 def test_in_air_as_declared_a_loss_shows_as_if_the_air_might_not_be_calm():

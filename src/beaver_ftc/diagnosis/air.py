@@ -9,7 +9,8 @@ Vanes and airspeed give the velocity through the moving air; the forces, attitud
 through still air would have changed. The difference is the gust's own change. The rolling gust, which
 changes across the span, is seen by no instrument. Where the design model has no forces, as the
 GTM's, accelerometers say them; without these no gust is seen: a change of the aircraft's own velocity
-would be taken for one.
+would be taken for one. It is only shown, as it would be if lift held the weight: fast changes are the gust's,
+and a law that answers the vanes moves the surfaces along with its rotation, as if they were lost.
 
 Velocity is followed as JSBSim moves it, by Adams and Bashforth's two steps: v' = v + dt (3 a - a_before) / 2.
 """
@@ -35,11 +36,13 @@ from beaver_ftc.plant.instruments import wrapped
 UNSEEN = (1.0, 0.003, 0.03)
 BY_FORCE = 0.01  # share of the intensity that errors of a tenth leave of the gusts that forces show
 TWO_STEPS = 1.6  # times its noise does an acceleration scatter by Adams and Bashforth: sqrt(1.5^2 + 0.5^2)
+STEEP = 0.5  # cosine of the steepest bank at which lift is taken to hold the weight
 LEAST_SWING = 0.01  # of a gust's own intensity: less is not reckoned with
 
 AIR = record(
     moving=int, started=int,  # whether there is turbulence; whether `pull` is known
     modelled=int, seen=int,  # whether the design model has forces; whether the vanes tell a gust
+    glimpsed=int, shown=3,  # whether they do but roughly; what a gust so shown does, rad/s2
     read=int, felt=3,  # whether accelerometers are read; what they say, m/s2
     forces=TABLE, scratch=MAX_MONOMIALS,  # force coefficients
     area_per_mass=float, gravity=float, span=float, velocity=3, force=3, turn=(3, 3), heading=float,
@@ -208,16 +211,20 @@ def effect(air, design, x, y, u):
     """
     if air.read:
         air.force[:] = air.felt
+    elif air.glimpsed:  # lift holds the weight, and turns as far as the bank goes
+        air.force[0] = air.force[1] = 0.0
+        air.force[2] = -air.gravity / max(air.turn[2, 2], STEEP)
     else:
         specific_force(air, x, y, u, air.force)
     rate_damping(design, x, y, u, air.scratch, air.damping)
     for i in range(3):
         known = air.axes[i, 1] * air.gust[1] + air.axes[i, 2] * air.gust[2]
-        air.rotation[i] = known if air.seen else 0.0
+        air.rotation[i] = known if air.seen or air.glimpsed else 0.0
     for i in range(3):
-        air.acceleration[i] = 0.0
+        moved = 0.0
         for j in range(3):
-            air.acceleration[i] -= air.damping[i, j] * air.rotation[j]
+            moved -= air.damping[i, j] * air.rotation[j]
+        air.acceleration[i], air.shown[i] = (moved, 0.0) if air.seen else (0.0, moved)
 
 
 @kernel
@@ -344,6 +351,7 @@ def set_up_air(air: np.void, turbulence: str, mass: MassProperties, aircraft: Ai
     span_m = aircraft.geometry.span_m
     air["moving"], air["modelled"] = turbulence != "none", bool(aircraft.measurable_forces)
     air["seen"] = air["modelled"] or air["read"]  # only where forces are known
+    air["glimpsed"] = air["moving"] and not air["seen"]
     fill_table(air["forces"], aircraft, aircraft.measurable_forces, FORCES)
     air["area_per_mass"] = aircraft.geometry.wing_area_m2 / mass.mass_kg
     air["gravity"] = GRAVITY_MPS2  # standard; what is constant has no part in a change of the gust

@@ -45,6 +45,9 @@ answers the same noise through the surfaces, so a loss then shows where there is
 is fitted, lambda = sum p' S^-1 g / sum p' S^-1 p: 0 in air as declared, 1 in calm air. What lambda p gives
 the evidence is taken off it.
 
+Nor is a gust that vanes show, but forces do not tell from the aircraft's own way, independent of the surfaces
+of a law that answers the vanes. What it gives the evidence, whitened alike, is taken off that.
+
 Onsets: slot j starts anew every 2^(j+1) frames, so that there is always one of about every age. From the
 alarm on they stay, and old evidence is forgotten slowly.
 """
@@ -107,6 +110,7 @@ def lane_dtype(rooms: Rooms) -> np.dtype:
         # what a bounded uncertainty can add to the correlation: as it stays, as it swings, at its pace
         stays=lanes, swings=lanes, drifts=lanes,
         foreseen=lanes,  # of the correlation, what calm air gives a law that answers noise
+        shown=lanes,  # and a gust that the vanes show a law which answers them
         # what it comes to, the last three as log likelihood ratios
         score=lanes, at_least=lanes, at_most=lanes, likelihood=lanes,
     )  # fmt: skip
@@ -128,6 +132,7 @@ def block_dtype(rooms: Rooms) -> np.dtype:
         lag=float, stronger=float, rest=4, scratch=2,
         # the filter that reckons with no gust, where one is declared; lambda p, and the two sums of lambda
         calm=FILTER, foreseen=2, agreement=float, size=float,
+        glimpsed=int, shown=2, shown_state=4,  # whether vanes show a gust roughly; what it does, whitened
         # alarm level; share of it that chance is given beside what is bounded; omega dt of the latter
         level=float, chance=float, pace=float, stay=2, swing=2,
         n_regressors=int, tolerance=rooms.regressors, regressor=(rooms.regressors, 2),
@@ -266,7 +271,7 @@ def start(block, slot):
     for k in range(slot, lanes(block), N_SLOTS):
         lane.correlation[k] = lane.information[k] = 0.0
         lane.weight[0, k] = lane.weight[1, k] = 0.0
-        lane.stays[k] = lane.swings[k] = lane.drifts[k] = lane.foreseen[k] = 0.0
+        lane.stays[k] = lane.swings[k] = lane.drifts[k] = lane.foreseen[k] = lane.shown[k] = 0.0
         lane.missing[k] = 1.0
         for i in range(4):
             lane.response[i, k] = 0.0
@@ -353,11 +358,21 @@ def overlap(block, keep):
 
 
 @kernel
+def glimpse(block, keep):
+    """Bring to this frame what a gust that the vanes show adds to N; `respond` has left the weights."""
+    lane, p0, p1 = block.lane, block.shown[0], block.shown[1]
+    for k in range(lanes(block)):
+        lane.shown[k] = keep * lane.shown[k] + (lane.weight[0, k] * p0 + lane.weight[1, k] * p1)
+
+
+@kernel
 def weigh(block, tolerated, dt, keep):
     """Add the frame just whitened to every hypothesis and onset; `keep` is the share of what was there."""
     for h in range(block.n_hypotheses):
         shape(block, h)
     respond(block, dt, keep)
+    if block.glimpsed:
+        glimpse(block, keep)
     if tolerated:
         overlap(block, keep)
 
@@ -405,7 +420,7 @@ def judge_lanes(block, certain):
     level, chance, doubted = block.level, block.chance, 0.0 if certain else 1.0
     for k in range(lanes(block)):
         N, D = lane.correlation[k], lane.information[k]
-        slack = lane.slack[k] + max(sense[k] * lane.foreseen[k], 0.0)
+        slack = lane.slack[k] + max(sense[k] * lane.foreseen[k], 0.0) + max(sense[k] * lane.shown[k], 0.0)
         is_loss, known = sense[k] != 0.0, D > 0.0
         evidence = sense[k] * N if is_loss else abs(N)
         room = allowance(lane, k, swing0, swing1)
@@ -454,6 +469,8 @@ def take_in(block, bounded, tolerated, dt, keep, memory=0.0):
     whiten(block, block.state, block.scratch, dt, block.innovation)
     if block.calm.n > 0:
         foresee(block, dt)
+    if block.glimpsed:
+        whiten(block, block.shown_state, block.shown, dt, block.shown)
     if tolerated:
         for j in range(block.n_regressors):
             state, response = block.regressor_state[j], block.regressor_response[j]

@@ -123,8 +123,6 @@ def set_up(
     _set_up_blocks(statistical, errors, aircraft)
     _set_up_bounded(statistical, config, pace, dt_s)
     _set_up_noise(statistical, given, config.bounds, design, start, dt_s)
-    if not aircraft.damage:  # its surfaces alone do not say how fast a derived model's error moves
-        statistical["noise"]["pace"] = pace
     tolerance = steady_tolerance(config.bounds, aircraft, design, mass, *start[1:])
     _set_up_tolerances(statistical, aircraft, tolerance)
     set_up_readings(statistical, errors, fdi["bound"]["admitted"])
@@ -179,7 +177,7 @@ def pace_of(given: Statistical, aircraft: Aircraft, dt_s: float) -> float:
     """By what share of its bound an uncertainty that is merely bounded changes within a frame, at most.
 
     What an aircraft's own terms are off moves with its surfaces, which a law may throw from frame to frame:
-    there from one end of the bound to the other. Where damage is declared, that is followed in flight
+    there from one end of the bound to the other. Where the error is mapped, that is followed in flight
     (`statistical.follow_surfaces`).
     """
     return 2.0 if any(aircraft.model_error_rad_s2) else given.uncertainty_rad_s * dt_s

@@ -36,7 +36,7 @@ def of_alarm(tape: Tape, history: History, surfaces: Sequence[str], k: int) -> D
         return None
     hypothesis = chances["block"][b]["hypothesis"][h]
     score = float(hypothesis["score"] / chances["tests"]["alarm_level"])
-    said = _written(tape, history, (b, h), range(first, k + 1))
+    said = _written(tape, history, (b, h, slot), range(first, k + 1))
     if score > 1.0 + _AS_LOGGED:
         _leave_out(said, history)
     value, limit, _ = sides(said, history)
@@ -147,9 +147,9 @@ def _loudest(chances: np.void) -> tuple[int, int, int]:
     return found
 
 
-def _written(tape: Tape, history: History, test: tuple[int, int], rows: range) -> Document:
-    """The statement of a test, block and hypothesis, with these frames."""
-    (b, h), dt, chances = test, history.dt, tape.alarm["fdi"]["statistical"]
+def _written(tape: Tape, history: History, test: tuple[int, int, int], rows: range) -> Document:
+    """The statement of a test, block, hypothesis and onset's slot, with these frames."""
+    (b, h, slot), dt, chances = test, history.dt, tape.alarm["fdi"]["statistical"]
     block, here = chances["block"][b], slice(rows[0] - 1 - tape.first, rows[-1] + 1 - tape.first)
     of = {name: tape.chances[name][here, b] for name in (*OF_BLOCK, "signature")}
     then, now = ({name: values[part] for name, values in of.items()} for part in (np.s_[:-1], np.s_[1:]))
@@ -175,9 +175,11 @@ def _written(tape: Tape, history: History, test: tuple[int, int], rows: range) -
     if chances["air"]["moving"]:
         its["air"] = tape.chances["air"][here][1:][:, axes]
         drift += block["stronger"] * tape.chances["leap"][here][1:][np.ix_(range(len(rows)), axes, axes)]
-    loss = bool(block["lane"]["sense"][h * N_SLOTS])
-    if loss and block["calm"]["n"]:
-        its["foreseen"] = now["foreseen"][:, felt]
+    lane, at = block["lane"], h * N_SLOTS + slot
+    loss = bool(lane["sense"][at])
+    taken = [name for name in ("foreseen", "shown") if lane["sense"][at] * lane[name][at] > 0.0]
+    if taken:  # each of them where it speaks for the loss
+        its["foreseen"] = np.sum([now[name] for name in taken], axis=0)[:, felt]
     state = then["state"][0, states]
     Y = np.array([state, np.zeros(2 * n), *before[0]]).T
     xx, xd, dd = (of[name][0][np.ix_(felt, felt)] for name in ("P_xx", "P_xd", "P_dd"))

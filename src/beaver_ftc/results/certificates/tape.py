@@ -21,7 +21,7 @@ MOST_AFTER = 1 << 16  # frames kept after the alarm
 _AT_ONCE = 1 << 10  # so many at first
 OF_BLOCK = (
     "keep", "pace", "state", "P_xx", "P_xd", "P_dd", "drift", "jitter", "noise", "foreseen",
-    "regressor_state", "regressor_response",
+    "shown", "regressor_state", "regressor_response",
 )  # fmt: skip
 
 

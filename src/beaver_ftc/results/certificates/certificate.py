@@ -173,26 +173,24 @@ def statements(
 ) -> Iterator[Document]:
     """What can be said of each event; one without a `value` says why it cannot be certified."""
     alarm, fdi = events["detected"], tape.alarm["fdi"]
+    about: Document = {"what": None, "column": "detected", "frame": alarm}
+    watch = instruments_say.of_alarm(fdi["watch"]) if fdi["watch"]["alarmed"] else None
     if not fdi["isolation"]["n"] or not fdi["config"]["enabled"] or fdi["published"]["in_use"]:
-        yield {"what": None, "column": "detected", "frame": alarm, "because": "another scheme was in charge"}
+        yield about | (watch or {"because": "another scheme was in charge"})
         return
-    watched = fdi["watch"]["alarmed"]
-    because = instruments_say.NOT_STATED if watched else chance.NOT_STATED
-    found = _of_alarm(scenario, tape, history, alarm)
-    said = _stated(found, history, because, what=None, column="detected", frame=alarm)
-    if found is None and watched:
-        said |= instruments_say.of_alarm(fdi["watch"])
-    elif found is None and scenario.fdi.statistical:
-        said |= chance.of_alarm(tape, history, scenario.airframe.surfaces, alarm) or {}
-    if "sides" in said:
-        said.pop("because", None)
+    said = _stated(_of_alarm(scenario, tape, history, alarm), history, chance.NOT_STATED, **about)
+    if "because" in said and watch is not None:
+        said = about | watch
+    elif "because" in said and scenario.fdi.statistical:
+        by_chance = chance.of_alarm(tape, history, scenario.airframe.surfaces, alarm)
+        said = said if by_chance is None else about | by_chance
     yield said
     for e, name in enumerate(tape.names):
         column = f"fie_{name}_excluded"
         if column in events:
             k, because = events[column], chance.NOT_EXCLUDED if events[column] < tape.end else LATE
             found = None if because == LATE else _of_exclusion(scenario, tape, history, e, alarm, k)
-            about: Document = {"what": name, "column": column, "frame": k}
+            about = {"what": name, "column": column, "frame": k}
             if found is None and because != LATE and chance.says_nothing_of(tape, e, said):
                 yield about | {"as": "alarm"}
                 continue

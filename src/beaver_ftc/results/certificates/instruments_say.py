@@ -35,7 +35,7 @@ def of_alarm(watch: np.void) -> Document:
     named = int(watch["named"])
     if named >= 0 and watch["replaced"][named] and not watch["share"] > 1.0:
         return {"because": f"there was no reading of {sensor_words(SENSORS[named])}: nothing is compared"}
-    return {}
+    return {"because": NOT_STATED}
 
 
 def _looks(step: np.void, number: int) -> Iterator[list[float]]:

@@ -81,10 +81,21 @@ def test_spans_of_time(seconds, span):
     assert progress._span(seconds) == span
 
 
-def test_a_bar_shows_once_it_is_waited_for_and_on_a_terminal_alone(monkeypatch, clock):
-    monkeypatch.setattr(sys, "stderr", Terminal(False))
+def test_a_log_has_a_line_of_a_study_now_and_then_and_none_of_a_short_one(clock, monkeypatch):
+    monkeypatch.setattr(sys, "stderr", log := Terminal(False))
     with progress.progress_bar("x") as show:
-        assert show is None
+        for flown in range(101):  # one a second
+            clock["s"] = 100.0 + flown
+            show(flown / 100)
+            if flown == 5:
+                assert log.getvalue() == ""
+    first, second, *others = log.getvalue().splitlines()
+    assert first == "x: 6%"
+    assert second == "x: 36%, 64 s left"
+    assert len(others) == 2
+
+
+def test_a_bar_shows_once_it_is_waited_for(monkeypatch, clock):
     bars = []
     monkeypatch.setattr(progress, "_bar", lambda label, stack: bars.append(label) or bars.append)
     monkeypatch.setattr(sys, "stderr", Terminal(True))

@@ -1,7 +1,7 @@
 """How far a command has come, on standard error.
 
-A run or a study: a bar, on a terminal only, once it takes long enough to be waited for. A sweep: a moving
-line on a terminal, one now and then in a log.
+A run or a study: a bar on a terminal, once it takes long enough to be waited for. A sweep: a moving line.
+Elsewhere, as in a log, both say a line now and then.
 """
 
 import contextlib
@@ -11,27 +11,42 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 
 PATIENCE_S = 1.0
-TERMINAL_S, LOG_S = 0.2, 30.0  # time between two lines of a sweep
+TERMINAL_S, LOG_S = 0.2, 30.0  # time between two lines
+FIRST_S = 5.0  # before the first line of a log
 
 
 @contextlib.contextmanager
-def progress_bar(label: str) -> Iterator[Callable[[float], None] | None]:
-    """Yield what a run calls with how far it has come (0 to 1); None where nobody would see it."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    started, advance = time.monotonic(), None
+def progress_bar(label: str) -> Iterator[Callable[[float], None]]:
+    """Yield what a run calls with how far it has come (0 to 1)."""
     with contextlib.ExitStack() as stack:
+        begin = (lambda: _bar(label, stack)) if sys.stderr.isatty() else (lambda: _lines(label))
+        patience_s = PATIENCE_S if sys.stderr.isatty() else FIRST_S
+        started, advance = time.monotonic(), None
 
         def show(done: float) -> None:
             """Shows itself only once the run has taken longer than anyone waits without asking."""
             nonlocal advance
-            if advance is None and time.monotonic() - started > PATIENCE_S:
-                advance = _bar(label, stack)
+            if advance is None and time.monotonic() - started > patience_s:
+                advance = begin()
             if advance:
                 advance(done)
 
         yield show
+
+
+def _lines(label: str) -> Callable[[float], None]:
+    started, first, next_s = time.monotonic(), None, 0.0
+
+    def tell(done: float) -> None:
+        nonlocal first, next_s
+        first, passed_s = done if first is None else first, time.monotonic() - started
+        if passed_s >= next_s and done < 1.0:
+            next_s = passed_s + LOG_S
+            to_come = f", {_span((1.0 - done) / (done - first) * passed_s)} left" if done > first else ""
+            sys.stderr.write(f"{label}: {done:.0%}{to_come}\n")
+            sys.stderr.flush()
+
+    return tell
 
 
 def _bar(label: str, stack: contextlib.ExitStack) -> Callable[[float], None]:

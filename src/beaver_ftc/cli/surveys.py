@@ -59,7 +59,8 @@ def matrix(
     from beaver_ftc.studies.matrix import pitch_lost as lost
 
     speeds_mps = tuple(airspeed) if airspeed else None
-    with progress_bar("faults") as progress:
+    with progress_bar("faults flown") as progress:
+        progress(0.0)
         if pitch_lost:
             name, as_text = lost.NAME, lost.as_text
             document = lost.run_pitch_lost(out, speeds_mps, workers, progress)

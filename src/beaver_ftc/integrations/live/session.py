@@ -322,6 +322,7 @@ class Session:
             "scenario": self._base.name, "description": self._base.description, "rate_hz": scenario.rate_hz,
             "law": self.flying["law"], "scheme": self.flying["scheme"],
             "fault_class": scenario.fdi.fault_class, "aircraft": str(scenario.aircraft),
+            "damage": {case: list(of.takes) for case, of in scenario.airframe.damage.items()},
             "sensors": sensors, "travel_rad": [list(map(float, limits)) for limits in self.sim.travel_rad],
             "autopilot": list(scenario.autopilot.channels if scenario.autopilot else ()),
             "trim_rad": list(map(float, self.sim.trim_rad)),

@@ -1,17 +1,9 @@
-// A high-wing single-engined aircraft of simple bodies; x forward, y up, z right, metres.
+// A high-wing single-engined aircraft of simple bodies, or a jet (jet3d.js); x forward, y up, z right, metres.
 // Each surface is a group that turns about its hinge, with an outline where it is commanded to be.
 
 import * as THREE from "../vendor/three.min.js";
-
-const HULL = 0xf0b429, WING = 0xf4f1e8, MOVING = 0x2b7fb8, BROKEN = 0xd1401f, DARK = 0x23303b;
-
-const paint = (color) => new THREE.MeshLambertMaterial({ color });
-
-function box(size, at, material) {
-  const mesh = new THREE.Mesh(new THREE.BoxGeometry(...size), material);
-  mesh.position.set(...at);
-  return mesh;
-}
+import { box, paint, panel, BROKEN, DARK, HULL, MOVING, WING } from "./bodies3d.js";
+import { buildJet, GONE } from "./jet3d.js";
 
 function fuselage() {
   const group = new THREE.Group();
@@ -42,20 +34,6 @@ function wings() {
   return group;
 }
 
-// A movable panel: behind its hinge by its chord. axis: the hinge's; sign: of positive deflection.
-function panel(name, hinge, size, axis, sign) {
-  const group = new THREE.Group();
-  group.position.set(...hinge);
-  const geometry = new THREE.BoxGeometry(...size);
-  geometry.translate(-size[0] / 2, 0, 0);
-  const mesh = new THREE.Mesh(geometry, paint(MOVING));
-  mesh.userData.surface = name;
-  group.add(mesh);
-  const wanted = new THREE.LineSegments(new THREE.EdgesGeometry(geometry), new THREE.LineBasicMaterial({ color: 0x10212f }));
-  wanted.position.copy(group.position);
-  return { name, group, mesh, wanted, axis, sign };
-}
-
 const PLACES = {
   aileron: [[[0.35, 0.95, 5.6], [0.45, 0.12, 3.2], "z", 1], [[0.35, 0.95, -5.6], [0.45, 0.12, 3.2], "z", -1]],
   flap: [[[0.35, 0.95, 2.4], [0.5, 0.12, 2.9], "z", 1], [[0.35, 0.95, -2.4], [0.5, 0.12, 2.9], "z", 1]],
@@ -73,15 +51,16 @@ function placesOf(name) {
 }
 
 export function buildAircraft(surfaces) {
+  if (surfaces.some((name) => /spoiler|stabiliser/.test(name))) return buildJet(surfaces);
   const root = new THREE.Group();
   root.add(fuselage(), wings());
   const panels = surfaces.flatMap((name) => placesOf(name).map((place) => panel(name, ...place)));
-  for (const { group, wanted } of panels) root.add(group, wanted);
+  for (const { place } of panels) root.add(place);
   const disc = new THREE.Mesh(new THREE.CircleGeometry(1.3, 24), new THREE.MeshBasicMaterial({ color: 0x40505c, transparent: true, opacity: 0.25, side: THREE.DoubleSide }));
   disc.rotation.y = Math.PI / 2;
   disc.position.x = 3.55;
   root.add(disc);
-  return { root, panels };
+  return { root, panels, parts: {} };
 }
 
 // Turn the surfaces; deflections in rad by name, commanded and effective (null: hidden, drawn as commanded).
@@ -92,4 +71,11 @@ export function deflect(panels, commanded, effective, broken) {
     wanted.rotation[axis] = sign * asked;
     mesh.material.color.setHex(broken.has(name) ? BROKEN : MOVING);
   }
+}
+
+// Leave out what damage has taken: the surfaces on each case's list, and the part they were on.
+export function dismember({ panels, parts }, cases, takes) {
+  const lost = new Set(cases.flatMap((name) => takes[name] ?? [])), gone = new Set(cases.flatMap((name) => GONE[name] ?? []));
+  for (const { name, place } of panels) place.visible = name === "stabiliser" || !lost.has(name);
+  for (const [name, part] of Object.entries(parts)) part.visible = !gone.has(name);
 }

@@ -2,7 +2,7 @@
 
 import { ask } from "./link.js";
 import { notice } from "./panels.js";
-import { flight, mayBreak } from "./state.js";
+import { damages, flight, mayBreak } from "./state.js";
 
 const kinds = () => flight.hello?.breaks ?? []; // [label, fault]: the rows of the fault types
 const byId = (id) => document.getElementById(id);
@@ -36,7 +36,19 @@ function buttons(surface) {
   return [...made, mend];
 }
 
+// A button a case of damage that the aircraft declares; pressed again, all of it is repaired.
+function meetDamage(cases) {
+  byId("damage").hidden = !cases.length;
+  byId("damage").replaceChildren(Object.assign(document.createElement("legend"), { textContent: "Damage" }), ...cases.map((name) => {
+    const button = Object.assign(document.createElement("button"), { textContent: name.replaceAll("-", " "), type: "button" });
+    button.dataset.case = name;
+    button.addEventListener("click", () => (damages().includes(name) ? repair("damage") : perform({ do: "break", fault: { type: "damage", case: name } })));
+    return button;
+  }));
+}
+
 export function meetSurfaces(hello) {
+  meetDamage(Object.keys(hello.damage));
   byId("sensor").replaceChildren(...hello.sensors.map((name) => new Option(name.replaceAll("_", " "), name)));
   byId("surfaces").replaceChildren(...hello.surfaces.map((surface, i) => {
     const group = document.createElement("fieldset");
@@ -80,7 +92,8 @@ function drawSensors(broken) {
 export function drawBroken() {
   const broken = new Set(flight.state?.broken ?? []);
   drawSensors(broken);
-  drawLegend([...broken]);
+  drawLegend([...broken].flatMap((name) => (name === "damage" ? damages().map((of) => of.replaceAll("-", " ")) : [name])));
+  for (const button of byId("damage").querySelectorAll("button")) button.setAttribute("aria-pressed", damages().includes(button.dataset.case));
   for (const group of byId("surfaces").children) {
     const surface = group.dataset.surface;
     const says = broken.has(surface) ? ` ✕ broken: ${[...new Set(faultsOf(surface).map(inWords))].join(", ")}` : "";

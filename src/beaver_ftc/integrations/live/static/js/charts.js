@@ -36,6 +36,13 @@ function marked(times) {
   return times.length ? [...places, times.length - 1] : places;
 }
 
+// Of many surfaces: what tells one from those of its kind, and the kind, as in "L in" and "elevator".
+const SHORT = { left: "L", right: "R", inboard: "in", outboard: "out" };
+function shortened(name) {
+  const words = name.split("_"), kind = words.pop();
+  return [words.map((word) => SHORT[word] ?? word).join(" "), kind];
+}
+
 class Chart {
   constructor(parent, plan) {
     this.plan = plan;
@@ -55,8 +62,12 @@ class Chart {
   title() {
     const title = document.createElement("h2");
     title.append(Object.assign(document.createElement("b"), { textContent: this.plan.title }));
+    let kind = "";
     this.plan.names.forEach((name, i) => {
-      const key = Object.assign(document.createElement("span"), { className: "key", textContent: `${MARKS[i]} ${name}` });
+      const [said, of] = this.plan.names.length > COLOURS.length ? shortened(name) : [name, ""];
+      if (of !== kind) title.append(Object.assign(document.createElement("span"), { className: "key", textContent: of }));
+      kind = of;
+      const key = Object.assign(document.createElement("span"), { className: "key", textContent: `${MARKS[i]} ${said}`, title: name });
       key.style.color = COLOURS[i % COLOURS.length];
       title.append(key);
     });

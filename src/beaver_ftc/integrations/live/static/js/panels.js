@@ -40,14 +40,18 @@ function sizeText(size, estimate) {
   return ` ${word} ${unit === "%" ? `${Math.round(-100 * estimate)} %` : inDegrees(estimate)}`;
 }
 
+const MANY = 12; // candidates, of which only those left are shown, once there is an alarm
+
 function drawCandidates(frame, hidden) {
   const list = byId("candidates");
   const named = hidden ? null : frame.isolated;
+  list.classList.toggle("many", list.children.length > MANY);
+  list.classList.toggle("asked", hidden || Boolean(frame.detected));
   const first = list.children[0]; // another diagnosis than the flight began with has no such candidates
   list.classList.toggle("gone", Boolean(first) && !hidden && value(`fie_${first.dataset.name}_excluded`) === null);
   for (const item of list.children) {
     const out = !hidden && value(`fie_${item.dataset.name}_excluded`) === 1;
-    const isNamed = Boolean(named) && item.dataset.name.split("_")[0] === named && !out;
+    const isNamed = Boolean(named) && `${item.dataset.name}_`.startsWith(`${named}_`) && !out;
     item.classList.toggle("out", out);
     item.classList.toggle("named", isNamed);
     setText(item, item.dataset.label + (out ? " out" : isNamed ? " named" : ""));

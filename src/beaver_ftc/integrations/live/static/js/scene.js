@@ -1,8 +1,8 @@
 // The aircraft in its air: chase camera, ground, clouds to pass by, the path flown.
 
 import * as THREE from "../vendor/three.min.js";
-import { buildAircraft, deflect } from "./aircraft3d.js";
-import { flight, value } from "./state.js";
+import { buildAircraft, deflect, dismember } from "./aircraft3d.js";
+import { damages, flight, value } from "./state.js";
 
 const PATH_POINTS = 600, PATH_STEP_S = 0.25, CLOUDS = 36, CLOUD_BOX_M = 700;
 const CAMERAS = [[-21, 6.5, 8], [-13, 12, 0.01], [5, 2.5, 19], [-8, -3, -17]];
@@ -102,6 +102,7 @@ export class View {
     const psi = value("psi_rad");
     root.rotation.set(value("phi_rad"), -psi, value("theta_rad"), "YZX");
     deflect(this.aircraft.panels, (s) => value(`${s}_cmd_rad`), (s) => value(`${s}_effective_rad`), broken);
+    dismember(this.aircraft, damages(), flight.hello.damage);
     this.moveAir(root.position);
     this.extendPath(root.position);
     this.follow(root.position, psi);

@@ -17,6 +17,9 @@ export function value(name) {
   return i === undefined || !flight.frame ? null : flight.frame.v[i];
 }
 
+// The cases of damage that have struck.
+export const damages = () => (flight.state?.faults ?? []).filter(({ type }) => type === "damage").map((fault) => fault.case);
+
 export const AXES = ["p", "q", "r"];
 export const DEG = 180 / Math.PI;
 

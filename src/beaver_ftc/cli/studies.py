@@ -243,7 +243,9 @@ def detectability(
     from beaver_ftc.studies.detectability import (
         alike,
         answers,
+        engine_failures,
         geometry,
+        of_engines,
         run_survey,
         survey_name,
         text,
@@ -261,9 +263,11 @@ def detectability(
         found = run_survey(out, loaded, airspeed or (), altitude or (), progress=progress)
     folder, rows = str(out / name), found["points"]
     if surface is None:
-        pairs = alike(loaded)
-        whole = "\n".join([text(rows, found["pairs"]), *geometry(pairs), folder])
-        answer(format, found | {"alike": pairs, "folder": folder}, lambda: whole)
+        pairs, failures = alike(loaded), engine_failures(loaded)
+        lines = [*geometry(pairs), *of_engines(failures)]
+        whole = "\n".join([text(rows, found["pairs"]), *lines, folder])
+        given = found | {"alike": pairs, "folder": folder} | ({"engines": failures} if failures else {})
+        answer(format, given, lambda: whole)
         return
     of = {what: [row for row in found[what] if row["fault"] == surface] for what in ("points", "pairs")}
     said = answers(loaded, of["points"])

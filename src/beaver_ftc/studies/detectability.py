@@ -26,15 +26,18 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.aircraft import load
+from beaver_ftc.control.engines import ENGINES
+from beaver_ftc.control.engines import configure as configure_engines
 from beaver_ftc.design.model import AXES, N_Y, both_responses
 from beaver_ftc.design.variants import design_of
 from beaver_ftc.diagnosis.forces import ASIDE, UP, separated_by_force
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
-from beaver_ftc.loop.loop import fly
+from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.results.log import Columns
 from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies import isolability
+from beaver_ftc.studies.derive.fit import EXACT_TERMS
 from beaver_ftc.studies.engine.statistics import quantile
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.present.figures import heat_map, label_edges, panels
@@ -223,6 +226,41 @@ def geometry(pairs: Sequence[Document]) -> list[str]:
         says = f"the rates tell {told}" if told else f"the rates never tell them apart{forces}"
         lines.append(f"{' and '.join(pair['surfaces'])} move the rates alike: {says}")
     return lines
+
+
+def engine_failures(scenario: Scenario) -> list[Document]:
+    """Of each engine that is an effector: how a failure to idle turns the aircraft in trim, rad/s2; over what
+    is certain to show in a frame; and whether its moment is a signal, so that the design model knows it."""
+    aircraft = scenario.airframe
+    engines, thrust = np.zeros(1, ENGINES)[0], aircraft.engine.thrust
+    short = scenario.model_copy(update={"duration_s": SETTLED_S + 1.0, "faults": ()})
+    configure_engines(engines, short)
+    power = aircraft.file.power_setting
+    if thrust is None or power is None or not engines["n"]:
+        return []
+    loop, bound = Loop(short), excitation(short).bound[0]
+    setting = loop.trim.settings[power[0]]
+    force_n = [
+        np.interp(loop.trim.airspeed_mps, thrust.airspeed_mps, f) for f in zip(*thrust.force_n, strict=True)
+    ]
+    gained = np.interp(setting, thrust.setting, force_n) / aircraft.mass.mass_kg
+    loop.release()
+    known, found = any(name in EXACT_TERMS.values() for name in aircraft.signals), []
+    for e, name in enumerate(aircraft.effectors):
+        turns = np.abs(engines["B"][:, e]) * gained
+        shows = 1.0 / float(detection_magnitude(turns[None], bound[None])[0])
+        found.append({"engine": name, "turns_rad_s2": turns.tolist(), "shows": shows, "known": known})
+    return found
+
+
+def of_engines(failures: Sequence[Document]) -> list[str]:
+    """A line an engine."""
+    ends = {True: "; its moment is a signal: nothing is left to show", False: ""}
+    return [
+        f"{of['engine']} at idle turns the aircraft by {max(of['turns_rad_s2']):.2g} rad/s2, "
+        f"{of['shows']:.2g} times what is certain to show in a frame{ends[of['known']]}"
+        for of in failures
+    ]
 
 
 def with_aircraft(scenario: Scenario, reference: str) -> Scenario:

@@ -2,6 +2,7 @@
 
 import pytest
 
+from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.loader import load_text
 from beaver_ftc.scenario.schema import Scenario
 
@@ -96,6 +97,10 @@ GUST = {"at_s": 1, "velocity_mps": [0, 0, 5]}
         ),
         ({"environment": {"gust": GUST}}, ["environment.gust: what a gust does"]),
         (
+            {"environment": {"gust": GUST}, "fdi": {"statistical": {}, "bounds": {"turbulence": "light"}}},
+            ["environment.gust: what a gust does", "environment.gust: JSBSim's does not rotate"],
+        ),
+        (
             {
                 "environment": {"turbulence": "dryden", "severity": "light"},
                 "initial": {"altitude_m": 500},
@@ -110,3 +115,14 @@ def test_all_that_is_undeclared_is_said_where_there_is_a_diagnosis(keys, says):
     assert [line[: len(start)] for line, start in zip(said, says, strict=True)] == says
     silent = {**keys, "fdi": {**keys.get("fdi", {}), "scheme": "none"}}
     assert Scenario.model_validate({"name": "x", **silent}).warnings() == ()
+
+
+def test_a_sharp_gust_is_taken_for_one_that_rotates_where_turbulence_is_declared():
+    def alarm(turbulence):
+        gust = {"at_s": 0.5, "velocity_mps": [0, 6, 0], "rise_s": 0.2}
+        fdi = {"statistical": {}, "bounds": {"turbulence": turbulence}}
+        given = {"name": "x", "duration_s": 1, "environment": {"gust": gust}, "fdi": fdi}
+        return fly(Scenario.model_validate(given)).detection_time_s
+
+    assert alarm("light") is not None
+    assert alarm("none") is None

@@ -115,6 +115,12 @@ def _air(scenario: Any) -> Iterator[str]:
     environment = scenario.environment
     if any(any(gust.velocity_mps) for gust in environment.gusts):
         yield "environment.gust: what a gust does is covered by fdi.bounds.constant_rad_s2 only"
+        fdi = scenario.fdi
+        if fdi.weighs_chance and fdi.bounds.turbulence != "none" and scenario.airframe.measurable_forces:
+            yield (
+                "environment.gust: JSBSim's does not rotate, but with fdi.bounds.turbulence the vanes take a "
+                "sharp one for one that does: fdi.statistical may raise an alarm"
+            )
     low = scenario.initial.altitude_m < LOWEST_TURBULENCE_M and not scenario.initial.on_ground
     if environment.severity is not None and low:  # from the ground the diagnosis begins above
         yield (

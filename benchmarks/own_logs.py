@@ -7,12 +7,14 @@ Three laws, two airspeeds, references drawn by the seed (sines and doublets on t
 inertia and air drawn as well, gyros ideal or with declared noise. Healthy flights, and losses of 0.3, 0.6 and
 0.9 of whatever turns the aircraft, or with `--type` another fault of it. Each flight is written as a recorder
 on board would have, read again, and diagnosed as `diagnose --aircraft` does (`by` aircraft), and by a model
-that `identify` has of twelve healthy flights of a minute: two of the laws, other airspeeds, other days.
+that `identify` has of twelve healthy flights of a minute: two of the laws, other airspeeds, other days
+(`other_laws: true`).
 `--air light` flies in turbulence, declared to the aircraft's own model.
 
 Prints a row for each model and size: flights, alarms before the fault, found, named rightly, named wrongly in
-any row, share of samples and surfaces whose effectiveness the bounds hold, share of those of which more is
-said than 0 to 1, their width, and the share of credible samples.
+any row, share of samples and surfaces whose effectiveness the bounds hold, the same of the surface at fault
+alone (1, of the others, is an end of the range), share of those of which more is said than 0 to 1, their
+width, and the share of credible samples.
 """
 
 import argparse
@@ -52,7 +54,7 @@ TRAINING, TRAINING_S = 12, 60.0
 NOISE = {"noise_std_deg_s": 0.05}
 HEAD = [
     "by", "fault", "flights", "false alarms", "found", "named rightly", "named wrongly", "held by bounds",
-    "said of", "median width", "credible",
+    "held at fault", "said of", "median width", "credible",
 ]  # fmt: skip
 
 
@@ -166,8 +168,8 @@ def identified(of: Campaign, kind: str, folder: Path) -> Model:
     """As `identify`, from healthy flights of other days."""
     logs = [recorded(one, kind, folder) for one in training(of)]
     vehicle: Vehicle = load_vehicle(str(logs[0].folder / "vehicle.yaml"))
-    if of.type != LOSS:
-        vehicle = vehicle.model_copy(update={"faults": ["loss", "stuck"]})
+    faults = ["loss"] if of.type == LOSS else ["loss", "stuck"]
+    vehicle = vehicle.model_copy(update={"faults": faults, "other_laws": True})
     named = [log.path.rename(log.path.with_stem(log.flown.name)) for log in logs]
     return identify(*by_pressure(load_flights(named, vehicle), vehicle))
 
@@ -191,6 +193,7 @@ def judged(by: str, log: Log, said_of: Said) -> Document:
     known = np.isfinite(truth)
     said = (rows.high - rows.low < 0.999) & known
     held = (rows.low <= truth + 1e-9) & (truth <= rows.high + 1e-9)
+    lost = said & (truth < 1.0)
     alarmed = rows.t_s[rows.faulty == 1]
     named = {one for name in rows.named[rows.faulty == 1] for one in name.split("+")}
     return {
@@ -202,6 +205,8 @@ def judged(by: str, log: Log, said_of: Said) -> Document:
         "wrong": bool(named - {actual, "unknown", "unanticipated", ""}),
         "held": int(held[said].sum()),
         "said": int(said.sum()),
+        "held_lost": int(held[lost].sum()),
+        "lost": int(lost.sum()),
         "samples": int(known.sum()),
         "width": (rows.high - rows.low)[said],
         "credible": float(rows.credible.mean()),
@@ -229,12 +234,17 @@ def table(results: list[Document]) -> list[list[str]]:
         rows.append([
             by, size, str(len(of)),
             *(str(sum(one[key] for one in of)) for key in _COUNTED),
-            f"{sum(one['held'] for one in of) / max(said, 1):.3f}",
+            _share(sum(one["held"] for one in of), said),
+            _share(sum(one["held_lost"] for one in of), sum(one["lost"] for one in of)),
             f"{said / max(sum(one['samples'] for one in of), 1):.2f}",
             f"{np.median(widths):.3f}" if len(widths) else "",
             f"{np.mean([one['credible'] for one in of]):.2f}",
         ])  # fmt: skip
     return sorted(rows, key=lambda row: row[0])
+
+
+def _share(part: int, whole: int) -> str:
+    return f"{part / whole:.3f}" if whole else ""
 
 
 _COUNTED = ("false", "found", "right", "wrong")

@@ -108,3 +108,30 @@ def test_a_drift_of_the_trim_is_told_from_noise(monkeypatch):
 def test_a_rate_that_is_none_is_refused(rate):
     with pytest.raises(BadInput, match="allowed: more than 0, up to 1000 an hour"):
         asking(small.vehicle(), rate)
+
+
+@pytest.mark.parametrize("threshold", [2.0, 3.0])
+def test_a_true_likelihood_ratio_alarms_once_in_exp_h_samples_or_less_often(threshold):
+    """Page's sum of normal evidence, drawn: the theorem's bound holds, and the rate asked gives it back."""
+    rng, shift, runs = np.random.default_rng(8), 1.0, 4000
+    total, alive, waited = np.zeros(runs), np.ones(runs, dtype=bool), np.zeros(runs)
+    while alive.any():
+        x = rng.standard_normal(runs)
+        total = np.maximum(total + shift * x - 0.5 * shift**2, 0.0)
+        waited[alive] += 1
+        alive &= total < threshold
+    assert waited.mean() > np.exp(threshold)
+    rate_hz = 20.0
+    per_hour = 3600.0 * rate_hz / np.exp(threshold)
+    assert extremes.sure_threshold(rate_hz, per_hour) == pytest.approx(threshold)
+    assert extremes.sure_threshold(rate_hz, 1e9) == 0.0
+
+
+def test_under_other_laws_the_threshold_is_not_below_the_theorem():
+    tail = extremes.Tail(level=0.1, excess=[0.1] * 20, minutes=30.0)
+    same = small.model(rate_hz=20.0)
+    other = same.model_copy(update={"vehicle": same.vehicle.model_copy(update={"other_laws": True})})
+    assert fitting._threshold(tail, 1.0, same) == extremes.threshold_for(tail, 1.0) < 3.0
+    assert fitting._threshold(tail, 1.0, other) == pytest.approx(np.log(72_000.0))
+    high = tail.model_copy(update={"level": 50.0})
+    assert fitting._threshold(high, 1.0, other) == extremes.threshold_for(high, 1.0) > 50.0

@@ -100,6 +100,7 @@ def posterior(bank, *shares):
     return rows
 
 
+ONE = np.array([1])
 SOUND, RIGHT, LEFT, BOTH = (1.0, 1.0), (0.5, 1.0), (1.0, 0.25), (0.5, 0.25)
 SHARES = {
     "found and gone": [
@@ -150,10 +151,31 @@ def test_names_by_hand():
     assert found.named.tolist() == ["elevator"] * 3 + ["elevator", "", aileron, aileron, ""]
     assert found.estimate[0].tolist() == [1.0, 0.25, 1.0]
     assert (found.low[5].tolist(), found.high[5].tolist()) == ([0.0, 0.875, 0.0], [1.0, 1.0, 1.0])
-    first = diagnose._names(TAIL, bank, posterior(bank, {"unknown": 0.9, LEFT: 0.1}), np.array([1]))
+    first = diagnose._names(TAIL, bank, posterior(bank, {"unknown": 0.9, LEFT: 0.1}), ONE, ONE > 0)
     assert first.tolist() == ["elevator"]
-    split = diagnose._names(TAIL, bank, posterior(bank, {LEFT: 0.5, RIGHT: 0.5}), np.array([1]))
+    split = diagnose._names(TAIL, bank, posterior(bank, {LEFT: 0.5, RIGHT: 0.5}), ONE, ONE > 0)
     assert split.tolist() == ["unknown"]
+
+
+def test_names_under_other_laws(monkeypatch):
+    """Unknown until the evidence is twice the threshold; another name waits a second; never two groups."""
+    other = WING.vehicle.model_copy(update={"other_laws": True})
+    settings = WING.settings.model_copy(update={"threshold": 2.0})
+    model = WING.model_copy(update={"vehicle": other, "settings": settings})
+    reach = round(WING.rate_hz)
+    gained = np.concatenate([[1.0, 1.0, 1.0, 1.0], np.zeros(2 * reach + 2)])
+    monkeypatch.setattr(diagnose, "evidence", lambda posterior, bank: gained)
+    shares = [{LEFT: 1.0}] * 4 + [{BOTH: 0.6, LEFT: 0.4}] + [{RIGHT: 1.0}] * (2 * reach + 1)
+    bank = bank_of(model)
+
+    def named_by(of):
+        found = diagnose.rows_of(small.flight(of, len(shares)), of, bank, posterior(bank, *shares))
+        assert found.faulty.tolist() == [0, 1] + [1] * (len(shares) - 2)
+        return found.named.tolist()
+
+    assert named_by(model) == ["", "unknown", "unknown", *["left"] * (2 + reach), *["right"] * (reach + 1)]
+    same = model.model_copy(update={"vehicle": WING.vehicle})
+    assert named_by(same) == ["", *["left"] * 3, "right+left", *["right"] * (2 * reach + 1)]
 
 
 def test_rows_at_the_stamps_of_a_faster_log():

@@ -23,6 +23,9 @@ from beaver_ftc.flights.samples import Samples
 _RATE_TOLERANCE = 0.25
 UNKNOWN = "unknown"
 _NAMED = 0.5
+_SURER, _RENAMED_S = 2.0, 1.0
+"""Under other laws a name asks for so much more evidence than an alarm, and another name must stand for so
+long to replace it; and it is of one group, the likeliest."""
 _IDLE = 0.5
 """Probability that nothing answers the commands above which nothing is said of any surface."""
 
@@ -151,10 +154,12 @@ def rows_of(samples: Samples, model: Model, bank: Bank, posterior: Floats) -> Ro
     answering = posterior[:, : bank.idle] / np.maximum(1.0 - idle, TINY)[:, None]
     well = posterior[:, 0] + idle > 0.5
     threshold = model.settings.threshold
-    gathered = accumulated(evidence(posterior, bank), threshold or np.inf)
-    raised = _standing(probability >= model.settings.alarm, model)
+    gained = evidence(posterior, bank)
+    gathered = accumulated(gained, threshold or np.inf)
+    raised = surer = _standing(probability >= model.settings.alarm, model)
     if threshold is not None:
         raised = (gathered >= threshold) & ~well
+        surer = (accumulated(gained, _SURER * threshold) >= _SURER * threshold) & ~well
     faulty = _latched(raised, well).astype(np.int64)
     began = np.maximum.accumulate(np.where(gathered <= 0.0, np.arange(len(gathered)), 0))
     by_group = [_of_group(bank, answering, g, model) for g in range(len(model.groups))]
@@ -164,7 +169,7 @@ def rows_of(samples: Samples, model: Model, bank: Bank, posterior: Floats) -> Ro
     return Rows(
         t_s=samples.t_s,
         faulty=faulty,
-        named=_names(model, bank, posterior, faulty),
+        named=_names(model, bank, posterior, faulty, _latched(surer, well)),
         estimate=by_surface(estimate, model),
         low=by_surface(low, model),
         high=by_surface(high, model),
@@ -225,18 +230,29 @@ def _bounds(levels: Floats, mass: Floats, share: float) -> tuple[Floats, Floats]
     return edges[np.searchsorted(levels, low)], edges[np.searchsorted(levels, high) + 1]
 
 
-def _names(model: Model, bank: Bank, posterior: Floats, faulty: NDArray[np.int64]) -> NDArray[np.object_]:
-    """The surfaces of the groups that most of the fault's probability is on; `unknown` where it is split."""
+def _names(
+    model: Model, bank: Bank, posterior: Floats, faulty: NDArray[np.int64], sure: NDArray[np.bool_]
+) -> NDArray[np.object_]:
+    """The surfaces of the groups that most of the fault's probability is on; `unknown` where it is split.
+
+    sure (n,): where the evidence names a surface under other laws too.
+    """
     total = np.maximum(posterior[:, bank.faults].sum(axis=1), TINY)
     shares = [posterior[:, bank.faulty(g)].sum(axis=1) / total for g in range(len(model.groups))]
-    likely = joined(np.column_stack(shares) > _NAMED, ["+".join(group) for group in model.groups])
+    share = np.column_stack(shares)
+    likelier = share > _NAMED
+    if model.vehicle.other_laws:
+        likelier &= sure[:, None] & (np.arange(share.shape[1]) == share.argmax(axis=1)[:, None])
+    likely = joined(likelier, ["+".join(group) for group in model.groups])
     named = np.full(len(posterior), "", dtype=object)
     other = posterior[:, bank.kind == UNKNOWN_OFFSET].sum(axis=1) > total
+    reach, stood = round(_RENAMED_S * model.rate_hz) if model.vehicle.other_laws else 0, 0
     for k in np.flatnonzero(faulty):
-        if other[k] and k and named[k - 1]:
-            named[k] = named[k - 1]  # an offset of no known cause, with the alarm still standing
-        else:
-            named[k] = likely[k] or UNKNOWN
+        now, said = likely[k] or UNKNOWN, named[k - 1] if k else ""
+        stood = stood + 1 if k and now == (likely[k - 1] or UNKNOWN) else 0
+        # an offset of no known cause, or a name that has not stood, while the alarm does: nothing new
+        keeps = said and (other[k] or (said != UNKNOWN and stood < reach))
+        named[k] = said if keeps else now
     return named
 
 

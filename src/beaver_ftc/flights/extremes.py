@@ -116,6 +116,12 @@ def threshold_for(tail: Tail, per_hour: float) -> float:
     return tail.level + high
 
 
+def sure_threshold(rate_hz: float, per_hour: float) -> float:
+    """The threshold with so many false alarms an hour at most where the model is right, whatever the tail:
+    Page's sum of a log likelihood ratio passes h once in exp(h) samples or less often [Lorden1971]."""
+    return float(np.log(max(3600.0 * rate_hz / per_hour, 1.0)))
+
+
 def minutes_missing(tail: Tail, per_hour: float) -> float:
     """Minutes of health by which the rate asked would show without any tail, less those there are."""
     return max(60.0 * SHOWN / per_hour - tail.minutes, 0.0)

@@ -67,16 +67,25 @@ def events_of(rows: Rows, surfaces: list[str]) -> list[Document]:
 
 
 def _joined(rows: Rows, runs: list[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Runs with the brief ones taken into the alarm before them, and alike neighbours made one."""
+    """Runs with the brief ones taken into the alarm before them, a brief one without a name into the one
+    after it, and alike neighbours made one."""
     joined: list[tuple[int, int]] = []
     for begin, end in runs:
-        last = joined[-1] if joined else None
-        brief = rows.t_s[end - 1] - rows.t_s[begin] < BRIEF_S
-        if last and rows.faulty[last[0]] and (brief or _alike(rows, last[0], begin)) and rows.faulty[begin]:
+        last = joined[-1] if joined else (begin, begin)
+        goes_on = _brief(rows, begin, end) or _unsure(rows, *last) or _alike(rows, last[0], begin)
+        if last[0] < begin and rows.faulty[last[0]] and rows.faulty[begin] and goes_on:
             joined[-1] = (last[0], end)
         else:
             joined.append((begin, end))
     return joined
+
+
+def _brief(rows: Rows, begin: int, end: int) -> bool:
+    return bool(rows.t_s[end - 1] - rows.t_s[begin] < BRIEF_S)
+
+
+def _unsure(rows: Rows, begin: int, end: int) -> bool:
+    return rows.named[begin] == UNKNOWN and begin < end and _brief(rows, begin, end)
 
 
 def _alike(rows: Rows, one: int, other: int) -> bool:
@@ -93,7 +102,7 @@ def _event(rows: Rows, begin: int, end: int, surfaces: list[str]) -> Document:
     return {
         "from_s": float(rows.t_s[begin]),
         "to_s": float(rows.t_s[end - 1]),
-        "brief": bool(rows.t_s[end - 1] - rows.t_s[begin] < BRIEF_S),
+        "brief": _brief(rows, begin, end),
         "named": named,
         "probability": float(rows.probability[begin:end].max()),
         "effectiveness": {

@@ -53,6 +53,9 @@ _OTHER_DAYS: dict[str, Any] = {
 }
 """How far another day may be: chosen on days drawn from one flight, judged on others (`--other-days`). The
 drift of the trim is what the means of the residual over 30 s show in that flight."""
+_OTHER_LAWS = {"own_gain_sd": 0.05, "own_gain_time_s": 20.0}
+"""How far each group's gain wanders under a law and air that the fit has not seen: a law that answers what is
+not modelled ties the command to it. Chosen on simulated flights (`own_logs.py`, seeds 1 to 3)."""
 _DELAYS = (-0.4, 0.0, 0.4)
 """Delays beside the model's that a flight may have, in samples."""
 _ALIKE = 1e-9
@@ -226,15 +229,17 @@ def prior(stretches: Sequence[Stretch], model: Model) -> Settings:
         repairs += sum(int(level == 1.0) for flight in seen for level in flight[1:])
     levels = {name: found for name, found in levels.items() if found}
     delays_s = [share / model.rate_hz for share in _DELAYS]
+    laws = _OTHER_LAWS if model.vehicle.other_laws else {}
     if not levels:
         walk = _drift(stretches, model)
         usual = model.model_copy(update={"settings": Settings(trim_walk=walk)})
         power = min(_POWER_ALONE, 1.0 / dispersion(stretches, usual))
-        return Settings(alarm=_SURE, hold_s=_HOLD_S, power=power, trim_walk=walk, delays_s=delays_s)
+        alarm = {"alarm": _SURE, "hold_s": _HOLD_S}
+        return Settings(**alarm, **laws, power=power, trim_walk=walk, delays_s=delays_s)
     return Settings(
         levels=levels,
         changes_per_hour=float(np.sqrt((changes + 1) / hours * Settings().changes_per_hour)),
-        **_OTHER_DAYS,
+        **(_OTHER_DAYS | laws),
         delays_s=delays_s,
         repair_share=(repairs + _PRIOR_CHANGES / 2) / (changes + _PRIOR_CHANGES),
         power=_POWER,
@@ -344,28 +349,34 @@ def trusted(stretches: Sequence[Stretch], model: Model) -> Model:
         says = f"{_minutes(parts):.1f} min of health left out have too few peaks of the evidence to tell"
         more = extremes.SHOWN * 60.0 / asked - _minutes(parts)
         raise BadInput(f"identify: false_alarms_per_hour {asked:g}: {says}, allowed: {more:.0f} min more")
-    threshold = extremes.threshold_for(tail, per_hour) if tail and per_hour else None
+    threshold = _threshold(tail, per_hour, model) if tail and per_hour else None
     settings = {"false_alarms_per_hour": per_hour, "threshold": threshold}
     return model.model_copy(
         update={
             "fitted": known.model_copy(update={"tail": tail}),
             "settings": model.settings.model_copy(update=settings),
-            "identified": dict(_alone(parts, per_hour)),
+            "identified": dict(_alone(parts, per_hour, model)),
         }
     )
+
+
+def _threshold(tail: extremes.Tail, per_hour: float, model: Model) -> float:
+    """By the tail; under laws of which the parts left out say nothing, by theory if that asks for more."""
+    least = extremes.sure_threshold(model.rate_hz, per_hour) if model.vehicle.other_laws else 0.0
+    return max(extremes.threshold_for(tail, per_hour), least)
 
 
 def _minutes(parts: Sequence[extremes.Part]) -> float:
     return 60.0 * sum(hours for _, hours in parts)
 
 
-def _alone(parts: Sequence[extremes.Part], per_hour: float | None) -> Document:
+def _alone(parts: Sequence[extremes.Part], per_hour: float | None, model: Model) -> Document:
     """What parts left out say of another day: how many would have alarmed, each at the threshold that the
     others ask for, and how often."""
     tails = [extremes.tail_of([*parts[:i], *parts[i + 1 :]]) for i in range(len(parts))]
     if per_hour is None or len(parts) < 2 or not all(tails):
         return {}
-    limits = [extremes.threshold_for(tail, per_hour) for tail in tails if tail]
+    limits = [_threshold(tail, per_hour, model) for tail in tails if tail]
     alarms = [int((peaks >= limit).sum()) for (peaks, _), limit in zip(parts, limits, strict=True)]
     return {
         "parts": len(parts),

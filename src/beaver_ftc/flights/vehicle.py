@@ -192,6 +192,12 @@ class Vehicle(Section):
         description="what a surface may do: lose effectiveness, be stuck",
         examples=[["loss", "stuck"]],
     )
+    other_laws: bool = Field(
+        default=False,
+        description="flights to be diagnosed may be flown by other laws than those of `identify`: an alarm "
+        "and a name ask for more",
+        examples=[True],
+    )
     max_rate_hz: Number = number(
         20.0, gt=0, le=1000, unit="Hz", says="rate above which the log is averaged to this rate"
     )

@@ -1,6 +1,9 @@
 """What docs/gtm.md prints of damage: where it can be flown, what flies there, what is found of it."""
 
+import json
 import os
+import subprocess
+import sys
 import tempfile
 from functools import cache
 from pathlib import Path
@@ -9,6 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import yaml
 from benchmarks import gtm_damage as campaign
+from benchmarks import gtm_informed as informed
 
 import beaver_ftc as bf
 from beaver_ftc.studies.gtm.conversion import convert
@@ -21,6 +25,7 @@ from tools.gtm.specification import DATABASE
 PICTURE = "images/gtm-envelope.png"
 LAWS = ("fault-tolerant", "oracle", "nominal")
 FLIGHTS, CALM = 600, 120
+SWEEP = Path(__file__).parents[3] / "examples" / "gtm" / "damaged-turns.yaml"
 FLOWN_KT = (80, 95, 110)
 DURATION_S, AT_S, TURN_S, TURN_DEG = 70.0, 10.0, 30.0, 15.0
 
@@ -99,14 +104,50 @@ def _draw(of: dict[str, list[Turn]]) -> None:
 
 
 def gtm_damage() -> str:
-    """The campaign of `benchmarks/gtm_damage.py`; and of calm air what is found within 1 s, and wrong names.
+    """The campaign of `benchmarks/gtm_damage.py`; of calm air what is found within 1 s, and wrong names; and
+    what `benchmarks/gtm_informed.py` says of the same flights.
 
     `BEAVER_FTC_GTM_ROWS`: a folder with rows flown before by that benchmark, which are not flown again.
     """
-    kept = Path(os.environ.get("BEAVER_FTC_GTM_ROWS") or tempfile.mkdtemp(prefix="beaver-ftc-"))
+    kept = _kept()
     real = campaign.fly_all(FLIGHTS, 1, False, kept / "full.jsonl")
     calm = campaign.fly_all(CALM, 1, True, kept / "calm.jsonl")
     within = {row[0]: f"{row[3]}/{row[1]}/{row[11]}" for row in campaign.rows(calm)}
+    ours = {one["k"]: one for one in real}
+    told = informed.see_all(ours, 1, kept / "informed.jsonl")
+    beside = {row[0]: [row[3], "/".join(row[-2:])] for row in informed.rows(ours, told)}
     shown = [1, 2, 3, 4, 5, 7, 8, 9, 10, 11]
-    rows = [[row[0], *(str(row[k]) for k in shown), within[row[0]]] for row in campaign.rows(real)]
-    return markdown_table(("case", *(campaign.HEAD[k] for k in shown), "calm: within/wrong"), rows)
+    rows = [
+        [row[0], *(str(row[k]) for k in shown), within[row[0]], *beside[row[0]]]
+        for row in campaign.rows(real)
+    ]
+    last = ("calm: within/wrong", "told", "beyond/unfound")
+    return markdown_table(("case", *(campaign.HEAD[k] for k in shown), *last), rows)
+
+
+@cache
+def _kept() -> Path:
+    return Path(os.environ.get("BEAVER_FTC_GTM_ROWS") or tempfile.mkdtemp(prefix="beaver-ftc-"))
+
+
+def gtm_laws() -> str:
+    """Our laws and the rivals on the flights of SWEEP, by `beaver-ftc compare`; made before, it is read."""
+    made = _kept() / "comparisons" / f"gtm-{SWEEP.stem}" / "comparison.json"
+    if not made.is_file():
+        code = "from beaver_ftc.cli.main import main; main()"
+        asked = ["compare", "--sweep", str(SWEEP), "--schemes", "adaptive-estimators", "--workers", "1"]
+        subprocess.run([sys.executable, "-c", code, *asked], cwd=_kept(), capture_output=True, check=True)
+    (of,) = json.loads(made.read_text(encoding="utf-8"))["sets"].values()
+    rows = [
+        [
+            one["law"],
+            str(one["departures"]),
+            *(_degrees(one[f"{when}_median"]) for when in ("before", "after")),
+        ]
+        for one in of["lines"]
+    ]
+    return markdown_table(("law", f"lost of {of['flights']}", "before, deg/s", "after"), rows)
+
+
+def _degrees(rate: float | None) -> str:
+    return "-" if rate is None else f"{rate:.3g}"

@@ -78,7 +78,8 @@ def alarms_at(traces: Sequence[Trace], level: float) -> tuple[int, float]:
 class Recording:
     """A flight under the nominal law as a detector sees it, with the built-in statistic beside it.
 
-    known (frames,): whether the design model's error is, where the aircraft is then. With `fdi.statistical`,
+    known (frames,): whether the design model's error is, where the aircraft is then; error (frames, 3):
+    its bound there, rad/s2, of an aircraft that maps it. With `fdi.statistical`,
     where the aircraft's forces are known: air (frames, 3) rad/s2, what the vanes' view of the air explains of
     each elapsed frame, and air_noise (3,) rad/s2, the standard deviation of its noise.
     """
@@ -88,6 +89,7 @@ class Recording:
     built_in: np.ndarray
     fault_at_s: float
     known: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    error: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     air: np.ndarray | None = None
     air_noise: np.ndarray | None = None
 
@@ -96,7 +98,7 @@ def record(scenario: Scenario) -> Recording:
     """Fly a scenario under the nominal law and keep what a detector would see."""
     nominal = scenario.control.model_copy(update={"law": "nominal"})
     recorder, built_in = Recorder(), list[float]()
-    air, known = list[np.ndarray](), list[bool]()
+    air, known, error = list[np.ndarray](), list[bool](), list[np.ndarray]()
     loop = Loop(scenario.model_copy(update={"control": nominal}), recorder)
     statistical, fly_frame = loop.frames["fdi"]["statistical"], loop.plugin_frame
     error_map = loop.frames["fdi"]["bound"]["error_map"]
@@ -108,13 +110,15 @@ def record(scenario: Scenario) -> Recording:
         status = fly_frame(frames, references, log)
         built_in.append(built_in_statistic(frames))
         known.append(not error_map["outside"][0])
+        error.append(error_map["now"][0].copy())
         return status
 
     loop.fly_frame = fly_and_note
     for _ in loop.chunks():
         pass
     fault_at_s = min((fault.at_s for fault in scenario.faults), default=inf)
-    recording = Recording(recorder.context, recorder.seen, np.array(built_in), fault_at_s, np.array(known))
+    by_frame = np.array(built_in), fault_at_s, np.array(known), np.array(error)
+    recording = Recording(recorder.context, recorder.seen, *by_frame)
     if scenario.fdi.statistical is not None and statistical["air"]["seen"]:
         recording.air, recording.air_noise = np.array(air), np.sqrt(statistical["noise"]["jitter"][0])
     return recording

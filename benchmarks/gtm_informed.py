@@ -1,0 +1,215 @@
+"""Which of the damage could be found at all: beside a test that is told everything of it but when it strikes.
+
+    python benchmarks/gtm_informed.py [--flights 600] [--seed 1] [--beside gtm_damage.jsonl] [--out F]
+
+The flights are those of gtm_damage.py, whose rows --beside holds (`python benchmarks/gtm_damage.py --out
+gtm_damage.jsonl`); each is flown again under the nominal law, recorded as a detector sees it. Told is which
+case; what it does to the three rates' accelerations in every frame (every third, straight lines between),
+worked out from the true flight by the specification (tools/gtm: moments, mass, centre of gravity and inertia,
+with the case less without); and noise as it is, the model's errors in it, by a vector autoregression fitted
+to flights without damage at that speed. The test is Page's (unknown_instant.py). A likelihood ratio that
+begins at one instant ever reaches h with probability exp(-h) at most [Ville], so that an instant a frame
+gives the declared rate of false alarms, or fewer, at h = ln(frames per hour / alarms per hour); its level is
+that, or more where it reached more before the damage in any flight of its case.
+
+That test knows how far the model is off. A detector knows a bound alone: an error within it may hide the
+damage, but for what of its effect is beyond the bound. `beyond the bound` says of how many flights the test
+that is told the instant too finds what is left within 1 s (the mean of its chances, clairvoyant.py): no
+detector that keeps to the declared error is sure to find more. Where the model's error is not known, none.
+
+A row a case: found within 1 s by ours, by the informed test, by both, by ours alone, by it alone; beyond the
+bound; and of the flights that ours does not find in time how many are beyond it, by the same chances. Rows
+that --out holds are not flown again. Needs BEAVER_FTC_GTM and `aircraft: gtm`.
+"""
+
+import argparse
+import json
+from collections.abc import Iterator
+from functools import cache
+from math import cos, degrees, log, sin
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from benchmarks.gtm_damage import M_S_PER_KT, Document, scenario
+from benchmarks.unknown_instant import ORDER, WITHIN_S, Whitener, fitted, unexplained
+from tools.gtm.flights import CASES, NAMES
+from tools.gtm.specification import Controls, Specification, folder
+
+import beaver_ftc as bf
+from beaver_ftc.aircraft import load
+from beaver_ftc.diagnosis.bounds.clairvoyant import chance
+from beaver_ftc.scenario.loader import load_text
+from beaver_ftc.studies.compare.replay import Recording, aware_of_the_air, record, trace
+from beaver_ftc.studies.present.tables import markdown_table
+
+M_PER_FT = 0.3048
+BANDS_KT = (70.0, 80.0, 90.0, 100.0, 110.0)  # the noise is fitted between two
+HEALTHY = 16  # flights a band that fit it
+EACH = 3  # frames between two of which the effect is worked out
+PER_H = 1e-3  # false alarms, as ours declares
+LEVEL = log(3600.0 * 100.0 / PER_H)
+HEAD = [
+    "case", "flights", "ours", "told all but the instant", "both", "ours alone", "it alone",
+    "beyond the bound", "of these not ours",
+]  # fmt: skip
+
+
+def recorded(given: Document) -> Recording:
+    """A flight as a detector sees it that takes off the gust as ours does."""
+    recording = record(load_text(json.dumps(given)))
+    return recording if recording.air is None else aware_of_the_air(recording)
+
+
+def healthy(seed: int, k: int) -> Document:
+    """The k-th flight's like without damage, of a seed of its own."""
+    given = scenario(seed + 1000, k)
+    return {key: of for key, of in given.items() if key != "faults"}
+
+
+@cache
+def noise(seed: int, band: int) -> Whitener:
+    """Of flights without damage between two speeds."""
+    low, high = (knots * M_S_PER_KT for knots in BANDS_KT[band : band + 2])
+    flights = (healthy(seed, k) for k in range(100 * HEALTHY))
+    there = [one for one in flights if low <= one["initial"]["airspeed_mps"] < high][:HEALTHY]
+    return fitted([unexplained(recorded(one)) for one in there])
+
+
+def band_of(given: Document) -> int:
+    """Which band of speed a flight begins in."""
+    found = np.searchsorted(BANDS_KT, given["initial"]["airspeed_mps"] / M_S_PER_KT) - 1
+    return int(np.clip(found, 0, len(BANDS_KT) - 2))
+
+
+def effect(spec: Specification, given: Document, case: int) -> np.ndarray:
+    """What the damage does, or would do, in each frame but the first, (frames - 1, 3) rad/s2."""
+    log = {name: np.asarray(of) for name, of in bf.fly(load_text(json.dumps(given))).log.items()}
+    names = [f"{name}_pos_rad" for name in NAMES.values()]
+    frames = np.arange(len(log["t_s"]) - 1)
+    some = frames[::EACH]
+    known = np.array([_effect(spec, log, names, case, k) for k in some])
+    return np.column_stack([np.interp(frames, some, of) for of in known.T])
+
+
+def _effect(
+    spec: Specification, log: dict[str, np.ndarray], names: list[str], case: int, k: int
+) -> np.ndarray:
+    at = {name: float(of[k]) for name, of in log.items() if name in _STATE}
+    V, a, b = at["airspeed_mps"] / M_PER_FT, at["alpha_rad"], at["beta_rad"]
+    velocity = [V * cos(a) * cos(b), V * sin(b), V * sin(a) * cos(b)]
+    rest = [at[name] for name in _STATE[3:-1]]
+    x = np.array([*velocity, *rest, at["altitude_m"] / M_PER_FT])
+    surfaces = {s: degrees(float(log[name][k])) for s, name in zip(NAMES, names, strict=True)}
+    controls = Controls(surfaces, (100.0 * float(log["throttle"][k]),) * 2)
+    with_it, without = (spec.rates_of_change(x, controls, which)[3:6] for which in (case, 0))
+    return with_it - without
+
+
+_STATE = (
+    "airspeed_mps", "alpha_rad", "beta_rad", "p_rad_s", "q_rad_s", "r_rad_s", "phi_rad", "theta_rad",
+    "psi_rad", "altitude_m",
+)  # fmt: skip
+
+
+def largest_ratio(recording: Recording, does: np.ndarray, white: Whitener) -> np.ndarray:
+    """The largest log likelihood ratio of these accelerations since some frame, at every frame (n,).
+
+    From ORDER frames after it began on a fault is whitened as if it had always been there.
+    """
+    z, begins = white.respond(unexplained(recording)), np.arange(len(does))
+    always = white.respond(does)
+    gone = np.cumsum(np.einsum("ki,ki->k", z, always) - 0.5 * np.square(always).sum(axis=1))
+    before, of = white.before.reshape(ORDER, 3, 3), np.vstack((does, np.zeros((ORDER, 3))))
+    seen_z, since, best = np.vstack((z, np.zeros((ORDER, 3)))), np.zeros(len(does)), np.zeros(len(does))
+    for late in range(ORDER):
+        rest = of[begins + late] - sum(
+            (of[begins + late - j] @ before[j - 1] for j in range(1, late + 1)), np.zeros((len(does), 3))
+        )
+        response = rest @ white.root
+        since = since + (response * (seen_z[begins + late] - 0.5 * response)).sum(axis=1)
+        best[late:] = np.maximum(best[late:], since[: len(does) - late])
+    settled = np.maximum.accumulate(since[:-ORDER] - gone[ORDER - 1 : -1])
+    best[ORDER:] = np.maximum(best[ORDER:], gone[ORDER:] + settled)
+    return np.concatenate(([0.0], np.maximum(best, 0.0)))
+
+
+def deflected(recording: Recording, does: np.ndarray, white: Whitener) -> float:
+    """How far they stand out of the noise WITHIN_S after the damage."""
+    t = np.array([measured.t_s for measured, _ in recording.seen[1:]]) - recording.fault_at_s
+    response = white.respond(does * (t > 1e-9)[:, None])
+    return float(np.sqrt(np.square(response[t <= WITHIN_S + 1e-9]).sum()))
+
+
+def seen(seed: int, k: int, spec: Specification) -> Document:
+    """Of the k-th flight: the informed test's largest value before the damage, and within WITHIN_S of it; the
+    chance of one that is told the instant too of finding what is beyond the bound."""
+    given = scenario(seed, k) | {"control": {"law": "nominal"}}
+    damage = given["faults"][0]
+    given["duration_s"] = round(damage["at_s"] + WITHIN_S + 0.05, 2)
+    case = CASES.index(damage["case"]) + 1
+    recording, white = recorded(given), noise(seed, band_of(given))
+    does = effect(spec, given, case)[: len(recording.seen) - 1]
+    of_it = trace(recording, largest_ratio(recording, does, white))
+    bound = np.minimum(recording.error[:-1], recording.error[1:])  # at either end of each frame
+    beyond = np.sign(does) * np.maximum(np.abs(does) - bound, 0.0)
+    return {
+        "k": k, "before": of_it.before,
+        "after": max((value for late, value in of_it.records if late <= WITHIN_S + 1e-9), default=0.0),
+        "beyond": chance(deflected(recording, beyond, white), WITHIN_S, PER_H),
+    }  # fmt: skip
+
+
+def rows(ours: dict[int, Document], of: dict[int, Document]) -> Iterator[list[Any]]:
+    """A row a case, and one of all."""
+    total = np.zeros(8)
+    for case in load("gtm").damage:
+        there = [k for k in of if ours[k]["case"] == case]
+        level = max(LEVEL, *(of[k]["before"] for k in there))
+        by_us = np.array([(ours[k]["delay_s"] or np.inf) <= WITHIN_S + 1e-9 for k in there])
+        by_it = np.array([of[k]["after"] > level for k in there])
+        beyond = np.array([of[k]["beyond"] for k in there])
+        either = by_us & by_it, by_us & ~by_it, by_it & ~by_us
+        row = [len(there), by_us.sum(), by_it.sum(), *(one.sum() for one in either), beyond.sum()]
+        row.append(beyond[~by_us].sum())
+        total += row
+        yield [case, *_printed(row)]
+    yield ["all", *_printed(list(total))]
+
+
+def _printed(row: list[float]) -> list[str]:
+    return [*(str(int(n)) for n in row[:6]), *(f"{n:.1f}" for n in row[6:])]
+
+
+def see_all(ours: dict[int, Document], seed: int, out: Path) -> dict[int, Document]:
+    """What the informed test makes of our flights: the rows in the file, and the others, added to it."""
+    where = folder()
+    assert where is not None
+    done = [json.loads(line) for line in out.read_text().splitlines()] if out.is_file() else []
+    of, spec = {one["k"]: one for one in done}, Specification(where)
+    with out.open("a", encoding="utf-8") as file:
+        for k in sorted(ours.keys() - of.keys()):
+            of[k] = seen(seed, k, spec)
+            print(json.dumps(of[k]), file=file, flush=True)
+    return {k: of[k] for k in ours}
+
+
+def main() -> None:
+    """Fly, print the table."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--flights", type=int, default=600)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--beside", type=Path, default=Path("gtm_damage.jsonl"))
+    parser.add_argument("--out", type=Path, default=Path("gtm_informed.jsonl"))
+    given = parser.parse_args()
+    if folder() is None or not given.beside.is_file():
+        parser.error("needs BEAVER_FTC_GTM, and --beside, which gtm_damage.py writes")
+    flown = map(json.loads, given.beside.read_text().splitlines())
+    ours = {one["k"]: one for one in flown if one["k"] < given.flights}
+    print(markdown_table(HEAD, list(rows(ours, see_all(ours, given.seed, given.out)))))
+
+
+if __name__ == "__main__":
+    main()

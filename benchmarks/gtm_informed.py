@@ -1,6 +1,6 @@
 """Which of the damage could be found at all: beside a test that is told everything of it but when it strikes.
 
-    python benchmarks/gtm_informed.py [--flights 600] [--seed 1] [--beside gtm_damage.jsonl] [--out F]
+    python -m benchmarks.gtm_informed [--flights 600] [--seed 1] [--beside gtm_damage.jsonl] [--out F]
 
 The flights are those of gtm_damage.py, whose rows --beside holds (`python benchmarks/gtm_damage.py --out
 gtm_damage.jsonl`); each is flown again under the nominal law, recorded as a detector sees it. Told is which

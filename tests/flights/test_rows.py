@@ -158,12 +158,12 @@ def test_names_by_hand():
 
 
 def test_names_under_other_laws(monkeypatch):
-    """Unknown until the evidence is twice the threshold; another name waits a second; never two groups."""
+    """Unknown until the evidence is four times the threshold; another name waits a second; never two groups."""
     other = WING.vehicle.model_copy(update={"other_laws": True})
     settings = WING.settings.model_copy(update={"threshold": 2.0})
     model = WING.model_copy(update={"vehicle": other, "settings": settings})
     reach = round(WING.rate_hz)
-    gained = np.concatenate([[1.0, 1.0, 1.0, 1.0], np.zeros(2 * reach + 2)])
+    gained = np.concatenate([[1.0, 1.0, 5.0, 1.0], np.zeros(2 * reach + 2)])
     monkeypatch.setattr(diagnose, "evidence", lambda posterior, bank: gained)
     shares = [{LEFT: 1.0}] * 4 + [{BOTH: 0.6, LEFT: 0.4}] + [{RIGHT: 1.0}] * (2 * reach + 1)
     bank = bank_of(model)

@@ -23,7 +23,7 @@ from beaver_ftc.flights.samples import Samples
 _RATE_TOLERANCE = 0.25
 UNKNOWN = "unknown"
 _NAMED = 0.5
-_SURER, _RENAMED_S = 2.0, 1.0
+_SURER, _RENAMED_S = 4.0, 1.0
 """Under other laws a name asks for so much more evidence than an alarm, and another name must stand for so
 long to replace it; and it is of one group, the likeliest."""
 _IDLE = 0.5

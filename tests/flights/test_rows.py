@@ -158,7 +158,7 @@ def test_names_by_hand():
 
 
 def test_names_under_other_laws(monkeypatch):
-    """Unknown until the evidence is four times the threshold; another name waits a second; never two groups."""
+    """Unknown until the evidence is four times the threshold; another name waits a second; one group."""
     other = WING.vehicle.model_copy(update={"other_laws": True})
     settings = WING.settings.model_copy(update={"threshold": 2.0})
     model = WING.model_copy(update={"vehicle": other, "settings": settings})

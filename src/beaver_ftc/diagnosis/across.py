@@ -81,7 +81,7 @@ class Size(NamedTuple):
 
 # The usual one serves most aircraft, so that the same compiled code does; the second, long fits of few
 # surfaces; all fit into the last.
-USUAL = Size(Rooms(24, MAX_HYPOTHESES), Rooms(36, 3), 13, 6)
+USUAL = Size(Rooms(23, MAX_HYPOTHESES), Rooms(36, 3), 13, 6)
 LONG = Size(Rooms(69, MAX_HYPOTHESES), Rooms(106, MAX_HYPOTHESES), 16, 6)
 MOST = Size(
     Rooms(2 * MAX_TERMS_OF_ONE + N_READINGS, 3 * MAX_SURFACES + 2),

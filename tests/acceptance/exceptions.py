@@ -45,7 +45,8 @@ TABLE = (
     ),
     Exempt(r"fgfs .*", "needs FlightGear"),
     Exempt(r"(ray start|srun|sleep|head=).*|.* --ray-address .*", "needs a cluster of several machines"),
-    Exempt(r"python benchmarks/.*", "a measurement of minutes to hours, from a checkout"),
+    Exempt(r"python (-m )?benchmarks[/.].*", "a measurement of minutes to hours, from a checkout"),
+    Exempt(r"beaver-ftc compare --sweep examples/gtm/.*", "needs NASA's data, imported"),
     Exempt(r"python -m tools\.docs reference \S+", "in a checkout; tests/tools prints every such page"),
     Exempt(
         r"(beaver-ftc live(?: (?!--open)\S+)*)( --open)?",

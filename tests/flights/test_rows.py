@@ -159,9 +159,9 @@ def test_names_by_hand():
 
 def test_names_under_other_laws(monkeypatch):
     """Unknown until the evidence is four times the threshold; another name waits a second; one group."""
-    other = WING.vehicle.model_copy(update={"other_laws": True})
     settings = WING.settings.model_copy(update={"threshold": 2.0})
-    model = WING.model_copy(update={"vehicle": other, "settings": settings})
+    asks = settings.model_copy(update={"name_evidence": 4.0, "rename_s": 1.0, "one_group": True})
+    model = WING.model_copy(update={"settings": asks})
     reach = round(WING.rate_hz)
     gained = np.concatenate([[1.0, 1.0, 5.0, 1.0], np.zeros(2 * reach + 2)])
     monkeypatch.setattr(diagnose, "evidence", lambda posterior, bank: gained)
@@ -174,7 +174,7 @@ def test_names_under_other_laws(monkeypatch):
         return found.named.tolist()
 
     assert named_by(model) == ["", "unknown", "unknown", *["left"] * (2 + reach), *["right"] * (reach + 1)]
-    same = model.model_copy(update={"vehicle": WING.vehicle})
+    same = model.model_copy(update={"settings": settings})
     assert named_by(same) == ["", *["left"] * 3, "right+left", *["right"] * (2 * reach + 1)]
 
 

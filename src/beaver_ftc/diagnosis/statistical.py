@@ -89,8 +89,10 @@ def observe(tests, bounded, blocks, air, innovation, dt, k, latched, ends=False)
             likelihood.start(block, slot)
         for i, axis in enumerate(block.axis[: block.n]):
             block.scratch[i] = innovation[axis] - air.mean[axis]
-            block.shown[i] = air.shown[axis]
         block.glimpsed = air.glimpsed
+        if air.glimpsed:
+            for i, axis in enumerate(block.axis[: block.n]):
+                block.shown[i] = air.shown[axis]
         if air.moving:
             leap(air, block)
             if b < likelihood.RETURNING:

@@ -23,9 +23,6 @@ from beaver_ftc.flights.samples import Samples
 _RATE_TOLERANCE = 0.25
 UNKNOWN = "unknown"
 _NAMED = 0.5
-_SURER, _RENAMED_S = 4.0, 1.0
-"""Under other laws a name asks for so much more evidence than an alarm, and another name must stand for so
-long to replace it; and it is of one group, the likeliest."""
 _IDLE = 0.5
 """Probability that nothing answers the commands above which nothing is said of any surface."""
 
@@ -156,10 +153,11 @@ def rows_of(samples: Samples, model: Model, bank: Bank, posterior: Floats) -> Ro
     threshold = model.settings.threshold
     gained = evidence(posterior, bank)
     gathered = accumulated(gained, threshold or np.inf)
-    raised = surer = _standing(probability >= model.settings.alarm, model)
+    raised = sure = _standing(probability >= model.settings.alarm, model)
     if threshold is not None:
+        named_at = model.settings.name_evidence * threshold
         raised = (gathered >= threshold) & ~well
-        surer = (accumulated(gained, _SURER * threshold) >= _SURER * threshold) & ~well
+        sure = (accumulated(gained, named_at) >= named_at) & ~well
     faulty = _latched(raised, well).astype(np.int64)
     began = np.maximum.accumulate(np.where(gathered <= 0.0, np.arange(len(gathered)), 0))
     by_group = [_of_group(bank, answering, g, model) for g in range(len(model.groups))]
@@ -169,7 +167,7 @@ def rows_of(samples: Samples, model: Model, bank: Bank, posterior: Floats) -> Ro
     return Rows(
         t_s=samples.t_s,
         faulty=faulty,
-        named=_names(model, bank, posterior, faulty, _latched(surer, well)),
+        named=_names(model, bank, posterior, faulty, _latched(sure, well)),
         estimate=by_surface(estimate, model),
         low=by_surface(low, model),
         high=by_surface(high, model),
@@ -235,18 +233,18 @@ def _names(
 ) -> NDArray[np.object_]:
     """The surfaces of the groups that most of the fault's probability is on; `unknown` where it is split.
 
-    sure (n,): where the evidence names a surface under other laws too.
+    sure (n,): where the evidence is enough for a name.
     """
     total = np.maximum(posterior[:, bank.faults].sum(axis=1), TINY)
     shares = [posterior[:, bank.faulty(g)].sum(axis=1) / total for g in range(len(model.groups))]
     share = np.column_stack(shares)
-    likelier = share > _NAMED
-    if model.vehicle.other_laws:
-        likelier &= sure[:, None] & (np.arange(share.shape[1]) == share.argmax(axis=1)[:, None])
+    likelier = (share > _NAMED) & sure[:, None]
+    if model.settings.one_group:
+        likelier &= np.arange(share.shape[1]) == share.argmax(axis=1)[:, None]
     likely = joined(likelier, ["+".join(group) for group in model.groups])
     named = np.full(len(posterior), "", dtype=object)
     other = posterior[:, bank.kind == UNKNOWN_OFFSET].sum(axis=1) > total
-    reach, stood = round(_RENAMED_S * model.rate_hz) if model.vehicle.other_laws else 0, 0
+    reach, stood = round(model.settings.rename_s * model.rate_hz), 0
     for k in np.flatnonzero(faulty):
         now, said = likely[k] or UNKNOWN, named[k - 1] if k else ""
         stood = stood + 1 if k and now == (likely[k - 1] or UNKNOWN) else 0

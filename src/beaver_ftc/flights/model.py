@@ -51,6 +51,9 @@ class Settings(Section):
     threshold: Number | None = Field(
         None, gt=0, description="evidence for a fault that raises the alarm, instead of both: for that rate"
     )
+    name_evidence: Number = Field(1.0, ge=1, description="evidence for a name, over that for an alarm")
+    rename_s: Number = Field(0.0, ge=0, description="for how long another name stands before it counts, s")
+    one_group: bool = Field(False, description="whether a name is of the likeliest group alone")
     level_step: Number = Field(0.1, gt=0, le=0.5, description="step of the grid of effectiveness")
     bounds: Number = Field(0.9, gt=0, lt=1, description="posterior mass inside the bounds")
 

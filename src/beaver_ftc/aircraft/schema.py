@@ -327,6 +327,7 @@ class ErrorBox(Section):
     error_p_rad_s2: largest error of the roll acceleration, rad/s2
     error_q_rad_s2: largest error of the pitch acceleration, rad/s2
     error_r_rad_s2: largest error of the yaw acceleration, rad/s2
+    engines_apart: Cn of engines beyond what their thrust gives, at most, all levers alike; left out: unknown
     """
 
     airspeed_mps: Range = entry(..., examples=[[40, 50]])
@@ -340,6 +341,7 @@ class ErrorBox(Section):
     error_p_rad_s2: Errors = entry(..., examples=[[[0.01]]])
     error_q_rad_s2: Errors = entry(..., examples=[[[0.01]]])
     error_r_rad_s2: Errors = entry(..., examples=[[[0.01]]])
+    engines_apart: Number | None = number(None, unit="1", ge=0, le=100, examples=[0.0003])
 
     def ends(self, signals: Iterable[str]) -> list[Range]:
         """Ends of the box: rates, angle of attack, sideslip, airspeed, density, then these signals."""
@@ -376,6 +378,11 @@ class ErrorMapSection(Section):
             ]
         )
         return self
+
+    @property
+    def knows_engines(self) -> bool:
+        """Whether it says of all boxes how alike engines under one lever pull."""
+        return all(box.engines_apart is not None for box in self.boxes)
 
 
 class StartSection(Section):

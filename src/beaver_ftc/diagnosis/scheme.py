@@ -11,7 +11,17 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import apart, kernel, record
 from beaver_ftc.design.model import AIRSPEED
-from beaver_ftc.diagnosis import air, bank, detection, forces, isolation, state, statistical, zhang2005
+from beaver_ftc.diagnosis import (
+    air,
+    balance,
+    bank,
+    detection,
+    forces,
+    isolation,
+    state,
+    statistical,
+    zhang2005,
+)
 from beaver_ftc.diagnosis.across import USUAL, Size
 from beaver_ftc.diagnosis.bank import largest_share
 from beaver_ftc.diagnosis.bounds import declared
@@ -42,7 +52,7 @@ def diagnosis_dtype(n: int, size: Size = USUAL) -> np.dtype:
         verdict=state.conclusion_dtype(n), layout=state.layout_dtype(n),
         isolation=isolation.isolation_dtype(n),
         types=registry.types_dtype(n), statistical=statistical.statistical_dtype(size), watch=WATCH,
-        published=zhang2005.PUBLISHED,
+        published=zhang2005.PUBLISHED, balance=balance.BALANCE,
     )  # fmt: skip
 
 
@@ -64,6 +74,7 @@ def configure(fdi: np.void, belief: np.void, scenario: Scenario, travel: np.ndar
     declared.configure(fdi["bound"], scenario, belief["design"])
     bank.configure(fdi["bank"], config, dt)
     detection.configure(fdi["fdae"], scenario)
+    balance.configure(fdi["balance"], aircraft)
     if config.is_published:
         zhang2005.configure(fdi, scenario, travel)
     registry.configure(fdi["types"], fdi["layout"], belief["actuators"], scenario, travel)

@@ -25,6 +25,7 @@ from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, unanticipated_pitch
 from beaver_ftc.diagnosis import (
     across,
     air,
+    balance,
     bank,
     detection,
     instruments,
@@ -63,8 +64,7 @@ def take_back(fdi):
     """What the diagnosis of the surfaces made of a broken instrument is void."""
     for s in range(fdi.types.surface.size):
         fdi.types.surface[s].measure = -1
-    fdi.fdae.network.weights[:] = 0.0
-    fdi.fdae.network.output[:] = 0.0
+    fdi.fdae.network.weights[:], fdi.fdae.network.output[:] = 0.0, 0.0
 
 
 @kernel
@@ -102,6 +102,7 @@ def diagnose(frame):
             predict(frame, k)
         else:
             bank.align(fdi.isolation, frame.belief.G)
+        balance.heed(fdi.balance, frame.control.power.command[1:])
         conclude(fdi, frame.measured, frame.belief.u, frame.t)
     make_ready(frame, k)
 
@@ -191,7 +192,7 @@ def conclude(fdi, measured, u, t):
     """From residuals to alarm, and from then on to a verdict. u (n,) rad: where healthy surfaces are.
 
     Where instruments are watched, a surface waits a frame after the alarm: that much later the attitude shows
-    what a gyro did; a blurred one, later. Once an instrument is found broken, no surface is named.
+    what a gyro did; a blurred one, later. Once it or an engine is found broken, no surface is named.
     """
     if instruments.speaks(fdi.watch):
         return
@@ -201,12 +202,13 @@ def conclude(fdi, measured, u, t):
         zhang2005.detect(fdi.fdae, fdi.verdict, t)
         zhang2005.respond(fdi.published, fdi.fdae, fdi.layout.main, measured.x, measured.y, u)
     else:
+        balance.detect(fdi.balance, fdi.verdict, fdi.bound.error_map.apart_now, measured.y, t)
         detection.detect(fdi.bank, fdi.verdict, fdi.config.authority, fdi.statistical.alarm, t)
     if not fdi.verdict.detected:
         return
     if not known:
         scheme.begin_isolation(fdi.isolation, fdi.types, every_type, fdi.bound.noise, measured.x)
-    if instruments.clears_surfaces(fdi.watch, known):
+    if instruments.clears_surfaces(fdi.watch, known) and not fdi.balance.failed:
         isolate(fdi, measured.x, t, known)
     if not fdi.published.in_use:
         detection.evaluate(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
@@ -220,8 +222,7 @@ def isolate(fdi, x, t, started):
         fie = records.estimator[s]
         can_be = isolation.possible(records, fie, fdi.bank, bound.frame, config.abrupt, x, started)
         if rules_out(fdi, fie, can_be) and not fie.excluded:
-            fie.excluded = 1
-            fie.excluded_at_s = t
+            fie.excluded, fie.excluded_at_s = 1, t
     if config.every_type:
         scheme.isolate_type(fdi.types, fdi.verdict, fdi.layout, records, fdi.bank, bound, t, started)
     else:
@@ -596,5 +597,4 @@ def finish(frame, commanded, row):
     reference.govern(control.reference, commanded, control.axes.shortfall)
     follow_command(belief, control.allocation.command)
     hand_over(frame.truth, belief.commanded, control.power)
-    frame.k += 1
-    frame.row += 1
+    frame.k, frame.row = frame.k + 1, frame.row + 1

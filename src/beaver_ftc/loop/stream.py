@@ -73,6 +73,7 @@ class Diagnosis:
         self._frames = assemble(self._scenario, np.zeros(travel.shape[1]), travel)
         self._frame = self._frames[0]
         self._fdi = self._frame["fdi"]
+        self._fdi["balance"]["n"] = 0  # nobody says where levers are
         self._x, self._command, self._attitude = np.zeros(3), np.zeros(travel.shape[1]), np.zeros(3)
         self._y = np.zeros_like(self._frame["measured"]["y"])  # beyond the aircraft's own signals always zero
         self._signals = self._y[: len(FLOW) + len(self._aircraft.signals)]

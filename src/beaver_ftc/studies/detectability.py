@@ -255,7 +255,7 @@ def engine_failures(scenario: Scenario) -> list[Document]:
 
 def of_engines(failures: Sequence[Document]) -> list[str]:
     """A line an engine."""
-    ends = {True: "; its moment is a signal: nothing is left to show", False: ""}
+    ends = {True: "; its moment is a signal, held against their thrust", False: ""}
     return [
         f"{of['engine']} at idle turns the aircraft by {max(of['turns_rad_s2']):.2g} rad/s2, "
         f"{of['shows']:.2g} times what is certain to show in a frame{ends[of['known']]}"

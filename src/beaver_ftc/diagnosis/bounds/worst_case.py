@@ -65,11 +65,12 @@ def admitted_dtype(n: int) -> np.dtype:
 @lru_cache
 def error_map_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
     """The map for an aircraft with n surfaces. whole: surfaces may be anywhere. outside: of all boxes.
-    before: the surfaces in the frame before, rad. now: the error here, rad/s2."""
+    before: the surfaces in the frame before, rad. now: the error here, rad/s2. apart: `engines_apart`."""
     return record(
         n_boxes=int, n_levels=int, n_ages=int, whole=int, outside=int, time_s=float, until_s=MAX_AGES,
         low=(boxes, _N), high=(boxes, _N), share=MAX_LEVELS,
         error=(MAX_AGES, boxes, MAX_LEVELS, 3), travel_low=n, travel_high=n, before=n, place=_N, now=3,
+        apart=boxes, apart_now=float,
     )  # fmt: skip
 
 
@@ -102,6 +103,7 @@ def fill_error_map(error_map: np.void, aircraft: Aircraft, whole: bool) -> None:
         error_map["low"][k, : len(ends)], error_map["high"][k, : len(ends)] = ends.T
         errors = box.error_p_rad_s2, box.error_q_rad_s2, box.error_r_rad_s2
         error_map["error"][:n_ages, k, :n_levels] = np.stack(errors, axis=-1)
+        error_map["apart"][k] = box.engines_apart or 0.0
 
 
 @kernel
@@ -286,8 +288,9 @@ def look_up(error_map, x, y, u):
     for k in range(error_map.n_boxes if age >= 0 else 0):
         if is_inside(error_map, k):
             error_map.outside, error_map.now[:] = 0, error_map.error[age, k, level]
+            error_map.apart_now = error_map.apart[k]
             return
-    error_map.outside, error_map.now[:] = 1, UNKNOWN_RAD_S2
+    error_map.outside, error_map.now[:], error_map.apart_now = 1, UNKNOWN_RAD_S2, UNKNOWN_RAD_S2
 
 
 @kernel

@@ -21,6 +21,7 @@ from beaver_ftc.aircraft import loading
 from beaver_ftc.aircraft.aircraft import THRUST_TERM
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_SIGNALS, MAX_TERMS_OF_ONE
 from beaver_ftc.design.model import design_record
+from beaver_ftc.diagnosis.balance import THRUST
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.plant import instrumented
 from beaver_ftc.plant.adapter import Plant, translated
@@ -36,6 +37,7 @@ from beaver_ftc.studies.derive.fit import (
     fitted,
     map_of,
     nearness,
+    set_engines_apart,
     signals_of_use,
 )
 from beaver_ftc.studies.derive.sample import (
@@ -277,6 +279,7 @@ def _derived(
     first = sample_all(plant, about, SAMPLES, 1, properties, FRESH, moves)
     if not declared:
         wanted = engine_signals(flown, plant.aircraft)
+        wanted += [THRUST] if plant.aircraft.effectors else []
         useful = signals_of_use(first, plant.aircraft, MAX_SIGNALS, wanted)
         data["signals"] = {name: {"property": properties[name]} for name in useful}
     tell("fit")
@@ -290,6 +293,9 @@ def _derived(
     data["model_error_map"], (of_fit, of_check, _) = map_of(
         aircraft, (first, other), flown, len(about), moves
     )
+    if plant.aircraft.effectors:
+        alike = sample_all(plant, about, SAMPLES, 3, properties, moves=moves, apart=0.0)
+        set_engines_apart(data["model_error_map"]["boxes"], plant.aircraft, alike)
     outermost = data["model_error_map"]["boxes"][-len(about) :]
     largest = {axis: max(box[f"error_{axis}_rad_s2"][0][-1] for box in outermost) for axis in "pqr"}
     data["model_error_rad_s2"] = largest

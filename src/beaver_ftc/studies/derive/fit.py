@@ -17,6 +17,7 @@ from scipy.linalg import lstsq
 from beaver_ftc.aircraft import AXES, Aircraft, MassProperties
 from beaver_ftc.aircraft.aircraft import MOMENTS
 from beaver_ftc.design.model import inertia_coefficients, inertial
+from beaver_ftc.diagnosis import balance
 from beaver_ftc.studies.derive.sample import (
     AGES_S,
     REACHES,
@@ -35,6 +36,7 @@ RIDGE = 1e-13  # keeps what is nearly the same twice from being nearly infinite
 NO_USE = 1e-3  # of what is left in the end, for a term to stay
 LEAST_RAD_S2 = 1e-3  # below it, how small an error is does not matter
 MARGIN = 1.3  # of the declared error over the largest one found
+LEAST_APART = 1e-7  # of what engines do unlike, as a coefficient
 ROUNDING_RAD_S2 = 1e-7  # of errors in the file
 LEAST_SPAN = 1e-9  # of a signal over the samples, dimensionless
 NOT_MISSED = 0.02  # rise of the sum of the logarithms of the errors without a signal
@@ -282,6 +284,14 @@ def map_of(
     of_all = tables[:, 0, -regions:, -1].max(axis=1)
     seldom = {"stand_ins": moves.stand_ins} if moves.stand_ins != 1.0 else {}
     return {"travel_share": list(moves.shares), **seldom, "until_s": list(AGES_S), "boxes": boxes}, of_all
+
+
+def set_engines_apart(boxes: Sequence[dict[str, Any]], aircraft: Aircraft, alike: Samples) -> None:
+    """Fill in how unlike engines pull in each box; alike: states with all their levers where one is."""
+    of = alike.signals
+    apart = np.abs(of[balance.YAWING] - balance.mean_arm(aircraft) * of[balance.THRUST])
+    for i, box in enumerate(boxes):
+        box["engines_apart"] = _rounded(MARGIN * float(apart[alike.box <= i].max()) + LEAST_APART, np.ceil)
 
 
 def _ends(aircraft: Aircraft, sets: Sequence[Samples], box: int, regions: int) -> np.ndarray:

@@ -158,10 +158,10 @@ class Draw:
 
 def sample(
     plant: Plant, envelope: Envelope, trim: FlightState, n: int, seed: int, properties: Mapping[str, str],
-    ages: tuple[int, ...] = EVERY_AGE, starts: int = STARTS, moves: Moves = USUAL,
+    ages: tuple[int, ...] = EVERY_AGE, starts: int = STARTS, moves: Moves = USUAL, apart: float = _APART,
 ) -> Samples:  # fmt: skip
     """So many random states; properties: of each signal to be read there; ages: of the flights; starts: how
-    often the engines are started anew."""
+    often the engines are started anew; apart: how far their levers are from one another, if they have any."""
     draw, rows = Draw(seed, plant.aircraft, envelope, trim, moves), []
     tanks = Tanks(plant, trim)
     for k in range(starts):
@@ -169,7 +169,7 @@ def sample(
         tanks.fill(draw.between(0.0, AGES_S[age]))
         started = draw.start(REACHES[box])
         for effector in plant.aircraft.effectors.values():
-            plant.write(effector.throttle, draw.around(0.0, REACHES[box] * _APART))
+            plant.write(effector.throttle, draw.around(0.0, REACHES[box] * apart))
         plant.start(started)
         for i in range(max(1, n // starts)):
             level = i % len(moves.shares)
@@ -183,12 +183,12 @@ def sample(
 
 def sample_all(
     plant: Plant, regions: Sequence[Region], n: int, seed: int, properties: Mapping[str, str],
-    ages: tuple[int, ...] = EVERY_AGE, moves: Moves = USUAL,
+    ages: tuple[int, ...] = EVERY_AGE, moves: Moves = USUAL, apart: float = _APART,
 ) -> Samples:  # fmt: skip
-    """So many random states of all regions together; boxes are numbered reach by reach."""
+    """So many random states of all regions together; boxes are numbered reach by reach; apart: as above."""
     few, many = STARTS // len(regions), n // len(regions)
     parts = [
-        sample(plant, of.envelope, of.trim, many, seed + 10 * k, properties, ages, few, moves)
+        sample(plant, of.envelope, of.trim, many, seed + 10 * k, properties, ages, few, moves, apart)
         for k, of in enumerate(regions)
     ]
     return joined([replace(of, box=len(parts) * of.box + k) for k, of in enumerate(parts)])

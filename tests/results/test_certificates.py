@@ -81,6 +81,12 @@ FLIGHTS = {
     },
     "an altimeter": {"faults": [{"sensor": "altitude", "type": "bias", "magnitude": 3, "at_s": 1.0}]},
     "a roll angle": {"faults": [{"sensor": "phi", "type": "bias", "magnitude": 0.1, "at_s": 1.0}]},
+    "blocks": {
+        "faults": [STUCK],
+        "sensors": GYROS,
+        "fdi": {"fault_class": "all", "bounds": {"sensors": GYROS}},
+    },
+    "no vane": {"faults": [{"sensor": "alpha", "type": "lost", "at_s": 1.0}]},
     "no fault": {},
 }
 CHANCE = [name for name in FLIGHTS if name.startswith("chance")]
@@ -195,11 +201,46 @@ def test_an_alarm_of_instruments_is_that_of_the_log():
         assert [*doubts(sealed(renamed), log)]
 
 
-def test_what_is_missing_is_beyond_no_bound():
-    lost = {"sensor": "alpha", "type": "lost", "at_s": 1.0}
-    flight = bf.fly({"name": "test", "duration_s": 1.5, "faults": [lost]})
-    (said,) = flight.certificate()["without"]
-    assert said["because"] == "there was no reading of sensor alpha: nothing is compared"
+def test_that_a_reading_is_missing_is_what_the_log_says():
+    """Of the fourth instrument, from its fault on; of no other, and in no other row."""
+    certificate, log = flown("no vane")
+    (said,) = certificate["statements"]
+    assert (said["frame"], said["missing"]) == (100, [3])
+    assert np.isnan(log["watch_missing"][:100]).all()
+    assert (log["watch_missing"][100:] == 3.0).all()
+    assert "watch_missing" not in flown("an altimeter")[1]
+    other = log | {"watch_missing": np.full(len(log["t_s"]), 4.0)}
+    assert [*failures(certificate, other)] == ["alarm: not so"]
+    assert [*doubts(certificate, other)]
+
+
+def test_in_blocks_a_jam_is_what_a_block_says_in_the_mean():
+    """With gyros as noisy, by plain sums over the rows of a block: no loss explains what it shows."""
+    certificate, log = flown("blocks")
+    said = next(one for one in certificate["statements"] if one["what"] == "aileron loss_of_effectiveness")
+    (length, begin, _), dt, limit, value = said["block"], log["t_s"][1], 0.0, 0.0
+    for one in said["terms"]:
+        rows = range(begin + one["frame"] * length, begin + (one["frame"] + 1) * length)
+        for axis, d in zip("pqr", one["d"], strict=True):
+            x, model, bound = (
+                log[f"{axis}_{of}"] for of in ("measured_rad_s", "design_rad_s2", "eta_bar_rad_s2")
+            )
+            value += one["weight"] * d * (x[rows[-1]] - x[rows[0] - 1] - dt * sum(model[rows]))
+            limit += one["weight"] * abs(d) * dt * sum(bound[rows])
+    assert length == 20
+    assert value == pytest.approx(said["sides"][0], rel=1e-12)
+    assert limit < said["sides"][1] < value  # which has noise and effects besides
+
+
+def test_a_path_without_a_certificate_ends_in_one_line(tmp_path):
+    (tmp_path / "text.json").write_text("no certificate")
+    (tmp_path / "list.json").write_text("[1, 2]")
+    for name in ("nothing", "text.json", "list.json", "."):
+        command = [sys.executable, CHECKER, name, "log.parquet"]
+        checked = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert checked.returncode == 1
+        assert checked.stderr.startswith("no certificate beside its log: ")
+        assert checked.stderr.count("\n") == 1
 
 
 def test_many_constants_are_written_as_one_at_its_worst(monkeypatch):
@@ -252,6 +293,8 @@ ALTERED = [
     "another aircraft",
     "an altimeter",
     "a roll angle",
+    "blocks",
+    "no vane",
     *CHANCE,
 ]
 

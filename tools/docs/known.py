@@ -146,7 +146,7 @@ class Known:
             aircraft = load(name)
             estimators = estimator_names("all", aircraft)
             found.update(
-                dict.fromkeys(log_columns(aircraft, estimators, True, aircraft.power_setting, COLUMNS, True))
+                dict.fromkeys(log_columns(aircraft, estimators, 3, aircraft.power_setting, COLUMNS, True))
             )
         return tuple(found)
 

@@ -6,7 +6,7 @@ It shares no code with tools/check_certificate.py, which sums what is left of ea
 from collections.abc import Iterator
 from hashlib import sha256
 from json import dumps
-from math import exp, isclose
+from math import exp, fsum, isclose
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ ROUNDING_RAD_S2 = 1e-11  # rho
 OTHER_TWO = ((1, 2), (0, 2), (0, 1))
 _ANGLES = "turning p", "turning q", "turning r", "phi", "theta", "psi"
 TESTS = (*_ANGLES, "V", "alpha", "beta", "density", "altitude", "engine_rpm", "manifold_pressure")
-PUBLISHED_TO_SHARE, SIDES_TO_SHARE = 3e-14, 1e-12
+PUBLISHED_TO_SHARE, MEANS_TO_SHARE, SIDES_TO_SHARE = 3e-14, 1e-13, 1e-12
 
 
 class Doubtful(Exception):
@@ -75,6 +75,37 @@ class Flight:
         return any(abs(nu[i]) > eta[i] + (now[i] + then[i]) / self.dt for i in range(3))
 
 
+class Blocks(Flight):
+    """A flight by blocks of frames (section 4): gyros as one ends, all else in the mean."""
+
+    def __init__(self, flight: Flight, length: int, begin: int, end: int) -> None:
+        if length < 1 or (end - begin) % length or not 0 <= begin < end <= flight.rows:
+            raise Doubtful("blocks that are none")
+        vars(self).update(vars(flight))
+        self.frames, self.length, self.begin = flight, length, begin
+        self.dt, self.rows, self.instants = flight.dt * length, (end - begin) // length, 2  # as of several
+
+    def _of(self, k: int) -> range:
+        """The rows of block k."""
+        if not 0 <= k < self.rows:
+            raise Doubtful(f"there is no block {k}")
+        return range(self.begin + k * self.length, self.begin + (k + 1) * self.length)
+
+    def logged(self, quantity: str, k: int) -> Vector:
+        """p, q, r of a column."""
+        if quantity == "measured_rad_s":
+            return self.frames.logged(quantity, self._of(k)[-1])
+        return _means([self.frames.logged(quantity, row) for row in self._of(k)])
+
+    def bound(self, k: int) -> Vector:
+        """Of section 2's bound the first terms."""
+        return _means([self.frames.bound(row) for row in self._of(k)])
+
+
+def _means(vectors: list[Vector]) -> Vector:
+    return [fsum(values) / len(vectors) for values in zip(*vectors, strict=True)]
+
+
 def _by_axis(given: dict[str, float]) -> Vector:
     return [float(given.get(axis, 0.0)) for axis in "pqr"]
 
@@ -129,8 +160,9 @@ def _statement(said: Document, flight: Flight) -> None:
     ):
         raise Doubtful(f"{what}: {column} is not set then")
     how = _weighed if "likelihood" in said else _read if "looks" in said else _added
+    how = _missed if "missing" in said else how
     how = _compared if said.get("theta") == "course" else how
-    found = how(said, flight)
+    found = how(said, Blocks(flight, *said["block"]) if "block" in said else flight)
     stated = said["sides"] if how in (_weighed, _compared) else [[side] for side in said["sides"]]
     for value, limit, *two in zip(*zip(*found, strict=True), *stated, strict=True):
         if not value > limit or not all(
@@ -167,6 +199,13 @@ def _read(said: Document, flight: Flight) -> list[tuple[float, float]]:
     return [(residual, bound)]
 
 
+def _missed(said: Document, flight: Flight) -> list[tuple[float, float]]:
+    """How many readings are missing, where sound instruments leave out none."""
+    if said["what"] is not None or [flight.log["watch_missing"][said["frame"]]] != said["missing"]:
+        raise Doubtful("another reading is missing, or none")
+    return [(1.0, 0.0)]
+
+
 def _followed(one: Document, said: Document, flight: Flight) -> tuple[float, float, float]:
     """A filter along d, frame by frame: E; T with what the fault can have done; what theta multiplies."""
     first, last, d = one["first"], one["frame"], one["d"]
@@ -200,8 +239,9 @@ def _written_frames(one: Document, flight: Flight, first: int, last: int) -> Non
         place, eta = k - first, flight.logged("eta_bar_rad_s2", k)
         rest, published = one["rest"][place] if "rest" in one else [0.0] * 3, flight.bound(k)
         for name, column in (("x", "measured_rad_s"), ("F", "design_rad_s2"), ("eta_bar", "eta_bar_rad_s2")):
-            if one[name][place] != flight.logged(column, k):
-                raise Doubtful(f"{name} of row {k} is another")
+            for stated, known in zip(one[name][place], flight.logged(column, k), strict=True):
+                if not isclose(stated, known, rel_tol=MEANS_TO_SHARE):
+                    raise Doubtful(f"{name} of row {k} is another")
         for i in range(3):
             if not isclose(published[i] + rest[i], eta[i], rel_tol=PUBLISHED_TO_SHARE):
                 raise Doubtful(f"the bound of row {k} is another")

@@ -22,7 +22,7 @@ from beaver_ftc.plant.sensing import truth_dtype
 from beaver_ftc.scenario.dump import texts_of
 from beaver_ftc.scenario.schema import Scenario
 
-# What the log has columns for: estimators, the watch, the engine, statistical tests; power: how many.
+# How many columns the log has for estimators, the watch, the engine, statistical tests.
 LOGGED = record(estimators=int, watch=int, power=int, tests=int)
 
 
@@ -99,7 +99,7 @@ def lay_out(frame: np.void, scenario: Scenario, diagnoses_itself: bool) -> tuple
     aircraft, tests = scenario.airframe, fdi["statistical"]["tests"]
     estimators = estimator_names(scenario.fdi.fault_class, aircraft) if diagnoses_itself else ()
     logged["estimators"] = fdi["isolation"]["n"] if diagnoses_itself else 0
-    watched = logged["watch"] = instrument_records.comes_to_be_watched(scenario)
+    watched = logged["watch"] = instrument_records.columns_of_the_watch(scenario)
     moved = frame["control"]["power"]["enabled"] or (profile and aircraft.airspeed_by == "power")
     moved |= bool(frame["control"]["engines"]["n"])
     power = aircraft.power_setting if moved else ""

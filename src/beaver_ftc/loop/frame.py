@@ -574,8 +574,8 @@ def record(frame, commanded, row):
     row[column], row[column + 1] = frame.supervisor.mode, fdi.verdict.detected or fdi.watch.alarmed
     column += 2
     if logged.watch:
-        log_row.record_watch(fdi.watch, row, column)
-        column += 2
+        missing = frame.measured.missing
+        column = log_row.record_watch(fdi.watch, missing, row, column, logged.watch)
     column = put(row, column, control.power.command[: logged.power])
     if frame.autopilot.enabled:
         log_row.record_profile(frame.autopilot, row, column)

@@ -44,6 +44,12 @@ def comes_to_be_watched(scenario: Scenario) -> bool:
     return any(is_watched(then) for then in (scenario, *(then for _, then in stages(scenario))))
 
 
+def columns_of_the_watch(scenario: Scenario) -> int:
+    """How many the log has: none, share and test, and of flights in which readings go missing, which."""
+    lost = any(fault.type == "lost" for fault in scenario.faults)
+    return comes_to_be_watched(scenario) * (3 if lost else 2)
+
+
 def has_real_engine(scenario: Scenario) -> bool:
     """Whether dpt is to be worked out from readings that can be wrong from the start."""
     real = any(not getattr(scenario.sensors, name).is_ideal for name in OF_THE_SLIPSTREAM)

@@ -118,15 +118,15 @@ def _estimator_columns(name: str) -> list[str]:
 def log_columns(
     aircraft: Aircraft,
     estimators: tuple[str, ...],
-    watch: bool,
+    watch: int,
     power: str,
     profile: tuple[str, ...],
     tests: bool,
 ) -> tuple[str, ...]:
-    """The log's columns in order, for the isolation estimators of these names; watch: the instruments are
-    held against one another; power: the engine setting commanded, empty where none is, and what each engine
-    that is an effector has beside it; profile: columns of the commanded profile; tests: there is a
-    statistical detector, whose tests are logged as shares of its level.
+    """The log's columns in order, for the isolation estimators of these names; watch: how many where
+    instruments are held against one another; power: the engine setting commanded, empty where none is, and
+    what each engine that is an effector has beside it; profile: columns of the commanded profile; tests:
+    there is a statistical detector, whose tests are logged as shares of its level.
 
     Of each surface's effectiveness the `estimate` is the diagnosis', 1 where nothing is estimated; `used` is
     what the law takes it for, on its way there at a limited rate, and 1 throughout under the nominal law.
@@ -144,7 +144,7 @@ def log_columns(
         *(column for name in estimators for column in _estimator_columns(name)),
         *(f"{s}_effectiveness_{which}" for which in ("estimate", "used") for s in surfaces),
         "mode", "detected",
-        *(("watch_share", "watch_test") if watch else ()),
+        *("watch_share", "watch_test", "watch_missing")[:watch],
         *((power, *(f"{engine}_difference" for engine in aircraft.effectors)) if power else ()),
         *profile,
         *(likelihoods(aircraft) if tests else ()),

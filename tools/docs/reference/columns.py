@@ -39,9 +39,7 @@ Columns = Mapping[str, str]  # name -> type
 
 def _log() -> Columns:
     aircraft = load()
-    names = log_columns(
-        aircraft, estimator_names("all", aircraft), True, aircraft.power_setting, PROFILE, True
-    )
+    names = log_columns(aircraft, estimator_names("all", aircraft), 3, aircraft.power_setting, PROFILE, True)
     return dict.fromkeys(names, NUMBER)
 
 

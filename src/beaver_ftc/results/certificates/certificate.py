@@ -20,6 +20,7 @@ from beaver_ftc.diagnosis.state import LOSS
 from beaver_ftc.diagnosis.types.registry import STUCK
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.certificates import chance, courses, instruments_say, kinds
+from beaver_ftc.results.certificates.blocks import Blocks, by_blocks, in_blocks, rows_of
 from beaver_ftc.results.certificates.inequality import (
     Document,
     History,
@@ -43,7 +44,7 @@ Found = tuple[list[Term], Hypothesis] | None
 Columns = dict[str, np.ndarray]
 FILE, FORMAT = "certificate.json", 4
 MEASURED_MODEL_BOUND = "measured_rad_s", "design_rad_s2", "eta_bar_rad_s2"  # columns of each axis
-_OF_AXES = {f"{axis}_{of}" for axis in AXES for of in MEASURED_MODEL_BOUND}
+_OF_LOG = {"watch_missing"} | {f"{axis}_{of}" for axis in AXES for of in MEASURED_MODEL_BOUND}
 _EVENT, _SHARE = re.compile("detected|fie_.*_excluded"), "_likelihood_share"  # columns of events, of shares
 LATE = f"more than {MOST_AFTER} frames after the alarm, or with another diagnosis begun anew"
 
@@ -65,7 +66,7 @@ def certificate(scenario: Scenario, log: Log, recorder: Recorder | None = None) 
 
 def logged(log: Log) -> Columns:
     """The columns of a log that certificates take, (rows,)."""
-    taken = _OF_AXES.union(name for name in log.columns if _EVENT.fullmatch(name) or name.endswith(_SHARE))
+    taken = _OF_LOG.union(name for name in log.columns if _EVENT.fullmatch(name) or name.endswith(_SHARE))
     columns = [name for name in log.columns if name in taken]
     chunks = list(log.read_chunks(columns))
     return {name: np.concatenate([chunk[name] for chunk in chunks]) for name in columns}
@@ -95,7 +96,9 @@ def certificate_of(scenario: Scenario, rows: Columns, events: dict[str, int], ta
 
 
 def _beside_the_log(said: Document, rows: Columns) -> Document:
-    """The statement; one of chance with what the log has of it."""
+    """The statement; one of chance, or of a missing reading, with what the log has of it."""
+    if "missing" in said:
+        return instruments_say.as_logged(said, rows)
     if "likelihood" not in said:
         return said
     return chance.with_share(said, float(rows[said["likelihood"]][said["frame"]]))
@@ -108,16 +111,28 @@ def _without(said: Document) -> Document:
 
 def _declared(scenario: Scenario, history: History, said: list[Document]) -> Document:
     """What all these statements go by."""
-    spans = [span for one in said for span in (*one.get("terms", ()), *one.get("bounds", ()))]
-    frames = [np.arange(span["first"], span["frame"] + 1) for span in spans]
-    shown = any("shows" in one.get("theta", "") or "bounds" in one for one in said)  # which asks all axes
-    asked = np.array([shown or any(span["d"][i] for span in spans) for i in range(3)])
+    of = [(one, span) for one in said for span in (*one.get("terms", ()), *one.get("bounds", ()))]
+    frames, asked = [rows_of(one, span) for one, span in of], np.zeros(3, bool)
+    for _, span in of:
+        asked |= np.array(span["d"]) != 0.0
+    if not _shows(history.asking(asked), of):
+        asked[:] = True
     about: Document = {"declared": declaration(history, frames, asked)}
-    if not all("looks" in one for one in said):
+    if not all("looks" in one or "missing" in one for one in said):
         about["dt_s"] = history.dt
     if frames:
         about |= {"instants": scenario.substeps, "omega_E": history.declared["earth_rad_s"]}
     return about
+
+
+def _shows(history: History, of: list[tuple[Document, Document]]) -> bool:
+    """Whether health explains none of the frames of statements, and their terms, that say so."""
+    for one, span in of:
+        if "shows" in one["theta"] or "bounds" in one:
+            seen = by_blocks(history, *one["block"][:2]) if "block" in one else history
+            if not kinds.wrong(seen, np.arange(span["first"], span["frame"] + 1)).all():
+                return False
+    return True
 
 
 def check_scheme(scenario: Scenario) -> None:
@@ -201,25 +216,32 @@ def statements(
 
 def _of_types(scenario: Scenario, tape: Tape, history: History, alarm: int) -> Iterator[Document]:
     """Of each type excluded, surface by surface; the log has no column for it."""
+    frames = tape, history
+    if tape.alarm["fdi"]["types"]["config"]["length"] > 1:
+        tape, history, alarm = in_blocks(tape, history, alarm)
     for s, kind, k in kinds.excluded_types(tape):
-        because, found = kinds.why_not(tape, kind), None
+        because, followed = kinds.why_not(tape, kind), kind in courses.RULES
         about: Document = {"what": kinds.name_of(scenario.airframe.surfaces[s], kind), "column": None}
-        if because is None:
-            followed = kind in courses.RULES  # by where the surface was, as if it were held there
-            of = kinds.hypothesis(tape, s, STUCK if followed else kind)
-            if followed:
-                said = courses.excludes(scenario, tape, history, of, s, kind, alarm)
-                yield about | (said or {"because": kinds.COURSE})
-                continue
+        of = kinds.hypothesis(tape, s, STUCK if followed else kind)
+        if because is not None:
+            yield about | {"because": because}
+        elif followed:  # by where the surface was, as if it were held there
+            said = courses.excludes(scenario, tape, history, of, s, kind, alarm)
+            yield about | (history.said | said if said else {"because": kinds.COURSE})
+        elif isinstance(history, Blocks) and not of.constant:
+            own = kinds.hypothesis(frames[0], s, kind)
+            found = _first_violated(history.added_up(k, own.asked), own, frames[1], tape)
+            yield _stated(found, frames[1], kinds.COURSE, **about)
+        else:
             found = _first_violated(kinds.candidates(of, history, alarm, k), of, history, tape)
-        yield _stated(found, history, because or kinds.COURSE, **about)
+            yield _stated(found, history, kinds.COURSE, **about)
 
 
 def _stated(found: Found, history: History, because: str, **about: Any) -> Document:
     """A statement, or why there is none."""
     if found is None:
         return about | {"because": because}
-    return about | written(*found, history)
+    return about | history.said | written(*found, history)
 
 
 def _poles(scenario: Scenario) -> list[float]:

@@ -109,7 +109,7 @@ def _offsets(seen: Seen, i: int, j: int) -> Found:
 def _runaway(seen: Seen, surface: Surface, config: np.void) -> Iterator[Found]:
     """Less far than its least rate takes it; of several instants, by the frame before."""
     pace, stop = float(surface["least_runaway_rate"]), seen.stops[1]
-    step, late = pace * float(config["dt"]), int(not config["whole"])
+    step, late = pace * float(config["span_s"]), int(not config["whole"])
     began = np.where(seen.wrong, seen.low - step * np.arange(len(seen.low)), -np.inf)
     for j in np.flatnonzero(seen.wrong & (seen.high < stop - _LEAST)).tolist():
         if j <= late:
@@ -137,7 +137,7 @@ def _slow(seen: Seen, surface: Surface, config: np.void) -> Iterator[Found]:
     """Further away from all that it was ordered to than one can be that comes nearer at its least pace, until
     its lag makes the steps smaller."""
     step = float(surface["slowest_step"])
-    least, close = int(config["instants"]) * step, step / float(surface["approach"])
+    least, close = int(config["instants"] * config["length"]) * step, step / float(surface["approach"])
     for axis, low in enumerate(seen.least.T):
         beyond = seen.wrong & (low > seen.ordered + _LEAST)
         begins, comes = seen.since(beyond), seen.high + least * np.arange(len(low))

@@ -8,7 +8,7 @@ With one term the fault's parameter may move as it likes, or the fault be absent
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import exp, inf, isinf
 from typing import Any
@@ -39,6 +39,17 @@ class History:
     model: np.ndarray
     eta_bar: np.ndarray
     declared: Document
+
+    def asking(self, axes: np.ndarray) -> "History":
+        """The same, with what gyros are always off by on these axes alone, (3,); on others it may change."""
+        gyro = self.declared["gyro"]
+        gyro = gyro | {"steady_rad_s": (gyro["steady_rad_s"] * axes).tolist()}
+        return replace(self, declared=self.declared | {"gyro": gyro})
+
+    @property
+    def said(self) -> Document:
+        """What a statement says of the rows that it goes by: frames."""
+        return {}
 
     @cached_property
     def noise(self) -> np.ndarray:

@@ -2,7 +2,7 @@
 (docs/theory.md, section 9).
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -34,8 +34,16 @@ def of_alarm(watch: np.void) -> Document:
             return {"test": TESTS[number], "looks": looks, "sides": [value, limit]}
     named = int(watch["named"])
     if named >= 0 and watch["replaced"][named] and not watch["share"] > 1.0:
-        return {"because": f"there was no reading of {sensor_words(SENSORS[named])}: nothing is compared"}
+        because = f"there was no reading of {sensor_words(SENSORS[named])}, and no column that says so"
+        return {"missing": [named], "because": because}
     return {"because": NOT_STATED}
+
+
+def as_logged(said: Document, rows: Mapping[str, np.ndarray]) -> Document:
+    """That a reading is missing, where the log says so: one, where sound instruments leave out none."""
+    if rows.get("watch_missing", rows["detected"] - 2.0)[said["frame"]] != said["missing"][0]:
+        return said
+    return {name: value for name, value in said.items() if name != "because"} | {"sides": [1.0, 0.0]}
 
 
 def _looks(step: np.void, number: int) -> Iterator[list[float]]:

@@ -35,7 +35,6 @@ from beaver_ftc.results.certificates.tape import Tape
 COURSE = "frames of quiet excluded it, or what several say together"
 SWING = "of several instants a frame, a swing that a stop cuts off may keep its sign"
 RETURN = "its actuator may be bringing the surface back"
-BLOCKS = "frames were examined in blocks"
 _COURSES = {VARYING_LOSS: " that varies", GROWING_BIAS: " that grows", UP: " up", DOWN: " down"}
 
 
@@ -52,8 +51,6 @@ def excluded_types(tape: Tape) -> Iterator[tuple[int, int, int]]:
 def why_not(tape: Tape, kind: int) -> str | None:
     """Why an exclusion of this type cannot be certified, None if it can."""
     config = tape.alarm["fdi"]["types"]["config"]
-    if config["length"] > 1:
-        return BLOCKS
     if kind == OSCILLATORY and not config["whole"]:
         return SWING
     return RETURN if config["returns"] and kind in (STUCK, FLOAT, UP, DOWN) else None
@@ -70,6 +67,8 @@ def hypothesis(tape: Tape, s: int, kind: int) -> Hypothesis:
     e, surface = int(fdi["layout"]["position_of"][s]), fdi["types"]["surface"][s]
     Gu, G, spread = -tape.offset[:, e], tape.slope[:, e], tape.spread[:, e]
     asked = tuple(i for i in range(3) if not fdi["isolation"]["estimator"][e]["unasked"][i])
+    if fdi["types"]["config"]["length"] > 1:  # blocks: the axis on which no effect changes its sign
+        asked = (int(fdi["layout"]["dominant_axis"][s]),)
     low, high = float(surface["travel_low"]), float(surface["travel_high"])
     if kind == STUCK:
         return Hypothesis(tape.first, -Gu, G, spread, low, high, True, True, asked)

@@ -13,6 +13,7 @@ from beaver_ftc.diagnosis.isolation import members_of
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.trim import trim
 from beaver_ftc.results.verdict import verdict_text
+from beaver_ftc.scenario.loader import load_text
 
 AILERONS = {"aileron_right_0", "aileron_right_1", "aileron_right_2"}
 
@@ -109,3 +110,23 @@ def test_what_is_left_of_an_axis_is_computed_and_said():
     assert (of["greatest_rad_s2"] - of["least_rad_s2"]) / whole == pytest.approx(expected, abs=0.03)
     assert "of what all surfaces together give" in verdict_text(flight.metrics, "here")
     assert flight.metrics["tracking"]["post_fault_rms_deg_s"]["p"] < 0.2
+
+
+def test_two_surfaces_lost_at_once_are_found_by_the_law_itself():
+    """No single fault explains two lost ailerons: the law listens which surfaces answer, and asks those."""
+    sines = {
+        axis: [{"sine": {"amplitude_deg_s": 3, "frequency_hz": 0.2 + 0.1 * i}}]
+        for i, axis in enumerate("pqr")
+    }
+    lost = [
+        {"type": "loss_of_effectiveness", "actuator": f"aileron_{side}", "magnitude": magnitude, "at_s": 3}
+        for side, magnitude in (("left", 1.0), ("right", 0.7))
+    ]
+    given = {"name": "both", "aircraft": "beaver-split", "duration_s": 8, "reference": sines, "faults": lost}
+    flight = bf.fly(load_text(yaml.safe_dump(given)))
+    used = {
+        name: flight.log[f"{name}_effectiveness_used"].iloc[-1] for name in flight.scenario.airframe.surfaces
+    }
+    assert flight.metrics["isolation"]["fault"] == "unanticipated"
+    assert {name for name, share in used.items() if share < 0.4} == {"aileron_left", "aileron_right"}
+    assert min(share for name, share in used.items() if "aileron" not in name) > 0.9

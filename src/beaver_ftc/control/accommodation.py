@@ -14,6 +14,7 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.control.laws import ORACLE, REJECTING, rejecting
+from beaver_ftc.control.laws.answering import effectiveness_of
 from beaver_ftc.diagnosis.types.examine import FIXED
 from beaver_ftc.scenario.control import ControlConfig
 
@@ -29,12 +30,12 @@ def surfaces_dtype(n: int) -> np.dtype:
 
 @lru_cache
 def assessment_dtype(n: int) -> np.dtype:
-    """What the diagnosis says of n surfaces: whether it has detected a fault, and which surface it names, -1
-    for none. measure: what is to be done about each, -1 where that is open, or for faults of every type not
-    asked; effectiveness; offset, lag rad; at_once: whether its effectiveness need not be eased in. hedge: a
-    surface is slow."""
+    """What the diagnosis says of n surfaces: whether it has detected a fault, none that it knows or can tell
+    (unknown), and which surface it names, -1 for none. measure: what is to be done about each, -1 where that
+    is open, or for faults of every type not asked; effectiveness; offset, lag rad; at_once: whether its
+    effectiveness need not be eased in. hedge: a surface is slow."""
     return record(
-        detected=int, every_type=int, named=int, hedge=int, measure=(int, n), effectiveness=n,
+        detected=int, unknown=int, every_type=int, named=int, hedge=int, measure=(int, n), effectiveness=n,
         at_once=(int, n), offset=n, lag=n,
     )  # fmt: skip
 
@@ -58,14 +59,19 @@ def accommodate(law, inner, assessment, surfaces, rejection, layout, saturated, 
 
     faults: `true_faults_dtype`, looked at by the oracle alone. u (n,) rad: where healthy surfaces would be.
     """
+    learns = inner == REJECTING and law != ORACLE
+    if learns:
+        rejecting.look_for_losses(rejection, layout, assessment.detected)
     for s in range(surfaces.target.size):
         surfaces.target[s], surfaces.offset[s], surfaces.lag[s] = 1.0, 0.0, 0.0
         if law == ORACLE:
             take_truth(surfaces, faults, s, u[s])
         else:
             take_assessment(surfaces, assessment, s)
-        if inner == REJECTING and law != ORACLE:
-            if assessment.measure[s] != FIXED:
+        if learns:
+            if assessment.unknown and rejection.answering.listening:
+                surfaces.target[s] = effectiveness_of(rejection.answering, s)
+            elif assessment.measure[s] != FIXED:
                 rejecting.believe_larger(rejection, surfaces, layout, s)
             named = assessment.detected and s == assessment.named
             suspected = named and is_doubtful(assessment, surfaces, rejection, layout, s)

@@ -197,6 +197,12 @@ def isolated_surface(conclusion, estimators):
 
 
 @kernel
+def is_unknown(conclusion):
+    """Whether no surface is named, or thought likeliest, and nobody estimates any: what is left is open."""
+    return conclusion.isolated < 0 and conclusion.lead < 0 and not conclusion.estimates
+
+
+@kernel
 def note_name(conclusion, s, named, t):
     """Note whether surface s is named, and what is withdrawn; of more than there is room for, the latest
     stays."""

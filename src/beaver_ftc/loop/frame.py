@@ -307,7 +307,7 @@ def assess(fdi, assessment):
     conclusion, types, estimators = fdi.verdict, fdi.types, fdi.isolation.estimator
     every_type, named = fdi.config.every_type, scheme.isolated_surface(conclusion, estimators)
     assessment.detected, assessment.every_type = conclusion.detected, every_type
-    assessment.named, assessment.hedge = named, 0
+    assessment.named, assessment.hedge, assessment.unknown = named, 0, scheme.is_unknown(conclusion)
     for s in range(assessment.measure.size):
         assessment.measure[s] = types.surface[s].measure if every_type else -1
         assessment.effectiveness[s], assessment.at_once[s] = 1.0, 0

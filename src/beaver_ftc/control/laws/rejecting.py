@@ -11,14 +11,10 @@ acts, one JSBSim frame from now, and xm is taken there too.
 Discrete: z and d are corrected by `pull` = 1 - e^{-2 w dt} and `learn` = (1 - e^{-w dt})^2 / dt of what the
 observer missed. gains.py derives w, Kp and the lead.
 
-How much of a surface is left, the observer sees as well. An acceleration a that the law does not reckon with
-shows in what it misses, through its own error dynamics
-
-    e' = a - dd,   missed = e before correction,   e <- (1 - pull) missed,   dd <- dd + learn missed
-
-which take out what changes slowly: gusts, wrong coefficients. A surface with effectiveness 1 + theta gives
-theta G u more than a healthy one: theta is the least-squares fit of that, so filtered, to what was missed
-[Ljung1999, ch. 13: a prediction error in a closed loop]. The last MEMORY_S count.
+How much of a surface is left, the observer sees as well, in what it misses (answering.py). A surface with
+effectiveness 1 + theta gives theta G u more than a healthy one: theta is the least-squares fit of that, so
+filtered, to what was missed [Ljung1999, ch. 13: a prediction error in a closed loop]. The last MEMORY_S
+count.
 
 An equation error in a closed loop takes a surface for weaker than it is, since the command answers the gust
 it is hidden in. This one errs the other way, with what the gyro's noise commands. The larger of both is
@@ -31,6 +27,8 @@ from math import exp
 import numpy as np
 
 from beaver_ftc.compiled import kernel, record
+from beaver_ftc.control.laws import answering
+from beaver_ftc.control.laws.answering import ANSWER, answer, answering_dtype
 from beaver_ftc.control.reference import advance
 from beaver_ftc.design.model import QDYN
 from beaver_ftc.diagnosis.state import PITCH
@@ -42,8 +40,7 @@ MEMORY_S = 5.0  # a slow reference's swing
 UNSURE = 0.2  # standard deviation of the diagnosis' estimate reckoned with: it settles the start
 NOTHING_LEFT = 0.05  # half of what the law divides by
 
-# The observer's answer to an acceleration, and the sums of the least squares.
-ANSWER = record(rate=3, disturbance=3)
+# The sums of the least squares.
 FOUND = record(fading=float, product=3, square=3, missed=3, frames=3, named=(int, 3))
 
 
@@ -56,13 +53,13 @@ def rejection_dtype(surfaces: int) -> np.dtype:
     rate (3,) rad/s, disturbance (3,) rad/s2: its estimates. ahead (3,) rad/s: the rate when the command
     acts. lost: share of pitch that the stand-in carries; part: the same once all is handed over. lead (n,):
     command beyond the actuator's position over what is wanted beyond it. at_stop_s, withdrawn (n,): see
-    `withdraw`.
+    `withdraw`. missed (3,) rad/s: what the estimates were off.
     """
     return record(
         begun=int, dt=float, share=float, lost=float, part=float, qdyn=N_POINTS, Kp_at=(N_LOOPS, N_POINTS),
         pull_at=(N_LOOPS, N_POINTS), learn_at=(N_LOOPS, N_POINTS), Kp=3, pull=3, learn=3, rate=3,
         disturbance=3, ahead=3, lead=surfaces, at_stop_s=surfaces, withdrawn=(int, surfaces),
-        healthy=ANSWER, believed=ANSWER, found=FOUND,
+        healthy=ANSWER, believed=ANSWER, found=FOUND, missed=3, answering=answering_dtype(surfaces),
     )  # fmt: skip
 
 
@@ -180,6 +177,15 @@ def withdraw(rejection, surfaces, layout, s, saturated, suspected):
 
 
 @kernel
+def look_for_losses(rejection, layout, detected):
+    """Listen from the alarm on which surfaces answer, where more move than lead an axis or stand in."""
+    if not (detected and layout.general and rejection.answering.found.size > 1):
+        rejection.answering.listening = 0
+    elif not rejection.answering.listening:
+        answering.begin(rejection.answering, rejection.found.missed, rejection.found.frames, rejection.dt)
+
+
+@kernel
 def explained(surfaces, i, design, given, G):
     """Acceleration of axis i that the law believes in, rad/s2: the design model's with the faults in it."""
     total = design[i]
@@ -199,19 +205,10 @@ def observe(rejection, surfaces, main, x, design, given, G):
     for i in range(3):
         expected = explained(surfaces, i, design, given, G) + rejection.disturbance[i]
         rejection.rate[i] += rejection.dt * expected
-        missed = x[i] - rejection.rate[i]
+        missed = rejection.missed[i] = x[i] - rejection.rate[i]
         learn(rejection, i, surfaces.effectiveness[main[i]], given[i, main[i]], missed)
         rejection.rate[i] += rejection.pull[i] * missed
         rejection.disturbance[i] += rejection.learn[i] * missed
-
-
-@kernel
-def answer(memory, i, acceleration, pull, learn, dt):
-    """What the observer misses in a frame for an acceleration (rad/s2) of axis i; memory: dtype ANSWER."""
-    missed = memory.rate[i] + dt * (acceleration - memory.disturbance[i])
-    memory.rate[i] = (1.0 - pull) * missed
-    memory.disturbance[i] += learn * missed
-    return missed
 
 
 @kernel
@@ -235,6 +232,11 @@ def demand(rejection, axes, reference, surfaces, main, belief, measured):
     means = belief.means
     schedule(rejection, measured.y[QDYN])
     observe(rejection, surfaces, main, measured.x, means.acceleration, means.Gu, means.G)
+    if rejection.answering.listening:
+        answering.listen(
+            rejection.answering, rejection.missed, rejection.pull, rejection.learn, rejection.dt, measured.x,
+            measured.y, surfaces.effectiveness, means.Gu,
+        )  # fmt: skip
     for i in range(3):
         look_ahead(rejection, surfaces, i, belief.f, belief.G, belief.u)
         target, after = targets(reference, i, rejection.share)

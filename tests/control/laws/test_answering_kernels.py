@@ -1,0 +1,130 @@
+"""Which surfaces answer, from what an observer misses: against least squares over the whole past at once."""
+
+import numpy as np
+import pytest
+
+from beaver_ftc.control.laws import answering
+from beaver_ftc.control.laws.answering import answering_dtype
+from beaver_ftc.design.model import ALPHA, BETA
+
+N, DT, FRAMES = 6, 0.02, 200
+PULL, INTO = np.array([0.2, 0.3, 0.25]), np.array([0.8, 1.2, 1.0])
+THETA = np.array([-0.9, -0.3, 0.0, -0.6, -0.1, -0.45])
+TURNED = {
+    (2, 1): 20.0,
+    (0, 1): -8.0,
+    (1, 0): 12.0,
+}  # rad/s2 per rad: yaw and roll by sideslip, pitch by alpha
+
+
+def missed_by_observer(accelerations):
+    """What an observer of a rate and a constant disturbance misses (frames, 3) of accelerations."""
+    error, believed, missed = np.zeros(3), np.zeros(3), []
+    for a in accelerations:
+        error = error + DT * (a - believed)
+        missed.append(error.copy())
+        believed = believed + INTO * error
+        error = (1.0 - PULL) * error
+    return np.array(missed)
+
+
+def flown(seed=1, tied=0.0):
+    """Moments of healthy surfaces (frames, 3, N), signals (frames, 5), what is missed (frames, 3).
+
+    tied: how much of the last surface's command answers the sideslip, as a rudder does.
+    """
+    rng = np.random.default_rng(seed)
+    t = DT * np.arange(FRAMES)
+    G = rng.normal(0.0, 8.0, (3, N))
+    u = 0.2 * np.sin(np.outer(t, rng.uniform(2.0, 15.0, N)) + rng.uniform(0, 6, N))
+    signals = 0.1 * np.sin(np.outer(t, rng.uniform(2.0, 15.0, 5)) + rng.uniform(0, 6, 5))
+    u[:, -1] = (1.0 - tied) * u[:, -1] + tied * signals[:, 1]
+    given = G[None] * u[:, None]
+    a = given @ THETA
+    for (axis, signal), per in TURNED.items():
+        a[:, axis] += per * signals[:, signal]
+    return given, signals, missed_by_observer(a)
+
+
+def listened(given, signals, missed, believed=None, airframe=True, forgets=True):
+    """The record after all frames; believed (N,): the effectiveness that the observer reckoned with."""
+    record = np.zeros(1, answering_dtype(N)).view(np.recarray)[0]
+    answering.begin(record, np.zeros(3), np.zeros(3), DT)
+    record.unsure[:] *= forgets
+    if not airframe:
+        record.P[N:, N:] = record.unsure[N:] = 0.0
+    effectiveness = np.ones(N) if believed is None else believed
+    y = np.zeros(8)
+    for moments, signal, off in zip(given, signals, missed, strict=True):
+        y[ALPHA], y[BETA] = signal[:2]
+        answering.listen(record, off, PULL, INTO, DT, signal[2:], y, effectiveness, moments)
+    return record
+
+
+def at_once(given, signals, missed, noise):
+    """theta by one weighted ridge regression over all frames and axes."""
+    rows, seen = [], []
+    filtered = [missed_by_observer(given[:, :, s]) for s in range(N)]
+    for i in range(3):
+        of_signals = [
+            missed_by_observer(np.outer(signals[:, j], np.eye(3)[i]))[:, i] if k == i else np.zeros(FRAMES)
+            for k in range(3)
+            for j in range(5)
+        ]
+        rows.append(np.column_stack([*(f[:, i] for f in filtered), *of_signals]))
+        seen.append(missed[:, i])
+    H, z = np.vstack(rows), np.concatenate(seen)
+    prior = np.concatenate([np.full(N, 0.5**2), np.tile([900.0, 900.0, 9.0, 9.0, 9.0], 3)])
+    return np.linalg.solve(H.T @ H / noise + np.diag(1.0 / prior), H.T @ z / noise)[:N]
+
+
+def test_it_is_least_squares_over_the_whole_past():
+    given, signals, missed = flown()
+    record = listened(given, signals, missed, forgets=False)
+    noise = float(record.noise[0])
+    assert record.noise == pytest.approx(10.0 * (0.05 * DT) ** 2 * np.ones(3))
+    expected = at_once(given, signals, missed, noise)
+    assert expected.min() > -1.0
+    assert abs(expected - THETA).max() < 0.05
+    free = np.abs(THETA) > 0.0  # those that nothing holds at a limit on the way
+    assert record.found[:N][free] == pytest.approx(expected[free], abs=0.03)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_each_surface_is_found_while_the_airframe_has_changed(seed):
+    record = listened(*flown(seed))
+    assert [1.0 + theta for theta in record.found[:N]] == pytest.approx(1.0 + THETA, abs=0.1)
+    assert answering.effectiveness_of(record, 0) == pytest.approx(0.1, abs=0.1)
+
+
+def test_without_the_airframe_a_surface_is_blamed_for_what_it_answers():
+    """The last surface answers the sideslip, whose yaw has turned round."""
+    flight = flown(3, tied=0.5)
+    with_it = listened(*flight).found[:N]
+    without = listened(*flight, airframe=False).found[:N]
+    assert abs(with_it - THETA).max() < 0.2
+    assert abs(without - THETA).max() > 0.4
+
+
+def test_what_the_law_already_reckons_with_is_no_news():
+    """Of losses that are believed the observer misses nothing; they are found all the same."""
+    given, signals, _ = flown()
+    airframe = np.zeros((FRAMES, 3))
+    for (axis, signal), per in TURNED.items():
+        airframe[:, axis] += per * signals[:, signal]
+    record = listened(given, signals, missed_by_observer(airframe), believed=1.0 + THETA)
+    assert record.found[:N] == pytest.approx(THETA, abs=0.1)
+
+
+def test_noise_never_leads_it_away():
+    """With noise many times what is reckoned with, theta stays about its limits and A finite."""
+    given, signals, missed = flown(5)
+    noisy = missed + np.random.default_rng(2).normal(0.0, 0.05, missed.shape)
+    record = listened(given, signals, noisy, forgets=False)
+    assert record.found[:N].min() >= -1.2
+    assert record.found[:N].max() <= 0.2
+    assert np.abs(record.found[N:]).max() < 300.0
+
+
+def test_few_surfaces_need_no_room():
+    assert answering_dtype(4).itemsize < 300 < answering_dtype(6).itemsize

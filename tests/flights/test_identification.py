@@ -23,6 +23,9 @@ from beaver_ftc.results.metrics import as_json
 from flights import small
 
 MODEL = small.model()
+SAYS_LITTLE = {
+    "flights": [], "tests": [], "another_day": {}, "colour": {}, "output_error": {}, "collinear": [],
+}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +51,24 @@ def test_commands_count_with_the_dynamic_pressure_where_that_explains_more():
         assert by_pressure(plain, its) == (plain, its)
     told = its.model_copy(update={"reference_airspeed_mps": 20.0})
     assert by_pressure([pressed(flight)], told)[1] is told
+
+
+def test_under_other_laws_each_surface_has_its_own_power_of_the_airspeed():
+    flight, its = small.flight(MODEL, 1100), MODEL.vehicle.model_copy(update={"airspeed": "V"})
+    flown = pressed(flight)
+    by_speed = (flown.airspeed / 20.0)[:, None] ** np.array([[1.0, 2.0]])
+    mixed = replace(flown, commands=flight.commands / by_speed)
+    told = its.model_copy(update={"other_laws": True})
+    (anew,), described = by_pressure([mixed], told)
+    assert described.airspeed_powers == {"right": 1.0}
+    ratio = 20.0 / described.reference_airspeed_mps
+    assert anew.commands == pytest.approx(flight.commands * ratio ** np.array([1.0, 2.0]))
+    assert by_pressure([flown], told)[1].airspeed_powers == {}
+    assert by_pressure([mixed], its)[1].airspeed_powers == {}
+    said = summary(MODEL.model_copy(update={"vehicle": described, "identified": SAYS_LITTLE}))
+    assert "right with airspeed^1\n" in said
+    with pytest.raises(ValueError, match="contradictory"):
+        small.vehicle(airspeed_powers={"fin": 1})
 
 
 def test_where_the_airspeed_is_unknown_commands_count_as_they_are():

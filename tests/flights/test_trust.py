@@ -158,6 +158,24 @@ def test_few_minutes_mean_wide_bounds():
     assert (errors[0] / errors[1] < 8.0).all()
 
 
+def test_under_other_laws_the_gain_is_known_as_a_factor_of_the_whole_response():
+    """As of one regressor, the response to the commands, with what the others make up of it taken off."""
+    flown = small.flight(small.model(), n=3000, seed=6)
+    model = fitting.fit_model(fitting.stretches_of([flown]), small.vehicle(other_laws=True))
+    stretches = fitting.stretches_of([flown])
+    x, _, _ = fitting.stacked(stretches, model.vehicle, model.history, model.lags)
+    fit = fitting.fit_order(stretches, model.vehicle, model.history, model.lags)
+    white = replace(fit, standard_errors=fit.standard_errors / fit.colour)
+    sd = np.sqrt(np.diag(fit.covariance))
+    for g, found in enumerate(fitting.gain_sd(white, model)):
+        first = x.shape[1] - (len(model.groups) - g) * model.lags
+        place = np.arange(x.shape[1])
+        own = (place >= first) & (place < first + model.lags)
+        answer, others = x[:, own] @ fit.coefficients[own] / sd, x[:, ~own]
+        left = answer - others @ np.linalg.lstsq(others, answer, rcond=None)[0]
+        assert found == pytest.approx(1.0 / np.sqrt((left**2).sum()), rel=1e-6)
+
+
 def test_a_model_that_explains_less_than_the_mean_is_refused():
     tests = [
         {"samples": 100, "explained": {"p": -71.0, "q": 0.5, "r": 0.1}},

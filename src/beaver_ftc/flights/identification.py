@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.flights import extremes, fitting, trust
+from beaver_ftc.flights import extremes, fitting, regression, trust
 from beaver_ftc.flights.model import Fitted, Model
 from beaver_ftc.flights.recording import Floats
 from beaver_ftc.flights.regression import group_indices, spectrum, variance_inflation
@@ -27,6 +27,7 @@ _DECISIVE = 10.0
 _BANDS_HZ = ((0.0, 0.1), (0.1, 0.5), (0.5, 1.0), (1.0, 2.0), (2.0, 5.0), (5.0, 10.0))
 WINDOW_S = 2.0
 _MOST_WINDOWS = 400
+_POWERS = (0.0, 1.0, 3.0)
 _MOST_DELAY_S, _LEAST_LAG_S, _MOST_LAG_S = 0.6, 0.005, 1.0
 
 
@@ -83,13 +84,33 @@ def by_pressure(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Sequence[
     reference_mps = float(np.median(speeds_mps)) if speeds_mps.size else 0.0
     if vehicle.reference_airspeed_mps is not None or reference_mps <= 0.0:
         return flights, vehicle
-    pressed = [with_pressure(one, reference_mps) for one in flights]
+    pressed = [with_pressure(one, reference_mps, vehicle.powers) for one in flights]
     faster = vehicle.model_copy(update={"reference_airspeed_mps": reference_mps})
-    plain, better = (
-        min(fitting.criteria(fitting.stretches_of(each), of).values())
-        for each, of in ((flights, vehicle), (pressed, faster))
-    )
-    return (flights, vehicle) if plain - better < _DECISIVE else (pressed, faster)
+    if _criterion(flights, vehicle) - _criterion(pressed, faster) < _DECISIVE:
+        return flights, vehicle
+    return _by_powers(flights, faster) if vehicle.other_laws else (pressed, faster)
+
+
+def _criterion(flights: Sequence[Samples], vehicle: Vehicle) -> float:
+    """The least Bayesian information criterion of any order."""
+    return min(fitting.criteria(fitting.stretches_of(flights), vehicle).values())
+
+
+def _by_powers(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[list[Samples], Vehicle]:
+    """Each surface, or group, in its turn with the power of the airspeed that explains most: slipstream and
+    linkages change the square. Another than that must explain decisively more."""
+
+    def with_powers(of: Vehicle) -> list[Samples]:
+        return [with_pressure(one, of.reference_airspeed_mps or 0.0, of.powers) for one in flights]
+
+    least, names = _criterion(with_powers(vehicle), vehicle) - _DECISIVE, list(vehicle.surfaces)
+    for group in regression.groups_of(vehicle):
+        for power in _POWERS:
+            own = vehicle.airspeed_powers | {names[i]: power for i in group}
+            other = vehicle.model_copy(update={"airspeed_powers": own})
+            if (found := _criterion(with_powers(other), other)) < least:
+                least, vehicle = found, other
+    return with_powers(vehicle), vehicle
 
 
 def check_explains(tests: list[Document], stretches: Sequence[fitting.Stretch], model: Model) -> None:
@@ -228,7 +249,8 @@ def _another_day_lines(found: Document) -> list[str]:
 def _pressure_lines(model: Model) -> list[str]:
     if (reference_mps := model.vehicle.reference_airspeed_mps) is None:
         return []
-    return [f"  surfaces work with the dynamic pressure, 1 at {reference_mps:.4g} m/s"]
+    others = "".join(f", {n} with airspeed^{x:g}" for n, x in model.vehicle.airspeed_powers.items() if x != 2)
+    return [f"  surfaces work with the dynamic pressure, 1 at {reference_mps:.4g} m/s{others}"]
 
 
 def _test_line(test: Document) -> str:

@@ -94,18 +94,18 @@ def sample(recording: Recording, vehicle: Vehicle) -> Samples:
         energy_climb=_energy_climb(recording, vehicle, (t_s, run, step)),
     )
     reference_mps = vehicle.reference_airspeed_mps
-    return samples if reference_mps is None else with_pressure(samples, reference_mps)
+    return samples if reference_mps is None else with_pressure(samples, reference_mps, vehicle.powers)
 
 
-def with_pressure(samples: Samples, reference_mps: float) -> Samples:
-    """The flight with what the airspeed V does of its own: commands times (V / reference)^2, and, as further
-    signals, rates and signals times V / reference - 1, since damping and stability grow with it; as at the
-    reference where the airspeed is unknown."""
+def with_pressure(samples: Samples, reference_mps: float, powers: Sequence[float] = (2.0,)) -> Samples:
+    """The flight with what the airspeed V does of its own: commands times V / reference to the power of each
+    surface, (S,) or one, and, as further signals, rates and signals times V / reference - 1, since damping
+    and stability grow with it; as at the reference where the airspeed is unknown."""
     airspeed = np.full(len(samples.t_s), np.nan) if samples.airspeed is None else samples.airspeed
     pressure = np.clip(np.nan_to_num(airspeed / reference_mps, nan=1.0) ** 2, *_PRESSURES)[:, None]
     moved = np.column_stack([samples.rates, samples.signals]) * (np.sqrt(pressure) - 1.0)
     signals = np.column_stack([samples.signals, moved])
-    return replace(samples, commands=samples.commands * pressure, signals=signals)
+    return replace(samples, commands=samples.commands * pressure ** (0.5 * np.array(powers)), signals=signals)
 
 
 def _remarks(recording: Recording, used: list[str], rates: list[str]) -> Iterator[str]:

@@ -173,6 +173,13 @@ class Vehicle(Section):
         json_schema_extra={"unit": "m/s"},
         examples=[20.0],
     )
+    airspeed_powers: dict[str, Number] = Field(
+        default={},
+        description="the power of the airspeed with which a surface's command counts; 2 where left out; "
+        "`identify` finds it for `other_laws`",
+        json_schema_extra={"unit": "1", "range": "any"},
+        examples=[{"left": 1}],
+    )
     outputs: dict[str, Logged] = Field(
         default={},
         description="columns of the servo outputs: read by the freeze rule of a benchmark alone",
@@ -213,6 +220,7 @@ class Vehicle(Section):
             "labels": self.labels,
             "outputs": self.outputs,
             "full_deflection_rad": self.full_deflection_rad,
+            "airspeed_powers": self.airspeed_powers,
         }
         for key, table in of_surfaces.items():
             conflicts += _unknown((key,), table, "surface", self.surfaces)
@@ -269,6 +277,11 @@ class Vehicle(Section):
     def signal_names(self) -> list[str]:
         """The further signals' columns."""
         return [signal.column for signal in self.signals]
+
+    @property
+    def powers(self) -> list[float]:
+        """The power of the airspeed with which each surface's command counts."""
+        return [float(self.airspeed_powers.get(name, 2.0)) for name in self.surfaces]
 
     @property
     def past_names(self) -> list[str]:

@@ -158,6 +158,8 @@ class Plant:
         self._engines_run = False
         self._run_up_for: tuple[float, ...] = ()
         self.n_engines: int = self.fdm.get_propulsion().get_num_engines()
+        if self.n_engines:
+            self._initialise()  # at rest: placed in flight at once, JSBSim's turboprop reads unwritten memory
 
     def set_rate(self, rate_hz: float, substeps: int) -> None:
         """Frames a second of the loop, and JSBSim's in each of them."""

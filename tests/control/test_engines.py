@@ -1,6 +1,7 @@
 """Engines as effectors: their column of G is arm times thrust over inertia; they take the slow part of what
 surfaces leave; a transport without ailerons and rudder keeps its heading by them, and by nothing else."""
 
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -21,6 +22,7 @@ from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.instrumented import source_of
 from beaver_ftc.plant.trim import trim
 from beaver_ftc.studies.derive.derivation import derive
+from beaver_ftc.studies.derive.fit import set_engines_apart
 from beaver_ftc.studies.detectability import engine_failures, of_engines
 
 M_PER_IN, N_PER_LBF = 0.0254, 4.4482216
@@ -205,6 +207,15 @@ def judged(jet, missing_n, levers=(0.0, 0.0)):
     balance.heed(of_it, np.array(levers))
     balance.detect(of_it, verdict, 1e-6, y, 1.0)
     return bool(verdict["detected"])
+
+
+@pytest.mark.parametrize(("off", "known"), [(1e-8, True), (1e-4, False)])
+def test_engines_that_pull_unlike_in_health_are_not_watched(jet, off, known):
+    """Propellers yaw aslant, and by something else while they come to speed."""
+    aircraft, boxes, thrust = read(jet / "aircraft" / "737"), [{}, {}], np.array([0.01, 0.1, 0.2])
+    of_it = {"thrust": thrust, "engines_n": balance.mean_arm(aircraft) * thrust + [0.0, off, 0.5 * off]}
+    set_engines_apart(boxes, aircraft, SimpleNamespace(signals=of_it, box=np.array([0, 1, 1])))
+    assert [("engines_apart" in box) for box in boxes] == [known, known]
 
 
 def test_a_thrust_that_is_missing_on_one_side_alarms(jet):

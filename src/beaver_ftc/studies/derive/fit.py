@@ -36,7 +36,7 @@ RIDGE = 1e-13  # keeps what is nearly the same twice from being nearly infinite
 NO_USE = 1e-3  # of what is left in the end, for a term to stay
 LEAST_RAD_S2 = 1e-3  # below it, how small an error is does not matter
 MARGIN = 1.3  # of the declared error over the largest one found
-LEAST_APART = 1e-7  # of what engines do unlike, as a coefficient
+LEAST_APART, MIRRORED = 1e-7, 1e-6  # of what engines do unlike, as a coefficient
 ROUNDING_RAD_S2 = 1e-7  # of errors in the file
 LEAST_SPAN = 1e-9  # of a signal over the samples, dimensionless
 NOT_MISSED = 0.02  # rise of the sum of the logarithms of the errors without a signal
@@ -287,10 +287,11 @@ def map_of(
 
 
 def set_engines_apart(boxes: Sequence[dict[str, Any]], aircraft: Aircraft, alike: Samples) -> None:
-    """Fill in how unlike engines pull in each box; alike: states with all their levers where one is."""
+    """Fill in how unlike engines pull in each box, if they are mirrored; alike: states with all their levers
+    where one is. Of others nobody has measured what they do while levers move: a c310's alarmed."""
     of = alike.signals
     apart = np.abs(of[balance.YAWING] - balance.mean_arm(aircraft) * of[balance.THRUST])
-    for i, box in enumerate(boxes):
+    for i, box in enumerate(boxes if apart.max() < MIRRORED else ()):
         box["engines_apart"] = _rounded(MARGIN * float(apart[alike.box <= i].max()) + LEAST_APART, np.ceil)
 
 

@@ -141,6 +141,18 @@ def test_where_frames_are_examined_in_blocks_no_frame_tells_types_apart():
     assert "blocks of frames" in tell_apart(*both, replace(PLAIN, in_blocks=True), NAMES)["because"]
 
 
+def test_where_a_surface_already_tells_it_is_held():
+    """A jam at neutral and a bias differ by 0.15 rad where the surface is: between two deflections tried."""
+    there = replace(PLAIN, u=np.array([0.0, -0.2001, 0.0, 0.0]))
+    found = tell_apart(Candidate(1, STUCK, 0.0, 0.0), Candidate(1, BIAS, 0.05, 0.06), there, NAMES)
+    assert found["amplitude_deg"] == pytest.approx(0.0, abs=1e-9)
+    assert np.array(found["commands_rad"]["elevator"]) == pytest.approx(-0.2001, abs=1e-12)
+    kinds = [{"surface": "elevator", "type": kind} for kind in ("stuck", "bias")]
+    document = {"scenario": "mine", "time_s": 1.0, "assumes": "it stays", "not_constant": []}
+    text = as_text(document | {"pairs": [found | {"candidates": kinds}]})
+    assert "elevator stuck or elevator bias: elevator held as now, told after 0.03 s" in text
+
+
 def test_a_limit_on_the_rates_can_leave_none():
     pair = tell_apart(
         Candidate(0, STUCK, 0.1, 0.11), Candidate(0, BIAS, 0.1, 0.11), replace(PLAIN, rate=1e-4), NAMES

@@ -41,6 +41,7 @@ MARGIN = 1.1  # on what is asked: the aircraft flies on while the doublet is flo
 LONGEST_S = 0.5  # until the frame that tells
 LARGEST_RATE_DEG_S = 20.0
 GRID = 801  # deflections tried over the travel
+HELD_DEG = 1e-9  # by less no surface is moved
 Document = dict[str, Any]
 CONSTANT = (CONSTANT_LOSS, STUCK, FLOAT, BIAS)
 
@@ -331,7 +332,7 @@ def _types_apart(one: Candidate, other: Candidate, at: Situation) -> tuple[float
     """The deflection nearest to the present at which a surface's two types differ, and from health."""
     s = one.surface
     room = float(np.min(2.0 * MARGIN * at.bound / np.maximum(np.abs(at.G[:, s]), 1e-12)))
-    u = np.linspace(at.stops[0, s], at.stops[1, s], GRID)
+    u = _deflections(at, s)
     (low, high), (low_too, high_too) = one.deflection(u), other.deflection(u)
     gap = np.maximum(low - high_too, low_too - high)
     gap = np.minimum(gap, np.minimum(one.off(u), other.off(u)))  # else health explains the frame
@@ -344,9 +345,14 @@ def _surface_shown(one: Candidate, other: Candidate, at: Situation) -> tuple[flo
     room = min(
         (2.0 * MARGIN * np.abs(d) @ at.bound / abs(d @ at.G[:, a]) for d in _blind_to(b, at, a)), default=inf
     )
-    u = np.linspace(at.stops[0, a], at.stops[1, a], GRID)
+    u = _deflections(at, a)
     off = one.off(u)
     return _nearest(u, off > room, a, at, float(room), "off its command", float(off.max()))
+
+
+def _deflections(at: Situation, s: int) -> np.ndarray:
+    """Where a surface can be asked to go, (GRID + 1,) rad: all over its travel, and where it is now."""
+    return np.append(np.linspace(at.stops[0, s], at.stops[1, s], GRID), np.clip(at.u[s], *at.stops[:, s]))
 
 
 def _blind_to(b: int, at: Situation, a: int) -> Iterator[np.ndarray]:
@@ -501,8 +507,9 @@ def as_text(document: Document) -> str:
     for pair in document["pairs"]:
         one, other = (f"{each['surface']} {each['type']}" for each in pair["candidates"])
         if pair["separates"]:
-            by = " and ".join(pair["commands_rad"])
-            says = f"{by} by {pair['amplitude_deg']:.3g} deg, told after {pair['time_s']:.3g} s"
+            by, much = " and ".join(pair["commands_rad"]), pair["amplitude_deg"]
+            moves = f"by {much:.3g} deg" if much > HELD_DEG else "held as now"
+            says = f"{by} {moves}, told after {pair['time_s']:.3g} s"
             if "left" in pair:
                 words = " and ".join(f"{each['surface']} {each['type']}" for each in pair["left"])
                 says += f"; flown, left: {words or 'neither'}"

@@ -15,13 +15,13 @@ class Flight:
         x, F, H = (np.column_stack([log[f"{i}_{end}"] for i in "pqr"]) for end in ends)
         said, w, parts = about["declared"], about.get("omega_E", 0), about.get("instants", 1)
         c, b, g, o, beta, m = (np.array([said[name].get(axis, 0.0) for axis in "pqr"]) for name in "cbgoBm")
-        f, late, self.dt = abs(x) + (o + m * abs(x)) / (1 - m), int(parts * L > 1), about.get("dt_s", 1) * L
+        f, late, dt = abs(x) + (o + m * abs(x)) / (1 - m), int(parts * L > 1), about.get("dt_s", 1) * L
         B = c * f[:, [1, 0, 0]] * f[:, [2, 2, 1]] + b + w * ((1 + g) * f.sum(1)[:, None] + g * w) + 1e-11
         of = np.stack([x, o - beta + m * f, F, H, np.roll(B, 1, 0) / parts])[:, s:e].reshape(5, -1, L, 3)
         self.x, self.n, self.F, self.eta_bar, self.bound = x, n, F, H, B = *of[:2, :, -1], *of[2:].mean(2)
-        self.nu, self.most = np.diff(x, 1, 0, x[:1]) / self.dt - F, H + (n + np.roll(n, 1, 0)) / self.dt
+        self.nu, self.most = np.diff(x, 1, 0, x[:1] * np.nan) / dt - F, H + (n + np.roll(n, 1, 0)) / dt
         shows = (abs(self.nu) > self.most).any(1) & (B < H * (1 + 1e-13)).all(1)
-        self.late, self.shows = late, shows & np.roll(shows, late) & np.roll(shows, -late)
+        self.late, self.dt, self.shows = late, dt, shows & np.roll(shows, late) & np.roll(shows, -late)
 
     def sides(self, one, said, to):  # section 4, a filter along d: value, limit, what theta multiplies
         k, dt, d, fault, theta = one["frame"], self.dt, np.array(one["d"]), one.get("fault", 0), said["theta"]

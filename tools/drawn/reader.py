@@ -65,7 +65,9 @@ class Flight:
         return found
 
     def unhealthy(self, k: int) -> bool:
-        """Whether more than the bound was at work in the frame that ends with row k."""
+        """Whether more than the bound was at work in the frame that ends with row k, none with the first."""
+        if k < 1:
+            return False
         nu, eta, now, then = (
             self.innovation(k),
             self.logged("eta_bar_rad_s2", k),

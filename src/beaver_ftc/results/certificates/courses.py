@@ -26,9 +26,10 @@ class Seen:
     """Where a surface was by frame from `first` on, by axis `least` to `most` (frames, 3), rad; mirrored by
     sign -1, so that a type needs one rule.
 
-    command: where a healthy one was; room (frames, 2): how far below and above that within the frame, of
-    several instants. wrong: health explains nothing. ordered: what it was told, at most. stops: low and high.
-    slowest_rad_s: of an oscillation.
+    command: where a healthy one was; commands (frames, 3): by each axis, which has a mean of its own where
+    the effectiveness changes within the frame; room (frames, 2): how far below and above that within the
+    frame, of several instants. wrong: health explains nothing. ordered: what it was told, at most. stops: low
+    and high. slowest_rad_s: of an oscillation.
     """
 
     first: int
@@ -36,6 +37,7 @@ class Seen:
     least: np.ndarray
     most: np.ndarray
     command: np.ndarray
+    commands: np.ndarray
     room: np.ndarray
     wrong: np.ndarray
     ordered: np.ndarray
@@ -84,7 +86,7 @@ def _bias(seen: Seen, surface: Surface, config: np.void) -> Iterator[Found]:
     low, high = seen.off_command()
     i, j = int(np.argmax(low)), int(np.argmin(high))
     if low[i] > high[j] + _LEAST:
-        yield _offsets(seen, i, j)
+        yield from _offsets(seen, i, j)
 
 
 def _growing(seen: Seen, surface: Surface, config: np.void) -> Iterator[Found]:
@@ -93,17 +95,21 @@ def _growing(seen: Seen, surface: Surface, config: np.void) -> Iterator[Found]:
     for j in np.flatnonzero(high < np.inf).tolist():
         i = int(np.argmax(low[: j + 1]))
         if i < j and low[i] > max(high[j], 0.0) + _LEAST:
-            found, frames = _offsets(seen, i, j), (seen.first + j, seen.first + i)
-            yield replace(found, compared=[(low[i], 0.0), *found.compared, frames])
+            for found in _offsets(seen, i, j):
+                (off, _), frames = found.compared[0], (seen.first + j, seen.first + i)
+                if off > 0.0:
+                    yield replace(found, compared=[(off, 0.0), *found.compared, frames])
             return
 
 
-def _offsets(seen: Seen, i: int, j: int) -> Found:
+def _offsets(seen: Seen, i: int, j: int) -> Iterator[Found]:
     """Two offsets, away from the stops: these as far as the command comes near them within the frames."""
+    commands = seen.commands[i, seen.least[i].argmax()], seen.commands[j, seen.most[j].argmin()]
     low, high = seen.stops[0] + seen.room[i, 0], seen.stops[1] - seen.room[j, 1]
-    off = seen.low[i] - seen.command[i], seen.high[j] - seen.command[j]
+    off = seen.low[i] - commands[0], seen.high[j] - commands[1]
     pairs = [off, (seen.low[i], low), (high, seen.high[j])]
-    return Found(range(i, i + 1), j, pairs, {"stops": [float(low), float(high)]})
+    if off[0] > off[1]:
+        yield Found(range(i, i + 1), j, pairs, {"stops": [float(low), float(high)]})
 
 
 def _runaway(seen: Seen, surface: Surface, config: np.void) -> Iterator[Found]:
@@ -188,8 +194,9 @@ def _seen(
     least, most, _ = by_each_frame(of, history, frames)
     if sign < 0:
         least, most = -most, -least
-    i = int(np.abs(of.slope[here]).sum(axis=0).argmax())
-    command = -sign * of.offset[here, i] / of.slope[here, i]
+    slope = of.slope[here]
+    commands = -sign * of.offset[here] / np.where(slope == 0.0, np.inf, slope)
+    command = commands[:, np.abs(slope).sum(axis=0).argmax()]
     told = tape.told_most if sign > 0 else -tape.told_least
     reach = np.column_stack([tape.least[here, s, 0], tape.greatest[here, s, 0]])[:, ::sign] * sign
     room = np.maximum(0.0, (command[:, None] - reach) * (1.0, -1.0)) * (not whole)
@@ -198,7 +205,7 @@ def _seen(
     judged = slice(here.start + 1, here.stop + 1)
     ordered = np.maximum(told[judged, s, 2], told[judged, s, 2 if whole else 1])
     shows = wrong(history, frames)
-    return Seen(alarm, sign, least, most, command, room, shows, ordered, stops, slowest_rad_s)
+    return Seen(alarm, sign, least, most, command, commands, room, shows, ordered, stops, slowest_rad_s)
 
 
 def _written(found: Found, seen: Seen, of: Hypothesis) -> Document:

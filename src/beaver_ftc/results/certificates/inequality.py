@@ -68,7 +68,7 @@ class History:
 
     @cached_property
     def _nu(self) -> np.ndarray:
-        return np.asarray(np.diff(self.x, axis=0, prepend=self.x[:1]) / self.dt - self.model)
+        return np.asarray(np.diff(self.x, axis=0, prepend=np.nan * self.x[:1]) / self.dt - self.model)
 
     def innovation(self, rows: slice) -> np.ndarray:
         """nu of rows after the first, (rows, 3) rad/s2."""
@@ -238,8 +238,10 @@ def sides(terms: list[Term], of: Hypothesis, history: History) -> tuple[float, f
 def _first(term: Term, of: Hypothesis, dt: float) -> int:
     """The first frame that is written out: what is forgotten would decide nothing. A constant parameter needs
     all there are."""
+    if isinf(term.pole_per_s):
+        return term.frame
     longest = term.frame - term.since if of.constant else WINDOW
-    known = 1 if isinf(term.pole_per_s) else int(_FORGOTTEN / (term.pole_per_s * dt))
+    known = int(_FORGOTTEN / (term.pole_per_s * dt))
     return max(term.frame + 1 - max(min(longest, known), 1), term.since + 1, term.known_from + 1)
 
 

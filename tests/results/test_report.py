@@ -1,6 +1,7 @@
 import io
 import json
 import re
+import shutil
 
 import matplotlib.image
 import numpy as np
@@ -267,3 +268,24 @@ def test_first_of_two_faults_is_marked(tmp_path):
         r'id="data">(.*?)</script>', render([_folder(tmp_path / "two", Flight(scenario=two))])
     ).group(1)
     assert [mark["time_s"] for mark in json.loads(data)["runs"][0]["marks"]] == [12.0, 12.07, 12.12]
+
+
+def test_what_damage_takes_is_left_out_from_its_instant_to_its_repair(browser, folder, tmp_path):
+    """The replay draws so many polygons of a jet: all, without fin and rudder, without a tip, all again."""
+    broken = tmp_path / "broken"
+    shutil.copytree(folder, broken)
+    document = json.loads((broken / "metrics.json").read_text())
+    document["faults"] = [
+        {"actuator": None, "type": "damage", "at_s": at_s, "end_s": end_s, "size": {"case": case}}
+        for case, at_s, end_s in (("fin-off", 5.0, 10.0), ("left-wing-tip-off", 8.0, None))
+    ]
+    (broken / "metrics.json").write_text(as_json(document))
+    write_report(tmp_path / "report.html", [broken])
+    browser.open(tmp_path / "report.html")
+    count = """(() => { let n = 0; const run = { ...DATA.runs[0], jet: true };
+      const space = Object.assign(Object.create(Space.prototype), { run }); clock.now = %s;
+      const pen = { beginPath: () => n++, moveTo() {}, lineTo() {}, closePath() {}, fill() {}, stroke() {} };
+      space.drawAircraft(pen, () => [1, 1, 1], { position: [0, 0, 0], attitude: (p) => p }, 1);
+      return n; })()"""
+    drawn = [browser.evaluate(count % t) for t in (4.0, 6.0, 9.0, 11.0)]
+    assert [drawn[0] - n for n in drawn] == [0, 2, 3, 1]

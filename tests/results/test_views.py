@@ -16,6 +16,7 @@ from beaver_ftc.results.views import (
     View,
     _share_of_bound,
     estimators,
+    kinds,
     series_of,
     sources,
     surfaces,
@@ -233,12 +234,36 @@ def test_of_a_residual_of_nothing_the_upper_bound_counts():
     assert list(_share_of_bound(chunk, "abc")) == [0.0, 0.25]
 
 
-def test_there_are_looks_for_eight_surfaces():
-    known = {view.name: view for view in views([f"s{i}_{what}" for i in range(9) for what in (
-        "effectiveness_estimate", "effectiveness_used", "cmd_rad")])}  # fmt: skip
-    for panel, which in zip(known["effectiveness"].panels, ("estimate", "used"), strict=True):
-        looks = [(trace.column, trace.role) for trace in panel.traces]
-        assert looks == [(f"s{i}_effectiveness_{which}", f"surface {i}") for i in range(8)]
+MANY = (
+    *(f"{side}_{place}_{kind}" for kind in ("elevator", "flap") for side in ("left", "right")
+      for place in ("inboard", "outboard")), "rudder_0", "rudder_1", "aileron_left", "stabiliser",
+)  # fmt: skip
+
+
+def test_of_more_than_eight_surfaces_those_of_a_kind_share_a_panel_and_none_is_left_out():
+    what = (
+        "effectiveness_estimate",
+        "effectiveness_used",
+        "cmd_rad",
+        "effective_rad",
+        "loss_likelihood_share",
+    )
+    columns = [f"{name}_{each}" for name in MANY for each in what]
+    known = {view.name: view for view in views([*columns, *(f"{a}_step_likelihood_share" for a in "pqr")])}
+    assert list(kinds(MANY)) == ["elevator", "flap", "rudder", "aileron", "stabiliser"]
+    assert [panel.label for panel in known["surfaces"].panels] == list(kinds(MANY))
+    where = [("surfaces", "effective_rad"), ("likelihood", "loss_likelihood_share")]
+    for name, ending in (*where, *(("effectiveness", each) for each in what[:2])):
+        shown = [t.column for panel in known[name].panels for t in panel.traces if t.column.endswith(ending)]
+        assert sorted(shown) == sorted(f"{surface}_{ending}" for surface in MANY)
+    for panel in known["surfaces"].panels:
+        assert (
+            len({trace.role for trace in panel.traces})
+            == len({t.label for t in panel.traces})
+            == len(panel.traces)
+        )
+    elevator = known["surfaces"].panels[0]
+    assert elevator.traces[0].label == "left inboard"
 
 
 def test_what_a_figure_looks_like():

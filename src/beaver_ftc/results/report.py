@@ -18,7 +18,7 @@ import numpy as np
 from beaver_ftc.results import log, verdict
 from beaver_ftc.results.metrics import Document
 from beaver_ftc.results.style import LOOKS, MODE_COLOURS, closeup_window, marks
-from beaver_ftc.results.views import MAX_POINTS, Panel, View, read_series, views
+from beaver_ftc.results.views import MAX_POINTS, Panel, View, kinds, read_series, surfaces, views
 
 if TYPE_CHECKING:
     from jinja2 import Template
@@ -136,6 +136,16 @@ def _run(path: Path, metrics: Document, columns: Sequence[str], name: str, point
         levels.append(read_series(path, columns, window, points))
     return {
         "name": name,
+        "jet": not {"spoiler", "stabiliser"}.isdisjoint(kinds(surfaces(log.column_names(path)))),
+        "damage": [
+            {
+                "part": fault["size"]["case"].removesuffix("-off"),
+                "at_s": fault["at_s"],
+                "end_s": fault["end_s"],
+            }
+            for fault in metrics["faults"]
+            if fault["type"] == "damage"
+        ],
         "marks": [asdict(mark) for mark in instants],
         "window": window or ((float(t_s[0]), float(t_s[-1])) if t_s.size else (0.0, 0.0)),
         "levels": [{name: _packed(name, values) for name, values in level.items()} for level in levels],

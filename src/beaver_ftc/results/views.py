@@ -21,6 +21,7 @@ AXES = ("p", "q", "r")
 AXIS_NAMES = {"p": "roll rate p", "q": "pitch rate q", "r": "yaw rate r"}
 MODES = ("nominal", "adaptive", "reallocated", "unanticipated")
 
+SIDES = ("left", "right")
 SURFACE_ROLES = tuple(f"surface {i}" for i in range(8))  # looks of the surfaces, in the aircraft's order
 LIMITED = "airspeed_limited_mps"  # the commanded airspeed, as far as it can be held
 BEAVERS_POWER = "manifold_pressure_inhg"
@@ -175,7 +176,34 @@ def _profile(limited: bool, power: str) -> View:
     return View("profile", "Profile: what was commanded, and what was flown", (*panels, *engine))
 
 
+def kinds(names: Sequence[str]) -> dict[str, list[str]]:
+    """Names of surfaces by kind, in their order: `left_inboard_elevator`, `elevator_2` are elevators."""
+    found: dict[str, list[str]] = {}
+    for name in names:
+        first, *_, last = name.split("_") * 2
+        found.setdefault(first if last.isdigit() or last in SIDES else last, []).append(name)
+    return found
+
+
+def _by_kind(names: Sequence[str]) -> dict[str, list[tuple[str, str, str]]]:
+    """By kind, or all in one where each may have a look of its own: name, what to call it, and its role."""
+    if len(names) <= len(SURFACE_ROLES):
+        return {"": [(name, name, role) for name, role in zip(names, SURFACE_ROLES, strict=False)]}
+    said: dict[str, list[tuple[str, str, str]]] = {}
+    for kind, alike in kinds(names).items():
+        for name, role in zip(alike, SURFACE_ROLES * len(alike), strict=False):
+            others = " ".join(word for word in name.split("_") if word != kind)
+            said.setdefault(kind, []).append((name, others or kind, role))
+    return said
+
+
 def _surfaces(names: Sequence[str]) -> View:
+    if len(names) > len(SURFACE_ROLES):
+        panels = tuple(
+            _panel(kind, *((f"{name}_effective_rad", called, role) for name, called, role in alike))
+            for kind, alike in _by_kind(names).items()
+        )
+        return View("surfaces", "Control surfaces by kind, as the aerodynamics see them", panels)
     panels = tuple(
         _panel(
             surface,
@@ -224,11 +252,13 @@ def _watch() -> View:
 def _likelihood(columns: Sequence[str]) -> View:
     ending = "_loss_likelihood_share"
     names = [column.removesuffix(ending) for column in columns if column.endswith(ending)]
-    roles = zip(names, SURFACE_ROLES, strict=False)
-    losses = [(f"{surface}{ending}", f"{surface} loss", role) for surface, role in roles]
+    losses = {
+        kind: [(f"{name}{ending}", f"{called} loss", role) for name, called, role in alike]
+        for kind, alike in (_by_kind(names).items() if names else ())
+    }
     steps = [(f"{axis}_step_likelihood_share", f"{axis}'", axis) for axis in AXES]
     panels = (
-        *([_share("loss of a surface: test / alarm level", *losses)] if losses else ()),
+        *(_share(f"loss of {kind or 'a surface'}: test / alarm level", *of) for kind, of in losses.items()),
         _share("step or tone of an acceleration, or its force: test / alarm level", *steps),
     )
     title = "Detection: likelihood ratio tests against their alarm level"
@@ -260,18 +290,17 @@ def _spoken(name: str) -> str:
 
 
 def _effectiveness(names: Sequence[str]) -> View:
-    looks = tuple(zip(names, SURFACE_ROLES, strict=False))
     panels = tuple(
         Panel(
-            label,
-            tuple(Trace(f"{s}_effectiveness_{which}", s, role) for s, role in looks),
+            f"{kind}: {label}" if kind else label,
+            tuple(Trace(f"{name}_effectiveness_{which}", called, role) for name, called, role in alike),
             limits=(-0.05, 1.1),
         )
+        for kind, alike in (_by_kind(names).items() if names else ())
         for which, label in (("estimate", "estimated (1 healthy)"), ("used", "used by the law"))
-        if looks
     )
     title = "Effectiveness of each surface: the diagnosis' estimate, and what the law uses, rate-limited"
-    return View("effectiveness", title, panels)
+    return View("effectiveness", title, panels, across=1 if len(panels) <= 2 else 2)
 
 
 def _supervisor() -> View:

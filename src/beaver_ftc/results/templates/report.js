@@ -416,6 +416,22 @@ const AIRFRAME = [
   { fill: "#f7e3bd", points: [[2, 7.32, -1.4], [2, -7.32, -1.4], [0.4, -7.32, -1.4], [0.4, 7.32, -1.4]] },
 ];
 
+/** A low-wing twin jet, for aircraft with spoilers or a stabiliser that moves. part: what damage may take, with what is on it. */
+const mirrored = (points) => points.map(([x, y, z]) => [x, -y, z]);
+const sides = (fill, part, points, on) => [["right", points], ["left", mirrored(points)]].map(([side, of]) => ({ fill, part: `${side}-${part}`, on: `${side}-${on}`, points: of }));
+const JET = [
+  { fill: "#d7dbe0", points: [[6.2, 0, 0], [5.2, 0, -0.7], [-4, 0, -0.7], [-6.4, 0, -0.4], [-6.4, 0, -0.1], [-3, 0, 0.6], [5, 0, 0.6]] },
+  { fill: "#e6e9ec", points: [[6.2, 0, 0], [5, 0.65, 0], [-3, 0.65, 0], [-6.4, 0.1, -0.2], [-6.4, -0.1, -0.2], [-3, -0.65, 0], [5, -0.65, 0]] },
+  { fill: "#4f6b8a", part: "fin", points: [[-3.9, 0, -0.7], [-5.6, 0, -2.8], [-6, 0, -2.8], [-5.5, 0, -0.5]] },
+  { fill: "#2d4661", part: "rudder", on: "fin", points: [[-5.5, 0, -0.6], [-6, 0, -2.8], [-6.4, 0, -2.8], [-5.95, 0, -0.6]] },
+  ...sides("#aebccb", "stabiliser", [[-4.7, 0.2, -0.3], [-5.8, 2.1, -0.4], [-6.1, 2.1, -0.4], [-5.6, 0.2, -0.3]]),
+  ...sides("#5f7893", "elevator", [[-5.6, 0.3, -0.3], [-6.1, 2.1, -0.4], [-6.4, 2.1, -0.4], [-6, 0.3, -0.3]], "stabiliser"),
+  ...sides("#c3ced9", "wing", [[1.7, 0.6, 0.35], [-0.9, 3.9, 0.2], [-1.9, 3.9, 0.2], [-1.1, 0.6, 0.35]]),
+  ...sides("#c3ced9", "wing-tip", [[-0.9, 3.9, 0.2], [-2, 5.4, 0.1], [-2.7, 5.4, 0.1], [-1.9, 3.9, 0.2]]),
+  ...sides("#5f7893", "outboard-flap", [[-1.35, 2, 0.3], [-1.9, 3.8, 0.2], [-2.3, 3.8, 0.2], [-1.8, 2, 0.3]]),
+  ...sides("#3c4b5a", "engine", [[1.6, 1.6, 0.9], [1.6, 2.2, 0.9], [0, 2.2, 0.8], [0, 1.6, 0.8]]),
+];
+
 /** Body to north-east-up, from bank, pitch and heading. */
 function attitude(phi, theta, psi) {
   const [sf, cf, st, ct, sp, cp] = [Math.sin(phi), Math.cos(phi), Math.sin(theta), Math.cos(theta), Math.sin(psi), Math.cos(psi)];
@@ -576,7 +592,9 @@ class Space {
   }
 
   drawAircraft(pen, project, { position, attitude: turned }, size) {
-    const placed = AIRFRAME.map(({ fill, points }) => ({ fill, corners: points.map((p) => project(turned(p).map((v, k) => position[k] + v * size))) }));
+    const gone = this.run.damage.filter(({ at_s, end_s }) => clock.now >= at_s && clock.now < (end_s ?? Infinity)).map(({ part }) => part);
+    const whole = this.run.jet ? JET.filter(({ part, on }) => !gone.includes(part) && !gone.includes(on)) : AIRFRAME;
+    const placed = whole.map(({ fill, points }) => ({ fill, corners: points.map((p) => project(turned(p).map((v, k) => position[k] + v * size))) }));
     const depth = ({ corners }) => corners.reduce((sum, c) => sum + c[2], 0) / corners.length;
     const visible = placed.filter(({ corners }) => corners.every(Boolean)).sort((a, b) => depth(b) - depth(a));
     pen.strokeStyle = "#3b2a10";

@@ -62,7 +62,7 @@ _OTHER_LAWS: dict[str, Any] = {
 }
 """How far each group's gain wanders under a law and air that the fit has not seen (a law that answers what is
 not modelled ties the command to it), and what a name asks for then. Chosen on simulated flights
-(`own_logs.py`, seeds 1 to 3)."""
+(`own_logs.py`, seeds 1 to 6)."""
 _POWER_OTHER_LAWS, _THEORIES = 0.4, 2.0
 """A law may feed a gyro's noise to the surfaces, which doubles the residual of one that does not: a sample
 then tells less than the fit knows. And so many times the evidence of theory raises an alarm. Chosen in the

@@ -230,7 +230,8 @@ def geometry(pairs: Sequence[Document]) -> list[str]:
 
 def engine_failures(scenario: Scenario) -> list[Document]:
     """Of each engine that is an effector: how a failure to idle turns the aircraft in trim, rad/s2; over what
-    is certain to show in a frame; and whether its moment is a signal, so that the design model knows it."""
+    is certain to show in a frame; whether its moment is a signal, so that the design model knows it, and
+    whether that is held against the thrust of all."""
     aircraft = scenario.airframe
     engines, thrust = np.zeros(1, ENGINES)[0], aircraft.engine.thrust
     short = scenario.model_copy(update={"duration_s": SETTLED_S + 1.0, "faults": ()})
@@ -246,19 +247,24 @@ def engine_failures(scenario: Scenario) -> list[Document]:
     gained = np.interp(setting, thrust.setting, force_n) / aircraft.mass.mass_kg
     loop.release()
     known, found = any(name in EXACT_TERMS.values() for name in aircraft.signals), []
+    mapped = aircraft.file.model_error_map
+    held = known and mapped is not None and mapped.knows_engines
     for e, name in enumerate(aircraft.effectors):
         turns = np.abs(engines["B"][:, e]) * gained
         shows = 1.0 / float(detection_magnitude(turns[None], bound[None])[0])
-        found.append({"engine": name, "turns_rad_s2": turns.tolist(), "shows": shows, "known": known})
+        turned = turns.tolist()
+        found.append({"engine": name, "turns_rad_s2": turned, "shows": shows, "known": known, "held": held})
     return found
 
 
 def of_engines(failures: Sequence[Document]) -> list[str]:
     """A line an engine."""
-    ends = {True: "; its moment is a signal, held against their thrust", False: ""}
+    signal, against = "; its moment is a signal", ", held against their thrust"
     return [
         f"{of['engine']} at idle turns the aircraft by {max(of['turns_rad_s2']):.2g} rad/s2, "
-        f"{of['shows']:.2g} times what is certain to show in a frame{ends[of['known']]}"
+        f"{of['shows']:.2g} times what is certain to show in a frame"
+        + signal * of["known"]
+        + against * of["held"]
         for of in failures
     ]
 

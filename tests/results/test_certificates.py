@@ -232,6 +232,16 @@ def test_in_blocks_a_jam_is_what_a_block_says_in_the_mean():
     assert limit < said["sides"][1] < value  # which has noise and effects besides
 
 
+def test_before_a_block_is_whole_no_type_is_held_against_one():
+    """The flight ends in the first block after the alarm."""
+    given = {"name": "early", "duration_s": 0.15, "reference": SINES, **FLIGHTS["blocks"]}
+    flight = bf.fly(given | {"faults": [STUCK | {"at_s": 0.05}]})
+    certificate = json.loads(as_text(flight.certificate()))
+    assert flight.metrics["detection"]["detected"]
+    assert [one["what"] for one in certificate["statements"]][:1] == [None]
+    assert all("block" not in one for one in certificate["statements"])
+
+
 def test_a_path_without_a_certificate_ends_in_one_line(tmp_path):
     (tmp_path / "text.json").write_text("no certificate")
     (tmp_path / "list.json").write_text("[1, 2]")

@@ -219,8 +219,9 @@ def _of_types(scenario: Scenario, tape: Tape, history: History, alarm: int) -> I
     frames = tape, history
     if tape.alarm["fdi"]["types"]["config"]["length"] > 1:
         tape, history, alarm = in_blocks(tape, history, alarm)
-    for s, kind, k in kinds.excluded_types(tape):
-        because, followed = kinds.why_not(tape, kind), kind in courses.RULES
+    any_block = len(tape.types) > 0
+    for s, kind, k in kinds.excluded_types(tape if any_block else frames[0]):
+        because, followed = kinds.why_not(tape, kind) if any_block else kinds.COURSE, kind in courses.RULES
         about: Document = {"what": kinds.name_of(scenario.airframe.surfaces[s], kind), "column": None}
         of = kinds.hypothesis(tape, s, STUCK if followed else kind)
         if because is not None:

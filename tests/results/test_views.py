@@ -251,8 +251,9 @@ def test_of_more_than_eight_surfaces_those_of_a_kind_share_a_panel_and_none_is_l
     columns = [f"{name}_{each}" for name in MANY for each in what]
     known = {view.name: view for view in views([*columns, *(f"{a}_step_likelihood_share" for a in "pqr")])}
     assert list(kinds(MANY)) == ["elevator", "flap", "rudder", "aileron", "stabiliser"]
-    assert [panel.label for panel in known["surfaces"].panels] == list(kinds(MANY))
-    where = [("surfaces", "effective_rad"), ("likelihood", "loss_likelihood_share")]
+    labels = [panel.label for panel in known["surfaces"].panels]
+    assert labels[::2] == [f"{kind}: commanded" for kind in kinds(MANY)]
+    where = [("surfaces", "cmd_rad"), ("surfaces", "effective_rad"), ("likelihood", "loss_likelihood_share")]
     for name, ending in (*where, *(("effectiveness", each) for each in what[:2])):
         shown = [t.column for panel in known[name].panels for t in panel.traces if t.column.endswith(ending)]
         assert sorted(shown) == sorted(f"{surface}_{ending}" for surface in MANY)

@@ -180,8 +180,9 @@ def kinds(names: Sequence[str]) -> dict[str, list[str]]:
     """Names of surfaces by kind, in their order: `left_inboard_elevator`, `elevator_2` are elevators."""
     found: dict[str, list[str]] = {}
     for name in names:
-        first, *_, last = name.split("_") * 2
-        found.setdefault(first if last.isdigit() or last in SIDES else last, []).append(name)
+        words = name.split("_")
+        is_one_of_many = words[-1].isdigit() or words[-1] in SIDES
+        found.setdefault(words[0 if is_one_of_many else -1], []).append(name)
     return found
 
 
@@ -200,10 +201,11 @@ def _by_kind(names: Sequence[str]) -> dict[str, list[tuple[str, str, str]]]:
 def _surfaces(names: Sequence[str]) -> View:
     if len(names) > len(SURFACE_ROLES):
         panels = tuple(
-            _panel(kind, *((f"{name}_effective_rad", called, role) for name, called, role in alike))
+            _panel(f"{kind}: {label}", *((f"{name}_{of}_rad", called, role) for name, called, role in alike))
             for kind, alike in _by_kind(names).items()
+            for of, label in (("cmd", "commanded"), ("effective", "as the aerodynamics see it"))
         )
-        return View("surfaces", "Control surfaces by kind, as the aerodynamics see them", panels)
+        return View("surfaces", "Control surfaces by kind", panels, across=2)
     panels = tuple(
         _panel(
             surface,

@@ -94,7 +94,7 @@ def failures(about, log):  # a line for each statement that does not hold; log: 
 
 
 if __name__ == "__main__":
-    sys.excepthook = lambda _, why, at: print("no certificate beside its log:", why, file=sys.stderr)
+    sys.excepthook = lambda _, why, at: print("no certificate at FOLDER|FILE [LOG]:", why, file=sys.stderr)
     about = loads((file := Path(sys.argv[1], "certificate.json" * Path(sys.argv[1]).is_dir())).read_text())
     log = read_table([*sys.argv, file.parent / "log.parquet"][2]).to_pydict()
     sys.exit("\n".join(failures(about, log)) or print(len(about["statements"]), "statements hold"))

@@ -249,7 +249,7 @@ def test_a_path_without_a_certificate_ends_in_one_line(tmp_path):
         command = [sys.executable, CHECKER, name, "log.parquet"]
         checked = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
         assert checked.returncode == 1
-        assert checked.stderr.startswith("no certificate beside its log: ")
+        assert checked.stderr.startswith("no certificate at FOLDER|FILE [LOG]: ")
         assert checked.stderr.count("\n") == 1
 
 

@@ -66,11 +66,8 @@ def in_blocks(tape: Tape, history: History, alarm: int) -> tuple[Tape, Blocks, i
         for name, values in tape.kept.items()
     }
     examined = replace(tape, first=first, frames=(tape.frames - since) // length, kept=kept)
-    return (
-        examined,
-        of,
-        max(ceil((alarm - begin) / length), 1),
-    )  # of the first block no one knows how it began
+    raised = max(ceil((alarm - begin) / length), 1)  # of the first block no one knows how it began
+    return examined, of, raised
 
 
 def rows_of(said: Document, span: Document) -> np.ndarray:

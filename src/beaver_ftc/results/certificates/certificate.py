@@ -221,12 +221,14 @@ def _of_types(scenario: Scenario, tape: Tape, history: History, alarm: int) -> I
         tape, history, alarm = in_blocks(tape, history, alarm)
     any_block = len(tape.types) > 0
     for s, kind, k in kinds.excluded_types(tape if any_block else frames[0]):
-        because, followed = kinds.why_not(tape, kind) if any_block else kinds.COURSE, kind in courses.RULES
+        because = kinds.why_not(tape, kind) if any_block else kinds.COURSE
         about: Document = {"what": kinds.name_of(scenario.airframe.surfaces[s], kind), "column": None}
-        of = kinds.hypothesis(tape, s, STUCK if followed else kind)
         if because is not None:
             yield about | {"because": because}
-        elif followed:  # by where the surface was, as if it were held there
+            continue
+        followed = kind in courses.RULES  # by where the surface was, as if it were held there
+        of = kinds.hypothesis(tape, s, STUCK if followed else kind)
+        if followed:
             said = courses.excludes(scenario, tape, history, of, s, kind, alarm)
             yield about | (history.said | said if said else {"because": kinds.COURSE})
         elif isinstance(history, Blocks) and not of.constant:

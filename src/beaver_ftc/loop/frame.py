@@ -222,7 +222,8 @@ def isolate(fdi, x, t, started):
         fie = records.estimator[s]
         can_be = isolation.possible(records, fie, fdi.bank, bound.frame, config.abrupt, x, started)
         if rules_out(fdi, fie, can_be) and not fie.excluded:
-            fie.excluded, fie.excluded_at_s = 1, t
+            fie.excluded = 1
+            fie.excluded_at_s = t
     if config.every_type:
         scheme.isolate_type(fdi.types, fdi.verdict, fdi.layout, records, fdi.bank, bound, t, started)
     else:
@@ -424,8 +425,7 @@ def demand(frame):
     control, belief, measured, axes = frame.control, frame.belief, frame.measured, frame.control.axes
     surfaces, reference = control.surfaces, control.reference
     if control.inner == REJECTING:
-        main = control.layout.main
-        rejecting.demand(control.rejection, axes, reference, surfaces, main, belief, measured)
+        rejecting.demand(control.rejection, axes, reference, surfaces, control.layout.main, belief, measured)
     else:
         published.demand(control.feedback, axes, reference, measured.x, belief.f)
     if control.law != NOMINAL:
@@ -574,8 +574,7 @@ def record(frame, commanded, row):
     row[column], row[column + 1] = frame.supervisor.mode, fdi.verdict.detected or fdi.watch.alarmed
     column += 2
     if logged.watch:
-        missing = frame.measured.missing
-        column = log_row.record_watch(fdi.watch, missing, row, column, logged.watch)
+        column = log_row.record_watch(fdi.watch, frame.measured.missing, row, column, logged.watch)
     column = put(row, column, control.power.command[: logged.power])
     if frame.autopilot.enabled:
         log_row.record_profile(frame.autopilot, row, column)
@@ -597,4 +596,5 @@ def finish(frame, commanded, row):
     reference.govern(control.reference, commanded, control.axes.shortfall)
     follow_command(belief, control.allocation.command)
     hand_over(frame.truth, belief.commanded, control.power)
-    frame.k, frame.row = frame.k + 1, frame.row + 1
+    frame.k += 1
+    frame.row += 1

@@ -95,10 +95,10 @@ def listen(answering, missed, pull, into, dt, x, y, effectiveness, given):
         seen = missed[i] + answer(answering.memory[n + _SIGNALS], i, believed, pull[i], into[i], dt)
         update(answering, seen, answering.noise[i])
     for s in range(n):
-        within = min(max(answering.found[s], -1.0), 0.0)
-        beyond = (answering.found[s] - within) / answering.P[s, s]
-        for j in range(h.size):
-            answering.found[j] -= answering.P[j, s] * beyond
+        beyond = answering.found[s] - min(max(answering.found[s], -1.0), 0.0)
+        if beyond != 0.0:
+            for j in range(h.size):
+                answering.found[j] -= answering.P[j, s] * (beyond / answering.P[s, s])
 
 
 @kernel

@@ -202,7 +202,7 @@ def blur(view, noise, blocks, forces, air, inertial_air, V):
         jitter += abs(m[i]) * np.sqrt(noise.jitter[i])
         if view.clears:
             jitter += abs(m[i]) * forces.blurred[i]
-        bound += abs(m[i]) * noise.bounded[i]
+        bound += abs(m[i]) * (noise.bounded[i] + noise.beyond[i])
     for f, force in enumerate(forces.component):
         jitter += abs(m[SIDE + f]) * np.sqrt(force.jitter[view.inertial])
         if view.inertial:

@@ -15,7 +15,7 @@ from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.actuators import actuators_dtype, move
 from beaver_ftc.design.model import design_dtype
 from beaver_ftc.design.variants import design_of, response
-from beaver_ftc.diagnosis.bounds.worst_case import bound_now, changing_error
+from beaver_ftc.diagnosis.bounds.worst_case import beyond, bound_now, changing_error
 from beaver_ftc.scenario.schema import Scenario
 
 
@@ -93,6 +93,10 @@ def sum_up(belief, bound, layout, every_type):
             if bound.own_errors:  # per rad and at the command
                 total.own_per_rad[i, s] += bound.admitted.per_rad[i, s]
                 total.own[i, s] += bound.admitted.per_rad[i, s] * abs(u[s])
+    if bound.error_map.anywhere:
+        for j in range(bound.error_map.n_levels):
+            for i in range(3):
+                bound.beyond[j, i] += belief.share * beyond(bound.error_map, j, i)
     if every_type:
         for s, axis in enumerate(layout.dominant_axis):
             now = G[axis, s]
@@ -174,6 +178,7 @@ def begin_frame(belief, bound, layout, every_type, measured):
     total.u_least[:], total.u_most[:] = np.inf, -np.inf
     if bound.own_errors:
         total.own_per_rad[:], total.own[:] = 0.0, 0.0
+    bound.beyond[:] = 0.0
     sum_up(belief, bound, layout, every_type)
     total.Gu_first[:] = total.Gu
 

@@ -50,7 +50,7 @@ ESTIMATOR = record(
     excluded=int, excluded_at_s=float, unasked=(int, 3), shown=int, doubted=int, xhat=3, residual=3, lower=3,
     upper=3, omega=3, rise=3, fall=3, bound=3, bound_eta=3, bound_noise=3, theta=3, covariance=3,
     effect=EFFECT, block_effect=EFFECT,  # of the frame; mean over a block
-    furthest=float,  # rad, from neutral, that the surface can have been in the frame
+    furthest=float, used=float,  # rad from neutral, share of its travel, where it can have been in the frame
     # what bank.py and membership.py keep
     across=3, reach_low=(MAX_POLES, 4), reach_high=(MAX_POLES, 4), theta_low=3, theta_high=3,
 )  # fmt: skip
@@ -134,7 +134,7 @@ def suppose(isolation, fie, bank, bound, config, G, Gu, spread):
     hypothesis(fie.kind, fie.surface, G, Gu, effect.offset, effect.Z)
     for i in range(3):
         effect.spread[i] = spread[i, fie.surface]
-    if bound.own_errors and fie.kind == POSITION:
+    if (bound.own_errors or bound.error_map.anywhere) and fie.kind == POSITION:
         membership.allow_for_own_errors(fie, bound, bank.innovation, config.instants)
     if isolation.memory:
         remember(bank, fie, config.dt)

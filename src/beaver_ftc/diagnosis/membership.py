@@ -8,6 +8,7 @@ sets of all frames since the alarm may be intersected.
 """
 
 from beaver_ftc.compiled import kernel
+from beaver_ftc.diagnosis.bounds.worst_case import covering, share_used
 
 NOTHING = (1.0, -1.0)
 ROUNDS = 4  # each narrows what is left of the travel to the tolerance's share of it
@@ -60,22 +61,38 @@ def allow_for_own_errors(fie, bound, innovation, instants):
     eta_bar holds them at the command. The further the surface is from neutral, the more they do; how far it
     can have been follows from the frame itself, in a few rounds from its travel inwards, each of them valid.
     Of several JSBSim frames in one of ours (instants) the first may have seen it where it was a frame before.
+    So with a map of the model's error, which is for healthy surfaces.
     """
     s, effect = fie.surface, fie.effect
     axis = dominant(effect.Z)
     before, reach = fie.furthest, max(abs(fie.low), abs(fie.high))
-    room = effect.spread[axis]
+    room, mapped, where = effect.spread[axis], bound.error_map, (fie.low, fie.high)
+    level = within(mapped, fie, where, instants)
     value = innovation[axis] - effect.offset[axis]
     earlier = 2.0 * before / instants if instants > 1 else 0.0
     for _ in range(ROUNDS):
         own = max(bound.own_per_rad[axis, s] * (reach + earlier) - bound.own[axis, s], 0.0)
+        own += bound.beyond[level, axis]
         low, high = solve(value, bound.frame[axis] + room + own, effect.Z[axis], fie.low, fie.high)
         if low > high:
             break
-        reach = min(reach, max(abs(low), abs(high)))
+        reach, where = min(reach, max(abs(low), abs(high))), (low, high)
+        level = within(mapped, fie, where, instants)
     fie.furthest = reach
+    if mapped.anywhere:
+        fie.used = share_used(mapped, s, where, fie.used, instants)
     for i in range(3):
         effect.spread[i] += max(bound.own_per_rad[i, s] * (reach + earlier) - bound.own[i, s], 0.0)
+        effect.spread[i] += bound.beyond[level, i]
+
+
+@kernel
+def within(mapped, fie, where, instants):
+    """The level of the map of errors, 0 without one, that covers a surface which was in the mean over the
+    frame at `where`, (low, high) rad."""
+    if not mapped.anywhere:
+        return 0
+    return covering(mapped, share_used(mapped, fie.surface, where, fie.used, instants))
 
 
 @kernel

@@ -18,7 +18,7 @@ from beaver_ftc.diagnosis import across, likelihood, noise_model
 from beaver_ftc.diagnosis import air as gusts
 from beaver_ftc.diagnosis.across import USUAL, Size, view_dtype
 from beaver_ftc.diagnosis.air import AIR
-from beaver_ftc.diagnosis.bounds.worst_case import UNKNOWN_TO_FILTERS_RAD_S2, uncertainty_bound
+from beaver_ftc.diagnosis.bounds.worst_case import UNKNOWN_TO_FILTERS_RAD_S2, beyond, uncertainty_bound
 from beaver_ftc.diagnosis.forces import FORCES_FELT
 from beaver_ftc.diagnosis.likelihood import ENDING, GROWING, LATERAL, N_BLOCKS, N_READINGS, STEP, block_dtype
 from beaver_ftc.diagnosis.state import BESIDE_DAMAGE, LOSS
@@ -41,12 +41,12 @@ TESTS = record(
 
 # What moves the rates besides a fault. rapidity, 1/s: intensity of the drift of an uncertainty over its bound
 # squared; pace: by what share of its bound it changes in a frame in which no surface moves; bounded, rad/s2:
-# that bound now; deflection: its part by that of the surfaces; jitter, (rad/s2)2: noise of the model's own
-# inputs, `own_jitter` what of it is none of the air data's. read: whether errors of the air data count. The
-# last are scratch.
+# that bound now, of healthy surfaces; beyond: what one anywhere in its travel adds; deflection: its part by
+# that of the surfaces; jitter, (rad/s2)2: noise of the model's own inputs, `own_jitter` what of it is none of
+# the air data's. read: whether errors of the air data count. The last are scratch.
 NOISE = record(
-    rapidity=float, pace=float, bounded=3, deflection=3, jitter=3, own_jitter=3, read=int, reading=N_READINGS,
-    terms=MAX_TERMS, direction=N_SIGNALS, slope=MAX_MONOMIALS, moved=3,
+    rapidity=float, pace=float, bounded=3, beyond=3, deflection=3, jitter=3, own_jitter=3, read=int,
+    reading=N_READINGS, terms=MAX_TERMS, direction=N_SIGNALS, slope=MAX_MONOMIALS, moved=3,
 )  # fmt: skip
 
 # What the tests say: the largest share of the alarm level and its axis, how close healthy flight came to it,
@@ -322,6 +322,8 @@ def drifts(noise, blocks, air, bound, design, measured, dt):
         bounded[i] += noise.deflection[i]
         if mapped:
             bounded[i] += min(bound.error_map.now[i], UNKNOWN_TO_FILTERS_RAD_S2)
+        if bound.error_map.anywhere:
+            noise.beyond[i] = beyond(bound.error_map, bound.error_map.n_levels - 1, i)
     for block in blocks:
         for i, axis in enumerate(block.axis[: block.n]):
             for j in range(block.n):

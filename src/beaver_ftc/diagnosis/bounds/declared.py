@@ -110,13 +110,14 @@ def configure(bound: np.void, scenario: "Scenario", design: np.void) -> None:
     config, aircraft = scenario.fdi, scenario.airframe
     bound["inertia"], bound["earth_rate"] = config.bounds.inertia_coupling.as_tuple(), EARTH_RATE_RAD_S
     bound["constant"] = config.bounds.constant_rad_s2.as_tuple()
-    fill_error_map(bound["error_map"], aircraft, whole=config.fault_class == "all")
+    every_type = config.fault_class == "all"
+    fill_error_map(bound["error_map"], aircraft, every_type, whole=every_type and config.pairs)
     if aircraft.file.model_error_map is None:
         bound["constant"] += aircraft.model_error_rad_s2
     admitted = bound["admitted"]
     admit(admitted, config.bounds, aircraft, design, mass_of(scenario.design_model, aircraft))
     admit_engine(admitted, scenario)
-    bound["own_errors"] = admitted["any"] and config.fault_class == "all"
+    bound["own_errors"] = admitted["any"] and every_type
 
 
 def admit(

@@ -16,10 +16,11 @@ however fast the frames.
 
 The error of a derived design model, where in the envelope the aircraft is, is measured, and looked up here.
 Its map is a few boxes of states, one inside the other, with the largest error found in each for surfaces
-within a share of their travel, those that stand in within less. A surface that has lost effectiveness gives
-no more than what it is taken to be at, so its error is within the same share; one that is stuck may be
-anywhere, so that the whole travel counts where such faults are in question. Outside of all boxes nobody has
-measured: nothing is concluded.
+within a share of their travel, those that stand in within less. Healthy surfaces are where their commands
+put them, and one that has lost effectiveness gives no more than what it is taken to be at: the bound is that
+of the share these use. One that is stuck may be anywhere: what its share adds, `beyond`, belongs to the
+hypothesis that it is off (membership.py). Where two may be, the whole travel counts for the bound itself.
+Outside of all boxes nobody has measured: nothing is concluded.
 """
 
 from functools import lru_cache
@@ -64,11 +65,12 @@ def admitted_dtype(n: int) -> np.dtype:
 
 @lru_cache
 def error_map_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
-    """The map for an aircraft with n surfaces. whole: surfaces may be anywhere. outside: of all boxes.
-    before: the surfaces in the frame before, rad. now: the error here, rad/s2. apart: `engines_apart`."""
+    """The map for an aircraft with n surfaces. anywhere: one surface may be, or, whole, more. outside: of all
+    boxes; box, age: where this is in the map. before: the surfaces in the frame before, rad. now: the error
+    here, rad/s2. apart: `engines_apart`."""
     return record(
-        n_boxes=int, n_levels=int, n_ages=int, whole=int, outside=int, time_s=float, until_s=MAX_AGES,
-        low=(boxes, _N), high=(boxes, _N), share=MAX_LEVELS,
+        n_boxes=int, n_levels=int, n_ages=int, anywhere=int, whole=int, outside=int, box=int, age=int,
+        time_s=float, until_s=MAX_AGES, low=(boxes, _N), high=(boxes, _N), share=MAX_LEVELS,
         error=(MAX_AGES, boxes, MAX_LEVELS, 3), travel_low=n, travel_high=n, before=n, place=_N, now=3,
         apart=boxes, apart_now=float,
     )  # fmt: skip
@@ -78,21 +80,22 @@ def error_map_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
 def bound_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
     """Bounds on the uncertainty. eta_bar, eta_bar_now: over the elapsed frame and at this instant, rad/s2.
     noise: on what a gyro's error changes by, rad/s. frame: on one frame's innovation, rad/s2. own: of the
-    errors of n surfaces' own terms, per rad of deflection and at the command, means over the frame."""
+    errors of n surfaces' own terms, per rad of deflection and at the command, means over the frame. beyond:
+    by how much the map's error with a surface at each share of its travel exceeds that in eta_bar."""
     return record(
         inertia=3, constant=3, earth_rate=float, admitted=admitted_dtype(n),
         error_map=error_map_dtype(n, boxes), eta_bar=3, eta_bar_now=3, noise=3, noise_then=3, frame=3,
-        own_errors=int, own_per_rad=(3, n), own=(3, n),
+        own_errors=int, own_per_rad=(3, n), own=(3, n), beyond=(MAX_LEVELS, 3),
     )  # fmt: skip
 
 
-def fill_error_map(error_map: np.void, aircraft: Aircraft, whole: bool) -> None:
-    """Write an aircraft's map, if it has one; whole: surfaces may be anywhere in their travel."""
+def fill_error_map(error_map: np.void, aircraft: Aircraft, anywhere: bool, whole: bool) -> None:
+    """Write an aircraft's map, if it has one; anywhere: one surface may be, in its travel; whole: more."""
     given = aircraft.file.model_error_map
     if given is None:
         return
     n_levels, n_ages = len(given.travel_share), len(given.until_s)
-    error_map["whole"], error_map["n_boxes"] = whole, len(given.boxes)
+    error_map["anywhere"], error_map["whole"], error_map["n_boxes"] = anywhere, whole, len(given.boxes)
     error_map["n_levels"], error_map["n_ages"] = n_levels, n_ages
     error_map["until_s"][:n_ages], error_map["share"][:n_levels] = given.until_s, given.travel_share
     least = np.array([given.stand_ins if s in aircraft.stand_ins else 1.0 for s in aircraft.surfaces])
@@ -254,18 +257,41 @@ def is_inside(error_map, k):
 @kernel
 def level_of(error_map, u):
     """The first share of the travel that covers surfaces u (n,) rad; the last if all of it may be used."""
-    last = error_map.n_levels - 1
     if error_map.whole:
-        return last
+        return error_map.n_levels - 1
     used = 0.0
     for s in range(u.size):
         if u[s] != 0.0:
             end = error_map.travel_high[s] if u[s] > 0.0 else error_map.travel_low[s]
             used = max(used, u[s] / end) if end != 0.0 else 1.0
+    return covering(error_map, used)
+
+
+@kernel
+def covering(error_map, used):
+    """The first level of the map for so large a share of the travel."""
+    last = error_map.n_levels - 1
     for j in range(last):
         if used <= error_map.share[j]:
             return j
     return last
+
+
+@kernel
+def share_used(error_map, s, where, before, instants):
+    """The largest share of its travel that surface s can use at any of so many instants of a frame.
+
+    where: (low, high) rad, in the mean over them; before: the share as the frame began, where it may be yet
+    at the first.
+    """
+    used, (low, high) = 0.0, where
+    if high > 0.0:
+        used = high / error_map.travel_high[s] if error_map.travel_high[s] != 0.0 else 1.0
+    if low < 0.0:
+        used = max(used, low / error_map.travel_low[s] if error_map.travel_low[s] != 0.0 else 1.0)
+    if instants > 1:
+        used = max(before, (instants * used + before) / (instants - 1))
+    return min(used, 1.0)
 
 
 @kernel
@@ -288,9 +314,18 @@ def look_up(error_map, x, y, u):
     for k in range(error_map.n_boxes if age >= 0 else 0):
         if is_inside(error_map, k):
             error_map.outside, error_map.now[:] = 0, error_map.error[age, k, level]
+            error_map.box, error_map.age = k, age
             error_map.apart_now = error_map.apart[k]
             return
     error_map.outside, error_map.now[:], error_map.apart_now = 1, UNKNOWN_RAD_S2, UNKNOWN_RAD_S2
+
+
+@kernel
+def beyond(error_map, j, i):
+    """By how much the error of axis i at this instant is larger with a surface at level j, rad/s2."""
+    if error_map.outside:
+        return 0.0
+    return max(error_map.error[error_map.age, error_map.box, j, i] - error_map.now[i], 0.0)
 
 
 @kernel

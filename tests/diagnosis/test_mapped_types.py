@@ -1,0 +1,112 @@
+"""A model whose mapped error grows as surfaces leave neutral: the alarm goes by where healthy ones are, and
+who may be anywhere is excluded by what he may do there alone."""
+
+import numpy as np
+import pytest
+from design_plant import TRAVEL_RAD, UNCERTAINTIES, DesignPlant
+from kernels import estimator, new_fdi, on
+
+from beaver_ftc.diagnosis import membership
+from beaver_ftc.diagnosis.bounds import worst_case
+from beaver_ftc.diagnosis.state import POSITION
+
+AILERON, ELEVATOR, RUDDER = range(3)
+SHARE, ERROR = (0.3, 0.6, 1.0), np.array([[0.02, 0.03, 0.02], [0.2, 0.3, 0.1], [2.0, 3.0, 1.0]])
+BEGINS, FRAMES = 100, 400
+POSITIONS = {
+    "hardover": lambda k, u: 0.4,
+    "hardover down": lambda k, u: -0.4,
+    "stuck": lambda k, u: 0.17,
+    "bias": lambda k, u: u + 0.15,
+    "swings": lambda k, u: 0.42 * np.sin(0.05 * k),
+    "jumps": lambda k, u: 0.42 * np.sign(np.sin(0.3 * k)),
+    "lost": lambda k, u: 0.0,
+}
+
+
+class Mapped(DesignPlant):
+    """What its model is off by is within the map, for where surfaces really are."""
+
+    def __init__(self, **given):
+        super().__init__(fault_class="all", **given)
+        self.map = self.fdi["bound"]["error_map"]
+        self.map["n_boxes"], self.map["n_levels"], self.map["n_ages"], self.map["anywhere"] = 1, 3, 1, 1
+        self.map["low"], self.map["high"], self.map["until_s"] = -1e9, 1e9, 1e9
+        self.map["share"][:3], self.map["error"][0, 0, :3] = SHARE, ERROR
+        self.map["travel_low"], self.map["travel_high"] = TRAVEL_RAD
+        self.amplitude *= 0.3
+
+    def effect(self, G):
+        if self.surface is None or self.k < BEGINS:
+            return np.zeros(3)
+        at = self.u.copy()
+        at[self.surface] = self.position(self.k, self.u[self.surface])
+        used = np.max(at / np.where(at > 0, TRAVEL_RAD[1], TRAVEL_RAD[0]))
+        more = np.maximum(ERROR[np.searchsorted(SHARE[:2], used)] - self.map["now"], 0.0)
+        signs = np.sign(np.random.default_rng((self.k // 9, 7)).uniform(-1, 1, 3))
+        return G @ (at - self.u) + signs * more
+
+
+def flown(course, surface=ELEVATOR, seed=1, uncertainty="bang-bang", **changes):
+    plant = Mapped(seed=seed, surface=surface, position=POSITIONS[course])
+    for name, value in changes.items():
+        plant.map[name] = value
+    return plant.fly(FRAMES, UNCERTAINTIES[uncertainty])
+
+
+@pytest.mark.parametrize("uncertainty", ["push", "bang-bang"])
+def test_no_healthy_flight_alarms(uncertainty):
+    for seed in range(5):
+        plant = Mapped(seed=seed).fly(FRAMES, UNCERTAINTIES[uncertainty])
+        assert plant.detected_at_s == np.inf
+        assert plant.fdi["bank"]["closest"].max() > 0.9
+
+
+@pytest.mark.parametrize("course", POSITIONS)
+@pytest.mark.parametrize("surface", [AILERON, ELEVATOR, RUDDER])
+def test_the_surface_at_fault_is_never_excluded(surface, course):
+    for seed, uncertainty in enumerate(UNCERTAINTIES):
+        plant = flown(course, surface, seed, uncertainty)
+        assert plant.detected_at_s >= plant.dt * BEGINS
+        assert not plant.position_excluded(surface)
+
+
+def test_by_the_error_of_healthy_surfaces_alone_it_would_be():
+    """Ablation: without what a surface at fault adds, and with the whole travel for the alarm as well."""
+    assert not any(flown("jumps", seed=seed).position_excluded(ELEVATOR) for seed in range(4))
+    assert any(flown("jumps", seed=seed, anywhere=0).position_excluded(ELEVATOR) for seed in range(4))
+    for whole, found in ((0, True), (1, False)):
+        hidden = [flown("bias", seed=seed, uncertainty="hide", whole=whole) for seed in range(4)]
+        assert all(np.isfinite(plant.detected_at_s) == found for plant in hidden)
+
+
+@pytest.mark.parametrize(
+    ("where", "before", "instants", "share"),
+    [
+        ((-0.1, 0.1), 0.9, 1, 0.5), ((-0.05, 0.1), 0.9, 1, 0.25), ((0.1, 0.2), 0.0, 1, 0.5),
+        ((-9.0, 0.0), 0.0, 1, 1.0), ((-0.1, 0.1), 0.5, 2, 1.0), ((-0.02, 0.02), 0.5, 11, 0.5),
+        ((0.0, 0.1), 0.0, 11, 0.275),
+    ],
+)  # fmt: skip
+def test_the_share_of_its_travel_is_the_furthest_at_any_instant(where, before, instants, share):
+    """Of n instants the first may be as before, p0; the others make up the mean: (n p - p0) / (n - 1)."""
+    error_map = new_fdi()["bound"]["error_map"]
+    error_map["travel_low"][1], error_map["travel_high"][1] = -0.2, 0.4
+    assert worst_case.share_used(error_map, 1, where, before, instants) == pytest.approx(share)
+
+
+def test_the_room_of_a_position_is_that_of_where_it_can_have_been():
+    fdi = new_fdi()
+    fie, bound = estimator(fdi, POSITION, surface=1, low=-0.5, high=0.5), fdi["bound"]
+    bound["error_map"]["anywhere"], bound["error_map"]["n_levels"], bound["error_map"]["share"][:3] = (
+        1,
+        3,
+        SHARE,
+    )
+    bound["error_map"]["travel_low"], bound["error_map"]["travel_high"] = -0.5, 0.5
+    bound["beyond"][:3], bound["frame"], fdi["bank"]["innovation"] = ERROR, 0.1, (0.0, 1.0, 0.0)
+    fie["effect"]["Z"], fdi["config"]["instants"] = (0.0, 20.0, 0.0), 1
+    # 1.0 +- 0.1 +- 3.0 over 20: within 0.205 of 0.5 rad, the second level; then 1.4 / 20, the first
+    on(membership.allow_for_own_errors, fdi, fie)
+    assert fie["effect"]["spread"] == pytest.approx(ERROR[0])
+    assert fie["used"] == pytest.approx(1.13 / 20 / 0.5)

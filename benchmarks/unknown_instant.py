@@ -1,6 +1,6 @@
 """What of all there is to see is found: beside a test that is told everything of a loss but when it strikes.
 
-    python benchmarks/unknown_instant.py [AIRCRAFT] [--surface S] [--turbulence light] [--flights 20]
+    python benchmarks/unknown_instant.py [AIRCRAFT ...] [--surface S] [--turbulence light] [--flights 20]
         [--healthy 72] [--seed 500000] [--published]
 
 Page's test [Page1954]: the largest log likelihood ratio of "this fault, since some instant" that any instant
@@ -17,14 +17,19 @@ within a model's envelope alone, and outside nothing is concluded: losses within
 aircraft is outside are left out.
 
 Each surface is lost by 40 and 100 % at 3 and 6 deg/s. A row a surface: the share of losses found within 1 s
-by the test told the instant too; by Page's; by our two detectors at their level, and as they ship. Levels
-give at most 20 false alarms per hour on the healthy flights. Then both of ours as a share of Page's.
+by the test told the instant too; by Page's; by our two detectors, all with levels that give at most 20 false
+alarms per hour on the healthy flights; then ours as a share of Page's. `shipped` is the same at the level
+that follows from the declaration, 0.001 an hour: Page's level is raised by the logarithm of how much rarer
+its false alarms are to be, which is what it takes of the greatest of many likelihood ratios [Lorden1971].
+Rows of all aircraft together are last. Intervals: 95 % of RESAMPLED draws of flights, a flight's losses kept
+together, and of the healthy flights, from which levels are taken anew.
 """
 
 import argparse
 from collections.abc import Iterator
 from dataclasses import dataclass
-from statistics import fmean
+from math import log
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -48,7 +53,8 @@ from beaver_ftc.studies.power.survey import (
 MAGNITUDES, EXCITATIONS_DEG_S = (0.4, 1.0), (3.0, 6.0)
 PER_H, EVERY, FURTHEST = 20.0, 5, 1000  # false alarms; frames between instants, and back
 ORDER, SETTLED, WITHIN_S = 20, 100, 1.0  # frames of the autoregression, and before it is fitted
-SHIPPED = 1.0  # our statistic's own alarm level
+SHIPPED, SHIPPED_PER_H = 1.0, 1e-3  # our statistic's own alarm level, and the false alarms it declares
+RESAMPLED, PERCENT = 400, (2.5, 97.5)
 NONE = dict.fromkeys("pqr", 0.0)
 OWN_ALONE = {
     "fdi.bounds.constant_rad_s2": NONE, "fdi.bounds.inertia_coupling": NONE,
@@ -63,11 +69,16 @@ class Whitener(NamedTuple):
     root: np.ndarray
 
     def respond(self, z: np.ndarray) -> np.ndarray:
-        """Accelerations z (n, 3, ...) rad/s2 as they are in the white noise of variance one."""
-        rest = z.copy()
+        """Accelerations z (n, 3) rad/s2 as they are in the white noise of variance one."""
+        return self.responses(z)[ORDER]
+
+    def responses(self, z: np.ndarray) -> np.ndarray:
+        """The same, (ORDER + 1, n, 3), of accelerations that began so many frames before each; the last: or
+        more."""
+        rest = np.repeat(z[None], ORDER + 1, axis=0)
         for j, part in enumerate(self.before.reshape(ORDER, 3, 3), start=1):
-            rest[j:] -= np.einsum("ki...,io->ko...", z[:-j], part)
-        return np.einsum("ki...,io->ko...", rest, self.root)
+            rest[j:, j:] -= z[:-j] @ part
+        return rest @ self.root
 
 
 def fitted(unexplained: list[np.ndarray]) -> Whitener:
@@ -103,12 +114,15 @@ def ratios(recording: Recording, surface: str, noise: Whitener) -> dict[float, n
     g = noise.respond(unexplained(recording))
     moment = signature(recording, surface)
     n = len(moment)
-    since = np.arange(0, n, EVERY)
-    there = np.arange(n)[:, None] >= since
-    response = noise.respond(moment[:, :, None] * there[:, None, :])
-    N = np.cumsum(np.einsum("kis,ki->ks", response, g), axis=0)
-    D = np.cumsum(np.square(response).sum(axis=1), axis=0)
-    late = there & (np.arange(n)[:, None] - since < FURTHEST)
+    k, since = np.arange(n), np.arange(0, n, EVERY)
+    response = noise.responses(moment)
+    age = k[:, None] - since
+    began = np.clip(age, 0, ORDER), k[:, None]
+    late = (age >= 0) & (age < FURTHEST)
+    N, D = (
+        np.cumsum(np.where(age >= 0, seen.sum(axis=2)[began], 0.0), axis=0)
+        for seen in (response * g, np.square(response))
+    )
     return {
         m: np.concatenate(([0.0], np.where(late, m * N - 0.5 * m * m * D, 0.0).max(axis=1)))
         for m in MAGNITUDES
@@ -166,35 +180,135 @@ def is_known(recording: Recording) -> bool:
     return bool(recording.known[soon].all())
 
 
-def share(seen: list[tuple[Trace, float]]) -> float:
-    """Of traces with their levels: how many alarm within WITHIN_S."""
-    return fmean(trace.delay_s(level) <= WITHIN_S + 1e-9 for trace, level in seen)
+@dataclass(frozen=True)
+class Seen:
+    """What of a statistic decides about alarms at any level: of each loss (n,) its largest value before, and
+    from then until WITHIN_S after; of healthy flights, their traces."""
+
+    before: np.ndarray
+    soon: np.ndarray
+    healthy: list[Trace]
+
+    @classmethod
+    def of(cls, losses: list[Trace], healthy: list[Trace]) -> "Seen":
+        """Of traces."""
+        soon = [max((v for t, v in one.records if t <= WITHIN_S + 1e-9), default=0.0) for one in losses]
+        return cls(np.array([one.before for one in losses]), np.array(soon), healthy)
+
+    def level(self, drawn: np.ndarray) -> float:
+        """Of PER_H false alarms, of the healthy flights drawn."""
+        return level_for([self.healthy[i] for i in drawn], PER_H).level
+
+    def found(self, level: float) -> np.ndarray:
+        """Which losses (n,) are found in time, and no alarm was raised before."""
+        return (self.soon > level) & (self.before <= level)
 
 
-def shares_of(survey: Survey, surface: str, healthy: list[Recording], noise: Whitener) -> list[float]:
-    """What is found of a surface's losses: told the instant, all but it, ours at its level, as it ships; and
-    how many count, of how many."""
+@dataclass(frozen=True)
+class Cell:
+    """A surface of an aircraft: of each loss (n,) its flight and magnitude, how surely a test told the
+    instant finds it; what Page's, of each magnitude, and ours made of it."""
+
+    aircraft: str
+    surface: str
+    flight: np.ndarray
+    magnitude: np.ndarray
+    told: np.ndarray
+    page: dict[float, Seen]
+    ours: Seen
+    flown: int
+
+    def counts(self, drawn: np.ndarray, losses: np.ndarray) -> np.ndarray:
+        """Of the losses, which may be drawn repeatedly: how many count, found by the test told the instant,
+        Page's, ours, at the level as shipped Page's, ours."""
+        page, shipped = np.zeros((2, len(self.flight)), dtype=bool)
+        for magnitude, seen in self.page.items():
+            level, of_it = seen.level(drawn), self.magnitude == magnitude
+            page[of_it] = seen.found(level)[of_it]
+            shipped[of_it] = seen.found(level + log(PER_H / SHIPPED_PER_H))[of_it]
+        ours = self.ours.found(self.ours.level(drawn))
+        columns = np.ones(len(page)), self.told, page, ours, shipped, self.ours.found(SHIPPED)
+        return np.array([column[losses].sum() for column in columns])
+
+
+def cell_of(survey: Survey, surface: str, healthy: list[Recording], noise: Whitener) -> Cell:
+    """Fly a surface's losses and show them to both tests."""
     page: dict[float, list[Trace]] = {magnitude: [] for magnitude in MAGNITUDES}
     for recording in healthy:
         for magnitude, statistic in ratios(recording, surface, noise).items():
             page[magnitude].append(trace(recording, statistic))
-    levels = {magnitude: level_for(traces, PER_H).level for magnitude, traces in page.items()}
-    ours = level_for([trace(one, one.built_in) for one in healthy], PER_H).level
-    told, seen, built_in = list[float](), list[tuple[Trace, float]](), list[Trace]()
-    lost = list(survey.lost(surface))
-    for magnitude, recording in ((m, one) for m, one in lost if is_known(one)):
-        statistic = ratios(recording, surface, noise)[magnitude]
-        seen.append((trace(recording, statistic), levels[magnitude]))
-        told.append(chance(magnitude * deflection(recording, surface, noise), WITHIN_S, PER_H))
-        built_in.append(trace(recording, recording.built_in))
-    at_ours, shipped = ([(one, level) for one in built_in] for level in (ours, SHIPPED))
-    return [fmean(told), share(seen), share(at_ours), share(shipped), len(told), len(lost)]
+    losses = list(survey.lost(surface))
+    known = [(at // len(MAGNITUDES), m, one) for at, (m, one) in enumerate(losses) if is_known(one)]
+    seen: dict[float, list[Trace]] = {magnitude: [] for magnitude in MAGNITUDES}
+    for _, _, recording in known:
+        for magnitude, statistic in ratios(recording, surface, noise).items():
+            seen[magnitude].append(trace(recording, statistic))
+    told = [chance(m * deflection(one, surface, noise), WITHIN_S, PER_H) for _, m, one in known]
+    return Cell(
+        survey.aircraft, surface,
+        np.array([flight for flight, _, _ in known], dtype=int), np.array([m for _, m, _ in known]),
+        np.array(told),
+        {m: Seen.of(seen[m], page[m]) for m in MAGNITUDES},
+        Seen.of(*([trace(one, one.built_in) for one in of] for of in ([one for *_, one in known], healthy))),
+        len(losses),
+    )  # fmt: skip
+
+
+def counted(cells: list[Cell]) -> tuple[np.ndarray, np.ndarray]:
+    """Counts as of `Cell.counts` of cells together, (6,), and of RESAMPLED draws (RESAMPLED, 6)."""
+    rng, total, draws = np.random.default_rng(0), np.zeros(6), np.zeros((RESAMPLED, 6))
+    for aircraft in dict.fromkeys(cell.aircraft for cell in cells):
+        of_it = [cell for cell in cells if cell.aircraft == aircraft]
+        healthy = len(of_it[0].ours.healthy)
+        flights = 1 + max(int(cell.flight.max(initial=0)) for cell in of_it)
+        places = [[np.flatnonzero(cell.flight == f) for f in range(flights)] for cell in of_it]
+        total += sum(cell.counts(np.arange(healthy), np.arange(cell.flight.size)) for cell in of_it)
+        for i in range(RESAMPLED):
+            drawn, again = rng.integers(healthy, size=healthy), rng.integers(flights, size=flights)
+            for cell, place in zip(of_it, places, strict=True):
+                draws[i] += cell.counts(drawn, np.concatenate([place[f] for f in again]))
+    return total, draws
+
+
+HEAD = [
+    "aircraft", "surface", "losses", "told the instant", "all but it", "ours", "share",
+    "all but it, shipped", "ours, shipped", "share, shipped",
+]  # fmt: skip
+
+
+def row_of(aircraft: str, surface: str, cells: list[Cell]) -> list[str]:
+    """A row of the table."""
+    total, draws = counted(cells)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        parts = [f"{of_all:.0%}" for of_all in total[1:] / total[0]]
+        spans = [np.nanpercentile(draws[:, i + 1] / draws[:, i], PERCENT) for i in (2, 4)]
+        shares = [total[i + 1] / total[i] for i in (2, 4)]
+    said = [
+        f"{value:.0%} ({low:.0%} to {high:.0%})" for value, (low, high) in zip(shares, spans, strict=True)
+    ]
+    losses = f"{total[0]:.0f} of {sum(cell.flown for cell in cells)}"
+    return [aircraft, surface, losses, *parts[:3], said[0], *parts[3:], said[1]]
+
+
+def cells_of(survey: Survey, surfaces: list[str]) -> list[Cell]:
+    """All cells of an aircraft."""
+    healthy = survey.in_health()
+    noise = fitted([unexplained(one) for one in healthy])
+    known = surfaces or find_aircraft(survey.aircraft, Path()).class_of_losses
+    return [cell_of(survey, surface, healthy, noise) for surface in known]
+
+
+def rows_together(cells: list[Cell]) -> list[list[str]]:
+    """Rows of several aircraft: of each surface, and of all."""
+    surfaces = dict.fromkeys(cell.surface for cell in cells)
+    of_surfaces = [row_of("all", name, [cell for cell in cells if cell.surface == name]) for name in surfaces]
+    return [*of_surfaces, row_of("all", "all", cells)]
 
 
 def main() -> None:
-    """Print a row a surface."""
+    """Print a row a surface, as they come."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("aircraft", nargs="?", default="beaver")
+    parser.add_argument("aircraft", nargs="*", default=["beaver"])
     parser.add_argument(
         "--surface", action="append", help="once a surface; without it all that the class has"
     )
@@ -204,18 +318,14 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=500_000)  # others than those of `power`
     parser.add_argument("--published", action="store_true")
     args = parser.parse_args()
-    survey = Survey(args.aircraft, args.turbulence, args.flights, args.healthy, args.seed, args.published)
-    healthy = survey.in_health()
-    noise = fitted([unexplained(one) for one in healthy])
-    for surface in args.surface or find_aircraft(args.aircraft).class_of_losses:
-        told, page, ours, shipped, known, flown = shares_of(survey, surface, healthy, noise)
-        print(
-            f"{args.aircraft}, {surface}, {known} of {flown} losses, within {WITHIN_S:g} s: "
-            f"told the instant {told:.0%}, all but the instant {page:.0%}, "
-            f"both detectors {ours:.0%}, as they ship {shipped:.0%}: "
-            f"{ours / page:.0%} and {shipped / page:.0%}",
-            flush=True,
-        )
+    cells: list[Cell] = []
+    print("|".join(HEAD))
+    for name in args.aircraft:
+        sizes = args.turbulence, args.flights, args.healthy, args.seed, args.published
+        of_it = cells_of(Survey(name, *sizes), args.surface)
+        print(*("|".join(row_of(one.aircraft, one.surface, [one])) for one in of_it), sep="\n", flush=True)
+        cells += of_it
+    print(*map("|".join, rows_together(cells)), sep="\n")
 
 
 if __name__ == "__main__":

@@ -55,6 +55,7 @@ CANNOT = {
     "signals of a box": box(signals={"dpt": [0, 1]}),
     "signals not in a box": {**box(), "signals": {"dpt": {"property": "aero/dpt"}}},
     "signals measured anyway": {"signals": {"alpha": {"property": "a/b"}, "betadoth": {"property": "a/b"}}},
+    "signals nobody measures": {"signals": {"dpt": {"property": "aero/dpt", "sensed": False}}},
     "writing": {"trim": {"throttle": "simulation/do_linearization"}},
 }
 CAN = {

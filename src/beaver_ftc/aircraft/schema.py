@@ -12,7 +12,7 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from beaver_ftc.aircraft.channels import ChannelsSection
-from beaver_ftc.documents.base import Conflict, Flag, Number, Section, Whole, entry, number, refuse
+from beaver_ftc.documents.base import Conflict, Number, Section, Whole, entry, number, refuse
 from beaver_ftc.documents.errors import suggestion
 
 MAX_SURFACES, MAX_SIGNALS, MAX_DAMAGE = 20, 6, 50
@@ -91,7 +91,7 @@ class SignalSection(Section):
     """A measured dimensionless signal beside rates, alpha, beta, airspeed and dynamic pressure."""
 
     property: Property = Field(description="property that holds it", examples=["aero/dpt"])
-    sensed: Flag = Field(default=True, description="whether an instrument measures it")
+    sensed: Literal[True] = Field(default=True, description="that an instrument measures it", examples=[True])
 
 
 class MassSection(Section):

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 DPI = 110
 DASHES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (2, 2)), (0, (6, 2, 1, 2)), (0, (1, 1)))
-MARKS = "osD^vPX*"
+MARKS = "os^DXPv<>*h"  # eleven beside eight colours: no two of 88 curves have both alike
 GRID = "#dddddd"
 
 

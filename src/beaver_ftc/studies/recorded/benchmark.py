@@ -25,7 +25,7 @@ from beaver_ftc.flights.vehicle import Vehicle, load_vehicle
 from beaver_ftc.results.metrics import as_json
 from beaver_ftc.results.style import SERIES
 from beaver_ftc.studies.engine.statistics import poisson
-from beaver_ftc.studies.present.figures import GRID, panels
+from beaver_ftc.studies.present.figures import GRID, marker, panels
 from beaver_ftc.studies.present.page import Files, replace_between
 from beaver_ftc.studies.present.tables import aligned, markdown_table
 
@@ -46,7 +46,6 @@ TITLES = {
     "sliding-least-squares": "sliding least squares, 20 s",
     "forgetting-least-squares": "forgetting least squares, 20 s",
 }
-_MARKS = "os^DXPv<>*ph"
 _HATCHES = ("", "//", "..")  # where the colours begin again
 _GROUP = 0.85  # the width that all methods share at one tick
 _LATEST_S = 30.0
@@ -327,7 +326,7 @@ def _draw_events(axis: Any, part: Document) -> None:
         delays = [mine[name]["delay_s"] for name in failures]
         heights = [_LATEST_S if delay is None else min(delay, _LATEST_S) for delay in delays]
         places = [k + _offset(i, len(methods)) for k in range(len(failures))]
-        axis.plot(places, heights, _MARKS[i % len(_MARKS)], color=_colour(i), markersize=6, label=method)
+        axis.plot(places, heights, marker(i), color=_colour(i), markersize=6, label=method)
     axis.set_xticks(range(len(failures)), [named[name].replace("+", "\n+ ") for name in failures])
     axis.set_ylabel("delay, s", fontsize=8)
     axis.set_ylim(0, _LATEST_S + 1.5)

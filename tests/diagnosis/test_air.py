@@ -164,16 +164,36 @@ def test_where_no_model_has_the_forces_only_accelerometers_tell_a_gust(tmp_path,
     assert (seen > 0.05) is (forces == "claimed")
 
 
-def test_where_no_model_has_the_forces_the_vanes_show_a_gust_roughly_for_a_law_that_answers_them(
-    tmp_path, monkeypatch
-):
-    """As JSBSim has it, in turns and climbs, over a filter's memory; the innovation keeps all of it."""
+@pytest.fixture
+def without_forces(tmp_path, monkeypatch):
+    """A folder with the trainer, whose file says no forces."""
     shutil.copytree(ROOT / "tests/data/aircraft/trainer", tmp_path / "trainer")
     file = tmp_path / "trainer/aircraft.yaml"
     text = yaml.safe_load(file.read_text())
     del text["forces"]
     file.write_text(yaml.safe_dump(text))
     monkeypatch.chdir(tmp_path)
+
+
+def test_where_no_gust_is_seen_each_returns_as_late_as_it_does(without_forces):
+    """What the view of roll and yaw that gathers for long reckons with covers a first-order gust of each
+    axis at every frequency, and where it is slow by no more than itself."""
+    fdi = {"statistical": {}, "bounds": {"turbulence": "light"}}
+    statistical = Loop(load_given({"aircraft": "./trainer", "fdi": fdi})).frames["fdi"]["statistical"][0]
+    long, record = statistical["block"][2], statistical["air"]
+    lengths = variances.length_of_gusts(float(record["span"]))
+    omega = np.geomspace(1e-4, 1e2, 50)  # rad/m
+    for g in range(3):
+        true = 1.0 / (1.0 / lengths[g] ** 2 + omega**2)
+        reckoned = long["stronger"] * air.sooner(record, g) / (1.0 / long["lag"] ** 2 + omega**2)
+        assert (reckoned >= true * (1.0 - 1e-9)).all()
+        assert reckoned[0] == pytest.approx(true[0], rel=1e-3)
+
+
+def test_where_no_model_has_the_forces_the_vanes_show_a_gust_roughly_for_a_law_that_answers_them(
+    without_forces,
+):
+    """As JSBSim has it, in turns and climbs, over a filter's memory; the innovation keeps all of it."""
     sine = {"sine": {"amplitude_deg_s": 4, "frequency_hz": 0.2}}
     flown = Flown(
         "moderate", aircraft="./trainer", duration_s=20, seed=3, reference={"p": [sine], "q": [sine]}

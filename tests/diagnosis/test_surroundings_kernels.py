@@ -268,6 +268,7 @@ def test_the_drift_is_of_what_is_bounded_and_of_the_air_not_seen(moving):
     record["air"]["moving"] = moving
     record["air"]["damping"], record["air"]["axes"] = rng.normal(size=(2, 3, 3))
     record["air"]["unseen"], record["air"]["per_metre"] = (1.0, 0.2, 0.3), (1e-3, 2e-3, 3e-3)
+    record["air"]["glimpsed"], record["air"]["rolling"], record["air"]["span"] = moving, 20.0, 5.0 * np.pi
     fdi["bound"]["constant"], fdi["bound"]["inertia"] = (0.02, 0.0, 0.04), 0.1
     Statistical.drifts(record, fdi, design, X, Y)
     bounded = np.zeros(3)
@@ -275,10 +276,11 @@ def test_the_drift_is_of_what_is_bounded_and_of_the_air_not_seen(moving):
     bounded += [0.01, 0.02, 0.03]
     assert record["noise"]["bounded"] == pytest.approx(bounded)
     turned = record["air"]["damping"] @ record["air"]["axes"]
-    unseen = moving * V * turned @ np.diag([1e-3, 4e-4, 9e-4]) @ turned.T
-    for block, stronger in zip(record["block"], (1.0, 1.0, 4.0), strict=True):
+    usual, slow = (1e-3, 4e-4, 9e-4), (4e-3, 16e-4, 36e-4 * 0.75**2)  # stronger; 20, 20 and 15 m
+    for block, intensity in zip(record["block"], (usual, usual, slow), strict=True):
         axes = block["axis"][: block["n"]]
-        drift = stronger * unseen[np.ix_(axes, axes)] + 2.0 * np.diag(bounded[axes] ** 2)
+        unseen = moving * V * turned @ np.diag(intensity) @ turned.T
+        drift = unseen[np.ix_(axes, axes)] + 2.0 * np.diag(bounded[axes] ** 2)
         assert block["drift"][: len(axes), : len(axes)] == pytest.approx(drift)
         assert block["jitter"][: len(axes)] == pytest.approx(np.array([0.1, 0.2, 0.3])[axes])
     assert record["block"]["keep"] == pytest.approx([1.0, 1.0, np.exp(-DT * V / 90.0)])

@@ -267,11 +267,23 @@ def hidden(air, g):
 
 
 @kernel
-def unseen_drift(air, V, i, j):
-    """Intensity, (rad/s2)2/s, with which the air's unseen rotation moves accelerations i and j; V m/s."""
+def sooner(air, g):
+    """How much less of the gust about axis g is slow than if it returned as late as the rolling one. What
+    vanes leave of a gust that they tell returns as it likes."""
+    if g == 0 or not air.glimpsed:
+        return 1.0
+    length = (4.0 if g == 1 else 3.0) * air.span / pi
+    return (length / air.rolling) ** 2
+
+
+@kernel
+def unseen_drift(air, V, i, j, slow=False):
+    """Intensity, (rad/s2)2/s, with which the air's unseen rotation moves accelerations i and j; V m/s.
+    `slow`: as of a gust that returns with the rolling one and moves them as much where it is slow."""
     total = 0.0
     for g in range(3):
-        total += together(air, air.axes, i, j, g) * hidden(air, g) * air.per_metre[g]
+        share = sooner(air, g) if slow else 1.0
+        total += together(air, air.axes, i, j, g) * hidden(air, g) * air.per_metre[g] * share
     return total * V
 
 

@@ -139,7 +139,8 @@ def set_up(
         set_up_views(statistical, aircraft)
     last, pitch = statistical["block"][-1], statistical["block"][likelihood.PITCH_BLOCK]
     rolling = float(air["rolling"]) if air["moving"] else 0.0
-    last["lag"] = returning_length(statistical, airspeed_mps, rate_hz, rolling)
+    gusts_m = length_of_gusts(air["span"]) if air["glimpsed"] else [rolling]
+    last["lag"] = returning_length(statistical, airspeed_mps, rate_hz, float(min(gusts_m)))
     if air["moving"]:
         # the filters that reckon with no gust: as the others begin, and with a drift that goes anywhere
         for name in ("n", "keep", "noise", "P_xx", "P_dd"):

@@ -324,12 +324,13 @@ def drifts(noise, blocks, air, bound, design, measured, dt):
             bounded[i] += min(bound.error_map.now[i], UNKNOWN_TO_FILTERS_RAD_S2)
         if bound.error_map.anywhere:
             noise.beyond[i] = beyond(bound.error_map, bound.error_map.n_levels - 1, i)
-    for block in blocks:
+    for b, block in enumerate(blocks):
         for i, axis in enumerate(block.axis[: block.n]):
             for j in range(block.n):
                 block.drift[i, j] = 0.0
                 if air.moving:
-                    block.drift[i, j] = block.stronger * gusts.unseen_drift(air, V, axis, block.axis[j])
+                    moved = gusts.unseen_drift(air, V, axis, block.axis[j], b == likelihood.RETURNING)
+                    block.drift[i, j] = block.stronger * moved
             size = max(bounded[axis], likelihood.LEAST_UNCERTAINTY_RAD_S2)
             walk = noise.rapidity * size * size
             block.drift[i, i] += walk

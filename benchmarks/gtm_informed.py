@@ -13,21 +13,23 @@ gives the declared rate of false alarms, or fewer, at h = ln(frames per hour / a
 that, or more where it reached more before the damage in any flight of its case.
 
 That test knows how far the model is off. A detector knows a bound alone: an error within it may hide the
-damage, but for what of its effect is beyond the bound. `beyond the bound` says of how many flights the test
-that is told the instant too finds what is left within 1 s (the mean of its chances, clairvoyant.py): no
-detector that keeps to the declared error is sure to find more. Where the model's error is not known, none.
+damage, but for what of its effect is beyond the bound. Of each flight that ours does not find in time, flown
+as it was, under our law, `certain` is the chance that the same test finds what is left of the effect within
+1 s: its log likelihood ratio is normal, of mean d^2 / 2 and variance d^2. No detector that keeps to the
+declared error is surer. Where the model's error is not known, nothing is left.
 
-A row a case: found within 1 s by ours, by the informed test, by both, by ours alone, by it alone; beyond the
-bound; and of the flights that ours does not find in time how many are beyond it, by the same chances. Rows
-that --out holds are not flown again. Needs BEAVER_FTC_GTM and `aircraft: gtm`.
+A row a case: found within 1 s by ours, by the informed test, by both, by ours alone, by it alone; of the
+flights that ours does not find in time, how many are certain, the sum of the chances. `--each` prints those
+flights, one a line. Rows that --out holds are not flown again. Needs BEAVER_FTC_GTM and `aircraft: gtm`.
 """
 
 import argparse
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache
 from math import cos, degrees, log, sin
 from pathlib import Path
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
@@ -38,7 +40,7 @@ from tools.gtm.specification import Controls, Specification, folder
 
 import beaver_ftc as bf
 from beaver_ftc.aircraft import load
-from beaver_ftc.diagnosis.bounds.clairvoyant import chance
+from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.scenario.loader import load_text
 from beaver_ftc.studies.compare.replay import Recording, aware_of_the_air, record, trace
 from beaver_ftc.studies.present.tables import markdown_table
@@ -47,12 +49,14 @@ M_PER_FT = 0.3048
 BANDS_KT = (70.0, 80.0, 90.0, 100.0, 110.0)  # the noise is fitted between two
 HEALTHY = 16  # flights a band that fit it
 EACH = 3  # frames between two of which the effect is worked out
+DT_S = 0.01
 PER_H = 1e-3  # false alarms, as ours declares
 LEVEL = log(3600.0 * 100.0 / PER_H)
 HEAD = [
     "case", "flights", "ours", "told all but the instant", "both", "ours alone", "it alone",
-    "beyond the bound", "of these not ours",
+    "certain, not ours",
 ]  # fmt: skip
+EACH_HEAD = ["flight", "case", "ours, s", "ratio", "level", "beyond, deviations", "certain"]
 
 
 def recorded(given: Document) -> Recording:
@@ -134,51 +138,108 @@ def largest_ratio(recording: Recording, does: np.ndarray, white: Whitener) -> np
     return np.concatenate(([0.0], np.maximum(best, 0.0)))
 
 
-def deflected(recording: Recording, does: np.ndarray, white: Whitener) -> float:
-    """How far they stand out of the noise WITHIN_S after the damage."""
-    t = np.array([measured.t_s for measured, _ in recording.seen[1:]]) - recording.fault_at_s
-    response = white.respond(does * (t > 1e-9)[:, None])
-    return float(np.sqrt(np.square(response[t <= WITHIN_S + 1e-9]).sum()))
+def deflected(late_s: np.ndarray, does: np.ndarray, white: Whitener) -> float:
+    """How far they stand out of the noise WITHIN_S after the damage; late_s (n,): frames after it."""
+    response = white.respond(does * (late_s > 1e-9)[:, None])
+    return float(np.sqrt(np.square(response[late_s <= WITHIN_S + 1e-9]).sum()))
 
 
-def seen(seed: int, k: int, spec: Specification) -> Document:
-    """Of the k-th flight: the informed test's largest value before the damage, and within WITHIN_S of it; the
-    chance of one that is told the instant too of finding what is beyond the bound."""
-    given = scenario(seed, k) | {"control": {"law": "nominal"}}
+def bounds_in(given: Document) -> np.ndarray:
+    """The bound on the model's error in each elapsed frame of a flight, (frames - 1, 3) rad/s2: the less of
+    those at its ends."""
+    there: list[np.ndarray] = []
+
+    def watch(loop: Loop) -> Callable[[], None]:
+        error_map = loop.frames["fdi"]["bound"]["error_map"]
+        loop.after_frame = lambda: there.append(error_map["now"][0].copy())
+        return lambda: None
+
+    fly(load_text(json.dumps(given)), watch=watch)
+    return np.minimum(there[:-1], there[1:])
+
+
+def beyond(seed: int, k: int, spec: Specification, case: int) -> float:
+    """How far what the k-th flight's damage does beyond the bound stands out of the noise."""
+    given = shortened(seed, k)
+    does, bound = effect(spec, given, case), bounds_in(given)
+    n = min(len(does), len(bound))
+    left = np.sign(does[:n]) * np.maximum(np.abs(does[:n]) - bound[:n], 0.0)
+    late_s = (np.arange(n) + 1) * DT_S - given["faults"][0]["at_s"]
+    return deflected(late_s, left, noise(seed, band_of(given)))
+
+
+def shortened(seed: int, k: int) -> Document:
+    """The k-th flight, until the second after its damage is over."""
+    given = scenario(seed, k)
+    return given | {"duration_s": round(given["faults"][0]["at_s"] + WITHIN_S + 0.05, 2)}
+
+
+def seen(seed: int, k: int, spec: Specification, late: bool) -> Document:
+    """Of the k-th flight: the informed test's largest value before the damage, and within WITHIN_S of it; if
+    ours was late, how far out of the noise what is beyond the bound stands."""
+    given = shortened(seed, k) | {"control": {"law": "nominal"}}
     damage = given["faults"][0]
-    given["duration_s"] = round(damage["at_s"] + WITHIN_S + 0.05, 2)
     case = CASES.index(damage["case"]) + 1
     recording, white = recorded(given), noise(seed, band_of(given))
     does = effect(spec, given, case)[: len(recording.seen) - 1]
     of_it = trace(recording, largest_ratio(recording, does, white))
-    bound = np.minimum(recording.error[:-1], recording.error[1:])  # at either end of each frame
-    beyond = np.sign(does) * np.maximum(np.abs(does) - bound, 0.0)
     return {
         "k": k, "before": of_it.before,
         "after": max((value for late, value in of_it.records if late <= WITHIN_S + 1e-9), default=0.0),
-        "beyond": chance(deflected(recording, beyond, white), WITHIN_S, PER_H),
+        "beyond": beyond(seed, k, spec, case) if late else None,
     }  # fmt: skip
 
 
 def rows(ours: dict[int, Document], of: dict[int, Document]) -> Iterator[list[Any]]:
     """A row a case, and one of all."""
-    total = np.zeros(8)
+    total = np.zeros(7)
     for case in load("gtm").damage:
         there = [k for k in of if ours[k]["case"] == case]
-        level = max(LEVEL, *(of[k]["before"] for k in there))
-        by_us = np.array([(ours[k]["delay_s"] or np.inf) <= WITHIN_S + 1e-9 for k in there])
+        level = level_of([of[k] for k in there])
+        by_us = np.array([not is_late(ours[k]) for k in there])
         by_it = np.array([of[k]["after"] > level for k in there])
-        beyond = np.array([of[k]["beyond"] for k in there])
         either = by_us & by_it, by_us & ~by_it, by_it & ~by_us
-        row = [len(there), by_us.sum(), by_it.sum(), *(one.sum() for one in either), beyond.sum()]
-        row.append(beyond[~by_us].sum())
+        row = [len(there), by_us.sum(), by_it.sum(), *(one.sum() for one in either)]
+        row.append(sum(certain(of[k], level) for k in there if is_late(ours[k])))
         total += row
         yield [case, *_printed(row)]
     yield ["all", *_printed(list(total))]
 
 
+def is_late(row: Document) -> bool:
+    """Whether ours did not find it within WITHIN_S."""
+    return row["delay_s"] is None or row["delay_s"] > WITHIN_S + 1e-9
+
+
+def level_of(rows_of_case: list[Document]) -> float:
+    """The informed test's level for a case."""
+    return max([LEVEL, *(row["before"] for row in rows_of_case)])
+
+
+def certain(row: Document, level: float) -> float:
+    """The chance that the informed test finds what is beyond the bound."""
+    d = row["beyond"]
+    return NormalDist().cdf((0.5 * d * d - level) / d) if d > 0.0 else 0.0
+
+
+def each(ours: dict[int, Document], of: dict[int, Document]) -> Iterator[list[Any]]:
+    """A row for each flight that ours does not find in time."""
+    for k, row in ours.items():
+        if is_late(row):
+            level = level_of([of[j] for j in of if ours[j]["case"] == row["case"]])
+            chances = f"{of[k]['beyond']:.1f}", f"{certain(of[k], level):.2f}"
+            yield [
+                str(k),
+                row["case"],
+                str(row["delay_s"]),
+                f"{of[k]['after']:.1f}",
+                f"{level:.1f}",
+                *chances,
+            ]
+
+
 def _printed(row: list[float]) -> list[str]:
-    return [*(str(int(n)) for n in row[:6]), *(f"{n:.1f}" for n in row[6:])]
+    return [*(str(int(n)) for n in row[:6]), f"{row[6]:.1f}"]
 
 
 def see_all(ours: dict[int, Document], seed: int, out: Path) -> dict[int, Document]:
@@ -189,7 +250,7 @@ def see_all(ours: dict[int, Document], seed: int, out: Path) -> dict[int, Docume
     of, spec = {one["k"]: one for one in done}, Specification(where)
     with out.open("a", encoding="utf-8") as file:
         for k in sorted(ours.keys() - of.keys()):
-            of[k] = seen(seed, k, spec)
+            of[k] = seen(seed, k, spec, is_late(ours[k]))
             print(json.dumps(of[k]), file=file, flush=True)
     return {k: of[k] for k in ours}
 
@@ -203,12 +264,18 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--beside", type=Path, default=Path("gtm_damage.jsonl"))
     parser.add_argument("--out", type=Path, default=Path("gtm_informed.jsonl"))
+    parser.add_argument("--each", action="store_true", help="the flights that ours does not find in time")
     given = parser.parse_args()
     if folder() is None or not given.beside.is_file():
         parser.error("needs BEAVER_FTC_GTM, and --beside, which gtm_damage.py writes")
     flown = map(json.loads, given.beside.read_text().splitlines())
     ours = {one["k"]: one for one in flown if one["k"] < given.flights}
-    print(markdown_table(HEAD, list(rows(ours, see_all(ours, given.seed, given.out)))))
+    of = see_all(ours, given.seed, given.out)
+    print(
+        markdown_table(EACH_HEAD, list(each(ours, of)))
+        if given.each
+        else markdown_table(HEAD, list(rows(ours, of)))
+    )
 
 
 if __name__ == "__main__":

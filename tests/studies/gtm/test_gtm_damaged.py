@@ -9,10 +9,12 @@ from pydantic import ValidationError
 from tools.gtm.envelope import Envelope
 
 from beaver_ftc.aircraft import Aircraft, load
-from beaver_ftc.aircraft.schema import AircraftFile
+from beaver_ftc.aircraft.schema import AircraftFile, DamageSection
+from beaver_ftc.diagnosis.noise_model import SLOW_RAD_S, swing_of
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.trim import trim
 from beaver_ftc.results.metrics import _type_correct
+from beaver_ftc.scenario.diagnosis import Statistical
 from beaver_ftc.studies.derive import sample as sampling
 from beaver_ftc.studies.gtm import folder
 from beaver_ftc.studies.gtm.steady import FT_S_PER_KNOT
@@ -79,6 +81,29 @@ def test_those_that_stand_in_move_less_but_at_the_last_share():
         assert (most[~seldom] <= share + 1e-9).all()
         assert (most[seldom] <= (share if share == 1.0 else 0.05 * share) + 1e-9).all()
     assert set(found.box) == set(range(8))
+
+
+def test_every_box_of_a_region_holds_all_its_engines_do():
+    plant = Plant(100, aircraft=SPLIT)
+    where = sampling.Envelope((40.0, 50.0), (0.0, 0.1), 0.16, (1000.0, 2000.0))
+    draw = sampling.Draw(1, SPLIT, where, trim(45.0, 1800.0, plant))
+    started = [draw.start(0.25) for _ in range(300)]
+    for name, setting in SPLIT.engine.settings.items():
+        drawn = [state.settings[name] for state in started]
+        assert (min(drawn), max(drawn)) == pytest.approx(setting.range)
+    states = [draw.state(started[0], 0.25, 1.0) for _ in range(300)]
+    assert np.ptp([state.beta_rad for state in states]) == pytest.approx(0.16)  # half of +-0.16
+    assert max(state.p_rad_s for state in states) == pytest.approx(0.5 * sampling.RATES_RAD_S[0])
+    assert np.ptp([state.alpha_rad for state in states]) < 0.25 * 0.1 + 1e-9
+
+
+def test_only_where_damage_takes_surfaces_is_the_drift_that_of_a_slow_swing():
+    given = Statistical()
+    known = [SPLIT]
+    for takes in ([], ["rudder"]):
+        damage = {"one": DamageSection(property="failures/damage/one", takes=takes)}
+        known.append(Aircraft(SPLIT.file.model_copy(update={"damage": damage}), SPLIT.folder))
+    assert [swing_of(given, of) for of in known] == [15.0, 15.0, SLOW_RAD_S]
 
 
 def test_unanticipated_is_no_wrong_type_of_damage():

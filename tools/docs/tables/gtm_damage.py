@@ -115,13 +115,13 @@ def gtm_damage() -> str:
     within = {row[0]: f"{row[3]}/{row[1]}/{row[11]}" for row in campaign.rows(calm)}
     ours = {one["k"]: one for one in real}
     told = informed.see_all(ours, 1, kept / "informed.jsonl")
-    beside = {row[0]: [row[3], "/".join(row[-2:])] for row in informed.rows(ours, told)}
+    beside = {row[0]: [row[3], row[-1]] for row in informed.rows(ours, told)}
     shown = [1, 2, 3, 4, 5, 7, 8, 9, 10, 11]
     rows = [
         [row[0], *(str(row[k]) for k in shown), within[row[0]], *beside[row[0]]]
         for row in campaign.rows(real)
     ]
-    last = ("calm: within/wrong", "told", "beyond/unfound")
+    last = ("calm: within/wrong", "told", "certain, not ours")
     return markdown_table(("case", *(campaign.HEAD[k] for k in shown), *last), rows)
 
 

@@ -39,7 +39,8 @@ _SPEEDS = (1.0, 1.0, 0.95, 1.05, 1.0, 1.0)  # as shares of the trim's
 @dataclass(frozen=True)
 class Envelope:
     """Where states are drawn: between these ends, and so far to either side in sideslip. altitude_m:
-    left out, about the trim's; given, it is alike in all boxes, and so is the airspeed."""
+    left out, about the trim's; given, it is alike in all boxes, and so are airspeed and engine settings;
+    rates and sideslip then come closer to the whole, since what they add to the error is little."""
 
     airspeed_mps: tuple[float, float]
     alpha_rad: tuple[float, float]
@@ -124,13 +125,18 @@ class Draw:
         """The reach in what is alike in all boxes of a region."""
         return reach if self.envelope.altitude_m is None else 1.0
 
+    def broad(self, reach: float) -> float:
+        """The reach in what is nearly alike in the boxes of a region."""
+        return reach if self.envelope.altitude_m is None else reach**0.5
+
     def start(self, reach: float) -> FlightState:
         """Where the engines come to run, and the aircraft there."""
         trim, settings = self.trim, {}
         for name, setting in self.aircraft.engine.settings.items():
             (low, high), middle = setting.range, trim.settings[name]
-            half = _THROTTLE * (high - low)
-            settings[name] = self.share(middle, (max(low, middle - half), min(high, middle + half)), reach)
+            half = high - low if self.envelope.altitude_m else _THROTTLE * (high - low)
+            ends = max(low, middle - half), min(high, middle + half)
+            settings[name] = self.share(middle, ends, self.wide(reach))
         airspeed_mps = self.share(trim.airspeed_mps, self.envelope.airspeed_mps, self.wide(reach))
         about = trim.altitude_m - reach * _ALTITUDE_M, trim.altitude_m + reach * _ALTITUDE_M
         altitude_m = max(self.between(*(self.envelope.altitude_m or about)), 0.0)
@@ -141,7 +147,7 @@ class Draw:
         trim, envelope = self.trim, self.envelope
         alpha = self.share(trim.alpha_rad, envelope.alpha_rad, reach)
         rates: dict[str, Any] = {
-            f"{axis}_rad_s": self.around(0.0, reach * half)
+            f"{axis}_rad_s": self.around(0.0, self.broad(reach) * half)
             for axis, half in zip(AXES, RATES_RAD_S, strict=True)
         }
         used = {n: share * (self.seldom[n] if share < 1.0 else 1.0) for n in self.aircraft.surfaces}
@@ -149,7 +155,7 @@ class Draw:
         surfaces = {n: used[n] * self.between(t.min_rad, t.max_rad) for n, t in travel}
         return FlightState(
             self.share(trim.airspeed_mps, envelope.airspeed_mps, self.wide(reach)), started.altitude_m,
-            alpha_rad=alpha, beta_rad=self.around(trim.beta_rad, reach * envelope.beta_rad),
+            alpha_rad=alpha, beta_rad=self.around(trim.beta_rad, self.broad(reach) * envelope.beta_rad),
             phi_rad=self.around(trim.phi_rad, _BANK_RAD),
             theta_rad=trim.theta_rad - trim.alpha_rad + alpha + self.around(0.0, _CLIMB_RAD),
             surfaces_rad=surfaces, settings=started.settings, **rates,

@@ -67,7 +67,7 @@ _SIDESLIP_RAD, _ALTITUDE_M = 0.2, (0.0, 1500.0)
 
 # Tables of elevators and rudders are straight to a third of their travel, of ailerons to half of it; level
 # flight in light turbulence takes a fifth. What stands in stays within a twentieth of that.
-MOVES = Moves((0.12, 0.2, 0.26, 1.0 / 3.0, 0.5, 1.0), 0.05)
+MOVES = Moves((0.12, 0.18, 0.25, 0.35, 0.65, 1.0), 0.05)
 
 
 def regions() -> list[Envelope]:

@@ -208,7 +208,7 @@ def test_a_lane_without_information_comes_to_nothing():
     block["lane"]["sense"], block["lane"]["correlation"], block["level"] = -1.0, -5.0, 4.0
     block["lane"]["information"][::2] = 2.0
     with np.errstate(divide="ignore", invalid="ignore"):
-        likelihood.judge_lanes(block, True)
+        likelihood.judge_lanes(block, True, False)
     for name, nothing in (("score", 0.0), ("at_least", 0.0), ("at_most", 0.0), ("likelihood", -1.0)):
         assert (block["lane"][name][1::2] == nothing).all()
         assert (block["lane"][name][::2] > 0.0).all()
@@ -250,8 +250,23 @@ def test_a_loss_takes_away_and_its_end_gives_back(kind, sided, score):
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), kind)
     for sign in (1.0, -1.0):
         block["lane"]["correlation"][0], block["lane"]["information"][0] = 3.0 * sign, 9.0
-        likelihood.judge_lanes(block, True)
+        likelihood.judge_lanes(block, True, False)
         assert block["lane"]["score"][0] == pytest.approx(score * sign if sided else 1.0)
+
+
+@pytest.mark.parametrize(("kind", "certain"), [(LOSS, 24.5), (ALPHA3, 0.5), (STEP, 0.5)])
+def test_a_mapped_error_is_doubt_of_all_but_a_loss(kind, certain):
+    """Evidence of 7 standard deviations, of which what is bounded may be 6: logarithms 7^2 / 2, 1 / 2."""
+    block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), kind)
+    lane = block["lane"]
+    lane["sense"], lane["correlation"], lane["information"] = likelihood.SENSE[kind], -7.0 * 9.0, 81.0
+    lane["stays"] = 6.0 * 9.0
+    likelihood.judge_lanes(block, True, True)
+    assert lane["at_least"][0] == pytest.approx(certain)
+    likelihood.judge_lanes(block, True, False)
+    assert lane["at_least"][0] == pytest.approx(24.5)
+    likelihood.judge_lanes(block, False, True)
+    assert lane["at_least"][0] == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize("kind", [LOSS, STEP])

@@ -411,10 +411,11 @@ def share(level, chance, evidence, room, D):
 
 
 @kernel
-def judge_lanes(block, certain):
+def judge_lanes(block, certain, mapped):
     """Find what every lane comes to; certain: what a bounded uncertainty may hide is no doubt.
 
-    A lane without information comes to nothing.
+    A lane without information comes to nothing. A model whose error is `mapped` has more of it than what is
+    published, and the same for long: what is no loss is then doubted.
     """
     lane, sense, swing0, swing1 = block.lane, block.lane.sense, block.swing[0], block.swing[1]
     level, chance, doubted = block.level, block.chance, 0.0 if certain else 1.0
@@ -424,7 +425,7 @@ def judge_lanes(block, certain):
         is_loss, known = sense[k] != 0.0, D > 0.0
         evidence = sense[k] * N if is_loss else abs(N)
         room = allowance(lane, k, swing0, swing1)
-        doubt = slack + doubted * room
+        doubt = slack + (room if mapped and not is_loss else doubted * room)
         score = share(level, chance, evidence - slack, room, D)
         likelihood = log_likelihood(is_loss, evidence, D)
         at_least = log_likelihood(is_loss, evidence - doubt, D)
@@ -436,13 +437,14 @@ def judge_lanes(block, certain):
 
 
 @kernel
-def judge(block, memory=0.0):
+def judge(block, memory=0.0, mapped=False):
     """Fill each hypothesis' score, estimate, and the least and greatest log likelihood ratio it can have.
 
     memory: where a loss may end, what a frame leaves of what one explained before; 0 where a loss stays.
+    mapped: as of `judge_lanes`.
     """
     lane = block.lane
-    judge_lanes(block, memory > 0.0)
+    judge_lanes(block, memory > 0.0, mapped)
     for h, hypothesis in enumerate(block.hypothesis[: block.n_hypotheses]):
         score, at_least, at_most, best, likeliest = 0.0, 0.0, memory * hypothesis.at_most, -1.0, -1
         for k in range(h * N_SLOTS, (h + 1) * N_SLOTS):
@@ -457,11 +459,11 @@ def judge(block, memory=0.0):
 
 
 @kernel
-def take_in(block, bounded, tolerated, dt, keep, memory=0.0):
+def take_in(block, bounded, tolerated, dt, keep, memory=0.0, mapped=False):
     """One frame of a block: its `scratch`, rad/s2, whitened and weighed against every hypothesis.
 
     Noise, drift and signatures are the frame's already, and so, where `tolerated`, are the regressors.
-    bounded: as of `reach`; keep, memory: as of `weigh` and `judge`.
+    bounded: as of `reach`; keep, memory, mapped: as of `weigh` and `judge`.
     """
     advance(block, dt)
     if block.level > 0.0:
@@ -476,7 +478,7 @@ def take_in(block, bounded, tolerated, dt, keep, memory=0.0):
             state, response = block.regressor_state[j], block.regressor_response[j]
             whiten(block, state, block.regressor[j], dt, response)
     weigh(block, tolerated, dt, keep)
-    judge(block, memory)
+    judge(block, memory, mapped)
 
 
 @kernel

@@ -114,6 +114,7 @@ def set_up(
     errors, dt_s, instants = Errors(config.bounds.sensors), 1.0 / rate_hz, int(fdi["config"]["instants"])
     airspeed_mps, pace = float(start[1][AIRSPEED]), pace_of(given, aircraft, dt_s)
     tests["enabled"], tests["share"] = 1, 1.0 / max(instants, 1)
+    tests["mapped"] = aircraft.file.model_error_map is not None
     set_up_air(air, config.bounds.turbulence, mass, aircraft)
     forces = bool(statistical["forces"]["known"])
     across = across_a_column(config, instants)

@@ -34,9 +34,11 @@ FROM_END_TO_END = 2.0 / WITHIN_TRAVEL
 LEAST_TRAVEL_RAD = 1e-6
 
 # What the scenario asks of the tests: whether there are any, levels, what of the evidence a frame after the
-# alarm leaves, columns of the log, whether constants are tolerated; one over the instants in a frame.
+# alarm leaves, columns of the log, whether constants are tolerated; one over the instants in a frame; whether
+# the model's error is mapped.
 TESTS = record(
     enabled=int, alarm_level=float, naming_level=float, keep=float, n_columns=int, tolerated=int, share=float,
+    mapped=int,
 )  # fmt: skip
 
 # What moves the rates besides a fault. rapidity, 1/s: intensity of the drift of an uncertainty over its bound
@@ -100,7 +102,7 @@ def observe(tests, bounded, blocks, air, innovation, dt, k, latched, ends=False)
             else:  # calm air is the same for both views of roll and yaw
                 block.calm.innovation[:] = blocks[LATERAL].calm.innovation
         memory = tests.keep if ends else 0.0
-        likelihood.take_in(block, bounded, tests.tolerated, dt, keep, memory)
+        likelihood.take_in(block, bounded, tests.tolerated, dt, keep, memory, tests.mapped)
 
 
 @kernel

@@ -9,7 +9,8 @@ inertia and air drawn as well, gyros ideal or with declared noise. Healthy fligh
 on board would have, read again, and diagnosed as `diagnose --aircraft` does (`by` aircraft), and by a model
 that `identify` has of twelve healthy flights of a minute: two of the laws, other airspeeds, other days
 (`other_laws: true`).
-`--air light` flies in turbulence, declared to the aircraft's own model.
+`--air light` flies in turbulence, declared to the aircraft's own model and, by `moving_air: true`, to
+`identify`.
 
 Prints a row for each model and size: flights, alarms before the fault, found, named rightly, named wrongly in
 any row, share of samples and surfaces whose effectiveness the bounds hold, the same of the surface at fault
@@ -169,7 +170,9 @@ def identified(of: Campaign, kind: str, folder: Path) -> Model:
     logs = [recorded(one, kind, folder) for one in training(of)]
     vehicle: Vehicle = load_vehicle(str(logs[0].folder / "vehicle.yaml"))
     faults = ["loss"] if of.type == LOSS else ["loss", "stuck"]
-    vehicle = vehicle.model_copy(update={"faults": faults, "other_laws": True})
+    vehicle = vehicle.model_copy(
+        update={"faults": faults, "other_laws": True, "moving_air": of.air != "none"}
+    )
     named = [log.path.rename(log.path.with_stem(log.flown.name)) for log in logs]
     return identify(*by_pressure(load_flights(named, vehicle), vehicle))
 

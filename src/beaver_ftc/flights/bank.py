@@ -35,7 +35,9 @@ Hypothesis = tuple[Floats, int, float, Floats]  # a row of Bank: effectiveness, 
 class Bank(NamedTuple):
     """H hypotheses. effectiveness (H, G); kind (H,); weight (H,) share of the changes that lead there, the
     first is healthy; offset (H, 3) variance of the rates' offset that comes with it, (rad/s)2; start (H,)
-    probability of each before the flight; change: probability of a change in a sample."""
+    probability of each before the flight; change: probability of a change in a sample; own (H, G): share of
+    each group's answer that its own gain is of, what is left of it, or all where a law's answer to noise adds
+    to what a surface seems to do."""
 
     effectiveness: Floats
     kind: np.ndarray
@@ -43,6 +45,7 @@ class Bank(NamedTuple):
     offset: Floats
     start: Floats
     change: float
+    own: Floats
 
     @property
     def idle(self) -> int:
@@ -83,7 +86,8 @@ def bank_of(model: Model) -> Bank:
     effectiveness, kind, weight, offset = (np.array(column) for column in zip(*rows, strict=True))
     weight[1:] *= (1.0 - settings.repair_share) / weight[1:].sum()
     change = settings.changes_per_hour / (3600.0 * model.rate_hz)
-    return Bank(effectiveness, kind, weight, offset, _at_first(kind, weight), change)
+    own = np.ones_like(effectiveness) if model.vehicle.other_laws else effectiveness
+    return Bank(effectiveness, kind, weight, offset, _at_first(kind, weight), change, own)
 
 
 def _with(count: int, levels: dict[int, float]) -> Floats:

@@ -182,6 +182,9 @@ def _of_group(bank: Bank, posterior: Floats, group: int, model: Model) -> tuple[
     Of several surfaces that move together any may have lost all, or nothing.
     """
     levels, mass = _marginal(bank, posterior, group)
+    if model.vehicle.other_laws:  # how rare faults are says nothing of a flight with one: all levels alike
+        mass = mass / _marginal(bank, bank.start[None, : bank.idle], group)[1]
+        mass /= mass.sum(axis=1, keepdims=True)
     low, high = _bounds(levels, mass, model.settings.bounds)
     if len(model.groups[group]) > 1:
         low, high = np.where(low < low.max(initial=0.0), 0.0, low), np.ones_like(high)

@@ -21,10 +21,10 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.flights.bank import Bank, adaptation_of, noise_of
-from beaver_ftc.flights.model import Model
+from beaver_ftc.flights.model import Colour, Model
 from beaver_ftc.flights.recording import Floats
 from beaver_ftc.flights.regression import predicted
-from beaver_ftc.flights.samples import Samples
+from beaver_ftc.flights.samples import Samples, whitened
 
 _DELAY_MEMORY_S = 600.0
 _FLOOR = 1e-15
@@ -36,14 +36,33 @@ _EXPECTED = 0.93
 def posterior_of(samples: Samples, model: Model, bank: Bank) -> tuple[Floats, Floats, Floats]:
     """Probability of each hypothesis (n, H), trim and gains (n, 4 + G) and noise scale (n,), by sample.
 
-    The mean over the delays of the model's settings, each weighted by how well it explains the last minutes.
+    The mean over the delays of the model's settings, and the colours of its noise where the flight is not yet
+    whitened, each weighted by how well it explains the last minutes.
     """
-    runs = [_filtered(_later(samples, delay_s), model, bank) for delay_s in model.settings.delays_s]
-    weights = _weights([run[3] for run in runs], model.rate_hz)
+    if model.colours and not samples.colour:
+        flights = [whitened(samples, one.average) for one in model.colours]
+        runs = [_filtered(one, model.heard(one.colour), bank) for one in flights]
+        likely = [_likelihood(one, model, of) for one, of in zip(flights, model.colours, strict=True)]
+    else:
+        own, delays_s = model.heard(samples.colour), model.settings.delays_s
+        runs = [_filtered(_later(samples, delay_s), own, bank) for delay_s in delays_s]
+        likely = [run[3] for run in runs]
+    weights = _weights(likely, model.rate_hz)
     posterior = sum(weight[:, None] * run[0] for weight, run in zip(weights, runs, strict=True))
     state = sum(weight[:, None] * run[1] for weight, run in zip(weights, runs, strict=True))
     scale = sum(weight * run[2] for weight, run in zip(weights, runs, strict=True))
     return np.asarray(posterior), np.asarray(state), np.asarray(scale)
+
+
+def _likelihood(flight: Samples, model: Model, of: Colour) -> Floats:
+    """Log likelihood of a colour at each sample of a flight that is whitened by it, all in health, (n,): by
+    its noise as it was, not as much wider as gains differ. Filtering made a sample C(1) times as large."""
+    ok, unexplained, answers = predicted(flight, model)
+    e = np.nan_to_num(unexplained - answers.sum(axis=1) - np.array(model.intercept))
+    square = np.einsum("na,ab,nb->n", e, np.linalg.inv(of.noise), e)
+    dof, size = model.settings.tail, np.linalg.slogdet(of.noise)[1]
+    found = -0.5 * ((dof + 3.0) * np.log1p(square / dof) + size) + 3.0 * np.log(sum(of.average))
+    return np.where(ok, model.settings.power * found, 0.0)
 
 
 def evidence(posterior: Floats, bank: Bank) -> Floats:
@@ -199,7 +218,7 @@ def _correct(prior, m, p, y, f, bank, noise, scale):
     nothing, certain = np.zeros(states), np.zeros((states, states))
     covariance, dof = noise.covariance * scale, noise.tail
     for h in range(hypotheses):
-        seen = _seen(bank.effectiveness[h], f, noise.constant, states)
+        seen = _seen(bank.effectiveness[h], bank.own[h], f, noise.constant, states)
         if h == hypotheses - 1:
             squares[h], log_det = _update(nothing, certain, y, seen, covariance, dof)
         else:
@@ -216,15 +235,15 @@ def _correct(prior, m, p, y, f, bank, noise, scale):
 
 
 @kernel
-def _seen(e, f, base, states):
+def _seen(e, own, f, base, states):
     """How the rates show the states, (N, 3): trim, the gain of the constant and of all groups' answers f
-    (G, 3), each as effective as e (G,) says, and of each group's own."""
+    (G, 3), each as effective as e (G,) says, and each group's own gain of a share (G,) of its answer."""
     seen = np.zeros((states, 3))
     seen[:3] = np.eye(3)
     seen[3] = base
     for g in range(len(e)):
-        seen[4 + g] = e[g] * f[g]
-        seen[3] += seen[4 + g]
+        seen[4 + g] = own[g] * f[g]
+        seen[3] += e[g] * f[g]
     return seen
 
 

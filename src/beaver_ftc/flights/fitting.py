@@ -20,7 +20,7 @@ from beaver_ftc.flights import extremes, regression, trust
 from beaver_ftc.flights.bank import adaptation_of, bank_of
 from beaver_ftc.flights.diagnose import Rows, rows_of
 from beaver_ftc.flights.filtering import accumulated, evidence, posterior_of
-from beaver_ftc.flights.model import Fitted, Model, Settings
+from beaver_ftc.flights.model import Colour, Fitted, Model, Settings
 from beaver_ftc.flights.recording import TINY, Floats
 from beaver_ftc.flights.samples import Samples, constant_parts
 from beaver_ftc.flights.scoring import by_labels
@@ -63,6 +63,10 @@ _OTHER_LAWS: dict[str, Any] = {
 """How far each group's gain wanders under a law and air that the fit has not seen (a law that answers what is
 not modelled ties the command to it), and what a name asks for then. Chosen on simulated flights
 (`own_logs.py`, seeds 1 to 6)."""
+_MOVING_AIR: dict[str, Any] = {"own_gain_sd": 0.08, "own_gain_time_s": 100.0}
+_POWER_MOVING_AIR, _WINDOW_S = 0.6, 10.0
+"""Whitened by the flight's own colour, whose width is measured, a sample tells more, and gains differ by
+flight rather than within it: chosen on seeds 11 and 12 in light turbulence."""
 _POWER_OTHER_LAWS, _THEORIES = 0.4, 2.0
 """A law may feed a gyro's noise to the surfaces, which doubles the residual of one that does not: a sample
 then tells less than the fit knows. And so many times the evidence of theory raises an alarm. Chosen in the
@@ -115,13 +119,20 @@ def fit_model(stretches: Sequence[Stretch], vehicle: Vehicle, settings: Settings
     """The model that fits these stretches. Raises BadInput where there is too little to fit."""
     history, lags = choose_order(stretches, vehicle)
     model = _model(stretches, vehicle, history, lags)
-    return model.model_copy(update={"settings": settings or prior(stretches, model)})
+    model = model.model_copy(update={"settings": settings or prior(stretches, model)})
+    return _widened(stretches, model) if model.colours else model
 
 
 def fit_like(stretches: Sequence[Stretch], model: Model) -> Model:
     """Another fit of the same order and settings to other stretches."""
     fitted = _model(stretches, model.vehicle, model.history, model.lags)
-    return fitted.model_copy(update={"settings": model.settings})
+    wider = {tuple(one.average): one.wider for one in model.colours}
+    return _with_wider(fitted.model_copy(update={"settings": model.settings}), wider)
+
+
+def _with_wider(model: Model, wider: dict[tuple[float, ...], float]) -> Model:
+    colours = [one.model_copy(update={"wider": wider.get(tuple(one.average), 1.0)}) for one in model.colours]
+    return model.model_copy(update={"colours": colours})
 
 
 def _left_out(
@@ -163,11 +174,11 @@ def criteria(stretches: Sequence[Stretch], vehicle: Vehicle) -> dict[tuple[int, 
 
 def _columns(vehicle: Vehicle, history: int, lags: int) -> list[int]:
     """Columns of the largest design that an order has."""
-    first = 1 + 3 * max(HISTORIES)
-    commands = first + len(vehicle.past_names)
+    first, signals = 1 + 3 * max(HISTORIES), len(vehicle.past_names)
+    commands = first + signals * vehicle.felt(max(HISTORIES))
     starts = [commands + group * max(LAGS) for group in range(len(regression.groups_of(vehicle)))]
     delayed = [start + lag for start in starts for lag in range(lags)]
-    return [*range(1 + 3 * history), *range(first, commands), *delayed]
+    return [*range(1 + 3 * history), *range(first, first + signals * vehicle.felt(history)), *delayed]
 
 
 def fit_order(stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags: int) -> regression.Fit:
@@ -195,12 +206,13 @@ def stacked(
     groups, reach = regression.groups_of(vehicle), max(HISTORIES + LAGS)
     xs, ys, runs = [], [], []
     for number, stretch in enumerate(stretches):
-        past, commands, ok = regression.build(stretch.samples, groups, history, lags, scaled=True)
+        one, felt = stretch.samples, vehicle.felt(history)
+        past, commands, ok = regression.build(one, groups, history, lags, True, felt)
         use = stretch.use & ok
         use[:reach] = False
         n = len(past)
-        xs.append(np.column_stack([np.ones(n), past, commands.reshape(n, -1)])[use])
-        ys.append(stretch.samples.rates[use])
+        xs.append(one.weight * np.column_stack([np.ones(n), past, commands.reshape(n, -1)])[use])
+        ys.append(one.weight * one.rates[use])
         runs.append(np.cumsum(np.diff(np.flatnonzero(use), prepend=0) > 1) + 1_000_000 * number)
     return np.vstack(xs), np.vstack(ys), np.concatenate(runs)
 
@@ -210,7 +222,7 @@ def _model(stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags: i
     names, groups = list(vehicle.surfaces), regression.groups_of(vehicle)
     first = len(fit.coefficients) - len(groups) * lags
     shape = (len(groups), lags, 3)
-    return Model(
+    model = Model(
         vehicle=vehicle,
         rate_hz=1.0 / float(np.median([stretch.samples.dt_s for stretch in stretches])),
         groups=[[names[i] for i in group] for group in groups],
@@ -222,6 +234,16 @@ def _model(stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags: i
         response_sd=fit.standard_errors[first:].reshape(shape).tolist(),
         noise=fit.covariance.tolist(),
     )
+    return model.model_copy(update={"colours": _colours(stretches, model)})
+
+
+def _colours(stretches: Sequence[Stretch], model: Model) -> list[Colour]:
+    """The colours that flights are whitened by, with the noise of each."""
+    found = []
+    for colour in sorted({one.samples.colour for one in stretches} - {()}):
+        alike = [residuals(model, one)[1] for one in stretches if one.samples.colour == colour]
+        found.append(Colour(average=list(colour), noise=np.cov(np.vstack(alike).T).tolist()))
+    return found
 
 
 def prior(stretches: Sequence[Stretch], model: Model) -> Settings:
@@ -239,12 +261,14 @@ def prior(stretches: Sequence[Stretch], model: Model) -> Settings:
         changes += sum(max(len(flight) - 1, 0) for flight in seen)
         repairs += sum(int(level == 1.0) for flight in seen for level in flight[1:])
     levels = {name: found for name, found in levels.items() if found}
-    delays_s = [share / model.rate_hz for share in _DELAYS]
-    laws = _OTHER_LAWS if model.vehicle.other_laws else {}
+    moving = model.vehicle.moving_air
+    delays_s = [share / model.rate_hz for share in ((0.0,) if moving else _DELAYS)]
+    laws = _OTHER_LAWS | (_MOVING_AIR if moving else {}) if model.vehicle.other_laws else {}
     if not levels:
         walk = _drift(stretches, model)
         usual = model.model_copy(update={"settings": Settings(trim_walk=walk, **laws)})
-        power = min(_POWER_OTHER_LAWS if laws else _POWER_ALONE, 1.0 / dispersion(stretches, usual))
+        most = (_POWER_MOVING_AIR if moving else _POWER_OTHER_LAWS) if laws else _POWER_ALONE
+        power = min(most, 1.0 / dispersion(stretches, usual))
         alarm = {"alarm": _SURE, "hold_s": _HOLD_S}
         return Settings(**alarm, **laws, power=power, trim_walk=walk, delays_s=delays_s)
     return Settings(
@@ -280,11 +304,31 @@ def dispersion(stretches: Sequence[Stretch], model: Model) -> float:
     return squares / number
 
 
+def _widened(stretches: Sequence[Stretch], model: Model) -> Model:
+    """The model with the noise of each colour so many times wider as the gains of ten seconds left out are
+    farther from 1, in squares, than it lets them be: quiet gyros show what the model itself lacks."""
+    whole = [(stretch.samples, stretch.use) for stretch in stretches]
+    found: dict[tuple[float, ...], list[float]] = {}
+    for tested, kept in _left_out(stretches, model, trust.tied(whole, model).tolist()):
+        told = np.array(trust.claimed(tested))
+        for one in kept:
+            x, e = _answers(tested, one)
+            count = max(round(len(e) / 3 * one.samples.dt_s / _WINDOW_S), 1)
+            for part in np.array_split(np.arange(len(e) // 3), count):
+                rows = (3 * part[:, None] + np.arange(3)).ravel()
+                f, left = x[rows][:, told].reshape(-1, 3, told.sum()), e[rows].reshape(-1, 3)
+                f, left = (f - f.mean(axis=0)).reshape(len(rows), -1), (left - left.mean(axis=0)).ravel()
+                gains = np.linalg.lstsq(f, left, rcond=_ALIKE)[0]
+                found.setdefault(one.samples.colour, []).append(float(left @ f @ gains) / len(gains))
+    return _with_wider(model, {colour: max(float(np.mean(ratio)), 1.0) for colour, ratio in found.items()})
+
+
 def _answers(model: Model, kept: Stretch) -> tuple[Floats, Floats]:
     """Each group's answers (3 n, G) and the residuals (3 n,) of a part in sd of the noise, without means."""
     rows, residual = residuals(model, kept)
     _, _, answers = regression.predicted(kept.samples, model, scaled=True)
-    whiten = np.linalg.inv(np.linalg.cholesky(np.array(model.noise))).T
+    noise = model.heard(kept.samples.colour).noise
+    whiten = np.linalg.inv(np.linalg.cholesky(np.array(noise))).T
     x, e = answers[rows] @ whiten, residual @ whiten
     x, e = x - x.mean(axis=0), e - e.mean(axis=0)
     return x.transpose(0, 2, 1).reshape(-1, len(model.groups)), e.ravel()
@@ -301,7 +345,8 @@ def _drift(stretches: Sequence[Stretch], model: Model) -> list[float]:
         like = fit_like(fitted, model)
         for one in kept:
             rows, residual = residuals(like, one)
-            white = residual / np.sqrt(np.maximum(np.diag(np.array(like.noise)), TINY))
+            noise = np.array(like.heard(one.samples.colour).noise)
+            white = residual / np.sqrt(np.maximum(np.diag(noise), TINY))
             for begin, end in _runs(rows):
                 for i, n in enumerate(lengths.astype(int).tolist()):
                     means = white[begin:end][: (end - begin) // n * n].reshape(-1, n, 3).mean(axis=1)
@@ -373,7 +418,8 @@ def trusted(stretches: Sequence[Stretch], model: Model) -> Model:
 
 def _threshold(tail: extremes.Tail, per_hour: float, model: Model) -> float:
     """By the tail; under laws of which the parts left out say nothing, by theory if that asks for more."""
-    least = _THEORIES * extremes.sure_threshold(model.rate_hz, per_hour) if model.vehicle.other_laws else 0.0
+    theories = (1.0 if model.vehicle.moving_air else _THEORIES) if model.vehicle.other_laws else 0.0
+    least = theories * extremes.sure_threshold(model.rate_hz, per_hour)
     return max(extremes.threshold_for(tail, per_hour), least)
 
 

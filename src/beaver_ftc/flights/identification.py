@@ -12,7 +12,7 @@ from beaver_ftc.flights import extremes, fitting, regression, trust
 from beaver_ftc.flights.model import Fitted, Model
 from beaver_ftc.flights.recording import Floats
 from beaver_ftc.flights.regression import group_indices, spectrum, variance_inflation
-from beaver_ftc.flights.samples import Samples, with_pressure
+from beaver_ftc.flights.samples import Samples, whitened, with_pressure
 from beaver_ftc.flights.vehicle import Vehicle
 
 Document = dict[str, Any]
@@ -28,13 +28,19 @@ _BANDS_HZ = ((0.0, 0.1), (0.1, 0.5), (0.5, 1.0), (1.0, 2.0), (2.0, 5.0), (5.0, 1
 WINDOW_S = 2.0
 _MOST_WINDOWS = 400
 _POWERS = (0.0, 1.0, 3.0)
+_TURNS = 8
+_COLOURS = (
+    (1.0,), (1.0, 0.5), (1.0, 0.95),
+    *((1.0, -2.0 * c, c**2) for c in (0.2, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85, 0.9)),
+)  # fmt: skip
+"""Moving averages of the noise: gusts held within a sample add to the next, gyros' noise takes from it."""
 _MOST_DELAY_S, _LEAST_LAG_S, _MOST_LAG_S = 0.6, 0.005, 1.0
 
 
 def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
     """The model of a vehicle from its flights, with its own account of how good it is in `identified`."""
-    stretches = fitting.stretches_of(flights)
     _check_commands(flights, vehicle)
+    stretches = fitting.stretches_of(coloured(flights, vehicle))
     model = fitting.fit_model(stretches, vehicle)
     check_explains(fitting.explained(stretches, model), stretches, model)
     model = fitting.trusted(stretches, model)
@@ -50,6 +56,42 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
     }
     settings = model.settings.model_copy(update={"bounds": bounds})
     return model.model_copy(update={"settings": settings, "identified": found})
+
+
+def coloured(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples]:
+    """In moving air the flights whitened by the colour that leaves least unexplained of each, and one fit of
+    all, in turns.
+
+    A law that answers rates answers their noise: with a residual that is not white, what is noise is taken
+    for what the surface does [Ljung1999, section 13.4].
+    """
+    order = max(fitting.HISTORIES), max(fitting.HISTORIES)
+    found, known = list(flights), None
+    for _ in range(_TURNS if vehicle.moving_air else 0):
+        x, y, _ = fitting.stacked(fitting.stretches_of(found), vehicle, *order)
+        by = np.linalg.lstsq(x, y, rcond=None)[0]
+        best = [_colour(fitting.stretches_of([one]), vehicle, order, np.asarray(by)) for one in flights]
+        if (now := [colour for _, colour in best]) == known:
+            break
+        usual, known = np.mean([score for score, _ in best]), now
+        found = [
+            whitened(one, colour, float(np.exp((usual - score) / 6.0)))
+            for one, (score, colour) in zip(flights, best, strict=True)
+        ]
+    return found
+
+
+def _colour(
+    stretch: list[fitting.Stretch], vehicle: Vehicle, order: tuple[int, int], by: Floats
+) -> tuple[float, tuple[float, ...]]:
+    """The colour of a flight, and the log determinant of the residual that it leaves."""
+    from scipy.signal import lfilter
+
+    x, y, _ = fitting.stacked(stretch, vehicle, *order)
+    e = y - x @ by
+    left = {one: np.linalg.slogdet(np.cov(lfilter([1.0], one, e, axis=0).T))[1] for one in _COLOURS}
+    colour = min(left, key=lambda one: float(left[one]))
+    return float(left[colour]) + 6.0 * float(np.log(sum(colour))), colour
 
 
 def another_day(tests: list[Document], model: Model) -> Document:
@@ -100,8 +142,14 @@ def _by_powers(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[list[Sampl
     """Each surface, or group, in its turn with the power of the airspeed that explains most: slipstream and
     linkages change the square. Another than that must explain decisively more."""
 
-    def with_powers(of: Vehicle) -> list[Samples]:
-        return [with_pressure(one, of.reference_airspeed_mps or 0.0, of.powers) for one in flights]
+    pressed = [with_pressure(one, vehicle.reference_airspeed_mps or 0.0, vehicle.powers) for one in flights]
+    white = coloured(pressed, vehicle)  # a criterion believes each sample, as only white noise lets it
+
+    def with_powers(of: Vehicle, colours: bool = True) -> list[Samples]:
+        found = [with_pressure(one, of.reference_airspeed_mps or 0.0, of.powers) for one in flights]
+        if not (colours and vehicle.moving_air):
+            return found
+        return [whitened(one, as_.colour, as_.weight) for one, as_ in zip(found, white, strict=True)]
 
     least, names = _criterion(with_powers(vehicle), vehicle) - _DECISIVE, list(vehicle.surfaces)
     for group in regression.groups_of(vehicle):
@@ -110,7 +158,7 @@ def _by_powers(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[list[Sampl
             other = vehicle.model_copy(update={"airspeed_powers": own})
             if (found := _criterion(with_powers(other), other)) < least:
                 least, vehicle = found, other
-    return with_powers(vehicle), vehicle
+    return with_powers(vehicle, colours=False), vehicle
 
 
 def check_explains(tests: list[Document], stretches: Sequence[fitting.Stretch], model: Model) -> None:
@@ -168,7 +216,8 @@ def collinear(stretches: Sequence[fitting.Stretch], model: Model) -> list[Docume
 def regressor_names(model: Model) -> list[str]:
     """Names of the columns of the fit after the constant, in their order."""
     rates = [f"{rate}[-{k}]" for k in range(1, model.history + 1) for rate in "pqr"]
-    signals = [f"{name}[-1]" for name in model.vehicle.past_names]
+    felt = range(1, model.vehicle.felt(model.history) + 1)
+    signals = [f"{name}[-{k}]" for k in felt for name in model.vehicle.past_names]
     delays, groups = range(1, model.lags + 1), map("+".join, model.groups)
     return rates + signals + [f"command of {group}[-{k}]" for group in groups for k in delays]
 
@@ -203,6 +252,11 @@ def summary(model: Model) -> str:
         f"past samples of the rates: {model.history}, of the commands: {model.lags}",
         *(f"  together, not to be told apart: {', '.join(g)}" for g in model.groups if len(g) > 1),
         *_pressure_lines(model),
+        *(
+            f"  noise of the colour {', '.join(f'{c:.3g}' for c in one.average)}: gains of 10 s left out "
+            f"differ {one.wider:.2g} times as it lets them, in squares"
+            for one in model.colours
+        ),
         *(f"  {line}" for line in trust.unclaimed_lines(model)),
         *(f"  {flight['name']}: {note}" for flight in found["flights"] for note in flight["notes"]),
         *map(_test_line, found["tests"]),

@@ -3,6 +3,7 @@
 JSON; every key is checked when it is read, as in any other file a user names.
 """
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -79,6 +80,14 @@ class Fitted(Section):
     tail: Tail | None = Field(default=None, description="highest alarm statistic on parts not fitted")
 
 
+class Colour(Section):
+    """The noise of some flights: another gyro, air or law colours what is not explained."""
+
+    average: Row = Field(min_length=1, description="1, c1, ...: its moving average, newest first")
+    noise: Matrix = Field(description="covariance of the residual whitened by that, (3, 3), (rad/s)2")
+    wider: Number = Field(1.0, ge=1, description="how many times as far, in squares, gains left out differ")
+
+
 class Model(Section):
     """How one vehicle's rates answer their own past and the commands, and how well that is known."""
 
@@ -92,16 +101,24 @@ class Model(Section):
     response: list[Matrix] = Field(description="(groups, lags, 3), a share of command to rad/s a sample")
     response_sd: list[Matrix] = Field(description="standard errors of `response`, colour included")
     noise: Matrix = Field(description="covariance of the residual, (3, 3), (rad/s)2")
+    colours: list[Colour] = Field(
+        default=[], description="noises that flights were seen to have, for `moving_air`"
+    )
     settings: Settings = Settings()
     fitted: Fitted | None = Field(default=None, description="what it was fitted on; None: nothing is known")
     identified: dict[str, object] = Field(default={}, description="what it was found from, and how well")
 
     @model_validator(mode="after")
     def _fits(self) -> "Model":
-        rows = 3 * self.history + len(self.vehicle.past_names)
+        rows = 3 * self.history + len(self.vehicle.past_names) * self.vehicle.felt(self.history)
         says = f"has {len(self.past)} rows, allowed: {rows}, as `identify` writes them: identify it anew"
         refuse([(("past",), says)] * (len(self.past) != rows))
         return self
+
+    def heard(self, colour: Sequence[float]) -> "Model":
+        """The model with the noise of a colour that it has seen, as much wider as parts left out say."""
+        known = [one.wider * np.array(one.noise) for one in self.colours if one.average == list(colour)]
+        return self.model_copy(update={"noise": known[0].tolist()}) if known else self
 
     def arrays(self) -> tuple[Floats, Floats, Floats, Floats]:
         """intercept (3,), past (m, 3), response (G, L, 3) and noise (3, 3) as arrays."""

@@ -8,6 +8,7 @@ does to its covariance, and which regressors are collinear.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,19 +39,20 @@ def groups_of(vehicle: Vehicle) -> list[list[int]]:
 
 
 def build(
-    samples: Samples, groups: list[list[int]], history: int, lags: int, scaled: bool
+    samples: Samples, groups: list[list[int]], history: int, lags: int, scaled: bool, felt: int = 1
 ) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """The regressors of each sample: the past (n, 3 h + X), the commands (n, G, L) of the groups at lags 1 to
-    L, and whether all of it is known and no gap lies within, (n,).
+    """The regressors of each sample: the past (n, 3 h + X f), the commands (n, G, L) of the groups at lags 1
+    to L, and whether all of it is known and no gap lies within, (n,).
 
-    scaled: multiply each surface's command by its labelled effectiveness (1 where there is no label).
+    scaled: multiply each surface's command by its labelled effectiveness (1 where there is no label). felt:
+    past samples f of the signals.
     """
     surfaces = samples.commands
     if scaled:
         surfaces = surfaces * np.where(np.isfinite(samples.labels), samples.labels, 1.0)
     grouped = np.column_stack([surfaces[:, group].sum(axis=1) for group in groups])
     rates = [_delayed(samples.rates, k, np.nan) for k in range(1, history + 1)]
-    past = np.column_stack([*rates, _delayed(samples.signals, 1, np.nan)])
+    past = np.column_stack([*rates, *(_delayed(samples.signals, k, np.nan) for k in range(1, felt + 1))])
     commands = np.stack([_delayed(grouped, k, np.nan) for k in range(1, lags + 1)], axis=1)
     known = np.isfinite(past).all(axis=1) & np.isfinite(commands).all(axis=(1, 2))
     known &= np.isfinite(samples.rates).all(axis=1)
@@ -86,7 +88,8 @@ def predicted(
 
     Summed in the same order whatever the length of the flight, so that a row does not depend on later ones.
     """
-    past, commands, ok = build(samples, group_indices(model), model.history, model.lags, scaled)
+    order = model.history, model.lags, scaled, model.vehicle.felt(model.history)
+    past, commands, ok = build(samples, group_indices(model), *order)
     _, by_past, response, _ = model.arrays()
     unexplained = samples.rates - np.einsum("nm,mr->nr", past, by_past)
     return ok, unexplained, np.einsum("ngl,glr->ngr", commands, response)
@@ -132,12 +135,13 @@ def least_squares(x: Floats, y: Floats, run: NDArray[np.int64], reach: int) -> F
 
 def _newey_west(z: Floats, e: Floats, inverse: Floats, run: NDArray[np.int64], reach: int) -> Floats:
     """Standard errors that hold for autocorrelated residuals: Bartlett weights over `reach` lags."""
-    score = z * e[:, None]
-    middle = score.T @ score
-    for lag in range(1, min(reach, len(e) - 1) + 1):
-        together = (run[lag:] == run[:-lag])[:, None]
-        product = (score[lag:] * together).T @ score[:-lag]
-        middle += (1.0 - lag / (reach + 1.0)) * (product + product.T)
+    score, width = z * e[:, None], reach + 1
+    edges = [0, *(np.flatnonzero(np.diff(run)) + 1).tolist(), len(run)]
+    middle = np.zeros((z.shape[1], z.shape[1]))
+    for begin, end in pairwise(edges):  # Bartlett's weights are those of products of running sums
+        total = np.cumsum(np.pad(score[begin:end], ((width, width - 1), (0, 0))), axis=0)
+        sums = total[width:] - total[:-width]
+        middle += sums.T @ sums / width
     return np.sqrt(np.maximum(np.diag(inverse @ middle @ inverse), 0.0))
 
 

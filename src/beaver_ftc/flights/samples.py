@@ -40,7 +40,8 @@ class Samples:
     age_s: mean age of each held column; stamps (m,) the log's own time stamps, s; notes: what is said of the
     reading; airspeed (n,) m/s, nan where unknown; still_s: for how long each column of rates, commands and
     signals has been the same, (n,) s; clipped (n,): whether a rate is; energy_climb (n,) m/s: rate of
-    the energy height over the last seconds, None where it is not logged.
+    the energy height over the last seconds, None where it is not logged; colour: the moving average of the
+    noise, that rates, commands and signals are whitened by, none where empty; weight: of a sample in a fit.
     """
 
     name: str
@@ -59,6 +60,8 @@ class Samples:
     still_s: Mapping[str, Floats] = field(default_factory=dict)
     clipped: NDArray[np.bool_] | None = None
     energy_climb: Floats | None = None
+    colour: tuple[float, ...] = ()
+    weight: float = 1.0
 
 
 def sample(recording: Recording, vehicle: Vehicle) -> Samples:
@@ -69,7 +72,7 @@ def sample(recording: Recording, vehicle: Vehicle) -> Samples:
     _require(recording, used, rates=names)
     _consistent(recording, vehicle)
     stamps = recording.columns[names[0]].t_s
-    t_s, run, step = _time_base(recording.name, stamps, vehicle.max_rate_hz)
+    t_s, run, step = _time_base(recording.name, stamps, vehicle.rate_hz)
     found = {name: at_samples(recording.columns[name], t_s, step) for name in used}
 
     def columns(names: list[str]) -> Floats:
@@ -106,6 +109,24 @@ def with_pressure(samples: Samples, reference_mps: float, powers: Sequence[float
     moved = np.column_stack([samples.rates, samples.signals]) * (np.sqrt(pressure) - 1.0)
     signals = np.column_stack([samples.signals, moved])
     return replace(samples, commands=samples.commands * pressure ** (0.5 * np.array(powers)), signals=signals)
+
+
+def whitened(samples: Samples, colour: Sequence[float], weight: float = 1.0) -> Samples:
+    """The flight with rates, commands and signals filtered by C(1) / C(z), C the moving average of the noise
+    (1, c1, ...): what is left of an autoregressive model is then white [Ljung1999, section 4.2]. Begins anew
+    after a gap, and where a number is missing."""
+    from scipy.signal import lfilter
+
+    parts = (samples.rates, samples.commands, samples.signals)
+    values = np.hstack(parts)
+    known = np.isfinite(values).all(axis=1)
+    edges = np.flatnonzero((np.diff(known) != 0) | (np.diff(samples.run) != 0)) + 1
+    values[~known] = np.nan
+    for begin, end in pairwise([0, *edges.tolist(), len(values)]):
+        first = values[begin]
+        values[begin:end] = first + lfilter([sum(colour)], colour, values[begin:end] - first, axis=0)
+    rates, commands, felt = np.split(values, np.cumsum([part.shape[1] for part in parts])[:2], axis=1)
+    return replace(samples, rates=rates, commands=commands, signals=felt, colour=tuple(colour), weight=weight)
 
 
 def _remarks(recording: Recording, used: list[str], rates: list[str]) -> Iterator[str]:

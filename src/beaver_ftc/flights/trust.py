@@ -95,7 +95,8 @@ def tied(flights: Sequence[tuple[Samples, Mask]], model: Model) -> Floats:
     it is near 1 the law ties the group to what it answers to, and its effect cannot be told; 1 where the
     group never moved. An effect far above the noise may be made up to a larger share: what is left counts."""
     groups = regression.group_indices(model)
-    parts = [regression.build(one, groups, model.history, model.lags, scaled=True) for one, _ in flights]
+    order = model.history, model.lags, True, model.vehicle.felt(model.history)
+    parts = [regression.build(one, groups, *order) for one, _ in flights]
     use = [mask & ok for (_, mask), (_, _, ok) in zip(flights, parts, strict=True)]
     past = np.vstack([part[0][kept] for part, kept in zip(parts, use, strict=True)])
     commands = np.vstack([part[1][kept] for part, kept in zip(parts, use, strict=True)])

@@ -19,6 +19,7 @@ from beaver_ftc.scenario.loader import looks_like_a_path
 
 _MAX_BYTES = 1_000_000
 MOST_PER_HOUR = 1000.0
+_LAW_HZ = 100.0
 _FOLDER = Path(__file__).parent / "vehicles"
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=100)]
@@ -205,8 +206,18 @@ class Vehicle(Section):
         "and a name ask for more",
         examples=[True],
     )
+    moving_air: bool = Field(
+        default=False,
+        description="flights meet gusts, which laws answer: every sample counts, and noise has the colour "
+        "of the flight",
+        examples=[True],
+    )
     max_rate_hz: Number = number(
-        20.0, gt=0, le=1000, unit="Hz", says="rate above which the log is averaged to this rate"
+        20.0,
+        gt=0,
+        le=1000,
+        unit="Hz",
+        says="rate above which the log is averaged to this rate; 100 for `moving_air`",
     )
 
     @model_validator(mode="after")
@@ -277,6 +288,18 @@ class Vehicle(Section):
     def signal_names(self) -> list[str]:
         """The further signals' columns."""
         return [signal.column for signal in self.signals]
+
+    @property
+    def rate_hz(self) -> float:
+        """The rate above which a log is averaged. Within an average a law may answer what the same average
+        shows, and no fit tells that from what the surface does: of other laws every sample is wanted."""
+        usual = self.moving_air and "max_rate_hz" not in self.model_fields_set
+        return _LAW_HZ if usual else self.max_rate_hz
+
+    def felt(self, history: int) -> int:
+        """Past samples of the signals, of so many of the rates: noise that is coloured is whitened by
+        filtering all that comes in alike."""
+        return history if self.moving_air else 1
 
     @property
     def powers(self) -> list[float]:

@@ -1,0 +1,96 @@
+"""Flights in gusts that a law answers: a gain is right only where the noise has its own colour."""
+
+from dataclasses import replace
+
+import numpy as np
+import small
+
+from beaver_ftc.flights import diagnose, fitting, identification
+from beaver_ftc.flights.bank import bank_of
+from beaver_ftc.flights.filtering import posterior_of
+from beaver_ftc.flights.samples import whitened
+
+AVERAGE = (1.0, -1.4, 0.49)
+
+
+def test_a_whitened_flight_averages_to_what_it_was():
+    """C(z) of the filtered is C(1) times what was measured, sample by sample; a gap begins anew."""
+    flight = small.flight(small.model(), 80)
+    flight.rates[50] = np.nan
+    found = whitened(replace(flight, run=(np.arange(80) >= 30).astype(np.int64)), AVERAGE)
+    for now, was in ((found.rates, flight.rates), (found.commands, flight.commands)):
+        again = now[2:] + AVERAGE[1] * now[1:-1] + AVERAGE[2] * now[:-2]
+        inside = np.setdiff1d(np.arange(2, 80), [30, 31, 50, 51, 52])
+        np.testing.assert_allclose(again[inside - 2], sum(AVERAGE) * was[inside], atol=1e-12)
+        np.testing.assert_array_equal(now[[0, 30, 51]], was[[0, 30, 51]])
+    assert np.isnan(found.rates[50]).all()
+    assert np.isfinite(found.rates[51:]).all()
+
+
+def flown(colour, answers, n, seed):
+    """Rates that a law answers, with noise of a colour: p' = 0.9 p + 0.5 u + noise."""
+    rng = np.random.default_rng(seed)
+    white, wanted = 0.02 * rng.standard_normal((n + 2, 3)), 0.01 * rng.standard_normal((n, 2))
+    noise = sum(c * white[2 - j : n + 2 - j] for j, c in enumerate(colour))
+    rates, commands = np.zeros((n, 3)), np.zeros((n, 2))
+    for k in range(n):
+        if k:
+            moved = np.array([commands[k - 1, 0], commands[k - 1, 1], 0.3 * commands[k - 1, 0]])
+            rates[k] = 0.9 * rates[k - 1] + 0.5 * moved + noise[k]
+        commands[k] = wanted[k] - answers * rates[k, :2]
+    like = small.flight(small.model(), n, name=f"flight-{seed}")
+    nothing = np.full((n, 2), np.nan)
+    return replace(like, rates=rates, commands=commands, labels=nothing, signals=np.empty((n, 0)), dt_s=0.01)
+
+
+VEHICLE = small.vehicle(
+    surfaces={"right": {"roll": 1.0}, "left": {"pitch": 1.0}}, labels={}, other_laws=True, moving_air=True
+)
+
+
+def first_response(flights):
+    """Of the roll rate to its own command, by the order that the criterion takes."""
+    model = fitting.fit_model(fitting.stretches_of(flights), VEHICLE)
+    return model.response[0][0][0]
+
+
+def test_a_fit_finds_the_colours_that_a_law_answers():
+    """The response is 0.5. A fit that takes coloured noise for white is farther off."""
+    flights = [flown(AVERAGE if i % 2 else (1.0,), 0.5 + 0.1 * i, 4000, i) for i in range(4)]
+    white = identification.coloured(flights, VEHICLE)
+    colours = [one.colour for one in white]
+    assert colours == colours[:2] * 2
+    assert len(set(colours)) == 2
+    assert abs(first_response(white) - 0.5) < 0.5 * abs(first_response(flights) - 0.5)
+
+
+def test_air_that_stands_still_is_left_alone():
+    flights = [flown((1.0,), 0.5, 200, 1)]
+    assert identification.coloured(flights, VEHICLE.model_copy(update={"moving_air": False})) == flights
+
+
+def test_a_model_of_two_colours_takes_the_likelier():
+    """Each flight through the noise it has, picked at once, is as if the other had never been seen."""
+    flights = [flown(AVERAGE if i % 2 else (1.0,), 0.5, 3000, i) for i in range(4)]
+    white = identification.coloured(flights, VEHICLE)
+    model = fitting.fit_model(fitting.stretches_of(white), VEHICLE)
+    assert len(model.colours) == 2
+    assert all(one.wider >= 1.0 for one in model.colours)
+    for i in (0, 1):
+        new = flown(AVERAGE if i else (1.0,), 0.5, 1500, 9 + i)
+        own = [one for one in model.colours if tuple(one.average) == white[i].colour]
+        alone = model.model_copy(update={"colours": own})
+        both = posterior_of(new, model, bank_of(model))[0][300:]
+        np.testing.assert_allclose(both, posterior_of(new, alone, bank_of(model))[0][300:], atol=1e-6)
+
+
+def test_bounds_lean_on_no_prior_where_laws_differ():
+    """With nothing known but how rare faults are, each of eleven levels is as likely: 90 % are ten."""
+    model = small.model(small.WING | {"other_laws": True})
+    bank, samples = bank_of(model), small.flight(model, 50)
+    nothing = np.tile(bank.start, (50, 1))
+    rows = diagnose.rows_of(samples, model, bank, nothing)
+    assert (rows.high - rows.low >= 0.9).all()
+    plain = small.model()
+    rows = diagnose.rows_of(samples, plain, bank_of(plain), np.tile(bank_of(plain).start, (50, 1)))
+    assert (rows.low > 0.9).all()

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 DPI = 110
 LEFT, STEPS_LEFT, RIGHT, TOP, BOTTOM, GAP = 0.75, 1.2, 0.2, 0.9, 0.85, 0.42  # inches
+LEGEND_LINE = 0.17  # inches, of one more line of the legend
 LOWEST_RATIO = 1e-2  # of a logarithmic axis: what is smaller is nothing
 
 
@@ -166,6 +167,15 @@ def _say_absent(view: View, series: Series, grid: Iterable["Axes"]) -> None:
             axes.text(0.5, 0.5, view.absent, transform=axes.transAxes, ha="center", va="center", fontsize=9)
 
 
+def _columns(labels: Sequence[str], width: float) -> int:
+    """The most columns of these labels that a figure, so many inches wide, has room for."""
+    for n in range(min(len(labels), 12 if width > 11 else 9), 1, -1):
+        longest = (max(map(len, part)) for part in np.array_split(labels, n))
+        if sum(0.45 + 0.06 * letters for letters in longest) < width:
+            return n
+    return 1
+
+
 def _draw_legend(figure: "Figure", grid: Iterable["Axes"]) -> None:
     """One legend for the figure: each label once, but for the single curves that panel titles name."""
     entries: dict[str, Any] = {}
@@ -174,12 +184,18 @@ def _draw_legend(figure: "Figure", grid: Iterable["Axes"]) -> None:
         entries = entries | dict(zip(labels, handles, strict=True)) | entries
     titles = {axes.get_title().rpartition(" (")[0] or axes.get_title() for axes in grid}
     shown = {label: handle for label, handle in entries.items() if label not in titles}
+    columns, tall = _columns(list(shown), figure.get_figwidth()), figure.get_figheight()
+    more = LEGEND_LINE * (-(-len(shown) // columns) - 1) / tall
+    top, share = 1 - TOP / tall, 1 - more * tall / (tall - TOP - BOTTOM)
+    for axes in grid if more else ():  # lower, to make room
+        old = axes.get_position()
+        axes.set_position((old.x0, top - share * (top - old.y0), old.width, share * old.height))
     figure.legend(
         shown.values(),
         shown.keys(),
         loc="lower center",
         bbox_to_anchor=(0.5, 0.04 / figure.get_figheight()),
-        ncols=min(len(shown), 12 if figure.get_figwidth() > 11 else 9) or 1,
+        ncols=columns,
         columnspacing=1.2,
         fontsize=8,
         frameon=False,

@@ -9,7 +9,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from xml.etree import ElementTree
 
+import numpy as np
 from benchmarks.any_aircraft import HEALTHY_S, TWELVE, row_of
+from benchmarks.unknown_instant import PERCENT, Cell, Survey, cells_of, counted
 
 from beaver_ftc.plant.instrumented import names
 from beaver_ftc.studies.derive.derivation import derive
@@ -21,6 +23,9 @@ PROGRAM = "from beaver_ftc.cli.main import main; main()"
 LONGEST_S = 600
 FLIGHTS, HOURS, SEED = 10, 0.2, 90417
 PROBE = "pa28"
+WATCHED = ("737", "A4", "B747", "MD11", "c172p", "c310", "J3Cub", "OV10", "T37", "pa28", "p51d", "t6texan2")
+LOST, HEALTHY, FIRST = 20, 72, 500_000  # flights, and the first seed
+BESIDE = ("aircraft", "losses", "told", "ours", "share", "told, shipped", "ours, shipped", "share, shipped")
 # Of the example: a derivative in its model, and the term it becomes.
 SAME = {"Cmalpha": "Cm_alpha", "Cmde": "Cm_elevator", "Cmadot": "Cm_alpha_rate", "Cmq": "Cm_qh"}
 FLOWN = ("healthy", "false alarms", "losses", "detected", "named", "wrong", "left out", "certain", "late")
@@ -44,6 +49,45 @@ def any_aircraft() -> str:
 def any_aircraft_probe() -> str:
     """Two flights of each kind of one."""
     return _flown((PROBE,), 2, 0.0)
+
+
+def unknown_instant() -> str:
+    """`python benchmarks/unknown_instant.py`, aileron/elevator/rudder in a cell."""
+    return _beside(WATCHED, LOST, HEALTHY)
+
+
+def unknown_instant_probe() -> str:
+    """A few flights of one."""
+    return _beside((PROBE,), 2, 12)
+
+
+def _beside(chosen: Iterable[str], flights: int, healthy: int) -> str:
+    """A row an aircraft; then of each surface, and of all, with 95 % limits of the shares."""
+    cells: list[Cell] = []
+    rows = []
+    for name in chosen:
+        derive_if_needed(f"jsbsim:{name}")
+        of_it = cells_of(Survey(f"jsbsim:{name}", "light", flights, healthy, FIRST), [])
+        each = [_shares([cell], False) for cell in of_it]
+        rows.append((name, *("/".join(parts) for parts in zip(*each, strict=True))))
+        cells += of_it
+    surfaces = dict.fromkeys(cell.surface for cell in cells)
+    rows += [(name, *_shares([cell for cell in cells if cell.surface == name])) for name in surfaces]
+    return markdown_table(BESIDE, [*rows, ("all", *_shares(cells))])
+
+
+def _shares(cells: list[Cell], limits: bool = True) -> list[str]:
+    """Losses; found by the test told all but the instant, by ours, theirs over its, in percent; the same at
+    the level as shipped."""
+    total, draws = counted(cells)
+    found = []
+    for told, ours in ((2, 3), (4, 5)):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share, spread = total[ours] / total[told], draws[:, ours] / draws[:, told]
+        low, high = 100.0 * np.nanpercentile(spread, PERCENT)
+        found += [f"{100.0 * total[i] / total[0]:.0f}" for i in (told, ours)]
+        found.append(f"{100.0 * share:.0f}" + (f"({low:.0f}-{high:.0f})" if limits else ""))
+    return [f"{total[0]:.0f}", *found]
 
 
 def _flown(chosen: Iterable[str], flights: int, hours: float) -> str:

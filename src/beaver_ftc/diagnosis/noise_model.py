@@ -114,7 +114,7 @@ def set_up(
     errors, dt_s, instants = Errors(config.bounds.sensors), 1.0 / rate_hz, int(fdi["config"]["instants"])
     airspeed_mps, pace = float(start[1][AIRSPEED]), pace_of(given, aircraft, dt_s)
     tests["enabled"], tests["share"] = 1, 1.0 / max(instants, 1)
-    tests["mapped"] = aircraft.file.model_error_map is not None
+    tests["mapped"] = aircraft.file.model_error_map is not None and not loses_surfaces(aircraft)
     set_up_air(air, config.bounds.turbulence, mass, aircraft)
     forces = bool(statistical["forces"]["known"])
     across = across_a_column(config, instants)
@@ -193,8 +193,12 @@ def swing_of(given: Statistical, aircraft: Aircraft) -> float:
     What it may hide is reckoned with at its own pace, whatever the drift is (`likelihood.allowance`): that
     shares out between this and chance. Where damage may take surfaces, a weak one finds most.
     """
-    lost = any(case.takes for case in aircraft.damage.values())
-    return min(SLOW_RAD_S, given.uncertainty_rad_s) if lost else given.uncertainty_rad_s
+    return min(SLOW_RAD_S, given.uncertainty_rad_s) if loses_surfaces(aircraft) else given.uncertainty_rad_s
+
+
+def loses_surfaces(aircraft: Aircraft) -> bool:
+    """Whether damage may take surfaces: what no loss explains is then likely more than a model's error."""
+    return any(case.takes for case in aircraft.damage.values())
 
 
 def _set_up_bounded(statistical: np.void, config: FdiConfig, pace: float, dt_s: float) -> None:

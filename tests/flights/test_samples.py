@@ -144,6 +144,26 @@ def test_a_log_on_one_time_base():
     np.testing.assert_array_equal(tail.signals, t_s[:, None])
 
 
+@pytest.mark.parametrize("step_s", [0.1, 0.01])
+def test_a_rate_that_is_no_number_any_more_is_unknown_and_stands_still(step_s):
+    """Averaged or as it is; a row without a number now and then is no gap."""
+    stamps_s = stamps(step_s, round(6.0 / step_s))
+    rate = np.where((stamps_s > 2.9) | (np.arange(len(stamps_s)) % 3 == 1), np.nan, np.cos(stamps_s))
+    given = recording(
+        p_rad_s=column(stamps_s, rate),
+        q_rad_s=column(stamps_s, np.cos(stamps_s)),
+        r_rad_s=column(stamps_s, np.sin(stamps_s)),
+    )
+    found = of.sample(given, WING)
+    last_s = stamps_s[np.isfinite(rate)][-1]
+    late, early = found.t_s > 3.3, (found.t_s > 0.2) & (found.t_s < 2.8)
+    assert np.isnan(found.rates[late, 0]).all()
+    assert np.isfinite(found.rates[early, 0]).mean() > 0.6
+    assert np.isfinite(found.rates[:, 1:]).all()
+    np.testing.assert_allclose(found.still_s["p_rad_s"][late], found.t_s[late] - last_s, atol=1e-9)
+    assert found.still_s["p_rad_s"][early].max() < 0.5
+
+
 def test_the_mixer_has_a_row_a_surface():
     tail = small.vehicle(small.TAIL)
     assert of.mixer(tail).tolist() == [[1.0, 0.0], [0.0, 0.8], [0.5, 0.0]]

@@ -83,6 +83,18 @@ def test_a_signal_that_stands_still_is_named_and_not_learnt_from(model):
     assert list(rows.reasons) == ["q_rad_s stands still, for longer than 1.5 s"]
 
 
+@pytest.mark.parametrize(("usual", "most"), [(0.0, 0.5), (0.25, 0.75)])
+def test_a_rate_that_never_stood_still_may_for_half_a_second(model, usual, most):
+    """A filter that follows a dead gyro for longer finds a fault of it."""
+    known = model.model_copy(
+        update={"fitted": model.fitted.model_copy(update={"still_s": {"q_rad_s": usual}})}
+    )
+    still = np.zeros(600)
+    still[300:320] = 0.1 * np.arange(20)
+    flown = small.flight(model, n=600, seed=4, still_s={"q_rad_s": still})
+    assert (diagnose(flown, known).credible == 0).tolist() == (still > most).tolist()
+
+
 def test_a_command_may_stand_still_thrice_as_long_as_it_did(model):
     trained = model.fitted.model_copy(update={"still_s": {"roll": 4.0}})
     known = model.model_copy(update={"fitted": trained})

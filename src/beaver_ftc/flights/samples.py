@@ -74,6 +74,9 @@ def sample(recording: Recording, vehicle: Vehicle) -> Samples:
     stamps = recording.columns[names[0]].t_s
     t_s, run, step = _time_base(recording.name, stamps, vehicle.rate_hz)
     found = {name: at_samples(recording.columns[name], t_s, step) for name in used}
+    for name in names:
+        values, age_s = found[name]
+        found[name] = np.where(_old(recording.columns[name], t_s, step), np.nan, values), age_s
 
     def columns(names: list[str]) -> Floats:
         return np.column_stack([found[name][0] for name in names]) if names else np.empty((len(t_s), 0))
@@ -141,9 +144,19 @@ def _remarks(recording: Recording, used: list[str], rates: list[str]) -> Iterato
 
 
 def _still(column: Column, t_s: Floats) -> Floats:
-    """For how long a column has been the same at each sample, s, its own age included."""
+    """For how long a column has been the same at each sample, s, its age included: rows without a number
+    stand still."""
+    known = np.isfinite(column.values)
+    column = replace(column, t_s=column.t_s[known], values=column.values[known])
     last = _latest(t_s, column.t_s, column.t_s)
     return np.nan_to_num(_latest(t_s, column.t_s, signals.still_s(column)) + (t_s - last))
+
+
+def _old(column: Column, t_s: Floats, step_s: float) -> NDArray[np.bool_]:
+    """Whether at each sample a gap has opened since the last number of a column."""
+    stamps = column.t_s[np.isfinite(column.values)]
+    usual_s = max(_step(stamps), step_s) if len(stamps) > 1 else step_s
+    return np.asarray(t_s - _latest(t_s, stamps, stamps) > _GAP * usual_s)
 
 
 def _clipped(rates: list[Column], t_s: Floats) -> NDArray[np.bool_]:

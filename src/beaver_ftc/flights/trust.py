@@ -257,10 +257,11 @@ def _rates(model: Model) -> list[str]:
 
 def _most_still(samples: Samples, model: Model) -> dict[str, float]:
     """For how long each column may stand still, s: a measured rate hardly, another thrice as long as in the
-    flights of the model."""
+    flights of the model; a rate of which these are known, from a third of STILL_S on."""
     known = model.fitted.still_s if model.fitted else {}
     usual = {name: 0.0 if name in _rates(model) else np.inf for name in samples.still_s} | known
-    return {name: max(STILL_S, _STILL_LONGER * usual[name]) for name in samples.still_s}
+    least = {name: STILL_S / 3.0 if name in known and name in _rates(model) else STILL_S for name in usual}
+    return {name: max(least[name], _STILL_LONGER * usual[name]) for name in samples.still_s}
 
 
 def dead(samples: Samples, model: Model) -> Mask:

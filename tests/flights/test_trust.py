@@ -9,7 +9,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights import fitting, identification, trust
 from beaver_ftc.flights.bank import adaptation_of
 from beaver_ftc.flights.diagnose import diagnose, silenced
-from beaver_ftc.flights.findings import as_text, verdict_of
+from beaver_ftc.flights.findings import as_text, statement, verdict_of
 from beaver_ftc.flights.model import Fitted
 from flights import small
 
@@ -157,6 +157,10 @@ def test_a_surface_that_never_moved_is_not_claimed(model):
     assert not (rows.faulty & (rows.named == "")).any()
     (line,) = trust.unclaimed_lines(known)
     assert line.startswith("of what right does, 100.0%")
+    with np.errstate(all="raise"):  # no median of nothing: none of its losses is asked for
+        right, left = statement(still, known)["groups"]
+    assert set(right["smallest_loss"].values()) == {None}
+    assert left["smallest_loss"]["60"] < 0.5
 
 
 def test_few_minutes_mean_wide_bounds():

@@ -222,10 +222,11 @@ def _conditional(answers: Floats, group: int) -> float:
 
 
 def _odds_against(model: Model, bank: Bank, group: int, dt_s: float) -> float:
-    """Log odds that a change to one level of this group overcomes to raise the alarm."""
-    settings = model.settings
-    share = float(np.median(bank.weight[bank.faulty(group)]))
-    change = settings.changes_per_hour * dt_s / 3600.0 * share
+    """Log odds that a change to one level of this group overcomes to raise the alarm; inf where none can."""
+    settings, shares = model.settings, bank.weight[bank.faulty(group)]
+    if not len(shares):
+        return float("inf")
+    change = settings.changes_per_hour * dt_s / 3600.0 * float(np.median(shares))
     return float(np.log(settings.alarm / (1.0 - settings.alarm)) - np.log(change))
 
 

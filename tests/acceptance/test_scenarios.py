@@ -25,9 +25,9 @@ def _verdicts(text):
 
 
 def _warnings(stderr):
-    """Its lines, but those of the first flight that uses a part of the code."""
-    first = ("beaver-ftc: compiling ", "beaver-ftc: making ready ")
-    return [line for line in stderr.splitlines() if not line.startswith(first)]
+    """Its lines, but those of the first flight that uses a part of the code, and how far a slow one is."""
+    passing = re.compile(r"beaver-ftc: (compiling|making ready) |[\w-]+: \d+%$")
+    return [line for line in stderr.splitlines() if not passing.match(line)]
 
 
 def _only_warnings(stderr, names):

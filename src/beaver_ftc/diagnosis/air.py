@@ -15,7 +15,7 @@ and a law that answers the vanes moves the surfaces along with its rotation, as 
 Velocity is followed as JSBSim moves it, by Adams and Bashforth's two steps: v' = v + dt (3 a - a_before) / 2.
 """
 
-from math import pi, sqrt
+from math import pi
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from beaver_ftc.design.model import rate_damping
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, QDYN, TABLE, evaluate, fill_table, whole_sum
 from beaver_ftc.diagnosis.bounds.declared import SCALE_M, Errors
 from beaver_ftc.diagnosis.bounds.variances import drift as gust_drift
-from beaver_ftc.diagnosis.bounds.variances import flow_noise, jitter
+from beaver_ftc.diagnosis.bounds.variances import flow_noise, jitter, length_of_gusts
 from beaver_ftc.plant.instruments import wrapped
 
 # Share of the intensity of the rolling, pitching and yawing gust that the vanes leave; on exact vanes and
@@ -251,7 +251,7 @@ def no_longer_read(air):
     air.read = 0
     if air.seen and not air.modelled:
         air.seen, air.unseen[:] = 0, 1.0
-        pitching, yawing = 2.0 * air.span / pi, 1.5 * air.span / pi  # half the lag times airspeed, m
+        pitching, yawing = 0.5 * length(air, 1), 0.5 * length(air, 2)
         for i in range(3):
             for j in range(3):
                 air.leaping[i, j] += pitching * air.per_metre[1] * together(air, air.axes, i, j, 1)
@@ -270,10 +270,13 @@ def hidden(air, g):
 def sooner(air, g):
     """How much less of the gust about axis g is slow than if it returned as late as the rolling one. What
     vanes leave of a gust that they tell returns as it likes."""
-    if g == 0 or not air.glimpsed:
-        return 1.0
-    length = (4.0 if g == 1 else 3.0) * air.span / pi
-    return (length / air.rolling) ** 2
+    return (length(air, g) / air.rolling) ** 2 if air.glimpsed else 1.0
+
+
+@kernel
+def length(air, g):
+    """Way flown within which the gust about axis g returns, m, as of `length_of_gusts`."""
+    return air.rolling if g == 0 else (4.0 if g == 1 else 3.0) * air.span / pi
 
 
 @kernel
@@ -370,7 +373,7 @@ def set_up_air(air: np.void, turbulence: str, mass: MassProperties, aircraft: Ai
     air["span"] = span_m
     air["per_metre"], air["unseen"] = gust_drift(turbulence, span_m), UNSEEN if air["seen"] else 1.0
     air["scale"] = SCALE_M
-    air["rolling"] = sqrt(air["scale"] * span_m) / 2.6  # [Yeager1998, eq. 10]
+    air["rolling"] = length_of_gusts(span_m)[0]
 
 
 def set_up_jitter(

@@ -146,17 +146,15 @@ def _remarks(recording: Recording, used: list[str], rates: list[str]) -> Iterato
 def _still(column: Column, t_s: Floats) -> Floats:
     """For how long a column has been the same at each sample, s, its age included: rows without a number
     stand still."""
-    known = np.isfinite(column.values)
-    column = replace(column, t_s=column.t_s[known], values=column.values[known])
-    last = _latest(t_s, column.t_s, column.t_s)
-    return np.nan_to_num(_latest(t_s, column.t_s, signals.still_s(column)) + (t_s - last))
+    column = _known(column)
+    return np.nan_to_num(_latest(t_s, column.t_s, signals.still_s(column)) + _age(column, t_s))
 
 
 def _old(column: Column, t_s: Floats, step_s: float) -> NDArray[np.bool_]:
     """Whether at each sample a gap has opened since the last number of a column."""
-    stamps = column.t_s[np.isfinite(column.values)]
-    usual_s = max(_step(stamps), step_s) if len(stamps) > 1 else step_s
-    return np.asarray(t_s - _latest(t_s, stamps, stamps) > _GAP * usual_s)
+    column = _known(column)
+    usual_s = max(_step(column.t_s), step_s) if len(column.t_s) > 1 else step_s
+    return np.asarray(_age(column, t_s) > _GAP * usual_s)
 
 
 def _clipped(rates: list[Column], t_s: Floats) -> NDArray[np.bool_]:
@@ -305,11 +303,21 @@ def at_samples(column: Column, t_s: Floats, step_s: float) -> tuple[Floats, floa
 
 def _held(column: Column, t_s: Floats) -> tuple[Floats, float]:
     """The last value up to each time, nan before the first; and its mean age, s."""
-    known = np.isfinite(column.values)
-    stamps = column.t_s[known]
-    age_s = t_s - _latest(t_s, stamps, stamps)
+    column = _known(column)
+    age_s = _age(column, t_s)
     age_s = age_s[np.isfinite(age_s)]
-    return _latest(t_s, stamps, column.values[known]), float(age_s.mean()) if age_s.size else float("nan")
+    return _latest(t_s, column.t_s, column.values), float(age_s.mean()) if age_s.size else float("nan")
+
+
+def _known(column: Column) -> Column:
+    """The rows of a column that have a number."""
+    known = np.isfinite(column.values)
+    return replace(column, t_s=column.t_s[known], values=column.values[known])
+
+
+def _age(column: Column, t_s: Floats) -> Floats:
+    """How old the last row of a column is at each time, s, nan before the first."""
+    return t_s - _latest(t_s, column.t_s, column.t_s)
 
 
 def _latest(t_s: Floats, stamps: Floats, values: Floats) -> Floats:
@@ -320,8 +328,8 @@ def _latest(t_s: Floats, stamps: Floats, values: Floats) -> Floats:
 
 def _averaged(column: Column, t_s: Floats, step_s: float) -> tuple[Floats, float]:
     """The mean over the interval that ends at each time, and half that interval: the delay it adds, s."""
-    known = np.isfinite(column.values)
-    stamps, total = column.t_s[known], np.concatenate([[0.0], np.cumsum(column.values[known])])
+    column = _known(column)
+    stamps, total = column.t_s, np.concatenate([[0.0], np.cumsum(column.values)])
     rounding = 1e-6 * step_s  # of stamps that are meant to fall on the edge
     end = np.searchsorted(stamps, t_s + rounding, side="right")
     start = np.searchsorted(stamps, t_s - step_s + rounding, side="right")

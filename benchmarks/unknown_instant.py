@@ -276,18 +276,26 @@ HEAD = [
 ]  # fmt: skip
 
 
+def shares_of(cells: list[Cell]) -> tuple[int, float, list[list[float]]]:
+    """Losses that count, the share that a test told the instant finds; at equal rates, then as shipped, what
+    the one told all but the instant finds, ours, ours over its, and the ends of that."""
+    total, draws = counted(cells)
+    found = []
+    for told, ours in ((2, 3), (4, 5)):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share, spread = total[ours] / total[told], draws[:, ours] / draws[:, told]
+            ends = np.nanpercentile(spread, PERCENT)
+        found.append([total[told] / total[0], total[ours] / total[0], share, *ends])
+    return int(total[0]), float(total[1] / total[0]), found
+
+
 def row_of(aircraft: str, surface: str, cells: list[Cell]) -> list[str]:
     """A row of the table."""
-    total, draws = counted(cells)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        parts = [f"{of_all:.0%}" for of_all in total[1:] / total[0]]
-        spans = [np.nanpercentile(draws[:, i + 1] / draws[:, i], PERCENT) for i in (2, 4)]
-        shares = [total[i + 1] / total[i] for i in (2, 4)]
-    said = [
-        f"{value:.0%} ({low:.0%} to {high:.0%})" for value, (low, high) in zip(shares, spans, strict=True)
-    ]
-    losses = f"{total[0]:.0f} of {sum(cell.flown for cell in cells)}"
-    return [aircraft, surface, losses, *parts[:3], said[0], *parts[3:], said[1]]
+    losses, instant, found = shares_of(cells)
+    row = [aircraft, surface, f"{losses} of {sum(cell.flown for cell in cells)}", f"{instant:.0%}"]
+    for told, ours, share, low, high in found:
+        row += [f"{told:.0%}", f"{ours:.0%}", f"{share:.0%} ({low:.0%} to {high:.0%})"]
+    return row
 
 
 def cells_of(survey: Survey, surfaces: list[str]) -> list[Cell]:

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 from benchmarks.any_aircraft import HEALTHY_S, TWELVE, row_of
-from benchmarks.unknown_instant import PERCENT, Cell, Survey, cells_of, counted
+from benchmarks.unknown_instant import Cell, Survey, cells_of, shares_of
 
 from beaver_ftc.plant.instrumented import names
 from beaver_ftc.studies.derive.derivation import derive
@@ -79,15 +79,11 @@ def _beside(chosen: Iterable[str], flights: int, healthy: int) -> str:
 def _shares(cells: list[Cell], limits: bool = True) -> list[str]:
     """Losses; found by the test told all but the instant, by ours, theirs over its, in percent; the same at
     the level as shipped."""
-    total, draws = counted(cells)
-    found = []
-    for told, ours in ((2, 3), (4, 5)):
-        with np.errstate(divide="ignore", invalid="ignore"):
-            share, spread = total[ours] / total[told], draws[:, ours] / draws[:, told]
-        low, high = 100.0 * np.nanpercentile(spread, PERCENT)
-        found += [f"{100.0 * total[i] / total[0]:.0f}" for i in (told, ours)]
-        found.append(f"{100.0 * share:.0f}" + (f"({low:.0f}-{high:.0f})" if limits else ""))
-    return [f"{total[0]:.0f}", *found]
+    losses, _, found = shares_of(cells)
+    row = [str(losses)]
+    for told, ours, share, low, high in 100.0 * np.array(found):
+        row += [f"{told:.0f}", f"{ours:.0f}", f"{share:.0f}" + (f"({low:.0f}-{high:.0f})" if limits else "")]
+    return row
 
 
 def _flown(chosen: Iterable[str], flights: int, hours: float) -> str:

@@ -170,7 +170,10 @@ MISMATCH = {
 IDENTIFY = {
     "flights__vehicle__load_vehicle": "vehicle",
     "flights__samples__load_flights": ["flight"],
-    "flights__identification__by_pressure": (["pressed"], "described"),
+    "flights__identification__by_pressure": (
+        [SimpleNamespace(name="pressed", parts=2, notes=["long"])],
+        "described",
+    ),
     "flights__identification__identify": SimpleNamespace(
         identified={"i": 1}, settings=SimpleNamespace(model_dump=lambda: {"s": 2})
     ),
@@ -183,7 +186,7 @@ IDENTIFY = {
 DIAGNOSE = {
     "flights__detectors__check_detector": None,
     "flights__model__load_model": SimpleNamespace(vehicle="vehicle", groups="groups"),
-    "flights__samples__load_flights": ["one", "two"],
+    "flights__samples__flights_of": ["one", "two"],
     "flights__findings__as_text": lambda each: each["flight"],
     "flights__detectors__diagnose_with": "rows",
     "flights__findings__verdict_of": lambda of, *_: {"flight": of},

@@ -72,7 +72,8 @@ def identify(
         "identified": model.identified,
         "settings": model.settings.model_dump(),
     }
-    answer(format, document, lambda: f"{summary(model)}\nmodel: {out}\npage: {page}")
+    long = [f"  {one.name}: {one.notes[0]}" for one in loaded if one.parts > 1]
+    answer(format, document, lambda: "\n".join([summary(model), *long, f"model: {out}", f"page: {page}"]))
 
 
 def _check(
@@ -149,13 +150,13 @@ def diagnose(options: Options) -> None:
     from beaver_ftc.flights.detectors import check_detector
     from beaver_ftc.flights.findings import as_text
     from beaver_ftc.flights.model import load_model
-    from beaver_ftc.flights.samples import load_flights
+    from beaver_ftc.flights.samples import flights_of
 
     check_detector(options.detector)
     known = load_model(options.model)
     verdicts = [
         _diagnose(flight, known, out, options.score, options.detector)
-        for flight in load_flights(flights, known.vehicle, options.reader)
+        for flight in flights_of(flights, known.vehicle, options.reader)
     ]
     answer(
         format,
@@ -186,7 +187,7 @@ def _by_aircraft(options: Options) -> None:
     from beaver_ftc.flights import certified
     from beaver_ftc.flights.by_aircraft import as_text, diagnosed, known, take
     from beaver_ftc.flights.pages import write_by_aircraft
-    from beaver_ftc.flights.samples import read_for
+    from beaver_ftc.flights.samples import parts_for
     from beaver_ftc.flights.scoring import score
     from beaver_ftc.flights.vehicle import load_vehicle
 
@@ -197,14 +198,15 @@ def _by_aircraft(options: Options) -> None:
         if options.vehicle is None and not beside.is_file():
             raise BadInput(f"{path}: no vehicle.yaml beside it, allowed: --vehicle FILE")
         described = load_vehicle(options.vehicle or str(beside))
-        taken = take(read_for(path, described, options.reader), described, by)
-        rows, verdict = diagnosed(taken, by)
-        samples, surfaces = taken.samples, by.aircraft.surfaces
-        if options.score:
-            verdict["score"] = score(samples, rows, [[name] for name in surfaces])
-        proof = partial(certified.write, taken, rows) if options.certificate else None
-        folder = write_by_aircraft(options.out, samples, surfaces, rows, verdict, proof)
-        verdicts.append(verdict | {"folder": str(folder)})
+        for recording in parts_for(path, described, options.reader):
+            taken = take(recording, described, by)
+            rows, verdict = diagnosed(taken, by)
+            samples, surfaces = taken.samples, by.aircraft.surfaces
+            if options.score:
+                verdict["score"] = score(samples, rows, [[name] for name in surfaces])
+            proof = partial(certified.write, taken, rows) if options.certificate else None
+            folder = write_by_aircraft(options.out, samples, surfaces, rows, verdict, proof)
+            verdicts.append(verdict | {"folder": str(folder)})
     answer(options.format, {"flights": verdicts}, lambda: "\n".join(map(as_text, verdicts)))
 
 

@@ -14,10 +14,10 @@ import numpy as np
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights import physics
-from beaver_ftc.flights.readers import check_exists, evident, read_flight
-from beaver_ftc.flights.readers.table import TIME, names_of, read_numbers
+from beaver_ftc.flights.readers import check_exists, evident, read_parts
+from beaver_ftc.flights.readers.table import TIME, first_of, names_of
 from beaver_ftc.flights.recording import Column, Floats, Recording, nearest_ten
-from beaver_ftc.flights.samples import Samples, read_for, sample
+from beaver_ftc.flights.samples import Samples, parts_for, sample
 from beaver_ftc.flights.units import ACCELERATION, RATE, SECONDS, UNITS, nearest_unit
 from beaver_ftc.flights.vehicle import Vehicle, further_keys
 
@@ -54,22 +54,27 @@ def check(path: Path, vehicle: Vehicle | None, reader: str | None) -> Document:
     lines: list[str] = []
     guess: Document | None = None
     if vehicle is None:
-        recording, guess = _guessed(path, reader, lines)
+        guess = _guessed(path, reader, lines)
         if guess is None:
             return {"log": str(path), "usable": False, "lines": lines, "vehicle": None}
         vehicle = Vehicle.model_validate(guess)
-    else:
-        recording = read_for(path, vehicle, reader)
+    found = [_looked_at(recording, vehicle) for recording in parts_for(path, vehicle, reader)]
+    for number, (_, of) in enumerate(found, 1):
+        lines += of if len(found) == 1 else [f"part {number} of {len(found)}: {line}" for line in of]
+    return {"log": str(path), "usable": all(fine for fine, _ in found), "lines": lines, "vehicle": guess}
+
+
+def _looked_at(recording: Recording, vehicle: Vehicle) -> tuple[bool, list[str]]:
+    """Whether a recording could be identified or diagnosed, and what is said of it."""
     try:
         samples = sample(recording, vehicle)
     except BadInput as error:
-        return {"log": str(path), "usable": False, "lines": [*lines, str(error)], "vehicle": guess}
-    lines += [_size(samples), *samples.notes, *_physics(recording, vehicle)]
+        return False, [str(error)]
     dead = [
         axis for axis, of in zip("pqr", samples.rates.T, strict=True) if np.ptp(of[np.isfinite(of)]) == 0.0
     ]
-    lines += [f"rate {axis} does not move: nothing can be identified or diagnosed" for axis in dead]
-    return {"log": str(path), "usable": not dead, "lines": lines, "vehicle": guess}
+    said = [f"rate {axis} does not move: nothing can be identified or diagnosed" for axis in dead]
+    return not dead, [_size(samples), *samples.notes, *_physics(recording, vehicle), *said]
 
 
 def _size(samples: Samples) -> str:
@@ -110,13 +115,13 @@ def _si(columns: Any, quantity: Any) -> Column:
     return replace(column, values=quantity.si(column.values))
 
 
-def _guessed(path: Path, reader: str | None, lines: list[str]) -> tuple[Recording, Document | None]:
-    """The recording, and the keys of a vehicle file for it; None where rates or commands are not found."""
+def _guessed(path: Path, reader: str | None, lines: list[str]) -> Document | None:
+    """The keys of a vehicle file for a log, by its first part; None where rates or commands are not found."""
     check_exists(path)
     kind = reader or evident(path)
     time = _time(path, lines) if kind == "table" else None
     wanted = _candidates(names_of(path)) if kind == "table" else None
-    recording = read_flight(path, kind, time, wanted)
+    recording = next(read_parts(path, kind, time, wanted))
     names = [name for name, one in recording.columns.items() if np.isfinite(one.values).any()]
     found = {what: _first(pattern, names) for what, pattern in _NAMES.items()}
     commands = _commands(names, found)
@@ -125,11 +130,12 @@ def _guessed(path: Path, reader: str | None, lines: list[str]) -> tuple[Recordin
         what = f"no column looks like the rate {missing[0]}" if missing else "no column looks like a command"
         near = nearest_ten("rate" if missing else "command", recording.columns)
         lines.append(f"{path}: {what}, allowed: a vehicle file that names it; the log has {near}")
-        return recording, None
-    return recording, _proposed(recording, kind, time, found, commands)
+        return None
+    return _proposed(path.stem, recording, kind, time, found, commands)
 
 
 def _proposed(
+    name: str,
     recording: Recording,
     kind: str,
     time: tuple[str, str] | None,
@@ -140,7 +146,7 @@ def _proposed(
     roll = columns[found["roll"]] if found["roll"] else None
     turned = _angle_unit(str(found["roll"]), roll, kind) if roll is not None else "rad"
     unit = _rate_unit(recording, [str(found[axis]) for axis in "pqr"], roll, UNITS[turned][1])
-    vehicle: Document = {"name": _plain(recording.name), "reader": kind}
+    vehicle: Document = {"name": _plain(name), "reader": kind}
     if time and time != (TIME, "s"):
         vehicle["time"] = {"column": time[0], "unit": time[1]}
     vehicle["rates"] = {axis: _column(str(found[axis]), unit, "rad/s") for axis in "pqr"}
@@ -149,11 +155,11 @@ def _proposed(
     angles = {axis: found[axis] for axis in ("roll", "pitch") if found[axis]}
     if roll is not None:
         vehicle["attitude"] = {axis: _column(str(name), turned, "rad") for axis, name in angles.items()}
-    if name := found["az"]:
-        size = float(np.nanmedian(np.abs(columns[name].values)))
+    if down := found["az"]:
+        size = float(np.nanmedian(np.abs(columns[down].values)))
         fits = nearest_unit(ACCELERATION, UNITS["g"][1] / size, 2.0) if size > 0.0 else None
         if fits:
-            vehicle["acceleration"] = _column(name, fits, "m/s2")
+            vehicle["acceleration"] = _column(down, fits, "m/s2")
     if found["airspeed"]:
         vehicle["airspeed"] = found["airspeed"]
     return vehicle
@@ -186,7 +192,7 @@ def _time(path: Path, lines: list[str]) -> tuple[str, str]:
     names = names_of(path)
     tried = [name for name in names if re.fullmatch(_NAMES["time"], name.lower())]
     for name in sorted(tried, key=lambda name: name != TIME):
-        values = read_numbers(path, [name])[name]
+        values = first_of(path, name)
         step = float(np.median(np.diff(values[np.isfinite(values)][:50]))) if len(values) > 1 else 0.0
         units = [unit for unit, size in SECONDS.items() if step > 0.0 and _fits(1.0 / (step * size))]
         if units:

@@ -11,13 +11,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights import energy, physics, signals
-from beaver_ftc.flights.readers import read_flight
+from beaver_ftc.flights.readers import read_flight, read_parts
 from beaver_ftc.flights.recording import Column, Event, Floats, Recording, nearest_ten
 from beaver_ftc.flights.units import SECONDS
 from beaver_ftc.flights.vehicle import Vehicle
@@ -27,6 +28,8 @@ _FIRST = 50
 _LARGEST, _FASTEST_RAD_S, _WILD_RAD_S = 1e6, 60.0, 3.0
 _PRESSURES = (0.1, 10.0)
 """Least and largest dynamic pressure over that at the reference, whatever the airspeed says."""
+MOST_SAMPLES, _STRETCH = 200_000, 5000
+"""Samples of a log read in parts that a fit takes at most, and how many of them in turn."""
 _GAP = 3.5
 """A step of more than this many usual steps is a gap: nothing is predicted across it."""
 
@@ -41,7 +44,8 @@ class Samples:
     reading; airspeed (n,) m/s, nan where unknown; still_s: for how long each column of rates, commands and
     signals has been the same, (n,) s; clipped (n,): whether a rate is; energy_climb (n,) m/s: rate of
     the energy height over the last seconds, None where it is not logged; colour: the moving average of the
-    noise, that rates, commands and signals are whitened by, none where empty; weight: of a sample in a fit.
+    noise, that rates, commands and signals are whitened by, none where empty; weight: of a sample in a fit;
+    parts: in how many the log was read, of which these are stretches where there are several.
     """
 
     name: str
@@ -62,6 +66,12 @@ class Samples:
     energy_climb: Floats | None = None
     colour: tuple[float, ...] = ()
     weight: float = 1.0
+    parts: int = 1
+
+
+_BY_SAMPLE = (
+    "t_s", "rates", "commands", "signals", "labels", "run", "airspeed", "clipped", "energy_climb",
+)  # fmt: skip
 
 
 def sample(recording: Recording, vehicle: Vehicle) -> Samples:
@@ -359,17 +369,77 @@ def constant_parts(values: Floats) -> list[tuple[int, int]]:
 
 def read_for(path: Path, vehicle: Vehicle, reader: str | None = None) -> Recording:
     """What a vehicle's file wants of a log. Raises BadInput with the reason where it cannot be used."""
+    return read_flight(path, *_wanted(vehicle, reader))
+
+
+def parts_for(path: Path, vehicle: Vehicle, reader: str | None = None) -> Iterator[Recording]:
+    """The same, a long table in parts."""
+    return read_parts(path, *_wanted(vehicle, reader))
+
+
+def _wanted(vehicle: Vehicle, reader: str | None) -> tuple[str | None, tuple[str, str] | None, list[str]]:
     time = (vehicle.time.column, vehicle.time.unit) if vehicle.time else None
-    return read_flight(path, reader or vehicle.reader, time, vehicle.columns())
+    return reader or vehicle.reader, time, vehicle.columns()
+
+
+def flights_of(paths: Sequence[Path], vehicle: Vehicle, reader: str | None = None) -> Iterator[Samples]:
+    """The flights, one by one, a long one in parts. Raises BadInput before the first with a line for each
+    that cannot be used."""
+    whole = [one if one.parts == 1 else None for one in load_flights(paths, vehicle, reader)]
+    for path, samples in zip(paths, whole, strict=True):
+        if samples is not None:
+            yield samples
+            continue
+        for recording in parts_for(path, vehicle, reader):
+            yield sample(recording, vehicle)
+
+
+def _flight(path: Path, vehicle: Vehicle, reader: str | None) -> Samples:
+    """A flight; of a long one stretches that are spread over it evenly."""
+    kept: list[Samples] = []
+    every, met, known_s = 1, 0, -np.inf
+    for number, recording in enumerate(parts_for(path, vehicle, reader), 1):
+        found = sample(recording, vehicle)
+        for begin in range(int(np.searchsorted(found.t_s, known_s, side="right")), len(found.t_s), _STRETCH):
+            if met % every == 0:
+                kept.append(_rows_of(found, slice(begin, begin + _STRETCH)))
+            met += 1
+        while len(kept) * _STRETCH > MOST_SAMPLES and number > 1:
+            kept, every = kept[::2], 2 * every
+        known_s = found.t_s[-1]
+    return found if number == 1 else _in_turn(path.stem, kept, number)
+
+
+def _rows_of(samples: Samples, rows: slice) -> Samples:
+    """Some of the samples, copied."""
+    cut = {name: of[rows].copy() for name in _BY_SAMPLE if (of := getattr(samples, name)) is not None}
+    still_s = {name: of[rows].copy() for name, of in samples.still_s.items()}
+    return replace(samples, stamps=cut["t_s"], still_s=still_s, **cut)
+
+
+def _in_turn(name: str, flights: list[Samples], parts: int) -> Samples:
+    """Samples one after the other, with a gap between."""
+    known = [name for name in _BY_SAMPLE if getattr(flights[0], name) is not None]
+    whole: dict[str, Any] = {name: np.concatenate([getattr(one, name) for one in flights]) for name in known}
+    begins = np.diff(whole["run"], prepend=whole["run"][0]) != 0
+    begins[np.cumsum([len(one.t_s) for one in flights])[:-1]] = True
+    whole["run"] = np.cumsum(begins)
+    still_s = {name: np.concatenate([one.still_s[name] for one in flights]) for name in flights[0].still_s}
+    many = f"a long log, read in {parts} parts: {len(begins)} samples of it, spread evenly, are looked at"
+    notes = (many, *dict.fromkeys(note for one in flights for note in one.notes))
+    return replace(
+        flights[0], name=name, notes=notes, parts=parts, stamps=whole["t_s"], still_s=still_s, **whole
+    )
 
 
 def load_flights(paths: Sequence[Path], vehicle: Vehicle, reader: str | None = None) -> list[Samples]:
-    """The flights, each on one time base. Raises BadInput with a line for each that cannot be used."""
+    """The flights, each on one time base, of a long one what a fit wants of it. Raises BadInput with a line
+    for each that cannot be used."""
     loaded: list[Samples] = []
     mistakes: list[str] = []
     for path in paths:
         try:
-            loaded.append(sample(read_for(path, vehicle, reader), vehicle))
+            loaded.append(_flight(path, vehicle, reader))
         except BadInput as error:
             mistakes.append(str(error))
     for name, count in Counter(samples.name for samples in loaded).items():

@@ -51,11 +51,12 @@ def inputs_of(aircraft: Any) -> tuple[list[str], ...]:
 
 def step_through(diagnosis: Diagnosis, inputs: Sequence[Floats], rate_hz: float) -> Stepped:
     """The verdicts of evenly spaced samples; inputs: as `inputs_of`, (n, ...) each."""
-    verdicts, frames = [], []
-    for sample in zip(*map(np.ascontiguousarray, inputs), strict=True):
+    verdicts: list[Verdict] = []
+    innovation, bound = np.empty_like(inputs[0]), np.empty_like(inputs[0])
+    expected = np.empty((*innovation.shape, inputs[2].shape[1]))
+    for k, sample in enumerate(zip(*map(np.ascontiguousarray, inputs), strict=True)):
         verdicts.append(diagnosis.step(*sample))
-        frames.append(diagnosis.surprise())
-    innovation, bound, expected = (np.array(part) for part in zip(*frames, strict=True))
+        innovation[k], bound[k], expected[k] = diagnosis.surprise()
     theta = _explaining(innovation[:, :, None], bound[:, :, None], expected)
     theta[0][0], theta[1][0] = -1.0, 0.0  # the first sample ends no frame
     reach = max(round(STANDS_S * rate_hz), 1)

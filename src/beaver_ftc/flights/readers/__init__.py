@@ -1,12 +1,15 @@
 """Readers of recorded flights, by name. A new format is one file here and one line in `READERS`."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights.recording import Recording
 
+PART_ROWS = 100_000
+"""Rows of a part of a long table."""
 READERS = ("table", "alfa", "ulog", "ardupilot")
 _BY_SUFFIX = {
     ".csv": "table", ".tsv": "table", ".txt": "table", ".parquet": "table",
@@ -30,19 +33,34 @@ def read_flight(
     columns: those that a table is read for, all where None. Raises BadInput with one line: why the log cannot
     be used.
     """
+    return next(_read(path, reader, time, {"columns": columns, "rows": None}))
+
+
+def read_parts(
+    path: Path,
+    reader: str | None = None,
+    time: tuple[str, str] | None = None,
+    columns: Collection[str] | None = None,
+) -> Iterator[Recording]:
+    """The same, a long table in parts."""
+    return _read(path, reader, time, {"columns": columns, "rows": PART_ROWS})
+
+
+def _read(
+    path: Path, reader: str | None, time: tuple[str, str] | None, of_table: dict[str, Any]
+) -> Iterator[Recording]:
     check_exists(path)
     name = reader or evident(path)
     if name not in READERS:
         raise BadInput(f"--reader {name}: is not known, allowed: {', '.join(READERS)}")
     module = import_module(f"beaver_ftc.flights.readers.{name}")
     if name == "table":
-        table: Recording = module.read(path, *(time or ()), columns=columns)
-        return table
+        yield from module.read_parts(path, *(time or ()), **of_table)
+        return
     if time is not None and time != _STAMPS[name]:
         column, unit = _STAMPS[name]
         raise BadInput(f"{path}: time: {' in '.join(time)} is not its time, allowed: {column} in {unit}")
-    recording: Recording = module.read(path)
-    return recording
+    yield module.read(path)
 
 
 def check_exists(path: Path) -> None:

@@ -1,23 +1,36 @@
 """A CSV or Parquet table with a time column `t_s`, or another: one row a sample, one column a quantity."""
 
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.flights.readers.text import Layout, layout_of, read_cells, remarks
+from beaver_ftc.flights.readers.text import (
+    Cells,
+    Layout,
+    check_broken,
+    joined,
+    layout_of,
+    read_cells,
+    remarks,
+)
 from beaver_ftc.flights.recording import Column, Floats, Recording, nearest_ten
 from beaver_ftc.flights.units import SECONDS
 
 TIME = "t_s"
 _BYTES = 8
 _MOST_ROWS, _MOST_BYTES = 10_000_000, 2_000_000_000
-"""What is read of a file at most: 2.8 h at 1000 Hz."""
+"""What is read of a file at most at once: 2.8 h at 1000 Hz."""
+_LAST, _ONCE_MORE, _BATCH_ROWS = 1.2, 0.1, 50_000
+"""So many times the rows of a part has the last at most; their share with which the next begins once more."""
 
 Table = dict[str, Floats]
+Part = tuple[Cells, list[tuple[str, str]], bool]
+"""Cells, of each column what is said of it, and whether there is more."""
 
 
 def read(
@@ -28,18 +41,43 @@ def read(
     time, unit: the column of the time and its unit, `t_s` in s where None. columns: what is read, all where
     None; the others are nan.
     """
+    return next(read_parts(path, time, unit, columns))
+
+
+def read_parts(
+    path: Path,
+    time: str | None = None,
+    unit: str = "s",
+    columns: Collection[str] | None = None,
+    rows: int | None = None,
+) -> Iterator[Recording]:
+    """The flight in a table as `read` gives it, one of more than 1.2 times so many rows in parts of so many,
+    numbered, each of which begins with the end of the one before: memory does not grow with the file."""
     name = time or TIME
-    table, notes = _read(path, None if columns is None else {name, *columns})
-    if name not in table:
+    names, found = _parts(path, None if columns is None else {name, *columns}, rows)
+    if name not in names:
         says = f"a table with {TIME} in seconds, or its `time` in the vehicle file"
-        raise BadInput(f"{path}: no column {name}, allowed: {says}; it has {nearest_ten(name, table)}")
-    t_s = table.pop(name) * SECONDS[unit]
-    kept, said = _stamped(path, name, t_s)
-    rows = slice(None) if kept is None else kept
-    t_s = t_s[rows]
-    check_time(path, t_s, name)
-    found = {key: Column(t_s, values[rows], notes.get(key, "")) for key, values in table.items()}
-    return Recording(path.stem, found, notes=(*filter(None, notes.get("", "").split("\n")), *said))
+        raise BadInput(f"{path}: no column {name}, allowed: {says}; it has {nearest_ten(name, names)}")
+    for number, (cells, said, more) in enumerate(found, 1):
+        table = _filled(names, cells)
+        notes: dict[str, str] = {}
+        for column, line in said:
+            notes[column] = f"{notes[column]}\n{line}" if column in notes else line
+        t_s = table.pop(name) * SECONDS[unit]
+        kept, lost = _stamped(path, name, t_s)
+        of = slice(None) if kept is None else kept
+        t_s = t_s[of]
+        check_time(path, t_s, name, cells.before)
+        flight = {key: Column(t_s, values[of], notes.get(key, "")) for key, values in table.items()}
+        whole = number == 1 and not more
+        told = (*filter(None, notes.get("", "").split("\n")), *lost)
+        yield Recording(path.stem if whole else f"{path.stem}-part-{number}", flight, notes=told)
+
+
+def _filled(names: Sequence[str], cells: Cells) -> Table:
+    """All columns, those that were not read nan."""
+    nothing = np.broadcast_to(np.nan, cells.rows)
+    return {name: cells.numbers.get(name, nothing) for name in names}
 
 
 def _stamped(path: Path, name: str, t_s: Floats) -> tuple[Floats | None, list[str]]:
@@ -55,13 +93,19 @@ def _stamped(path: Path, name: str, t_s: Floats) -> tuple[Floats | None, list[st
 def read_numbers(path: Path, columns: Sequence[str] | None = None) -> Table:
     """The columns of a table, or those named that it has, nan where there is no number. Raises BadInput where
     it is no table, or larger than any flight."""
-    table = _read(path, columns)[0]
+    names, parts = _parts(path, columns, None)
+    table = _filled(names, next(parts)[0])
     return {name: values for name, values in table.items() if columns is None or name in columns}
 
 
 def names_of(path: Path) -> list[str]:
     """The names of a table's columns. Raises BadInput where it is no table."""
-    return list(_read(path, [])[0]) if path.suffix.lower() == ".parquet" else list(_layout(path).names)
+    return _parts(path, [], None)[0]
+
+
+def first_of(path: Path, name: str) -> Floats:
+    """The first numbers of a column."""
+    return next(_parts(path, [name], _BATCH_ROWS)[1])[0].numbers[name]
 
 
 def _layout(path: Path) -> Layout:
@@ -72,52 +116,85 @@ def _layout(path: Path) -> Layout:
         raise BadInput(f"{path}: is no table that can be read ({says}), allowed: CSV or Parquet") from None
 
 
-def _read(path: Path, columns: Collection[str] | None) -> tuple[Table, dict[str, str]]:
-    """All columns, those not asked for nan, and of each a line on what is wrong with it."""
+@contextmanager
+def _readable(path: Path) -> Iterator[None]:
+    """Within this a table is read. Raises BadInput where it is none."""
     import pyarrow as pa
 
     try:
-        return (_parquet(path, columns), {}) if path.suffix.lower() == ".parquet" else _csv(path, columns)
+        yield
     except (pa.ArrowException, OSError, ValueError) as error:
         says = " ".join(str(error).split())[:200]
         raise BadInput(f"{path}: is no table that can be read ({says}), allowed: CSV or Parquet") from None
 
 
-def check_time(path: Path, t_s: Floats, name: str = TIME) -> None:
-    """Raise BadInput unless the stamps are finite and increase."""
+def check_time(path: Path, t_s: Floats, name: str = TIME, before: int = 0) -> None:
+    """Raise BadInput unless the stamps, of rows with so many before them, are finite and increase."""
     if len(t_s) < 2:
         raise BadInput(f"{path}: has {len(t_s)} rows, allowed: at least 2")
     wrong = np.flatnonzero(~np.isfinite(t_s) | (np.diff(t_s, prepend=-np.inf) <= 0))
     if wrong.size:
-        row = int(wrong[0]) + 1
+        row = before + int(wrong[0]) + 1
         raise BadInput(f"{path}: {name}: row {row}: time does not increase, allowed: increasing seconds")
 
 
-def _csv(path: Path, columns: Collection[str] | None) -> tuple[Table, dict[str, str]]:
-    layout, found = read_cells(path, columns, _MOST_ROWS)
-    _check_names(path, layout.names)
-    notes: dict[str, str] = {}
-    for name, says in remarks(layout, found):
-        notes[name] = f"{notes[name]}\n{says}" if name in notes else says
-    return found.numbers, notes
+def _parts(path: Path, columns: Collection[str] | None, rows: int | None) -> tuple[list[str], Iterator[Part]]:
+    """The names of a table's columns, and its parts of so many rows; the whole where None."""
+    layout = None if path.suffix.lower() == ".parquet" else _layout(path)
+    with _readable(path):
+        names, numbers = (
+            _stored(path, columns) if layout is None else (list(layout.names), list(layout.names))
+        )
+    _check_names(path, names)
+    wanted = [name for name in numbers if columns is None or name in columns]
+    blocks = _batches(path, wanted) if layout is None else read_cells(path, layout, wanted)
+    return names, _put_together(path, layout, blocks, rows)
 
 
-def _parquet(path: Path, columns: Collection[str] | None) -> Table:
-    """The columns of numbers are read, the others not even looked into: a list in a cell may be any size."""
+def _put_together(
+    path: Path, layout: Layout | None, blocks: Iterator[Cells], rows: int | None
+) -> Iterator[Part]:
+    held: list[Cells] = []
+    with _readable(path):
+        for block in blocks:
+            held.append(block)
+            many = sum(one.rows for one in held)
+            if rows is None and many > _MOST_ROWS:
+                raise BadInput(f"{path}: has more than {_MOST_ROWS:,} rows, allowed: up to {_MOST_ROWS:,}")
+            while rows is not None and many > _LAST * rows:
+                found = joined(held)
+                part, rest = found.rows_from(0, rows), found.rows_from(rows - round(_ONCE_MORE * rows))
+                part.text, part.broken = found.text, found.broken
+                held, many = [rest], rest.rows
+                yield part, list(remarks(layout, part)) if layout else [], True
+        found = joined(held)
+        if layout:
+            check_broken(path, layout, found)
+        yield found, list(remarks(layout, found)) if layout else [], False
+
+
+def _stored(path: Path, columns: Collection[str] | None) -> tuple[list[str], list[str]]:
+    """The columns of a Parquet file, and those of numbers: the others are not even looked into, a list in a
+    cell may be any size."""
     from pyarrow import parquet
 
     with parquet.ParquetFile(path) as file:
-        schema, rows = file.schema_arrow, file.metadata.num_rows
-        _check_names(path, schema.names)
-        numbers = [
-            field.name
-            for field in schema
-            if _is_number(field.type) and (columns is None or field.name in columns)
-        ]
-        _check_size(path, file.metadata, numbers)
-        table = file.read(columns=numbers)
-    nothing = np.broadcast_to(np.nan, rows)
-    return {name: _numbers(table[name]) if name in numbers else nothing for name in schema.names}
+        schema = file.schema_arrow
+        numbers = [field.name for field in schema if _is_number(field.type)]
+        _check_size(path, file.metadata, [name for name in numbers if columns is None or name in columns])
+    return list(schema.names), numbers
+
+
+def _batches(path: Path, names: Sequence[str]) -> Iterator[Cells]:
+    """The rows of a Parquet file, batch by batch, none last."""
+    from pyarrow import parquet
+
+    rows = 0
+    with parquet.ParquetFile(path) as file:
+        for batch in file.iter_batches(_BATCH_ROWS, columns=list(names)):
+            yield Cells({name: _numbers(batch[name]) for name in names}, batch.num_rows, rows)
+            rows += batch.num_rows
+    yield Cells({name: np.empty(0) for name in names}, 0, rows)
 
 
 def _check_names(path: Path, names: Sequence[str]) -> None:

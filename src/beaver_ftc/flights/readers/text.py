@@ -6,7 +6,7 @@ many cells costs itself; both are counted.
 
 import csv as lines_of
 import re
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -18,7 +18,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights.recording import Floats
 
 _DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
-_HEAD_BYTES, _HEAD_LINES, _BLOCK_BYTES = 200_000, 60, 4_000_000
+_HEAD_BYTES, _HEAD_LINES, _BLOCK_BYTES = 200_000, 60, 1_000_000
 _NUMBER = r"^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$"
 _MOST_BROKEN = 0.1
 """Share of lines with another number of cells that a table may have."""
@@ -37,11 +37,32 @@ class Layout:
 @dataclass
 class Cells:
     """What was read: numbers by column, nan where there is none; of each column its cells of text, the first
-    of them with its row; the lines left out."""
+    of them with its row; the lines left out, by their beginnings; how many rows there are, and before."""
 
     numbers: dict[str, Floats]
+    rows: int
+    before: int = 0
     text: dict[str, tuple[int, int, str]] = field(default_factory=dict)
-    broken: int = 0
+    broken: list[str] = field(default_factory=list)
+
+    def rows_from(self, first: int, end: int | None = None) -> "Cells":
+        """The rows from the first to the end, of which nothing else is said."""
+        numbers = {name: values[first:end].copy() for name, values in self.numbers.items()}
+        return Cells(numbers, len(range(self.rows)[first:end]), self.before + first)
+
+
+def joined(blocks: Sequence[Cells]) -> Cells:
+    """Blocks that follow one another as one; they are used up."""
+    first = blocks[0]
+    names = list(first.numbers)
+    numbers = {name: np.concatenate([one.numbers.pop(name) for one in blocks]) for name in names}
+    found = Cells(numbers, sum(one.rows for one in blocks), first.before)
+    for one in blocks:
+        found.broken += one.broken
+        for name, (many, row, cell) in one.text.items():
+            known = found.text.get(name, (0, row, cell))
+            found.text[name] = (known[0] + many, *known[1:])
+    return found
 
 
 def layout_of(path: Path) -> Layout:
@@ -103,14 +124,10 @@ def _instead(lines: Sequence[str]) -> str:
     return f"no line of names with a line of as many numbers below it; it begins {first[:60]!r}"
 
 
-def read_cells(path: Path, columns: Collection[str] | None, most_rows: int) -> tuple[Layout, Cells]:
-    """The numbers of a file's columns, or of those named alone. Raises BadInput where it is no table, or has
-    more rows than `most_rows`."""
+def read_cells(path: Path, layout: Layout, wanted: Sequence[str]) -> Iterator[Cells]:
+    """The numbers of some of a file's columns, block by block, one at least."""
     from pyarrow import csv
 
-    layout = layout_of(path)
-    wanted = [name for name in dict.fromkeys(layout.names) if columns is None or name in columns]
-    found = Cells({})
     broken: list[str] = []
     options = {
         "read_options": csv.ReadOptions(
@@ -119,25 +136,23 @@ def read_cells(path: Path, columns: Collection[str] | None, most_rows: int) -> t
         "parse_options": csv.ParseOptions(delimiter=layout.delimiter, invalid_row_handler=_left_out(broken)),
         "convert_options": _as_text(layout.names, wanted),
     }
-    parts: dict[str, list[Floats]] = {name: [] for name in wanted}
     rows = 0
     with csv.open_csv(path, **options) as blocks:
         for block in blocks:
-            for name in wanted:
-                parts[name].append(_numbers(block[name], layout.decimal, name, rows, found))
+            found = Cells({}, block.num_rows, rows)
+            found.numbers = {name: _numbers(block[name], layout.decimal, name, found) for name in wanted}
+            found.broken, broken[:] = broken[:], []
             rows += block.num_rows
-            if rows > most_rows:
-                raise BadInput(f"{path}: has more than {most_rows:,} rows, allowed: up to {most_rows:,}")
-    found.broken = len(broken)
-    if found.broken > _MOST_BROKEN * (rows + found.broken):
-        many = f"{found.broken} of {rows + found.broken} lines have another number of cells than the header"
-        raise _no_table(path, f"{many}, {len(layout.names)}: the first {broken[0]!r}")
-    nothing = np.broadcast_to(np.nan, rows)
-    numbers = {
-        name: np.concatenate([*parts.pop(name), np.empty(0)]) for name in wanted
-    }  # one column twice at most
-    found.numbers = {name: numbers.get(name, nothing) for name in layout.names}
-    return layout, found
+            yield found
+    yield Cells({name: np.empty(0) for name in wanted}, 0, rows, broken=broken)
+
+
+def check_broken(path: Path, layout: Layout, found: Cells) -> None:
+    """Raise BadInput where too many lines have another number of cells than the header."""
+    lost, lines = len(found.broken), found.rows + len(found.broken)
+    if lost > _MOST_BROKEN * lines:
+        many = f"{lost} of {lines} lines have another number of cells than the header"
+        raise _no_table(path, f"{many}, {len(layout.names)}: the first {found.broken[0]!r}")
 
 
 def _left_out(broken: list[str]) -> Callable[[Any], str]:
@@ -160,7 +175,7 @@ def _as_text(names: Sequence[str], wanted: Sequence[str]) -> Any:
     )
 
 
-def _numbers(cells: Any, decimal: str, name: str, before: int, found: Cells) -> Floats:
+def _numbers(cells: Any, decimal: str, name: str, found: Cells) -> Floats:
     """A block's column as numbers; text in it is counted."""
     import pyarrow as pa
     from pyarrow import compute
@@ -172,18 +187,17 @@ def _numbers(cells: Any, decimal: str, name: str, before: int, found: Cells) -> 
         numbers = compute.cast(cells, pa.float64())
     except pa.ArrowInvalid:
         fine = compute.fill_null(compute.match_substring_regex(cells, _NUMBER), True)
-        _count(name, cells, fine, before, found)
+        _count(name, cells, fine, found)
         numbers = compute.cast(compute.if_else(fine, cells, None), pa.float64())
     values = numbers.to_numpy(zero_copy_only=False)
     return np.where(np.isfinite(values), values, np.nan)
 
 
-def _count(name: str, cells: Any, fine: Any, before: int, found: Cells) -> None:
+def _count(name: str, cells: Any, fine: Any, found: Cells) -> None:
     places = np.flatnonzero(~fine.to_numpy(zero_copy_only=False))
     texts = [place for place in places.tolist() if cells[place].as_py()]
     if texts:
-        many, row, first = found.text.get(name, (0, before + texts[0] + 1, str(cells[texts[0]])))
-        found.text[name] = (many + len(texts), row, first)
+        found.text[name] = (len(texts), found.before + texts[0] + 1, str(cells[texts[0]]))
 
 
 def remarks(layout: Layout, found: Cells) -> Iterator[tuple[str, str]]:
@@ -199,4 +213,4 @@ def remarks(layout: Layout, found: Cells) -> Iterator[tuple[str, str]]:
         comma = ", with a decimal comma" if layout.decimal == "," else ""
         yield "", f"cells are parted by {_DELIMITERS[layout.delimiter]}{comma}"
     if found.broken:
-        yield "", f"lines with too few or too many cells, left out: {found.broken}"
+        yield "", f"lines with too few or too many cells, left out: {len(found.broken)}"

@@ -4,6 +4,7 @@ import os
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from itertools import count, takewhile
 from math import cos, sin
 from pathlib import Path
 
@@ -158,6 +159,8 @@ class Plant:
         self._engines_run = False
         self._run_up_for: tuple[float, ...] = ()
         self.n_engines: int = self.fdm.get_propulsion().get_num_engines()
+        tanks = (f"propulsion/tank[{i}]/contents-lbs" for i in count())
+        self.tanks_lbs = {name: self.read(name) for name in takewhile(self.has, tanks)}  # as loaded
         if self.n_engines:
             self._initialise()  # at rest: placed in flight at once, JSBSim's turboprop reads unwritten memory
 

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from beaver_ftc.studies.derive import derivation, derived
+from beaver_ftc.plant.adapter import Plant
+from beaver_ftc.studies.derive import derivation, derived, sample
 
 TRAINER = Path(__file__).parents[2] / "data" / "aircraft" / "trainer"
 ENVELOPE = "airspeed_mps: [42, 58]\nalpha_deg: [-2, 9]\naltitude_m: 1200\nsideslip_deg: 6\n"
@@ -21,6 +22,7 @@ def derive(reference, folder, envelope=None):
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(derivation, "SAMPLES", 300)
         patched.setattr(derivation, "CHECKED", 400)
+        patched.setattr(sample, "STARTS_OF_WORST", 16)
         return derivation.derive(reference, folder, envelope, told.append), told
 
 
@@ -45,6 +47,15 @@ def parts_of(found_and_told):
     assert page.replace("1.2 s", f"{found.took_s:.1f} s") == (folder / "derived.md").read_text()
     file = yaml.safe_load((folder / "aircraft.yaml").read_text())
     return {"file": file, "document": document | {"told": told}, "page": page.splitlines()}
+
+
+def test_fuel_is_what_the_model_starts_with_however_long_its_engines_have_run(stranger):
+    """As its file says: 100 lbs in each of two tanks."""
+    found, _ = stranger
+    plant = Plant(100, aircraft=found.aircraft)
+    plant.start(found.trim)
+    assert list(plant.tanks_lbs.values()) == [100.0, 100.0]
+    assert all(0.0 < plant.read(name) < 100.0 for name in plant.tanks_lbs)
 
 
 def test_what_is_derived_of_a_model(stranger, changed):

@@ -55,7 +55,8 @@ def test_states_are_within_their_box(plant, trim, changed):
     one, seen = draw(plant, trim), []
     for _ in range(200):
         started = one.start(0.5)
-        seen.append(one.state(started, 0.5, 0.35).as_dict() | {"started_mps": started.airspeed_mps})
+        there = one.state(started, one.place(one.ends(0.5, 0.35)))
+        seen.append(there.as_dict() | {"started_mps": started.airspeed_mps})
     low, high = ({name: of([state[name] for state in seen]) for name in seen[0]} for of in (min, max))
     V, alpha, beta = trim.airspeed_mps, trim.alpha_rad, trim.beta_rad
     ends = {
@@ -85,6 +86,37 @@ def test_samples_of_every_box_share_and_age(plant, trim, changed):
     fewer = sampling.sample(plant, ENVELOPE, trim, 3, 3, PROPERTIES, (0, 2), starts=8)
     assert (len(fewer), fewer.age.tolist()) == (8, [0, 0, 0, 0, 2, 2, 2, 2])
     assert plant.read("velocities/vt-fps") * 0.3048 == pytest.approx(trim.airspeed_mps)
+
+
+def test_the_largest_error_is_looked_for_at_corners_and_in_the_middle(plant, trim, monkeypatch):
+    """Of errors that a corner, or a corner and the middle, makes largest, all is found; chance finds less."""
+    monkeypatch.setattr(sampling, "STARTS_OF_WORST", 4)
+
+    def errors(samples):
+        (alpha, beta, V, _), (p, q, r), elevator = samples.y.T, samples.x.T, samples.u[:, 1]
+        corner = (2.0 + p) * (2.0 + q) * (2.0 - r) * (1.0 + alpha) * (1.0 - elevator) * V
+        return np.column_stack([corner, (1.0 - abs(beta - trim.beta_rad)) * (2.0 - q), 0.0 * V])
+
+    def worst(found):
+        widest = errors(found)[(found.box == 3) & (found.level == 3)]
+        return widest.max(axis=0) / [2.6 * 2.35 * 2.35 * 1.2 * 1.45 * 60.0, 2.35, 1.0]
+
+    region = [sampling.Region(ENVELOPE, trim)]
+    climbed = sampling.sample_all(plant, region, 60, 3, PROPERTIES, errors=errors)
+    assert worst(climbed) == pytest.approx([1.0, 1.0, 0.0])
+    assert worst(sampling.sample(plant, ENVELOPE, trim, 1200, 3, PROPERTIES))[0] < 0.8
+
+
+def test_old_aircraft_are_as_old_as_flights_come_to_be(plant, trim, monkeypatch):
+    """Of every other turn the fuel is what is left at the end of the age; of the others, of its flights."""
+    burnt_s = []
+    monkeypatch.setattr(sampling.Tanks, "fill", lambda tanks, age_s: burnt_s.append(age_s))
+    sampling.sample(plant, ENVELOPE, trim, 1, 3, PROPERTIES, (0, 1, 2), starts=24)
+    turns = np.array(burnt_s[:-1]).reshape(2, 3, 4)
+    assert (turns[1] == [[150.0], [930.0], [7230.0]]).all()
+    youngest, oldest = np.array([[0.0], [120.0], [900.0]]), turns[1]
+    assert ((turns[0] >= youngest) & (turns[0] <= oldest)).all()
+    assert burnt_s[-1] == 0.0
 
 
 def test_flights_about_trim(plant, trim, changed, monkeypatch):

@@ -19,7 +19,7 @@ class Bench:
 
     def __init__(self, flow_pps):
         self.aircraft = SimpleNamespace(engine=SimpleNamespace(settings=SETTINGS))
-        self.state = dict(FULL_LBS)
+        self.tanks_lbs, self.state = FULL_LBS, {name: 0.9 * of for name, of in FULL_LBS.items()}
         self._flow_pps, self._throttle = flow_pps, 0.0
 
     def has(self, name):

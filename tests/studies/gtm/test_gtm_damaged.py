@@ -91,7 +91,7 @@ def test_every_box_of_a_region_holds_all_its_engines_do():
     for name, setting in SPLIT.engine.settings.items():
         drawn = [state.settings[name] for state in started]
         assert (min(drawn), max(drawn)) == pytest.approx(setting.range)
-    states = [draw.state(started[0], 0.25, 1.0) for _ in range(300)]
+    states = [draw.state(started[0], draw.place(draw.ends(0.25, 1.0))) for _ in range(300)]
     assert np.ptp([state.beta_rad for state in states]) == pytest.approx(0.16)  # half of +-0.16
     assert max(state.p_rad_s for state in states) == pytest.approx(0.5 * sampling.RATES_RAD_S[0])
     assert np.ptp([state.alpha_rad for state in states]) < 0.25 * 0.1 + 1e-9

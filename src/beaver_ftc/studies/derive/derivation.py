@@ -10,6 +10,7 @@ import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from math import degrees, radians
 from pathlib import Path
 from time import perf_counter
@@ -34,6 +35,7 @@ from beaver_ftc.studies.derive.derived import Derived, page_of
 from beaver_ftc.studies.derive.fit import (
     MOST_TERMS,
     engine_signals,
+    errors_of,
     fitted,
     map_of,
     nearness,
@@ -41,6 +43,7 @@ from beaver_ftc.studies.derive.fit import (
     signals_of_use,
 )
 from beaver_ftc.studies.derive.sample import (
+    AGES_OF_WORST,
     FRESH,
     SIDESLIP_RAD,
     USUAL,
@@ -54,7 +57,7 @@ from beaver_ftc.studies.derive.sample import (
 )
 from beaver_ftc.studies.derive.thrust import LEAST_ARM_M, effectors_of, thrust_of
 
-SAMPLES, CHECKED = 6000, 16000
+SAMPLES, CHECKED = 6000, 8000
 CHECKED_OF_REGIONS = 18000
 SPAN_OF_ALPHA_RAD = 0.10
 FEWEST_TERMS = 6
@@ -286,10 +289,12 @@ def _derived(
     weight = nearness(first, len(about), moves) if len(about) > 1 else None
     data["moments"] = outline.named_as(plant.aircraft, _moments(first, data, folder, weight))
     tell("check")
-    other = sample_all(
-        plant, about, CHECKED if weight is None else CHECKED_OF_REGIONS, 2, properties, moves=moves
-    )
     aircraft = outline.aircraft_of(data, folder)
+    if weight is None:
+        errors = partial(errors_of, aircraft)
+        other = sample_all(plant, about, CHECKED, 2, properties, AGES_OF_WORST, moves, errors=errors)
+    else:
+        other = sample_all(plant, about, CHECKED_OF_REGIONS, 2, properties, moves=moves)
     data["model_error_map"], (of_fit, of_check, _) = map_of(
         aircraft, (first, other), flown, len(about), moves
     )

@@ -6,9 +6,8 @@ hold nothing of what changes by itself: beside them are states as the aircraft c
 from trim, its surfaces moved a little by sines: engines turn, the air lags, fuel burns.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -25,12 +24,16 @@ FRESH = (0,)
 SIDESLIP_RAD = 0.15  # the usual half width
 RATES_RAD_S = (0.60, 0.35, 0.35)  # half widths
 EVERY_AGE = (0, 0, 1, 0, 0, 2)
-STARTS = 48
+AGES_OF_WORST = (0, 1, 0, 2)
+STARTS, STARTS_OF_WORST = 48, 96
 AT_AN_END = 0.3  # share of the draws that are at an end of their range: corners are where errors are large
 _BANK_RAD, _CLIMB_RAD, _ALTITUDE_M, _THROTTLE = 1.0, 0.3, 600.0, 0.35  # half widths beside the envelope's
 _APART, _APART_RAD_S = 0.6, 0.8  # of engines that are effectors: their levers, and how they swing in flight
 _MOST_BURNT = 0.9  # of the fuel
 FRAMES, EVERY = 800, 4
+_ATTITUDE = ("phi_rad", "climb_rad")  # which no moment knows of
+_CLIMB_FROM, _CLIMBS = 12, 2  # states; steps from the worst of them
+_BEFORE_S = 30.0  # in which engines come to run
 _SHARE_OF_TRAVEL = 0.06
 _FREQUENCIES_HZ = (0.2, 0.5, 1.1)
 _SPEEDS = (1.0, 1.0, 0.95, 1.05, 1.0, 1.0)  # as shares of the trim's
@@ -95,6 +98,23 @@ class Samples:
         return len(self.x)
 
 
+Ends = tuple[float, float]
+Place = dict[str, float]
+
+
+def _about(middle: float, half: float) -> Ends:
+    return middle - half, middle + half
+
+
+def _towards(middle: float, ends: Ends, reach: float) -> Ends:
+    """Two ends drawn towards the middle, to that share of the way."""
+    low, high = (middle + reach * (end - middle) for end in ends)
+    return low, high
+
+
+Errors = Callable[[Samples], np.ndarray]
+
+
 class Draw:
     """Random states of an aircraft about its trim, often at the ends of their ranges."""
 
@@ -114,12 +134,11 @@ class Draw:
 
     def around(self, middle: float, half: float) -> float:
         """One number about a middle."""
-        return self.between(middle - half, middle + half)
+        return self.between(*_about(middle, half))
 
-    def share(self, middle: float, ends: tuple[float, float], reach: float) -> float:
+    def share(self, middle: float, ends: Ends, reach: float) -> float:
         """One number between two ends drawn towards the middle, to that share of the way."""
-        low, high = (middle + reach * (end - middle) for end in ends)
-        return self.between(low, high)
+        return self.between(*_towards(middle, ends, reach))
 
     def wide(self, reach: float) -> float:
         """The reach in what is alike in all boxes of a region."""
@@ -142,59 +161,127 @@ class Draw:
         altitude_m = max(self.between(*(self.envelope.altitude_m or about)), 0.0)
         return replace(trim, airspeed_mps=airspeed_mps, altitude_m=altitude_m, settings=settings)
 
-    def state(self, started: FlightState, reach: float, share: float) -> FlightState:
-        """A state with the engines as started; reach: of its box; share: of the surfaces' travel."""
-        trim, envelope = self.trim, self.envelope
-        alpha = self.share(trim.alpha_rad, envelope.alpha_rad, reach)
-        rates: dict[str, Any] = {
-            f"{axis}_rad_s": self.around(0.0, self.broad(reach) * half)
-            for axis, half in zip(AXES, RATES_RAD_S, strict=True)
-        }
+    def ends(self, reach: float, share: float) -> dict[str, Ends]:
+        """Between what a state may be placed; reach: of its box; share: of the surfaces' travel."""
+        trim, envelope, broad = self.trim, self.envelope, self.broad(reach)
+        names = [f"{axis}_rad_s" for axis in AXES]
         used = {n: share * (self.seldom[n] if share < 1.0 else 1.0) for n in self.aircraft.surfaces}
-        travel = self.aircraft.travel.items()
-        surfaces = {n: used[n] * self.between(t.min_rad, t.max_rad) for n, t in travel}
+        return {
+            "alpha_rad": _towards(trim.alpha_rad, envelope.alpha_rad, reach),
+            **{n: _about(0.0, broad * half) for n, half in zip(names, RATES_RAD_S, strict=True)},
+            **{n: (used[n] * t.min_rad, used[n] * t.max_rad) for n, t in self.aircraft.travel.items()},
+            "airspeed_mps": _towards(trim.airspeed_mps, envelope.airspeed_mps, self.wide(reach)),
+            "beta_rad": _about(trim.beta_rad, broad * envelope.beta_rad),
+            "phi_rad": _about(trim.phi_rad, _BANK_RAD),
+            "climb_rad": _about(0.0, _CLIMB_RAD),
+        }
+
+    def place(self, ends: Mapping[str, Ends]) -> Place:
+        """Somewhere between these."""
+        return {name: self.between(low, high) for name, (low, high) in ends.items()}
+
+    def state(self, started: FlightState, place: Place) -> FlightState:
+        """The aircraft there, with the engines as started."""
+        theta_rad = self.trim.theta_rad - self.trim.alpha_rad
         return FlightState(
-            self.share(trim.airspeed_mps, envelope.airspeed_mps, self.wide(reach)), started.altitude_m,
-            alpha_rad=alpha, beta_rad=self.around(trim.beta_rad, self.broad(reach) * envelope.beta_rad),
-            phi_rad=self.around(trim.phi_rad, _BANK_RAD),
-            theta_rad=trim.theta_rad - trim.alpha_rad + alpha + self.around(0.0, _CLIMB_RAD),
-            surfaces_rad=surfaces, settings=started.settings, **rates,
+            place["airspeed_mps"], started.altitude_m, alpha_rad=place["alpha_rad"],
+            beta_rad=place["beta_rad"], phi_rad=place["phi_rad"],
+            theta_rad=theta_rad + place["alpha_rad"] + place["climb_rad"],
+            p_rad_s=place["p_rad_s"], q_rad_s=place["q_rad_s"], r_rad_s=place["r_rad_s"],
+            surfaces_rad={name: place[name] for name in self.aircraft.surfaces}, settings=started.settings,
         )  # fmt: skip
+
+
+class _Standing:
+    """An aircraft for which time stands still, put from place to place; what it is there is kept as rows."""
+
+    def __init__(self, plant: Plant, draw: Draw, properties: Mapping[str, str]) -> None:
+        self.plant, self.draw, self.properties = plant, draw, properties
+        self.tanks, self.rows = Tanks(plant, draw.trim), list[tuple]()
+
+    def start(self, box: int, age: int, youngest_s: float, apart: float) -> None:
+        """Let the engines come to run somewhere in a box, in a flight of some age."""
+        draw, plant = self.draw, self.plant
+        self.tanks.fill(draw.between(youngest_s, _BEFORE_S + AGES_S[age]))
+        self.started, self.box, self.age = draw.start(REACHES[box]), box, age
+        for effector in plant.aircraft.effectors.values():
+            plant.write(effector.throttle, draw.around(0.0, REACHES[box] * apart))
+        plant.start(self.started)
+
+    def look(self, places: Sequence[Place], level: int) -> Samples:
+        """The states there, also those that are not finite."""
+        for place in places:
+            self.plant.hold(self.draw.state(self.started, place))
+            self.rows.append((*seen_at(self.plant, self.properties), self.box, level, self.age))
+        return _arrays(self.rows[-len(places) :], tuple(self.properties))
 
 
 def sample(
     plant: Plant, envelope: Envelope, trim: FlightState, n: int, seed: int, properties: Mapping[str, str],
     ages: tuple[int, ...] = EVERY_AGE, starts: int = STARTS, moves: Moves = USUAL, apart: float = _APART,
+    errors: Errors | None = None,
 ) -> Samples:  # fmt: skip
     """So many random states; properties: of each signal to be read there; ages: of the flights; starts: how
-    often the engines are started anew; apart: how far their levers are from one another, if they have any."""
-    draw, rows = Draw(seed, plant.aircraft, envelope, trim, moves), []
-    tanks = Tanks(plant, trim)
+    often the engines are started anew; apart: how far their levers are from one another, if they have any;
+    errors: of samples, (m, 3) rad/s2: if given, states where these are large are looked for as well."""
+    draw = Draw(seed, plant.aircraft, envelope, trim, moves)
+    standing = _Standing(plant, draw, properties)
     for k in range(starts):
-        box, age = k % len(REACHES), ages[(k // len(REACHES)) % len(ages)]
-        tanks.fill(draw.between(0.0, AGES_S[age]))
-        started = draw.start(REACHES[box])
-        for effector in plant.aircraft.effectors.values():
-            plant.write(effector.throttle, draw.around(0.0, REACHES[box] * apart))
-        plant.start(started)
+        box, (turn, of) = k % len(REACHES), divmod(k // len(REACHES), len(ages))
+        age = ages[of]
+        youngest_s = _BEFORE_S + AGES_S[age] if turn % 2 else AGES_S[age - 1] if age else 0.0
+        standing.start(box, age, youngest_s, apart)
+        ends = [draw.ends(REACHES[box], share) for share in moves.shares]
         for i in range(max(1, n // starts)):
             level = i % len(moves.shares)
-            plant.hold(draw.state(started, REACHES[box], moves.shares[level]))
-            rows.append((*seen_at(plant, properties), box, level, age))
-    tanks.fill(0.0)
+            standing.look([draw.place(ends[level])], level)
+        if errors is not None:
+            for level, of_share in enumerate(ends):
+                _climb(standing, of_share, level, errors)
+    standing.tanks.fill(0.0)
     _together(plant)
     plant.start(trim)
-    return as_arrays(rows, tuple(properties))
+    return as_arrays(standing.rows, tuple(properties))
+
+
+def _climb(standing: _Standing, ends: Mapping[str, Ends], level: int, errors: Errors) -> None:
+    """From the worst of some states on each axis, go where the error is larger.
+
+    Each quantity is put to its ends and its middle, the others as they are; then all together are put where
+    each alone was worst. Corners of so many quantities are too many for random states to be near all of them.
+    """
+
+    def look(places: list[Place]) -> np.ndarray:
+        return np.nan_to_num(errors(standing.look(places, level)))
+
+    moved = [name for name in ends if name not in _ATTITUDE]
+    drawn = [standing.draw.place(ends) for _ in range(_CLIMB_FROM)]
+    found = look(drawn)
+    for axis, first in enumerate(found.argmax(axis=0)):
+        place, error = drawn[first], found[first, axis]
+        for _ in range(_CLIMBS):
+            tried = [
+                (name, at) for name in moved for at in (ends[name][0], sum(ends[name]) / 2, ends[name][1])
+            ]
+            there = look([place | {name: at} for name, at in tried])[:, axis]
+            order = np.argsort(there)  # the worst last: of each name, it is the one that stays
+            together = place | {tried[k][0]: tried[k][1] for k in order if there[k] > error}
+            alone = place | dict([tried[order[-1]]])
+            of_both = look([together, alone])[:, axis]
+            if of_both.max() <= error:
+                break
+            place, error = (together, alone)[of_both.argmax()], of_both.max()
 
 
 def sample_all(
     plant: Plant, regions: Sequence[Region], n: int, seed: int, properties: Mapping[str, str],
     ages: tuple[int, ...] = EVERY_AGE, moves: Moves = USUAL, apart: float = _APART,
+    errors: Errors | None = None,
 ) -> Samples:  # fmt: skip
-    """So many random states of all regions together; boxes are numbered reach by reach; apart: as above."""
-    few, many = STARTS // len(regions), n // len(regions)
+    """So many states of all regions together; boxes are numbered reach by reach; apart, errors: as above."""
+    few, many = (STARTS_OF_WORST if errors else STARTS) // len(regions), n // len(regions)
     parts = [
-        sample(plant, of.envelope, of.trim, many, seed + 10 * k, properties, ages, few, moves, apart)
+        sample(plant, of.envelope, of.trim, many, seed + 10 * k, properties, ages, few, moves, apart, errors)
         for k, of in enumerate(regions)
     ]
     return joined([replace(of, box=len(parts) * of.box + k) for k, of in enumerate(parts)])
@@ -216,18 +303,20 @@ def _together(plant: Plant) -> None:
 
 def as_arrays(rows: list[tuple], names: tuple[str, ...]) -> Samples:
     """Rows of x, y, signals, u, rate, box, level, age as samples; without those that are not finite."""
+    samples = _arrays(rows, names)
+    return samples.at(np.isfinite(samples.rate).all(axis=1))
+
+
+def _arrays(rows: list[tuple], names: tuple[str, ...]) -> Samples:
     x, y, signals, u, rate, *indices = (np.array(column) for column in zip(*rows, strict=True))
-    named = dict(zip(names, signals.T, strict=True))
-    return Samples(x, y, named, u, rate, *indices).at(np.isfinite(rate).all(axis=1))
+    return Samples(x, y, dict(zip(names, signals.T, strict=True)), u, rate, *indices)
 
 
 class Tanks:
     """The tanks of an aircraft in trim, and what flight at full power burns of them."""
 
     def __init__(self, plant: Plant, trim: FlightState) -> None:
-        names = [f"propulsion/tank[{i}]/contents-lbs" for i in range(20)]
-        self._plant = plant
-        self.full_lbs = {name: plant.read(name) for name in names if plant.has(name)}
+        self._plant, self.full_lbs = plant, plant.tanks_lbs
         power = {name: setting.range[1] for name, setting in plant.aircraft.engine.settings.items()}
         plant.start(replace(trim, settings=power))
         flows = [f"propulsion/engine[{i}]/fuel-flow-rate-pps" for i in range(plant.n_engines)]

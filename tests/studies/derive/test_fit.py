@@ -205,6 +205,25 @@ def test_the_error_map(trainer, samples, changed):
     assert not changed({"map": told, "worst": worst})
 
 
+def test_a_moment_of_engines_that_no_held_state_shows_bounds_no_box():
+    """A turboprop's torque is 0 while time stands still; in flight a box that ended there held nobody."""
+    propeller = aircraft("engines_l", "mach")
+
+    def shown(engines_l, n, seed):
+        of = states(propeller, n=n, seed=seed, signals=("engines_l", "mach"))
+        of.signals["engines_l"][:] = engines_l
+        return moving(propeller, of, [0.0, 0.002 if engines_l else 0.0, 0.0])
+
+    held, flown = shown(0.0, 400, 1), shown(-0.002, 30, 3)
+    told, (_, of_flown) = fit.map_of(propeller, (held,), flown)
+    for box in told["boxes"]:
+        assert box["signals"]["engines_l"] == [-1.0, 1.0]
+        assert 0.1 <= box["signals"]["mach"][0] < box["signals"]["mach"][1] <= 0.5
+    assert of_flown[1] > 0.01, "flown states are in the boxes, and count"
+    seen = fit.map_of(propeller, (held, shown(-0.001, 5, 2)), flown)[0]
+    assert seen["boxes"][-1]["signals"]["engines_l"] == [-0.001, 0.0]
+
+
 @pytest.mark.parametrize(
     ("value", "down", "up"),
     [(0.0, 0.0, 0.0), (1.0, 1.0, 1.0), (123456.0, 123450.0, 123460.0), (-0.123456, -0.12346, -0.12345),

@@ -54,6 +54,7 @@ _OF_DECLARED: tuple[dict[str, int], ...] = (
 )  # fmt: skip
 EXACT_TERMS = {"Cl": "engines_l", "Cm": "engines_m", "Cn": "engines_n"}  # with 1, by their definition
 PLAIN = ("alpha_rate", "beta_rate", *EXACT_TERMS.values())
+ANY_MOMENT = 1.0  # more than engines have, as a coefficient
 MATTERS_RAD_S2 = 1e-3  # what an engine's moment must do in flight to be worth a signal
 Term = dict[str, Any]
 Candidate = tuple[dict[str, int], str | None]
@@ -296,10 +297,14 @@ def set_engines_apart(boxes: Sequence[dict[str, Any]], aircraft: Aircraft, alike
 
 
 def _ends(aircraft: Aircraft, sets: Sequence[Samples], box: int, regions: int) -> np.ndarray:
-    """The least and the greatest of every quantity in a box, (2, 7 + declared), rounded outwards."""
+    """The least and the greatest of every quantity in a box, (2, 7 + declared), rounded outwards; anything of
+    an engines' moment that no state shows: in the terms it stands by its definition alone."""
     there = [places(samples, aircraft)[within(samples, box, regions)] for samples in sets]
     inside = np.concatenate(there)
     low, high = inside.min(axis=0).tolist(), inside.max(axis=0).tolist()
+    for k, name in enumerate(aircraft.signals, start=len(low) - len(aircraft.signals)):
+        if name in EXACT_TERMS.values() and not any(of.signals[name].any() for of in sets):
+            low[k], high[k] = -ANY_MOMENT, ANY_MOMENT
     return np.array([[_rounded(v, np.floor) for v in low], [_rounded(v, np.ceil) for v in high]])
 
 

@@ -155,7 +155,10 @@ def test_an_engines_moment_that_moves_in_flight_is_a_signal(trainer, samples):
     one = fit._accelerations(samples, trainer)
     ramp = np.linspace(-0.5, 0.5, 400)
     signals = {"engines_l": 1.1e-3 / one[0] * ramp, "engines_n": 0.9e-3 / one[2] * ramp, "mach": ramp}
-    assert fit.engine_signals(replace(samples, signals=signals), trainer) == ["engines_l"]
+    flown = replace(samples, signals=signals)
+    assert fit.engine_signals(flown, flown, trainer) == ["engines_l"]
+    held = replace(samples, signals=dict.fromkeys(signals, np.zeros(400)))
+    assert fit.engine_signals(held, flown, trainer) == ["engines_l", "engines_n"], "one is nothing: all"
 
 
 def test_signals_that_nothing_wants_are_left_out(trainer, samples):

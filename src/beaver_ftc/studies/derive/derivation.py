@@ -281,7 +281,7 @@ def _derived(
     flown = joined([fly_about(plant, of.trim, 3, properties) for of in about])
     first = sample_all(plant, about, SAMPLES, 1, properties, FRESH, moves)
     if not declared:
-        wanted = engine_signals(flown, plant.aircraft)
+        wanted = engine_signals(first, flown, plant.aircraft)
         wanted += [THRUST] if plant.aircraft.effectors else []
         useful = signals_of_use(first, plant.aircraft, MAX_SIGNALS, wanted)
         data["signals"] = {name: {"property": properties[name]} for name in useful}

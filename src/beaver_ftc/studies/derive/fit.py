@@ -196,12 +196,13 @@ def fitted(
     return terms
 
 
-def engine_signals(flown: Samples, aircraft: Aircraft) -> list[str]:
+def engine_signals(held: Samples, flown: Samples, aircraft: Aircraft) -> list[str]:
     """The moments of the engines that change in flight, so that no state at which time stands still shows
-    them."""
+    them; all of them where one is nothing there: such a propeller leaps as its governor moves."""
     effects = zip(EXACT_TERMS.values(), _accelerations(flown, aircraft), strict=True)
     moves = {name: effect * np.ptp(flown.signals[name]) for name, effect in effects if name in flown.signals}
-    return [name for name, moved in moves.items() if moved > MATTERS_RAD_S2]
+    found = [name for name, moved in moves.items() if moved > MATTERS_RAD_S2]
+    return found if all(held.signals[name].any() for name in found) else list(moves)
 
 
 def signals_of_use(samples: Samples, aircraft: Aircraft, most: int, wanted: Sequence[str] = ()) -> list[str]:

@@ -27,7 +27,15 @@ from beaver_ftc.design.model import N_Y
 from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
 from beaver_ftc.documents.errors import BadInput, suggestion
 from beaver_ftc.flights.bank import bank_of
-from beaver_ftc.flights.diagnose import UNKNOWN, Rows, check_rate, diagnose, joined, silenced
+from beaver_ftc.flights.diagnose import (
+    UNKNOWN,
+    Rows,
+    check_rate,
+    diagnose,
+    healthy_residual,
+    joined,
+    silenced,
+)
 from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.recording import Floats, Recording
 from beaver_ftc.flights.regression import by_surface, group_indices, predicted
@@ -59,13 +67,12 @@ def _least_squares(samples: Samples, model: Model, forget: bool) -> Rows:
 
 def _whitened(samples: Samples, model: Model) -> tuple[Floats, Floats]:
     """Regressors (n, 3, 3 + G) of trim and lost effectiveness, and what a healthy vehicle leaves, (n, 3)."""
-    ok, unexplained, answers = predicted(samples, model)
-    intercept, _, _, noise = model.arrays()
+    ok, _, answers = predicted(samples, model)
+    noise = model.arrays()[3]
     whiten = np.linalg.inv(np.linalg.cholesky(noise))
-    rest = np.where(ok[:, None], unexplained - intercept - answers.sum(axis=1), 0.0) @ whiten.T
-    sizes = np.broadcast_to(np.diag(np.sqrt(np.diag(noise))), (len(rest), 3, 3))
+    sizes = np.broadcast_to(np.diag(np.sqrt(np.diag(noise))), (len(ok), 3, 3))
     x = np.where(ok[:, None, None], np.concatenate([sizes, answers.transpose(0, 2, 1)], axis=2), 0.0)
-    return np.einsum("ab,nbi->nai", whiten, x), rest
+    return np.einsum("ab,nbi->nai", whiten, x), healthy_residual(samples, model)
 
 
 def _remembered(values: Floats, dt_s: float, forget: bool) -> Floats:

@@ -17,12 +17,13 @@ from beaver_ftc.flights.bank import Bank, bank_of
 from beaver_ftc.flights.filtering import accumulated, evidence, posterior_of
 from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.recording import TINY, Floats
-from beaver_ftc.flights.regression import by_surface
+from beaver_ftc.flights.regression import by_surface, predicted
 from beaver_ftc.flights.samples import Samples
 
 _RATE_TOLERANCE = 0.25
 UNKNOWN = "unknown"
 _NAMED = 0.5
+_LATELY_S = 1.0
 _IDLE = 0.5
 """Probability that nothing answers the commands above which nothing is said of any surface."""
 
@@ -86,9 +87,13 @@ def diagnose(samples: Samples, model: Model) -> Rows:
     """The diagnosis of each sample. Raises BadInput where the log's rate or unit is not the model's."""
     check_rate(samples, model)
     bank = bank_of(model)
-    posterior, _, scale = posterior_of(trust.without_dead(samples, model), model, bank)
+    lived = trust.without_dead(samples, model)
+    posterior, _, scale = posterior_of(lived, model, bank)
     still = posterior[:, bank.idle] > _IDLE
-    return silenced(samples, model, rows_of(samples, model, bank, posterior), scale, still)
+    rows = rows_of(samples, model, bank, posterior)
+    if model.vehicle.other_laws and model.settings.threshold is not None and not model.colours:
+        rows = _along(lived, model, rows, model.settings.threshold)
+    return silenced(samples, model, rows, scale, still)
 
 
 def silenced(
@@ -123,6 +128,36 @@ def _without_power(samples: Samples, model: Model, rows: Rows) -> Rows:
     climb = samples.energy_climb
     named = energy.renamed(rows.t_s, rows.faulty, rows.named, climb, lowest, rows.since_s)
     return replace(rows.unbounded(named != rows.named), named=named)
+
+
+def _along(samples: Samples, model: Model, rows: Rows, asked: float) -> Rows:
+    """Rows that name no group where what the last second left unexplained lies along another.
+
+    Whatever a surface at fault does, be it stuck, biased or swinging, it does along the rates that it turns
+    when it is healthy: a name is taken back where another direction, whatever the course of time along it,
+    explains as much more as is asked. Not in moving air: gusts have directions, too.
+    """
+    rest = healthy_residual(samples, model)
+    _, _, response, noise = model.arrays()
+    turned = np.linalg.solve(np.linalg.cholesky(noise), response.sum(axis=1).T)
+    size = np.linalg.norm(turned, axis=0)
+    along = (rest @ (turned / np.maximum(size, TINY))) ** 2
+    total = np.cumsum(along, axis=0)
+    begin = np.maximum(np.arange(len(total)) - round(_LATELY_S * model.rate_hz), 0)
+    explained = 0.5 * model.settings.power * (total - total[begin])
+    best, gone = explained.max(axis=1), np.zeros(len(rest), dtype=bool)
+    for g, group in enumerate(model.groups):
+        gone |= _of(rows.named, set(group)) & (best - explained[:, g] > asked)
+    return replace(rows.unbounded(gone), named=np.where(gone, UNKNOWN, rows.named))
+
+
+def healthy_residual(samples: Samples, model: Model) -> Floats:
+    """What a healthy vehicle leaves unexplained, in standard deviations of the noise, (n, 3); 0 where
+    nothing can be predicted."""
+    ok, unexplained, answers = predicted(samples, model)
+    intercept, _, _, noise = model.arrays()
+    rest = np.where(ok[:, None], unexplained - intercept - answers.sum(axis=1), 0.0)
+    return np.asarray(rest @ np.linalg.inv(np.linalg.cholesky(noise)).T)
 
 
 def _of(named: NDArray[np.object_], unclaimed: set[str]) -> NDArray[np.bool_]:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beaver_ftc.flights.bank import adaptation_of, bank_of
+from beaver_ftc.flights.bank import Noise, adaptation_of, bank_of
 from beaver_ftc.flights.filtering import _later, _update, _weights, posterior_of
 from beaver_ftc.flights.samples import load_flights
 from flights import synthetic
@@ -134,6 +134,7 @@ def test_a_covariance_stays_symmetric_to_the_bit():
     root, seen, noise = rng.standard_normal((5, 5)), rng.standard_normal((5, 3)), np.diag([0.2, 0.3, 0.1])
     p = root @ root.T + 0.1 * np.eye(5)
     expected = np.linalg.inv(np.linalg.inv(p) + seen @ np.linalg.inv(noise) @ seen.T)
-    _update(np.zeros(5), p, np.zeros(3), seen, noise, 1e9)
+    normal = Noise(np.zeros(3), noise, 1.0, 1e9, 1.0, 1.0, 1.0, np.inf)
+    _update(np.zeros(5), p, np.zeros(3), seen, noise, normal)
     assert (p == p.T).all()
     assert p == pytest.approx(expected, rel=1e-9)

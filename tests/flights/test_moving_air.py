@@ -3,11 +3,14 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 import small
 
 from beaver_ftc.flights import diagnose, fitting, identification
-from beaver_ftc.flights.bank import bank_of
-from beaver_ftc.flights.filtering import posterior_of
+from beaver_ftc.flights.bank import bank_of, noise_of
+from beaver_ftc.flights.filtering import _update, posterior_of
+from beaver_ftc.flights.model import Colour
+from beaver_ftc.flights.regression import in_white, predicted
 from beaver_ftc.flights.samples import whitened
 
 AVERAGE = (1.0, -1.4, 0.49)
@@ -94,3 +97,54 @@ def test_bounds_lean_on_no_prior_where_laws_differ():
     plain = small.model()
     rows = diagnose.rows_of(samples, plain, bank_of(plain), np.tile(bank_of(plain).start, (50, 1)))
     assert (rows.low > 0.9).all()
+
+
+def test_what_those_before_foretell_of_a_residual_is_found():
+    """Drawn: e[k] = 0.8 e[k-1] + w[k]. The noise left is that of w; too few tell nothing."""
+    rng, size = np.random.default_rng(3), np.array([0.1, 0.2, 0.05])
+    e = np.zeros((20_000, 3))
+    w = size * rng.standard_normal(e.shape)
+    for k in range(1, len(e)):
+        e[k] = 0.8 * e[k - 1] + w[k]
+    rows = np.concatenate([np.arange(9_000), np.arange(9_500, 20_500)])
+    found = fitting._foretelling([1.0], [(rows, e)])
+    before = np.reshape(found.before, (-1, 3, 3))
+    np.testing.assert_allclose(before[0], 0.8 * np.eye(3), atol=0.1)
+    np.testing.assert_allclose(np.diag(found.noise), size**2, rtol=0.05)
+    np.testing.assert_allclose(before[1:].sum(axis=0), 0.0, atol=0.15)
+    few = fitting._foretelling([1.0], [(np.arange(100), e[:100])])
+    assert few.before == []
+    np.testing.assert_allclose(few.noise, np.cov(e[:100].T))
+
+
+def in_colour(before):
+    """A model that has heard one colour, and a flight of it."""
+    plain = small.model()
+    colour = Colour(average=[1.0], noise=plain.noise, before=np.reshape(before, (-1, 3)).tolist())
+    model = plain.model_copy(update={"colours": [colour]})
+    return model, replace(small.flight(model, 60), colour=(1.0,))
+
+
+def test_answers_and_constant_are_whitened_as_the_residual_is():
+    """Of a steady flight by hand: what is foretold of a constant is its share; without a past nothing is."""
+    by = np.diag([0.5, 0.2, 0.0])
+    model, flight = in_colour([by, 0.1 * np.eye(3)])
+    ok, left, answers = in_white(flight, model)
+    known, plain, heard = predicted(flight, model)
+    np.testing.assert_allclose(left[7], plain[7] - plain[6] @ by - 0.1 * plain[5])
+    np.testing.assert_allclose(answers[7], heard[7] - heard[6] @ by - 0.1 * heard[5])
+    assert ok.sum() == known.sum() - 2
+    np.testing.assert_allclose(model.constant((1.0,)), np.array(model.intercept) * [0.4, 0.7, 0.9])
+    np.testing.assert_array_equal(model.constant(()), model.intercept)
+
+
+@pytest.mark.parametrize(("size", "learns"), [(3.0, True), (50.0, False)])
+def test_a_sample_that_nothing_explains_teaches_nothing(size, learns):
+    """As just after a fault, which is whitened as if it had been there before."""
+    model, _ = in_colour([0.5 * np.eye(3)])
+    noise = noise_of(model, (1.0,))
+    m, p = np.zeros(3), 0.01 * noise.covariance
+    y = size * np.sqrt(np.diag(noise.covariance)) * [1.0, 0.0, 0.0]
+    _update(m, p, y, np.eye(3), noise.covariance, noise)
+    assert (m[0] > 0.0) == learns
+    assert noise_of(model).farthest == np.inf

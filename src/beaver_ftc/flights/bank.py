@@ -11,6 +11,7 @@ about what it was when the model was identified. A group's own gain that the fit
 to a step between levels is free by as much: few minutes mean wide bounds.
 """
 
+from collections.abc import Sequence
 from itertools import combinations, product
 from typing import NamedTuple
 
@@ -27,6 +28,8 @@ _IDLE_SHARE = 0.02
 _PAIR_LEVELS = (0.25, 0.5, 0.75)
 _HEALTHY_AT_FIRST, _IDLE_AT_FIRST = 0.7, 0.2
 _LEAST_SCALE, _LARGEST_SCALE = 0.3, 6.0
+_FARTHEST = 30.0
+"""Of a whitened flight: a fault is not whitened by what was before it, for a fraction of a second."""
 
 
 Hypothesis = tuple[Floats, int, float, Floats]  # a row of Bank: effectiveness, kind, weight, offset
@@ -184,7 +187,8 @@ class Noise(NamedTuple):
 
     constant (3,) of the model, rad/s; covariance (3, 3) of a sample, (rad/s)2; power: share of a white
     residual's information in this one; tail: degrees of freedom of its t distribution; memory in samples, and
-    least and largest value, of the running scale of the covariance.
+    least and largest value, of the running scale of the covariance; farthest: square of a residual from
+    which on a sample tells nothing more.
     """
 
     constant: Floats
@@ -194,11 +198,14 @@ class Noise(NamedTuple):
     memory: float
     least: float
     largest: float
+    farthest: float
 
 
-def noise_of(model: Model) -> Noise:
-    """The noise that a model's settings say."""
-    settings = model.settings
-    constant, _, _, covariance = model.arrays()
+def noise_of(model: Model, colour: Sequence[float] = ()) -> Noise:
+    """The noise that a model's settings say, of a colour."""
+    settings, farthest = model.settings, _FARTHEST if len(model.foretold(colour)) else np.inf
     memory = settings.noise_memory_s * model.rate_hz
-    return Noise(constant, covariance, settings.power, settings.tail, memory, _LEAST_SCALE, _LARGEST_SCALE)
+    return Noise(
+        model.constant(colour), model.arrays()[3], settings.power, settings.tail, memory,
+        _LEAST_SCALE, _LARGEST_SCALE, farthest,
+    )  # fmt: skip

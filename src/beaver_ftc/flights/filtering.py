@@ -23,7 +23,7 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.flights.bank import Bank, adaptation_of, noise_of
 from beaver_ftc.flights.model import Colour, Model
 from beaver_ftc.flights.recording import Floats
-from beaver_ftc.flights.regression import predicted
+from beaver_ftc.flights.regression import in_white
 from beaver_ftc.flights.samples import Samples, whitened
 
 _DELAY_MEMORY_S = 600.0
@@ -57,8 +57,8 @@ def posterior_of(samples: Samples, model: Model, bank: Bank) -> tuple[Floats, Fl
 def _likelihood(flight: Samples, model: Model, of: Colour) -> Floats:
     """Log likelihood of a colour at each sample of a flight that is whitened by it, all in health, (n,): by
     its noise as it was, not as much wider as gains differ. Filtering made a sample C(1) times as large."""
-    ok, unexplained, answers = predicted(flight, model)
-    e = np.nan_to_num(unexplained - answers.sum(axis=1) - np.array(model.intercept))
+    ok, unexplained, answers = in_white(flight, model)
+    e = np.nan_to_num(unexplained - answers.sum(axis=1) - model.constant(of.average))
     square = np.einsum("na,ab,nb->n", e, np.linalg.inv(of.noise), e)
     dof, size = model.settings.tail, np.linalg.slogdet(of.noise)[1]
     found = -0.5 * ((dof + 3.0) * np.log1p(square / dof) + size) + 3.0 * np.log(sum(of.average))
@@ -109,10 +109,10 @@ def _weights(evidence: list[Floats], rate_hz: float) -> Floats:
 
 def _filtered(samples: Samples, model: Model, bank: Bank) -> tuple[Floats, Floats, Floats, Floats]:
     """As the kernel gives it."""
-    ok, *parts = predicted(samples, model)
+    ok, *parts = in_white(samples, model)
     unexplained, answers = (np.ascontiguousarray(np.nan_to_num(part)) for part in parts)
     found: tuple[Floats, Floats, Floats, Floats] = run_bank(
-        unexplained, answers, ok, bank, adaptation_of(model), noise_of(model)
+        unexplained, answers, ok, bank, adaptation_of(model), noise_of(model, samples.colour)
     )
     return found
 
@@ -220,10 +220,11 @@ def _correct(prior, m, p, y, f, bank, noise, scale):
     for h in range(hypotheses):
         seen = _seen(bank.effectiveness[h], bank.own[h], f, noise.constant, states)
         if h == hypotheses - 1:
-            squares[h], log_det = _update(nothing, certain, y, seen, covariance, dof)
+            squares[h], log_det = _update(nothing, certain, y, seen, covariance, noise)
         else:
-            squares[h], log_det = _update(m[h], p[h], y, seen, covariance, dof)
-        log[h] = noise.power * (-0.5 * (dof + 3.0) * np.log(1.0 + squares[h] / dof) - 0.5 * log_det)
+            squares[h], log_det = _update(m[h], p[h], y, seen, covariance, noise)
+        square = min(squares[h], noise.farthest)
+        log[h] = noise.power * (-0.5 * (dof + 3.0) * np.log(1.0 + square / dof) - 0.5 * log_det)
     most = log.max()
     mu = np.maximum(prior * np.exp(log - most), _FLOOR)
     total = mu.sum()
@@ -255,15 +256,15 @@ def _bound(m, low, high):
 
 
 @kernel
-def _update(m, p, y, seen, noise, dof):
+def _update(m, p, y, seen, covariance, noise):
     """Correct one Gaussian (m (N,), p (N, N), replaced) by y (3,) = seen' m + noise, seen (N, 3).
 
     Returns the square of the residual in its own covariance, and the log determinant of that. A residual far
-    out in the tail of the t distribution counts less.
+    out in the tail of the t distribution counts less, and one that is too far nothing.
     """
-    states = len(m)
+    states, dof = len(m), noise.tail
     cross = np.zeros((states, 3))
-    s = noise.copy()
+    s = covariance.copy()
     v = y.copy()
     for i in range(states):
         for j in range(3):
@@ -282,7 +283,7 @@ def _update(m, p, y, seen, noise, dof):
             square += v[j] * inverse[j, k] * v[k]
             for i in range(states):
                 gain[i, j] += cross[i, k] * inverse[k, j]
-    gain *= min(1.0, (dof + 3.0) / (dof + square))
+    gain *= min(1.0, (dof + 3.0) / (dof + square)) if square < noise.farthest else 0.0
     for j in range(3):
         for i in range(states):
             m[i] += gain[i, j] * v[j]

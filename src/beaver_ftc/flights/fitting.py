@@ -63,10 +63,11 @@ _OTHER_LAWS: dict[str, Any] = {
 """How far each group's gain wanders under a law and air that the fit has not seen (a law that answers what is
 not modelled ties the command to it), and what a name asks for then. Chosen on simulated flights
 (`own_logs.py`, seeds 1 to 6)."""
-_MOVING_AIR: dict[str, Any] = {"own_gain_sd": 0.08, "own_gain_time_s": 100.0}
-_POWER_MOVING_AIR, _WINDOW_S = 0.6, 10.0
-"""Whitened by the flight's own colour, whose width is measured, a sample tells more, and gains differ by
-flight rather than within it: chosen on seeds 11 and 12 in light turbulence."""
+_MOVING_AIR: dict[str, Any] = {"own_gain_sd": 0.08, "own_gain_time_s": 100.0, "name_evidence": 4.0}
+_POWER_MOVING_AIR, _WINDOW_S, _FORETOLD = 0.8, 10.0, 20
+"""Whitened by the flight's own colour and by what so many samples before foretell, a sample tells more, and
+gains differ by flight rather than within it: chosen on seeds 11 and 12, the power on 31, 33 and 35, in light
+turbulence; what a name asks for on a pa28, seed 11 (at half of it one wrong name, none of 336 Beavers)."""
 _POWER_OTHER_LAWS, _THEORIES = 0.4, 2.0
 """A law may feed a gyro's noise to the surfaces, which doubles the residual of one that does not: a sample
 then tells less than the fit knows. And so many times the evidence of theory raises an alarm. Chosen in the
@@ -241,9 +242,25 @@ def _colours(stretches: Sequence[Stretch], model: Model) -> list[Colour]:
     """The colours that flights are whitened by, with the noise of each."""
     found = []
     for colour in sorted({one.samples.colour for one in stretches} - {()}):
-        alike = [residuals(model, one)[1] for one in stretches if one.samples.colour == colour]
-        found.append(Colour(average=list(colour), noise=np.cov(np.vstack(alike).T).tolist()))
+        alike = [residuals(model, one) for one in stretches if one.samples.colour == colour]
+        found.append(_foretelling(list(colour), alike))
     return found
+
+
+def _foretelling(average: list[float], residual: Sequence[tuple[NDArray[np.int64], Floats]]) -> Colour:
+    """A colour with what those before foretell of a residual, by least squares where they follow one another,
+    and the noise that is left; nothing is foretold where too few do."""
+    parts = [e[begin:end] for rows, e in residual for begin, end in _runs(rows)]
+    ends = [part[_FORETOLD:] for part in parts]
+    if sum(map(len, ends)) < 10 * 3 * _FORETOLD:
+        return Colour(average=average, noise=np.cov(np.vstack(parts).T).tolist())
+    x = np.vstack([
+        np.hstack([part[_FORETOLD - j : len(part) - j] for j in range(1, _FORETOLD + 1)])
+        for part in parts if len(part) > _FORETOLD
+    ])  # fmt: skip
+    y = np.vstack(ends)
+    by = np.linalg.lstsq(x, y, rcond=None)[0]
+    return Colour(average=average, before=by.tolist(), noise=np.cov((y - x @ by).T).tolist())
 
 
 def prior(stretches: Sequence[Stretch], model: Model) -> Settings:
@@ -293,45 +310,57 @@ def dispersion(stretches: Sequence[Stretch], model: Model) -> float:
     whole = [(stretch.samples, stretch.use) for stretch in stretches]
     squares = number = float(len(model.groups))
     for tested, kept in _left_out(stretches, model, trust.tied(whole, model).tolist()):
-        told, free = np.array(trust.claimed(tested)), adaptation_of(tested).covariance[3:, 3:]
-        between = free[0, 0] + np.diag(np.diag(free)[1:][told])
+        told = np.array(trust.claimed(tested))
         for one in kept:
             x, e = _answers(tested, one)
-            information, score = x[:, told].T @ x[:, told], x[:, told].T @ e
-            gains = np.linalg.lstsq(information, score, rcond=_ALIKE)[0]
-            squares += float(score @ np.linalg.solve(np.eye(len(gains)) + between @ information, gains))
-            number += np.linalg.matrix_rank(information, tol=_ALIKE * np.trace(information))
+            x = x.sum(axis=3)[:, :, told].reshape(e.size, -1)
+            farther, rank = _farther(x, e.ravel(), _between(tested, told))
+            squares, number = squares + farther, number + rank
     return squares / number
 
 
 def _widened(stretches: Sequence[Stretch], model: Model) -> Model:
-    """The model with the noise of each colour so many times wider as the gains of ten seconds left out are
-    farther from 1, in squares, than it lets them be: quiet gyros show what the model itself lacks."""
+    """The model with the noise of each colour so many times wider as the gains of ten seconds left out, each
+    axis of an answer with its own, are farther from 1, in squares, than it and the filter let them be: quiet
+    gyros show what the model itself lacks."""
     whole = [(stretch.samples, stretch.use) for stretch in stretches]
     found: dict[tuple[float, ...], list[float]] = {}
     for tested, kept in _left_out(stretches, model, trust.tied(whole, model).tolist()):
         told = np.array(trust.claimed(tested))
+        between: Floats = np.asarray(np.kron(_between(tested, told), np.ones((3, 3))), dtype=float)
         for one in kept:
             x, e = _answers(tested, one)
-            count = max(round(len(e) / 3 * one.samples.dt_s / _WINDOW_S), 1)
-            for part in np.array_split(np.arange(len(e) // 3), count):
-                rows = (3 * part[:, None] + np.arange(3)).ravel()
-                f, left = x[rows][:, told].reshape(-1, 3, told.sum()), e[rows].reshape(-1, 3)
-                f, left = (f - f.mean(axis=0)).reshape(len(rows), -1), (left - left.mean(axis=0)).ravel()
-                gains = np.linalg.lstsq(f, left, rcond=_ALIKE)[0]
-                found.setdefault(one.samples.colour, []).append(float(left @ f @ gains) / len(gains))
+            x = x[:, :, told].reshape(*e.shape, -1)
+            count = max(round(len(e) * one.samples.dt_s / _WINDOW_S), 1)
+            for part in np.array_split(np.arange(len(e)), count):
+                f, left = x[part] - x[part].mean(axis=0), e[part] - e[part].mean(axis=0)
+                squares, rank = _farther(f.reshape(left.size, -1), left.ravel(), between)
+                found.setdefault(one.samples.colour, []).append(squares / max(rank, 1))
     return _with_wider(model, {colour: max(float(np.mean(ratio)), 1.0) for colour, ratio in found.items()})
 
 
+def _between(model: Model, told: NDArray[np.bool_]) -> Floats:
+    """Covariance of the gains of groups told that the filter leaves free."""
+    free = adaptation_of(model).covariance[3:, 3:]
+    return np.asarray(free[0, 0] + np.diag(np.diag(free)[1:][told]))
+
+
+def _farther(x: Floats, e: Floats, between: Floats) -> tuple[float, int]:
+    """Squares of the gains of residuals e (m,) on answers x (m, G), in their covariance and what lies between
+    flights, and how many gains there are."""
+    information, score = x.T @ x, x.T @ e
+    gains = np.linalg.lstsq(information, score, rcond=_ALIKE)[0]
+    squares = float(score @ np.linalg.solve(np.eye(len(gains)) + between @ information, gains))
+    return squares, int(np.linalg.matrix_rank(information, tol=_ALIKE * np.trace(information)))
+
+
 def _answers(model: Model, kept: Stretch) -> tuple[Floats, Floats]:
-    """Each group's answers (3 n, G) and the residuals (3 n,) of a part in sd of the noise, without means."""
-    rows, residual = residuals(model, kept)
-    _, _, answers = regression.predicted(kept.samples, model, scaled=True)
-    noise = model.heard(kept.samples.colour).noise
-    whiten = np.linalg.inv(np.linalg.cholesky(np.array(noise))).T
-    x, e = answers[rows] @ whiten, residual @ whiten
-    x, e = x - x.mean(axis=0), e - e.mean(axis=0)
-    return x.transpose(0, 2, 1).reshape(-1, len(model.groups)), e.ravel()
+    """What each axis of each group's answer does to the residuals (n, 3) of a part, (n, 3, G, 3), both in sd
+    of the noise, without means."""
+    _, residual, answers = left_white(model, kept)
+    whiten = np.linalg.inv(np.linalg.cholesky(np.array(model.heard(kept.samples.colour).noise))).T
+    x, e = np.einsum("nga,ab->nbga", answers, whiten), residual @ whiten
+    return x - x.mean(axis=0), e - e.mean(axis=0)
 
 
 def _drift(stretches: Sequence[Stretch], model: Model) -> list[float]:
@@ -344,7 +373,7 @@ def _drift(stretches: Sequence[Stretch], model: Model) -> list[float]:
     for fitted, kept in _parts(stretches):
         like = fit_like(fitted, model)
         for one in kept:
-            rows, residual = residuals(like, one)
+            rows, residual, _ = left_white(like, one)
             noise = np.array(like.heard(one.samples.colour).noise)
             white = residual / np.sqrt(np.maximum(np.diag(noise), TINY))
             for begin, end in _runs(rows):
@@ -538,6 +567,15 @@ def prediction(model: Model, kept: Stretch) -> Document:
         "explained": dict(zip("pqr", explained.tolist(), strict=True)),
         "residual_rad_s": dict(zip("pqr", residual.std(axis=0).tolist(), strict=True)),
     }
+
+
+def left_white(model: Model, kept: Stretch) -> tuple[NDArray[np.int64], Floats, Floats]:
+    """Places (n,) of the samples in use, what residual (n, 3) those before do not foretell, and answers
+    (n, G, 3) as they show in it."""
+    ok, unexplained, answers = regression.in_white(kept.samples, model, scaled=True)
+    rows = np.flatnonzero(kept.use & ok)
+    constant = model.constant(kept.samples.colour)
+    return rows, (unexplained - answers.sum(axis=1) - constant)[rows], answers[rows]
 
 
 def residuals(model: Model, kept: Stretch) -> tuple[NDArray[np.int64], Floats]:

@@ -30,7 +30,7 @@ _MOST_WINDOWS = 400
 _POWERS = (0.0, 1.0, 3.0)
 _TURNS = 8
 _COLOURS = (
-    (1.0,), (1.0, 0.5), (1.0, 0.95),
+    (1.0,), (1.0, 0.5),
     *((1.0, -2.0 * c, c**2) for c in (0.2, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85, 0.9)),
 )  # fmt: skip
 """Moving averages of the noise: gusts held within a sample add to the next, gyros' noise takes from it."""

@@ -85,6 +85,9 @@ class Colour(Section):
 
     average: Row = Field(min_length=1, description="1, c1, ...: its moving average, newest first")
     noise: Matrix = Field(description="covariance of the residual whitened by that, (3, 3), (rad/s)2")
+    before: Matrix = Field(
+        default=[], description="what so many residuals before foretell of the next, latest first, (3 L, 3)"
+    )
     wider: Number = Field(1.0, ge=1, description="how many times as far, in squares, gains left out differ")
 
 
@@ -119,6 +122,16 @@ class Model(Section):
         """The model with the noise of a colour that it has seen, as much wider as parts left out say."""
         known = [one.wider * np.array(one.noise) for one in self.colours if one.average == list(colour)]
         return self.model_copy(update={"noise": known[0].tolist()}) if known else self
+
+    def foretold(self, colour: Sequence[float]) -> Floats:
+        """What the residuals before one foretell of it in the noise of a colour, (L, 3, 3)."""
+        known = [one.before for one in self.colours if one.average == list(colour)]
+        return np.reshape(np.array(known[0] if known else []), (-1, 3, 3))
+
+    def constant(self, colour: Sequence[float]) -> Floats:
+        """What of the constant is not foretold in a colour, (3,)."""
+        constant = np.array(self.intercept)
+        return np.asarray(constant - constant @ self.foretold(colour).sum(axis=0))
 
     def arrays(self) -> tuple[Floats, Floats, Floats, Floats]:
         """intercept (3,), past (m, 3), response (G, L, 3) and noise (3, 3) as arrays."""

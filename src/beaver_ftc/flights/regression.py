@@ -95,6 +95,20 @@ def predicted(
     return ok, unexplained, np.einsum("ngl,glr->ngr", commands, response)
 
 
+def in_white(
+    samples: Samples, model: Model, scaled: bool = False
+) -> tuple[NDArray[np.bool_], Floats, Floats]:
+    """As `predicted`, less what the residuals before each sample foretell of it in the colour of the flight:
+    what is then left of health is white."""
+    ok, unexplained, answers = predicted(samples, model, scaled)
+    rest, seen, known = unexplained.copy(), answers.copy(), ok.copy()
+    for j, by in enumerate(model.foretold(samples.colour), start=1):
+        rest[j:] -= np.einsum("nr,rs->ns", unexplained[:-j], by)
+        seen[j:] -= np.einsum("ngr,rs->ngs", answers[:-j], by)
+        known &= _delayed(ok, j, False)
+    return known, rest, seen
+
+
 @dataclass(frozen=True)
 class Fit:
     """coefficients (m, 3); covariance (3, 3) of the residuals; standard errors (m, 3) and

@@ -177,6 +177,7 @@ def check_rate(samples: Samples, model: Model) -> None:
     if model.fitted is not None and model.fitted.commands:
         surfaces = list(model.vehicle.surfaces)
         trust.check_commands(samples.name, samples.commands, samples.rates, model.fitted, surfaces)
+    trust.check_columns(samples, model)
 
 
 def rows_of(samples: Samples, model: Model, bank: Bank, posterior: Floats) -> Rows:

@@ -35,6 +35,9 @@ _TIED, _PLAIN = 0.98, 12.5
 _UNIT, _SPREAD = 10.0, 1.6
 _ALIKE, _OTHER_UNIT = 3.0, 20.0
 _RARE = (0.001, 0.999)
+_PARTS, _LEAST_ROWS, _SURELY, _REVERSED, _MIDDLE = 4, 60, 4.0, -0.3, 2.366
+"""Parts of a flight, and their rows at least; standard errors, and the gain below which a command works the
+other way round; the median of a square of three axes."""
 
 
 def fitted_on(flights: Sequence[tuple[Samples, Mask]], model: Model, gain_sd: Floats, scale: float) -> Fitted:
@@ -179,6 +182,35 @@ def check_commands(
                 f"{name}: the command of {surface} moves {ratio:.3g} times as much as in the other flights, "
                 "and the rates alike, allowed: one unit (57.3 is deg for rad, 100 percent: `unit`, `scale`)"
             )
+
+
+def check_columns(samples: Samples, model: Model) -> None:
+    """Raise BadInput where in every part of a flight the rates answer a command the other way round, or do
+    what no trim and no effectiveness explain: columns, signs or units are others than in the flights of the
+    model, since no fault has always been there and turns an effect about."""
+    ok, unexplained, answers = regression.predicted(samples, model)
+    whiten = np.linalg.inv(np.linalg.cholesky(model.arrays()[3])).T
+    rows, gains, noise = np.flatnonzero(ok), np.full(len(model.groups), -np.inf), np.inf
+    for part in np.array_split(rows, _PARTS):
+        if len(part) < _LEAST_ROWS:
+            return
+        x = np.concatenate([np.broadcast_to(np.eye(3), (len(part), 3, 3)), answers[part]], axis=1) @ whiten
+        flat, y = x.transpose(0, 2, 1).reshape(3 * len(part), -1), (unexplained[part] @ whiten).ravel()
+        inverse = np.linalg.pinv(flat.T @ flat)
+        found = inverse @ (flat.T @ y)
+        square = (y - flat @ found) ** 2
+        error = np.sqrt(np.maximum(np.diag(inverse), 0.0) * square.mean() / model.settings.power)
+        moved = (flat[:, 3:] ** 2).sum(axis=0) > 0.0
+        gains = np.maximum(gains, np.where(moved, (found + _SURELY * error)[3:], np.inf))
+        noise = min(noise, float(np.median(square.reshape(-1, 3).sum(axis=1)) / _MIDDLE))
+    says = "allowed: columns, signs and units as in the flights of the model"
+    for group, gain in zip(model.groups, gains.tolist(), strict=True):
+        if gain < _REVERSED:
+            other = f"the rates answer the command of {'+'.join(group)} the other way round"
+            raise BadInput(f"{samples.name}: {other} in all of it, {says}; does `scale: -1` fit?")
+    if model.fitted is not None and not model.colours and noise > noise_limit(model.fitted):
+        left = f"the noise is {noise:.3g} times the model's in all of it, whatever is lost of a surface"
+        raise BadInput(f"{samples.name}: {left}, {says}")
 
 
 def _reach(span: Sequence[Sequence[float]]) -> Floats:

@@ -1,6 +1,7 @@
 """`identify --check`, tables as people write them, and mis-scaled logs, through the command."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -99,6 +100,24 @@ def test_a_log_without_rates_names_what_it_has(tmp_path):
     done = run("identify", "--check", path)
     assert done.exit_code == 2
     assert "no column looks like the rate p" in done.stdout
+
+
+@pytest.mark.parametrize(("names", "factor", "says"), [
+    (("p_rad_s", "q_rad_s", "r_rad_s"), 57.29578, r"p_rad_s is in deg/s, a factor of 0\.01745 fits"),
+    (("roll_rad",), -1.0, "one of them has the other sign"), ((), 1.0, None),
+])  # fmt: skip
+def test_a_short_log_in_another_unit_is_said_as_diagnose_says_it_of_a_long_one(tmp_path, names, factor, says):
+    """15 s: too few for what a diagnosis refuses by itself. The factor is that of the file."""
+    path = logged(tmp_path / "short.csv", factors=dict.fromkeys(names, factor))
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join(lines[:302]) + "\n")
+    (tmp_path / "v.yaml").write_text(
+        "name: k\nrates: {p: p_rad_s, q: q_rad_s, r: r_rad_s}\ncommands: [roll_cmd]\n"
+        "surfaces: {a: {roll_cmd: 1}}\nattitude: {roll: roll_rad, pitch: pitch_rad}\n"
+    )
+    done = run("identify", "--check", path, "--vehicle", tmp_path / "v.yaml")
+    assert done.exit_code == (2 if says else 0)
+    assert re.search(says or "they agree", done.stdout.replace("\n", " "))
 
 
 def test_identify_without_check_wants_vehicle_and_out(tmp_path):

@@ -1,6 +1,6 @@
 """Our own logs, diagnosed by two models: bounds, names and alarms where the truth is known.
 
-    python benchmarks/own_logs.py [--flights 1] [--seed 1] [--as table] [--aircraft beaver] [--type TYPE]
+    python -m benchmarks.own_logs [--flights 1] [--seed 1] [--as table] [--aircraft beaver] [--type TYPE]
         [--air none] [--by identified]
 
 Three laws, two airspeeds, references drawn by the seed (sines and doublets on three axes), admitted errors of
@@ -15,18 +15,27 @@ that `identify` has of twelve healthy flights of a minute: two of the laws, othe
 Prints a row for each model and size: flights, alarms before the fault, found, named rightly, named wrongly in
 any row, share of samples and surfaces whose effectiveness the bounds hold, the same of the surface at fault
 alone (1, of the others, is an end of the range), share of those of which more is said than 0 to 1, their
-width, and the share of credible samples.
+width, the share of credible samples, and of how many losses a test that is told surface, size, instant, the
+aircraft's design model and the noise (a vector autoregression of what that model leaves of the training
+flights, with quiet and with noisy gyros) is sure enough for one false alarm an hour: its log likelihood
+ratio exceeds the logarithm of the samples in an hour [Lorden1971].
 """
 
 import argparse
 import tempfile
 from collections.abc import Callable, Iterator
+from math import log as ln
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
+from benchmarks.unknown_instant import Whitener, fitted
 
 import beaver_ftc as bf
+from beaver_ftc.design.context import DesignFunctions
+from beaver_ftc.design.model import design_record
+from beaver_ftc.design.terms import N_Y
 from beaver_ftc.flights.by_aircraft import diagnose_as, known
 from beaver_ftc.flights.diagnose import Rows, diagnose
 from beaver_ftc.flights.identification import by_pressure, identify
@@ -55,7 +64,7 @@ TRAINING, TRAINING_S = 12, 60.0
 NOISE = {"noise_std_deg_s": 0.05}
 HEAD = [
     "by", "fault", "flights", "false alarms", "found", "named rightly", "named wrongly", "held by bounds",
-    "held at fault", "said of", "median width", "credible",
+    "held at fault", "said of", "median width", "credible", "told",
 ]  # fmt: skip
 
 
@@ -165,9 +174,8 @@ def by_aircraft(log: Log, of: Campaign) -> Said:
     return rows, verdict["isolated"]
 
 
-def identified(of: Campaign, kind: str, folder: Path) -> Model:
+def identified(of: Campaign, logs: list[Log]) -> Model:
     """As `identify`, from healthy flights of other days."""
-    logs = [recorded(one, kind, folder) for one in training(of)]
     vehicle: Vehicle = load_vehicle(str(logs[0].folder / "vehicle.yaml"))
     faults = ["loss"] if of.type == LOSS else ["loss", "stuck"]
     vehicle = vehicle.model_copy(
@@ -175,6 +183,45 @@ def identified(of: Campaign, kind: str, folder: Path) -> Model:
     )
     named = [log.path.rename(log.path.with_stem(log.flown.name)) for log in logs]
     return identify(*by_pressure(load_flights(named, vehicle), vehicle))
+
+
+def unexplained(log: Log) -> tuple[np.ndarray, np.ndarray]:
+    """What the design model leaves of each frame's acceleration, (n, 3) rad/s2, and what each surface would
+    do by its command while healthy, (n, 3, S)."""
+    aircraft, table = log.flown.airframe, pd.read_parquet(log.folder / "log.parquet")
+    model = DesignFunctions(design_record(aircraft))
+    rates = table[[f"{axis}_measured_rad_s" for axis in "pqr"]].to_numpy()
+    flow = table[["alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", *aircraft.signals]].to_numpy()
+    flow = np.pad(flow, ((0, 0), (0, N_Y - flow.shape[1])))
+    commands = table[[f"{surface}_cmd_rad" for surface in aircraft.surfaces]].to_numpy()
+    does = np.array([model.G(y) for y in flow]) * commands[:, None, :]
+    expected = np.array([model.f(x, y) for x, y in zip(rates, flow, strict=True)]) + does.sum(axis=2)
+    return np.diff(rates, axis=0) * log.flown.rate_hz - expected[:-1], does[:-1]
+
+
+def noisy(log: Log) -> bool:
+    """Whether its gyros have noise."""
+    return bool(log.flown.sensors.p.noise_std_deg_s > 0.0)
+
+
+def noises(logs: list[Log]) -> dict[bool, Whitener]:
+    """The noise of healthy flights, with quiet and with noisy gyros."""
+    left = {log.folder: unexplained(log)[0] for log in logs}
+    kinds = {noisy(log) for log in logs}
+    return {kind: fitted([left[one.folder] for one in logs if noisy(one) == kind]) for kind in kinds}
+
+
+def told(log: Log, noise: dict[bool, Whitener]) -> bool:
+    """Whether a test that is told all of a loss is sure of it before the flight ends."""
+    if noisy(log) not in noise or not log.flown.faults:
+        return False
+    (fault,), (left, does) = log.flown.faults, unexplained(log)
+    lost = -fault.magnitude * does[:, :, list(log.flown.airframe.surfaces).index(fault.actuator)]
+    lost[: round(fault.at_s * log.flown.rate_hz)] = 0.0
+    white = noise[noisy(log)]
+    seen, expected = white.respond(left), white.respond(lost)
+    ratio = np.cumsum((expected * (seen - 0.5 * expected)).sum(axis=1))
+    return bool(ratio.max() > ln(3600.0 * log.flown.rate_hz))
 
 
 def by_model(log: Log, model: Model) -> Said:
@@ -241,9 +288,14 @@ def table(results: list[Document]) -> list[list[str]]:
             _share(sum(one["held_lost"] for one in of), sum(one["lost"] for one in of)),
             f"{said / max(sum(one['samples'] for one in of), 1):.2f}",
             f"{np.median(widths):.3f}" if len(widths) else "",
-            f"{np.mean([one['credible'] for one in of]):.2f}",
+            f"{np.mean([one['credible'] for one in of]):.2f}", _told(of),
         ])  # fmt: skip
     return sorted(rows, key=lambda row: row[0])
+
+
+def _told(of: list[Document]) -> str:
+    known = [one["told"] for one in of if one["told"] is not None]
+    return str(sum(known)) if known else ""
 
 
 def _share(part: int, whole: int) -> str:
@@ -265,16 +317,25 @@ def main() -> None:
     parser.add_argument("--by", choices=("aircraft", "identified"), nargs="*")
     asked = parser.parse_args()
     of = Campaign(asked.aircraft, asked.air, asked.type, asked.flights, asked.seed)
+    print(markdown_table(HEAD, table(flown(of, asked.kind, asked.by or ["aircraft", "identified"]))))
+
+
+def flown(of: Campaign, kind: str, by: list[str]) -> list[Document]:
+    """Fly a campaign and diagnose each log: a row for each flight and model."""
+    results = []
     with tempfile.TemporaryDirectory() as folder:
+        logs = [recorded(one, kind, Path(folder)) for one in training(of)]
+        noise = noises(logs)
         ways: dict[str, Callable[[Log], Said]] = {"aircraft": lambda log: by_aircraft(log, of)}
-        if "identified" in (asked.by or ["identified"]):
-            model = identified(of, asked.kind, Path(folder))
+        if "identified" in by:
+            model = identified(of, logs)
             ways["identified"] = lambda log: by_model(log, model)
-        results = []
         for document in scenarios(of):
-            log = recorded(document, asked.kind, Path(folder))
-            results += [judged(by, log, ways[by](log)) for by in asked.by or ways]
-    print(markdown_table(HEAD, table(results)))
+            log = recorded(document, kind, Path(folder))
+            lost = of.type == LOSS and bool(log.flown.faults)
+            certain = told(log, noise) if lost else None
+            results += [judged(name, log, ways[name](log)) | {"told": certain} for name in by]
+    return results
 
 
 if __name__ == "__main__":

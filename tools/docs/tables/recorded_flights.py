@@ -1,8 +1,12 @@
 """Tables of docs/recorded-flights.md: ways to diagnose the flights in the folder `BEAVER_FTC_FLIGHTS`."""
 
 import os
+from itertools import islice
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
+
+from benchmarks import own_logs as own
 
 from beaver_ftc.studies.present.page import write_files
 from beaver_ftc.studies.present.tables import markdown_table
@@ -11,6 +15,8 @@ from tools.docs.tables import shared
 
 Document = dict[str, Any]
 PICTURE = "images/recorded-flights.png"
+OWN = ("fault", "flights", "false alarms", "found", "told", "named rightly", "named wrongly",
+       "held by bounds", "held at fault")  # fmt: skip
 SHOWN = ("classes", "healthy_or_faulty", "mean_error", "held_by_bounds")
 
 
@@ -35,6 +41,23 @@ def recorded_alfa() -> str:
 def recorded_enac() -> str:
     """Labels of the ENAC flight: how many rows each method has right."""
     return _enac(_benchmark())
+
+
+def own_logs() -> str:
+    """Simulated flights in light turbulence, diagnosed by an identified model, beside a test that is told."""
+    of_it = [own.HEAD.index(name) for name in OWN]
+    rows = own.table(own.flown(own.Campaign(air="light", seed=62), "table", ["identified"]))
+    return markdown_table(OWN, [[row[i].removeprefix(f"{own.LOSS} ") for i in of_it] for row in rows])
+
+
+def own_logs_probe() -> str:
+    """The end of one of these flights, by a model of two others."""
+    of = own.Campaign(air="light", seed=62)
+    with TemporaryDirectory() as folder:
+        logs = [own.recorded(one, "table", Path(folder)) for one in islice(own.training(of), 2)]
+        model = own.identified(of, logs)
+        rows, _ = own.by_model(own.recorded(next(own.scenarios(of)), "table", Path(folder)), model)
+    return f"{rows.probability[-1]:.6g} {rows.low[-1]} {rows.high[-1]}"
 
 
 def _part(document: Document, name: str) -> Document:

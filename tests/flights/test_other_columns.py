@@ -8,6 +8,7 @@ import pytest
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights.diagnose import diagnose
 from beaver_ftc.flights.samples import load_flights
+from beaver_ftc.flights.trust import check_columns
 from flights import synthetic
 
 
@@ -25,6 +26,12 @@ def other_commands(samples, signs):
 def test_a_command_of_the_other_sign_is_refused(flown, wing_model, signs, name):
     with pytest.raises(BadInput, match=f"answer the command of {name} the other way round"):
         diagnose(other_commands(flown, signs), wing_model)
+
+
+def test_in_moving_air_a_law_that_answers_gusts_is_not_taken_for_another_sign(flown, wing_model):
+    """Then the command opposes what the air turns, in all of a correct log."""
+    moving = wing_model.model_copy(update={"colours": ["any"]})
+    check_columns(other_commands(flown, (-1, 1)), moving)
 
 
 def test_a_sign_that_turns_about_in_flight_is_no_column(flown, wing_model):

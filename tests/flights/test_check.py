@@ -106,8 +106,8 @@ def test_a_log_without_rates_names_what_it_has(tmp_path):
     (("p_rad_s", "q_rad_s", "r_rad_s"), 57.29578, r"p_rad_s is in deg/s, a factor of 0\.01745 fits"),
     (("roll_rad",), -1.0, "one of them has the other sign"), ((), 1.0, None),
 ])  # fmt: skip
-def test_a_short_log_in_another_unit_is_said_as_diagnose_says_it_of_a_long_one(tmp_path, names, factor, says):
-    """15 s: too few for what a diagnosis refuses by itself. The factor is that of the file."""
+def test_a_short_log_in_another_unit_is_said(tmp_path, names, factor, says):
+    """15 s. The factor is that of the file."""
     path = logged(tmp_path / "short.csv", factors=dict.fromkeys(names, factor))
     lines = path.read_text().splitlines()
     path.write_text("\n".join(lines[:302]) + "\n")

@@ -98,6 +98,20 @@ def test_a_wrong_unit_of_rate_or_roll_is_found_by_kinematics(rate, angle, says):
     assert (said is None) if says is None else (says in said)
 
 
+@pytest.mark.parametrize(("seconds", "rate", "says"), [
+    (7.5, 180 / np.pi, False), (15.0, 180 / np.pi, True), (15.0, 0.6, False), (15.0, 0.5, True),
+    (25.0, 0.6, True),
+])  # fmt: skip
+def test_of_a_short_log_more_is_needed(seconds, rate, says):
+    """Eight windows of a second, and 1.8 times apart where there are fewer than twenty."""
+    phi, theta, rates = turning()
+    kept = T_S - T_S[0] <= seconds
+    t_s = T_S[kept]
+    columns = [Column(t_s, rate * one[kept]) for one in rates]
+    found = physics.roll_of(columns, Column(t_s, phi[kept]), Column(t_s, theta[kept]))
+    assert (found is not None and physics.angle_remark(found, "p", "roll") is not None) is says
+
+
 def test_nothing_is_said_of_a_roll_that_does_not_move():
     still = Column(T_S, np.zeros(len(T_S)))
     assert physics.roll_of([still] * 3, still, None) is None

@@ -260,9 +260,10 @@ def test_a_model_that_claims_nothing_says_nothing(model):
 
 @pytest.mark.parametrize(
     ("factor", "turned", "refused"),
-    [(57.3, 1.0, True), (0.01, 1.0, True), (5.0, 1.0, False), (57.3, 5.0, False), (0.0, 1.0, False)],
-)
-def test_a_command_in_another_unit_is_refused_where_rates_move_alike(factor, turned, refused):
+    [(57.3, 1.0, True), (0.01, 1.0, True), (8.0, 1.0, False), (57.3, 5.0, False), (57.3, 4.0, True),
+     (57.3, 0.1, True), (0.01, 0.1, False), (0.0, 1.0, False)],
+)  # fmt: skip
+def test_a_command_in_another_unit_is_refused_where_rates_move_alike_or_far_less(factor, turned, refused):
     n = np.arange(2000)
     rates = np.column_stack([np.sin(0.01 * (k + 1) * n) for k in range(3)])
     commands = np.column_stack([np.sin(0.03 * n), np.cos(0.02 * n)])

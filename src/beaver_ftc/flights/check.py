@@ -17,7 +17,7 @@ from beaver_ftc.flights import physics
 from beaver_ftc.flights.readers import check_exists, evident, read_parts
 from beaver_ftc.flights.readers.table import TIME, first_of, names_of
 from beaver_ftc.flights.recording import Column, Floats, Recording, nearest_ten
-from beaver_ftc.flights.samples import Samples, check_consistent, in_si, parts_for, sample
+from beaver_ftc.flights.samples import Samples, parts_for, sample
 from beaver_ftc.flights.units import ACCELERATION, RATE, SECONDS, UNITS, nearest_unit
 from beaver_ftc.flights.vehicle import Vehicle, further_keys
 
@@ -41,8 +41,7 @@ _NO_COMMAND = r"truth|effectiveness|position|_pos|feedback|measured|error|failur
 _HINTS = {"rad_s": "rad/s", "rad/s": "rad/s", "deg_s": "deg/s", "deg/s": "deg/s", "dps": "deg/s"}
 _PWM = (700.0, 2300.0)
 _FAST_RAD_S = 12.0
-_AGREE, _LEAST_COMPARED = 0.7, 8
-"""Correlation of an angle with its rate, and the seconds over which they are compared at least."""
+_AGREE = 0.7
 _MOST_COMMANDS, _MOST_READ = 8, 60
 _RATE_HZ = (4.0, 2000.0)
 
@@ -69,7 +68,6 @@ def _looked_at(recording: Recording, vehicle: Vehicle) -> tuple[bool, list[str]]
     """Whether a recording could be identified or diagnosed, and what is said of it."""
     try:
         samples = sample(recording, vehicle)
-        check_consistent(in_si(recording, vehicle), vehicle, _LEAST_COMPARED)
     except BadInput as error:
         return False, [str(error)]
     dead = [
@@ -94,12 +92,12 @@ def _physics(recording: Recording, vehicle: Vehicle) -> list[str]:
     rates = [_si(columns, getattr(vehicle.rates, axis)) for axis in "pqr"]
     pitch = attitude.pitch
     known = _si(columns, pitch) if pitch is not None and pitch.column in columns else None
-    found = physics.roll_of(rates, _si(columns, attitude.roll), known, _LEAST_COMPARED)
+    found = physics.roll_of(rates, _si(columns, attitude.roll), known)
     if found is None:
         return ["too little moves to compare the rates with the roll angle"]
     lines = [_agreement(found, attitude.roll.column, vehicle.rates.p.column)]
     if pitch is not None and known is not None:
-        pitching = physics.pitch_of(rates, _si(columns, attitude.roll), known, _LEAST_COMPARED)
+        pitching = physics.pitch_of(rates, _si(columns, attitude.roll), known)
         lines += [_agreement(pitching, pitch.column, vehicle.rates.q.column)] if pitching else []
     return lines
 
@@ -226,7 +224,7 @@ def _rate_unit(recording: Recording, names: list[str], roll: Column | None, rad:
     angle's numbers are multiplied by."""
     rates = [recording.columns[name] for name in names]
     if roll is not None:
-        found = physics.roll_of(rates, replace(roll, values=roll.values * rad), None, _LEAST_COMPARED)
+        found = physics.roll_of(rates, replace(roll, values=roll.values * rad), None)
         if found is not None and abs(found.correlation) > _AGREE:
             return nearest_unit(RATE, abs(found.slope), 1.5) or "rad/s"
     hint = next((unit for text, unit in _HINTS.items() if text in names[0].lower()), None)

@@ -12,9 +12,10 @@ import numpy as np
 from beaver_ftc.flights.recording import Column, Floats
 from beaver_ftc.flights.units import ACCELERATION, ANGLE, RATE, UNITS, nearest_unit
 
-_WINDOW_S, LEAST_WINDOWS = 1.0, 20
-_SURE, _APART = 0.7, 1.5
-_NEAR, _APART_FROM = 1.3, 0.4
+_WINDOW_S, _LEAST_WINDOWS = 1.0, 8
+_MANY_WINDOWS, _SURE, _NEAR = 20, 0.7, 1.3
+_APART, _APART_OF_FEW = 1.5, 1.8
+_UNLIKE, _UNLIKE_OF_FEW = 0.4, 0.2
 _G = UNITS["g"][1]
 _GRAVITY = (0.5, 2.0)
 _CIRCLE_RAD, _FAST_RAD_S = 1.02 * 2.0 * np.pi, 12.0
@@ -32,13 +33,16 @@ class Followed:
     angle: float
     rate: float
 
+    @property
+    def many(self) -> bool:
+        """Whether so many windows were seen that less is needed to tell."""
+        return self.windows >= _MANY_WINDOWS
 
-def roll_of(
-    rates: list[Column], roll: Column, pitch: Column | None, least: int = LEAST_WINDOWS
-) -> Followed | None:
+
+def roll_of(rates: list[Column], roll: Column, pitch: Column | None) -> Followed | None:
     """How the roll angle follows the rates; None where too little moves. All of them as the log says, in SI.
 
-    rates: p, q, r; least: seconds that are compared at least.
+    rates: p, q, r.
     """
     t_s = rates[0].t_s
     p, q, r = (_at(column, t_s) for column in rates)
@@ -49,20 +53,18 @@ def roll_of(
         theta = _at(pitch, t_s) * 2.0 * np.pi / _turn(np.append(4.0 * pitch.values, roll.values))
         slope = np.tan(np.clip(theta, -1.0, 1.0))
         terms += [slope * q * np.sin(angle), slope * r * np.cos(angle)]
-    return _followed(t_s, phi, terms, least, full)
+    return _followed(t_s, phi, terms, full)
 
 
-def pitch_of(rates: list[Column], roll: Column, pitch: Column, least: int = LEAST_WINDOWS) -> Followed | None:
+def pitch_of(rates: list[Column], roll: Column, pitch: Column) -> Followed | None:
     """How the pitch angle follows the rates, as `roll_of`."""
     t_s = rates[0].t_s
     _, q, r = (_at(column, t_s) for column in rates)
     angle = _at(roll, t_s) * 2.0 * np.pi / _turn(roll.values)
-    return _followed(t_s, _at(pitch, t_s), [q * np.cos(angle), -r * np.sin(angle)], least)
+    return _followed(t_s, _at(pitch, t_s), [q * np.cos(angle), -r * np.sin(angle)])
 
 
-def _followed(
-    t_s: Floats, angle: Floats, terms: list[Floats], least: int, full: float | None = None
-) -> Followed | None:
+def _followed(t_s: Floats, angle: Floats, terms: list[Floats], full: float | None = None) -> Followed | None:
     """How an angle follows the first term of its rate of change, window by window, the others in whatever
     unit they are; full: a circle, where it may go round."""
     step = np.diff(t_s)
@@ -81,7 +83,7 @@ def _followed(
     by_terms = np.linalg.lstsq(moved, turned, rcond=None)[0]
     turned, moved = turned - moved[:, 1:] @ by_terms[1:], moved[:, 0]
     power, answer = float(moved @ moved), float(turned @ turned)
-    if len(moved) < least or not power * answer > 0.0:
+    if len(moved) < _LEAST_WINDOWS or not power * answer > 0.0:
         return None
     cross = float(moved @ turned)
     return Followed(
@@ -113,21 +115,17 @@ def _turn(roll: Floats) -> float:
 
 
 def attitude_says(
-    rates: dict[str, Column],
-    roll: Column,
-    pitch: Column | None,
-    names: tuple[str, str],
-    least: int = LEAST_WINDOWS,
+    rates: dict[str, Column], roll: Column, pitch: Column | None, names: tuple[str, str]
 ) -> str | None:
     """What is wrong with the rates (p, q, r by column) or the angles, roll and pitch of these names; None
     where nothing is."""
     (p, q, _), columns = list(rates), list(rates.values())
     if pitch is not None and (says := pitch_remark(pitch, names[1])):
         return says
-    found = roll_of(columns, roll, pitch, least)
-    if found is not None and abs(found.correlation) < _APART_FROM:
+    found = roll_of(columns, roll, pitch)
+    if found is not None and abs(found.correlation) < (_UNLIKE if found.many else _UNLIKE_OF_FEW):
         return _another_is(rates, roll, names[0], found)
-    pitching = pitch_of(columns, roll, pitch, least) if pitch else None
+    pitching = pitch_of(columns, roll, pitch) if pitch else None
     says = angle_remark(found, p, names[0]) if found else None
     return says or (angle_remark(pitching, q, names[1]) if pitching else None)
 
@@ -136,8 +134,7 @@ def _another_is(rates: dict[str, Column], roll: Column, name: str, found: Follow
     """That the roll angle follows another rate, where it does."""
     (p, *others), columns = list(rates), list(rates.values())
     for other in others:
-        turned = [rates[other], *(one for one in columns if one is not rates[other])]
-        moved = roll_of(turned, roll, None, found.windows)
+        moved = roll_of([rates[other], *(one for one in columns if one is not rates[other])], roll, None)
         if moved is not None and abs(moved.correlation) > _SURE:
             return (
                 f"{name} does not follow {p} (correlation {found.correlation:.2f}) but {other} "
@@ -153,7 +150,8 @@ def angle_remark(found: Followed, rate: str, angle: str) -> str | None:
     Either may be; an angle that goes round more than once is, and a rate that no vehicle turns at.
     """
     size = abs(found.slope)
-    near = 1.0 / _APART < size < _APART
+    apart = _APART if found.many else _APART_OF_FEW
+    near = 1.0 / apart < size < apart
     if abs(found.correlation) < _SURE or (near and found.slope > 0.0):
         return None
     fits = f"the change of {angle} is {found.slope:.4g} times the integral of {rate}"

@@ -80,7 +80,7 @@ def sample(recording: Recording, vehicle: Vehicle) -> Samples:
     used = list(dict.fromkeys([*names, *vehicle.command_names, *vehicle.signal_names]))
     recording = in_si(recording, vehicle)
     _require(recording, used, rates=names)
-    check_consistent(recording, vehicle)
+    _consistent(recording, vehicle)
     stamps = recording.columns[names[0]].t_s
     t_s, run, step = _time_base(recording.name, stamps, vehicle.rate_hz)
     found = {name: at_samples(recording.columns[name], t_s, step) for name in used}
@@ -192,9 +192,8 @@ def _energy_climb(
     return energy.climb_of(t_s, altitude, airspeed, run)
 
 
-def check_consistent(recording: Recording, vehicle: Vehicle, least: int = physics.LEAST_WINDOWS) -> None:
-    """Raise BadInput where rates, roll and gravity of a recording in SI contradict one another: what is in
-    another unit. least: seconds that rates and angles are compared over at least."""
+def _consistent(recording: Recording, vehicle: Vehicle) -> None:
+    """Raise BadInput where rates, roll and gravity contradict one another: what is in another unit."""
     rates = [recording.columns[getattr(vehicle.rates, axis).column] for axis in "pqr"]
     found = vehicle.attitude and recording.columns.get(vehicle.attitude.roll.column)
     says = None
@@ -204,7 +203,7 @@ def check_consistent(recording: Recording, vehicle: Vehicle, least: int = physic
         names = [getattr(vehicle.rates, axis).column for axis in "pqr"]
         if not signals.clipped(rates[0].values).any():
             angles = (vehicle.attitude.roll.column, pitch.column if pitch else "")
-            says = physics.attitude_says(dict(zip(names, rates, strict=True)), found, theta, angles, least)
+            says = physics.attitude_says(dict(zip(names, rates, strict=True)), found, theta, angles)
     down = vehicle.acceleration and recording.columns.get(vehicle.acceleration.column)
     if not says and vehicle.acceleration and down:
         says = physics.gravity_remark(down, vehicle.acceleration.column)

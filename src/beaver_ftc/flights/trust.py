@@ -33,7 +33,7 @@ _CLIPPED_S = 30.0
 _TIED, _PLAIN = 0.98, 12.5
 """Of an effect of so many variances of the noise a sample, a fiftieth is half a standard deviation."""
 _UNIT, _SPREAD = 10.0, 1.6
-_ALIKE, _OTHER_UNIT = 3.0, 20.0
+_ALIKE, _OTHER_UNIT = 3.0, 12.0
 _RARE = (0.001, 0.999)
 _PARTS, _LEAST_ROWS, _SURELY, _REVERSED, _MIDDLE = 4, 60, 4.0, -0.3, 2.366
 """Parts of a flight, and their rows at least; standard errors, and the gain below which a command works the
@@ -168,19 +168,20 @@ def check_commands(
     name: str, commands: Floats, rates: Floats, fitted: Fitted, surfaces: Sequence[str]
 ) -> None:
     """Raise BadInput where a command moves so much more or less than in the flights of the model, while every
-    rate moves alike, that it is in another unit.
+    rate moves alike, that it is in another unit; or so much more than any rate does.
 
     Shapes: commands (n, S), rates (n, 3).
     """
     turned = _reach(span(rates)) / np.maximum(_reach(fitted.rates), TINY)
-    if turned.min() < 1.0 / _ALIKE or turned.max() > _ALIKE:
-        return
+    alike = turned.min() > 1.0 / _ALIKE and turned.max() < _ALIKE
+    most = _OTHER_UNIT * (1.0 if alike else max(turned.max(), 1.0))
     ratios = _reach(span(commands)) / np.maximum(_reach(fitted.commands), TINY)
     for surface, ratio in zip(surfaces, ratios.tolist(), strict=True):
-        if ratio > 0.0 and not 1.0 / _OTHER_UNIT < ratio < _OTHER_UNIT and 1e-4 < ratio < 1e4:
+        if most < ratio < 1e4 or (alike and 1e-4 < ratio < 1.0 / _OTHER_UNIT):
             raise BadInput(
                 f"{name}: the command of {surface} moves {ratio:.3g} times as much as in the other flights, "
-                "and the rates alike, allowed: one unit (57.3 is deg for rad, 100 percent: `unit`, `scale`)"
+                f"the rates {turned.max():.2g} times at most, allowed: one unit (57.3 is deg for rad, 100 "
+                "percent: `unit`, `scale`)"
             )
 
 

@@ -58,6 +58,26 @@ def test_new_result_replaces_the_old_one_entirely(tmp_path, monkeypatch, can_exc
     assert (tmp_path / "case" / "metrics.json").read_text() == "new"
 
 
+@pytest.mark.parametrize("can_exchange", [True, False])
+def test_a_run_of_the_same_name_may_end_just_before(tmp_path, monkeypatch, can_exchange):
+    """The other one's result comes into place when this one is about to be renamed."""
+    final, rename, ended = tmp_path / "case", writer.Path.rename, []
+
+    def late(path, target):
+        if target == final and not ended:
+            ended.append(final.mkdir())
+            (final / "metrics.json").write_text("of the other")
+        return rename(path, target)
+
+    if not can_exchange:
+        monkeypatch.setattr(writer, "_exchange", lambda one, other: False)
+    monkeypatch.setattr(writer.Path, "rename", late)
+    with result_folder(tmp_path, "case") as folder:
+        (folder / "metrics.json").write_text("of this one")
+    assert (final / "metrics.json").read_text() == "of this one"
+    assert _names(tmp_path) == ["case"]
+
+
 def test_old_result_survives_a_failed_run(tmp_path):
     _result(tmp_path, "old")
     with pytest.raises(KeyboardInterrupt), result_folder(tmp_path, "case"):

@@ -249,9 +249,13 @@ def sync(path: Path) -> None:
 
 def _move_into_place(partial: Path, final: Path) -> None:
     refuse_foreign(final)
-    if not final.exists():
-        partial.rename(final)
-    elif _exchange(partial, final):
+    try:
+        partial.rename(final)  # tried, not asked first: another run of this name may end in between
+        return
+    except OSError:
+        if not final.exists():
+            raise
+    if _exchange(partial, final):
         shutil.rmtree(partial, ignore_errors=True)
     else:
         retired = partial.with_name(f"{partial.name}-replaced")

@@ -9,7 +9,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from math import degrees, radians
 from pathlib import Path
@@ -299,7 +299,7 @@ def _derived(
         aircraft, (first, other), flown, len(about), moves
     )
     if plant.aircraft.effectors:
-        alike = sample_all(plant, about, SAMPLES, 3, properties, moves=moves, apart=0.0)
+        alike = sample_all(plant, about, SAMPLES, 3, properties, moves=replace(moves, apart=0.0))
         set_engines_apart(data["model_error_map"]["boxes"], plant.aircraft, alike)
     outermost = data["model_error_map"]["boxes"][-len(about) :]
     largest = {axis: max(box[f"error_{axis}_rad_s2"][0][-1] for box in outermost) for axis in "pqr"}

@@ -54,10 +54,11 @@ class Envelope:
 @dataclass(frozen=True)
 class Moves:
     """How far surfaces are moved: shares of their travel, rising to 1; of these but the last, how much
-    those that stand in use."""
+    those that stand in use. apart: how far engines' levers are from one another, if they have any."""
 
     shares: tuple[float, ...] = SHARES
     stand_ins: float = 1.0
+    apart: float = _APART
 
     def seldom(self, aircraft: Aircraft) -> np.ndarray:
         """Of each surface, how much of a share that is not the last, (surfaces,)."""
@@ -218,19 +219,19 @@ class _Standing:
 
 def sample(
     plant: Plant, envelope: Envelope, trim: FlightState, n: int, seed: int, properties: Mapping[str, str],
-    ages: tuple[int, ...] = EVERY_AGE, starts: int = STARTS, moves: Moves = USUAL, apart: float = _APART,
+    ages: tuple[int, ...] = EVERY_AGE, starts: int = STARTS, moves: Moves = USUAL,
     errors: Errors | None = None,
 ) -> Samples:  # fmt: skip
     """So many random states; properties: of each signal to be read there; ages: of the flights; starts: how
-    often the engines are started anew; apart: how far their levers are from one another, if they have any;
-    errors: of samples, (m, 3) rad/s2: if given, states where these are large are looked for as well."""
+    often the engines are started anew; errors: of samples, (m, 3) rad/s2: if given, states where these are
+    large are looked for as well."""
     draw = Draw(seed, plant.aircraft, envelope, trim, moves)
     standing = _Standing(plant, draw, properties)
     for k in range(starts):
         box, (turn, of) = k % len(REACHES), divmod(k // len(REACHES), len(ages))
         age = ages[of]
         youngest_s = _BEFORE_S + AGES_S[age] if turn % 2 else AGES_S[age - 1] if age else 0.0
-        standing.start(box, age, youngest_s, apart)
+        standing.start(box, age, youngest_s, moves.apart)
         ends = [draw.ends(REACHES[box], share) for share in moves.shares]
         for i in range(max(1, n // starts)):
             level = i % len(moves.shares)
@@ -275,13 +276,12 @@ def _climb(standing: _Standing, ends: Mapping[str, Ends], level: int, errors: Er
 
 def sample_all(
     plant: Plant, regions: Sequence[Region], n: int, seed: int, properties: Mapping[str, str],
-    ages: tuple[int, ...] = EVERY_AGE, moves: Moves = USUAL, apart: float = _APART,
-    errors: Errors | None = None,
+    ages: tuple[int, ...] = EVERY_AGE, moves: Moves = USUAL, errors: Errors | None = None,
 ) -> Samples:  # fmt: skip
-    """So many states of all regions together; boxes are numbered reach by reach; apart, errors: as above."""
+    """So many states of all regions together; boxes are numbered reach by reach; errors: as above."""
     few, many = (STARTS_OF_WORST if errors else STARTS) // len(regions), n // len(regions)
     parts = [
-        sample(plant, of.envelope, of.trim, many, seed + 10 * k, properties, ages, few, moves, apart, errors)
+        sample(plant, of.envelope, of.trim, many, seed + 10 * k, properties, ages, few, moves, errors)
         for k, of in enumerate(regions)
     ]
     return joined([replace(of, box=len(parts) * of.box + k) for k, of in enumerate(parts)])

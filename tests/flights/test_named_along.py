@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.flights.diagnose import _along, diagnose, healthy_residual
+from beaver_ftc.flights.regression import predicted
 from beaver_ftc.flights.samples import load_flights
 from flights import synthetic
 
@@ -44,7 +45,7 @@ def test_the_surface_at_fault_keeps_its_name(biased, wing_model):
 
 
 def test_the_residual_is_white_in_health_and_along_the_bias_after_it(biased, wing_model):
-    rest, late = healthy_residual(biased, wing_model), biased.t_s > FROM_S + 1.0
+    rest, late = healthy_residual(wing_model, *predicted(biased, wing_model)), biased.t_s > FROM_S + 1.0
     assert rest[~late][10:590].std(axis=0) == pytest.approx(1.0, abs=0.15)
     whiten = np.linalg.inv(np.linalg.cholesky(np.diag(synthetic.NOISE**2)))
     expected = whiten @ (BIAS * synthetic.LEFT.sum(axis=0))

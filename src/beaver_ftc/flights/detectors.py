@@ -67,12 +67,12 @@ def _least_squares(samples: Samples, model: Model, forget: bool) -> Rows:
 
 def _whitened(samples: Samples, model: Model) -> tuple[Floats, Floats]:
     """Regressors (n, 3, 3 + G) of trim and lost effectiveness, and what a healthy vehicle leaves, (n, 3)."""
-    ok, _, answers = predicted(samples, model)
+    ok, unexplained, answers = predicted(samples, model)
     noise = model.arrays()[3]
     whiten = np.linalg.inv(np.linalg.cholesky(noise))
     sizes = np.broadcast_to(np.diag(np.sqrt(np.diag(noise))), (len(ok), 3, 3))
     x = np.where(ok[:, None, None], np.concatenate([sizes, answers.transpose(0, 2, 1)], axis=2), 0.0)
-    return np.einsum("ab,nbi->nai", whiten, x), healthy_residual(samples, model)
+    return np.einsum("ab,nbi->nai", whiten, x), healthy_residual(model, ok, unexplained, answers)
 
 
 def _remembered(values: Floats, dt_s: float, forget: bool) -> Floats:

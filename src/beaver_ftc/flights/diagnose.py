@@ -137,7 +137,7 @@ def _along(samples: Samples, model: Model, rows: Rows, asked: float) -> Rows:
     when it is healthy: a name is taken back where another direction, whatever the course of time along it,
     explains as much more as is asked. Not in moving air: gusts have directions, too.
     """
-    rest = healthy_residual(samples, model)
+    rest = healthy_residual(model, *predicted(samples, model))
     _, _, response, noise = model.arrays()
     turned = np.linalg.solve(np.linalg.cholesky(noise), response.sum(axis=1).T)
     size = np.linalg.norm(turned, axis=0)
@@ -151,10 +151,9 @@ def _along(samples: Samples, model: Model, rows: Rows, asked: float) -> Rows:
     return replace(rows.unbounded(gone), named=np.where(gone, UNKNOWN, rows.named))
 
 
-def healthy_residual(samples: Samples, model: Model) -> Floats:
-    """What a healthy vehicle leaves unexplained, in standard deviations of the noise, (n, 3); 0 where
-    nothing can be predicted."""
-    ok, unexplained, answers = predicted(samples, model)
+def healthy_residual(model: Model, ok: NDArray[np.bool_], unexplained: Floats, answers: Floats) -> Floats:
+    """What a healthy vehicle leaves of what is `predicted`, in standard deviations of the noise, (n, 3); 0
+    where nothing can be."""
     intercept, _, _, noise = model.arrays()
     rest = np.where(ok[:, None], unexplained - intercept - answers.sum(axis=1), 0.0)
     return np.asarray(rest @ np.linalg.inv(np.linalg.cholesky(noise)).T)

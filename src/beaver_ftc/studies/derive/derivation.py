@@ -44,6 +44,7 @@ from beaver_ftc.studies.derive.fit import (
 )
 from beaver_ftc.studies.derive.sample import (
     AGES_OF_WORST,
+    EVERY_AGE,
     FRESH,
     SIDESLIP_RAD,
     USUAL,
@@ -290,11 +291,12 @@ def _derived(
     data["moments"] = outline.named_as(plant.aircraft, _moments(first, data, folder, weight))
     tell("check")
     aircraft = outline.aircraft_of(data, folder)
-    if weight is None:
-        errors = partial(errors_of, aircraft)
-        other = sample_all(plant, about, CHECKED, 2, properties, AGES_OF_WORST, moves, errors=errors)
-    else:
-        other = sample_all(plant, about, CHECKED_OF_REGIONS, 2, properties, moves=moves)
+    # Of several regions by random states alone: what a search finds in their corners no flight of the
+    # benchmarks came to, and it takes from the diagnosis what boxes by region give.
+    of_one = weight is None
+    checked, ages = (CHECKED, AGES_OF_WORST) if of_one else (CHECKED_OF_REGIONS, EVERY_AGE)
+    errors = partial(errors_of, aircraft) if of_one else None
+    other = sample_all(plant, about, checked, 2, properties, ages, moves, errors)
     data["model_error_map"], (of_fit, of_check, _) = map_of(
         aircraft, (first, other), flown, len(about), moves
     )

@@ -3,7 +3,8 @@
 The states fill boxes about the trim, one inside the other. The aircraft is started at some settings of its
 engines, tanks and altitudes; at each of these time stands still, and the state goes from place to place. They
 hold nothing of what changes by itself: beside them are states as the aircraft comes through them in flight,
-from trim, its surfaces moved a little by sines: engines turn, the air lags, fuel burns.
+from trim, its surfaces moved a little by sines: engines turn, the air lags, fuel burns. States where a
+model is worst are looked for, from the worst of random ones on.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -209,12 +210,10 @@ class _Standing:
             plant.write(effector.throttle, draw.around(0.0, REACHES[box] * apart))
         plant.start(self.started)
 
-    def look(self, places: Sequence[Place], level: int) -> Samples:
-        """The states there, also those that are not finite."""
-        for place in places:
-            self.plant.hold(self.draw.state(self.started, place))
-            self.rows.append((*seen_at(self.plant, self.properties), self.box, level, self.age))
-        return _arrays(self.rows[-len(places) :], tuple(self.properties))
+    def put(self, place: Place, level: int) -> None:
+        """Look at one place, with the surfaces within a share of their travel."""
+        self.plant.hold(self.draw.state(self.started, place))
+        self.rows.append((*seen_at(self.plant, self.properties), self.box, level, self.age))
 
 
 def sample(
@@ -235,7 +234,7 @@ def sample(
         ends = [draw.ends(REACHES[box], share) for share in moves.shares]
         for i in range(max(1, n // starts)):
             level = i % len(moves.shares)
-            standing.look([draw.place(ends[level])], level)
+            standing.put(draw.place(ends[level]), level)
         if errors is not None:
             for level, of_share in enumerate(ends):
                 _climb(standing, of_share, level, errors)
@@ -253,7 +252,9 @@ def _climb(standing: _Standing, ends: Mapping[str, Ends], level: int, errors: Er
     """
 
     def look(places: list[Place]) -> np.ndarray:
-        return np.nan_to_num(errors(standing.look(places, level)))
+        for place in places:
+            standing.put(place, level)
+        return np.nan_to_num(errors(_arrays(standing.rows[-len(places) :], tuple(standing.properties))))
 
     moved = [name for name in ends if name not in _ATTITUDE]
     drawn = [standing.draw.place(ends) for _ in range(_CLIMB_FROM)]

@@ -129,11 +129,11 @@ def test_the_mean_of_the_specific_force_is_one_g(mean, says):
 def test_swapped_rates_are_found_by_the_roll_they_make():
     phi, theta, (p, q, r) = turning()
     swapped = {"gx": Column(T_S, q), "gy": Column(T_S, p), "gz": Column(T_S, r)}
-    names = ("roll", "pitch")
-    said = physics.attitude_says(swapped, Column(T_S, phi), Column(T_S, theta), names)
+    angles = [("roll", Column(T_S, phi)), ("pitch", Column(T_S, theta)), None]
+    said = physics.attitude_says(swapped, angles, {})
     assert said.endswith("gy is the roll rate")
     right = {"gx": Column(T_S, p), "gy": Column(T_S, q), "gz": Column(T_S, r)}
-    assert physics.attitude_says(right, Column(T_S, phi), Column(T_S, theta), names) is None
+    assert physics.attitude_says(right, angles, {}) is None
 
 
 @pytest.mark.parametrize(("factor", "angle", "says"), [
@@ -148,5 +148,57 @@ def test_a_wrong_pitch_rate_alone_is_found_by_the_pitch_angle(factor, angle, say
     found = physics.pitch_of([Column(T_S, one) for one in (p, q, r)], Column(T_S, phi), Column(T_S, theta))
     assert (found.slope, found.correlation) == (pytest.approx(1.0, rel=2e-3), pytest.approx(1.0, abs=1e-3))
     rates = {"gx": Column(T_S, p), "gy": Column(T_S, factor * q), "gz": Column(T_S, r)}
-    said = physics.attitude_says(rates, Column(T_S, phi), Column(T_S, angle * theta), ("roll", "pitch"))
+    angles = [("roll", Column(T_S, phi)), ("pitch", Column(T_S, angle * theta)), None]
+    said = physics.attitude_says(rates, angles, {})
     assert (said is None) if says is None else (says in said)
+
+
+def yawed(seed=1):
+    """The yaw angle of the same body, whose rate is known in closed form: 0.4 + 0.3 sin(0.3 t + phase)."""
+    phase = np.random.default_rng(seed).uniform(0, 6.0, 3)[2]
+    return (0.4 * T_S - np.cos(0.3 * T_S + phase) + np.pi) % (2.0 * np.pi) - np.pi
+
+
+@pytest.mark.parametrize(("factor", "angle", "says"), [
+    (1.0, 1.0, None),
+    (180 / np.pi, 1.0, "times the integral of gz: a factor of 0.02"),
+    (1.0, 180 / np.pi, "yaw is in deg, a factor of 0.01745 fits"),
+    (1.0, -1.0, "the change of yaw is -1 times the integral of gz: one of them has the other sign"),
+])  # fmt: skip
+def test_a_wrong_yaw_rate_is_found_by_the_yaw_angle(factor, angle, says):
+    phi, theta, (p, q, r) = turning()
+    columns = [Column(T_S, one) for one in (p, q, r)]
+    found = physics.yaw_of(columns, Column(T_S, phi), Column(T_S, theta), Column(T_S, yawed()))
+    assert (found.slope, found.correlation) == (pytest.approx(1.0, rel=2e-3), pytest.approx(1.0, abs=1e-3))
+    rates = {"gx": columns[0], "gy": columns[1], "gz": Column(T_S, factor * r)}
+    angles = [
+        ("roll", Column(T_S, phi)),
+        ("pitch", Column(T_S, theta)),
+        ("yaw", Column(T_S, angle * yawed())),
+    ]
+    said = physics.attitude_says(rates, angles, {})
+    assert (said is None) if says is None else (says in said)
+
+
+def test_another_column_in_the_place_of_a_rate_is_found_by_the_angle_that_follows_it():
+    phi, theta, (p, q, r) = turning()
+    angles = [("roll", Column(T_S, phi)), ("pitch", Column(T_S, theta)), ("yaw", Column(T_S, yawed()))]
+    rates = {"gx": Column(T_S, p), "gy": Column(T_S, np.sin(2.1 * T_S)), "gz": Column(T_S, r)}
+    assert physics.attitude_says(rates, angles, {}) is None
+    said = physics.attitude_says(rates, angles, {"alpha": Column(T_S, q), "beta": Column(T_S, 0.1 * p)})
+    assert said is not None
+    assert said.startswith("pitch does not follow gy")
+    assert said.endswith("alpha is the pitch rate")
+
+
+def test_nothing_is_said_where_the_nose_is_steep():
+    """Roll and yaw turn about the same line there, and jump by half a circle over the top."""
+    t_s = np.arange(0.0, 40.0, 0.05)
+    looping = 0.3 * t_s + 1.2
+    theta, over = np.arcsin(np.sin(looping)), np.cos(looping) < 0.0
+    phi, psi = np.where(over, np.pi, 0.0), np.where(over, np.pi, 0.0)
+    still = Column(t_s, 1e-3 * np.sin(t_s))
+    rates = {"gx": still, "gy": Column(t_s, np.full(len(t_s), 0.3)), "gz": still}
+    angles = [("roll", Column(t_s, phi)), ("pitch", Column(t_s, theta)), ("yaw", Column(t_s, psi))]
+    assert physics.attitude_says(rates, angles, {}) is None
+    assert physics.roll_of(list(rates.values()), angles[0][1], angles[1][1]) is None

@@ -99,6 +99,9 @@ def _physics(recording: Recording, vehicle: Vehicle) -> list[str]:
     if pitch is not None and known is not None:
         pitching = physics.pitch_of(rates, _si(columns, attitude.roll), known)
         lines += [_agreement(pitching, pitch.column, vehicle.rates.q.column)] if pitching else []
+    if (yaw := attitude.yaw) is not None and yaw.column in columns:
+        yawing = physics.yaw_of(rates, _si(columns, attitude.roll), known, _si(columns, yaw))
+        lines += [_agreement(yawing, yaw.column, vehicle.rates.r.column)] if yawing else []
     return lines
 
 

@@ -1,10 +1,12 @@
-"""What mechanics says of a log's units: the integrals of p and q are the changes of roll and pitch, and the
-mean of the specific force is 1 g.
+"""What mechanics says of a log's units: the integrals of p, q and r are the changes of roll, pitch and yaw,
+and the mean of the specific force is 1 g.
 
     phi' = p + tan(theta) (q sin(phi) + r cos(phi))        [SL03, eq. 1.4-4]
     theta' = q cos(phi) - r sin(phi)
+    psi' = (q sin(phi) + r cos(phi)) / cos(theta)
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,12 +16,13 @@ from beaver_ftc.flights.units import ACCELERATION, ANGLE, RATE, UNITS, nearest_u
 
 _WINDOW_S, _LEAST_WINDOWS = 1.0, 8
 _MANY_WINDOWS, _SURE, _NEAR = 20, 0.7, 1.3
+_SURELY = 0.95
 _APART, _APART_OF_FEW = 1.5, 1.8
 _UNLIKE, _UNLIKE_OF_FEW = 0.4, 0.2
 _G = UNITS["g"][1]
 _GRAVITY = (0.5, 2.0)
 _CIRCLE_RAD, _FAST_RAD_S = 1.02 * 2.0 * np.pi, 12.0
-_UPRIGHT_RAD = 1.02 * 0.5 * np.pi
+_UPRIGHT_RAD, _STEEP_RAD = 1.02 * 0.5 * np.pi, 1.0
 
 
 @dataclass(frozen=True)
@@ -42,18 +45,17 @@ class Followed:
 def roll_of(rates: list[Column], roll: Column, pitch: Column | None) -> Followed | None:
     """How the roll angle follows the rates; None where too little moves. All of them as the log says, in SI.
 
-    rates: p, q, r.
+    rates: p, q, r. Not where the nose is so steep that roll and yaw are hardly told apart.
     """
     t_s = rates[0].t_s
     p, q, r = (_at(column, t_s) for column in rates)
     phi, full = _at(roll, t_s), _turn(roll.values)
     angle = phi * 2.0 * np.pi / full  # the circle is known whatever the unit
-    terms = [p]
+    terms, theta = [p], None
     if pitch is not None:
-        theta = _at(pitch, t_s) * 2.0 * np.pi / _turn(np.append(4.0 * pitch.values, roll.values))
-        slope = np.tan(np.clip(theta, -1.0, 1.0))
-        terms += [slope * q * np.sin(angle), slope * r * np.cos(angle)]
-    return _followed(t_s, phi, terms, full)
+        theta = _pitched(roll, pitch, t_s)
+        terms += [np.tan(theta) * q * np.sin(angle), np.tan(theta) * r * np.cos(angle)]
+    return _followed(t_s, phi, terms, full, theta)
 
 
 def pitch_of(rates: list[Column], roll: Column, pitch: Column) -> Followed | None:
@@ -64,9 +66,28 @@ def pitch_of(rates: list[Column], roll: Column, pitch: Column) -> Followed | Non
     return _followed(t_s, _at(pitch, t_s), [q * np.cos(angle), -r * np.sin(angle)])
 
 
-def _followed(t_s: Floats, angle: Floats, terms: list[Floats], full: float | None = None) -> Followed | None:
+def yaw_of(rates: list[Column], roll: Column, pitch: Column | None, yaw: Column) -> Followed | None:
+    """How the yaw angle follows the rates, as `roll_of`: r and q in one unit, since what a turn makes of them
+    is alike."""
+    t_s = rates[0].t_s
+    _, q, r = (_at(column, t_s) for column in rates)
+    angle = _at(roll, t_s) * 2.0 * np.pi / _turn(roll.values)
+    theta = np.zeros(len(t_s)) if pitch is None else _pitched(roll, pitch, t_s)
+    turning = (q * np.sin(angle) + r * np.cos(angle)) / np.cos(theta)
+    return _followed(t_s, _at(yaw, t_s), [turning], _turn(yaw.values), theta)
+
+
+def _pitched(roll: Column, pitch: Column, t_s: Floats) -> Floats:
+    """The pitch angle at given times, rad, of two angles in one unit."""
+    return _at(pitch, t_s) * 2.0 * np.pi / _turn(np.append(4.0 * pitch.values, roll.values))
+
+
+def _followed(
+    t_s: Floats, angle: Floats, terms: list[Floats], full: float | None = None, theta: Floats | None = None
+) -> Followed | None:
     """How an angle follows the first term of its rate of change, window by window, the others in whatever
-    unit they are; full: a circle, where it may go round."""
+    unit they are; full: a circle, where it may go round; theta: the pitch angle, where windows in which it is
+    steep say nothing."""
     step = np.diff(t_s)
     gaps_out = np.where(step < _WINDOW_S, step, 0.0)
     integrals = np.vstack(
@@ -75,6 +96,9 @@ def _followed(t_s: Floats, angle: Floats, terms: list[Floats], full: float | Non
     length = max(round(_WINDOW_S / max(float(np.median(step)), 1e-9)), 1)
     begin, end = np.arange(0, len(t_s) - length, length), np.arange(length, len(t_s), length)
     whole = (t_s[end] - t_s[begin]) < 2.0 * _WINDOW_S
+    if theta is not None:
+        steep = np.cumsum(np.abs(theta) > _STEEP_RAD)
+        whole &= steep[end] == steep[begin]
     turned, moved = (angle[end] - angle[begin])[whole], (integrals[end] - integrals[begin])[whole]
     if full is not None:
         turned = (turned + 0.5 * full) % full - 0.5 * full
@@ -114,33 +138,52 @@ def _turn(roll: Floats) -> float:
     return next((full for full in (2.0 * np.pi, 360.0) if largest <= 1.02 * full), 36000.0)
 
 
+Named = tuple[str, Column]
+_RATES = ("roll rate", "pitch rate", "yaw rate")
+
+
 def attitude_says(
-    rates: dict[str, Column], roll: Column, pitch: Column | None, names: tuple[str, str]
+    rates: Mapping[str, Column], angles: Sequence[Named | None], others: Mapping[str, Column]
 ) -> str | None:
-    """What is wrong with the rates (p, q, r by column) or the angles, roll and pitch of these names; None
-    where nothing is."""
-    (p, q, _), columns = list(rates), list(rates.values())
-    if pitch is not None and (says := pitch_remark(pitch, names[1])):
-        return says
-    found = roll_of(columns, roll, pitch)
-    if found is not None and abs(found.correlation) < (_UNLIKE if found.many else _UNLIKE_OF_FEW):
-        return _another_is(rates, roll, names[0], found)
-    pitching = pitch_of(columns, roll, pitch) if pitch else None
-    says = angle_remark(found, p, names[0]) if found else None
-    return says or (angle_remark(pitching, q, names[1]) if pitching else None)
-
-
-def _another_is(rates: dict[str, Column], roll: Column, name: str, found: Followed) -> str | None:
-    """That the roll angle follows another rate, where it does."""
-    (p, *others), columns = list(rates), list(rates.values())
-    for other in others:
-        moved = roll_of([rates[other], *(one for one in columns if one is not rates[other])], roll, None)
-        if moved is not None and abs(moved.correlation) > _SURE:
-            return (
-                f"{name} does not follow {p} (correlation {found.correlation:.2f}) but {other} "
-                f"({moved.correlation:.2f}): {other} is the roll rate"
-            )
+    """What is wrong with the rates (p, q, r by column) or the angles: roll, pitch and yaw, None where one is
+    not known. The first that is wrong; None where nothing is. others: what may have taken the place of a
+    rate."""
+    columns = list(rates.values())
+    for place, (rate, angle) in enumerate(zip(rates, angles, strict=True)):
+        if angle is None:
+            continue
+        if place == 1 and (says := pitch_remark(angle[1], angle[0])):
+            return says
+        found = _follows(columns, angles, place)
+        if found is None:
+            continue
+        unlike = abs(found.correlation) < (_UNLIKE if found.many else _UNLIKE_OF_FEW)
+        for other, column in {**rates, **others}.items() if abs(found.correlation) < _SURE else ():
+            moved = _follows([*columns[:place], column, *columns[place + 1 :]], angles, place)
+            asked = _SURE if unlike and other in rates else _SURELY
+            if moved is not None and abs(moved.correlation) > asked:
+                return _another_is(angle[0], (rate, found), (other, moved), _RATES[place])
+        if says := angle_remark(found, rate, angle[0]):
+            return says
     return None
+
+
+def _follows(rates: list[Column], angles: Sequence[Named | None], place: int) -> Followed | None:
+    """How the angle of a place follows the rates; None where too little moves, or it is not known."""
+    (roll, pitch, yaw) = (None if one is None else one[1] for one in angles)
+    if roll is None or (known := (roll, pitch, yaw)[place]) is None:
+        return None
+    if place == 2:
+        return yaw_of(rates, roll, pitch, known)
+    return pitch_of(rates, roll, known) if place else roll_of(rates, roll, pitch)
+
+
+def _another_is(angle: str, of: tuple[str, Followed], by: tuple[str, Followed], rate: str) -> str:
+    (own, found), (other, moved) = of, by
+    return (
+        f"{angle} does not follow {own} (correlation {found.correlation:.2f}) but {other} "
+        f"({moved.correlation:.2f}): {other} is the {rate}"
+    )
 
 
 def angle_remark(found: Followed, rate: str, angle: str) -> str | None:

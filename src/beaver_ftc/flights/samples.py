@@ -194,16 +194,20 @@ def _energy_climb(
 
 def _consistent(recording: Recording, vehicle: Vehicle) -> None:
     """Raise BadInput where rates, roll and gravity contradict one another: what is in another unit."""
-    rates = [recording.columns[getattr(vehicle.rates, axis).column] for axis in "pqr"]
-    found = vehicle.attitude and recording.columns.get(vehicle.attitude.roll.column)
-    says = None
-    if vehicle.attitude and found:
-        pitch = vehicle.attitude.pitch
-        theta = recording.columns.get(pitch.column) if pitch else None
-        names = [getattr(vehicle.rates, axis).column for axis in "pqr"]
-        if not signals.clipped(rates[0].values).any():
-            angles = (vehicle.attitude.roll.column, pitch.column if pitch else "")
-            says = physics.attitude_says(dict(zip(names, rates, strict=True)), found, theta, angles)
+    columns, attitude, says = recording.columns, vehicle.attitude, None
+    rates = {(name := getattr(vehicle.rates, axis).column): columns[name] for axis in "pqr"}
+    if attitude and not signals.clipped(next(iter(rates.values())).values).any():
+        wanted = [attitude.roll, attitude.pitch, attitude.yaw]
+        angles = [
+            (one.column, columns[one.column]) if one and one.column in columns else None for one in wanted
+        ]
+        others = [
+            *vehicle.signal_names,
+            *(one.column for one in vehicle.flow.values()),
+            *vehicle.command_names,
+        ]
+        known = {name: columns[name] for name in dict.fromkeys(others) if name in columns}
+        says = physics.attitude_says(rates, angles, known)
     down = vehicle.acceleration and recording.columns.get(vehicle.acceleration.column)
     if not says and vehicle.acceleration and down:
         says = physics.gravity_remark(down, vehicle.acceleration.column)

@@ -134,7 +134,7 @@ def test_a_covariance_stays_symmetric_to_the_bit():
     root, seen, noise = rng.standard_normal((5, 5)), rng.standard_normal((5, 3)), np.diag([0.2, 0.3, 0.1])
     p = root @ root.T + 0.1 * np.eye(5)
     expected = np.linalg.inv(np.linalg.inv(p) + seen @ np.linalg.inv(noise) @ seen.T)
-    normal = Noise(np.zeros(3), noise, 1.0, 1e9, 1.0, 1.0, 1.0, np.inf)
+    normal = Noise(np.zeros(3), noise, 1.0, 1e9, 1.0, 1.0, 1.0, np.inf, 1.0)
     _update(np.zeros(5), p, np.zeros(3), seen, noise, normal)
     assert (p == p.T).all()
     assert p == pytest.approx(expected, rel=1e-9)

@@ -148,3 +148,31 @@ def test_a_sample_that_nothing_explains_teaches_nothing(size, learns):
     _update(m, p, y, np.eye(3), noise.covariance, noise)
     assert (m[0] > 0.0) == learns
     assert noise_of(model).farthest == np.inf
+
+
+@pytest.mark.parametrize("wider", [1.0, 4.0])
+def test_the_scale_of_the_noise_is_of_residuals_however_wide_it_is_taken(wider):
+    """Five memories long: else the scale takes back what was taken wider."""
+    model, _ = in_colour(np.zeros((1, 3, 3)))
+    model = model.model_copy(update={"colours": [model.colours[0].model_copy(update={"wider": wider})]})
+    flight = replace(small.flight(model, 3000, seed=3), colour=(1.0,))
+    scale = posterior_of(flight, model, bank_of(model))[2]
+    assert scale[-1] == pytest.approx(1.0, abs=0.15)
+    assert noise_of(model.heard((1.0,)), (1.0,)).covariance == pytest.approx(wider * np.array(model.noise))
+
+
+@pytest.mark.parametrize(("average", "factor"), [((1.0, -0.8, 0.16), 1.7), ((1.0, 0.5), 2.5), ((1.0,), 2.5)])
+def test_of_another_law_the_noise_is_taken_wider(monkeypatch, average, factor):
+    """By what was seen to be asked for after gyros and after gusts; of the laws seen not at all."""
+    plain = small.model(small.WING | {"moving_air": True})
+    colour = Colour(average=list(average), noise=plain.noise)
+    monkeypatch.setattr(fitting, "_left_out", lambda *_: [(model, stretches)])
+    found = []
+    for laws in (False, True):
+        vehicle = plain.vehicle.model_copy(update={"other_laws": laws})
+        model = plain.model_copy(update={"colours": [colour], "vehicle": vehicle})
+        flight = replace(small.flight(model, 400, seed=5), colour=average)
+        stretches = [fitting.Stretch(flight, np.ones(400, dtype=bool))]
+        found.append(fitting._widened(stretches, model).wider(average))
+    assert found[0] >= 1.0
+    assert found[1] == pytest.approx(factor * found[0])

@@ -188,7 +188,7 @@ class Noise(NamedTuple):
     constant (3,) of the model, rad/s; covariance (3, 3) of a sample, (rad/s)2; power: share of a white
     residual's information in this one; tail: degrees of freedom of its t distribution; memory in samples, and
     least and largest value, of the running scale of the covariance; farthest: square of a residual from
-    which on a sample tells nothing more.
+    which on a sample tells nothing more; wider: how many times the covariance is that of residuals.
     """
 
     constant: Floats
@@ -199,6 +199,7 @@ class Noise(NamedTuple):
     least: float
     largest: float
     farthest: float
+    wider: float
 
 
 def noise_of(model: Model, colour: Sequence[float] = ()) -> Noise:
@@ -207,5 +208,5 @@ def noise_of(model: Model, colour: Sequence[float] = ()) -> Noise:
     memory = settings.noise_memory_s * model.rate_hz
     return Noise(
         model.constant(colour), model.arrays()[3], settings.power, settings.tail, memory,
-        _LEAST_SCALE, _LARGEST_SCALE, farthest,
+        _LEAST_SCALE, _LARGEST_SCALE, farthest, model.wider(colour),
     )  # fmt: skip

@@ -210,7 +210,8 @@ def _relax(m, p, own):
 def _correct(prior, m, p, y, f, bank, noise, scale):
     """Kalman correction of every hypothesis by one sample; m and p are replaced.
 
-    Returns the posterior probabilities, the clipped square of the residual under them, and the evidence.
+    Returns the posterior probabilities, the clipped square of the residual under them, as if the noise were
+    no wider than residuals are, and the evidence.
     """
     hypotheses, states = m.shape
     log = np.empty(hypotheses)
@@ -231,7 +232,7 @@ def _correct(prior, m, p, y, f, bank, noise, scale):
     mu /= total
     clipped = 0.0
     for h in range(hypotheses):
-        clipped += mu[h] * min(squares[h], 3.0 * _CLIP)
+        clipped += mu[h] * min(noise.wider * squares[h], 3.0 * _CLIP)
     return mu, clipped, most + np.log(total)
 
 

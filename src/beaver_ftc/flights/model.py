@@ -88,7 +88,9 @@ class Colour(Section):
     before: Matrix = Field(
         default=[], description="what so many residuals before foretell of the next, latest first, (3 L, 3)"
     )
-    wider: Number = Field(1.0, ge=1, description="how many times as far, in squares, gains left out differ")
+    wider: Number = Field(
+        1.0, ge=1, description="how many times as far, in squares, gains left out and other laws' differ"
+    )
 
 
 class Model(Section):
@@ -120,8 +122,12 @@ class Model(Section):
 
     def heard(self, colour: Sequence[float]) -> "Model":
         """The model with the noise of a colour that it has seen, as much wider as parts left out say."""
-        known = [one.wider * np.array(one.noise) for one in self.colours if one.average == list(colour)]
-        return self.model_copy(update={"noise": known[0].tolist()}) if known else self
+        known = [np.array(one.noise) for one in self.colours if one.average == list(colour)]
+        return self.model_copy(update={"noise": (self.wider(colour) * known[0]).tolist()}) if known else self
+
+    def wider(self, colour: Sequence[float]) -> float:
+        """How many times the noise of a colour is taken as wide as residuals are."""
+        return next((float(one.wider) for one in self.colours if one.average == list(colour)), 1.0)
 
     def foretold(self, colour: Sequence[float]) -> Floats:
         """What the residuals before one foretell of it in the noise of a colour, (L, 3, 3)."""

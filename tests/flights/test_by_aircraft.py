@@ -119,11 +119,40 @@ def test_outside_the_envelope_nothing_is_said(log):
 def test_a_log_of_another_aircraft_is_not_credible(log):
     """Rates twice as large as this aircraft's commands can make them: no fault of a surface does that."""
     recording, vehicle = log
-    turned = changed(recording, p_rad_s=lambda p: -p, q_rad_s=lambda q: -q, r_rad_s=lambda r: -r)
+    turned = changed(recording, **dict.fromkeys(("p_rad_s", "q_rad_s", "r_rad_s"), lambda rate: 2.0 * rate))
     vehicle = vehicle.model_copy(update={"attitude": None})
     _, rows, verdict = diagnose_as(turned, vehicle, BEAVER)
     assert not rows.faulty.any()
     assert "another aircraft" in verdict["credible"]["reasons"][0]["says"]
+
+
+@pytest.mark.parametrize(
+    ("theta", "gain"), [((0.0, 0.0), (1.0, 1.0)), ((-0.9, 0.0), (0.1, 1.0)), ((0.0, -2.0), (1.0, -1.0))]
+)
+def test_what_each_command_does_in_all_of_a_flight(theta, gain):
+    """Innovations that are theta times what was expected, a trim and noise: a little over 1 + theta."""
+    rng = np.random.default_rng(6)
+    expected, noise = rng.standard_normal((4000, 3, 2)), 0.1 * rng.standard_normal((4000, 3))
+    innovation = np.einsum("nas,s->na", expected, theta) + np.array([0.5, 0.0, -0.2]) + noise
+    found = stepped._gains(innovation, expected)
+    assert np.all(found > gain)
+    assert found == pytest.approx(gain, abs=0.05)
+    assert (stepped._gains(innovation[:200], expected[:200]) == 1.0).all()
+
+
+def test_a_command_of_the_other_sign_is_refused_but_in_declared_turbulence(tmp_path):
+    sine = [{"sine": {"amplitude_deg_s": 3.0, "frequency_hz": 0.4}}]
+    scenario = bf.load({"name": "swung", "duration_s": 8.0, "reference": dict.fromkeys("pqr", sine)})
+    bf.fly(scenario).save(tmp_path)
+    path, vehicle = exported(tmp_path / "swung", "table", tmp_path)
+    recording = read_for(path, vehicle)
+    turned = changed(recording, rudder_command=np.negative)
+    assert diagnose_as(recording, vehicle, BEAVER)[2]["faulty"] is False
+    with pytest.raises(BadInput, match=r"answer the command of rudder the other way round.*`scale: -1` fit"):
+        diagnose_as(turned, vehicle, BEAVER)
+    (tmp_path / "moving.yaml").write_text("name: moving\nfdi: {bounds: {turbulence: light}}\n")
+    moving = known("beaver", str(tmp_path / "moving.yaml"))
+    assert diagnose_as(turned, vehicle, moving)[2]["faulty"] in (False, True)
 
 
 def without(vehicle, **keys):

@@ -31,7 +31,7 @@ ALONE = (np.tile([0.9, 0.5, 0.7, 0.0], (len(SAID), 1)), np.tile([1.0, 0.7, 0.8, 
 
 def test_verdicts_as_columns():
     fdi = SimpleNamespace(is_ours=True, pairs=False)
-    rows = stepped.rows_of(T_S, stepped.Stepped(SAID, *ALONE), SURFACES, fdi)
+    rows = stepped.rows_of(T_S, stepped.Stepped(SAID, *ALONE, np.ones(4)), SURFACES, fdi)
     columns = of.columns(rows, SURFACES)
     assert list(columns) == [
         "t_s", "faulty", "named",

@@ -120,11 +120,21 @@ def diagnosed(taken: Taken, by: Known) -> tuple[Rows, Document]:
     for begin, end in parts:
         diagnosis.reset()
         found.append(step_through(diagnosis, [part[begin:end] for part in inputs], taken.rate_hz))
+    if diagnosis.config.bounds.turbulence == "none":  # a law that answers gusts opposes what they turn
+        _check_signs(samples.name, by.aircraft, found)
     stepped = _whole(len(samples.t_s), len(by.aircraft.surfaces), parts, found)
     rows = rows_of(samples.t_s, stepped, by.aircraft.surfaces, diagnosis.config)
     reasons = _outside(inputs[1], by.aircraft, taken.unknown, parts) | _misled(samples.t_s, parts, stepped)
     rows = rows.silent(_since(parts, rows, reasons))
     return rows, _verdict(samples, rows, stepped, by, taken.ages)
+
+
+def _check_signs(name: str, aircraft: Aircraft, found: list[Stepped]) -> None:
+    """Raise BadInput where the rates answer a command the other way round in all of a stretch."""
+    for surface, gain in zip(aircraft.surfaces, np.min([one.gains for one in found], axis=0), strict=True):
+        if gain < trust.REVERSED:
+            says = f"the rates answer the command of {surface} the other way round in all of it"
+            raise BadInput(f"{name}: {says}, allowed: signs as of {aircraft.name}; does `scale: -1` fit?")
 
 
 def _check(recording: Recording, vehicle: Vehicle, aircraft: Aircraft) -> None:
@@ -235,9 +245,10 @@ def _stretches(samples: Samples, unknown: Mask, rate_hz: float) -> list[tuple[in
 def _whole(n: int, surfaces: int, parts: list[tuple[int, int]], found: list[Stepped]) -> Stepped:
     """The stretches put together; nothing is said between them."""
     verdicts, low, high = [Verdict()] * n, np.zeros((n, surfaces)), np.ones((n, surfaces))
+    gains = np.min([one.gains for one in found], axis=0)
     for (begin, end), one in zip(parts, found, strict=True):
         verdicts[begin:end], low[begin:end], high[begin:end] = one.verdicts, one.low, one.high
-    return Stepped(verdicts, low, high)
+    return Stepped(verdicts, low, high, gains)
 
 
 def _outside(

@@ -253,8 +253,8 @@ def summary(model: Model) -> str:
         *(f"  together, not to be told apart: {', '.join(g)}" for g in model.groups if len(g) > 1),
         *_pressure_lines(model),
         *(
-            f"  noise of the colour {', '.join(f'{c:.3g}' for c in one.average)}: taken {one.wider:.2g} times "
-            "as wide, in squares, as gains of 10 s left out differ, and other laws may"
+            f"  noise of the colour {', '.join(f'{c:.3g}' for c in one.average)}: {one.wider:.2g} times as "
+            "wide, in squares, as gains of 10 s left out differ, and other laws may"
             for one in model.colours
         ),
         *(f"  {line}" for line in trust.unclaimed_lines(model)),

@@ -16,7 +16,7 @@ from beaver_ftc.flights.units import ACCELERATION, ANGLE, RATE, UNITS, nearest_u
 
 _WINDOW_S, _LEAST_WINDOWS = 1.0, 8
 _MANY_WINDOWS, _SURE, _NEAR = 20, 0.7, 1.3
-_SURELY = 0.95
+_SURELY, _EXACTLY = 0.95, 0.99
 _APART, _APART_OF_FEW = 1.5, 1.8
 _UNLIKE, _UNLIKE_OF_FEW = 0.4, 0.2
 _G = UNITS["g"][1]
@@ -157,15 +157,21 @@ def attitude_says(
         found = _follows(columns, angles, place)
         if found is None:
             continue
-        unlike = abs(found.correlation) < (_UNLIKE if found.many else _UNLIKE_OF_FEW)
-        for other, column in {**rates, **others}.items() if abs(found.correlation) < _SURE else ():
+        for other, column in {**rates, **others}.items():
             moved = _follows([*columns[:place], column, *columns[place + 1 :]], angles, place)
-            asked = _SURE if unlike and other in rates else _SURELY
-            if moved is not None and abs(moved.correlation) > asked:
+            if moved is not None and abs(moved.correlation) > _asked(found, other in rates):
                 return _another_is(angle[0], (rate, found), (other, moved), _RATES[place])
         if says := angle_remark(found, rate, angle[0]):
             return says
     return None
+
+
+def _asked(found: Followed, is_rate: bool) -> float:
+    """How well another column has to agree with an angle to be its rate, where the one named agrees so."""
+    own = abs(found.correlation)
+    if is_rate and own < (_UNLIKE if found.many else _UNLIKE_OF_FEW):
+        return _SURE
+    return _SURELY if own < _SURE else _EXACTLY if own < _SURELY else 1.0
 
 
 def _follows(rates: list[Column], angles: Sequence[Named | None], place: int) -> Followed | None:

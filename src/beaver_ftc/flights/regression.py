@@ -21,6 +21,8 @@ from beaver_ftc.flights.vehicle import Vehicle
 _PARALLEL = 1e-9
 _RIDGE = 1e-10
 _DEPENDENT = 1e-12
+_PARTS, _LEAST_ROWS, _SURELY = 4, 60, 4.0
+"""Parts of a flight, and their rows at least; standard errors."""
 
 
 def groups_of(vehicle: Vehicle) -> list[list[int]]:
@@ -157,6 +159,24 @@ def _newey_west(z: Floats, e: Floats, inverse: Floats, run: NDArray[np.int64], r
         sums = total[width:] - total[:-width]
         middle += sums.T @ sums / width
     return np.sqrt(np.maximum(np.diag(inverse @ middle @ inverse), 0.0))
+
+
+def at_most(x: Floats, y: Floats, power: float) -> tuple[Floats, Floats]:
+    """Least squares of y (n,) on x (n, m): what each coefficient surely does not exceed, (m,), which is much
+    where columns make one another up; and squares of what is left (n,). power: as in `Settings`."""
+    size = np.maximum(np.sqrt((x**2).mean(axis=0)), TINY)
+    z = x / size
+    inverse = np.linalg.inv(z.T @ z + _RIDGE * len(z) * np.eye(z.shape[1]))
+    found = inverse @ (z.T @ y)
+    square = (y - z @ found) ** 2
+    error = np.sqrt(np.maximum(np.diag(inverse), 0.0) * square.mean() / power)
+    return (found + _SURELY * error) / size, square
+
+
+def quarters(rows: NDArray[np.int64]) -> list[NDArray[np.int64]] | None:
+    """The rows of a flight in its parts; None where one is too short."""
+    parts = np.array_split(rows, _PARTS)
+    return parts if min(map(len, parts)) >= _LEAST_ROWS else None
 
 
 def variance_inflation(x: Floats) -> Floats:

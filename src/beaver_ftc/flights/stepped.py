@@ -15,21 +15,25 @@ import numpy as np
 from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.flights.diagnose import UNKNOWN, Rows
 from beaver_ftc.flights.recording import TINY, Floats
+from beaver_ftc.flights.regression import at_most, quarters
 from beaver_ftc.loop.stream import FLOW, Diagnosis
 
 LOSS = "loss_of_effectiveness"
 STANDS_S = 1.0
 _ROUNDING, _ROUNDING_RAD_S2 = 1e-9, 1e-12
+_POWER = 0.4
 _KEPT = ("fdi", "actuators", "design_model")  # between samples a log has no instants
 
 
 @dataclass(frozen=True)
 class Stepped:
-    """verdicts, one a sample; low, high (n, S): effectiveness of each surface if it alone is at fault."""
+    """verdicts, one a sample; low, high (n, S): effectiveness of each surface if it alone is at fault; gains
+    (S,): of what each command does at most as much as this in all of it, 1 where it is too short."""
 
     verdicts: list[Verdict]
     low: Floats
     high: Floats
+    gains: Floats
 
 
 def declared_of(scenario: Any) -> dict[str, Any]:
@@ -62,7 +66,22 @@ def step_through(diagnosis: Diagnosis, inputs: Sequence[Floats], rate_hz: float)
     reach = max(round(STANDS_S * rate_hz), 1)
     low, high = 1.0 + _latest(theta[0], reach), 1.0 - _latest(-theta[1], reach)
     nothing = low > high
-    return Stepped(verdicts, np.where(nothing, 0.0, low), np.where(nothing, 1.0, high))
+    gains = _gains(innovation, expected)
+    return Stepped(verdicts, np.where(nothing, 0.0, low), np.where(nothing, 1.0, high), gains)
+
+
+def _gains(innovation: Floats, expected: Floats) -> Floats:
+    """As in `Stepped`, of the rates' innovation (n, 3) and what each surface was to do, (n, 3, S)."""
+    known = np.flatnonzero(np.isfinite(innovation).all(axis=1) & (np.arange(len(innovation)) > 0))
+    if (parts := quarters(known)) is None:
+        return np.ones(expected.shape[2])
+    white = np.maximum(innovation[known].std(axis=0), TINY)
+    x = np.concatenate([np.broadcast_to(np.eye(3), (len(expected), 3, 3)), expected / white[:, None]], axis=2)
+    y, found = innovation / white, np.full(expected.shape[2], -np.inf)
+    for part in parts:
+        theta, _ = at_most(x[part].reshape(3 * len(part), -1), y[part].ravel(), _POWER)
+        found = np.maximum(found, 1.0 + theta[3:])
+    return found
 
 
 def _explaining(innovation: Floats, bound: Floats, expected: Floats) -> tuple[Floats, Floats]:

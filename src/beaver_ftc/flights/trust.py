@@ -35,9 +35,9 @@ _TIED, _PLAIN = 0.98, 12.5
 _UNIT, _SPREAD = 10.0, 1.6
 _ALIKE, _OTHER_UNIT = 3.0, 12.0
 _RARE = (0.001, 0.999)
-_PARTS, _LEAST_ROWS, _SURELY, _RIDGE, _MIDDLE = 4, 60, 4.0, 1e-10, 2.366
-"""Parts of a flight, and their rows at least; standard errors; the median of a square of three axes."""
-_REVERSED, _LITTLE, _FAINT = -0.3, 0.2, 0.5
+_MIDDLE = 2.366
+"""The median of a square of three axes."""
+REVERSED, _LITTLE, _FAINT = -0.3, 0.2, 0.5
 """Gains below which a command works the other way round, or hardly, and another column is another. Of 1,152
 correct logs with faults of any kind no column was below 1.8 in all parts (`own_logs.py`, seeds 31 to 42)."""
 
@@ -213,7 +213,7 @@ def _wrong_columns(samples: Samples, model: Model, found: _InAll) -> Iterator[st
     """What is wrong with a flight's columns, the surest first."""
     for group, gain in zip(model.groups, found.gains, strict=True):
         command, moved = f"the command of {'+'.join(group)}", _moved(samples, model, group)
-        if gain < _REVERSED:
+        if gain < REVERSED:
             yield f"the rates answer {command} the other way round in all of it (does `scale: -1` fit?)"
         elif gain < _LITTLE and moved > _ALIKE:
             little = f"does at most {gain:.2g} of what it did"
@@ -230,19 +230,20 @@ def _in_all_parts(samples: Samples, model: Model) -> _InAll | None:
     ok, unexplained, answers = regression.predicted(samples, model)
     columns, names = _by_column(samples, model)
     whiten = np.linalg.inv(np.linalg.cholesky(model.arrays()[3])).T
-    rows, noise, groups = np.flatnonzero(ok), np.inf, len(model.groups)
-    gains = np.full(groups + len(names), -np.inf)
-    for part in np.array_split(rows, _PARTS):
-        if len(part) < _LEAST_ROWS:
-            return None
+    noise, groups = np.inf, len(model.groups)
+    gains, shares = np.full(groups, -np.inf), np.full(len(names), -np.inf)
+    if (parts := regression.quarters(np.flatnonzero(ok))) is None:
+        return None
+    for part in parts:
         trim = np.broadcast_to(np.eye(3), (len(part), 3, 3))
         x = np.concatenate([trim, answers[part], columns[part]], axis=1) @ whiten
         flat, y = x.transpose(0, 2, 1).reshape(3 * len(part), -1), (unexplained[part] @ whiten).ravel()
-        found, error, square = _gains(flat, y, model.settings.power)
-        found[3 + groups :] += 1.0  # what the past does is taken off already
-        gains = np.maximum(gains, (found + _SURELY * error)[3:])
+        gain, square = regression.at_most(flat[:, : 3 + groups], y, model.settings.power)
+        share, _ = regression.at_most(flat, y, model.settings.power)
+        gains = np.maximum(gains, gain[3:])
+        shares = np.maximum(shares, 1.0 + share[3 + groups :])  # what the past does is taken off already
         noise = min(noise, float(np.median(square.reshape(-1, 3).sum(axis=1)) / _MIDDLE))
-    return _InAll(gains[:groups].tolist(), dict(zip(names, gains[groups:].tolist(), strict=True)), noise)
+    return _InAll(gains.tolist(), dict(zip(names, shares.tolist(), strict=True)), noise)
 
 
 def _moved(samples: Samples, model: Model, group: list[str]) -> float:
@@ -252,18 +253,6 @@ def _moved(samples: Samples, model: Model, group: list[str]) -> float:
         return 0.0
     more = _reach(span(samples.commands)) / np.maximum(_reach(model.fitted.commands), TINY)
     return max(float(more[list(model.vehicle.surfaces).index(name)]) for name in group)
-
-
-def _gains(x: Floats, y: Floats, power: float) -> tuple[Floats, Floats, Floats]:
-    """Least squares of y (n,) on x (n, m): coefficients and their standard errors (m,), large where columns
-    make one another up, and squares of what is left (n,)."""
-    size = np.maximum(np.sqrt((x**2).mean(axis=0)), TINY)
-    z = x / size
-    inverse = np.linalg.inv(z.T @ z + _RIDGE * len(z) * np.eye(z.shape[1]))
-    found = inverse @ (z.T @ y)
-    square = (y - z @ found) ** 2
-    error = np.sqrt(np.maximum(np.diag(inverse), 0.0) * square.mean() / power)
-    return found / size, error / size, square
 
 
 def _by_column(samples: Samples, model: Model) -> tuple[Floats, list[str]]:

@@ -171,7 +171,7 @@ def _asked(found: Followed, is_rate: bool) -> float:
     own = abs(found.correlation)
     if is_rate and own < (_UNLIKE if found.many else _UNLIKE_OF_FEW):
         return _SURE
-    return _SURELY if own < _SURE else _EXACTLY if own < _SURELY else 1.0
+    return _SURELY if own < _SURE else _EXACTLY if own < _SURELY else np.inf
 
 
 def _follows(rates: list[Column], angles: Sequence[Named | None], place: int) -> Followed | None:

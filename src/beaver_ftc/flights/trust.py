@@ -334,11 +334,11 @@ def _within(values: Floats, low: float, high: float) -> Mask:
 
 
 def _often(rows: Mask, samples: Samples) -> Mask:
-    """Where a condition held in half of the last seconds."""
+    """Where a condition held in half of the last seconds, or of what there is yet."""
     length = max(round(_WINDOW_S / samples.dt_s), 1)
-    total = np.concatenate([[0], np.cumsum(rows)])
-    begin = np.maximum(np.arange(1, len(rows) + 1) - length, 0)
-    return np.asarray(total[1:] - total[begin] > _OUTSIDE * length)
+    total, end = np.concatenate([[0], np.cumsum(rows)]), np.arange(1, len(rows) + 1)
+    begin = np.maximum(end - length, 0)
+    return np.asarray(total[1:] - total[begin] > _OUTSIDE * (end - begin))
 
 
 def _rates(model: Model) -> list[str]:

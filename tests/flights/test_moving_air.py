@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 import small
 
-from beaver_ftc.flights import diagnose, fitting, identification
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.flights import diagnose, fitting, identification, trust
 from beaver_ftc.flights.bank import bank_of, noise_of
 from beaver_ftc.flights.filtering import _update, posterior_of
-from beaver_ftc.flights.model import Colour
+from beaver_ftc.flights.model import Colour, Fitted
 from beaver_ftc.flights.regression import in_white, predicted
 from beaver_ftc.flights.samples import whitened
 
@@ -176,3 +177,35 @@ def test_of_another_law_the_noise_is_taken_wider(monkeypatch, average, factor):
         found.append(fitting._widened(stretches, model).wider(average))
     assert found[0] >= 1.0
     assert found[1] == pytest.approx(factor * found[0])
+
+
+@pytest.fixture(scope="module")
+def moving():
+    """A model of two colours, identified from flights of a law that answers rates."""
+    flights = [flown(AVERAGE if i % 2 else (1.0,), 0.5 + 0.2 * i, 4000, i) for i in range(4)]
+    white = identification.coloured(flights, VEHICLE)
+    return fitting.fit_model(fitting.stretches_of(white), VEHICLE)
+
+
+@pytest.mark.parametrize("colour", [AVERAGE, (1.0,)])
+def test_columns_are_compared_in_white(moving, colour):
+    """A command of the other sign is told; one that a law moves by the noise itself is not taken for it."""
+    flight = flown(colour, 1.1, 4000, 21)
+    trust.check_columns(flight, moving)
+    found = [trust._in_all_parts(whitened(flight, one.average), moving) for one in moving.colours]
+    likeliest = min(zip(found, moving.colours, strict=True), key=lambda pair: pair[0].unlikely)
+    assert likeliest[0].noise == pytest.approx(1.0, abs=0.3)
+    assert all(1.0 < gain < 1.6 for gain in likeliest[0].gains)
+    plain = trust._in_all_parts(flight, moving.model_copy(update={"colours": []}))
+    assert colour == (1.0,) or min(plain.gains) > 1.9  # what coloured noise does to the fit
+    with pytest.raises(BadInput, match="answer the command of right the other way round"):
+        trust.check_columns(replace(flight, commands=flight.commands * [-1.0, 1.0]), moving)
+
+
+def test_a_signal_of_other_size_is_told_in_moving_air_too(moving):
+    flight = flown((1.0,), 0.5, 4000, 22)
+    known = Fitted(commands=trust.span(flight.commands), rates=trust.span(flight.rates))
+    moving = moving.model_copy(update={"fitted": known})
+    trust.check_columns(flight, moving)
+    with pytest.raises(BadInput, match="columns, signs and units as in the flights of the model"):
+        trust.check_columns(replace(flight, rates=flight.rates * [20.0, 1.0, 1.0]), moving)

@@ -29,14 +29,6 @@ def test_a_command_of_the_other_sign_is_refused(flown, wing_model, signs, name):
         diagnose(other_commands(flown, signs), wing_model)
 
 
-def test_in_moving_air_a_law_that_answers_gusts_is_not_taken_for_another_sign(flown, wing_model):
-    """Then the command opposes what the air turns, in all of a correct log."""
-    opposed = other_commands(flown, (-1, 1))
-    with pytest.raises(BadInput, match="the other way round"):
-        check_columns(opposed, wing_model)
-    assert check_columns(opposed, wing_model.model_copy(update={"colours": ["any"]})) is None
-
-
 def test_a_sign_that_turns_about_in_flight_is_no_column(flown, wing_model):
     """What is reversed from the middle on is no mistake of the file: nothing is believed from there on."""
     signs = np.where(flown.t_s < 60.0, 1.0, -1.0)[:, None]

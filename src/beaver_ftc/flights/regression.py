@@ -103,12 +103,18 @@ def in_white(
     """As `predicted`, less what the residuals before each sample foretell of it in the colour of the flight:
     what is then left of health is white."""
     ok, unexplained, answers = predicted(samples, model, scaled)
-    rest, seen, known = unexplained.copy(), answers.copy(), ok.copy()
-    for j, by in enumerate(model.foretold(samples.colour), start=1):
-        rest[j:] -= np.einsum("nr,rs->ns", unexplained[:-j], by)
-        seen[j:] -= np.einsum("ngr,rs->ngs", answers[:-j], by)
+    before, known = model.foretold(samples.colour), ok.copy()
+    for j in range(1, len(before) + 1):
         known &= _delayed(ok, j, False)
-    return known, rest, seen
+    return known, less_foretold(unexplained, before), less_foretold(answers, before)
+
+
+def less_foretold(values: Floats, before: Floats) -> Floats:
+    """Values (n, ..., 3) less what those before each foretell of it, by (L, 3, 3)."""
+    rest = values.copy()
+    for j, by in enumerate(before, start=1):
+        rest[j:] -= np.einsum("n...r,rs->n...s", values[:-j], by)
+    return rest
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights import energy, regression
 from beaver_ftc.flights.model import Fitted, Model
 from beaver_ftc.flights.recording import TINY, Floats
-from beaver_ftc.flights.samples import Samples
+from beaver_ftc.flights.samples import Samples, whitened
 from beaver_ftc.flights.signals import STILL_S
 
 Document = dict[str, Any]
@@ -189,21 +189,25 @@ def check_commands(
 
 class _InAll(NamedTuple):
     """Of all parts of a flight: at most how much of the model's answer to each group's command, (G,), and to
-    each column, by its name, there is; and the least scale of the noise."""
+    each column, by its name, there is; the least scale of the noise; and minus the log likelihood of a
+    sample, but for what all colours have alike."""
 
     gains: list[float]
     columns: dict[str, float]
     noise: float
+    unlikely: float
 
 
 def check_columns(samples: Samples, model: Model) -> None:
     """Raise BadInput where in every part of a flight the rates answer a command or another column as in no
     flight of the model, or do what no trim and no effectiveness explain: columns, signs or units are others,
-    since no fault has always been there and changes what is not its own. Not in moving air: what a law
-    answers to gusts looks like a command that works the other way round."""
-    if model.colours or (found := _in_all_parts(samples, model)) is None:
+    since no fault has always been there and changes what is not its own. In moving air by what the likeliest
+    colour leaves white: what a law answers to gusts looks like a command that works the other way round."""
+    flights = [whitened(samples, one.average) for one in model.colours] or [samples]
+    found = [one for flight in flights if (one := _in_all_parts(flight, model)) is not None]
+    if not found:
         return
-    says = next(_wrong_columns(samples, model, found), None)
+    says = next(_wrong_columns(samples, model, min(found, key=lambda one: one.unlikely)), None)
     if says is not None:
         allowed = "allowed: columns, signs and units as in the flights of the model"
         raise BadInput(f"{samples.name}: {says}, {allowed}")
@@ -227,23 +231,31 @@ def _wrong_columns(samples: Samples, model: Model, found: _InAll) -> Iterator[st
 
 def _in_all_parts(samples: Samples, model: Model) -> _InAll | None:
     """None where a part is too short."""
-    ok, unexplained, answers = regression.predicted(samples, model)
+    ok, unexplained, answers = regression.in_white(samples, model)
     columns, names = _by_column(samples, model)
-    whiten = np.linalg.inv(np.linalg.cholesky(model.arrays()[3])).T
-    noise, groups = np.inf, len(model.groups)
-    gains, shares = np.full(groups, -np.inf), np.full(len(names), -np.inf)
+    columns = regression.less_foretold(columns, model.foretold(samples.colour))
+    wider, groups = model.wider(samples.colour), len(model.groups)
+    root = np.linalg.cholesky(model.heard(samples.colour).arrays()[3] / wider)
+    whiten, power = np.linalg.inv(root).T, model.settings.power / wider
+    gains, shares, noises = np.full(groups, -np.inf), np.full(len(names), -np.inf), []
     if (parts := regression.quarters(np.flatnonzero(ok))) is None:
         return None
     for part in parts:
         trim = np.broadcast_to(np.eye(3), (len(part), 3, 3))
         x = np.concatenate([trim, answers[part], columns[part]], axis=1) @ whiten
         flat, y = x.transpose(0, 2, 1).reshape(3 * len(part), -1), (unexplained[part] @ whiten).ravel()
-        gain, square = regression.at_most(flat[:, : 3 + groups], y, model.settings.power)
-        share, _ = regression.at_most(flat, y, model.settings.power)
+        gain, square = regression.at_most(flat[:, : 3 + groups], y, power)
+        share, _ = regression.at_most(flat, y, power)
         gains = np.maximum(gains, gain[3:])
         shares = np.maximum(shares, 1.0 + share[3 + groups :])  # what the past does is taken off already
-        noise = min(noise, float(np.median(square.reshape(-1, 3).sum(axis=1)) / _MIDDLE))
-    return _InAll(gains.tolist(), dict(zip(names, shares.tolist(), strict=True)), noise)
+        noises.append(float(np.median(square.reshape(-1, 3).sum(axis=1)) / _MIDDLE))
+    size = float(np.log(np.diag(root)).sum() + 1.5 * np.log(noises).mean())
+    return _InAll(
+        gains.tolist(),
+        dict(zip(names, shares.tolist(), strict=True)),
+        min(noises),
+        size - 3.0 * float(np.log(sum(samples.colour or (1.0,)))),
+    )
 
 
 def _moved(samples: Samples, model: Model, group: list[str]) -> float:

@@ -177,6 +177,8 @@ def test_of_another_law_the_noise_is_taken_wider(monkeypatch, average, factor):
         found.append(fitting._widened(stretches, model).wider(average))
     assert found[0] >= 1.0
     assert found[1] == pytest.approx(factor * found[0])
+    monkeypatch.setattr(fitting, "_farther", lambda *_: (1e6, 1))
+    assert fitting._widened(stretches, model).wider(average) == pytest.approx(200.0 * factor)
 
 
 @pytest.fixture(scope="module")

@@ -76,6 +76,9 @@ _AFTER_GYROS, _AFTER_GUSTS = 1.7, 2.5
 """In moving air the noise of another law's flight is taken as so many times wider, where it is gyros' or
 gusts', so that gains too are known no better. Chosen on seeds 71, 73 and 101 to 106: 3 of 240 healthy flights
 alarmed, and with no such factor 6 of 150."""
+_MOST_WIDER = 200.0
+"""One part left out counts as no more than this: of few flights of a colour one can be far from all others
+(1,550 of seed 205, and the rest 5)."""
 _DELAYS = (-0.4, 0.0, 0.4)
 """Delays beside the model's that a flight may have, in samples."""
 _ALIKE = 1e-9
@@ -339,7 +342,7 @@ def _widened(stretches: Sequence[Stretch], model: Model) -> Model:
             for part in np.array_split(np.arange(len(e)), count):
                 f, left = x[part] - x[part].mean(axis=0), e[part] - e[part].mean(axis=0)
                 squares, rank = _farther(f.reshape(left.size, -1), left.ravel(), between)
-                found.setdefault(one.samples.colour, []).append(squares / max(rank, 1))
+                found.setdefault(one.samples.colour, []).append(min(squares / max(rank, 1), _MOST_WIDER))
     wider = {colour: max(float(np.mean(ratio)), 1.0) for colour, ratio in found.items()}
     if model.vehicle.other_laws:
         wider = {

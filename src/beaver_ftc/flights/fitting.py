@@ -73,12 +73,10 @@ _POWER_OTHER_LAWS, _THEORIES = 0.4, 2.0
 then tells less than the fit knows. And so many times the evidence of theory raises an alarm. Chosen in the
 same way, the first on seed 1 of five aircraft."""
 _AFTER_GYROS, _AFTER_GUSTS = 1.7, 2.5
-"""In moving air the noise of another law's flight is taken as so many times wider, where it is gyros' or
-gusts', so that gains too are known no better. Chosen on seeds 71, 73 and 101 to 106: 3 of 240 healthy flights
-alarmed, and with no such factor 6 of 150."""
+"""In moving air the noise of another law's flight is so many times wider, gyros' or gusts', for gains too.
+Chosen on seeds 71, 73 and 101 to 106: 3 of 240 healthy flights alarmed, and with no such factor 6 of 150."""
 _MOST_WIDER = 200.0
-"""One part left out counts as no more than this: of few flights of a colour one can be far from all others
-(1,550 of seed 205, and the rest 5)."""
+"""What a part counts at most: of few flights one can be far from all others (1,550 of seed 205, else 5)."""
 _DELAYS = (-0.4, 0.0, 0.4)
 """Delays beside the model's that a flight may have, in samples."""
 _ALIKE = 1e-9

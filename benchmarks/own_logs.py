@@ -39,7 +39,7 @@ from beaver_ftc.design.terms import N_Y
 from beaver_ftc.flights.by_aircraft import diagnose_as, known
 from beaver_ftc.flights.diagnose import Rows, diagnose
 from beaver_ftc.flights.identification import by_pressure, identify
-from beaver_ftc.flights.model import Model
+from beaver_ftc.flights.model import Model, as_text
 from beaver_ftc.flights.samples import load_flights, read_for, sample
 from beaver_ftc.flights.vehicle import Vehicle, load_vehicle
 from beaver_ftc.results.exports import RECORDINGS
@@ -175,14 +175,15 @@ def by_aircraft(log: Log, of: Campaign) -> Said:
 
 
 def identified(of: Campaign, logs: list[Log]) -> Model:
-    """As `identify`, from healthy flights of other days."""
+    """As `identify` writes it to a file, from healthy flights of other days."""
     vehicle: Vehicle = load_vehicle(str(logs[0].folder / "vehicle.yaml"))
     faults = ["loss"] if of.type == LOSS else ["loss", "stuck"]
     vehicle = vehicle.model_copy(
         update={"faults": faults, "other_laws": True, "moving_air": of.air != "none"}
     )
     named = [log.path.rename(log.path.with_stem(log.flown.name)) for log in logs]
-    return identify(*by_pressure(load_flights(named, vehicle), vehicle))
+    found = identify(*by_pressure(load_flights(named, vehicle), vehicle))
+    return Model.model_validate_json(as_text(found))
 
 
 def unexplained(log: Log) -> tuple[np.ndarray, np.ndarray]:

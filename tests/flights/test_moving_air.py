@@ -10,7 +10,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights import diagnose, fitting, identification, trust
 from beaver_ftc.flights.bank import bank_of, noise_of
 from beaver_ftc.flights.filtering import _update, posterior_of
-from beaver_ftc.flights.model import Colour, Fitted
+from beaver_ftc.flights.model import Colour, Fitted, as_text, load_model
 from beaver_ftc.flights.regression import in_white, predicted
 from beaver_ftc.flights.samples import whitened
 
@@ -209,5 +209,17 @@ def test_a_signal_of_other_size_is_told_in_moving_air_too(moving):
     known = Fitted(commands=trust.span(flight.commands), rates=trust.span(flight.rates))
     moving = moving.model_copy(update={"fitted": known})
     trust.check_columns(flight, moving)
-    with pytest.raises(BadInput, match="columns, signs and units as in the flights of the model"):
+    with pytest.raises(BadInput, match="gyros or air as in no flight of the model"):
         trust.check_columns(replace(flight, rates=flight.rates * [20.0, 1.0, 1.0]), moving)
+
+
+@pytest.mark.parametrize(("keys", "rate_hz"), [
+    ({}, 20.0), ({"max_rate_hz": 40}, 40.0), ({"moving_air": True}, 100.0),
+    ({"moving_air": True, "max_rate_hz": 50}, 50.0),
+])  # fmt: skip
+def test_a_model_that_is_read_again_samples_as_it_did(tmp_path, keys, rate_hz):
+    """In memory a key that was left out is known to be; a file has every key."""
+    model = small.model(small.WING | keys)
+    assert model.vehicle.rate_hz == rate_hz
+    (tmp_path / "model.json").write_text(as_text(model))
+    assert load_model(tmp_path / "model.json").vehicle.rate_hz == rate_hz

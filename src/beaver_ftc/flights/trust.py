@@ -215,7 +215,12 @@ def check_columns(samples: Samples, model: Model) -> None:
 
 
 def _wrong_columns(samples: Samples, model: Model, found: _InAll) -> Iterator[str]:
-    """What is wrong with a flight's columns, the surest first."""
+    """What is wrong with a flight's columns, the surest first: in a colour that the flight has not, noise
+    looks like anything."""
+    noise = f"the noise is {found.noise:.3g} times the model's in all of it, whatever is lost of a surface"
+    noisy = model.fitted is not None and found.noise > noise_limit(model.fitted)
+    if noisy and model.colours:
+        yield f"{noise} (gyros or air as in no flight of the model?)"
     for group, gain in zip(model.groups, found.gains, strict=True):
         command, moved = f"the command of {'+'.join(group)}", _moved(samples, model, group)
         if gain < REVERSED:
@@ -223,11 +228,10 @@ def _wrong_columns(samples: Samples, model: Model, found: _InAll) -> Iterator[st
         elif gain < _LITTLE and moved > _ALIKE:
             little = f"does at most {gain:.2g} of what it did"
             yield f"{command} moves {moved:.3g} times as much as in the flights of the model, and {little}"
-    if other := [name for name, share in found.columns.items() if share < _FAINT]:
-        yield f"what the rates answer to {', '.join(other)} is not what it is in the model, in all of it"
-    if model.fitted is not None and found.noise > noise_limit(model.fitted):
-        noise = f"the noise is {found.noise:.3g} times the model's in all of it"
-        yield f"{noise}, whatever is lost of a surface"
+    if odd := [name for name, share in found.columns.items() if share < _FAINT]:
+        yield f"what the rates answer to {', '.join(odd)} is not what it is in the model, in all of it"
+    if noisy:
+        yield noise
 
 
 def _in_all_parts(samples: Samples, model: Model) -> _InAll | None:

@@ -19,7 +19,7 @@ from beaver_ftc.scenario.loader import looks_like_a_path
 
 _MAX_BYTES = 1_000_000
 MOST_PER_HOUR = 1000.0
-_LAW_HZ = 100.0
+_USUAL_HZ, _LAW_HZ = 20.0, 100.0
 _FOLDER = Path(__file__).parent / "vehicles"
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=100)]
@@ -212,12 +212,12 @@ class Vehicle(Section):
         "of the flight",
         examples=[True],
     )
-    max_rate_hz: Number = number(
-        20.0,
+    max_rate_hz: Number | None = number(
+        None,
         gt=0,
         le=1000,
         unit="Hz",
-        says="rate above which the log is averaged to this rate; 100 for `moving_air`",
+        says="rate above which the log is averaged to this rate; 20, 100 for `moving_air`",
     )
 
     @model_validator(mode="after")
@@ -293,8 +293,8 @@ class Vehicle(Section):
     def rate_hz(self) -> float:
         """The rate above which a log is averaged. Within an average a law may answer what the same average
         shows, and no fit tells that from what the surface does: of other laws every sample is wanted."""
-        usual = self.moving_air and "max_rate_hz" not in self.model_fields_set
-        return _LAW_HZ if usual else self.max_rate_hz
+        usual_hz = _LAW_HZ if self.moving_air else _USUAL_HZ
+        return float(self.max_rate_hz or usual_hz)
 
     def felt(self, history: int) -> int:
         """Past samples of the signals, of so many of the rates: noise that is coloured is whitened by

@@ -218,6 +218,7 @@ class Vehicle(Section):
         le=1000,
         unit="Hz",
         says="rate above which the log is averaged to this rate; 20, 100 for `moving_air`",
+        examples=[50],
     )
 
     @model_validator(mode="after")

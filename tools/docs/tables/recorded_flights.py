@@ -64,7 +64,7 @@ def own_logs_probe() -> str:
         model = own.identified(of, logs)
         quiet = next(one for one in own.scenarios(of) if one["sensors"] == "ideal")  # as those four are
         rows, _ = own.by_model(own.recorded(quiet, "table", Path(folder)), model)
-    return f"{rows.probability[-1]:.6g} {rows.low[-1]} {rows.high[-1]}"
+    return f"{rows.probability[-1]:.2g} {rows.low[-1]} {rows.high[-1]}"
 
 
 def _part(document: Document, name: str) -> Document:

@@ -17,6 +17,8 @@ from tools.drawn.reader import doubts
 
 import beaver_ftc as bf
 from beaver_ftc.cli.main import main
+from beaver_ftc.results import writer
+from beaver_ftc.results.certificates import certificate as certificate_module
 from beaver_ftc.results.certificates import chance
 from beaver_ftc.results.certificates.certificate import as_text, sealed
 from flying import SINES
@@ -93,11 +95,23 @@ CHANCE = [name for name in FLIGHTS if name.startswith("chance")]
 
 
 @lru_cache
-def flown(name):
-    """A flight's certificate as it is read back, and its log."""
+def proved(name):
+    """A flight's certificate as it is read back, its log, and the text of its scenario."""
     flight = bf.fly({"name": "test", "duration_s": 2.0, "reference": SINES, **FLIGHTS[name]})
-    log = {column: flight.log[column].to_numpy() for column in flight.log.columns}
-    return json.loads(as_text(flight.certificate())), log
+    proof = flight.proof()
+    return json.loads(as_text(proof.certificate)), proof.log, proof.scenario
+
+
+def flown(name):
+    """A flight's certificate, and its log."""
+    return proved(name)[:2]
+
+
+def refusals(name, certificate, log=None):
+    """Why the checker refuses a certificate of this flight, and why the second reader does."""
+    _, own, scenario = proved(name)
+    given = certificate, own if log is None else log, scenario
+    return [*failures(*given)], [*doubts(*given)]
 
 
 def set_at_end(log):
@@ -108,11 +122,11 @@ def set_at_end(log):
 @pytest.mark.parametrize("name", FLIGHTS)
 def test_the_checker_accepts_a_flights_certificate(name):
     certificate, log = flown(name)
-    assert [*failures(certificate, log)] == []
-    assert [*doubts(certificate, log)] == []
+    assert refusals(name, certificate) == ([], [])
     stated = {said["column"] for said in certificate["statements"]} - {None}
     left_out = {said["column"] for said in certificate["without"]} - {None}
     assert stated | left_out == set_at_end(log)
+    assert all(said["column"] for said in certificate["statements"])
     assert bool(stated) == bool(log["detected"].any())
     assert len(as_text(certificate)) <= 200_000
 
@@ -142,10 +156,12 @@ def test_chance_excludes_what_moves_nothing_where_it_raised_the_alarm():
     assert log["fie_elevator_excluded"][said["frame"]] == 1.0
     other = copy.deepcopy(certificate)
     next(one for one in other["statements"] if one["what"] == "elevator")["what"] = "rudder"
-    assert [*failures(sealed(other), log)] == ["rudder: of another column"]
+    refused, doubted = refusals("chance", sealed(other))
+    assert refused == ["rudder excluded: fie_elevator_excluded is another column than that of this event"]
+    assert doubted
     before = copy.deepcopy(certificate)
     before["statements"][0]["frame"] += 1
-    assert [*doubts(sealed(before), log)]
+    assert all(refusals("chance", sealed(before)))
 
 
 def looked(name):
@@ -190,15 +206,15 @@ def test_a_roll_angle_is_held_against_the_last_attitude_turned_by_the_gyros():
 def test_an_alarm_of_instruments_is_that_of_the_log():
     """Larger by what nothing allows, or of another reading, it is refused."""
     for name in ("an altimeter", "a roll angle"):
-        certificate, log = flown(name)
+        certificate, _ = flown(name)
         wider, renamed = copy.deepcopy(certificate), copy.deepcopy(certificate)
         said = wider["statements"][0]
         said["looks"][0][0] *= 2.0
         said["sides"][0] += certificate["statements"][0]["looks"][0][0]
         renamed["statements"][0]["test"] = "V"
-        assert [*failures(sealed(wider), log)] == ["alarm: not logged"]
-        assert [*doubts(sealed(wider), log)]
-        assert [*doubts(sealed(renamed), log)]
+        assert refusals(name, sealed(wider))[0] == ["alarm: the log's share is smaller"]
+        assert all(refusals(name, sealed(wider)))
+        assert all(refusals(name, sealed(renamed)))
 
 
 def test_that_a_reading_is_missing_is_what_the_log_says():
@@ -210,8 +226,10 @@ def test_that_a_reading_is_missing_is_what_the_log_says():
     assert (log["watch_missing"][100:] == 3.0).all()
     assert "watch_missing" not in flown("an altimeter")[1]
     other = log | {"watch_missing": np.full(len(log["t_s"]), 4.0)}
-    assert [*failures(certificate, other)] == ["alarm: not so"]
-    assert [*doubts(certificate, other)]
+    assert refusals("no vane", certificate, other)[0] == [
+        "alarm: the log says that another reading is missing, or none"
+    ]
+    assert refusals("no vane", certificate, other)[1]
 
 
 def test_in_blocks_a_jam_is_what_a_block_says_in_the_mean():
@@ -249,7 +267,7 @@ def test_a_path_without_a_certificate_ends_in_one_line(tmp_path):
         command = [sys.executable, CHECKER, name, "log.parquet"]
         checked = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
         assert checked.returncode == 1
-        assert checked.stderr.startswith("no certificate at FOLDER|FILE [LOG]: ")
+        assert checked.stderr.startswith("no certificate at FOLDER, or CERTIFICATE LOG [SCENARIO]: ")
         assert checked.stderr.count("\n") == 1
 
 
@@ -266,7 +284,7 @@ def test_many_constants_are_written_as_one_at_its_worst(monkeypatch):
 
 def test_in_moving_air_the_axes_that_go_together_are_weighed_together():
     """Both at once, with the gust that the vanes saw and what calm air would foretell."""
-    certificate, log = flown("chance, in moving air")
+    certificate, _ = flown("chance, in moving air")
     (alarm,) = (said for said in certificate["statements"] if said["what"] is None)
     assert alarm["axes"] == [0, 2]
     assert any(its["drift"][0][1] for its in alarm["frames"])
@@ -275,13 +293,13 @@ def test_in_moving_air_the_axes_that_go_together_are_weighed_together():
     (said,) = (said for said in apart["statements"] if said["what"] is None)
     for its in said["frames"]:
         its["drift"][0][1] = its["drift"][1][0] = 0.0
-    assert "alarm: not so" in failures(sealed(apart), log)
+    assert all(refusals("chance, in moving air", sealed(apart)))
 
 
 def test_what_is_stuck_is_neither_floating_nor_lost_and_a_repair_proves_nothing_against_it():
     for name in ("any type", "any type with release"):
         certificate, _ = flown(name)
-        types = {said["what"] for said in certificate["statements"] if said["column"] is None}
+        types = {said["what"] for said in certificate["statements"]}
         assert {"aileron float", "aileron loss_of_effectiveness"} <= types
         assert "aileron stuck" not in types
 
@@ -312,43 +330,148 @@ ALTERED = [
 @pytest.mark.parametrize("name", ALTERED)
 def test_whatever_number_is_altered_the_checker_refuses_it(name):
     """As it is, and with the digest written anew: no number is there that decides nothing."""
-    certificate, log = flown(name)
+    certificate, _ = flown(name)
     known = [*places(certificate)]
     rng = np.random.default_rng(7)
     size = 60 if len(certificate["statements"]) < 9 else 20
     for i in rng.choice(len(known), size=min(size, len(known)), replace=False):
         other = altered(certificate, known[i])
-        assert [*failures(other, log)], known[i]
-        assert [*failures(sealed(other), log)], known[i]
-        assert [*doubts(sealed(other), log)], known[i]
+        assert refusals(name, other)[0], known[i]
+        assert all(refusals(name, sealed(other))), known[i]
 
 
-def test_nobody_can_exclude_the_fault_that_is_there():
+def test_the_fault_that_is_there_cannot_be_excluded():
     """The numbers of another surface's exclusion say nothing of the true one."""
-    certificate, log = flown("loss")
+    certificate, _ = flown("loss")
     other = copy.deepcopy(certificate)
     said = next(one for one in other["statements"] if one["what"] == "rudder")
     said |= {"what": "elevator", "column": "fie_elevator_excluded"}
-    assert [*failures(sealed(other), log)] == ["elevator: fie_elevator_excluded is not set in that frame"]
+    why, doubted = refusals("loss", sealed(other))
+    assert why == [f"elevator excluded: fie_elevator_excluded is not set in row {said['frame']}"]
+    assert doubted
 
 
-def test_a_smaller_declared_bound_is_not_that_of_the_log():
-    certificate, log = flown("loss")
+def test_a_smaller_declared_bound_is_not_that_of_the_scenario():
+    certificate, _ = flown("loss")
     other = copy.deepcopy(certificate)
     other["declared"]["b"] = {}
-    refused = [*failures(sealed(other), log)]
-    assert len(refused) == len(other["statements"])
-    assert all("not logged" in line for line in refused)
+    assert refusals("loss", sealed(other))[0] == ["b on p is smaller than the scenario's bound"]
+    _, _, scenario = proved("loss")
+    assert "SHA-256 of scenario.yaml" in next(failures(certificate, flown("loss")[1], scenario + "\n"))
 
 
-def test_the_checker_is_short_and_takes_numpy_alone():
-    text = CHECKER.read_text()
-    assert len(text.splitlines()) <= 100
-    tree = ast.parse(text)
+EARLY = 30  # a row before any fault
+EMPTY = {name: {} for name in "cbgoBm"}
+
+
+def single_frame(k, log, **more):
+    """A term of one frame, as the log has it."""
+    of = {"x": "measured_rad_s", "F": "design_rad_s2", "eta_bar": "eta_bar_rad_s2"}
+    copies = {name: [[float(log[f"{axis}_{column}"][k]) for axis in "pqr"]] for name, column in of.items()}
+    return {"weight": 1.0, "d": [0.0, 1.0, 0.0], "first": k, "frame": k, **copies, **more}
+
+
+FORGED = {
+    "another frame than the log's": lambda log: (
+        {"dt_s": 1e-7}, {"theta": "any", "terms": [single_frame(EARLY, log)]}
+    ),
+    "noise denied": lambda log: ({"declared": EMPTY}, {"theta": "any", "terms": [single_frame(EARLY, log)]}),
+    "a constant error beyond the whole": lambda log: (
+        {"declared": EMPTY | {"B": dict.fromkeys("pqr", 1e3)}},
+        {"theta": "any", "terms": [single_frame(EARLY, log)]},
+    ),
+    "a filter that grows": lambda log: (
+        {}, {"theta": "any", "terms": [single_frame(EARLY, log, pole_per_s=-5.0, since=10)]}
+    ),
+    "a bound below zero": lambda log: ({}, {"test": "V", "looks": [[1.0, 0.0, -2.0]]}),
+    "a level below zero": lambda log: ({}, {
+        "likelihood": "t_s", "level": -50.0, "sense": "either", "axes": [1], "R": [1e-6], "first": EARLY,
+        "P": [[1e-6, 0], [0, 1e-6]], "Y": [[0, 0], [0, 0]], "tolerance": [],
+        "frames": [{"jitter": [0], "drift": [[0]], "signature": [1.0]}],
+    }),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("road", FORGED)
+@pytest.mark.parametrize("event", ["before any fault", "at the alarm"])
+def test_a_statement_that_its_own_numbers_make_true_is_refused(road, event):
+    """Before any fault by the log's column; at the alarm itself by what the scenario declares."""
+    certificate, log = flown("gyros")
+    more, evidence = FORGED[road](log)
+    early = {"what": "rudder", "column": "fie_rudder_excluded", "frame": EARLY}
+    alarm = {"what": None, "column": "detected", "frame": int(np.argmax(log["detected"]))}
+    said = (early if event == "before any fault" else alarm) | evidence
+    said["sides"] = [[9.0, 9.0], [1.0, 1.0]] if "likelihood" in said else [9.0, 1.0]
+    assert all(refusals("gyros", sealed(certificate | more | {"statements": [said]})))
+
+
+def test_the_effect_of_a_fault_is_that_of_the_log():
+    """A stuck aileron at another deflection would be excluded; h, Z and r are recomputed, stated or not."""
+    certificate, _ = flown("any type")
+    altered_fields = set()
+    for what in ("aileron float", "aileron loss_of_effectiveness"):
+        for name in "hZr":
+            other = copy.deepcopy(certificate)
+            said = next(one for one in other["statements"] if one["what"] == what)
+            for term in said["terms"]:
+                if name in term:
+                    term[name] = [2.0 * value + 1.0 for value in term[name]]
+                    altered_fields.add(name)
+            assert other == certificate or all(refusals("any type", sealed(other))), (what, name)
+    assert {"h", "Z"} <= altered_fields
+
+
+@pytest.mark.parametrize("where", ["document", "statement", "term"])
+def test_no_field_is_there_that_is_not_known(where):
+    certificate, _ = flown("loss")
+    other = copy.deepcopy(certificate)
+    said = other["statements"][0]
+    {"document": other, "statement": said, "term": said["terms"][0]}[where]["comment"] = "true"
+    assert "the field comment is not known" in refusals("loss", sealed(other))[0][0]
+
+
+def test_the_checker_takes_numpy_and_readers_of_the_files_alone():
+    tree = ast.parse(CHECKER.read_text())
     imported = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
     imported |= {str(node.module) for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
     others = {name.partition(".")[0] for name in imported} - set(sys.stdlib_module_names)
-    assert others == {"numpy", "pyarrow"}  # which opens the log
+    assert others == {"numpy", "pyarrow", "yaml"}  # the log's and the scenario's reader
+
+
+@pytest.mark.parametrize("place", ["metrics", "figures", "certificate"])
+def test_whatever_fails_while_results_are_written_the_log_is_kept(place, tmp_path, monkeypatch, capsys):
+    """One line says what failed; nothing half written is left."""
+
+    def fails(*_, **__):
+        raise ZeroDivisionError("of the test")
+
+    modules = {"metrics": writer, "figures": writer, "certificate": certificate_module}
+    names = {"metrics": "metrics", "figures": "write_report_files", "certificate": "certificate"}
+    monkeypatch.setattr(modules[place], names[place], fails)
+    monkeypatch.chdir(tmp_path)
+    Path("mine.yaml").write_text(
+        json.dumps({"name": "mine", "duration_s": 0.2, "faults": [LOSS | {"at_s": 0.1}]})
+    )
+    monkeypatch.setattr(sys, "argv", ["beaver-ftc", "run", "mine.yaml", "--certificate"])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 3
+    written = {path.name for path in Path("runs/mine").iterdir()}
+    assert {"log.parquet", "scenario.yaml"} <= written
+    lost = {"metrics": "metrics.json", "figures": "report.html", "certificate": "certificate.json"}[place]
+    assert ("metrics.json" in written) == (place != "metrics")
+    assert lost not in written
+    said = capsys.readouterr().err.strip().splitlines()
+    assert len([line for line in said if "the flight and its log are kept" in line and lost in line]) == 1
+
+
+def test_a_fault_in_the_first_row_has_a_certificate():
+    given = {"name": "zero", "duration_s": 0.5, "reference": SINES, "fdi": {"fault_class": "all"}}
+    proof = bf.fly(given | {"faults": [STUCK | {"at_s": 0}]}).proof()
+    certificate = json.loads(as_text(proof.certificate))
+    assert certificate["statements"][0]["frame"] == 1
+    assert [*failures(certificate, proof.log, proof.scenario)] == []
+    assert [*doubts(certificate, proof.log, proof.scenario)] == []
 
 
 def test_by_the_command_line(tmp_path, monkeypatch, capsys):
@@ -362,7 +485,13 @@ def test_by_the_command_line(tmp_path, monkeypatch, capsys):
     checked = subprocess.run(
         [sys.executable, CHECKER, "runs/mine"], capture_output=True, text=True, check=False
     )
-    assert (checked.returncode, checked.stdout) == (0, "3 statements hold\n")
+    assert (checked.returncode, checked.stdout.splitlines()[-1]) == (0, "3 statements hold")
+    monkeypatch.setattr(sys, "argv", ["beaver-ftc", "check", "runs/mine"])
+    capsys.readouterr()
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert not ended.value.code
+    assert capsys.readouterr().out == checked.stdout
     written = Path("runs/mine/certificate.json")
     written.write_text(written.read_text().replace('"frame":51', '"frame":52', 1))
     checked = subprocess.run(
@@ -372,7 +501,10 @@ def test_by_the_command_line(tmp_path, monkeypatch, capsys):
         check=False,
     )
     assert checked.returncode == 1
-    assert "alarm: " in checked.stderr
+    assert checked.stderr == "SHA-256 does not match: the file was edited, or belongs to another log\n"
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 1
     capsys.readouterr()
     monkeypatch.setattr(sys, "argv", ["beaver-ftc", "run", "mine.yaml", "--certificate", "--no-report"])
     Path("mine.yaml").write_text(json.dumps(scenario | {"fdi": {"scheme": "zhang2005"}}))

@@ -20,15 +20,24 @@ import numpy as np
 
 import beaver_ftc as bf
 from beaver_ftc.loop.loop import fly
-from beaver_ftc.results.certificates.certificate import as_text, certificate_of, events_of, logged, sealed
+from beaver_ftc.results.certificates.certificate import (
+    Evidence,
+    as_text,
+    certificate,
+    copy_with,
+    events_of,
+    logged,
+    sealed,
+)
+from beaver_ftc.results.certificates.check_certificate import failures
 from beaver_ftc.results.certificates.tape import Recorder
-from tools.check_certificate import failures
+from beaver_ftc.results.log import Columns
+from beaver_ftc.scenario.dump import to_yaml
 from tools.drawn.campaign import AIRCRAFT
 from tools.drawn.compose import OURS, PLAIN, drawn_flights
 from tools.drawn.reader import doubts
 
 Document = dict[str, Any]
-Columns = dict[str, np.ndarray]
 Times = list[tuple[float, float]]
 SCALED = 1.01  # times a number that is altered
 
@@ -43,26 +52,26 @@ def main() -> None:
     rng, count, sizes, unseen = np.random.default_rng(args.seed), Counter(), [0], Counter()
     without: Counter[str] = Counter()
     ms: Times = []
-    for index, certificate, log in certified(args.seed, args.flights, ms):
-        refused = [*failures(certificate, log)]
+    for index, written, log, scenario in certified(args.seed, args.flights, ms):
+        refused = [*failures(written, log, scenario)]
         count["flights"] += 1
-        count["statements"] += len(certificate["statements"])
-        count["not certified"] += len(certificate["without"])
-        without.update(f"{_kind(said)}: {said['because']}" for said in certificate["without"])
+        count["statements"] += len(written["statements"])
+        count["not certified"] += len(written["without"])
+        without.update(f"{_kind(said)}: {said['because']}" for said in written["without"])
         count["refused"] += bool(refused)
-        doubted = [*doubts(certificate, log)]
+        doubted = [*doubts(written, log, scenario)]
         count["doubted by a second reader"] += bool(doubted)
-        sizes.append(len(as_text(certificate)))
+        sizes.append(len(as_text(written)))
         if refused or doubted:
             print(f"{index}: {'; '.join([*refused, *doubted])[:300]}", flush=True)
         due = -(-args.altered * count["flights"] // args.flights) - count["altered"]
-        for place in drawn_places(rng, certificate, due):
+        for place in drawn_places(rng, written, due):
             count["altered"] += 1
-            other = altered(certificate, place)
-            count["accepted"] += not [*failures(other, log)]
+            other = altered(written, place)
+            count["accepted"] += not [*failures(other, log, scenario)]
             anew = sealed(other)
-            accepts = not [*failures(anew, log)]
-            if accepts == bool([*doubts(anew, log)]):
+            accepts = not [*failures(anew, log, scenario)]
+            if accepts == bool([*doubts(anew, log, scenario)]):
                 count["readers disagree"] += 1
                 print(f"{index}: {place}: accepted by {'the first' if accepts else 'the second'}", flush=True)
             if accepts:
@@ -82,36 +91,43 @@ def _kind(said: Document) -> str:
     return "alarm" if said["what"] is None else "exclusion" if said["column"] else "type"
 
 
-def certified(seed: int, flights: int, ms: Times) -> Iterator[tuple[int, Document, Columns]]:
-    """So many flights of our scheme: number, certificate as it is read back, log. ms: what they took."""
+def certified(
+    seed: int, flights: int, ms: Times
+) -> Iterator[tuple[int, Document, dict[str, np.ndarray], str]]:
+    """So many flights of our scheme: number, certificate as it is read back, log, scenario.
+
+    ms: what they took.
+    """
     found = 0
     for drawn in drawn_flights(seed, AIRCRAFT, kinds=(OURS, PLAIN, PLAIN)):
         try:
             flight = bf.fly(drawn.scenario())
         except bf.BadInput:
             continue
-        certificate = json.loads(as_text(timed(flight, ms)))
-        table = flight.log
-        yield drawn.index, certificate, {name: table[name].to_numpy() for name in table.columns}
+        document, evidence = timed(flight, ms)
+        log = Columns()
+        copy_with(flight._kept(), evidence, log)
+        log.close()
+        yield drawn.index, json.loads(as_text(document)), dict(log), to_yaml(flight.scenario)
         found += 1
         if found == flights:
             return
 
 
-def timed(flight: bf.Flight, ms: Times) -> Document:
-    """The certificate of a flight; ms: of the processor, what keeping its frames adds, and to write it."""
+def timed(flight: bf.Flight, ms: Times) -> tuple[Document, Evidence]:
+    """A flight's certificate and the columns that prove it; ms: of the processor, what keeping its frames
+    adds, and to write it."""
     rows, scenario = logged(flight._kept()), flight.scenario
-    if not (events := events_of(rows)):
-        return flight.certificate()
+    if not events_of(rows):
+        return certificate(scenario, flight._kept())
     recorder, began = Recorder(scenario), process_time()
     fly(scenario)
     plain = process_time()
     fly(scenario, watch=recorder.watch)
     flown = process_time()
-    tape = recorder.tape([events["detected"], *events.values()], len(rows["detected"]))
-    document = certificate_of(scenario, rows, events, tape)
+    found = certificate(scenario, flight._kept(), recorder)
     ms.append((1e3 * (flown - plain - (plain - began)), 1e3 * (process_time() - flown)))
-    return document
+    return found
 
 
 def places(node: Any, place: tuple = ()) -> Iterator[tuple]:

@@ -19,6 +19,7 @@ import numpy as np
 
 import beaver_ftc as bf
 from beaver_ftc.results.certificates.certificate import as_text
+from beaver_ftc.scenario.dump import to_yaml
 from beaver_ftc.studies import separation
 from tools.check_certificate import failures
 
@@ -66,7 +67,9 @@ def main() -> None:
             log, proof = separation.certified(scenario, pair)
             columns = dict(zip(log.columns, log.rows.T, strict=True))
             count["certificates"] += 1
-            count["certificates refused"] += bool([*failures(json.loads(as_text(proof)), columns)])
+            count["certificates refused"] += bool(
+                [*failures(json.loads(as_text(proof)), columns, to_yaml(scenario))]
+            )
             said = {one["what"] for one in proof["statements"]}
             gone = [f"{surface} {kind}" for surface, kind in names if (surface, kind) not in left]
             proved = [what in said or what.split()[0] in said for what in gone]

@@ -1,12 +1,12 @@
 """certificate.json: for the alarm and for each exclusion the inequality that the data violated, with every
-number it takes. `tools/check_certificate.py` recomputes it from the log.
+number it takes. `check_certificate.py` recomputes it from the log, which has the columns of `evidence`.
 """
 
 import hashlib
 import json
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import chain
 from math import inf
 from pathlib import Path
@@ -19,6 +19,7 @@ from beaver_ftc.diagnosis.bounds.declared import poles_for_noise
 from beaver_ftc.diagnosis.state import LOSS
 from beaver_ftc.diagnosis.types.registry import STUCK
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.loop.loop import LogSink
 from beaver_ftc.results.certificates import chance, courses, instruments_say, kinds
 from beaver_ftc.results.certificates.blocks import Blocks, by_blocks, in_blocks, rows_of
 from beaver_ftc.results.certificates.inequality import (
@@ -36,32 +37,39 @@ from beaver_ftc.results.certificates.inequality import (
     written,
 )
 from beaver_ftc.results.certificates.tape import MOST_AFTER, Recorder, Tape, recorded
-from beaver_ftc.results.log import Log
+from beaver_ftc.results.log import Log, ParquetLog, StoredLog
 from beaver_ftc.scenario.diagnosis import MAX_POLES
+from beaver_ftc.scenario.dump import to_yaml
 from beaver_ftc.scenario.schema import Scenario
 
 Found = tuple[list[Term], Hypothesis] | None
+Evidence = dict[str, "Part"]  # column of the log -> what stands in it
 Columns = dict[str, np.ndarray]
-FILE, FORMAT = "certificate.json", 4
+FILE, FORMAT = "certificate.json", 5
 MEASURED_MODEL_BOUND = "measured_rad_s", "design_rad_s2", "eta_bar_rad_s2"  # columns of each axis
 _OF_LOG = {"watch_missing"} | {f"{axis}_{of}" for axis in AXES for of in MEASURED_MODEL_BOUND}
 _EVENT, _SHARE = re.compile("detected|fie_.*_excluded"), "_likelihood_share"  # columns of events, of shares
 LATE = f"more than {MOST_AFTER} frames after the alarm, or with another diagnosis begun anew"
 
 
-def certificate(scenario: Scenario, log: Log, recorder: Recorder | None = None) -> Document:
-    """The certificate of a flight. recorder: what has kept what the log does not hold; without one the flight
-    is flown again.
+def certificate(
+    scenario: Scenario, log: Log, recorder: Recorder | None = None, text: str | None = None
+) -> tuple[Document, Evidence]:
+    """The certificate of a flight, and the columns that its log needs to prove it.
 
-    Raises BadInput where somebody else diagnosed.
+    recorder: has kept what the log does not hold; without one the flight is flown again. text: of the file
+    scenario.yaml beside the log, if it is not the scenario's own.
+
+    Raises BadInput where another scheme diagnosed.
     """
     check_scheme(scenario)
     rows = logged(log)
     if not (events := events_of(rows)):
-        return certificate_of(scenario, rows, events, None)
+        return certificate_of(scenario, rows, events, None, text), {}
     known, n = [events["detected"], *events.values()], len(rows["detected"])
     tape = recorder.tape(known, n) if recorder else recorded(scenario, known, n)
-    return certificate_of(scenario, rows, events, tape)
+    document = certificate_of(scenario, rows, events, tape, text)
+    return document, evidence(scenario, tape, document["statements"])
 
 
 def logged(log: Log) -> Columns:
@@ -78,11 +86,14 @@ def events_of(rows: Columns) -> dict[str, int]:
     return {name: k for name in events if (k := _rise(rows[name])) is not None}
 
 
-def certificate_of(scenario: Scenario, rows: Columns, events: dict[str, int], tape: Tape | None) -> Document:
+def certificate_of(
+    scenario: Scenario, rows: Columns, events: dict[str, int], tape: Tape | None, text: str | None = None
+) -> Document:
     """The certificate of a flight with these events; rows: as of `logged`, tape: what was kept of it."""
+    declares = hashlib.sha256((to_yaml(scenario) if text is None else text).encode()).hexdigest()
     document: Document = {
-        "format": FORMAT, "scenario": scenario.name, "rows": len(rows["detected"]), "statements": [],
-        "without": [],
+        "format": FORMAT, "scenario": scenario.name, "scenario_sha256": declares,
+        "rows": len(rows["detected"]), "statements": [], "without": [],
     }  # fmt: skip
     if tape is not None:
         history = history_of(scenario, rows, tape)
@@ -155,9 +166,78 @@ def digest(document: Document) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def write(scenario: Scenario, log: Log, recorder: Recorder, folder: Path) -> None:
-    """Write the certificate of a flight into its result folder."""
-    (folder / FILE).write_text(as_text(certificate(scenario, log, recorder)), encoding="utf-8")
+def write(scenario: Scenario, recorder: Recorder, folder: Path) -> None:
+    """Write the certificate of a flight into its result folder, which has log and scenario; the log gets the
+    columns that prove it."""
+    path, text = folder / "log.parquet", (folder / "scenario.yaml").read_text(encoding="utf-8")
+    log = StoredLog(path)
+    document, columns = certificate(scenario, log, recorder, text)
+    if columns:
+        extended = folder / ".log.parquet"
+        with ParquetLog(extended) as further:
+            copy_with(log, columns, further)
+        extended.replace(path)
+    (folder / FILE).write_text(as_text(document), encoding="utf-8")
+
+
+def copy_with(log: Log, columns: Evidence, to: LogSink) -> None:
+    """Copy a log and these columns."""
+    to.open([*log.columns, *columns])
+    first = 0
+    for chunk in log.read_chunks():
+        n = len(chunk["t_s"])
+        to.write(np.column_stack([*chunk.values(), *(one.rows(first, n) for one in columns.values())]))
+        first += n
+
+
+def evidence(scenario: Scenario, tape: Tape, said: list[Document]) -> Evidence:
+    """The columns of the log by which these statements are checked: for each estimator that they speak of
+    offset, slope and spread of its fault's effect and the range of its parameter; for each fault type on a
+    surface whether it is excluded. The effects are known in the frames of the tape only."""
+    found: Evidence = {}
+    surfaces, fdi = scenario.airframe.surfaces, tape.alarm["fdi"]
+    of_types = [one["what"].partition(" ")[0] for one in said if one["what"] and " " in one["what"]]
+    wanted = {one["what"] for one in said} | {f"{surface}_position" for surface in of_types}
+    for e, name in enumerate(tape.names):
+        if name not in wanted:
+            continue
+        for quantity, unit in (("offset", "_rad_s2"), ("slope", ""), ("spread", "_rad_s2")):
+            for axis, values in zip(AXES, getattr(tape, quantity)[:, e].T, strict=True):
+                found[f"fie_{name}_{axis}_{quantity}{unit}"] = Part(tape.first, values)
+        for end in ("low", "high"):
+            found[f"fie_{name}_theta_{end}"] = Part.constant(float(fdi["isolation"]["estimator"][e][end]))
+    for surface in dict.fromkeys(of_types):
+        place = fdi["types"]["surface"][surfaces.index(surface)]
+        for end in ("low", "high"):
+            found[f"{surface}_travel_{end}_rad"] = Part.constant(float(place[f"travel_{end}"]))
+    for s, kind, _ in kinds.excluded_types(tape):
+        if surfaces[s] in of_types:
+            flags = (tape.types[:, s, kind] > 0).astype(float)
+            found[kinds.column_of(surfaces[s], kind)] = Part(tape.first, flags, 0.0, flags[-1])
+    return found
+
+
+@dataclass(frozen=True)
+class Part:
+    """A column of which a part is known: `values` from row `first` on, and what stands before and after."""
+
+    first: int
+    values: np.ndarray
+    before: float = np.nan
+    after: float = np.nan
+
+    @classmethod
+    def constant(cls, value: float) -> "Part":
+        """The same value in every row."""
+        return cls(0, np.empty(0), value, value)
+
+    def rows(self, first: int, n: int) -> np.ndarray:
+        """The rows from `first` on, (n,)."""
+        places = np.arange(first, first + n) - self.first
+        found = np.where(places < 0, self.before, self.after)
+        inside = (places >= 0) & (places < len(self.values))
+        found[inside] = self.values[places[inside]]
+        return found
 
 
 def as_text(document: Document) -> str:
@@ -204,25 +284,30 @@ def statements(
         column = f"fie_{name}_excluded"
         if column in events:
             k, because = events[column], chance.NOT_EXCLUDED if events[column] < tape.end else LATE
-            found = None if because == LATE else _of_exclusion(scenario, tape, history, e, alarm, k)
+            known = because != LATE and k > 0  # the first row has no innovation
+            found = _of_exclusion(scenario, tape, history, e, alarm, k) if known else None
             about = {"what": name, "column": column, "frame": k}
             if found is None and because != LATE and chance.says_nothing_of(tape, e, said):
                 yield about | {"as": "alarm"}
                 continue
             yield _stated(found, history, because, **about)
     if scenario.fdi.fault_class == "all":
-        yield from _of_types(scenario, tape, history, alarm)
+        yield from _of_types(scenario, tape, history, max(alarm, 1))  # the first row has no innovation
 
 
 def _of_types(scenario: Scenario, tape: Tape, history: History, alarm: int) -> Iterator[Document]:
-    """Of each type excluded, surface by surface; the log has no column for it."""
+    """Of each type excluded, surface by surface; the log has a column for it only with a certificate."""
     frames = tape, history
     if tape.alarm["fdi"]["types"]["config"]["length"] > 1:
         tape, history, alarm = in_blocks(tape, history, alarm)
     any_block = len(tape.types) > 0
     for s, kind, k in kinds.excluded_types(tape if any_block else frames[0]):
         because = kinds.why_not(tape, kind) if any_block else kinds.COURSE
-        about: Document = {"what": kinds.name_of(scenario.airframe.surfaces[s], kind), "column": None}
+        surface = scenario.airframe.surfaces[s]
+        about: Document = {
+            "what": kinds.name_of(surface, kind), "column": kinds.column_of(surface, kind),
+            "frame": kinds.row_of(frames[0], s, kind),
+        }  # fmt: skip
         if because is not None:
             yield about | {"because": because}
             continue

@@ -10,7 +10,7 @@ With one term the fault's parameter may move as it likes, or the fault be absent
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import exp, inf, isinf
+from math import exp, inf, isinf, nan
 from typing import Any
 
 import numpy as np
@@ -75,13 +75,12 @@ class History:
         return self._nu[rows]
 
     def frame_bound(self, rows: slice) -> np.ndarray:
-        """The bound on it, (rows, 3) rad/s2."""
-        before, n = slice(rows.start - 1, rows.stop - 1), self.noise
-        return np.asarray(self.eta_bar[rows] + (n[rows] + n[before]) / self.dt)
+        """The bound on it, (rows, 3) rad/s2; not a number in the first row, before which nothing is known."""
+        return np.asarray(self.eta_bar[rows] + (self.noise[rows] + _before(self.noise)[rows]) / self.dt)
 
     def rest(self, rows: slice) -> np.ndarray:
         """What of eta_bar is neither published nor the Earth's, nor of the row before; (rows, 3) rad/s2."""
-        declared, f = self.declared, (np.abs(self.x) + self.off)[rows.start - 1 : rows.stop - 1]
+        declared, f = self.declared, _before(np.abs(self.x) + self.off)[rows]
         earth, g = declared["earth_rad_s"], np.array(declared["earth_share"])
         pairs = np.column_stack((f[:, 1] * f[:, 2], f[:, 0] * f[:, 2], f[:, 0] * f[:, 1]))
         of_earth = earth * ((1.0 + g) * f.sum(axis=1, keepdims=True) + g * earth) + ROUNDING_RAD_S2
@@ -89,6 +88,11 @@ class History:
         return np.asarray(
             self.eta_bar[rows] - self.share * (coupled + declared["constant_rad_s2"] + of_earth)
         )
+
+
+def _before(values: np.ndarray) -> np.ndarray:
+    """Of each row the one before, (rows, 3); before the first there is none."""
+    return np.concatenate([np.full_like(values[:1], nan), values[:-1]])
 
 
 def declared_of(frame: np.void) -> Document:
@@ -121,7 +125,7 @@ def declaration(history: History, frames: list[np.ndarray], asked: np.ndarray) -
     declared, gyro = history.declared, history.declared["gyro"]
     of = {"o": gyro["offset_rad_s"], "B": gyro["steady_rad_s"] * asked, "m": gyro["slope"]}
     if not frames:
-        return _by_axis({name: [] for name in "cbgoBm"})
+        return _by_axis(of | {name: [] for name in "cbg"})
     rows = np.concatenate(frames)
     f = (np.abs(history.x) + history.off)[rows - 1]
     pairs = np.column_stack((f[:, 1] * f[:, 2], f[:, 0] * f[:, 2], f[:, 0] * f[:, 1]))

@@ -61,6 +61,17 @@ def name_of(surface: str, kind: int) -> str:
     return f"{surface} {NAMES[kind]}{_COURSES.get(kind, '')}"
 
 
+def column_of(surface: str, kind: int) -> str:
+    """The column of the log that says whether it is excluded."""
+    return f"{name_of(surface, kind).replace(' ', '_')}_excluded"
+
+
+def row_of(tape: Tape, s: int, kind: int) -> int:
+    """The row from which on a type that is excluded at the end has been."""
+    clear = np.flatnonzero(~(tape.types[:, s, kind] > 0))
+    return tape.first + (int(clear[-1]) + 1 if len(clear) else 0)
+
+
 def hypothesis(tape: Tape, s: int, kind: int) -> Hypothesis:
     """What a fault of this type on surface s adds to the innovation."""
     fdi = tape.alarm["fdi"]

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,7 +12,8 @@ from beaver_ftc.results.certificates import certificate, chance
 from beaver_ftc.results.certificates.certificate import MEASURED_MODEL_BOUND
 from beaver_ftc.results.certificates.inequality import Document
 from beaver_ftc.results.certificates.tape import Recorder
-from beaver_ftc.results.log import MemoryLog, ParquetLog
+from beaver_ftc.results.log import Columns, Log, MemoryLog
+from beaver_ftc.scenario.dump import to_yaml
 from beaver_ftc.scenario.schema import Scenario
 
 
@@ -23,14 +25,34 @@ def proved(scenario: Scenario, frames: np.ndarray, flown: Iterable[int]) -> tupl
     recorder.begin(frames)
     log = _log(frames, flown, scenario, recorder)
     recorder.land()
-    return log, certificate.certificate(scenario, log, recorder)
+    document, columns = certificate.certificate(scenario, log, recorder)
+    whole = MemoryLog()
+    certificate.copy_with(log, columns, whole)
+    return whole, document
 
 
-def write(log: MemoryLog, document: Document, folder: Path) -> None:
-    """Write both into a folder."""
-    with ParquetLog(folder / "log.parquet") as stored:
-        stored.open(log.columns)
-        stored.write(log.rows)
+class Proof(NamedTuple):
+    """A certificate, the log that proves it, column -> values (rows,), and the text of scenario.yaml."""
+
+    certificate: Document
+    log: dict[str, np.ndarray]
+    scenario: str
+
+
+def proof(scenario: Scenario, log: Log) -> Proof:
+    """The certificate of a flight that kept its log, flown once more. Raises BadInput where another scheme
+    than ours diagnosed."""
+    document, columns = certificate.certificate(scenario, log)
+    whole = Columns()
+    certificate.copy_with(log, columns, whole)
+    whole.close()
+    return Proof(document, dict(whole), to_yaml(scenario))
+
+
+def write(scenario: Scenario, log: MemoryLog, document: Document, folder: Path) -> None:
+    """Write certificate, log and the scenario that declares the bounds into a folder."""
+    log.copy_to(folder / "log.parquet")
+    (folder / "scenario.yaml").write_text(to_yaml(scenario), encoding="utf-8")
     (folder / certificate.FILE).write_text(certificate.as_text(document), encoding="utf-8")
 
 

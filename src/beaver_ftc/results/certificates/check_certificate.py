@@ -1,0 +1,841 @@
+"""Check the certificate of a flight against its log and its scenario; docs/certificates.md has each field.
+
+    python check_certificate.py FOLDER                        the folder of a run
+    python check_certificate.py CERTIFICATE LOG [SCENARIO]    files that lie elsewhere
+
+Exit status 0 if every statement holds, 1 if not. `beaver-ftc check RUN` runs this same file. It imports
+NumPy, the reader of the log's file, the reader of the scenario's file (PyYAML) and the standard library.
+
+The flight's log and its scenario are taken as true; no number of the certificate is. A statement is accepted
+if the log's own column shows the event in the row that the statement names, and if the inequality, computed
+anew from the log and from the bounds that the scenario declares, is violated as stated.
+"""
+
+import sys
+from dataclasses import dataclass
+from hashlib import sha256
+from json import JSONDecodeError, dumps, loads
+from math import exp, isfinite, pi, radians
+from pathlib import Path
+from statistics import NormalDist
+
+import numpy as np
+import yaml
+from pyarrow.parquet import read_table
+
+AXES = "pqr"
+FORMAT = 5
+NOISE_LIMIT_SIGMA = 4.0  # noise of a sensor is cut off here
+EARTH_RATE_RAD_S = 2.0 * pi / 86164.0905
+ROUNDING_RAD_S2 = 1e-11  # the part of every bound that covers rounding
+LEAST_EFFECT_RAD_S2 = 1e-12  # a smaller effect of a fault is rounding
+SAME = 1e-12  # relative difference between a stated side and the recomputed one: order of summation
+TESTS = (
+    "turning p", "turning q", "turning r", "phi", "theta", "psi", "V", "alpha", "beta", "density", "altitude",
+    "engine_rpm", "manifold_pressure",
+)  # fmt: skip
+OF_A_SUM = ("", "stuck", "float", "loss_of_effectiveness", "loss_of_effectiveness that varies")
+
+
+class Refused(Exception):
+    """Why a certificate, or one of its statements, is not accepted; one sentence."""
+
+
+def require(condition, why):
+    """Refuse with this sentence unless the condition holds."""
+    if not condition:
+        raise Refused(why)
+
+
+# --- 1. The form: which fields there are, and what may stand in each -------------------------------------
+
+
+def number(value):
+    """A finite number."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
+
+
+def positive(value):
+    """A finite number above zero."""
+    return number(value) and value > 0
+
+
+def size(value):
+    """A finite number, zero or more."""
+    return number(value) and value >= 0
+
+
+def row(value):
+    """A row of the log, or a count: an integer, zero or more."""
+    return isinstance(value, int) and not isinstance(value, bool) and value >= 0
+
+
+def mapping(value):
+    """A mapping."""
+    return isinstance(value, dict)
+
+
+def text(value):
+    """Words."""
+    return isinstance(value, str)
+
+
+def one_of(*words):
+    """One of these words."""
+    return lambda value: value in words
+
+
+def optional(of):
+    """Such a value, or null."""
+    return lambda value: value is None or of(value)
+
+
+def list_of(of, length=None):
+    """A list of such values, of this length if one is given."""
+    return lambda value: (
+        isinstance(value, list) and len(value) == (length or len(value)) and all(map(of, value))
+    )
+
+
+def by_axis(of):
+    """Such a value for some of the axes p, q, r."""
+    return lambda value: isinstance(value, dict) and set(value) <= set(AXES) and all(map(of, value.values()))
+
+
+def share(value):
+    """More than zero, at most one."""
+    return positive(value) and value <= 1
+
+
+def below_one(value):
+    """Zero or more, below one."""
+    return size(value) and value < 1
+
+
+VECTORS, MATRIX = list_of(list_of(number, 3)), list_of(list_of(number))
+DOCUMENT = {
+    "format": row, "scenario": text, "scenario_sha256": text, "rows": row, "statements": list_of(mapping),
+    "without": list_of(mapping), "digest": text,
+}  # fmt: skip
+IF_STATED = {
+    "declared": mapping, "dt_s": positive, "instants": row, "omega_E": size, "begins_s": number,
+}  # fmt: skip
+DECLARED = {name: by_axis(size) for name in "cbgoB"} | {"m": by_axis(below_one)}
+EVENT = {"what": optional(text), "column": text, "frame": row}
+THETA = one_of("any", "constant", "constant while it shows")
+SUM = {"theta": THETA, "terms": list_of(mapping), "sides": list_of(number, 2)}
+SUM_TOO = {"block": list_of(row, 3), "least": number, "most": number}
+TERM = {
+    "weight": positive, "d": list_of(number, 3), "first": row, "frame": row, "x": VECTORS, "F": VECTORS,
+    "eta_bar": VECTORS,
+}  # fmt: skip
+TERM_TOO = {
+    "pole_per_s": positive, "since": row, "fault": size, "rest": VECTORS, "h": list_of(optional(number)),
+    "Z": list_of(optional(number)), "r": list_of(size),
+}  # fmt: skip
+COURSE = {
+    "theta": one_of("course"), "bounds": list_of(mapping),
+    "sides": list_of(list_of(number), 2),
+}  # fmt: skip
+COURSE_TOO = {
+    "block": list_of(row, 3), "stops": list_of(number), "pace_rad_s": positive, "slowest_rad_s": positive,
+    "ordered": list_of(number), "step": size, "near": number,
+}  # fmt: skip
+BOUND = {
+    "d": list_of(number, 3), "first": row, "frame": row, "h": list_of(number), "Z": list_of(number),
+    "r": list_of(size),
+}  # fmt: skip
+CHANCE = {
+    "likelihood": text, "level": positive, "axes": list_of(one_of(0, 1, 2)),
+    "sense": one_of("less", "either"),
+    "tolerance": list_of(positive), "R": list_of(optional(size)), "Y": list_of(list_of(optional(number))),
+    "P": list_of(list_of(optional(number))), "first": row, "frames": list_of(mapping),
+    "sides": list_of(list_of(number, 2), 2),
+}  # fmt: skip
+FRAME = {"signature": list_of(number), "jitter": list_of(size), "drift": MATRIX}
+FRAME_TOO = {
+    "bounded": list_of(size), "pace": size, "keep": share, "known": MATRIX, "air": list_of(number),
+    "foreseen": list_of(number),
+}  # fmt: skip
+LOOKS = {"test": one_of(*TESTS), "looks": list_of(list_of(number, 3)), "sides": list_of(number, 2)}
+MISSING = {"missing": list_of(row, 1), "sides": list_of(number, 2)}
+LIKE_THE_ALARM = {"as": one_of("alarm")}
+# The field that says which kind of evidence a statement has, and the fields of that kind.
+KINDS = {
+    "terms": (SUM, SUM_TOO), "bounds": (COURSE, COURSE_TOO), "likelihood": (CHANCE, {}),
+    "looks": (LOOKS, {}), "missing": (MISSING, {}), "as": (LIKE_THE_ALARM, {}),
+}  # fmt: skip
+
+
+def check_form(document, needed, allowed, where):
+    """Every field that is needed, none that is not known, and in each what may stand there."""
+    require(isinstance(document, dict), f"{where}: this is no mapping")
+    fields = needed | allowed
+    for name in needed:
+        require(name in document, f"{where}: the field {name} is missing")
+    for name, value in document.items():
+        require(name in fields, f"{where}: the field {name} is not known")
+        allowed_is = fields[name].__doc__ or "another form"
+        require(fields[name](value), f"{where}: {name} is not allowed, allowed: {allowed_is}")
+
+
+def kind_of(said):
+    """Which kind of evidence a statement has."""
+    found = [name for name in KINDS if name in said]
+    require(len(found) == 1, "the statement has no evidence, or more than one kind of it")
+    return found[0]
+
+
+def check_statement_form(said):
+    """The fields of a statement; the lists in it have as many entries as frames."""
+    kind = kind_of(said)
+    needed, allowed = KINDS[kind]
+    check_form(said, EVENT | needed, allowed, "statement")
+    for term in said.get("terms", []):
+        check_form(term, TERM, TERM_TOO, "term")
+        check_lengths(term, ("x", "F", "eta_bar", "rest", "h", "Z", "r"))
+        require(("pole_per_s" in term) == ("since" in term), "a pole needs the frame since which it filters")
+        require("fault" not in term or "pole_per_s" in term, "a frame by itself has no past")
+    for bound in said.get("bounds", []):
+        check_form(bound, BOUND, {}, "bound")
+        check_lengths(bound, ("h", "Z", "r"))
+        require(all(bound["Z"]), "the surface does not act along this direction")
+    if kind in ("terms", "bounds", "looks"):
+        require(len(said[kind]) > 0, "the evidence is empty")
+    if kind == "likelihood":
+        check_chance_form(said)
+
+
+def check_lengths(span, names):
+    """A value for each frame from `first` to `frame`; a direction that is not zero."""
+    require(1 <= span["first"] <= span["frame"], "the frames are not in order")
+    require(any(span["d"]), "the direction is zero")
+    for name in names:
+        if name in span:
+            require(len(span[name]) == span["frame"] + 1 - span["first"], f"{name}: frames are missing")
+
+
+def check_chance_form(said):
+    """Sizes of the lists of a statistical alarm: n axes, m constants."""
+    n, m = len(said["axes"]), len(said["tolerance"])
+    require(n in (1, 2) and len(set(said["axes"])) == n, "axes: one or two different ones are allowed")
+    require(len(said["R"]) == n, "R: one variance for each axis")
+    require([len(line) for line in said["P"]] == [2 * n] * (2 * n), "P: two states for each axis")
+    require([len(line) for line in said["Y"]] == [2 + m] * (2 * n), "Y: two states for each axis")
+    P = np.array([[value or 0.0 for value in line] for line in said["P"]])
+    require(np.array_equal(P, P.T) and (P.diagonal() >= 0).all(), "P is no covariance")
+    require(said["first"] >= 1 and said["frames"], "frames are missing")
+    for its in said["frames"]:
+        check_form(its, FRAME, FRAME_TOO, "frame")
+        for name in ("signature", "jitter", "bounded", "air", "foreseen"):
+            require(len(its.get(name, [0] * n)) == n, f"{name}: one value for each axis")
+        drift, known = np.array(its["drift"]), its.get("known", [])
+        require(drift.shape == (n, n) and np.allclose(drift, drift.T), "drift is no covariance")
+        require((np.linalg.eigvalsh(drift) >= -1e-9 * np.abs(drift).max()).all(), "drift is no covariance")
+        require(len(known) == m and all(len(line) == n for line in known), "known: a value for each constant")
+        require(set(its) == set(said["frames"][0]), "the frames have different fields")
+
+
+# --- 2. What the scenario declares -----------------------------------------------------------------------
+
+
+@dataclass
+class Declared:
+    """What a scenario declares about the frame, and about the errors of the gyros from some row on."""
+
+    dt: float
+    instants: int
+    gyros: dict  # by axis: (offset rad/s, constant part of it rad/s, slope)
+    constant: dict  # by axis, rad/s2
+    coupled: dict  # by axis
+    from_row: int  # the diagnosis began anew with this row
+    scenario: dict
+
+
+def declared_in(scenario, k):
+    """What a resolved scenario declares, as it is in force at row k."""
+    require(
+        isinstance(scenario, dict) and isinstance(scenario.get("fdi"), dict), "the scenario is no scenario"
+    )
+    fdi, rate = scenario["fdi"], float(scenario["rate_hz"])
+    sensors, from_row = fdi["bounds"]["sensors"], 0
+    for change in scenario.get("changes") or []:
+        begins = int(np.ceil((change["at_s"] - 1e-9) * rate))
+        if begins <= k:
+            sensors = change.get("declared_sensors") or sensors
+            anew = any(change.get(name) is not None for name in ("scheme", "sensors", "declared_sensors"))
+            from_row = begins if anew else from_row
+    gyros = {}
+    for axis in AXES:
+        gyro = sensors[axis]
+        bias = abs(radians(gyro["bias_deg_s"]))
+        offset = NOISE_LIMIT_SIGMA * radians(gyro["noise_std_deg_s"]) + bias
+        gyros[axis] = offset + radians(gyro["quantum_deg_s"]) / 2, bias, abs(gyro["scale_error"])
+    return Declared(
+        1.0 / rate, int(scenario["substeps"]), gyros, fdi["bounds"]["constant_rad_s2"],
+        fdi["bounds"]["inertia_coupling"], from_row, scenario,
+    )  # fmt: skip
+
+
+def check_declared(about, declared):
+    """The bounds in the certificate are those of the scenario.
+
+    A bias of a gyro may be left out: then the bound on its noise is larger, which proves less. c, b and g
+    only explain the bound that the log has; c must be zero where the scenario's share is.
+    """
+    check_form(about.get("declared"), DECLARED, {}, "declared")
+    for axis, (offset, bias, slope) in declared.gyros.items():
+        o, B, m = (about["declared"][name].get(axis, 0.0) for name in "oBm")
+        same = np.isclose(o, offset, 1e-12, 0) and np.isclose(m, slope, 1e-12, 0)
+        require(same and (B == 0 or np.isclose(B, bias, 1e-12, 0)),
+                f"the declared error of gyro {axis} is not that of the scenario")  # fmt: skip
+        require(o >= B, f"gyro {axis}: the constant error is larger than the whole error")
+        if "omega_E" not in about:
+            continue
+        c, b, g = (about["declared"][name].get(axis, 0.0) for name in "cbg")
+        require(
+            b >= declared.constant[axis] * (1 - 1e-12), f"b on {axis} is smaller than the scenario's bound"
+        )
+        require(c == 0 or declared.coupled[axis] > 0, f"c on {axis}: the scenario declares none")
+        require(g >= 1 if about["omega_E"] else g == 0, f"g on {axis} is not allowed")
+    require(np.isclose(about.get("dt_s", declared.dt), declared.dt, 1e-12, 0),
+            "dt_s is not the frame of the scenario")  # fmt: skip
+    require(
+        about.get("instants", declared.instants) == declared.instants, "instants: not those of the scenario"
+    )
+    require(about.get("omega_E", 0) == 0 or np.isclose(about["omega_E"], EARTH_RATE_RAD_S, 1e-12, 0),
+            "omega_E is not the Earth's rate")  # fmt: skip
+
+
+# --- 3. What follows from the log, by row or by block of rows ---------------------------------------------
+
+
+class Frames:
+    """Innovation and bounds of each frame (docs/theory.md, sections 1 and 2), arrays (frames, 3).
+
+    x: measured rates, rad/s; F: model, eta_bar: bound on what the model does not know, published: the part of
+    it that c, b, g and the Earth's rate explain, rad/s2; n: changing error of the gyros, rad/s;
+    nu: innovation, most: the largest healthy one, rad/s2; shows: health does not explain it (frames,).
+    A block of L rows counts as one frame of several instants: x and n of its last row, all else the mean.
+    """
+
+    def __init__(self, about, log, declared, block=None):
+        self.log = log
+        length, begin, end = block or (1, 0, len(log["t_s"]))
+        require(length >= 1 and 0 <= begin < end <= len(log["t_s"]) and (end - begin) % length == 0,
+                "the block has other rows")  # fmt: skip
+        self.length, self.begin, self.rows = length, begin, slice(begin, end)
+        self.dt, instants = declared.dt * length, declared.instants
+        self.x = self.last(self.columns("{}_measured_rad_s"))
+        self.F, self.eta_bar = (self.mean(self.columns(f"{{}}_{of}_rad_s2")) for of in ("design", "eta_bar"))
+        said, earth = about["declared"], about.get("omega_E", 0.0)
+        c, b, g, o, B, m = (np.array([said[name].get(axis, 0.0) for axis in AXES]) for name in "cbgoBm")
+        x = self.columns("{}_measured_rad_s")
+        rates = np.abs(x) + (o + m * np.abs(x)) / (1 - m)  # as large as the true rates can be
+        self.n = self.last(o - B + m * rates)
+        of_earth = earth * ((1 + g) * rates.sum(axis=1, keepdims=True) + g * earth)
+        published = c * rates[:, [1, 0, 0]] * rates[:, [2, 2, 1]] + b + of_earth + ROUNDING_RAD_S2
+        published = np.roll(published, 1, axis=0) / instants  # of the row with which the frame began
+        published[0] = np.nan
+        self.published = self.mean(published)
+        before = np.roll(self.x, 1, axis=0)
+        before[0] = np.nan
+        self.nu = (self.x - before) / self.dt - self.F
+        self.most = self.eta_bar + (self.n + np.roll(self.n, 1, axis=0)) / self.dt
+        self.late = int(instants * length > 1)
+        beyond = (np.abs(self.nu) > self.most).any(axis=1)
+        explained = (self.published <= self.eta_bar * (1 + 1e-13)).all(axis=1)
+        shows = beyond & explained  # never in frame 0: what was before it is not known
+        self.shows = shows & np.roll(shows, self.late) & np.roll(shows, -self.late)
+
+    def columns(self, name):
+        """The log's columns of the three axes, side by side (rows, 3)."""
+        return np.column_stack([np.asarray(self.log[name.format(axis)], float) for axis in AXES])
+
+    def last(self, values):
+        """Of each block the last row's."""
+        return values[self.rows][self.length - 1 :: self.length]
+
+    def mean(self, values):
+        """Of each block the mean."""
+        return values[self.rows].reshape(-1, self.length, *values.shape[1:]).mean(axis=1)
+
+    def row_of(self, k):
+        """The last row of the log in frame k."""
+        return self.begin + (k + 1) * self.length - 1
+
+
+# --- 4. The event: what the log's own column says --------------------------------------------------------
+
+
+def column_of(what, log):
+    """The column that says whether this is excluded; the alarm's if nothing is named."""
+    if what is None:
+        return "detected"
+    estimator = f"fie_{what}_excluded"
+    return estimator if estimator in log else f"{what.replace(' ', '_')}_excluded"
+
+
+def check_event(said, log):
+    """The log's column is set from the stated row to the end, and not in the row before."""
+    name, k = said["column"], said["frame"]
+    require(name == column_of(said["what"], log), f"{name} is another column than that of this event")
+    require(name in log, f"the log has no column {name}: it was not written with this certificate")
+    values = np.asarray(log[name], float)
+    require(k < len(values), f"the log has no row {k}")
+    require((values[k:] == 1).all() and (k == 0 or values[k - 1] == 0), f"{name} is not set in row {k}")
+
+
+# --- 5. What the fault can have added to the innovation ---------------------------------------------------
+
+
+@dataclass
+class Effect:
+    """offset + theta slope, give or take spread (frames, 3), rad/s2; theta between low and high."""
+
+    offset: np.ndarray
+    slope: np.ndarray
+    spread: np.ndarray
+    low: float
+    high: float
+
+    def along(self, d, rows):
+        """h, Z and r: along a direction, in these frames."""
+        return self.offset[rows] @ d, self.slope[rows] @ d, self.spread[rows] @ np.abs(d)
+
+    def most(self, h, Z, r):
+        """The most that a fault can do which may be absent; at most rounding is nothing."""
+        ends = np.maximum(h + self.low * Z, h + self.high * Z)
+        return np.where(ends <= LEAST_EFFECT_RAD_S2, 0.0, ends) + r
+
+
+def effect_of(what, frames):
+    """The effect of the fault that is excluded, from the log's columns; of the alarm none."""
+    if what is None:
+        zero = np.zeros_like(frames.x)
+        return Effect(zero, zero, zero, 0.0, 0.0)
+    surface, _, kind = what.partition(" ")
+    name = f"fie_{surface}_position" if kind else f"fie_{surface}"
+    needed = [f"{name}_p_slope"] + ([f"{surface}_travel_low_rad"] if kind else [f"{name}_theta_low"])
+    require(all(column in frames.log for column in needed),
+            f"the log has no columns of {what}: it was not written with this certificate")  # fmt: skip
+    columns = f"{name}_{{}}_offset_rad_s2", f"{name}_{{}}_slope", f"{name}_{{}}_spread_rad_s2"
+    offset, slope, spread = (frames.mean(frames.columns(column)) for column in columns)
+    ends = f"{surface}_travel_{{}}_rad" if kind else f"{name}_theta_{{}}"
+    low, high = (constant(frames.log[ends.format(end)]) for end in ("low", "high"))
+    if not kind:
+        return Effect(offset, slope, spread, low, high)
+    return of_type(kind, offset, slope, spread, low, high)
+
+
+def constant(values):
+    """The one value of a column that says it in some rows."""
+    values = np.asarray(values, float)
+    found = np.unique(values[np.isfinite(values)])
+    require(len(found) == 1, "a column that must be constant is not")
+    return float(found[0])
+
+
+def of_type(kind, offset, slope, spread, low, high):
+    """Of a fault type; offset and slope of the surface's position: -G u and G. Stuck p = c, floating p = 0, a
+    loss p = (1 + theta) u; a course says where the surface was, theta = p, of an oscillation p - u."""
+    zero = np.zeros_like(slope)
+    if kind == "float":
+        return Effect(offset + min(max(0.0, low), high) * slope, zero, spread, 0.0, 0.0)
+    if kind.startswith("loss_of_effectiveness"):
+        return Effect(zero, -offset, spread, -1.0, 0.0)
+    if kind == "oscillatory":
+        return Effect(zero, slope, spread, low, high)
+    return Effect(offset, slope, spread, low, high)
+
+
+# --- 6. The sum over filters (docs/theory.md, section 4) --------------------------------------------------
+
+
+def sum_of_terms(said, frames, declared):
+    """Both sides: the sum of `weight` times d.E, and the most that bounds, noise and fault allow."""
+    what, theta = said["what"], said["theta"]
+    effect = effect_of(what, frames)
+    kind = (what or "").partition(" ")[2]
+    require(kind in OF_A_SUM, "a sum of frames says nothing of this type")
+    check_theta(said, effect, declared, frames)
+    sums = [abs(term["weight"]) * filtered(term, said, frames, effect, declared) for term in said["terms"]]
+    value, limit, slope = np.sum(sums, axis=0)
+    if theta != "any" and abs(slope) > LEAST_EFFECT_RAD_S2:
+        limit += max(effect.low * slope, effect.high * slope)
+    return value, limit
+
+
+def check_theta(said, effect, declared, frames):
+    """The stated ends are those of the log; one constant theta is allowed where the scenario declares it."""
+    for end, known in (("least", effect.low), ("most", effect.high)):
+        require(said.get(end, known) == known, f"{end} is not the end of theta's range in the log")
+    fdi, alarm = declared.scenario["fdi"], int(np.argmax(np.asarray(frames.log["detected"]) == 1))
+    if said["theta"] == "constant":
+        declares = fdi["fault_profile"] == "abrupt" or fdi["thresholds"] == "published"
+        require(said["what"] and declares, "the scenario does not declare a constant parameter")
+        since = [term.get("since", term["frame"]) for term in said["terms"]]
+        require("block" not in said and min(since) >= alarm, "a frame before the alarm may be healthy")
+    if said["theta"] == "constant while it shows":
+        require(said["what"] and " " in said["what"], "only a fault type is at fault where health fails")
+    if said["what"] is None:
+        require("block" not in said, "an alarm is raised by frames, not by blocks")
+
+
+def filtered(term, said, frames, effect, declared):
+    """One filter along d: its value E, the limit on it without theta, and what a constant theta multiplies.
+
+    E[k] = sum of a^(k-j) dt nu[j].d    over j = since + 1 ... k
+    """
+    k, first, dt, d = term["frame"], term["first"], frames.dt, np.array(term["d"])
+    decay = exp(-term["pole_per_s"] * dt) if "pole_per_s" in term else 0.0
+    since = term["since"] if "pole_per_s" in term else k - 1
+    begun = declared.from_row if frames.length == 1 else 0
+    require(begun <= since < first <= k < len(frames.x), "the frames of a term are not in order")
+    require(frames.row_of(k) <= said["frame"], "a frame after the event cannot have caused it")
+    require("pole_per_s" in term or first == k, "without a pole a term has one frame")
+    require(said["theta"] != "constant while it shows" or frames.shows[k], "health explains a frame")
+    past, size = np.arange(since + 1, k + 1), np.abs(d)
+    left = decay ** (k - past.astype(float))  # what is left at frame k of each frame's input
+    noise = frames.n @ size
+    value = left @ (dt * frames.nu[past] @ d)
+    limit = left @ (dt * frames.eta_bar[past] @ size + (1 - decay) * noise[past - 1])
+    limit += decay * left[0] * noise[since] + noise[k]
+    if said["what"] is not None:
+        h, Z, r = effect.along(d, past)
+        check_effect(term, h[first - past[0] :], Z[first - past[0] :], r[first - past[0] :], effect, said)
+        before = done_before(term, h, Z, r, effect, decay, dt, first - past[0])
+        own = slice(first - past[0], None)
+        done = (h + r)[own] if said["theta"] != "any" else effect.most(h, Z, r)[own]
+        limit += left[own] @ (dt * done) + decay ** (k + 1.0 - first) * before
+        slope = dt * left[own] @ Z[own] if said["theta"] != "any" else 0.0
+    else:
+        require(not {"h", "Z", "r", "fault"} & set(term), "an alarm has no effect of a fault")
+        slope = 0.0
+    check_copies(term, frames, slice(first, k + 1))
+    return np.array([value, limit, slope])
+
+
+def done_before(term, h, Z, r, effect, decay, dt, written):
+    """What the fault can have done to the filter before the frames that are written: as stated, and no less
+    than the logged effects of the frames before add up to."""
+    stated = term.get("fault", 0.0)
+    known = np.isfinite(h[:written]) & np.isfinite(Z[:written])
+    places = np.arange(written)[known]
+    most = effect.most(h[:written], Z[:written], r[:written])[known]
+    least = float(dt * decay ** (written - 1.0 - places) @ most) if len(places) else 0.0
+    require(stated >= least * (1 - 1e-9) - 1e-15, "the effect before the written frames is too small")
+    return stated
+
+
+def check_effect(term, h, Z, r, effect, said):
+    """Where h, Z, r are stated they are those of the log; null where the fault adds only rounding."""
+    for name, known in (("h", h), ("Z", Z), ("r", r)):
+        for stated, value in zip(term.get(name, ()), known, strict=False):
+            require(stated is None or np.isclose(stated, value, 1e-9, LEAST_EFFECT_RAD_S2),
+                    f"{name} is not that of the log")  # fmt: skip
+    require(np.isfinite(h).all() and np.isfinite(Z).all() and np.isfinite(r).all(),
+            "the log has no effect of this fault in these rows")  # fmt: skip
+
+
+def check_copies(term, frames, rows):
+    """What stands in the log as well is the same; eta_bar is a published part and a rest of zero or more."""
+    for name in ("x", "F", "eta_bar"):
+        require(
+            np.allclose(term[name], getattr(frames, name)[rows], 1e-13, 0), f"{name} is not that of the log"
+        )
+    rest, eta_bar = np.array(term.get("rest", np.zeros((1, 3)))), frames.eta_bar[rows]
+    require((rest >= -1e-13 * eta_bar).all(), "rest: a part of a bound is below zero")
+    require(
+        np.allclose(frames.published[rows] + rest, eta_bar, 3e-14, 0), "the declared bounds are not the log's"
+    )
+
+
+# --- 7. The course of a surface (docs/fault-types.md) -----------------------------------------------------
+
+
+def course(said, frames, declared):
+    """Pairs (what must be more, than what) that a fault type forbids, from where frames say the surface was.
+
+    In each frame |nu.d - h - theta Z| <= most.|d| + r bounds the deflection theta from below where Z > 0,
+    from above where Z < 0. Downwards is upwards with every sign of theta turned.
+    """
+    effect = effect_of(said["what"], frames)
+    surface, _, kind = said["what"].partition(" ")
+    low: dict = {}
+    high: dict = {}
+    signs = set()
+    for bound in said["bounds"]:
+        for place, k in enumerate(range(bound["first"], bound["frame"] + 1)):
+            theta, command, sign = deflection(bound, place, k, frames, effect)
+            signs.add(sign)
+            (low if bound["Z"][place] > 0 else high)[k] = theta, command
+    require(len(signs) == 1, "a surface deflects one way")
+    sign = signs.pop()
+    require(
+        low and sorted(low) == list(range(min(low), max(low) + 1)), "the frames do not follow one another"
+    )
+    require(len(high) == (kind != "oscillatory"), "one frame bounds the deflection from above")
+    first, last = min(low), max(low)
+    above = next(iter(high), first)
+    reached, commanded = np.array([low[k] for k in sorted(low)]).T
+    most, most_command = high.get(above, (np.nan, np.nan))
+    ends = sorted((sign * effect.low, sign * effect.high))
+    if kind.startswith("bias"):
+        stops = said["stops"]
+        require(len(stops) == 2 and stops[0] >= ends[0] - 1e-12 and stops[1] <= ends[1] + 1e-12, "stops")
+        pairs = [(reached[0] - commanded[0], most - most_command), (reached[0], stops[0]), (stops[1], most)]
+        if kind == "bias that grows":
+            pairs = [(reached[0] - commanded[0], 0.0), *pairs, (above, first)]
+        return pairs
+    if kind in ("hardover up", "hardover down"):
+        require(sign == (1 if kind == "hardover up" else -1), "the surface runs the other way")
+        require(said["stops"] == [ends[1]], "the stop is not that of the log")
+        rate = radians(declared.scenario["actuators"][surface]["rate_limit_deg_s"]) or pi / 3
+        require(np.isclose(said["pace_rad_s"], rate / 2, 1e-12, 0), "pace_rad_s is not half the rate limit")
+        went = reached[0] + said["pace_rad_s"] * frames.dt * (above - first - frames.late)
+        return [(ends[1], most), (above, first), (went, most)]
+    if kind == "oscillatory":
+        slowest = declared.scenario["fdi"]["slowest_oscillation_rad_s"]
+        require(said["slowest_rad_s"] == slowest, "slowest_rad_s is not that of the scenario")
+        return [(last - first, pi / slowest / frames.dt), (reached.min(), 0.0), (reached.sum(), 0.0)]
+    require(kind == "rate_limit" and above == first, f"{kind} is no type with a course")
+    require(len(said["ordered"]) == len(reached), "ordered: frames are missing")
+    require(said["near"] >= max(said["ordered"]), "near is nearer than the order itself")
+    ahead = reached - said["ordered"]
+    come = said.get("step", 0.0) * (last - first - 1)
+    return [(ahead.min(), 0.0), (ahead.sum(), 0.0), (reached[-1], most - come), (reached[-1], said["near"]),
+            (1.0, 0.0)]  # fmt: skip
+
+
+def deflection(bound, place, k, frames, effect):
+    """The bound on theta that frame k gives, the command -h/Z, and the sign by which theta is turned."""
+    require(k < len(frames.x) and frames.shows[k], "health explains a frame")
+    d = np.array(bound["d"])
+    h, Z, r = (bound[name][place] for name in "hZr")
+    known_h, known_Z, known_r = (float(values[0]) for values in effect.along(d, slice(k, k + 1)))
+    same = [np.isclose(h, known_h, 1e-9, 1e-12), np.isclose(abs(Z), abs(known_Z), 1e-9, 1e-12)]
+    require(all(same) and np.isclose(r, known_r, 1e-9, 1e-12), "h, Z or r is not that of the log")
+    theta = (frames.nu[k] @ d - h - frames.most[k] @ np.abs(d) - r) / Z
+    return theta, -h / Z, int(np.sign(Z * known_Z))
+
+
+# --- 8. A statistical alarm (docs/theory.md, section 7) ---------------------------------------------------
+
+
+def likelihood(said, frames, declared):
+    """Evidence N against its limit; and the log's share of the level against N's.
+
+    The Kalman filter with the stated variances whitens innovation, signature and constants (columns of Y);
+    w = S^-1 g_s; N = sum w.g, D = sum w.g_s; limit: max(z sqrt D, room + z/2 sqrt D).
+    """
+    k, dt, axes, z = said["first"], frames.dt, said["axes"], said["level"]
+    statistical, n = declared.scenario["fdi"].get("statistical"), len(said["axes"])
+    require(statistical and said["what"] is None, "the scenario declares no statistical detector")
+    one_test = statistical["false_alarms_per_h"] / (3600 / declared.dt)
+    require(
+        z >= -NormalDist().inv_cdf(one_test) * (1 - 1e-9), "level: the declared rate allows no smaller one"
+    )
+    require(said["first"] + len(said["frames"]) - 1 == said["frame"] >= said["first"], "frames are missing")
+    require(said["likelihood"].endswith("_likelihood_share"), "likelihood: this is no share of the level")
+    Y, P = (np.array([[value or 0.0 for value in line] for line in said[name]]) for name in "YP")
+    R = np.array([value or 0.0 for value in said["R"]])
+    eye = np.eye(2 * n, n)
+    sums, swung, paced, stayed, w, last = 0.0, 0.0, 0.0, 0.0, np.zeros(n), 0.0
+    for k, its in enumerate(said["frames"], said["first"]):
+        inputs = np.stack(
+            [frames.nu[k, axes] - its.get("air", 0), its["signature"], *its.get("known", [])], 1
+        )
+        Q = np.pad(np.diag(its["jitter"]), (0, n)) + np.pad(its["drift"], (n, 0))
+        forgets, bounded = 1 - its.get("keep", 1), np.array(its.get("bounded", [0] * n))
+        step = np.kron([[1, dt], [0, 1 - forgets]], eye[:n])
+        Y, P = step @ Y + dt * eye @ inputs, step @ (P + Q) @ step.T
+        inverse = np.linalg.inv(P[:n, :n] + np.diag(R))
+        K, before, w = P[:, :n] @ inverse, w, inverse @ Y[:n, 1]
+        sums = sums + w @ np.column_stack([Y[:n], its.get("foreseen", np.zeros(n))])
+        swing = 1.2 * np.abs(np.linalg.pinv(K[n:])) @ bounded
+        swung, last = swung + swing @ np.abs(w - before), swing @ np.abs(w)
+        paced += its.get("pace", 1e9) * last
+        stays = forgets * bounded / (np.diag(K) * forgets / dt + np.diag(K[n:]))
+        stayed += stays @ np.abs(w)
+        Y, P = Y - K @ Y[:n], P - K @ P[:n]
+    N, D, *R_of_constants, foreseen = np.asarray(sums)
+    evidence = -N - max(0.0, -foreseen) if said["sense"] == "less" else abs(N)
+    evidence -= said["tolerance"] @ np.abs(R_of_constants) if R_of_constants else 0.0
+    require(D >= 0, "the evidence has a negative variance")
+    limit = max(z * D**0.5, stayed + min(swung + last, paced) + z / 2 * D**0.5)
+    require(said["likelihood"] in frames.log, f"the log has no column {said['likelihood']}")
+    logged = float(frames.log[said["likelihood"]][k]) * (1 + 1e-5)
+    return [(evidence, limit), (logged, evidence / limit)]
+
+
+def like_the_alarm(said, about, frames):
+    """The statistical alarm came on axes that this fault does not move: that excludes it."""
+    alarm = about["statements"][0]
+    require(alarm.get("what", "") is None and "likelihood" in alarm, "there is no statistical alarm before")
+    require(alarm["frame"] <= said["frame"] and said["what"] is not None, "the alarm came later")
+    effect, rows = effect_of(said["what"], frames), slice(max(alarm["first"] - 1, 0), alarm["frame"] + 1)
+    moved = np.abs([effect.offset[rows], effect.slope[rows], effect.spread[rows]])[..., alarm["axes"]]
+    require(moved.max() == 0, "this fault moves the axes of the alarm")
+
+
+# --- 9. An alarm between instruments (docs/theory.md, section 9) ------------------------------------------
+
+
+def instruments(said, log):
+    """Residual and bound of the test; the log's share in that row is at least as large."""
+    require(said["what"] is None, "instruments raise an alarm, they exclude no surface")
+    k = said["frame"]
+    if "missing" in said:
+        require(np.asarray(log.get("watch_missing", []), float)[k : k + 1].tolist() == said["missing"],
+                "the log says that another reading is missing, or none")  # fmt: skip
+        return 1.0, 0.0
+    require({"watch_share", "watch_test"} <= set(log), "the log has no test between instruments")
+    require(TESTS[int(log["watch_test"][k])] == said["test"], "the log has another test in this row")
+    require(all(most >= 0 for _, _, most in said["looks"]), "looks: a bound is below zero")
+    residual, bound = (
+        sum(z - other for z, other, _ in said["looks"]),
+        sum(most for *_, most in said["looks"]),
+    )
+    require(bound > 0 and log["watch_share"][k] * (1 + 1e-9) > residual / bound, "the log's share is smaller")
+    return residual, bound
+
+
+# --- 10. All statements ----------------------------------------------------------------------------------
+
+
+def check_statement(said, about, log, declared):
+    """Raise Refused unless the statement follows from log and scenario."""
+    check_statement_form(said)
+    check_event(said, log)
+    kind = kind_of(said)
+    frames = Frames(about, log, declared, said.get("block"))
+    if kind == "as":
+        like_the_alarm(said, about, frames)
+        return
+    if kind == "terms":
+        pairs = [sum_of_terms(said, frames, declared)]
+    elif kind == "bounds":
+        pairs = course(said, frames, declared)
+    elif kind == "likelihood":
+        pairs = likelihood(said, frames, declared)
+    else:
+        pairs = [instruments(said, log)]
+    stated = said["sides"] if kind in ("bounds", "likelihood") else [[side] for side in said["sides"]]
+    sides = np.array(pairs, float).T
+    require(np.isfinite(sides).all() and sides.shape == np.shape(stated), "the sides are no numbers")
+    least = 1e-10 * np.abs(sides).max(axis=0) if kind == "terms" else 0.0
+    require((sides[0] > sides[1] + least).all(), f"{sides[0][0]:.6g} is not more than {sides[1][0]:.6g}")
+    require(np.allclose(sides, stated, SAME, 0), "the stated sides are not the recomputed ones")
+
+
+def digest(about):
+    """SHA-256 of the certificate without its own digest, keys sorted, no spaces."""
+    plain = dumps(about | {"digest": ""}, sort_keys=True, separators=(",", ":"))
+    return sha256(plain.encode()).hexdigest()
+
+
+def failures(about, log, scenario=""):
+    """A sentence for each reason to refuse; log: column -> values, scenario: the text of scenario.yaml."""
+    try:
+        check_form(about, DOCUMENT, IF_STATED, "certificate")
+        require(about["format"] == FORMAT, f"this checker reads format {FORMAT}, not {about['format']}")
+        require(digest(about) == about["digest"],
+                "SHA-256 does not match: the file was edited, or belongs to another log")  # fmt: skip
+        rows = len(log["t_s"])
+        another = f"the log has {rows} rows, not {about['rows']}: the certificate belongs to another log"
+        require(rows == about["rows"], another)
+        another = "SHA-256 of scenario.yaml does not match: it was edited, or is of another flight"
+        require(sha256(scenario.encode()).hexdigest() == about["scenario_sha256"], another)
+        if not about["statements"]:
+            return
+        events = [said.get("frame") for said in about["statements"]]
+        require(all(map(row, events)), "statement: the field frame is missing, or no row")
+        declared = declared_in(yaml.safe_load(scenario), min(events))
+        check_declared(about, declared)
+        times = np.asarray(log["t_s"], float)
+        require(np.allclose(times, np.arange(rows) * declared.dt, 0, 1e-6),
+                "dt_s: the log's rows are not that far apart")  # fmt: skip
+    except Refused as why:
+        yield str(why)
+        return
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError, yaml.YAMLError) as why:
+        yield f"certificate, log and scenario do not fit together: {type(why).__name__}: {why}"
+        return
+    for said in about["statements"]:
+        try:
+            check_statement(said, about, log, declared)
+        except Refused as why:
+            yield f"{name_of(said)}: {why}"
+        except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as why:
+            yield f"{name_of(said)}: the numbers do not fit the log: {type(why).__name__}: {why}"
+
+
+def name_of(said):
+    """What a statement is about, in words."""
+    what = said.get("what")
+    return "alarm" if what is None else f"{what} excluded"
+
+
+def sentences(about, log):
+    """What the certificate states, a sentence for each statement."""
+    for said in about["statements"]:
+        at = f"{name_of(said)} at {log['t_s'][said['frame']]:.3f} s (row {said['frame']})"
+        if "as" in said:
+            yield f"{at}: the statistical alarm came on axes that this fault does not move"
+        elif "missing" in said:
+            yield f"{at}: instrument {said['missing'][0]} gave no reading"
+        elif "bounds" in said:
+            yield f"{at}: the surface moved as this type cannot"
+        elif "likelihood" in said:
+            (value, _), (limit, _) = said["sides"]
+            yield f"{at}: evidence {value:.4g} is more than {limit:.4g} at the declared rate of false alarms"
+        else:
+            unit = "" if said.get("theta", "any") != "any" or said.get("test") else " rad/s"
+            value, limit = said["sides"]
+            yield f"{at}: {value:.4g}{unit} is more than {limit:.4g}{unit}, the most that bounds allow"
+
+
+def no_constant(name):
+    """JSON has no NaN and no infinity."""
+    raise ValueError(f"{name} is no number of JSON")
+
+
+def check(certificate, log=None, scenario=None):
+    """Read the files and check them. Returns the statements in sentences, and the reasons to refuse.
+
+    certificate: the folder of a run, or the file; log, scenario: where they lie elsewhere.
+    """
+    file = Path(certificate, "certificate.json") if Path(certificate).is_dir() else Path(certificate)
+    log = Path(log) if log else file.parent / "log.parquet"
+    scenario = Path(scenario) if scenario else log.parent / "scenario.yaml"
+    about = loads(file.read_text(encoding="utf-8"), parse_constant=no_constant)
+    require(isinstance(about, dict), f"{file}: this is no certificate")
+    table = read_table(log)
+    columns = {name: table[name].to_numpy() for name in table.column_names}
+    why = list(failures(about, columns, scenario.read_text(encoding="utf-8")))
+    said = [] if why else list(sentences(about, columns))
+    said += (
+        [f"not certified: {name_of(one)}: {one.get('because')}" for one in about["without"]]
+        if not why
+        else []
+    )
+    return said, why
+
+
+def main(arguments):
+    """Print the statements, or why they are refused; returns the exit status."""
+    try:
+        said, why = check(*arguments)
+    except (OSError, TypeError, ValueError, LookupError, Refused, JSONDecodeError) as error:
+        print(f"no certificate at FOLDER, or CERTIFICATE LOG [SCENARIO]: {error}", file=sys.stderr)
+        return 1
+    print(*why, sep="\n", end="\n" * bool(why), file=sys.stderr)
+    print(*said, sep="\n", end="\n" * bool(said))
+    if not why:
+        print(f"{sum(not one.startswith('not certified') for one in said)} statements hold")
+    return int(bool(why))
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,365 @@
+"""Forged certificates: does any reader accept a statement that is false?
+
+    python -m tools.drawn.forgeries [--flights N] [--seed S] [--forged F]
+
+The true certificates of N drawn flights of our scheme, and of N healthy ones, are taken. F times in all a
+false statement is put into one of them: an alarm in a row in which there was none, an exclusion of a fault
+that is not excluded, or at another time. Its evidence is altered by one to three of ROADS, its sides and the
+digest are written anew. Log and scenario stay as they are. Exit status 1 where either reader accepts a forged
+certificate, or refuses a true one. How often each road was taken is printed.
+"""
+
+import argparse
+import copy
+import json
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+
+import beaver_ftc as bf
+from beaver_ftc.results.certificates import check_certificate as checker
+from beaver_ftc.results.certificates.certificate import as_text, sealed
+from beaver_ftc.scenario.dump import to_yaml
+from tools.drawn.certificates import certified
+from tools.drawn.reader import doubts
+
+Document = dict[str, Any]
+Log = dict[str, np.ndarray]
+TYPES = ("stuck", "float", "bias", "loss_of_effectiveness", "hardover up", "oscillatory", "rate_limit")
+WIDE = 10.0 ** np.arange(-12.0, 13.0)
+
+
+def main() -> None:
+    """Forge, check, count."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--flights", type=int, default=40)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--forged", type=int, default=5000)
+    args = parser.parse_args()
+    np.seterr(all="ignore")  # forged numbers overflow
+    rng, count, roads, reasons = (
+        np.random.default_rng(args.seed),
+        Counter[str](),
+        Counter[str](),
+        Counter[str](),
+    )
+    for written, log, scenario in flights(args.seed, args.flights):
+        count["true certificates"] += 1
+        for word, reader in (("checker", checker.failures), ("second reader", doubts)):
+            if refused := [*reader(written, log, scenario)]:
+                count[f"true ones refused by the {word}"] += 1
+                print(f"refused by the {word}: {refused[0][:200]}", flush=True)
+        due = -(-args.forged * count["true certificates"] // (2 * args.flights)) - count["forged"]
+        for forged, names in forgeries(rng, written, log, due):
+            count["forged"] += 1
+            roads.update(names)
+            why = [*checker.failures(forged, log, scenario)]
+            reasons.update(one.rpartition(": ")[2][:60] for one in why[:1])
+            accepted = [not why, not [*doubts(forged, log, scenario)]]
+            for word, holds in zip(("checker", "second reader"), accepted, strict=True):
+                count[f"accepted by the {word}"] += holds
+                if holds:
+                    print(f"accepted by the {word}: {names}: {as_text(forged)[:400]}", flush=True)
+    for word in ("checker", "second reader"):
+        count[f"accepted by the {word}"] += 0
+    print(*(f"{word} {n}" for word, n in count.items()), sep=", ")
+    print("roads:", ", ".join(f"{name} {n}" for name, n in sorted(roads.items())))
+    for reason, n in reasons.most_common(25):
+        print(f"{n:6d} {reason}")
+    raise SystemExit(any(n for word, n in count.items() if "refused" in word or "accepted" in word))
+
+
+def flights(seed: int, n: int) -> Iterator[tuple[Document, Log, str]]:
+    """Certificate, log and scenario of n drawn flights, and of as many healthy ones."""
+    for k, (_, written, log, scenario) in enumerate(certified(seed, n, [])):
+        yield written, log, scenario
+        given = {
+            "name": "healthy",
+            "duration_s": 4.0,
+            "seed": seed + k,
+            "initial": {"airspeed_mps": 35 + k % 15},
+        }
+        given |= {"reference": {"q": [{"sine": {"amplitude_deg_s": 1 + k % 4, "frequency_hz": 0.3}}]}}
+        given |= {"fdi": {"fault_class": ("all", "published")[k % 2]}}
+        flight = bf.fly(given)
+        proof = flight.proof()
+        yield json.loads(as_text(proof.certificate)), proof.log, to_yaml(flight.scenario)
+
+
+def forgeries(
+    rng: np.random.Generator, written: Document, log: Log, n: int
+) -> Iterator[tuple[Document, tuple[str, ...]]]:
+    """So many documents with a statement that is false, and the roads by which each was made to hold."""
+    while n > 0:
+        forged, said = false_statement(rng, written, log)
+        chosen = tuple(rng.choice([*ROADS], size=rng.integers(1, 4), replace=False))
+        for name in chosen:
+            with suppress(TypeError):  # a road after one that left a field of another type
+                ROADS[name](rng, forged, said, log)
+        restate(forged, said, log)
+        yield sealed(json.loads(json.dumps(forged))), chosen
+        n -= 1
+
+
+def false_statement(rng: np.random.Generator, written: Document, log: Log) -> tuple[Document, Document]:
+    """The document with one statement alone, of an event that the log does not have."""
+    rows, forged = len(log["t_s"]), copy.deepcopy(written)
+    true = [one for one in written["statements"] if "as" not in one]
+    surfaces = [name.removesuffix("_cmd_rad") for name in log if name.endswith("_cmd_rad")]
+    excluded = {(one["what"], one["frame"]) for one in written["statements"]}
+    while True:
+        k, kind = int(rng.integers(1, rows)), rng.integers(3)
+        surface = str(rng.choice(surfaces))
+        what = (None, surface, f"{surface} {rng.choice(TYPES)}")[kind]
+        column = checker.column_of(what, log)
+        columns = [column, f"fie_{surface}_excluded", "detected", "t_s"]
+        column = str(rng.choice(columns, p=[0.7, 0.1, 0.1, 0.1]))
+        if (what, k) not in excluded and not _is_event(what, k, log):
+            break
+    if true and rng.random() < 0.6:  # the evidence of another event
+        said = copy.deepcopy(true[rng.integers(len(true))])
+        if rng.random() < 0.5:
+            _move(said, k - said["frame"], rows, log)
+    else:
+        said = {"theta": "any", "terms": [_term(k, log, forged)], "sides": [0.0, 0.0]}
+        forged.setdefault("declared", {name: {} for name in "cbgoBm"})
+        forged.setdefault("dt_s", float(np.median(np.diff(log["t_s"]))))
+    said |= {"what": what, "column": column, "frame": k}
+    forged["statements"] = [said]
+    return forged, said
+
+
+def _is_event(what: str | None, k: int, log: Log) -> bool:
+    """Whether the log has this event in this row."""
+    column = log.get(checker.column_of(what, log))
+    return column is not None and bool(column[k:].all() and (k == 0 or not column[k - 1]))
+
+
+def _term(k: int, log: Log, forged: Document) -> Document:
+    """A frame by itself, as the log has it."""
+    d = [0.0, 0.0, 0.0]
+    d[k % 3] = (-1.0) ** (k // 3)
+    return {"weight": 1.0, "d": d, "first": k, "frame": k, **_copies(k, k, log)}
+
+
+def _copies(first: int, last: int, log: Log) -> Document:
+    of = {"x": "measured_rad_s", "F": "design_rad_s2", "eta_bar": "eta_bar_rad_s2"}
+    return {
+        name: [[float(log[f"{axis}_{column}"][k]) for axis in "pqr"] for k in range(first, last + 1)]
+        for name, column in of.items()
+    }
+
+
+def _move(said: Document, by: int, rows: int, log: Log) -> None:
+    """The evidence at another time."""
+    for one in (*said.get("terms", ()), *said.get("bounds", ())):
+        if "block" not in said and 0 < one["first"] + by <= one["frame"] + by < rows:
+            one["first"], one["frame"] = one["first"] + by, one["frame"] + by
+            if "since" in one:
+                one["since"] = max(one["since"] + by, 0)
+            if "x" in one:
+                one.update(_copies(one["first"], one["frame"], log))
+    if "likelihood" in said:
+        said["first"] = max(said["first"] + by, 1)
+
+
+def restate(forged: Document, said: Document, log: Log) -> None:
+    """Write rest and sides as the numbers now have it: the checker's own sums, whatever they are."""
+    try:
+        declared = _Any(forged, log)
+        frames = checker.Frames(forged, log, declared, said.get("block"))
+        for term in said.get("terms", ()):
+            rows = slice(term["first"], term["frame"] + 1)
+            term["rest"] = (np.array(term["eta_bar"]) - frames.published[rows]).tolist()
+        pairs = [(1.0, 0.0)]
+        if "terms" in said:
+            pairs = [_sum(said, frames)]
+        elif "looks" in said:
+            pairs = [(sum(z - o for z, o, _ in said["looks"]), sum(most for *_, most in said["looks"]))]
+        elif "likelihood" in said:
+            pairs = checker.likelihood(said, frames, declared)
+        sides = np.array(pairs, float).T
+        said["sides"] = sides.tolist() if "likelihood" in said else sides[:, 0].tolist()
+    except Exception:  # numbers that no sum can be made of are left as they are
+        return
+
+
+class _Any:
+    """A scenario that declares whatever the forged certificate says."""
+
+    def __init__(self, forged: Document, log: Log) -> None:
+        self.dt, self.instants, self.from_row = forged.get("dt_s", 0.01), forged.get("instants", 1), 0
+        self.scenario = {"fdi": {"statistical": {"false_alarms_per_h": 1e3}}}
+
+
+def _sum(said: Document, frames: Any) -> tuple[float, float]:
+    """Both sides with the effects that the certificate states."""
+    value = limit = 0.0
+    for term in said["terms"]:
+        k, first, dt, d = term["frame"], term["first"], frames.dt, np.array(term["d"])
+        a = np.exp(-term["pole_per_s"] * dt) if "pole_per_s" in term else 0.0
+        since = term.get("since", k - 1)
+        past = np.arange(since + 1, k + 1)
+        left, noise = a ** (k - past.astype(float)), frames.n @ abs(d)
+        value += term["weight"] * (left @ (dt * frames.nu[past] @ d))
+        limit += term["weight"] * (
+            left @ (dt * frames.eta_bar[past] @ abs(d) + (1 - a) * noise[past - 1])
+            + a * left[0] * noise[since]
+            + noise[k] + a ** (k + 1.0 - first) * term.get("fault", 0.0)
+        )  # fmt: skip
+    return float(value), float(limit)
+
+
+# --- the roads: each alters one thing that could make a statement hold -----------------------------------
+
+
+def _dt(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
+    forged["dt_s"] = float(forged.get("dt_s", 0.01) * rng.choice([-1.0, *WIDE]))
+
+
+def _instants(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
+    forged["instants"] = rng.choice([-1e9, 0, 0.5, 2, 50]).item()
+
+
+def _noise(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
+    given = {
+        axis: float(v) for axis, v in zip("pqr", rng.choice([-1e3, -1e-3, 0, 1e-6, 0.5, 1e3], 3), strict=True)
+    }
+    forged.setdefault("declared", {name: {} for name in "cbgoBm"})[str(rng.choice([*"oBm"]))] = given
+
+
+def _no_bounds(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
+    forged["declared"] = {name: {} for name in "cbgoBm"}
+    forged["omega_E"] = rng.choice([0.0, -1e3, 7.292115857915991e-05]).item()
+
+
+def _of_terms(alter: Callable[..., None]) -> Callable[..., None]:
+    def road(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
+        for term in (*said.get("terms", ()), *said.get("bounds", ())):
+            if isinstance(term, dict):  # `bounds` of some statements are names
+                alter(rng, term, log)
+
+    return road
+
+
+def _direction(rng: np.random.Generator, term: Document, log: Log) -> None:
+    term["d"] = rng.choice([-1.0, 0.0, 1.0, 0.3, 1e300], 3).tolist()
+
+
+def _pole(rng: np.random.Generator, term: Document, log: Log) -> None:
+    term["pole_per_s"] = float(rng.choice([-1.0, 1.0], p=[0.7, 0.3]) * rng.choice([0.1, 5, 50, 200, 1e4]))
+    term["since"] = int(max(term["frame"] - rng.integers(1, 60), 0))
+
+
+def _since(rng: np.random.Generator, term: Document, log: Log) -> None:
+    term["since"] = int(rng.integers(-5, term["frame"] + 3))
+
+
+def _weight(rng: np.random.Generator, term: Document, log: Log) -> None:
+    term["weight"] = float(rng.choice([-1.0, 0.0, 1e-300, 1e300, np.inf, np.nan]))
+
+
+def _effect(rng: np.random.Generator, term: Document, log: Log) -> None:
+    for name in rng.choice([*"hZr"], rng.integers(1, 4), replace=False):
+        n = term["frame"] + 1 - term["first"]
+        term[str(name)] = rng.choice([-1e3, -1.0, 0.0, 1.0, 1e-13], n).tolist()
+
+
+def _no_effect(rng: np.random.Generator, term: Document, log: Log) -> None:
+    for name in ("h", "Z", "r", "fault"):
+        term.pop(name, None)
+
+
+def _past(rng: np.random.Generator, term: Document, log: Log) -> None:
+    term["fault"] = float(rng.choice([-1e3, -1e-3, 0.0]))
+
+
+def _copy(rng: np.random.Generator, term: Document, log: Log) -> None:
+    for name in rng.choice(["x", "F", "eta_bar"], rng.integers(1, 4), replace=False):
+        if name in term:
+            term[str(name)] = (np.array(term[str(name)]) * rng.choice([-1.0, 0.0, 2.0])).tolist()
+
+
+def _theta(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
+    said["theta"] = str(rng.choice(["any", "constant", "constant while it shows", "course", "none"]))
+    said |= {"least": float(rng.choice([-1.0, 0.0, 5.0])), "most": float(rng.choice([-5.0, 0.0, 1.0]))}
+
+
+def _block(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
+    length = int(rng.choice([-1, 0, 1, 2, 20]))
+    said["block"] = [length, 0, (len(log["t_s"]) // max(length, 1)) * max(length, 1)]
+
+
+def _replace(said: Document, **evidence: Any) -> None:
+    for name in [name for name in said if name not in ("what", "column", "frame")]:
+        del said[name]
+    said |= evidence
+
+
+def _looks(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
+    looks = rng.choice([[1.0, 0.0, -2.0], [1.0, 0.0, 0.0], [1e3, 0.0, 1.0], [np.nan, 0.0, -1.0]], 2).tolist()
+    _replace(said, test=str(rng.choice(checker.TESTS)), looks=looks, sides=[1.0, 0.0])
+
+
+def _missing(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
+    _replace(said, missing=[rng.choice([-1, 0, 3]).item()], sides=[1.0, 0.0])
+
+
+def _as_alarm(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
+    alarm = {"likelihood": "t_s", "axes": [1], "first": 1, "what": None, "column": "detected", "frame": 1}
+    forged["statements"].insert(0, alarm)
+    _replace(said, **{"as": "alarm"})
+
+
+def _chance(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
+    k, shares = said["frame"], [name for name in log if name.endswith("_likelihood_share")]
+    frame: Document = {"jitter": [float(rng.choice([0, -1e-6]))], "drift": [[0.0]], "signature": [1.0]}
+    if rng.random() < 0.5:
+        frame["bounded"] = [float(rng.choice([0.0, -1e6]))]
+    tolerance = [-1e3] if rng.random() < 0.3 else []
+    if tolerance:
+        frame["known"] = [[1.0]]
+    _replace(
+        said, likelihood=str(rng.choice([*shares, "t_s", "airspeed_mps"])),
+        level=float(rng.choice([-50.0, 1e-9, 0.0, 6.0])), sense=str(rng.choice(["either", "less"])),
+        axes=[int(rng.integers(3))], R=[float(rng.choice([1e-6, -1e-6, 0.0]))],
+        P=[[1e-6, 0], [0, float(rng.choice([1e-6, -1e-6]))]], Y=[[0.0] * (2 + len(tolerance))] * 2,
+        tolerance=tolerance, first=k, frames=[frame], sides=[[1.0, 1.0], [0.0, 0.0]],
+    )  # fmt: skip
+
+
+def _course(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
+    k = said["frame"]
+    frames = sorted({max(k - 2, 1), k})
+    bounds = [{"d": [0.0, 1.0, 0.0], "first": j, "frame": j, "h": [0.0],
+               "r": [float(rng.choice([0.0, -1e6]))],
+               "Z": [float(z)]} for j, z in zip(frames, (1.0, -1.0), strict=False)]  # fmt: skip
+    _replace(said, theta="course", bounds=bounds, stops=[1e9], pace_rad_s=1e9, slowest_rad_s=1e9, near=-1e9,
+             ordered=[-1e9], sides=[[1.0], [0.0]])  # fmt: skip
+
+
+def _empty(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
+    _replace(said, theta=str(rng.choice(["any", "course"])), terms=[], sides=[1.0, 0.0])
+
+
+def _odd(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
+    """A value of another type in some field of the statement."""
+    name = str(rng.choice([*said]))
+    said[name] = [None, "1", True, [], {}, [[]], 1e400, -1][rng.integers(8)]
+
+
+ROADS: dict[str, Callable[..., None]] = {
+    "dt": _dt, "instants": _instants, "noise": _noise, "no bounds": _no_bounds,
+    "direction": _of_terms(_direction), "pole": _of_terms(_pole), "since": _of_terms(_since),
+    "weight": _of_terms(_weight), "effect": _of_terms(_effect), "no effect": _of_terms(_no_effect),
+    "past": _of_terms(_past), "copies": _of_terms(_copy), "theta": _theta, "block": _block, "looks": _looks,
+    "missing": _missing, "as the alarm": _as_alarm, "chance": _chance, "course": _course, "empty": _empty,
+    "odd": _odd,
+}  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()

@@ -25,7 +25,7 @@ IMPORTED = {
 }
 BESIDE, FROM_JSBSIM = "./", "jsbsim:"
 DERIVED = "# Written by beaver-ftc derive"
-_FORMAT = 8  # of what is derived: files of another are derived anew
+_FORMAT = 9  # of what is derived: files of another are derived anew
 _MAX_BYTES = 1_000_000
 _ALLOWED = "a built-in name, jsbsim:NAME, or ./FOLDER beside the scenario"
 
@@ -86,15 +86,16 @@ def derived_folder(name: str) -> Path:
     """Where `beaver-ftc derive` keeps what it made of an aircraft of the jsbsim package."""
     if not re.fullmatch(r"[A-Za-z0-9_-]{1,60}", name):
         raise UnknownAircraft(f"'jsbsim:{name[:60]}' is no name, allowed: letters, digits, - and _")
-    return _kept() / "aircraft" / name
+    return kept_folder() / "aircraft" / name
 
 
 def imported_folder(name: str) -> Path:
     """Where `beaver-ftc import` keeps what it made of data that others publish."""
-    return _kept() / "imported" / name
+    return kept_folder() / "imported" / name
 
 
-def _kept() -> Path:
+def kept_folder() -> Path:
+    """Where `derive` and `import` keep aircraft."""
     base = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser())
     return base / "beaver-ftc"
 

@@ -171,10 +171,12 @@ class EnvelopeSection(Section):
 
     airspeed_mps: lowest and highest true airspeed, m/s
     alpha_deg: lowest and highest angle of attack, deg
+    altitude_m: lowest and highest altitude above sea level, m; left out: any
     """
 
     airspeed_mps: Interval = entry(..., examples=[[30, 55]])
     alpha_deg: Interval = entry(..., examples=[[-5.7, 16]])
+    altitude_m: Interval | None = entry(None, examples=[[0, 3000]])
 
 
 _Share = Annotated[Number, Field(ge=-1, le=1, json_schema_extra={"unit": "share of 1"})]

@@ -13,13 +13,13 @@ _VERSIONS_KEPT = 5
 _ROOT = 0
 _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 _REFUSED = "BEAVER_FTC_REFUSED"  # folders that were refused, and said so
-_PACKAGE = Path(__file__).resolve().parents[1]
-_INSTALLED = _PACKAGE / "data"
+PACKAGE = Path(__file__).resolve().parents[1]
+_INSTALLED = PACKAGE / "data"
 
 
 def data_root() -> Path:
     """The folder that holds `aircraft/` and `scenarios/`; JSBSim's root directory."""
-    return _INSTALLED if _INSTALLED.is_dir() else _PACKAGE.parents[1]
+    return _INSTALLED if _INSTALLED.is_dir() else PACKAGE.parents[1]
 
 
 def inside(folder: Path, file: str) -> Path | None:
@@ -57,8 +57,8 @@ def _bases() -> Iterator[Path]:
 
 def _candidates() -> Iterator[Path]:
     """Folders that may keep compiled code, best first."""
-    if "NUMBA_CACHE_DIR" in os.environ:
-        yield Path(os.environ["NUMBA_CACHE_DIR"])
+    if chosen := os.environ.get("NUMBA_CACHE_DIR"):  # empty: as if it were not set
+        yield Path(chosen)
     with contextlib.suppress(RuntimeError):  # no home at all
         yield Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "beaver-ftc"
     with contextlib.suppress(FileNotFoundError):  # nor anywhere for temporary files

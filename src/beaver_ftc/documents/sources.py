@@ -1,78 +1,49 @@
-"""Which sources of a package machine code follows from: those of its kernels, and all that these import.
+"""What machine code follows from: a kernel's instructions, its constants, and all that its names stand for.
 
-What a kernel calls, and each constant in it, comes from a module that its own imports. Imports at the top of
-a file count, at the left margin: what a function imports is no part of a kernel. Kernels of other packages
-have no such list, so code is kept under what a kernel is made of, too: `digest_of`.
+Compiled code is kept under this digest, so an edit compiles again what it changes and nothing else. Comments,
+docstrings and line numbers change no code. What is compiled by means of its own, an intrinsic, is as its
+whole file.
 """
 
 import hashlib
-import re
+import sys
 from collections.abc import Iterator
+from enum import EnumMeta
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
 import numpy as np
 
-_COMPILER = "compiled"  # the module that kernels are made with
-_MAKES = re.compile(rb"\b(kernel|apart)\b")
-_CALLS = b"compile_into"  # in what makes kernels of others' functions, or fills what they read
+BY_ADDRESS = "called_by_address"  # an attribute of a kernel that its callers look up by name when they run
 
 
-def fingerprint(package: Path) -> str:
-    """A name for these sources as they are now."""
+def digest_of_files(*files: Path) -> str:
+    """A name for these files as they are now."""
     digest = hashlib.sha256()
-    for name, text in sorted(sources_of_kernels(package).items()):
-        digest.update(f"{name} {len(text)} ".encode() + text)
+    for file in files:
+        content = file.read_bytes()
+        digest.update(f"{file.name} {len(content)} ".encode() + content)
     return digest.hexdigest()[:16]
-
-
-def sources_of_kernels(package: Path) -> dict[str, bytes]:
-    """Their texts, by dotted name below the package."""
-    texts = {}
-    for path in package.rglob("*.py"):
-        dotted = ".".join(path.relative_to(package).with_suffix("").parts)
-        texts[dotted.removesuffix("__init__").removesuffix(".")] = path.read_bytes()
-    pattern = rf"^(?:from {package.name}\.?([\w.]*) import (\([^)]*\)|.*)|import {package.name}\.([\w.]+))"
-    statement = re.compile(pattern.encode(), re.MULTILINE)
-    imports = {name: statement.findall(text) for name, text in texts.items()}
-    ahead = [name for name, found in imports.items() if any(map(_makes_kernels, found))]
-    found: dict[str, bytes] = {}
-    while ahead:
-        name = ahead.pop()
-        if name not in found and name in texts:
-            found[name] = texts[name]
-            for each in imports[name]:
-                ahead += _modules(*each)
-    return found | {name: text for name, text in texts.items() if _CALLS in text}
-
-
-def _makes_kernels(imported: tuple[bytes, bytes, bytes]) -> bool:
-    module, names, _ = imported
-    return module.decode() == _COMPILER and bool(_MAKES.search(names))
-
-
-def _modules(module: bytes, names: bytes, plain: bytes) -> list[str]:
-    """The modules that one statement imports; a name that is no module is found in none."""
-    start = (module or plain).decode()
-    return [start, *(f"{start}.{name}".removeprefix(".") for name in re.findall(r"\w+", names.decode()))]
 
 
 def digest_of(function: FunctionType) -> str:
     """A name for what a kernel's machine code follows from beside its arguments' types: its instructions,
     the constants in it, and what its names stand for now, kernels it calls included."""
     digest = hashlib.sha256()
-    for part in _parts(function, set()):
+    for part in _parts(function, {}):
         digest.update(part.encode() + b"\0")
     return digest.hexdigest()
 
 
-def _parts(function: FunctionType, seen: set[int]) -> Iterator[str]:
+def _parts(function: FunctionType, seen: dict[int, int]) -> Iterator[str]:
     if id(function) in seen:
+        yield f"as before, {seen[id(function)]}"
         return
-    seen.add(id(function))
+    seen[id(function)] = len(seen)
     cells = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
     known = {**function.__globals__, **{name: cell.cell_contents for name, cell in cells}}
+    yield from _value(function.__defaults__ or (), seen)
     for code in _codes(function.__code__):
         yield code.co_code.hex()
         constants = code.co_consts[1:] if code.co_consts[:1] == (function.__doc__,) else code.co_consts
@@ -80,10 +51,15 @@ def _parts(function: FunctionType, seen: set[int]) -> Iterator[str]:
         for name in (*code.co_names, *code.co_freevars):
             yield name
             if name in known:
-                yield from _value(known[name], seen)
-                if isinstance(known[name], ModuleType) and not _is_numeric(known[name].__name__):
-                    for below in code.co_names:  # a constant or a kernel may be one of its names
-                        yield from _value(vars(known[name]).get(below), seen)
+                yield from _named(known[name], code.co_names, seen, set())
+
+
+def _named(value: Any, names: tuple[str, ...], seen: dict[int, int], passed: set[int]) -> Iterator[str]:
+    """A value, and of a module whatever these names may stand for in it: a constant, a kernel, a module."""
+    yield from _value(value, seen)
+    if isinstance(value, ModuleType) and not _is_numeric(value.__name__) and id(value) not in passed:
+        for below in names:
+            yield from _named(vars(value).get(below), names, seen, passed | {id(value)})
 
 
 def _is_numeric(module: str) -> bool:
@@ -98,9 +74,16 @@ def _codes(code: CodeType) -> Iterator[CodeType]:
             yield from _codes(constant)
 
 
-def _value(value: Any, seen: set[int]) -> Iterator[str]:
+def _value(value: Any, seen: dict[int, int]) -> Iterator[str]:
     plain = getattr(value, "py_func", value)
-    if isinstance(value, np.ndarray):
+    defined_by = getattr(value, "_defn", None)  # of an intrinsic: what gives its instructions
+    if hasattr(value, BY_ADDRESS):
+        yield getattr(value, BY_ADDRESS)
+    elif isinstance(value, EnumMeta):
+        yield repr([*value])
+    elif isinstance(defined_by, FunctionType):
+        yield digest_of_files(Path(sys.modules[defined_by.__module__].__file__ or ""))
+    elif isinstance(value, np.ndarray):
         yield f"{value.dtype} {value.shape} {value.tobytes().hex()}"
     elif isinstance(value, tuple | list):
         yield f"{len(value)}"

@@ -13,10 +13,12 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft import load as load_aircraft
+from beaver_ftc.aircraft.loading import kept_folder
 from beaver_ftc.aircraft.units import M_PER_FT, N_PER_LBF
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.documents.paths import data_root
-from beaver_ftc.plant.model_file import refuse_deeds, shared
+from beaver_ftc.plant.addresses import available
+from beaver_ftc.plant.model_file import package, refuse_deeds, shared
 from beaver_ftc.plant.state import START_LATITUDE_DEG, FlightState
 
 FT_PER_M = 1.0 / M_PER_FT
@@ -123,15 +125,14 @@ def bare(model: Path, absent: Iterable[str] = ()) -> jsbsim.FGFDMExec:
     return fdm
 
 
-def probe(model: Path, absent: Iterable[str] = ()) -> None:
-    """Load a model, start it and let it run for a few frames; raises SimulationFailed if it does not.
+def _is_ours(model: Path) -> bool:
+    """Whether a model is built in, of the jsbsim package, or was made of such by `derive` or `import`.
 
-    absent: properties that nothing gives, at 0.
+    Another's may raise an error in any frame and at any reading, which compiled code cannot catch: the
+    process would end. It is read and run through Python.
     """
-    fdm = bare(model, absent)
-    with translated(model):
-        for _ in range(5):
-            fdm.run()
+    homes = (data_root() / "aircraft", package(), kept_folder())
+    return any(model.resolve().is_relative_to(home.resolve()) for home in homes)
 
 
 class Plant:
@@ -153,6 +154,7 @@ class Plant:
         self._nodes: dict[str, jsbsim.FGPropertyNode] = {}
         self.as_loaded: dict[str, float] = {}  # of what has been written since
         self._inputs: dict[str, jsbsim.FGPropertyNode] = {}
+        self.native = available() and _is_ours(model or self.aircraft.jsbsim)
         self.executive = 0  # its address, if compiled code may run it: see native.py
         self.origin: object = None  # what it was loaded from, if it is to be flown again: see reuse.py
         self._settings: Mapping[str, float] = {}

@@ -27,7 +27,11 @@ ENGINES, SYSTEMS = "Engines", "Systems"
 _ENGINE_FOLDERS = (ENGINES, "engines", "Engine", "engine")  # beside a model; JSBSim knows all four
 _ENGINE_ELEMENTS = ("engine", "thruster")
 _MAX_BYTES = 20_000_000
+_MOST_IN_A_FOLDER, _MAX_BYTES_OF_A_FOLDER = 1000, 40_000_000
+_DEEPEST = 100  # elements in elements; JSBSim's own aircraft have 21, and JSBSim recurses without a bound
 _LONGEST = 160
+# Properties that start a trim or a reset from within a frame, which JSBSim may not survive.
+_CONTROLLING = ("simulation/reset", "simulation/do_simple_trim", "simulation/do_trim")
 _NAMING = {"use": ("aircraft", "initialize")}  # what names files beside `file`
 _FORBIDDEN = {
     "output": "writes files or connects, allowed: no <output> here; what flies is logged by beaver-ftc",
@@ -75,9 +79,31 @@ def _deeds(model: Path) -> Iterator[str]:
         if path.parent not in (package() / "engine", package() / "systems"):
             yield from _wrong_with(path, folder)
     if (folder / "aircraft.yaml").is_file():  # what is beside a single model may be anything
-        for path in sorted(folder.rglob("*.xml")):
+        beside = sorted(folder.rglob("*.xml"))
+        if says := _too_much(beside):
+            yield f"{one_line(str(folder), 4096)}:1: {says}"
+            return
+        for path in beside:
             if path not in used and (path.is_symlink() or _read(path).root == SCRIPT):
                 yield from _wrong_with(path, folder)
+
+
+def _forbidden_property(text: str) -> tuple[str, str]:
+    """The property in a text that must not be named, and what is wrong with it; empty if none is."""
+    if name := writing_property(text):
+        return name, "writes a file, allowed: other properties"
+    if name := next((name for name in _CONTROLLING if name in text), ""):
+        return name, "controls JSBSim itself, allowed: other properties"
+    return "", ""
+
+
+def _too_much(paths: list[Path]) -> str:
+    """What is wrong with the number or the size of a folder's files; empty if nothing is."""
+    if len(paths) > _MOST_IN_A_FOLDER:
+        return f"has {len(paths)} XML files, allowed: up to {_MOST_IN_A_FOLDER}"
+    size = sum(path.stat().st_size for path in paths if path.is_file())
+    most = f"{_MAX_BYTES_OF_A_FOLDER / 1e6:g} MB"
+    return f"has {size / 1e6:.3g} MB of XML, allowed: up to {most}" if size > _MAX_BYTES_OF_A_FOLDER else ""
 
 
 def _wrong_with(path: Path, folder: Path) -> Iterator[str]:
@@ -154,8 +180,9 @@ def _read_at(path: Path, *_state: int) -> _File:
         says.wrong.append((parser.CurrentLineNumber, what))
 
     def flush() -> None:
-        if says_it := writing_property("".join(text)):
-            forbid(f"{says_it} writes a file, allowed: other properties")
+        named, says_of_it = _forbidden_property("".join(text))
+        if named:
+            forbid(f"{named} {says_of_it}")
         text.clear()
 
     def begin(name: str, attributes: dict[str, str]) -> None:
@@ -171,9 +198,13 @@ def _read_at(path: Path, *_state: int) -> _File:
                 says.names.append((name, attributes[key], parser.CurrentLineNumber))
                 if _leaves(attributes[key]):
                     forbid(f"<{shown}> leaves the folder, allowed: a file of the aircraft's own folder")
-        if any(map(writing_property, attributes.values())):
-            forbid(f"<{shown}> writes a file, allowed: other properties")
+        for value in attributes.values():
+            named, says_of_it = _forbidden_property(value)
+            if named:
+                forbid(f"<{shown}> {says_of_it}")
         depth += 1
+        if depth == _DEEPEST + 1:
+            forbid(f"<{shown}> is in more than {_DEEPEST} elements, allowed: up to {_DEEPEST}")
 
     def end(_name: str) -> None:
         nonlocal depth

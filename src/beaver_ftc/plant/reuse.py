@@ -41,7 +41,7 @@ def borrowed(rate_hz: float, substeps: int, aircraft: Aircraft) -> Plant:
     except IndexError:
         plant = Plant(rate_hz, substeps, aircraft)
         plant.origin = origin
-        if not plant.n_engines:
+        if plant.native and not plant.n_engines:
             plant.executive = executive_address(plant.fdm)
     renew(plant, rate_hz, substeps)
     return plant

@@ -1,122 +1,191 @@
-"""The name compiled code is kept under: it follows from the sources of kernels, and of nothing else.
+"""What compiled code is kept under: it follows from all that a kernel is made of, and from nothing else."""
 
-Expected by another road: the syntax tree of each file, and what comes out of a program that is changed.
-"""
-
-import ast
-import shutil
 import sys
-from functools import cache
+from importlib import import_module
 from pathlib import Path
-from types import ModuleType
+from pkgutil import walk_packages
+from types import BuiltinFunctionType, FunctionType, ModuleType, NoneType
 
+import numpy as np
 import pytest
 
 import beaver_ftc
-from beaver_ftc import compiled
-from beaver_ftc.documents.sources import sources_of_kernels
+from beaver_ftc import compiled, numba_inside
+from beaver_ftc.documents import sources
+from beaver_ftc.documents.sources import digest_of
 
-PACKAGE = Path(beaver_ftc.__file__).parent
-MAKERS = {"kernel", "apart", "compile_into"}
-BESIDE = (
-    "control/rivals/indi.py", "control/rivals/lqr.py", "loop/plugin_frame.py", "plant/channels.py",
-    "aircraft/schema.py", "compiled.py", "control/laws/__init__.py", "numba_inside.py",
-)  # fmt: skip
+SOLE = """
+from enum import IntEnum
+import numpy as np
+import sole_folder.inner
+from beaver_ftc.compiled import apart, kernel
+from sole_intrinsic import loaded
+from sole_folder import inner
 
+SCALE, TABLE = 2.0, (np.array([1.0, 2.0]), 3)
 
-@cache
-def tree(path: Path) -> ast.Module:
-    return ast.parse(path.read_text(encoding="utf-8"))
+class Kind(IntEnum):
+    LOST = 4
 
+def other(x):
+    return x + 1.0
 
-def makes_kernels(path: Path) -> bool:
-    """Whether a file has what kernels are made with from where it is."""
-    return b"compiled" in path.read_bytes() and any(
-        (node.module == "beaver_ftc.compiled" and MAKERS & {alias.name for alias in node.names})
-        or (node.module == "beaver_ftc" and "compiled" in {alias.name for alias in node.names})
-        for node in ast.walk(tree(path))
-        if isinstance(node, ast.ImportFrom)
-    )
+@kernel
+def half(x):
+    return 0.5 * x
 
+@kernel
+def third(x):
+    return x / 3.0
 
-def at_import(node: ast.AST):
-    """The import statements that are executed when the file is imported."""
-    for child in ast.iter_child_nodes(node):
-        if isinstance(child, ast.Import | ast.ImportFrom):
-            yield child
-        elif isinstance(child, ast.If) and "TYPE_CHECKING" in ast.dump(child.test):
-            continue
-        elif not isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
-            yield from at_import(child)
+part = half
 
+@apart
+def rare(record):
+    record.value = 1.0
 
-def imported(path: Path):
-    """The files of the package that a file imports when it is imported."""
-    for node in at_import(tree(path)):
-        if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-        else:
-            names = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
-        for name in names:
-            if name.startswith("beaver_ftc."):
-                place = PACKAGE.joinpath(*name.split(".")[1:])
-                yield from (p for p in (place / "__init__.py", place.with_suffix(".py")) if p.is_file())
+@kernel
+def below(x, by=5.0):
+    return x * by
 
+@kernel
+def above(record, x):
+    \"""What is done.\"""
+    if x > SCALE:
+        rare(record)
+    part_of_it = below(x) + TABLE[0][1] + TABLE[1] + Kind.LOST + half(x) + third(x) + part(x)
+    return part_of_it + inner.A + sole_folder.inner.B + loaded(x) + 6.0
+"""
+INTRINSIC = """
+from numba import types
+from numba.extending import intrinsic
 
-def test_every_file_that_a_kernel_follows_from_is_hashed():
-    """Kernels' files, and whatever these import, on and on."""
-    made = {path for path in PACKAGE.rglob("*.py") if makes_kernels(path)}
-    assert len(made) > 50
-    wanted, ahead = set(), list(made)
-    while ahead:
-        path = ahead.pop()
-        if path not in wanted:
-            wanted.add(path)
-            ahead += imported(path)
-    hashed = {PACKAGE.joinpath(*name.split(".")) for name in sources_of_kernels(PACKAGE)}
-    hashed = {p / "__init__.py" if p.is_dir() else p.with_suffix(".py") for p in hashed}
-    assert wanted - hashed == set()
-    assert not [path for path in hashed if path.relative_to(PACKAGE).parts[0] in ("cli", "integrations")]
-    assert len(hashed) < len(list(PACKAGE.rglob("*.py"))) / 2, "an edit anywhere would compile all anew"
-
-
-@pytest.fixture(scope="module")
-def copy(tmp_path_factory):
-    """A copy of the package's sources."""
-    copied = tmp_path_factory.mktemp("copy") / "beaver_ftc"
-    shutil.copytree(
-        PACKAGE, copied, ignore=lambda _, names: [n for n in names if "." in n and not n.endswith(".py")]
-    )
-    return copied
+@intrinsic
+def loaded(typingctx, x):
+    return types.float64(x), lambda context, builder, signature, args: args[0]
+"""
+FILES = {"sole.py": SOLE, "sole_intrinsic.py": INTRINSIC, "sole_folder/inner.py": "A = 7.0\nB = 8.0\n"}
 
 
 @pytest.fixture
-def name_of(copy, monkeypatch, tmp_path):
-    """The name of the folder that the copy's code is kept in."""
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    monkeypatch.setattr(compiled, "_PACKAGE", copy)
+def digest(tmp_path, monkeypatch):
+    """digest(file, before, after): that of `above` with so much changed, in modules read anew."""
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    (tmp_path / "sole_folder").mkdir()
+
+    def of(file="sole.py", before="", after=""):
+        assert before in FILES[file]
+        for name, text in FILES.items():
+            (tmp_path / name).write_text(text.replace(before, after) if name == file and before else text)
+        for name in ("sole", "sole_intrinsic", "sole_folder.inner", "sole_folder"):
+            sys.modules.pop(name, None)
+        return digest_of(import_module("sole").above.py_func)
+
+    yield of
+    for name in [name for name in sys.modules if name.startswith("sole")]:
+        del sys.modules[name]
+
+
+@pytest.mark.parametrize(
+    ("file", "before", "after"),
+    [
+        ("sole.py", "SCALE, TABLE = 2.0", "SCALE, TABLE = 2.5"),
+        ("sole.py", "[1.0, 2.0]", "[1.0, 4.0]"),
+        ("sole.py", "LOST = 4", "LOST = 9"),
+        ("sole.py", "by=5.0", "by=5.5"),
+        ("sole.py", "x * by", "x / by"),
+        ("sole.py", "6.0", "6.5"),
+        ("sole.py", "x > SCALE", "x >= SCALE"),
+        ("sole.py", "part = half", "part = third"),
+        ("sole.py", "rare(", "rarer("),
+        ("sole_intrinsic.py", "args[0]", "args[-1]"),
+        ("sole_folder/inner.py", "7.0", "7.5"),
+        ("sole_folder/inner.py", "8.0", "8.5"),
+    ],
+)
+def test_what_changes_its_code_makes_another_name(digest, file, before, after):
+    assert digest() != digest(file, before, after)
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ("x + 1.0", "x + 2.0"),
+        ("What is done", "What is done, in other words"),
+        ("\n@kernel\ndef above", "\n# Why.\n\n@kernel\ndef above"),
+        ("record.value = 1.0", "record.value = 2.0"),
+    ],
+    ids=["another function", "its docstring", "its line", "what it looks up when it runs"],
+)
+def test_what_changes_nothing_of_its_code_leaves_its_name(digest, before, after):
+    assert digest() == digest("sole.py", before, after)
+
+
+CONTENTS = (
+    NoneType,
+    float,
+    np.ndarray,
+    np.generic,
+    np.dtype,
+    tuple,
+    list,
+    frozenset,
+    bool,
+    int,
+    complex,
+    str,
+    bytes,
+)
+NAMES = (BuiltinFunctionType, FunctionType, ModuleType)  # of a library, or followed by their contents
+
+
+def test_all_that_kernels_of_the_package_name_is_followed(monkeypatch):
+    """By its contents; of a value of any other kind, an instance of a class, only its name would count."""
+    value, other, kernels = sources._value, set(), 0
+
+    def noted(found, seen):
+        plain = getattr(found, "py_func", found)
+        intrinsic = isinstance(getattr(found, "_defn", None), FunctionType)
+        if not isinstance(plain, CONTENTS + NAMES) and not intrinsic:
+            other.add(f"{type(found).__qualname__} {getattr(found, '__name__', found)}")
+        yield from value(found, seen)
+
+    monkeypatch.setattr(sources, "_value", noted)
+    for module in walk_packages(beaver_ftc.__path__, "beaver_ftc."):
+        for made in vars(import_module(module.name)).values():
+            if isinstance(made, numba_inside.Kernel) and made.py_func.__module__ == module.name:
+                kernels += 1
+                digest_of(made.py_func)
+    assert kernels > 300
+    assert other == ALLOWED
+
+
+# A type that one of Python's variables has the name of: no kernel takes it from its module.
+ALLOWED = {"type SimpleNamespace"}
+
+
+def test_how_code_is_compiled_names_the_folder(monkeypatch, tmp_path):
+    package = Path(beaver_ftc.__file__).parent
+    (tmp_path / "documents").mkdir()
+    files = ("compiled.py", "numba_inside.py", "documents/sources.py")
+    for file in files:
+        (tmp_path / file).write_bytes((package / file).read_bytes())
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setattr(compiled, "_PACKAGE", tmp_path)
 
     def name():
         compiled.cache_folder.cache_clear()
         return compiled.cache_folder().name
 
-    yield name
+    names = [name(), name()]
+    for file in files:
+        (tmp_path / file).write_bytes((package / file).read_bytes() + b"\n")
+        names.append(name())
+    monkeypatch.undo()
     compiled.cache_folder.cache_clear()
-
-
-def test_an_edit_of_what_a_kernel_follows_from_makes_another_name(copy, name_of):
-    names = [name_of()]
-    edited = {str(path.relative_to(PACKAGE)) for path in PACKAGE.rglob("*.py") if makes_kernels(path)}
-    for file in sorted(edited.union(BESIDE)):
-        path = copy / file
-        path.write_bytes(path.read_bytes() + b"\n")
-        names.append(name_of())
-    assert len(edited) > 50
-    assert len(set(names)) == len(names)
-    for file in ("cli/run.py", "results/report.py", "studies/sweep/campaign.py"):
-        path = copy / file
-        path.write_bytes(path.read_bytes() + b"\n")
-        assert name_of() == names[-1], file
+    assert names[0] == names[1]
+    assert len(set(names)) == 1 + len(files)
 
 
 PROGRAM = """

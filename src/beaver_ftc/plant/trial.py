@@ -1,0 +1,111 @@
+"""A model is loaded, started and run for some frames in a process of its own before it is loaded here.
+
+JSBSim reads whatever a model says: some models end the process that loads them, or take all its memory or
+time. The process of the trial has limits for both (POSIX; elsewhere for time alone).
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterable
+from pathlib import Path
+from time import process_time
+
+from beaver_ftc.documents.errors import BeaverFtcError, SimulationFailed
+
+MOST_BYTES = 1 << 30  # of its address space
+MOST_CPU_S = 4  # of processor, imports included: 0.5 s; JSBSim's own largest aircraft take 0.1 s more
+LONGEST_S = 30.0  # on the clock, should it wait for something or the processor be taken
+FRAMES = 60
+MOST_FRAME_S = 0.002  # of processor, on average; JSBSim's own largest aircraft take 0.0001 s
+_COMMAND = "import sys; from beaver_ftc.plant.trial import _alone; _alone(*sys.argv[1:])"
+_REFUSED = 2
+
+
+def failure(model: Path, absent: Iterable[str] = ()) -> str | None:
+    """Why a model cannot be loaded and flown, in words; None if it can.
+
+    absent: properties that nothing gives, at 0.
+    """
+    above = str(Path(__file__).parents[2])  # the package itself, never what lies in the working directory
+    paths = [above, *filter(None, [os.environ.get("PYTHONPATH")])]
+    command = [sys.executable, "-P", "-c", _COMMAND, str(model), *absent]
+    with tempfile.TemporaryDirectory(prefix="beaver-ftc-") as here:  # also of a process that is ended
+        around = os.environ | {
+            "TMPDIR": here, "PYTHONPATH": os.pathsep.join(paths), "OPENBLAS_NUM_THREADS": "1"
+        }  # fmt: skip
+        try:
+            run = subprocess.run(
+                command, capture_output=True, timeout=LONGEST_S, check=False, env=around,
+                stdin=subprocess.DEVNULL,
+            )  # fmt: skip
+        except subprocess.TimeoutExpired:
+            return f"JSBSim does not start it within {LONGEST_S:g} s"
+    if run.returncode == 0:
+        return None
+    if run.returncode == _REFUSED:
+        return run.stdout.decode(errors="replace").strip()
+    return _how_it_ended(run.returncode, run.stderr.decode(errors="replace"))
+
+
+def _how_it_ended(status: int, said: str) -> str:
+    import signal
+
+    if status in (-signal.SIGKILL, -getattr(signal, "SIGXCPU", 0)):
+        return f"JSBSim does not start it within {MOST_CPU_S} s of processor"
+    if "bad_alloc" in said or "MemoryError" in said or "length_error" in said:
+        return f"JSBSim needs more than {MOST_BYTES / 2**30:g} GB of memory for it"
+    last = next((line.strip() for line in reversed(said.splitlines()) if line.strip()), "")
+    how = f"it ends JSBSim by signal {-status}" if status < 0 else f"JSBSim ends with status {status}"
+    return f"{how}: {' '.join(last.removeprefix('what():').split())[:200]}" if last else how
+
+
+def _alone(model: str, *absent: str) -> None:
+    """What the process of the trial does. It ends at once: what JSBSim has loaded may not be freed safely."""
+    _limit()
+    try:
+        probe(Path(model), absent)
+    except BeaverFtcError as error:
+        _end(_REFUSED, " ".join(str(error).split()))
+    except MemoryError:
+        _end(_REFUSED, f"JSBSim needs more than {MOST_BYTES / 2**30:g} GB of memory for it")
+    _end(0)
+
+
+def probe(model: Path, absent: Iterable[str] = ()) -> None:
+    """Load a model, start it and let it run for some frames, in this process.
+
+    Raises SimulationFailed if it does not, or if a frame takes long. absent: properties that nothing gives.
+    """
+    from beaver_ftc.plant.adapter import bare, translated
+
+    fdm = bare(model, absent)
+    with translated(model):
+        began_s = process_time()
+        for _ in range(FRAMES):
+            fdm.run()
+    frame_s = (process_time() - began_s) / FRAMES
+    if frame_s > MOST_FRAME_S:
+        allowed = f"allowed: up to {1e3 * MOST_FRAME_S:g} ms"
+        raise SimulationFailed(f"a frame of JSBSim takes {1e3 * frame_s:.2g} ms of processor, {allowed}")
+
+
+def _end(status: int, says: str = "") -> None:
+    sys.stdout.buffer.write(says.encode(errors="replace"))
+    sys.stdout.buffer.flush()
+    os._exit(status)
+
+
+def _limit() -> None:
+    """Bound memory, processor time and what is left behind, where the system can."""
+    try:
+        import resource
+    except ImportError:
+        return
+    limits = {"AS": (MOST_BYTES,) * 2, "CPU": (MOST_CPU_S, MOST_CPU_S + 1), "CORE": (0, 0)}
+    for name, wanted in limits.items():
+        try:
+            resource.setrlimit(getattr(resource, f"RLIMIT_{name}"), wanted)
+        except (OSError, ValueError, AttributeError):
+            continue

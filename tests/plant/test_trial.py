@@ -1,0 +1,140 @@
+"""Models that would end, fill or hold up the process that loads them: refused in a line, or run where errors
+are caught."""
+
+import shutil
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+import beaver_ftc as bf
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents.paths import data_root
+from beaver_ftc.plant import adapter, model_file, trial
+from beaver_ftc.plant.model_file import refuse_deeds
+
+ROOT = '<fdm_config name="m" version="2.0" release="BETA">{}</fdm_config>'
+
+
+def model(tmp_path, inside):
+    path = tmp_path / "m" / "m.xml"
+    path.parent.mkdir()
+    path.write_text(ROOT.format(inside))
+    return path
+
+
+def test_elements_in_elements_are_bounded(tmp_path):
+    """The root is one of them."""
+    path = model(tmp_path, "<a>" * 99 + "</a>" * 99)
+    refuse_deeds(path)
+    path.write_text(ROOT.format("<a>" * 100_000 + "</a>" * 100_000))
+    with pytest.raises(BadInput) as caught:
+        refuse_deeds(path)
+    (line,) = str(caught.value).splitlines()
+    assert line == f"{path}:1: <a> is in more than 100 elements, allowed: up to 100"
+
+
+@pytest.mark.parametrize("name", ["simulation/reset", "simulation/do_simple_trim", "simulation/do_trim"])
+def test_a_model_does_not_start_jsbsim_anew_from_within_a_frame(tmp_path, name):
+    path = model(tmp_path, f"<system><output> {name} </output></system>")
+    with pytest.raises(BadInput, match=f"m.xml:1: {name} controls JSBSim itself, allowed: other properties"):
+        refuse_deeds(path)
+
+
+def test_files_of_a_folder_are_bounded_in_number_and_size(tmp_path, monkeypatch):
+    path = model(tmp_path, "")
+    (path.parent / "aircraft.yaml").write_text("")
+    for i in range(3):
+        (path.parent / f"f{i}.xml").write_text("<a/>")
+    refuse_deeds(path)
+    monkeypatch.setattr(model_file, "_MAX_BYTES_OF_A_FOLDER", 20)
+    with pytest.raises(BadInput, match=r"m:1: has \S+ MB of XML, allowed: up to 2e-05 MB"):
+        refuse_deeds(path)
+    monkeypatch.setattr(model_file, "_MOST_IN_A_FOLDER", 3)
+    with pytest.raises(BadInput, match="m:1: has 4 XML files, allowed: up to 3"):
+        refuse_deeds(path)
+
+
+def beaver_with(tmp_path, component):
+    """A copy of the built-in aircraft that has one flight-control component more; its scenario."""
+    shutil.copytree(data_root() / "aircraft" / "beaver", tmp_path / "own")
+    path = tmp_path / "own" / "beaver.xml"
+    system = f'<system name="x"><channel name="x">{component}</channel></system>'
+    path.write_text(path.read_text().replace("</fdm_config>", f"{system}</fdm_config>"))
+    scenario = tmp_path / "s.yaml"
+    scenario.write_text("name: s\nduration_s: 1\naircraft: ./own\n")
+    return path, scenario
+
+
+def test_a_model_that_takes_all_memory_is_refused_and_this_process_goes_on(tmp_path):
+    path, scenario = beaver_with(
+        tmp_path,
+        '<pure_gain name="x/y"><input>velocities/p-rad_sec</input><gain>1</gain><delay>1e9</delay></pure_gain>',  # noqa: E501
+    )
+    says = (
+        "jsbsim: JSBSim needs more than 1 GB of memory for it, allowed: a model that JSBSim loads and flies"
+    )
+    with pytest.raises(BadInput) as caught:
+        bf.load(scenario)
+    assert str(caught.value) == f"{path.parent}/aircraft.yaml:14: {says}"
+
+
+# 7 at 0.7 s; a constant index would be refused at loading
+LATER = "<product><property>simulation/sim-time-sec</property><value>10</value></product>"
+
+
+@pytest.mark.parametrize(
+    ("bad", "says"),
+    [("<property>no/such</property>", "The property no/such does not exist"),
+     (f"<switch>{LATER}<value>1</value><value>2</value></switch>", "switch function index")],
+)  # fmt: skip
+def test_an_error_that_a_model_raises_in_flight_ends_the_flight_alone(tmp_path, bad, says):
+    early = "<lt><property>simulation/sim-time-sec</property><value>0.7</value></lt>"
+    function = f"<function><ifthen>{early}<value>0</value>{bad}</ifthen></function>"
+    _, scenario = beaver_with(tmp_path, f'<fcs_function name="x/y">{function}</fcs_function>')
+    with pytest.raises(adapter.SimulationFailed, match=f"JSBSim cannot fly own/beaver.xml: .*{says}"):
+        bf.fly(bf.load(scenario))
+
+
+@pytest.mark.parametrize(
+    ("status", "said", "why"),
+    [(-9, "", "JSBSim does not start it within 4 s of processor"),
+     (-6, "terminate\n  what():  std::bad_alloc\n", "JSBSim needs more than 1 GB of memory for it"),
+     (-11, "", "it ends JSBSim by signal 11"), (-6, "a\n what():  broken\n\n", "it ends JSBSim by signal 6: broken"),  # noqa: E501
+     (1, "one\n\n two \n", "JSBSim ends with status 1: two"), (0, "a warning", None)],
+)  # fmt: skip
+def test_how_the_process_of_the_trial_ends_is_said(monkeypatch, status, said, why):
+    ended = SimpleNamespace(returncode=status, stdout=b"", stderr=said.encode())
+    asked = []
+    monkeypatch.setattr(trial.subprocess, "run", lambda command, **how: asked.append((command, how)) or ended)
+    assert trial.failure(Path("mine/m.xml"), ["of/0"]) == why
+    ((command, how),) = asked
+    assert command[1] == "-P"  # nothing is imported from the working directory
+    assert command[-2:] == [str(Path("mine/m.xml")), "of/0"]
+    assert how["timeout"] == trial.LONGEST_S
+
+
+def test_a_model_that_waits_is_refused(monkeypatch):
+    def late(command, **how):
+        raise trial.subprocess.TimeoutExpired(command, 30.0)
+
+    monkeypatch.setattr(trial.subprocess, "run", late)
+    assert trial.failure(Path("m.xml")) == "JSBSim does not start it within 30 s"
+
+
+def test_a_frame_that_takes_long_is_refused(monkeypatch):
+    clock = iter((0.0, 60 * 0.0021))
+    monkeypatch.setattr(trial, "process_time", lambda: next(clock))
+    monkeypatch.setattr(adapter, "bare", lambda model, absent: SimpleNamespace(run=lambda: True))
+    with pytest.raises(adapter.SimulationFailed, match=r"takes 2.1 ms of processor, allowed: up to 2 ms"):
+        trial.probe(Path("m.xml"))
+
+
+def test_only_models_of_ours_are_read_and_run_by_compiled_code(tmp_path):
+    """An error that another's raises in a frame would end the process there."""
+    ours = adapter.load_aircraft().jsbsim
+    assert adapter._is_ours(ours)
+    assert not adapter._is_ours(tmp_path / "beaver.xml")
+    link = tmp_path / "aircraft"
+    link.symlink_to(tmp_path)
+    assert not adapter._is_ours(link / "beaver.xml")

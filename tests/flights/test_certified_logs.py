@@ -27,7 +27,8 @@ def proved(folder):
     document = json.loads((folder / "certificate.json").read_text())
     table = parquet.read_table(folder / "log.parquet")
     log = {name: table[name].to_numpy() for name in table.column_names}
-    return document, log, [*failures(document, log)], [*doubts(document, log)]
+    scenario = (folder / "scenario.yaml").read_text()
+    return document, log, [*failures(document, log, scenario)], [*doubts(document, log, scenario)]
 
 
 @pytest.mark.parametrize("faults", [[LOSS], []])

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights.diagnose import diagnose
 from beaver_ftc.flights.fitting import fit_model, folds, stretches_of
 from beaver_ftc.flights.samples import load_flights
@@ -63,3 +64,21 @@ def test_a_rudder_hard_over_is_found_by_its_effect_alone(real_flights):
     assert found["false_alarms"] == 0
     assert found["delay_s"] < 5.0
     assert found["right_group"] is True
+
+
+def test_another_day_of_the_wing_is_read_whole_and_its_columns_are_not_doubted(enac, real_flights):
+    """17 July: the wing is twisted, and the residual's variance is six times that of the model's day."""
+    vehicle, trained = enac
+    model = fit_model(stretches_of([trained]), vehicle)
+    other = load_flights([real_flights / "enac" / "flight-17.csv"], vehicle)[0]
+    rows = diagnose(other, model)
+    assert all("nothing answers the commands" in reason for reason in rows.reasons)
+    assert by_labels(rows, other.labels)["classes"] > 0.93
+    mistakes = {
+        "exchanged": replace(other, commands=other.commands[:, ::-1]),
+        "on q_rad_s": replace(other, rates=other.rates * np.array([1.0, 1.0 / 57.3, 1.0])),
+        "p_rad_s": replace(other, rates=other.rates * np.array([-1.0, 1.0, 1.0])),
+    }
+    for says, wrong in mistakes.items():
+        with pytest.raises(BadInput, match=says):
+            diagnose(wrong, model)

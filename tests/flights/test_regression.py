@@ -177,3 +177,13 @@ def test_what_a_model_predicts_does_not_depend_on_later_samples():
     whole, cut = (regression.predicted(one, WING) for one in (samples, short))
     for one, other in zip(whole, cut, strict=True):
         np.testing.assert_array_equal(one[:40], other)
+
+
+def test_a_column_of_rounding_gets_no_coefficient_and_changes_no_other():
+    rng = np.random.default_rng(3)
+    x = np.column_stack([np.ones(400), rng.standard_normal((400, 2)) * [0.3, 40.0]])
+    y = x @ np.array([[0.5, -1.0, 2.0], [3.0, 0.2, -0.7], [0.01, 0.02, -0.03]])
+    dead = np.column_stack([x[:, :2], 1e-140 * rng.standard_normal(400), x[:, 2:]])
+    fit = regression.least_squares(dead, y, np.zeros(400, dtype=int), 5)
+    assert fit.coefficients[2].tolist() == [0.0, 0.0, 0.0]
+    np.testing.assert_allclose(fit.coefficients[[0, 1, 3]], np.linalg.lstsq(x, y, rcond=None)[0], rtol=1e-9)

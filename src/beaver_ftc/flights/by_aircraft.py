@@ -63,6 +63,9 @@ def known(reference: str, scenario: str | None = None) -> Known:
     if given.fdi.sensor_monitor == "always":
         says = "fdi.sensor_monitor: always wants accelerations, which a log has not, allowed: auto, never"
         raise BadInput(f"--scenario {scenario}: {says}")
+    if given.fdi.scheme == "none":
+        says = "fdi.scheme is none, so no diagnosis would run, allowed: a scenario with a scheme"
+        raise BadInput(f"--scenario {scenario}: {says}")
     if given.airframe.name != aircraft.name:
         says = f"flies {given.airframe.name}, allowed: a scenario of {aircraft.name}"
         raise BadInput(f"--scenario {scenario}: {says}")

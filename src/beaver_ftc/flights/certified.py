@@ -34,4 +34,4 @@ def write(taken: Taken, rows: Rows, folder: Path) -> None:
     named = scenario.model_copy(update={"name": taken.samples.name})
     log, document = by_frames.proved(named, frames, stepped())
     document = certificate.sealed(document | {"begins_s": float(taken.samples.t_s[start])})
-    by_frames.write(log, document, folder)
+    by_frames.write(named, log, document, folder)

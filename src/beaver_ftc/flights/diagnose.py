@@ -88,25 +88,23 @@ def diagnose(samples: Samples, model: Model) -> Rows:
     check_rate(samples, model)
     bank = bank_of(model)
     lived = trust.without_dead(samples, model)
-    posterior, _, scale = posterior_of(lived, model, bank)
+    posterior, _, _ = posterior_of(lived, model, bank)
     still = posterior[:, bank.idle] > _IDLE
     rows = rows_of(samples, model, bank, posterior)
     if model.vehicle.other_laws and model.settings.threshold is not None and not model.colours:
         rows = _along(lived, model, rows, model.settings.threshold)
-    return silenced(samples, model, rows, scale, still)
+    return silenced(samples, model, rows, still)
 
 
 def silenced(
     samples: Samples,
     model: Model,
     rows: Rows,
-    scale: Floats | None = None,
     still: NDArray[np.bool_] | None = None,
 ) -> Rows:
     """Rows at the log's own stamps, that say nothing where the model is not credible, and nothing of a group
-    whose effect it does not know. scale (n,): of the noise, 1 where None; still (n,): where nothing answers
-    the commands."""
-    reasons = trust.outside(samples, model, np.ones(len(samples.t_s)) if scale is None else scale)
+    whose effect it does not know. still (n,): where nothing answers the commands."""
+    reasons = trust.outside(samples, model)
     if still is not None and still.any():
         reasons["nothing answers the commands: on the ground, or these are not what it follows"] = still
     if not any(trust.claimed(model)):

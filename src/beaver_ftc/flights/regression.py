@@ -134,11 +134,12 @@ def least_squares(x: Floats, y: Floats, run: NDArray[np.int64], reach: int) -> F
     """Ordinary least squares of y (n, 3) on x (n, m), with Newey-West standard errors over `reach` lags.
 
     run (n,): products of residuals are formed within one gap-free stretch only. Directions that x does not
-    excite get the least coefficients that fit.
+    excite get the least coefficients that fit, and a column of nothing but rounding gets 0.
     """
-    scale = np.maximum(np.sqrt((x**2).mean(axis=0)), TINY)
+    size = np.sqrt((x**2).mean(axis=0))
+    scale = np.where(size > _DEPENDENT * size.max(), size, np.inf)
     z = x / scale
-    inverse = np.linalg.pinv(z.T @ z, rcond=_RIDGE)
+    inverse: Floats = np.asarray(np.linalg.pinv(z.T @ z, rcond=_RIDGE), dtype=np.float64)
     coefficients = inverse @ (z.T @ y)
     residuals = y - z @ coefficients
     free = max(len(y) - x.shape[1], 1)

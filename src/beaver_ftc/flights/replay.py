@@ -34,7 +34,7 @@ def replay(path: Path) -> tuple[dict[str, Any], Document]:
 
     scenario = load_scenario(path.with_name("scenario.yaml"))
     aircraft = scenario.airframe
-    inputs = stepped.inputs_of(aircraft)
+    inputs = [*stepped.inputs_of(aircraft), ["altitude_m"]]
     log = _columns_of(path, ["t_s", *chain.from_iterable(inputs)])
     diagnosis = Diagnosis(aircraft, scenario.rate_hz, **stepped.declared_of(scenario))
     given = [np.column_stack([log[name] for name in names]) for names in inputs]

@@ -2,11 +2,12 @@
 
 It wants the extra `gym`.
 
-    env = gymnasium.make(
-        "beaver_ftc.integrations.gym:beaver_ftc/Beaver-v0", scenario="fault-free", frames_per_step=5
-    )
+    import beaver_ftc
+    import gymnasium
 
-Gymnasium imports what stands before the colon, and with it registers the name behind it.
+    env = gymnasium.make("beaver_ftc/Beaver-v0", scenario="fault-free", frames_per_step=5)
+
+The name is registered once both packages are imported, in either order (environments.py).
 The plant, the faults, the reference model and the accounts are those of a flight: what is learnt can be
 plugged in afterwards as a law, and compared with the others.
 
@@ -23,6 +24,7 @@ from collections.abc import Sequence
 from ctypes import Array, c_double
 from itertools import pairwise
 from multiprocessing.connection import Connection
+from operator import index
 from typing import Any, NamedTuple
 
 import gymnasium
@@ -40,7 +42,6 @@ from beaver_ftc.results.simulation import Simulation
 from beaver_ftc.scenario.loader import ScenarioLike, load
 from beaver_ftc.studies.engine.workers import context, cores, single_threaded
 
-ID = "beaver_ftc/Beaver-v0"
 DEPARTURE = -100.0
 NOBODY = {"control.law": "nominal", "control.options": {}}  # the surfaces are the agent's
 
@@ -75,7 +76,7 @@ class Episode(Simulation):
 
     def act(self, action: ArrayLike, frames: int) -> float:
         """Fly so many frames, or to the end, with an action (surfaces,) held; returns what they cost."""
-        shares = np.ascontiguousarray(action, np.float64)
+        shares = _numbers("action", action, (self._size,))
         if shares.shape != (self._size,) or not self._acts(self._loop.frames, shares):
             raise BadInput(f"action: {action!r:.80} is not usable, allowed: {self._size} finite numbers")
         self._cost, self._by_hand = 0.0, True
@@ -122,6 +123,7 @@ class BeaverEnv(gymnasium.Env[Vector, Vector]):
     def reset(self, *, seed: int | None = None, options: Info | None = None) -> tuple[Vector, Info]:
         """Put the aircraft in trim. A seed replaces the scenario's, and those of the episodes to come follow
         from it; without any they all have the scenario's."""
+        seed = None if seed is None else _seed(seed)
         super().reset(seed=seed)
         self._seeded |= seed is not None
         if seed is None and self._seeded:
@@ -138,6 +140,8 @@ class BeaverEnv(gymnasium.Env[Vector, Vector]):
         episode = self._episode
         if episode is None:
             raise gymnasium.error.ResetNeeded("call reset() before step()")
+        if episode.done:
+            raise gymnasium.error.ResetNeeded("the episode is over, call reset() before step()")
         reward = -episode.act(action, self.frames_per_step)
         if not episode.done:
             return episode.observation(), reward, False, False, {}
@@ -199,10 +203,12 @@ class BeaverVectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
         self, *, seed: int | Sequence[int | None] | None = None, options: Info | None = None
     ) -> tuple[Vector, Info]:
         """Put every aircraft in trim. A seed is the first one's, the others have those after it."""
-        seeds = [seed] * self.num_envs if seed is None else seed
-        if isinstance(seeds, int):
-            super().reset(seed=seeds)
-            seeds = [seeds + i for i in range(self.num_envs)]
+        if seed is None or isinstance(seed, Sequence | np.ndarray):
+            given = [None] * self.num_envs if seed is None else list(seed)
+            seeds = [None if one is None else _seed(one) for one in given]
+        else:
+            super().reset(seed=_seed(seed))
+            seeds = [_seed(seed) + i for i in range(self.num_envs)]
         if len(seeds) != self.num_envs:
             raise BadInput(f"seed: {len(seeds)} of them, allowed: {self.num_envs}, or one")
         for worker in self._workers:
@@ -212,10 +218,8 @@ class BeaverVectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
 
     def step(self, actions: ArrayLike) -> tuple[Vector, Vector, Flags, Flags, Info]:
         """Command the surfaces, fly, look: all at the same time."""
-        shared, given = self._shared, np.asarray(actions, np.float64)
-        if given.shape != shared.actions.shape:
-            raise BadInput(f"actions: shape {given.shape}, allowed: {shared.actions.shape}")
-        shared.actions[:] = given
+        shared = self._shared
+        shared.actions[:] = _numbers("actions", actions, shared.actions.shape)
         for worker in self._workers:
             worker.tell(_STEP)
         infos = self._answers()
@@ -335,13 +339,34 @@ def _serve(line: Connection, part: _Part) -> None:
             line.send_bytes(pickle.dumps(said) if said else _NOTHING)
 
 
+def _numbers(name: str, given: ArrayLike, shape: tuple[int, ...]) -> Vector:
+    """Real numbers of a shape, as they are given; BadInput for anything else."""
+    try:
+        array = np.asarray(given)
+        numbers = None if array.dtype.kind not in "fiub" else np.ascontiguousarray(array, np.float64)
+    except (TypeError, ValueError):
+        numbers = None
+    if numbers is None or numbers.shape != shape:
+        had = (
+            f"shape {numbers.shape}"
+            if numbers is not None
+            else f"{' '.join(repr(given).split()):.80} is not usable"
+        )
+        raise BadInput(f"{name}: {had}, allowed: finite numbers of shape {shape}")
+    return numbers
+
+
+def _seed(given: object) -> int:
+    """A whole number of at least 0, NumPy's own among them."""
+    try:
+        seed = index(given)  # type: ignore[arg-type]
+    except TypeError:
+        seed = -1
+    if seed < 0:
+        raise gymnasium.error.Error(f"seed: {given!r:.60} is out of range, allowed: a whole number from 0 on")
+    return seed
+
+
 def _check_count(name: str, count: object) -> None:
     if not isinstance(count, int) or count < 1:
         raise BadInput(f"{name}: {count!r} is out of range, allowed: a whole number of at least 1")
-
-
-gymnasium.register(
-    id=ID,
-    entry_point="beaver_ftc.integrations.gym:BeaverEnv",
-    vector_entry_point="beaver_ftc.integrations.gym:BeaverVectorEnv",
-)

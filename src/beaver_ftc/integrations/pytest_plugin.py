@@ -50,7 +50,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """--beaver-plugin: what `beaver-ftc run --plugin` does."""
+    """Declare the mark that xdist reads, which is unknown without xdist; `--beaver-plugin` does what
+    `beaver-ftc run --plugin` does."""
+    config.addinivalue_line("markers", "xdist_group(name): items of one flight run in one worker")
     given = config.getoption("--beaver-plugin")
     if not given:
         return
@@ -205,8 +207,9 @@ class ExpectationItem(pytest.Item):
         self.user_properties.append(("result", document["folder"]))
         for expectation in document["expectations"]:
             if expectation["name"] == self.name and not expectation["passed"]:
+                why = f"; {expectation['reason']}" if expectation.get("reason") else ""
                 raise ExpectationMissed(
-                    f"{self.name}: expected {expectation['expected']}, actual {expectation['actual']}\n"
+                    f"{self.name}: expected {expectation['expected']}, actual {expectation['actual']}{why}\n"
                     f"kept: {document['folder']} (see report.html)"
                 )
 

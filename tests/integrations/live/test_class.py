@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import time
 
 import pytest
 from hypothesis import given
@@ -9,7 +10,7 @@ from hypothesis import strategies as st
 from live_site import EVERYTHING, Site, says
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.integrations.live import messages, server
+from beaver_ftc.integrations.live import gate, messages, server
 from beaver_ftc.integrations.live.gate import COOKIE
 from beaver_ftc.integrations.live.server import MAX_SLOW, Page
 
@@ -293,3 +294,14 @@ def test_a_guest_is_sent_twenty_frames_a_second_at_most_and_every_event(guest, s
     frames = [at_s for at_s, text in sent if '"f"' in text]
     assert events == [0, 20, 40]
     assert (len(frames) <= 15) == bool(guest)  # 0.3 s, and those that events push on
+
+
+def test_a_guest_opens_pages_at_a_bounded_pace_and_whoever_flies_at_any():
+    """Six at once, then one in two seconds; a page that is refused costs the flight nothing."""
+    guest, flyer = gate.Seat(1), gate.Seat()
+    now_s = time.monotonic()
+    assert [guest.may_join(now_s) for _ in range(8)] == [True] * 6 + [False] * 2
+    assert [guest.may_join(now_s + 2.1) for _ in range(2)] == [True, False]
+    assert all(flyer.may_join(now_s) for _ in range(100))
+    guest.pages = gate.MAX_PAGES_OF_A_GUEST
+    assert not guest.may_join(now_s + 1000.0)

@@ -134,3 +134,14 @@ def test_before_anything_broke_nobody_is_waited_for():
     game.answer("nothing", NAMES, 1.0)
     assert game.settle(5.0, 1.0)
     assert (game.winner, game.score) == (None, [0, 0])
+
+
+def test_the_first_answer_counts_and_a_second_does_not():
+    game = Game(phase="waiting", due_s=10.0)
+    game.broke({"actuator": "aileron"}, 10.0)
+    game.answer("elevator", NAMES, 10.5)
+    game.answer("aileron", NAMES, 11.25)
+    assert game.yours == ("elevator", 10.5)
+    game.named("aileron", 12.5)
+    assert game.settle(5.0, 12.75)
+    assert game.score == [0, 1]

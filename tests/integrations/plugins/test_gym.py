@@ -11,7 +11,8 @@ gymnasium = pytest.importorskip("gymnasium")
 
 from gymnasium.utils.env_checker import check_env  # noqa: E402
 
-from beaver_ftc.integrations.gym import DEPARTURE, ID, BeaverEnv  # noqa: E402
+from beaver_ftc.integrations.environments import ID  # noqa: E402
+from beaver_ftc.integrations.gym import DEPARTURE, BeaverEnv  # noqa: E402
 
 FAULT = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.4, "at_s": 0.5}
 
@@ -112,7 +113,7 @@ def test_a_step_across_the_chunks_of_the_log_is_the_frames_it_has():
 def test_an_action_that_is_none_is_said(action):
     env = BeaverEnv(scenario(duration_s=1))
     env.reset()
-    with pytest.raises(BadInput, match=r"action: .* allowed: 4 finite numbers"):
+    with pytest.raises(BadInput, match=r"action: .* allowed: (4 )?finite numbers"):
         env.step(np.array(action))
     seen, *_ = env.step(np.zeros(4))  # and the flight goes on
     assert env.observation_space.contains(seen)

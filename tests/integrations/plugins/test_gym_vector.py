@@ -11,7 +11,8 @@ from flying import scenario
 
 gymnasium = pytest.importorskip("gymnasium")
 
-from beaver_ftc.integrations.gym import ID, BeaverEnv, BeaverVectorEnv  # noqa: E402
+from beaver_ftc.integrations.environments import ID  # noqa: E402
+from beaver_ftc.integrations.gym import BeaverEnv, BeaverVectorEnv  # noqa: E402
 
 FLOWN = {
     "duration_s": 0.5,
@@ -69,7 +70,7 @@ def test_one_seed_is_the_first_ones(three, seeds):
 
 def test_actions_of_another_shape_are_said_and_it_goes_on(three):
     three.reset()
-    with pytest.raises(BadInput, match=r"actions: shape \(2, 4\), allowed: \(3, 4\)"):
+    with pytest.raises(BadInput, match=r"actions: shape \(2, 4\), allowed: finite numbers of shape \(3, 4\)"):
         three.step(np.zeros((2, 4)))
     with pytest.raises(BadInput, match="seed: 2 of them, allowed: 3"):
         three.reset(seed=[1, 2])
@@ -105,3 +106,34 @@ def test_one_process_alone_is_this_one(three):
     actions = np.full((3, 4), 0.02)
     for ours, theirs in zip(alone.step(actions)[:4], three.step(actions)[:4], strict=True):
         assert np.array_equal(ours, theirs)
+
+
+def test_seeds_of_numpy_are_seeds(three):
+    wanted, _ = three.reset(seed=3)
+    for seed in (np.int64(3), np.array([3, 4, 5]), [np.uint8(3), 4, np.int64(5)]):
+        assert np.array_equal(three.reset(seed=seed)[0], wanted)
+    for seed in (-1, 1.5, "3", [3, 4, -5]):
+        with pytest.raises((gymnasium.error.Error, BadInput), match="seed: "):
+            three.reset(seed=seed)
+
+
+@pytest.mark.parametrize(
+    "bad", [np.full((3, 4), 1j), np.full((3, 4), "0"), [[0.0] * 4, [0.0] * 3, [0.0] * 4], None]
+)
+def test_actions_that_are_no_numbers_are_refused(three, bad):
+    three.reset(seed=1)
+    with pytest.raises(BadInput, match=r"actions: .*, allowed: finite numbers of shape \(3, 4\)"):
+        three.step(bad)
+    assert np.isfinite(three.step(np.zeros((3, 4)))[0]).all()
+
+
+def test_a_step_after_the_end_asks_for_a_reset():
+    env = BeaverEnv(scenario(**FLOWN), frames_per_step=50)
+    seeds = env.reset(seed=np.int64(3)), env.reset(seed=3)
+    assert np.array_equal(seeds[0][0], seeds[1][0])
+    assert env.step(np.zeros(4))[3]
+    with pytest.raises(gymnasium.error.ResetNeeded, match="the episode is over"):
+        env.step(np.zeros(4))
+    env.reset()
+    with pytest.raises(BadInput, match=r"action: .*, allowed: finite numbers"):
+        env.step(np.full(4, 1j))

@@ -1,6 +1,7 @@
 """The command over its sockets: what it prints, keeps and returns, for both protocols; who is let in, how it
 ends."""
 
+import contextlib
 import json
 import re
 import signal
@@ -8,6 +9,7 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 from contextlib import contextmanager
 from types import SimpleNamespace
 
@@ -21,7 +23,9 @@ import beaver_ftc as bf
 from beaver_ftc.cli.sitl import address
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.integrations.sitl import Protocol
+from beaver_ftc.integrations.sitl import serve as serving
 from beaver_ftc.integrations.sitl.serve import Options, Pace, serve
+from beaver_ftc.results import verdict
 
 CODE = "from beaver_ftc.cli.main import main; main()"
 CASE = """
@@ -200,3 +204,77 @@ def test_the_pace_holds_answers_back_and_lets_go_what_is_late(monkeypatch):
     pace.wait(0.0)  # begun anew
     pace.wait(0.5)
     assert now[0] == pytest.approx(110.5)
+
+
+def pair():
+    return socket.socketpair()
+
+
+def test_a_peer_that_never_reads_does_not_keep_the_flight_from_ending():
+    """Its buffer is full: sending waits, until somebody ends the flight."""
+    near, far = pair()
+    endpoint = SimpleNamespace(ended=False)
+    end = threading.Timer(0.3, lambda: setattr(endpoint, "ended", True))
+    with near, far:
+        end.start()
+        began_s = time.monotonic()
+        serving._send(near, bytes(50_000_000), endpoint)
+        assert 0.2 < time.monotonic() - began_s < 2.0
+
+
+def test_all_of_it_is_sent_to_a_peer_that_reads_slowly():
+    near, far = pair()
+    data = bytes(range(256)) * 8000
+    with near, far:
+        got = []
+        reader = threading.Thread(target=lambda: got.extend(iter(lambda: far.recv(50_000), b"")))
+        reader.start()
+        serving._send(near, data, SimpleNamespace(ended=False))
+        near.shutdown(socket.SHUT_WR)
+        reader.join(10)
+    assert b"".join(got) == data
+
+
+def test_a_peer_that_goes_on_talking_is_hung_up_on():
+    near, far = pair()
+    talks = threading.Event()
+
+    def talk():
+        with contextlib.suppress(OSError):
+            while not talks.is_set():
+                far.send(b"more")
+                time.sleep(0.01)
+
+    talking = threading.Thread(target=talk)
+    with near, far:
+        talking.start()
+        began_s = time.monotonic()
+        serving._hang_up(near)
+        took_s = time.monotonic() - began_s
+        talks.set()
+        talking.join()
+    assert took_s < 1.5
+
+
+def test_a_slow_pace_ends_with_the_flight():
+    pace = Pace(0.001)
+    pace.wait(0.0)
+    began_s = time.monotonic()
+    pace.wait(1.0, lambda: time.monotonic() - began_s > 0.1)  # due in 1,000 s
+    assert time.monotonic() - began_s < 1.5
+
+
+@pytest.mark.parametrize("protocol", ["ardupilot", "px4"])
+def test_an_interrupted_flight_is_not_passed(protocol):
+    """Nothing is expected of it; whoever ends it has not seen the end."""
+    said = []
+    endpoint = serving.Endpoint(scenario(), Options(Protocol(protocol)), said.append)
+    endpoint.vehicle.flight.step(frames=20)
+    endpoint.ended = True
+    document = endpoint.result().metrics
+    assert (document["passed"], document["interrupted_s"]) == (
+        False,
+        pytest.approx(endpoint.vehicle.flight.t_s),
+    )
+    assert verdict.title(document).endswith(f"INTERRUPTED at {document['interrupted_s']:.2f} s, not passed")
+    assert any(line.startswith("interrupted at ") for line in said)

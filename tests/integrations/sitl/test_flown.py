@@ -9,11 +9,12 @@ from tools.autopilots import peers
 from tools.autopilots.small import Small
 
 import beaver_ftc as bf
+from beaver_ftc.design.atmosphere import standard_air
 from beaver_ftc.diagnosis.rivals.rls import RlsMonitor
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.integrations.sitl.ardupilot import Ardupilot
 from beaver_ftc.integrations.sitl.link import Link
-from beaver_ftc.integrations.sitl.px4 import quaternion, rotation, standard_air
+from beaver_ftc.integrations.sitl.px4 import quaternion, rotation
 from beaver_ftc.integrations.sitl.vehicle import Flown, Vehicle, at_rate, without_reference
 
 NO_PULSE = 0

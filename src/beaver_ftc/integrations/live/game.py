@@ -55,12 +55,13 @@ class Game:
             self.detector = name, now_s
 
     def answer(self, name: str | None, names: tuple[str, ...], now_s: float) -> None:
-        """You name a surface. The first answer counts; before anything broke it is wrong."""
+        """You name a surface. The first answer counts, later ones do not; before the fault it is wrong."""
         if not self.hidden:
             raise BadInput("game: no round is on, allowed: start one")
         if name not in names:
             raise BadInput(f"answer: {name!r:.60} is not known{suggestion(str(name), names)}")
-        self.yours = str(name), now_s
+        if self.yours is None:
+            self.yours = str(name), now_s
 
     def settle(self, wait_s: float, now_s: float) -> bool:
         """End the round once both have spoken, or you have and the detector had its time; tells if so."""

@@ -29,6 +29,23 @@ MAX_PAGES_OF_A_GUEST = 3
 LOOKING_ON = frozenset({"name"})
 INVITED = LOOKING_ON | {"break", "repair", "blow"}
 MESSAGES_PER_S, BURST = 5.0, 20.0  # of a guest
+JOINS_PER_S, BURST_OF_JOINS = 0.5, 6.0  # of a guest: each makes the flight introduce itself, some 7 ms
+
+
+class Allowance:
+    """So many at once, and so many a second thereafter. Times are the machine's monotonic clock, s."""
+
+    def __init__(self, per_s: float, burst: float, now_s: float) -> None:
+        self._per_s, self._burst, self._left, self._at_s = per_s, burst, burst, now_s
+
+    def takes(self, now_s: float) -> bool:
+        """Whether one more is within it; it then counts."""
+        self._left = min(self._burst, self._left + (now_s - self._at_s) * self._per_s)
+        self._at_s = now_s
+        if self._left < 1.0:
+            return False
+        self._left -= 1.0
+        return True
 
 
 class Seat:
@@ -41,7 +58,9 @@ class Seat:
         self._session = secrets.token_urlsafe(32)
         self._tokens: deque[str] = deque(maxlen=TOKENS_OPEN)
         self._used: deque[str] = deque(maxlen=TOKENS_OPEN)
-        self._left, self._at_s = BURST, time.monotonic()
+        now_s = time.monotonic()
+        self._messages = Allowance(MESSAGES_PER_S, BURST, now_s)
+        self._joins = Allowance(JOINS_PER_S, BURST_OF_JOINS, now_s)
 
     def token(self) -> str:
         """A new one."""
@@ -93,13 +112,12 @@ class Seat:
 
     def check_pace(self, now_s: float) -> None:
         """Raise BadInput for a guest who asks too much: requests would keep the flight from flying."""
-        if not self.number:
-            return
-        self._left = min(BURST, self._left + (now_s - self._at_s) * MESSAGES_PER_S)
-        self._at_s = now_s
-        if self._left < 1.0:
+        if self.number and not self._messages.takes(now_s):
             raise BadInput(f"too many requests at once, allowed: {MESSAGES_PER_S:g} a second")
-        self._left -= 1.0
+
+    def may_join(self, now_s: float) -> bool:
+        """Whether a page may be opened now: a guest's pages are opened at a bounded pace, as its requests."""
+        return not self.is_full and (not self.number or self._joins.takes(now_s))
 
 
 class Gate:

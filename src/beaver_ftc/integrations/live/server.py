@@ -237,7 +237,7 @@ async def _serve(websocket: WebSocket, gate: Gate, pages: Pages, ask: Ask) -> No
     """One page's websocket, from opening to end."""
     seat = gate.seat_of(websocket.scope["path"])
     own = gate.is_own_page(websocket.headers, _came_to(websocket.scope))
-    if seat is None or not own or seat.is_full:
+    if seat is None or not own or not seat.may_join(time.monotonic()):
         await websocket.close(REFUSED)
         return
     await websocket.accept()

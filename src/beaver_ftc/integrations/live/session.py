@@ -280,7 +280,8 @@ class Session:
         said = ("detected", "axis", "isolated", "type", "candidates", "estimate")
         seen |= {name: getattr(verdict, name) for name in said}
         effectiveness = [short(self._effectiveness(surface)) for surface in self.surfaces]
-        return seen | {"mode": sim.mode, "effectiveness": effectiveness}
+        said_of_all = {"mode": sim.mode, "effectiveness": effectiveness, "inconclusive": sim.inconclusive}
+        return seen | said_of_all
 
     def _effectiveness(self, surface: str) -> float:
         """How much of its moment a surface gives for its command: none while it does not follow that."""

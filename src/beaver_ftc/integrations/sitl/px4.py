@@ -10,12 +10,13 @@ An autopilot that starts needs time to pass before it answers. Until its first a
 and until it is armed for the first time the scenario's own law flies, level.
 """
 
-from math import atan2, cos, degrees, exp, hypot, radians, sin, sqrt
+from math import atan2, cos, degrees, hypot, radians, sin, sqrt
 from typing import Any, Protocol
 
 import numpy as np
 
 from beaver_ftc.aircraft.units import GRAVITY_MPS2
+from beaver_ftc.design.atmosphere import standard_air
 from beaver_ftc.integrations.sitl.link import Link
 from beaver_ftc.integrations.sitl.mavlink import Inject, Mavlink
 from beaver_ftc.integrations.sitl.vehicle import Instant
@@ -27,8 +28,6 @@ GPS_HZ, STATE_HZ, SLOW_HZ = 10.0, 50.0, 50.0
 INERTIAL, MAGNETIC, AIR = 0b111111, 0b111000000, 0b1111000000000  # bits of fields_updated
 # The Earth's field where all flights start, 45 N 0 E: declination, inclination, deg; gauss [WMM, 2023].
 DECLINATION_DEG, INCLINATION_DEG, FIELD_GAUSS = 1.2, 60.5, 0.467
-T0_K, LAPSE_K_M, P0_HPA, SCALE, STRATOSPHERE_M = 288.15, 0.0065, 1013.25, 5.2558797, 11000.0  # [ISA]
-R_AIR = 287.05287
 NO_YAW = 0
 
 Message = Any
@@ -190,14 +189,6 @@ def quaternion(phi: float, theta: float, psi: float) -> list[float]:
         cr * sp * cy + sr * cp * sy,
         cr * cp * sy - sr * sp * cy,
     ]
-
-
-def standard_air(altitude_m: float) -> tuple[float, float]:
-    """Pressure, hPa, and temperature, deg C, of the standard atmosphere up to 20 km [ISA]."""
-    low_m = min(altitude_m, STRATOSPHERE_M)
-    kelvin = T0_K - LAPSE_K_M * low_m
-    pressure = P0_HPA * (kelvin / T0_K) ** SCALE
-    return pressure * exp(-GRAVITY_MPS2 * (altitude_m - low_m) / (R_AIR * kelvin)), kelvin - 273.15
 
 
 def magnetic_gauss(attitude: tuple[float, ...]) -> tuple[float, float, float]:

@@ -29,6 +29,7 @@ LOOPBACK = "127.0.0.1"
 PX4_HZ = 250.0  # of HIL_SENSOR, where nobody says otherwise
 MOST_BYTES = 65536
 WAIT_S = 0.25  # at most, for whatever may come
+HANG_UP_S = 0.5  # at most, for the other end to hang up too
 NAMES = {Protocol.ardupilot: "ArduPilot", Protocol.px4: "PX4"}
 
 Say = Callable[[str], None]
@@ -62,8 +63,11 @@ class Pace:
     late_s: float = 0.0
     _from: tuple[float, float] = field(default=(0.0, inf))  # of the clock, of the flight, s
 
-    def wait(self, t_s: float) -> None:
-        """Until flight time t_s is due; a flight begun anew begins anew here, and what is late is let go."""
+    def wait(self, t_s: float, ended: Callable[[], bool] = lambda: False) -> None:
+        """Until flight time t_s is due; a flight begun anew begins anew here, and what is late is let go.
+
+        ended: whether there is nothing to wait for any more; it is called every WAIT_S.
+        """
         if not self.speed:
             return
         now_s = time.monotonic()
@@ -71,7 +75,8 @@ class Pace:
             self._from = now_s, t_s
         due_s = self._from[0] + (t_s - self._from[1]) / self.speed
         if due_s > now_s:
-            time.sleep(due_s - now_s)
+            while (left_s := due_s - time.monotonic()) > 0.0 and not ended():
+                time.sleep(min(left_s, WAIT_S))
         elif now_s - due_s > WAIT_S:
             self._from = now_s, t_s
         self.late_s = max(self.late_s, now_s - due_s)
@@ -116,7 +121,7 @@ class Endpoint:
             self._ground.say(news)
         self.listen()
         self.link.latency.add(time.perf_counter() - began_s)
-        self.pace.wait(sim.frames / sim.rate_hz)
+        self.pace.wait(sim.frames / sim.rate_hz, lambda: self.ended)
         return news
 
     def listen(self) -> None:
@@ -142,6 +147,7 @@ class Endpoint:
         landed = sim.land()
         document = landed.metrics
         document["flight"]["law"] = NAMES[options.protocol]
+        self._note_end(document)
         document["tracking"] |= dict.fromkeys(("pre_fault_rms_deg_s", "post_fault_rms_deg_s"))
         self._note_silence(document)
         self.link.counts["off_rate"] = self.vehicle.off_rate
@@ -156,6 +162,13 @@ class Endpoint:
             "said": [text._asdict() for text in self._teller.kept],
         }
         return landed
+
+    def _note_end(self, document: dict[str, Any]) -> None:
+        """A flight that somebody ended before its time has not done what is expected of it."""
+        if self.ended and not self.vehicle.over:
+            at_s = self.vehicle.flight.t_s
+            self._say(f"interrupted at {at_s:.2f} s of {self.vehicle.scenario.duration_s:g} s: not passed")
+            document["interrupted_s"], document["passed"] = at_s, False
 
     def _note_silence(self, document: dict[str, Any]) -> None:
         """No alarm was certain of what broke before the diagnosis began, near the ground."""
@@ -274,7 +287,7 @@ def _serve_line(
 ) -> None:
     """One connection, to its end. Another caller meanwhile is turned away."""
     vehicle = endpoint.vehicle
-    line.sendall(protocol.connect(time.monotonic()))
+    _send(line, protocol.connect(time.monotonic()), endpoint)
     while not endpoint.over:
         step_s = 1.0 / (vehicle.packets_hz * (endpoint.pace.speed or 1.0))
         ready, _, _ = select.select([line, listener], [], [], step_s)
@@ -293,8 +306,19 @@ def _serve_line(
             endpoint._say(says)
         protocol.done.clear()
         if answer:
-            line.sendall(mavlink.texts(endpoint.after(began_s)) + answer)
+            _send(line, mavlink.texts(endpoint.after(began_s)) + answer, endpoint)
     _hang_up(line)
+
+
+def _send(line: socket.socket, data: bytes, endpoint: Endpoint) -> None:
+    """Send all of it; a peer that does not read is waited for until somebody ends the flight."""
+    line.setblocking(False)
+    left = memoryview(data)
+    while left and not endpoint.ended:
+        _, ready, _ = select.select([], [line], [], WAIT_S)
+        if ready:
+            with contextlib.suppress(BlockingIOError):
+                left = left[line.send(left) :]
 
 
 def _has_gone(line: socket.socket) -> bool:
@@ -306,6 +330,9 @@ def _has_gone(line: socket.socket) -> bool:
 def _hang_up(line: socket.socket) -> None:
     """Close a line of which the other end is to hear the last word: with words unread it would be reset."""
     line.shutdown(socket.SHUT_WR)
-    line.settimeout(WAIT_S)
-    while line.recv(MOST_BYTES):
-        continue
+    line.setblocking(False)
+    until_s = time.monotonic() + HANG_UP_S
+    while (left_s := until_s - time.monotonic()) > 0.0:
+        ready, _, _ = select.select([line], [], [], left_s)
+        if ready and not line.recv(MOST_BYTES):
+            return

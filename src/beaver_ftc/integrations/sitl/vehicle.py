@@ -20,7 +20,6 @@ from beaver_ftc.plant.instruments import AX, SENSORS
 from beaver_ftc.results.log import SpooledLog
 from beaver_ftc.results.simulation import Simulation
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.scenario.warnings import LOWEST_TURBULENCE_M
 
 if TYPE_CHECKING:
     from beaver_ftc.diagnosis.base import Detector
@@ -30,6 +29,7 @@ FASTEST_PACKETS_HZ = 4000.0
 UP_M, DOWN_M = 5.0, 2.0  # wheels so far above the ground: in flight, and not any more
 SLOW_MPS = 10.0
 UNDERNEATH_M = -1e4
+GUSTY_M = 609.6  # height above which a flight from the ground is diagnosed in declared turbulence
 WHOLE = 1e-6  # JSBSim frames: so near a whole number is one
 # The surfaces are the autopilot's, and so is where it flies to.
 THEIRS = {"control.law": "nominal", "control.options": {}, "reference": {}}
@@ -139,7 +139,7 @@ class Flown(Simulation):
         frame["truth"]["ground_m"], frame["truth"]["slow_mps"] = self.ground_m, SLOW_MPS
         self._standing_m = self.ground_m + file.ground.height_m
         gusty = self._scenario.fdi.bounds.turbulence != "none"
-        self._lowest_m = LOWEST_TURBULENCE_M if gusty else DOWN_M
+        self._lowest_m = GUSTY_M if gusty else DOWN_M
         self._fresh = loop.frames.copy()
         if not self._scenario.initial.on_ground:
             if loop.trim.altitude_m < self._standing_m + UP_M:

@@ -13,7 +13,10 @@ export function drawDiagnosis() {
   const alarm = byId("alarm"), on = Boolean(frame.detected);
   alarm.classList.toggle("on", on);
   alarm.classList.toggle("hidden", hidden);
-  setText(alarm, hidden ? "hidden during the game" : on ? alarmText(frame) : "no alarm");
+  const inconclusive = !on && !hidden && Boolean(frame.inconclusive);
+  alarm.classList.toggle("inconclusive", inconclusive);
+  const quiet = inconclusive ? `nothing can be concluded: ${frame.inconclusive}` : "no alarm";
+  setText(alarm, hidden ? "hidden during the game" : on ? alarmText(frame) : quiet);
   setText(byId("verdict"), hidden ? "" : verdictText(frame));
   setText(byId("knows"), flight.state?.knows ?? "");
   setText(byId("mode"), hidden ? "hidden" : frame.mode ?? "");

@@ -103,30 +103,15 @@ def test_what_a_model_lacks_is_given_until_it_flies(monkeypatch):
         derivation.try_out(source)
 
 
-@pytest.mark.parametrize(
-    ("code", "said", "why"),
-    [(0, "warning", None), (-11, "", "ended by signal 11"), (1, "one\n\n two \n", "two"),
-     (1, "a\nx.SimulationFailed: no engine\nterminate", "no engine"), (-6, "x\nwhat():  broken\n", "broken")],
-)  # fmt: skip
-def test_why_a_model_does_not_fly_is_the_last_that_it_says(code, said, why, monkeypatch):
+def test_a_copy_of_the_model_is_put_on_trial(monkeypatch):
     asked = []
-
-    def run(command, timeout, env, **how):
-        asked.append((command[3:], timeout, env["TMPDIR"]))
-        return SimpleNamespace(returncode=code, stderr=said)
-
-    monkeypatch.setattr(derivation.subprocess, "run", run)
-    source = Source("mine", TRAINER / "trainer.xml")
-    assert derivation._failure(source, ["of/0"]) == why
-    ((model, *absent), limit_s, folder) = (*asked[0],)
-    assert (absent, limit_s) == (["of/0"], 60.0)
-    assert Path(model).is_relative_to(folder)
-
-    def late(command, **how):
-        raise derivation.subprocess.TimeoutExpired(command, 60.0)
-
-    monkeypatch.setattr(derivation.subprocess, "run", late)
-    assert derivation._failure(source, []) == "JSBSim does not start it within 60 s"
+    monkeypatch.setattr(
+        derivation.trial, "failure", lambda model, absent: asked.append((model, absent)) or "no"
+    )
+    assert derivation._failure(Source("mine", TRAINER / "trainer.xml"), ["of/0"]) == "no"
+    ((model, absent),) = asked
+    assert (model.name, model.parent.name, absent) == ("trainer.xml", "mine", ["of/0"])
+    assert model.parent != TRAINER
 
 
 def test_the_envelope_is_about_trim_unless_somebody_says_where():

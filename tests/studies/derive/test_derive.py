@@ -23,8 +23,9 @@ from beaver_ftc.integrations.sitl.link import Link
 from beaver_ftc.integrations.sitl.vehicle import Vehicle
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant import instrumented
-from beaver_ftc.plant.adapter import Plant, bare, probe, translated
+from beaver_ftc.plant.adapter import Plant, bare, translated
 from beaver_ftc.plant.model_file import copy_of
+from beaver_ftc.plant.trial import probe
 from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc.scenario.loader import load_text
 from beaver_ftc.studies.derive import derivation
@@ -57,7 +58,8 @@ def unseen(derived):
     """A third set of states, and the aircraft."""
     made, _, _ = derived
     aircraft = made.aircraft
-    envelope = Envelope(aircraft.envelope.airspeed_mps, aircraft.alpha_rad, SIDESLIP_RAD)
+    of = aircraft.envelope
+    envelope = Envelope(of.airspeed_mps, aircraft.alpha_rad, SIDESLIP_RAD, of.altitude_m)
     properties = {name: signal.property for name, signal in aircraft.signals.items()}
     return sample(Plant(100, aircraft=aircraft), envelope, made.trim, 1000, 77, properties, (0,)), aircraft
 
@@ -213,7 +215,7 @@ def test_pursuit_finds_the_terms_that_made_the_data():
 def test_rounding_is_no_signal(unseen, size, kept):
     """Terms of what JSBSim leaves of a thrust that is zero would fit, and fly wrong where that differs."""
     seen, aircraft = unseen
-    explaining = {**seen.signals, "thrust": size * seen.rate[:, 0]}
+    explaining = {**seen.signals, "thrust": size * seen.rate[:, 1]}
     assert ("thrust" in signals_of_use(replace(seen, signals=explaining), aircraft, 6)) == kept
 
 

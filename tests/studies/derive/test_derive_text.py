@@ -8,7 +8,7 @@ DOCUMENT = {
     "aircraft": "glider", "folder": "out/glider",
     "surfaces": {"aileron": [-0.3, 0.3], "elevator": [-0.4, 0.2]},
     "terms": {"Cl": 4, "Cm": 3, "Cn": 5},
-    "envelope": {"airspeed_mps": [20.0, 45.5], "alpha_deg": [-2.0, 12.0]},
+    "envelope": {"airspeed_mps": [20.0, 45.5], "alpha_deg": [-2.0, 12.0], "altitude_m": [200.0, 3000.0]},
     "largest_error_rad_s2": {
         kind: {axis: 0.01 * (3 * k + i) for i, axis in enumerate("pqr")}
         for k, kind in enumerate(("fitted", "checked", "declared"))
@@ -24,7 +24,7 @@ DOCUMENT = {
 def test_a_derivation_as_text():
     assert derived.text_of(DOCUMENT).splitlines() == [
         "glider: Cl 4, Cm 3, Cn 5 terms",
-        " envelope   20 to 45.5 m/s, angle of attack -2 to 12 deg",
+        " envelope   20 to 45.5 m/s, angle of attack -2 to 12 deg, altitude 200 to 3000 m",
         " surfaces   aileron, elevator",
         " largest error, rad/s2            p         q         r",
         "   states of the fit              0   1.5e-05    0.0021",

@@ -54,7 +54,7 @@ def test_states_are_within_their_box(plant, trim, changed):
     """Half way to the ends of the envelope, and as far to either side of trim; bank and climb everywhere."""
     one, seen = draw(plant, trim), []
     for _ in range(200):
-        started = one.start(0.5)
+        started = one.start(0.5, 0)
         there = one.state(started, one.place(one.ends(0.5, 0.35)))
         seen.append(there.as_dict() | {"started_mps": started.airspeed_mps})
     low, high = ({name: of([state[name] for state in seen]) for name in seen[0]} for of in (min, max))
@@ -73,7 +73,9 @@ def test_states_are_within_their_box(plant, trim, changed):
     reach = [0.5 * 0.35 * 3000.0, thrust / 2]  # no less than nothing
     assert (low["thrust_n"], high["thrust_n"]) == pytest.approx((thrust - min(reach), thrust + reach[0]))
     deep = replace(trim, altitude_m=100.0)
-    assert min(Draw(1, plant.aircraft, ENVELOPE, deep).start(1.0).altitude_m for _ in range(20)) >= 0.0
+    assert (
+        min(Draw(1, plant.aircraft, ENVELOPE, deep).start(1.0, turn).altitude_m for turn in range(20)) >= 0.0
+    )
     assert not changed({name: in_short([state[name] for state in seen]) for name in seen[0]})
 
 
@@ -180,3 +182,15 @@ def test_a_state_is_in_the_innermost_box_that_has_it_and_in_its_share_of_the_tra
     assert found.rate[:, 0].tolist() == [0, 3, 6, 9, 12, 15], "the last is in no box"
     assert found.box.tolist() == [0, 0, 0, 1, 1, 1]
     assert found.level.tolist() == [0, 1, 1, 3, 2, 3]
+
+
+def test_every_box_reaches_the_ends_of_the_altitudes():
+    plant = Plant(100)
+    where = replace(ENVELOPE, altitude_m=(250.0, 2750.0))
+    draw = Draw(5, plant.aircraft, where, trimmed(45.0, 1500.0, plant))
+    for reach in (0.25, 1.0):
+        altitudes = [draw.start(reach, turn).altitude_m for turn in range(40)]
+        assert altitudes[:2] == [250.0, 2750.0]
+        assert min(altitudes) == 250.0
+        assert max(altitudes) == 2750.0
+        assert np.ptp(altitudes[2:]) > 1500.0

@@ -71,7 +71,7 @@ def test_those_that_stand_in_move_less_but_at_the_last_share():
     plant = Plant(100, aircraft=SPLIT)
     moves = sampling.Moves((0.1, 0.2, 0.5, 1.0), 0.05)
     point = trim(45.0, 1800.0, plant)
-    where = sampling.Region(sampling.Envelope((40.0, 50.0), (0.0, 0.1), 0.1, (1000.0, 2000.0)), point)
+    where = sampling.Region(sampling.Envelope((40.0, 50.0), (0.0, 0.1), 0.1, (1000.0, 2000.0), True), point)
     found = sampling.sample_all(plant, [where, where], 960, 1, {}, sampling.FRESH, moves)
     ends = np.array([max(-t.min_rad, t.max_rad) for t in SPLIT.travel.values()])
     used = np.abs(found.u) / ends
@@ -85,9 +85,9 @@ def test_those_that_stand_in_move_less_but_at_the_last_share():
 
 def test_every_box_of_a_region_holds_all_its_engines_do():
     plant = Plant(100, aircraft=SPLIT)
-    where = sampling.Envelope((40.0, 50.0), (0.0, 0.1), 0.16, (1000.0, 2000.0))
+    where = sampling.Envelope((40.0, 50.0), (0.0, 0.1), 0.16, (1000.0, 2000.0), True)
     draw = sampling.Draw(1, SPLIT, where, trim(45.0, 1800.0, plant))
-    started = [draw.start(0.25) for _ in range(300)]
+    started = [draw.start(0.25, turn) for turn in range(300)]
     for name, setting in SPLIT.engine.settings.items():
         drawn = [state.settings[name] for state in started]
         assert (min(drawn), max(drawn)) == pytest.approx(setting.range)

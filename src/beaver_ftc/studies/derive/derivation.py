@@ -1,11 +1,8 @@
 """From an aircraft's name to a folder that flies: a JSBSim model that takes faults, and `aircraft.yaml`."""
 
 import json
-import os
 import re
 import shutil
-import subprocess
-import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -24,7 +21,7 @@ from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_SIGNALS, MAX_TERMS_OF_
 from beaver_ftc.design.model import design_record
 from beaver_ftc.diagnosis.balance import THRUST
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
-from beaver_ftc.plant import instrumented
+from beaver_ftc.plant import instrumented, trial
 from beaver_ftc.plant.adapter import Plant, translated
 from beaver_ftc.plant.model_file import copy_of, refuse_deeds
 from beaver_ftc.plant.trim import TrimPoint
@@ -44,6 +41,7 @@ from beaver_ftc.studies.derive.fit import (
 )
 from beaver_ftc.studies.derive.sample import (
     AGES_OF_WORST,
+    ALTITUDE_M,
     EVERY_AGE,
     FRESH,
     SIDESLIP_RAD,
@@ -61,13 +59,10 @@ from beaver_ftc.studies.derive.thrust import LEAST_ARM_M, effectors_of, thrust_o
 SAMPLES, CHECKED = 6000, 8000
 CHECKED_OF_REGIONS = 18000
 SPAN_OF_ALPHA_RAD = 0.10
+LOWEST_M, SPANS_ABOVE_GROUND = 100.0, 2.0  # of what is sampled
+BEYOND_M = 100.0  # sampled beyond the altitudes of the envelope: a flight at its end moves up and down
 FEWEST_TERMS = 6
 Tell = Callable[[str], None]
-_PROBE = """import sys
-from pathlib import Path
-from beaver_ftc.plant.adapter import probe
-probe(Path(sys.argv[1]), sys.argv[2:])"""
-_LONGEST_S = 60.0
 _MOST_ABSENT = 20
 _ABSENT = re.compile(r"The property ([^ ]+) does not exist")
 _ALLOWED = "jsbsim:NAME, a built-in name, a JSBSim model FILE.xml, or a folder with an aircraft.yaml"
@@ -128,22 +123,8 @@ def try_out(source: Source) -> tuple[str, ...]:
 
 def _failure(source: Source, absent: list[str]) -> str | None:
     """Why the model does not fly with these properties at 0; None if it does."""
-    try:
-        with tempfile.TemporaryDirectory(prefix="beaver-ftc-") as here:  # also of a process that is ended
-            around = os.environ | {"TMPDIR": here}
-            model = copy_of(source.model, Path(here) / source.name)
-            command = [sys.executable, "-c", _PROBE, str(model), *absent]
-            run = subprocess.run(
-                command, capture_output=True, text=True, timeout=_LONGEST_S, check=False, env=around
-            )
-    except subprocess.TimeoutExpired:
-        return f"JSBSim does not start it within {_LONGEST_S:g} s"
-    if not run.returncode:
-        return None
-    said = [line.strip() for line in run.stderr.splitlines() if line.strip()]
-    ours = [line for line in said if "SimulationFailed: " in line]  # JSBSim may end the process after it
-    why = (ours or said or [f"ended by signal {-run.returncode}"])[-1]
-    return why.rpartition("SimulationFailed: ")[2].removeprefix("what():").strip()
+    with tempfile.TemporaryDirectory(prefix="beaver-ftc-") as here:
+        return trial.failure(copy_of(source.model, Path(here) / source.name), absent)
 
 
 def derive(
@@ -175,6 +156,8 @@ def derive(
                 )
             if source.folder is None:
                 _set_envelope(data, trim, wanted)
+            if wanted.altitude_m is not None or data["envelope"].get("altitude_m") is None:
+                data["envelope"]["altitude_m"] = _altitudes_about(trim, plant.aircraft.geometry.span_m)
             usual_rad = outline.WIDE_SIDESLIP_RAD if source.folder else SIDESLIP_RAD
             sideslip_rad = radians(wanted.sideslip_deg) if wanted.sideslip_deg else usual_rad
             about = _regions(data, plant, trim, sideslip_rad, regions)
@@ -263,7 +246,10 @@ def _regions(
 ) -> list[Region]:
     """Where to sample: the whole envelope about the trim, or parts of it, each about a trim of its own."""
     low, high = map(radians, data["envelope"]["alpha_deg"])
-    whole = Envelope(tuple(data["envelope"]["airspeed_mps"]), (low, high), sideslip_rad)
+    of = data["envelope"]
+    lowest, highest = of["altitude_m"]
+    altitudes = max(lowest - BEYOND_M, 0.0), highest + BEYOND_M
+    whole = Envelope(tuple(of["airspeed_mps"]), (low, high), sideslip_rad, altitudes)
     if not wanted:
         return [Region(whole, trim)]
     middles = [0.5 * sum(of.airspeed_mps) for of in wanted]
@@ -329,6 +315,13 @@ def _set_envelope(data: outline.Data, trim: TrimPoint, wanted: outline.EnvelopeF
     for name, ends in data["envelope"].items():
         data["envelope"][name] = [float(f"{end:.4g}") for end in ends]
     data["start"]["airspeed_mps"] = float(f"{trim.airspeed_mps:.4g}")
+
+
+def _altitudes_about(trim: TrimPoint, span_m: float) -> list[float]:
+    """The altitudes of the envelope, m; none so low that the ground, at sea level, takes part in what is
+    sampled."""
+    lowest = max(trim.altitude_m - ALTITUDE_M, LOWEST_M, SPANS_ABOVE_GROUND * span_m) + BEYOND_M
+    return [round(lowest, 1), round(max(trim.altitude_m + ALTITUDE_M, lowest + BEYOND_M), 1)]
 
 
 def _target(source: Source, out: Path | None) -> Path:

@@ -18,6 +18,7 @@ from beaver_ftc.design.model import design_record
 from beaver_ftc.design.terms import N_Y
 from beaver_ftc.plant.trim import TrimPoint
 from beaver_ftc.scenario.diagnosis import Bounds
+from beaver_ftc.scenario.measured import measured_spans, plural, span_in_words
 
 DEFLECTION_DEG = 3.0  # beside neutral: what flight with the built-in references asks of a surface
 _NEAR = 1  # box and share of the travel of such a flight, as `fit` makes them
@@ -88,18 +89,24 @@ def _usual_y(made: Derived) -> np.ndarray:
 def page_of(made: Derived) -> str:
     """The page, Markdown."""
     aircraft, trim = made.aircraft, made.trim
-    low, high = aircraft.envelope.airspeed_mps
-    least, most = aircraft.envelope.alpha_deg
     parts = [
         f"# {aircraft.name}",
         f"{aircraft.file.description}.",
-        f"Envelope {low:g} to {high:g} m/s, angle of attack {least:g} to {most:g} deg; trim at "
+        f"Envelope {_envelope(aircraft.envelope.model_dump())}; trim at "
         f"{trim.airspeed_mps:.1f} m/s and {trim.altitude_m:.0f} m. Derived in {made.took_s:.1f} s.",
         "## What is to be known",
         "\n".join(f"- {note}" for note in made.notes) or "Nothing unusual was found.",
         *_diagnosed(made), *_not_used(made), *_errors(made), "## Terms", _terms(aircraft),
     ]  # fmt: skip
     return "\n\n".join(parts) + "\n"
+
+
+def _envelope(envelope: Mapping[str, Any]) -> str:
+    """What was sampled, in a line."""
+    (low, high), (least, most) = envelope["airspeed_mps"], envelope["alpha_deg"]
+    lowest, highest = envelope["altitude_m"]
+    airspeed, alpha = f"{low:g} to {high:g} m/s", f"angle of attack {least:g} to {most:g} deg"
+    return f"{airspeed}, {alpha}, altitude {lowest:g} to {highest:g} m"
 
 
 def _table(*rows: Iterable[str]) -> str:
@@ -154,7 +161,14 @@ def _errors(made: Derived) -> Iterator[str]:
     yield "## The error over the envelope"
     yield (
         f"Largest error, rad/s2, in boxes about trim, for surfaces within {shares} of their travel, in the "
-        f"first {made.error_map.until_s[0]:g} s of a flight. Outside of the last box nothing is concluded."
+        f"first {made.error_map.until_s[0]:g} s of a flight. Outside of the last box nothing is concluded: "
+        f"there is no "
+        "alarm, and no name. The verdict of such a flight says where, why, and in what share of its frames."
+    )
+    spans = measured_spans(made.aircraft)
+    yield "All boxes together:"
+    yield _table(
+        ("quantity", "measured"), *((plural(n), span_in_words(n, span)) for n, span in spans.items())
     )
     rows = []
     for box in made.error_map.boxes:
@@ -196,12 +210,10 @@ def document_of(made: Derived) -> dict[str, Any]:
 
 def text_of(document: dict[str, Any]) -> str:
     """The document as a page of text."""
-    low, high = document["envelope"]["airspeed_mps"]
-    least, most = document["envelope"]["alpha_deg"]
     terms = ", ".join(f"{name} {count}" for name, count in document["terms"].items())
     lines = [
         f"{document['aircraft']}: {terms} terms",
-        f" envelope   {low:g} to {high:g} m/s, angle of attack {least:g} to {most:g} deg",
+        f" envelope   {_envelope(document['envelope'])}",
         f" surfaces   {', '.join(document['surfaces'])}",
         f" {'largest error, rad/s2':24}{'p':>10}{'q':>10}{'r':>10}",
     ]

@@ -26,6 +26,7 @@ from beaver_ftc.documents.errors import BeaverFtcError, SimulationFailed
 from beaver_ftc.documents.paths import cache_base
 from beaver_ftc.documents.problems import ScenarioError
 from beaver_ftc.documents.validation import parse_document
+from beaver_ftc.plant import trial
 from beaver_ftc.plant.adapter import Plant, translated
 from beaver_ftc.plant.model_file import refuse_deeds
 from beaver_ftc.plant.trim import trim
@@ -62,21 +63,28 @@ def _say(line: str) -> None:
 def kept_or_compared(aircraft: Aircraft) -> list[str]:
     """A line for each axis on which the model exceeds what the file declares, found now or earlier.
 
-    Raises BadInput as `refuse_deeds`, and as `compared`.
+    Raises BadInput as `refuse_deeds`, and as `compared`; ScenarioError, too, where JSBSim does not survive
+    the model: that is tried in a process of its own.
     """
     refuse_deeds(aircraft.jsbsim)
     base = cache_base()
     if base is None:
-        return compared(aircraft)
+        return _tried_and_compared(aircraft)
     file = base / "compared" / f"{_digest(aircraft.folder)}.json"
     try:
         return list(json.loads(file.read_text(encoding="utf-8")))
     except (OSError, ValueError):
-        lines = compared(aircraft)
+        lines = _tried_and_compared(aircraft)
     with contextlib.suppress(OSError):  # nowhere to keep it, or another process was first
         file.parent.mkdir(parents=True, exist_ok=True)
         write_whole(file, json.dumps(lines).encode())
     return lines
+
+
+def _tried_and_compared(aircraft: Aircraft) -> list[str]:
+    if why := trial.failure(aircraft.jsbsim):
+        raise _bad(aircraft, {("jsbsim",): f"{why}, allowed: a model that JSBSim loads and flies"})
+    return compared(aircraft)
 
 
 def _digest(folder: Path) -> str:
@@ -135,7 +143,8 @@ def _bad(aircraft: Aircraft, says: Mapping[Location, str]) -> ScenarioError:
 def _samples(aircraft: Aircraft, plant: Plant) -> Samples:
     """States over the envelope, in their boxes if the file has a map."""
     point = trim(plant=plant, **usual_start(aircraft))
-    envelope = Envelope(aircraft.envelope.airspeed_mps, aircraft.alpha_rad, SIDESLIP_RAD)
+    of = aircraft.envelope
+    envelope = Envelope(of.airspeed_mps, aircraft.alpha_rad, SIDESLIP_RAD, of.altitude_m)
     properties = {name: signal.property for name, signal in aircraft.signals.items()}
     samples = sample(plant, envelope, point, STATES, SEED, properties, FRESH, STARTS)
     error_map = aircraft.file.model_error_map

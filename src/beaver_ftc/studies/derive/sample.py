@@ -28,6 +28,7 @@ EVERY_AGE = (0, 0, 1, 0, 0, 2)
 AGES_OF_WORST = (0, 1, 0, 2)
 STARTS, STARTS_OF_WORST = 48, 96
 AT_AN_END = 0.3  # share of the draws that are at an end of their range: corners are where errors are large
+ALTITUDE_M = 1500.0  # half width of what is derived, about the trim's
 _BANK_RAD, _CLIMB_RAD, _ALTITUDE_M, _THROTTLE = 1.0, 0.3, 600.0, 0.35  # half widths beside the envelope's
 _APART, _APART_RAD_S = 0.6, 0.8  # of engines that are effectors: their levers, and how they swing in flight
 _MOST_BURNT = 0.9  # of the fuel
@@ -42,14 +43,17 @@ _SPEEDS = (1.0, 1.0, 0.95, 1.05, 1.0, 1.0)  # as shares of the trim's
 
 @dataclass(frozen=True)
 class Envelope:
-    """Where states are drawn: between these ends, and so far to either side in sideslip. altitude_m:
-    left out, about the trim's; given, it is alike in all boxes, and so are airspeed and engine settings;
-    rates and sideslip then come closer to the whole, since what they add to the error is little."""
+    """Where states are drawn: between these ends, and so far to either side in sideslip. altitude_m: alike
+    in all
+    boxes; left out, about the trim's. of_region: airspeed and engine settings are alike in all boxes too;
+    rates and
+    sideslip then come closer to the whole, since what they add to the error is little."""
 
     airspeed_mps: tuple[float, float]
     alpha_rad: tuple[float, float]
     beta_rad: float
     altitude_m: tuple[float, float] | None = None
+    of_region: bool = False
 
 
 @dataclass(frozen=True)
@@ -144,23 +148,27 @@ class Draw:
 
     def wide(self, reach: float) -> float:
         """The reach in what is alike in all boxes of a region."""
-        return reach if self.envelope.altitude_m is None else 1.0
+        return 1.0 if self.envelope.of_region else reach
 
     def broad(self, reach: float) -> float:
         """The reach in what is nearly alike in the boxes of a region."""
-        return reach if self.envelope.altitude_m is None else reach**0.5
+        return reach**0.5 if self.envelope.of_region else reach
 
-    def start(self, reach: float) -> FlightState:
-        """Where the engines come to run, and the aircraft there."""
+    def start(self, reach: float, turn: int) -> FlightState:
+        """Where the engines come to run, and the aircraft there; turn: how often they have in this box. The
+        first
+        two turns are at the ends of the altitudes, if these are given, so that every box reaches them."""
         trim, settings = self.trim, {}
         for name, setting in self.aircraft.engine.settings.items():
             (low, high), middle = setting.range, trim.settings[name]
-            half = high - low if self.envelope.altitude_m else _THROTTLE * (high - low)
+            half = high - low if self.envelope.of_region else _THROTTLE * (high - low)
             ends = max(low, middle - half), min(high, middle + half)
             settings[name] = self.share(middle, ends, self.wide(reach))
         airspeed_mps = self.share(trim.airspeed_mps, self.envelope.airspeed_mps, self.wide(reach))
-        about = trim.altitude_m - reach * _ALTITUDE_M, trim.altitude_m + reach * _ALTITUDE_M
-        altitude_m = max(self.between(*(self.envelope.altitude_m or about)), 0.0)
+        ends = self.envelope.altitude_m or _about(trim.altitude_m, reach * _ALTITUDE_M)
+        altitude_m = max(self.between(*ends), 0.0)
+        if self.envelope.altitude_m and turn < len(ends):
+            altitude_m = ends[turn]
         return replace(trim, airspeed_mps=airspeed_mps, altitude_m=altitude_m, settings=settings)
 
     def ends(self, reach: float, share: float) -> dict[str, Ends]:
@@ -201,11 +209,11 @@ class _Standing:
         self.plant, self.draw, self.properties = plant, draw, properties
         self.tanks, self.rows = Tanks(plant, draw.trim), list[tuple]()
 
-    def start(self, box: int, age: int, youngest_s: float, apart: float) -> None:
-        """Let the engines come to run somewhere in a box, in a flight of some age."""
+    def start(self, box: int, age: int, youngest_s: float, apart: float, turn: int) -> None:
+        """Let the engines come to run somewhere in a box, in a flight of some age; turn: as `Draw.start`."""
         draw, plant = self.draw, self.plant
         self.tanks.fill(draw.between(youngest_s, _BEFORE_S + AGES_S[age]))
-        self.started, self.box, self.age = draw.start(REACHES[box]), box, age
+        self.started, self.box, self.age = draw.start(REACHES[box], turn), box, age
         for effector in plant.aircraft.effectors.values():
             plant.write(effector.throttle, draw.around(0.0, REACHES[box] * apart))
         plant.start(self.started)
@@ -227,10 +235,11 @@ def sample(
     draw = Draw(seed, plant.aircraft, envelope, trim, moves)
     standing = _Standing(plant, draw, properties)
     for k in range(starts):
-        box, (turn, of) = k % len(REACHES), divmod(k // len(REACHES), len(ages))
+        box, of_box = k % len(REACHES), k // len(REACHES)
+        turn, of = divmod(of_box, len(ages))
         age = ages[of]
         youngest_s = _BEFORE_S + AGES_S[age] if turn % 2 else AGES_S[age - 1] if age else 0.0
-        standing.start(box, age, youngest_s, moves.apart)
+        standing.start(box, age, youngest_s, moves.apart, of_box)
         ends = [draw.ends(REACHES[box], share) for share in moves.shares]
         for i in range(max(1, n // starts)):
             level = i % len(moves.shares)

@@ -73,7 +73,7 @@ MOVES = Moves((0.12, 0.18, 0.25, 0.35, 0.65, 1.0), 0.05)
 def regions() -> list[Envelope]:
     """Parts of the envelope, each about a steady flight of its own."""
     return [
-        Envelope(speed, (radians(low), radians(high)), _SIDESLIP_RAD, _ALTITUDE_M)
+        Envelope(speed, (radians(low), radians(high)), _SIDESLIP_RAD, _ALTITUDE_M, of_region=True)
         for speed, (low, high) in _REGIONS
     ]
 

@@ -60,7 +60,7 @@ def test_a_doublet_that_was_flown_leaves_log_and_certificate(tmp_path):
         own, pair = folder / "flown" / str(place), document["pairs"][place]
         proof, table = json.loads((own / "certificate.json").read_text()), read_table(own / "log.parquet")
         log = {name: table[name].to_numpy() for name in table.column_names}
-        assert [*failures(proof, log)] == []
+        assert [*failures(proof, log, (own / "scenario.yaml").read_text())] == []
         said = {one["what"] for one in proof["statements"]}
         gone = [one for one in pair["candidates"] if one not in pair["left"]]
         assert gone

@@ -19,6 +19,7 @@ from beaver_ftc.cli.output import failure_of, report_last, status_of_stop
 # Where each is: a module of this package, and its function there.
 COMMANDS = {
     "run": "run:command",
+    "check": "check:command",
     "mismatch": "mismatch:command",
     "validate": "scenarios:validate",
     "schema": "catalogue:schema",
@@ -33,6 +34,7 @@ COMMANDS = {
     "reproduce": "studies:reproduce",
     "matrix": "surveys:matrix",
     "power": "surveys:power",
+    "smallest": "surveys:smallest",
     "bench": "studies:bench",
     "derive": "studies:derive",
     "verify": "studies:verify",
@@ -53,7 +55,17 @@ GROUPS = {
     "challenge": "Grade a class's detectors and laws on hidden flights.",
 }
 # Those that fly no scenario of the user's choice: no plug-in can be registered for them.
-WITHOUT_PLUGINS = {"schema", "show", "new", "reproduce", "bench", "derive", "verify", "detectability"}
+WITHOUT_PLUGINS = {
+    "check",
+    "schema",
+    "show",
+    "new",
+    "reproduce",
+    "bench",
+    "derive",
+    "verify",
+    "detectability",
+}
 WITHOUT_PLUGINS |= {"import gtm", "challenge new", "challenge submit", "challenge grade"}
 
 app = typer.Typer(

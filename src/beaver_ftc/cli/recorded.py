@@ -187,6 +187,7 @@ def _by_aircraft(options: Options) -> None:
     from beaver_ftc.flights import certified
     from beaver_ftc.flights.by_aircraft import as_text, diagnosed, known, take
     from beaver_ftc.flights.pages import write_by_aircraft
+    from beaver_ftc.flights.readers import check_exists
     from beaver_ftc.flights.samples import parts_for
     from beaver_ftc.flights.scoring import score
     from beaver_ftc.flights.vehicle import load_vehicle
@@ -194,6 +195,7 @@ def _by_aircraft(options: Options) -> None:
     by = known(str(options.aircraft), options.scenario)
     verdicts = []
     for path in options.flights:
+        check_exists(path)
         beside = path.with_name("vehicle.yaml")
         if options.vehicle is None and not beside.is_file():
             raise BadInput(f"{path}: no vehicle.yaml beside it, allowed: --vehicle FILE")

@@ -142,4 +142,15 @@ def _run_one(scenario: "Scenario", options: Options, prepare: "Prepare | None") 
         document = run(
             scenario, options.out, not options.no_report, progress, exports, prepare, recording, certified
         )
-    return document | {"folder": str(options.out / scenario.name)}
+    folder = options.out / scenario.name
+    return document | {"folder": str(folder)} | (_certificate(folder) if certified else {})
+
+
+def _certificate(folder: Path) -> Document:
+    """How much of the flight its certificate states."""
+    import json
+
+    from beaver_ftc.results.certificates.certificate import FILE
+
+    written = json.loads((folder / FILE).read_text(encoding="utf-8"))
+    return {"certificate": {name: len(written[name]) for name in ("statements", "without")}}

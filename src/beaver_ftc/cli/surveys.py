@@ -1,4 +1,5 @@
-"""Surveys of faults: `beaver-ftc matrix`, each type on each surface; `power`, how likely each is found."""
+"""Surveys of faults: `beaver-ftc matrix`, each type on each surface; `power`, how likely each is found;
+`smallest`, how small a loss of one surface is found in time."""
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -7,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from beaver_ftc.cli.inputs import TurbulenceName, WorkersOption, listed
-from beaver_ftc.cli.output import Format, FormatOption, answer
+from beaver_ftc.cli.inputs import ScenarioArgument, TurbulenceName, WorkersOption, listed
+from beaver_ftc.cli.output import Format, FormatOption, answer, complain
 from beaver_ftc.cli.progress import progress_bar
 
 GridName = StrEnum("GridName", ["quick", "full"])
@@ -127,3 +128,41 @@ def power(asked: Surveyed) -> None:
     document |= {"answers": said} if said else {}
     text = "\n".join(said) or as_text(document)
     answer(asked.format, document | {"folder": folder}, lambda: f"{text}\n\nresults: {folder}")
+
+
+def smallest(
+    scenario: ScenarioArgument,
+    surface: Annotated[str, typer.Option()],
+    within: Annotated[float, typer.Option(min=0.01, max=60)] = 0.5,
+    seed: Annotated[int, typer.Option(min=0)] = 1,
+    workers: WorkersOption = None,
+    out: Path = Path("runs"),
+    format: FormatOption = Format.text,
+) -> None:
+    """Find how small a loss of one surface is found in time.
+
+    The size that is certain to be detected, and the size that is found in 90 % of flights with its 95 %
+    interval. Flies the scenario without its own faults; seed and instant of the loss are drawn, and flights
+    are added until the interval is narrow, 480 at most.
+
+    Then what limits it: turbulence, sensors, servos and uncertainty of the model, each left out of the same
+    flights; and which reference would help: twice the amplitude, twice the frequency.
+
+    Stopped or killed, it goes on where it was with the same command.
+
+    Examples:
+      beaver-ftc smallest elevator-partial-loss --surface elevator --within 0.5
+
+    surface: The surface that loses effectiveness.
+    within: From the loss to the alarm, s.
+    seed: Of everything drawn.
+    out: Folder for the results: SCENARIO-smallest-SURFACE in it, with a page, CSV and JSON.
+    """
+    from beaver_ftc.scenario.loader import load_scenario
+    from beaver_ftc.studies.engine.workers import cores
+    from beaver_ftc.studies.smallest.shown import as_text
+    from beaver_ftc.studies.smallest.survey import Asked, run_smallest
+
+    asked = Asked(surface, within, seed)
+    document = run_smallest(out, load_scenario(scenario), asked, workers or cores(), complain)
+    answer(format, document, lambda: f"{as_text(document)}\n\nresults: {document['folder']}")

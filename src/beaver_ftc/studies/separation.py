@@ -203,7 +203,7 @@ def write(document: Document, scenario: Scenario, out: Path) -> Path:
         for place, pair in enumerate(document["pairs"]):
             if "left" in pair:
                 (folder / FLOWN / str(place)).mkdir(parents=True)
-                proved.write(*certified(scenario, pair), folder / FLOWN / str(place))
+                proved.write(scenario, *certified(scenario, pair), folder / FLOWN / str(place))
         (folder / FILE).write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
     return out / name
 

@@ -25,7 +25,7 @@ from beaver_ftc.results.metrics import fault_free_s
 from beaver_ftc.scenario.faults import LossOfEffectiveness
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial_upper, poisson_bound, share_within
-from beaver_ftc.studies.engine.store import Parts, RowsAsJson, fingerprint, write_whole
+from beaver_ftc.studies.engine.store import UNREADABLE, Parts, RowsAsJson, fingerprint, set_aside, write_whole
 from beaver_ftc.studies.engine.study import GO_ON, Batches, Progress
 from beaver_ftc.studies.engine.study import conduct as fly_missing
 from beaver_ftc.studies.engine.workers import Batch, Work
@@ -269,19 +269,21 @@ def _open(folder: Path, campaign: Campaign) -> None:
         theirs = json.loads(manifest.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise SimulationFailed(f"{folder}: cannot be used for a campaign: {error}") from error
+    if not isinstance(theirs, dict):
+        raise BadInput(f"{manifest}: {UNREADABLE}, allowed: a new folder")
     if theirs != mine:
         differs = ", ".join(key for key in mine if theirs.get(key) != mine[key])
         raise BadInput(f"--out {folder}: holds flights of another {differs}, allowed: a new folder")
 
 
 def _kept(folder: Path, kind: str) -> dict[int, Row]:
-    """What has landed; what cannot be read is removed, to be flown again."""
+    """What has landed; what cannot be read is set aside, to be flown again."""
     rows: dict[int, Row] = {}
     for file in sorted(folder.glob(f"{kind}-*.json")):
         try:
             rows.update((row["index"], row) for row in json.loads(file.read_text(encoding="utf-8")))
         except (ValueError, KeyError, TypeError):
-            file.unlink()
+            set_aside(file, UNREADABLE)
     return rows
 
 

@@ -140,6 +140,17 @@ def test_what_old_versions_left_goes_but_for_the_latest(nowhere, tmp_path):
     }
 
 
+def test_what_was_not_used_for_longest_goes_where_much_is_kept(tmp_path, monkeypatch):
+    monkeypatch.setattr(numba_inside, "MOST_BYTES", 250)
+    for i, name in enumerate(["a-1", "b-2", "c-3", "d-4", "lock"]):
+        (tmp_path / name).write_bytes(b"x" * 100)
+        os.utime(tmp_path / name, (i, i))
+    os.utime(tmp_path / "a-1", (9, 0))  # the oldest was read last
+    (tmp_path / "parts-3").mkdir()
+    numba_inside.discard_unused(tmp_path)
+    assert {path.name for path in tmp_path.iterdir()} == {"a-1", "d-4", "lock", "parts-3"}
+
+
 PROGRAM = """
 import sys
 from beaver_ftc.loop.stepping import fly_on

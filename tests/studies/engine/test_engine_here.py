@@ -44,11 +44,11 @@ def test_parts_are_files_of_their_batch(tmp_path):
     assert sorted(path.name for path in parts.folder.iterdir()) == ["000007.json", "healthy-3.json"]
     assert parts.landed(7, [0]) == [{"a": 1.5, "b": 2}]
     assert parts.landed("healthy-3", [0, 1])[1] == {"a": float("inf")}
-    assert parts.landed(7, [0, 1]) is None  # not so many: removed
+    assert parts.landed(7, [0, 1]) is None  # not so many: set aside
     assert parts.landed(7, [0]) is None
     (parts.folder / "mine.txt").touch()
     parts.remove()
-    assert [path.name for path in parts.folder.iterdir()] == ["mine.txt"]
+    assert {path.name for path in parts.folder.iterdir()} == {"mine.txt", "000007.json.damaged"}
 
 
 def test_a_file_is_whole_or_as_it_was(tmp_path):

@@ -37,7 +37,7 @@ def test_what_has_landed_is_there(store, short):
 
 
 @pytest.mark.parametrize("damage", ["truncate", "garbage", "other runs", "other columns"])
-def test_a_damaged_part_is_removed_and_missing(store, short, damage):
+def test_a_damaged_part_is_set_aside_and_missing(store, short, damage):
     with store:
         store.begin(identity_of(short), resume=False)
         store.parts.land(0, batch_of(short, range(3)))
@@ -51,8 +51,46 @@ def test_a_damaged_part_is_removed_and_missing(store, short, damage):
             store.parts.land(0, batch_of(short, range(1, 4)))
         else:
             pq.write_table(tabulated(short, range(3)).drop_columns(["status"]), part)
+        damaged = part.read_bytes()
         assert store.landed(0, range(3)) is None
         assert not part.exists()
+        assert part.with_name("000000.parquet.damaged").read_bytes() == damaged
+
+
+@pytest.mark.parametrize("text", ["null", "[]", "5", "{", "{}", '{"sweep": 1, "versions": {}}', "\xff", None])
+def test_a_damaged_identity_loses_nothing(store, short, text, capsys):
+    """Without --resume it is refused, with it all that is there is renamed, and the sweep begins anew."""
+    with store:
+        store.begin(identity_of(short), resume=False)
+        store.parts.land(0, batch_of(short, range(3)))
+    manifest, part = store.folder / "sweep.json", store.folder / "parts" / "000000.parquet"
+    (store.folder / "flights").mkdir()
+    flown = part.read_bytes()
+    manifest.unlink() if text is None else manifest.write_bytes(text.encode("latin-1"))
+    with store:
+        with pytest.raises(BadInput, match=r"sweep.json: is .*, allowed: --resume, which sets aside"):
+            store.begin(identity_of(short), resume=False)
+        assert part.read_bytes() == flown
+        store.begin(identity_of(short), resume=True)
+        assert (store.folder / "parts.damaged" / "000000.parquet").read_bytes() == flown
+        assert store.landed(0, range(3)) is None
+    assert "set aside as parts.damaged; what was in it is flown again" in capsys.readouterr().err
+    with store:  # and may be resumed
+        store.begin(identity_of(short), resume=True)
+
+
+def test_damaged_results_are_set_aside(store, short):
+    with store:
+        store.begin(identity_of(short), resume=False)
+        store.parts.land(0, batch_of(short, range(3)))
+        store.compact([store.landed(0, range(3))])
+        whole = store.results.read_bytes()
+        for name in ("results.parquet.damaged", "results.parquet.damaged-2"):
+            store.results.write_bytes(whole[: len(whole) // 2])
+            assert not store.is_compacted(3)
+            assert store.landed(0, range(3)) is None
+            assert not store.results.exists()
+            assert (store.folder / name).read_bytes() == whole[: len(whole) // 2]
 
 
 def test_compacting_joins_the_parts_in_order_and_removes_them(store, short):

@@ -78,7 +78,7 @@ def test_the_flights_kept_have_their_certificates_if_asked(hired, tmp_path):
     certificate = json.loads((folder / "certificate.json").read_text())
     table = pq.read_table(folder / "log.parquet")
     log = {name: table[name].to_numpy() for name in table.column_names}
-    assert [*failures(certificate, log)] == []
+    assert [*failures(certificate, log, (folder / "scenario.yaml").read_text())] == []
     assert bool(certificate["statements"]) == bool(log["detected"].any())
 
 

@@ -33,6 +33,7 @@ SUMMARY = {
         ],
         "missed_detection": [],
     },
+    "on_the_bound": rate(4, 9), "inconclusive": rate(3, 11),
     "tracking": {axis: {**RMS, "ratio": {"median": None}} for axis in "pqr"},
     "expectations": [
         {"name": "detection_delay_s", "expected": {"quantile": 0.95, "at_most": 0.5, "confidence": 0.9},
@@ -43,6 +44,13 @@ SUMMARY = {
 }  # fmt: skip
 
 
+SATURATED = (
+    "the bound or more; detection of small faults then measures the scenario's own saturation, "
+    "not the diagnosis"
+)
+WHY = (
+    "for part of the time, or all of it (detection.inconclusive.share); the verdict of a kept flight says why"
+)
 RESIDUALS = "residuals came to 0.9877 of the threshold"
 
 
@@ -51,6 +59,8 @@ def test_each_thing_worth_knowing_is_said():
         ("flights", "12, 0.123 h in the air (1 bad input, 2 departed)"),
         ("searched for", "the worst false alarm: 0.1235 of the threshold in flight 7"),
         ("detection", "66.7 % (25 % to 87.5 %): 6 of 9 faults detected"),
+        ("warning", f"in 4 of 9 flights the healthy part already uses 90 % of {SATURATED}"),
+        ("inconclusive", f"in 3 of 11 flights nothing can be concluded {WHY}"),
         ("detection delay", "median 0.25 s, 95 % 1.5 s, 99 % never, max 2.5 s"),
         ("isolation", "44.4 % (25 % to 87.5 %): 4 of 9 faults named rightly"),
         ("wrongly named", "1 of 5 named"),
@@ -65,7 +75,8 @@ def test_what_there_is_nothing_of_is_not_said():
     nothing = {
         "statuses": {"flown": 12}, "search": None, "departures": rate(0, 11), "guarantee": {"promised": 0},
         "detection": {**rate(0, 0), "delay_s": {"of": 0}}, "isolation": {**rate(0, 0), "wrong": rate(0, 0)},
-        "false_alarms": {"hours": 0.0}, "sensitivity": {"detection_delay": [], "missed_detection": []},
+        "on_the_bound": rate(0, 0), "inconclusive": rate(0, 11), "false_alarms": {"hours": 0.0},
+        "sensitivity": {"detection_delay": [], "missed_detection": []},
     }  # fmt: skip
     assert words.facts(SUMMARY | nothing) == [("flights", "12, 0.123 h in the air")]
     search = {"score": None, "objective": "delay", "run": 3}

@@ -11,7 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import IO, Any, Protocol
 
-from beaver_ftc.documents.errors import BadInput, SimulationFailed
+from beaver_ftc.documents.errors import BadInput, SimulationFailed, say_once
 from beaver_ftc.documents.paths import data_root
 from beaver_ftc.results.metrics import versions
 from beaver_ftc.results.writer import clear_disk_errors, sync
@@ -19,6 +19,8 @@ from beaver_ftc.results.writer import clear_disk_errors, sync
 Document = dict[str, Any]
 
 LOCK = ".lock"
+DAMAGED = ".damaged"  # at the end of the name of what was set aside
+UNREADABLE = "is damaged and cannot be read"
 KEPT = "; what has been flown is kept, go on with --resume"
 
 
@@ -71,6 +73,17 @@ def locked(folder: Path) -> Iterator[None]:
         lock.release()
 
 
+def set_aside(path: Path, why: str) -> Path:
+    """Rename what is damaged, and say so in a line; nothing of it is lost."""
+    name, n = f"{path.name}{DAMAGED}", 1
+    while (path.parent / name).exists():
+        n += 1
+        name = f"{path.name}{DAMAGED}-{n}"
+    path.rename(path.parent / name)
+    say_once(f"{path}: {why}: set aside as {name}; what was in it is flown again")
+    return path.parent / name
+
+
 class Codec(Protocol):
     """How the rows of a batch are written and read."""
 
@@ -99,13 +112,13 @@ class Parts:
             replace_whole(self._path(batch), lambda file: self._codec.write(rows, file))
 
     def landed(self, batch: int | str, runs: Sequence[int]) -> Any:
-        """The rows of a batch if it has landed whole; what cannot be read is removed, to be flown again."""
+        """The rows of a batch if it has landed whole; what cannot be read is set aside, to be flown again."""
         path, rows = self._path(batch), None
         if path.exists():
             with contextlib.suppress(Exception):
                 rows = self._codec.read(path, runs)
             if rows is None:
-                path.unlink()
+                set_aside(path, UNREADABLE)
         return rows
 
     def remove(self) -> None:

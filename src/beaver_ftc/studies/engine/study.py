@@ -224,6 +224,8 @@ def _begin(kept: Path, study: Study) -> store.Parts:
     with contextlib.suppress(OSError, ValueError):
         there = json.loads(manifest.read_text(encoding="utf-8"))
     with clear_disk_errors(kept):
+        if not isinstance(there, dict) and parts:  # nothing says whose they are
+            store.set_aside(parts.folder, f"{manifest.name} {store.UNREADABLE}")
         if there != identity:
             parts.remove()
             store.write_whole(manifest, json.dumps(identity).encode())

@@ -176,13 +176,19 @@ def answers(document: Document, surface: str) -> list[str]:
     lines = []
     for cell in document["cells"]:
         if cell["surface"] == surface and cell["scheme"] == BOTH:
-            soon = ", ".join(f"within {s} s in {of['value']:.0%}" for s, of in cell["within"].items())
+            soon = ", ".join(
+                f"within {s} s in {of['value']:.0%} ({100 * of['low']:.0f} to {of['high']:.0%})"
+                for s, of in cell["within"].items()
+            )
             air = "still air" if cell["turbulence"] == "none" else f"{cell['turbulence']} turbulence"
             lines.append(
                 f"{cell['sensors']} sensors, {air}, {cell['excitation_deg_s']:g} deg/s: a loss of {surface} "
                 f"of {cell['magnitude']:.0%} is found {soon} of {cell['flights']} flights"
             )
-    return lines
+    pointer = (
+        "In brackets 95 % intervals. `beaver-ftc smallest SCENARIO` finds the size found in 90 % of flights."
+    )
+    return [*lines, pointer] if lines else lines
 
 
 def _counted(level: Level) -> Document:

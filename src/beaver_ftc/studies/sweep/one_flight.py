@@ -259,7 +259,7 @@ def warm_up(sweep: Sweep) -> None:
 
 def keep_flight(sweep: Sweep, assignment: Assignment, keep: Keep, report: bool = False) -> None:
     """Fly one flight as `run` would, into a result folder of its own; of a failure, keep the scenario."""
-    from beaver_ftc.results.writer import result_folder, run
+    from beaver_ftc.results.writer import NotAllWritten, result_folder, run
     from beaver_ftc.scenario.dump import to_yaml
 
     try:
@@ -268,6 +268,8 @@ def keep_flight(sweep: Sweep, assignment: Assignment, keep: Keep, report: bool =
         return  # there is no such scenario: the row says why
     try:
         run(scenario, keep.folder, report, certified=keep.certified and scenario.fdi.is_ours)
+    except NotAllWritten:
+        return  # log and scenario are kept
     except Exception:  # as in its row, which says why
         with result_folder(keep.folder, scenario.name) as partial:
             (partial / "scenario.yaml").write_text(to_yaml(scenario), encoding="utf-8")

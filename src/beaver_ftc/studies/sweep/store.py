@@ -11,7 +11,7 @@ from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.results.writer import clear_disk_errors, refuse_foreign, sync
 from beaver_ftc.scenario.sweeps import Sweep
 from beaver_ftc.studies.engine import store as files
-from beaver_ftc.studies.engine.store import KEPT, Document, Parts
+from beaver_ftc.studies.engine.store import KEPT, UNREADABLE, Document, Parts
 from beaver_ftc.studies.engine.workers import Number
 from beaver_ftc.studies.sweep.one_flight import schema_of, table_of
 
@@ -25,6 +25,7 @@ OWN_FILES = frozenset({
 })  # fmt: skip
 ROWS_PER_GROUP = 8192
 _WRITE_OPTIONS: dict[str, Any] = {"compression": "snappy", "write_statistics": False, "use_dictionary": False}
+_IDENTITY = ("sweep", "versions")  # the parts of sweep.json
 # Words, verdicts, and what the resolved base says better: no flight follows from them.
 _NOT_FLOWN = ("description", "expect", "base", "set")
 
@@ -84,7 +85,9 @@ class Store:
         A finished sweep is replaced unless it is to be resumed; an unfinished one never is.
         """
         there, flown = self._identity(), self.results.exists() or bool(self.parts)
-        if there is not None and resume:
+        if there is None and (flown or self._manifest.exists()):
+            self._set_all_aside(resume)
+        elif there is not None and resume:
             files.refuse_other(identity, there, self.folder)
         elif there is not None and flown and not (self.folder / "summary.json").exists():
             raise BadInput(
@@ -102,13 +105,17 @@ class Store:
 
     def landed(self, batch: Number, runs: Sequence[int]) -> "pa.Table | None":
         """The table of a batch if it has landed whole."""
+        from pyarrow import ArrowException
         from pyarrow.parquet import read_table
 
         table = self.parts.landed(batch, runs)
         if table is not None:
             return table
         if self._compacted is None and self.results.exists():
-            self._compacted = read_table(self.results, schema=self.schema)
+            try:
+                self._compacted = read_table(self.results, schema=self.schema)
+            except (ArrowException, OSError, ValueError):
+                files.set_aside(self.results, files.UNREADABLE)
         return self._compacted and self._compacted.slice(runs[0], len(runs))
 
     def is_compacted(self, flights: int) -> bool:
@@ -119,7 +126,7 @@ class Store:
         try:
             with ParquetFile(self.results) as file:
                 return file.metadata.num_rows == flights and file.schema_arrow.equals(self.schema)
-        except (FileNotFoundError, ArrowException):
+        except (OSError, ArrowException):
             return False
 
     def compact(self, batches: Iterable["pa.Table"]) -> None:
@@ -133,13 +140,31 @@ class Store:
         with clear_disk_errors(self.folder):
             files.write_whole(self.folder / name, text.encode("utf-8"))
 
+    @property
+    def _manifest(self) -> Path:
+        return self.folder / "sweep.json"
+
     def _identity(self) -> dict[str, Any] | None:
+        """Whose flights these are; None where no file says so, or it is damaged."""
         try:
-            return json.loads((self.folder / "sweep.json").read_text(encoding="utf-8"))
-        except FileNotFoundError:
+            there = json.loads(self._manifest.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
             return None
-        except ValueError:
-            raise BadInput(f"{self.folder / 'sweep.json'}: is not readable, allowed: another --out") from None
+        whole = isinstance(there, dict) and all(isinstance(there.get(key), dict) for key in _IDENTITY)
+        return there if whole else None
+
+    def _set_all_aside(self, resume: bool) -> None:
+        """Rename all that is there, since nothing says whose it is; BadInput unless the sweep is resumed."""
+        what = UNREADABLE if self._manifest.exists() else "is not there"
+        if not resume:
+            raise BadInput(
+                f"{self._manifest}: {what}, allowed: --resume, which sets aside what is there and flies "
+                "anew, or another --out"
+            )
+        with clear_disk_errors(self.folder):
+            for name in sorted(OWN_FILES - {"lock", files.LOCK}):
+                if (self.folder / name).exists():
+                    files.set_aside(self.folder / name, f"{self._manifest.name} {what}")
 
     def _clear(self) -> None:
         """Remove what an earlier sweep left; its identity last, by which it is known for ours.
@@ -180,6 +205,11 @@ def write_tables(file: IO[bytes], tables: Iterable["pa.Table"], schema: "pa.Sche
             writer.write_table(pa.concat_tables(waiting))
 
 
+def _is_leftover(name: str) -> bool:
+    """Whether a file of this name was half written, or set aside by us."""
+    return name.endswith(".partial") or any(name.startswith(f"{own}{files.DAMAGED}") for own in OWN_FILES)
+
+
 def _refuse_foreign(folder: Path) -> None:
     """Raise SimulationFailed if the folder holds anything that no sweep wrote: it might be lost."""
     if not folder.exists():
@@ -187,8 +217,9 @@ def _refuse_foreign(folder: Path) -> None:
     if not folder.is_dir():
         raise SimulationFailed(f"cannot write {folder}: it exists and is not a folder")
     names = sorted(entry.name for entry in folder.iterdir())
-    strangers = [name for name in names if name not in OWN_FILES and not name.endswith(".partial")]
-    if strangers or (names and not {"sweep.json", "lock", files.LOCK, "flights"} & set(names)):
+    strangers = [name for name in names if name not in OWN_FILES and not _is_leftover(name)]
+    known = {"sweep.json", "lock", files.LOCK, "flights"}
+    if strangers or (names and not known & set(names) and not any(map(_is_leftover, names))):
         raise SimulationFailed(
             f"will not write into {folder}: it holds {(strangers or names)[0]}, which is no part of a sweep; "
             "move it away or choose another --out"

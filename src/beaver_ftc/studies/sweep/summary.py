@@ -11,6 +11,7 @@ from functools import partial
 
 import numpy as np
 
+from beaver_ftc.results.metrics import ON_THE_BOUND
 from beaver_ftc.scenario.sweeps import AxisLevels, Level, QuantileLevel, Sweep, SweepExpect
 from beaver_ftc.studies.engine import statistics
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, Estimate, quantile, wilson
@@ -47,6 +48,8 @@ def summarise(flights: Flights, sweep: Sweep) -> Document:
         "departures": rate(flights.departed, flights.measured),
         "passes": rate(flights["passed"], flights.measured),
         "guarantee": _guarantee(flights),
+        "on_the_bound": rate(flights["worst_residual_ratio"] >= ON_THE_BOUND, flights.faulted),
+        "inconclusive": rate(flights["detection.inconclusive.share"] > 0.0, flights.measured),
         "by_fault": _by_fault(flights),
         "confusion": _confusion(flights),
         "tracking": {axis: _tracking(flights, axis) for axis in AXES},

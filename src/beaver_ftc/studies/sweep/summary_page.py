@@ -6,6 +6,7 @@ Everything is said from the summary document, so that the words and `summary.jso
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from beaver_ftc.results.metrics import ON_THE_BOUND
 from beaver_ftc.studies.present.page import picture_data
 from beaver_ftc.studies.present.tables import number, printed
 from beaver_ftc.studies.sweep.one_flight import AXES, Document
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 
+MANY = 0.1  # of a sweep's flights
 _UNITS = {"delay": " s", "false_alarm": " of the threshold", "tracking": " deg/s"}
 
 
@@ -33,6 +35,8 @@ def facts(summary: Document) -> list[tuple[str, str]]:
         ("flights", _flights(summary)),
         ("searched for", _search(summary)),
         ("detection", _rate(summary["detection"], "faults detected")),
+        ("warning", _on_the_bound(summary["on_the_bound"])),
+        ("inconclusive", _inconclusive(summary["inconclusive"])),
         ("detection delay", _quantiles(summary["detection"]["delay_s"])),
         ("isolation", _rate(summary["isolation"], "faults named rightly")),
         ("wrongly named", f"{wrong['count']} of {wrong['of']} named" if wrong["count"] else ""),
@@ -163,6 +167,29 @@ def _false_alarms(found: Document) -> str:
         f"{found['count']} in {value(found['hours'])} h without a fault: {value(found['per_hour'])}/h "
         f"({value(found['low'])} to {value(found['high'])}); residuals came to "
         f"{found['closest_residual_ratio']:.4g} of the threshold"
+    )
+
+
+def _on_the_bound(found: Document) -> str:
+    """That detection shows the uncertainty flown, where the healthy part has used up the bound in many
+    flights."""
+    if not found["of"] or found["rate"] < MANY:
+        return ""
+    return (
+        f"in {found['count']} of {found['of']} flights the healthy part already uses "
+        f"{percent(ON_THE_BOUND)} of the "
+        "bound or more; detection of small faults then measures the scenario's own saturation, not the "
+        "diagnosis"
+    )
+
+
+def _inconclusive(found: Document) -> str:
+    if not found["count"]:
+        return ""
+    return (
+        f"in {found['count']} of {found['of']} flights nothing can be concluded for part of the time, or "
+        f"all of it "
+        "(detection.inconclusive.share); the verdict of a kept flight says why"
     )
 
 

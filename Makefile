@@ -5,8 +5,9 @@ BIN := $(VENV)/bin
 WORKERS ?= 2
 SEED ?= 1
 # One thread of linear algebra to a worker: two workers with two each wait for each other half a minute in one test.
+# A file's tests stay in one worker: what its fixtures fly is flown once; conftest.py puts the longest files first.
 # Byte code is kept also where the machine forbids it: hundreds of commands would read all sources again.
-PYTEST := env -u PYTHONDONTWRITEBYTECODE OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
+PYTEST := env -u PYTHONDONTWRITEBYTECODE OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 # What a change breaks most often, in less than a minute: what flies little or nothing.
 FAST := tests/aircraft tests/design tests/plant tests/results tests/scenario $(wildcard tests/test_re*.py tests/test_arch*.py)
 
@@ -16,11 +17,14 @@ PLAIN := tests/design $(wildcard tests/*/test_*_kernels.py tests/*/*/test_*_kern
   $(addprefix tests/control/test_,decisions.py law_frame.py laws.py supervisor.py compiled_rivals.py) \
   tests/control/laws/test_gains.py tests/diagnosis/rivals/test_filters.py
 
-.PHONY: demo test plain acceptance cost test-fast coverage mutants drawn lint docs docs-check site clean help
+.PHONY: demo check test nightly promises plain acceptance cost test-fast coverage mutants drawn lint docs docs-check site clean help
 
 help:
 	@echo "make demo       set up, fly the published elevator case, print the verdict and where the report lies"
-	@echo "make test       set up and run the whole test suite"
+	@echo "make check      the tests that execute the lines you changed: a minute at most"
+	@echo "make test       set up and run every test of every day"
+	@echo "make nightly    the rest: whole samples, browsers, notebooks, drawn scenarios, mutants"
+	@echo "make promises   what is promised, and which tests hold each promise"
 	@echo "make acceptance the installed command from outside: every scenario, page and mistake"
 	@echo "make cost       what a flight costs beside bare JSBSim: no more than a tenth above the recorded revision?"
 	@echo "make test-fast  the tests that fly little or nothing: less than a minute"
@@ -49,7 +53,19 @@ demo: $(VENV)/.demo
 
 test: $(VENV)/.dev
 	NUMBA_DISABLE_JIT=1 $(PYTEST) $(PLAIN)
-	$(PYTEST) -m "not acceptance" $(addprefix --ignore=,$(PLAIN))
+	$(PYTEST) -m "not acceptance and not nightly" $(addprefix --ignore=,$(PLAIN))
+
+# What tests/nightly.yaml lists, and what draws: scenarios, mutants.
+nightly: $(VENV)/.dev
+	$(PYTEST) -m nightly
+	$(BIN)/python -m tools.drawn
+	$(BIN)/python -m tools.mutants --seed $(SEED)
+
+check: $(VENV)/.dev
+	$(BIN)/python -m tools.check
+
+promises: $(VENV)/.dev
+	$(BIN)/python -m tools.promises
 
 plain:
 	@echo $(PLAIN)
@@ -61,7 +77,7 @@ cost: $(VENV)/.dev
 	$(BIN)/python benchmarks/flight_cost.py --rounds 8 --check benchmarks/ratios.json
 
 test-fast: $(VENV)/.dev
-	$(PYTEST) -m "not acceptance" $(FAST)
+	$(PYTEST) -m "not acceptance and not nightly" $(FAST)
 
 # Compiled kernels and commands that tests start as processes are not seen: what is counted is Python in the tests.
 coverage: $(VENV)/.dev

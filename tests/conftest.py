@@ -9,6 +9,8 @@ from hypothesis import settings
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+from tools.promises import is_at_night
+
 import kept
 
 # No deadline: a first call compiles. Derandomised: a red build can be repeated.
@@ -18,6 +20,24 @@ settings.load_profile("repeatable")
 
 def pytest_addoption(parser):
     parser.addoption("--keep", action="store_true", help="write anew what differs from tests/kept/")
+
+
+# Files that take a worker longest: begun last, they would keep it while the other has nothing to do.
+LONGEST = (
+    "cli/test_command_line.py", "integrations/live/test_session.py", "studies/derive/test_derive.py",
+    "diagnosis/test_short_flights.py", "integrations/challenge/test_cheats.py",
+    "studies/mismatch/test_command.py", "control/outer/test_thrust_of_others.py", "tools/test_mutants.py",
+    "studies/bench/test_cache.py", "tools/test_site.py", "studies/compare/test_compare.py",
+    "control/test_engines.py", "diagnosis/test_frames_kernels.py", "diagnosis/test_redundancy_kernels.py",
+)  # fmt: skip
+
+
+def pytest_collection_modifyitems(items):
+    """The longest files come first; tests that tests/nightly.yaml lists have the mark `nightly`."""
+    items.sort(key=lambda item: not item.nodeid.partition("::")[0].endswith(LONGEST))
+    for item in items:
+        if is_at_night(item.nodeid):
+            item.add_marker("nightly")
 
 
 @pytest.fixture
@@ -40,7 +60,10 @@ def pytest_sessionstart(session):
 
     folder = cache_folder()
     worker, plain = hasattr(session.config, "workerinput"), os.environ.get("NUMBA_DISABLE_JIT", "0") != "0"
-    if worker or plain or folder is None or (folder / "warm").exists():
+    if worker or plain or folder is None:
+        return
+    warm = folder / f"warm-{_sources()}"
+    if warm.exists():
         return
     from beaver_ftc.control.rivals.indi import IncrementalInversion
     from beaver_ftc.diagnosis.rivals.rls import RlsMonitor
@@ -49,4 +72,12 @@ def pytest_sessionstart(session):
 
     for plugged in ({}, {"detector": RlsMonitor()}, {"law": IncrementalInversion()}):
         fly(scenario(duration_s=0.2, substeps=2, fdi={"statistical": {}}), **plugged)
-    (folder / "warm").touch()
+    warm.touch()
+
+
+def _sources():
+    """A name for the package's sources as they are now."""
+    from beaver_ftc.documents.paths import PACKAGE
+    from beaver_ftc.documents.sources import digest_of_files
+
+    return digest_of_files(*sorted(PACKAGE.rglob("*.py")))

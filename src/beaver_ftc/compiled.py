@@ -3,8 +3,9 @@
 Division by zero gives inf or nan, as in NumPy and JSBSim: the loop looks for non-finite values once a frame
 instead of every operation doing so. No fast-math: the same flight gives the same bits.
 
-Compiled code is kept in the user's cache, in a folder named after the sources: a change makes a new one. It
-also works where the package is read-only. Nobody else may write there: what is kept is run.
+Compiled code is kept in the user's cache, each kernel under what its code follows from: an edit compiles
+again what it changes. It also works where the package is read-only. Nobody else may write there: what is kept
+is run.
 
 Of the versions of Numba in `KNOWN` much is borrowed that Numba does not promise (numba_inside.py). With any
 other, Numba compiles by its own means: flights are the same, the first of them takes minutes.
@@ -25,7 +26,7 @@ from numba.extending import overload
 
 from beaver_ftc.documents.errors import say_once
 from beaver_ftc.documents.paths import cache_of_version
-from beaver_ftc.documents.sources import fingerprint
+from beaver_ftc.documents.sources import BY_ADDRESS, digest_of_files
 
 KNOWN = ("0.68",)  # versions whose inside numba_inside.py fits
 VARIABLE = "BEAVER_FTC_COMPILER"  # `numba`: borrow nothing
@@ -50,8 +51,12 @@ def _kind_and_shape(given: Any) -> tuple[Any, tuple[int, ...]]:
 
 @lru_cache(maxsize=1)
 def cache_folder() -> Path | None:
-    """Where compiled kernels are kept; None where nothing can be written: each process compiles its own."""
-    return cache_of_version(fingerprint(_PACKAGE))
+    """Where compiled kernels are kept; None where nothing can be written: each process compiles its own.
+
+    It is named after how code is compiled; which code is in a file, the file's name says.
+    """
+    how = ("compiled.py", "numba_inside.py", "documents/sources.py")
+    return cache_of_version(digest_of_files(*(_PACKAGE / file for file in how)))
 
 
 def kernel(function):
@@ -71,6 +76,7 @@ def apart(function):
     caller = inside.stub((function.__module__, function.__qualname__, tag), called)
     compiled = compile_into(called.folder, caller)
     compiled.py_func = function
+    setattr(compiled, BY_ADDRESS, f"{function.__module__}.{function.__qualname__}")
     return functools.update_wrapper(compiled, function)
 
 

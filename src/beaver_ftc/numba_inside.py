@@ -51,6 +51,8 @@ COMPILING = "compiling the flight code, once for this version on this machine: s
 MORE = "making ready what this flight is the first to use, once for this version on this machine: some 10 s"
 PATIENCE_S = 1.0  # what takes less needs no word
 
+MOST_BYTES = 500_000_000  # of code kept in a folder: some hundred versions of the flight code
+
 _DIGEST_BYTES = 32
 _LOCK = "lock"
 
@@ -168,8 +170,7 @@ class _Store:
     @functools.cached_property
     def _of(self):
         """Found when code is first asked for: what is named in a kernel may be defined after it."""
-        line = self._function.__code__.co_firstlineno
-        return self._name, line, digest_of(self._function), sys.version_info, numba.__version__
+        return self._name, digest_of(self._function), sys.version_info, numba.__version__
 
     def _path(self, types, codegen) -> Path:
         key = repr((*self._of, types, codegen.magic_tuple()))
@@ -204,6 +205,24 @@ class _Store:
             partial.replace(path)
         finally:
             partial.unlink(missing_ok=True)
+        discard_unused(self._folder)
+
+
+def discard_unused(folder: Path) -> None:
+    """Remove what was not used for longest, as far as a folder keeps more than `MOST_BYTES`."""
+    files = [(max(at.st_atime, at.st_mtime), at.st_size, path) for path, at in _statuses(folder)]
+    total = 0
+    for _, size, path in sorted(files, reverse=True):
+        total += size
+        if total > MOST_BYTES:
+            path.unlink(missing_ok=True)
+
+
+def _statuses(folder: Path) -> Iterator[tuple[Path, os.stat_result]]:
+    for path in folder.glob("*-*"):
+        with contextlib.suppress(FileNotFoundError):  # another process has removed it
+            if path.is_file():
+                yield path, path.stat()
 
 
 class _Inner:

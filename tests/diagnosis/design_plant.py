@@ -5,10 +5,9 @@ diagnosis with all it is allowed, and a fault with any course in time. The diagn
 frame for frame.
 """
 
-import numba
 import numpy as np
-from numba import njit
 
+from beaver_ftc.compiled import kernel
 from beaver_ftc.design.model import N_Y
 from beaver_ftc.diagnosis.bank import note_closest_approach
 from beaver_ftc.diagnosis.belief import look_back, respond
@@ -21,7 +20,7 @@ TRAVEL_RAD = np.array([[-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]])
 SURFACES = ("aileron", "elevator", "rudder")
 
 
-@njit
+@kernel
 def believe(frames):
     """What the design model makes of this instant."""
     frame = frames[0]
@@ -29,7 +28,7 @@ def believe(frames):
     bound_now(frame.fdi.bound, frame.belief.design, frame.measured, frame.belief.u)
 
 
-@njit
+@kernel
 def conclude(frames):
     """The flying diagnosis of this instant."""
     frame = frames[0]
@@ -59,8 +58,6 @@ class DesignPlant:
         scenario = Scenario.model_validate({"name": "design-plant", **keys})
         self.servo = actuators == "servo"
         self.frames = assemble(scenario, np.zeros(4), TRAVEL_RAD)
-        if numba.config.DISABLE_JIT:
-            self.frames = self.frames.view(np.recarray)
         self.frame, self.fdi = self.frames[0], self.frames[0]["fdi"]
         self.fdi["bound"]["earth_rate"] = 0.0  # this plant flies over a flat Earth at rest
         self.dt, self.airspeed_mps = 1.0 / rate_hz, airspeed_mps

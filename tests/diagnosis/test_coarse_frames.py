@@ -5,32 +5,32 @@ import pytest
 from design_plant import TRAVEL_RAD
 from hypothesis import given
 from hypothesis import strategies as st
-from numba import njit
 
+from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.bank import aligned_extremes, extremes
 from beaver_ftc.diagnosis.belief import begin_frame, elapse, sum_up
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.scenario.schema import Scenario
 
 
-@njit
+@kernel
 def first(frames):
     fdi = frames[0].fdi
     begin_frame(frames[0].belief, fdi.bound, fdi.layout, fdi.config.every_type, frames[0].measured)
 
 
-@njit
+@kernel
 def another(frames):
     fdi = frames[0].fdi
     sum_up(frames[0].belief, fdi.bound, fdi.layout, fdi.config.every_type)
 
 
-@njit
+@kernel
 def over(frames):
     elapse(frames[0].belief, frames[0].fdi.bound)
 
 
-@njit
+@kernel
 def limits(frames, surface):
     fie = frames[0].fdi.isolation.estimator[surface]
     return extremes(fie, 0), aligned_extremes(fie)

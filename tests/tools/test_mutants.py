@@ -238,31 +238,3 @@ def test_a_child_leaves_no_process_behind(tmp_path):
         time.sleep(0.02)
     else:
         pytest.fail("it still runs")
-
-
-@pytest.mark.parametrize(("mode", "kept"), [(scope.COMPILED, ["its", "true"]), (scope.PLAIN, ["true"])])
-def test_a_mutant_of_glue_finds_the_compiled_code_that_it_leaves_as_it_is(mode, kept, tmp_path, monkeypatch):
-    """Under its own name, as long as it is on trial: what it adds there is not the true package's."""
-    true, its = tmp_path / "true", tmp_path / "its"
-    (true / "code").mkdir(parents=True)
-    (true / "code" / "kernel").write_bytes(b"compiled")
-    monkeypatch.setattr(trial, "_code_of", lambda package: true if package == trial.PACKAGE else its)
-    with trial._code_of_the_true(tmp_path / "mutant", mode):
-        found = sorted(
-            file.parts[-3] for file in tmp_path.rglob("kernel") if file.read_bytes() == b"compiled"
-        )
-        assert found == kept
-        if its.exists():
-            (its / "code" / "another").write_bytes(b"")
-    assert [file.name for file in tmp_path.rglob("*") if file.is_file()] == ["kernel"]
-
-
-def test_where_compiled_code_is_kept_changes_with_what_kernels_are_made_of(monkeypatch, tmp_path):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
-    file = scope.PACKAGE / "documents" / "validation.py"  # glue, which the schema that kernels read imports
-    with trial._instead(file, file.read_text()) as same:
-        assert trial._code_of(same) == trial._code_of(scope.PACKAGE)
-    with trial._instead(file, f"{file.read_text()}# ") as other:
-        assert trial._code_of(other) != trial._code_of(scope.PACKAGE)
-    assert trial._code_of(scope.PACKAGE).is_relative_to(tmp_path)

@@ -1,9 +1,7 @@
 """One mutant on trial: a package in which it stands in for the true module, and the tests that reach it."""
 
 import contextlib
-import importlib.util
 import os
-import shutil
 import signal
 import sys
 import tempfile
@@ -11,7 +9,6 @@ import time
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
-from types import ModuleType
 
 import numba
 import pytest
@@ -77,12 +74,12 @@ def _run(mode: str, file: Path, source: str, tests: list[str], note: Path, limit
         turn_to(mode)
         return pytest_quietly(["-x", *tests], [_Note(note)])
 
-    with _instead(file, source) as package, _code_of_the_true(package, mode):
+    with _instead(file, source):
         return in_a_child(tried, limit_s)
 
 
 @contextlib.contextmanager
-def _instead(file: Path, source: str) -> Iterator[Path]:
+def _instead(file: Path, source: str) -> Iterator[None]:
     """A package of links to the true one but for one file comes first, for what tests start as well."""
     with tempfile.TemporaryDirectory() as folder:
         package = Path(folder) / "src" / PACKAGE.name
@@ -99,36 +96,7 @@ def _instead(file: Path, source: str) -> Iterator[Path]:
         mutant.unlink()
         mutant.write_text(source)
         with _first(str(package.parent)):
-            yield package
-
-
-@contextlib.contextmanager
-def _code_of_the_true(package: Path, mode: str) -> Iterator[None]:
-    """Compiled code is kept under a name of its sources, glue among them, and of what is in each kernel: code
-    that a mutant leaves as it is need not be compiled again.
-    """
-    true, its = map(_code_of, (PACKAGE, package)) if mode == COMPILED else (None, None)
-    if true is None or its is None or its == true:
-        yield
-        return
-    shutil.copytree(true, its, dirs_exist_ok=True)
-    try:
-        yield
-    finally:
-        shutil.rmtree(its, ignore_errors=True)
-
-
-def _code_of(package: Path) -> Path | None:
-    return _by_itself("paths").cache_of_version(_by_itself("sources").fingerprint(package))
-
-
-@cache
-def _by_itself(name: str) -> ModuleType:
-    """A module of the package's documents/, without the package: that is a mutant's to load."""
-    spec = importlib.util.spec_from_file_location(f"true_{name}", PACKAGE / "documents" / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+            yield
 
 
 @contextlib.contextmanager

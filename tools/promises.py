@@ -1,0 +1,81 @@
+"""`python -m tools.promises`: what the project promises, and which tests hold each promise.
+
+tests/promises.yaml has the promises in words and the names of their tests. Exit status 1 if a promise has no
+test that `make test` runs, or a test that is named does not exist.
+"""
+
+import ast
+import sys
+from collections.abc import Collection, Iterator
+from fnmatch import fnmatchcase
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+TESTS = Path(__file__).parents[1] / "tests"
+
+
+def table() -> dict[str, Any]:
+    """By its name: what a promise says, and the names of its tests."""
+    found: dict[str, Any] = yaml.safe_load((TESTS / "promises.yaml").read_text(encoding="utf-8"))
+    return found
+
+
+@cache
+def at_night() -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """How the names of tests begin that `make test` leaves out, and of those among them that it runs."""
+    rows = yaml.safe_load((TESTS / "nightly.yaml").read_text(encoding="utf-8"))
+    night, day = (tuple(name for row in rows for name in row[when]) for when in ("night", "day"))
+    return night, tuple(name for name in day if name.startswith(night))
+
+
+def is_at_night(test: str, lists: tuple[tuple[str, ...], tuple[str, ...]] | None = None) -> bool:
+    """Whether `make test` leaves a test out."""
+    night, day = lists or at_night()
+    return test.startswith(night) and not (day and test.startswith(day))
+
+
+def tests() -> Iterator[str]:
+    """The name of every test function, as pytest writes it, without parameters."""
+    for file in sorted(TESTS.rglob("test_*.py")):
+        name = f"tests/{file.relative_to(TESTS).as_posix()}"
+        body = ast.parse(file.read_text(encoding="utf-8")).body
+        yield from (f"{name}::{test}" for test in _tests_of(body))
+        for node in body:
+            if isinstance(node, ast.ClassDef):
+                yield from (f"{name}::{node.name}::{test}" for test in _tests_of(node.body))
+
+
+def _tests_of(body: list[ast.stmt]) -> Iterator[str]:
+    return (node.name for node in body if isinstance(node, ast.FunctionDef) and node.name.startswith("test"))
+
+
+def doubts(
+    promised: dict[str, Any],
+    known: Collection[str],
+    lists: tuple[tuple[str, ...], tuple[str, ...]] | None = None,
+) -> Iterator[str]:
+    """What is wrong with a table: a line a promise without a test, and a test that is not there."""
+    for name, row in promised.items():
+        found = {test: [each for each in known if fnmatchcase(each, test)] for test in row["tests"]}
+        yield from (f"{name}: no such test: {test}" for test, there in found.items() if not there)
+        if not [each for there in found.values() for each in there if not is_at_night(each, lists)]:
+            yield f"{name}: no test of every day holds it"
+
+
+def main() -> int:
+    """Print the table, then what is wrong with it."""
+    for name, row in table().items():
+        print(f"{name}: {row['says']}")
+        for test in row["tests"]:
+            print(f"    {test}")
+    found = list(doubts(table(), frozenset(tests())))
+    for line in found:
+        print(line, file=sys.stderr)
+    return bool(found)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -2,6 +2,7 @@
 
     python benchmarks/sensor_faults.py --flights 500 --seed 1
     python benchmarks/sensor_faults.py --flights 500 --seed 1 --sound
+    python benchmarks/sensor_faults.py --flights 2000 --seed 1 --at-start
 
 Every flight has one broken instrument, its own rate (20 to 200 Hz), JSBSim frames per frame, airspeed,
 references, fault class and law, and every second one the statistical detector. `surface` counts a flight in
@@ -12,20 +13,26 @@ With --sound no instrument breaks. Each has errors of its own, as large as decla
 10 JSBSim frames per frame, in hard manoeuvres, wind and turbulence, while law, diagnosis and sensors are
 changed, in every third flight with a broken surface. Each scenario with an alarm between the instruments, or
 with any but no fault, is printed: `beaver-ftc run` flies it.
+
+With --at-start the instrument is broken before the diagnosis first reads it: at 0 s, or while an earlier
+diagnosis runs, which a change then replaces. Aircraft, instrument, type, size, declared errors and turbulence
+are drawn. Nothing anchors the reading then, so that some stay open; each flight in which a sound instrument
+or a surface is the last name is printed as a scenario. --later flies the same with the fault in mid-flight.
 """
 
 import argparse
 import json
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from beaver_ftc.diagnosis.watch import instrument_found
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.scenario.loader import load
-from beaver_ftc.scenario.sensors import PRESETS, Sensors
+from beaver_ftc.scenario.sensors import ENGINE, PRESETS, Sensors
 
 TYPES = ("bias", "freeze", "noise", "scale", "lost")
 SIZES = {
@@ -64,9 +71,9 @@ def draw(rng: np.random.Generator, bounds: str, turbulent: bool) -> dict[str, An
     return words
 
 
-def fault(rng: np.random.Generator) -> dict[str, Any]:
-    """One instrument's fault."""
-    sensor, kind = str(rng.choice(list(SIZES))), str(rng.choice(TYPES))
+def fault(rng: np.random.Generator, names: Sequence[str] = tuple(SIZES)) -> dict[str, Any]:
+    """The fault of one of the instruments `names`."""
+    sensor, kind = str(rng.choice(list(names))), str(rng.choice(TYPES))
     drawn: dict[str, Any] = {"sensor": sensor, "type": kind, "at_s": rng.uniform(4, 10)}
     low, high = np.log(SIZES[sensor])
     size = float(np.exp(rng.uniform(low, high)))
@@ -80,15 +87,15 @@ def fault(rng: np.random.Generator) -> dict[str, Any]:
     return drawn
 
 
-def fly(words: dict[str, Any]) -> tuple[str, bool]:
-    """What became of a flight: its outcome, and whether the aircraft was lost."""
+def fly(words: dict[str, Any], last: bool = False) -> tuple[str, bool]:
+    """What became of a flight: its outcome, and whether it was lost; last: by the last name only."""
     loop = Loop(load(words))
     for _ in loop.chunks():
         pass
     frame = loop.frames[0]
     said = instrument_found(frame["fdi"]["watch"], float(frame["t"]))
     lost = bool(frame["departed"])
-    if frame["fdi"]["verdict"]["isolated"] >= 0 or frame["fdi"]["watch"]["misnamed"]:
+    if frame["fdi"]["verdict"]["isolated"] >= 0 or (frame["fdi"]["watch"]["misnamed"] and not last):
         return "surface", lost
     if said is None:
         return ("unanticipated" if frame["fdi"]["verdict"]["detected"] else "no alarm"), lost
@@ -110,6 +117,72 @@ def errors(rng: np.random.Generator) -> Any:
         return str(rng.choice(list(PRESETS)))
     fields = Sensors.model_fields.items()
     return {name: _errors_of(rng, name, field.annotation) for name, field in fields if rng.random() < 0.4}
+
+
+def draw_at_start(rng: np.random.Generator, aircraft: str, later: bool) -> dict[str, Any]:
+    """A flight in which an instrument is broken before the diagnosis first reads it; later: afterwards."""
+    known = load({"aircraft": aircraft}).airframe
+    turbulent = str(rng.choice(["none", "none", "none", "light", "moderate"]))
+    sensors = errors(rng) if rng.random() < 0.6 else "ideal"
+    trimmed = load({"aircraft": aircraft}).initial
+    broken = fault(rng, tuple(name for name in SIZES if known.has_engine_instruments or name not in ENGINE))
+    duration_s, anew_s = float(rng.uniform(4, 15)), float(rng.uniform(0.5, 3))
+    anew = rng.random() < 0.4
+    broken["at_s"] = float(rng.choice([0.0, rng.uniform(0, anew_s), anew_s])) if anew else 0.0
+    if later:
+        broken["at_s"] = rng.uniform(0.3, 0.8) * duration_s + (anew_s if anew else 0.0)
+    words: dict[str, Any] = {
+        "name": "broken-at-start",
+        "aircraft": aircraft,
+        "duration_s": duration_s + (anew_s if anew else 0.0),
+        "rate_hz": float(rng.choice([20, 50, 100, 200])),
+        "substeps": int(rng.choice([1, 1, 2, 5])),
+        "seed": int(rng.integers(2**31)),
+        "initial": {"airspeed_mps": trimmed.airspeed_mps * rng.uniform(0.9, 1.15)},
+        "reference": _gentle(rng) if rng.random() < 0.8 else {},
+        "faults": [broken],
+        "changes": [{"at_s": anew_s, "scheme": "adaptive-estimators"}] if anew else [],
+        "sensors": sensors,
+        "environment": {"turbulence": "dryden", "severity": turbulent} if turbulent != "none" else {},
+        "fdi": {
+            "fault_class": str(rng.choice(["published", "all"])),
+            "bounds": {"sensors": sizes_of(sensors), "turbulence": turbulent},
+        },
+        "control": {"law": str(rng.choice(["fault-tolerant", "nominal", "lqr"]))},
+    }
+    words["fdi"] |= {"statistical": {}} if rng.random() < 0.5 else {}
+    return words
+
+
+def _gentle(rng: np.random.Generator) -> dict[str, Any]:
+    """Sines about each axis, some from later on."""
+
+    def sine() -> dict[str, Any]:
+        size, frequency_hz = float(rng.uniform(1, 8)), float(rng.uniform(0.1, 0.6))
+        start_s = float(rng.choice([0.0, 0.0, rng.uniform(0, 4)]))
+        phase_deg = float(rng.uniform(0, 360))
+        words = {"amplitude_deg_s": size, "frequency_hz": frequency_hz, "phase_deg": phase_deg}
+        return {"sine": words | {"start_s": start_s}}
+
+    return {axis: [sine()] for axis in "pqr" if rng.random() < 0.8}
+
+
+def fly_at_start(count: int, first: int, seed: int, aircraft: list[str], later: bool) -> None:
+    """Fly so many with an instrument broken at the start; print those whose last name is of a sound part."""
+    found: dict[tuple[str, str], Counter[str]] = {}
+    for i in range(first, first + count):
+        rng = np.random.default_rng([seed, i])
+        words = draw_at_start(rng, aircraft[i % len(aircraft)], later)
+        try:
+            outcome, _ = fly(words, last=True)
+        except BadInput as refused:  # this draw cannot be flown
+            print(f"{i}: {refused}", flush=True)
+            continue
+        broken = words["faults"][0]
+        found.setdefault((broken["sensor"], broken["type"]), Counter())[outcome] += 1
+        if outcome in ("other sensor", "surface"):
+            print(i, outcome, json.dumps(words), flush=True)
+    print("\n".join(table(found)))
 
 
 def _errors_of(rng: np.random.Generator, name: str, kind: Any) -> dict[str, float]:
@@ -250,10 +323,19 @@ def main() -> None:
     parser.add_argument("--declared", default="ideal", help="errors of all instruments, had and declared")
     parser.add_argument("--turbulence", action="store_true", help="light turbulence, had and declared")
     parser.add_argument("--sound", action="store_true", help="no broken instrument: nothing may alarm")
+    parser.add_argument("--at-start", action="store_true", help="broken before the diagnosis first reads it")
+    parser.add_argument(
+        "--later", action="store_true", help="the flights of --at-start, broken in mid-flight"
+    )
+    parser.add_argument("--first", type=int, default=0, help="number of the first flight, with --at-start")
+    parser.add_argument("--aircraft", nargs="+", default=["beaver"], help="in turn, with --at-start")
     parser.add_argument("--verbose", action="store_true", help="every flight that is not `named`")
     given = parser.parse_args()
     if given.sound:
         fly_sound(given.flights, given.seed)
+        return
+    if given.at_start or given.later:
+        fly_at_start(given.flights, given.first, given.seed, given.aircraft, given.later)
         return
     found: dict[tuple[str, str], Counter[str]] = {}
     losses = alarms = 0

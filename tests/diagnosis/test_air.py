@@ -19,6 +19,7 @@ from beaver_ftc.diagnosis import air
 from beaver_ftc.diagnosis.air import AIR
 from beaver_ftc.diagnosis.bounds import variances
 from beaver_ftc.loop.loop import Loop
+from beaver_ftc.scenario.diagnosis import Bounds
 from beaver_ftc.scenario.loader import load as load_given
 from flying import scenario
 
@@ -30,7 +31,7 @@ FT = 0.3048
 def air_of(turbulence="light"):
     """The record as before a flight."""
     record = np.zeros(1, AIR).view(np.recarray)[0]
-    air.set_up_air(record, turbulence, MASS, load())
+    air.set_up_air(record, Bounds(turbulence=turbulence), MASS, load())
     return record
 
 

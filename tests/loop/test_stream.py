@@ -180,3 +180,18 @@ def own_aircraft(folder):
 def test_a_name_is_no_aircraft_of_a_stream():
     with pytest.raises(bf.BadInput, match=r"aircraft: 'beaver' is none, allowed: what aircraft\(\) gives"):
         bf.Diagnosis("beaver", rate_hz=100)
+
+
+def test_declared_turbulence_follows_the_altitude_that_is_given():
+    """The scale of turbulence is shorter near the ground: gusts turn the air faster [MIL-F-8785C]."""
+    bounds = {}
+    for altitude_m in (None, 1828.8, 20.0):
+        diagnosis = bf.Diagnosis(bf.aircraft("beaver"), 100, {"bounds": {"turbulence": "light"}})
+        sample = [0.01, 0.02, 0.03], [0.1, 0.01, 45.0, 1000.0, 0.2], [0.0] * 4, [0.0, 0.1, 0.0]
+        for _ in range(3):
+            diagnosis.step(*sample, altitude_m)
+        bounds[altitude_m] = diagnosis.surprise()[1]
+    assert (bounds[None] == bounds[1828.8]).all()
+    assert (bounds[20.0] > bounds[1828.8]).all()
+    with pytest.raises(bf.BadInput, match="is not finite"):
+        diagnosis.step(*sample, np.nan)

@@ -106,7 +106,25 @@ GUST = {"at_s": 1, "velocity_mps": [0, 0, 5]}
                 "initial": {"altitude_m": 500},
                 "fdi": {"bounds": {"turbulence": "light"}},
             },
-            ["initial.altitude_m: 500 is below 609.6 m"],
+            [],
+        ),
+        (
+            {"environment": {"wind_mps": [3, -2, 1.5]}, "fdi": {"sensor_monitor": "always"}},
+            ["environment: vertical wind of 1.5 m/s is more than fdi.bounds.vertical_wind_mps, 1:"],
+        ),
+        (
+            {
+                "environment": {"wind_mps": [3, -2, -1.5]},
+                "fdi": {"sensor_monitor": "always", "bounds": {"vertical_wind_mps": 1.6}},
+            },
+            [],
+        ),
+        (
+            {
+                "environment": {"wind_mps": [0, 0, 0.7], "gust": {**GUST, "velocity_mps": [1, 2, 0.4]}},
+                "fdi": {"sensor_monitor": "always"},
+            },
+            ["environment.gust: what a gust does", "environment: vertical wind of 1.1 m/s is more than"],
         ),
     ],
 )

@@ -12,6 +12,15 @@ GTM's, accelerometers say them; without these no gust is seen: a change of the a
 would be taken for one. It is only shown, as it would be if lift held the weight: fast changes are the gust's,
 and a law that answers the vanes moves the surfaces along with its rotation, as if they were lost.
 
+V in these equations is the speed at which the aircraft passes through the field of gusts. The mean wind
+carries that field [MIL-F-8785C, 3.7.1], so V is the speed through the mean air. The airspeed differs from it
+by the gust itself. The changes of the gust are seen, so their sum is known but for what it was at the start,
+and for the drift of accelerometers and attitude: `blown` is that sum, and forgets as slowly as that drift
+lets it. A speed that is off by a share e lets a gust be off by e of itself where it turns as slowly as it
+returns: of its intensity that is e^2 / 4 (`passing_doubt`).
+
+The strength of turbulence is that above 2000 ft, or that at the height flown where this is more.
+
 Velocity is followed as JSBSim moves it, by Adams and Bashforth's two steps: v' = v + dt (3 a - a_before) / 2.
 """
 
@@ -26,10 +35,15 @@ from beaver_ftc.aircraft.units import GRAVITY_MPS2
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.model import rate_damping
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, QDYN, TABLE, evaluate, fill_table, whole_sum
-from beaver_ftc.diagnosis.bounds.declared import SCALE_M, Errors
+from beaver_ftc.diagnosis.bounds.declared import EARTH_RATE_RAD_S, SCALE_M, Errors, gust_mps
 from beaver_ftc.diagnosis.bounds.variances import drift as gust_drift
+from beaver_ftc.diagnosis.bounds.variances import drift_at_1_m as gust_drift_at_1_m
 from beaver_ftc.diagnosis.bounds.variances import flow_noise, jitter, length_of_gusts
+from beaver_ftc.diagnosis.bounds.worst_case import least_height
+from beaver_ftc.diagnosis.redundancy import FALLING_M_S2
 from beaver_ftc.plant.instruments import wrapped
+from beaver_ftc.scenario.diagnosis import Bounds
+from beaver_ftc.scenario.warnings import MASS_TOLERANCE
 
 # Share of the intensity of the rolling, pitching and yawing gust that the vanes leave; on exact vanes and
 # over a filter's memory it is less (`tests/diagnosis/test_air.py`).
@@ -37,6 +51,9 @@ UNSEEN = (1.0, 0.003, 0.03)
 BY_FORCE = 0.01  # share of the intensity that errors of a tenth leave of the gusts that forces show
 TWO_STEPS = 1.6  # times its noise does an acceleration scatter by Adams and Bashforth: sqrt(1.5^2 + 0.5^2)
 STEEP = 0.5  # cosine of the steepest bank at which lift is taken to hold the weight
+STRONGEST = 4.0  # standard deviations: no gust is taken for stronger
+SLOPE_RAD = 0.3  # of the path, along which gravity acts
+DRAG = 0.3  # of the weight, at most: what errors of the coefficients are a share of
 LEAST_SWING = 0.01  # of a gust's own intensity: less is not reckoned with
 
 AIR = record(
@@ -51,7 +68,15 @@ AIR = record(
     gust=3, rotation=3, damping=(3, 3),
     acceleration=3,  # at this instant
     total=3, mean=3,  # over the instants of a frame; over the elapsed one
-    per_metre=3,  # intensity of the rotation's drift over airspeed, rad2/s3 per m/s
+    per_metre=3,  # intensity of the rotation's drift over airspeed, rad2/s3 per m/s, at this height
+    aloft=3, low=3,  # the same above 2000 ft; at a height of 1 m
+    altitude_off=float, altitude_slope=float,  # how far the altimeter's reading can be off, m; as a share
+    # The gust's velocity since the start, m/s ahead, right, down; its largest component; how fast it is
+    # forgotten, 1/s; speed through the mean air, m/s.
+    blown=3, strongest=float, forgets=float, speed=float,
+    # Variance, (m/s)2, that the speed is off by; that of a gust there was at the start, and which share of it
+    # is still unknown; share of a gust's intensity per square of the relative error.
+    spread=float, gusty=float, fresh=float, doubt=float,
     unseen=3,  # share of it that the vanes do not show
     rolling=float,  # lag of the rolling gust times airspeed, m
     # Scale of the gusts, m; share of a yawing one that turning loses at this instant, and that is lost.
@@ -114,7 +139,8 @@ def begin(air, y, attitude):
     turn_gusts(air, 0.0, 1.0)
     air.gust[:] = 0.0
     air.started, air.lost = 0, 0.0
-    air.turning = air.late = float(air.in_flight)
+    air.turning = air.late = air.fresh = float(air.in_flight)
+    air.blown[:], air.speed = 0.0, y[AIRSPEED]
     air.leaping[:], air.leapt[:], air.leap[:], air.leaps = 0.0, 0.0, 0.0, 0
 
 
@@ -176,11 +202,16 @@ def observe(air, y, attitude, dt):
         air.velocity[i] += dt * (1.5 * pulled[i] - 0.5 * air.pull[i])
     turned = wrapped(attitude[2] - air.heading)
     sin, cos = np.sin(turned), np.cos(turned)
-    right, down = air.velocity[1] * cos - air.velocity[0] * sin, air.velocity[2]
+    ahead, right = (
+        air.velocity[0] * cos + air.velocity[1] * sin,
+        air.velocity[1] * cos - air.velocity[0] * sin,
+    )
+    down = air.velocity[2]
     air.pull[0], air.pull[1] = pulled[0] * cos + pulled[1] * sin, pulled[1] * cos - pulled[0] * sin
     air.pull[2] = pulled[2]
     advance_axes(air, y, attitude)
-    V = y[AIRSPEED]
+    pass_through(air, ahead, right, down, y[AIRSPEED], dt)
+    V = air.speed
     turn_gusts(air, sin, cos)
     note_swing(air, dt, V)
     pitching, yawing = 4.0 * air.span / (pi * V), 3.0 * air.span / (pi * V)  # lags, s
@@ -192,6 +223,36 @@ def observe(air, y, attitude, dt):
     air.gust[2] = np.exp(-dt / yawing) * air.gust[2]
     if lost < 1.0:
         air.gust[2] += (right - air.velocity[1]) / (V * yawing)
+    else:
+        air.blown[:], air.fresh = 0.0, 1.0
+
+
+@kernel
+def pass_through(air, ahead, right, down, V, dt):
+    """Bring `blown` and `speed` to this instant, dt s after the one before: ahead, right, down, m/s, is the
+    velocity through air whose gust had not changed. V m/s: airspeed, which serves where no gust is seen."""
+    air.speed = V
+    if not air.seen:
+        return
+    kept = np.exp(-air.forgets * dt)
+    air.fresh *= kept * kept
+    air.blown[0] = kept * air.blown[0] + ahead - air.velocity[0]
+    air.blown[1] = kept * air.blown[1] + right - air.velocity[1]
+    air.blown[2] = kept * air.blown[2] + down - air.velocity[2]
+    squared = 0.0
+    for i in range(3):
+        air.blown[i] = min(max(air.blown[i], -air.strongest), air.strongest)
+        squared += (air.velocity[i] + air.blown[i]) ** 2
+    air.speed = max(np.sqrt(squared), 0.5 * V)
+
+
+@kernel
+def reach_height(air, altitude):
+    """Bring the strength of the turbulence to this altitude, m as measured."""
+    height = least_height(altitude, air.altitude_off, air.altitude_slope)
+    air.per_metre[0] = max(air.aloft[0], air.low[0] / height**1.5)
+    for g in range(1, 3):
+        air.per_metre[g] = max(air.aloft[g], air.low[g] / height)
 
 
 @kernel
@@ -262,8 +323,10 @@ def no_longer_read(air):
 @kernel
 def hidden(air, g):
     """Share of the gust about axis g that the vanes do not show in this frame."""
-    further = 0.0 if g == 0 else (air.late if g == 1 else air.turning)
-    return min(air.unseen[g] + further, 1.0)
+    if g == 0:
+        return min(air.unseen[g], 1.0)
+    off = air.doubt * (air.spread + air.fresh * air.gusty) / max(air.speed, 1.0) ** 2 if air.seen else 0.0
+    return min(air.unseen[g] + off + (air.late if g == 1 else air.turning), 1.0)
 
 
 @kernel
@@ -287,7 +350,7 @@ def unseen_drift(air, V, i, j, slow=False):
     for g in range(3):
         share = sooner(air, g) if slow else 1.0
         total += together(air, air.axes, i, j, g) * hidden(air, g) * air.per_metre[g] * share
-    return total * V
+    return total * max(V, air.speed)
 
 
 @kernel
@@ -331,7 +394,7 @@ def whole_drift(air, V, felt, by_forces):
         total += by_both**2 * air.per_metre[g]
         if air.swings:
             total += 0.5 * longest_s * longest_s * air.per_metre[g] * along(felt, air.swing, g) ** 2
-    return total * V
+    return total * max(V, air.speed)
 
 
 @kernel
@@ -342,7 +405,7 @@ def drift_beside(air, V, by_rates, by_forces):
     for g in range(3):
         of_rates = np.sqrt(hidden(air, g)) * abs(along(by_rates, air.axes, g))
         total += (of_rates + abs(along(by_forces, air.axes, g))) ** 2 * air.per_metre[g]
-    return total * V
+    return total * max(V, air.speed)
 
 
 @kernel
@@ -362,7 +425,8 @@ def together(air, axes, i, j, g):
     return on_i * on_j
 
 
-def set_up_air(air: np.void, turbulence: str, mass: MassProperties, aircraft: Aircraft) -> None:
+def set_up_air(air: np.void, bounds: Bounds, mass: MassProperties, aircraft: Aircraft) -> None:
+    turbulence, errors = bounds.turbulence, Errors(bounds.sensors)
     span_m = aircraft.geometry.span_m
     air["moving"], air["modelled"] = turbulence != "none", bool(aircraft.measurable_forces)
     air["seen"] = air["modelled"] or air["read"]  # only where forces are known
@@ -371,7 +435,9 @@ def set_up_air(air: np.void, turbulence: str, mass: MassProperties, aircraft: Ai
     air["area_per_mass"] = aircraft.geometry.wing_area_m2 / mass.mass_kg
     air["gravity"] = GRAVITY_MPS2  # standard; what is constant has no part in a change of the gust
     air["span"] = span_m
-    air["per_metre"], air["unseen"] = gust_drift(turbulence, span_m), UNSEEN if air["seen"] else 1.0
+    air["aloft"], air["low"] = gust_drift(turbulence, span_m), gust_drift_at_1_m(turbulence, span_m)
+    air["per_metre"], air["unseen"] = air["aloft"], UNSEEN if air["seen"] else 1.0
+    air["altitude_off"], air["altitude_slope"] = errors["altitude"].worst, errors["altitude"].slope
     air["scale"] = SCALE_M
     air["rolling"] = length_of_gusts(span_m)[0]
 
@@ -390,3 +456,41 @@ def set_up_jitter(
         statistical["forces"]["blurred"] = jitter(by_force, design, y, u, span_m)
     for name in ("own_jitter", "jitter"):
         statistical["noise"][name] += jitter(flow, design, y, u, span_m) ** 2
+
+
+def set_up_passing(air: np.void, bounds: Bounds, level: float, airspeed_mps: float) -> None:
+    """How well the speed through the mean air is known, from an airspeed in trim, and how fast the sum of the
+    gust's changes is forgotten; level: of the alarm, in standard deviations.
+
+    An acceleration off by b, m/s2, lets a sum that forgets at a rate a be off by b / a; and of a gust of
+    deviation sigma that returns at a rate V / L such a sum misses a variance of sigma^2 a / (a + V / L). Both
+    together are least near a^3 = 2 b^2 V / (L sigma^2).
+    """
+    sigma, errors = gust_mps(bounds.turbulence), Errors(bounds.sensors)
+    if not (air["moving"] and air["seen"]):
+        return
+    returns, V = airspeed_mps / SCALE_M, errors["V"]
+    drift = 2.0 * EARTH_RATE_RAD_S * airspeed_mps + SLOPE_RAD * FALLING_M_S2  # Coriolis; gravity with place
+    drift += GRAVITY_MPS2 * (errors["phi"].steady + errors["theta"].steady)
+    if air["read"]:
+        drift += errors["ax"].steady + GRAVITY_MPS2 * DRAG * errors["ax"].slope
+    else:
+        given = bounds.coefficients
+        share = max(given.values(), default=0.0) if isinstance(given, dict) else given
+        drift += GRAVITY_MPS2 * DRAG * (share + MASS_TOLERANCE)
+    forgets = (2.0 * drift**2 * returns / sigma**2) ** (1.0 / 3.0)
+    air["gusty"], air["strongest"], air["forgets"] = sigma**2, STRONGEST * sigma, forgets
+    air["spread"] = sigma**2 * forgets / (forgets + returns) + (drift / forgets) ** 2 + V.random**2
+    air["spread"] += (V.steady + V.slope * airspeed_mps) ** 2
+    air["doubt"] = passing_doubt(level)
+
+
+def passing_doubt(level: float) -> float:
+    """Share of a gust's intensity that a relative error of the speed leaves, over its variance.
+
+    A speed off by a share e leaves the gust's equation an error of (e / tau) q, of the spectrum
+    e^2 (w / tau)^2 / (w^2 + 1 / tau^2)^2 times that of a walk of the gust's intensity: e^2 / 4 at most. e is
+    a normal number of its own beside the noise: the product of two passes x deviations with a chance of
+    exp(-x), which is that of the alarm level, exp(-level^2 / 2), where e is taken to be level / 2 deviations.
+    """
+    return (0.5 * level) ** 2 / 4.0

@@ -20,7 +20,7 @@ from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, PH, QDYN, RH, directi
 from beaver_ftc.design.variants import jacobian
 from beaver_ftc.diagnosis import likelihood
 from beaver_ftc.diagnosis.across import AN_AXIS, Direction, across_a_column, set_up_views, views_of
-from beaver_ftc.diagnosis.air import BY_FORCE, UNSEEN, set_up_air, set_up_jitter
+from beaver_ftc.diagnosis.air import BY_FORCE, UNSEEN, set_up_air, set_up_jitter, set_up_passing
 from beaver_ftc.diagnosis.bounds.declared import Errors
 from beaver_ftc.diagnosis.bounds.variances import axis_of, length_of_gusts, steady_tolerance
 from beaver_ftc.diagnosis.forces import set_up_forces
@@ -115,11 +115,12 @@ def set_up(
     airspeed_mps, pace = float(start[1][AIRSPEED]), pace_of(given, aircraft, dt_s)
     tests["enabled"], tests["share"] = 1, 1.0 / max(instants, 1)
     tests["mapped"] = aircraft.file.model_error_map is not None and not loses_surfaces(aircraft)
-    set_up_air(air, config.bounds.turbulence, mass, aircraft)
+    set_up_air(air, config.bounds, mass, aircraft)
     forces = bool(statistical["forces"]["known"])
     across = across_a_column(config, instants)
     n_tests = tests_a_frame(aircraft, *(views_of(aircraft, forces) if across else ()))
     tests["alarm_level"] = alarm_level(given.false_alarms_per_h, rate_hz, n_tests)
+    set_up_passing(air, config.bounds, float(tests["alarm_level"]), airspeed_mps)
     tests["naming_level"] = naming_level(given.misnaming, rate_hz, aircraft)
     tests["keep"] = exp(-1.0 / (rate_hz * config.forgetting_time_s))
     _set_up_blocks(statistical, errors, aircraft)

@@ -16,6 +16,7 @@ turbulence widens the bounds of flow and climb by what its gusts do within a fil
 import numpy as np
 
 from beaver_ftc.compiled import kernel
+from beaver_ftc.diagnosis.bounds.worst_case import LEAST_HEIGHT_M
 from beaver_ftc.diagnosis.thresholds import bound_step, noise_step
 from beaver_ftc.diagnosis.watch import (
     AIRSPEED,
@@ -41,7 +42,6 @@ from beaver_ftc.plant.instruments import ALTITUDE, AX, ENGINE_SPEED, MANIFOLD, N
 
 TURNING_RAD_S = 4e-5  # Earth rate is in the rates; the level turns with the flight over the round Earth
 FALLING_M_S2 = 0.03  # Coriolis, centrifugal, and gravity's change with place
-CLIMBING_M_S = 1.0  # vertical wind
 DENSITY_HEIGHT_M = 6300.0  # over which the density falls by no more than a factor e: in the stratosphere
 STEEPEST_RAD = 1.3  # beyond, roll and heading are not to be told apart
 
@@ -226,6 +226,13 @@ def allow_turning(step, signal, turning, rates):
 
 
 @kernel
+def lowest(step, signal):
+    """The least height of the two looks, m, that the altimeter leaves."""
+    now, then = signal[ALTITUDE] - step.error[ALTITUDE], step.then[ALTITUDE] - step.error_then[ALTITUDE]
+    return max(min(now, then), LEAST_HEIGHT_M)
+
+
+@kernel
 def allow_flow(step, signal, turning, rates):
     """The same, of flow and climb: slopes of their kinematics with each reading, where they are greatest."""
     test, e, E, n = step.test, step.error, step.error_then, step.changing
@@ -234,7 +241,7 @@ def allow_flow(step, signal, turning, rates):
     aslant, vanes = 1.0 / np.cos(min(slip, STEEPEST_RAD)), E[ALPHA] + E[BETA]
     off = misjudged(step, turning, rates)
     pull, coarse = step.pull + off, 1.0 + step.h * (2.0 * step.pull / slow + turning)
-    gusty = np.sqrt(max(signal[AIRSPEED] / step.swift, 1.0))
+    gusty = np.sqrt(max(signal[AIRSPEED] / step.swift, 1.0) * max(step.low / lowest(step, signal), 1.0))
     flow = aslant**2 * ((off + pull * (vanes + E[AIRSPEED] / slow)) / slow + turning * vanes) + aslant * rates
     test[SPEED].air, test[SPEED].noise = gusty, n[AIRSPEED]
     test[SPEED].rate = off + coarse * pull * vanes + step.h * (pull / slow) ** 2 * E[AIRSPEED]
@@ -242,7 +249,7 @@ def allow_flow(step, signal, turning, rates):
         test[c].air, test[c].noise, test[c].rate = gusty * aslant / slow, n[vane], coarse * flow
     tilt, hardest = E[PHI] + E[THETA], max(pull, step.pulled[0], step.pulled[1])
     climb = (step.then[AIRSPEED] + E[AIRSPEED]) * (tilt + vanes) + E[AIRSPEED]
-    test[CLIMB].rate = CLIMBING_M_S + step.gust + climb + 4.0 / 3.0 * step.h * hardest
+    test[CLIMB].rate = step.rising + step.gust + climb + 4.0 / 3.0 * step.h * hardest
     test[CLIMB].noise = n[ALTITUDE]
 
 
@@ -258,7 +265,7 @@ def reciprocal_moved(step, signal, i):
 def allow_density(step, signal):
     """The same, of the logarithm of the density."""
     test, e, n = step.test[DENSITY], step.error, step.changing
-    fastest = step.then[AIRSPEED] + step.error_then[AIRSPEED] + CLIMBING_M_S + step.gust
+    fastest = step.then[AIRSPEED] + step.error_then[AIRSPEED] + step.rising + step.gust
     seems = reciprocal_moved(step, signal, QDYN) + 2.0 * reciprocal_moved(step, signal, AIRSPEED)
     test.rate = fastest / DENSITY_HEIGHT_M + seems / step.h
     test.noise = n[QDYN] / max(signal[QDYN] - e[QDYN], 1.0)

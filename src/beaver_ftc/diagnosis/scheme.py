@@ -155,6 +155,7 @@ def isolate_type(types, conclusion, layout, isolation, bank, bound, t, started):
 def see_air(seen, inertial, felt, belief, measured, k, dt):
     """Take in the air as the vanes see it, and what the accelerometers say of it (forces.py)."""
     if seen.moving:
+        air.reach_height(seen, measured.altitude)
         air.follow(seen, measured.y, measured.attitude, belief.share * dt, k)
     if (felt.known or seen.read) and not measured.inertial:
         forces.do_without(felt, seen, inertial)
@@ -171,6 +172,7 @@ def weigh_forces(seen, inertial, felt, belief, measured, k, dt):
     if inertial.moving:
         forces.without_vanes(felt, inertial.rotation, measured.y)
         inertial.felt[:] = measured.force
+        air.reach_height(inertial, measured.altitude)
         air.follow(inertial, felt.y, measured.attitude, dt, k)
         air.effect(inertial, belief.design, measured.x, felt.y, belief.u)
         air.begin_frame(inertial, felt.y[AIRSPEED], dt)

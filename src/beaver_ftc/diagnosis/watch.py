@@ -30,6 +30,8 @@ STEP = record(
     # of the declared turbulence: its speed at most, m/s, and what passes each filter of a gust's changes
     # up to an airspeed m/s
     gust=float, gusts=N_POLES, swift=float,
+    low=float,  # height below which a gust changes faster than those of 2000 ft, m
+    rising=float,  # vertical wind at most, m/s
     # declared: the whole error of a reading, and what of it changes; drift of the attitude
     offset=N_SENSORS, slope=N_SENSORS, steady=N_SENSORS, drift=float, error=N_SENSORS, changing=N_SENSORS,
     # drift so far, rad; the errors of the look before, and of the one before that

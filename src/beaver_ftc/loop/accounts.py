@@ -13,6 +13,7 @@ import numpy as np
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.control.supervisor import MAX_EVENTS
 from beaver_ftc.design.model import unanticipated_pitch
+from beaver_ftc.diagnosis.bounds.worst_case import N_PLACES, age_of, is_beyond
 from beaver_ftc.diagnosis.state import PITCH
 from beaver_ftc.plant.sensing import effective, effectiveness, position
 from beaver_ftc.scenario.diagnosis import MAX_POLES
@@ -30,6 +31,15 @@ AUTHORITY = record(demanded=3, lacking=3, beyond_frames=(int, 3))
 ENVELOPE = record(
     outside=int, n_exits=int, outside_frames=int, exit_at_s=MAX_EVENTS, return_at_s=MAX_EVENTS,
 )  # fmt: skip
+# Frames in which the diagnosis concludes nothing, of so many watched. undiagnosed: there is none. late: the
+# flight is
+# older than any that was measured. beyond: outside the map of the model's error in this quantity, which was
+# then
+# between least and greatest. between: inside the range of each quantity, but in no box of the map.
+INCONCLUSIVE = record(
+    watched=int, frames=int, from_s=float, undiagnosed=int, late=int, between=int,
+    beyond=(int, N_PLACES), least=N_PLACES, greatest=N_PLACES,
+)  # fmt: skip
 
 
 @lru_cache
@@ -38,6 +48,7 @@ def accounts_dtype(n: int) -> np.dtype:
     (n,) rad2/s: the integral of the speed's square."""
     return record(
         guarantee=GUARANTEE, tracking=TRACKING, authority=AUTHORITY, envelope=ENVELOPE,
+        inconclusive=INCONCLUSIVE,
         saturated_frames=(int, n), travelled=n, hurried=n, position_then=n,
     )  # fmt: skip
 
@@ -144,3 +155,35 @@ def note_envelope(envelope, outside, t):
     elif envelope.outside and not outside:
         envelope.return_at_s[last] = t
     envelope.outside = outside
+
+
+@kernel
+def note_inconclusive(inconclusive, fdi, t):
+    """Count this frame, and why nothing can be concluded in it; t s."""
+    enabled, error_map = fdi.config.enabled, fdi.bound.error_map
+    inconclusive.watched += 1
+    if enabled and (error_map.n_boxes == 0 or not error_map.outside):
+        return
+    if inconclusive.frames == 0:
+        inconclusive.from_s = t
+    inconclusive.frames += 1
+    if not enabled:
+        inconclusive.undiagnosed += 1
+    elif age_of(error_map) < 0:
+        inconclusive.late += 1
+    else:
+        note_place(inconclusive, error_map)
+
+
+@kernel
+def note_place(inconclusive, error_map):
+    """Count the quantities in which this place is outside the map."""
+    explained = False
+    for i in range(error_map.place.size):
+        if is_beyond(error_map, i):
+            now, first = error_map.place[i], inconclusive.beyond[i] == 0
+            inconclusive.least[i] = now if first else min(now, inconclusive.least[i])
+            inconclusive.greatest[i] = now if first else max(now, inconclusive.greatest[i])
+            inconclusive.beyond[i] += 1
+            explained = True
+    inconclusive.between += not explained

@@ -6,7 +6,7 @@ import numpy as np
 
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.adapter import Plant
-from beaver_ftc.plant.addresses import GETTER, RUN, SETTER, address, available
+from beaver_ftc.plant.addresses import GETTER, RUN, SETTER, address
 from beaver_ftc.plant.native import NodeBank
 
 UNANTICIPATED = "failures/unanticipated/Cm-alpha3"
@@ -29,7 +29,7 @@ class Cockpit:
         if n not in banks:
             banks[n] = _banks(plant, n)
         self._read, self._write, self._engine, self._air = banks[n]
-        self.native = available()
+        self.native = plant.native
         truth["native"] = self.native
         truth["getter"], truth["setter"] = address(GETTER), address(SETTER)
         truth["read_pointers"][: truth["n"]] = self._read.pointers

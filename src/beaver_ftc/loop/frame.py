@@ -537,8 +537,7 @@ def fly_profile(frame, commanded):
 
 @kernel
 def account(frame):
-    """Advance the metrics' sums by this frame; before a fault, how near healthy flight has come to an
-    alarm."""
+    """Advance the metrics' sums by this frame; before a fault, the closest approach to an alarm."""
     control, truth, sums = frame.control, frame.truth, frame.accounts
     accounts.track(sums.tracking, truth, control.reference.model_rate)
     if truth.faulted:
@@ -547,6 +546,7 @@ def account(frame):
         bank.note_closest_approach(frame.fdi.bank, frame.fdi.statistical.alarm)
     accounts.account_surfaces(sums, truth, control.allocation.saturated, frame.k, control.reference.dt)
     accounts.note_envelope(sums.envelope, truth.value[ch.ENVELOPE] < 0.5, frame.t)
+    accounts.note_inconclusive(sums.inconclusive, frame.fdi, frame.t)
 
 
 @kernel

@@ -8,7 +8,7 @@ from beaver_ftc.aircraft.units import GRAVITY_MPS2
 from beaver_ftc.design.context import DesignFunctions
 from beaver_ftc.diagnosis.accelerometers import NEVER_STILL
 from beaver_ftc.diagnosis.across import across_a_column
-from beaver_ftc.diagnosis.bounds.declared import GUST_LIMIT_SIGMA, SCALE_M, Errors, gust_mps
+from beaver_ftc.diagnosis.bounds.declared import GUST_LIMIT_SIGMA, SCALE_M, Errors, gust_mps, low_gust_mps
 from beaver_ftc.diagnosis.bounds.variances import gust_effect
 from beaver_ftc.diagnosis.forces import tell_apart
 from beaver_ftc.diagnosis.watch import NOBODY, POLES_PER_S
@@ -135,6 +135,8 @@ def configure_watch(watch: np.void, scenario: Scenario, h: float) -> None:
     step["gravity"] = GRAVITY_MPS2 * (1.0 + initial.altitude_m / EARTH_RADIUS_M) ** -2
     step["gust"], step["gusts"] = gusts_seen(scenario.fdi.bounds.turbulence, initial.airspeed_mps, h)
     step["swift"] = FASTER * initial.airspeed_mps
+    step["low"] = low_m(scenario.fdi.bounds.turbulence)
+    step["rising"] = scenario.fdi.bounds.vertical_wind_mps
     if watch["engine"]:  # whose keys the aircraft names
         step["command"] = [getattr(initial, name) for name in ("engine_rpm", "manifold_pressure_inhg")]
     for i, name in enumerate(SENSORS):
@@ -164,6 +166,12 @@ def gusts_seen(turbulence: str, airspeed_mps: float, h: float) -> tuple[float, n
     intensity = 3.0 * sigma_mps**2 * FASTER * airspeed_mps / SCALE_M
     kept_s = [h / (1.0 - exp(-2.0 * pole * h)) for pole in POLES_PER_S]
     return GUST_LIMIT_SIGMA * sigma_mps, GUST_LIMIT_SIGMA * np.sqrt(intensity * np.array(kept_s))
+
+
+def low_m(turbulence: str) -> float:
+    """Height, m, below which gusts change faster than those above 2000 ft: their intensity is sigma^2 / h
+    there [MIL-F-8785C, 3.7.3]; 0 in still air."""
+    return SCALE_M * (low_gust_mps(turbulence) / gust_mps(turbulence)) ** 2 if turbulence != "none" else 0.0
 
 
 def anchor_watch(watch: np.void, design: np.ndarray, y: np.ndarray) -> None:

@@ -1,5 +1,6 @@
 """The closed loop: JSBSim flies, compiled frames measure, diagnose, decide and command, the log goes out."""
 
+import threading
 from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Protocol
@@ -20,7 +21,7 @@ from beaver_ftc.loop.instrument_records import anchor_watch
 from beaver_ftc.loop.outcome import Landing, landing_of
 from beaver_ftc.loop.stepping import fly_frame, fly_on, hold, look_inside
 from beaver_ftc.plant import channels as ch
-from beaver_ftc.plant.adapter import Plant
+from beaver_ftc.plant.adapter import Plant, translated
 from beaver_ftc.plant.conditions import ready
 from beaver_ftc.plant.configure import GustSchedule, take_off
 from beaver_ftc.plant.faults import FaultSchedule, SensorFaultSchedule
@@ -38,6 +39,9 @@ if TYPE_CHECKING:
     from beaver_ftc.loop.plugin_frame import PluginFrame
 
 CHUNK_ROWS = 8192
+# JSBSim's logger, the aircraft that are flown again and their compiled frames are the process's own: of
+# several threads one flies at a time, the others wait. More at a time take more processes.
+ONE_FLIES = threading.RLock()
 AT_ONCE = 256  # frames, a millisecond or two: so long a signal and other threads wait
 
 
@@ -264,7 +268,8 @@ class Loop:
         if status != FLYING:
             return status
         runs, self._inside = self.scenario.substeps - self._inside, 0
-        return self.fly_frames(stop - max(k, 1), runs)
+        with translated(self.aircraft.jsbsim):
+            return self.fly_frames(stop - max(k, 1), runs)
 
     def fly_inside(self, runs: int) -> None:
         """So many of JSBSim's frames inside the coming frame, fewer than it has: the next segment, of this
@@ -369,8 +374,21 @@ def fly(
     trimmed plant just before the flight. watch: called with the flight; what it returns, as that ends.
 
     Raises BadInput when the flight cannot be trimmed or asks for what there is not, SimulationFailed when a
-    value is not finite.
+    value is not finite. In several threads, one flight is flown after the other.
     """
+    with ONE_FLIES:
+        return _fly(scenario, sink, progress, detector, law, prepare, watch)
+
+
+def _fly(
+    scenario: Scenario,
+    sink: LogSink | None,
+    progress: Callable[[float], None] | None,
+    detector: "Detector | None",
+    law: "Law | None",
+    prepare: Callable[[Plant], None] | None,
+    watch: Callable[[Loop], Callable[[], None]] | None,
+) -> Landing:
     loop = Loop(scenario, detector, law, prepare)
     try:
         over = None if watch is None else watch(loop)

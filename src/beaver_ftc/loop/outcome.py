@@ -22,6 +22,7 @@ from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, STATISTICS, UN
 from beaver_ftc.diagnosis.types.findings import estimate_of, found
 from beaver_ftc.diagnosis.watch import instrument_found
 from beaver_ftc.loop.frame import isolated_theta
+from beaver_ftc.loop.inconclusive import inconclusive_of
 from beaver_ftc.plant.channels import AIRSPEED, ALTITUDE
 from beaver_ftc.plant.faults import TIME_TOLERANCE_S
 from beaver_ftc.plant.sensing import DEPARTURE_SIGNALS
@@ -49,14 +50,16 @@ class Landing:
     several at once (`fdi.pairs`), as in types/findings.py, the first named first. statistical: when the
     statistical detector would have raised the alarm, its level in standard deviations, and the largest
     share of it reached in healthy flight. mode_changes, exits: how many there were of `supervisor` and
-    `envelope_exits`, which hold the first and the last; outside_s: time outside the validated envelope,
-    all exits together. end: airspeed, m/s, and altitude, m, at the end. profile: largest deviation from
+    `envelope_exits`, which hold the first and the last; the end of an exit that is still open is the end of
+    the flight, and outside_at_end says that it is open. outside_s: time outside the validated envelope, all
+    exits together. end: airspeed, m/s, and altitude, m, at the end. profile: largest deviation from
     the commanded one by channel of the autopilot, m, m/s, rad; None where it was not flown. arrival: the
     deviation's mean over the last 10 s, with its sign. limits: of each limit that protection has put on
     the command since when, on what (airspeed_mps, bank_deg), "at most" or "at least", its value at last,
     why, and whether it is in force at the end. changes: what was changed in flight: time_s; law and
     scheme, None for what was not; sensors, True or False; and of a diagnosis that was replaced
-    detection_time_s and isolated. The verdict above is the last diagnosis'.
+    detection_time_s and isolated. The verdict above is the last diagnosis'. inconclusive: in what share of
+    the frames the built-in diagnosis could conclude nothing, and why, as in inconclusive.py; else None.
     """
 
     scenario: Scenario
@@ -91,6 +94,7 @@ class Landing:
     mode_changes: int = 0
     exits: int = 0
     outside_s: float = 0.0
+    outside_at_end: bool = False
     end: tuple[float, float] | None = None
     profile: dict[str, float | None] | None = None
     arrival: dict[str, float | None] | None = None
@@ -98,6 +102,7 @@ class Landing:
     changes: tuple[dict[str, Any], ...] = ()
     so_far: bool | None = None
     withdrawn: tuple[dict[str, Any], ...] = ()
+    inconclusive: dict[str, Any] | None = None
 
 
 def _instant(seconds: float) -> float | None:
@@ -373,6 +378,7 @@ def landing_of(
         envelope_exits=_envelope_exits(frame),
         exits=int(envelope["n_exits"]),
         outside_s=int(envelope["outside_frames"]) * dt,
+        outside_at_end=bool(envelope["outside"]),
         end=(float(frame["truth"]["value"][AIRSPEED]), float(frame["truth"]["value"][ALTITUDE])),
         departure=(float(frame["t"]), DEPARTURE_SIGNALS[departed // 10]) if departed else None,
         saturation_s={s: int(n) * dt for s, n in zip(surfaces, accounts["saturated_frames"], strict=True)},
@@ -387,6 +393,7 @@ def landing_of(
         limits=_limits(frame, surfaces),
         changes=replaced,
         withdrawn=_withdrawn(fdi, surfaces),
+        inconclusive=None if verdict is not None else inconclusive_of(frame, scenario.airframe),
         surface_travel_rad={s: float(x) for s, x in zip(surfaces, accounts["travelled"], strict=True)},
         surface_energy_rad2_s={s: float(x) for s, x in zip(surfaces, accounts["hurried"], strict=True)},
         **(_findings(frame, surfaces) if verdict is None else _of_verdict(fdi, verdict)),

@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from beaver_ftc.control.outer.setup import set_up_profile
 from beaver_ftc.control.supervisor import MODES
 from beaver_ftc.documents.errors import BadInput, suggestion
-from beaver_ftc.loop.loop import CHUNK_ROWS, FLYING, LogSink, Loop
+from beaver_ftc.loop.inconclusive import inconclusive_now
+from beaver_ftc.loop.loop import CHUNK_ROWS, FLYING, ONE_FLIES, LogSink, Loop
 from beaver_ftc.loop.outcome import Landing, verdict_of
 from beaver_ftc.loop.plugin_frame import measured_of
 from beaver_ftc.plant.adapter import Plant, UnknownProperty
@@ -65,9 +66,14 @@ class Stepping:
 
     def release(self) -> None:
         """Give aircraft and memory back for another flight: this one is over and not asked again."""
-        self._loop.release()
+        with ONE_FLIES:
+            self._loop.release()
 
     def _make_ready(self) -> None:
+        with ONE_FLIES:
+            self._set_up()
+
+    def _set_up(self) -> None:
         self._scenario, self._faults = self._given, self._given.faults
         self._loop = self._loop_type(self._scenario, *self._plug_ins, self._prepare)
         self._frame: np.void = self._loop.frames[0]
@@ -132,6 +138,14 @@ class Stepping:
         """What the diagnosis makes of the flight so far."""
         plugins = self._loop.plugin_frame
         return plugins.verdict if plugins and plugins.detector else verdict_of(self._frame, self._surfaces)
+
+    @property
+    def inconclusive(self) -> str:
+        """Why the built-in diagnosis can conclude nothing at this frame; empty if it can, or a plug-in
+        diagnoses."""
+        plugins = self._loop.plugin_frame
+        plugged = plugins is not None and plugins.detector is not None
+        return "" if plugged else inconclusive_now(self._frame, self._loop.aircraft)
 
     @property
     def mode(self) -> str:
@@ -312,6 +326,10 @@ class Stepping:
 
     def _fly_to(self, end: int, stick_deg_s: Vector | None = None) -> None:
         """Frames up to `end`, chunk by chunk as `Loop.chunks` has them, stopping where something changes."""
+        with ONE_FLIES:
+            self._fly_all(end, stick_deg_s)
+
+    def _fly_all(self, end: int, stick_deg_s: Vector | None) -> None:
         loop, k_flown, rows_flown = self._loop, self._k_flown, self._rows_flown
         while self._next < end and self._status == FLYING:
             k = self._next

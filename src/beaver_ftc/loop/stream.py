@@ -62,6 +62,9 @@ class Diagnosis:
         if not is_compiled(DETECTORS, scheme := self._scenario.fdi.scheme):
             allowed = "adaptive-estimators (step a plug-in itself)"
             raise BadInput(f"fdi.scheme: {scheme} is plugged in, allowed: {allowed}")
+        if not self._scenario.fdi.diagnoses:
+            allowed = "adaptive-estimators, zhang2005"
+            raise BadInput(f"fdi.scheme: {scheme}: no diagnosis would run, allowed: {allowed}")
         if self._scenario.fdi.probing is not None:
             raise BadInput("fdi.probing: moves surfaces, allowed here: a diagnosis that only looks on")
         self.reset()
@@ -75,6 +78,7 @@ class Diagnosis:
         self._fdi = self._frame["fdi"]
         self._fdi["balance"]["n"] = 0  # nobody says where levers are
         self._x, self._command, self._attitude = np.zeros(3), np.zeros(travel.shape[1]), np.zeros(3)
+        self._altitude = np.array([self._scenario.initial.altitude_m])
         self._y = np.zeros_like(self._frame["measured"]["y"])  # beyond the aircraft's own signals always zero
         self._signals = self._y[: len(FLOW) + len(self._aircraft.signals)]
         self._take = direct(watching.take, self._frames, self._x, self._y, self._command, self._attitude)
@@ -98,14 +102,16 @@ class Diagnosis:
         signals: ArrayLike,
         command_rad: ArrayLike,
         attitude_rad: ArrayLike | None = None,
+        altitude_m: float | None = None,
     ) -> Verdict:
         """Take a sample and say what it shows.
 
         rates_rad_s (3,): p, q, r. signals: alpha rad, beta rad, airspeed m/s, dynamic pressure Pa, then the
         aircraft's own (of the Beaver dpt). command_rad (surfaces,): in effect since the sample before; with
         the first sample, the surfaces in trim. attitude_rad (3,): roll, pitch, yaw, wanted only where
-        `fdi.bounds` declares turbulence. Raises BadInput for what has another shape or is not finite; such a
-        sample is not taken.
+        `fdi.bounds` declares turbulence. altitude_m: as measured above sea level; near the ground declared
+        turbulence depends on it. Without it the altitude before stays, at first 1828.8 m. Raises BadInput for
+        what has another shape or is not finite; such a sample is not taken.
         """
         _put("rates_rad_s", rates_rad_s, self._x)
         _put("signals", signals, self._signals)
@@ -114,9 +120,13 @@ class Diagnosis:
             _put("attitude_rad", attitude_rad, self._attitude)
         elif self._turning_air:
             raise BadInput("attitude_rad: is missing, allowed: (3,) rad where fdi.bounds declares turbulence")
+        if altitude_m is not None:
+            _put("altitude_m", np.atleast_1d(altitude_m), self._altitude)
         if self._fresh:
             self._begin()
-        if not self._take(self._frames, self._x, self._y, self._command, self._attitude):
+        self._frame["measured"]["altitude"] = self._altitude[0]
+        flown = self._frames, self._x, self._y, self._command, self._attitude
+        if not (np.isfinite(self._altitude[0]) and self._take(*flown)):
             raise BadInput(f"the sample after {self.t_s:g} s is not finite, allowed: finite numbers")
         self._diagnose(self._frames)
         self._believe(self._frames)

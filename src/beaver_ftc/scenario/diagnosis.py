@@ -61,7 +61,10 @@ class Bounds(Section, strict=True):
     sensors: measurement errors, as those of the truth: a preset, or noise, bias, resolution, slope by
     signal
     deflection_deg: how far a surface may be from its actuator's model, deg
-    turbulence: rotation of the air, which no instrument sees: Dryden, above 2000 ft
+    turbulence: rotation of the air, which no instrument sees: Dryden, at the height flown, no less than above
+    2000 ft
+    vertical_wind_mps: the strongest steady vertical wind, up or down, by which the sensor monitor compares
+    altitude and climb, m/s
     """
 
     inertia_coupling: PerAxis = number(PerAxis(p=0.25, q=0.25, r=0.25), "share of 1")
@@ -71,6 +74,7 @@ class Bounds(Section, strict=True):
     sensors: BoundedSensors = entry(Sensors)
     deflection_deg: Deflection = entry(0.0, examples=[0.2])
     turbulence: Literal["none", "light", "moderate", "severe"] = "none"
+    vertical_wind_mps: float = entry(1.0, ge=0, le=100, examples=[3])
 
     @field_validator("coefficients")
     @classmethod

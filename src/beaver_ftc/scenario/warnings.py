@@ -7,14 +7,16 @@ from collections.abc import Iterator
 from math import pi
 from typing import Any
 
+from beaver_ftc.scenario.faults import of_a_sensor
+from beaver_ftc.scenario.measured import ALTITUDE, LATE, lies_outside, measured_spans, outside
 from beaver_ftc.scenario.sensors import PRESETS, Sensors
 from beaver_ftc.scenario.signals import Chirp
 
 _SEVERITIES = ("none", "light", "moderate", "severe")
 _MOMENTS, _FORCES = ("Cl", "Cm", "Cn"), ("CY", "CZ")
 MASS_TOLERANCE = 0.05  # that accelerometers are judged with: fuel and load, which nobody declares
+OF_DIAGNOSIS = ("detected_within_s", "isolated_as", "isolated_within_s", "isolated_type", "candidate_type")
 _ROUNDING = 1e-9
-LOWEST_TURBULENCE_M = 609.6  # 2000 ft: below, its scales and strengths are others [MIL-F-8785C, 3.7]
 FULL_SHARE = 0.02  # of the range of the power: within it a setting is full power
 
 
@@ -25,7 +27,35 @@ def warnings_of(scenario: Any) -> tuple[str, ...]:
         *_power(scenario),
         *_too_fast_for_the_frame(scenario),
         *undeclared(scenario),
+        *_inconclusive(scenario),
     )
+
+
+def _inconclusive(scenario: Any) -> Iterator[str]:
+    """Where the diagnosis can conclude nothing, as far as it is known before the flight."""
+    if scenario.fdi.scheme == "none":
+        for key in OF_DIAGNOSIS:
+            if getattr(scenario.expect, key) is not None:
+                yield f"expect.{key}: cannot be met, fdi.scheme is none: no diagnosis runs"
+        return
+    spans = measured_spans(scenario.airframe) if scenario.fdi.diagnoses else {}
+    for key, quantity, value in _planned(scenario):
+        if lies_outside({quantity: value}, spans):
+            why = outside(quantity, spans[quantity])
+            yield f"{key}: {value:g}: nothing can be detected or named {why}"
+
+
+def _planned(scenario: Any) -> Iterator[tuple[str, str, float]]:
+    """Key, quantity of the map and value of what a scenario says of where, and how long, it is flown."""
+    yield "initial.altitude_m", ALTITUDE, scenario.initial.altitude_m
+    yield "initial.airspeed_mps", "airspeed_mps", scenario.initial.airspeed_mps
+    for i, leg in enumerate(scenario.autopilot.altitude_m if scenario.autopilot else ()):
+        if leg.value is not None:
+            yield f"autopilot.altitude_m[{i}].value", ALTITUDE, leg.value
+    for i, leg in enumerate(scenario.autopilot.airspeed_mps if scenario.autopilot else ()):
+        if leg.value is not None:
+            yield f"autopilot.airspeed_mps[{i}].value", "airspeed_mps", leg.value
+    yield "duration_s", LATE, scenario.duration_s
 
 
 def undeclared(scenario: Any) -> Iterator[str]:
@@ -121,11 +151,22 @@ def _air(scenario: Any) -> Iterator[str]:
                 "environment.gust: JSBSim's does not rotate, but with fdi.bounds.turbulence the vanes take a "
                 "sharp one for one that does: fdi.statistical may raise an alarm"
             )
-    low = scenario.initial.altitude_m < LOWEST_TURBULENCE_M and not scenario.initial.on_ground
-    if environment.severity is not None and low:  # from the ground the diagnosis begins above
+    yield from _vertical_wind(scenario)
+
+
+def _vertical_wind(scenario: Any) -> Iterator[str]:
+    """Vertical wind by which a sound altimeter seems broken, where the instruments are watched."""
+    environment, fdi = scenario.environment, scenario.fdi
+    broken = any(of_a_sensor(fault) for fault in scenario.faults)
+    watched = fdi.sensor_monitor == "always" or (fdi.sensor_monitor == "auto" and broken)
+    if not (watched and fdi.is_ours):
+        return
+    steady, declared = environment.wind_mps[2], fdi.bounds.vertical_wind_mps
+    largest = max((steady, *(steady + gust.velocity_mps[2] for gust in environment.gusts)), key=abs)
+    if abs(largest) > declared + _ROUNDING:
         yield (
-            f"initial.altitude_m: {scenario.initial.altitude_m:g} is below {LOWEST_TURBULENCE_M:g} m, where "
-            "turbulence is not as fdi.bounds.turbulence has it"
+            f"environment: vertical wind of {abs(largest):g} m/s is more than fdi.bounds.vertical_wind_mps, "
+            f"{declared:g}: the sensor monitor may take a sound altimeter for broken"
         )
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import solve_continuous_lyapunov
 
@@ -71,6 +71,7 @@ def test_what_a_saturated_surface_misses_teaches_nothing():
     assert not control.adaptation.network.weights.any()
 
 
+@settings(max_examples=15)
 @given(st.floats(-3.0, 3.0), st.floats(-1.0, 1.0))
 def test_the_lyapunov_function_falls(unknown, e0):
     """e' = -Kp e - Ki int e + fhat - phi, phi constant, in small steps: V with the weights in it."""

@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 # Largest vertical gust (standard deviation) above 2000 ft and its scale [MIL-F-8785C, fig. 7, 3.7.2].
 GUST_FT_S = {"none": 0.0, "light": 7.4, "moderate": 10.6, "severe": 23.6}
 SCALE_FT = 1750.0
+# That below 1000 ft, a tenth of the wind at 20 ft [MIL-F-8785C, 3.7.3]; its scale is the height. Between 1000
+# and 2000 ft both go from the one to the other, and what follows from them is below that above.
+LOW_GUST_FT_S = {"none": 0.0, "light": 2.53, "moderate": 5.06, "severe": 7.6}
 SCALE_M = M_PER_FT * SCALE_FT
 ROLLING = 1.9  # of the rotating gusts the strongest [Yeager1998, eq. 8]; pitching and yawing are weaker
 GUST_LIMIT_SIGMA = 6.0  # once in 5e8 samples beyond, were they independent
@@ -74,10 +77,20 @@ def gust_mps(turbulence: str) -> float:
     return M_PER_FT * GUST_FT_S[turbulence]
 
 
+def low_gust_mps(turbulence: str) -> float:
+    """The same below 1000 ft, where their scale is the height."""
+    return M_PER_FT * LOW_GUST_FT_S[turbulence]
+
+
 def gust_sigma_rad_s(turbulence: str, span_m: float) -> float:
     """Standard deviation of the air's rotation, rad/s, on any axis of an aircraft of this span."""
     span_ft = span_m / M_PER_FT
     return ROLLING * GUST_FT_S[turbulence] / sqrt(SCALE_FT * span_ft)
+
+
+def low_gust_sigma_rad_s(turbulence: str, span_m: float) -> float:
+    """The same below 1000 ft times the root of the height in m, rad/s m^0.5."""
+    return ROLLING * low_gust_mps(turbulence) / sqrt(span_m)
 
 
 @lru_cache(maxsize=64)
@@ -128,8 +141,11 @@ def admit(
     admitted["tolerance"][: tolerance.size] = tolerance
     admitted["inertia"] = inertia_slack(bounds.inertia, mass)
     admitted["deflection"] = radians(bounds.deflection_deg)
-    admitted["gust"] = GUST_LIMIT_SIGMA * gust_sigma_rad_s(bounds.turbulence, aircraft.geometry.span_m)
-    errors = Errors(bounds.sensors)
+    errors, span_m = Errors(bounds.sensors), aircraft.geometry.span_m
+    admitted["gust_aloft"] = GUST_LIMIT_SIGMA * gust_sigma_rad_s(bounds.turbulence, span_m)
+    admitted["gust_low"] = GUST_LIMIT_SIGMA * low_gust_sigma_rad_s(bounds.turbulence, span_m)
+    admitted["gust"] = admitted["gust_aloft"]
+    admitted["altitude_off"], admitted["altitude_slope"] = errors["altitude"].worst, errors["altitude"].slope
     admitted["offset"], admitted["slope"] = errors.each("worst"), errors.each("slope")
     admitted["steady"] = errors.each("steady", AXES)
     declared = (admitted["tolerance"], admitted["inertia"], admitted["deflection"], admitted["gust"])

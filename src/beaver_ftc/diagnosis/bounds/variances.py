@@ -11,7 +11,15 @@ from beaver_ftc.design.context import Declared, DesignFunctions
 from beaver_ftc.design.model import inertia_coefficients
 from beaver_ftc.design.terms import AIRSPEED, PH, QH, RH
 from beaver_ftc.design.variants import coefficient_slopes, jacobian
-from beaver_ftc.diagnosis.bounds.declared import ROLLING, SCALE_M, Errors, gust_mps, inertia_slack, tolerances
+from beaver_ftc.diagnosis.bounds.declared import (
+    ROLLING,
+    SCALE_M,
+    Errors,
+    gust_mps,
+    inertia_slack,
+    low_gust_mps,
+    tolerances,
+)
 from beaver_ftc.scenario.actuators import Actuators
 from beaver_ftc.scenario.diagnosis import Bounds
 
@@ -107,7 +115,19 @@ def drift(turbulence: str, span_m: float) -> np.ndarray:
     sigma = 1.9 sigma_w / sqrt(L b) and a lag of sqrt(L b) / 2.6 V [Yeager1998, eq. 8]: 2 sigma^2 / lag. The
     others are lagged slopes of a velocity of intensity 3 sigma_w^2 V / L [MIL-F-8785C, 3.7], over (V lag)^2.
     """
-    sigma_w, L, b = gust_mps(turbulence), SCALE_M, span_m
+    return _drift(gust_mps(turbulence), SCALE_M, span_m)
+
+
+def drift_at_1_m(turbulence: str, span_m: float) -> np.ndarray:
+    """The same by the formulas for heights below 1000 ft, where the vertical gust's scale is the height, h in
+    m: over h^1.5 the rolling one, over h the pitching one, and a bound on the yawing one.
+
+    The lateral gust has sigma_v^2 / L_v = sigma_w^2 / h (0.177 + 0.000823 h / ft)^0.4, which is less.
+    """
+    return _drift(low_gust_mps(turbulence), 1.0, span_m)
+
+
+def _drift(sigma_w: float, L: float, b: float) -> np.ndarray:
     rolling = 2.0 * 1.9**2 * 2.6 * sigma_w**2 / (L * b) ** 1.5
     velocity = 3.0 * sigma_w**2 / L
     return np.array([rolling, velocity * (pi / (4 * b)) ** 2, velocity * (pi / (3 * b)) ** 2])

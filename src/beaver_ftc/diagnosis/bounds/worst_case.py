@@ -43,7 +43,8 @@ UNKNOWN_RAD_S2 = 1e6  # terms fitted near trim are off by thousands at 0.5 rad
 # The same to filters that carry a covariance, beside noise of 1e-4: more than any aircraft does, and no more.
 UNKNOWN_TO_FILTERS_RAD_S2 = 100.0
 _ROUNDING = 1e-9
-_N = 3 + N_Y  # rates, then y with the density of the air in place of dynamic pressure
+LEAST_HEIGHT_M = 3.048  # 10 ft: below, turbulence is what it is there
+N_PLACES = 3 + N_Y  # rates, then y with the density of the air in place of dynamic pressure
 
 
 @lru_cache
@@ -56,6 +57,9 @@ def admitted_dtype(n: int) -> np.dtype:
         offset=7, slope=7,  # error of a signal: offset + slope |signal|
         steady=3,  # of the offset of a gyro, what does not change
         gust=3, deflection=float,
+        # of the air's rotation, rad/s: above 2000 ft; below 1000 ft, times the root of the height in m; how
+        # far the reading of the altitude can be off, m, and as a share
+        gust_aloft=float, gust_low=float, altitude_off=float, altitude_slope=float,
         engine=int, engine_kw=float, thin_air_kw=float,  # of dpt: see `slipstream_error`
         # scratch: magnitudes as measured, and the furthest they can be from there
         near_x=3, near_y=N_Y, near_u=n, far_x=3, far_y=N_Y, far_u=n, far_aero=3, signal=N_SIGNALS,
@@ -70,8 +74,8 @@ def error_map_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
     here, rad/s2. apart: `engines_apart`."""
     return record(
         n_boxes=int, n_levels=int, n_ages=int, anywhere=int, whole=int, outside=int, box=int, age=int,
-        time_s=float, until_s=MAX_AGES, low=(boxes, _N), high=(boxes, _N), share=MAX_LEVELS,
-        error=(MAX_AGES, boxes, MAX_LEVELS, 3), travel_low=n, travel_high=n, before=n, place=_N, now=3,
+        time_s=float, until_s=MAX_AGES, low=(boxes, N_PLACES), high=(boxes, N_PLACES), share=MAX_LEVELS,
+        error=(MAX_AGES, boxes, MAX_LEVELS, 3), travel_low=n, travel_high=n, before=n, place=N_PLACES, now=3,
         apart=boxes, apart_now=float,
     )  # fmt: skip
 
@@ -255,6 +259,16 @@ def is_inside(error_map, k):
 
 
 @kernel
+def is_beyond(error_map, i):
+    """Whether quantity i of `place` is outside what any box spans."""
+    low, high = np.inf, -np.inf
+    for k in range(error_map.n_boxes):
+        low, high = min(low, error_map.low[k, i]), max(high, error_map.high[k, i])
+    room = _ROUNDING * (1.0 + abs(error_map.place[i]))
+    return not low - room <= error_map.place[i] <= high + room
+
+
+@kernel
 def level_of(error_map, u):
     """The first share of the travel that covers surfaces u (n,) rad; the last if all of it may be used."""
     if error_map.whole:
@@ -368,11 +382,27 @@ def by_earth(earth_rate, rates, share):
 
 
 @kernel
+def least_height(altitude, off, slope):
+    """The least height, m, that a measured altitude leaves: off by so much and by a share. The ground is at
+    sea level; turbulence knows no height below LEAST_HEIGHT_M."""
+    return max(altitude - (off + slope * abs(altitude)) / (1.0 - slope), LEAST_HEIGHT_M)
+
+
+@kernel
+def reach_height(admitted, altitude):
+    """Bring the bound on the air's rotation to this altitude, m as measured."""
+    if admitted.gust_low > 0.0:
+        height = least_height(altitude, admitted.altitude_off, admitted.altitude_slope)
+        admitted.gust[:] = max(admitted.gust_aloft, admitted.gust_low / np.sqrt(height))
+
+
+@kernel
 def bound_now(bound, design, measured, u):
     """Fill eta_bar_now (3,) rad/s2, the bound on the uncertainty at this instant; u (n,) rad."""
     x, y = measured.x, measured.y
     bound.eta_bar_now[:] = 0.0
     if bound.admitted.any:
+        reach_height(bound.admitted, measured.altitude)
         derived_bound(bound.admitted, design, x, y, u, bound.eta_bar_now)
         if bound.own_errors:
             for s in range(u.size):

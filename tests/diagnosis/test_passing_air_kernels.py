@@ -1,0 +1,124 @@
+"""The speed through the field of gusts, and the strength of turbulence at a height: closed forms, by hand."""
+
+import numpy as np
+import pytest
+
+from beaver_ftc.diagnosis import air
+from beaver_ftc.diagnosis.bounds import declared, variances, worst_case
+from beaver_ftc.diagnosis.bounds.worst_case import admitted_dtype
+from beaver_ftc.scenario.diagnosis import Bounds
+
+SPAN_M, FT = 14.63, 0.3048
+# sigma_w below 1000 ft: a tenth of 25.3, 50.6 and 76.0 ft/s; above 2000 ft: 7.4, 10.6 and 23.6 ft/s
+LOW, HIGH = {"light": 2.53, "moderate": 5.06, "severe": 7.6}, {"light": 7.4, "moderate": 10.6, "severe": 23.6}
+
+
+def record_of(dtype):
+    return np.zeros(1, dtype).view(np.recarray)[0]
+
+
+def in_moving_air():
+    record = record_of(air.AIR)
+    record["seen"], record["strongest"], record["forgets"] = 1, 30.0, 0.02
+    record["velocity"], record["blown"], record["fresh"] = (44.0, 1.5, 3.0), (5.0, -2.0, 0.7), 0.8
+    return record
+
+
+def test_the_speed_is_that_through_the_air_without_the_gust():
+    record, dt = in_moving_air(), 0.5
+    air.pass_through(record, 45.0, 1.1, 3.3, 44.1, dt)  # the gust has changed by 1.0, -0.4, 0.3
+    kept = np.exp(-0.02 * dt)
+    blown = kept * np.array([5.0, -2.0, 0.7]) + [1.0, -0.4, 0.3]
+    assert record["blown"] == pytest.approx(blown)
+    assert record["speed"] == pytest.approx(np.linalg.norm(blown + np.array([44.0, 1.5, 3.0])))
+    assert record["fresh"] == pytest.approx(0.8 * kept**2)
+
+
+def test_no_gust_is_taken_for_stronger_than_is_likely():
+    record = in_moving_air()
+    record["strongest"] = 2.0
+    air.pass_through(record, 90.0, -70.0, 3.3, 44.1, 0.01)
+    assert record["blown"][:2] == pytest.approx([2.0, -2.0])
+
+
+def test_where_no_gust_is_seen_the_airspeed_serves():
+    record = in_moving_air()
+    record["seen"] = 0
+    air.pass_through(record, 45.0, 1.1, 3.3, 44.1, 0.5)
+    assert record["speed"] == 44.1
+    assert air.hidden(record, 1) == 0.0
+
+
+@pytest.mark.parametrize(("g", "further"), [(1, 0.02), (2, 0.05)])
+def test_an_unknown_speed_leaves_a_share_of_the_gusts_that_vanes_show(g, further):
+    record = in_moving_air()
+    record["unseen"], record["late"], record["turning"] = (1.0, 0.003, 0.03), 0.02, 0.05
+    record["speed"], record["spread"], record["gusty"], record["doubt"] = 40.0, 1.3, 4.7, 2.5
+    off = 2.5 * (1.3 + 0.8 * 4.7) / 40.0**2
+    assert air.hidden(record, g) == pytest.approx(record["unseen"][g] + off + further)
+    assert air.hidden(record, 0) == 1.0
+
+
+def test_a_speed_that_is_off_leaves_no_more_than_is_reckoned_with():
+    # q' = -q / tau + w' followed with tau (1 + e): over the spectrum of the walk w', the error's is
+    # |1 / (s + 1 / tau) - 1 / (s + (1 + e) / tau)|^2 |s|^2, to first order in e
+    e, tau, level = 1e-3, 0.37, 6.6
+    s = 1j * np.geomspace(1e-3, 1e3, 20001)
+    error = np.abs(s / (s + 1.0 / tau) - s / (s + (1.0 + e) / tau)) ** 2
+    assert air.passing_doubt(level) / (0.5 * level) ** 2 == pytest.approx(error.max() / e**2, rel=2e-3)
+
+
+@pytest.mark.parametrize("turbulence", ["light", "moderate", "severe"])
+@pytest.mark.parametrize("height_ft", [4.0, 10.0, 120.0, 300.0, 900.0, 5000.0])
+def test_turbulence_is_as_strong_as_the_standard_has_it_at_a_height_and_no_less_than_aloft(
+    turbulence, height_ft
+):
+    h, b = max(height_ft, 10.0), SPAN_M / FT
+    low, high = LOW[turbulence] * FT, HIGH[turbulence] * FT
+    record = record_of(air.AIR)
+    record["aloft"] = variances.drift(turbulence, SPAN_M)
+    record["low"] = variances.drift_at_1_m(turbulence, SPAN_M)
+    record["altitude_off"], record["altitude_slope"] = 0.7, 0.02
+    reading = height_ft * FT / (1.0 - 0.02 / 0.98) + 0.7 / 0.98 / (1.0 - 0.02 / 0.98)
+    air.reach_height(record, reading)
+    L = h * FT
+    rolling = 2.0 * 1.9**2 * 2.6 * max(low**2 / L**1.5, high**2 / (1750 * FT) ** 1.5) / SPAN_M**1.5
+    vertical = 3.0 * max(low**2 / L, high**2 / (1750 * FT))
+    by_gusts = [rolling, vertical * (np.pi / 4 / SPAN_M) ** 2, vertical * (np.pi / 3 / SPAN_M) ** 2]
+    assert record["per_metre"] == pytest.approx(by_gusts)
+
+    admitted = record_of(admitted_dtype(4))
+    admitted["gust_aloft"] = declared.GUST_LIMIT_SIGMA * declared.gust_sigma_rad_s(turbulence, SPAN_M)
+    admitted["gust_low"] = declared.GUST_LIMIT_SIGMA * declared.low_gust_sigma_rad_s(turbulence, SPAN_M)
+    admitted["altitude_off"], admitted["altitude_slope"] = 0.7, 0.02
+    worst_case.reach_height(admitted, reading)
+    sigma = max(1.9 * LOW[turbulence] / np.sqrt(h * b), 1.9 * HIGH[turbulence] / np.sqrt(1750.0 * b))
+    assert admitted["gust"] == pytest.approx(6.0 * sigma)
+
+
+def test_below_2000_ft_the_lateral_gust_and_the_layer_between_are_weaker_than_reckoned_with():
+    for severity, low in LOW.items():
+        for h in np.linspace(10.0, 1000.0, 100):  # sigma_v^2 / L_v of the standard
+            shape = 0.177 + 0.000823 * h
+            sigma_v, L_v = low / shape**0.4, h / shape**1.2
+            assert sigma_v**2 / L_v <= low**2 / h * (1.0 + 1e-9)
+        for share in np.linspace(0.0, 1.0, 50):
+            sigma = low + share * (HIGH[severity] - low)
+            L = 1000.0 + 750.0 * share
+            assert sigma**2 / L**1.5 <= HIGH[severity] ** 2 / 1750.0**1.5 * (1.0 + 1e-9)
+
+
+def test_what_is_declared_of_drift_and_gusts_says_how_long_the_sum_lasts():
+    kept = []
+    for turbulence in ("light", "severe"):
+        record = record_of(air.AIR)
+        record["moving"] = record["seen"] = record["read"] = 1
+        air.set_up_passing(record, Bounds(turbulence=turbulence), 6.6, 45.0)
+        sigma, V_L = HIGH[turbulence] * FT, 45.0 / (1750.0 * FT)
+        b = (2.0 * record["forgets"] ** 3 * sigma**2 / V_L) ** 0.5 / 2.0  # a^3 = 2 b^2 V / (L sigma^2)
+        assert b == pytest.approx(2.0 * 7.292e-5 * 45.0 + 0.3 * 0.03, rel=1e-3)
+        a = record["forgets"]
+        assert record["spread"] == pytest.approx(sigma**2 * a / (a + V_L) + (b / a) ** 2)
+        assert record["spread"] < 0.5 * sigma**2
+        kept.append(float(record["forgets"]))
+    assert kept[1] < kept[0]

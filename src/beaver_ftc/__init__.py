@@ -14,6 +14,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
+from beaver_ftc.integrations.environments import register_when_imported
 from beaver_ftc.plugins import first_use
 
 if TYPE_CHECKING:
@@ -96,6 +97,7 @@ def _compare(aircraft: "Aircraft") -> None:
 
 
 first_use.derive, first_use.compare = _derive, _compare
+register_when_imported()
 
 
 def __dir__() -> list[str]:

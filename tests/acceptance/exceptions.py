@@ -46,6 +46,17 @@ TABLE = (
     Exempt(r"fgfs .*", "needs FlightGear"),
     Exempt(r"(ray start|srun|sleep|head=).*|.* --ray-address .*", "needs a cluster of several machines"),
     Exempt(r"python (-m )?benchmarks[/.].*", "a measurement of minutes to hours, from a checkout"),
+    Exempt(
+        r"python tools/check_certificate\.py FOLDER",
+        "stands for the folder of any run with a certificate",
+        "beaver-ftc run elevator-partial-loss --no-report --certificate"
+        " && python tools/check_certificate.py runs/elevator-partial-loss",
+    ),
+    Exempt(
+        r"python -m tools\.drawn",
+        "flight 161 breaks a promise (docs/robustness.md, section 2): those before it",
+        "python -m tools.drawn --flights 160",
+    ),
     Exempt(r"beaver-ftc compare --sweep examples/gtm/.*", "needs NASA's data, imported"),
     Exempt(r"python -m tools\.docs reference \S+", "in a checkout; tests/tools prints every such page"),
     Exempt(

@@ -32,13 +32,14 @@ def lay_out(line: str, folder: Path, installation: Installation) -> None:
     if "engines-alone" in line:
         _with_engines(folder, installation)
     for name in re.findall(r"\bruns/([\w-]+)", line):
-        if line.startswith("beaver-ftc compare"):
-            _fly(name, folder, installation)
+        if line.startswith(("beaver-ftc compare", "beaver-ftc check")):
+            _fly(name, folder, installation, *["--certificate"] * ("check" in line))
 
 
-def _fly(name: str, folder: Path, installation: Installation) -> None:
+def _fly(name: str, folder: Path, installation: Installation, *options: str) -> None:
     given = f"{name}.yaml" if (folder / f"{name}.yaml").exists() else name
-    assert installation.beaver("run", given, "--no-report", cwd=folder).returncode in (0, 1)  # 1: missed
+    done = installation.beaver("run", given, "--no-report", *options, cwd=folder)
+    assert done.returncode in (0, 1)  # 1: missed
 
 
 def _shown(page: str, name: str) -> str:

@@ -121,9 +121,12 @@ class Flight:
     changes: tuple[Any, ...] = ()
     exits: int = 0
     outside_s: float = 0.0
+    outside_at_end: bool = False
     end: tuple[float, float] | None = None
     so_far: bool | None = None
     withdrawn: tuple[dict[str, Any], ...] = ()
+    closest_approach: tuple[float, ...] = (0.11,)
+    inconclusive: dict[str, Any] | None = None
 
     def __post_init__(self) -> None:
         if self.isolated is not None:

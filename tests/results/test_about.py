@@ -16,10 +16,10 @@ UNKNOWN = {"type": "unanticipated", "at_s": 12}
 ALL, PAIRS = {"fault_class": "all"}, {"fault_class": "all", "pairs": True}
 
 
-def _hints(*faults, detected=True, guaranteed=0.1, end=(45.0, 1828.8), **keys):
+def _hints(*faults, detected=True, guaranteed=0.1, end=(45.0, 1828.8), why=None, used=(0.11, 0.5), **keys):
     scenario = Scenario.model_validate({"name": "x", "faults": list(faults), **keys})
-    document = {"detection": {"detected": detected, "guaranteed_delay_s": guaranteed}}
-    return hints(SimpleNamespace(scenario=scenario, end=end), document)
+    document = {"detection": {"detected": detected, "guaranteed_delay_s": guaranteed, "inconclusive": why}}
+    return hints(SimpleNamespace(scenario=scenario, end=end, closest_approach=used), document)
 
 
 @pytest.mark.parametrize(
@@ -28,6 +28,8 @@ def _hints(*faults, detected=True, guaranteed=0.1, end=(45.0, 1828.8), **keys):
         ([], {}), ([LOSS], {}), ([UNKNOWN], {}), ([STUCK], {"fdi": ALL}), ([STUCK, RUDDER], {"fdi": PAIRS}),
         ([STUCK], {"fdi": {"scheme": "none"}}), ([LOSS], {"end": (41.0, 1600.0)}),
         ([LOSS | {"end_s": 13}, RUDDER], {"fdi": ALL}), ([LOSS], {"detected": False}),
+        ([LOSS], {"detected": False, "guaranteed": None, "why": {"share": 0.5}}),
+        ([LOSS], {"used": (0.2, 0.899)}), ([LOSS], {"used": (0.2, 1.25)}), ([], {"used": (0.95, 0.2)}),
     ],
 )  # fmt: skip
 def test_nothing_is_said_without_need(arguments, keys):
@@ -46,6 +48,7 @@ def test_nothing_is_said_without_need(arguments, keys):
             {"end": (39.0, 1828.8)},
             "the flight drifted in airspeed from 45 to 39 m/s: only the body rates",
         ),
+        ([LOSS], {"used": (0.2, 0.9687)}, "healthy part of this flight already uses 96.8 % of the bound"),
         ([], {"end": (45.0, 1500.0)}, "the flight drifted in altitude from 1829 to 1500 m"),
     ],
 )

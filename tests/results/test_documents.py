@@ -39,7 +39,8 @@ FLIGHTS = {
         scenario=Scenario(
             faults=(Fault(), Fault(at_s=20.0, actuator="flap", type="stuck", end_s=25.0)), expect=EXPECT
         ),
-        mode_changes=9, exits=4, outside_s=2.25, envelope_exits=[(13.0, 14.5), (20.0, math.inf)],
+        mode_changes=9, exits=4, outside_s=2.25, envelope_exits=[(13.0, 14.5), (20.0, 30.0)],
+        outside_at_end=True,
         end=(39.0, 1500.0), isolation_type="stuck", estimate=0.1, estimate_interval=(0.05, math.nan),
         frequency_rad_s=5.0, type_time_s=12.5, probing_s=(14.0, 18.5),
         engine_power={"from_s": 13.2, "in_charge_s": 0.9, "lowest_inhg": 20.04, "highest_inhg": 22.26},

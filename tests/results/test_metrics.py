@@ -25,7 +25,7 @@ def test_published_case_has_every_key_of_the_contract_in_order():
     assert document["fault"] == {"actuator": "elevator", "type": "loss_of_effectiveness", "at_s": 12.0}
     assert document["detection"] == {
         "detected": True, "time_s": 12.07, "delay_s": 0.07, "axis": "q", "guaranteed_delay_s": 0.31,
-        "statistical": None,
+        "statistical": None, "inconclusive": None,
     }  # fmt: skip
     assert document["isolation"] == {
         "isolated": True, "fault": "elevator", "type": "loss_of_effectiveness",
@@ -78,7 +78,7 @@ def test_flight_without_fault_and_alarm():
     assert document["fault"] is None
     assert document["detection"] == {
         "detected": False, "time_s": None, "delay_s": None, "axis": None, "guaranteed_delay_s": None,
-        "statistical": None,
+        "statistical": None, "inconclusive": None,
     }  # fmt: skip
     assert document["isolation"]["isolated"] is False
     assert document["isolation"]["correct"] is None
@@ -243,10 +243,10 @@ def test_of_several_faults_the_verdict_is_held_against_that_of_its_surface(surfa
 
 
 @pytest.mark.parametrize(
-    ("exits", "inside"), [([], True), ([(13.0, 14.5)], True), ([(3.0, 4.0), (13.0, math.inf)], False)]
+    ("exits", "inside"), [([], True), ([(13.0, 14.5)], True), ([(3.0, 4.0), (13.0, 30.0)], False)]
 )
 def test_a_flight_arrives_in_the_envelope_if_it_has_come_back_to_it(exits, inside):
-    document = _of(arrival={"altitude_m": 2.0}, envelope_exits=exits)
+    document = _of(arrival={"altitude_m": 2.0}, envelope_exits=exits, outside_at_end=not inside)
     assert document["arrival"]["in_envelope"] is inside
     assert document["arrival"]["altitude_m"] == 2.0
     assert _of(arrival={"altitude_m": 2.0}, departure=(14.5, "alpha_rad"))["arrival"] is None

@@ -113,6 +113,28 @@ def test_a_named_fault_in_words(changes, said):
     assert verdict._isolation({"isolation": NAMED | changes, "faults": FAULTS}) == said
 
 
+@pytest.mark.parametrize(
+    ("candidates", "said"),
+    [
+        (["rudder"], "still possible: rudder"),
+        (["aileron", "unanticipated"], "still possible: aileron or a fault outside the class"),
+        (
+            ["left_flap:stuck", "left_flap:float"],
+            "still possible: left flap; type not determined (2 remain: stuck, float)",
+        ),
+        (
+            [f"{side}_{name}:{kind}" for side in ("left", "right") for name in ("aileron", "flap", "elevator")
+             for kind in ("bias", "stuck", "rate_limit")] + ["damage"],
+            "still possible: one of 6 surfaces (4 on the wing, 2 on the tail) or damage; "
+            "type not determined (3 remain: bias, stuck, rate limit)",
+        ),
+        (["sensor p", "sensor phi"], "still possible: sensor p or sensor phi"),
+    ],
+)  # fmt: skip
+def test_what_is_still_possible_is_grouped_and_counted(candidates, said):
+    assert verdict.candidates_in_words(candidates) == said
+
+
 FIRST, AGAIN, OTHER = (
     {"fault": name, "from_s": from_s, "to_s": to_s}
     for name, from_s, to_s in (("elevator", 12.0, 12.25), ("elevator", 14.0, 15.0), ("flap", 13.0, 13.5))

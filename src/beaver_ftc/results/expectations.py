@@ -1,12 +1,16 @@
 """What a scenario expects of its flight (`expect:`), held against the metrics: what a CI job asserts.
 
 One row a key: how the metrics document says what was found, and whether that will do for what was expected.
-Where the quantity does not exist (nothing was detected, say) the expectation fails.
+Where the quantity does not exist (nothing was detected, say) the expectation fails. If an expectation of the
+diagnosis is not met and there were frames in which it could conclude nothing, that is given as the reason.
 """
 
 from collections.abc import Callable, Iterator
 from operator import eq
 from typing import Any
+
+from beaver_ftc.scenario.measured import in_words
+from beaver_ftc.scenario.warnings import OF_DIAGNOSIS
 
 Document = dict[str, Any]
 Rule = tuple[Callable[[Document], Any], Callable[[Any, Any], bool]]
@@ -14,12 +18,20 @@ Rule = tuple[Callable[[Document], Any], Callable[[Any, Any], bool]]
 
 
 def evaluate(expect: Any, metrics: Document) -> list[Document]:
-    """One {name, passed, expected, actual} for each expectation set in `expect`, in its fields' order."""
+    """One {name, passed, expected, actual} for each expectation set in `expect`, in its fields' order; with
+    `reason`, where one is known."""
     return [
         {"name": name, "passed": met(actual, expected), "expected": expected, "actual": actual}
+        | ({} if met(actual, expected) else _reason(name, metrics))
         for name, (found, met), expected in _each(expect)
         for actual in [found(metrics)]
     ]
+
+
+def _reason(name: str, metrics: Document) -> Document:
+    """Why what was expected of the diagnosis is not met, if it could not conclude anything."""
+    inconclusive = metrics.get("detection", {}).get("inconclusive") if name in OF_DIAGNOSIS else None
+    return {"reason": in_words(inconclusive)} if inconclusive else {}
 
 
 def margin(found: Document) -> float | None:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from beaver_ftc.control.base import Law
     from beaver_ftc.diagnosis.base import Detector
     from beaver_ftc.loop.outcome import Landing
+    from beaver_ftc.results.certificates.proved import Proof
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -130,9 +131,14 @@ class Flight:
 
         It is flown once more for it. Raises BadInput for a flight without a log, or not of our scheme.
         """
-        from beaver_ftc.results.certificates.certificate import certificate
+        return self.proof().certificate
 
-        return certificate(self.scenario, self._kept())
+    def proof(self) -> "Proof":
+        """The same with what it is checked against: the flight's log, which has further columns for it, and
+        the text of its scenario."""
+        from beaver_ftc.results.certificates.proved import proof
+
+        return proof(self.scenario, self._kept())
 
     def save(self, out: str | PathLike[str] = "runs", *, report: bool = True) -> Path:
         """Write `out/<name>/` as `beaver-ftc run` does, whole or not at all; returns that folder.

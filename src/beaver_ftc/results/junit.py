@@ -53,6 +53,7 @@ def _case(name: str, expectation: Document) -> ElementTree.Element:
     case = ElementTree.Element("testcase", classname=name, name=expectation["name"])
     if not expectation["passed"]:
         says = f"expected {expectation['expected']}, actual {expectation['actual']}"
+        says += f": {expectation['reason']}" if expectation.get("reason") else ""
         ElementTree.SubElement(case, "failure", message=_text(says), type="ExpectationMissed")
     return case
 

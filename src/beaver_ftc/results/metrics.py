@@ -9,6 +9,12 @@ give the same file.
 excluded this one so far, and nothing within the class proves that a fault outside of it does not look alike.
 It is false of `unanticipated` and of an instrument, null of nothing and of what a plug-in names.
 `isolation.withdrawn`: surfaces that were named before, and from when to when.
+
+`detection.inconclusive`: null, or the frames in which the built-in diagnosis can conclude nothing: their
+`share`, the
+first of them `from_s`, and `reasons`, each with the `quantity`, its own `share`, the range that was
+`measured`, the
+range that was `flown` outside of it, and what it `says`.
 """
 
 import json
@@ -34,6 +40,7 @@ UNANTICIPATED = "unanticipated"
 TIME_TOLERANCE_S = 1e-9
 LOSS_OF_EFFECTIVENESS = "loss_of_effectiveness"
 TAKEN_OVER, LONG_S = "reallocated", 1.0  # a change of mode that comes later than this is explained
+ON_THE_BOUND = 0.9  # of the worst-case test's bound, in healthy flight
 DRIFT_MPS, DRIFT_M = 5.0, 300.0  # a flight that ends further from where it began has wandered off
 _NOT_SIZE = {"actuator", "sensor", "type", "at_s", "end_s", "profile"}
 
@@ -117,6 +124,7 @@ def _detection(flight: "Landing", fault: Document | None) -> Document:
         "axis": flight.detection_axis,
         "guaranteed_delay_s": _number(flight.guaranteed_delay_s),
         "statistical": _rounded(flight.statistical),
+        "inconclusive": _rounded(flight.inconclusive),
     }
 
 
@@ -235,8 +243,7 @@ def _arrival(flight: "Landing") -> Document | None:
     off = _in_deg(flight.arrival)
     if off is None or flight.departure is not None:
         return None
-    outside = bool(flight.envelope_exits) and math.isinf(flight.envelope_exits[-1][1])
-    return {**off, "in_envelope": not outside}
+    return {**off, "in_envelope": not flight.outside_at_end}
 
 
 def _alarms_s(flight: "Landing") -> list[float]:
@@ -346,7 +353,8 @@ def hints(flight: "Landing", document: Document) -> list[str]:
     """What would mislead a reader who is not told of it: one sentence each."""
     scenario = flight.scenario
     of_diagnosis = (_outside_the_class, _several, _too_small) if scenario.fdi.diagnoses else ()
-    said = [*(says(scenario, document) for says in of_diagnosis), _waited(document), _drift(flight)]
+    said = [*(says(scenario, document) for says in of_diagnosis), _on_the_bound(flight), _waited(document)]
+    said.append(_drift(flight))
     return [sentence for sentence in said if sentence]
 
 
@@ -386,9 +394,23 @@ def _too_small(scenario: "Scenario", document: Document) -> str:
     detection = document["detection"]
     if not scenario.faults or detection["detected"] or detection["guaranteed_delay_s"] is not None:
         return ""
+    if detection.get("inconclusive"):  # which has a line of its own
+        return ""
     return (
         "no alarm, and none was certain: what the fault did stayed within what fdi.bounds declares as "
         "uncertainty; a larger fault, a livelier reference or tighter bounds would show it"
+    )
+
+
+def _on_the_bound(flight: "Landing") -> str:
+    """The worst-case test has next to nothing left before the fault, which any fault then takes."""
+    used = max(flight.closest_approach, default=0.0)
+    if not flight.scenario.faults or not ON_THE_BOUND <= used <= 1.0:
+        return ""
+    return (
+        f"the healthy part of this flight already uses {math.floor(1000.0 * used) / 10.0:g} % of the "
+        f"bound; that a "
+        "small fault is detected here follows from the uncertainty this scenario flies with"
     )
 
 

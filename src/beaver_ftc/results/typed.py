@@ -96,12 +96,14 @@ class Departure(_Part):
 
 @dataclass(frozen=True)
 class Expectation(_Part):
-    """One of the scenario's expectations, and what came out."""
+    """One of the scenario's expectations, and what came out; the reason of one that is not met, if it is
+    known."""
 
     name: str
     passed: bool
     expected: Any
     actual: Any
+    reason: str | None = None
 
 
 def every(part: type[Any], documents: Iterable[Mapping[str, Any]]) -> tuple[Any, ...]:

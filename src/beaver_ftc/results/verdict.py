@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.results.metrics import Document
+from beaver_ftc.scenario.measured import in_words
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -18,6 +19,8 @@ LEAST_BEYOND_S = 0.1
 def title(metrics: Document) -> str:
     """The scenario's name, whether it did as expected, and whether the aircraft was lost."""
     lost = ", the aircraft was LOST" if metrics["departure"] else ""
+    if "interrupted_s" in metrics:
+        return f"{metrics['scenario']}: INTERRUPTED at {metrics['interrupted_s']:.2f} s, not passed{lost}"
     if not metrics["expectations"]:
         return f"{metrics['scenario']}: flown{lost}, nothing was expected"
     return f"{metrics['scenario']}: {'PASSED' if metrics['passed'] else 'FAILED'}{lost}"
@@ -35,6 +38,7 @@ def facts(metrics: Document) -> list[tuple[str, str]]:
         ("flight", _flight(metrics)),
         *(("" if i else "fault", _fault(fault)) for i, fault in enumerate(declared)),
         ("detection", _detection(metrics)),
+        ("inconclusive", _inconclusive(metrics)),
         ("statistical", _statistical(metrics)),
         ("isolation", _isolation(metrics)),
         *(("", said) for said in _others(metrics)),
@@ -64,8 +68,64 @@ def _others(metrics: Document) -> list[str]:
     ]
 
 
-def _still_possible(candidates: list[str]) -> str:
-    return f"not isolated, still possible: {', '.join(candidates)}"
+MOST_LISTED = 4  # places, or types: more are counted
+
+
+def _still_possible(candidates: Sequence[str]) -> str:
+    return f"not isolated, {candidates_in_words(candidates)}"
+
+
+def candidates_in_words(candidates: Sequence[str]) -> str:
+    """What is still possible, `surface` or `surface:type`, grouped: surfaces by place, types by kind, both
+    counted where there are many. The metrics document has the whole list."""
+    places: dict[str, list[str]] = {}
+    for candidate in candidates:
+        place, _, kind = candidate.partition(":")
+        places.setdefault(place, []).extend([kind] if kind else [])
+    surfaces = [place for place, kinds in places.items() if place not in _NO_SURFACE]
+    said = [_surfaces(surfaces)] if surfaces else []
+    said += [_NO_SURFACE[place] for place in places if place in _NO_SURFACE]
+    open_types = list(dict.fromkeys(kind for kinds in places.values() for kind in kinds))
+    types = f"; {_open_types(open_types)}" if open_types else ""
+    return f"still possible: {' or '.join(said) or 'nothing'}{types}"
+
+
+_NO_SURFACE = {
+    "damage": "damage", "unanticipated": "a fault outside the class", "unknown": "a fault outside the class",
+}  # fmt: skip
+# What an aircraft's surfaces are called, and where on it they are.
+_PARTS = {
+    "aileron": "wing", "flap": "wing", "spoiler": "wing", "slat": "wing", "elevon": "wing",
+    "elevator": "tail", "rudder": "tail", "stabilator": "tail", "stabilizer": "tail", "canard": "canard",
+    "throttle": "engines", "engine": "engines",
+}  # fmt: skip
+
+
+def _surfaces(names: Sequence[str]) -> str:
+    """One surface, a few by their names, or many counted by the part of the aircraft where they are."""
+    if len(names) <= MOST_LISTED:
+        return " or ".join(_in_words(name) for name in names)
+    parts: dict[str, int] = {}
+    for name in names:
+        part = next((part for word, part in _PARTS.items() if word in name), "others")
+        parts[part] = parts.get(part, 0) + 1
+    counted = ", ".join(f"{n} {'' if part == 'others' else 'on the '}{part}" for part, n in parts.items())
+    return f"one of {len(names)} surfaces ({counted})"
+
+
+def _open_types(kinds: Sequence[str]) -> str:
+    """The types that remain, counted."""
+    if len(kinds) == 1:
+        return f"type {_in_words(kinds[0])}"
+    return f"type not determined ({len(kinds)} remain: {', '.join(map(_in_words, kinds))})"
+
+
+def _in_words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _counted(n: int, what: str) -> str:
+    return f"{n} {what}{'' if n == 1 else 's'}"
 
 
 def tracking(metrics: Document) -> list[tuple[str, str, str, str]]:
@@ -78,9 +138,15 @@ def tracking(metrics: Document) -> list[tuple[str, str, str, str]]:
 def expectations(metrics: Document) -> list[tuple[str, str, str, bool]]:
     """(name, expected, actual, passed) for each expectation."""
     return [
-        (found["name"], _bound(found["expected"]), _value(found["actual"]), found["passed"])
+        (found["name"], _bound(found["expected"]), _actual(found), found["passed"])
         for found in metrics["expectations"]
     ]
+
+
+def _actual(found: Document) -> str:
+    """What came out, and why if the reason is known."""
+    reason = found.get("reason")
+    return _value(found["actual"]) + (f"; {reason}" if reason else "")
 
 
 def verdict_text(metrics: Document, folder: str, colour: bool = False) -> str:
@@ -109,8 +175,18 @@ def _table(metrics: Document, folder: str) -> "Table":
     for name, expected, actual, passed in expectations(metrics):
         mark = Text("met   " if passed else "MISSED", "green" if passed else "bold red")
         table.add_row("expected", Text.assemble(mark, f" {name} {expected}, got {actual}"))
+    if "certificate" in metrics:
+        table.add_row("certificate", _certificate(metrics["certificate"], folder))
     table.add_row("results", folder)
     return table
+
+
+def _certificate(written: Document, folder: str) -> str:
+    """How many alarms and exclusions are certified, and the command that checks them."""
+    if not written["statements"] and not written["without"]:
+        return "nothing to certify: no alarm"
+    without = f", {written['without']} not certified" if written["without"] else ""
+    return f"{_counted(written['statements'], 'statement')}{without}; check: beaver-ftc check {folder}"
 
 
 def _changed(change: Document) -> str:
@@ -226,6 +302,12 @@ def _detection(metrics: Document) -> str:
     return f"after {_time(detection['delay_s'])} {_seen(detection)}{within}"
 
 
+def _inconclusive(metrics: Document) -> str:
+    """Where the diagnosis could conclude nothing; nothing if it could all the time."""
+    found = metrics["detection"].get("inconclusive")
+    return in_words(found) if found else ""
+
+
 def _seen(detection: Document) -> str:
     """Where an alarm showed: on an axis, or between the instruments."""
     return f"on {detection['axis']}" if detection["axis"] else "between the instruments"
@@ -286,7 +368,9 @@ def _type(isolation: Document) -> str:
     if str(isolation["fault"]).startswith("sensor "):
         return ""
     if isolation["type"] is None:
-        return f", {' or '.join(isolation['candidates']).replace('_', ' ') or 'of no known type'}"
+        left = isolation["candidates"]
+        few = len(left) < MOST_LISTED
+        return f", {' or '.join(map(_in_words, left)) or 'of no known type' if few else _open_types(left)}"
     return "" if isolation["type"] == "unanticipated" else f", {isolation['type'].replace('_', ' ')}"
 
 

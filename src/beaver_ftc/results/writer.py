@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from uuid import uuid4
 
 from beaver_ftc.documents.errors import SimulationFailed
-from beaver_ftc.results.log import ParquetLog, StoredLog
+from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import Document, as_json, metrics
 
 if TYPE_CHECKING:
@@ -39,6 +39,7 @@ FILES_OF_A_RESULT = frozenset({
     "diagnosis.parquet", "verdict.json", "flights.json", "flights.md", "flights.png",
     "flight.csv", "flight.ulg", "flight.bin", "vehicle.yaml", "grades.json", "grades.md", "grades.html",
     "aircraft", "certificate.json", "separation.json", "flown",
+    "smallest.json", "smallest.csv", "smallest.html",
     "rare.json", "flight.yaml", "evidence.json", "evidence.html", "evidence.pdf",
 })  # fmt: skip
 AIRCRAFT, MODEL_FILES = "aircraft", frozenset({".xml", ".yaml"})  # an own aircraft, to fly it again
@@ -60,12 +61,15 @@ def run(
     recording: str | None = None,
     certified: bool = False,
 ) -> Document:
-    """Fly `scenario`, write `out/<name>/` whole or not at all, and return the metrics document.
+    """Fly `scenario`, write `out/<name>/`, and return the metrics document.
+
+    A flight that is not completed leaves nothing. Once it is, log and scenario are kept whatever else fails.
 
     exports: of "csv" and "acmi". prepare: called with the trimmed plant just before the flight. recording:
     table, ulog or ardupilot, to write the log as a recorder on board would have. certified: write the
     certificate of its alarm and exclusions. Raises BadInput for a flight that cannot be trimmed or
-    certified, SimulationFailed for one not completed or kept.
+    certified, SimulationFailed for one not completed or kept, NotAllWritten where the log is kept but another
+    file could not be written.
     """
     from beaver_ftc.loop.loop import fly
     from beaver_ftc.results import exports as exporting
@@ -76,35 +80,72 @@ def run(
     watch = recorder.watch if recorder else None
     if certified:
         certificate.check_scheme(scenario)
+    failed: list[Exception] = []
     with result_folder(out, scenario.name) as folder:
         log_path, aircraft = folder / "log.parquet", scenario.airframe
         with ParquetLog(log_path) as log:
             flight = fly(scenario, log, progress, prepare=prepare, watch=watch)
-        document = metrics(flight)
-        write_documents(folder, scenario, document)
-        if report:
-            write_report_files(folder, document)
+        write_scenario(folder, scenario)
+        document: Document = {}
+        with _kept_whatever(folder, "metrics.json", failed):
+            document = metrics(flight)
+            (folder / "metrics.json").write_text(as_json(document), encoding="utf-8")
+        if recorder:
+            with _kept_whatever(folder, "certificate.json", failed):
+                certificate.write(scenario, recorder, folder)
+        if report and document:
+            with _kept_whatever(folder, "report.html", failed):
+                write_report_files(folder, document)
         if "csv" in exports:
-            exporting.write_csv(log_path, folder / "log.csv")
-        if "acmi" in exports:
-            exporting.write_acmi(log_path, document, folder / "flight.acmi", aircraft)
+            with _kept_whatever(folder, "log.csv", failed):
+                exporting.write_csv(log_path, folder / "log.csv")
+        if "acmi" in exports and document:
+            with _kept_whatever(folder, "flight.acmi", failed):
+                exporting.write_acmi(log_path, document, folder / "flight.acmi", aircraft)
         if recording is not None:
             stops_rad = {s: max(abs(to.min_rad), abs(to.max_rad)) for s, to in aircraft.travel.items()}
-            exporting.write_recording(log_path, stops_rad, recording, folder, tuple(aircraft.signals))
-        if recorder:
-            certificate.write(scenario, StoredLog(log_path), recorder, folder)
+            with _kept_whatever(folder, f"the recording ({recording})", failed):
+                exporting.write_recording(log_path, stops_rad, recording, folder, tuple(aircraft.signals))
+    if failed:
+        why = "; ".join(" ".join(str(error).split()) for error in failed)
+        raise NotAllWritten(f"{out / scenario.name}: the flight and its log are kept, but {why}") from failed[
+            0
+        ]
     return document
+
+
+class NotAllWritten(SimulationFailed):
+    """A flight was completed and its log is kept, but another file of its results could not be written."""
+
+
+@contextlib.contextmanager
+def _kept_whatever(folder: Path, what: str, failed: list[Exception]) -> Iterator[None]:
+    """Write one part of the results; where that fails, note why and leave nothing of that part."""
+    before = set(folder.iterdir())
+    try:
+        yield
+    except Exception as error:
+        for left in set(folder.iterdir()) - before:
+            shutil.rmtree(left) if left.is_dir() else left.unlink()
+        reason = SimulationFailed(f"{what} could not be written: {type(error).__name__}: {error}")
+        reason.__cause__ = error
+        failed.append(reason)
 
 
 def write_documents(folder: Path, scenario: "Scenario", document: Document) -> None:
     """Write what was flown and what came out of it into a result folder."""
+    write_scenario(folder, scenario)
+    (folder / "metrics.json").write_text(as_json(document), encoding="utf-8")
+
+
+def write_scenario(folder: Path, scenario: "Scenario") -> None:
+    """Write what was flown into a result folder."""
     from beaver_ftc.scenario.dump import to_yaml
 
     if str(scenario.aircraft).startswith("./"):  # the user's own, copied: it can be flown again from here
         shutil.copytree(scenario.airframe.folder, folder / AIRCRAFT, ignore=_no_model, dirs_exist_ok=True)
         scenario = scenario.model_copy(update={"aircraft": f"./{AIRCRAFT}"})
     (folder / "scenario.yaml").write_text(to_yaml(scenario), encoding="utf-8")
-    (folder / "metrics.json").write_text(as_json(document), encoding="utf-8")
 
 
 def _no_model(folder: str, names: list[str]) -> set[str]:

@@ -13,6 +13,7 @@ import yaml
 import beaver_ftc as bf
 from tools.drawn.compose import Drawn, drawn_flights
 from tools.drawn.promises import broken, flown_again, saved_alike, told_alike
+from tools.drawn.shrink import smaller
 
 AIRCRAFT = ("beaver", "jsbsim:c172p")
 AGAIN, BY_COMMAND = 3, 50  # every so many-th flight is flown again, and by the command line
@@ -106,9 +107,7 @@ def keep_it(folder: Path, drawn: Drawn, outcome: Outcome, shrink: bool) -> None:
     path = folder / f"{drawn.words['name']}.yaml"
     words = drawn.words
     if shrink:
-        from tools.drawn.shrink import smaller
-
-        words = smaller(drawn, outcome)
+        words = smaller(drawn, outcome.broken, lambda less: fly(less, again=True, by_command=False).broken)
     heading = "".join(f"# {line}\n" for line in outcome.broken)
     path.write_text(heading + yaml.safe_dump(plain(words), sort_keys=False, width=110), encoding="utf-8")
 

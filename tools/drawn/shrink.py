@@ -1,11 +1,10 @@
 """A counterexample with as much left out as still breaks the same promise."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from copy import deepcopy
 from dataclasses import replace
 from typing import Any
 
-from tools.drawn.campaign import Outcome, fly
 from tools.drawn.compose import Drawn
 from tools.drawn.declare import Words
 
@@ -13,10 +12,13 @@ MOST_FLIGHTS = 150
 KEPT = ("name", "seed")
 
 
-def smaller(drawn: Drawn, outcome: Outcome) -> Words:
+def smaller(drawn: Drawn, broken: Sequence[str], flown: Callable[[Drawn], Sequence[str]]) -> Words:
     """Keys, and entries of lists, left out one by one for as long as a promise of the same kind breaks. The
-    declaration stays, so that what is left is as well declared as before."""
-    kinds = {line.partition(":")[0] for line in outcome.broken}
+    declaration stays, so that what is left is as well declared as before.
+
+    broken: what the flight breaks. flown: flies and says what breaks.
+    """
+    kinds = {line.partition(":")[0] for line in broken}
     words, flights, again = drawn.words, 0, True
     while again:
         again = False
@@ -27,8 +29,8 @@ def smaller(drawn: Drawn, outcome: Outcome) -> Words:
             if less is None:
                 continue
             flights += 1
-            found = fly(replace(drawn, words=less), again=True, by_command=False)
-            if kinds & {line.partition(":")[0] for line in found.broken}:
+            found = flown(replace(drawn, words=less))
+            if kinds & {line.partition(":")[0] for line in found}:
                 words, again = less, True
     return words
 

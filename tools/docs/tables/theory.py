@@ -5,7 +5,7 @@ import numpy as np
 from beaver_ftc.diagnosis import likelihood, noise_model, redundancy, statistical, tones, watch
 from beaver_ftc.diagnosis.bounds import declared, worst_case
 from beaver_ftc.plant import instruments
-from beaver_ftc.scenario.diagnosis import FdiConfig, Statistical
+from beaver_ftc.scenario.diagnosis import Bounds, FdiConfig, Statistical
 from beaver_ftc.studies.present.tables import markdown_table
 
 CONSTANTS = (  # (section, symbol on the page, module, name there, unit)
@@ -26,7 +26,6 @@ CONSTANTS = (  # (section, symbol on the page, module, name there, unit)
     (9, "", watch, "POLES_PER_S", "1/s"),
     (9, "", redundancy, "TURNING_RAD_S", "rad/s"),
     (9, "", redundancy, "FALLING_M_S2", "m/s2"),
-    (9, "", redundancy, "CLIMBING_M_S", "m/s"),
     (9, "", redundancy, "DENSITY_HEIGHT_M", "m"),
     (9, "", redundancy, "STEEPEST_RAD", "rad"),
 )
@@ -38,6 +37,7 @@ SETTINGS = (  # (section, symbol, key of a scenario, of which section of it, uni
     (7, "", "false_alarms_per_h", Statistical(), "1/h"),
     (7, "", "misnaming", Statistical(), ""),
     (7, r"$\omega$", "uncertainty_rad_s", Statistical(), "rad/s"),
+    (9, "", "vertical_wind_mps", Bounds(), "m/s"),
 )
 
 

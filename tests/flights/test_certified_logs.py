@@ -4,12 +4,12 @@ import json
 
 import pytest
 from pyarrow import parquet
-from tools.check_certificate import failures
 from tools.drawn.reader import doubts
 from typer.testing import CliRunner
 
 import beaver_ftc as bf
 from beaver_ftc.cli.main import app
+from beaver_ftc.results.certificates.check_certificate import failures
 from beaver_ftc.results.exports import RECORDINGS, write_recording
 from flying import SINES
 

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from tools.check_certificate import failures
 from tools.drawn.certificates import altered, places
 from tools.drawn.reader import doubts
 
@@ -19,8 +18,9 @@ import beaver_ftc as bf
 from beaver_ftc.cli.main import main
 from beaver_ftc.results import writer
 from beaver_ftc.results.certificates import certificate as certificate_module
-from beaver_ftc.results.certificates import chance
+from beaver_ftc.results.certificates import chance, check_certificate
 from beaver_ftc.results.certificates.certificate import as_text, sealed
+from beaver_ftc.results.certificates.check_certificate import failures
 from flying import SINES
 
 CHECKER = Path(__file__).parents[2] / "tools/check_certificate.py"
@@ -431,7 +431,7 @@ def test_no_field_is_there_that_is_not_known(where):
 
 
 def test_the_checker_takes_numpy_and_readers_of_the_files_alone():
-    tree = ast.parse(CHECKER.read_text())
+    tree = ast.parse(Path(check_certificate.__file__).read_text())
     imported = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
     imported |= {str(node.module) for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
     others = {name.partition(".")[0] for name in imported} - set(sys.stdlib_module_names)

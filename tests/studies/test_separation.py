@@ -12,11 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyarrow.parquet import read_table
 from scipy.optimize import linprog
-from tools.check_certificate import failures
 
 import beaver_ftc as bf
 from beaver_ftc.cli.main import main
 from beaver_ftc.diagnosis.types.registry import BIAS, CONSTANT_LOSS, FLOAT, STUCK
+from beaver_ftc.results.certificates.check_certificate import failures
 from beaver_ftc.studies.separation import Candidate, Situation, as_text, doublet, separate, tell_apart, write
 
 SMALL = {

@@ -19,9 +19,9 @@ import numpy as np
 
 import beaver_ftc as bf
 from beaver_ftc.results.certificates.certificate import as_text
+from beaver_ftc.results.certificates.check_certificate import failures
 from beaver_ftc.scenario.dump import to_yaml
 from beaver_ftc.studies import separation
-from tools.check_certificate import failures
 
 SURFACES = ("aileron", "elevator", "rudder", "flap")
 LOSS = "loss_of_effectiveness"

@@ -7,10 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from tools.check_certificate import failures
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
+from beaver_ftc.results.certificates.check_certificate import failures
 from beaver_ftc.scenario.sweeps import Variation
 from beaver_ftc.studies.engine.workers import ThisProcess
 from beaver_ftc.studies.sweep import campaign, one_flight, store

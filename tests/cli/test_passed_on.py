@@ -315,10 +315,14 @@ def test_who_is_chosen():
     from beaver_ftc.cli.compare import _chosen
     from beaver_ftc.plugins import LAWS, registered
 
-    assert _chosen("--laws", LAWS, None, "fault-tolerant") == list(registered(LAWS))
-    assert _chosen("--laws", LAWS, "lqr, fault-tolerant,lqr", "fault-tolerant") == ["fault-tolerant", "lqr"]
+    assert _chosen("--laws", LAWS, None, "fault-tolerant", alone=True) == list(registered(LAWS))
+    assert _chosen("--laws", LAWS, None, "fault-tolerant", alone=False) == []
+    assert _chosen("--laws", LAWS, "lqr, fault-tolerant,lqr", "fault-tolerant", alone=True) == [
+        "fault-tolerant",
+        "lqr",
+    ]
     with pytest.raises(BadInput) as caught:
-        _chosen("--laws", LAWS, "lq,nomina", "fault-tolerant")
+        _chosen("--laws", LAWS, "lq,nomina", "fault-tolerant", alone=True)
     assert [line.partition(",")[0] for line in str(caught.value).splitlines()] == [
         "--laws: unknown law 'lq'", "--laws: unknown law 'nomina'",
     ]  # fmt: skip

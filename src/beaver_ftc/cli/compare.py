@@ -50,8 +50,8 @@ def command(options: Options) -> None:
     benchmark: Compare on the standard sets; update the leaderboard.
     tune: Tune the rivals on the calibration set.
     errors: With --tune: for declared sensor errors and turbulence.
-    schemes: Comma-separated schemes; all registered ones if left out.
-    laws: Comma-separated laws; all registered ones if left out.
+    schemes: Comma-separated schemes; all registered ones if neither schemes nor laws are listed.
+    laws: Comma-separated laws; all registered ones if neither schemes nor laws are listed.
     only: With --benchmark: one set.
     flights: At most N flights of each sweep; or recorded flights.
     other_days: With --flights FOLDER: on days made of the labelled flights.
@@ -148,7 +148,8 @@ def _compare_on_flights(options: Options, most: int | None) -> None:
         cases = [case for each in sets for case in of_set(each, most)]
         name = f"benchmark-{options.only}" if options.only else "benchmark"
     entries = entries_of(
-        _chosen("--schemes", DETECTORS, options.schemes, SCHEME), _chosen("--laws", LAWS, options.laws, LAW)
+        _chosen("--schemes", DETECTORS, options.schemes, SCHEME, alone=options.laws is None),
+        _chosen("--laws", LAWS, options.laws, LAW, alone=options.schemes is None),
     )
     with progress_bar(f"{len(cases)} flights, {len(entries)} times each") as progress:
         document = run_comparison(options.out, name, cases, entries, options.workers, progress)
@@ -162,12 +163,14 @@ def _compare_on_flights(options: Options, most: int | None) -> None:
         write_leaderboard(document, options.leaderboard)
 
 
-def _chosen(option: str, group: str, names: str | None, ours: str) -> list[str]:
-    """The names listed, ours among them. Raises BadInput with a line a name that is not registered."""
+def _chosen(option: str, group: str, names: str | None, ours: str, *, alone: bool) -> list[str]:
+    """The names listed, ours among them; without a list all that are registered, or none where the list of
+    the other kind is what was asked for (alone: it was not). Raises BadInput with a line a name that is not
+    registered."""
     from beaver_ftc.plugins import refusal, registered
 
     if names is None:
-        return list(registered(group))
+        return list(registered(group)) if alone else []
     wrong = [f"{option}: {says}" for name in listed(names) if (says := refusal(group, name))]
     if wrong:
         raise BadInput("\n".join(wrong))

@@ -50,7 +50,7 @@ SIGNALS = st.lists(
 )
 PARAMETERS = {
     "loss_of_effectiveness": {"magnitude": numbers(0, 1)},
-    "stuck": {"position_deg": numbers(-30, 30)},
+    "stuck": {"position_deg": numbers(-5, 15)},  # within the stops of every surface
     "hardover": {"direction": st.sampled_from([1, -1])},
     "float": {},
     "bias": {"bias_deg": numbers(-10, 10)},

@@ -10,7 +10,7 @@ from scenario.damageable import damageable
 
 GIVEN = {
     "loss_of_effectiveness": {"magnitude": 0.4},
-    "stuck": {"position_deg": 90.0},
+    "stuck": {"position_deg": 45.0},
     "hardover": {"direction": -1},
     "float": {},
     "bias": {"bias_deg": -18.0},
@@ -27,7 +27,7 @@ BEFORE = {
 PI = 3.14159265358979
 AFTER = {
     "loss_of_effectiveness": {"effectiveness": 0.8 * 0.9 * 0.6},
-    "stuck": {"stuck": 1.0, "stuck-at-rad": PI / 2},
+    "stuck": {"stuck": 1.0, "stuck-at-rad": PI / 4},
     "hardover": {"hardover": -1.0},
     "float": {"float": 1.0},
     "bias": {"bias-rad": 0.1 - 1.25 * PI / 10},

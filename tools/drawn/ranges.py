@@ -93,8 +93,10 @@ def _surface(now: Circumstances, path: str) -> str:
 
 def _jam(now: Circumstances, path: str) -> float:
     """Within the travel of any surface."""
-    least = max(degrees(travel.min_rad) for travel in now.aircraft.travel.values())
-    return float(now.rng.uniform(max(-5.0, least), 15.0))
+    travels = now.aircraft.travel.values()
+    least = max(degrees(travel.min_rad) for travel in travels)
+    most = min(degrees(travel.max_rad) for travel in travels)
+    return float(now.rng.uniform(max(-5.0, least), min(15.0, most)))
 
 
 _SENSOR_SIZES = {

@@ -1,11 +1,13 @@
 """The faults that there are, of surfaces and of the aerodynamics: a row each (base.py)."""
 
-from math import radians
+from math import degrees, radians
 from typing import Literal
 
-from beaver_ftc.documents.base import Number, entry, number
-from beaver_ftc.scenario.airframe import Actuator
+from beaver_ftc.documents.base import Conflict, Number, entry, number
+from beaver_ftc.scenario.airframe import Actuator, checked_aircraft
 from beaver_ftc.scenario.faults.base import Button, Gradual, Properties, Switched
+
+_ROUNDED = 1e-4  # of a stop in degrees as people write it
 
 
 class LossOfEffectiveness(Gradual):
@@ -31,7 +33,7 @@ class Stuck(Switched):
     """The surface jams.
 
     actuator: the surface that fails
-    position_deg: where it jams; left out: where it happens to be, deg
+    position_deg: where it jams, between its stops; left out: where it happens to be, deg
     """
 
     adds, stays_where_it_is, truth, size = False, True, ("position_deg", 1.0), ("at", "deg")
@@ -41,6 +43,16 @@ class Stuck(Switched):
     type: Literal["stuck"]
     actuator: Actuator
     position_deg: Number | None = number(None, "deg", ge=-90, le=90, examples=[3])
+
+    def _conflicts(self) -> list[Conflict]:
+        travel = checked_aircraft().travel[self.actuator]
+        least, most = degrees(travel.min_rad), degrees(travel.max_rad)
+        found = super()._conflicts()
+        if self.position_deg is not None and not least - _ROUNDED <= self.position_deg <= most + _ROUNDED:
+            allowed = f"allowed: {least:.6g} to {most:.6g} deg"
+            says = f"{self.position_deg:g} is beyond the stops of {self.actuator}, {allowed}"
+            found.append((("position_deg",), says))
+        return found
 
     def strike(self, of: Properties, share: float, was_rad: float) -> None:
         if of["stuck"] == 0.0:

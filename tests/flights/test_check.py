@@ -64,6 +64,23 @@ def test_a_strangers_log_is_told_and_gets_a_vehicle_file(tmp_path):
     assert again["vehicle"] is None
 
 
+@pytest.mark.parametrize(("time", "rates"), [
+    ("Time [ms]", "sensor_combined.gyro_rad[{}]"),
+    ("time (ms)", "Gyro {} [rad/s]"),
+    ("t_ms", "vehicle_attitude.{}speed"),
+    ("Time / ms", "control_state.{}_rate"),
+    ("Timestamp [ms]", "{} rate [rad/s]"),
+])  # fmt: skip
+def test_names_that_loggers_write_are_found(tmp_path, time, rates):
+    words = (0, 1, 2) if "[{}]" in rates else "xyz" if "Gyro" in rates else ("roll", "pitch", "yaw")
+    names = {f"{axis}_rad_s": rates.format(word) for axis, word in zip("pqr", words, strict=True)}
+    path = logged(tmp_path / "named.csv", names | {"t_s": time}, {"t_s": 1e3})
+    told = json.loads(run("identify", "--check", path, "--format", "json").stdout)
+    assert told["logs"][0]["usable"]
+    assert told["vehicle"]["time"] == {"column": time, "unit": "ms"}
+    assert list(told["vehicle"]["rates"].values()) == [names["p_rad_s"], names["q_rad_s"], names["r_rad_s"]]
+
+
 @pytest.mark.parametrize(("factors", "says"), [
     ({"p_rad_s": 57.29578, "q_rad_s": 57.29578, "r_rad_s": 57.29578}, "p_rad_s is in deg/s"),
     ({"roll_rad": 57.29578}, "roll_rad is in deg"),

@@ -23,10 +23,20 @@ from beaver_ftc.flights.vehicle import Vehicle, further_keys
 
 Document = dict[str, Any]
 
+
+def _rate(name: str, angle: str, axis: str, index: int) -> str:
+    """What columns of a body rate are called: ours, by its angle, by its axis, by its place in a vector."""
+    return "|".join((
+        f"{name}_rad_s", name, rf"(.*\.)?{angle}_?(rate|speed)\w*", rf".*gyr(o|_)?_?{axis}\w*",
+        rf".*gyro_rad\[{index}\]", f"w{axis}", f"omega_?{axis}", rf"rate\.{angle[0]}",
+        rf".*velocity\.({axis}|xyz\[{index}\])",
+    ))  # fmt: skip
+
+
 _NAMES = {
-    "p": r"p_rad_s|p|roll_?(rate|speed)\w*|.*gyr(o|_)?_?x\w*|wx|omega_?x|rate\.r|.*velocity\.(x|xyz\[0\])",
-    "q": r"q_rad_s|q|pitch_?(rate|speed)\w*|.*gyr(o|_)?_?y\w*|wy|omega_?y|rate\.p|.*velocity\.(y|xyz\[1\])",
-    "r": r"r_rad_s|r|yaw_?(rate|speed)\w*|.*gyr(o|_)?_?z\w*|wz|omega_?z|rate\.y|.*velocity\.(z|xyz\[2\])",
+    "p": _rate("p", "roll", "x", 0),
+    "q": _rate("q", "pitch", "y", 1),
+    "r": _rate("r", "yaw", "z", 2),
     "roll": r"(.*\.)?(roll|phi|bank)(_?(rad|deg|angle))?(_\w+)?",
     "pitch": r"(.*\.)?(pitch|theta)(_?(rad|deg|angle))?(_\w+)?",
     "az": r"(.*[._])?(az|acc_?z|accel_?z|acc_?down|linear_acceleration\.z|accelerometer_m_s2\[2\])(_\w+)?",
@@ -171,7 +181,7 @@ def _proposed(
 def _candidates(names: Iterable[str]) -> list[str]:
     """Columns of a table that may be something: a wide one is not read whole."""
     pattern = "|".join(f"({one})" for one in _NAMES.values())
-    known = [name for name in names if re.fullmatch(pattern, name.lower()) or _may_command(name)]
+    known = [name for name in names if re.fullmatch(pattern, _spelled(name)) or _may_command(name)]
     return known[:_MOST_READ]
 
 
@@ -179,9 +189,15 @@ def _may_command(name: str) -> bool:
     return bool(re.search(_COMMAND, name.lower()) and not re.search(_NO_COMMAND, name.lower()))
 
 
+def _spelled(name: str) -> str:
+    """A column's name as the patterns have it: `Roll rate [deg/s]` is `roll_rate_deg_s`."""
+    with_unit = re.sub(r"\s*[\[(]\s*([^\d\])][^\])]*?)\s*[\])]\s*$", r"_\1", name.strip().lower())
+    return re.sub(r"[\s/]+", "_", with_unit)
+
+
 def _first(pattern: str, names: Sequence[str]) -> str | None:
     """The column that fits a pattern, and its earliest alternative; the shorter name of two."""
-    fits = [name for name in names if re.fullmatch(pattern, name.lower()) and not _may_command(name)]
+    fits = [name for name in names if re.fullmatch(pattern, _spelled(name)) and not _may_command(name)]
     return min(fits, key=lambda name: (len(name), name), default=None)
 
 
@@ -193,15 +209,13 @@ def _commands(names: Sequence[str], found: dict[str, str | None]) -> list[str]:
 def _time(path: Path, lines: list[str]) -> tuple[str, str]:
     """The time column of a table and its unit. Raises BadInput where no column increases like time."""
     names = names_of(path)
-    tried = [name for name in names if re.fullmatch(_NAMES["time"], name.lower())]
+    tried = [name for name in names if re.fullmatch(_NAMES["time"], _spelled(name))]
     for name in sorted(tried, key=lambda name: name != TIME):
         values = first_of(path, name)
         step = float(np.median(np.diff(values[np.isfinite(values)][:50]))) if len(values) > 1 else 0.0
         units = [unit for unit, size in SECONDS.items() if step > 0.0 and _fits(1.0 / (step * size))]
         if units:
-            unit = next(
-                (one for one in units if name.lower().endswith((f"_{one}", f"({one})", one))), units[0]
-            )
+            unit = next((one for one in units if _spelled(name).endswith(one)), units[0])
             if (name, unit) != (TIME, "s"):
                 lines.append(f"time is in column {name}, its steps fit {unit}")
             return name, unit

@@ -16,7 +16,7 @@ from beaver_ftc.documents.keys import UnusableKeyError, parse_key, plain, with_v
     [
         (b"a\nb\0", 9, "is a binary file, allowed: UTF-8 text", 2),
         (b"a\n\n\xff\n", 9, "byte 0xff is not UTF-8, allowed: UTF-8 text", 3),
-        (b"abcd", 3, "is too large (4e-06 MB), allowed: at most 3e-06 MB", 1),
+        (b"abcd", 3, "is too large (4e-06 MB), allowed: at most 3e-06 MB", 0),
     ],
 )
 def test_what_is_no_text(tmp_path, data, most, says, line):
@@ -35,7 +35,7 @@ def test_a_text_of_the_largest_size_is_read_without_its_mark(tmp_path):
 @pytest.mark.parametrize(
     ("file", "says"),
     [
-        ("none", "no such file, allowed: the path of a file that exists"),
+        ("none", "no such file, allowed: the path of a text file"),
         (".", "is a folder, allowed: a text file"),
         ("pipe", "is a pipe or a device, allowed: a regular text file"),
         ("n" * 300, "cannot be read (file name too long), allowed: a readable text file"),

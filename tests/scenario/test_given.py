@@ -41,7 +41,7 @@ class TestLoad:
         ("given", "says"),
         [
             ("elevator-partial-los", "did you mean elevator-partial-loss"),
-            (Path("nowhere.yaml"), "nowhere.yaml:1: .*no such file"),
+            (Path("nowhere.yaml"), "nowhere.yaml: no such file"),
             ({"durations_s": 3}, "^durations_s: unknown key, did you mean duration_s"),
             (
                 {"initial": {"airspeed_kt": 90}},

@@ -6,9 +6,10 @@ from pathlib import Path
 
 
 class UnreadableError(Exception):
-    """The file cannot be used as text; the message says why and what is allowed, the line where."""
+    """The file cannot be used as text; the message says why and what is allowed, the line where: 0 if it is
+    the file as a whole."""
 
-    def __init__(self, reason: str, line: int = 1) -> None:
+    def __init__(self, reason: str, line: int = 0) -> None:
         super().__init__(reason)
         self.line = line
 
@@ -37,7 +38,7 @@ def read_bytes(path: Path | str, max_bytes: int) -> bytes:
             _check_kind_and_size(os.fstat(file.fileno()), max_bytes)
             data = file.read(max_bytes + 1)
     except FileNotFoundError:
-        raise UnreadableError("no such file, allowed: the path of a file that exists") from None
+        raise UnreadableError("no such file, allowed: the path of a text file") from None
     except IsADirectoryError:
         raise UnreadableError("is a folder, allowed: a text file") from None
     except (OSError, ValueError) as error:

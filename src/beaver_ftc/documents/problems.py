@@ -31,12 +31,14 @@ class ScenarioError(BadInput):
 
     @property
     def lines(self) -> tuple[str, ...]:
-        file = one_line(self.source, 4096)
-        return tuple(
-            (f"{file}:{problem.line}: " if file else "")
-            + f"{key_path(problem.location)}: {one_line(problem.says, 2000)}"
-            for problem in self.problems
-        )
+        return tuple(self._line(problem) for problem in self.problems)
+
+    def _line(self, problem: Problem) -> str:
+        """file:line: key: what; of a file as a whole file: what."""
+        file, says = one_line(self.source, 4096), one_line(problem.says, 2000)
+        if file and not problem.line:
+            return f"{file}: {says}"
+        return (f"{file}:{problem.line}: " if file else "") + f"{key_path(problem.location)}: {says}"
 
     def __reduce__(self) -> tuple[Any, ...]:
         return (type(self), (self.source, self.problems))

@@ -220,7 +220,7 @@ def _read_at(path: Path, *_state: int) -> _File:
     try:
         parser.Parse(read_bytes(path, _MAX_BYTES), True)
     except UnreadableError as error:
-        says.wrong.append((error.line, str(error)))
+        says.wrong.append((error.line or 1, str(error)))
     except (expat.ExpatError, ValueError) as error:
         says.wrong.append((getattr(error, "lineno", 1), f"is no XML ({error}), allowed: a JSBSim file"))
     return says

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from beaver_ftc.documents.document import Document, Problem
-from beaver_ftc.documents.errors import BadInput, nearest, suggestion
+from beaver_ftc.documents.errors import BadInput, nearest
 from beaver_ftc.documents.keys import plain
 from beaver_ftc.documents.paths import data_root
 from beaver_ftc.documents.problems import ScenarioError
@@ -113,11 +113,12 @@ def no_such(given: str, kind: str) -> str:
         if other != kind and given in names[other]:
             return f"{given} is a {other}, allowed: a {kind}; `beaver-ftc {flies} {given}` flies it"
     says = f"no such file or built-in {kind}: {given[:100]!r}"
+    allowed = f"allowed: a file, or one of the {len(names[kind])} names that `beaver-ftc list` prints"
     near = nearest(given, [name for known in (names[kind], *names.values()) for name in known])
-    for other in _KINDS:
-        if near and near not in names[kind] and near in names[other]:
-            return f"{says}, did you mean the {other} {near}? allowed: {', '.join(names[kind])}"
-    return f"{says}{suggestion(given, names[kind])}"
+    if near is None:
+        return f"{says}, {allowed}"
+    kinds = "" if near in names[kind] else f"the {next(of for of in _KINDS if near in names[of])} "
+    return f"{says}, did you mean {kinds}{near}? {allowed}"
 
 
 def resolve(name_or_path: str | Path, kind: str = "scenario") -> Path:

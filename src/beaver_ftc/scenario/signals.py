@@ -217,7 +217,7 @@ def _read_column(file: Any, column: Any, folder: Path | None) -> dict[str, list[
     try:
         return _parse(read_text(path, _MAX_BYTES).splitlines(), column)
     except UnreadableError as error:
-        deny(f"{file!r} line {error.line}: {error}", "file")
+        deny(f"{file!r}{f' line {error.line}' if error.line else ''}: {error}", "file")
 
 
 def _inside(folder: Path | None, file: str) -> Path:
@@ -234,7 +234,7 @@ def _parse(lines: Sequence[str], column: str) -> dict[str, list[float]]:
     header = [name.strip() for name in next(csv_files.reader(lines[:1]), [])]
     for name in ("t_s", column):
         if header.count(name) != 1:
-            raise UnreadableError(f"the header has no column {name!r}, allowed: {_FORMAT}")
+            raise UnreadableError(f"the header has no column {name!r}, allowed: {_FORMAT}", 1)
     if len(lines) - 1 > MAX_ROWS:
         raise UnreadableError(f"too many rows ({len(lines) - 1}), allowed: at most {MAX_ROWS}")
     at, of = header.index("t_s"), header.index(column)

@@ -4,6 +4,7 @@ import json
 import re
 import sys
 from copy import deepcopy
+from dataclasses import fields, is_dataclass
 from importlib import import_module
 from inspect import signature
 from pathlib import Path
@@ -61,13 +62,17 @@ def _noting(name, result, given):
 
 
 def _shown(value):
-    """What can be compared of a value: of objects their names; a time is not negative."""
+    """What can be compared of a value: of objects their names, or their fields; a time is not negative."""
     if isinstance(value, dict):
         return {key: of >= 0 if key == "took_s" else _shown(of) for key, of in value.items()}
     if isinstance(value, list | tuple):
         return list(map(_shown, value))
     if isinstance(value, str | int | float | Path | None):
         return str(value) if isinstance(value, Path) else value
+    if isinstance(value, frozenset):
+        return sorted(value)
+    if is_dataclass(value) and not hasattr(value, "name"):
+        return {field.name: _shown(getattr(value, field.name)) for field in fields(value)}
     return getattr(value, "vanes", getattr(value, "name", "(object)"))
 
 
@@ -203,6 +208,10 @@ ASKED = [
     ("run fault-free rudder-stuck", RUN), ("run nothing.yaml --format json", RUN),
     ("sweep elevator-effectiveness", SWEEP), ("sweep nothing.yaml --format json --junit j.xml", SWEEP),
     ("sweep elevator-effectiveness --search delay --workers 3 --out o --format json --keep-logs all", SWEEP),
+    ("sweep elevator-effectiveness --keep-logs 3,17 --certificate --resume", SWEEP),
+    ("sweep elevator-effectiveness --certificate --no-report --workers 2", SWEEP),
+    ("sweep elevator-effectiveness --keep-logs failed --certificate", SWEEP),
+    ("sweep elevator-effectiveness --keep-logs 3,x", SWEEP),
     ("sweep elevator-effectiveness --replay 3", SWEEP), ("sweep elevator-effectiveness --backend ray", SWEEP),
     ("sweep elevator-effectiveness --replay 0 --format json", SWEEP),
     ("live", LIVE), ("live rudder-stuck --port 80 --out o", LIVE),

@@ -411,3 +411,16 @@ def test_an_error_crosses_its_bound_within_a_quarter_of_a_surfaces_travel():
     assert record.block[0].pace == pytest.approx(0.02)
     statistical.follow_surfaces(record.noise, record.block, error_map, error_map.travel_low.copy())
     assert record.block[0].pace == 2.0
+
+
+def test_a_surface_that_stands_still_again_moves_no_error():
+    """Each frame is held against the one before it, not against where the surfaces were at first."""
+    record = np.zeros(1, statistical_dtype()).view(np.recarray)[0]
+    error_map = np.zeros(1, error_map_dtype(3)).view(np.recarray)[0]
+    error_map.travel_low, error_map.travel_high = (-0.3, -0.2, -0.4), (0.1, 0.25, 0.5)
+    record.noise.pace, paces = 0.02, []
+    for u in ((0.0, 0.0, 0.0), *[(0.01, -0.02, 0.0)] * 2, (0.01, -0.02, 0.018), (0.01, -0.02, 0.0)):
+        statistical.follow_surfaces(record.noise, record.block, error_map, np.array(u))
+        paces.append(float(record.block[1].pace))
+    shares = [0.0, 0.02 / 0.45, 0.0, 0.02, 0.02]  # of the travel of the surface that moves farthest
+    assert paces == pytest.approx([0.02 + 8.0 * share for share in shares])

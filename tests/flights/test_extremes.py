@@ -135,3 +135,14 @@ def test_under_other_laws_the_threshold_is_not_below_twice_the_theorem():
     assert fitting._threshold(tail, 1.0, other) == pytest.approx(2.0 * np.log(72_000.0))
     high = tail.model_copy(update={"level": 50.0})
     assert fitting._threshold(high, 1.0, other) == extremes.threshold_for(high, 1.0) > 50.0
+
+
+@pytest.mark.parametrize("n", [100, 400])
+def test_the_interval_holds_nine_tenths_of_a_posterior_that_is_known(n):
+    """Exponential excess x over a scale of 2, at a level above by that: by the information of rate, shape and
+    scale [Coles2001, section 4.3], a logarithm of the rate of variance (1 + 1/4 + 2 - 1) / n."""
+    excess = TAILS["exponential"][0]((np.arange(n) + 0.5) / n)
+    tail = extremes.Tail(level=5.0, excess=excess.tolist(), minutes=30.0)
+    found = extremes.expected(tail, 7.0)
+    assert np.log(found.high / found.low) == pytest.approx(2.0 * 1.645 * 1.5 / np.sqrt(n), rel=0.05)
+    assert np.sqrt(found.high * found.low) == pytest.approx(2.0 * n / np.e, rel=0.02)

@@ -7,7 +7,7 @@ import pyarrow as pa
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.flights.readers import alfa, read_flight, table
+from beaver_ftc.flights.readers import alfa, read_flight, table, text
 from beaver_ftc.flights.recording import columns_of
 from flights import synthetic
 
@@ -196,3 +196,23 @@ def test_a_ulog_says_from_when_its_time_counts(tmp_path):
     columns = {name: values[:5] for name, values in synthetic.fly(2.0).items()}
     recording = read_flight(synthetic.write_ulog(tmp_path / "a.ulg", columns))
     assert recording.notes == ("time counts from 1.000 s of the autopilot's clock",)
+
+
+def test_a_cell_of_text_is_counted_in_its_row_of_the_whole_table(tmp_path, monkeypatch):
+    """Blocks of a few lines; of three columns one has text in two blocks, one in the last, one nowhere."""
+    rows = [f"{k},{k + 0.5},{2 * k}" for k in range(1, 401)]
+    rows[122], rows[310], rows[398] = "123,odd,246", "311,odder,622", "399,399.5,last"
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(["a,b,c", *rows]) + "\n")
+    monkeypatch.setattr(text, "_BLOCK_BYTES", 600)
+    blocks = [*text.read_cells(path, text.layout_of(path), ("a", "b", "c"))]
+    assert len(blocks) > 5
+    assert [one.before for one in blocks] == [
+        sum(each.rows for each in blocks[:k]) for k in range(len(blocks))
+    ]
+    assert {name: found for one in reversed(blocks) for name, found in one.text.items()} == {
+        "b": (1, 123, "odd"), "c": (1, 399, "last"),
+    }  # fmt: skip
+    whole = text.joined(blocks)
+    assert whole.text == {"b": (2, 123, "odd"), "c": (1, 399, "last")}
+    assert (whole.rows, np.isnan(whole.numbers["b"]).sum(), np.isnan(whole.numbers["a"]).sum()) == (400, 2, 0)

@@ -12,6 +12,7 @@ from beaver_ftc.flights.diagnose import diagnose, silenced
 from beaver_ftc.flights.findings import as_text, statement, verdict_of
 from beaver_ftc.flights.model import Fitted
 from flights import small
+from telling import apart
 
 HEALTHY = small.flight(small.model(), n=1200, seed=2)
 
@@ -275,3 +276,28 @@ def test_a_command_in_another_unit_is_refused_where_rates_move_alike_or_far_less
             trust.check_commands("log", *flown, fitted, ["aileron", "elevator"])
     else:
         trust.check_commands("log", *flown, fitted, ["aileron", "elevator"])
+
+
+SPANS = {"commands": [[2.0, 3.0], [-7.0, -6.5]], "rates": [[0.5, 1.1], [-2.2, 0.8], [4.0, 4.4]]}
+
+
+@pytest.mark.parametrize(
+    ("kind", "column", "low", "high", "name"),
+    [
+        ("commands", 0, 1.5, 3.5, "command of right"), ("commands", 1, -7.25, -6.25, "command of left"),
+        ("rates", 0, 0.2, 1.4, "p_rad_s"), ("rates", 1, -3.7, 2.3, "q_rad_s"),
+        ("rates", 2, 3.8, 4.6, "r_rad_s"),
+    ],
+)  # fmt: skip
+def test_a_range_is_passed_by_half_its_span_at_either_end(model, kind, column, low, high, name):
+    apart(**SPANS)
+    fitted = model.fitted.model_copy(update=SPANS)
+    known = model.model_copy(update={"fitted": fitted})
+    middle = {of: np.mean(spans, axis=1) for of, spans in SPANS.items()}
+    for value in (low - 0.02, low + 0.02, high - 0.02, high + 0.02):
+        flown = {of: np.tile(values, (300, 1)) for of, values in middle.items()}
+        flown[kind][:, column] = value
+        found = trust.outside(small.flight(model, **flown), known)
+        first, last = SPANS[kind][column]
+        says = f"{name} is outside {first:.3g} to {last:.3g}, where the model was fitted"
+        assert list(found) == ([] if low < value < high else [says])

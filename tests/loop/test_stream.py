@@ -4,15 +4,17 @@ import shutil
 import subprocess
 import sys
 import tracemalloc
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 import beaver_ftc as bf
 from flying import loss, scenario
+from telling import apart
 
 PAIR = [loss(at_s=1.0), {"type": "stuck", "actuator": "rudder", "position_deg": 3.0, "at_s": 2.0}]
-NOISY = {"p": {"noise_std_deg_s": 0.05}, "q": {"noise_std_deg_s": 0.05}, "r": {"noise_std_deg_s": 0.05}}
+NOISY = {"p": {"noise_std_deg_s": 0.06}, "q": {"noise_std_deg_s": 0.05}, "r": {"noise_std_deg_s": 0.04}}
 CASES = {
     "published": {"faults": [loss(at_s=1.0)]},
     "unanticipated": {"faults": [{"type": "unanticipated", "at_s": 1.0}], "initial": {"airspeed_mps": 46}},
@@ -195,3 +197,16 @@ def test_declared_turbulence_follows_the_altitude_that_is_given():
     assert (bounds[20.0] > bounds[1828.8]).all()
     with pytest.raises(bf.BadInput, match="is not finite"):
         diagnosis.step(*sample, np.nan)
+
+
+def test_what_a_frame_left_unexplained_is_held_against_the_bound_of_that_frame():
+    """What is declared of the model, which hardly changes in a frame, and of its two readings of a gyro."""
+    noisy = Flown(**CASES["in noise and turbulence"])
+    diagnosis, rows = noisy.diagnosis(), []
+    for sample in noisy.samples[:120]:
+        diagnosis.step(*sample)
+        rows.append((*diagnosis.surprise(), diagnosis.inside()[0]["fdi"]["bound"].copy()))
+    for (*_, then), (innovation, bound, _, now) in pairwise(rows[60:]):
+        errors = (then["noise"][0] + now["noise"][0]) * 100.0
+        apart(errors=errors, bound=bound, innovation=innovation, eta_bar=then["eta_bar"][0])
+        assert bound == pytest.approx(then["eta_bar"][0] + errors, rel=1e-2)

@@ -13,6 +13,7 @@ from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.loop.changing import Changing, _check_delays, renews_diagnosis, take_diagnosis, take_law
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.studies.matrix.fault_matrix import trimmed_deg
 from flying import loss, scenario
 
 TRAVEL = np.array([[-0.5, -0.4, -0.3, -0.1], [0.5, 0.45, 0.35, 1.0]])
@@ -208,3 +209,35 @@ def test_a_flight_tells_its_log_and_how_far_it_is():
     columns = len(landing.columns)
     assert told == [columns, (10, columns), 1.0, "closed"]
     assert fly(scenario(duration_s=0.1)).frames == 10
+
+
+@pytest.mark.parametrize("law", ["oracle", "oracle-published"])
+def test_a_law_in_its_own_place_goes_on_where_it_was(law):
+    """Whatever a flight with the engine in charge of pitch changes in the law's record: of engine, reference,
+    surfaces and command the one that takes over has it, but for what each frame makes anew."""
+    stuck = {"type": "stuck", "at_s": 0.5}
+    faults = [
+        {"actuator": "elevator", "position_deg": trimmed_deg(45.0, "elevator") + 1.0, **stuck},
+        {"actuator": "flap", "position_deg": 1.0, **stuck},
+    ]
+    given = scenario(duration_s=14.0, faults=faults, control={"law": law}, fdi={"fault_class": "all"})
+    sim = bf.Simulation(given)
+    while not sim.done:
+        sim.step()
+    frame = sim._loop.frames[0]
+    before, layout = frame["control"].copy(), frame["control"]["layout"]
+    power = before["power"]
+    assert power["least"] < power["trim"] < power["greatest"]
+    new = assemble(given, layout["trim"], np.array([layout["low"], layout["high"]]))[0]["control"]
+    parts = "reference", "surfaces", "allocation", "probe", "power"
+    fresh = new.copy()
+    take_law(frame, new)
+    changed, kept = set(), set()
+    for part in parts:
+        for name in before[part].dtype.names:
+            if before[part][name].tobytes() != fresh[part][name].tobytes():
+                changed.add(f"{part}.{name}")
+                if frame["control"][part][name].tobytes() == before[part][name].tobytes():
+                    kept.add(f"{part}.{name}")
+    assert changed - kept == {"allocation.G", "surfaces.target", "reference.hedging", "reference.scale"}
+    assert {f"power.{name}" for name in ("least", "greatest", "from_s", "frames", "command")} <= kept

@@ -16,12 +16,16 @@ from tools.drawn.reader import doubts
 
 import beaver_ftc as bf
 from beaver_ftc.cli.main import main
+from beaver_ftc.diagnosis.watch import WATCH
+from beaver_ftc.plant.instruments import SENSORS
 from beaver_ftc.results import writer
 from beaver_ftc.results.certificates import certificate as certificate_module
-from beaver_ftc.results.certificates import chance, check_certificate
+from beaver_ftc.results.certificates import chance, check_certificate, instruments_say
 from beaver_ftc.results.certificates.certificate import as_text, sealed
 from beaver_ftc.results.certificates.check_certificate import failures
+from beaver_ftc.results.certificates.instruments_say import TESTS
 from flying import SINES
+from telling import apart, fill
 
 CHECKER = Path(__file__).parents[2] / "tools/check_certificate.py"
 GYRO = {"noise_std_deg_s": 0.02, "bias_deg_s": 0.05, "scale_error": 1e-3}
@@ -512,3 +516,26 @@ def test_by_the_command_line(tmp_path, monkeypatch, capsys):
         main()
     assert ended.value.code == 2
     assert "mine: fdi.scheme: 'zhang2005'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("turned", [1.0, -1.0])
+def test_an_alarm_of_instruments_adds_up_to_its_test_whatever_is_declared(turned):
+    """Of a watch every number of which is another, gusts among them: the last look by its own limit, and what
+    the filter nearest to its bound keeps of those before."""
+    watch = fill(np.zeros(1, WATCH)[0], seed=2, size=0.3)
+    watch["furthest"], watch["share"] = TESTS.index("alpha"), 1.2
+    step = watch["step"]
+    test = step["test"][TESTS.index("alpha")]
+    test["filtered"], test["bound"] = turned * np.array([3.0, 8.0, 5.5]), (2.9, 4.7, 5.1)
+    test["residual"] = turned * 0.9
+    apart(looked=[step["h"], test["rate"], test["noise"], test["air"], *step["gusts"]])
+    said = instruments_say.of_alarm(watch)
+    (now, then, most), (before, nothing, most_before) = said["looks"]
+    foretold = float(step["predicted"][SENSORS.index("alpha")])
+    assert said["test"] == "alpha"
+    assert sorted([now, then]) == pytest.approx(sorted([foretold + turned * 0.9, foretold]))
+    assert now - then == pytest.approx(0.9)
+    assert most == pytest.approx(step["h"] * test["rate"] + test["noise"] + test["air"] * step["gusts"][1])
+    assert before - nothing == pytest.approx(8.0 - 0.9)
+    assert most_before == pytest.approx(4.7 - most)
+    assert said["sides"] == pytest.approx([8.0, 4.7])

@@ -5,6 +5,7 @@ import sys
 from dataclasses import replace
 from math import radians
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,7 +18,17 @@ import beaver_ftc as bf
 from beaver_ftc.cli.main import main
 from beaver_ftc.diagnosis.types.registry import BIAS, CONSTANT_LOSS, FLOAT, STUCK
 from beaver_ftc.results.certificates.check_certificate import failures
-from beaver_ftc.studies.separation import Candidate, Situation, as_text, doublet, separate, tell_apart, write
+from beaver_ftc.studies.separation import (
+    Candidate,
+    Situation,
+    as_text,
+    doublet,
+    separate,
+    situation_of,
+    tell_apart,
+    write,
+)
+from telling import apart, fill
 
 SMALL = {
     "p": [{"sine": {"amplitude_deg_s": 1, "frequency_hz": 0.5}}],
@@ -270,3 +281,25 @@ def by_impulses(target, at, tells):
         [(-0.3, 0.3)] * frames + [(0, None)],
     )  # fmt: skip
     return found.x[-1] if found.status == 0 else None
+
+
+def test_where_the_flight_ends_is_what_its_record_says_of_the_frame_just_flown():
+    """Of a record every number of which is another: of the bound, what the rates add to it, and the errors of
+    two readings a frame apart."""
+    record = bf.Simulation(ambiguous(substeps=2))._loop.frames
+    frame = fill(record.copy()[0], seed=1)
+    frame["fdi"]["bound"]["admitted"]["any"], frame["fdi"]["types"]["config"]["length"] = 1, 1
+    bound, design, means = frame["fdi"]["bound"], frame["belief"]["design"], frame["belief"]["means"]
+    x, y, actuators = frame["measured"]["x"], frame["measured"]["y"], frame["belief"]["actuators"]
+    apart(eta_bar=bound["eta_bar"], noise=bound["noise"], inertia=bound["inertia"], G=means["G"], x=x)
+    at = situation_of(SimpleNamespace(last=frame), ambiguous(substeps=2), 0.3)
+    coupling = np.array([abs(design[name]) for name in ("Pqr", "Qpr", "Rpq")])
+    turning = bound["inertia"] * coupling * 0.3**2
+    assert at.bound == pytest.approx(1.1 * (bound["eta_bar"] + turning + 2.0 * bound["noise"] * 100.0))
+    for found, expected in (
+        (at.G, means["G"]), (at.u, frame["belief"]["u"]), (at.x, x), (at.alpha, y[0]),
+        (at.stops, [actuators["low"], actuators["high"]]), (at.step, actuators["step"]),
+        (at.approach, actuators["approach"]), (at.alpha_range, (-0.1, 0.28)),
+    ):  # fmt: skip
+        assert found == pytest.approx(np.array(expected))
+    assert (at.instants, at.held, at.in_blocks, at.dt, at.rate) == (2, 3, False, 0.01, 0.3)

@@ -76,6 +76,19 @@ def test_a_loop_that_integrates_what_is_missing_does_not_overshoot_by_it(filled,
     assert gain[loop] / (2.0 * np.sqrt(gain[f"{loop}_i"])) == pytest.approx(damping, rel=1e-6)
 
 
+@pytest.mark.parametrize(("by", "slower"), [("power", 1.5), ("pitch", 1.0)])
+def test_an_engine_that_lags_slows_its_loop_down_and_nothing_else(filled, by, slower):
+    """3 s of the loop and 1.5 of the engine in a row: k by 1.5, k_i by its square, so that it damps alike."""
+    engine = SimpleNamespace(thrust=SimpleNamespace(lag_s=1.5))
+    lagging = setup._gains(SimpleNamespace(engine=engine, airspeed_by=by))
+    usual = {name: float(filled[0]["gain"][name]) for name in GAIN.names}
+    assert lagging["speed"] == pytest.approx(usual["speed"] / slower)
+    damping = [gain["speed"] / np.sqrt(gain["speed_i"]) for gain in (lagging, usual)]
+    assert damping[0] == pytest.approx(damping[1])
+    assert {name for name in usual if lagging[name] != usual[name]} <= {"speed", "speed_i"}
+    assert lagging["airspeed_s"] == 3.0
+
+
 def test_each_loop_is_a_few_times_slower_than_the_one_inside_it(filled):
     """Attitude 3 1/s; altitude and speed beside it; heading a quarter of bank. Time constants in s."""
     gain = {name: float(filled[0]["gain"][name]) for name in GAIN.names}

@@ -139,6 +139,30 @@ def test_a_lost_flight_counts_and_a_barred_submission_has_nothing():
     assert grading.detectors_row(barred)["score"] == 0.0
 
 
+def test_a_row_counts_what_is_its_own():
+    """Delays of faults found, neither after a false alarm nor where there is none; six flights, unlike."""
+    seen = [
+        replace(SEEN, delay_s=0.5), replace(SEEN, delay_s=1.75, correct=False), replace(SEEN, delay_s=4.0),
+        replace(SEEN, delay_s=0.125, false_alarm=True, correct=False),
+        replace(SEEN, delay_s=inf, correct=False), replace(SEEN, delay_s=0.25, faulted=False, correct=False),
+        None,
+    ]  # fmt: skip
+    row = grading.detectors_row(grading.Graded("ada", "detector", results=seen))
+    counted = ("flights", "false_alarms", "faults", "detected", "delay_median_s", "named_rightly", "reason")
+    assert {name: row[name] for name in counted} == dict(
+        zip(counted, (6, 1, 5, 3, 1.75, 2, None), strict=True)
+    )
+    assert row["score"] == pytest.approx((95.0 + 32.5 + 60.0 + 100.0) / 7.0, abs=0.05)
+    oracle = [replace(SEEN, rms_deg_s=size) for size in (0.2, 0.3, 0.5)]
+    flown = [replace(SEEN, rms_deg_s=0.3), None, replace(SEEN, rms_deg_s=inf)]
+    laws = grading.laws_row(grading.Graded("bob", "law", results=flown), oracle)
+    assert (laws["flights"], laws["lost"], laws["tracking_median"]) == (2, 1, None)
+    assert laws["score"] == pytest.approx(100.0 * 2.0 / 3.0 / 3.0, abs=0.05)
+    flown = [replace(SEEN, rms_deg_s=size) for size in (0.3, 0.9, 0.6)]
+    laws = grading.laws_row(grading.Graded("bob", "law", results=flown), oracle)
+    assert (laws["tracking_median"], laws["error_median_deg_s"]) == pytest.approx((1.5, 0.6))
+
+
 def test_what_is_built_in_takes_no_place():
     names = ["ada", grading.DETECTOR, "bob", "eve"]
     results = [[SEEN], [replace(SEEN, delay_s=0.0)], [SEEN], [None]]

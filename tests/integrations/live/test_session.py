@@ -195,6 +195,21 @@ def test_repair_all_leaves_nothing_broken(session):
     assert [event["says"] for event in told(session, "repaired")] == ["rudder", "everything"]
 
 
+def test_a_repair_is_told_once_whatever_the_scenario_breaks_later(tmp_path):
+    """Of three faults of the scenario one is repaired by hand; the others come and go by themselves."""
+    faults = [
+        {**LOSS, "at_s": 0.1}, {"type": "stuck", "actuator": "rudder", "at_s": 0.4, "end_s": 0.6},
+        {"type": "bias", "actuator": "aileron", "bias_deg": 1, "at_s": 0.5},
+    ]  # fmt: skip
+    session = flown(Session(bf.load({"name": "later", "faults": faults}), tmp_path), 20)
+    asked(session, do="repair", actuator="elevator")
+    flown(session, 60)
+    assert [event["says"] for event in told(session, "repaired")] == ["elevator", "rudder: stuck"]
+    assert [event["says"].partition(":")[0] for event in told(session, "broken")] == [
+        "elevator", "rudder", "aileron",
+    ]  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("fault", "left"),
     [

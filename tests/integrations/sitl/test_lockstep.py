@@ -2,6 +2,7 @@
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -12,8 +13,9 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.integrations.sitl.ardupilot import Ardupilot
 from beaver_ftc.integrations.sitl.link import Link
 from beaver_ftc.integrations.sitl.mavlink import Mavlink
-from beaver_ftc.integrations.sitl.px4 import Px4
+from beaver_ftc.integrations.sitl.px4 import Px4, gps, quaternion, sensor, state
 from beaver_ftc.integrations.sitl.vehicle import Instant
+from telling import apart
 
 ZERO = (0.0, 0.0, 0.0)
 
@@ -194,3 +196,37 @@ def test_the_bad_line_would_notice():
     assert (found.twice, found.lost > 0) == (1, True)
     assert trial.Found(meant=[[0, 1, 2]], flown=[[0, 2]]).lost > 0
     assert trial.Found(meant=[[0, 1]], flown=[[0, 1]]).lost == 0
+
+
+ALOFT = Instant(
+    12.5, (0.11, -0.23, 0.37), (1.3, -2.9, -9.1), (0.05, 0.21, 6.1), 61.0, -0.04, 1520.0, 3050.0,
+    (410.0, -75.0, -2890.0), (58.0, -13.0, 2.5), 45.0036, -0.00095, 2890.0, (0.07, 0.19, 0.6),
+)  # fmt: skip
+
+
+def test_a_state_is_read_again_as_it_was_at_altitude():
+    """MAVLink's fields by their names and units; at 3000 m an airspeed is indicated as less than it is."""
+    apart(instant=[one for part in ALOFT for one in np.atleast_1d(part) if abs(one) != 2890.0])
+    line = Mavlink()
+    (read_again,) = line.unpack(line.pack(state(line.messages, ALOFT, 4_000_000)))
+    found = read_again.to_dict()
+    g = 9.80665
+    expected = {
+        "time_usec": 4_000_000, "rollspeed": 0.11, "pitchspeed": -0.23, "yawspeed": 0.37,
+        "lat": 450036000, "lon": -9500, "alt": 2_890_000, "vx": 5800, "vy": -1300, "vz": 250,
+        "ind_airspeed": round(100.0 * np.sqrt(2.0 * 1520.0 / 1.225)), "true_airspeed": 6100,
+        "xacc": round(1300 / g), "yacc": round(-2900 / g), "zacc": round(-9100 / g),
+    }  # fmt: skip
+    assert {name: found[name] for name in expected} == pytest.approx(expected)
+    assert found["attitude_quaternion"] == pytest.approx(quaternion(*ALOFT.true_attitude))
+    (fix,) = line.unpack(line.pack(gps(line.messages, ALOFT, 4_000_000)))
+    found = fix.to_dict()
+    course = round(100.0 * np.degrees(np.arctan2(-13.0, 58.0))) % 36000
+    expected = {"lat": 450036000, "lon": -9500, "alt": 2_890_000, "vn": 5800, "ve": -1300, "vd": 250,
+                "vel": round(100.0 * np.hypot(58.0, 13.0)), "cog": course, "fix_type": 3}  # fmt: skip
+    assert {name: found[name] for name in expected} == expected
+    (felt,) = line.unpack(line.pack(sensor(line.messages, ALOFT, 4_000_000, True)))
+    found = felt.to_dict()
+    expected = {"xacc": 1.3, "yacc": -2.9, "zacc": -9.1, "xgyro": 0.11, "ygyro": -0.23, "zgyro": 0.37,
+                "diff_pressure": 15.2, "pressure_alt": 3050.0, "abs_pressure": 696.8}  # fmt: skip
+    assert {name: found[name] for name in expected} == pytest.approx(expected, rel=1e-3)

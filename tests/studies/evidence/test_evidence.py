@@ -5,13 +5,16 @@ import json
 import pytest
 import yaml
 
+import beaver_ftc as bf
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.studies.evidence import shown
+from beaver_ftc.studies.evidence import flown, shown
 from beaver_ftc.studies.evidence.flown import MET, NOT_MET, NOT_SHOWN, fly_flight
 from beaver_ftc.studies.evidence.judged import document_of
-from beaver_ftc.studies.evidence.plan import load_plan
+from beaver_ftc.studies.evidence.plan import OfMargins, load_plan
 from beaver_ftc.studies.evidence.shown import as_text, files, of_flight, page, run_plan
+from beaver_ftc.studies.margins import Margin
 from beaver_ftc.studies.sweep import one_flight
+from telling import apart
 
 from .plans import FAULTY, HEALTHY, seeded
 
@@ -213,3 +216,25 @@ def test_without_what_writes_pdf_nothing_flies(tmp_path, monkeypatch):
     with pytest.raises(BadInput, match=r"allowed: pip install 'beaver-ftc\[evidence\]'"):
         run_plan(plan, tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("gain_db", "phase_deg", "verdicts", "least"),
+    [(4.0, 41.0, [MET, NOT_MET], (4.5, 40.0)), (5.0, 39.0, [NOT_MET, MET], (4.5, 40.0))],
+)
+def test_of_a_loops_margins_the_smaller_counts_upwards_and_downwards(
+    monkeypatch, gain_db, phase_deg, verdicts, least
+):
+    loops = [
+        Margin(45.0, "none", "aileron", up_db=7.0, down_db=9.0, phase_deg=62.0),
+        Margin(45.0, "40 % loss", "elevator", up_db=8.0, down_db=4.5, phase_deg=51.0),
+        Margin(45.0, "total loss", "rudder", up_db=5.5, down_db=6.0, phase_deg=40.0),
+    ]
+    apart(margins=[[each.up_db, each.down_db, each.phase_deg] for each in loops])
+    monkeypatch.setattr("beaver_ftc.studies.margins.at", lambda scenario: iter(loops))
+    asked = OfMargins(type="margins", gain_db=gain_db, phase_deg=phase_deg)
+    gain, phase = flown._of_margins(asked, bf.load({"name": "any"}))
+    assert [gain["verdict"], phase["verdict"]] == verdicts
+    assert (gain["actual"], phase["actual"]) == least
+    assert (gain["margin"], phase["margin"]) == pytest.approx((least[0] - gain_db, least[1] - phase_deg))
+    assert (gain["says"], phase["says"]) == ("fault: 40 % loss", "fault: total loss")

@@ -8,6 +8,7 @@ import pytest
 from beaver_ftc import load as load_scenario
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.context import DesignFunctions
+from beaver_ftc.design.model import inertia_coefficients, inertial
 from beaver_ftc.design.variants import design_of
 from beaver_ftc.diagnosis.bounds.clairvoyant import accelerations, healthy
 from beaver_ftc.loop.loop import fly
@@ -15,6 +16,7 @@ from beaver_ftc.results.log import Columns
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.matrix.clairvoyant import columns_of, seen_when_told
 from beaver_ftc.studies.matrix.fault_matrix import AT_S, FaultCase, beside_told, scenario_of, trimmed_deg
+from telling import apart
 
 AIRCRAFT = load()
 FOLDER = Path(__file__).parents[2] / "data" / "aircraft"
@@ -34,7 +36,7 @@ def lost():
     return flown("40 % loss", "elevator")
 
 
-def test_terms_add_up_to_what_the_design_model_makes_of_a_surface():
+def test_terms_add_up_to_what_the_design_model_makes_of_a_surface_and_of_none():
     rng = np.random.default_rng(2)
     n = 3
     kept = Columns()
@@ -43,11 +45,16 @@ def test_terms_add_up_to_what_the_design_model_makes_of_a_surface():
     kept |= {"airspeed_mps": rng.uniform(35, 55, n), "qdyn_pa": rng.uniform(700, 1500, n)}
     model = DesignFunctions(design_of(Scenario(name="any").design_model, AIRCRAFT))
     deflection = rng.uniform(-0.2, 0.2, n)
+    apart(deflection=deflection, **kept)
+    x = np.column_stack([kept[f"{axis}_rad_s"] for axis in "pqr"])
+    y = np.column_stack([kept[name] for name in ("alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", "dpt")])
+    found = sum(t.value * accelerations(AIRCRAFT, t, kept, None) for t in AIRCRAFT.moments if not t.surface)
+    turning = inertial(inertia_coefficients(AIRCRAFT.mass), x)
+    expected = [model.f(*each) for each in zip(x, y, strict=True)]
+    assert found + turning == pytest.approx(np.array(expected), rel=1e-9)
     for s, surface in enumerate(AIRCRAFT.surfaces):
         of_it = [term for term in AIRCRAFT.moments if term.surface == surface]
         found = sum(term.value * accelerations(AIRCRAFT, term, kept, deflection) for term in of_it)
-        names = "alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", "dpt"
-        y = np.column_stack([kept[name] for name in names])
         expected = [model.G(one)[:, s] * u for one, u in zip(y, deflection, strict=True)]
         assert found == pytest.approx(np.array(expected), rel=1e-9)
 

@@ -1,9 +1,12 @@
 import errno
 import os
+import shutil
+from dataclasses import replace
 
 import pyarrow.parquet as pq
 import pytest
 
+import beaver_ftc as bf
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.studies.sweep.one_flight import row_of_failure, schema_of, table_of
 from beaver_ftc.studies.sweep.sampling import Assignment
@@ -226,3 +229,21 @@ def test_a_users_files_in_the_sweeps_folders_stay(store, short):
         with pytest.raises(SimulationFailed, match=r"notes\.txt"):
             store.begin(identity_of(short), resume=False)
         assert (flight / "notes.txt").exists()
+
+
+@pytest.mark.parametrize(
+    ("file", "is_other"), [("aircraft.yaml", True), ("beaver.xml", True), ("notes.md", False)]
+)
+def test_an_aircraft_whose_files_have_changed_is_another(store, short, tmp_path, file, is_other):
+    """Of one folder and one name: what flies it is told from what is written beside it."""
+    folder = shutil.copytree(bf.aircraft("beaver").folder, tmp_path / "own")
+    path = folder / file
+    own = replace(short, aircraft=bf.aircraft("./own", tmp_path))
+    with store:
+        store.begin(identity_of(own), resume=False)
+        path.write_text((path.read_text() if path.exists() else "") + "\n")
+        if is_other:
+            with pytest.raises(BadInput, match=r"has changed since these flights \(aircraft\)"):
+                store.begin(identity_of(own), resume=True)
+        else:
+            store.begin(identity_of(own), resume=True)

@@ -47,8 +47,8 @@ from numba.np.numpy_support import ufunc_find_matching_loop
 from beaver_ftc.documents.errors import say_once
 from beaver_ftc.documents.sources import digest_of
 
-COMPILING = "compiling the flight code, once for this version on this machine: some 10 s on an idle one"
-MORE = "making ready what this flight is the first to use, once for this version on this machine: some 10 s"
+COMPILING = "compiling the flight code, once on this machine: some 20 s on an idle one"
+MORE = "compiling what this flight is the first to use, once on this machine: 10 s to a minute on an idle one"
 PATIENCE_S = 1.0  # what takes less needs no word
 
 MOST_BYTES = 500_000_000  # of code kept in a folder: some hundred versions of the flight code

@@ -90,6 +90,9 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
     if page.file.src_uri == "README.md":
         markdown = _PICTURE.sub(_FRAME, markdown, count=1)
         page.meta.setdefault("hide", ["navigation", "toc"])
+    if page.file.src_uri.removesuffix(".md") in _reference_pages():
+        page.meta.setdefault("hide", ["toc"])  # their tables are wide
+        page.meta.setdefault("search", {"boost": 0.5})  # who searches for a word wants what explains it
     if page.file.src_uri == REFERENCE:
         markdown += "\n\n" + "\n".join(_listed())
     above = "../" * page.file.src_uri.count("/")
@@ -103,6 +106,13 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
         return f"[{link[1]}]({above}{_copy_of(path)})"
 
     return _LINK.sub(inward, markdown)
+
+
+@cache
+def _reference_pages() -> frozenset[str]:
+    from tools.docs.reference import PAGES
+
+    return frozenset(PAGES)
 
 
 def _listed() -> Iterator[str]:

@@ -64,7 +64,7 @@ def submit(
     if to is not None:
         document["submitted"] = str(folders.keep(source, name, to))
     done = f"handed in as {document['submitted']}" if to else "not handed in, which --to DIR does"
-    says = f"{document['kind']} {document['class']}: {document['points']:g} points in practice; {done}"
+    says = f"{document['kind']} {document['class']}: {document['points']:g} points in one practice flight with a loss (the grade is the mean over all hidden flights); {done}"
     answer(format, document, lambda: says)
 
 

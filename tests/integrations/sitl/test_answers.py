@@ -1,5 +1,7 @@
 """ArduPilot's packets and answers: both forms, and the reader on the other side, in Python and in C."""
 
+import json
+import re
 import shutil
 import struct
 import subprocess
@@ -13,6 +15,7 @@ from tools.autopilots.reader import Unreadable, read
 from beaver_ftc.integrations.sitl.ardupilot import decoded, encoded
 from beaver_ftc.integrations.sitl.vehicle import Instant
 
+PAGE = Path(__file__).parents[3] / "docs/autopilots.md"
 COMPILER = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 NUMBER = st.floats(-1e6, 1e6)
 THREE = st.tuples(NUMBER, NUMBER, NUMBER)
@@ -64,6 +67,22 @@ def test_an_answer_is_one_line_between_newlines():
     assert answer.count(b"\n") == 2
     assert b" " not in answer
     assert len(answer) < 1400  # a datagram that no network cuts
+
+
+def test_the_page_has_the_packet_and_every_key_of_the_answer():
+    page = PAGE.read_text(encoding="utf-8")
+    packed = re.search(r"`(struct\.pack\(.*?\))`", page)[1]
+    datagram = eval(packed, {"struct": struct}, {"frame": 7, "pulses": range(1100, 1116)})
+    assert decoded(datagram) == (400, 7, tuple(range(1100, 1116)))
+    rows = page.partition("|`timestamp`|")[1] + page.partition("|`timestamp`|")[2].partition("\n\n")[0]
+    answered = {
+        f"{key}.{below}" if isinstance(of, dict) else key
+        for key, of in json.loads(encoded(INSTANT)).items()
+        for below in (of if isinstance(of, dict) else [""])
+    }
+    said = [name for row in rows.splitlines() for name in re.findall(r"`(.*?)`", row.split("|")[1])]
+    whole = {f"windvane{name}" if name.startswith(".") else name for name in said}
+    assert whole == answered
 
 
 def test_the_reader_takes_the_last_whole_line():

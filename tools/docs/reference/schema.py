@@ -190,4 +190,6 @@ def limits(node: Node) -> str:
 
 def shown(value: float) -> str:
     """A number without trailing noise."""
+    if value == 2**63 - 1:
+        return "2^63 - 1"
     return str(value) if isinstance(value, int) else f"{value:.6g}"

@@ -64,7 +64,8 @@ def submit(
     if to is not None:
         document["submitted"] = str(folders.keep(source, name, to))
     done = f"handed in as {document['submitted']}" if to else "not handed in, which --to DIR does"
-    says = f"{document['kind']} {document['class']}: {document['points']:g} points in one practice flight with a loss (the grade is the mean over all hidden flights); {done}"
+    points = f"{document['points']:g} points in one practice flight with a loss"
+    says = f"{document['kind']} {document['class']}: {points} (a grade is the mean over all flights); {done}"
     answer(format, document, lambda: says)
 
 

@@ -288,7 +288,7 @@ def test_validate_reports_every_file(short):
     assert [line.split(": ")[0] for line in done.stderr.splitlines()] == [
         "bad.yaml:2",
         "fast.yaml",
-        "nowhere.yaml:1",
+        "nowhere.yaml",
     ]
     document = json.loads(_beaver("validate", "short.yaml", "bad.yaml", "--format", "json", cwd=short).stdout)
     assert document["valid"] is False

@@ -106,7 +106,7 @@ def test_the_poles_find_the_smallest_fault_there_is_to_be_found(noise, eta_bar):
 
 def test_a_gyros_error_varies_by_noise_steps_or_scale():
     def varies(**errors):
-        return declared.gyros_vary(scenario({"name": "x", "sensors": {"q": errors}}).sensors)
+        return scenario({"name": "x", "sensors": {"q": errors}}).sensors.gyros_vary
 
     assert not varies(bias_deg_s=1.0)
     assert varies(noise_std_deg_s=0.1)

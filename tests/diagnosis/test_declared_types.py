@@ -15,6 +15,7 @@ from beaver_ftc.diagnosis.types.findings import found
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.sensors import Sensors
 
 NOISE_DEG_S = 0.02
 TOLERANCE = 0.05
@@ -94,12 +95,12 @@ def test_blocks_see_what_frames_do_not():
 
 
 def test_pairs_are_refused_with_noisy_gyros_in_one_line():
-    bounds = {"sensors": "tactical-grade"}
-    fdi = {"fault_class": "all", "pairs": True, "bounds": bounds}
-    with pytest.raises(BadInput, match=r"x: fdi.pairs is not available .*, allowed: a bias$"):
-        assemble(
-            Scenario.model_validate({"name": "x", "fdi": fdi}), np.zeros(4), np.array([[-1.0] * 4, [1.0] * 4])
-        )
+    """What a change in flight would make of it, too."""
+    scenario = Scenario.model_validate({"name": "x", "fdi": {"fault_class": "all", "pairs": True}})
+    noisy = scenario.fdi.bounds.model_copy(update={"sensors": Sensors.model_validate("tactical-grade")})
+    changed = scenario.model_copy(update={"fdi": scenario.fdi.model_copy(update={"bounds": noisy})})
+    with pytest.raises(BadInput, match=r"x: fdi\.pairs: not available with errors .*, allowed: false$"):
+        assemble(changed, np.zeros(4), np.array([[-1.0] * 4, [1.0] * 4]))
 
 
 @pytest.mark.parametrize("kind", HELD)

@@ -125,7 +125,7 @@ def test_what_it_has_not_is_refused_by_its_key():
 
 
 def test_pairs_are_refused_where_there_is_no_pair():
-    with pytest.raises(BadInput, match=r"fdi\.pairs: trainer has not two surfaces in pitch"):
+    with pytest.raises(BadInput, match=r"fdi\.pairs: not available: trainer has not two surfaces in pitch"):
         fly(quiet(**{"fdi.fault_class": "all", "fdi.pairs": True}))
 
 

@@ -51,7 +51,10 @@ class Fault:
         return {"magnitude": self.magnitude}
 
 
-FDI = SimpleNamespace(scheme="adaptive-estimators", diagnoses=True, fault_class="published", pairs=False)
+FDI = SimpleNamespace(
+    scheme="adaptive-estimators", diagnoses=True, is_ours=True, fault_class="published", pairs=False,
+    bounds=SimpleNamespace(sensors=SimpleNamespace(gyros_vary=False)),
+)  # fmt: skip
 CONTROL = SimpleNamespace(law="fault-tolerant")
 INITIAL = SimpleNamespace(airspeed_mps=45.0, altitude_m=1828.8)
 
@@ -80,6 +83,7 @@ class Scenario:
     control: Any = field(default_factory=lambda: CONTROL)
     initial: Any = field(default_factory=lambda: INITIAL)
     airframe: Any = field(default_factory=load)
+    changes: tuple[Any, ...] = ()
 
 
 @dataclass

@@ -31,7 +31,8 @@ def test_published_case_has_every_key_of_the_contract_in_order():
         "isolated": True, "fault": "elevator", "type": "loss_of_effectiveness",
         "time_s": 12.12, "delay_s": 0.12, "correct": True, "estimate": -0.39, "candidates": ["elevator"],
         "type_correct": True, "type_delay_s": None, "estimate_deg": None, "estimate_interval": None,
-        "frequency_rad_s": None, "so_far": True, "withdrawn": [], "probing_s": None, "faults": [],
+        "frequency_rad_s": None, "so_far": True, "premature": False, "withdrawn": [],
+        "names": ["elevator"], "probing_s": None, "faults": [],
     }  # fmt: skip
     assert document["false_alarm"] is False
     assert document["supervisor"][1] == {"time_s": 12.07, "mode": "adaptive"}

@@ -8,7 +8,6 @@ from functools import lru_cache
 
 import numpy as np
 
-from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import apart, kernel, record
 from beaver_ftc.design.model import AIRSPEED
 from beaver_ftc.diagnosis import (
@@ -30,7 +29,6 @@ from beaver_ftc.diagnosis.isolation import start
 from beaver_ftc.diagnosis.state import (
     BESIDE_DAMAGE,
     IN_PITCH,
-    IN_ROLL_AND_YAW,
     NOT_ISOLATED,
     STATISTICS,
     WORST_CASE,
@@ -39,6 +37,7 @@ from beaver_ftc.diagnosis.types import examine, pairs, registry, verdict
 from beaver_ftc.diagnosis.types.examine import FIXED, LAGS, LOSES, SHIFTED
 from beaver_ftc.diagnosis.watch import WATCH
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.scenario.pairs import pairs_refused
 from beaver_ftc.scenario.schema import Scenario
 
 PATIENCE_S = 4.0  # in still air what damage left over was excluded within 3.2 s, in 210 flights
@@ -70,7 +69,7 @@ def configure(fdi: np.void, belief: np.void, scenario: Scenario, travel: np.ndar
     lost = {surface for case in aircraft.damage.values() for surface in case.takes}
     fdi["isolation"]["taken"] = [surface in lost for surface in aircraft.surfaces]
     if config.pairs:
-        _ask_each_plane(fdi, aircraft)
+        _ask_each_plane(fdi, scenario)
     declared.configure(fdi["bound"], scenario, belief["design"])
     bank.configure(fdi["bank"], config, dt)
     detection.configure(fdi["fdae"], scenario)
@@ -84,12 +83,13 @@ def configure(fdi: np.void, belief: np.void, scenario: Scenario, travel: np.ndar
     conclusion["type"] = conclusion["lead"] = conclusion["lead_kind"] = conclusion["type_at_s"] = -1
 
 
-def _ask_each_plane(fdi: np.void, aircraft: Aircraft) -> None:
-    """Each plane is asked for itself: pitch by its two surfaces, roll and yaw by theirs."""
-    if sorted(fdi["layout"]["group"]) != [IN_PITCH, IN_PITCH, IN_ROLL_AND_YAW, IN_ROLL_AND_YAW]:
-        raise BadInput(
-            f"fdi.pairs: {aircraft.name} has not two surfaces in pitch, two in roll and yaw, allowed: false"
-        )
+def _ask_each_plane(fdi: np.void, scenario: Scenario) -> None:
+    """Each plane is asked for itself: pitch by its two surfaces, roll and yaw by theirs.
+
+    Raises BadInput where a change in flight declares what pairs are not available with.
+    """
+    if why := pairs_refused(scenario.fdi.bounds.sensors, scenario.airframe):
+        raise BadInput(f"{scenario.name}: fdi.pairs: {why}, allowed: false")
     for fie in fdi["isolation"]["estimator"][: fdi["isolation"]["n"]]:
         fie["unasked"] = (1, 0, 1) if fdi["layout"]["group"][fie["surface"]] == IN_PITCH else (0, 1, 0)
 

@@ -1,8 +1,9 @@
 """What a scenario expects of its flight (`expect:`), held against the metrics: what a CI job asserts.
 
 One row a key: how the metrics document says what was found, and whether that will do for what was expected.
-Where the quantity does not exist (nothing was detected, say) the expectation fails. If an expectation of the
-diagnosis is not met and there were frames in which it could conclude nothing, that is given as the reason.
+Where the quantity does not exist (nothing was detected, say) the expectation fails. A name that was given
+before its fault began meets none. If an expectation of the diagnosis is not met because of that, because the
+name was withdrawn, or because there were frames in which nothing could be concluded, the reason is given.
 """
 
 from collections.abc import Callable, Iterator
@@ -20,18 +21,31 @@ Rule = tuple[Callable[[Document], Any], Callable[[Any, Any], bool]]
 def evaluate(expect: Any, metrics: Document) -> list[Document]:
     """One {name, passed, expected, actual} for each expectation set in `expect`, in its fields' order; with
     `reason`, where one is known."""
-    return [
-        {"name": name, "passed": met(actual, expected), "expected": expected, "actual": actual}
-        | ({} if met(actual, expected) else _reason(name, metrics))
-        for name, (found, met), expected in _each(expect)
-        for actual in [found(metrics)]
-    ]
+    return [_judged(name, rule, expected, metrics) for name, rule, expected in _each(expect)]
 
 
-def _reason(name: str, metrics: Document) -> Document:
-    """Why what was expected of the diagnosis is not met, if it could not conclude anything."""
-    inconclusive = metrics.get("detection", {}).get("inconclusive") if name in OF_DIAGNOSIS else None
-    return {"reason": in_words(inconclusive)} if inconclusive else {}
+def _judged(name: str, rule: Rule, expected: Any, metrics: Document) -> Document:
+    (found, met), isolation = rule, metrics.get("isolation") or {}
+    actual = found(metrics)
+    of_one_name = name in _OF_A_NAME and not isinstance(expected, list)  # a list holds none that is premature
+    early = of_one_name and bool(isolation.get("premature"))
+    passed = met(actual, expected) and not early
+    why = "" if passed or name not in OF_DIAGNOSIS else _reason(expected, early, metrics)
+    said = {"name": name, "passed": passed, "expected": expected, "actual": actual}
+    return said | ({"reason": why} if why else {})
+
+
+def _reason(expected: Any, early: bool, metrics: Document) -> str:
+    """Why what was expected of the diagnosis is not met, if it is known."""
+    inconclusive = metrics.get("detection", {}).get("inconclusive")
+    isolation = metrics.get("isolation", {})
+    if early:
+        return f"{isolation['fault']} was named at {isolation['time_s']:g} s, before the fault began"
+    gone = [one for one in isolation.get("withdrawn", ()) if one["fault"] == expected]
+    if gone:
+        last = gone[-1]
+        return f"{expected} was named at {last['from_s']:g} s, and the name withdrawn at {last['to_s']:g} s"
+    return in_words(inconclusive) if inconclusive else ""
 
 
 def margin(found: Document) -> float | None:
@@ -52,7 +66,9 @@ def _each(expect: Any) -> Iterator[tuple[str, Rule, Any]]:
     if expect is None:
         return
     for name, expected in expect.model_dump(exclude_none=True).items():
-        if isinstance(expected, dict):
+        if isinstance(expected, tuple):
+            yield name, _LIST_RULES[name], list(expected)
+        elif isinstance(expected, dict):
             yield from ((f"{name}.{part}", _rule_of(name, part), limit) for part, limit in expected.items())
         else:
             yield name, _RULES[name], expected
@@ -80,6 +96,10 @@ def _off_by_at_most(found: float | None, limit: float) -> bool:
 def _among(candidates: list[str], kind: str) -> bool:
     return any(kind == candidate.rpartition(":")[2] for candidate in candidates)
 
+
+_OF_A_NAME = ("isolated_as", "isolated_within_s", "isolated_type", "candidate_type")
+_LIST_RULES: dict[str, Rule] = {"isolated_as": (_entry("isolation", "names"), eq)}
+"""Of the expectations that may be a list."""
 
 _RULES: dict[str, Rule] = {
     "detected_within_s": (_entry("detection", "delay_s"), _at_most),

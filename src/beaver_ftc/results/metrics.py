@@ -9,6 +9,8 @@ give the same file.
 excluded this one so far, and nothing within the class proves that a fault outside of it does not look alike.
 It is false of `unanticipated` and of an instrument, null of nothing and of what a plug-in names.
 `isolation.withdrawn`: surfaces that were named before, and from when to when.
+`isolation.premature` is true of a name given before the fault that it names began, or the first one where it
+names none that was declared: such a name is not correct and meets no expectation. Null of nothing.
 
 `detection.inconclusive`: null, or the frames in which the built-in diagnosis can conclude nothing: their
 `share`, the
@@ -27,6 +29,7 @@ from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.results.expectations import evaluate
 from beaver_ftc.scenario.faults import DAMAGE, Damage, of_a_sensor
+from beaver_ftc.scenario.pairs import failing, of_several
 
 if TYPE_CHECKING:
     from beaver_ftc.loop.outcome import Landing
@@ -131,71 +134,101 @@ def _detection(flight: "Landing", fault: Document | None) -> Document:
 # What the document says of the fault that is named, in its order.
 _NAMED = (
     "fault", "type", "time_s", "delay_s", "correct", "estimate", "candidates", "type_correct", "type_delay_s",
-    "estimate_deg", "estimate_interval", "frequency_rad_s", "so_far",
+    "estimate_deg", "estimate_interval", "frequency_rad_s", "so_far", "premature",
 )  # fmt: skip
 
 
 def _isolation(flight: "Landing", fault: Document | None) -> Document:
-    meant = _meant(flight, fault)
-    correct = _correct(flight.isolated, meant, _takes(flight.scenario))
-    right = correct, _type_correct(flight.isolation_type, meant)
-    named = _named(vars(flight), fault, right, flight.scenario)
+    scenario = flight.scenario
+    meant = _meant(flight.isolated, flight.isolation_time_s, scenario)
+    held_against = meant[0] if meant else fault
+    correct = None if flight.isolated is None else bool(meant)
+    right = correct, _type_correct(flight.isolation_type, held_against)
+    named = _named(vars(flight), held_against, right, scenario)
     return {
         "isolated": flight.isolated is not None,
         **{key: named[key] for key in _NAMED},
         "withdrawn": [_rounded(gone) for gone in flight.withdrawn],
+        "names": _names(flight, fault),
         "probing_s": _rounded(flight.probing_s or ()) or None,
-        "faults": [_one_of_several(found, flight.scenario) for found in flight.faults],
+        "faults": [_one_of_several(found, scenario) for found in flight.faults],
     }
+
+
+def _names(flight: "Landing", fault: Document | None) -> list[str]:
+    """The names given in flight, those that were withdrawn too, each once, in the order of the faults that
+    they name, and as they were given; without those that were premature."""
+    given = [(gone["fault"], gone["from_s"]) for gone in flight.withdrawn]
+    if flight.faults:
+        given += [(one["isolated"], one["isolation_time_s"]) for one in flight.faults]
+    else:
+        given.append((flight.isolated, flight.isolation_time_s))
+    said = []
+    for name, time_s in given:
+        meant = _meant(name, time_s, flight.scenario)
+        of = meant[0] if meant else fault
+        if name is not None and not _premature(name, time_s, of):
+            said.append((of["at_s"] if of else 0.0, time_s, name))
+    return list(dict.fromkeys(name for _, _, name in sorted(said)))
 
 
 def _one_of_several(found: Document, scenario: "Scenario") -> Document:
     """One of several faults at once; `fault` is null where a plane's is open between its candidates."""
-    surface, kind = found["isolated"], found["isolation_type"]
-    declared = _declared_on(surface, scenario)
-    correct = None if surface is None else bool(declared)
-    type_correct = None if kind is None else any(bool(_type_correct(kind, fault)) for fault in declared)
-    of_ours = {**found, "so_far": None if surface is None else True}  # no other diagnosis names several
-    return _named(of_ours, declared[0] if declared else None, (correct, type_correct), scenario)
+    name, kind = found["isolated"], found["isolation_type"]
+    meant = _meant(name, found["isolation_time_s"], scenario)
+    correct = None if name is None else bool(meant)
+    type_correct = None if kind is None else any(bool(_type_correct(kind, fault)) for fault in meant)
+    of_ours = {**found, "so_far": None if name is None else True}  # no other diagnosis names several
+    return _named(of_ours, meant[0] if meant else None, (correct, type_correct), scenario)
 
 
 def _named(
     found: Document, fault: Document | None, right: tuple[bool | None, bool | None], scenario: "Scenario"
 ) -> Document:
-    """A fault that is named; fault: since when it is there. right: whether it, and its type, are."""
+    """A fault that is named; fault: since when it is there. right: whether it, and its type, are, unless they
+    were named before."""
     estimate, kind = found.get("estimate"), found["isolation_type"]
+    premature = _premature(found["isolated"], found["isolation_time_s"], fault)
     angle_rad = None if kind == LOSS_OF_EFFECTIVENESS else estimate
     return {
         "fault": found["isolated"],
         "type": kind,
         "time_s": _number(found["isolation_time_s"]),
         "delay_s": _delay(found["isolation_time_s"], fault, scenario),
-        "correct": right[0],
+        "correct": right[0] and not premature,
         "candidates": list(found["candidates"]),
-        "type_correct": right[1],
+        "type_correct": right[1] and not premature,
         "type_delay_s": _delay(found.get("type_time_s"), fault, scenario),
         "estimate": _number(estimate),
         "estimate_deg": None if angle_rad is None else _number(math.degrees(angle_rad)),
         "estimate_interval": _rounded(found.get("estimate_interval") or ()) or None,
         "frequency_rad_s": _number(found.get("frequency_rad_s")),
         "so_far": found["so_far"],
+        "premature": premature,
     }
 
 
-def _meant(flight: "Landing", fault: Document | None) -> Document | None:
-    """The declared fault that the verdict is held against: the first, or of several that surface's."""
-    of_surface = _declared_on(flight.isolated, flight.scenario) if flight.faults else []
-    return of_surface[0] if of_surface else fault
+def _premature(name: str | None, time_s: float | None, fault: Document | None) -> bool | None:
+    """Whether a name was given before its fault began; null without a name."""
+    if name is None or time_s is None:
+        return None
+    return fault is not None and _is_false(time_s, fault)
 
 
-def _declared_on(surface: str | None, scenario: "Scenario") -> list[Document]:
-    """The faults declared on a surface, as they strike."""
-    taken = surface in _takes(scenario)
-    return [
-        fault
-        for fault in faults_of(scenario)
-        if fault["actuator"] == surface or (taken and fault["type"] == DAMAGE)
-    ]
+def _meant(name: str | None, time_s: float | None, scenario: "Scenario") -> list[Document]:
+    """The declared faults of which a name given then is right, as they strike."""
+    declared = [*faults_of(scenario), *_beyond_one_fault(time_s, scenario)]
+    return [fault for fault in declared if _is_right(name, fault, _takes(scenario))]
+
+
+def _beyond_one_fault(time_s: float | None, scenario: "Scenario") -> list[Document]:
+    """From the instant on at which a second surface fails, no single fault explains the flight: to a
+    diagnosis that looks for one, both together are outside the class, an unanticipated fault."""
+    began = failing(scenario)
+    if scenario.fdi.pairs or len(began) < 2 or time_s is None:
+        return []
+    both = {"actuator": None, "type": UNANTICIPATED, "at_s": sorted(began.values())[1]}
+    return [] if _is_false(time_s, both) else [both]
 
 
 def _takes(scenario: "Scenario") -> set[str]:
@@ -205,18 +238,15 @@ def _takes(scenario: "Scenario") -> set[str]:
     return {surface for case in cases for surface in damage[case].takes}
 
 
-def _correct(isolated: str | None, fault: Document | None, takes: Collection[str] = ()) -> bool | None:
-    """Whether the isolated fault is the declared one; null while nothing is isolated. takes: surfaces that
-    are lost with damage."""
-    if isolated is None:
-        return None
-    if fault is None:
-        return False
+def _is_right(name: str | None, fault: Document, takes: Collection[str]) -> bool:
+    """Whether a name is that of a declared fault. takes: surfaces that are lost with damage."""
     if "sensor" in fault:  # outside the class of surface faults is right as well
-        return isolated in (f"sensor {fault['sensor']}", UNANTICIPATED)
+        return name in (f"sensor {fault['sensor']}", UNANTICIPATED)
     if fault["type"] == DAMAGE:  # outside of every class, unless a surface that it takes
-        return isolated == UNANTICIPATED or isolated in takes
-    return isolated == (UNANTICIPATED if fault["type"] == UNANTICIPATED else fault["actuator"])
+        return name == UNANTICIPATED or name in takes
+    return name is not None and name == (
+        UNANTICIPATED if fault["type"] == UNANTICIPATED else fault["actuator"]
+    )
 
 
 def _type_correct(kind: str | None, fault: Document | None) -> bool | None:
@@ -377,17 +407,7 @@ def _outside_the_class(scenario: "Scenario", document: Document) -> str:
 
 
 def _several(scenario: "Scenario", document: Document) -> str:
-    spans = [
-        (fault.at_s, fault.end_s or scenario.duration_s, surface_of(fault))
-        for fault in scenario.faults
-        if not of_a_sensor(fault)
-    ]
-    together = any(a[2] != b[2] and a[0] < b[1] and b[0] < a[1] for a in spans for b in spans)
-    if scenario.fdi.pairs or not together:
-        return ""
-    both = "fdi: {fault_class: all, pairs: true}"
-    wanted = "fdi.pairs: true" if scenario.fdi.fault_class == "all" else both
-    return f"faults on several surfaces at once: the diagnosis looks for one; set {wanted}"
+    return "" if scenario.fdi.pairs else of_several(scenario)
 
 
 def _too_small(scenario: "Scenario", document: Document) -> str:

@@ -45,7 +45,8 @@ class Detection(_Part):
 @dataclass(frozen=True)
 class Isolation(_Part):
     """What was named. estimate: theta in [-1, 0] for a loss of effectiveness, else rad; candidates: the fault
-    types (or surfaces) still possible. so_far: a surface named by exclusion, which data may yet exclude."""
+    types (or surfaces) still possible. so_far: a surface named by exclusion, which data may yet exclude.
+    premature: named before the fault began. names: all names given, in the order of the faults."""
 
     isolated: bool
     fault: str | None
@@ -59,6 +60,8 @@ class Isolation(_Part):
     estimate_interval: tuple[float, float] | None
     candidates: tuple[str, ...]
     so_far: bool | None
+    premature: bool | None
+    names: tuple[str, ...]
 
 
 @dataclass(frozen=True)

@@ -354,6 +354,8 @@ def _one(isolation: Document, metrics: Document) -> str:
     far = " so far" if isolation.get("so_far") else ""
     when = "" if isolation["delay_s"] is None else f"{',' if far else ''} after {_time(isolation['delay_s'])}"
     right = "correct" if isolation["correct"] and isolation["type_correct"] is not False else "WRONG"
+    if isolation.get("premature"):
+        right = f"PREMATURE at {_time(isolation['time_s'])}"
     size = _estimate(isolation) + _true(isolation, metrics)
     return f"{isolation['fault']}{far}{when}, {right}{_type(isolation)}{size}"
 

@@ -9,6 +9,7 @@ from beaver_ftc.documents.base import Section, deny, entry, number, refuse
 from beaver_ftc.documents.errors import suggestion
 from beaver_ftc.plugins import DETECTORS, refusal, wrong_options
 from beaver_ftc.scenario.airframe import checked_aircraft, named
+from beaver_ftc.scenario.pairs import pairs_refused
 from beaver_ftc.scenario.sensors import Sensors
 
 MAX_POLES = 6  # of the bank of detection filters, the published one included
@@ -215,6 +216,8 @@ class FdiConfig(Section, strict=True):
     def _fits_together(self) -> Self:
         if self.pairs and self.fault_class != "all":
             deny("pairs of the published class are not known, allowed: true with fault_class: all", "pairs")
+        if self.pairs and (why := pairs_refused(self.bounds.sensors, checked_aircraft())):
+            deny(f"{why}, allowed: false", "pairs")
         if self.authority == "statistical" and self.statistical is None:
             deny("statistical wants fdi.statistical, e.g. {}, allowed: either, worst-case", "authority")
         refuse(wrong_options(DETECTORS, self.scheme, self.options))

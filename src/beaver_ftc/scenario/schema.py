@@ -6,11 +6,13 @@ from typing import Annotated, Any, Self
 
 from pydantic import (
     AfterValidator,
+    Discriminator,
     Field,
     ModelWrapValidatorHandler,
     PlainValidator,
     PrivateAttr,
     SerializeAsAny,
+    Tag,
     ValidationInfo,
     model_validator,
 )
@@ -27,6 +29,7 @@ from beaver_ftc.scenario.airframe import (
     Ratios,
     aircraft_called,
     checked_against,
+    checked_aircraft,
     find_aircraft,
     folder_of,
     known_aircraft,
@@ -38,10 +41,12 @@ from beaver_ftc.scenario.diagnosis import BoundedSensors, FdiConfig, Scheme
 from beaver_ftc.scenario.environment import Environment
 from beaver_ftc.scenario.faults import MOST_FAULTS, Fault, FaultType, Nameable
 from beaver_ftc.scenario.initial import Initial, default_initial, given_initial, initial_schema
+from beaver_ftc.scenario.pairs import changes_refused
 from beaver_ftc.scenario.sensors import Sensors
 from beaver_ftc.scenario.signals import Reference
 
 NAME_PATTERN = r"^[A-Za-z0-9_-]+$"
+MOST_NAMES = 20  # of a flight: as many surfaces as an aircraft may have
 
 
 class InertiaCoupling(Section):
@@ -164,11 +169,19 @@ class Arrival(Section):
     in_envelope: Flag | None = entry(None, "true: inside the validated envelope at the end; false: outside")
 
 
+def _one_or_list(given: Any) -> str:
+    return "(list)" if isinstance(given, list | tuple) else "(one)"
+
+
+Names = Annotated[tuple[Nameable, ...], Field(max_length=MOST_NAMES)]
+
+
 class Expect(Section):
     """What must come out for the run to pass; what is left out is not asserted.
 
     detected_within_s: delay from fault to first alarm, s
-    isolated_as: what the diagnosis must name: a surface, `sensor p` and the like, or unanticipated
+    isolated_as: what the diagnosis must name: a surface, `sensor p` and the like, or unanticipated; a list:
+    every name that it gives in flight, withdrawn ones too, in the order of the faults
     isolated_type: the fault type the diagnosis must name
     candidate_type: a fault type that must be named or still be possible
     isolated_within_s: delay from fault to isolation, s
@@ -187,7 +200,12 @@ class Expect(Section):
     """
 
     detected_within_s: Number | None = number(None, "s", ge=0, le=360_000, examples=[0.5])
-    isolated_as: Nameable | None = entry(None, examples=["elevator"])
+    isolated_as: (
+        Annotated[
+            Annotated[Nameable, Tag("(one)")] | Annotated[Names, Tag("(list)")], Discriminator(_one_or_list)
+        ]
+        | None
+    ) = entry(None, examples=["elevator", ["elevator", "rudder"]])
     isolated_type: FaultType | None = None
     candidate_type: FaultType | None = None
     isolated_within_s: Number | None = number(None, "s", ge=0, le=360_000, examples=[2])
@@ -281,7 +299,8 @@ class Scenario(Section, title="beaver-ftc scenario"):
     @model_validator(mode="after")
     def _parts_fit_together(self) -> Self:
         flown = dict(self.autopilot or {})
-        refuse(conflicts({**dict(self), "autopilot": flown, "expect": self.expect.model_dump()}))
+        said = conflicts({**dict(self), "autopilot": flown, "expect": self.expect.model_dump()})
+        refuse([*said, *changes_refused(self, checked_aircraft())])
         return self
 
     def with_(self, changes: Mapping[str, Any]) -> Self:

@@ -193,6 +193,12 @@ class Sensors(Section):
     def is_ideal(self) -> bool:
         return all(sensor.is_ideal for _, sensor in self)
 
+    @property
+    def gyros_vary(self) -> bool:
+        """Whether the error of some gyro is more than a constant."""
+        gyros = (self.p, self.q, self.r)
+        return any(gyro.random_error > 0.0 or gyro.scale_error != 0.0 for gyro in gyros)
+
     @classmethod
     def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         signals = handler.resolve_ref_schema(handler(core))

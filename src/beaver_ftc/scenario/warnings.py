@@ -7,8 +7,9 @@ from collections.abc import Iterator
 from math import pi
 from typing import Any
 
-from beaver_ftc.scenario.faults import of_a_sensor
+from beaver_ftc.scenario.faults import UNANTICIPATED, of_a_sensor
 from beaver_ftc.scenario.measured import ALTITUDE, LATE, lies_outside, measured_spans, outside
+from beaver_ftc.scenario.pairs import failing, of_several
 from beaver_ftc.scenario.sensors import PRESETS, Sensors
 from beaver_ftc.scenario.signals import Chirp
 
@@ -28,7 +29,19 @@ def warnings_of(scenario: Any) -> tuple[str, ...]:
         *_too_fast_for_the_frame(scenario),
         *undeclared(scenario),
         *_inconclusive(scenario),
+        *_in_sequence(scenario),
     )
+
+
+def _in_sequence(scenario: Any) -> Iterator[str]:
+    """Surfaces that fail one after the other, of which the diagnosis names the first and takes it back; not
+    where that is what is expected."""
+    expected = scenario.expect.isolated_as or ()
+    in_turn = len(set(failing(scenario).values())) > 1
+    told = UNANTICIPATED in ((expected,) if isinstance(expected, str) else expected)
+    looks_for_one = scenario.fdi.is_ours and not scenario.fdi.pairs
+    if looks_for_one and in_turn and not told and (says := of_several(scenario)):
+        yield f"faults: {says.removeprefix('faults ')}"
 
 
 def _inconclusive(scenario: Any) -> Iterator[str]:

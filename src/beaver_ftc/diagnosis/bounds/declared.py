@@ -179,12 +179,6 @@ def poles_for_noise(sensors: Sensors, constant_rad_s2: float) -> tuple[float, ..
     return tuple(_pole(delay_s, nbar, constant_rad_s2) for delay_s in DELAYS_S) if nbar > 0 else ()
 
 
-def gyros_vary(sensors: Sensors) -> bool:
-    """Whether the error of some gyro is more than a constant."""
-    errors = Errors(sensors)
-    return any(errors.each(of_it, AXES).any() for of_it in ("noise", "resolution", "slope"))
-
-
 def _pole(delay_s: float, noise: float, eta_bar: float) -> float:
     phi = eta_bar + 8.0 * noise / delay_s
     for _ in range(50):

@@ -13,12 +13,10 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.diagnosis.bounds.declared import gyros_vary
 from beaver_ftc.diagnosis.state import IN_PITCH
 from beaver_ftc.diagnosis.types import table
 from beaver_ftc.diagnosis.types.contract import FaultType
 from beaver_ftc.diagnosis.types.table import bias, hardover, loss, oscillatory, rate_limit, stuck
-from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.schema import Scenario
 
 BLOCK_S = 0.2  # to be examined at once where gyros are noisy: short beside the slowest half-cycle, 3.1 s
@@ -155,7 +153,7 @@ def configure(
 ) -> None:
     """Fill in what the types go by, and what they know of each surface's actuator; travel (2, n) rad."""
     config, shared, dt = scenario.fdi, types["config"], 1.0 / scenario.rate_hz
-    shared["length"] = block = ceil(BLOCK_S / dt) if gyros_vary(config.bounds.sensors) else 1
+    shared["length"] = block = ceil(BLOCK_S / dt) if config.bounds.sensors.gyros_vary else 1
     shared["whole"], shared["span_s"] = scenario.substeps == 1 and block == 1, block * dt
     shared["patience"] = ceil(pi / config.slowest_oscillation_rad_s / (block * dt))
     shared["instants"], shared["returns"], shared["dt"] = scenario.substeps, actuators["real"], dt
@@ -171,8 +169,3 @@ def configure(
         rate_deg_s = getattr(scenario.actuators, name).rate_limit_deg_s
         place["least_runaway_rate"] = 0.5 * (radians(rate_deg_s) or RUNAWAY_RATE_RAD_S)
         place["slowest_step"] = min(radians(config.slowest_rate_deg_s) * instant_s, place["step"])
-    if config.pairs and block > 1:
-        raise BadInput(
-            f"{scenario.name}: fdi.pairs is not available with errors of the gyros that vary declared in "
-            "fdi.bounds.sensors, allowed: a bias"
-        )

@@ -1,5 +1,7 @@
 """Workers that is dismissed leaves at once and in silence, whatever its workers are doing."""
 
+import os
+import signal
 import subprocess
 import sys
 import time
@@ -73,3 +75,41 @@ def test_ctrl_c_while_workers_are_getting_ready_is_for_the_one_who_gives_the_ord
         start_new_session=True,
     )
     assert (done.stdout, done.stderr, done.returncode) == ("worked\nTrue\n", "", 0)
+
+
+INTERRUPTED = """
+import sys
+from beaver_ftc.studies.engine import workers
+
+workers._PRELOAD[:] = ["slow"]  # imported by the process that workers are forked from
+if __name__ == "__main__":
+    print("begun", flush=True)
+    try:
+        workers.LocalWorkers(workers.Work(print), 2)
+    except KeyboardInterrupt:
+        sys.exit(130)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there workers start afresh, on a terminal of their own")
+def test_ctrl_c_ends_a_command_that_waits_for_its_first_worker(tmp_path):
+    """Not once the imports are over, and without a word of what is forked when nobody waits any more."""
+    (tmp_path / "slow.py").write_text("import time\ntime.sleep(60)\n")
+    (tmp_path / "begun.py").write_text(INTERRUPTED)
+    with subprocess.Popen(
+        [sys.executable, "-c", HEARD_AGAIN, sys.executable, "begun.py"],
+        cwd=tmp_path, env={**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])},
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True,
+    ) as running:  # fmt: skip
+        running.stdout.readline()
+        time.sleep(1.0)
+        os.killpg(running.pid, signal.SIGINT)
+        said = running.communicate(timeout=30)[1]
+    assert (running.returncode, said) == (130, b"")
+
+
+HEARD_AGAIN = """
+import os, signal, sys
+signal.signal(signal.SIGINT, signal.SIG_DFL)
+os.execv(sys.argv[1], sys.argv[1:])
+"""

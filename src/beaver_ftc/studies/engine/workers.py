@@ -101,9 +101,17 @@ class _Worker:
     """A process of its own: one that dies takes nobody else's task with it."""
 
     def __init__(self, work: Work) -> None:
-        self._pool = ProcessPoolExecutor(1, mp_context=context(), initializer=_begin, initargs=(work,))
-        with single_threaded():
-            self.pid: Future[int] = self._pool.submit(os.getpid)
+        chosen = context()
+        self._pool = ProcessPoolExecutor(1, mp_context=chosen, initializer=_begin, initargs=(work,))
+        # What the worker is forked from is deaf to Ctrl-C; to wait for it, for its imports, is not.
+        start_early()
+        quiet = contextlib.nullcontext() if chosen.get_start_method() == "forkserver" else single_threaded()
+        try:
+            with quiet:
+                self.pid: Future[int] = self._pool.submit(os.getpid)
+        except (KeyboardInterrupt, SystemExit):
+            _begin_no_more()
+            raise
 
     def fly(self, task: Batch) -> "Future[list[Row]]":
         return self._pool.submit(_fly, task.cases)
@@ -127,10 +135,15 @@ class LocalWorkers:
 
     def __init__(self, work: Work, workers: int) -> None:
         self._work, self.slots = work, workers
-        self._idle = [_Worker(work)]
-        wait([self._idle[0].pid])  # the first compiles, should that be needed; the others find it done
-        self._idle += [_Worker(work) for _ in range(workers - 1)]
         self._busy: dict[Future[list[Row]], tuple[_Worker, Batch]] = {}
+        self._idle = [_Worker(work)]
+        try:
+            wait([self._idle[0].pid])  # the first compiles, should that be needed; the others find it done
+            self._idle += [_Worker(work) for _ in range(workers - 1)]
+        except (KeyboardInterrupt, SystemExit):
+            _begin_no_more()
+            self.close()
+            raise
 
     def submit(self, task: Batch) -> None:
         worker = self._idle.pop()
@@ -246,6 +259,15 @@ def start_early() -> None:
     if context().get_start_method() == "forkserver":
         with single_threaded():
             forkserver.ensure_running()
+
+
+def _begin_no_more() -> None:
+    """End the process that workers are forked from: one that is forked when nobody waits for it any more
+    finds its pipes gone, and says so in a traceback. The next study starts another."""
+    pid = getattr(getattr(forkserver, "_forkserver", None), "_forkserver_pid", None)
+    if pid is not None:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(pid, signal.SIGKILL)
 
 
 @contextlib.contextmanager

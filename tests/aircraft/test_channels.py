@@ -28,6 +28,7 @@ def test_elevons_and_a_throttle_can_be_said():
         ({"channel": 1, "share": 0.0}, "0 moves nothing, allowed: -1 to 1 without 0"),
         ({"channel": 1, "share": 1.1}, "less than or equal to 1"),
         ({"channel": 1, "pwm_us": [2000, 1000]}, "ends out of order, allowed: \\[lower, upper\\]"),
+        ({"channel": 1, "pwm_us": [1500, 1500]}, "ends out of order, allowed: \\[lower, upper\\]"),
         ({"channel": 1, "pwm_us": [900, 5000]}, "less than or equal to 2500"),
         ({"channel": 1, "trim_us": 2100}, "is out of range, allowed: 1000 to 2000, as pwm_us says"),
         ({"channel": 1, "reverse": True}, "Extra inputs are not permitted"),

@@ -8,6 +8,7 @@ from statistics_of import Across
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.aircraft import FORCES, Aircraft
 from beaver_ftc.aircraft.schema import SIDESLIP_RATE
+from beaver_ftc.design.engine import slipstream_slopes
 from beaver_ftc.design.terms import fill_table
 from beaver_ftc.diagnosis import across, forces, statistical
 from beaver_ftc.diagnosis.across import AN_AXIS, THE_VANE, set_up_views
@@ -16,6 +17,7 @@ from beaver_ftc.diagnosis.state import NORMAL, PITCH, ROLL, SIDE, YAW
 from beaver_ftc.diagnosis.tones import set_up_listening
 from beaver_ftc.plant.instruments import MEASURED
 from beaver_ftc.scenario.diagnosis import Bounds
+from telling import apart
 
 AIRCRAFT = load()
 ELEVATOR, FLAP = 1, 3
@@ -34,9 +36,11 @@ def measured(x=X, y=Y, force=(0.5, 0.3, -9.5), attitude=(0.2, 0.15)):
     return record
 
 
-def felt(bounds=None):
-    """A diagnosis whose forces are set up at X, Y, U."""
+def felt(bounds=None, **admitted):
+    """A diagnosis whose forces are set up at X, Y, U; admitted: errors of what the engine is told."""
     fdi = new_fdi()
+    for name, value in admitted.items():
+        fdi["bound"]["admitted"][name] = value
     statistical = fdi["statistical"]
     air = statistical["air"]
     fill_table(air["forces"], AIRCRAFT, AIRCRAFT.measurable_forces, FORCES)
@@ -684,3 +688,40 @@ def test_an_aircraft_told_apart_in_one_plane_only_has_the_views_of_that_plane(ai
     asking = [asked and view in (0, 2, 3) for view in range(5)]  # pitch, yaw, and past the aileron
     assert [bool(view["cleared_by"]) for view in views[:5]] == asking
     assert tell_apart(aircraft)
+
+
+NOISY = {
+    "alpha": {"noise_std_deg": 0.11}, "beta": {"noise_std_deg": 0.17}, "V": {"noise_std_mps": 0.4},
+    "qdyn": {"noise_std_pa": 9.0}, "p": {"noise_std_deg_s": 0.5}, "q": {"noise_std_deg_s": 0.7},
+    "r": {"noise_std_deg_s": 0.9},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("f", "name", "vane"), [(ASIDE, "CY", "beta"), (UP, "CZ", "alpha")])
+@pytest.mark.parametrize("engine", [0, 1])
+def test_what_noise_of_the_readings_makes_up_of_a_force(f, name, vane, engine):
+    """Variance per metre: that of each reading, by differences, the airspeed's through the slipstream too;
+    the slipstream's own, of pressure and power; and all of it without the vane."""
+    sizes = [next(iter(each.values())) for each in NOISY.values()]
+    apart(noise=sizes)
+    told = {"engine": engine, "engine_kw": 7.0, "thin_air_kw": 31.0}
+    found = felt(Bounds(sensors=NOISY), **told)["statistical"]["forces"]["component"][f]["quiet"]
+    sd = dict(zip(NOISY, sizes, strict=True))
+    sd |= {axis: np.radians(sd[axis]) for axis in ("alpha", "beta", "p", "q", "r")}
+
+    def slope(step, x=X, y=Y):
+        ahead, behind = (coefficient(name, **{"x": x + s * step[0], "y": y + s * step[1]}) for s in (1, -1))
+        return per_coefficient() * (ahead - behind) / 2.0
+
+    still, e = np.zeros(3), 1e-5
+    by_airspeed, by_pressure, per_kw = slipstream_slopes(Y, 31.0) if engine else (0.0, 0.0, 0.0)
+    moved = {
+        "alpha": (still, e * np.eye(5)[0]), "beta": (still, e * np.eye(5)[1]),
+        "V": (still, e * (np.eye(5)[2] + by_airspeed * np.eye(5)[4])),
+        **{axis: (e * np.eye(3)[i], np.zeros(5)) for i, axis in enumerate("pqr")},
+    }  # fmt: skip
+    parts = {reading: (slope(step) / e * sd[reading]) ** 2 for reading, step in moved.items()}
+    slipstream = slope((still, e * np.eye(5)[4])) / e
+    others = slipstream**2 * ((by_pressure * sd["qdyn"]) ** 2 + (per_kw * 7.0 / 4.0) ** 2)
+    whole = sum(parts.values()) + others
+    assert found == pytest.approx([whole, whole - parts[vane]], rel=1e-3)

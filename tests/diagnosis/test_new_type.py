@@ -148,3 +148,13 @@ def test_types_of_a_constant_parameter_come_first():
     constant = [row.constant for row in registry.TYPES]
     assert constant == sorted(constant, reverse=True)
     assert sum(constant) == registry.N_CONSTANT
+
+
+def test_types_stand_by_their_rank_those_of_a_constant_parameter_first():
+    """The order of every array of types, of lists and of candidates in a verdict."""
+    assert [(row.name, row.constant) for row in registry.TYPES] == [
+        ("loss_of_effectiveness", True), ("stuck", True), ("float", True), ("hardover", True),
+        ("hardover", True), ("bias", True), ("loss_of_effectiveness", False), ("oscillatory", False),
+        ("rate_limit", False), ("bias", False),
+    ]  # fmt: skip
+    assert (registry.UP, registry.DOWN) == (3, 4)

@@ -1,5 +1,6 @@
 """What the readers make of small files: every column, event and refusal."""
 
+import os
 import sys
 
 import numpy as np
@@ -7,7 +8,7 @@ import pyarrow as pa
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.flights.readers import alfa, read_flight, table, text
+from beaver_ftc.flights.readers import alfa, ardupilot, read_flight, table, text
 from beaver_ftc.flights.recording import columns_of
 from flights import synthetic
 
@@ -216,3 +217,12 @@ def test_a_cell_of_text_is_counted_in_its_row_of_the_whole_table(tmp_path, monke
     whole = text.joined(blocks)
     assert whole.text == {"b": (2, 123, "odd"), "c": (1, 399, "last")}
     assert (whole.rows, np.isnan(whole.numbers["b"]).sum(), np.isnan(whole.numbers["a"]).sum()) == (400, 2, 0)
+
+
+def test_what_is_said_after_a_dataflash_log_is_heard_again(capfd):
+    """By file descriptor too: the library behind pymavlink writes past Python."""
+    os.write(2, b"before, ")
+    with ardupilot._silence():
+        os.write(2, b"within, ")
+    os.write(2, b"after")
+    assert capfd.readouterr().err == "before, after"

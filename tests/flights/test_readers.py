@@ -1,5 +1,7 @@
 """Readers give what was written, and say in one line why a log cannot be used."""
 
+import struct
+
 import numpy as np
 import pytest
 
@@ -163,3 +165,26 @@ def test_two_instances_of_a_message_are_two_sets_of_columns(tmp_path, number):
         np.testing.assert_allclose(columns[name].t_s, t_s + 0.01 * i, atol=1e-6)
         np.testing.assert_array_equal(columns[name].values, np.sin(t_s) + 0.5 * i)
         assert columns[name].note == ""
+
+
+def test_a_ulogs_messages_without_a_stamp_are_left_out(tmp_path):
+    """Of three one has no stamp, and one never came."""
+    pytest.importorskip("pyulog")
+
+    def message(kind, body):
+        return struct.pack("<HB", len(body), ord(kind)) + body
+
+    data = b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0)
+    names = {"good": "uint64_t timestamp;", "timeless": "", "silent": "uint64_t timestamp;"}
+    for name, stamp in names.items():
+        data += message("F", f"{name}:{stamp}double x;".encode())
+    for number, name in enumerate(names):
+        data += message("A", struct.pack("<BH", 0, number) + name.encode())
+    for k in range(3):
+        data += message("D", struct.pack("<HQd", 0, 1_000_000 + 100_000 * k, 7.0 + k))
+    data += message("D", struct.pack("<Hd", 1, 9.0))
+    path = tmp_path / "flight.ulg"
+    path.write_bytes(data)
+    (column,) = read_flight(path).columns.values()
+    assert column.values.tolist() == [7.0, 8.0, 9.0]
+    assert column.t_s == pytest.approx([0.0, 0.1, 0.2])

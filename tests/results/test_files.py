@@ -5,6 +5,7 @@ import errno
 import os
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pyarrow as pa
@@ -150,6 +151,25 @@ def test_folders_are_exchanged_in_one_step_where_a_system_can(tmp_path, monkeypa
             writer._exchange(Path("one"), Path("three"))
     monkeypatch.setattr(ctypes, "CDLL", lambda *_, **__: object())
     assert writer._exchange(Path("one"), Path("two")) is False
+
+
+@pytest.mark.parametrize("number", [errno.ENOSYS, errno.EINVAL, errno.EOPNOTSUPP, errno.EACCES])
+def test_a_kernel_or_a_file_system_that_cannot_exchange_is_no_error(monkeypatch, number):
+    """An old kernel, a file system without it; what else goes wrong is said."""
+    asked = []
+
+    def renameat2(*arguments):
+        asked.append(arguments)
+        ctypes.set_errno(number)
+        return -1
+
+    monkeypatch.setattr(ctypes, "CDLL", lambda *_, **__: SimpleNamespace(renameat2=renameat2))
+    if number == errno.EACCES:
+        with pytest.raises(PermissionError):
+            writer._exchange(Path("one"), Path("two"))
+    else:
+        assert writer._exchange(Path("one"), Path("two")) is False
+    assert [each[1:4:2] for each in asked] == [(b"one", b"two")]
 
 
 def test_a_folder_is_locked_once(tmp_path, monkeypatch):

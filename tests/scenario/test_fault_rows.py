@@ -105,3 +105,8 @@ def test_what_is_ideal_and_what_covers_what():
     assert not gyro({"quantum_deg_s": 0.1}).is_within(bounded)
     assert not gyro({"bias_deg_s": 2.1}).is_within(bounded)
     assert not Sensors.model_validate({"az": {"delay_s": 0.1}}).is_ideal
+
+
+def test_what_nobody_anticipates_comes_last_wherever_types_are_listed():
+    assert list(TYPES)[-1] == "unanticipated"
+    assert set(TYPES) == set(GIVEN)

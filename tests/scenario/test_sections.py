@@ -5,6 +5,7 @@ import pytest
 from beaver_ftc.documents.problems import ScenarioError
 from beaver_ftc.scenario.consistency import conflicts
 from beaver_ftc.scenario.dump import to_yaml
+from beaver_ftc.scenario.environment import air_of
 from beaver_ftc.scenario.loader import load, load_text
 from beaver_ftc.scenario.schema import Scenario
 
@@ -194,3 +195,10 @@ def test_a_dump_reads_well(changed):
     }  # fmt: skip
     lines = to_yaml(Scenario.model_validate(given)).splitlines()
     assert not changed([line for line in lines if "std" not in line])
+
+
+@pytest.mark.parametrize("severity", ["none", "light", "moderate", "severe"])
+def test_air_by_the_name_of_its_severity_is_what_a_scenario_says_of_it(severity):
+    found = Scenario.model_validate({"name": "x", "environment": air_of(severity)}).environment
+    assert found.turbulence == ("none" if severity == "none" else "dryden")
+    assert severity in ("none", found.severity)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.control import state
+from beaver_ftc.control import reference, state
 from beaver_ftc.control.laws import REJECTING, gains
 from beaver_ftc.control.laws.rejecting import N_POINTS
 from beaver_ftc.design.model import AIRSPEED, QDYN, design_record
@@ -11,6 +11,7 @@ from beaver_ftc.design.variants import response
 from beaver_ftc.diagnosis.belief import belief_dtype
 from beaver_ftc.scenario.schema import Scenario
 from law_records import new_control
+from telling import apart
 
 Y = np.array([0.1, 0.02, 44.0, 1000.0, 0.3, 0.0, 0.0, 0.0])
 SENSORS = {
@@ -92,3 +93,30 @@ def test_noise_may_take_its_share_of_the_rate_more_where_the_aircraft_damps_itse
     assert found["speed_rad_s"] == pytest.approx(0.2 * shares * rates, rel=1e-6)
     alone = asked(given({"noise_share": 0.2}, actuators=actuators), stand_in=-1)
     assert alone["speed_rad_s"][3] == pytest.approx(0.2 * np.pi / 3.0)
+
+
+def test_a_laws_record_is_what_its_scenario_says_frame_by_frame():
+    """At 50 Hz of three instants each; every number asked for is another, and so are those of the record."""
+    control = {
+        "law": "adaptive", "proportional_per_s": 3.1, "integral_per_s2": 0.7, "hand_over_s": 0.8,
+        "reference_natural_frequency_rad_s": 9.0, "reference_damping": 0.6, "effectiveness_rate_per_s": 1.7,
+        "least_effectiveness": 0.15,
+    }  # fmt: skip
+    probing = {"amplitude_deg": 4.0, "frequency_hz": 1.25, "duration_s": 2.4}
+    travel = np.array([[-0.5, -0.4, -0.3, -0.1], [0.55, 0.45, 0.35, 1.0]])
+    apart(travel=travel, control=[*control.values()][1:], probing=list(probing.values()))
+    scenario = given(control, substeps=3, fdi={"fault_class": "all", "probing": probing})
+    record = np.zeros(1, state.control_dtype(4))[0]
+    state.configure(record, scenario, travel)
+    assert (record["feedback"]["Kp"], record["feedback"]["Ki"]) == (3.1, 0.7)
+    assert (record["layout"]["low"].tolist(), record["layout"]["high"].tolist()) == tuple(travel.tolist())
+    assert record["allocation"]["hand_over_step"] == pytest.approx(0.02 / 0.8)
+    assert record["surfaces"]["effectiveness_step"] == pytest.approx(1.7 * 0.02)
+    assert record["surfaces"]["least_effectiveness"] == 0.15
+    probe = record["probe"]
+    assert probe["amplitude"] == pytest.approx(np.radians(4.0))
+    assert probe["step"] == pytest.approx(2.0 * np.pi * 1.25 * 0.02)
+    assert (probe["frames"], probe["from_s"], probe["to_s"]) == (120, -1.0, -1.0)
+    A, B = reference.discretise(9.0, 0.6, 0.02)
+    assert record["reference"]["A"] == pytest.approx(np.array(A))
+    assert record["reference"]["B"] == pytest.approx(np.array(B))

@@ -163,6 +163,25 @@ def test_the_table_is_that_of_level_flight_between_the_ends_of_speed_and_flap(fi
     assert (hold["bank"], hold["fastest"]) == (pytest.approx(radians(30.0)), inf)
 
 
+@pytest.mark.parametrize(
+    ("qdyn_pa", "flap_rad", "held"),
+    [
+        (1800.0, 1.0, True),
+        (4000.0, 0.6, True),
+        (4000.0, 1.0, False),
+        (280.0, 0.6, True),
+        (280.0, -0.1, False),
+    ],
+)
+def test_what_takes_more_thrust_or_incidence_than_there_is_cannot_be_held(qdyn_pa, flap_rad, held):
+    """Too much flap for the speed, or too slow for what flap there is; each beside one that is held."""
+    wanted = (("Cm_alpha", 1.2),), (qdyn_pa, 900.0), (0.3, flap_rad)
+    needed = setup.elevator_needed(AIRCRAFT, ("elevator", "flap"), 1.1 * AIRCRAFT.mass.mass_kg, *wanted)
+    expected = level(qdyn_pa, flap_rad) if held else np.nan
+    assert needed[0, 1] == pytest.approx(expected, abs=1e-7, nan_ok=True)
+    assert needed[1, 0] == pytest.approx(level(900.0, 0.3), abs=1e-7)
+
+
 def test_without_a_surface_that_stands_in_nothing_is_known_of_what_can_be_held():
     hold = set_up(stand_in=-1)[0]["holding"]
     assert (hold["known"], hold["fastest"]) == (0, inf)

@@ -8,7 +8,7 @@ from tools.gtm.specification import DATABASE
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.loading import UnknownAircraft, imported_folder
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.studies.gtm import conversion
+from beaver_ftc.studies.gtm import conversion, elements
 from beaver_ftc.studies.gtm.database import read
 from beaver_ftc.studies.gtm.parameters import cases, parameters
 
@@ -134,3 +134,11 @@ def test_the_first_of_two_cases_is_in_force(bench):
 def test_where_it_is_kept_follows_the_cache(monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert imported_folder("gtm") == tmp_path / "beaver-ftc" / "imported" / "gtm"
+
+
+def test_an_operation_on_one_argument_is_that_argument_where_nothing_is_to_be_done():
+    a, b = elements.value(2.0), elements.read("p")
+    for operation in ("sum", "product"):
+        assert elements.do(operation, a) == a
+        assert elements.do(operation, a, b) == f"<{operation}>{a}{b}</{operation}>"
+    assert elements.do("abs", b) == f"<abs>{b}</abs>"

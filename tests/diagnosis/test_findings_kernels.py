@@ -15,10 +15,12 @@ from beaver_ftc.diagnosis.types.registry import (
     NAMES,
     SLOW,
     STUCK,
+    TYPES,
     UP,
     VARYING_LOSS,
 )
 from beaver_ftc.diagnosis.types.verdict import BY_DEDUCTION, RULED_OUT
+from telling import apart, fill
 
 SURFACES = ("aileron", "elevator", "rudder", "flap")
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)
@@ -168,3 +170,18 @@ def test_where_one_of_two_in_pitch_stands_still_the_other_may_be_off_as_well(kin
     assert set(findings._types_left(fdi, RUDDER)) == set(said(kind))
     assert set(findings._types_left(new({ELEVATOR: [BIAS]}, pairs=1), ELEVATOR)) == set(said(BIAS))
     assert set(findings._types_left(new({ELEVATOR: [kind]}), ELEVATOR)) == set(said(kind))
+
+
+@pytest.mark.parametrize("s", [AILERON, RUDDER, FLAP])
+def test_a_parameter_is_said_of_its_own_surface_and_type(s):
+    """Of records in which every number is another: sets as they are, of a loss as theta, 1 of it less."""
+    fdi = new()
+    sets = fdi["types"]["surface"]
+    for surface in range(4):
+        fill(sets[surface], seed=surface + 1)
+    apart(low=sets["set_low"], high=sets["set_high"])
+    for kind, off in ((STUCK, 0.0), (BIAS, 0.0), (CONSTANT_LOSS, 1.0)):
+        low, high = sets["set_low"][s, kind] - off, sets["set_high"][s, kind] - off
+        assert TYPES[kind].interval(fdi, s, kind) == pytest.approx((low, high))
+    middle = 0.5 * (sets["set_low"][s, STUCK] + sets["set_high"][s, STUCK])
+    assert TYPES[STUCK].estimate(fdi, s, STUCK) == pytest.approx(middle)

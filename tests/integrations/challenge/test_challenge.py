@@ -218,6 +218,25 @@ def test_from_beginning_to_end(challenge, monkeypatch):
         assert "ZeroDivisionError" in (challenge / "grades" / page).read_text()
 
 
+def test_grades_of_other_hidden_flights_are_others(challenge, monkeypatch):
+    """What has been graded is kept under a number that follows from the flights, and tells nobody of them."""
+    asked = []
+    monkeypatch.setattr(grading, "run_study", lambda study, *_: asked.append(study.follows_from))
+    folders.keep("text", "ada", challenge)
+    hidden = challenge / "teacher" / "loss.yaml"
+    text = hidden.read_text()
+    for edited in (text, text, text + "# a word\n", reseeded(text)):
+        hidden.write_text(edited)
+        grading.grade(challenge, 1, None)
+    assert asked[0] == asked[1] == asked[2] != asked[3]
+    assert not any(word in asked[0] for word in ("seed", "loss", "Scenario"))
+
+
+def reseeded(text):
+    seed = text.partition("seed: ")[2].split()[0]
+    return text.replace(seed, str(int(seed) + 1))
+
+
 def test_a_challenge_that_is_none(tmp_path):
     assert "no such folder" in str(beaver("grade", tmp_path / "no").exception)
     assert "no hidden flights" in str(beaver("grade", tmp_path).exception)

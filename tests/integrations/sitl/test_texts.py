@@ -1,6 +1,7 @@
 """What is said of a flight, and what a MAVLink command breaks in it."""
 
 from collections import Counter
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from beaver_ftc.integrations.sitl import failures
 from beaver_ftc.integrations.sitl.link import COUNTED, Link, Times
 from beaver_ftc.integrations.sitl.mavlink import Mavlink
 from beaver_ftc.integrations.sitl.telling import CRITICAL, INFO, WARNING, Teller, Text
-from beaver_ftc.integrations.sitl.vehicle import Vehicle
+from beaver_ftc.integrations.sitl.vehicle import Flown, Vehicle
 
 
 def vehicle(**keys):
@@ -149,3 +150,12 @@ def test_a_link_without_a_packet_is_a_document_too():
     document = Link().document()
     assert {document[name] for name in COUNTED} == {0}
     assert document["latency_ms"] == {"median": 0.0, "p99": 0.0, "largest": 0.0}
+
+
+@pytest.mark.parametrize("detected", [0, 1])
+@pytest.mark.parametrize("watched", [0, 1])
+@pytest.mark.parametrize("plugged", [None, "a plug-in"])
+def test_an_alarm_is_of_surfaces_or_of_instruments_and_a_plug_in_may_have_one(detected, watched, plugged):
+    seen = {"detected": np.array([detected])}, {"alarmed": np.array([watched])}
+    flight = SimpleNamespace(_seen=seen, _loop=SimpleNamespace(plugin_frame=plugged))
+    assert Flown.alarmed.fget(flight) is bool(detected or watched or plugged)

@@ -289,3 +289,21 @@ def test_what_is_flown_to_be_shown(monkeypatch):
     ]  # fmt: skip
     assert asked[len(PUBLISHED) + 1] == ("fault-free", OURS)
     assert flights.designs == [("fault-free", "elevator")] * 3
+
+
+def test_the_paper_does_better_where_a_reader_would_see_it():
+    """By more than MATTERS of ours, where ours has none, and never in a flight that was lost."""
+    keys = [quantity.key for quantity in beside.QUANTITIES]
+
+    def row(departed=False, **values):
+        return {"case": "loss", "departed": departed} | dict.fromkeys(keys) | values
+
+    ours, little, enough = 2.0, 2.0 * (1.0 - 0.9 * beside.MATTERS), 2.0 * (1.0 - 1.1 * beside.MATTERS)
+    for key in keys:
+        for paper, known, better in (
+            (little, ours, False), (enough, ours, True), (ours, enough, False), (3.0, None, True),
+            (None, ours, False), (None, None, False),
+        ):  # fmt: skip
+            found = beside._better([row(**{key: paper}), row(**{key: known})])
+            assert [(one["paper"], one["ours"]) for one in found] == ([(paper, known)] if better else [])
+            assert beside._better([row(departed=True, **{key: paper}), row(**{key: known})]) == []

@@ -259,12 +259,32 @@ def test_a_sweep_is_asked_to_stop_once_and_stopped_twice(capsys):
             assert not stopped()
             signal.raise_signal(signal.SIGTERM)
             assert stopped()
-            assert capsys.readouterr().err.startswith("\nstopping once the flights in the air have landed")
+            assert capsys.readouterr().err.startswith("\nstopping: flights in the air have a second to land")
             signal.raise_signal(signal.SIGINT)
 
-    with pytest.raises(SweepStopped, match="stopped at once"):
+    with pytest.raises(SweepStopped, match="stopped; what had landed is kept"):
         stopped_twice()
     assert signal.getsignal(signal.SIGTERM) is before
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there a second Ctrl-C ends it")
+def test_flights_that_do_not_land_are_not_waited_for(monkeypatch):
+    import signal
+    import time
+
+    from beaver_ftc.studies.sweep.campaign import SweepStopped
+
+    monkeypatch.setattr(sweep, "LANDS_S", 0.01)
+
+    def stopped_once():
+        with sweep._stoppable():
+            signal.raise_signal(signal.SIGINT)
+            time.sleep(60.0)  # nothing lands
+
+    with pytest.raises(SweepStopped, match="go on with --resume"):
+        stopped_once()
+    assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+    assert signal.getsignal(signal.SIGALRM) is signal.SIG_DFL
 
 
 def test_what_is_asked_of_a_sweep():

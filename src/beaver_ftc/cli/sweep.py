@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from beaver_ftc.studies.sweep.campaign import Options
     from beaver_ftc.studies.sweep.one_flight import Keep
 
+LANDS_S = 1.0  # of flights in the air, once the sweep is told to stop
 
 Backend = StrEnum("Backend", ["local", "ray"])  # who flies
 Objective = StrEnum("Objective", ["delay", "false_alarm", "tracking"])  # what a search looks for
@@ -152,22 +153,28 @@ def _replay(sweep: "Sweep", options: "Options", index: int, format: Format) -> D
 
 @contextmanager
 def _stoppable() -> Iterator[Callable[[], bool]]:
-    """Let Ctrl-C (or SIGTERM) end the sweep after what is in the air; a second one ends it at once."""
+    """Let Ctrl-C (or SIGTERM) end the sweep once what is in the air has landed, LANDS_S later at the latest;
+    a second one ends it at once."""
     signals: list[int] = []
 
     def stop(number: int, frame: Any) -> None:
         if signals:
             raise KeyboardInterrupt
         signals.append(number)
-        complain("\nstopping once the flights in the air have landed; once more to stop at once")
+        if hasattr(signal, "setitimer"):
+            signal.setitimer(signal.ITIMER_REAL, LANDS_S)
+        complain("\nstopping: flights in the air have a second to land; once more to stop at once")
 
-    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    heard = [signal.SIGINT, signal.SIGTERM, *([signal.SIGALRM] if hasattr(signal, "setitimer") else [])]
+    before = {number: signal.signal(number, stop) for number in heard}
     try:
         yield lambda: bool(signals)
     except KeyboardInterrupt:
         from beaver_ftc.studies.sweep.campaign import SweepStopped
 
-        raise SweepStopped("stopped at once; what had landed is kept, go on with --resume") from None
+        raise SweepStopped("stopped; what had landed is kept, go on with --resume") from None
     finally:
+        if hasattr(signal, "setitimer"):
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
         for number, handler in before.items():
             signal.signal(number, handler)

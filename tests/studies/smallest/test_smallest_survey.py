@@ -1,0 +1,131 @@
+"""`smallest` on flights: which are flown, what each row says, and that a second start flies nothing again."""
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+import beaver_ftc as bf
+from beaver_ftc.cli.main import app
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.loop.loop import fly
+from beaver_ftc.results.metrics import metrics
+from beaver_ftc.studies.smallest import survey
+from beaver_ftc.studies.smallest.survey import Asked, Flight, check, fly_one, run_smallest, variants_of
+
+STAGES = (45, 50)  # the fewest of which an order statistic bounds the 0.9 quantile from above: 36
+SCENARIO = {
+    "name": "sines", "duration_s": 3.0, "rate_hz": 20,
+    "reference": {"q": [{"sine": {"amplitude_deg_s": 2.0, "frequency_hz": 0.4}}]},
+}  # fmt: skip
+EVERYTHING = {
+    "environment": {"turbulence": "dryden", "severity": "light"}, "sensors": "tactical-grade",
+    "actuators": "servo",
+    "fdi": {"bounds": {"turbulence": "light", "sensors": "tactical-grade", "deflection_deg": 0.1}},
+}  # fmt: skip
+ASKED = Asked("elevator", 0.5, seed=3)
+COMPARED = ("as it is", "without uncertainty of the model")
+
+
+@pytest.fixture
+def few(monkeypatch):
+    monkeypatch.setattr(survey, "STAGES", STAGES)
+    monkeypatch.setattr(survey, "FIRST", STAGES[:1])
+    monkeypatch.setattr(
+        survey, "variants_of", lambda *of: (one for one in variants_of(*of) if one[0] in COMPARED)
+    )
+
+
+def test_what_is_left_out_is_left_out_of_truth_and_declaration():
+    scenario = bf.load(SCENARIO | EVERYTHING)
+    flown = dict(variants_of(scenario, "elevator"))
+    assert list(flown) == [
+        "as it is", "without turbulence", "with perfect sensors", "with perfect servos",
+        "without uncertainty of the model", "with twice the amplitude of reference.q",
+        "with twice the frequency of reference.q",
+    ]  # fmt: skip
+    calm = flown["without turbulence"]
+    assert (calm.environment.severity, calm.fdi.bounds.turbulence) == (None, "none")
+    exact = flown["with perfect sensors"]
+    assert exact.sensors.is_ideal
+    assert exact.fdi.bounds.sensors.is_ideal
+    servos = flown["with perfect servos"]
+    assert servos.actuators.is_ideal
+    assert servos.fdi.bounds.deflection_deg == 0.0
+    bounds = flown["without uncertainty of the model"].fdi.bounds
+    assert (bounds.coefficients, bounds.inertia) == (0.0, 0.0)
+    louder = flown["with twice the amplitude of reference.q"].reference.q[0].sine
+    faster = flown["with twice the frequency of reference.q"].reference.q[0].sine
+    assert (louder.amplitude_deg_s, louder.frequency_hz) == (4.0, 0.4)
+    assert (faster.amplitude_deg_s, faster.frequency_hz) == (2.0, 0.8)
+    # of a surface that no reference moves, the axis on which it shows gets one
+    assert list(dict(variants_of(scenario, "rudder")))[-1].endswith("as reference.r")
+
+
+def test_a_row_is_what_its_flight_says():
+    scenario = bf.load(SCENARIO)
+    variants = dict(variants_of(scenario, "elevator"))
+    rows = [fly_one(variants, ASKED, Flight("as it is", run, 60)) for run in range(3)]
+    assert rows == [fly_one(variants, ASKED, Flight("as it is", run, 60)) for run in range(3)]
+    assert all(row["found"] and not row["failed"] and not row["false_alarm"] for row in rows)
+    nothing = fly_one(variants, ASKED, Flight("as it is", 0, 0))
+    assert not nothing["found"]
+    assert not nothing["certain"]
+    # certain and found, against the metrics of the same loss at an instant of one's own
+    loss = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.6, "at_s": 1.5}
+    said = metrics(fly(scenario.with_({"faults": [loss]})))["detection"]
+    assert said["delay_s"] <= said["guaranteed_delay_s"]
+
+
+def test_a_document_and_what_the_command_prints(few, tmp_path):
+    (tmp_path / "sines.yaml").write_text(json.dumps(SCENARIO))
+    line = ["smallest", str(tmp_path / "sines.yaml"), "--surface", "elevator", "--within", "0.5"]
+    line += ["--workers", "1", "--out", str(tmp_path)]
+    done = CliRunner().invoke(app, [*line, "--format", "json"])
+    assert done.exit_code == 0, done.output
+    document = json.loads(done.stdout)
+    certain, found = document["certain"], document["found"]
+    assert found["low"] <= found["size"] <= found["high"]
+    assert found["size"] <= certain["size"] <= 1.0  # what is certain is found, in every flight
+    assert found["flights"] in STAGES
+    assert certain["flights"] == STAGES[0]
+    assert [row["variant"] for row in document["compared"]] == [*COMPARED[1:]]
+    folder = tmp_path / "sines-smallest-elevator"
+    assert {".json", ".csv", ".html"} <= {path.suffix for path in folder.iterdir()}
+    text = CliRunner().invoke(app, line)
+    assert "found within 0.5 s in 90 % of flights (95 % interval" in text.stdout
+    assert f"A loss of {100 * certain['size']:.0f} % of the effectiveness of elevator" in text.stdout
+
+
+def test_what_is_stopped_goes_on_and_flies_no_finished_round_again(few, tmp_path, monkeypatch):
+    scenario, flown, last = bf.load(SCENARIO), [], STAGES[0] + 5
+
+    def counted(variants, asked, flight):
+        flown.append(flight)
+        if len(flown) == last:
+            raise KeyboardInterrupt
+        return fly_one(variants, asked, flight)
+
+    monkeypatch.setattr(survey, "fly_one", counted)
+    with pytest.raises(KeyboardInterrupt):
+        run_smallest(tmp_path, scenario, ASKED)
+    document = run_smallest(tmp_path, scenario, ASKED)
+    resumed = len(flown) - last
+    flown.clear()
+    last = -1
+    whole = run_smallest(tmp_path / "other", scenario, ASKED)
+    assert {**document, "folder": 0} == {**whole, "folder": 0}
+    assert resumed <= len(flown) - STAGES[0]
+
+
+@pytest.mark.parametrize(
+    ("changes", "asked", "says"),
+    [
+        ({}, Asked("elevater", 0.5), "--surface 'elevater': allowed: aileron, elevator, rudder, flap"),
+        ({"fdi": {"scheme": "none"}}, ASKED, "scheme: none diagnoses nothing"),
+        ({"duration_s": 1.0}, ASKED, "too short for --within"),
+    ],
+)
+def test_what_cannot_be_answered_is_a_line(changes, asked, says):
+    with pytest.raises(BadInput, match=says):
+        check(bf.load(SCENARIO | changes), asked)

@@ -241,6 +241,7 @@ def detectability(
     """
     from beaver_ftc.scenario.loader import load_scenario
     from beaver_ftc.studies.detectability import (
+        POINTER,
         alike,
         answers,
         engine_failures,
@@ -271,4 +272,4 @@ def detectability(
         return
     of = {what: [row for row in found[what] if row["fault"] == surface] for what in ("points", "pairs")}
     said = answers(loaded, of["points"])
-    answer(format, found | of | {"answers": said, "folder": folder}, lambda: "\n".join(said))
+    answer(format, found | of | {"answers": said, "folder": folder}, lambda: "\n".join([*said, POINTER]))

@@ -278,6 +278,11 @@ def with_aircraft(scenario: Scenario, reference: str) -> Scenario:
     return Scenario.model_validate({**document, **given, "faults": [], "expect": {}})
 
 
+POINTER = (
+    "`beaver-ftc smallest SCENARIO` gives the size found in 90 % of flights too, within any time, and why."
+)
+
+
 def answers(scenario: Scenario, rows: Sequence[Document]) -> list[str]:
     """A line a row: from which loss on a surface's fault is certain to be found there."""
     aircraft = scenario.airframe

@@ -39,8 +39,8 @@ if TYPE_CHECKING:
     from beaver_ftc.loop.plugin_frame import PluginFrame
 
 CHUNK_ROWS = 8192
-# JSBSim's logger, the aircraft that are flown again and their compiled frames are the process's own: of
-# several threads one flies at a time, the others wait. More at a time take more processes.
+# The aircraft that are flown again and their compiled frames are the process's own: of several threads one
+# flies at a time, the others wait. More at a time take more processes.
 ONE_FLIES = threading.RLock()
 AT_ONCE = 256  # frames, a millisecond or two: so long a signal and other threads wait
 

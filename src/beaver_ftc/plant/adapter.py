@@ -2,6 +2,7 @@
 
 import os
 import re
+import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import count, takewhile
@@ -74,6 +75,11 @@ class _Errors(jsbsim.FGLogger):
         pass
 
 
+# Who listens to JSBSim in each thread, by the thread's number. JSBSim lets go of a thread's logger when the
+# thread has ended, without the interpreter's lock: were that the last reference, the process would abort.
+_LISTENING: dict[int, _Errors] = {}
+
+
 def _load(errors: _Errors, model: Path) -> jsbsim.FGFDMExec:
     """An executive with a model; engines, propellers and systems are looked for beside it first.
 
@@ -82,6 +88,7 @@ def _load(errors: _Errors, model: Path) -> jsbsim.FGFDMExec:
     """
     refuse_deeds(model)
     jsbsim.set_logger(errors)
+    _LISTENING[threading.get_ident()] = errors
     fdm = jsbsim.FGFDMExec(str(data_root()))
     fdm.set_debug_level(0)
     fdm.set_output_path(os.devnull)  # which is no folder: should JSBSim write after all, it cannot

@@ -382,3 +382,8 @@ def test_a_range_upside_down_is_refused_in_one_line():
     text = "name: x\ncontrol:\n  power: {lowest_inhg: 30, highest_inhg: 20}\n"
     with pytest.raises(BadInput, match=r"control\.power\.highest_inhg: below lowest_inhg, allowed: 30 inHg"):
         load_text(text)
+
+
+def test_a_range_may_be_one_value():
+    power = load_text("name: x\ncontrol:\n  power: {lowest_inhg: 21, highest_inhg: 21}\n").control.power
+    assert (power.lowest_inhg, power.highest_inhg) == (21.0, 21.0)

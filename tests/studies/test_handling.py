@@ -5,9 +5,11 @@ import math
 import numpy as np
 import pytest
 
+from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant.linear import LinearModel
 from beaver_ftc.results.log import MemoryLog
+from beaver_ftc.studies import handling
 from beaver_ftc.studies.handling import (
     LIMITS,
     WORSE,
@@ -20,6 +22,7 @@ from beaver_ftc.studies.handling import (
 )
 from beaver_ftc.studies.linear_systems import CLASSICAL
 from flying import scenario
+from telling import apart, numbers
 
 G = 9.80665
 
@@ -104,6 +107,28 @@ def test_a_jam_leaves_other_modes_than_the_trim():
     assert after[0].value == pytest.approx(before[0].value, rel=0.2)  # short period: much the same
     at_trim = where_ended(flown, _as_row(flown))
     assert [each.value for each in at_trim] == pytest.approx([each.value for each in before], rel=1e-6)
+
+
+def test_where_a_flight_ended_every_number_is_of_its_last_row(monkeypatch):
+    """The engine's setting too, where the log has it; what cannot be linearised is said."""
+    flown, seen = scenario(duration_s=2.0), []
+    names = ["alpha_rad", "beta_rad", *(f"{axis}_rad_s" for axis in "pqr"), "phi_rad", "theta_rad", "psi_rad"]
+    names += [f"{surface}_effective_rad" for surface in flown.airframe.surfaces]
+    end = dict(zip(names, numbers(len(names), seed=3, size=0.02).tolist(), strict=True))
+    end |= {"airspeed_mps": 43.0, "altitude_m": 1700.0, "manifold_pressure_inhg": 24.5}
+    apart(end=list(end.values()))
+    unknown = LinearModel(np.full((10, 10), np.nan), np.zeros((10, 4)), ("x",) * 10, ("u",) * 4)
+    monkeypatch.setattr(handling, "differences", lambda plant, there: seen.append(there) or unknown)
+    with pytest.raises(SimulationFailed, match="nothing can be linearised where it ended"):
+        where_ended(flown, end)
+    (there,) = seen
+    assert {name: getattr(there, name) for name in names if hasattr(there, name)} == {
+        name: end[name] for name in names if not name.endswith("_effective_rad")
+    }
+    assert (there.airspeed_mps, there.altitude_m) == (43.0, 1700.0)
+    assert there.settings["manifold_pressure_inhg"] == 24.5
+    surfaces = flown.airframe.surfaces
+    assert dict(there.surfaces_rad) == {name: end[f"{name}_effective_rad"] for name in surfaces}
 
 
 def _as_row(flown):

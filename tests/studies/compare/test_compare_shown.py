@@ -8,7 +8,7 @@ import pytest
 
 from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.studies.compare import runs, tune
+from beaver_ftc.studies.compare import leaderboard, runs, tune
 from beaver_ftc.studies.compare.leaderboard import (
     MARK,
     as_text,
@@ -20,7 +20,7 @@ from beaver_ftc.studies.compare.leaderboard import (
 )
 from beaver_ftc.studies.compare.replay import Recording, Trace, _statistic, alarms_at, trace
 from beaver_ftc.studies.compare.scores import document_of
-from beaver_ftc.studies.compare.trial import LAW, SCHEME, Result, SetFlight, Trial, entries_of
+from beaver_ftc.studies.compare.trial import LAW, SCHEME, Entry, Result, SetFlight, Trial, entries_of
 from beaver_ftc.studies.engine.workers import Case
 from beaver_ftc.studies.present.figures import panels
 from flying import scenario
@@ -294,3 +294,13 @@ def test_a_law_costs_its_error_and_a_departure_ten(monkeypatch):
         assert tune._law_cost(SetFlight("c", scenario()), "lqr", {"rate_weight": 2.0}) == cost
     control = flown[0].control
     assert (control.law, control.options, flown[0].fdi.scheme) == ("lqr", {"rate_weight": 2.0}, SCHEME)
+
+
+def test_flights_of_other_entries_are_others(monkeypatch, tmp_path):
+    """What has landed of a comparison is taken up again for the same entries alone."""
+    asked = []
+    monkeypatch.setattr(leaderboard, "run_study", lambda study, *_: asked.append(study.follows_from))
+    entries = [Entry("adaptive-estimators", "nominal"), Entry("adaptive-estimators", "fault-tolerant")]
+    for chosen in (entries, entries[:1], entries):
+        leaderboard.run_comparison(tmp_path, "any", [], chosen, 1, None)
+    assert asked[0] == asked[2] != asked[1]

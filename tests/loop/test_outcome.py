@@ -32,7 +32,8 @@ CASES = {
         "truth.value.5": 50.0, "truth.value.12": 1500.0,
     }),
     "modes-and-exits": ({}, {
-        "t": 9.0, "departed": 30, "supervisor.n_modes": 3, "supervisor.mode_at_s": [0.0, 1.5, 2.0, 7.0],
+        "k": 900, "t": 8.99, "departed": 30,
+        "supervisor.n_modes": 3, "supervisor.mode_at_s": [0.0, 1.5, 2.0, 7.0],
         "supervisor.mode_is": [0, 1, 3, 2], "accounts.envelope.n_exits": 2,
         "accounts.envelope.outside_frames": 150, "accounts.envelope.exit_at_s": [2.0, 8.0, 5.0],
         "accounts.envelope.return_at_s": [3.0, inf, 6.0],

@@ -146,7 +146,7 @@ def account_authority(authority, axes):
 @kernel
 def note_envelope(envelope, outside, t):
     """Note when the flight leaves the validated envelope and when it comes back; t s."""
-    envelope.outside_frames += envelope.outside
+    envelope.outside_frames += outside
     exits = outside and not envelope.outside
     envelope.n_exits += exits
     last = min(envelope.n_exits, MAX_EVENTS) - 1  # of more than there is room for, the latest stays

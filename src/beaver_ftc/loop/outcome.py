@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.control.outer.state import BANK_LIMIT, CHANNELS, FASTEST, LIMITED, SLOWEST, SPEED
+from beaver_ftc.control.outer.state import BANK_LIMIT, CHANNELS, FASTEST, LIMITED, NOT_JUDGED, SLOWEST, SPEED
 from beaver_ftc.control.supervisor import MODES
 from beaver_ftc.design.model import AXES
 from beaver_ftc.diagnosis.base import Verdict
@@ -152,7 +152,7 @@ def _isolation(fdi: np.void, surfaces: Sequence[str]) -> dict[str, Any]:
 
 
 def _envelope_exits(frame: np.void) -> tuple[tuple[float, float], ...]:
-    envelope, end_s = frame["accounts"]["envelope"], float(frame["t"])
+    envelope, end_s = frame["accounts"]["envelope"], int(frame["k"]) * float(frame["dt"])
     known = slice(int(envelope["n_exits"]))  # as many as there is room for
     exits = zip(envelope["exit_at_s"][known], envelope["return_at_s"][known], strict=True)
     return tuple((float(out), float(back) if isfinite(back) else end_s) for out, back in exits)
@@ -224,10 +224,14 @@ def _by_channel(frame: np.void, off: str) -> dict[str, float | None] | None:
 
 
 def _profile(frame: np.void) -> dict[str, float | None] | None:
-    """Largest deviation from the commanded profile, by channel; None where there is none."""
+    """Largest deviation from the commanded profile, by channel; None where there is none, and of angles that
+    had no time to settle."""
     off, autopilot = _by_channel(frame, "worst"), frame["autopilot"]
+    if off is None:
+        return None
+    judged = {name: None if away == NOT_JUDGED else away for name, away in off.items()}
     limited = float(autopilot["held_worst"]) if autopilot["commanded"][SPEED] else None
-    return None if off is None else off | {LIMITED: limited}
+    return judged | {LIMITED: limited}
 
 
 def _limits(frame: np.void, surfaces: Sequence[str]) -> tuple[dict[str, Any], ...]:

@@ -15,7 +15,7 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.aircraft import THRUST_TERM
 from beaver_ftc.aircraft.units import GRAVITY_MPS2
-from beaver_ftc.control.outer.state import CHANNELS, GAINS, N_FLAP, N_QDYN
+from beaver_ftc.control.outer.state import CHANNELS, GAINS, N_FLAP, N_QDYN, NOT_JUDGED
 from beaver_ftc.control.outer.thrust import set_up_engine
 from beaver_ftc.design.engine import SEA_LEVEL_DENSITY_KG_M3
 from beaver_ftc.diagnosis.state import PITCH
@@ -46,7 +46,7 @@ def set_up_autopilot(autopilot: np.void, control: np.void, scenario: Scenario) -
         return
     autopilot["enabled"], autopilot["dt"] = 1, 1.0 / scenario.rate_hz
     set_up_profile(autopilot, scenario)
-    autopilot["changed_at_s"] = -inf
+    autopilot["changed_at_s"], autopilot["worst"] = -inf, NOT_JUDGED
     autopilot["gain"] = tuple(_gains(scenario.airframe).values())
     autopilot["gravity"] = GRAVITY_MPS2
     _know(autopilot, scenario)

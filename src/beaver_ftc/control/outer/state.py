@@ -7,6 +7,7 @@ ALTITUDE, SPEED, HEADING, BANK = range(4)
 N_CHANNELS = 4
 MAX_LEGS = 100
 CHANNELS = ("altitude_m", "airspeed_mps", "heading_deg", "bank_deg")
+NOT_JUDGED = -1.0  # a deviation that no frame has counted for
 LIMITED = "airspeed_limited_mps"  # the commanded one, as far as it can be held
 COLUMNS = (
     "altitude_command_m", "airspeed_command_mps", "heading_command_rad", "bank_command_rad", LIMITED,
@@ -71,5 +72,6 @@ AUTOPILOT = record(
     rates=3, gain=GAIN,
     held=float, held_moving=float, holding=HOLDING,  # airspeed to fly, m/s, and its change
     # how far off, at most; and the mean deviation of late, from what is commanded and, airspeed, held
+    # `worst` is NOT_JUDGED until a channel is: of angles that takes SETTLED_S
     mean_off=N_CHANNELS, held_off=float, held_worst=float, worst=N_CHANNELS,
 )  # fmt: skip

@@ -4,16 +4,18 @@ import json
 import os
 import stat
 from dataclasses import replace
-from math import inf
+from math import inf, nan
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 import beaver_ftc as bf
 from beaver_ftc.cli.main import app
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.integrations.challenge import folders, grading, line
-from beaver_ftc.integrations.challenge.line import Allowance, Stranger
+from beaver_ftc.integrations.challenge.line import Allowance, Barred, Stranger
 from beaver_ftc.studies.compare.trial import Entry, Result, with_entry
 
 ENTRY = Entry("adaptive-estimators", "nominal")
@@ -181,6 +183,32 @@ def test_what_is_built_in_takes_no_place():
 def test_a_stranger_s_text_cannot_colour_a_page():
     assert line.plain("a\x1b[31m<b>\n|`é") == "a??31m?b??????"[:13]
     assert len(line.plain("x" * 999)) == line.MOST_TEXT
+
+
+@pytest.mark.parametrize(
+    ("said", "verdict"),
+    [
+        ((1.0, 3.0, 5.0, 0.0, nan, 2.5, 0.0), ("r", "unanticipated", None)),
+        ((1.0, 2.0, 4.0, 1.0, -0.3, 2.5, 0.0), ("q", "flap", -0.3)), ((0.0,) * 7, (None, None, None)),
+        ((1.0, 4.0, 1.0, 0.0, 0.0, 0.0, 0.0), Barred), ((1.0, 1.0, 6.0, 0.0, 0.0, 0.0, 0.0), Barred),
+        ((1.0, -1.0, 1.0, 0.0, 0.0, 0.0, 0.0), Barred), ((1.0, 1.0, 0.5, 0.0, 0.0, 0.0, 0.0), Barred),
+        ((1.0, 1.0, 1.0, 1.0, nan, 0.0, 0.0), BeaverFtcError),
+        ((1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0), BeaverFtcError),
+    ],
+)  # fmt: skip
+def test_what_a_stranger_says_is_one_of_the_verdicts_there_are(monkeypatch, said, verdict):
+    """Axis and name by their places, none at 0; past the last of them it has written on the line itself."""
+    monkeypatch.setattr(line, "_shown", lambda measured: [])
+    stranger = object.__new__(line.StrangersDetector)
+    stranger.surfaces = ("aileron", "elevator", "rudder", "flap")
+    stranger.asked = lambda *_: np.array([*said, 1.0, nan, 0.5, 0.2])
+    if isinstance(verdict, tuple):
+        found = stranger.step(SimpleNamespace(t_s=1.0), np.zeros(4))
+        assert (found.axis, found.isolated, found.estimate) == verdict
+        assert (found.detected, found.statistic, found.effectiveness) == (bool(said[0]), said[5], None)
+    else:
+        with pytest.raises(verdict):
+            stranger.step(SimpleNamespace(t_s=1.0), np.zeros(4))
 
 
 @pytest.mark.parametrize("name", ["detector.py", "law.py"])

@@ -505,3 +505,16 @@ def test_the_autopilot_goes_where_it_is_sent_and_flies_again_to_the_bit(session,
     assert np.array_equal(log.to_numpy(), bf.fly(folder / "scenario.yaml").log.to_numpy(), equal_nan=True)
     asked(session, do="fresh", autopilot=False)
     assert session.hello()["autopilot"] == []
+
+
+def test_rounds_of_the_game_follow_from_the_seed(tmp_path):
+    """Five rounds in a row of two sessions of one seed, and of one of another."""
+    rounds = {}
+    for name, seed in (("one", 3), ("again", 3), ("other", 4)):
+        session = Session(bf.load("fault-free"), tmp_path / name, seed=seed)
+        rounds[name] = []
+        for _ in range(5):
+            asked(session, do="game", move="random")
+            rounds[name].append((session.game.fault, session.game.due_s))
+    assert rounds["one"] == rounds["again"] != rounds["other"]
+    assert len({due_s for _, due_s in rounds["one"]}) == 5

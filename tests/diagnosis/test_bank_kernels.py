@@ -5,6 +5,9 @@ import pytest
 from kernels import DT, POLES, estimator, new_fdi, on, weights
 
 from beaver_ftc.diagnosis import bank
+from beaver_ftc.diagnosis.bounds.declared import poles_for_noise
+from beaver_ftc.scenario.schema import Scenario
+from telling import apart
 
 
 def test_a_filter_and_its_bound_are_convolutions_of_what_went_in():
@@ -153,3 +156,23 @@ def test_across_a_fault_is_square_to_its_column_in_roll_and_yaw(size):
     assert fie["across"] == pytest.approx([-0.6, 0.0, -0.8])
     on(bank.align, fdi, np.zeros((3, 4)))
     assert fie["across"] == pytest.approx([-0.6, 0.0, -0.8]), "what moves neither has no direction"
+
+
+@pytest.mark.parametrize("noisy", [False, True])
+@pytest.mark.parametrize("several", [False, True])
+def test_poles_are_those_asked_for_and_those_that_noise_asks_for(noisy, several):
+    """The first by itself where no bank is wanted, whatever the gyros do; of noise one a delay."""
+    noise = {"sensors": {"p": {"noise_std_deg_s": 0.04}, "q": {"noise_std_deg_s": 0.09}}} if noisy else {}
+    asked = {"detection_pole_per_s": 2.5, "pole_bank_per_s": [11.0, 0.7], "bounds": noise}
+    asked |= {"sharpen": {"pole_bank": several}}
+    config, fdi = Scenario.model_validate({"name": "x", "fdi": asked}).fdi, new_fdi()
+    fdi["bank"]["decay"] = 0.0
+    bank.configure(fdi["bank"], config, DT)
+    bound = max(config.bounds.constant_rad_s2.as_tuple())
+    for_noise = poles_for_noise(config.bounds.sensors, bound)
+    assert bool(for_noise) is noisy
+    poles = [2.5, *([11.0, 0.7, *for_noise] if several else [])]
+    apart(poles=poles)
+    assert fdi["bank"]["n"] == len(poles)
+    assert fdi["bank"]["decay"][: len(poles)] == pytest.approx(np.exp(-DT * np.array(poles)))
+    assert not fdi["bank"]["decay"][len(poles) :].any()

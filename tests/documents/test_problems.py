@@ -274,3 +274,10 @@ def test_a_value_with_a_unit_and_no_description():
     with pytest.raises(ScenarioError) as error:
         validate(Shares, Document({"of": {"all": None}}), "s.yaml")
     assert str(error.value) == "s.yaml:1: of.all: has no value, allowed: a number of at most 1"
+
+
+@pytest.mark.parametrize(
+    ("given", "meant"), [("fil", "filtered_elevator"), ("FIL", "filtered_elevator"), ("fi", None)]
+)
+def test_three_letters_are_a_beginning_and_two_are_none(given, meant):
+    assert nearest(given, ["rudder", "filtered_elevator"]) == meant

@@ -47,6 +47,16 @@ def test_what_is_hidden_is_for_its_owner_and_new_each_time(tmp_path):
     assert min(len(seed) for seed in seeds) > 12
 
 
+def test_as_many_flights_are_hidden_as_are_asked_for(tmp_path):
+    done = beaver("new", tmp_path / "autumn", "--flights", "8", "--format", "json")
+    said = json.loads(done.stdout)
+    assert (said["flights"], said["teacher"]) == (8, str(tmp_path / "autumn" / "teacher"))
+    assert len(folders.hidden_flights(tmp_path / "autumn")) == 8
+    done = beaver("new", tmp_path / "spring", "--flights", "12")
+    assert f"{tmp_path / 'spring' / 'teacher'}: 12 hidden flights, for you alone" in done.stdout
+    assert len(folders.hidden_flights(tmp_path / "spring")) == 12
+
+
 def test_students_are_told_the_limits_that_hold(challenge):
     told = handed_out(challenge, "README.md")
     for limit in (f"{line.ALL_S:g} s for all", "64 KiB", "1024 MiB", "nothing from 5 s on"):

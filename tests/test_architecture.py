@@ -22,7 +22,7 @@ ROOTS = {PACKAGE: ROOT, "tools": Path(__file__).parents[1] / "tools"}
 # Folders from the ground up; a folder imports what is below its own floor, and itself.
 FLOORS = (
     {"documents"},
-    {"compiled", "numba_inside", "plugins"},
+    {"compiled", "numba_inside", "numba_sized", "plugins"},
     {"aircraft"},
     {"design"},
     {"scenario"},

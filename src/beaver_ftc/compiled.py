@@ -26,7 +26,10 @@ from numba.extending import overload
 
 from beaver_ftc.documents.errors import say_once
 from beaver_ftc.documents.paths import cache_of_version
+from beaver_ftc.documents.sized import record, sized
 from beaver_ftc.documents.sources import BY_ADDRESS, digest_of_files
+
+__all__ = ["apart", "direct", "kernel", "plain", "record", "row_of", "sized"]
 
 KNOWN = ("0.68",)  # versions whose inside numba_inside.py fits
 VARIABLE = "BEAVER_FTC_COMPILER"  # `numba`: borrow nothing
@@ -35,27 +38,13 @@ PLAINLY = "numba {} is not known from inside: the first flight compiles for some
 _PACKAGE = Path(__file__).parent
 
 
-def record(**fields: Any) -> np.dtype:
-    """The type of a record: what each field is, `int`, `float` or the type of another record, or, of an array
-    of floats, its shape. Of other arrays what they are made of comes first.
-
-    record(n=int, share=float, decay=8, damping=(3, 3), fired=(int, 13), test=(TEST, 13))
-    """
-    return np.dtype([(name, *_kind_and_shape(given)) for name, given in fields.items()], align=True)
-
-
-def _kind_and_shape(given: Any) -> tuple[Any, tuple[int, ...]]:
-    parts = given if isinstance(given, tuple) else (given,)
-    return (float, parts) if isinstance(parts[0], int) else (parts[0], parts[1:])
-
-
 @lru_cache(maxsize=1)
 def cache_folder() -> Path | None:
     """Where compiled kernels are kept; None where nothing can be written: each process compiles its own.
 
     It is named after how code is compiled; which code is in a file, the file's name says.
     """
-    how = ("compiled.py", "numba_inside.py", "documents/sources.py")
+    how = ("compiled.py", "numba_inside.py", "numba_sized.py", "documents/sized.py", "documents/sources.py")
     return cache_of_version(digest_of_files(*(_PACKAGE / file for file in how)))
 
 
@@ -150,13 +139,25 @@ def direct(function: Any, *arguments: np.ndarray) -> Any:
 
 @lru_cache(maxsize=64)
 def _entry_point(function, kinds):
-    """The machine code for C-ordered arrays of these types and dimensions: 9 ms to find, so kept."""
-    types = tuple(numba.types.Array(numba.from_dtype(dtype), dimensions, "C") for dtype, dimensions in kinds)
+    """The machine code for C-ordered arrays of these types and dimensions."""
+    return _code(function, tuple(_array_of(dtype, dimensions) for dtype, dimensions in kinds))
+
+
+@lru_cache(maxsize=64)
+def _code(function, types):
+    """The same for types of numba's: 9 ms to find, so kept."""
     found = function.stored(types) if _inside() else None
     if found is None:
         function.compile(types)
         found = function.overloads[types]
     return found.entry_point
+
+
+def _array_of(dtype, dimensions):
+    """The type of a C-ordered array; of records that have a size, theirs."""
+    inside = _inside()
+    sizeless = inside and inside.kind_of(dtype, dimensions)
+    return sizeless or numba.types.Array(numba.from_dtype(dtype), dimensions, "C")
 
 
 def row_of(array, i):

@@ -46,6 +46,9 @@ from numba.np.numpy_support import ufunc_find_matching_loop
 
 from beaver_ftc.documents.errors import say_once
 from beaver_ftc.documents.sources import digest_of
+from beaver_ftc.numba_sized import kind_of, type_of
+
+__all__ = ["Kernel", "borrowed_row", "kind_of", "stub"]
 
 COMPILING = "compiling the flight code, once on this machine: some 20 s on an idle one"
 MORE = "compiling what this flight is the first to use, once on this machine: 10 s to a minute on an idle one"
@@ -75,6 +78,10 @@ class Kernel(CPUDispatcher):
             if _nesting:
                 return self._translated(types, inner=True)
             return self._loaded(types) or self._compiled(types)
+
+    def typeof_pyval(self, val):
+        """The type of an argument; in place of numba's for records that have a size."""
+        return type_of(val) or super().typeof_pyval(val)
 
     def stored(self, types):
         """The code an earlier process has kept, or None; found without making ready to compile."""

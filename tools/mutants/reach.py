@@ -33,7 +33,7 @@ SLOW_S = {
 WAITS_S = 20.0  # nor is what waits so long, for other processes
 HANGS_S = 900.0  # of processor for the tests of one file, far more than the limits allow
 EXAMPLES = 4
-APART = ("beaver_ftc.compiled", "beaver_ftc.numba_inside")
+APART = ("beaver_ftc.compiled", "beaver_ftc.numba_inside", "beaver_ftc.numba_sized")
 SHARED = ("conftest.py", "kept.py")
 KEPT = ROOT / ".mutants"
 

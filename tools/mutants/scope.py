@@ -27,7 +27,7 @@ MODES = {KERNELS: (PLAIN,), GLUE: (PLAIN, COMPILED)}
 # Compiled modules that plain Python reaches in a second.
 QUICK = ("design", "diagnosis", "control")
 APART = {
-    "compiled.py": "compile", "numba_inside.py": "compile",
+    "compiled.py": "compile", "numba_inside.py": "compile", "numba_sized.py": "compile",
     "results/style.py": "looks",
 }  # fmt: skip
 LEFT_OUT = {

@@ -8,18 +8,16 @@ What becomes of it is the effectiveness that the laws divide by. It is rate limi
 kicks the surfaces, and projected: a surface weaker than `least_effectiveness` is given up.
 """
 
-from functools import lru_cache
-
 import numpy as np
 
-from beaver_ftc.compiled import kernel, record
+from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.control.laws import ORACLE, REJECTING, rejecting
 from beaver_ftc.control.laws.answering import effectiveness_of
 from beaver_ftc.diagnosis.types.examine import FIXED
 from beaver_ftc.scenario.control import ControlConfig
 
 
-@lru_cache
+@sized
 def surfaces_dtype(n: int) -> np.dtype:
     """What n surfaces are taken for: effectiveness, on its way to target by at most a step a frame; offset
     and lag, rad."""
@@ -28,7 +26,7 @@ def surfaces_dtype(n: int) -> np.dtype:
     )  # fmt: skip
 
 
-@lru_cache
+@sized
 def assessment_dtype(n: int) -> np.dtype:
     """What the diagnosis says of n surfaces: whether it has detected a fault, none that it knows or can tell
     (unknown), and which surface it names, -1 for none. measure: what is to be done about each, -1 where that
@@ -40,7 +38,7 @@ def assessment_dtype(n: int) -> np.dtype:
     )  # fmt: skip
 
 
-@lru_cache
+@sized
 def true_faults_dtype(n: int) -> np.dtype:
     """present: 1 from the first fault on. effectiveness (n,): 1 healthy. immovable (n,): does not follow its
     command. effective (n,) rad: the deflection that acts. Cm_alpha3: the unanticipated pitching moment."""

@@ -12,13 +12,12 @@ The probe is active diagnosis: a healthy aircraft feels nothing of it. The flap 
 then shows.
 """
 
-from functools import lru_cache
 from math import pi, radians
 
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.compiled import apart, kernel, record
+from beaver_ftc.compiled import apart, kernel, record, sized
 from beaver_ftc.control import least_squares
 from beaver_ftc.control.least_squares import problem_dtype
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW, leaders_of
@@ -38,7 +37,7 @@ PROBE = record(
 )  # fmt: skip
 
 
-@lru_cache
+@sized
 def layout_dtype(n: int) -> np.dtype:
     """n surfaces: the one that leads each axis, who stands in for pitch's, or -1; trim and stops, rad. aside:
     which of them wait until pitch is handed over; authority: what part of the authority about each axis is
@@ -57,7 +56,7 @@ def layout_dtype(n: int) -> np.dtype:
     )
 
 
-@lru_cache
+@sized
 def allocation_dtype(n: int) -> np.dtype:
     """n surfaces: effectiveness matrix with what is believed of each in it; the command, rad, and which stand
     at a stop; how far pitch is handed over, and by how much that changes in a frame; the least squares."""

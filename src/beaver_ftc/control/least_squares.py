@@ -15,12 +15,11 @@ and y is the multiplier as well: a surface at its limit stays there while (u - p
 The set of the frame before is tried first: as a rule it is right, and one system is solved.
 """
 
-from functools import lru_cache
 from math import sqrt
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel, record
+from beaver_ftc.compiled import kernel, record, sized
 
 LOW, FREE, HIGH = -1, 0, 1
 SLACK = 1e-10  # of the mean of B v B'
@@ -28,7 +27,7 @@ LEAST_SLACK = 1e-14
 ROUNDING = 1e-12  # of a multiplier
 
 
-@lru_cache
+@sized
 def problem_dtype(n: int) -> np.dtype:
     """A problem of n surfaces and its solution u. at: which limits hold, kept for the next frame; y: the
     multipliers; steps: systems solved."""

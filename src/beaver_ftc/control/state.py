@@ -1,10 +1,8 @@
 """The control stage: the records of the law, one a part of it, and how they are filled from a scenario."""
 
-from functools import lru_cache
-
 import numpy as np
 
-from beaver_ftc.compiled import record
+from beaver_ftc.compiled import record, sized
 from beaver_ftc.control import accommodation, allocation, engines, power, reference
 from beaver_ftc.control.accommodation import surfaces_dtype
 from beaver_ftc.control.allocation import AXES, PROBE, allocation_dtype, layout_dtype
@@ -18,7 +16,7 @@ from beaver_ftc.control.rivals.compiled import RIVAL
 from beaver_ftc.scenario.schema import Scenario
 
 
-@lru_cache
+@sized
 def control_dtype(n: int) -> np.dtype:
     """What the law of an aircraft with n surfaces keeps: a record of each part, which alone writes it."""
     return record(

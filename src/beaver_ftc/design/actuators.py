@@ -6,14 +6,12 @@ the discretisation of aircraft/actuator.xml, one step a JSBSim frame, so that a 
 the model has it.
 """
 
-from functools import lru_cache
-
 import numpy as np
 
-from beaver_ftc.compiled import kernel, record
+from beaver_ftc.compiled import kernel, record, sized
 
 
-@lru_cache
+@sized
 def actuators_dtype(n: int) -> np.dtype:
     """The actuators of n surfaces."""
     return record(

@@ -15,13 +15,12 @@ Sign conventions: body axes X forward, Y right, Z down; positive moments right w
 
 from collections import namedtuple
 from collections.abc import Mapping
-from functools import lru_cache
 
 import numpy as np
 
 from beaver_ftc.aircraft import AXES, Aircraft, MassProperties, load
 from beaver_ftc.aircraft.aircraft import MOMENTS
-from beaver_ftc.compiled import kernel, record
+from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design import terms
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, DPT, N_Y, PH, QDYN, RH
 
@@ -55,7 +54,7 @@ def inertial(inertia: InertiaCoefficients, x: np.ndarray) -> np.ndarray:
     return np.column_stack([roll, pitch, yaw])
 
 
-@lru_cache
+@sized
 def design_dtype(n: int) -> np.dtype:
     """The design model of an aircraft with n surfaces."""
     return record(

@@ -30,14 +30,13 @@ known by them. Known to be broken, or suspected of it, they count no more.
 """
 
 from collections.abc import Iterator
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.schema import MAX_BOXES, MAX_SURFACES, MAX_TERMS_OF_ONE
-from beaver_ftc.compiled import kernel, record
+from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.diagnosis import forces, likelihood, tones
 from beaver_ftc.diagnosis.air import along, drift_beside, whole_drift
 from beaver_ftc.diagnosis.bounds.variances import axis_of
@@ -91,7 +90,7 @@ MOST = Size(
 )
 
 
-@lru_cache
+@sized
 def view_dtype(rooms: Rooms) -> np.dtype:
     """A view whose block has these rooms."""
     return record(

@@ -6,12 +6,11 @@ frames in one of ours the rates move by dt/n a[k], and then by the accelerations
 u[k+1]: the truth is a left sum over n instants, the first under the old command, and so are these means.
 """
 
-from functools import lru_cache
 from math import exp, radians
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel, record
+from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design.actuators import actuators_dtype, move
 from beaver_ftc.design.model import design_dtype
 from beaver_ftc.design.variants import design_of, response
@@ -19,7 +18,7 @@ from beaver_ftc.diagnosis.bounds.worst_case import beyond, bound_now, changing_e
 from beaver_ftc.scenario.schema import Scenario
 
 
-@lru_cache
+@sized
 def sums_dtype(n: int) -> np.dtype:
     """Sums over the instants of a frame, n surfaces: f, G, G u and the bound; own errors as in state.py."""
     return record(
@@ -30,7 +29,7 @@ def sums_dtype(n: int) -> np.dtype:
     )  # fmt: skip
 
 
-@lru_cache
+@sized
 def means_dtype(n: int) -> np.dtype:
     """Means over the elapsed frame. acceleration: f + G u; Gu_spread: see `spread`. G_foreseen, Gu_foreseen:
     with G of the frame before, of which the readings of this one know nothing: a law answers what they are
@@ -43,7 +42,7 @@ def means_dtype(n: int) -> np.dtype:
     )  # fmt: skip
 
 
-@lru_cache
+@sized
 def belief_dtype(n: int) -> np.dtype:
     """The belief about an aircraft with n surfaces; rad, rad/s, rad/s2."""
     return record(

@@ -20,13 +20,12 @@ The sharpened tests (bank.py, membership.py) exclude beside it, each by its own 
 by the first test that fails.
 """
 
-from functools import lru_cache
 from math import exp
 
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.compiled import kernel, record
+from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.diagnosis import membership
 from beaver_ftc.diagnosis.bank import explains, remember
 from beaver_ftc.diagnosis.state import (
@@ -56,7 +55,7 @@ ESTIMATOR = record(
 )  # fmt: skip
 
 
-@lru_cache
+@sized
 def isolation_dtype(surfaces: int) -> np.dtype:
     """The isolation estimators, a loss and a position of each surface at most, and how the decision among
     them is sharpened. by_gradient: how they adapt, else by least squares; unprojected: their estimates may

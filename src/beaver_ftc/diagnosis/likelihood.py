@@ -52,13 +52,12 @@ Onsets: slot j starts anew every 2^(j+1) frames, so that there is always one of 
 alarm on they stay, and old evidence is forgotten slowly.
 """
 
-from functools import lru_cache
 from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel, record
+from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.diagnosis.state import LOSS
 
 # A block is the axes whose noise goes together: pitch, and roll with yaw, the latter twice. States of a
@@ -97,7 +96,7 @@ class Rooms(NamedTuple):
     hypotheses: int
 
 
-@lru_cache
+@sized
 def lane_dtype(rooms: Rooms) -> np.dtype:
     """What the lanes of a block keep, side by side."""
     lanes = N_SLOTS * rooms.hypotheses
@@ -123,7 +122,7 @@ _FILTER = {
 FILTER = record(**_FILTER)
 
 
-@lru_cache
+@sized
 def block_dtype(rooms: Rooms) -> np.dtype:
     """A block: its filter, and what its hypotheses come to."""
     return record(

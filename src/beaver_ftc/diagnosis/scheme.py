@@ -4,11 +4,9 @@ conclusion: of `conclusion_dtype`; estimators: those of the isolation; bank, typ
 stages. k: number of the diagnosis' frame; t s.
 """
 
-from functools import lru_cache
-
 import numpy as np
 
-from beaver_ftc.compiled import apart, kernel, record
+from beaver_ftc.compiled import apart, kernel, record, sized
 from beaver_ftc.design.model import AIRSPEED
 from beaver_ftc.diagnosis import (
     air,
@@ -43,7 +41,7 @@ from beaver_ftc.scenario.schema import Scenario
 PATIENCE_S = 4.0  # in still air what damage left over was excluded within 3.2 s, in 210 flights
 
 
-@lru_cache
+@sized
 def diagnosis_dtype(n: int, size: Size = USUAL) -> np.dtype:
     """The stages of the diagnosis of an aircraft with n surfaces; size: rooms of its record."""
     return record(

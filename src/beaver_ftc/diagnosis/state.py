@@ -1,12 +1,11 @@
 """Records of the diagnosis, and the numbers that stand for its words."""
 
 from collections.abc import Sequence
-from functools import lru_cache
 
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.compiled import record
+from beaver_ftc.compiled import record, sized
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.schema import Scenario
 
@@ -24,13 +23,13 @@ MAX_WITHDRAWN = 16
 WITHDRAWN = record(surface=int, from_s=float, to_s=float)
 
 
-@lru_cache
+@sized
 def verdict_dtype(n: int) -> np.dtype:
     """A plug-in's verdict. isolated: a surface, NOT_ISOLATED or UNANTICIPATED."""
     return record(detected=int, axis=int, isolated=int, theta=float, estimates=int, effectiveness=n)
 
 
-@lru_cache
+@sized
 def conclusion_dtype(n: int) -> np.dtype:
     """What is concluded about n surfaces. isolated: an estimator, NOT_ISOLATED or UNANTICIPATED. type: of the
     isolated fault, -1 if open. lead: the surface the law acts upon, and what it does about it. effectiveness:
@@ -43,7 +42,7 @@ def conclusion_dtype(n: int) -> np.dtype:
     )  # fmt: skip
 
 
-@lru_cache
+@sized
 def layout_dtype(n: int) -> np.dtype:
     """Axis and group of each of n surfaces, the other one of a group of two, or -1; the main surface of each
     axis; the estimators of a surface's loss and position, or -1."""

@@ -7,12 +7,10 @@ false alarms holds for the declared noise; the worst-case scheme beside it needs
 `fdi.config.authority` says whose alarms and exclusions count.
 """
 
-from functools import lru_cache
-
 import numpy as np
 
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_TERMS
-from beaver_ftc.compiled import kernel, record
+from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design.terms import AIRSPEED, N_SIGNALS, QDYN, evaluate, regressors
 from beaver_ftc.diagnosis import across, likelihood, noise_model
 from beaver_ftc.diagnosis import air as gusts
@@ -56,7 +54,7 @@ NOISE = record(
 ALARM = record(score=float, axis=int, closest=float, detected_at_s=float)
 
 
-@lru_cache
+@sized
 def statistical_dtype(size: Size = USUAL) -> np.dtype:
     """What the detector keeps of an aircraft of this size."""
     return record(

@@ -14,12 +14,11 @@ little less, since d changes no faster than declared.
 Frames are summed a few at a time: no frequency listened to turns far within 0.04 s.
 """
 
-from functools import lru_cache
 from math import exp, pi, sqrt
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel, record
+from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA
 from beaver_ftc.diagnosis.likelihood import share
 
@@ -44,7 +43,7 @@ LISTENING = record(
 )  # fmt: skip
 
 
-@lru_cache
+@sized
 def tones_dtype(regressors: int) -> np.dtype:
     """What a view of so many regressors keeps."""
     return record(

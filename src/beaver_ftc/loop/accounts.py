@@ -6,11 +6,9 @@ at worst an admissible eta hides ebar_i of the fault's effect. With a bank of po
 The effect phi is the truth's, so this is an analyst's figure: the diagnosis never sees it.
 """
 
-from functools import lru_cache
-
 import numpy as np
 
-from beaver_ftc.compiled import kernel, record
+from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.control.supervisor import MAX_EVENTS
 from beaver_ftc.design.model import unanticipated_pitch
 from beaver_ftc.diagnosis.bounds.worst_case import N_PLACES, age_of, is_beyond
@@ -42,7 +40,7 @@ INCONCLUSIVE = record(
 )  # fmt: skip
 
 
-@lru_cache
+@sized
 def accounts_dtype(n: int) -> np.dtype:
     """Accounts of a flight with n surfaces; travelled (n,) rad, hurried
     (n,) rad2/s: the integral of the speed's square."""

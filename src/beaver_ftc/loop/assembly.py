@@ -1,10 +1,8 @@
 """Turns a scenario into the frame record that the compiled loop works on."""
 
-from functools import lru_cache
-
 import numpy as np
 
-from beaver_ftc.compiled import record
+from beaver_ftc.compiled import record, sized
 from beaver_ftc.control import state as control
 from beaver_ftc.control.accommodation import assessment_dtype, true_faults_dtype
 from beaver_ftc.control.outer.state import AUTOPILOT, COLUMNS
@@ -26,7 +24,7 @@ from beaver_ftc.scenario.schema import Scenario
 LOGGED = record(estimators=int, watch=int, power=int, tests=int)
 
 
-@lru_cache
+@sized
 def frame_dtype(n: int, size: Size = USUAL, line: int = USUAL_LINE) -> np.dtype:
     """All that a flight of an aircraft with n surfaces remembers between frames; size: of its statistics;
     line: of its delay lines."""

@@ -6,7 +6,7 @@ arrays, since to look up the type of a whole record costs a call from Python a h
 frames (1,): of `frame_dtype` (assembly.py).
 """
 
-from beaver_ftc.compiled import kernel, row_of
+from beaver_ftc.compiled import apart, kernel, row_of
 from beaver_ftc.design.actuators import move
 from beaver_ftc.diagnosis import instruments
 from beaver_ftc.diagnosis.scheme import built_in_statistic as largest_statistic
@@ -102,6 +102,20 @@ def look_inside(frames):
         add_effect(frame.accounts.guarantee)
 
 
+@apart
+def fly_one(frame, commanded, row):
+    """See `fly_frame`, which returns frame.departed. By itself, so that all who call it share its code.
+
+    commanded (3,) rad/s, row (columns,) of the log: rows, which nobody counts the users of.
+    """
+    frame.departed = whole.begin(frame)
+    if frame.departed != NOT_FINITE:
+        whole.diagnose(frame)
+        whole.decide(frame)
+        whole.command(frame)
+        whole.finish(frame, commanded, row)
+
+
 @kernel
 def fly_frame(frames, references, log):
     """One frame of the closed loop with the built-in diagnosis and law.
@@ -110,14 +124,8 @@ def fly_frame(frames, references, log):
     or why the flight ends: the row of a departure is still recorded, that of a non-finite truth is not.
     """
     frame = frames[0]
-    status = whole.begin(frame)
-    if status == NOT_FINITE:
-        return status
-    whole.diagnose(frame)
-    whole.decide(frame)
-    whole.command(frame)
-    finish(frames, references, log)
-    return status
+    fly_one(frame, row_of(references, frame.row), row_of(log, frame.row))
+    return frame.departed
 
 
 @kernel

@@ -8,12 +8,11 @@ to the bit whatever else is flown beside it. What is known of an instant (`MEASU
 alone: nothing in it knows the truth.
 """
 
-from functools import lru_cache
 from math import pi
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel, record
+from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design.engine import measured_slipstream
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, DPT, N_Y, QDYN
 
@@ -42,7 +41,7 @@ SENSOR_FAULT = record(
 )  # fmt: skip
 
 
-@lru_cache
+@sized
 def instruments_dtype(line: int = USUAL_LINE) -> np.dtype:
     """The instruments of a flight whose delay lines keep so many samples."""
     return record(

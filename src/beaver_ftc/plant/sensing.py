@@ -4,12 +4,10 @@ The truth and what is measured are records of different types, so that compiled 
 law cannot be handed the truth by mistake.
 """
 
-from functools import lru_cache
-
 import numpy as np
 
 from beaver_ftc.aircraft.schema import MAX_LEVERS
-from beaver_ftc.compiled import kernel, record
+from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design.model import AIRSPEED, DPT
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.instruments import (
@@ -33,7 +31,7 @@ DEPARTURE_RATE_RAD_S = 6.0
 DEPARTURE_SIGNALS = ("p", "q", "r", "alpha", "beta", "altitude")
 
 
-@lru_cache
+@sized
 def truth_dtype(n: int) -> np.dtype:
     """The truth of an aircraft with n surfaces: its nodes, what they hold, and its faults."""
     room = ch.most_channels(n)

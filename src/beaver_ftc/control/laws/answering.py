@@ -17,12 +17,11 @@ by recursive least squares from all three axes at once [Ljung1999, ch. 11]. A th
 back, the others with it along the covariance: to the likeliest place within, never further from the truth.
 """
 
-from functools import lru_cache
-
 import numpy as np
 
-from beaver_ftc.compiled import apart, kernel, record
+from beaver_ftc.compiled import apart, kernel, record, sized
 from beaver_ftc.design.model import ALPHA, BETA
+from beaver_ftc.documents.sized import Room
 
 ANSWER = record(rate=3, disturbance=3)
 _SIGNALS = 5
@@ -34,16 +33,16 @@ _LEAST_NOISE_RAD_S2 = 0.05
 _FORGOTTEN_S = 30.0  # what is not seen again in that time may have changed
 
 
-@lru_cache
+@sized
 def answering_dtype(n: int) -> np.dtype:
     """n surfaces. found (N,): theta of each, then A row by row; P (N, N): their covariance; memory: what each
     surface's moment, each signal and what is believed of all surfaces has become in the observer; noise (3,)
     (rad/s)2: of what is missed in health; unsure (N,): variances begun with; h, Ph (N,): for the update."""
-    known = n if n > _FEW else 0
-    size = known + 3 * _SIGNALS if known else 1
+    many = n > _FEW
+    size, answers = (n + 3 * _SIGNALS, n + _SIGNALS + 1) if many else (Room(1), Room(1))
     return record(
         listening=int, noise=3, found=size, P=(size, size), h=size, Ph=size, unsure=size,
-        memory=(ANSWER, known + _SIGNALS + 1 if known else 1), signal=_SIGNALS,
+        memory=(ANSWER, answers), signal=_SIGNALS,
     )  # fmt: skip
 
 

@@ -21,12 +21,11 @@ it is hidden in. This one errs the other way, with what the gyro's noise command
 believed: a loop is then no faster than its margins allow.
 """
 
-from functools import lru_cache
 from math import exp
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel, record
+from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.control.laws import answering
 from beaver_ftc.control.laws.answering import ANSWER, answer, answering_dtype
 from beaver_ftc.control.reference import advance
@@ -44,7 +43,7 @@ NOTHING_LEFT = 0.05  # half of what the law divides by
 FOUND = record(fading=float, product=3, square=3, missed=3, frames=3, named=(int, 3))
 
 
-@lru_cache
+@sized
 def rejection_dtype(surfaces: int) -> np.dtype:
     """The law's record for an aircraft with so many surfaces.
 

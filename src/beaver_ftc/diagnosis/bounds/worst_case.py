@@ -23,13 +23,11 @@ hypothesis that it is off (membership.py). Where two may be, the whole travel co
 Outside of all boxes nobody has measured: nothing is concluded.
 """
 
-from functools import lru_cache
-
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.schema import MAX_AGES, MAX_BOXES, MAX_LEVELS, MAX_MONOMIALS, MAX_TERMS
-from beaver_ftc.compiled import kernel, record
+from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design.engine import DPT_0, KW_TO_DPT, density_ratio
 from beaver_ftc.design.terms import AIRSPEED, DPT, N_SIGNALS, N_Y, QDYN, monomials, signals
 
@@ -47,7 +45,7 @@ LEAST_HEIGHT_M = 3.048  # 10 ft: below, turbulence is what it is there
 N_PLACES = 3 + N_Y  # rates, then y with the density of the air in place of dynamic pressure
 
 
-@lru_cache
+@sized
 def admitted_dtype(n: int) -> np.dtype:
     """What else than the published bound is admitted, for an aircraft with n surfaces."""
     return record(
@@ -67,7 +65,7 @@ def admitted_dtype(n: int) -> np.dtype:
     )  # fmt: skip
 
 
-@lru_cache
+@sized
 def error_map_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
     """The map for an aircraft with n surfaces. anywhere: one surface may be, or, whole, more. outside: of all
     boxes; box, age: where this is in the map. before: the surfaces in the frame before, rad. now: the error
@@ -80,7 +78,7 @@ def error_map_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
     )  # fmt: skip
 
 
-@lru_cache
+@sized
 def bound_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
     """Bounds on the uncertainty. eta_bar, eta_bar_now: over the elapsed frame and at this instant, rad/s2.
     noise: on what a gyro's error changes by, rad/s. frame: on one frame's innovation, rad/s2. own: of the

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel, record
+from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.diagnosis.state import IN_PITCH
 from beaver_ftc.diagnosis.types import table
 from beaver_ftc.diagnosis.types.contract import FaultType
@@ -142,7 +142,7 @@ def surface_dtype() -> np.dtype:
     )  # fmt: skip
 
 
-@lru_cache
+@sized
 def types_dtype(n: int) -> np.dtype:
     """Faults of every type on n surfaces: types/."""
     return record(config=TYPES_CONFIG, frame=int, pair=PAIR, block=FRAME_BLOCK, surface=(surface_dtype(), n))

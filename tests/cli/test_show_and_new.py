@@ -1,5 +1,6 @@
 """Built-in scenarios to look at, and new ones to begin with."""
 
+import json
 import os
 import subprocess
 import sys
@@ -18,6 +19,18 @@ BEAVER = Path(sys.executable).with_name("beaver-ftc")
 
 def _beaver(*arguments):
     return CliRunner().invoke(app, [str(argument) for argument in arguments], catch_exceptions=True)
+
+
+def test_a_short_list_has_every_name_and_no_more():
+    listed = json.loads(_beaver("list", "--format", "json").stdout)
+    said, kind = {}, None
+    for line in _beaver("list", "--short").stdout.splitlines():
+        if line.startswith("  "):
+            said[kind] += [name for name in line.strip().rstrip(",").split(", ") if name]
+        else:
+            kind = line
+            said[kind] = []
+    assert said == {kind: [entry["name"] for entry in entries] for kind, entries in listed.items()}
 
 
 def test_what_is_shown_is_the_file():

@@ -1,6 +1,7 @@
 """`beaver-ftc list`, `show` and `schema`: what there is to choose from, and what a file may say."""
 
 from collections.abc import Iterable, Iterator
+from textwrap import fill, indent
 from typing import Annotated
 
 import typer
@@ -10,10 +11,12 @@ from beaver_ftc.cli.output import Document, Format, FormatOption, answer, emit, 
 from beaver_ftc.documents.errors import BadInput, suggestion
 
 Entries = list[dict[str, str]]
+WIDTH = 76
 
 
 def list_choices(
     kind: Annotated[str | None, typer.Argument(metavar="KIND")] = None,
+    short: bool = False,
     format: FormatOption = Format.text,
 ) -> None:
     """List what there is to choose from.
@@ -22,15 +25,17 @@ def list_choices(
     and reference signals.
 
     Examples:
-      beaver-ftc list
+      beaver-ftc list --short
 
     kind: One kind only, e.g. aircraft.
+    short: Names alone.
     """
     available = _available()
     if kind is not None and kind not in available:
         raise BadInput(f"there is no list of {kind[:60]!r}{suggestion(kind, available)}")
     available = available if kind is None else {kind: available[kind]}
-    answer(format, available, lambda: "\n\n".join(map(_section, available, available.values())))
+    section, gap = (_names, "\n") if short else (_section, "\n\n")
+    answer(format, available, lambda: gap.join(map(section, available, available.values())))
 
 
 def _available() -> dict[str, Entries]:
@@ -114,6 +119,11 @@ def _section(kind: str, entries: Entries) -> str:
     width = max((len(entry["name"]) for entry in entries), default=0)
     lines = (f"  {entry['name']:{width}}  {entry['description']}".rstrip() for entry in entries)
     return "\n".join((kind, *lines))
+
+
+def _names(kind: str, entries: Entries) -> str:
+    names = fill(", ".join(entry["name"] for entry in entries), WIDTH, break_on_hyphens=False)
+    return f"{kind}\n{indent(names, '  ')}"
 
 
 def show(

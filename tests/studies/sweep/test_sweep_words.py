@@ -1,5 +1,6 @@
 """What a sweep says, line by line, of a summary in which no two numbers are alike."""
 
+import numpy as np
 import pytest
 
 from beaver_ftc.studies.sweep import summary_page as words
@@ -151,3 +152,13 @@ def test_faults_of_a_kind_are_counted_by_themselves(tmp_path):
     assert (rudder["detection"]["count"], rudder["detection"]["of"]) == (1, 2)
     assert (elevator["isolation"]["count"], rudder["isolation"]["count"]) == (4, 1)
     assert found["false_alarms"]["closest_residual_ratio"] == 0.5
+
+
+def test_a_worst_flight_that_many_equal_says_so():
+    from beaver_ftc.studies.sweep.outcomes import _largest
+
+    values = np.array([0.1, 0.3, 0.3 + 1e-12, 0.2, 0.3, -np.inf])
+    said = dict(_largest(values, lambda i: f"after {values[i]:.3g} s"))
+    assert next(iter(said)) == 2  # the largest of them
+    assert set(said.values()) <= {"after 0.3 s, as in 2 more", "after 0.2 s", "after 0.1 s"}
+    assert said[2] == "after 0.3 s, as in 2 more"

@@ -250,4 +250,6 @@ def _first(which: np.ndarray, why: Callable[[int], str]) -> Iterator[tuple[int, 
 
 def _largest(values: np.ndarray, why: Callable[[int], str]) -> Iterator[tuple[int, str]]:
     largest = np.argsort(-values, kind="stable")[:OF_EACH_KIND]
-    return ((i, why(i)) for i in largest.tolist() if np.isfinite(values[i]))
+    for i in largest[np.isfinite(values[largest])].tolist():
+        alike = int(np.isclose(values, values[i], rtol=1e-9, atol=0.0).sum())
+        yield i, why(i) + (f", as in {alike - 1} more" if alike > 1 else "")

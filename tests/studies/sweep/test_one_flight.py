@@ -39,6 +39,7 @@ def test_every_metric_has_a_column(short):
     names = set(columns_of(load().surfaces))
     lists = {
         "supervisor",
+        "isolation.names",
         "envelope_exits",
         "expectations",
         "departure",

@@ -104,3 +104,21 @@ def test_an_address_is_said_and_a_server_that_has_gone_does_not_matter(vehicle):
     page.shown.tick()
     fly(vehicle, 5)
     assert vehicle.flight.frames == 6
+
+
+def test_what_the_scenario_breaks_is_told_as_well():
+    faults = [{"type": "stuck", "actuator": "rudder", "at_s": 0.2, "end_s": 0.5}]
+    base = bf.load("fault-free").with_({"expect": {}, "faults": faults})
+    vehicle = Vehicle(ready_for_hands(base), pulses=True)
+    page = Page(vehicle)
+    told = []
+    for _ in range(3):
+        fly(vehicle, 20)
+        page.told("f")
+        events = page.shown._watched.events
+        told.append(
+            [(each["kind"], each["says"]) for each in events if each["kind"] in ("broken", "repaired")]
+        )
+    assert told[0] in ([], [("broken", "rudder: stuck")])
+    assert told[1] == [("broken", "rudder: stuck")]
+    assert told[2] == [("broken", "rudder: stuck"), ("repaired", "rudder: stuck")]

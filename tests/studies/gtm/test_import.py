@@ -142,3 +142,16 @@ def test_an_operation_on_one_argument_is_that_argument_where_nothing_is_to_be_do
         assert elements.do(operation, a) == a
         assert elements.do(operation, a, b) == f"<{operation}>{a}{b}</{operation}>"
     assert elements.do("abs", b) == f"<abs>{b}</abs>"
+
+
+def test_what_was_imported_before_is_replaced_and_nothing_else(tmp_path, monkeypatch):
+    """Known by its notice; a folder of somebody's own is left alone before anything is read."""
+    monkeypatch.setattr(conversion, "read", lambda database: (_ for _ in ()).throw(BadInput("it was read")))
+    for notice, says in ((False, "is there already and was not imported"), (True, "it was read")):
+        (tmp_path / "gtm").mkdir(exist_ok=True)
+        (tmp_path / "gtm" / "mine.txt").write_text("mine")
+        if notice:
+            (tmp_path / "gtm" / "LICENSE.md").write_text("terms")
+        with pytest.raises(BadInput, match=says):
+            conversion.convert(tmp_path / "database", tmp_path)
+        assert (tmp_path / "gtm" / "mine.txt").exists()

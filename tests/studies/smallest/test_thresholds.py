@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.studies.engine.statistics import binomial
-from beaver_ftc.studies.smallest.thresholds import STAGES, Sizes, of_all, threshold
+from beaver_ftc.studies.smallest.thresholds import STAGES, Sizes, Threshold, of_all, threshold
 
 MIDDLE, SLOPE = 30.0, 4.0  # of a logistic curve, per cent
 NINETY = MIDDLE + SLOPE * log(9.0)  # where it is 0.9
@@ -73,3 +73,15 @@ def test_certain_is_the_largest_size_of_all():
     assert of_all(finder(sizes), 60) == np.ceil(sizes.max())
     sizes[17] = 140.0
     assert of_all(finder(sizes), 60) == inf
+
+
+@pytest.mark.parametrize(
+    ("size", "low", "high", "narrow"),
+    [
+        (40.0, 37.5, 43.4, True), (40.0, 37.5, 43.6, False), (8.0, 7.0, 8.9, True), (8.0, 6.9, 9.1, False),
+        (95.0, 88.0, inf, False), (inf, inf, inf, True),
+    ],
+)  # fmt: skip
+def test_an_interval_is_narrow_beside_its_size_or_by_itself(size, low, high, narrow):
+    """15 % of the size, or two per cent of effectiveness, whichever is more; beyond every loss it is."""
+    assert Threshold(size, low, high, 60).is_narrow is narrow

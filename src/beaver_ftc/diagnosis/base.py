@@ -37,7 +37,9 @@ class Verdict(NamedTuple):
     axis: p, q or r, where it showed. isolated: aileron, elevator, rudder, flap, unanticipated, or None.
     type: of the isolated fault. estimate: its parameter, theta in [-1, 0] for a loss of effectiveness.
     effectiveness (4,): of every surface, 1 healthy, if the detector estimates it; the adaptive laws use it.
-    statistic: alarm when it exceeds 1; lets `compare` draw the detector's whole trade-off.
+    statistic: alarm when it exceeds 1. `compare` tries other levels too and draws the whole trade-off, so it
+    is to be computed in every frame, as if no alarm had been raised: one that stays as it was at the alarm is
+    never above a higher level.
     """
 
     detected: bool = False

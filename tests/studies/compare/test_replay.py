@@ -127,3 +127,13 @@ def test_a_level_beyond_everything_is_never_reached():
     assert quiet.delay_s(0.89) == 1.0
     assert quiet.delay_s(0.4) == inf  # there was an alarm before
     assert quiet.false_alarm(0.4)
+
+
+def test_a_statistic_that_stays_as_it_was_at_the_alarm_is_not_seen_at_higher_levels(recorded):
+    """What the documentation says of a plug-in's."""
+    t = np.array([measured.t_s for measured, _ in recorded.seen])
+    goes_on = np.maximum(t - 6.0, 0.0) * 10.0 + 0.05
+    stays = np.minimum(goes_on, 1.01)
+    assert trace(recorded, goes_on).delay_s() == pytest.approx(trace(recorded, stays).delay_s(), abs=0.011)
+    assert trace(recorded, goes_on).delay_s(level=2.0) == pytest.approx(0.2)
+    assert trace(recorded, stays).delay_s(level=2.0) == inf

@@ -41,6 +41,21 @@ def test_the_documented_text_runs_as_it_stands(tmp_path, monkeypatch):
     assert not shown["verdict"].detected
 
 
+def test_the_exclusion_by_hand_is_that_of_the_diagnosis(capsys):
+    """The last Python text of the section on the diagnosis alone, as it stands."""
+    text = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
+    section = text.partition("## The diagnosis alone")[2]
+    shown = {}
+    exec(re.search(r"```python\n(.*?)```", section, re.DOTALL).group(1), shown)
+    log = shown["log"]
+    row = int(log["detected"].to_numpy().argmax())
+    assert shown["diagnosis"].t_s == pytest.approx(log["t_s"][row])
+    flags = {name: bool(log[f"fie_{name}_excluded"][row]) for name in ("aileron", "elevator", "rudder")}
+    assert {name: shown["excluded"][name] for name in flags} == flags
+    assert flags == {"aileron": True, "elevator": False, "rudder": True}
+    assert "'elevator': False" in capsys.readouterr().out
+
+
 def test_every_public_name_is_there():
     assert set(bf.__all__) <= set(dir(bf))
     for name in bf.__all__:

@@ -210,3 +210,16 @@ def test_what_a_frame_left_unexplained_is_held_against_the_bound_of_that_frame()
         errors = (then["noise"][0] + now["noise"][0]) * 100.0
         apart(errors=errors, bound=bound, innovation=innovation, eta_bar=then["eta_bar"][0])
         assert bound == pytest.approx(then["eta_bar"][0] + errors, rel=1e-2)
+
+
+def test_the_model_is_what_the_surfaces_are_expected_to_give():
+    flown = Flown(**CASES["published"])
+    diagnosis = flown.diagnosis()
+    for sample in flown.samples[:50]:
+        diagnosis.step(*sample)
+    f, G = diagnosis.model()
+    means = diagnosis.surprise()[2]
+    assert (f.shape, G.shape) == ((3,), (3, 4))
+    assert G * flown.samples[49][2] == pytest.approx(means, rel=0.05, abs=1e-3)
+    model = bf.linearise(flown.scenario)
+    assert G[1, 1] == pytest.approx(model.B[model.states.index("q"), 1], rel=0.05)

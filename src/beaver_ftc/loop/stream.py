@@ -147,6 +147,12 @@ class Diagnosis:
         innovation, bound = self._fdi["bank"]["innovation"], self._fdi["bound"]["frame"]
         return innovation.copy(), bound.copy(), self._frame["belief"]["means"]["Gu"].copy()
 
+    def model(self) -> tuple[Vector, Vector]:
+        """The design model at the last sample: f (3,) rad/s2 and G (3, surfaces) rad/s2 per rad, of
+        xdot = f + G u."""
+        belief = self._frame["belief"]
+        return belief["f"].copy(), belief["G"].copy()
+
     def inside(self) -> tuple[np.ndarray, Scenario]:
         """Its record, of `frame_dtype`, since the last reset, and the scenario it stands for."""
         return self._frames, self._scenario

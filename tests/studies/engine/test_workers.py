@@ -113,3 +113,46 @@ import os, signal, sys
 signal.signal(signal.SIGINT, signal.SIG_DFL)
 os.execv(sys.argv[1], sys.argv[1:])
 """
+
+
+KILLED = """
+import os, signal, threading
+from multiprocessing import forkserver
+from beaver_ftc.studies.engine import workers
+
+ends, begun = int(__import__("sys").argv[1]), []
+start = workers.start_early
+
+def start_and_kill():
+    # stopped, it does not answer; then it is gone, as if memory had run out
+    start()
+    server = forkserver._forkserver._forkserver_pid
+    if len(begun) < ends:
+        os.kill(server, signal.SIGSTOP)
+        threading.Timer(0.3, os.kill, (server, signal.SIGKILL)).start()
+    begun.append(server)
+
+workers._PRELOAD[:] = []
+workers.start_early = start_and_kill
+if __name__ == "__main__":
+    try:
+        worker = workers._Worker(workers.Work(len))
+        print(worker.fly(workers.Batch(0, (workers.Case(0, "four"),))).result(60), len(set(begun)))
+        worker.end()
+    except workers.SimulationFailed as error:
+        print(error)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there workers start afresh")
+@pytest.mark.parametrize(
+    ("ends", "says"),
+    [(1, "[2] 2"), (9, "a worker process cannot start: what it is forked from is ended, each time")],
+)
+def test_what_workers_are_forked_from_is_killed(tmp_path, ends, says):
+    (tmp_path / "killed.py").write_text(KILLED)
+    done = subprocess.run(
+        [sys.executable, "killed.py", str(ends)], cwd=tmp_path, capture_output=True, text=True, check=False,
+        timeout=120,
+    )  # fmt: skip
+    assert (done.stdout.strip(), done.stderr, done.returncode) == (says, "", 0)

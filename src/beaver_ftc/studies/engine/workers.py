@@ -22,6 +22,7 @@ from typing import Any, NamedTuple, Protocol
 from beaver_ftc.documents.errors import SimulationFailed
 
 LEAVES_S = 5.0  # a pool's thread, once its workers have ended: milliseconds
+MOST_STARTS = 3  # of a worker, should what it is forked from be killed meanwhile
 
 Row = Any
 Number = int | str  # of a batch: what its file is called
@@ -101,14 +102,21 @@ class _Worker:
     """A process of its own: one that dies takes nobody else's task with it."""
 
     def __init__(self, work: Work) -> None:
-        chosen = context()
-        self._pool = ProcessPoolExecutor(1, mp_context=chosen, initializer=_begin, initargs=(work,))
+        self.pid: Future[int] = Future()
+        for _ in range(MOST_STARTS):
+            self._pool = ProcessPoolExecutor(1, mp_context=context(), initializer=_begin, initargs=(work,))
+            with contextlib.suppress(EOFError, ConnectionError):  # what it is forked from was killed: anew
+                self.pid = self._started()
+                return
+        raise SimulationFailed("a worker process cannot start: what it is forked from is ended, each time")
+
+    def _started(self) -> "Future[int]":
         # What the worker is forked from is deaf to Ctrl-C; to wait for it, for its imports, is not.
         start_early()
-        quiet = contextlib.nullcontext() if chosen.get_start_method() == "forkserver" else single_threaded()
+        forked = context().get_start_method() == "forkserver"
         try:
-            with quiet:
-                self.pid: Future[int] = self._pool.submit(os.getpid)
+            with contextlib.nullcontext() if forked else single_threaded():
+                return self._pool.submit(os.getpid)
         except (KeyboardInterrupt, SystemExit):
             _begin_no_more()
             raise

@@ -131,14 +131,11 @@ def test_this_process_is_one_worker():
 class Hired:
     """A worker whose flights end as it is told: with rows, or with an error."""
 
-    all, errors, starts = (), (), True
+    all, errors, stillborn = (), (), 0
 
     def __init__(self, work):
         self.work, self.ended, self.pid = work, False, Future()
-        if self.starts:
-            self.pid.set_result(1)
-        else:
-            self.pid.set_exception(BrokenProcessPool())
+        self.pid.set_result(1)
         Hired.all.append(self)
 
     def fly(self, task):
@@ -159,7 +156,6 @@ class Hired:
 def hired(monkeypatch):
     monkeypatch.setattr(Hired, "all", [])
     monkeypatch.setattr(Hired, "errors", [])
-    monkeypatch.setattr(Hired, "starts", True)
     monkeypatch.setattr(workers, "_Worker", Hired)
     return Hired
 
@@ -182,20 +178,32 @@ def test_local_workers_hand_back_rows_and_what_was_lost(hired):
     assert local.outcomes(0.0)[0].rows == [double(case) for case in CASES]
 
 
-@pytest.mark.parametrize(
-    ("starts", "error", "says"),
-    [
-        (False, BrokenProcessPool(), "a worker process cannot start: it ended before"),
-        (True, ValueError("x"), "cannot go on: x"),
-    ],
-)
-def test_workers_that_cannot_fly_end_the_study(hired, monkeypatch, starts, error, says):
-    monkeypatch.setattr(hired, "starts", starts)
+def test_a_failure_that_is_no_flights_ends_the_study(hired):
     local = LocalWorkers(Work(double), 1)
-    hired.errors[:] = [error]
+    hired.errors[:] = [ValueError("x")]
     local.submit(Batch(1, CASES))
-    with pytest.raises(SimulationFailed, match=says):
+    with pytest.raises(SimulationFailed, match="cannot go on: x"):
         local.outcomes(1.0)
+    assert len(local._idle) == 1
+
+
+def test_a_worker_killed_before_its_first_flight_is_replaced_but_not_for_ever(hired):
+    """Three in a row give up; one that had begun, and dies, begins the count anew."""
+    local = LocalWorkers(Work(double), 1)
+
+    def dies(has_begun):
+        local._idle[0].pid = Future()
+        if has_begun:
+            local._idle[0].pid.set_result(1)
+        hired.errors[:] = [BrokenProcessPool()]
+        local.submit(Batch(1, CASES))
+        return local.outcomes(1.0)
+
+    for has_begun in (False, False, True, False, False):
+        assert dies(has_begun) == [Outcome(Batch(1, CASES), None)]
+    says = "a worker process cannot start: 3 in a row ended before their first flight"
+    with pytest.raises(SimulationFailed, match=says):
+        dies(has_begun=False)
     assert len(local._idle) == 1
 
 

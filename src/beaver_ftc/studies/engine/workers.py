@@ -22,7 +22,7 @@ from typing import Any, NamedTuple, Protocol
 from beaver_ftc.documents.errors import SimulationFailed
 
 LEAVES_S = 5.0  # a pool's thread, once its workers have ended: milliseconds
-MOST_STARTS = 3  # of a worker, should what it is forked from be killed meanwhile
+MOST_STARTS = 3  # of a worker, should it or what it is forked from be killed meanwhile
 
 Row = Any
 Number = int | str  # of a batch: what its file is called
@@ -101,6 +101,8 @@ class ThisProcess:
 class _Worker:
     """A process of its own: one that dies takes nobody else's task with it."""
 
+    stillborn = 0  # before it in its place, in a row: those that ended before they had begun
+
     def __init__(self, work: Work) -> None:
         self.pid: Future[int] = Future()
         for _ in range(MOST_STARTS):
@@ -176,16 +178,24 @@ class LocalWorkers:
         try:
             rows = flown.result()
         except BrokenProcessPool:
-            if not worker.pid.done() or worker.pid.exception() is not None:
-                raise SimulationFailed(
-                    "a worker process cannot start: it ended before its first flight"
-                ) from None
-            worker = _Worker(self._work)
+            worker = self._in_place_of(worker)
         except Exception as error:  # not a flight's: those are in their rows
             raise SimulationFailed(f"a worker cannot go on: {error}") from error
         finally:
             self._idle.append(worker)
         return Outcome(task, rows)
+
+    def _in_place_of(self, ended: _Worker) -> _Worker:
+        """Another. One may be killed before it begins; if so are those that take its place, that is said."""
+        has_begun = ended.pid.done() and ended.pid.exception() is None
+        stillborn = 0 if has_begun else ended.stillborn + 1
+        if stillborn == MOST_STARTS:
+            raise SimulationFailed(
+                f"a worker process cannot start: {stillborn} in a row ended before their first flight"
+            ) from None
+        worker = _Worker(self._work)
+        worker.stillborn = stillborn
+        return worker
 
 
 _OF_THIS_PROCESS: list[Work] = []  # a worker's only one

@@ -5,7 +5,7 @@
 are the stages of frame.py; left of a bar: built in, right of it: a plug-in's answer.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from math import isfinite
 from typing import Any
 
@@ -27,6 +27,35 @@ from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled, made
 from beaver_ftc.scenario.schema import Scenario
 
 _AXES = {"p": 0, "q": 1, "r": 2, None: 0}
+_REAL = "biuf"  # kinds of NumPy's types whose values are real numbers
+_NUMBER = (float, int, np.floating, np.integer)
+
+
+def _is_number(given: Any) -> bool:
+    return isinstance(given, _NUMBER)
+
+
+def _is_text(given: Any) -> bool:
+    return isinstance(given, str)
+
+
+# What each field of a verdict may be, besides which surface is isolated: that depends on the aircraft.
+_ALLOWED: tuple[tuple[str, Callable[[Any], bool], str], ...] = (
+    (
+        "detected",
+        lambda given: isinstance(given, bool | np.bool_ | int | np.integer) and given in (0, 1),
+        "True or False",
+    ),
+    ("axis", lambda given: given is None or (_is_text(given) and given in _AXES), "p, q, r or None"),
+    ("type", lambda given: given is None or _is_text(given), "a str or None"),
+    ("estimate", lambda given: given is None or (_is_number(given) and isfinite(given)), "a finite number"),
+    ("statistic", _is_number, "a number"),
+    (
+        "candidates",
+        lambda given: isinstance(given, tuple | list) and all(map(_is_text, given)),
+        "a tuple of str",
+    ),
+)
 
 
 class PluginFrame:
@@ -121,14 +150,13 @@ class PluginFrame:
         name = self._names[0]
         if not isinstance(verdict, Verdict):
             self._blame(name, f"step returned {type(verdict).__name__}, allowed: a Verdict")
-        if verdict.axis not in _AXES:
-            self._blame(name, f"verdict.axis is {verdict.axis!r}, allowed: p, q, r or None")
-        if verdict.isolated not in self._isolated:
+        for field, is_allowed, allowed in _ALLOWED:
+            if not is_allowed(given := getattr(verdict, field)):
+                self._blame(name, f"verdict.{field} is {given!r}, allowed: {allowed}")
+        if not isinstance(verdict.isolated, str | None) or verdict.isolated not in self._isolated:
             allowed = ", ".join(str(key) for key in self._isolated)
             self._blame(name, f"verdict.isolated is {verdict.isolated!r}, allowed: {allowed}")
         estimate = 0.0 if verdict.estimate is None else verdict.estimate
-        if not isinstance(estimate, float | int | np.floating) or not isfinite(estimate):
-            self._blame(name, f"verdict.estimate is {estimate!r}, allowed: a finite number")
         taken["detected"], taken["axis"] = bool(verdict.detected), _AXES[verdict.axis]
         taken["isolated"], taken["theta"] = self._isolated[verdict.isolated], estimate
         taken["estimates"] = verdict.effectiveness is not None
@@ -139,7 +167,8 @@ class PluginFrame:
     def _a_number_each(self, name: str, what: str, values: Any) -> np.ndarray:
         """A finite number for each surface, or the plug-in is to blame."""
         try:
-            array = np.asarray(values, dtype=float)
+            given = np.asarray(values)
+            array = given.astype(float) if given.dtype.kind in _REAL else np.empty(0)
         except (TypeError, ValueError):
             array = np.empty(0)
         if array.shape != (len(self._surfaces),):

@@ -128,4 +128,4 @@ for fault_class in ("published", "all"):
 
 def test_a_flight_asks_for_what_it_uses_and_for_nothing_else():
     done = subprocess.run([sys.executable, "-c", FLIGHTS], capture_output=True, text=True, check=True)
-    assert done.stdout.split("\n")[:2] == ["", "isolate_type"]
+    assert done.stdout.split("\n")[:2] == ["fly_one", "fly_one isolate_type"]

@@ -50,7 +50,7 @@ def assembled(**keys):
 
 
 def test_a_flight_remembers_little_and_one_of_more_terms_or_delays_as_much_as_it_needs():
-    """The usual record is that of most flights, so that one compiled code is."""
+    """A record has the room that its aircraft and its delays need."""
     usual = assembled()
     assert usual.nbytes <= 1_000_000  # the order of a second-level cache
     assert usual["fdi"]["statistical"].dtype == statistical_dtype(size_for(load()))

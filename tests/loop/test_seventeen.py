@@ -8,8 +8,9 @@ from tests import seventeen
 import beaver_ftc as bf
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.schema import MAX_SURFACES
-from beaver_ftc.diagnosis.across import MOST, USUAL, size_for
+from beaver_ftc.diagnosis.across import size_for
 from beaver_ftc.diagnosis.isolation import members_of
+from beaver_ftc.loop.assembly import frame_dtype
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.trim import trim
 from beaver_ftc.results.verdict import verdict_text
@@ -70,9 +71,12 @@ def test_every_loss_and_position_has_an_estimator(folder):
     } - stand_ins
 
 
-def test_the_usual_record_is_that_of_the_usual_aircraft(folder):
-    assert size_for(load()) is USUAL
-    assert size_for(load(f"./{seventeen.NAME}", folder)) is MOST
+def test_a_record_has_the_room_that_its_aircraft_needs(folder):
+    few, many = load(), load(f"./{seventeen.NAME}", folder)
+    small, large = (frame_dtype(aircraft.n, size_for(aircraft)).itemsize for aircraft in (few, many))
+    assert small < 600_000
+    assert 5_000_000 < large < 7_000_000
+    assert size_for(many).rates.hypotheses == 3 * 8 + 2  # ailerons and rudders: losses that are one block's
 
 
 def test_a_healthy_flight_raises_no_alarm_and_ends_in_no_departure(folder):

@@ -35,7 +35,7 @@ from typing import NamedTuple
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.aircraft.schema import MAX_BOXES, MAX_SURFACES, MAX_TERMS_OF_ONE
+from beaver_ftc.aircraft.schema import MAX_TERMS_OF_ONE
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.diagnosis import forces, likelihood, tones
 from beaver_ftc.diagnosis.air import along, drift_beside, whole_drift
@@ -78,16 +78,7 @@ class Size(NamedTuple):
     boxes: int
 
 
-# The usual one serves most aircraft, so that the same compiled code does; the second, long fits of few
-# surfaces; all fit into the last.
-USUAL = Size(Rooms(23, MAX_HYPOTHESES), Rooms(36, 3), 13, 6)
-LONG = Size(Rooms(69, MAX_HYPOTHESES), Rooms(106, MAX_HYPOTHESES), 16, 6)
-MOST = Size(
-    Rooms(2 * MAX_TERMS_OF_ONE + N_READINGS, 3 * MAX_SURFACES + 2),
-    Rooms(2 * MAX_TERMS_OF_ONE + N_READINGS + forces.MAX_ERRORS + 2, MAX_SURFACES + 1),
-    2 * MAX_SURFACES + 7,
-    MAX_BOXES,
-)
+USUAL = Size(Rooms(23, MAX_HYPOTHESES), Rooms(36, 3), 13, 6)  # of most aircraft: `size_for` says whose
 
 
 @sized
@@ -415,7 +406,7 @@ def across_a_column(config: FdiConfig, instants: int) -> bool:
 
 
 def size_for(aircraft: Aircraft) -> Size:
-    """The smallest size that is large enough."""
+    """What an aircraft needs room for."""
     axes, views = [axis_of(term) for term in aircraft.moments], list(views_of(aircraft, tell_apart(aircraft)))
     rates = N_READINGS + max(axes.count(PITCH), axes.count(ROLL) + axes.count(YAW))
     errors = max(len(terms_of(aircraft, f)) for f in (ASIDE, UP)) + forces.MAX_ERRORS - MAX_TERMS_OF_ONE
@@ -424,12 +415,7 @@ def size_for(aircraft: Aircraft) -> Size:
     tried = max(len(view.tries) for view in views)
     error_map = aircraft.file.model_error_map
     boxes = len(error_map.boxes) if error_map else 0
-    needed = rates, 3 * losses + 2, rates + errors + 2, tried + 1, len(views), boxes
-    for size in (USUAL, LONG):
-        rooms = (*size.rates, *size.view, size.views, size.boxes)
-        if all(n <= room for n, room in zip(needed, rooms, strict=True)):
-            return size
-    return MOST
+    return Size(Rooms(rates, 3 * losses + 2), Rooms(rates + errors + 2, tried + 1), len(views), boxes)
 
 
 def set_up_views(statistical: np.void, aircraft: Aircraft) -> None:

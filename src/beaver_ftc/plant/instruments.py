@@ -28,7 +28,7 @@ PHI, PSI, ALTITUDE, ENGINE_SPEED, MANIFOLD, AX = (
 )
 NOISE_LIMIT_SIGMA = 4.0
 LONGEST_DELAY = 1000  # JSBSim frames
-# Samples that all delay lines together keep: most flights', for which the same compiled code serves; any's.
+# Samples that all delay lines together keep: most flights', so that delays can be set in the air; any's.
 USUAL_LINE, MOST_LINE = 512, N_SENSORS * (LONGEST_DELAY + 2)
 
 # Counters of random numbers: those of one draw change nothing in the noise of another.

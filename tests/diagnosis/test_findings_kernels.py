@@ -143,6 +143,20 @@ def test_of_several_faults_the_first_named_is_told_first():
     assert several(named=[(RUDDER, 9.0), (ELEVATOR, 9.0)])["isolated"] == "elevator"
 
 
+def test_each_of_several_faults_has_instants_of_its_own():
+    """When it was named, and when its type; none of a type that is open."""
+    fdi = new(pairs=1)
+    surface = fdi["types"]["surface"]
+    for s, kind, named_at_s, type_at_s in ((RUDDER, STUCK, 9.0, 11.5), (ELEVATOR, -1, 7.0, -1.0)):
+        surface["named"][s], surface["named_at_s"][s] = 1, named_at_s
+        surface["type"][s], surface["type_at_s"][s] = kind, type_at_s
+    apart(instants=[9.0, 11.5, 7.0])
+    elevator, rudder = findings.found(fdi, SURFACES)["faults"]
+    keys = "isolated", "isolation_time_s", "isolation_type", "type_time_s"
+    assert [elevator[key] for key in keys] == ["elevator", 7.0, None, None]
+    assert [rudder[key] for key in keys] == ["rudder", 9.0, "stuck", 11.5]
+
+
 def test_a_plane_that_is_alarmed_and_not_explained_stays_open():
     alarmed = [0, 0]
     alarmed[IN_PITCH] = 1

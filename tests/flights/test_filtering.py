@@ -1,14 +1,17 @@
 """What of a flight is adapted: its delay, its trim, its gain; bounded, and never by looking ahead."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from beaver_ftc.flights import filtering
 from beaver_ftc.flights.bank import Noise, adaptation_of, bank_of
 from beaver_ftc.flights.filtering import _later, _update, _weights, posterior_of
 from beaver_ftc.flights.samples import load_flights
 from flights import synthetic
+from telling import apart
 
 
 @pytest.fixture(scope="module")
@@ -138,3 +141,27 @@ def test_a_covariance_stays_symmetric_to_the_bit():
     _update(np.zeros(5), p, np.zeros(3), seen, noise, normal)
     assert (p == p.T).all()
     assert p == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("average", [(1.0, 0.6, -0.2), (1.0, -0.35)])
+def test_a_colour_is_no_likelier_by_the_size_that_filtering_gives_a_sample(monkeypatch, average):
+    """Filtered by C(1) / C(z) a white residual is C(1) times as large, and so is its noise: the density by
+    each is the same once the volume is."""
+    rng, gain = np.random.default_rng(5), sum(average)
+    white = rng.normal(0.0, (0.05, 0.02, 0.09), (40, 3))
+    noise = np.array([[0.0025, 0.0003, -0.0007], [0.0003, 0.0004, 0.0001], [-0.0007, 0.0001, 0.0081]])
+    constant, known = np.array([0.3, -0.2, 0.1]), np.arange(40) != 7
+    apart(noise=noise[np.triu_indices(3)], constant=constant, average=average)
+    settings = SimpleNamespace(tail=7.0, power=0.4)
+    model = SimpleNamespace(settings=settings, constant=lambda average: sum(average) * constant)
+    found = []
+    for of, size in ((average, gain), ((1.0,), 1.0)):
+        answers = rng.normal(size=(40, 2, 3))
+        unexplained = size * (white + constant) + answers.sum(axis=1)
+        monkeypatch.setattr(filtering, "in_white", lambda *_, made=(known, unexplained, answers): made)
+        colour = SimpleNamespace(average=of, noise=(size**2 * noise).tolist())
+        found.append(filtering._likelihood(None, model, colour))
+    np.testing.assert_allclose(found[0], found[1], atol=1e-12)
+    square = np.einsum("na,ab,nb->n", white, np.linalg.inv(noise), white)
+    student = -0.5 * ((7.0 + 3.0) * np.log1p(square / 7.0) + np.log(np.linalg.det(noise)))
+    np.testing.assert_allclose(found[1], np.where(known, 0.4 * student, 0.0))

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from beaver_ftc.flights import findings
 from beaver_ftc.flights.findings import (
     as_text,
     events_of,
@@ -167,3 +168,18 @@ def test_nearly_proportional_is_a_cosine_of_nine_tenths(share, separable):
     (pair,) = statement(replace(samples, commands=samples.commands[:, [0, 0]]), model)["alike"]
     assert pair["cosine"] == pytest.approx(share)
     assert pair["separable"] is separable
+
+
+@pytest.mark.parametrize(
+    ("share", "says"),
+    [
+        (1.0, "no fault shows"), (0.999, "no fault shows where the model is credible,"),
+        (0.92, "no fault shows where the model is credible,"), (0.0, "no verdict"),
+    ],
+)  # fmt: skip
+def test_that_nothing_shows_is_said_of_the_rows_that_are_credible(share, says):
+    """Of all of them without a word more; of hardly any there is no verdict."""
+    assert findings._nothing({"credible": {"share": share}}) == says
+    little = findings._LITTLE
+    assert findings._nothing({"credible": {"share": 0.99 * little}}) == "no verdict"
+    assert findings._nothing({"credible": {"share": 1.01 * little}}).startswith("no fault shows where")

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 
 import beaver_ftc as bf
+from beaver_ftc.results import typed
 from beaver_ftc.results.writer import run
 from flying import loss, scenario
 
@@ -133,3 +134,9 @@ class TestPlugIns:
 
 def files(folder: Path):
     return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
+
+
+def test_lists_within_lists_are_frozen_and_numbers_by_axis_have_names():
+    found = typed._frozen([[1.0, [2.0]], {"p": 0.1, "q": 0.2, "r": 0.3}, "word"])
+    assert found == ((1.0, (2.0,)), typed.Rates(p=0.1, q=0.2, r=0.3), "word")
+    assert hash(found)

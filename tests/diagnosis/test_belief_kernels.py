@@ -5,6 +5,8 @@ import pytest
 
 from beaver_ftc.diagnosis import belief as beliefs
 from beaver_ftc.diagnosis.bounds.worst_case import bound_dtype
+from beaver_ftc.scenario.schema import Scenario
+from telling import apart
 
 
 @pytest.mark.parametrize("instants", [1, 3])
@@ -32,3 +34,25 @@ def test_of_the_first_frame_nothing_is_foreseen():
     beliefs.elapse(belief, np.zeros(1, bound_dtype(2))[0])
     beliefs.foresee(belief["means"])
     assert not belief["means"]["Gu_foreseen"].any()
+
+
+def test_actuators_are_believed_an_instant_at_a_time():
+    """At 50 Hz of four instants: the share of the way and the longest way in 5 ms, each surface its own."""
+    dynamics = {
+        "aileron": {"bandwidth_rad_s": 20.0, "rate_limit_deg_s": 60.0}, "elevator": {"bandwidth_rad_s": 35.0},
+        "rudder": {"rate_limit_deg_s": 40.0},
+    }  # fmt: skip
+    given = {"name": "x", "rate_hz": 50, "substeps": 4, "actuators": dynamics, "design_model": {"mass": 1.1}}
+    scenario = Scenario.model_validate(given)
+    travel = np.array([[-0.5, -0.4, -0.3, -0.1], [0.55, 0.45, 0.35, 1.0]])
+    apart(travel=travel)
+    record = np.zeros(1, beliefs.belief_dtype(4))[0]
+    beliefs.configure(record, scenario, travel)
+    actuators = record["actuators"]
+    assert (record["share"], bool(actuators["real"])) == (0.25, True)
+    assert (actuators["low"].tolist(), actuators["high"].tolist()) == tuple(travel.tolist())
+    assert actuators["approach"] == pytest.approx([1 - np.exp(-0.1), 1 - np.exp(-0.175), 1.0, 1.0])
+    assert actuators["step"] == pytest.approx([np.radians(0.3), np.inf, np.radians(0.2), np.inf])
+    ideal = np.zeros(1, beliefs.belief_dtype(4))[0]
+    beliefs.configure(ideal, Scenario.model_validate({"name": "x"}), travel)
+    assert (ideal["share"], bool(ideal["actuators"]["real"])) == (1.0, False)

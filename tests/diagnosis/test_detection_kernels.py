@@ -12,6 +12,7 @@ from beaver_ftc.diagnosis.state import (
     STATISTICS,
     WORST_CASE,
 )
+from beaver_ftc.scenario.schema import Scenario
 
 
 def new_network(**fields):
@@ -198,3 +199,17 @@ def test_a_command_is_followed_by_surfaces_that_were_where_they_were():
     assert record["u_then"] == pytest.approx([0.1, 0.2, 0.3, 0.0])
     assert record["u"] == pytest.approx(record["commanded"])
     assert record["commanded"] == pytest.approx([0.4, 0.5, -0.6, 0.2])
+
+
+@pytest.mark.parametrize("substeps", [1, 3])
+def test_an_estimator_forgets_by_the_frame_however_many_instants_it_has(substeps):
+    """Of numbers asked for that all differ: pole, gain, leak and limit, at 40 Hz."""
+    control = {"network_gain_per_s2": 91.0, "network_leak_per_s": 0.7, "network_weight_limit_rad_s2": 3.3}
+    asked = {"fdi": {"detection_pole_per_s": 2.2}, "control": control, "rate_hz": 40, "substeps": substeps}
+    record = new_fdi()["fdae"]
+    detection.configure(record, Scenario.model_validate({"name": "x", **asked}))
+    assert np.unique(record["pole"]).tolist() == [2.2]
+    assert np.unique(record["decay"]) == pytest.approx([np.exp(-2.2 / 40.0)])
+    network = record["network"]
+    names = "gain", "leak_per_s", "weight_limit"
+    assert [float(network[name]) for name in names] == [91.0, 0.7, 3.3]

@@ -54,6 +54,12 @@ def test_a_plan_names_its_own_flights_built_in_ones_and_files_beside_it(write):
     assert plan.expect["A"].no_departure is True
 
 
+def test_flights_that_are_named_twice_count_once(write):
+    plan = load_plan(write(GOOD.replace("deeper/also.yaml]", "deeper/also.yaml, many]")))
+    assert plan.over["B"] == ("many", "also")
+    assert len(plan.cases) == len(load_plan(write(GOOD)).cases)
+
+
 def test_what_a_source_says_is_in_its_digest(write):
     before = load_plan(write(GOOD)).sources
     after = load_plan(write(GOOD.replace("[-2, 2, 3]", "[-2, 2.1, 3]"))).sources

@@ -96,6 +96,18 @@ def test_links_are_followed_to_a_base_alone(tmp_path, monkeypatch):
     assert (tmp_path / "made" / "anew").stat().st_mode & 0o777 == 0o700
 
 
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="where there are users")
+@pytest.mark.parametrize("base", [True, False])
+def test_a_folder_of_another_user_is_refused_by_that_users_number(tmp_path, monkeypatch, capsys, base):
+    monkeypatch.delenv(paths._REFUSED, raising=False)
+    other = os.getuid() + 1
+    monkeypatch.setattr(paths, "_user", lambda: other)
+    monkeypatch.setattr(paths, "_ROOT", other)
+    tmp_path.chmod(0o755)
+    assert not paths._is_ours(tmp_path, base=base)
+    assert f"from {tmp_path}: it belongs to user {os.getuid()}, allowed: " in capsys.readouterr().err
+
+
 def test_where_code_is_kept(tmp_path, monkeypatch):
     for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME"):
         monkeypatch.setenv(name, str(tmp_path / name))

@@ -1,6 +1,7 @@
 """Signal temporal logic: against rtamt, closed forms, and what is no formula."""
 
 import math
+import warnings
 
 import numpy as np
 import pytest
@@ -85,6 +86,13 @@ def test_what_is_not_a_number_is_no_verdict():
     assert parse("a >= 0").robustness(columns, RATE_HZ) == 1.0
 
 
+def test_what_is_too_large_is_infinite_and_no_warning():
+    columns = {"a": np.array([1e308, 1.0])}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert parse("a * 10 >= 0").robustness(columns, RATE_HZ) == math.inf
+
+
 def test_how_far_it_looks_and_at_what():
     formula = parse("always[0:5](eventually[1:2](abs(a) <= b / 2)) and once[0:90](c > 0)")
     assert formula.looks_ahead_s == 7.0
@@ -98,7 +106,7 @@ def test_how_far_it_looks_and_at_what():
         "", "a", "a + 1", "abs(a)", "a <=", "(a <= 1", "a <= 1)", "a <= 1 b", "a == 1", "always a <= 1",
         "always[0:5]", "always[5:0](a <= 1)", "always[-1:2](a <= 1)", "always[0](a <= 1)", "not a", "a and b",
         "(a <= 1) + 2 <= 3", "abs(a <= 1) >= 0", "__import__('os')", "a <= 1; b <= 1", "and <= 1",
-        "a <= 1e9999999:",
+        "a <= 1e9999999:", "a <= 1e999", "a <= " + "9" * 400,
         "always[0:1e9](a <= 1)", "(" * (MOST_DEPTH + 1) + "a <= 1", "a <= " + "1" * MOST_CHARACTERS,
     ],
 )  # fmt: skip

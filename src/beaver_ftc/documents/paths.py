@@ -89,7 +89,7 @@ def _is_ours(folder: Path, base: bool = False) -> bool:
 def _not_ours(folder: Path, base: bool) -> str:
     """Who else may put code into a folder, in words; nothing if nobody."""
     itself, status, trusted = folder.lstat(), folder.stat(), (_user(), _ROOT)
-    if itself.st_uid not in trusted or (folder.is_symlink() and not base):
+    if folder.is_symlink() and (itself.st_uid not in trusted or not base):
         return "it is a link"
     if base and status.st_mode & stat.S_ISVTX and status.st_uid in trusted:
         return ""  # as /tmp: what we make in it nobody else can replace

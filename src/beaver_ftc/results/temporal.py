@@ -14,6 +14,7 @@ to a release of 2017 and Python below 3.13, so it is a check beside this and not
 
 import re
 from collections.abc import Callable, Iterator, Mapping
+from math import isfinite
 from typing import NamedTuple
 
 import numpy as np
@@ -140,6 +141,8 @@ class _Parser:
             interval = self._interval() if token in _TEMPORAL else None
             return _of_truths(token, self._operand(_TIGHTEST), interval=interval)
         if re.fullmatch(r"[\d.].*", token):
+            if not isfinite(float(token)):
+                raise FormulaError(f"{token[:40]!r} is too large for a number")
             return Formula("number", what=float(token))
         if not token or token in _WORDS or not re.fullmatch(r"[A-Za-z_].*", token):
             raise FormulaError(f"{token or 'the end'!r} where a column, a number or ( is due")
@@ -203,7 +206,7 @@ def _values(formula: Formula, columns: Mapping[str, np.ndarray], rate_hz: float,
         return np.full(frames, formula.what) if operator == "number" else columns[str(formula.what)]
     parts = [_values(part, columns, rate_hz, frames) for part in formula.parts]
     if operator in _PLAIN:
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             return _PLAIN[operator](*parts)
     begin, end = (round(t * rate_hz) for t in formula.interval or (0.0, frames / rate_hz))
     if operator == "until":

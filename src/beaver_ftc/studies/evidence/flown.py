@@ -167,7 +167,8 @@ def _of_formula(text: str, formula: Formula, rate_hz: float, document: Row, log:
     r = formula.robustness(log.columns, rate_hz)
     lost = document["departure"]
     if not math.isfinite(r):
-        why = "a column is not a number where it asks" if math.isnan(r) else "it looks beyond the log"
+        nan, far = "a column is not a number where it asks", "it looks beyond the log, or at what is infinite"
+        why = nan if math.isnan(r) else far
         return part("robustness", text, None, NOT_SHOWN, says=why)
     if r >= 0.0 and lost and formula.looks_ahead_s > lost["time_s"]:
         return part("robustness", text, r, NOT_SHOWN, says=f"the aircraft was lost at {lost['time_s']:g} s")

@@ -1,11 +1,14 @@
 """Engine power on pitch: when it takes over, what it may do, and that it helps."""
 
+import shutil
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
+import beaver_ftc as bf
 from beaver_ftc.aircraft import load
 from beaver_ftc.control import power
 from beaver_ftc.control.laws import ORACLE
@@ -387,3 +390,19 @@ def test_a_range_upside_down_is_refused_in_one_line():
 def test_a_range_may_be_one_value():
     power = load_text("name: x\ncontrol:\n  power: {lowest_inhg: 21, highest_inhg: 21}\n").control.power
     assert (power.lowest_inhg, power.highest_inhg) == (21.0, 21.0)
+
+
+def test_an_engine_of_which_no_speed_is_known_is_flown_by_its_range(tmp_path):
+    """The slipstream cannot be computed without: the range of the file is all that is known."""
+    folder = tmp_path / "a"
+    shutil.copytree(load().folder, folder)
+    kept = [
+        line for line in (folder / "aircraft.yaml").read_text().splitlines(keepends=True)
+        if not line.strip().startswith("engine_rpm:")
+    ]  # fmt: skip
+    (folder / "aircraft.yaml").write_text("".join(kept))
+    (tmp_path / "s.yaml").write_text("name: s\naircraft: ./a\nduration_s: 0.5\n")
+    slow = bf.load(tmp_path / "s.yaml")
+    assert "engine_rpm" not in type(slow.initial).model_fields
+    flight = bf.fly(slow)
+    assert len(flight.log) == 50

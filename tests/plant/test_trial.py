@@ -98,7 +98,7 @@ def test_an_error_that_a_model_raises_in_flight_ends_the_flight_alone(tmp_path, 
 
 @pytest.mark.parametrize(
     ("status", "said", "why"),
-    [(-9, "", "JSBSim does not start it within 4 s of processor"),
+    [(-9, "", "JSBSim does not start it within 2 s of processor"),
      (-6, "terminate\n  what():  std::bad_alloc\n", "JSBSim needs more than 1 GB of memory for it"),
      (-11, "", "it ends JSBSim by signal 11"), (-6, "a\n what():  broken\n\n", "it ends JSBSim by signal 6: broken"),  # noqa: E501
      (1, "one\n\n two \n", "JSBSim ends with status 1: two"), (0, "a warning", None)],

@@ -53,8 +53,8 @@ def is_at_hand(scenario: Scenario) -> bool:
 
 
 def _has_piston_engine(aircraft: Aircraft) -> bool:
-    """Whether the power law knows the engine: manifold pressure is what it moves."""
-    return aircraft.power_setting == "manifold_pressure_inhg"
+    """Whether the power law knows the engine: manifold pressure is what it moves, at a known engine speed."""
+    return aircraft.power_setting == "manifold_pressure_inhg" and aircraft.has_engine_instruments
 
 
 def configure(power: np.void, layout: np.void, scenario: Scenario) -> None:

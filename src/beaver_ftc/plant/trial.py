@@ -15,7 +15,7 @@ from time import process_time
 from beaver_ftc.documents.errors import BeaverFtcError, SimulationFailed
 
 MOST_BYTES = 1 << 30  # of its address space
-MOST_CPU_S = 4  # of processor, imports included: 0.5 s; JSBSim's own largest aircraft take 0.1 s more
+MOST_CPU_S = 2  # of processor, imports included: 0.5 s; JSBSim's own largest aircraft take 0.1 s more
 LONGEST_S = 30.0  # on the clock, should it wait for something or the processor be taken
 FRAMES = 60
 MOST_FRAME_S = 0.002  # of processor, on average; JSBSim's own largest aircraft take 0.0001 s

@@ -74,7 +74,7 @@ def compared(sweep, tmp_path):
     names = ("--schemes", "observer-constant,augmented-ekf", "--laws", "nominal,lqr")
     done = _run("--sweep", sweep, *names, "--workers", 1, "--out", tmp_path / "out", "--format", "json")
     assert done.exit_code == 0, done.output
-    return json.loads(done.output), tmp_path / "out" / "few"
+    return json.loads(done.stdout), tmp_path / "out" / "few"
 
 
 def test_a_comparison_has_everything_asked_for(compared):
@@ -324,7 +324,7 @@ def test_finished_runs_stand_side_by_side(tmp_path):
     page = (tmp_path / "out" / "runs" / "runs.html").read_text()
     assert page.count('<p class="folder">') == 2
     done = _run(*folders, "--out", tmp_path / "out", "--format", "json")
-    assert set(json.loads(done.output)["runs"]) == {"a", "b"}
+    assert set(json.loads(done.stdout)["runs"]) == {"a", "b"}
 
 
 def test_entries_are_every_scheme_with_our_law_and_every_law_with_our_scheme():

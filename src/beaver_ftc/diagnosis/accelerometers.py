@@ -16,6 +16,7 @@ instrument is named. None that may be broken is used: `measured.inertial`.
 import numpy as np
 
 from beaver_ftc.compiled import kernel
+from beaver_ftc.diagnosis.since_start import hidden
 from beaver_ftc.diagnosis.watch import (
     AIRSPEED,
     ALPHA,
@@ -25,6 +26,9 @@ from beaver_ftc.diagnosis.watch import (
     CLIMB,
     DENSITY,
     LEAP_M_S2,
+    OF_ALPHA,
+    OF_BETA,
+    OF_SPEED,
     SPEED,
 )
 from beaver_ftc.plant.instruments import AX, N_SENSORS, PHI
@@ -43,6 +47,14 @@ def instrument_of(test):
     if test == SPEED:
         return AIRSPEED
     return ALPHA if test == ALPHA_FLOW else BETA
+
+
+@kernel
+def hypothesis_of(test):
+    """That this instrument was broken when the watch began (since_start.py)."""
+    if test == SPEED:
+        return OF_SPEED
+    return OF_ALPHA if test == ALPHA_FLOW else OF_BETA
 
 
 @kernel
@@ -106,7 +118,7 @@ def leapt(watch, signal):
 @kernel
 def gather(watch, signal):
     """Add up the residuals of the flow after the look of the alarm, (3,), what sound instruments may have of
-    them, and how far each reading has moved meanwhile."""
+    them, what a first error of the reading may, and how far each reading has moved meanwhile."""
     step = watch.step
     for j in range(3):
         i, test = instrument_of(SPEED + j), step.test[SPEED + j]
@@ -115,9 +127,11 @@ def gather(watch, signal):
             watch.sound[j] = 2.0 * test.noise + test.air * step.gust
             continue
         watch.gathered[j] += test.residual
+        of = hypothesis_of(SPEED + j)
         watch.sound[j] += step.h * test.rate
+        watch.first[j] += watch.since.held[of] * watch.since.reach[of, SPEED + j]
         watch.least[j], watch.most[j] = min(watch.least[j], signal[i]), max(watch.most[j], signal[i])
-    excess = np.sign(watch.gathered[1]) * max(abs(watch.gathered[1]) - watch.sound[1], 0.0)
+    excess = np.sign(watch.gathered[1]) * max(abs(watch.gathered[1]) - watch.sound[1] - watch.first[1], 0.0)
     fallen = step.h * signal[AIRSPEED] * excess * np.cos(signal[PHI]) * np.cos(signal[PHI + 1])
     for m in range(step.decay.size):
         watch.fallen[m] = step.decay[m] * watch.fallen[m] + fallen
@@ -129,7 +143,8 @@ def goes_on(watch):
     """Whether the residuals add up to what no error of a reading is, that has moved by so much."""
     j = watch.lead - SPEED
     moved = watch.most[j] - watch.least[j]
-    return moved > 0.0 and abs(watch.gathered[j]) > GOES_ON * moved + CLEARLY * watch.sound[j]
+    sound = watch.sound[j] + watch.first[j]
+    return moved > 0.0 and abs(watch.gathered[j]) > GOES_ON * moved + CLEARLY * sound
 
 
 @kernel
@@ -140,11 +155,13 @@ def would_show_elsewhere(watch, signal):
     elsewhere = DENSITY if watch.lead == SPEED else CLIMB
     if watch.lead == BETA_FLOW or watch.fired[elsewhere]:
         return False
+    of = hypothesis_of(watch.lead)
     for m in range(step.decay.size):
         error, speed = abs(watch.fallen[m]), step.test[SPEED]
         if watch.lead == SPEED:
             error = 2.0 * (abs(speed.filtered[m]) - speed.bound[m]) / max(signal[AIRSPEED], 1.0)
-        if error > CLEARLY * step.test[elsewhere].bound[m]:
+            error *= 1.0 - min(watch.since.held[of], 1.0)
+        if error > CLEARLY * (step.test[elsewhere].bound[m] + hidden(watch.since, of, elsewhere, m)):
             return True
     return False
 

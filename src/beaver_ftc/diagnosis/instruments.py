@@ -13,7 +13,7 @@ of it, for the diagnosis and for the laws (`stand_in`); it is not trusted again 
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis import accelerometers, redundancy
+from beaver_ftc.diagnosis import accelerometers, redundancy, since_start
 from beaver_ftc.diagnosis.bank import alarm
 from beaver_ftc.diagnosis.state import NOT_ISOLATED
 from beaver_ftc.diagnosis.thresholds import bound_step
@@ -29,10 +29,14 @@ from beaver_ftc.diagnosis.watch import (
     N_TESTS,
     NO,
     NOBODY,
+    OF_PHI,
+    OF_SPEED,
     PRESSURE,
     QDYN,
     RPM,
     SPEED,
+    STARTERS,
+    THETA,
     TURN,
     UNKNOWN,
     YES,
@@ -49,6 +53,7 @@ from beaver_ftc.plant.instruments import (
 )
 
 INVOLVED = 0.03  # of the largest residual of its kind: less is what a large error does to its neighbours
+ASKED = 3  # `begun`: after the first look 1, with the first whole frame 2, from the next one on 3
 BESIDE_S = 0.5  # a surface found earlier than this before the alarm was found without the broken instrument
 SLACK = 0.2  # of the damping, away from trim
 GONE = 0.003  # of what an attitude's jump has shown: what is left of it afterwards
@@ -70,9 +75,11 @@ def monitor(watch, belief, measured, conclusion, bank, bound, dt, t):
     if watch.past == 0:
         follow_rates(watch, bank.innovation, bound.eta_bar, dt)
     redundancy.check(step, signal, watch.engine)
+    since_start.follow(step, watch.since, signal)
     accelerometers.note_stillness(watch, signal)
     if watch.past == 0:
-        watch.error_then[:], watch.spike_then[:] = watch.error, watch.spike
+        watch.error_then[:], watch.spike_before[:] = watch.error, watch.spike_then
+        watch.spike_then[:] = watch.spike
         watch.spike[:] = 0.0
     for i in range(3):
         error = -step.test[TURN + i].residual / step.h
@@ -80,6 +87,8 @@ def monitor(watch, belief, measured, conclusion, bank, bound, dt, t):
             watch.error[i] = error
         else:
             watch.spike[i] = max(watch.spike[i], abs(error))
+    if watch.begun < ASKED:
+        note_first_errors(watch)
     if watch.blurred:
         clear_gyros(watch)
     decide(watch, measured, conclusion, bank, bound, dt, t)
@@ -96,8 +105,20 @@ def begin(watch, measured, t):
     watch.begun = 1
     watch.step.drifted = watch.step.drift * t
     redundancy.begin(watch.step, measured.signal, measured.force)
+    since_start.begin(watch.since, measured.signal)
     watch.earlier[:] = watch.step.then
     watch.past = (watch.past + 1) % watch.instants
+
+
+@kernel
+def note_first_errors(watch):
+    """A gyro's error e of the first look has brought no innovation: W is e less exp(-D t) times the first e,
+    which its bound therefore begins with. The first frame shows no change of an error."""
+    if watch.past == 0:
+        watch.begun += 1
+    if watch.begun == ASKED - 1 and watch.past == 0:
+        for i in range(3):
+            watch.W_bound[i] += abs(watch.error[i])
 
 
 @kernel
@@ -147,8 +168,9 @@ def decide(watch, measured, conclusion, bank, bound, dt, t):
     if watch.share > 1.0 and not watch.alarmed:
         raise_alarm(watch, conclusion, t)
         watch.lead = watch.furthest
+        since_start.hold(watch.since)
     if watch.alarmed:
-        if watch.past == 0:
+        if watch.past == 0 and watch.begun == ASKED:
             ask_rates(watch, bank, bound, dt)
         note_fired(watch)
         accelerometers.weigh(watch, measured.signal)
@@ -199,7 +221,8 @@ def name(watch, i, t):
 def ask_rates(watch, bank, bound, dt):
     """By axis, whether the rates' dynamics have seen what the attitude shows: YES or NO once it is certain.
 
-    What has shown inside the frame before and is gone is no gyro's: its error would have come to stay.
+    What has shown inside a frame and is gone for all of the next is no gyro's: its error would have come to
+    stay, and one that varies is not as small at every look.
     """
     alarmed, innovation = alarm(bank), bank.innovation
     for i in range(3):
@@ -210,8 +233,8 @@ def ask_rates(watch, bank, bound, dt):
         blur = 4.0 * watch.step.test[TURN + i].noise / watch.step.h  # of `error`, by the attitude's noise
         most = bound.frame[i] + 1e-6
         seen = abs(innovation[i]) > most or alarmed >= 0 or abs(watch.W[i]) > watch.W_bound[i] + 1e-6
-        spike = watch.spike_then[i]
-        sudden = abs(error) < GONE * spike and spike > 2.0 * blur
+        spike, left = watch.spike_before[i], max(abs(watch.error_then[i]), watch.spike_then[i], abs(error))
+        sudden = left < GONE * spike and spike > 2.0 * blur
         explained = abs(innovation[i] - jump) <= most + own + blur / dt
         slow = 0.7 * abs(error) <= watch.W_bound[i] + abs(watch.W[i]) + blur
         if not explained or (not seen and (sudden or not slow)):
@@ -238,6 +261,7 @@ def note_fired(watch):
         beyond = involved(watch, c, triple) if c < SPEED else watch.step.test[c].share > 1.0
         if beyond:
             watch.fired[c] = 1
+    since_start.note_refuted(watch.step, watch.since, watch.fired)
 
 
 @kernel
@@ -257,6 +281,14 @@ def suspect(watch):
     suspect_vane(watch, BETA, BETA_FLOW, 2)
     who[ALTITUDE] = lead == CLIMB
     who[ENGINE_SPEED], who[MANIFOLD] = lead == RPM, lead == PRESSURE
+    frozen = False
+    for i in range(N_SENSORS):
+        frozen = frozen or (
+            who[i] == 1 and watch.step.then[i] != 0.0 and accelerometers.stands_still(watch, i)
+        )
+    for i in range(STARTERS):
+        if not frozen and since_start.explains(watch.since, i, lead):
+            who[(ALPHA, BETA, AIRSPEED, QDYN, PHI, THETA)[i]] = 1
 
 
 @kernel
@@ -278,8 +310,10 @@ def suspect_vane(watch, vane, flow, gyro):
 def would_show(watch):
     """Whether an airspeed as wrong as the density has it would be beyond the bound of its own test."""
     density, speed = watch.step.test[DENSITY], watch.step.test[SPEED]
+    most = 1.0 + watch.since.held[OF_SPEED]
     for m in range(density.filtered.size):
-        if 0.5 * watch.step.then[AIRSPEED] * abs(density.filtered[m]) > 2.0 * speed.bound[m]:
+        shown = abs(density.filtered[m]) - since_start.hidden(watch.since, OF_SPEED, DENSITY, m)
+        if 0.5 * watch.step.then[AIRSPEED] * shown > 2.0 * most * speed.bound[m]:
             return True
     return False
 
@@ -290,20 +324,29 @@ def suspect_attitude(watch):
     to show what a gyro does; one that is frozen is no gyro's doing, and until that is seen it may be.
     Nor is it a gyro's as long as an angle's own test leaves room for all that has shown."""
     fired, who = watch.fired, watch.suspect
-    turns, angles, frozen = 0, 0, False
+    turns, frozen = 0, False
     for i in range(3):
         turns += fired[TURN + i]
-        angles += fired[ANGLE + i]
         frozen = frozen or accelerometers.stands_still(watch, PHI + i)
     for i in range(3):
         alone = turns == 0 or (fired[TURN + i] == 1 and turns == 1)
         who[i] = alone and watch.rates_say[i] != NO and not frozen
         fits = explains(watch, i)
-        mine = angles == 1 if fired[ANGLE + i] == 1 else angles == 0 and fits
+        mine = no_other_angle(watch, i) and (fired[ANGLE + i] == 1 or fits)
         moved = mine and watch.rates_say[axis_of(watch, i)] != YES
         still, longest = watch.still[PHI + i], watch.longest_still[PHI + i]
         may_be_frozen = 0 < still < longest < accelerometers.NEVER_STILL  # too early to say
         who[PHI + i] = moved or (fits and may_be_frozen)
+
+
+@kernel
+def no_other_angle(watch, i):
+    """Whether no test of another angle has shown what a first error of angle i leaves unexplained."""
+    for j in range(3):
+        shown = watch.fired[ANGLE + j] if i == 2 else watch.since.refuted[OF_PHI + i, ANGLE + j]
+        if j != i and shown:
+            return False
+    return True
 
 
 @kernel
@@ -315,7 +358,8 @@ def explains(watch, i):
         turn, per_angle = step.test[TURN + j], abs(redundancy.turned_by(step, j, i)) + unsure
         for m in range(step.decay.size):
             most = abs(angle.filtered[m]) + angle.bound[m]
-            if watch.fired[TURN + j] and abs(turn.filtered[m]) > per_angle * most + turn.bound[m]:
+            hidden = since_start.hidden(watch.since, OF_PHI + i, TURN + j, m) if i < 2 else 0.0
+            if watch.fired[TURN + j] and abs(turn.filtered[m]) > per_angle * most + turn.bound[m] + hidden:
                 return False
     return True
 

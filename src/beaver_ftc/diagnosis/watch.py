@@ -19,6 +19,10 @@ WAIT_S = 1.0  # for the instrument to be found; then the fault is outside what c
 P, Q, R, ALPHA, BETA, AIRSPEED, QDYN = range(len(SIGNALS))
 THETA, PSI = PHI + 1, PHI + 2
 
+# Hypotheses of since_start.py: the instruments that may be broken when the watch begins
+OF_ALPHA, OF_BETA, OF_SPEED, OF_QDYN, OF_PHI, OF_THETA = range(6)
+STARTERS, N_COUPLINGS = 6, 15
+
 TEST = record(
     residual=float, rate=float, noise=float, noise_then=float,  # of the elapsed step
     air=float, bound=N_POLES,  # share of `gusts` in it; the whole bound
@@ -46,6 +50,14 @@ STEP = record(
     test=(TEST, N_TESTS),
 )  # fmt: skip
 
+SINCE = record(
+    # of each hypothesis: how far it can be off, at first, now, at the alarm; what it may have moved by
+    first=STARTERS, off=STARTERS, held=STARTERS, changed=STARTERS,
+    reach=(STARTERS, RPM), reached=(STARTERS, RPM, N_POLES),  # of a unit: in this look, through the filters
+    coupling=N_COUPLINGS, coupled=(N_COUPLINGS, N_POLES),  # the same with its sign
+    refuted=(int, STARTERS, N_TESTS),  # since the alarm, and by which test
+)  # fmt: skip
+
 WATCH = record(
     enabled=int, begun=int, instants=int, past=int, engine=int, alarmed=int, alarmed_at_s=float, beside=int,
     lead=int,
@@ -55,7 +67,7 @@ WATCH = record(
     trim=N_SENSORS, follows=float,  # share of its error a replaced rate makes up a look
     # what tells a gyro from the attitude, by axis
     error=3, error_then=3,  # of the gyro, as each frame began, rad/s
-    spike=3, spike_then=3, damping=(3, 3), W=3, W_bound=3, W_then=3, before=3,
+    spike=3, spike_then=3, spike_before=3, damping=(3, 3), W=3, W_bound=3, W_then=3, before=3,
     # no gyro can be what the rates show: what attitude and W make of that, and how far one gyro goes
     blurred=int, no_gyro=int, apart=(3, N_POLES), apart_bound=(3, N_POLES),
     rates_say=(int, 3), taken_over=(int, 3),
@@ -63,10 +75,10 @@ WATCH = record(
     # two looks ago; who is cleared
     still=(int, N_SENSORS), longest_still=(int, N_SENSORS), earlier=N_SENSORS, cleared=(int, N_SENSORS),
     # how far accelerometers have leapt of late. Since the alarm: looks, residuals of speed, incidence and
-    # sideslip, how much of them is sound, least and most of the readings; the climb that such an
+    # sideslip, how much of them is sound, or of a first error; least and most of the readings; the climb that such an
     # incidence makes up; the velocity made up, body axes
-    restless=float, gathering=int, gathered=3, sound=3, least=3, most=3, fallen=N_POLES, made_up=3,
-    step=STEP,
+    restless=float, gathering=int, gathered=3, sound=3, first=3, least=3, most=3, fallen=N_POLES, made_up=3,
+    step=STEP, since=SINCE,
 )  # fmt: skip
 
 

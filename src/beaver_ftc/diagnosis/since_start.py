@@ -1,0 +1,303 @@
+"""Which instruments may have been broken when the watch over them began, and what that can do to its tests.
+
+A reading that was off by a constant from the first look on has leapt in no test of its own: the tests show it
+through the kinematics alone, beside what sound instruments do. For each reading of the flow and of the
+attitude that others are predicted from, on the hypothesis that it alone is broken,
+
+    off        how far it can still be off: at first as far as an aircraft may fly, from then on
+                   off <= (|residual| + bound) / coupling        of every test and filter it is coupled to,
+               plus what it may have moved by since: what its own test has shown, and that test's bound
+    reach      how much a unit of its error adds to each test's residual in a look, at most
+    reached    the same through the filters
+
+A test beyond bound + off * reached refutes the hypothesis. So the instrument that is broken in truth is never refuted
+by what its first error does, whatever its size: each step holds for it. What moves afterwards is decided as
+before (instruments.py), with bound + off * reached in place of the bound.
+
+The error of an angle is counted as 2 sin(error / 2), by which it turns a vector of length one; that of the
+airspeed and of the dynamic pressure as reading / truth - 1. Then, with s the acceleration, gravity included,
+
+    turning, phi         an error of p (0, q, r)                    theta   an error of psi'
+    SPEED                s . v / V
+    ALPHA_FLOW           q - tan beta (p cos alpha + r sin alpha) + (s_z cos alpha - s_x sin alpha) / V cos beta
+    BETA_FLOW            p sin alpha - r cos alpha + (s_y cos beta - (s_x cos alpha + s_z sin alpha) sin beta) / V
+    DENSITY              log (qdyn / V^2): an error x scales the change of the logarithm by 1 + x
+    CLIMB                V (sin theta cos alpha cos beta - ...)
+
+are off by no more, and where said by no less, than the differences of these sines. Gyros need none of it: all
+of a gyro's error is in the test of its own axis.
+"""
+
+import numpy as np
+
+from beaver_ftc.compiled import kernel
+from beaver_ftc.diagnosis.redundancy import STEEPEST_RAD, steepest
+from beaver_ftc.diagnosis.watch import (
+    AIRSPEED,
+    ALPHA,
+    ALPHA_FLOW,
+    ANGLE,
+    BETA,
+    BETA_FLOW,
+    CLIMB,
+    DENSITY,
+    OF_ALPHA,
+    OF_BETA,
+    OF_PHI,
+    OF_QDYN,
+    OF_SPEED,
+    OF_THETA,
+    QDYN,
+    RPM,
+    SPEED,
+    STARTERS,
+    THETA,
+    TURN,
+)
+from beaver_ftc.plant.instruments import ALTITUDE, PHI
+
+SIDEWAYS_RAD = 0.7  # no aircraft whose attitude and flow are followed flies at more, to either side
+TIMES = 10.0  # what is read may be so many times the truth, or a part of it
+WEATHER = 0.25  # share by which the air is thicker or thinner than the standard has it at a height
+STEADY = 0.8  # share of a coupling that is left when speed and flow have changed within a filter's memory
+SLOW = 2  # of watch.POLES_PER_S
+
+# Couplings that are followed with their sign
+Q_TURNS, R_TURNS, G_DOWN, G_ASIDE, G_AHEAD, CLIMBS, ROLLS, YAWS, BESIDE_ALPHA, BESIDE_BETA = range(10)
+PULLS, PUSHES, FASTER, DENSER, HEADS = range(10, 15)
+
+
+@kernel
+def angle_of(size):
+    """The angle whose 2 sin(angle / 2) this is, rad."""
+    return 2.0 * np.arcsin(min(0.5 * size, 1.0))
+
+
+@kernel
+def size_of(angle):
+    """2 sin(angle / 2), of no more than half a turn."""
+    return 2.0 * np.sin(0.5 * min(abs(angle), np.pi))
+
+
+@kernel
+def density(altitude):
+    """Of the standard troposphere, kg/m3."""
+    return 1.225 * max(1.0 - 2.25577e-5 * altitude, 0.05) ** 4.2559
+
+
+@kernel
+def begin(since, signal):
+    """With the first look at readings (N_SENSORS,) each may be off as far as an aircraft may fly."""
+    since.first[OF_ALPHA] = size_of(abs(signal[ALPHA]) + SIDEWAYS_RAD)
+    since.first[OF_BETA] = size_of(abs(signal[BETA]) + SIDEWAYS_RAD)
+    V, dense = max(signal[AIRSPEED], 1.0), density(signal[ALTITUDE])
+    thick = max(signal[QDYN], 1.0) / (0.5 * dense * V * V)
+    thin, least, densest = 1.0 / thick, 1.0 - WEATHER, 1.0 + WEATHER
+    faster, slower = np.sqrt(thin * densest), np.sqrt(thin * least)
+    since.first[OF_SPEED] = min(max(faster - 1.0, 1.0 - slower), TIMES - 1.0)
+    since.first[OF_QDYN] = min(max(thick / least - 1.0, 1.0 - thick / densest), TIMES - 1.0)
+    since.first[OF_PHI] = since.first[OF_THETA] = 2.0
+    since.off[:] = since.first
+
+
+@kernel
+def own_test(i):
+    """The test that shows at once by how much the error of hypothesis i has changed."""
+    return (ALPHA_FLOW, BETA_FLOW, SPEED, DENSITY, ANGLE, ANGLE + 1)[i]
+
+
+@kernel
+def note_changes(step, since):
+    """By how much each may have moved: within the slowest filter's memory, and what that has forgotten."""
+    for i in range(STARTERS):
+        changed = most(step, own_test(i), SLOW) + since.off[i] * since.reached[i, own_test(i), SLOW]
+        if i == OF_SPEED:
+            changed /= max(step.then[AIRSPEED], 1.0)
+        if i in (OF_SPEED, OF_QDYN):
+            changed *= 1.0 + since.off[i]
+        since.changed[i] = min(changed, since.first[i])
+        grown = since.off[i] + (1.0 - step.decay[SLOW]) * since.changed[i]
+        since.off[i] = min(grown, since.first[i])
+
+
+@kernel
+def reach(step, since, signal):
+    """Fill reach (STARTERS, RPM): what a unit of each error adds to a residual in this look, at most; and
+    `coupling`: what it adds, with its sign. Of the look before, from which this one was predicted."""
+    then, h = step.then, step.h
+    p, q, r = then[0], then[1], then[2]
+    V, phi, theta = max(then[AIRSPEED], 1.0), then[PHI], then[THETA]
+    to, c = since.reach, since.coupling
+    to[:] = 0.0
+    # the attitude, by turning; of the second order in h what turns meanwhile
+    tilt = 1.0 / np.cos(min(abs(theta), STEEPEST_RAD))
+    tilt_true = 1.0 / np.cos(min(abs(theta) + angle_of(since.off[OF_THETA]), STEEPEST_RAD))
+    meanwhile = (h * (abs(p) + abs(q) + abs(r))) ** 2
+    across, heading = h * np.hypot(q, r), h * abs(q * np.sin(phi) + r * np.cos(phi)) * tilt_true
+    for i in range(3):
+        to[OF_PHI, TURN + i] = meanwhile + (across if i > 0 else 0.0)
+        to[OF_THETA, TURN + i] = meanwhile + heading
+        to[OF_PHI, ANGLE + i] = tilt * (across + tilt * meanwhile)
+        to[OF_THETA, ANGLE + i] = tilt * ((heading if i != 1 else 0.0) + tilt_true * meanwhile)
+    c[Q_TURNS], c[R_TURNS], c[HEADS] = h * q, h * r, h * (q * np.sin(phi) + r * np.cos(phi))
+    reach_flow(step, since, V, p, q, r)
+    speeds_up = np.log(max(signal[AIRSPEED], 1.0) / V)
+    thickens = np.log(max(signal[QDYN], 1.0) / max(then[QDYN], 1.0))
+    to[OF_SPEED, DENSITY], to[OF_QDYN, DENSITY] = 2.0 * abs(speeds_up), abs(thickens)
+    c[FASTER], c[DENSER] = 2.0 * speeds_up, thickens
+
+
+@kernel
+def reach_flow(step, since, V, p, q, r):
+    """The same of flow and climb, at V m/s and rates p, q, r rad/s."""
+    then, h, s, g = step.then, step.h, step.acceleration, step.gravity
+    to, c = since.reach, since.coupling
+    sa, ca, sb, cb = np.sin(then[ALPHA]), np.cos(then[ALPHA]), np.sin(then[BETA]), np.cos(then[BETA])
+    sp, cp, st, ct = np.sin(then[PHI]), np.cos(then[PHI]), np.sin(then[THETA]), np.cos(then[THETA])
+    slip, wide = abs(then[BETA]), abs(then[BETA]) + angle_of(since.off[OF_BETA])
+    aslant, aslant_true = 1.0 / np.cos(min(slip, STEEPEST_RAD)), 1.0 / np.cos(min(wide, STEEPEST_RAD))
+    normal, pull = s[2] * ca - s[0] * sa, max(step.pull, np.sqrt(s[0] ** 2 + s[1] ** 2 + s[2] ** 2))
+    aside = s[1] * cb - (s[0] * ca + s[2] * sa) * sb
+    roll, yaw = p * ca + r * sa, p * sa - r * ca
+    coarse = h * (1.0 + h * (pull / V + abs(p) + abs(q) + abs(r)))
+    rates, climbed = np.hypot(p, r), step.predicted[ALTITUDE] - then[ALTITUDE]
+    to[OF_ALPHA, SPEED] = to[OF_BETA, SPEED] = coarse * pull
+    to[OF_ALPHA, ALPHA_FLOW] = coarse * aslant * (pull / V + rates * abs(sb))
+    to[OF_ALPHA, BETA_FLOW] = coarse * (rates + pull * abs(sb) / V)
+    to[OF_BETA, ALPHA_FLOW] = coarse * aslant * aslant_true * (abs(roll) + pull / V)
+    to[OF_BETA, BETA_FLOW] = coarse * pull / V
+    to[OF_SPEED, ALPHA_FLOW] = to[OF_SPEED, BETA_FLOW] = coarse * aslant * pull / V
+    to[OF_PHI, SPEED] = coarse * g * ct * np.hypot(sb, sa * cb)
+    to[OF_PHI, ALPHA_FLOW] = to[OF_PHI, BETA_FLOW] = coarse * g * ct * aslant / V
+    to[OF_THETA, SPEED], to[OF_THETA, ALPHA_FLOW] = coarse * g, coarse * aslant * g / V
+    to[OF_THETA, BETA_FLOW] = coarse * g * (abs(sp) + abs(sb)) / V
+    flat = np.hypot(st, cp * ct)
+    to[OF_ALPHA, CLIMB] = h * V * cb * flat
+    to[OF_BETA, CLIMB] = h * V * np.hypot(ca * st - sa * cp * ct, sp * ct)
+    to[OF_SPEED, CLIMB] = abs(climbed) / (1.0 - min(since.off[OF_SPEED], 1.0 - 1.0 / TIMES))
+    to[OF_PHI, CLIMB] = h * V * ct * np.hypot(sb, sa * cb)
+    to[OF_THETA, CLIMB] = h * V
+    c[G_DOWN], c[G_ASIDE] = h * g * ct * cp, h * g * ct * sp
+    nose = abs(then[THETA])  # the difference of two pitch angles is felt across the one between them
+    c[G_AHEAD] = h * g * np.cos(min(nose + 0.5 * angle_of(since.off[OF_THETA]), 0.5 * nose + 0.25 * np.pi))
+    steep = abs(np.arctan2(st, cp * ct) - then[ALPHA]) + 0.5 * angle_of(since.off[OF_ALPHA])
+    c[CLIMBS] = h * V * cb * flat * np.cos(min(steep, 0.5 * np.pi))
+    c[ROLLS], c[YAWS] = h * roll, h * yaw
+    c[BESIDE_ALPHA] = h * abs(sb) * pull / V
+    c[BESIDE_BETA] = h * np.sin(min(wide, 0.5 * np.pi)) * aslant * aslant_true * abs(normal) / V
+    c[PULLS], c[PUSHES] = h * normal * aslant / V, h * aside / V
+
+
+@kernel
+def accumulate(step, since):
+    """Pass reach and coupling through the filters."""
+    for i in range(STARTERS):
+        for t in range(RPM):
+            for m in range(step.decay.size):
+                since.reached[i, t, m] = step.decay[m] * since.reached[i, t, m] + since.reach[i, t]
+    for j in range(since.coupling.size):
+        for m in range(step.decay.size):
+            since.coupled[j, m] = step.decay[m] * since.coupled[j, m] + since.coupling[j]
+
+
+@kernel
+def most(step, t, m):
+    """What an error may have added to test t through filter m, at most."""
+    return abs(step.test[t].filtered[m]) + step.test[t].bound[m]
+
+
+@kernel
+def narrow_by(since, i, shown, coupling):
+    """An error that adds at least `coupling` a unit has added no more than `shown`."""
+    if coupling > 0.0:
+        since.off[i] = min(since.off[i], shown / (STEADY * coupling) + 2.0 * since.changed[i])
+
+
+@kernel
+def narrow(step, since):
+    """Bring down how far each may be off."""
+    V = max(step.then[AIRSPEED], 1.0)
+    for m in range(step.decay.size):
+        c = since.coupled[:, m]
+        turned = np.hypot(most(step, TURN + 1, m), most(step, TURN + 2, m))
+        flow = np.hypot(most(step, ALPHA_FLOW, m), most(step, BETA_FLOW, m))
+        pulled = np.hypot(most(step, SPEED, m), V * flow)
+        narrow_by(since, OF_PHI, turned, np.hypot(c[Q_TURNS], c[R_TURNS]))
+        narrow_by(since, OF_PHI, pulled, np.hypot(c[G_DOWN], c[G_ASIDE]))
+        narrow_by(since, OF_THETA, pulled, c[G_AHEAD])
+        narrow_by(since, OF_THETA, np.hypot(turned, most(step, TURN, m)), abs(c[HEADS]))
+        narrow_by(since, OF_ALPHA, most(step, CLIMB, m), c[CLIMBS])
+        half = 0.5 * angle_of(since.off[OF_ALPHA])
+        rolled = np.cos(half) * abs(c[ROLLS]) - np.sin(half) * abs(c[YAWS]) - c[BESIDE_ALPHA]
+        narrow_by(since, OF_ALPHA, most(step, BETA_FLOW, m), rolled)
+        rolled = np.cos(0.5 * angle_of(since.off[OF_BETA])) * abs(c[ROLLS]) - c[BESIDE_BETA]
+        narrow_by(since, OF_BETA, most(step, ALPHA_FLOW, m), rolled)
+        slower = 1.0 + since.off[OF_SPEED]  # bounds of the flow are for an airspeed that is right
+        narrow_by(since, OF_SPEED, slower * most(step, ALPHA_FLOW, m), abs(c[PULLS]))
+        narrow_by(since, OF_SPEED, slower * most(step, BETA_FLOW, m), abs(c[PUSHES]))
+        narrow_by(since, OF_SPEED, most(step, DENSITY, m), abs(c[FASTER]))
+        narrow_by(since, OF_QDYN, most(step, DENSITY, m), abs(c[DENSER]))
+
+
+@kernel
+def follow(step, since, signal):
+    """Bring all this to the look whose readings (N_SENSORS,) have just been tested."""
+    if steepest(step, signal) > STEEPEST_RAD:  # turning is not tested
+        since.coupled[:] = 0.0
+        return
+    note_changes(step, since)
+    reach(step, since, signal)
+    accumulate(step, since)
+    narrow(step, since)
+
+
+@kernel
+def beyond(step, since, i, t):
+    """Whether test t is further beyond its bound than a first error of hypothesis i could make it."""
+    test, off = step.test[t], since.off[i] + since.changed[i]
+    if t >= RPM:
+        return test.share > 1.0
+    room = 1.0 + (off if i == OF_SPEED and t >= SPEED else 0.0)
+    for m in range(step.decay.size):
+        if abs(test.filtered[m]) > room * test.bound[m] + off * since.reached[i, t, m]:
+            return True
+    return False
+
+
+@kernel
+def hold(since):
+    """Keep how far each was off before the alarm: what shows afterwards may be another's."""
+    since.held[:] = since.off
+
+
+@kernel
+def hidden(since, i, t, m):
+    """What the error that hypothesis i had at the alarm adds to test t through filter m, at most."""
+    return since.held[i] * since.reached[i, t, m]
+
+
+@kernel
+def note_refuted(step, since, fired):
+    """Since the alarm: note the tests, of those that have `fired`, that a first error does not explain."""
+    for i in range(STARTERS):
+        for t in range(fired.size):
+            if fired[t] and not since.refuted[i, t] and beyond(step, since, i, t):
+                since.refuted[i, t] = 1
+
+
+@kernel
+def moves(i, t):
+    """Whether test t moves at once when the error of hypothesis i does."""
+    if i in (OF_PHI, OF_THETA):
+        return t < ANGLE or t == own_test(i)
+    return t == own_test(i) or (i == OF_SPEED and t == DENSITY)
+
+
+@kernel
+def explains(since, i, lead):
+    """Whether what has shown since the alarm, led by test `lead`, may be the first error of hypothesis i, which
+    may move. What leads in a test that shows its moves is left to instruments.py, unless nothing has moved."""
+    for t in range(since.refuted.shape[1]):
+        if since.refuted[i, t] and (moves(i, lead) or not moves(i, t)):
+            return False
+    return True

@@ -52,11 +52,6 @@ TABLE = (
         "beaver-ftc run elevator-partial-loss --no-report --certificate"
         " && python tools/check_certificate.py runs/elevator-partial-loss",
     ),
-    Exempt(
-        r"python -m tools\.drawn",
-        "flight 161 breaks a promise (docs/robustness.md, section 2): those before it",
-        "python -m tools.drawn --flights 160",
-    ),
     Exempt(r"beaver-ftc compare --sweep examples/gtm/.*", "needs NASA's data, imported"),
     Exempt(r"python -m tools\.docs reference \S+", "in a checkout; tests/tools prints every such page"),
     Exempt(

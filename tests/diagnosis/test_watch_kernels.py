@@ -108,6 +108,8 @@ def suspects(shares, lead=None, **fields):
         ({BETA_FLOW: 2.0}, {BETA, 2, *FORCES}),
         ({ALPHA_FLOW: 5.0, TURN + 1: 2.0}, {1}),
         ({BETA_FLOW: 5.0, TURN + 2: 2.0}, {2}),
+        ({BETA_FLOW: 5.0, TURN: 2.0}, {0}),  # no instrument of the flow moves the attitude's tests
+        ({ALPHA_FLOW: 5.0, TURN: 2.0, TURN + 1: 1.5}, set()),
         ({TURN: 2.1}, {0}),
         ({TURN + 2: 2.1}, {2}),
         ({TURN: 1.9}, {0, PHI}),  # the angle's own test may hide as much: both bounds together
@@ -145,6 +147,7 @@ def test_an_airspeed_as_wrong_as_the_density_has_it_would_show_in_its_own_test(a
     watch = with_shares({DENSITY: 0.2})
     watch["step"]["test"]["share"][DENSITY] = 2.0
     watch["step"]["then"][AIRSPEED], watch["lead"] = airspeed, DENSITY
+    watch["since"]["refuted"] = 1
     assert watching.would_show(watch) == (who == {QDYN})
     watching.suspect(watch)
     assert set(np.flatnonzero(watch["suspect"]).tolist()) == who
@@ -170,6 +173,29 @@ def test_a_surface_may_be_named_where_no_gyro_can_be_it(known, no_gyro, blurred)
     assert watching.clears_surfaces(new_watch(enabled=0, **fields), known)
     clear = bool(known and (no_gyro or not blurred))
     assert bool(watching.clears_surfaces(new_watch(**fields), known)) == clear
+
+
+@pytest.mark.parametrize(("detected_at_s", "early"), [(2.5, True), (3.49, True), (3.51, False)])
+def test_an_alarm_of_the_first_second_may_be_an_instruments_first_error(detected_at_s, early):
+    assert watching.shown_from_the_start(new_watch(begun_at_s=2.5), detected_at_s) == early
+    assert not watching.shown_from_the_start(new_watch(enabled=0, begun_at_s=2.5), detected_at_s)
+
+
+@pytest.mark.parametrize(
+    ("flow", "gyro", "share"),
+    [(ALPHA_FLOW, 0, np.tan(0.3) * np.cos(0.2)), (ALPHA_FLOW, 1, 1.0),
+     (ALPHA_FLOW, 2, np.tan(0.3) * np.sin(0.2)), (BETA_FLOW, 0, np.sin(0.2)), (BETA_FLOW, 1, 0.0),
+     (BETA_FLOW, 2, 1.0)],
+)  # fmt: skip
+@pytest.mark.parametrize("less", [0.99, 1.01])
+def test_how_much_of_the_flow_a_gyro_may_move_unseen(flow, gyro, share, less):
+    """Twice what its own test leaves, by the kinematics of a flow at 0.2 rad and -0.3 rad."""
+    watch = new_watch()
+    watch["step"]["then"][[ALPHA, BETA]] = 0.2, -0.3
+    watch["step"]["test"]["bound"][TURN + gyro] = 40.0
+    own = (flow, gyro) in ((ALPHA_FLOW, 1), (BETA_FLOW, 2))
+    watch["step"]["test"]["filtered"][flow] = -less * (80.0 * share + (2.0 if own else 1.0))
+    assert watching.may_hide(watch, flow, gyro, own) == (less < 1.0 and share > 0.0)
 
 
 @pytest.mark.parametrize("name", ["alpha", "beta", "V", "qdyn"])
@@ -269,7 +295,7 @@ def asked(
     error=(0.0, 0.0, 0.0), then=(0.0, 0.0, 0.0), innovation=(0.0, 0.0, 0.0), noise=0.0, spike=0.0, **fields
 ):
     """What the rates say by axis; by default the bound of a frame is 1 rad/s2."""
-    watch, fdi = new_watch(error=error, error_then=then, spike_then=spike, **fields), new_fdi()
+    watch, fdi = new_watch(error=error, error_then=then, spike_before=spike, **fields), new_fdi()
     fdi["bank"]["innovation"], fdi["bound"]["frame"] = innovation, 1.0
     fdi["bank"]["threshold"][:3] = 1.0
     watch["step"]["test"]["noise"] = noise
@@ -324,6 +350,35 @@ def test_a_gyros_error_stays_within_what_the_filter_may_have_of_it(error, say):
 
 def test_what_the_rates_have_said_stays_said():
     assert asked(error=(0, 0.3, 0), rates_say=(YES, YES, NO)) == [YES, YES, NO]
+
+
+@pytest.mark.parametrize(("first", "say"), [(1.0, UNKNOWN), (0.5, UNKNOWN), (0.2, NO)])
+def test_a_first_error_of_a_gyro_need_not_be_in_the_filter(first, say):
+    """An error there from the first look on, which brought no innovation: 0.7 of it is within the bound."""
+    watch = new_watch(begun=1, past=0, error=(first, -first, 2.0 * first))
+    for past in (0, 1, 2, 3):
+        watch["past"] = past
+        watching.note_first_errors(watch)
+    assert watch["begun"] == 2
+    assert watch["W_bound"].tolist() == [first, first, 2.0 * first], "once, at the first look of the frame"
+    error = (0.7, -0.7, 1.4)
+    assert asked(error=error, then=error, W_bound=watch["W_bound"])[0] == say
+
+
+@pytest.mark.parametrize(("begun", "asked"), [(1, False), (2, False), (3, True)])
+def test_the_first_whole_frame_shows_no_jump(begun, asked):
+    watch, fdi = with_shares({TURN: 2.0, ANGLE: 1.5}, past=0, error=(0, 0.3, 0), begun=begun), new_fdi()
+    fdi["bank"]["threshold"], fdi["bound"]["frame"] = 1.0, 1.0
+    on(watching.decide, fdi, watch, seen(), 5.0)
+    assert (watch["rates_say"][1] == NO) == asked
+
+
+@pytest.mark.parametrize("quiet", ["error", "then", "spike_then"])
+def test_what_comes_again_within_a_frame_is_not_gone(quiet):
+    given = {"error": (0, 0, 0), "then": (0, 0, 0), "spike_then": 0.0}
+    assert asked(spike=1.0, W_bound=(1, 1, 1), **given)[0] == NO
+    given[quiet] = 0.004 if quiet == "spike_then" else (0.004, 0, 0)
+    assert asked(spike=1.0, W_bound=(1, 1, 1), **given)[0] == UNKNOWN
 
 
 def test_the_filter_of_a_gyros_error_follows_it_exactly():
@@ -484,7 +539,10 @@ def test_a_broken_altimeter_is_named_and_replaced_from_then_on():
 
 @pytest.mark.parametrize(("past", "asked"), [(0, True), (1, False)])
 def test_the_rates_are_asked_once_a_frame(past, asked):
-    watch, fdi = with_shares({TURN: 2.0, ANGLE: 1.5}, past=past, error=(0, 0.3, 0)), new_fdi()
+    watch, fdi = (
+        with_shares({TURN: 2.0, ANGLE: 1.5}, past=past, error=(0, 0.3, 0), begun=watching.ASKED),
+        new_fdi(),
+    )
     fdi["bank"]["threshold"], fdi["bound"]["frame"] = 1.0, 1.0
     on(watching.decide, fdi, watch, seen(), 5.0)
     assert (watch["rates_say"][1] == NO) == asked
@@ -527,10 +585,11 @@ def test_what_is_replaced_is_shared_out_and_the_slipstream_is_that_of_what_it_is
 
 def test_at_its_bound_a_test_is_within_it():
     """Shares of exactly one, and residuals of exactly the share that neighbours explain, are no suspicion."""
-    assert suspects({TURN: 1.0, TURN + 1: 1.0}, lead=TURN) == {0, 1, 2, PHI, THETA, PSI}
+    at_first = {ALPHA, BETA, AIRSPEED, PHI, THETA}  # nothing is beyond what a first error may have done
+    assert suspects({TURN: 1.0, TURN + 1: 1.0}, lead=TURN) == {0, 1, 2, PSI} | at_first
     assert suspects({ANGLE: 2.0, ANGLE + 1: 1.0}) == {0, 1, 2, PHI}
     assert suspects({TURN: 100.0, TURN + 1: 100.0 * watching.INVOLVED}) == {0}
-    assert suspects({SPEED: 1.0, DENSITY: 1.0}, lead=DENSITY) == {AIRSPEED, QDYN}
+    assert suspects({SPEED: 1.0, DENSITY: 1.0}, lead=DENSITY) == {QDYN} | at_first
 
 
 def test_of_a_kind_the_first_filter_says_how_large_it_is():
@@ -557,6 +616,7 @@ def test_angles_are_held_against_angles_and_rates_against_rates():
 def test_suspicions_of_the_frame_before_are_gone():
     watch = with_shares({CLIMB: 2.0}, lead=CLIMB)
     watch["suspect"] = 1
+    watching.note_fired(watch)
     watching.suspect(watch)
     assert np.flatnonzero(watch["suspect"]).tolist() == [ALTITUDE]
 

@@ -55,6 +55,7 @@ from beaver_ftc.plant.instruments import (
 INVOLVED = 0.03  # of the largest residual of its kind: less is what a large error does to its neighbours
 ASKED = 3  # `begun`: after the first look 1, with the first whole frame 2, from the next one on 3
 BESIDE_S = 0.5  # a surface found earlier than this before the alarm was found without the broken instrument
+SETTLED_S = 1.0  # after the watch has begun: an alarm of the surfaces by then may be an instrument's
 SLACK = 0.2  # of the damping, away from trim
 GONE = 0.003  # of what an attitude's jump has shown: what is left of it afterwards
 QUICK_PER_S = 10.0  # the second of watch.POLES_PER_S
@@ -102,7 +103,7 @@ def monitor(watch, belief, measured, conclusion, bank, bound, dt, t):
 @kernel
 def begin(watch, measured, t):
     """The first look, at t s: nothing to compare with."""
-    watch.begun = 1
+    watch.begun, watch.begun_at_s = 1, t
     watch.step.drifted = watch.step.drift * t
     redundancy.begin(watch.step, measured.signal, measured.force)
     since_start.begin(watch.since, measured.signal)
@@ -281,29 +282,48 @@ def suspect(watch):
     suspect_vane(watch, BETA, BETA_FLOW, 2)
     who[ALTITUDE] = lead == CLIMB
     who[ENGINE_SPEED], who[MANIFOLD] = lead == RPM, lead == PRESSURE
-    frozen = False
-    for i in range(N_SENSORS):
-        frozen = frozen or (
-            who[i] == 1 and watch.step.then[i] != 0.0 and accelerometers.stands_still(watch, i)
-        )
+    frozen = one_is_frozen(watch)
     for i in range(STARTERS):
         if not frozen and since_start.explains(watch.since, i, lead):
-            who[(ALPHA, BETA, AIRSPEED, QDYN, PHI, THETA)[i]] = 1
+            who[(ALPHA, BETA, AIRSPEED, PHI, THETA)[i]] = 1
+
+
+@kernel
+def one_is_frozen(watch):
+    """Whether a suspect stands still: no first error of another explains that. A sound one may read zero."""
+    for i in range(N_SENSORS):
+        if watch.suspect[i] and watch.step.then[i] != 0.0 and accelerometers.stands_still(watch, i):
+            return True
+    return False
 
 
 @kernel
 def suspect_vane(watch, vane, flow, gyro):
     """A vane, an accelerometer, or the gyro that moves the flow as well, if its error need not show in the
-    attitude yet."""
+    attitude yet. No instrument of the flow moves the attitude's tests."""
     if watch.lead != flow:
         return
-    test, turn, shown = watch.step.test[flow], watch.step.test[TURN + gyro], watch.fired[TURN + gyro] == 1
-    hidden = True
+    turns = watch.fired[TURN] + watch.fired[TURN + 1] + watch.fired[TURN + 2]
+    accelerometers.suspect_accelerometers(watch, turns > 0)
+    watch.suspect[vane] = not (turns > 0 or watch.cleared[vane])
+    for i in range(3):
+        shown = turns == 1 and watch.fired[TURN + i] == 1
+        watch.suspect[i] = shown or (turns == 0 and may_hide(watch, flow, i, i == gyro))
+
+
+@kernel
+def may_hide(watch, flow, i, own):
+    """Whether gyro i may do what the test of the flow shows, and not show in that of its axis; own: it is the
+    one that turns the flow with all of its error. Of the others it takes the share by kinematics."""
+    step, alpha = watch.step, watch.step.then[ALPHA]
+    along = np.cos(alpha) if i == 0 else np.sin(alpha)
+    share = abs(np.tan(step.then[BETA]) * along) if flow == ALPHA_FLOW else abs(np.sin(alpha))
+    test, turn = step.test[flow], step.test[TURN + i]
     for m in range(test.filtered.size):
-        hidden = hidden and abs(test.filtered[m]) <= 2.0 * (turn.bound[m] + test.bound[m])
-    accelerometers.suspect_accelerometers(watch, shown)
-    watch.suspect[vane] = not (shown or watch.cleared[vane])
-    watch.suspect[gyro] = shown or hidden
+        room = 2.0 * test.bound[m] if own else test.bound[m]
+        if abs(test.filtered[m]) > 2.0 * (1.0 if own else share) * turn.bound[m] + room:
+            return False
+    return own or i == 0 or flow == ALPHA_FLOW  # the sideslip does not feel q
 
 
 @kernel
@@ -380,6 +400,13 @@ def clears_surfaces(watch, known):
     if not watch.enabled:
         return True
     return known == 1 and (watch.no_gyro == 1 or not watch.blurred) and not flow_stands_still(watch)
+
+
+@kernel
+def shown_from_the_start(watch, detected_at_s):
+    """Whether the alarm of the surfaces came so early that a reading of the flow may have brought it by its
+    first error, which in the model moves the aircraft from the first frame on. Then no surface is named."""
+    return watch.enabled and detected_at_s < watch.begun_at_s + SETTLED_S
 
 
 @kernel

@@ -1,31 +1,34 @@
 """Which instruments may have been broken when the watch over them began, and what that can do to its tests.
 
-A reading that was off by a constant from the first look on has leapt in no test of its own: the tests show it
-through the kinematics alone, beside what sound instruments do. For each reading of the flow and of the
-attitude that others are predicted from, on the hypothesis that it alone is broken,
+A reading that was off by a constant from the first look on has leapt in no test of its own: it shows through
+the kinematics of the others alone, in tests that are held to be theirs. For each reading that others are
+predicted from, on the hypothesis that it alone is broken,
 
-    off        how far it can still be off: at first as far as an aircraft may fly, from then on
-                   off <= (|residual| + bound) / coupling        of every test and filter it is coupled to,
-               plus what it may have moved by since: what its own test has shown, and that test's bound
+    off        how far it can still be off: at first as far as an aircraft flies, from then on
+                   off <= (|residual| + bound) / coupling         for each filter of a test it is coupled to
+    changed    what it may have moved by since: what its own test shows, and that test's bound; it adds to off
     reach      how much a unit of its error adds to each test's residual in a look, at most
     reached    the same through the filters
 
-A test beyond bound + off * reached refutes the hypothesis. So the instrument that is broken in truth is never refuted
-by what its first error does, whatever its size: each step holds for it. What moves afterwards is decided as
-before (instruments.py), with bound + off * reached in place of the bound.
+A test beyond bound + (off + changed) reached refutes the hypothesis: a residual is the sum of what sound
+instruments make, at most bound, and of what the error makes, at most the rest. So the broken instrument is
+never ruled out by what its first error does, of whatever size. Where instruments.py rules one out by what it
+would do from now on, bound + off reached is in the place of the bound.
 
 The error of an angle is counted as 2 sin(error / 2), by which it turns a vector of length one; that of the
-airspeed and of the dynamic pressure as reading / truth - 1. Then, with s the acceleration, gravity included,
+airspeed as reading / truth - 1. With s the acceleration, gravity included, and errors that are differences of
+these sines,
 
-    turning, phi         an error of p (0, q, r)                    theta   an error of psi'
-    SPEED                s . v / V
-    ALPHA_FLOW           q - tan beta (p cos alpha + r sin alpha) + (s_z cos alpha - s_x sin alpha) / V cos beta
-    BETA_FLOW            p sin alpha - r cos alpha + (s_y cos beta - (s_x cos alpha + s_z sin alpha) sin beta) / V
-    DENSITY              log (qdyn / V^2): an error x scales the change of the logarithm by 1 + x
-    CLIMB                V (sin theta cos alpha cos beta - ...)
+    attitude     an error of phi adds the difference of (q, r) turned by it; of theta, that of psi' turned
+    gravity      of the length of g cos theta, or of g, turned by it; in SPEED, ALPHA_FLOW and BETA_FLOW
+    SPEED        s . v / V
+    ALPHA_FLOW   q - tan beta (p cos alpha + r sin alpha) + (s_z cos alpha - s_x sin alpha) / V cos beta
+    BETA_FLOW    p sin alpha - r cos alpha + (s_y cos beta - (s_x cos alpha + s_z sin alpha) sin beta) / V
+    DENSITY      log V: an error x scales its change by 1 + x
+    CLIMB        V (cos beta (cos alpha sin theta - sin alpha cos phi cos theta) - sin beta sin phi cos theta)
 
-are off by no more, and where said by no less, than the differences of these sines. Gyros need none of it: all
-of a gyro's error is in the test of its own axis.
+Gyros need none of it: all of a gyro's error is in the test of its own axis at every look. Nor does the
+dynamic pressure: nothing but the density shows it.
 """
 
 import numpy as np
@@ -44,7 +47,6 @@ from beaver_ftc.diagnosis.watch import (
     OF_ALPHA,
     OF_BETA,
     OF_PHI,
-    OF_QDYN,
     OF_SPEED,
     OF_THETA,
     QDYN,
@@ -64,7 +66,7 @@ SLOW = 2  # of watch.POLES_PER_S
 
 # Couplings that are followed with their sign
 Q_TURNS, R_TURNS, G_DOWN, G_ASIDE, G_AHEAD, CLIMBS, ROLLS, YAWS, BESIDE_ALPHA, BESIDE_BETA = range(10)
-PULLS, PUSHES, FASTER, DENSER, HEADS = range(10, 15)
+PULLS, PUSHES, FASTER, HEADS = range(10, 14)
 
 
 @kernel
@@ -90,12 +92,11 @@ def begin(since, signal):
     """With the first look at readings (N_SENSORS,) each may be off as far as an aircraft may fly."""
     since.first[OF_ALPHA] = size_of(abs(signal[ALPHA]) + SIDEWAYS_RAD)
     since.first[OF_BETA] = size_of(abs(signal[BETA]) + SIDEWAYS_RAD)
-    V, dense = max(signal[AIRSPEED], 1.0), density(signal[ALTITUDE])
-    thick = max(signal[QDYN], 1.0) / (0.5 * dense * V * V)
-    thin, least, densest = 1.0 / thick, 1.0 - WEATHER, 1.0 + WEATHER
-    faster, slower = np.sqrt(thin * densest), np.sqrt(thin * least)
+    # the airspeed that the dynamic pressure and the height leave
+    V = max(signal[AIRSPEED], 1.0)
+    true = np.sqrt(2.0 * max(signal[QDYN], 1.0) / density(signal[ALTITUDE]))
+    faster, slower = V / true * np.sqrt(1.0 + WEATHER), V / true * np.sqrt(1.0 - WEATHER)
     since.first[OF_SPEED] = min(max(faster - 1.0, 1.0 - slower), TIMES - 1.0)
-    since.first[OF_QDYN] = min(max(thick / least - 1.0, 1.0 - thick / densest), TIMES - 1.0)
     since.first[OF_PHI] = since.first[OF_THETA] = 2.0
     since.off[:] = since.first
 
@@ -103,7 +104,7 @@ def begin(since, signal):
 @kernel
 def own_test(i):
     """The test that shows at once by how much the error of hypothesis i has changed."""
-    return (ALPHA_FLOW, BETA_FLOW, SPEED, DENSITY, ANGLE, ANGLE + 1)[i]
+    return (ALPHA_FLOW, BETA_FLOW, SPEED, ANGLE, ANGLE + 1)[i]
 
 
 @kernel
@@ -112,9 +113,7 @@ def note_changes(step, since):
     for i in range(STARTERS):
         changed = most(step, own_test(i), SLOW) + since.off[i] * since.reached[i, own_test(i), SLOW]
         if i == OF_SPEED:
-            changed /= max(step.then[AIRSPEED], 1.0)
-        if i in (OF_SPEED, OF_QDYN):
-            changed *= 1.0 + since.off[i]
+            changed *= (1.0 + since.off[i]) / max(step.then[AIRSPEED], 1.0)
         since.changed[i] = min(changed, since.first[i])
         grown = since.off[i] + (1.0 - step.decay[SLOW]) * since.changed[i]
         since.off[i] = min(grown, since.first[i])
@@ -142,9 +141,7 @@ def reach(step, since, signal):
     c[Q_TURNS], c[R_TURNS], c[HEADS] = h * q, h * r, h * (q * np.sin(phi) + r * np.cos(phi))
     reach_flow(step, since, V, p, q, r)
     speeds_up = np.log(max(signal[AIRSPEED], 1.0) / V)
-    thickens = np.log(max(signal[QDYN], 1.0) / max(then[QDYN], 1.0))
-    to[OF_SPEED, DENSITY], to[OF_QDYN, DENSITY] = 2.0 * abs(speeds_up), abs(thickens)
-    c[FASTER], c[DENSER] = 2.0 * speeds_up, thickens
+    to[OF_SPEED, DENSITY], c[FASTER] = 2.0 * abs(speeds_up), 2.0 * speeds_up
 
 
 @kernel
@@ -207,36 +204,67 @@ def most(step, t, m):
 
 
 @kernel
+def shown(step, since, i, t, m):
+    """What the error that hypothesis i has now has added to test t through filter m, at most: what is there,
+    and what the error was less or more by while the filter gathered it."""
+    return most(step, t, m) + 2.0 * since.changed[i] * since.reached[i, t, m]
+
+
+@kernel
 def narrow_by(since, i, shown, coupling):
     """An error that adds at least `coupling` a unit has added no more than `shown`."""
     if coupling > 0.0:
-        since.off[i] = min(since.off[i], shown / (STEADY * coupling) + 2.0 * since.changed[i])
+        since.off[i] = min(since.off[i], shown / (STEADY * coupling))
+
+
+@kernel
+def pulled(step, since, i, m):
+    """The same of the velocity, m/s, whatever its direction."""
+    V = max(step.then[AIRSPEED], 1.0)
+    flow = np.hypot(shown(step, since, i, ALPHA_FLOW, m), shown(step, since, i, BETA_FLOW, m))
+    return np.hypot(shown(step, since, i, SPEED, m), V * flow)
+
+
+@kernel
+def turned(step, since, i, m):
+    """The same of the turning about the axes other than the body's first."""
+    return np.hypot(shown(step, since, i, TURN + 1, m), shown(step, since, i, TURN + 2, m))
 
 
 @kernel
 def narrow(step, since):
     """Bring down how far each may be off."""
-    V = max(step.then[AIRSPEED], 1.0)
     for m in range(step.decay.size):
         c = since.coupled[:, m]
-        turned = np.hypot(most(step, TURN + 1, m), most(step, TURN + 2, m))
-        flow = np.hypot(most(step, ALPHA_FLOW, m), most(step, BETA_FLOW, m))
-        pulled = np.hypot(most(step, SPEED, m), V * flow)
-        narrow_by(since, OF_PHI, turned, np.hypot(c[Q_TURNS], c[R_TURNS]))
-        narrow_by(since, OF_PHI, pulled, np.hypot(c[G_DOWN], c[G_ASIDE]))
-        narrow_by(since, OF_THETA, pulled, c[G_AHEAD])
-        narrow_by(since, OF_THETA, np.hypot(turned, most(step, TURN, m)), abs(c[HEADS]))
-        narrow_by(since, OF_ALPHA, most(step, CLIMB, m), c[CLIMBS])
-        half = 0.5 * angle_of(since.off[OF_ALPHA])
-        rolled = np.cos(half) * abs(c[ROLLS]) - np.sin(half) * abs(c[YAWS]) - c[BESIDE_ALPHA]
-        narrow_by(since, OF_ALPHA, most(step, BETA_FLOW, m), rolled)
-        rolled = np.cos(0.5 * angle_of(since.off[OF_BETA])) * abs(c[ROLLS]) - c[BESIDE_BETA]
-        narrow_by(since, OF_BETA, most(step, ALPHA_FLOW, m), rolled)
-        slower = 1.0 + since.off[OF_SPEED]  # bounds of the flow are for an airspeed that is right
-        narrow_by(since, OF_SPEED, slower * most(step, ALPHA_FLOW, m), abs(c[PULLS]))
-        narrow_by(since, OF_SPEED, slower * most(step, BETA_FLOW, m), abs(c[PUSHES]))
-        narrow_by(since, OF_SPEED, most(step, DENSITY, m), abs(c[FASTER]))
-        narrow_by(since, OF_QDYN, most(step, DENSITY, m), abs(c[DENSER]))
+        narrow_by(since, OF_PHI, turned(step, since, OF_PHI, m), np.hypot(c[Q_TURNS], c[R_TURNS]))
+        narrow_by(since, OF_PHI, pulled(step, since, OF_PHI, m), np.hypot(c[G_DOWN], c[G_ASIDE]))
+        narrow_by(since, OF_THETA, pulled(step, since, OF_THETA, m), c[G_AHEAD])
+        about = np.hypot(shown(step, since, OF_THETA, TURN, m), turned(step, since, OF_THETA, m))
+        narrow_by(since, OF_THETA, about, abs(c[HEADS]))
+        narrow_vanes(step, since, m)
+        narrow_speed(step, since, m)
+
+
+@kernel
+def narrow_vanes(step, since, m):
+    """The same of incidence and sideslip."""
+    c, half = since.coupled[:, m], 0.5 * angle_of(since.off[OF_ALPHA])
+    rolled = np.cos(half) * abs(c[ROLLS]) - np.sin(half) * abs(c[YAWS]) - c[BESIDE_ALPHA]
+    narrow_by(since, OF_ALPHA, shown(step, since, OF_ALPHA, CLIMB, m), c[CLIMBS])
+    narrow_by(since, OF_ALPHA, shown(step, since, OF_ALPHA, BETA_FLOW, m), rolled)
+    rolled = np.cos(0.5 * angle_of(since.off[OF_BETA])) * abs(c[ROLLS]) - c[BESIDE_BETA]
+    narrow_by(since, OF_BETA, shown(step, since, OF_BETA, ALPHA_FLOW, m), rolled)
+
+
+@kernel
+def narrow_speed(step, since, m):
+    """The same of the airspeed. Bounds of the flow are for one that is right; the density shows its changes,
+    and so does its own test: a scale error is in both alike."""
+    c, slower = since.coupled[:, m], 1.0 + since.off[OF_SPEED]
+    narrow_by(since, OF_SPEED, slower * shown(step, since, OF_SPEED, ALPHA_FLOW, m), abs(c[PULLS]))
+    narrow_by(since, OF_SPEED, slower * shown(step, since, OF_SPEED, BETA_FLOW, m), abs(c[PUSHES]))
+    changes = 2.0 * slower * most(step, SPEED, m) / max(step.then[AIRSPEED], 1.0)
+    narrow_by(since, OF_SPEED, shown(step, since, OF_SPEED, DENSITY, m) + changes, abs(c[FASTER]))
 
 
 @kernel
@@ -295,8 +323,8 @@ def moves(i, t):
 
 @kernel
 def explains(since, i, lead):
-    """Whether what has shown since the alarm, led by test `lead`, may be the first error of hypothesis i, which
-    may move. What leads in a test that shows its moves is left to instruments.py, unless nothing has moved."""
+    """Whether what has shown since the alarm, led by test `lead`, may be the first error of hypothesis i, and
+    one that moves. Where its moves show in `lead`, those are for instruments.py: here it has not moved."""
     for t in range(since.refuted.shape[1]):
         if since.refuted[i, t] and (moves(i, lead) or not moves(i, t)):
             return False

@@ -20,8 +20,8 @@ P, Q, R, ALPHA, BETA, AIRSPEED, QDYN = range(len(SIGNALS))
 THETA, PSI = PHI + 1, PHI + 2
 
 # Hypotheses of since_start.py: the instruments that may be broken when the watch begins
-OF_ALPHA, OF_BETA, OF_SPEED, OF_QDYN, OF_PHI, OF_THETA = range(6)
-STARTERS, N_COUPLINGS = 6, 15
+OF_ALPHA, OF_BETA, OF_SPEED, OF_PHI, OF_THETA = range(5)
+STARTERS, N_COUPLINGS = 5, 14
 
 TEST = record(
     residual=float, rate=float, noise=float, noise_then=float,  # of the elapsed step
@@ -59,8 +59,8 @@ SINCE = record(
 )  # fmt: skip
 
 WATCH = record(
-    enabled=int, begun=int, instants=int, past=int, engine=int, alarmed=int, alarmed_at_s=float, beside=int,
-    lead=int,
+    enabled=int, begun=int, begun_at_s=float, instants=int, past=int, engine=int, alarmed=int,
+    alarmed_at_s=float, beside=int, lead=int,
     misnamed=int,  # a surface had been named in the moment before the alarm
     furthest=int, share=float,  # of this frame: the test nearest its bound, and how near
     fired=(int, N_TESTS), suspect=(int, N_SENSORS), named=int, named_at_s=float, replaced=(int, N_SENSORS),
@@ -75,8 +75,8 @@ WATCH = record(
     # two looks ago; who is cleared
     still=(int, N_SENSORS), longest_still=(int, N_SENSORS), earlier=N_SENSORS, cleared=(int, N_SENSORS),
     # how far accelerometers have leapt of late. Since the alarm: looks, residuals of speed, incidence and
-    # sideslip, how much of them is sound, or of a first error; least and most of the readings; the climb that such an
-    # incidence makes up; the velocity made up, body axes
+    # sideslip, how much of them is sound, how much is of a first error; least and most of the readings; the
+    # climb that such an incidence makes up; the velocity made up, body axes
     restless=float, gathering=int, gathered=3, sound=3, first=3, least=3, most=3, fallen=N_POLES, made_up=3,
     step=STEP, since=SINCE,
 )  # fmt: skip

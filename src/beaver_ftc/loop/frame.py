@@ -208,7 +208,8 @@ def conclude(fdi, measured, u, t):
         return
     if not known:
         scheme.begin_isolation(fdi.isolation, fdi.types, every_type, fdi.bound.noise, measured.x)
-    if instruments.clears_surfaces(fdi.watch, known) and not fdi.balance.failed:
+    sound = not instruments.shown_from_the_start(fdi.watch, fdi.verdict.detected_at_s)
+    if sound and instruments.clears_surfaces(fdi.watch, known) and not fdi.balance.failed:
         isolate(fdi, measured.x, t, known)
     if not fdi.published.in_use:
         detection.evaluate(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])

@@ -1,0 +1,184 @@
+"""Errors that were there from the first look on, in flights by rotation matrices: none is ever ruled out.
+
+The flights move about all axes, fast and slowly, with sideslip and bank; their readings are sound but for
+one, which is off from the first look on by a constant, by a scale, or by what swings slowly.
+"""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from beaver_ftc.diagnosis import redundancy, since_start
+from beaver_ftc.diagnosis.watch import (
+    AIRSPEED,
+    ALPHA,
+    BETA,
+    CLIMB,
+    DENSITY,
+    N_TESTS,
+    OF_ALPHA,
+    OF_BETA,
+    OF_PHI,
+    OF_SPEED,
+    OF_THETA,
+    QDYN,
+    SPEED,
+    STARTERS,
+    THETA,
+    TURN,
+    WATCH,
+)
+from beaver_ftc.plant.instruments import ALTITUDE, AX, N_SENSORS, PHI
+
+GRAVITY, LOOKS = 9.8, 100
+READING = {OF_ALPHA: ALPHA, OF_BETA: BETA, OF_SPEED: AIRSPEED, OF_PHI: PHI, OF_THETA: THETA}
+NAMES = {OF_ALPHA: "alpha", OF_BETA: "beta", OF_SPEED: "V", OF_PHI: "phi", OF_THETA: "theta"}
+SHOWN = {OF_ALPHA: 0.1, OF_BETA: 0.12, OF_PHI: 0.06, OF_THETA: 0.06}
+
+
+def flight(seed, h, swiftly):
+    """Readings (LOOKS, N_SENSORS) of a flight with every motion, and no error."""
+    rng = np.random.default_rng(seed)
+    t = h * np.arange(LOOKS)
+    size, pace = (0.3, 4.0) if swiftly else (0.06, 1.0)
+    rates, felt = np.zeros((LOOKS, 3)), np.zeros((LOOKS, 3))
+    for i in range(3):
+        rates[:, i] = size * np.sin(pace * rng.uniform(0.5, 1.5) * t + rng.uniform(0, 6))
+        felt[:, i] = (1.0, 0.6, 1.5)[i] * np.sin(pace * rng.uniform(0.5, 1.5) * t + rng.uniform(0, 6))
+    turn = Rotation.from_euler("ZYX", (rng.uniform(-3, 3), rng.uniform(-0.2, 0.3), rng.uniform(-0.5, 0.5)))
+    alpha, beta, V, altitude = rng.uniform(0.03, 0.2), rng.uniform(-0.1, 0.1), rng.uniform(35, 55), 900.0
+    v = turn.apply(V * np.array([np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)]))
+    down, before, signal = np.array([0.0, 0.0, GRAVITY]), None, np.zeros((LOOKS, N_SENSORS))
+    for k in range(LOOKS):
+        force = felt[k] - turn.inv().apply(down)  # so that it does not fall: accelerations are those drawn
+        body, angles = turn.inv().apply(v), turn.as_euler("ZYX")[::-1]
+        V = np.linalg.norm(v)
+        signal[k, :3], signal[k, PHI : PHI + 3], signal[k, AX:] = rates[k], angles, force
+        signal[k, [ALPHA, BETA, AIRSPEED]] = np.arctan2(body[2], body[0]), np.arcsin(body[1] / V), V
+        air = 1.225 * (1.0 - 2.25577e-5 * altitude) ** 4.2559
+        signal[k, QDYN], signal[k, ALTITUDE] = 0.5 * 1.1 * air * V * V, altitude  # on a cold day
+        acceleration = turn.apply(felt[k])
+        before = acceleration if before is None else before
+        altitude -= h * v[2]
+        v = v + h * (1.5 * acceleration - 0.5 * before)
+        before, turn = acceleration, turn * Rotation.from_rotvec(h * rates[k])
+    return signal
+
+
+def course(kind, size, true, h):
+    """An error that is there from the first look on."""
+    t = h * np.arange(LOOKS)
+    return {
+        "constant": np.full(LOOKS, size),
+        "scale": 1.6 * size * true,
+        "swinging": size * (1.0 + 0.1 * np.sin(0.7 * t)),
+    }[kind]
+
+
+def new_watch(h):
+    watch = np.zeros(1, WATCH).view(np.recarray)[0]
+    step = watch["step"]
+    step["h"], step["decay"], step["gravity"] = h, np.exp([-1e6 * h, -10.0 * h, -h]), GRAVITY
+    step["rising"], step["swift"] = 1.0, 80.0
+    step["offset"][:3], step["steady"][:3] = 2e-4, 1e-4
+    step["offset"][[ALPHA, BETA, PHI, THETA]] = 5e-4
+    step["offset"][AIRSPEED], step["offset"][QDYN], step["offset"][ALTITUDE] = 0.05, 2.0, 0.5
+    return watch
+
+
+def sizes(i, reading, true):
+    """The error as since_start counts it."""
+    return reading / true - 1.0 if i == OF_SPEED else 2.0 * np.sin(0.5 * (reading - true))
+
+
+def looks(signal, h):
+    """Each look's number and the watch, all that was beyond its bound by then noted as fired."""
+    watch = new_watch(h)
+    redundancy.begin(watch["step"], signal[0], signal[0, AX:])
+    since_start.begin(watch["since"], signal[0])
+    redundancy.look(watch["step"], signal[0], signal[0, AX:])
+    fired = np.zeros(N_TESTS, int)
+    for k in range(1, len(signal)):
+        redundancy.check(watch["step"], signal[k], 0)
+        since_start.follow(watch["step"], watch["since"], signal[k])
+        fired |= watch["step"]["test"]["share"] > 1.0
+        since_start.note_refuted(watch["step"], watch["since"], fired)
+        yield k, watch, fired
+        redundancy.look(watch["step"], signal[k], signal[k, AX:])
+
+
+@pytest.mark.parametrize("kind", ["constant", "scale", "swinging"])
+@pytest.mark.parametrize("i", range(STARTERS), ids=NAMES.get)
+@pytest.mark.parametrize(("seed", "h", "swiftly"), [(1, 0.01, True), (2, 0.05, False)])
+def test_what_is_broken_from_the_start_is_never_refuted(seed, h, swiftly, i, kind):
+    rng, true = np.random.default_rng([seed, i]), flight(seed, h, swiftly)
+    for size in rng.uniform(0.8, 1.2) * np.array([-0.4, 0.03, 0.5]):
+        broken = true.copy()
+        factor = true[0, AIRSPEED] if i == OF_SPEED else 1.0
+        broken[:, READING[i]] += course(
+            kind, size * (1.0 if kind == "scale" else factor), true[:, READING[i]], h
+        )
+        off = abs(sizes(i, broken[:, READING[i]], true[:, READING[i]]))
+        moved = set()
+        for k, watch, _ in looks(broken, h):
+            since = watch["since"]
+            assert off[k] <= (since["off"][i] + since["changed"][i]) * (1.0 + 1e-9), (size, k)
+            moved |= set(np.flatnonzero(since["refuted"][i]).tolist())
+        assert all(since_start.moves(i, t) for t in moved), (size, moved)
+        assert kind != "constant" or not moved
+
+
+def test_a_sound_flight_shows_each_reading_to_be_sound():
+    """None is beyond its bound, and none can be off by more than a little any more; the airspeed by as little
+    as the density of the air says from the first look on."""
+    for k, watch, fired in looks(flight(5, 0.01, True), 0.01):
+        assert not fired.any(), k
+        since = watch["since"]
+    for i, little in SHOWN.items():
+        assert since["off"][i] < little < since["first"][i], NAMES[i]
+    assert since["off"][OF_SPEED] < 0.2
+
+
+def test_in_steady_flight_nothing_shows_the_sideslip_or_the_airspeed():
+    """They stay as unknown as at the first look; the attitude is shown by gravity."""
+    signal = np.repeat(flight(6, 0.01, False)[:1], LOOKS, axis=0)
+    signal[:, :3] = 0.0
+    level = Rotation.from_euler("ZYX", signal[0, PHI : PHI + 3][::-1]).inv().apply((0, 0, GRAVITY))
+    signal[:, AX:] = -level
+    V, alpha, beta = signal[0, [AIRSPEED, ALPHA, BETA]]
+    body = V * np.array([np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)])
+    down = Rotation.from_euler("ZYX", signal[0, PHI : PHI + 3][::-1]).apply(body)[2]
+    signal[:, ALTITUDE] -= 0.01 * down * np.arange(LOOKS)
+    for _, watch, fired in looks(signal, 0.01):
+        assert not fired.any()
+        off, first = watch["since"]["off"], watch["since"]["first"]
+    assert off[OF_BETA] == first[OF_BETA]
+    assert off[OF_SPEED] == first[OF_SPEED]
+    assert max(off[OF_PHI], off[OF_THETA]) < 0.06
+
+
+@pytest.mark.parametrize(
+    ("i", "lead", "by", "explained"),
+    [
+        (OF_ALPHA, CLIMB, (CLIMB,), False), (OF_ALPHA, CLIMB, (7,), True), (OF_ALPHA, 7, (7,), False),
+        (OF_SPEED, CLIMB, (SPEED, DENSITY), True), (OF_SPEED, DENSITY, (DENSITY,), False),
+        (OF_PHI, 8, (TURN, TURN + 2, 3), True), (OF_PHI, 8, (4,), False), (OF_PHI, TURN, (TURN,), False),
+        (OF_THETA, 8, (TURN + 1, 4), True), (OF_THETA, 8, (3,), False), (OF_BETA, CLIMB, (12,), False),
+        (OF_BETA, CLIMB, (), True),
+    ],
+)  # fmt: skip
+def test_tests_that_show_its_moves_do_not_speak_against_a_first_error(i, lead, by, explained):
+    since = new_watch(0.01)["since"]
+    since["refuted"][i, list(by)] = 1
+    assert since_start.explains(since, i, lead) == explained
+
+
+def test_what_the_airspeed_may_be_off_by_follows_from_the_dynamic_pressure():
+    """At 1000 m of the standard the density is 1.1116 kg/m3; a quarter more or less is the weather."""
+    for V, true in ((45.0, 45.0), (20.0, 45.0), (90.0, 45.0)):
+        signal, since = np.zeros(N_SENSORS), new_watch(0.01)["since"]
+        signal[[AIRSPEED, ALTITUDE, QDYN, ALPHA]] = V, 1000.0, 0.5 * 1.1116 * true**2, -0.2
+        since_start.begin(since, signal)
+        ends = V / true * np.sqrt(1.25) - 1.0, 1.0 - V / true * np.sqrt(0.75)
+        assert since["off"][OF_SPEED] == pytest.approx(max(ends), rel=1e-3)
+        assert since["off"][OF_ALPHA] == pytest.approx(2.0 * np.sin(0.45))

@@ -33,7 +33,7 @@ from beaver_ftc.plant.instruments import ALTITUDE, AX, N_SENSORS, PHI
 GRAVITY, LOOKS = 9.8, 100
 READING = {OF_ALPHA: ALPHA, OF_BETA: BETA, OF_SPEED: AIRSPEED, OF_PHI: PHI, OF_THETA: THETA}
 NAMES = {OF_ALPHA: "alpha", OF_BETA: "beta", OF_SPEED: "V", OF_PHI: "phi", OF_THETA: "theta"}
-SHOWN = {OF_ALPHA: 0.1, OF_BETA: 0.12, OF_PHI: 0.06, OF_THETA: 0.06}
+SHOWN = {OF_ALPHA: 0.1, OF_BETA: 0.12, OF_PHI: 0.1, OF_THETA: 0.1}
 
 
 def flight(seed, h, swiftly):

@@ -212,4 +212,11 @@ def test_a_saved_flight_is_said_with_its_report(session, tmp_path, monkeypatch):
     says = asked(session, do="save")
     assert asked_for == [(tmp_path, True)]
     assert says == f"saved: {tmp_path / 'x'}; fly it again: beaver-ftc run {tmp_path / 'x' / 'scenario.yaml'}"
+    asked(session, do="stick", rates_deg_s=[1, 0, 0])
+    assert asked(session, do="save") == says
+    assert len(asked_for) == 1  # of an instant once, though it is pressed again and again
+    for changes in (session.step, lambda: asked(session, do="break", fault=LOSS)):
+        changes()
+        asked(session, do="save")
+    assert len(asked_for) == 3
     assert session.events[-1]["says"] == "x"  # guests hear this: no folder of whoever flies

@@ -34,6 +34,7 @@ GUST_S = {"rise_s": 0.5, "hold_s": 1.0, "fade_s": 0.5}
 PATIENCE_S = 10.0  # for the diagnosis, once you have spoken
 INSTRUMENTS = "instruments"
 OF_A_FLIGHT = ("break", "repair", "blow", "aim", "change")  # what is asked of a flight that goes on
+CHANGES_NOTHING = ("save", "stick")  # of what has been flown
 HIDDEN = (
     "_effective_rad", "_pos_rad", "_excluded", "_effectiveness_estimate", "_effectiveness_used", "mode",
     "detected",
@@ -79,6 +80,7 @@ class Session:
         turns = {at_s for fault in flown.faults for at_s in (fault.at_s, fault.end_s) if at_s is not None}
         self._turns_s = deque(sorted(turns))
         self._known: tuple[Any, ...] = ()
+        self._saved = ""  # what was said of the folder that has all of this flight, if there is one
         self._broken_by: dict[str, str] = {}
         self._tell("flight", f"{scenario.name}: trimmed, {flown.control.law} law, {flown.fdi.scheme}")
 
@@ -89,6 +91,7 @@ class Session:
 
     def step(self) -> None:
         """Fly one frame and notice what it brought."""
+        self._saved = ""
         if self.game.is_due(self.sim.t_s):
             self._inject(self.game.fault)
         if self.sim.frames % STICK_FRAMES == 0 or not self.stick.coordinated:
@@ -160,6 +163,7 @@ class Session:
         if self.over and request.do in OF_A_FLIGHT:
             raise BadInput("the flight is over, allowed: a new flight")
         self._by = by
+        self._saved = self._saved if request.do in CHANGES_NOTHING else ""
         try:
             says: str = getattr(self, f"_{request.do}")(request)
         finally:
@@ -259,6 +263,11 @@ class Session:
         return ""
 
     def _save(self, asked: messages.Save) -> str:
+        """Seconds in which nobody flies: of one instant only once, however often it is asked."""
+        self._saved = self._saved or self._written()
+        return self._saved
+
+    def _written(self) -> str:
         flight = self.sim.land()
         declared = sorted(flight.scenario.faults, key=lambda fault: fault.at_s)
         for fault, document in zip(declared, flight.metrics["faults"], strict=True):

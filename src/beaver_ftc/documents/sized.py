@@ -102,14 +102,11 @@ def sized(function: Callable[..., np.dtype]) -> Callable[..., np.dtype]:
     arguments = inspect.signature(function)
 
     @functools.lru_cache
-    def made(*sizes: Any) -> np.dtype:
-        return function(*map(_rooms, sizes))
-
     @functools.wraps(function)
     def of(*given: Any, **named: Any) -> np.dtype:
         bound = arguments.bind(*given, **named)
         bound.apply_defaults()
-        return made(*bound.args)
+        return function(*map(_rooms, bound.args))
 
     return of
 

@@ -352,6 +352,16 @@ def test_how_many_tasks_a_cluster_holds(ray, cpus, asked, slots):
     assert ray_workers.RayWorkers(Work(double), None, asked).slots == slots
 
 
+def test_what_ray_prints_of_workers_that_die_is_no_part_of_the_output(ray, capsys):
+    there = ray_workers.RayWorkers(Work(double), None, None)
+    there.submit(Batch(1, CASES[:1]))
+    print("(raylet) a worker died")
+    there.submit(Batch(2, CASES[:1]))
+    there.close()
+    print("results")
+    assert capsys.readouterr() == ("results\n", "(raylet) a worker died\n")
+
+
 def test_a_cluster_that_was_there_goes_on(ray):
     ray.running = True
     ray_workers.RayWorkers(Work(double), None, 2).close()

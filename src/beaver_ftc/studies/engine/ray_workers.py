@@ -4,7 +4,9 @@ Whether a lost task is flown again is the campaign's to decide, as with local pr
 retry.
 """
 
+import contextlib
 import os
+import sys
 from typing import Any
 
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
@@ -30,6 +32,7 @@ class RayWorkers:
         self._versions = dict(versions())
         self._fly = self._ray.remote(num_cpus=1, max_retries=0)(fly_task)
         self._tasks: dict[Any, Batch] = {}
+        self._diverted: contextlib.redirect_stdout[Any] | None = None
 
     @property
     def slots(self) -> int:
@@ -38,6 +41,9 @@ class RayWorkers:
         return self._most or QUEUED_A_CPU * cpus
 
     def submit(self, task: Batch) -> None:
+        if self._diverted is None:  # Ray prints of workers that die, where a document may be due
+            self._diverted = contextlib.redirect_stdout(sys.stderr)
+            self._diverted.__enter__()
         self._tasks[self._fly.remote(self._work, self._versions, task.cases)] = task
 
     def outcomes(self, timeout_s: float) -> list[Outcome]:
@@ -49,6 +55,9 @@ class RayWorkers:
             self._ray.cancel(reference, force=True)
         if self._ours:
             self._ray.shutdown()
+        if self._diverted is not None:
+            self._diverted.__exit__(None, None, None)
+            self._diverted = None
 
     def _rows(self, reference: Any) -> list[Row] | None:
         """The rows, or None if the worker or its node was lost. SimulationFailed if the code failed."""

@@ -100,6 +100,8 @@ def suspects(shares, lead=None, **fields):
         ({SPEED: 2.0}, {AIRSPEED, *FORCES}),
         ({DENSITY: 3.0, SPEED: 2.0}, {AIRSPEED}),
         ({CLIMB: 2.0}, {ALTITUDE}),
+        ({CLIMB: 3.0, SPEED: 2.0}, set()),  # the altitude is in no other test
+        ({DENSITY: 3.0, CLIMB: 2.0}, {AIRSPEED}),  # nor is the dynamic pressure
         ({RPM: 2.0}, {ENGINE_SPEED}),
         ({PRESSURE: 2.0}, {MANIFOLD}),
         ({ALPHA_FLOW: 5.0}, {ALPHA, *FORCES}),
@@ -151,6 +153,9 @@ def test_an_airspeed_as_wrong_as_the_density_has_it_would_show_in_its_own_test(a
     assert watching.would_show(watch) == (who == {QDYN})
     watching.suspect(watch)
     assert set(np.flatnonzero(watch["suspect"]).tolist()) == who
+    watch["still"][AIRSPEED] = 1
+    watching.suspect(watch)
+    assert watch["suspect"][AIRSPEED], "one that stands still may be frozen"
 
 
 @pytest.mark.parametrize(("say", "who"), [(UNKNOWN, {1, THETA}), (YES, {1}), (NO, {THETA})])

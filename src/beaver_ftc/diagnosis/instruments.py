@@ -276,16 +276,26 @@ def suspect(watch):
         accelerometers.suspect_accelerometers(watch, False)
         who[AIRSPEED] = not watch.cleared[AIRSPEED]
     elif lead == DENSITY:
-        who[AIRSPEED] = fired[SPEED] == 1 or not would_show(watch)
-    who[QDYN] = lead == DENSITY and fired[SPEED] == 0
+        may_be_frozen = watch.still[AIRSPEED] > 0  # then it need not show how it is wrong
+        who[AIRSPEED] = fired[SPEED] == 1 or not would_show(watch) or may_be_frozen
+    who[QDYN] = lead == DENSITY and shown_alone(watch, DENSITY)
     suspect_vane(watch, ALPHA, ALPHA_FLOW, 1)
     suspect_vane(watch, BETA, BETA_FLOW, 2)
-    who[ALTITUDE] = lead == CLIMB
+    who[ALTITUDE] = lead == CLIMB and shown_alone(watch, CLIMB)
     who[ENGINE_SPEED], who[MANIFOLD] = lead == RPM, lead == PRESSURE
     frozen = one_is_frozen(watch)
     for i in range(STARTERS):
         if not frozen and since_start.explains(watch.since, i, lead):
             who[(ALPHA, BETA, AIRSPEED, PHI, THETA)[i]] = 1
+
+
+@kernel
+def shown_alone(watch, test):
+    """Whether no test but this one has shown anything: its instrument is in none of the others."""
+    for c in range(RPM):
+        if c != test and watch.fired[c]:
+            return False
+    return True
 
 
 @kernel

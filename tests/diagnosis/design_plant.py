@@ -52,10 +52,12 @@ class DesignPlant:
         position=None,
         actuators="ideal",
         beside=(),
+        aircraft=None,
         **fdi,
     ):
         keys = {"rate_hz": rate_hz, "fdi": fdi, "actuators": actuators}
         scenario = Scenario.model_validate({"name": "design-plant", **keys})
+        scenario._airframe = aircraft
         self.servo = actuators == "servo"
         self.frames = assemble(scenario, np.zeros(4), TRAVEL_RAD)
         self.frame, self.fdi = self.frames[0], self.frames[0]["fdi"]

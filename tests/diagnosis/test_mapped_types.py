@@ -6,6 +6,8 @@ import pytest
 from design_plant import TRAVEL_RAD, UNCERTAINTIES, DesignPlant
 from kernels import estimator, new_fdi, on
 
+from beaver_ftc.aircraft import Aircraft, load
+from beaver_ftc.aircraft.schema import AircraftFile
 from beaver_ftc.diagnosis import membership
 from beaver_ftc.diagnosis.bounds import worst_case
 from beaver_ftc.diagnosis.state import POSITION
@@ -24,15 +26,25 @@ POSITIONS = {
 }
 
 
+def mapped_beaver():
+    """The Beaver with a map: one box of everything it flies."""
+    beaver = load()
+    ends = {f"{name}_rad": [-3, 3] for name in ("alpha", "beta")}
+    ends |= {f"{axis}_rad_s": [-100, 100] for axis in "pqr"} | {"airspeed_mps": [1, 999]}
+    ends |= {"density_kg_m3": [0.01, 2], "signals": {name: [-1e6, 1e6] for name in beaver.signals}}
+    errors = {f"error_{axis}_rad_s2": [list(ERROR[:, i])] for i, axis in enumerate("pqr")}
+    box = {"travel_share": SHARE, "until_s": [1e6], "boxes": [ends | errors]}
+    data = beaver.file.model_dump(mode="json", exclude_none=True) | {"model_error_map": box}
+    return Aircraft(AircraftFile.model_validate(data), beaver.folder)
+
+
 class Mapped(DesignPlant):
     """What its model is off by is within the map, for where surfaces really are."""
 
     def __init__(self, **given):
-        super().__init__(fault_class="all", **given)
+        super().__init__(fault_class="all", aircraft=mapped_beaver(), **given)
         self.map = self.fdi["bound"]["error_map"]
-        self.map["n_boxes"], self.map["n_levels"], self.map["n_ages"], self.map["anywhere"] = 1, 3, 1, 1
-        self.map["low"], self.map["high"], self.map["until_s"] = -1e9, 1e9, 1e9
-        self.map["share"][:3], self.map["error"][0, 0, :3] = SHARE, ERROR
+        self.map["anywhere"], self.map["whole"] = 1, 0
         self.map["travel_low"], self.map["travel_high"] = TRAVEL_RAD
         self.amplitude *= 0.3
 

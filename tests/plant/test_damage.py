@@ -1,10 +1,13 @@
 """Damage as a fault: when which property is set, what is refused, what a verdict is held against."""
 
+from dataclasses import replace
+
 import pytest
 
 from beaver_ftc import Simulation
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.results.metrics import _correct, _type_correct
+from beaver_ftc.loop.loop import fly
+from beaver_ftc.results.metrics import metrics
 from beaver_ftc.scenario.loader import load
 from scenario.damageable import damageable
 
@@ -77,13 +80,19 @@ def test_an_aircraft_without_cases_has_none():
         load({"faults": [CASE]})
 
 
-def test_right_is_outside_of_every_class_or_a_surface_that_went_with_it():
-    damage = {"actuator": None, "type": "damage", "at_s": 0.1}
-    taken = {"elevator", "rudder"}
-    names = ("unanticipated", "elevator", "rudder", "aileron", None)
-    assert [_correct(name, damage, taken) for name in names] == [True, True, True, False, None]
-    kinds = ("loss_of_effectiveness", "stuck", None)
-    assert [_type_correct(kind, damage) for kind in kinds] == [True, False, None]
+@pytest.mark.parametrize(
+    ("name", "right"),
+    [("unanticipated", True), ("elevator", True), ("rudder", True), ("aileron", False), (None, None)],
+)
+def test_right_is_outside_of_every_class_or_a_surface_that_went_with_it(written, name, right):
+    flight = replace(fly(written(CASE)), isolated=name, isolation_time_s=0.5)
+    assert metrics(flight)["isolation"]["correct"] is right
+
+
+@pytest.mark.parametrize(("kind", "right"), [("loss_of_effectiveness", True), ("stuck", False), (None, None)])
+def test_a_surface_that_is_gone_has_lost_all_its_effect(written, kind, right):
+    flight = replace(fly(written(CASE)), isolated="rudder", isolation_type=kind, isolation_time_s=0.5)
+    assert metrics(flight)["isolation"]["type_correct"] is right
 
 
 def test_the_verdict_says_what_broke(written):

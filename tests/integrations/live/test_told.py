@@ -43,7 +43,7 @@ def _flown(session, frames):
 def test_a_flight_in_which_much_is_asked(session, changed):
     told = [{key: value for key, value in session.hello().items() if key not in ADDED}, seen(session)]
     script = [
-        (50, {"do": "break", "fault": LOSS}), (150, {"do": "stick", "rates_deg_s": [1.5, 0, -0.5]}),
+        (150, {"do": "break", "fault": LOSS}), (150, {"do": "stick", "rates_deg_s": [1.5, 0, -0.5]}),
         (5, {"do": "blow", "velocity_mps": [0, 3, -1.5]}), (1, {"do": "repair", "actuator": "elevator"}),
         (202, {"do": "change", "law": "adaptive", "scheme": "adaptive-estimators"}),
         (2, {"do": "break", "fault": {"type": "bias", "sensor": "q", "magnitude": 4}}),

@@ -11,6 +11,7 @@ from flying import scenario
 PLANES = (("elevator", "flap"), ("aileron", "rudder"))
 SURFACES = ("aileron", "elevator", "rudder", "flap")
 FLIGHTS = 60
+FLAP_UP_DEG = -5.7  # its upper stop is at -5.73
 
 
 def two_faults(rng, repaired):
@@ -20,9 +21,11 @@ def two_faults(rng, repaired):
     faults = [drawn(rng, at_s), drawn(rng, later_s)]
     others = [surface for surface in SURFACES if surface != faults[0]["actuator"]]
     faults[1]["actuator"] = others[rng.integers(3)]
-    if not repaired:
-        for fault in faults:
+    for fault in faults:
+        if not repaired:
             fault.pop("end_s", None)
+        if fault["actuator"] == "flap" and "position_deg" in fault:
+            fault["position_deg"] = max(fault["position_deg"], FLAP_UP_DEG)
     return faults
 
 

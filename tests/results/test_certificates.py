@@ -5,12 +5,15 @@ import copy
 import json
 import subprocess
 import sys
-from functools import lru_cache
+from functools import lru_cache, reduce
+from operator import getitem
 from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from scipy.spatial.transform import Rotation
+from scipy.stats import norm
 from tools.drawn.certificates import altered, places
 from tools.drawn.reader import doubts
 
@@ -362,6 +365,59 @@ def test_a_smaller_declared_bound_is_not_that_of_the_scenario():
     assert refusals("loss", sealed(other))[0] == ["b on p is smaller than the scenario's bound"]
     _, _, scenario = proved("loss")
     assert "SHA-256 of scenario.yaml" in next(failures(certificate, flown("loss")[1], scenario + "\n"))
+
+
+GYRO_Q = "the declared error of gyro q is not that of the scenario"
+HEAD = {
+    "dt_s": ((1 - 1e-6, 1 + 1e-6), "dt_s is not the frame of the scenario"),
+    "instants": ((2,), "instants: not those of the scenario"),
+    "omega_E": ((1 - 1e-6, 1 + 1e-6), "omega_E is not the Earth's rate"),
+    "declared o q": ((0.99, 1.01), GYRO_Q),
+    "declared B q": ((0.99, 1.01), GYRO_Q),
+    "declared m q": ((0.99, 1.01), GYRO_Q),
+    "declared g q": ((0.99,), "g on q is not allowed"),
+}
+
+
+@pytest.mark.parametrize("field", HEAD)
+def test_a_number_of_the_head_that_is_not_the_scenarios_is_refused_by_name(field):
+    certificate, _ = flown("gyros")
+    *within, name = field.split()
+    factors, says = HEAD[field]
+    for factor in factors:
+        other = copy.deepcopy(certificate)
+        reduce(getitem, within, other)[name] *= factor
+        assert refusals("gyros", sealed(other))[0] == [says]
+
+
+COURSES = {
+    ("hardover up", "pace_rad_s"): (lambda pace: 1.01 * pace, "pace_rad_s is not half the rate limit"),
+    ("hardover up", "stops"): (lambda stops: [1.01 * stops[0]], "the stop is not that of the log"),
+    ("bias", "stops"): (lambda stops: [stops[0], 1.01 * stops[1]], "stops"),
+    ("bias that grows", "stops"): (lambda stops: [1.01 * stops[0], stops[1]], "stops"),
+    ("rate_limit", "ordered"): (lambda ordered: ordered[:-1], "ordered: frames are missing"),
+    ("rate_limit", "near"): (lambda near: -near, "near is nearer than the order itself"),
+}
+
+
+@pytest.mark.parametrize(("kind", "field"), COURSES)
+def test_what_a_course_takes_from_log_and_scenario_is_refused_by_name(kind, field):
+    other = copy.deepcopy(flown("any type")[0])
+    (said,) = (one for one in other["statements"] if one["what"] == f"aileron {kind}")
+    change, says = COURSES[kind, field]
+    said[field] = change(said[field])
+    assert refusals("any type", sealed(other))[0] == [f"aileron {kind} excluded: {says}"]
+
+
+def test_a_level_of_chance_is_no_smaller_than_the_declared_rate_of_false_alarms_allows():
+    certificate, _, scenario = proved("chance")
+    rate_per_h = yaml.safe_load(scenario)["fdi"]["statistical"]["false_alarms_per_h"]
+    least = norm.isf(rate_per_h * certificate["dt_s"] / 3600.0)
+    too_small = "alarm: level: the declared rate allows no smaller one"
+    for level, refused in ((0.9999 * least, True), (1.0001 * least, False)):
+        other = copy.deepcopy(certificate)
+        other["statements"][0]["level"] = level
+        assert (refusals("chance", sealed(other))[0][0] == too_small) == refused
 
 
 EARLY = 30  # a row before any fault

@@ -125,7 +125,7 @@ def test_every_field_of_a_recording(path, columns, tmp_path, kind):
     found = read_flight(tmp_path / RECORDINGS[kind]).columns
     assert found.keys() == RECORDED[kind].keys()
     for name, (column, factor) in RECORDED[kind].items():
-        np.testing.assert_allclose(found[name].t_s, columns["t_s"], atol=2e-6, err_msg=name)
+        np.testing.assert_allclose(found[name].t_s, columns["t_s"], rtol=0, atol=0.6e-6, err_msg=name)
         np.testing.assert_allclose(found[name].values, columns[column] * factor, rtol=1e-12, err_msg=name)
 
 

@@ -67,6 +67,14 @@ def test_events_are_bookmarks_in_the_first_frame_not_before_them(recording):
     assert [time for time, _ in events] == pytest.approx([12.0, 12.08, 12.12])
 
 
+def test_a_false_alarm_is_a_bookmark_before_the_faults(log_path, flight, tmp_path):
+    alarmed = metrics(flight)
+    alarmed["detection"]["time_s"] = 3.0
+    write_acmi(log_path, alarmed, tmp_path / "flight.acmi")
+    found = [(text, pytest.approx(time)) for time, text in _parse(tmp_path / "flight.acmi")[1]]
+    assert found == [("detection 3.00 s", 3.0), ("fault 12.00 s", 12.0), ("isolation 12.12 s", 12.12)]
+
+
 @pytest.mark.parametrize(("rate_hz", "every"), [(60.0, 3), (100.0, 4), (20.0, 1)])
 def test_frames_are_evenly_spaced_across_the_row_groups_of_a_log(tmp_path, rate_hz, every):
     """Groups of 100 rows, of which 3 is no divisor; 25 frames a second at most."""

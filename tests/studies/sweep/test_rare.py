@@ -158,6 +158,21 @@ def test_what_is_stopped_goes_on_where_it_was(drift, tmp_path, monkeypatch):
     assert len(flown) - before < whole["flights"]
 
 
+def test_flights_that_fail_are_counted_over_all_rounds(drift, tmp_path, monkeypatch):
+    """Every tenth flight of the first round, every seventh of the others."""
+    monkeypatch.setattr(Chains.__init__, "__defaults__", (2, 10))
+    failed, first = [], 2 * 10
+
+    def flown(sweep, name, case):
+        failed.append(case[0] % (10 if case[0] < first else 7) == 0)
+        return {"score": -math.inf if failed[-1] else case[1][0] - 3.0, "failed": failed[-1]}
+
+    monkeypatch.setattr(rare, "_fly", flown)
+    document = run_rare(drift, "no_departure", tmp_path)
+    assert document["flights"] == len(failed) > first
+    assert document["failed"] == sum(failed) > sum(failed[:first]) > 0
+
+
 def test_which_expectations_have_a_score(drift):
     assert scored(drift) == ["detected_within_s", "no_departure", "post_fault_rms_deg_s.q"]
 

@@ -18,7 +18,7 @@ from beaver_ftc.results.junit import write_junit
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import metrics
 
-RATE_HZ, FRAMES = 25.0, 60
+RATE_HZ, FRAMES = 24.0, 60  # of whose microseconds a third is cut or rounded
 TRAVEL_RAD = {"aileron": 0.5, "elevator": 0.4, "rudder": 0.3, "flap": 1.0}
 DEG = 180.0 / math.pi
 COLUMNS = (

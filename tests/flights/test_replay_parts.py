@@ -62,7 +62,8 @@ def scenario(**sensors):
 
 
 @pytest.mark.parametrize(("beside", "as_flown"), [
-    (None, None), ((0.5, 1.0), True), ((0.5, 1.5), False), ((1.0, 1.0), False), ((None, None), False),
+    (None, None), ((0.5, 3.0), True), ((0.5 + 1e-12, 3.0 - 1e-12), True), ((0.5, 1.0), False),
+    ((1.0, 3.0), False), ((None, None), False), ((0.5, None), False),
 ])  # fmt: skip
 def test_whether_a_replay_is_as_flown(tmp_path, beside, as_flown):
     if beside is not None:
@@ -71,9 +72,18 @@ def test_whether_a_replay_is_as_flown(tmp_path, beside, as_flown):
     log = {"t_s": T_S, "detected": np.array([1, 1, 0, 1, 1, 1, 1])}
     assert of._verdict(tmp_path / "log.parquet", scenario(), log, SAID) == {
         "flight": "one", "replay": True, "duration_s": 3.0, "faulty": True, "detection_s": 0.5,
-        "isolation_s": 1.0, "isolated": "elevator", "rows_that_differ": 2, "left_out": [],
+        "isolation_s": 3.0, "isolated": "unanticipated", "rows_that_differ": 2, "left_out": [],
         "as_flown": as_flown, "credible": {"share": 1.0, "reasons": []},
     }  # fmt: skip
+
+
+def test_what_is_withdrawn_is_not_what_is_named():
+    """The name that stands at the end, since it has stood there."""
+    assert of._named(T_S[:4], SAID[:4]) == (1.5, "rudder")
+    assert of._named(T_S[:5], SAID[:5]) == (1.5, "rudder")
+    assert of._named(T_S[:5], [*SAID[:4], Verdict(True)]) == (None, None)
+    again = [SAID[0], SAID[2], SAID[1], SAID[2], SAID[2]]
+    assert of._named(T_S[:5], again) == (1.5, "elevator")
 
 
 def test_a_replay_that_finds_nothing(tmp_path):

@@ -16,6 +16,7 @@ import numpy as np
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights.readers.table import check_time, read_numbers
 from beaver_ftc.flights.recording import Floats
+from beaver_ftc.results.metrics import TIME_TOLERANCE_S
 
 Document = dict[str, Any]
 
@@ -67,8 +68,7 @@ def _verdict(path: Path, scenario: Any, log: dict[str, Floats], verdicts: list[A
     """When what was found, and whether the flight's own record says the same."""
     t_s = log["t_s"]
     detected = [float(t) for t, one in zip(t_s, verdicts, strict=True) if one.detected]
-    isolated = [(float(t), one.isolated) for t, one in zip(t_s, verdicts, strict=True) if one.isolated]
-    isolation_s, name = isolated[0] if isolated else (None, None)
+    isolation_s, name = _named(t_s, verdicts)
     logged = zip(log.get("detected", []), verdicts, strict=False)
     found: Document = {
         "flight": scenario.name,
@@ -85,6 +85,15 @@ def _verdict(path: Path, scenario: Any, log: dict[str, Floats], verdicts: list[A
     return found | {"as_flown": _as_flown(path, found)}
 
 
+def _named(t_s: Floats, verdicts: list[Any]) -> tuple[float | None, str | None]:
+    """Since when what is named at last has been named: what was withdrawn before does not count."""
+    since_s, name = None, None
+    for t, one in zip(t_s, verdicts, strict=True):
+        if one.isolated != name:
+            since_s, name = float(t) if one.isolated else None, one.isolated
+    return since_s, name
+
+
 def _left_out(scenario: Any) -> list[str]:
     """What the diagnosis was given in flight and the log does not have."""
     ideal = type(scenario.sensors)()
@@ -99,8 +108,15 @@ def _as_flown(path: Path, found: Document) -> bool | None:
     if not beside.is_file():
         return None
     metrics = json.loads(beside.read_text(encoding="utf-8"))
-    same = metrics["detection"]["time_s"] == found["detection_s"]
-    return bool(same and metrics["isolation"]["time_s"] == found["isolation_s"])
+    flown = metrics["detection"]["time_s"], metrics["isolation"]["time_s"]
+    return all(map(_is_same_time, flown, (found["detection_s"], found["isolation_s"])))
+
+
+def _is_same_time(flown: float | None, found: float | None) -> bool:
+    """The log's times are rounded otherwise than those of metrics.json."""
+    if flown is None or found is None:
+        return flown is found
+    return abs(flown - found) < TIME_TOLERANCE_S
 
 
 def as_text(found: Document) -> str:

@@ -264,6 +264,8 @@ def test_a_sweep_is_asked_to_stop_once_and_stopped_twice(capsys):
 
     with pytest.raises(SweepStopped, match="stopped; what had landed is kept"):
         stopped_twice()
+    if hasattr(signal, "setitimer"):
+        assert signal.setitimer(signal.ITIMER_REAL, 0.0) == (0.0, 0.0)  # nothing goes off later
     assert signal.getsignal(signal.SIGTERM) is before
 
 

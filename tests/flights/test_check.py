@@ -79,6 +79,11 @@ def test_names_that_loggers_write_are_found(tmp_path, time, rates):
     assert told["logs"][0]["usable"]
     assert told["vehicle"]["time"] == {"column": time, "unit": "ms"}
     assert list(told["vehicle"]["rates"].values()) == [names["p_rad_s"], names["q_rad_s"], names["r_rad_s"]]
+    head, *rows = path.read_text().splitlines()
+    lines = [f"{head},t_s", *(f"{row},{float(row.split(',')[0]) / 1e3:.9g}" for row in rows)]
+    path.write_text("\n".join(lines) + "\n")
+    told = json.loads(run("identify", "--check", path, "--format", "json").stdout)
+    assert "time" not in told["vehicle"]  # ours, which comes before any other
 
 
 @pytest.mark.parametrize(("factors", "says"), [
@@ -172,9 +177,10 @@ def test_an_err_in_a_cell_is_that_cell_and_no_more(tmp_path):
     lines = synthetic.write_csv(tmp_path / "a.csv", synthetic.fly(20.0)).read_text().splitlines()
     cells = lines[9].split(",")
     lines[9] = ",".join([cells[0], "ERR", *cells[2:]])
+    lines[12] = ",".join([(cells := lines[12].split(","))[0], "NA", *cells[2:]])  # missing, and no text
     (tmp_path / "b.csv").write_text("\n".join(lines) + "\n")
     column = read_flight(tmp_path / "b.csv").columns["p_rad_s"]
-    assert np.flatnonzero(np.isnan(column.values)).tolist() == [8]
+    assert np.flatnonzero(np.isnan(column.values)).tolist() == [8, 11]
     assert column.note == "p_rad_s: 1 cell holds no number, the first in row 9: 'ERR'"
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import beaver_ftc as bf
+from beaver_ftc.loop.plugin_frame import measured_of
 from flying import loss, scenario
 
 SHORT = {"duration_s": 4.0, "faults": [loss(at_s=1.5)]}
@@ -43,6 +44,15 @@ class TestStepping:
         while not sim.done:
             sim.step(frames=13)
         assert same_log(sim.log, bf.fly(long).log)
+
+    @pytest.mark.parametrize("look", ["measured", "record", "records"])
+    def test_whoever_looks_before_the_first_step_sees_frame_0(self, look):
+        looked, begun = bf.Simulation(scenario(**SHORT)), bf.Simulation(scenario(**SHORT))
+        seen = getattr(looked, look)
+        found = seen if look == "measured" else measured_of(np.atleast_1d(seen)[0])
+        assert begun.values is not None  # which begins it
+        np.testing.assert_array_equal(found.y, begun.measured.y)
+        assert found.y[2] == pytest.approx(scenario(**SHORT).initial.airspeed_mps, rel=0.02)
 
     def test_looking_changes_nothing(self, flight):
         sim = bf.Simulation(scenario(**SHORT))

@@ -239,6 +239,15 @@ def test_that_a_reading_is_missing_is_what_the_log_says():
     assert refusals("no vane", certificate, other)[1]
 
 
+def test_of_several_missing_readings_the_log_says_the_first():
+    said = {"frame": 1, "missing": [3, 5], "because": "two", "sides": [2.0, 1.0]}
+    logged = {"frame": 1, "missing": [3, 5], "sides": [1.0, 0.0]}
+    rows = {"detected": np.array([0.0, 1.0])}
+    assert instruments_say.as_logged(said, rows) == said
+    for readings, expected in (([np.nan, 3.0], logged), ([3.0, 5.0], said)):
+        assert instruments_say.as_logged(said, rows | {"watch_missing": np.array(readings)}) == expected
+
+
 def test_in_blocks_a_jam_is_what_a_block_says_in_the_mean():
     """With gyros as noisy, by plain sums over the rows of a block: no loss explains what it shows."""
     certificate, log = flown("blocks")

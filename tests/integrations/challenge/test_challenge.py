@@ -95,7 +95,7 @@ def test_hidden_flights_among_what_students_may_read_are_refused(challenge, monk
     [
         (lambda at: at.mkdir(), "0 Python files, allowed: one"),
         (lambda at: at.with_suffix(".txt").write_text(""), "is no Python file"),
-        (lambda at: at.write_bytes(b"#" * 70_000), "larger than allowed: 64 KiB"),
+        (lambda at: at.write_bytes(b"#" * 65_537), "larger than allowed: 64 KiB"),
         (lambda at: at.write_bytes(b"\xff\xfe"), "is not UTF-8 text"),
         (lambda at: at.symlink_to("/etc/hostname"), "is no Python file"),
         (os.mkfifo, "is no Python file"),
@@ -115,8 +115,8 @@ def test_a_name_that_is_no_file_s(tmp_path):
 
 
 def test_a_folder_with_one_file_is_a_submission(tmp_path):
-    (tmp_path / "mine.py").write_text("text")
-    assert folders.source_of(tmp_path) == "text"
+    (tmp_path / "mine.py").write_text("#" * 65_536)
+    assert folders.source_of(tmp_path) == "#" * 65_536
 
 
 @pytest.mark.parametrize(

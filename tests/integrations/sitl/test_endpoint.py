@@ -99,13 +99,16 @@ def test_a_flight_over_tcp_with_a_second_caller_and_a_ground_station():
 
 
 def test_a_flight_goes_on_after_its_autopilot_is_started_again():
-    with served("px4", speed=0.0, rate_hz=100) as at:
+    jam = {"type": "stuck", "actuator": "elevator", "position_deg": 8, "at_s": 0.1}
+    with served("px4", scenario(faults=[jam]), speed=0.0, rate_hz=100) as at:
         first = peers.Px4(Small().outputs, silent=0)
-        first.fly(at.address, 30)
+        first.fly(at.address, 60)
         peers.Px4(Small().outputs, silent=0).fly(at.address, 500)
     metrics = at.flight.metrics
     assert (metrics["frames"], metrics["link"]["resets"]) == (100, 1)
-    assert "begun anew" in at.said
+    alarms = [line for line in at.said if line.endswith("FDI: alarm on q") or line == "begun anew"]
+    assert alarms == [alarms[0], "begun anew", alarms[0]]  # what is said of the first is forgotten
+    assert [text["text"] for text in metrics["link"]["said"]].count("FDI: alarm on q") == 1
 
 
 def test_the_ground_station_breaks_a_servo():
@@ -278,3 +281,50 @@ def test_an_interrupted_flight_is_not_passed(protocol):
     )
     assert verdict.title(document).endswith(f"INTERRUPTED at {document['interrupted_s']:.2f} s, not passed")
     assert any(line.startswith("interrupted at ") for line in said)
+
+
+def test_a_complaint_is_said_once_until_another_and_who_goes_ends_nothing(monkeypatch):
+    script = [b"slow", b"slow", TimeoutError(), b"fine", ConnectionResetError(), b"gone", b"odd", b"slow"]
+    complaints = {b"slow": "10 Hz", b"odd": "5 Hz"}
+    said, sent, answered, silences = [], [], [], []
+
+    class Protocol:
+        complaint = ""
+
+        def __init__(self, *_):
+            pass
+
+        def take(self, datagram, peer, now_s):
+            self.complaint = complaints.get(datagram, "")
+            return None if self.complaint else datagram
+
+    class Listener:
+        def settimeout(self, seconds):
+            self.seconds = seconds
+
+        def recvfrom(self, most):
+            if isinstance(came := script.pop(0), Exception):
+                raise came
+            return came, "it"
+
+        def sendto(self, answer, peer):
+            if answer == b"gone":
+                raise ConnectionRefusedError
+            sent.append((answer, peer))
+
+    class Endpoint:
+        vehicle = link = None
+        over = property(lambda self: not script)
+
+        def listen(self):
+            silences.append(len(script))
+
+        def after(self, began_s):
+            answered.append(len(script))
+
+    monkeypatch.setattr(serving, "Ardupilot", Protocol)
+    listener = Listener()
+    serving._serve_datagrams(Endpoint(), listener, said.append)
+    assert said == ["10 Hz", "5 Hz", "10 Hz"]
+    assert (sent, answered, silences) == ([(b"fine", "it")], [4, 2], [5])
+    assert listener.seconds == serving.WAIT_S

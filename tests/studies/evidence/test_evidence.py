@@ -109,6 +109,17 @@ class Clock:
         return self.now_is
 
 
+def test_what_has_been_flown_is_kept_of_this_plan_and_these_files(tmp_path, monkeypatch):
+    asked, mine = [], tmp_path / "mine.yaml"
+    monkeypatch.setattr(shown, "run_study", lambda study, *_: asked.append(study.follows_from))
+    for duration_s, text in ((2, "Ours."), (2, "Ours."), (3, "Ours."), (2, "Theirs.")):
+        mine.write_text(f"name: mine\nduration_s: {duration_s}\n")
+        content = {"id": "A", "text": text, "over": ["mine.yaml"], "expect": {"no_departure": True}}
+        run_plan(plan_of(tmp_path, requirements=[content]), tmp_path / "out")
+    assert asked[0] == asked[1]
+    assert asked[2] != asked[0] != asked[3]
+
+
 def test_the_worker_count_changes_nothing(tmp_path):
     plan = plan_of(tmp_path, **SMALL)
     one, two = (run_plan(plan, tmp_path / f"{n}", n) for n in (1, 2))

@@ -6,6 +6,7 @@ from difflib import SequenceMatcher, get_close_matches
 from functools import cache
 
 SHORTEST_BEGINNING = 3  # of a name, to be taken for it
+CLEAR_LINE = "\r\033[K"  # of a terminal
 
 
 class BeaverFtcError(Exception):
@@ -50,5 +51,5 @@ def nearest(given: str, names: Iterable[str], cutoff: float = 0.6) -> str | None
 
 @cache
 def say_once(line: str) -> None:
-    """Say something on standard error, once a process."""
-    print(f"beaver-ftc: {line}", file=sys.stderr, flush=True)
+    """Say something on standard error, once a process; a line of progress may stand there."""
+    print(f"{CLEAR_LINE * sys.stderr.isatty()}beaver-ftc: {line}", file=sys.stderr, flush=True)

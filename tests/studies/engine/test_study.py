@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from beaver_ftc.documents.errors import SimulationFailed
+from beaver_ftc.documents.errors import SimulationFailed, say_once
 from beaver_ftc.studies.engine.store import PACKAGE, differences, hashed_files
 from beaver_ftc.studies.engine.study import Study, flown, fly_all, run_study
 
@@ -98,11 +98,15 @@ def stopped_after(count):
     return progress
 
 
-def test_what_was_stopped_goes_on_and_only_what_is_missing_is_flown(tmp_path):
+def test_what_was_stopped_goes_on_and_only_what_is_missing_is_flown(tmp_path, capsys):
     log = tmp_path / "log"
     fly = partial(square, log=log)
+    say_once.cache_clear()
     with pytest.raises(KeyboardInterrupt):
         rows_of(tmp_path / "study", range(6), fly, progress=stopped_after(4))
+    assert capsys.readouterr().err == (
+        "beaver-ftc: study: stopped; what has been flown is kept, the same command goes on with it\n"
+    )
     log.unlink()
     assert rows_of(tmp_path / "study", range(6), fly) == list(map(square, range(6)))
     assert log.read_text().split() == ["4", "5"]

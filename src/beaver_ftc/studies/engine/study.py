@@ -15,13 +15,14 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from beaver_ftc.documents.errors import SimulationFailed
+from beaver_ftc.documents.errors import SimulationFailed, say_once
 from beaver_ftc.results.writer import clear_disk_errors, result_folder
 from beaver_ftc.studies.engine import store
 from beaver_ftc.studies.engine.workers import (
     Batch,
     Case,
     LocalWorkers,
+    Nothing,
     Number,
     Row,
     ThisProcess,
@@ -36,6 +37,7 @@ Lost = Callable[[Any, str], Any]
 GO_ON = "; what has been flown is kept, the same command goes on with it"
 POLL_S = 0.2
 MOST_LOSSES = 3
+OF_A_PART = 32  # cases of a round that are kept together
 TASKS_A_SLOT = 4  # towards the end tasks get smaller, so that no worker is left with a long last one
 LOST = "the process that flies it ends, each time it is tried"
 
@@ -127,7 +129,7 @@ class Study:
     name: of the result folder. fly: from a case to its row, a value of the type `row`; it can be pickled, as
     the cases can. document: of all rows. files: of the document. follows_from: what the rows follow from
     beside the cases. lost: the row of a case that kills its process each time; without it that is a
-    SimulationFailed.
+    SimulationFailed. warm_up: of the workers that fly rounds.
     """
 
     name: str
@@ -138,6 +140,7 @@ class Study:
     row: Any = dict
     follows_from: Any = None
     lost: Lost | None = None
+    warm_up: Nothing | None = None
 
 
 def run_study(study: Study, out: Path, workers: int = 1, progress: Progress | None = None) -> Any:
@@ -161,23 +164,25 @@ FlyRound = Callable[[int, Sequence[Any]], list[Any]]
 @contextlib.contextmanager
 def in_rounds(study: Study, out: Path, workers: int = 1) -> Iterator[FlyRound]:
     """Yield what flies one round of cases after the other, by its number, and gives their rows in order: what
-    to fly next may follow from the rows before. Kept round by round; on success they go."""
+    to fly next may follow from the rows before. Kept as they land; on success they go."""
     with _keeping(study, out) as parts, contextlib.ExitStack() as at_work:
         flying: list[Workers] = []
 
         def fly(number: int, cases: Sequence[Any]) -> list[Any]:
-            found: list[Any] | None = parts.landed(number, range(len(cases)))
-            if found is None:
+            pieces = {f"{number:06}-{n:06}": runs for n, runs in store.batches_of(len(cases), OF_A_PART)}
+            found = {piece: parts.landed(piece, runs) for piece, runs in pieces.items()}
+            missing = {piece: pieces[piece] for piece, rows in found.items() if rows is None}
+            if missing:
                 if not flying:
-                    work = Work(partial(_fly_case, study.fly))
+                    work = Work(partial(_fly_case, study.fly), study.warm_up)
                     made = LocalWorkers(work, workers) if workers > 1 else ThisProcess(work)
                     flying.append(at_work.enter_context(contextlib.closing(made)))
-                batch = Batch(number, tuple(Case(n, case) for n, case in enumerate(cases)))
-                batches = Batches(iter([batch]), len(cases), lambda _, rows: parts.land(number, rows))
+                left = sum(map(len, missing.values()))
+                coming = (Batch(piece, tuple(Case(n, cases[n]) for n in missing[piece])) for piece in missing)
+                batches = Batches(coming, left, lambda batch, rows: parts.land(batch.number, rows))
                 Campaign(batches, flying[0], study.lost or _fail).fly()
-                found = parts.landed(number, range(len(cases)))
-            assert found is not None
-            return found
+                found |= {piece: parts.landed(piece, runs) for piece, runs in missing.items()}
+            return [row for rows in found.values() for row in rows]
 
         yield fly
 
@@ -192,7 +197,9 @@ def _keeping(study: Study, out: Path) -> Iterator[store.Parts]:
         parts = _begin(kept, study)
         try:
             yield parts
-        except BaseException:
+        except BaseException as ended:
+            if parts and isinstance(ended, KeyboardInterrupt | SystemExit):
+                say_once(f"{study.name}: stopped{GO_ON}")
             if not parts:  # nothing to go on with
                 shutil.rmtree(kept, ignore_errors=True)
                 with contextlib.suppress(OSError):

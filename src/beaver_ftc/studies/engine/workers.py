@@ -22,7 +22,8 @@ from typing import Any, NamedTuple, Protocol
 from beaver_ftc.documents.errors import SimulationFailed
 
 LEAVES_S = 5.0  # a pool's thread, once its workers have ended: milliseconds
-MOST_STARTS = 3  # of a worker, should it or what it is forked from be killed meanwhile
+MOST_STARTS = 3  # of a worker, should what it is forked from be killed meanwhile
+MOST_STILLBORN = 8  # in a row, should workers be killed before they have begun
 
 Row = Any
 Number = int | str  # of a batch: what its file is called
@@ -123,6 +124,11 @@ class _Worker:
             _begin_no_more()
             raise
 
+    @property
+    def has_begun(self) -> bool:
+        """Whether it has been ready to fly."""
+        return self.pid.done() and self.pid.exception() is None
+
     def fly(self, task: Batch) -> "Future[list[Row]]":
         return self._pool.submit(_fly, task.cases)
 
@@ -166,30 +172,32 @@ class LocalWorkers:
 
     def outcomes(self, timeout_s: float) -> list[Outcome]:
         done, _ = wait(self._busy, timeout_s, FIRST_COMPLETED)
-        return [self._outcome(flown) for flown in done]
+        return [outcome for flown in done if (outcome := self._outcome(flown))]
 
     def close(self) -> None:
         for worker in (*self._idle, *(worker for worker, _ in self._busy.values())):
             worker.end()
 
-    def _outcome(self, flown: "Future[list[Row]]") -> Outcome:
+    def _outcome(self, flown: "Future[list[Row]]") -> Outcome | None:
+        """What became of a task; None if it is another's now, since its worker never came to fly it."""
         worker, task = self._busy.pop(flown)
-        rows = None
+        rows, begun = None, True
         try:
             rows = flown.result()
         except BrokenProcessPool:
-            worker = self._in_place_of(worker)
+            worker, begun = self._in_place_of(worker), worker.has_begun
         except Exception as error:  # not a flight's: those are in their rows
             raise SimulationFailed(f"a worker cannot go on: {error}") from error
         finally:
             self._idle.append(worker)
-        return Outcome(task, rows)
+        if not begun:
+            self.submit(task)
+        return Outcome(task, rows) if begun else None
 
     def _in_place_of(self, ended: _Worker) -> _Worker:
         """Another. One may be killed before it begins; if so are those that take its place, that is said."""
-        has_begun = ended.pid.done() and ended.pid.exception() is None
-        stillborn = 0 if has_begun else ended.stillborn + 1
-        if stillborn == MOST_STARTS:
+        stillborn = 0 if ended.has_begun else ended.stillborn + 1
+        if stillborn == MOST_STILLBORN:
             raise SimulationFailed(
                 f"a worker process cannot start: {stillborn} in a row ended before their first flight"
             ) from None

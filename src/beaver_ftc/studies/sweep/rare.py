@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFailed, suggestion
+from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFailed, say_once, suggestion
 from beaver_ftc.results.expectations import evaluate
 from beaver_ftc.results.metrics import as_json, metrics, versions
 from beaver_ftc.results.writer import result_folder
@@ -27,9 +27,10 @@ from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sweeps import Sweep
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial
 from beaver_ftc.studies.engine.study import FlyRound, Study, in_rounds
+from beaver_ftc.studies.engine.workers import Case
 from beaver_ftc.studies.present.page import write_files
 from beaver_ftc.studies.present.tables import finite, number
-from beaver_ftc.studies.sweep.one_flight import scenario_of
+from beaver_ftc.studies.sweep.one_flight import scenario_of, warm_up
 from beaver_ftc.studies.sweep.sampling import Assignment, value_at
 from beaver_ftc.studies.sweep.store import identity_of
 
@@ -239,10 +240,14 @@ def run_rare(
         tell(f"{name}: {chains.flights + len(rows)} flights, level {chains.levels}")
         return scores
 
+    def lost(case: Case, why: str) -> dict[str, Any]:
+        say_once(f"{name}: of a flight {why}; such flights count as no event")
+        return {"score": -math.inf, "failed": True}
+
     study = Study(
         name, (), partial(_fly, sweep, expectation), lambda rows: None, lambda document: {},
-        follows_from=[identity_of(sweep, expectation), RUNS, MEMBERS],
-        lost=lambda case, why: {"score": -math.inf, "failed": True},
+        follows_from=[identity_of(sweep, expectation), RUNS, MEMBERS], lost=lost,
+        warm_up=partial(warm_up, sweep),
     )  # fmt: skip
     with in_rounds(study, out, workers) as flies:
         chains.go(lambda number, points: fly(number, points, flies))
@@ -280,6 +285,8 @@ def as_text(document: dict[str, Any]) -> str:
         f"  probability  {said}, {_between(document)}, {document['flights']} flights",
         f"  plain        {plain['events']} of {plain['of']} flights, {_between(plain)}",
     ]
+    if document["failed"]:
+        lines.append(f"  not flown    {document['failed']} flights, counted as no event")
     if likeliest:
         values = likeliest["values"].items()
         listed = ", ".join(f"{key} {number(value, digits=4)}" for key, value in values)

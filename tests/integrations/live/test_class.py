@@ -115,6 +115,8 @@ def test_a_message_of_the_server_is_not_a_guests_to_send(site):
         ("</script><b onload=x>", "</script><b onload=x>"), ("A\nB", "A B"), ("x" * 24, "x" * 24),
         ("x" * 25, None), ("", None), ("   ", None), ("a\u202eb", None), ("a\u200bb", None), ("a\0b", None),
         ("a\x1b[2Jb", None), ("\ue000", None), (7, None), (None, None), (["a"], None),
+        ("\u0e17\u0e35\u0e48", "\u0e17\u0e35\u0e48"), ("a\u0336\u0301\u035a", None), ("\u0301", None),
+        ("a \u0301b", None), ("\u3164", None), ("a\u2800b", None),
     ],
 )  # fmt: skip
 def test_names(site, name, taken):

@@ -5,9 +5,11 @@ answers as JSON.
 """
 
 import json
+import re
 from collections.abc import Mapping
 from math import isfinite
 from typing import Annotated, Any, Literal
+from unicodedata import category
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
@@ -18,6 +20,8 @@ FASTEST = 20.0  # times real time
 STICK_DEG_S = 20.0  # full stick
 WHEN = {"at_s", "end_s"}  # of a fault: not what it is
 MAX_NAME = 24  # letters
+# Letters that are blank; a mark on no letter; three on one, which stand on the line above.
+ILLEGIBLE = re.compile(r"[\u115f\u1160\u2800\u3164\uffa0]|(^| )\0|\0{3}")
 
 Message = dict[str, Any]  # to a page
 
@@ -142,10 +146,16 @@ class Let(Request):
     on: bool
 
 
+def _with_marks_as_zero(name: str) -> str:
+    """The name with what stands above, below or through the letter before it as \\0."""
+    return "".join("\0" if category(letter) in ("Mn", "Me") else letter for letter in name)
+
+
 def _as_one_line(name: str) -> str:
-    """A name on one line. Letters that turn the direction of others or show as nothing are none of it."""
+    """A name on one line. Letters that turn the direction of others, show as nothing, or reach into other
+    lines are none of it."""
     one = " ".join(name.split())
-    if not one or not one.isprintable():
+    if not one or not one.isprintable() or ILLEGIBLE.search(_with_marks_as_zero(one)):
         raise ValueError("letters that can be read are missing, or others are there")
     return one
 

@@ -198,7 +198,7 @@ def _keeping(study: Study, out: Path) -> Iterator[store.Parts]:
         try:
             yield parts
         except BaseException as ended:
-            if parts and isinstance(ended, KeyboardInterrupt | SystemExit):
+            if parts and GO_ON not in str(ended):
                 say_once(f"{study.name}: stopped{GO_ON}")
             if not parts:  # nothing to go on with
                 shutil.rmtree(kept, ignore_errors=True)

@@ -12,6 +12,7 @@ import os
 import shutil
 from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 from uuid import uuid4
 
@@ -153,13 +154,33 @@ def _no_model(folder: str, names: list[str]) -> set[str]:
     return {n for n in names if Path(folder, n).is_file() and Path(n).suffix not in MODEL_FILES}
 
 
-def write_report_files(folder: Path, document: Document) -> None:
-    """Draw the figures and the report of a result folder that holds its log and its scenario."""
+def write_report_files(folder: Path, document: Document, to: Path | None = None) -> None:
+    """Draw the figures and the report of a result folder that holds its log and its scenario.
+
+    to: where to, if not into that folder.
+    """
     from beaver_ftc.results.figures import write_figures
     from beaver_ftc.results.report import write_report
 
-    write_figures(folder / "log.parquet", document, folder / "figures")
-    write_report(folder / "report.html", [folder])
+    write_figures(folder / "log.parquet", document, (to or folder) / "figures")
+    write_report((to or folder) / "report.html", [folder])
+
+
+def add_report(folder: Path, document: Document) -> str:
+    """Draw figures and report of a result folder that is there already; why not, if that fails: then the
+    folder is as it was. They appear whole, and in no folder that has taken its place meanwhile."""
+    failed: list[Exception] = []
+    with (
+        TemporaryDirectory(prefix=_prefix(folder.name), dir=folder.parent) as partial,
+        _locked(Path(partial)),
+        _kept_whatever(folder, "report.html", failed),
+    ):
+        drawn_for = folder.stat()
+        write_report_files(folder, document, Path(partial))
+        if os.path.samestat(drawn_for, folder.stat()):
+            for name in ("figures", "report.html"):
+                Path(partial, name).rename(folder / name)
+    return "".join(map(str, failed))
 
 
 @contextlib.contextmanager

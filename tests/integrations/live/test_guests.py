@@ -87,6 +87,8 @@ def test_a_class_breaks_what_it_is_let_and_the_record_says_who(cockpit):
         assert ask(flyer, do="save")["ok"]
         saved = until(guest, "e", having=lambda told: told["events"][-1]["kind"] == "saved")
         assert "/" not in saved["events"][-1]["says"]  # no folder of whoever flies
+        drawn = until(guest, "e", having=lambda told: told["events"][-1]["says"].endswith("report.html"))
+        assert drawn["events"][-1]["says"] == f"{saved['events'][-1]['says']}/report.html"
         assert ask(flyer, do="fresh")["ok"]
     (folder,) = cockpit.out.iterdir()
     by = {

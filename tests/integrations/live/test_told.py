@@ -1,6 +1,7 @@
 """What a session tells of a flight, held whole: events, states and frames of scripted flights."""
 
 import json
+import sys
 from math import pi
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 import beaver_ftc as bf
 from beaver_ftc.aircraft import load
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.integrations.live import messages
+from beaver_ftc.integrations.live import messages, reports
 from beaver_ftc.integrations.live.session import Session, as_live, changes_of, fault_types
 
 LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4}
@@ -201,7 +202,7 @@ def test_what_the_session_was_given_can_be_flown_again_and_files_cannot(session)
         asked(own, do="fresh", scenario="fault-fre")
 
 
-def test_a_saved_flight_is_said_with_its_report(session, tmp_path, monkeypatch):
+def test_a_saved_flight_is_said_and_its_report_is_to_be_drawn(session, tmp_path, monkeypatch):
     asked_for = []
 
     def save(_, out, report):
@@ -210,7 +211,7 @@ def test_a_saved_flight_is_said_with_its_report(session, tmp_path, monkeypatch):
 
     monkeypatch.setattr(bf.Flight, "save", save)
     says = asked(session, do="save")
-    assert asked_for == [(tmp_path, True)]
+    assert asked_for == [(tmp_path, False)]
     assert says == f"saved: {tmp_path / 'x'}; fly it again: beaver-ftc run {tmp_path / 'x' / 'scenario.yaml'}"
     asked(session, do="stick", rates_deg_s=[1, 0, 0])
     assert asked(session, do="save") == says
@@ -219,4 +220,43 @@ def test_a_saved_flight_is_said_with_its_report(session, tmp_path, monkeypatch):
         changes()
         asked(session, do="save")
     assert len(asked_for) == 3
+    assert session.unreported == [tmp_path / "x"] * 3
     assert session.events[-1]["says"] == "x"  # guests hear this: no folder of whoever flies
+
+
+def test_reports_are_drawn_one_by_one_and_what_waits_at_the_end_all_the_same(tmp_path, monkeypatch):
+    begun = []
+
+    class Drawing:
+        returncode = None
+
+        def __init__(self, *folders):
+            begun.append([folder.name for folder in folders])
+
+        def poll(self):
+            return self.returncode
+
+        def communicate(self):
+            return None, "Traceback\nno room\n" if self.returncode else ""
+
+    monkeypatch.setattr(reports, "_begun", Drawing)
+    drawn = reports.Reports()
+    assert drawn.news() == []
+    for name in "aabbcd":
+        drawn.add(tmp_path / name)
+    assert (begun, drawn.news()) == ([["a"]], [])
+    for status, says in ((1, []), (0, ["a/report.html"]), (1, ["b: without a report: no room"])):
+        drawn._drawing[1].returncode = status
+        assert drawn.news() == says
+    assert begun == [["a"], ["a"], ["b"], ["c"]]  # a was saved again while it was drawn
+    drawn.leave()
+    assert begun[4:] == [["d"]]
+
+
+def test_a_report_that_cannot_be_drawn_leaves_the_folder_as_it_was(tmp_path, monkeypatch):
+    (tmp_path / "metrics.json").write_text("{}")
+    monkeypatch.setattr(sys, "argv", ["draw", str(tmp_path / "gone"), str(tmp_path)])
+    monkeypatch.setattr(reports.os, "nice", lambda by: by, raising=False)
+    with pytest.raises(SystemExit, match=r"report.html could not be written: .*log.parquet"):
+        reports.draw()
+    assert [path.name for path in tmp_path.iterdir()] == ["metrics.json"]

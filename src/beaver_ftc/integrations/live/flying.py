@@ -15,6 +15,7 @@ from pathlib import Path
 
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.integrations.live import BAD_INPUT, EVERYONE, messages
+from beaver_ftc.integrations.live.reports import Reports
 from beaver_ftc.integrations.live.session import NO_STICK, Session
 
 STATE_EVERY = 15  # ticks
@@ -101,9 +102,16 @@ class Flying:
         self._paused, self._ended = False, False
         self._pace = Pace(session.scenario.rate_hz, time.monotonic())
         self._ticks = 0
+        self._reports = Reports()
 
     def run(self) -> None:
-        """Until told to end."""
+        """Until told to end, or the server is gone."""
+        try:
+            self._run()
+        finally:
+            self._reports.leave()
+
+    def _run(self) -> None:
         while not self._ended:
             self._listen()
             if not self._pages:
@@ -175,6 +183,8 @@ class Flying:
             self._send(EVERYONE, self._session.hello())
         if isinstance(request, messages.Fresh | messages.Save | messages.Game):
             self._pace.hold(time.monotonic())  # these take a while: the flight waits
+        while self._session.unreported:
+            self._reports.add(self._session.unreported.pop(0))
         return says
 
     def _obey(self, word: str, of: str = "0") -> None:
@@ -198,6 +208,8 @@ class Flying:
                 self._session.stick = NO_STICK
 
     def _tell(self) -> None:
+        for says in self._reports.news():
+            self._session.reported(says)
         events = self._session.take_events()
         if events:
             self._send(EVERYONE, {"k": "e", "events": events})

@@ -42,7 +42,10 @@ HIDDEN = (
 
 
 class Session:
-    """One flight at a time, begun anew by `fresh`. out: where `save` writes."""
+    """One flight at a time, begun anew by `fresh`. out: where `save` writes.
+
+    unreported: folders that were saved, and have no report so far.
+    """
 
     sim: "bf.Simulation"
 
@@ -51,6 +54,7 @@ class Session:
         self._rng = np.random.default_rng(seed)
         self.game = Game()
         self.stick = NO_STICK
+        self.unreported: list[Path] = []
         self._by = ""
         self._flown_stick: tuple[float, ...] | None = None
         self._begin(scenario)
@@ -263,7 +267,7 @@ class Session:
         return ""
 
     def _save(self, asked: messages.Save) -> str:
-        """Seconds in which nobody flies: of one instant only once, however often it is asked."""
+        """A moment in which nobody flies: of one instant only once, however often it is asked."""
         self._saved = self._saved or self._written()
         return self._saved
 
@@ -272,9 +276,14 @@ class Session:
         declared = sorted(flight.scenario.faults, key=lambda fault: fault.at_s)
         for fault, document in zip(declared, flight.metrics["faults"], strict=True):
             document.update(self._by_whom(fault))
-        folder = flight.save(self._out, report=True)
+        folder = flight.save(self._out, report=False)
+        self.unreported.append(folder)
         self._tell("saved", folder.name)
         return f"saved: {folder}; fly it again: beaver-ftc run {folder / 'scenario.yaml'}"
+
+    def reported(self, says: str) -> None:
+        """Tell what has become of the report of a saved flight."""
+        self._tell("saved", says)
 
     def frame(self) -> Message:
         """What the page draws, of the frame just flown."""

@@ -507,12 +507,21 @@ def test_the_checker_takes_numpy_and_readers_of_the_files_alone():
     assert others == {"numpy", "pyarrow", "yaml"}  # the log's and the scenario's reader
 
 
-@pytest.mark.parametrize("place", ["metrics", "figures", "certificate"])
-def test_whatever_fails_while_results_are_written_the_log_is_kept(place, tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize(
+    ("place", "error", "says"),
+    [
+        ("metrics", ZeroDivisionError("of the test"), "ZeroDivisionError: of the test"),
+        ("figures", OSError(28, "of the test"), "no space left on device"),
+        ("certificate", PermissionError(13, "of", "the test"), "PermissionError: [Errno 13] of: 'the test'"),
+    ],
+)
+def test_whatever_fails_while_results_are_written_the_log_is_kept(
+    place, error, says, tmp_path, monkeypatch, capsys
+):
     """One line says what failed; nothing half written is left."""
 
     def fails(*_, **__):
-        raise ZeroDivisionError("of the test")
+        raise error
 
     modules = {"metrics": writer, "figures": writer, "certificate": certificate_module}
     names = {"metrics": "metrics", "figures": "write_report_files", "certificate": "certificate"}
@@ -531,7 +540,8 @@ def test_whatever_fails_while_results_are_written_the_log_is_kept(place, tmp_pat
     assert ("metrics.json" in written) == (place != "metrics")
     assert lost not in written
     said = capsys.readouterr().err.strip().splitlines()
-    assert len([line for line in said if "the flight and its log are kept" in line and lost in line]) == 1
+    words = f"the flight and its log are kept, but {lost} could not be written: {says}"
+    assert len([line for line in said if words in line]) == 1
 
 
 def test_a_fault_in_the_first_row_has_a_certificate():

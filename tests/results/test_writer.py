@@ -138,10 +138,14 @@ def test_full_disk_is_a_clear_error_and_leaves_nothing(tmp_path, monkeypatch):
     def full(descriptor):
         raise OSError(errno.ENOSPC, "raised by the test")
 
+    _result(tmp_path / "older", "x")
     monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(SimulationFailed, match="no space left on device"):
+    with pytest.raises(SimulationFailed, match=r"no space left on device; nothing is left there$"):
         _result(tmp_path, "x")
-    assert _names(tmp_path) == []
+    with pytest.raises(SimulationFailed, match=r"device; the result that was there is as it was$"):
+        _result(tmp_path / "older", "y")
+    assert _names(tmp_path) == ["older"]
+    assert (tmp_path / "older" / "case" / "metrics.json").read_text() == "x"
 
 
 def test_result_is_readable_for_whom_the_umask_allows(tmp_path):

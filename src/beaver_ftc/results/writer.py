@@ -128,7 +128,10 @@ def _kept_whatever(folder: Path, what: str, failed: list[Exception]) -> Iterator
     except Exception as error:
         for left in set(folder.iterdir()) - before:
             shutil.rmtree(left) if left.is_dir() else left.unlink()
-        reason = SimulationFailed(f"{what} could not be written: {type(error).__name__}: {error}")
+        says = f"{type(error).__name__}: {error}"
+        if isinstance(error, OSError) and error.errno and not error.filename:  # of the disk
+            says = _in_words(error)
+        reason = SimulationFailed(f"{what} could not be written: {says}")
         reason.__cause__ = error
         failed.append(reason)
 
@@ -190,7 +193,8 @@ def result_folder(out: Path, name: str) -> Iterator[Path]:
     Raises SimulationFailed where the folder cannot be written, or `out/name` is not a result of ours.
     """
     final = out / name
-    with clear_disk_errors(final):
+    before = "the result that was there is as it was" if final.is_dir() else "nothing is left there"
+    with clear_disk_errors(final, f"; {before}"):
         refuse_foreign(final)
         created = _make_parents(out)
         _remove_stale(out, name)
@@ -249,8 +253,12 @@ def clear_disk_errors(folder: Path, but: str = "") -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        reason = os.strerror(error.errno) if error.errno else str(error)
-        raise SimulationFailed(f"cannot write {folder}: {reason[:1].lower()}{reason[1:]}{but}") from error
+        raise SimulationFailed(f"cannot write {folder}: {_in_words(error)}{but}") from error
+
+
+def _in_words(error: OSError) -> str:
+    reason = os.strerror(error.errno) if error.errno else str(error)
+    return f"{reason[:1].lower()}{reason[1:]}"
 
 
 def _prefix(name: str) -> str:

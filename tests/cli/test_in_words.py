@@ -34,8 +34,8 @@ def counts(done, **more):
 @pytest.mark.parametrize(
     ("terminal", "step_s", "shown"),
     [
-        (False, 15.0, "one: 20 of 1000 flights, 1/s, 25 min left\n"
-         "one: 40 of 1000 flights, 1/s, 24 min left\n"),
+        (False, 15.0, "one: 20 of 1000 flights, 0.67/s, 25 min left\n"
+         "one: 40 of 1000 flights, 0.67/s, 24 min left\n"),
         (True, 0.1, "\rone: 20 of 1000 flights, 100/s, 10 s left\rone: 40 of 1000 flights, 100/s, 10 s left\r"
          + " " * 41 + "\r"),
     ],
@@ -55,7 +55,7 @@ def test_a_line_of_a_sweep_now_and_then(monkeypatch, clock, terminal, step_s, sh
         (counts(5), 10.0, "one: 5 of 1000 flights, 0/s"),
         (counts(25), 0.0, "one: 25 of 1000 flights, 20000000000/s, 0 s left"),
         (counts(25, faulted=8, detected=2), 10.0, "one: 25 of 1000 flights, 2/s, 8 min left, detected 25.0%"),
-        (counts(25, failed=3), 200.0, "one: 25 of 1000 flights, 0/s, 2 h 42 min left, 3 not flown"),
+        (counts(25, failed=3), 200.0, "one: 25 of 1000 flights, 0.1/s, 2 h 42 min left, 3 not flown"),
         (counts(1000, faulted=8), 10.0, "one: 1000 of 1000 flights, 100/s, 0 s left, detected 0.0%"),
     ],
 )  # fmt: skip

@@ -7,6 +7,7 @@ import pytest
 
 from beaver_ftc.control.laws import ORACLE
 from beaver_ftc.control.supervisor import MAX_EVENTS
+from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.loop import accounts, assembly, frame, loop, outcome
 from beaver_ftc.loop.loop import fly
@@ -126,10 +127,20 @@ def test_a_flight_without_a_log_has_the_same_outcome():
     assert yielded(fly(case)) == yielded(fly(case, Memory()))
 
 
-def test_progress_ends_at_one():
-    shares = []
+class Silent:
+    def reset(self, context):
+        self.verdict = Verdict()
+
+    def step(self, measured, command):
+        return self.verdict
+
+
+def test_progress_ends_at_one_and_is_told_meanwhile_where_a_plug_in_flies():
+    shares, slow = [], []
     fly(scenario(duration_s=1), progress=shares.append)
-    assert shares[-1] == 1.0
+    fly(scenario(duration_s=1), progress=slow.append, detector=Silent())
+    assert shares[-1] == slow[-1] == 1.0
+    assert slow[:-1] == pytest.approx([16 * n / 100 for n in range(1, 7)])
 
 
 class TestFrames:

@@ -105,7 +105,7 @@ class _Progress:
         done, total = counts["done"], counts["total"]
         rate = (done - self._first) / max(now - self._begun, 1e-9)
         to_come = f", {_span((total - done) / rate)} left" if rate > 0 else ""
-        parts = [f"{self._name}: {done} of {total} flights, {rate:.0f}/s{to_come}"]
+        parts = [f"{self._name}: {done} of {total} flights, {_rate(rate)}/s{to_come}"]
         if counts["faulted"]:
             parts.append(f"detected {counts['detected'] / counts['faulted']:.1%}")
         if counts["failed"]:
@@ -125,6 +125,10 @@ class _Progress:
         if self._shown:
             sys.stderr.write("\r" + " " * len(self._shown) + "\r")
             sys.stderr.flush()
+
+
+def _rate(per_s: float) -> str:
+    return f"{per_s:.0f}" if per_s >= 10.0 or per_s == 0.0 else f"{per_s:.2g}"
 
 
 def _span(seconds: float) -> str:

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from beaver_ftc.loop.plugin_frame import PluginFrame
 
 CHUNK_ROWS = 8192
+TOLD_FRAMES = 16  # between two words of progress of a plug-in's flight
 # The aircraft that are flown again and their compiled frames are the process's own: of several threads one
 # flies at a time, the others wait. More at a time take more processes.
 ONE_FLIES = threading.RLock()
@@ -368,7 +369,8 @@ def fly(
     prepare: Callable[[Plant], None] | None = None,
     watch: Callable[[Loop], Callable[[], None]] | None = None,
 ) -> Landing:
-    """Fly a scenario. The log goes to `sink`; `progress` is called with the share flown, chunk by chunk.
+    """Fly a scenario. The log goes to `sink`; `progress` is called with the share flown, chunk by chunk, and
+    oftener where a plug-in flies: nobody knows how long it takes.
 
     detector, law: plug-ins to fly with, in place of those the scenario names. prepare: called with the
     trimmed plant just before the flight. watch: called with the flight; what it returns, as that ends.
@@ -394,6 +396,8 @@ def _fly(
         over = None if watch is None else watch(loop)
         if sink is not None:
             sink.open(loop.columns)
+        if progress is not None and loop.plugin_frame is not None:
+            loop.after_frame = _told(loop, progress)
         for rows in loop.chunks():
             if sink is not None:
                 sink.write(rows)
@@ -406,3 +410,16 @@ def _fly(
         return loop.land()
     finally:
         loop.release()
+
+
+def _told(loop: Loop, progress: Callable[[float], None]) -> Callable[[], None]:
+    """What to call after each frame, so that progress is told every so many."""
+    before, frames, n_frames = loop.after_frame, loop.frames["k"], loop.n_frames
+
+    def after_frame() -> None:
+        if before is not None:
+            before()
+        if frames[0] % TOLD_FRAMES == 0:
+            progress(frames[0] / n_frames)
+
+    return after_frame

@@ -23,7 +23,7 @@ help:
 	@echo "make demo       set up, fly the published elevator case, print the verdict and where the report lies"
 	@echo "make check      the tests that execute the lines you changed: a minute at most"
 	@echo "make test       set up and run every test of every day"
-	@echo "make nightly    the rest: whole samples, browsers, notebooks, drawn scenarios, mutants"
+	@echo "make nightly    all tests with all that they draw, browsers, notebooks, drawn scenarios, mutants"
 	@echo "make promises   what is promised, and which tests hold each promise"
 	@echo "make acceptance the installed command from outside: every scenario, page and mistake"
 	@echo "make cost       what a flight costs beside bare JSBSim: no more than a tenth above the recorded revision?"
@@ -55,9 +55,10 @@ test: $(VENV)/.dev
 	NUMBA_DISABLE_JIT=1 $(PYTEST) $(PLAIN)
 	$(PYTEST) -m "not acceptance and not nightly" $(addprefix --ignore=,$(PLAIN))
 
-# What tests/nightly.yaml lists, and what draws: scenarios, mutants.
+# Every test with all that it draws, what tests/nightly.yaml lists too; then drawn scenarios, mutants.
 nightly: $(VENV)/.dev
-	$(PYTEST) -m nightly
+	BEAVER_FTC_NIGHT=1 NUMBA_DISABLE_JIT=1 $(PYTEST) $(PLAIN)
+	BEAVER_FTC_NIGHT=1 $(PYTEST) -m "not acceptance" $(addprefix --ignore=,$(PLAIN))
 	$(BIN)/python -m tools.drawn
 	$(BIN)/python -m tools.mutants --seed $(SEED)
 

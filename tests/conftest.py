@@ -12,9 +12,10 @@ sys.path.insert(0, str(Path(__file__).parent))
 from tools.promises import is_at_night
 
 import kept
+from samples import samples
 
 # No deadline: a first call compiles. Derandomised: a red build can be repeated.
-settings.register_profile("repeatable", deadline=None, derandomize=True)
+settings.register_profile("repeatable", deadline=None, derandomize=True, max_examples=samples(100))
 settings.load_profile("repeatable")
 
 

@@ -10,6 +10,7 @@ from beaver_ftc.aircraft.aircraft import FORCES, MOMENTS
 from beaver_ftc.diagnosis.isolation import members_of
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.trim import trim
+from samples import samples
 from tools import split
 
 SIDES = ("left", "right")
@@ -26,7 +27,7 @@ def test_its_files_are_what_the_tool_writes(halves):
         assert (halves.folder / name).read_text(encoding="utf-8") == text, "run python -m tools.split"
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=samples(40), deadline=None)
 @given(st.lists(ANGLE, min_size=11, max_size=11))
 def test_both_sides_moved_as_one_are_the_whole(state):
     whole, halves = load(), load("beaver-split")
@@ -38,7 +39,7 @@ def test_both_sides_moved_as_one_are_the_whole(state):
         assert halves.coefficient(name, of) == pytest.approx(whole.coefficient(name, of), abs=1e-12)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=samples(20), deadline=None)
 @given(ANGLE, ANGLE)
 def test_the_sides_are_mirror_images(deflection, alpha):
     """Trailing edge down on one side or the other: the same lift and pitch, the opposite roll and yaw."""

@@ -10,6 +10,7 @@ from beaver_ftc.control import allocation, least_squares
 from beaver_ftc.control.least_squares import problem_dtype
 from beaver_ftc.diagnosis.belief import belief_dtype
 from law_records import new_control
+from samples import samples
 
 
 def problem_of(n, rng, at=None):
@@ -40,7 +41,7 @@ def cost(problem, B, demand, u):
     return float(lack @ lack + problem["slack"] * away.sum())
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=samples(60), deadline=None)
 @given(st.integers(3, 20), st.integers(0, 2**32 - 1), st.sampled_from([0.3, 3.0, 30.0]))
 def test_it_is_the_minimum_that_scipy_finds(n, seed, size):
     rng = np.random.default_rng(seed)
@@ -53,7 +54,7 @@ def test_it_is_the_minimum_that_scipy_finds(n, seed, size):
     assert np.all((problem["low"] <= problem["u"]) & (problem["u"] <= problem["high"]))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=samples(60), deadline=None)
 @given(st.integers(3, 20), st.integers(0, 2**32 - 1))
 def test_what_can_be_given_is_given(n, seed):
     """A demand that some deflections inside the limits meet is met, whatever was asked before."""
@@ -66,7 +67,7 @@ def test_what_can_be_given_is_given(n, seed):
     assert B @ problem["u"] == pytest.approx(B @ inside, abs=1e-4)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=samples(40), deadline=None)
 @given(st.integers(3, 20), st.integers(0, 2**32 - 1))
 def test_started_from_its_own_solution_one_system_is_solved(n, seed):
     rng = np.random.default_rng(seed)
@@ -125,7 +126,7 @@ def generally(demand, left, share, probe=0.0, at=None, step=np.inf):
     return control["allocation"]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=samples(60), deadline=None)
 @given(
     st.tuples(st.floats(-0.5, 0.5), st.floats(0.3, 0.7), st.floats(-0.2, 0.2)),
     st.floats(0.3, 1.0),

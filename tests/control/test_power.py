@@ -27,6 +27,7 @@ from beaver_ftc.studies.matrix.fault_matrix import REFERENCE, trimmed_deg
 from beaver_ftc.studies.matrix.pitch_lost import closed_loop
 from beaver_ftc.studies.mismatch.linear import in_fdc
 from flying import flown, scenario
+from samples import samples
 
 DT = 0.01
 TRAVEL = np.array([[-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]])
@@ -129,7 +130,7 @@ class TestWhen:
 
 
 class TestWithin:
-    @settings(max_examples=40, deadline=None)
+    @settings(max_examples=samples(40), deadline=None)
     @given(st.lists(st.tuples(st.floats(20, 90), st.floats(-1, 1), st.floats(0, 4)), min_size=3, max_size=12))
     def test_limits_and_rate_whatever_is_measured(self, told):
         control = control_record(patience_s=0.01)

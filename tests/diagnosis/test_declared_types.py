@@ -16,6 +16,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sensors import Sensors
+from samples import samples
 
 NOISE_DEG_S = 0.02
 TOLERANCE = 0.05
@@ -61,7 +62,7 @@ def fly(seed, noisy, kind, surface, at, share, frames):
 
 
 @pytest.mark.parametrize("noisy", [False, True])
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=samples(80), deadline=None)
 @given(st.integers(0, 2**32), st.sampled_from(list(TYPES)), surfaces, starts, shares)
 def test_the_true_type_is_neither_excluded_nor_named_wrongly(noisy, seed, kind, surface, at, share):
     plant = fly(seed, noisy, kind, surface, at, share, 700)
@@ -104,7 +105,7 @@ def test_pairs_are_refused_with_noisy_gyros_in_one_line():
 
 
 @pytest.mark.parametrize("kind", HELD)
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=samples(15), deadline=None)
 @example(0, 1, 20, 30, 1.0)
 @given(st.integers(0, 2**32), surfaces, starts, st.integers(11, 60), shares)
 def test_a_release_anywhere_inside_a_block_excludes_neither_surface_nor_type(

@@ -12,6 +12,7 @@ from beaver_ftc.diagnosis.thresholds import noise_step
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sensors import Sensors
+from samples import samples
 
 TRAVEL_RAD = np.array([[-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]])
 TERMS_USED = (
@@ -60,7 +61,7 @@ SENSORS = {
 }
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=samples(300), deadline=None)
 @given(st.integers(0, 2**32), st.booleans())
 def test_no_admitted_error_exceeds_the_bound(seed, at_the_corner):
     rng = np.random.default_rng(seed)
@@ -94,7 +95,7 @@ def test_nothing_declared_adds_nothing():
     assert (bound(x, y, u) == 0.0).all()
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=samples(100), deadline=None)
 @given(st.integers(0, 2**32))
 def test_inertia_coefficients_are_extreme_at_the_corners(seed):
     from dataclasses import replace
@@ -109,7 +110,7 @@ def test_inertia_coefficients_are_extreme_at_the_corners(seed):
     assert (np.abs(there - nominal) <= inertia_slack(tolerance, MASS) * (1 + 1e-12)).all()
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=samples(100), deadline=None)
 @given(st.integers(0, 2**32), st.floats(0.0, 1.0), st.integers(1, 60))
 def test_filtered_noise_stays_within_its_bound_and_can_reach_it(seed, a, frames):
     """eps[k+1] = a eps[k] + n[k+1] - n[k]; the worst noise keeps one sign until the last frame."""
@@ -148,7 +149,7 @@ def test_errors_that_have_no_bound_cannot_be_declared():
         load_text("name: x\nfdi: {bounds: {coefficients: {Cm_alfa: 0.1}}}\n")
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=samples(50), deadline=None)
 @given(st.integers(0, 2**32), st.integers(0, 3))
 def test_a_surfaces_own_share_of_the_bound_is_its_slope(seed, surface):
     """The bound is affine in |u|: a radian more raises it by what the surface's own terms may be off."""

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from beaver_ftc.diagnosis.types import registry as types
 from beaver_ftc.diagnosis.types.findings import found
+from samples import samples
 
 FRAMES = 200
 SURFACES = ("aileron", "elevator", "rudder", "flap")
@@ -112,7 +113,7 @@ def fly(case, kind, surface, at, share, uncertainty, frames=FRAMES, gone=None):
 
 
 @pytest.mark.parametrize("kind", TYPES)
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=samples(30), deadline=None)
 @given(cases, surfaces, starts, shares, uncertainties)
 def test_the_true_type_is_never_excluded(kind, case, surface, at, share, uncertainty):
     plant, code = fly(case, kind, surface, at, share, uncertainty)
@@ -121,7 +122,7 @@ def test_the_true_type_is_never_excluded(kind, case, surface, at, share, uncerta
 
 
 @pytest.mark.parametrize("kind", ["constant loss", "stuck", "float", "bias", "hardover up", "oscillatory"])
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=samples(20), deadline=None)
 @given(cases, surfaces, starts, shares, uncertainties)
 def test_nor_is_it_when_the_fault_goes_again(kind, case, surface, at, share, uncertainty):
     plant, code = fly(case, kind, surface, at, share, uncertainty, gone=at + 40)
@@ -130,7 +131,7 @@ def test_nor_is_it_when_the_fault_goes_again(kind, case, surface, at, share, unc
 
 
 @pytest.mark.parametrize("kind", TYPES)
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=samples(10), deadline=None)
 @given(st.integers(0, 2**32), surfaces, shares, uncertainties)
 def test_neither_surface_nor_type_is_ever_named_wrongly(kind, seed, surface, share, uncertainty):
     case = {"seed": seed, "rate_hz": 50.0, "airspeed_mps": 45.0}
@@ -143,7 +144,7 @@ def test_neither_surface_nor_type_is_ever_named_wrongly(kind, seed, surface, sha
 
 
 @pytest.mark.parametrize("kind", ["varying loss", "growing bias", "rate limit"])
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=samples(10), deadline=None)
 @given(cases, surfaces, starts, shares, uncertainties)
 def test_a_short_fault_of_any_course_stays_among_the_candidates(kind, case, surface, at, share, uncertainty):
     """Though a constant explains the few frames of it, too."""

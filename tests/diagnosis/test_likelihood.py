@@ -11,6 +11,7 @@ from scipy.stats import kstest
 from beaver_ftc.diagnosis import likelihood
 from beaver_ftc.diagnosis.likelihood import ALPHA3, N_SLOTS, STEP
 from beaver_ftc.diagnosis.state import LOSS
+from samples import samples
 
 DT = 0.01
 TOGETHER = np.array([[0.04, 0.006], [0.006, 0.003]])
@@ -102,7 +103,7 @@ def test_the_estimate_is_unbiased_and_as_sure_as_it_says(case, theta):
     assert np.mean(error**2) == pytest.approx(1.0, abs=4 * np.sqrt(2 / len(error)))
 
 
-@settings(max_examples=60)
+@settings(max_examples=samples(60))
 @given(
     st.sampled_from(sorted(AXES)),
     st.integers(0, 2**31),
@@ -143,7 +144,7 @@ def test_the_worst_corner_takes_all_of_the_allowance():
     assert abs(seen) - slack == pytest.approx(abs(clean), rel=1e-9)
 
 
-@settings(max_examples=60)
+@settings(max_examples=samples(60))
 @given(
     st.sampled_from(sorted(AXES)),
     st.integers(0, 2**31),

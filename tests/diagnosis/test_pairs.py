@@ -15,6 +15,7 @@ from beaver_ftc.diagnosis.types.findings import found
 from beaver_ftc.diagnosis.types.pairs import solve_roll_and_yaw
 from beaver_ftc.scenario.schema import Scenario
 from flying import flown
+from samples import samples
 
 AILERON, ELEVATOR, RUDDER = range(3)
 kinds = st.sampled_from(list(TYPES))
@@ -47,7 +48,7 @@ def check(plant, faults):
             assert true[one["isolated"]] in one["candidates"]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=samples(60), deadline=None)
 @given(st.integers(0, 2**32), uncertainties, kinds, kinds, starts, starts, shares, shares)
 def test_ailerons_and_rudder(seed, uncertainty, kind, other, at, later, share, other_share):
     faults = (AILERON, kind, at, share), (RUDDER, other, later, other_share)
@@ -58,14 +59,14 @@ def test_ailerons_and_rudder(seed, uncertainty, kind, other, at, later, share, o
     assert not plant.fdi["types"]["pair"]["no_lateral_pair"]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=samples(40), deadline=None)
 @given(st.integers(0, 2**32), uncertainties, kinds, kinds, starts, starts, shares, shares)
 def test_a_fault_in_each_plane(seed, uncertainty, kind, other, at, later, share, other_share):
     faults = (ELEVATOR, kind, at, share), (RUDDER, other, later, other_share)
     check(fly(seed, uncertainty, faults), faults)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=samples(40), deadline=None)
 @given(st.integers(0, 2**32), uncertainties, kinds, st.integers(0, 2), starts, shares)
 def test_one_fault_is_not_taken_for_two(seed, uncertainty, kind, surface, at, share):
     faults = ((surface, kind, at, share),)

@@ -6,6 +6,8 @@ from design_plant import SURFACES, UNCERTAINTIES, DesignPlant
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from samples import samples
+
 FRAMES = 160
 BOUNDS = {
     "published": {},
@@ -57,7 +59,7 @@ any_course = st.one_of(
 )
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=samples(120), deadline=None)
 @given(flights, uncertainties, st.sampled_from(["interval", "published"]))
 def test_no_admissible_uncertainty_raises_an_alarm(flight, uncertainty, thresholds):
     plant = DesignPlant(thresholds=thresholds, **flight).fly(FRAMES, uncertainty)
@@ -66,7 +68,7 @@ def test_no_admissible_uncertainty_raises_an_alarm(flight, uncertainty, threshol
     assert max(plant.fdi["bank"]["closest"]) <= 1.0  # of every filter, however near the uncertainty drives it
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=samples(150), deadline=None)
 @given(flights, uncertainties, st.integers(0, 2), any_course)
 def test_the_true_fault_is_never_excluded_whatever_its_course(flight, uncertainty, surface, theta):
     plant = DesignPlant(surface=surface, theta=theta, **flight).fly(FRAMES, uncertainty)
@@ -86,7 +88,7 @@ positions = st.one_of(
 )
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=samples(100), deadline=None)
 @given(flights, uncertainties, st.integers(0, 2), positions)
 def test_a_surface_that_may_be_anywhere_is_never_excluded(flight, uncertainty, surface, position):
     """Jammed, biased, swinging or mad: its position estimator admits it."""
@@ -96,7 +98,7 @@ def test_a_surface_that_may_be_anywhere_is_never_excluded(flight, uncertainty, s
     assert plant.detected_at_s <= plant.certain_after_s
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=samples(100), deadline=None)
 @given(flights, uncertainties, st.integers(0, 2), constants, st.sampled_from(["interval", "published"]))
 def test_a_constant_true_fault_is_never_excluded_by_any_threshold(
     flight, uncertainty, surface, theta, thresholds
@@ -112,7 +114,7 @@ def test_a_constant_true_fault_is_never_excluded_by_any_threshold(
         assert (fie["theta_high"] >= true - 1e-9).all()
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=samples(100), deadline=None)
 @given(flights, uncertainties, st.integers(0, 2), any_course)
 def test_detected_no_later_than_the_guaranteed_instant(flight, uncertainty, surface, theta):
     plant = DesignPlant(surface=surface, theta=theta, **flight).fly(FRAMES, uncertainty)
@@ -143,7 +145,7 @@ def test_filters_and_bounds_are_the_convolutions_they_stand_for():
     assert plant.fdi["bank"]["threshold"][0] == pytest.approx(bound, abs=1e-10)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=samples(60), deadline=None)
 @given(st.integers(0, 2**32), st.floats(20, 200), poles, st.integers(0, 2), any_course, uncertainties)
 def test_no_filter_alarms_before_the_innovation_itself(seed, rate_hz, pole, surface, theta, uncertainty):
     """Where every innovation is inside its bound there is nothing for any filter to find."""
@@ -157,7 +159,7 @@ def test_no_filter_alarms_before_the_innovation_itself(seed, rate_hz, pole, surf
     assert alarm([1e6], pole) <= alarm([], pole)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=samples(60), deadline=None)
 @given(st.integers(0, 2**32), st.integers(0, 2), st.floats(0.1, 1.0), uncertainties)
 def test_more_sharpening_never_isolates_later(seed, surface, size, uncertainty):
     """On one recorded flight each step can only exclude more."""
@@ -178,7 +180,7 @@ def test_a_surface_is_named_at_the_alarm_when_no_other_moves_that_axis():
     assert plant.fdi["verdict"]["isolated_at_s"] == plant.fdi["verdict"]["detected_at_s"]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=samples(60), deadline=None)
 @given(st.integers(0, 2**32), st.sampled_from([0, 2]), st.floats(0.1, 1.0))
 def test_a_constant_parameter_stays_in_its_shrinking_set(seed, surface, size):
     """Without any uncertainty the set closes on the parameter, and so does the estimate."""

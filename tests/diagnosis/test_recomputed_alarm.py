@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flying import flown, loss
+from samples import samples
 
 SIGMA, BIAS, SLOPE = radians(0.02), radians(0.05), 1e-3
 GYRO = {"noise_std_deg_s": 0.02, "bias_deg_s": 0.05, "scale_error": SLOPE}
@@ -83,7 +84,7 @@ def test_the_bound_follows_from_the_rates_that_the_row_before_measures():
         assert memory[f"{axis}_eta_bar_rad_s2"][1:] == pytest.approx(expected, rel=1e-7)
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=samples(6), deadline=None)
 @given(
     st.sampled_from([50, 100, 500]), st.sampled_from([1, 3]), st.floats(1.0, 60.0), st.floats(1.0, 200.0),
     st.sampled_from([{}, GYROS]),

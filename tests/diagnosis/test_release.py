@@ -9,6 +9,7 @@ from test_fault_types import TYPES, cases, shares, surfaces
 
 from beaver_ftc.diagnosis.types import registry as types
 from beaver_ftc.diagnosis.types.table import stuck
+from samples import samples
 
 HELD = ("stuck", "float", "hardover up", "hardover down")
 uncertainties = st.sampled_from(list(UNCERTAINTIES.values()))
@@ -47,7 +48,7 @@ def at_20_hz(seed, airspeed_mps):
 
 
 @pytest.mark.parametrize("kind", HELD)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=samples(40), deadline=None)
 @example(at_20_hz(0, 54.0), 1, 0, 3, 0.0, UNCERTAINTIES["push"])  # back to 1e-12 rad, and still felt
 @example(at_20_hz(284662124, 49.2), 1, 0, 12, 0.0, UNCERTAINTIES["across"])  # ends pass by rounding
 @example(at_20_hz(2069848671, 37.4), 2, 25, 4, 0.6, UNCERTAINTIES["bang-bang"])
@@ -59,7 +60,7 @@ def test_a_return_excludes_neither_surface_nor_type(kind, case, surface, at, las
     assert not plant.fdi["types"]["surface"][surface]["type_excluded"][fault.code]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=samples(60), deadline=None)
 @given(cases, surfaces, st.integers(0, 60), st.integers(3, 60), shares, uncertainties)
 def test_a_return_does_not_move_the_jam(case, surface, at, lasting, share, uncertainty):
     """Where it was jammed stays within its set, though the last frames showed it elsewhere."""

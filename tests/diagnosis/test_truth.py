@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.studies.verify import Draw
 from flying import PUBLISHED_UNCERTAINTY, flown, loss
+from samples import samples
 
 NOTHING_DECLARED = {
     "bounds": {"inertia_coupling": {"p": 0, "q": 0, "r": 0}, "constant_rad_s2": {"p": 0, "q": 0, "r": 0}}
@@ -20,7 +21,7 @@ ROUGH = {
 }
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=samples(12), deadline=None)
 @given(
     st.sampled_from([20, 50, 100, 1000]),
     st.sampled_from([1, 2, 5, 50]),

@@ -8,6 +8,7 @@ from innovations import PlainKalman, block_of, drawn, filter_all
 from scipy.linalg import solve_discrete_are
 
 from beaver_ftc.diagnosis import likelihood
+from samples import samples
 
 TOGETHER = np.array([[0.04, 0.006], [0.006, 0.003]])
 CASES = {  # drift, noise, what a drift keeps of itself in a frame
@@ -31,7 +32,7 @@ def _parts(block):
     }
 
 
-@settings(max_examples=25)
+@settings(max_examples=samples(25))
 @given(st.sampled_from(sorted(CASES)), st.sampled_from([20.0, 100.0, 1000.0]), st.integers(0, 2**31))
 def test_it_is_the_textbook_filter_while_noise_and_drift_change(case, rate_hz, seed):
     rng, dt = np.random.default_rng(seed), 1 / rate_hz

@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
 from flights import synthetic
+from samples import samples
 
 
 def run(*arguments):
@@ -90,7 +91,7 @@ def diagnosed(folder, path, out, *options):
     return parquet.read_table(out / path.stem / "diagnosis.parquet")
 
 
-@settings(max_examples=5, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=samples(5), deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(rows=st.integers(min_value=60, max_value=1199))
 def test_cutting_a_log_changes_no_row_before_the_cut(folder, tmp_path, rows):
     lines = (folder / "flight.csv").read_text().splitlines()

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from beaver_ftc.flights import physics, signals
 from beaver_ftc.flights.recording import Column
+from samples import samples
 
 T_S = np.arange(0.0, 60.0, 0.05)
 
@@ -38,7 +39,7 @@ def test_a_clipped_rate_and_one_that_is_not():
     assert not signals.clipped(np.zeros(500)).any()
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=samples(20), deadline=None)
 @given(cut=st.integers(20, 1199), level=st.floats(0.5, 2.9))
 def test_what_is_clipped_shows_without_what_comes_later(cut, level):
     values = np.minimum(np.sin(T_S) * 3.0 + 0.01 * noise(), level)

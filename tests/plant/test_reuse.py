@@ -11,6 +11,7 @@ from beaver_ftc.plant import conditions, reuse
 from beaver_ftc.plant.conditions import ready
 from beaver_ftc.plant.configure import take_off
 from beaver_ftc.scenario.loader import load
+from samples import samples
 
 SURFACES = ("aileron", "elevator", "rudder", "flap")
 KINDS = (
@@ -87,7 +88,9 @@ def flown_in_a_fresh_one(scenario, monkeypatch):
         return flown(scenario)
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=samples(25), deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 @given(before=st.lists(FLIGHTS, min_size=1, max_size=3), flight=FLIGHTS)
 def test_the_log_is_the_same_to_the_bit(before, flight, monkeypatch):
     expected = flown_in_a_fresh_one(scenario_of(flight), monkeypatch)

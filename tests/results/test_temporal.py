@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from beaver_ftc.results.temporal import MOST_CHARACTERS, MOST_DEPTH, FormulaError, parse
+from samples import samples
 
 RATE_HZ = 10.0
 COMPARED = ["(a <= 0.3)", "(b - 2*a >= -0.2)", "(abs(a*b) < 0.5)", "(a / 2 + b > c)", "(0.1 >= c)"]
@@ -36,7 +37,7 @@ def log(frames, seed):
     return {name: rng.normal(size=frames) for name in "abc"}
 
 
-@settings(max_examples=60)
+@settings(max_examples=samples(60))
 @given(st.recursive(st.sampled_from(COMPARED), joined, max_leaves=5), st.integers(2, 40), st.integers(0, 99))
 def test_robustness_is_that_of_rtamt(text, frames, seed):
     rtamt = pytest.importorskip("rtamt")

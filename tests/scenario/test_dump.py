@@ -7,11 +7,12 @@ from hypothesis import given, settings
 from beaver_ftc.scenario.dump import to_yaml
 from beaver_ftc.scenario.loader import load, load_scenario, load_text
 from beaver_ftc.scenario.schema import Scenario
+from samples import samples
 
 from .strategies import SCENARIOS
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=samples(150), deadline=None)
 @given(SCENARIOS)
 def test_a_dump_loads_as_the_same_scenario(data):
     scenario = Scenario.model_validate(data)

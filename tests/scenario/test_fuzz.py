@@ -13,6 +13,7 @@ from beaver_ftc.documents.problems import ScenarioError
 from beaver_ftc.documents.validation import validate
 from beaver_ftc.scenario.loader import builtin_path, load_scenario, load_text
 from beaver_ftc.scenario.schema import Scenario
+from samples import samples
 
 from .strategies import SCENARIOS
 
@@ -38,7 +39,7 @@ def unclear(read: Callable[[], Scenario]) -> list[str]:
     return [line for line in lines if not LINE.match(line)] + repeated + endless
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=samples(200), deadline=None)
 @given(st.binary(max_size=200))
 def test_random_bytes(tmp_path_factory, data):
     path = tmp_path_factory.mktemp("fuzz") / "s.yaml"
@@ -105,7 +106,7 @@ YAML_WORDS = st.sampled_from(
 )
 
 
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=samples(500), deadline=None)
 @given(st.lists(YAML_WORDS, max_size=40).map("".join))
 @example("a: &a [*a]")
 @example("{? {a: 1} : 2}")
@@ -123,7 +124,7 @@ def test_random_yaml(text):
     assert not unclear(lambda: load_text(text, source="s.yaml"))
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=samples(300), deadline=None)
 @given(st.data())
 def test_a_good_file_with_a_piece_cut_out_doubled_or_replaced(data):
     start = data.draw(st.integers(0, len(SEED)))
@@ -148,7 +149,7 @@ VALUES = st.one_of(
 )
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=samples(300), deadline=None)
 @given(SCENARIOS, st.data())
 def test_a_good_scenario_with_values_replaced(scenario, data):
     scenario = deepcopy(scenario)

@@ -8,6 +8,7 @@ from beaver_ftc.documents.base import Section
 from beaver_ftc.documents.document import parse
 from beaver_ftc.scenario.loader import builtin_names, builtin_path
 from beaver_ftc.scenario.schema import Scenario, json_schema
+from samples import samples
 
 from .strategies import SCENARIOS
 
@@ -31,7 +32,7 @@ def test_it_accepts_the_builtin_scenarios(name):
     assert refusals(parse(builtin_path(name).read_text()).data) == []
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=samples(60), deadline=None)
 @given(SCENARIOS)
 def test_it_accepts_what_the_loader_accepts(data):
     Scenario.model_validate(data)

@@ -36,6 +36,7 @@ from beaver_ftc.studies.detectability import (
     with_aircraft,
 )
 from flying import loss, scenario
+from samples import samples
 
 FAULTS = ("aileron", "elevator", "rudder")
 TRAINER = Path(__file__).parents[1] / "data" / "aircraft" / "trainer"
@@ -56,7 +57,7 @@ def _rows(*vectors):
     return [np.array([vector]) for vector in vectors]
 
 
-@settings(max_examples=200)
+@settings(max_examples=samples(200))
 @given(moments, moments, bounds)
 def test_mismatch_is_the_least_over_every_parameter_of_the_other_fault(z, other, bound):
     shares = np.linspace(0, 1, 2001)[:, None]
@@ -220,7 +221,7 @@ def test_another_aircraft_is_flown_from_where_it_starts():
     assert set(excitation(other).moment) == {"aileron_left", "aileron_right", "elevator", "rudder"}
 
 
-@settings(max_examples=100)
+@settings(max_examples=samples(100))
 @given(moments, moments, bounds)
 def test_what_is_told_apart_no_deflection_of_the_other_explains(column, other, bound):
     """By brute force over deflections of the other: below the least one some explains it, above it none."""

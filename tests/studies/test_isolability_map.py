@@ -14,6 +14,7 @@ from beaver_ftc.studies.detectability import SETTLED_S, Excitation, at, excitati
 from beaver_ftc.studies.isolability import DOUBLET, TOLD, doublets, shown
 from beaver_ftc.studies.separation import LARGEST_RATE_DEG_S
 from flying import loss, scenario
+from samples import samples
 
 FAULTS = ("aileron", "elevator", "rudder")
 
@@ -43,7 +44,7 @@ def test_a_total_loss_takes_no_longer_than_the_window_exactly_where_some_loss_is
         assert found["median_s"] <= found["longest_s"]
 
 
-@settings(max_examples=30)
+@settings(max_examples=samples(30))
 @given(st.lists(st.tuples(*[st.sampled_from([-4.0, -2.0, 0.0, 0.5, 1.0, 3.0])] * 9), min_size=2, max_size=4))
 def test_a_fault_that_is_isolated_is_told_from_every_other(moments):
     """`judge` says of a fault no more than each of its pairs."""

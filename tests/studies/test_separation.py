@@ -28,6 +28,7 @@ from beaver_ftc.studies.separation import (
     tell_apart,
     write,
 )
+from samples import samples
 from telling import apart, fill
 
 SMALL = {
@@ -118,7 +119,7 @@ def test_surfaces_that_act_along_two_directions_can():
     assert set(pair["commands_rad"]) == {"aileron", "rudder"}
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=samples(25), deadline=None)
 @given(st.floats(-0.2, 0.2), st.sampled_from([1, 2, 4]), st.floats(0.3, 1.0), st.floats(0.005, 0.1))
 def test_a_doublet_is_there_and_back_within_every_limit(target, instants, approach, step):
     at = replace(PLAIN, instants=instants, approach=np.full(4, approach), step=np.full(4, step))
@@ -200,7 +201,7 @@ def test_by_the_command_line(tmp_path, monkeypatch, capsys):
     assert "aileron" in as_text(written)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=samples(15), deadline=None)
 @given(
     st.sampled_from([1, 2, 3]), st.floats(0.05, 1.0), st.lists(st.floats(-0.3, 0.3), min_size=1, max_size=6)
 )
@@ -239,7 +240,7 @@ def flown_by_hand(command, at):
     return np.array(moved), at.dt * np.outer(at.G[:, 0], np.cumsum(moved))
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=samples(12), deadline=None)
 @given(
     st.floats(0.02, 0.25),
     st.sampled_from([1, 2]),

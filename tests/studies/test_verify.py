@@ -14,6 +14,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies import verify
 from beaver_ftc.studies.engine.statistics import binomial_upper, poisson_bound
 from beaver_ftc.studies.verify import PROMISES, Campaign, Draw, conduct, summarise, summary_text
+from samples import samples
 
 SMALL = Campaign(hours=0.1, faults=6, seed=4)
 
@@ -24,7 +25,7 @@ def flown(tmp_path_factory):
     return conduct(SMALL, folder, workers=1), folder
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=samples(60), deadline=None)
 @given(st.integers(0, 2**40), st.integers(0, 10**7), st.sampled_from(["healthy", "faulty"]))
 def test_every_draw_is_admissible(seed, index, kind):
     scenario = Draw(seed, kind, index).scenario()

@@ -12,6 +12,7 @@ from beaver_ftc.scenario.control import ControlConfig
 from beaver_ftc.studies.reproduce.choices import scenario as published
 from flying import Memory, flown, loss
 from law_records import new_control
+from samples import samples
 
 UNANTICIPATED = {"type": "unanticipated", "Cm_alpha3": 10, "at_s": 12.0}
 TRAVEL = np.array([[-0.5] * 4, [0.5] * 4])
@@ -71,7 +72,7 @@ def test_what_a_saturated_surface_misses_teaches_nothing():
     assert not control.adaptation.network.weights.any()
 
 
-@settings(max_examples=15)
+@settings(max_examples=samples(15))
 @given(st.floats(-3.0, 3.0), st.floats(-1.0, 1.0))
 def test_the_lyapunov_function_falls(unknown, e0):
     """e' = -Kp e - Ki int e + fhat - phi, phi constant, in small steps: V with the weights in it."""

@@ -15,6 +15,7 @@ from beaver_ftc.integrations.sitl.link import Link
 from beaver_ftc.integrations.sitl.mavlink import Mavlink
 from beaver_ftc.integrations.sitl.px4 import Px4, gps, quaternion, sensor, state
 from beaver_ftc.integrations.sitl.vehicle import Instant
+from samples import samples
 from telling import apart
 
 ZERO = (0.0, 0.0, 0.0)
@@ -180,7 +181,7 @@ def test_what_a_command_has_done_is_acknowledged(px4):
     assert px4.end.done == ["done"]
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=samples(8), deadline=None)
 @given(seed=st.integers(0, 10_000))
 @pytest.mark.parametrize("protocol", ["ardupilot", "px4"])
 def test_on_a_bad_line_nothing_is_flown_twice_or_lost(protocol, seed):

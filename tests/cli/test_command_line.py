@@ -12,6 +12,7 @@ import pytest
 import yaml
 
 from beaver_ftc.cli.output import status_of_stop
+from commands import beaver
 
 BEAVER = Path(sys.executable).with_name("beaver-ftc")
 SHORT = """
@@ -24,6 +25,7 @@ expect: {detected_within_s: 1.0, no_departure: true}
 
 
 def _beaver(*arguments, cwd, **options):
+    """In a process of its own."""
     return subprocess.run(
         [BEAVER, *arguments], cwd=cwd, capture_output=True, text=True, timeout=120, check=False, **options
     )
@@ -40,7 +42,7 @@ def _names(folder):
 
 
 def test_run_writes_the_contract_and_says_the_verdict(short):
-    done = _beaver("run", "short.yaml", cwd=short)
+    done = beaver("run", "short.yaml", cwd=short)
     assert (done.returncode, done.stderr) == (0, "")
     assert "short: PASSED" in done.stdout
     folder = short / "runs" / "short"
@@ -52,8 +54,8 @@ def test_run_writes_the_contract_and_says_the_verdict(short):
 
 
 def test_resolved_scenario_flies_again_to_the_same_numbers(short):
-    assert _beaver("run", "short.yaml", "--no-report", cwd=short).returncode == 0
-    again = _beaver("run", "runs/short/scenario.yaml", "--no-report", "--out", "again", cwd=short)
+    assert beaver("run", "short.yaml", "--no-report", cwd=short).returncode == 0
+    again = beaver("run", "runs/short/scenario.yaml", "--no-report", "--out", "again", cwd=short)
     assert again.returncode == 0
     for name in ("log.parquet", "metrics.json", "scenario.yaml"):
         assert (short / "runs/short" / name).read_bytes() == (short / "again/short" / name).read_bytes()
@@ -72,7 +74,7 @@ def test_json_is_one_document_and_nothing_else(short):
 
 def test_json_of_several_scenarios_is_a_list_with_one_verdict(short):
     (short / "strict.yaml").write_text(SHORT.replace("short", "strict").replace("1.0", "0.0"))
-    done = _beaver("run", "short.yaml", "strict.yaml", "--format", "json", "--no-report", cwd=short)
+    done = beaver("run", "short.yaml", "strict.yaml", "--format", "json", "--no-report", cwd=short)
     document = json.loads(done.stdout)
     assert set(document) == {"passed", "runs"}
     assert document["passed"] is False
@@ -80,16 +82,16 @@ def test_json_of_several_scenarios_is_a_list_with_one_verdict(short):
 
 
 def test_exports_lie_beside_the_log_when_asked_for(short):
-    assert _beaver("run", "short.yaml", "--no-report", "--csv", "--acmi", cwd=short).returncode == 0
+    assert beaver("run", "short.yaml", "--no-report", "--csv", "--acmi", cwd=short).returncode == 0
     expected = ["flight.acmi", "log.csv", "log.parquet", "metrics.json", "scenario.yaml"]
     assert _names(short / "runs/short") == expected
-    assert _beaver("run", "short.yaml", "--no-report", cwd=short).returncode == 0
+    assert beaver("run", "short.yaml", "--no-report", cwd=short).returncode == 0
     assert "log.csv" not in _names(short / "runs/short")
 
 
 @pytest.mark.parametrize("address", ["localhost", ":5550", "localhost:0", "localhost:65536", "localhost:x"])
 def test_what_is_no_address_of_a_flightgear_is_bad_input(short, address):
-    done = _beaver("run", "short.yaml", "--flightgear", address, cwd=short)
+    done = beaver("run", "short.yaml", "--flightgear", address, cwd=short)
     assert done.returncode == 2
     assert done.stderr.splitlines() == [
         f"--flightgear: {address!r} is no address, allowed: HOST:PORT with a port of 1 to 65535"
@@ -98,7 +100,7 @@ def test_what_is_no_address_of_a_flightgear_is_bad_input(short, address):
 
 def test_missed_expectation_is_status_1(short):
     (short / "strict.yaml").write_text(SHORT.replace("short", "strict").replace("1.0", "0.0"))
-    done = _beaver("run", "short.yaml", "strict.yaml", "--no-report", cwd=short)
+    done = beaver("run", "short.yaml", "strict.yaml", "--no-report", cwd=short)
     assert done.returncode == 1
     assert "short: PASSED" in done.stdout
     assert "strict: FAILED" in done.stdout
@@ -125,7 +127,7 @@ def test_bad_input_in_one_scenario_flies_none(short, format):
 def test_flight_that_cannot_be_trimmed_is_bad_input_with_its_place(short):
     (short / "slow.yaml").write_text("name: slow\ninitial: {airspeed_mps: 22, altitude_m: 6000}\n")
     for command in (["run", "short.yaml", "slow.yaml"], ["validate", "slow.yaml"]):
-        done = _beaver(*command, cwd=short)
+        done = beaver(*command, cwd=short)
         assert done.returncode == 2
         assert done.stderr.startswith("slow.yaml:2: initial")
         assert done.stderr.count("\n") == 1
@@ -133,7 +135,7 @@ def test_flight_that_cannot_be_trimmed_is_bad_input_with_its_place(short):
 
 
 def test_two_scenarios_of_one_name_are_refused(short):
-    done = _beaver("run", "short.yaml", "short.yaml", cwd=short)
+    done = beaver("run", "short.yaml", "short.yaml", cwd=short)
     assert done.returncode == 2
     assert "named short" in done.stderr
     assert not (short / "runs").exists()
@@ -143,14 +145,14 @@ def test_two_scenarios_of_one_name_are_refused(short):
     "arguments", [["fly"], ["run"], ["run", "x", "--format", "xml"], ["trim", "--flap-deg", "x"]]
 )
 def test_wrong_usage_is_status_2_on_standard_error(tmp_path, arguments):
-    done = _beaver(*arguments, cwd=tmp_path)
+    done = beaver(*arguments, cwd=tmp_path)
     assert (done.returncode, done.stdout) == (2, "")
     assert "Traceback" not in done.stderr
 
 
 def test_folder_that_cannot_be_written_is_status_3(short):
     (short / "file").write_text("")
-    done = _beaver("run", "short.yaml", "--out", "file/runs", cwd=short)
+    done = beaver("run", "short.yaml", "--out", "file/runs", cwd=short)
     assert done.returncode == 3
     assert done.stderr.startswith("cannot write file/runs/short: ")
     assert done.stderr.count("\n") == 1
@@ -210,32 +212,32 @@ def test_a_hang_up_that_is_to_be_ignored_is_ignored(short):
 
 
 def test_a_users_file_beside_the_figures_stops_the_run_before_it_flies(short):
-    assert _beaver("run", "short.yaml", cwd=short).returncode == 0
+    assert beaver("run", "short.yaml", cwd=short).returncode == 0
     note = short / "runs/short/figures/note.txt"
     note.write_text("mine")
-    done = _beaver("run", "short.yaml", "--no-report", cwd=short)
+    done = beaver("run", "short.yaml", "--no-report", cwd=short)
     assert done.returncode == 3
     assert "it holds figures/note.txt, which is no result of beaver-ftc" in done.stderr
     assert note.read_text() == "mine"
     note.unlink()
-    assert _beaver("run", "short.yaml", "--no-report", cwd=short).returncode == 0
+    assert beaver("run", "short.yaml", "--no-report", cwd=short).returncode == 0
 
 
 def test_a_folder_whose_name_is_not_utf_8(short):
     folder = os.fsdecode(b"r\xe9sultats")
-    done = _beaver("run", "short.yaml", "--csv", "--acmi", "--out", folder, cwd=short)
+    done = beaver("run", "short.yaml", "--csv", "--acmi", "--out", folder, cwd=short)
     assert (done.returncode, done.stderr) == (0, "")
     assert (short / folder / "short" / "report.html").exists()
-    done = _beaver("compare", f"{folder}/short", "--out", folder, cwd=short)
+    done = beaver("compare", f"{folder}/short", "--out", folder, cwd=short)
     assert (done.returncode, done.stderr) == (0, "")
 
 
 @pytest.mark.parametrize("size", [0, 4000, -100])
 def test_a_log_cut_short_is_bad_input_to_compare(short, size):
-    assert _beaver("run", "short.yaml", "--no-report", cwd=short).returncode == 0
+    assert beaver("run", "short.yaml", "--no-report", cwd=short).returncode == 0
     log = short / "runs/short/log.parquet"
     log.write_bytes(log.read_bytes()[:size])
-    done = _beaver("compare", "runs/short", cwd=short)
+    done = beaver("compare", "runs/short", cwd=short)
     assert done.returncode == 2
     says = "is damaged or cut short, allowed: a log that a run has written"
     assert done.stderr.splitlines() == [f"runs/short/log.parquet: {says}"]
@@ -282,7 +284,7 @@ def test_run_that_is_ended_leaves_no_half_result(short, number, status, left):
 def test_validate_reports_every_file(short):
     (short / "bad.yaml").write_text("name: bad\nduration_s: -6\n")
     (short / "fast.yaml").write_text("name: fast\ninitial: {airspeed_mps: 57}\n")
-    done = _beaver("validate", "short.yaml", "bad.yaml", "fast.yaml", "nowhere.yaml", cwd=short)
+    done = beaver("validate", "short.yaml", "bad.yaml", "fast.yaml", "nowhere.yaml", cwd=short)
     assert done.returncode == 2
     assert done.stdout.splitlines() == ["short.yaml: OK", "fast.yaml: OK"]
     assert [line.split(": ")[0] for line in done.stderr.splitlines()] == [
@@ -290,50 +292,50 @@ def test_validate_reports_every_file(short):
         "fast.yaml",
         "nowhere.yaml",
     ]
-    document = json.loads(_beaver("validate", "short.yaml", "bad.yaml", "--format", "json", cwd=short).stdout)
+    document = json.loads(beaver("validate", "short.yaml", "bad.yaml", "--format", "json", cwd=short).stdout)
     assert document["valid"] is False
     assert [file["valid"] for file in document["files"]] == [True, False]
 
 
 def test_schema_accepts_what_validate_accepts(short):
-    schema = json.loads(_beaver("schema", cwd=short).stdout)
+    schema = json.loads(beaver("schema", cwd=short).stdout)
     assert set(yaml.safe_load(SHORT)) <= set(schema["properties"])
     assert schema["required"] == ["name"]
 
 
 def test_trim_prints_the_same_flight_as_text_and_json(tmp_path):
     options = ("--airspeed-mps", "40", "--altitude-m", "1000", "--flap-deg", "10")
-    point = json.loads(_beaver("trim", *options, "--format", "json", cwd=tmp_path).stdout)
+    point = json.loads(beaver("trim", *options, "--format", "json", cwd=tmp_path).stdout)
     assert point["airspeed_mps"] == 40
     assert point["flap_rad"] == pytest.approx(0.17453293)
     assert max(map(abs, point["residual"].values())) < 1e-9
-    text = _beaver("trim", *options, cwd=tmp_path).stdout
+    text = beaver("trim", *options, cwd=tmp_path).stdout
     assert f"{point['alpha_rad'] * 57.29577951:.4f} deg" in text
 
 
 def test_trim_takes_the_condition_of_a_scenario(short):
     (short / "fast.yaml").write_text("name: fast\ninitial: {airspeed_mps: 52, altitude_m: 500}\n")
     point = json.loads(
-        _beaver("trim", "fast.yaml", "--altitude-m", "600", "--format", "json", cwd=short).stdout
+        beaver("trim", "fast.yaml", "--altitude-m", "600", "--format", "json", cwd=short).stdout
     )
     assert (point["airspeed_mps"], point["altitude_m"]) == (52, 600)
 
 
 def test_what_cannot_be_trimmed_is_status_2(tmp_path):
-    done = _beaver("trim", "--airspeed-mps", "22", "--altitude-m", "6000", cwd=tmp_path)
+    done = beaver("trim", "--airspeed-mps", "22", "--altitude-m", "6000", cwd=tmp_path)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.count("\n") == 1
 
 
 def test_list_names_what_a_scenario_can_say(tmp_path):
-    document = json.loads(_beaver("list", "--format", "json", cwd=tmp_path).stdout)
+    document = json.loads(beaver("list", "--format", "json", cwd=tmp_path).stdout)
     names = {kind: {entry["name"] for entry in entries} for kind, entries in document.items()}
     assert "elevator-partial-loss" in names["scenarios"]
     assert {"nominal", "adaptive", "fault-tolerant", "oracle"} <= names["laws"]
     assert "adaptive-estimators" in names["schemes"]
     assert {"stuck", "hardover", "float", "bias", "unanticipated"} <= names["faults"]
     assert {"sine", "doublet", "step", "square", "ramp", "chirp", "csv"} == names["signals"]
-    text = _beaver("list", cwd=tmp_path).stdout
+    text = beaver("list", cwd=tmp_path).stdout
     assert all(name in text for group in names.values() for name in group)
 
 
@@ -385,8 +387,8 @@ def test_run_imports_neither_plots_nor_pandas(short):
 
 
 def test_version_and_help(tmp_path):
-    assert _beaver("--version", cwd=tmp_path).stdout.startswith("beaver-ftc ")
-    said = dict(re.findall(r"^  (\w+)  +(.+)$", _beaver("--help", cwd=tmp_path).stdout, re.MULTILINE))
+    assert beaver("--version", cwd=tmp_path).stdout.startswith("beaver-ftc ")
+    said = dict(re.findall(r"^  (\w+)  +(.+)$", beaver("--help", cwd=tmp_path).stdout, re.MULTILINE))
     assert {"run", "validate", "schema", "trim", "list"} <= set(said)
     assert said["run"] == "Fly scenarios and say the verdict."
 

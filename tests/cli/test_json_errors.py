@@ -1,11 +1,12 @@
 """Who asks for one JSON document gets one, also of what cannot be done."""
 
 import json
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from commands import beaver
 
 BEAVER = str(Path(sys.executable).parent / "beaver-ftc")
 
@@ -23,9 +24,7 @@ BEAVER = str(Path(sys.executable).parent / "beaver-ftc")
     ids=lambda asked: asked[0],
 )
 def test_a_refusal_is_one_document(tmp_path, asked):
-    done = subprocess.run(
-        [BEAVER, *asked, "--format", "json"], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
+    done = beaver(*asked, "--format", "json", cwd=tmp_path)
     assert done.returncode == 2
     assert json.loads(done.stdout)["errors"] == done.stderr.splitlines()
     assert list(tmp_path.iterdir()) == []

@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 from beaver_ftc.cli.main import app
 from beaver_ftc.scenario.loader import builtin_names, builtin_path, builtin_sweeps, load_scenario
 from beaver_ftc.scenario.sweeps import load_sweep_text
+from commands import beaver
 
 BEAVER = Path(sys.executable).with_name("beaver-ftc")
 
@@ -40,10 +41,8 @@ def test_what_is_shown_is_the_file():
         assert load_sweep_text(_beaver("show", name).stdout, name=name).name == name
 
 
-def test_a_name_that_is_none_is_bad_input():
-    done = subprocess.run(
-        [BEAVER, "show", "elevator-partal-loss"], capture_output=True, text=True, check=False
-    )
+def test_a_name_that_is_none_is_bad_input(tmp_path):
+    done = beaver("show", "elevator-partal-loss", cwd=tmp_path)
     assert done.returncode == 2
     assert "did you mean elevator-partial-loss?" in done.stderr
 
@@ -59,9 +58,7 @@ def test_a_new_scenario_is_one_and_replaces_nothing(tmp_path, like):
     else:
         assert scenario.expect.isolated_as == scenario.faults[0].actuator == "elevator"
     (tmp_path / "mine.yaml").write_text("precious")
-    refused = subprocess.run(
-        [BEAVER, "new", "mine"], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
+    refused = beaver("new", "mine", cwd=tmp_path)
     assert (refused.returncode, refused.stderr) == (2, "new: mine.yaml exists, allowed: another name\n")
     assert (tmp_path / "mine.yaml").read_text() == "precious"
 
@@ -70,7 +67,7 @@ def test_a_new_scenario_is_one_and_replaces_nothing(tmp_path, like):
     ("name", "status"), [("a b", 2), ("../x", 2), ("", 2), ("x" * 101, 2), ("nowhere/x", 2)]
 )
 def test_a_name_that_cannot_be_a_scenarios_is_bad_input(tmp_path, name, status):
-    done = subprocess.run([BEAVER, "new", name], cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = beaver("new", name, cwd=tmp_path)
     assert done.returncode == status
     assert list(tmp_path.iterdir()) == []
 

@@ -45,6 +45,7 @@ from beaver_ftc.studies.compare.trial import (
 from beaver_ftc.studies.compare.tune import _best_detector, alarm_level, candidates, grids
 from beaver_ftc.studies.engine.study import fly_all
 from beaver_ftc.studies.present.page import write_files
+from commands import beaver
 from flying import scenario
 
 BEAVER = Path(sys.executable).with_name("beaver-ftc")
@@ -125,9 +126,7 @@ def test_workers_do_not_change_the_result(sweep):
     ],
 )
 def test_bad_usage_is_one_line_and_exit_status_2(tmp_path, arguments, says):
-    done = subprocess.run(
-        [BEAVER, "compare", *arguments], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
+    done = beaver("compare", *arguments, cwd=tmp_path)
     assert done.returncode == 2
     assert says in done.stderr
     assert "Traceback" not in done.stderr

@@ -2,13 +2,12 @@
 
 import csv
 import json
-import subprocess
-import sys
 from html import escape
 
 import numpy as np
 import pytest
 
+import commands
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.log import read
 from beaver_ftc.studies.mismatch import charts, study
@@ -27,8 +26,7 @@ uncertainty: {coefficients: {Cm_alpha: 1.01, Cl_p: 0.98}}
 
 
 def beaver(folder, *arguments):
-    command = [sys.executable, "-c", "from beaver_ftc.cli.main import main; main()"]
-    return subprocess.run([*command, *arguments], cwd=folder, capture_output=True, text=True, check=False)
+    return commands.beaver(*arguments, cwd=folder)
 
 
 @pytest.fixture(scope="module")

@@ -52,7 +52,7 @@ demo: $(VENV)/.demo
 	@echo "report: runs/elevator-partial-loss/report.html"
 
 test: $(VENV)/.dev
-	NUMBA_DISABLE_JIT=1 $(PYTEST) $(PLAIN)
+	NUMBA_DISABLE_JIT=1 $(PYTEST) -m "not nightly" $(PLAIN)
 	$(PYTEST) -m "not acceptance and not nightly" $(addprefix --ignore=,$(PLAIN))
 
 # Every test with all that it draws, what tests/nightly.yaml lists too; then drawn scenarios, mutants.

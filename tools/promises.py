@@ -26,9 +26,21 @@ def table() -> dict[str, Any]:
 @cache
 def at_night() -> tuple[tuple[str, ...], tuple[str, ...]]:
     """How the names of tests begin that `make test` leaves out, and of those among them that it runs."""
-    rows = yaml.safe_load((TESTS / "nightly.yaml").read_text(encoding="utf-8"))
-    night, day = (tuple(name for row in rows for name in row[when]) for when in ("night", "day"))
+    night, day = (tuple(name for row in rows() for name in row.get(when, ())) for when in ("night", "day"))
     return night, tuple(name for name in day if name.startswith(night))
+
+
+@cache
+def rows() -> list[dict[str, list[str]]]:
+    """What tests/nightly.yaml says."""
+    found: list[dict[str, list[str]]] = yaml.safe_load((TESTS / "nightly.yaml").read_text(encoding="utf-8"))
+    return found
+
+
+@cache
+def thinned() -> tuple[str, ...]:
+    """How the names of tests begin of whose cases `make test` runs a third."""
+    return tuple(name for row in rows() for name in row.get("thirds", ()))
 
 
 def is_at_night(test: str, lists: tuple[tuple[str, ...], tuple[str, ...]] | None = None) -> bool:

@@ -28,6 +28,7 @@ from beaver_ftc.results.certificates.certificate import as_text, sealed
 from beaver_ftc.results.certificates.check_certificate import failures
 from beaver_ftc.results.certificates.instruments_say import TESTS
 from flying import SINES
+from samples import samples
 from telling import apart, fill
 
 CHECKER = Path(__file__).parents[2] / "tools/check_certificate.py"
@@ -349,7 +350,7 @@ def test_whatever_number_is_altered_the_checker_refuses_it(name):
     certificate, _ = flown(name)
     known = [*places(certificate)]
     rng = np.random.default_rng(7)
-    size = 60 if len(certificate["statements"]) < 9 else 20
+    size = samples(60 if len(certificate["statements"]) < 9 else 20)
     for i in rng.choice(len(known), size=min(size, len(known)), replace=False):
         other = altered(certificate, known[i])
         assert refusals(name, other)[0], known[i]

@@ -3,11 +3,10 @@
 from functools import cache
 
 import pytest
-import yaml
 
 from tools import promises
 
-NIGHT = yaml.safe_load((promises.TESTS / "nightly.yaml").read_text(encoding="utf-8"))
+NIGHT = [row for row in promises.rows() if "night" in row]
 
 
 @cache
@@ -25,6 +24,11 @@ def test_what_the_night_runs_is_held_by_day_too(row):
         assert any(each.startswith(function_of(name)) for each in names()), name
     assert row["day"]
     assert not [name for name in row["day"] if promises.is_at_night(name)]
+
+
+def test_of_what_there_are_many_cases_there_is_such_a_test():
+    for name in promises.thinned():
+        assert any(each.startswith(name) for each in names()), name
 
 
 def test_every_promise_has_tests_of_every_day():

@@ -80,12 +80,13 @@ def test_half_of_what_is_drawn_is_glue_and_a_kernel_is_what_compiled_code_is_mad
 
 
 def test_what_fills_the_records_of_kernels_is_glue_and_what_lays_them_out_is_not():
-    file = scope.PACKAGE / "diagnosis" / "likelihood.py"
     of = {}
-    for mutant in mutants(scope.PACKAGE / "diagnosis" / "isolation.py") + mutants(file):
-        around = [f.name for f in ast.parse(mutant.file.read_text()).body if isinstance(f, ast.FunctionDef)
-                  and f.lineno <= mutant.lines[0] <= f.end_lineno]  # fmt: skip
-        of.setdefault((*around, "a constant")[0], set()).add(scope.kind_of(mutant))
+    for name in ("isolation.py", "likelihood.py"):
+        file = scope.PACKAGE / "diagnosis" / name
+        functions = [f for f in ast.parse(file.read_text()).body if isinstance(f, ast.FunctionDef)]
+        for mutant in mutants(file):
+            around = [f.name for f in functions if f.lineno <= mutant.lines[0] <= f.end_lineno]
+            of.setdefault((*around, "a constant")[0], set()).add(scope.kind_of(mutant))
     assert of["configure"] == {scope.GLUE}
     assert of["a constant"] == of["whiten"] == {scope.KERNELS}
     frame = {scope.kind_of(mutant) for mutant in mutants(scope.PACKAGE / "loop" / "frame.py")}

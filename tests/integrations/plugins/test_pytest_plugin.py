@@ -51,8 +51,9 @@ def test_marked_files_are_collected_by_themselves(folder):
     assert "misses" not in done.stdout
 
 
-def test_a_missed_expectation_is_one_item_with_both_values_and_the_result_is_kept(folder):
-    done = _pytest(folder, "--beaver", ".", "-n", "2", "--dist", "loadgroup")
+@pytest.mark.parametrize("workers", [(), ("-n", "2", "--dist", "loadgroup")], ids=["one", "two workers"])
+def test_a_missed_expectation_is_one_item_with_both_values_and_the_result_is_kept(folder, workers):
+    done = _pytest(folder, "--beaver", ".", *workers)
     assert done.returncode == 1
     assert "7 passed" in done.stdout
     assert "1 failed" in done.stdout

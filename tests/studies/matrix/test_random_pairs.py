@@ -7,10 +7,11 @@ from test_random_faults import conditions, drawn
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import metrics
 from flying import scenario
+from samples import samples
 
 PLANES = (("elevator", "flap"), ("aileron", "rudder"))
 SURFACES = ("aileron", "elevator", "rudder", "flap")
-FLIGHTS = 60
+FLIGHTS = samples(60)
 FLAP_UP_DEG = -5.7  # its upper stop is at -5.73
 
 

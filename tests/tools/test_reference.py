@@ -161,14 +161,21 @@ LOADERS = {
 }
 
 
+@pytest.fixture(scope="module")
+def beside(tmp_path_factory):
+    """A folder with the files that examples name."""
+    folder = tmp_path_factory.mktemp("beside")
+    (folder / "pilot.csv").write_text("t_s,q_deg_s,rate_deg_s\n0,0,0\n1,2,2\n")
+    damageable(folder / "plane", {CASE: {"property": f"failures/damage/{CASE}"}})
+    return folder
+
+
 @pytest.mark.parametrize(("kind", "section"), EVERY)
-def test_each_example_loads(kind, section, tmp_path):
-    (tmp_path / "pilot.csv").write_text("t_s,q_deg_s,rate_deg_s\n0,0,0\n1,2,2\n")
-    damageable(tmp_path / "plane", {CASE: {"property": f"failures/damage/{CASE}"}})
+def test_each_example_loads(kind, section, beside):
     refused = {}
     for key in section.keys:
         try:
-            LOADERS[kind](json.dumps(document(kind, section, key)), tmp_path)
+            LOADERS[kind](json.dumps(document(kind, section, key)), beside)
         except (ValueError, BadInput) as error:
             refused[key.name] = str(error)
     assert refused == {}

@@ -26,7 +26,7 @@ ELEVATOR_LOSS = {"actuator": "elevator", "type": "loss_of_effectiveness", "magni
 
 @pytest.fixture(scope="module")
 def document():
-    return measure.bench(rounds=3, with_parts=False)
+    return measure.bench(rounds=1, with_parts=False)
 
 
 def test_the_contract_keys_are_there(document):

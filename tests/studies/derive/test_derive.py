@@ -47,7 +47,7 @@ reference:
 """
 
 
-@pytest.fixture(scope="module", params=["c172p", "737"])
+@pytest.fixture(scope="module", params=["c172p", pytest.param("737", marks=pytest.mark.nightly)])
 def derived(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp("derived")
     return derive(f"jsbsim:{request.param}", folder), folder, request.param

@@ -71,8 +71,9 @@ promises: $(VENV)/.dev
 plain:
 	@echo $(PLAIN)
 
+# One file has most of it: its tests are shared out.
 acceptance: $(VENV)/.dev
-	$(PYTEST) -m acceptance
+	$(PYTEST) --dist worksteal -m acceptance
 
 cost: $(VENV)/.dev
 	$(BIN)/python benchmarks/flight_cost.py --rounds 8 --check benchmarks/ratios.json

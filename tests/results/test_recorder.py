@@ -55,6 +55,7 @@ def test_what_is_kept_is_what_the_log_has_to_the_last_frame_of_a_long_flight():
     kept = recorder.tape([alarm, len(log.rows) - 1], len(log.rows))
     assert (kept.first, kept.end) == (alarm - tape.BEFORE, len(log.rows))
     assert kept.frames > tape.BEFORE + 1024
+    assert recorder.tape([alarm - 9], len(log.rows)).first == kept.first  # what was before is overwritten
     here = slice(kept.first, kept.end)
     for i, axis in enumerate("pqr"):
         assert np.array_equal(kept.x[:, i], rows[f"{axis}_measured_rad_s"][here])

@@ -96,6 +96,14 @@ FAULTS = [
             {"type": None, "candidates": ["stuck", "rate_limit"]},
             "elevator after 0.25 s, correct, stuck or rate limit",
         ),
+        (
+            {"type": None, "candidates": ["stuck", "rate_limit", "bias"]},
+            "elevator after 0.25 s, correct, stuck or rate limit or bias",
+        ),
+        (
+            {"type": None, "candidates": ["stuck", "rate_limit", "bias", "float"]},
+            "elevator after 0.25 s, correct, type not determined (4 remain: stuck, rate limit, bias, float)",
+        ),
         ({"type": None, "candidates": []}, "elevator after 0.25 s, correct, of no known type"),
         ({"fault": "sensor q", "type": None}, "sensor q after 0.25 s, correct"),
         ({"type": "unanticipated"}, "elevator after 0.25 s, correct"),
@@ -127,6 +135,14 @@ def test_a_named_fault_in_words(changes, said):
              for kind in ("bias", "stuck", "rate_limit")] + ["damage"],
             "still possible: one of 6 surfaces (4 on the wing, 2 on the tail) or damage; "
             "type not determined (3 remain: bias, stuck, rate limit)",
+        ),
+        (
+            ["aileron", "elevator", "rudder", "flap"],
+            "still possible: aileron or elevator or rudder or flap",
+        ),
+        (
+            ["aileron", "elevator", "rudder", "flap", "slat"],
+            "still possible: one of 5 surfaces (3 on the wing, 2 on the tail)",
         ),
         (["sensor p", "sensor phi"], "still possible: sensor p or sensor phi"),
     ],

@@ -50,6 +50,25 @@ def timed(monkeypatch):
     return asked
 
 
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        ("processor\t: 0\nmodel name\t: A chip: fast\n", "A chip: fast"),
+        ("processor\t: 0\nBogoMIPS\t: 50\n", "aarch64"),
+        (None, "aarch64"),
+    ],
+)
+def test_a_machine_is_said_by_its_processors_name_or_by_its_kind(lines, said, monkeypatch):
+    def read(path, encoding):
+        if lines is None:
+            raise FileNotFoundError(path)
+        return lines
+
+    monkeypatch.setattr(measure.Path, "read_text", read)
+    monkeypatch.setattr(measure.platform, "machine", lambda: "aarch64")
+    assert measure._processor() == said
+
+
 def test_what_a_benchmark_times_and_says(timed, monkeypatch, changed):
     said, kinds = [], []
     monkeypatch.setattr(measure, "by_kind", lambda rounds: kinds.append(rounds) or {"kind": {}})

@@ -100,9 +100,10 @@ def test_one_set_without_a_curve_that_came_to_anything(compared, changed):
     assert "could not fly" not in as_text({"sets": {"healthy": part}})
 
 
-def test_what_was_written_above_the_mark_stays(compared, tmp_path):
+@pytest.mark.parametrize("below", ["", f"{MARK}\n\nold\n", f"{MARK}\n\nold\n\n{MARK}\n\nolder\n"])
+def test_what_was_written_above_the_mark_stays(below, compared, tmp_path):
     board = tmp_path / "board.md"
-    board.write_text(f"# Mine\n\nWords.\n\n{MARK}\n\nold\n")
+    board.write_text(f"# Mine\n\nWords.\n\n{below}")
     write_leaderboard(compared, board)
     assert board.read_text().startswith(f"# Mine\n\nWords.\n\n{MARK}\n\nMade with ours 1")
     assert "old" not in board.read_text()

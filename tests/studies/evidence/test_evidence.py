@@ -1,18 +1,23 @@
 """A plan flown: what is violated is found, in the flight it is in; and the document is the same twice."""
 
 import json
+from math import inf, nan
+from types import SimpleNamespace
 
 import pytest
 import yaml
+from reportlab.pdfgen.canvas import Canvas
 
 import beaver_ftc as bf
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.evidence import flown, shown
 from beaver_ftc.studies.evidence.flown import MET, NOT_MET, NOT_SHOWN, fly_flight
 from beaver_ftc.studies.evidence.judged import document_of
+from beaver_ftc.studies.evidence.paper import as_pdf
 from beaver_ftc.studies.evidence.plan import OfMargins, load_plan
 from beaver_ftc.studies.evidence.shown import as_text, files, of_flight, page, run_plan
 from beaver_ftc.studies.margins import Margin
+from beaver_ftc.studies.present.page import Heading
 from beaver_ftc.studies.sweep import one_flight
 from telling import apart
 
@@ -94,6 +99,39 @@ def test_two_runs_of_a_plan_differ_in_nothing_but_the_date(tmp_path, monkeypatch
         assert len(each.pop("log")) == len(each.pop("scenario")) == 64
     assert not changed(document)
     assert not changed(as_text(document, "FOLDER").splitlines(), "text")
+    document["sources"][0]["given"] = "beside/healthy.yaml"
+    assert not changed(list(page(document)), "page")
+
+
+def test_every_sheet_of_the_paper_has_its_foot_and_its_number(monkeypatch):
+    drawn = []
+    for where in ("drawString", "drawRightString"):
+        monkeypatch.setattr(Canvas, where, lambda self, x, y, text: drawn.append(text))
+    as_pdf("Title", ["Summary.", Heading("One"), *(f"Line {n}." for n in range(90))], "the foot")
+    sheets = len(drawn) // 2
+    assert sheets > 2
+    assert drawn == [text for n in range(1, sheets + 1) for text in ("the foot", str(n))]
+
+
+@pytest.mark.parametrize(
+    ("robustness", "lost_at_s", "verdict"),
+    [
+        (0.0, None, MET),
+        (-1e-9, None, NOT_MET),
+        (0.0, 3.0, MET),
+        (0.0, 2.9, NOT_SHOWN),
+        (-1e-9, 2.9, NOT_MET),
+        (inf, None, NOT_SHOWN),
+        (nan, None, NOT_SHOWN),
+    ],
+)
+def test_a_formula_is_met_from_zero_on_where_the_flight_lasted_as_far_as_it_looks(
+    robustness, lost_at_s, verdict
+):
+    formula = SimpleNamespace(robustness=lambda columns, rate_hz: robustness, looks_ahead_s=3.0)
+    document = {"departure": lost_at_s and {"time_s": lost_at_s}}
+    found = flown._of_formula("text", formula, 100.0, document, SimpleNamespace(columns={}))
+    assert found["verdict"] == verdict
 
 
 class Clock:

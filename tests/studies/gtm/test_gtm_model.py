@@ -189,6 +189,19 @@ def test_the_servo_is_late_by_15_ms_and_follows_at_5_hz(bench, dt):
     assert late_s == pytest.approx(0.015 + dt * pole / (1 - pole), abs=2e-4)
 
 
+def test_the_servo_is_no_faster_than_300_degrees_a_second(bench):
+    fdm, dt = bench.fdm, 0.001
+    bench.place(800.0, (160.0, 0.0, 8.0), (0.0, 0.05, 0.0))
+    fdm.set_dt(dt)
+    fdm["fcs/right_aileron-cmd-rad"] = 0.3
+    stood = []
+    for _ in range(60):
+        fdm.run()
+        stood.append(fdm["fcs/right_aileron-pos-rad"])
+    fdm["fcs/right_aileron-cmd-rad"] = 0.0
+    assert np.diff(stood).max() == pytest.approx(radians(300.0) * dt)
+
+
 @pytest.mark.parametrize("dt", [0.002, 0.01])
 def test_the_spool_dips_and_settles(bench, specified, dt):
     """A step of throttle against the exponential of the spool's matrix; thrust first falls."""

@@ -5,7 +5,8 @@ from math import degrees, radians
 import numpy as np
 import pytest
 
-from beaver_ftc.studies.gtm.steady import Bench, Steady
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.studies.gtm.steady import Bench, Condition, Steady
 from beaver_ftc.studies.gtm.systems import THROTTLE
 from telling import apart
 
@@ -48,3 +49,16 @@ def test_each_surface_is_commanded_by_its_kind_and_side():
     assert {kind for kind in ("elevator", "aileron", "rudder") if any(kind in name for name in commands)} == {
         "elevator", "aileron", "rudder",
     }  # fmt: skip
+
+
+@pytest.mark.parametrize(("left", "is_steady"), [(0.9e-6, True), (1.1e-6, False)])
+def test_flight_is_steady_where_a_millionth_is_left_of_its_accelerations(left, is_steady, monkeypatch):
+    monkeypatch.setattr(Bench, "damage", lambda self, case: None)
+    monkeypatch.setattr(Bench, "_off", lambda self, wanted, x: np.full(6, left))
+    monkeypatch.setattr(Bench, "_found", lambda self, wanted, x, left: left)
+    still = object.__new__(Bench)
+    if is_steady:
+        assert still.steady(Condition(alpha_deg=3.0)) == left
+    else:
+        with pytest.raises(BadInput, match="no steady flight with"):
+            still.steady(Condition(alpha_deg=3.0))

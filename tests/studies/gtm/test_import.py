@@ -2,15 +2,18 @@
 
 import numpy as np
 import pytest
+import yaml
 from scipy.io import savemat
 from tools.gtm.specification import DATABASE
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.loading import UnknownAircraft, imported_folder
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.studies.gtm import conversion, elements
+from beaver_ftc.studies.gtm import conversion, elements, folder
 from beaver_ftc.studies.gtm.database import read
 from beaver_ftc.studies.gtm.parameters import cases, parameters
+from beaver_ftc.studies.gtm.steady import Steady
+from telling import apart
 
 FAILURES = (
     "effectiveness", "stuck", "stuck-at-rad", "hardover", "float", "bias-rad", "rate-scale",
@@ -134,6 +137,20 @@ def test_the_first_of_two_cases_is_in_force(bench):
 def test_where_it_is_kept_follows_the_cache(monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert imported_folder("gtm") == tmp_path / "beaver-ftc" / "imported" / "gtm"
+
+
+def test_our_own_file_the_start_and_the_scripts_of_a_folder(tmp_path, changed):
+    """Of a steady flight no two numbers of which are alike."""
+    flown = Steady(165.0, 91.0, 3.0, 0.7, 1.3, 3.5, 2.4, -0.4, 0.25, 39.8, 1e-10)
+    apart(steady=list(vars(flown).values()))
+    folder.write_outline(tmp_path)
+    folder.write_start(tmp_path, flown)
+    folder.write_scripts(tmp_path, flown)
+    written = {path.name: path for path in tmp_path.rglob("*.*")}
+    assert not changed(yaml.safe_load(written.pop("aircraft.yaml").read_text()), "aircraft")
+    kept = ("reset00.xml", "doublets.xml", "fin-off.xml")
+    assert not changed({name: written[name].read_text().splitlines() for name in kept}, "xml")
+    assert written.keys() == {*kept, *(f"{case}.xml" for case in cases())}
 
 
 def test_an_operation_on_one_argument_is_that_argument_where_nothing_is_to_be_done():

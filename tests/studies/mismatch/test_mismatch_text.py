@@ -73,6 +73,11 @@ def test_every_finding_has_its_sentence(found):
         "published elevator case with the declared bound: detected after 0.50 s, certain within 0.75 s",
         "published elevator case with the recommended bound: not detected, never certain",
     ]
+    for delays, says in (
+        ({"delay_s": None}, "not detected, certain within 0.75 s"),
+        ({"certain_s": None}, "detected after 0.50 s, never certain"),
+    ):
+        assert findings(found | {"guarantee": guarantee(**delays)})[3].endswith(f"bound: {says}")
     found |= {"dominant": None, "false_alarm": False, "guarantee": guarantee(alarm=True)}
     found["recommended"]["settled"] = True
     said = findings(found)

@@ -1,10 +1,20 @@
 """What a study leaves in its folder, and pages that are written in part."""
 
+import re
+
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.present.figures import heat_map, label_edges, panels
-from beaver_ftc.studies.present.page import replace_between, write_files
+from beaver_ftc.studies.present.page import (
+    Bullets,
+    Heading,
+    Pictures,
+    Table,
+    as_html,
+    replace_between,
+    write_files,
+)
 from beaver_ftc.studies.present.tables import as_csv
 
 
@@ -54,6 +64,24 @@ def test_what_stands_outside_the_marks_of_a_page_stays(tmp_path):
     assert page.read_text() == "before\n<begin>\nnew\n<end>\nafter\n"
     with pytest.raises(BadInput, match=r"has no place for the tables, allowed: a page with <a> and <b>"):
         replace_between(page, "<a>", "<b>", "new")
+
+
+def test_whatever_a_page_shows_is_text_and_never_markup(tmp_path):
+    picture = tmp_path / "one.png"
+    picture.write_bytes(b"a picture")
+
+    def text(n):
+        return f'<i>{n}</i> & "more"'
+
+    parts = [
+        text(1), Heading(text(2)), Table((text(3), "verdict"), [(text(4), text(5))], {text(5): True}),
+        Bullets(text(6), [text(7)]), Pictures([(text(8), "one")]),
+    ]  # fmt: skip
+    made = as_html(text(0), parts, {"one": picture})
+    assert "<i>" not in made
+    assert re.findall("&lt;i&gt;(.)&lt;/i&gt; &amp; &quot;more&quot;", made.partition("</title>")[2]) == [
+        str(n) for n in range(9)
+    ]
 
 
 def test_csv_has_a_header_and_nothing_for_none():

@@ -64,3 +64,21 @@ def test_drawn_days_are_the_same_each_time_and_differ():
     assert drawn(2, range(3))[1].gain == drawn(2, range(1, 2))[0].gain
     assert len({day.gain for day in drawn(2, range(16))}) == 16
     assert len(grid(np.array([[0.5, 0.5], [0.5, -0.5]]), ["roll", "pitch"])) == 21
+
+
+def test_drawn_days_differ_as_much_as_is_said():
+    """Over 900 days of four surfaces; ratios in their logarithms, what can only be more is half a bell."""
+    days = drawn(4, range(900))
+    assert len({day.name for day in days}) == len({day.gain for day in days}) == 900
+    bells = {
+        "trim": (np.array, 0.015), "neutral": (np.array, 0.01), "own": (np.log, 0.03), "gain": (np.log, 0.1),
+        "late_s": (np.array, 0.02), "excitation": (np.log, 0.25),
+    }  # fmt: skip
+    for name, (of, spread) in bells.items():
+        values = of([getattr(day, name) for day in days])
+        assert np.std(values) == pytest.approx(spread, rel=0.1), name
+        assert np.mean(values) == pytest.approx(0.0, abs=0.15 * spread), name
+    for name, least, spread in (("noise", 1.0, 0.3), ("drift", 0.0, 0.006)):
+        more = np.array([getattr(day, name) for day in days]) - least
+        assert more.min() >= 0.0, name
+        assert np.sqrt(np.mean(more**2)) == pytest.approx(spread, rel=0.1), name

@@ -11,6 +11,7 @@ from beaver_ftc.results.style import LOOKS
 from beaver_ftc.scenario.loader import load_scenario
 from beaver_ftc.studies.reproduce import (
     beside,
+    cases,
     claims,
     measures,
     published_figures,
@@ -305,3 +306,17 @@ def test_settings_have_names_of_their_own():
 
 def test_cases_that_are_shown_say_where():
     assert {case.shown_in for case in PUBLISHED} >= {"Fig. 2a", "Fig. 2b", "Fig. 3, 4, 5", "Fig. 6", "Fig. 7"}
+
+
+@pytest.mark.parametrize(
+    ("others", "left"),
+    [
+        ({}, {"fdi.options.a", "control.options.b"}),
+        ({"fdi.scheme": "another"}, {"control.options.b"}),
+        ({"control.law": "another"}, {"fdi.options.a"}),
+        ({"fdi.scheme": "another", "control.law": "another"}, set()),
+    ],
+)
+def test_options_go_with_the_published_scheme_and_law_that_have_them(others, left):
+    options = {"fdi.options.a": 1.0, "control.options.b": 2.0}
+    assert cases._apt({**options, "rate_hz": 50, **others}).keys() == {"rate_hz", *others, *left}

@@ -3,7 +3,7 @@ import pytest
 from beaver_ftc.aircraft import load
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.results.metrics import metrics
-from beaver_ftc.studies.sweep.one_flight import Keep, columns_of, fly_one, scenario_of
+from beaver_ftc.studies.sweep.one_flight import Keep, columns_of, counts_of_rows, fly_one, scenario_of
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan, flight_seed
 
 from .conftest import SHORT, sweep_of
@@ -122,3 +122,10 @@ def test_keeping_follows_the_policy(policy, row, wanted):
 
 def test_selected_flights_are_kept_whatever_became_of_them():
     assert Keep("selected", frozenset({5})).wants({"run": 5})
+
+
+def test_an_alarm_without_a_fault_is_no_detection_among_the_counts():
+    flights = [("flown", "stuck", True)] * 3 + [("departed", "stuck", False), ("flown", None, True)] * 2
+    flights += [("failed", None, None)] * 6
+    rows = [dict(zip(("status", "fault.type", "detection.detected"), one, strict=True)) for one in flights]
+    assert counts_of_rows(rows) == {"done": 13, "failed": 6, "faulted": 5, "detected": 3}

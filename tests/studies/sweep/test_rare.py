@@ -177,6 +177,23 @@ def test_flights_that_fail_are_counted_over_all_rounds(drift, tmp_path, monkeypa
     assert document["failed"] == sum(failed) > sum(failed[:first]) > 0
 
 
+def test_the_likeliest_values_are_said_with_four_digits():
+    part = {"low": 0.0123, "high": 0.0456, "events": 2, "of": 90}
+    document = part | {
+        "sweep": "drift", "expectation": "no_departure", "probability": 0.0234, "flights": 180, "plain": part,
+        "likeliest": {"values": {"a": 1.23456, "b": -0.00987654}}, "folder": "out",
+    }  # fmt: skip
+    assert as_text(document).splitlines() == [
+        "drift: no_departure not met",
+        "  probability  0.023, 95 % 0.012 to 0.046, 180 flights",
+        "  plain        2 of 90 flights, 95 % 0.012 to 0.046",
+        "  likeliest    a 1.235, b -0.009877",
+        "  flies it     beaver-ftc run out/flight.yaml",
+        "",
+        "results: out",
+    ]
+
+
 def test_which_expectations_have_a_score(drift):
     assert scored(drift) == ["detected_within_s", "no_departure", "post_fault_rms_deg_s.q"]
 

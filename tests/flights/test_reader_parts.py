@@ -16,7 +16,8 @@ ORIGIN_NS = 1_538_768_543_780_097_959
 
 
 def write(folder, topic, *rows, header="%time,field.x"):
-    lines = [",".join([str(ORIGIN_NS + round(t_s * 1e9)), *map(str, cells)]) for t_s, *cells in rows]
+    stamps = ["nan" if np.isnan(t_s) else str(ORIGIN_NS + round(t_s * 1e9)) for t_s, *_ in rows]
+    lines = [",".join([at, *map(str, cells)]) for at, (_, *cells) in zip(stamps, rows, strict=True)]
     (folder / f"{folder.name}-{topic}.csv").write_text("\n".join([header, *lines]) + "\n")
 
 
@@ -58,7 +59,7 @@ def test_failures_of_alfa_in_their_order(folder):
     head = "%time,field.data"
     write(folder, "failure_status-aileron", (9.0, 2.0), (9.5, 2.0), (10.0, 1.0), (11.0, "nan"), header=head)
     write(folder, "failure_status-engines", (8.0, 1.0), header=head)
-    write(folder, "failure_status-rudder", (12.0, 1.0), header=head)
+    write(folder, "failure_status-rudder", (12.0, 1.0), (np.nan, 2.0), header=head)
     write(folder, "failure_status-elevator", header=head)
     write(folder, "failure_status-aileron", (9.0, 2.0), (9.5, 2.0), (10.0, 1.0), header=head)
     events = [(round(event.t_s, 6), event.surface) for event in read_flight(folder).events]
@@ -178,7 +179,11 @@ def test_what_counts_as_a_number():
 def test_columns_of_topics_count_from_the_first_stamp_of_all():
     topics = {
         "late": {"us": [3_000_000, 3_500_000], "x": [1, 2]},
-        "early": {"us": [2_000_000, 9_000_000, 2_250_000, 2_500_000], "y": [3, 4, 5, 6], "z": [6, 7, 8, 9]},
+        "early": {
+            "us": [np.nan, 2_000_000, 9_000_000, 2_250_000, 2_500_000],
+            "y": [2, 3, 4, 5, 6],
+            "z": [5, 6, 7, 8, 9],
+        },
         "none": {"us": [np.nan, np.nan], "w": [1, 2]},
     }
     columns, origin_s = columns_of(topics, "us")
@@ -186,7 +191,7 @@ def test_columns_of_topics_count_from_the_first_stamp_of_all():
     np.testing.assert_allclose(columns["late.x"].t_s, [1.0, 1.5])
     np.testing.assert_allclose(columns["early.z"].t_s, [0.0, 0.25, 0.5])
     assert columns["early.y"].values.tolist() == [3.0, 5.0, 6.0]
-    assert columns["early.y"].note.startswith("early: row 2: its stamp is out of order")
+    assert columns["early.y"].note.startswith("early: row 1: its stamp is out of order")
     assert columns["late.x"].note == ""
     assert set(columns) == {"late.x", "early.y", "early.z", "none.w"}
     assert columns_of({"none": topics["none"]}, "us")[1] == 0.0

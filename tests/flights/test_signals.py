@@ -35,6 +35,8 @@ def test_a_clipped_rate_and_one_that_is_not():
         rows = signals.clipped(side * np.clip(free, -9.0, 2.0))
         assert rows.sum() > 100
         assert (free[rows] >= 2.0).all()
+        said = signals.remarks("p", Column(T_S, side * np.clip(free, -9.0, 2.0)), measured=True)
+        assert said[-1] == f"p: clipped at 2 in {rows.sum()} rows"
     assert not signals.clipped(free).any()
     assert not signals.clipped(np.zeros(500)).any()
 
@@ -52,6 +54,10 @@ def test_jumps_are_single_rows_that_come_back():
     values[900:] += 50.0
     assert signals.jumps(values).tolist() == [100, 700]
     assert not len(signals.jumps(noise()))
+    assert signals.jumps(np.repeat(values[:800], 3))[:0].tolist() == []  # a jump is of one row
+    held = np.repeat(noise(), 3)
+    held[[400, 2200]] -= 50.0
+    assert signals.jumps(held).tolist() == [400, 2200]  # a log of more rows than readings
     said = signals.remarks("p", Column(T_S, values), measured=True)
     assert said == ["p: 2 jumps, the first at 5.00 s"]
 

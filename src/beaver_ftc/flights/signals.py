@@ -79,8 +79,8 @@ def remarks(name: str, column: Column, measured: bool) -> list[str]:
         said.append(f"{name}: frozen, the same to the last bit for {longest:.1f} s")
     if not measured and values.size and np.nanmin(values) == np.nanmax(values):
         said.append(f"{name}: does not move, nothing can be said of what it moves alone")
-    if measured and (rows := int(clipped(values).sum())):
-        said.append(f"{name}: clipped at {np.nanmax(np.abs(values)):.4g} in {rows} rows")
+    if measured and (rows := clipped(values)).any():
+        said.append(f"{name}: clipped at {np.abs(values[rows]).max():.4g} in {rows.sum()} rows")
     if measured and len(places := jumps(values)):
         many = "1 jump" if len(places) == 1 else f"{len(places)} jumps"
         said.append(f"{name}: {many}, the first at {column.t_s[places[0]]:.2f} s")

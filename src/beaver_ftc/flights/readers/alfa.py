@@ -108,8 +108,9 @@ def _events(topics: dict[str, Table], origin_ns: float) -> Iterator[Event]:
     for topic, table in topics.items():
         if topic.startswith(_STATUS):
             part = topic.removeprefix(_STATUS)
-            codes = table.get("field.data", np.empty(0))
+            stamps = table[_TIME]
+            codes = np.where(np.isfinite(stamps), table.get("field.data", np.nan), np.nan)
             for code in sorted(set(codes[np.isfinite(codes)])):
                 first = int(np.argmax(codes == code))
-                t_s = float((table[_TIME][first] - origin_ns) * _NS)
+                t_s = float((stamps[first] - origin_ns) * _NS)
                 yield Event(t_s, _known()["failures"].get(f"{part} {int(code)}", part))

@@ -68,7 +68,7 @@ def _shown(value):
     if isinstance(value, list | tuple):
         return list(map(_shown, value))
     if isinstance(value, str | int | float | Path | None):
-        return str(value) if isinstance(value, Path) else value
+        return str(value).replace(str(Path.cwd()), "HERE") if isinstance(value, Path) else value
     if isinstance(value, frozenset):
         return sorted(value)
     if is_dataclass(value) and not hasattr(value, "name"):
@@ -202,6 +202,41 @@ DIAGNOSE = {
     "flights__replay__as_text": "replayed",
     "flights__pages__write_results": "folder",
 }
+SMALLEST = {
+    "studies__smallest__survey__run_smallest": {"folder": "f"},
+    "studies__smallest__shown__as_text": "s",
+    "studies__engine__workers__cores": 7,
+}
+EVIDENCE = RUN | {
+    "studies__evidence__plan__load_plan": lambda name: SimpleNamespace(
+        name=name, file=SimpleNamespace(name="of-" + name)
+    ),
+    "studies__evidence__shown__run_plan": {"passed": False, "e": 1},
+    "studies__evidence__shown__as_text": "e",
+    "studies__evidence__shown__as_expectations": ["A"],
+    "studies__evidence__shown__of_flight": lambda plan, name: (
+        SimpleNamespace(name=name),
+        [{"name": of, "actual": f"met: {of}", "passed": of == "A"} for of in "AB"],
+    ),
+    "results__junit__write_junit": None,
+    "studies__engine__workers__cores": 7,
+}
+SEPARATE = {
+    "studies__separation__separate": lambda scenario, rate_deg_s: {"passed": rate_deg_s > 10.0},
+    "studies__separation__write": Path("folder"),
+    "studies__separation__as_text": "apart",
+}
+GRADE = {
+    "integrations__challenge__grading__grade": {"g": 1},
+    "integrations__challenge__grading__as_text": "graded",
+    "studies__engine__workers__cores": 7,
+}
+RARE = {
+    "studies__engine__workers__start_early": None,
+    "studies__engine__workers__cores": 7,
+    "studies__sweep__rare__run_rare": {"r": 1},
+    "studies__sweep__rare__as_text": "rare",
+}
 ASKED = [
     ("run fault-free", RUN),
     ("run rudder-stuck --csv --acmi --as ulog --no-report --out o --format json", RUN),
@@ -214,6 +249,17 @@ ASKED = [
     ("sweep elevator-effectiveness --keep-logs 3,x", SWEEP),
     ("sweep elevator-effectiveness --replay 3", SWEEP), ("sweep elevator-effectiveness --backend ray", SWEEP),
     ("sweep elevator-effectiveness --replay 0 --format json", SWEEP),
+    ("sweep elevator-effectiveness --rare no_departure", RARE),
+    ("sweep elevator-effectiveness --rare no_departure --workers 2 --out o --format json", RARE),
+    ("smallest fault-free --surface rudder", SMALLEST),
+    ("smallest rudder-stuck --surface flap --within 2 --seed 3 --workers 2 --out o --format json", SMALLEST),
+    ("evidence flight-controls", EVIDENCE),
+    ("evidence flight-controls --workers 2 --out o --format json --junit j.xml", EVIDENCE),
+    ("evidence flight-controls --replay one", EVIDENCE),
+    ("evidence flight-controls --replay one --no-report --out o --format json", EVIDENCE),
+    ("separate fault-free", SEPARATE), ("separate fault-free --rate-deg-s 5 --out o --format json", SEPARATE),
+    ("challenge grade .", GRADE), ("challenge grade . --workers 2 --format json", GRADE),
+    ("challenge grade nowhere", GRADE), ("check nothing", {}),
     ("live", LIVE), ("live rudder-stuck --port 80 --out o", LIVE),
     ("live rudder-stuck --aircraft beaver", LIVE), ("live --guests 1", LIVE), ("live --host 0.0.0.0", LIVE),
     ("sitl fault-free --as ardupilot", SITL), ("sitl fault-free --as px4 --mavlink nowhere", SITL),
@@ -271,6 +317,11 @@ ASKED = [
 
 
 KINDS = dict.fromkeys(asked.split()[0] for asked, _ in ASKED)
+
+
+def test_no_command_is_left_out():
+    elsewhere = {"list", "schema", "trim", "linearise"}  # below, and in test_interface.py
+    assert {info.name for info in app.registered_commands} <= {*KINDS, *elsewhere}
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -57,6 +57,9 @@ def test_a_new_scenario_is_one_and_replaces_nothing(tmp_path, like):
         assert scenario.faults == load_scenario(like).faults
     else:
         assert scenario.expect.isolated_as == scenario.faults[0].actuator == "elevator"
+    (tmp_path / "all.yaml").mkdir()
+    assert _beaver("new", "mine", "--out", tmp_path / "all.yaml", *options).exit_code == 0
+    assert (tmp_path / "all.yaml" / "mine.yaml").read_text() == (tmp_path / "mine.yaml").read_text()
     (tmp_path / "mine.yaml").write_text("precious")
     refused = beaver("new", "mine", cwd=tmp_path)
     assert (refused.returncode, refused.stderr) == (2, "new: mine.yaml exists, allowed: another name\n")

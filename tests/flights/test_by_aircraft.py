@@ -1,6 +1,7 @@
 """A log diagnosed by its aircraft's own model: the flight's own verdict, and refusals of what a log lacks."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from typer.testing import CliRunner
 import beaver_ftc as bf
 from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.flights import stepped
+from beaver_ftc.flights import by_aircraft, stepped
 from beaver_ftc.flights.by_aircraft import diagnose_as, known
 from beaver_ftc.flights.recording import Column, Recording
 from beaver_ftc.flights.samples import read_for
@@ -175,6 +176,16 @@ def test_what_a_log_lacks_is_said(log, keys, factors, says):
     scaled = {name: (lambda values, by=by: values * by) for name, by in factors.items()}
     with pytest.raises(BadInput, match=says):
         diagnose_as(changed(recording, **scaled), without(vehicle, **keys), BEAVER)
+
+
+@pytest.mark.parametrize(("rate_hz", "taken"), [(20.0, True), (19.98, False), (1e3, True), (1001.0, False)])
+def test_rates_that_an_aircraft_s_model_takes(rate_hz, taken):
+    samples = SimpleNamespace(name="log", t_s=np.arange(500) / rate_hz, dt_s=1.0 / rate_hz)
+    if taken:
+        assert by_aircraft._rate_hz(samples) == rate_hz
+    else:
+        with pytest.raises(BadInput, match=f"log: is logged at {rate_hz:g} Hz, allowed: .* 20 to 1000 Hz"):
+            by_aircraft._rate_hz(samples)
 
 
 def test_a_log_too_slow_or_uneven_is_refused(log):

@@ -14,7 +14,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights import readers, samples
 from beaver_ftc.flights.check import check
 from beaver_ftc.flights.diagnose import diagnose
-from beaver_ftc.flights.readers import read_flight, read_parts
+from beaver_ftc.flights.readers import read_flight, read_parts, table
 from flights import synthetic
 
 _PEAK = """
@@ -85,6 +85,19 @@ def test_what_is_wrong_is_said_by_its_row_in_the_file(tmp_path, parted, monkeypa
     assert [note for note in notes if note] == [
         "p_rad_s: 1 cell holds no number, the first in row 1501: 'ERR'"
     ]
+
+
+def test_all_parts_together_count_the_lines_that_are_left_out(tmp_path, monkeypatch):
+    monkeypatch.setattr("beaver_ftc.flights.readers.text._BLOCK_BYTES", 200)
+    lines = ["t_s,p", *(f"{0.1 * k:.1f},{k}" for k in range(300))]
+    for k in (20, 40, 150, 290):
+        lines.insert(k, "1,2,3")
+    path = tmp_path / "long.csv"
+    path.write_text("\n".join(lines) + "\n")
+    _, parts = table._parts(path, None, 100)
+    counted = [[int(text.rpartition(" ")[2]) for _, text in said] for _, said, _ in parts]
+    assert len(counted) == 3
+    assert sum(map(sum, counted)) == 4
 
 
 def test_a_fit_looks_at_stretches_that_are_spread_evenly(tmp_path, parted, wing):

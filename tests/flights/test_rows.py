@@ -1,6 +1,7 @@
 """From probabilities of hypotheses to rows: each step by hand, and the whole as it was kept."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -176,6 +177,34 @@ def test_names_under_other_laws(monkeypatch):
     assert named_by(model) == ["", "unknown", "unknown", *["left"] * (2 + reach), *["right"] * (reach + 1)]
     same = model.model_copy(update={"settings": settings})
     assert named_by(same) == ["", *["left"] * 3, "right+left", *["right"] * (2 * reach + 1)]
+
+
+def test_where_an_engine_may_have_failed_nothing_is_said_of_the_surface(monkeypatch):
+    rows = small.rows([(1, "left", [1.0, 0.5]), (1, "left", [1.0, 0.4]), (1, "right", [0.3, 1.0])])
+    given = []
+
+    def renamed(*of):
+        given.append(of[3:])
+        return np.array(["left", UNKNOWN, "right"], dtype=object)
+
+    monkeypatch.setattr(diagnose.energy, "renamed", renamed)
+    model = SimpleNamespace(fitted=SimpleNamespace(energy_climb=-1.5))
+    found = diagnose._without_power(SimpleNamespace(energy_climb="climb"), model, rows)
+    assert given[0][:2] == ("climb", -1.5)
+    assert found.named.tolist() == ["left", UNKNOWN, "right"]
+    for name, value in (("estimate", 1.0), ("low", 0.0), ("high", 1.0)):
+        values = getattr(rows, name).copy()
+        values[1] = value
+        np.testing.assert_array_equal(getattr(found, name), values)
+    for fitted, climb in (
+        (None, "climb"),
+        (SimpleNamespace(energy_climb=None), "climb"),
+        (model.fitted, None),
+    ):
+        alike = diagnose._without_power(
+            SimpleNamespace(energy_climb=climb), SimpleNamespace(fitted=fitted), rows
+        )
+        assert alike is rows
 
 
 def test_rows_at_the_stamps_of_a_faster_log():

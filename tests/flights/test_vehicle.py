@@ -1,6 +1,7 @@
 """The vehicle file: what it says, and one line for each mistake in it."""
 
 import pytest
+import yaml
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights.regression import groups_of
@@ -43,3 +44,26 @@ def test_a_mistake_is_one_line(tmp_path, old, new, says):
 def test_a_name_that_is_not_built_in():
     with pytest.raises(BadInput, match="no such file or built-in vehicle, did you mean alfa"):
         load_vehicle("alpha")
+
+
+PLACES = (
+    "rates.p", "rates.q", "rates.r", "attitude.roll", "attitude.pitch", "attitude.yaw", "acceleration",
+    "airspeed", "energy.altitude", "energy.airspeed", "flow.alpha_rad", "flow.beta_rad",
+)  # fmt: skip
+
+
+def test_a_unit_of_another_kind_is_refused_wherever_it_stands(tmp_path):
+    keys = {"name": "all", "commands": ["u"], "surfaces": {"left": {"u": 1.0}}}
+    for place in PLACES:
+        at, _, key = place.partition(".")
+        quantity = {"column": place, "unit": "%"}
+        if key:
+            keys.setdefault(at, {})[key] = quantity
+        else:
+            keys[at] = quantity
+    (tmp_path / "all.yaml").write_text(yaml.safe_dump(keys))
+    with pytest.raises(BadInput) as refused:
+        load_vehicle(tmp_path / "all.yaml")
+    lines = str(refused.value).splitlines()
+    assert sorted(line.split(": ")[1] for line in lines) == sorted(f"{place}.unit" for place in PLACES)
+    assert all("'%' is no unit of it" in line for line in lines)

@@ -153,8 +153,10 @@ PLUGGED = Verdict(True, "p", "rudder", "stuck", 0.125, ("rudder", "flap"))
     ],
 )
 def test_of_a_plug_in_the_alarm_is_latched_and_the_rest_its_own(values, verdict, said):
-    scenario, frame = _record({}, values)
+    counts = {"frames": 3, "watched": 10, "undiagnosed": 3}
+    scenario, frame = _record({}, values | {f"accounts.inconclusive.{name}": n for name, n in counts.items()})
     landing = landing_of(scenario, frame, ("t_s",), verdict, ({"time_s": 1.0},))
+    assert (landing.inconclusive, landing_of(scenario, frame, ()).inconclusive["share"]) == (None, 0.3)
     found = (landing.detection_time_s, landing.detection_axis, landing.isolated, landing.isolation_type)
     assert (*found, landing.estimate, landing.isolation_time_s) == said
     assert landing.candidates == (tuple(verdict.candidates) if values else ())

@@ -1,5 +1,6 @@
 """The adapter: names are checked, nothing is printed or written, a start is the state it was given."""
 
+import jsbsim
 import pytest
 
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFailed
@@ -112,10 +113,21 @@ def test_an_aircraft_that_cannot_be_loaded_is_one_clear_line(capfd, tmp_path):
     with pytest.raises(BadInput, match=r"/broken.xml:1: is no XML .mismatched tag.+, allowed: a JSB"):
         Plant(rate_hz=100, model=broken)
     broken.write_text("<fdm_config/>")
-    with pytest.raises(SimulationFailed, match=r"^JSBSim cannot load .+/broken.xml: .+") as caught:
+    with pytest.raises(SimulationFailed, match=r"^JSBSim cannot load .+/broken.xml: .*No metrics") as caught:
         Plant(rate_hz=100, model=broken)
     assert "\n" not in str(caught.value)
     assert capfd.readouterr() == ("", "")
+
+
+def test_what_jsbsim_raises_while_it_loads_is_in_the_line(monkeypatch, tmp_path):
+    class Raises(jsbsim.FGFDMExec):
+        def load_model_with_paths(self, *_):
+            raise jsbsim.BaseError("a\n b")
+
+    (tmp_path / "mine.xml").write_text("<fdm_config/>")
+    monkeypatch.setattr(jsbsim, "FGFDMExec", Raises)
+    with pytest.raises(SimulationFailed, match=r"/mine.xml: a b$"):
+        Plant(rate_hz=100, model=tmp_path / "mine.xml")
 
 
 def test_two_aircraft_do_not_share_anything(trim_point):

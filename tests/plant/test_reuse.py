@@ -1,5 +1,7 @@
 """An aircraft flown again is as freshly loaded, to the bit, whatever was flown in it before."""
 
+import os
+
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -190,6 +192,17 @@ def test_a_changed_model_is_loaded_anew(tmp_path, monkeypatch):
     reuse.give_back(plant)
     monkeypatch.setattr(reuse, "_last_written_ns", lambda model, second: (1,))
     assert reuse.borrowed(100.0, 1, aircraft) is not plant
+
+
+@pytest.mark.parametrize("file", ["mine.xml", "Systems/a.xml", "Systems/b.xml"])
+def test_every_file_of_a_model_is_looked_at(tmp_path, file):
+    (tmp_path / "Systems").mkdir()
+    for name in ("mine.xml", "Systems/a.xml", "Systems/b.xml"):
+        (tmp_path / name).write_text("<x/>")
+    before = reuse._last_written_ns(tmp_path / "mine.xml", 1)
+    os.utime(tmp_path / file, ns=(1, 1))
+    assert reuse._last_written_ns(tmp_path / "mine.xml", 1) == before  # within the same second
+    assert reuse._last_written_ns(tmp_path / "mine.xml", 2) != before
 
 
 def test_a_trim_that_is_known_is_the_one_that_would_be_found(monkeypatch):

@@ -34,6 +34,7 @@ from telling import apart, fill
 CHECKER = Path(__file__).parents[2] / "tools/check_certificate.py"
 GYRO = {"noise_std_deg_s": 0.02, "bias_deg_s": 0.05, "scale_error": 1e-3}
 GYROS = {"p": GYRO, "q": GYRO, "r": GYRO}
+COARSE = dict.fromkeys("pqr", GYRO | {"quantum_deg_s": 0.02})
 LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.5, "at_s": 0.5}
 STUCK = {"type": "stuck", "actuator": "aileron", "position_deg": 5, "at_s": 0.5}
 FLIGHTS = {
@@ -51,7 +52,7 @@ FLIGHTS = {
     "substeps": {"faults": [STUCK], "substeps": 3, "rate_hz": 50, "fdi": {"fault_class": "all"}},
     "any type": {"faults": [STUCK], "fdi": {"fault_class": "all"}},
     "any type with release": {"faults": [STUCK | {"end_s": 0.9}], "fdi": {"fault_class": "all"}},
-    "gyros": {"faults": [LOSS], "sensors": GYROS, "fdi": {"bounds": {"sensors": GYROS}}},
+    "gyros": {"faults": [LOSS], "sensors": COARSE, "fdi": {"bounds": {"sensors": COARSE}}},
     "filters begun long ago": {  # what a fault can have done to them before the frames kept counts
         "faults": [LOSS | {"actuator": "rudder", "magnitude": 0.6, "at_s": 1.0}],
         "sensors": GYROS,
@@ -360,6 +361,14 @@ def test_whatever_number_is_altered_the_checker_refuses_it(name):
         other = altered(certificate, known[i])
         assert refusals(name, other)[0], known[i]
         assert all(refusals(name, sealed(other))), known[i]
+
+
+@pytest.mark.parametrize("name", ["gyros", "blocks"])
+def test_what_gyros_may_be_off_by_is_declared_on_the_axes_that_statements_look_at(name):
+    certificate, _ = flown(name)
+    terms = [term for said in certificate["statements"] for term in said.get("terms", [])]
+    axes = {axis for term in terms for axis, d in zip("pqr", term["d"], strict=True) if d}
+    assert certificate["declared"]["B"] == pytest.approx(dict.fromkeys(axes, np.radians(0.05)))
 
 
 def test_the_fault_that_is_there_cannot_be_excluded():

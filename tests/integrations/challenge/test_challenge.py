@@ -5,6 +5,7 @@ import os
 import stat
 from dataclasses import replace
 from math import inf, nan
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -195,6 +196,15 @@ def test_a_stranger_s_text_cannot_colour_a_page():
     assert len(line.plain("x" * 999)) == line.MOST_TEXT
 
 
+def test_nor_can_what_is_said_of_a_file_that_is_refused(monkeypatch):
+    def refuses(path):
+        raise BadInput("a<b>\x1b[31m|c")
+
+    monkeypatch.setattr(folders, "source_of", refuses)
+    found = grading.grade_case(folders.Submission("ada", Path("ada-1.py"), ""), [])
+    assert (found.student, found.barred, found.reason) == ("ada", True, "a?b???31m?c")
+
+
 @pytest.mark.parametrize(
     ("said", "verdict"),
     [
@@ -219,6 +229,18 @@ def test_what_a_stranger_says_is_one_of_the_verdicts_there_are(monkeypatch, said
     else:
         with pytest.raises(verdict):
             stranger.step(SimpleNamespace(t_s=1.0), np.zeros(4))
+
+
+@pytest.mark.parametrize("place", [4, 7, 8, 9, 10])
+def test_every_number_of_an_answer_must_be_finite(monkeypatch, place):
+    monkeypatch.setattr(line, "_shown", lambda measured: [])
+    stranger, said = object.__new__(line.StrangersDetector), np.array([1.0] * 7 + [0.9, 0.8, 0.7, 0.6])
+    stranger.surfaces, stranger.asked = ("aileron", "elevator", "rudder", "flap"), lambda *_: said
+    found = stranger.step(SimpleNamespace(t_s=1.0), np.zeros(4))
+    assert found.effectiveness.tolist() == [0.9, 0.8, 0.7, 0.6]
+    said[place] = nan
+    with pytest.raises(BeaverFtcError, match=r"is not finite: .*nan"):
+        stranger.step(SimpleNamespace(t_s=1.0), np.zeros(4))
 
 
 @pytest.mark.parametrize("name", ["detector.py", "law.py"])

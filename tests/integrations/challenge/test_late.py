@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from beaver_ftc.integrations.challenge import line
+from beaver_ftc.integrations.challenge import line, pilot
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="accounts are Linux's")
 
@@ -59,3 +59,26 @@ def test_who_has_had_its_time_is_late(monkeypatch, over_s, wants, computed_s, wa
     assert stranger._is_late(process) == late
     monkeypatch.setattr(line.select, "select", lambda *_: ([process.stdout], [], []))
     assert not stranger._is_late(process)  # what it has said is there
+
+
+@pytest.mark.parametrize(
+    ("charged", "waited_s", "left_s"), [(True, 1.5, 8.5), (True, 9.0, 10.0), (False, 1.5, 10.0)]
+)
+def test_what_an_answer_takes_is_charged_less_the_wait_for_others(monkeypatch, charged, waited_s, left_s):
+    """Of 10 s: the answer takes 3 s, some of them behind other processes."""
+    clock, waits = [100.0], [1.0, 1.0 + waited_s]
+    said = [pilot.HEAD.pack(pilot.COMMAND, 3, 8), b"8 bytes."]
+
+    def read(size):
+        clock[0] += 1.5
+        assert len(said[0]) == size
+        return said.pop(0)
+
+    monkeypatch.setattr(line.time, "monotonic", lambda: clock[0])
+    stranger = object.__new__(line.StrangersLaw)
+    stranger._frame, stranger._sizes, stranger._read = 3, (5, 4), read
+    stranger._allowance = SimpleNamespace(left_s=10.0)
+    stranger._accounts = SimpleNamespace(waited_s=lambda: waits.pop(0), computed_s=lambda: 0.0)
+    assert stranger._answer(pilot.COMMAND, 8, 2.0, charged) == b"8 bytes."
+    assert stranger._allowance.left_s == pytest.approx(left_s)
+    assert stranger._deadline == float("inf")

@@ -3,12 +3,14 @@
 import json
 import sys
 from math import pi
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import beaver_ftc as bf
 from beaver_ftc.aircraft import load
+from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.integrations.live import messages, reports
 from beaver_ftc.integrations.live.session import Session, as_live, changes_of, fault_types
@@ -150,6 +152,32 @@ def test_words_of_what_is_asked(session, tmp_path):
     assert session._rates_rad_s() is None
     asked(session, do="stick", rates_deg_s=[0, 18, 0])
     assert session._rates_rad_s() == pytest.approx((0.0, pi / 10, 0.0))
+
+
+def test_each_turn_of_a_verdict_is_told_once(session, monkeypatch):
+    """Alarm, candidates, name, then another type of the same surface; taken back, alarmed anew, lost."""
+    jam = {"detected": True, "axis": "q", "isolated": "elevator", "type": "stuck"}
+    turns = [
+        ({"detected": True, "axis": "q"}, ["residual of q beyond its threshold"]),
+        ({"detected": True, "axis": "q", "candidates": ("elevator", "flap")}, ["elevator, flap"]),
+        (jam, ["elevator, stuck"]), (jam, []), (jam | {"type": "rate_limit"}, ["elevator, rate limit"]),
+        (jam | {"type": "rate_limit", "estimate": 0.1}, []),
+        (jam | {"isolated": "unanticipated", "type": "unanticipated"}, ["unanticipated"]),
+        ({"detected": True, "axis": "q", "candidates": ("flap",)}, ["flap"]),
+        ({"detected": True, "axis": "q"}, ["none left"]),
+        ({"detected": True}, ["instruments contradict one another"]),
+        ({"mode": "adaptive", "detected": True}, ["nominal to adaptive"]), ({}, ["adaptive to nominal"]),
+        ({"departed": True}, ["the aircraft is lost; begin a new flight"]), ({"departed": True}, []),
+    ]  # fmt: skip
+    session.take_events()
+    for keys, says in turns:
+        of = {"mode": "nominal", "departed": False} | keys
+        sim = SimpleNamespace(
+            t_s=1.0, mode=of.pop("mode"), departed=of.pop("departed"), verdict=Verdict(**of)
+        )
+        monkeypatch.setattr(session, "sim", sim)
+        session._notice()
+        assert [event["says"] for event in session.take_events()] == says, keys
 
 
 def test_what_a_page_waits_for_is_told_whatever_hides_the_rest(session, monkeypatch):

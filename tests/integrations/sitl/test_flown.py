@@ -78,7 +78,8 @@ def test_recorded_packets_fly_what_the_same_commands_fly_in_process(noisy):
 @pytest.mark.parametrize("packets_hz", [50, 400, 1200])
 def test_the_flight_follows_the_rate_of_the_packets(packets_hz):
     """At most 400 frames of the diagnosis a second: of faster packets the first in each counts."""
-    air = {"duration_s": 1.0, "environment": {"turbulence": "dryden", "severity": "light"}}
+    loss = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4, "at_s": 0.2}
+    air = {"duration_s": 1.0, "environment": {"turbulence": "dryden", "severity": "light"}, "faults": [loss]}
     packets, pulses = recorded(round(0.5 * packets_hz), packets_hz)
     vehicle = Vehicle(scenario(**air), pulses=True)
     log = flown_by(vehicle, packets)

@@ -158,6 +158,23 @@ def test_what_has_been_flown_is_kept_of_this_plan_and_these_files(tmp_path, monk
     assert asked[2] != asked[0] != asked[3]
 
 
+def test_the_table_of_what_was_flown_has_a_dot_for_no_flight():
+    cells = [
+        {"airspeed_mps": [30, 40.4], "altitude_m": ends}
+        for ends in ([None, 1000], [1000, 2500], [2500, None])
+    ]
+    flown = [{"surface": "rudder", "type": "rate_limit", "flights": [0, 12, 0]}]
+    never = [["aileron", "stuck"], ["aileron", "float"], ["flap", "loss_of_effectiveness"]]
+    each = {"aircraft": "beaver", "combinations": 1, "of": 9, "cells": cells, "flown": flown, "never": never}
+    said, table, missing = shown._coverage(each)
+    assert said.startswith("beaver: 1 of 9 combinations of surface, fault type and cell of the envelope")
+    ends = ("below 1 km", "1 to 2.5 km", "above 2.5 km")
+    assert list(table.head) == ["surface", "fault", *(f"30 to 40 m/s, {end}" for end in ends)]
+    assert [list(row) for row in table.rows] == [["rudder", "rate limit", "·", "12", "·"]]
+    assert missing == "Never flown: aileron: stuck, float; flap: loss of effectiveness."
+    assert len([*shown._coverage(each | {"never": []})]) == 2
+
+
 def test_the_worker_count_changes_nothing(tmp_path):
     plan = plan_of(tmp_path, **SMALL)
     one, two = (run_plan(plan, tmp_path / f"{n}", n) for n in (1, 2))

@@ -258,6 +258,27 @@ def test_of_many_requirements_the_summary_has_those_that_are_not_met_first(tmp_p
     table = next(part for part in page(document) if isinstance(part, shown.Table))
     assert table.rows[0][0] == "LAST"
     assert (len(table.rows), table.rows[-1][1]) == (shown.ON_THE_SUMMARY + 1, "7 more")
+    for more, last in ((0, met["text"]), (1, "1 more")):
+        document["requirements"] = [met] * (shown.ON_THE_SUMMARY + more)
+        table = next(part for part in page(document) if isinstance(part, shown.Table))
+        assert (len(table.rows), table.rows[-1][1]) == (shown.ON_THE_SUMMARY + more, last)
+
+
+@pytest.mark.parametrize(
+    ("failing", "more"), [(1, None), (2, ""), (shown.MOST_SHOWN, ""), (shown.MOST_SHOWN + 1, " and 1 more")]
+)
+@pytest.mark.parametrize(("letters", "left"), [(shown.MOST_LETTERS, 90), (shown.MOST_LETTERS + 1, 87)])
+def test_long_texts_and_many_flights_are_cut_and_counted(tmp_path, failing, more, letters, left):
+    content, _ = seeded(1, 1)
+    document = judged(plan_of(tmp_path, **content))
+    flights = [f"flight {n}" for n in range(failing)]
+    each = document["requirements"][0]
+    each |= {"text": "x" * letters, "failing": [{"flight": name} for name in flights]}
+    summary, requirement = [part for part in page(document) if isinstance(part, shown.Table)][:2]
+    assert summary.rows[0][1] == "x" * left + "..." * (letters > left)
+    assert requirement.head[1] == "x" * letters
+    said = dict(requirement.rows).get("do not meet it")
+    assert said == (None if more is None else ", ".join(flights[: shown.MOST_SHOWN]) + more)
 
 
 def test_the_plan_of_a_stranger_is_text_in_page_and_paper(tmp_path):

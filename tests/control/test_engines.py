@@ -21,6 +21,8 @@ from beaver_ftc.documents.problems import ScenarioError
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.instrumented import source_of
 from beaver_ftc.plant.trim import trim
+from beaver_ftc.studies.derive import derivation
+from beaver_ftc.studies.derive import sample as sampling
 from beaver_ftc.studies.derive.derivation import derive
 from beaver_ftc.studies.derive.fit import set_engines_apart
 from beaver_ftc.studies.detectability import engine_failures, of_engines
@@ -33,7 +35,10 @@ DT, YAW = 0.01, 2
 def jet(tmp_path_factory):
     """The 737 with its engines as effectors, in a folder beside a scenario."""
     folder = tmp_path_factory.mktemp("engines")
-    derive("jsbsim:737", folder / "aircraft", engines=True)
+    with pytest.MonkeyPatch.context() as quick:
+        quick.setattr(sampling, "STARTS_OF_WORST", 8)
+        quick.setattr(derivation, "CHECKED", 800)
+        derive("jsbsim:737", folder / "aircraft", engines=True)
     return folder
 
 

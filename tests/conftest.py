@@ -1,6 +1,7 @@
 """What all tests share: the helpers of tests/flying.py, and property tests that repeat themselves."""
 
 import os
+import subprocess
 import sys
 from pathlib import Path
 from zlib import crc32
@@ -13,6 +14,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from tools.promises import is_at_night, thinned
 
 import kept
+import warm
 from samples import samples
 
 # No deadline: a first call compiles. Derandomised: a red build can be repeated.
@@ -62,28 +64,11 @@ def changed(request):
 
 def pytest_sessionstart(session):
     """Compile what flights use before the first test: what is said meanwhile is a test by itself."""
-    from beaver_ftc.compiled import cache_folder
-
-    folder = cache_folder()
-    worker, plain = hasattr(session.config, "workerinput"), os.environ.get("NUMBA_DISABLE_JIT", "0") != "0"
-    if worker or plain or folder is None:
+    done = warm.mark()
+    if hasattr(session.config, "workerinput") or done is None or done.exists():
         return
-    warm = folder / f"warm-{_sources()}"
-    if warm.exists():
-        return
-    from beaver_ftc.control.rivals.indi import IncrementalInversion
-    from beaver_ftc.diagnosis.rivals.rls import RlsMonitor
-    from beaver_ftc.loop.loop import fly
-    from flying import scenario
-
-    for plugged in ({}, {"detector": RlsMonitor()}, {"law": IncrementalInversion()}):
-        fly(scenario(duration_s=0.2, substeps=2, fdi={"statistical": {}}), **plugged)
-    warm.touch()
-
-
-def _sources():
-    """A name for the package's sources as they are now."""
-    from beaver_ftc.documents.paths import PACKAGE
-    from beaver_ftc.documents.sources import digest_of_files
-
-    return digest_of_files(*sorted(PACKAGE.rglob("*.py")))
+    compiling = {name: value for name, value in os.environ.items() if name != "NUMBA_DISABLE_JIT"}
+    silent = subprocess.DEVNULL
+    process = subprocess.Popen([sys.executable, warm.__file__], env=compiling, stdout=silent, stderr=silent)
+    if not warm.plain():
+        process.wait()

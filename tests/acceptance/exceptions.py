@@ -80,6 +80,17 @@ TABLE = (
         "beaver-ftc compare --help",
     ),
     Exempt(
+        r"python -m tools\.drawn\.forgeries",
+        "minutes: a few forgeries",
+        "python -m tools.drawn.forgeries --flights 2 --forged 40",
+    ),
+    Exempt(
+        r"python -m tools\.drawn\.certificates",
+        "half a minute: a few flights",
+        "python -m tools.drawn.certificates --flights 4 --altered 4",
+    ),
+    Exempt(r"python -m tools\.drawn", "minutes: a few scenarios", "python -m tools.drawn --flights 40"),
+    Exempt(
         r"beaver-ftc (run|validate|sweep|compare|detectability)",
         "names the command without its arguments",
         r"beaver-ftc \1 --help",

@@ -135,6 +135,16 @@ def _copy(relative: str):
     return lambda folder: shutil.copytree(ROOT / relative, folder / relative)
 
 
+def _checker(folder: Path) -> None:
+    """The checker of certificates and what stands beside it in a checkout, without the package."""
+    for file in (
+        Path("src/beaver_ftc/results/certificates/check_certificate.py"),
+        Path("tools/check_certificate.py"),
+    ):
+        (folder / file.parent).mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / file, folder / file)
+
+
 _MATERIALS = {
     r"challenge (submit|grade)": _challenge,
     r"^(?!.*\bnew my-case).*\bmy-case\b": _my_case,
@@ -153,6 +163,7 @@ _MATERIALS = {
     r"(?<!\./)\baircraft/": _copy("aircraft"),
     r"\bdocs/": _copy("docs"),
     r"\btests/data\b": _copy("tests/data"),
-    r"\btools\b": _copy("tools"),
+    r"\btools/check_certificate\b": _checker,
+    r"\btools\.": _copy("tools"),
     r"\bmy-(detector|cusum)\b": _copy("examples"),
 }

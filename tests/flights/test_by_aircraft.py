@@ -286,3 +286,99 @@ def test_a_loss_that_explains_nothing_has_no_place():
 def test_the_latest_greatest_looks_back_only(values, reach):
     found = stepped._latest(np.array(values)[:, None], reach)[:, 0]
     assert found.tolist() == [max(values[max(0, k - reach + 1) : k + 1]) for k in range(len(values))]
+
+
+PLANE = SimpleNamespace(
+    envelope=SimpleNamespace(airspeed_mps=(20.0, 50.0)), alpha_rad=(-0.1, 0.3), surfaces=("aileron",),
+    travel={"aileron": SimpleNamespace(min_rad=-0.4, max_rad=0.2)},
+)  # fmt: skip
+
+
+def true(mask):
+    return np.flatnonzero(mask).tolist()
+
+
+def test_a_stretch_has_fifty_even_samples_that_are_all_known():
+    """Row 50 is unknown, 49 rows follow up to a step that is a fifth too long; one a twentieth too long
+    parts nothing."""
+    steps = np.full(150, 0.05)
+    steps[[100, 120]] *= 1.2, 1.05
+    unknown = np.arange(150) == 50
+    found = by_aircraft._stretches(SimpleNamespace(t_s=np.cumsum(steps)), unknown, 20.0)
+    assert found == [(0, 50), (100, 150)]
+
+
+def test_what_is_at_a_limit_of_the_envelope_is_inside():
+    airspeed, alpha = [19.9, 20.0, 50.0, 50.1, np.nan, 30.0], [0.0, -0.1, 0.3, 0.31, -0.11, np.nan]
+    signals = np.column_stack([alpha, np.full(6, 9.0), airspeed])
+    found = by_aircraft._outside(signals, PLANE, np.arange(6) == 5, [(1, 5)])
+    assert {says: true(mask) for says, mask in found.items()} == {
+        "a number is missing": [5], "samples are not evenly spaced": [0],
+        "airspeed is outside 20 to 50 m/s": [0, 3],
+        "angle of attack is outside -0.1 to 0.3 rad": [3, 4],
+    }  # fmt: skip
+
+
+def test_a_stretch_misleads_that_nothing_explains_within_its_first_second():
+    """From its alarm on; of what comes after a second, or outside all stretches, nothing is said."""
+    verdicts = [by_aircraft.Verdict()] * 10
+    for k in (0, 3, 6):
+        verdicts[k] = by_aircraft.Verdict(True, isolated="unanticipated")
+    verdicts[5] = by_aircraft.Verdict(True)
+    given = SimpleNamespace(verdicts=verdicts)
+    ((says, mask),) = by_aircraft._misled(np.arange(10) * 0.5, [(1, 5), (5, 10)], given).items()
+    assert (says.partition(":")[0], true(mask)) == (
+        "no fault explains it from the first second on", [5, 6, 7, 8, 9],
+    )  # fmt: skip
+
+
+def test_an_alarm_raised_where_nothing_is_said_is_none_in_its_stretch():
+    rows = SimpleNamespace(t_s=np.arange(8.0), faulty=np.array([0, 1, 1, 0, 0, 1, 0, 1]))
+    reasons = {name: np.arange(8) == at for name, at in (("one", 1), ("six", 6), ("none", 9))}
+    found = by_aircraft._since([(0, 4), (4, 8)], rows, reasons)
+    says = "the alarm was raised where nothing can be said"
+    assert {name: true(mask) for name, mask in found.items()} == {"one": [1], "six": [6], says: [2, 3]}
+
+
+def test_the_loss_that_shows_is_the_median_of_the_rows_that_are_quiet_and_credible():
+    low = np.array([[0.9, 0.0], [0.8, 0.5], [0.6, 0.0], [0.1, 0.9], [0.1, 0.9]])
+    rows = SimpleNamespace(faulty=np.array([0, 0, 0, 1, 0]), credible=np.array([1, 1, 1, 1, 0]), low=low)
+    assert by_aircraft._separable(rows, ["right", "left"]) == [
+        "right: a loss of more than 20 % shows within a second in half of the flight.",
+        "left: in half of the flight not even a complete loss would show within a second.",
+    ]
+    rows.credible = np.array([0, 0, 0, 1, 0])
+    assert by_aircraft._separable(rows, ["right", "left"]) == []
+
+
+@pytest.mark.parametrize(("alpha", "beta", "density", "command", "says"), [
+    (1.5, -1.5, 0.21, 0.43, None), (-1.6, 0.0, 1.2, 0.0, "flow.alpha_rad is 1.6 in the middle"),
+    (0.0, -1.7, 1.2, 0.0, "flow.beta_rad is 1.7 in the middle"), (0.0, 0.0, 1.59, -0.43, None),
+    (0.0, 0.0, 0.19, 0.0, "a density of 0.19 kg/m3"), (0.0, 0.0, 1.61, 0.0, "a density of 1.61 kg/m3"),
+    (0.0, 0.0, 1.2, 0.45, "of aileron reaches 0.45 rad, allowed: its stop, 0.4 rad; full_deflection_rad"),
+])  # fmt: skip
+def test_flow_and_commands_in_another_unit_are_refused(alpha, beta, density, command, says):
+    """A missing number, and the density of a row at half the least airspeed, count for nothing."""
+    airspeed = np.array([30.0, 40.0, np.nan, 10.0, 10.0, 10.0])
+    dynamic = 0.5 * density * airspeed**2 * [1.0, 1.0, 1.0, 9.0, 9.0, 9.0]
+    signals = np.column_stack(
+        [[alpha, 0.0, alpha, np.nan, alpha, alpha], np.full(6, beta), airspeed, dynamic]
+    )
+    commands = np.array([[0.0], [np.nan], [command], [0.0], [0.0], [0.0]])
+    if says is None:
+        by_aircraft._plausible("log", [np.empty(0), signals, commands], PLANE)
+        return
+    with pytest.raises(BadInput, match=f"^log: .*{says}"):
+        by_aircraft._plausible("log", [np.empty(0), signals, commands], PLANE)
+
+
+def test_stretches_make_one_flight():
+    one = stepped.Stepped([1, 2], np.full((2, 2), 0.2), np.full((2, 2), 0.7), np.array([0.5, 0.9]))
+    other = stepped.Stepped([3], np.full((1, 2), 0.3), np.full((1, 2), 0.8), np.array([0.6, 0.4]))
+    found = by_aircraft._whole(5, 2, [(1, 3), (4, 5)], [one, other])
+    assert found.verdicts == [by_aircraft.Verdict(), 1, 2, by_aircraft.Verdict(), 3]
+    assert (found.low[:, 1].tolist(), found.high[:, 0].tolist()) == (
+        [0, 0.2, 0.2, 0, 0.3],
+        [1, 0.7, 0.7, 1, 0.8],
+    )
+    assert found.gains.tolist() == [0.5, 0.4]

@@ -9,10 +9,11 @@ from typer.testing import CliRunner
 
 from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.flights import physics
+from beaver_ftc.flights import check, physics
 from beaver_ftc.flights.check import _angle_unit
 from beaver_ftc.flights.readers import read_flight
-from beaver_ftc.flights.recording import Column
+from beaver_ftc.flights.recording import Column, Recording
+from beaver_ftc.flights.units import nearest_unit
 from beaver_ftc.flights.vehicle import load_vehicle
 from flights import limited, synthetic
 from flights.test_signals import T_S, turning
@@ -312,3 +313,111 @@ def test_angles_and_rates_scaled_alike_are_found_by_the_pitch_angle():
         assert says is not None
         assert f"it is in {unit}, a factor of {1.0 / factor:.4g} fits" in says
     assert physics.pitch_remark(Column(t_s, 1.6 * np.sin(t_s)), "theta") is None
+
+
+def held(value, n=60):
+    return Column(np.arange(n) * 0.05, np.append(np.full(n - 1, float(value)), np.nan))
+
+
+@pytest.mark.parametrize(("name", "size", "unit"), [
+    ("gyro_dps", 1.0, "deg/s"), ("p_rad_s", 99.0, "rad/s"), ("P_Deg_s", 1.0, "deg/s"), ("wx", 12.0, "rad/s"),
+    ("wx", -12.1, "deg/s"),
+])  # fmt: skip
+def test_the_unit_of_rates_is_told_by_the_first_name_or_the_largest_of_all(name, size, unit):
+    columns = {name: held(0.1), "wy": held(size), "wz": held(0.2)}
+    assert check._rate_unit(Recording("log", columns), list(columns), held(0.3), 1.0) == unit
+
+
+@pytest.mark.parametrize(("values", "found"), [
+    ([1100, 1500, np.nan, 1900], {"column": "u", "scale": 0.0025, "offset": -3.75}), ([700.0], "u"),
+    ([701.0], {"column": "u", "scale": 0.0025, "offset": -3.75}), ([2300.0], "u"), ([-10.0, 3.0], "u"),
+    ([-10.1, 3.0], {"column": "u", "unit": "%"}), ([105.0], {"column": "u", "unit": "%"}), ([105.1], "u"),
+])  # fmt: skip
+def test_commands_are_pulses_per_cent_or_shares(values, found):
+    assert check._command("u", np.array(values, dtype=float)) == found
+
+
+def test_names_as_the_patterns_have_them():
+    spelled = {
+        " Roll Rate [deg/s] ": "roll_rate_deg_s", "gyro_rad[0]": "gyro_rad[0]", "Time (ms)": "time_ms",
+        "a / b": "a_b",
+    }  # fmt: skip
+    assert {name: check._spelled(name) for name in spelled} == spelled
+    plain = {"my log/2": "my_log_2", "__": "log", "a" * 101: "a" * 100, "_b-1_": "b-1"}
+    assert {name: check._plain(name) for name in plain} == plain
+    rates = ["gyro_x_cmd", "IMU.GyrX", "rolling", "gyro_x", "GyrX"]
+    assert check._first(check._NAMES["p"], rates) == "GyrX"
+    assert check._first(check._NAMES["p"], ["zyro_x", "xgyro_x", "agyro_x"]) == "agyro_x"
+    assert check._first(check._NAMES["r"], rates) is None
+    commands = ["Aileron", "rudder_position", "da", "servo1", "elevator_truth", "elevon_error", "roll"]
+    assert check._commands(commands, {"p": "da"}) == ["Aileron", "servo1"]
+    assert len(check._commands([f"servo{k}" for k in range(9)], {})) == 8
+    wide = [*(f"x{k}" for k in range(9)), "p", *(f"servo{k}" for k in range(70))]
+    assert check._candidates(wide) == ["p", *(f"servo{k}" for k in range(59))]
+
+
+@pytest.mark.parametrize(("correlation", "says"), [
+    (0.7, "tell nothing of one another"), (0.71, "agree"), (-0.71, "agree"), (-0.7, "tell nothing"),
+])  # fmt: skip
+def test_rate_and_angle_agree_from_seven_tenths_on(correlation, says):
+    said = check._agreement(physics.Followed(1.25, correlation, 9, 2.0, 3.0), "roll", "p")
+    told = f"the change of roll is 1.250 times the integral of p (correlation {correlation:.2f}): they {says}"
+    assert said.startswith(told)
+
+
+@pytest.mark.parametrize(("text", "found", "lines"), [
+    ("t_s,p\n0,1\n0.25,1\n0.5,1\n", ("t_s", "s"), []),
+    ("time_ms,t_s,p\n0,7,1\n20,7,2\n40,7,3\n", ("time_ms", "ms"),
+     ["time is in column time_ms, its steps fit ms"]),
+    ("p,Time\n1,5\n2,505\n3,1005\n", ("Time", "us"), ["time is in column Time, its steps fit us"]),
+    ("t_s,p\n0,1\n20,1\n40,1\n", ("t_s", "ms"), ["time is in column t_s, its steps fit ms"]),
+    ("t_s,p\n0,1\n0.251,1\n0.502,1\n", None, None), ("t_s,p\n0,1\n", None, None),
+])  # fmt: skip
+def test_time_is_the_column_whose_steps_fit_a_log(tmp_path, text, found, lines):
+    path, said = tmp_path / "log.csv", []
+    path.write_text(text)
+    if found is None:
+        with pytest.raises(BadInput, match=r"no column of time, allowed: a table with t_s in seconds"):
+            check._time(path, said)
+        return
+    assert (check._time(path, said), said) == (found, lines)
+
+
+@pytest.mark.parametrize(("down", "acceleration"), [
+    (-1.02, {"column": "az", "unit": "g"}), (9.7, "az"), (0.0, None), (100.0, None),
+    (-32.0, {"column": "az", "unit": "ft/s2"}),
+])  # fmt: skip
+def test_a_vehicle_file_is_proposed_of_what_was_found(down, acceleration):
+    of = {
+        "wx": 0.1, "wy": 20.0, "wz": 0.3, "roll_deg": 3.0, "pitch": 2.0, "az": down, "V": 20.0, "u 1": 0.4,
+    }  # fmt: skip
+    log = Recording("log", {name: held(value) for name, value in of.items()})
+    found = {
+        "p": "wx",
+        "q": "wy",
+        "r": "wz",
+        "roll": "roll_deg",
+        "pitch": "pitch",
+        "az": "az",
+        "airspeed": "V",
+    }
+    known = {} if acceleration is None else {"acceleration": acceleration}
+    assert check._proposed("my log", log, "table", ("time_ms", "ms"), found, ["u 1"]) == {
+        "name": "my_log", "reader": "table", "time": {"column": "time_ms", "unit": "ms"},
+        "rates": {axis: {"column": found[axis], "unit": "deg/s"} for axis in "pqr"},
+        "commands": ["u 1"], "surfaces": {"u_1": {"u 1": 1.0}},
+        "attitude": {axis: {"column": found[axis], "unit": "deg"} for axis in ("roll", "pitch")},
+        **known, "airspeed": "V",
+    }  # fmt: skip
+    bare = found | {"roll": None, "az": None, "airspeed": None}
+    assert set(check._proposed("log", log, "table", ("t_s", "s"), bare, ["u 1"])) == {
+        "name", "reader", "rates", "commands", "surfaces",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(("factor", "within", "unit"), [
+    (0.0174, 1.5, "deg/s"), (0.004, 4.0, "mrad/s"), (0.004, 3.9, None), (1.0, 1.0, "rad/s"),
+    (1e-4, 1.8, "cdeg/s"),
+])  # fmt: skip
+def test_the_nearest_unit_is_within_so_many_times(factor, within, unit):
+    assert nearest_unit("rate", factor, within) == unit

@@ -1,6 +1,7 @@
 """What a verdict says, of rows and flights made by hand."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -183,3 +184,17 @@ def test_that_nothing_shows_is_said_of_the_rows_that_are_credible(share, says):
     little = findings._LITTLE
     assert findings._nothing({"credible": {"share": 0.99 * little}}) == "no verdict"
     assert findings._nothing({"credible": {"share": 1.01 * little}}).startswith("no fault shows where")
+
+
+def test_the_smallest_loss_passes_the_odds_by_the_information_gathered():
+    """Half of the square of the loss times the information; a complete loss is one."""
+    assert findings._smallest(0.5, 5.0) == {"5": None, "20": 1.0, "60": pytest.approx(3.0**-0.5)}
+    assert findings._smallest(0.0, 5.0) == {"5": None, "20": None, "60": None}
+
+
+def test_odds_against_a_change_are_those_of_its_median_share():
+    weight = np.array([0.5, 0.2, 0.1, 0.3])
+    bank = SimpleNamespace(weight=weight, faulty=lambda group: np.arange(4) % 2 == (1 if group else 5))
+    model = small.model(settings={"alarm": 0.9, "changes_per_hour": 36.0})
+    assert findings._odds_against(model, bank, 1, 0.1) == pytest.approx(np.log(9.0) - np.log(0.00025))
+    assert findings._odds_against(model, bank, 0, 0.1) == np.inf

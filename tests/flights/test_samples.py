@@ -223,3 +223,33 @@ def test_two_flights_of_one_name_are_refused(tmp_path):
     assert [one.name for one in of.load_flights(paths[:1], vehicle)] == ["one"]
     with pytest.raises(BadInput, match="two flights are named one: one result would replace the other"):
         of.load_flights(paths, vehicle)
+
+
+@pytest.mark.parametrize(("rate_hz", "says"), [
+    (0.02, " (time in ms would be 20 Hz)"), (0.01, " (time in ms would be 10 Hz)"), (0.0099, ""),
+    (1.0, " (time in ms would be 1e+03 Hz)"), (1.01, ""), (2e-5, " (time in us would be 20 Hz)"),
+    (3e-8, " (time in ns would be 30 Hz)"), (5e-9, ""),
+])  # fmt: skip
+def test_a_log_too_slow_may_be_one_in_another_unit_of_time(rate_hz, says):
+    assert of._in_another_unit(rate_hz) == says
+
+
+def test_labels_are_the_last_ones_of_each_surface_that_has_them():
+    vehicle = small.vehicle(labels={"left": {"column": "left_left", "scale": 0.01}, "right": "right_left"})
+    known = Recording("log", {"left_left": column([1.0, 3.0], [40.0, 70.0])})
+    labels = of._labels(known, vehicle, np.array([0.5, 1.0, 2.9, 3.0]))
+    assert np.isnan(labels[:, 0]).all()
+    np.testing.assert_allclose(labels[:, 1], [np.nan, 0.4, 0.4, 0.7])
+
+
+def test_airspeed_and_energy_are_known_where_their_columns_are():
+    t_s = stamps(1.0, 8)
+    columns = {"alt": column(t_s, 3.0 * t_s), "V": column(t_s, np.full(8, 20.0)), "one": column([0.0], [1.0])}
+    base, log = (t_s, np.zeros(8, dtype=int), 1.0), Recording("log", columns)
+    for altitude, speed, there in (("alt", "V", True), ("alt", "W", False), ("one", "V", False)):
+        vehicle = small.vehicle(energy={"altitude": altitude, "airspeed": speed}, airspeed=speed)
+        climb, airspeed = of._energy_climb(log, vehicle, base), of._airspeed(log, vehicle, t_s, 1.0)
+        assert (climb is not None, airspeed is not None) == (there, speed == "V")
+        if there:
+            np.testing.assert_allclose(climb, [np.nan] * 5 + [3.0] * 3)
+    assert of._energy_climb(log, WING, base) is of._airspeed(log, WING, t_s, 1.0) is None

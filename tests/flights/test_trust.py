@@ -301,3 +301,72 @@ def test_a_range_is_passed_by_half_its_span_at_either_end(model, kind, column, l
         first, last = SPANS[kind][column]
         says = f"{name} is outside {first:.3g} to {last:.3g}, where the model was fitted"
         assert list(found) == ([] if low < value < high else [says])
+
+
+def test_a_condition_counts_where_it_holds_in_more_than_half_of_the_last_five_seconds():
+    rows = np.array([1, 0, 1, 1, 0, 0, 0, 0, 1, 1, 1], dtype=bool)
+    found = trust._often(rows, small.flight(small.model(), 20, dt_s=1.0))
+    assert found.astype(int).tolist() == [1, 0, 1, 1, 1, 0, 0, 0, 0, 0, 1]
+
+
+def test_what_was_clipped_is_remembered_for_half_a_minute():
+    for at, found in ((2, [2, 3, 4, 5]), (9, [])):
+        assert np.flatnonzero(trust._lately(np.arange(8) == at, 10.0)).tolist() == found
+
+
+def test_for_how_long_each_column_may_stand_still():
+    """A rate for a third of 1.5 s where it is known, any column thrice as long as it did; others for ever."""
+    names = ["p_rad_s", "q_rad_s", "r_rad_s", "roll", "pitch", "air"]
+    samples = small.flight(small.model(), 20, still_s=dict.fromkeys(names, np.zeros(20)))
+    known = {"p_rad_s": 0.4, "r_rad_s": 0.1, "roll": 2.0, "pitch": 0.3, "other": 9.0}
+    model = small.model(fitted={"commands": [], "rates": [], "still_s": known})
+    most = dict(zip(names, [pytest.approx(1.2), 1.5, 0.5, 6.0, 1.5, np.inf], strict=True))
+    assert trust._most_still(samples, model) == most
+    assert trust._most_still(samples, small.model()) == dict(
+        zip(names, [1.5] * 3 + [np.inf] * 3, strict=True)
+    )
+    still_s = {"q_rad_s": np.array([1.5, 1.51, 0.0]), "air": np.full(3, 99.0)}
+    short = replace(samples, t_s=np.arange(3.0), still_s=still_s)
+    assert trust.dead(short, model).tolist() == [False, True, False]
+    clipped = replace(short, clipped=np.array([False, False, True]))
+    assert trust.dead(clipped, model).tolist() == [False, True, True]
+
+
+def test_a_group_that_is_tied_to_98_of_a_hundred_is_not_claimed():
+    model = small.model(fitted={"commands": [], "rates": [], "tied": [0.98, 0.979]})
+    assert (trust.claimed(model), trust.unclaimed(model)) == ([False, True], {"right"})
+    says = (
+        "of what right does, 98.0% follows from the rates, signals and other surfaces of the flights fitted"
+    )
+    assert trust.unclaimed_lines(model) == [f"{says}: its effect cannot be told, nothing is said of it"]
+    for unknown in (small.model(), small.model(fitted={"commands": [], "rates": []})):
+        assert (trust.claimed(unknown), trust.unclaimed_lines(unknown)) == ([True, True], [])
+
+
+def test_what_is_kept_of_the_flights_fitted():
+    """Of each column the longest stand; of the energy height the lowest 15 of a hundred; of commands their
+    reach over that of the fit."""
+    climbs = np.append(np.arange(22.0), np.nan)  # 0 to 20 are used, and what is no number
+    use = np.arange(23) != 21
+    one = small.flight(small.model(), 23, energy_climb=climbs, still_s={"roll": np.array([0.3, 0.2])})
+    other = small.flight(small.model(), 23, still_s={"roll": np.array([0.4]), "air": np.array([0.7])})
+    flights = [(other, use), (one, use)]
+    assert trust._unpowered(flights) == pytest.approx(3.0)
+    assert trust._unpowered(flights[:1]) is None
+    assert trust._longest_still(flights) == {"roll": 0.4, "air": 0.7}
+    model = small.model(fitted={"commands": [[0.0, 1.0], [1.0, 3.0]], "rates": []})
+    commands = np.linspace([-1.0, 0.0], [3.0, 3.0], 1001)
+    flown = replace(other, commands=commands)
+    assert trust._moved(flown, model, ["left"]) == pytest.approx(2.994 / 2.0)
+    assert trust._moved(flown, model, ["left", "right"]) == pytest.approx(3.992)
+    assert trust._moved(flown, small.model(), ["left"]) == 0.0
+    assert trust.span(np.array([[np.nan, 2.0], [np.nan, 2.0]])) == [[0.0, 0.0], [2.0, 2.0]]
+    assert trust.span(np.empty((3, 0))) == []
+
+
+def test_reasons_come_with_their_shares_the_largest_first():
+    found = {"one": np.array([1, 0, 0, 0], bool), "other": np.array([1, 1, 0, 1], bool)}
+    assert trust.account(found, np.array([0, 0, 1, 0])) == {
+        "share": 0.25, "reasons": [{"says": "other", "share": 0.75}, {"says": "one", "share": 0.25}],
+    }  # fmt: skip
+    assert trust.account({}, np.array([])) == {"share": 0.0, "reasons": []}

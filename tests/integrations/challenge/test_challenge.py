@@ -3,6 +3,7 @@
 import json
 import os
 import stat
+import sys
 from dataclasses import replace
 from math import inf, nan
 from pathlib import Path
@@ -14,8 +15,9 @@ from typer.testing import CliRunner
 
 import beaver_ftc as bf
 from beaver_ftc.cli.main import app
+from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
-from beaver_ftc.integrations.challenge import folders, grading, line
+from beaver_ftc.integrations.challenge import folders, grading, line, pilot
 from beaver_ftc.integrations.challenge.line import Allowance, Barred, Stranger
 from beaver_ftc.studies.compare.trial import Entry, Result, with_entry
 
@@ -303,3 +305,99 @@ def test_a_challenge_that_is_none(tmp_path):
     (tmp_path / "mine.py").write_text("")
     with pytest.raises(BadInput, match="is no challenge"):
         folders.keep("", "ada", tmp_path)
+
+
+@pytest.mark.parametrize(("student", "kind", "places"), [
+    ("ada", "detector", "detectors"), ("ada", "", "detectors"), ("ada", "law", "laws"),
+    ("ada", "fault-tolerant law", "laws"), ("built-in scheme", "", "detectors"), ("built-in law", "", "laws"),
+    ("built-in law", "detector", "laws"), (grading.ORACLE, "law", ""),
+])  # fmt: skip
+def test_each_row_is_of_one_ranking(student, kind, places):
+    row = grading.Graded(student, kind)
+    of = {"detectors": ("detector", "built-in scheme"), "laws": ("law", "built-in law")}
+    assert [name for name, place in of.items() if grading._belongs(row, *place)] == places.split()
+
+
+def test_the_built_in_ones_take_no_place():
+    scores = {"cid": 70.0, "built-in scheme": 80.0, "bea": 70.0, "ada": 90.5, "dan": 12.25}
+    rows = grading._ranked([{"student": name, "score": score} for name, score in scores.items()])
+    assert [(row["student"], row["place"]) for row in rows] == [
+        ("ada", 1), ("built-in scheme", None), ("bea", 2), ("cid", 3), ("dan", 4),
+    ]  # fmt: skip
+    cells = [
+        ("score", 70.0),
+        ("flights", 3),
+        ("place", None),
+        ("reason", "late"),
+        ("tracking_median", 1.23456),
+    ]
+    assert [grading._cell(*one) for one in cells[:2]] == ["70.0", "3"]
+    assert grading._table([rows[0] | {"flights": 3, "unknown": 1}]).head == [
+        "",
+        "student",
+        "score",
+        "flights",
+    ]
+
+
+def test_a_false_alarm_in_every_flight_is_a_reason_of_a_detector():
+    false, says = replace(SEEN, false_alarm=True), "a false alarm in every flight"
+    for row, flown, reason in (
+        (grading.Graded("ada", "detector"), [false, false], says),
+        (grading.Graded("ada", "detector"), [false, SEEN], None),
+        (grading.Graded("ada", "detector"), [], None),
+        (grading.Graded("ada", "law"), [false], None),
+        (grading.Graded("ada", "detector", reason="late"), [false], "late"),
+    ):
+        assert grading._reason(row, flown) == reason
+
+
+@pytest.mark.parametrize(("source", "found"), [
+    ("class A:\n def reset(self, c): ...\n def step(self, a, b): ...", "detector"),
+    ("class A:\n def reset(self, c): ...\n def step(self, a, b, c): ...", "law"),
+    ("class A:\n fault_tolerant = True\n def reset(self, c): ...\n def step(self, a, b, c): ...",
+     "fault-tolerant law"),
+    ("class A:\n fault_tolerant = True\n def reset(self, c): ...\n def step(self, a, b): ...", "detector"),
+    ("class B:\n def step(self, a, b): ...", "classes with reset and step: none; allowed: one"),
+    ("class A:\n def reset(self, c): ...\n def step(self, a, b): ...\nclass B(A): ...",
+     "classes with reset and step: A, B; allowed: one"),
+    ("class A:\n def reset(self, c): ...\n def step(self, a): ...",
+     r"step\(self, a\), allowed: step\(measured, command\)"),
+    ("from beaver_ftc.control.rivals.indi import IncrementalInversion", "step: none; allowed: one"),
+])  # fmt: skip
+def test_the_one_class_of_a_submission(monkeypatch, source, found):
+    monkeypatch.setitem(sys.modules, pilot.MODULE, None)
+    if "law" in found or found == "detector":
+        plug_in, kind = pilot.class_of(source, "ada.py")
+        assert (plug_in.__name__, kind) == ("A", found)
+        return
+    with pytest.raises(TypeError, match=found):
+        pilot.class_of(source, "ada.py")
+
+
+def test_a_verdict_goes_over_the_line_as_numbers_and_comes_back():
+    surfaces = ("aileron", "elevator")
+    said = [
+        Verdict(True, "q", "elevator", None, -0.25, np.array([0.5, 0.75]), 1.5),
+        Verdict(False, None, "unanticipated", None, None, None, 0.5), Verdict(True, "r", statistic=2.5),
+    ]  # fmt: skip
+    numbers = [pilot.verdict_numbers(one, surfaces) for one in said]
+    np.testing.assert_array_equal(numbers, [
+        [1, 2, 2, 1, -0.25, 1.5, 1, 0.5, 0.75], [0, 0, 3, 0, 0, 0.5, 0, nan, nan],
+        [1, 3, 0, 0, 0, 2.5, 0, nan, nan],
+    ])  # fmt: skip
+    for one, given in zip(said, numbers, strict=True):
+        back = pilot.verdict_of(given, surfaces)
+        assert back._replace(effectiveness=None) == one._replace(effectiveness=None)
+        np.testing.assert_array_equal(back.effectiveness, one.effectiveness)
+
+
+@pytest.mark.parametrize(("said", "error", "says"), [
+    (None, TypeError, "step returned NoneType, allowed: a Verdict"),
+    (Verdict(axis="x"), ValueError, "axis 'x', isolated None, allowed"),
+    (Verdict(isolated="nose"), ValueError, "axis None, isolated 'nose', allowed"),
+    (Verdict(effectiveness=np.ones(3)), ValueError, r"effectiveness has shape \(3,\), allowed: \(2,\)"),
+])  # fmt: skip
+def test_what_is_no_verdict_is_told(said, error, says):
+    with pytest.raises(error, match=says):
+        pilot.verdict_numbers(said, ("aileron", "elevator"))

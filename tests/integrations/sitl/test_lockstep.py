@@ -10,7 +10,7 @@ from tools.autopilots import peers, trial
 from tools.autopilots.reader import read
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.integrations.sitl.ardupilot import Ardupilot
+from beaver_ftc.integrations.sitl.ardupilot import Ardupilot, Packet
 from beaver_ftc.integrations.sitl.link import Link
 from beaver_ftc.integrations.sitl.mavlink import Mavlink
 from beaver_ftc.integrations.sitl.px4 import Px4, gps, quaternion, sensor, state
@@ -231,3 +231,25 @@ def test_a_state_is_read_again_as_it_was_at_altitude():
     expected = {"xacc": 1.3, "yacc": -2.9, "zacc": -9.1, "xgyro": 0.11, "ygyro": -0.23, "zgyro": 0.37,
                 "diff_pressure": 15.2, "pressure_alt": 3050.0, "abs_pressure": 696.8}  # fmt: skip
     assert {name: found[name] for name in expected} == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize(("last", "again", "number", "peer", "anew"), [
+    (-1, -1, 7, "a", True), (5, -1, 6, "b", True), (5, -1, 6, "a", False), (64, -1, 1, "a", False),
+    (65, -1, 1, "a", True), (65, -1, 0, "a", True), (65, -1, 2, "a", False), (65, 2, 2, "a", True),
+    (65, 65, 65, "a", False), (65, 3, 2, "a", False), (0, -1, 0, "a", False),
+])  # fmt: skip
+def test_when_a_count_begins_anew(last, again, number, peer, anew):
+    endpoint = Ardupilot(None, Link())
+    endpoint._last, endpoint._again, endpoint._peer = last, again, "a"
+    assert endpoint._anew(Packet(400, number, ()), peer) is anew
+
+
+@pytest.mark.parametrize(("of", "number", "now_s", "may"), [
+    (None, 9, 0.0, True), ("a", 1, 3.01, True), ("a", 0, 3.01, True), ("a", 2, 9.0, False),
+    ("a", 1, 3.0, False),
+])  # fmt: skip
+def test_another_may_fly_after_more_than_a_second_of_silence(of, number, now_s, may):
+    endpoint = Ardupilot(None, Link())
+    endpoint._peer = of
+    endpoint._link.hear(2.0)
+    assert endpoint._may_take_over(Packet(400, number, ()), now_s) is may

@@ -11,9 +11,11 @@ from pymavlink.dialects.v20 import common
 from tools.autopilots.small import Small, Told
 
 import beaver_ftc as bf
+from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.integrations.sitl import failures
 from beaver_ftc.integrations.sitl.link import COUNTED, Link, Times
 from beaver_ftc.integrations.sitl.mavlink import Mavlink
+from beaver_ftc.integrations.sitl.serve import Endpoint
 from beaver_ftc.integrations.sitl.telling import CRITICAL, INFO, WARNING, Teller, Text
 from beaver_ftc.integrations.sitl.vehicle import Flown, Vehicle
 
@@ -159,3 +161,75 @@ def test_an_alarm_is_of_surfaces_or_of_instruments_and_a_plug_in_may_have_one(de
     seen = {"detected": np.array([detected])}, {"alarmed": np.array([watched])}
     flight = SimpleNamespace(_seen=seen, _loop=SimpleNamespace(plugin_frame=plugged))
     assert Flown.alarmed.fget(flight) is bool(detected or watched or plugged)
+
+
+LOSS = {"isolated": "elevator", "type": "loss_of_effectiveness"}
+TELLING = [  # time, verdict, what else of the flight, what is said
+    (0.0, {"detected": True}, {"alarmed": False}, []),  # of no alarm the verdict is not even looked at
+    (1.0, {}, {"listens_from_s": 1.0, "alarmed": False}, [(6, "FDI: listening")]),
+    (1.5, {}, {"listens_from_s": 1.0, "alarmed": False}, []),
+    (2.0, {"axis": "q", "candidates": ("rudder:jam", "flap", "rudder:float")}, {},
+     [(4, "FDI: alarm on q"), (4, "FDI: rudder or flap")]),
+    (2.5, {"axis": "q", "candidates": ("rudder:float", "flap")}, {}, []),
+    (3.0, {"candidates": ("flap",)}, {}, [(4, "FDI: flap")]),
+    (3.5, {}, {}, []),
+    (4.0, LOSS | {"estimate": -0.25}, {}, [(2, "FDI: elevator, loss of effectiveness")]),
+    (4.9, LOSS | {"estimate": -0.5}, {}, []),
+    (5.0, LOSS, {}, []),
+    (5.1, LOSS | {"estimate": -0.375}, {}, [(6, "FDI: elevator, 38 % lost")]),
+    (6.5, LOSS | {"estimate": -0.375}, {}, []),
+    (7.0, {"isolated": "elevator", "type": "rate_limit"}, {}, [(2, "FDI: elevator, rate limit")]),
+    (9.0, {"isolated": "elevator", "type": "rate_limit", "estimate": 0.1}, {}, []),
+    (9.5, {"isolated": "unanticipated", "type": "unanticipated"}, {}, [(2, "FDI: unanticipated")]),
+    (9.6, {"isolated": "flap"}, {"departed": True},
+     [(2, "FDI: flap"), (0, "FDI: the aircraft is lost")]),
+    (9.7, {"isolated": "flap"}, {"departed": True, "alarmed": False}, []),
+]  # fmt: skip
+
+
+def test_what_is_new_is_said_once():
+    teller, kept = Teller(), 0
+    for t_s, said, changes, texts in TELLING:
+        verdict = Verdict(**{"detected": bool(changes.get("alarmed", True))} | said)
+        flight = {"listens_from_s": None, "alarmed": True, "departed": False} | changes
+        found = teller.news(SimpleNamespace(t_s=t_s, verdict=verdict, **flight))
+        assert found == [Text(t_s, *one) for one in texts], t_s
+        kept += len(texts)
+        assert len(teller.kept) == kept
+    teller.kept *= 20
+    teller.kept[199:] = []
+    flight |= {"alarmed": True, "departed": False}
+    verdict = Verdict(True, isolated="flap")
+    teller._said = (False, None, None, ())
+    assert len(teller.news(SimpleNamespace(t_s=10.0, verdict=verdict, **flight))) == 2
+    assert len(teller.kept) == 200
+    teller.begin()
+    verdict = Verdict(True)
+    (text,) = teller.news(SimpleNamespace(t_s=1.0, verdict=verdict, **flight))
+    assert text.text == "FDI: alarm between the instruments"
+
+
+@pytest.mark.parametrize(("frame_hz", "fixed_hz", "runs", "off"), [
+    (20.0, None, 20, 0), (400.0, None, 1, 0), (100.00001, None, 4, 0), (100.001, None, 8, 1),
+    (50.0, None, 8, 0),
+    (500.0, None, 8, 1), (19.0, None, 8, 1), (0.0, None, 8, 1), (100.0, 100.0, 8, 1), (50.0, 100.0, 8, 0),
+    (1000.0, None, 8, 1),
+])  # fmt: skip
+def test_frames_of_the_model_in_a_frame_of_the_autopilot(frame_hz, fixed_hz, runs, off):
+    """At 400 Hz of the model, begun at 50 Hz: where the number is not whole it is that of the beginning."""
+    flying = SimpleNamespace(_jsbsim_hz=400.0, _fixed_hz=fixed_hz, packets_hz=50.0, off_rate=0)
+    assert (Vehicle.runs_of(flying, frame_hz), flying.off_rate) == (runs, off)
+
+
+@pytest.mark.parametrize(("from_s", "at_s", "delay_s"), [
+    (None, None, None), (None, 3.0, None), (2.0, None, 0.4), (2.0, 2.0, 0.4), (2.0, 1.9, None),
+])  # fmt: skip
+def test_no_delay_is_promised_of_what_broke_before_the_diagnosis_began(from_s, at_s, delay_s):
+    said = []
+    flight = SimpleNamespace(
+        vehicle=SimpleNamespace(flight=SimpleNamespace(listens_from_s=from_s)), _say=said.append
+    )
+    found = {"fault": None if at_s is None else {"at_s": at_s}, "detection": {"guaranteed_delay_s": 0.4}}
+    Endpoint._note_silence(flight, found)
+    assert found["detection"]["guaranteed_delay_s"] == delay_s
+    assert said == ["the diagnosis never began: near the ground nothing is diagnosed"] * (from_s is None)

@@ -11,6 +11,7 @@ from beaver_ftc.flights.bank import adaptation_of
 from beaver_ftc.flights.diagnose import diagnose, silenced
 from beaver_ftc.flights.findings import as_text, statement, verdict_of
 from beaver_ftc.flights.model import Fitted
+from beaver_ftc.flights.readings import Reading
 from flights import small
 from telling import apart
 
@@ -145,6 +146,10 @@ def test_what_the_law_ties_together_is_not_claimed(model):
     )
     assert share[0] > 0.98
     assert share[1] < 0.9
+    loose = 1000.0 * (follows + 0.05 * follows.std() * np.random.default_rng(4).standard_normal(2000))
+    commands[:, 0] = loose  # all but 1 of 400, of an effect that is a million times the noise
+    far = small.flight(model, n=2000, commands=commands, rates=flown.rates)
+    assert trust.tied([(far, np.ones(2000, bool))], small.model(history=4, lags=3))[0] == 0.0
 
 
 def test_a_surface_that_never_moved_is_not_claimed(model):
@@ -370,3 +375,17 @@ def test_reasons_come_with_their_shares_the_largest_first():
         "share": 0.25, "reasons": [{"says": "other", "share": 0.75}, {"says": "one", "share": 0.25}],
     }  # fmt: skip
     assert trust.account({}, np.array([])) == {"share": 0.0, "reasons": []}
+
+
+@pytest.mark.parametrize(("counted", "says"), [(19.0, None), (19.01, 3), (100.0, 17)])
+def test_a_mistake_is_told_where_it_explains_every_part_more_than_chance(monkeypatch, counted, says):
+    """Of two readings by more than 2000 times: in the part that gains least 0.3, and 0.1 by its unit."""
+    found = trust._InAll([], {}, 1.0, np.zeros(4), counted)
+    parts = {"as it is": found, "short": None, "other": found._replace(likely=np.array([0.9, 0.3, 0.5, 0.7]))}
+    read = [Reading(*one) for one in (("A", "short"), ("B", "other", 0.1))]
+    monkeypatch.setattr(trust, "_in_all_parts", lambda samples, *_: parts[samples])
+    monkeypatch.setattr(trust, "mended", lambda *_: read)
+    told = None if says is None else f"each part of the flight is at least 10^{says} times as likely with B"
+    assert trust._likelier("as it is", small.model()) == told
+    parts["as it is"] = None
+    assert trust._likelier("as it is", small.model()) is None

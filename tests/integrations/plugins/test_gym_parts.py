@@ -103,6 +103,9 @@ def test_without_a_seed_every_episode_has_the_scenarios():
     for _ in range(2):
         env.reset()
         assert env.step(STILL)[-1]["metrics"]["seed"] == 17
+    other = BeaverEnv(env.scenario, 100)
+    other.reset(seed=0)
+    assert other.step(STILL)[-1]["metrics"]["seed"] == 0
 
 
 @pytest.mark.parametrize(("envs", "workers", "rows"), [

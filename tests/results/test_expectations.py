@@ -2,7 +2,7 @@
 
 import pytest
 
-from beaver_ftc.results.expectations import evaluate
+from beaver_ftc.results.expectations import evaluate, margin
 from beaver_ftc.scenario.schema import Expect
 
 METRICS = {
@@ -66,3 +66,41 @@ def test_what_was_never_flown_or_never_left():
     assert _found("altitude_within_m", 15.0, {"profile": None}) == (None, False)
     assert _found("stays_in_envelope", True, {"envelope": {"exits": 0}}) == (True, True)
     assert _found("no_departure", True, {"departure": {"time_s": 3.0}}) == (False, False)
+
+
+EARLY = {
+    "isolation": {"fault": "rudder", "names": ["rudder"], "time_s": 1.5, "delay_s": 0.5, "premature": True}
+}
+GONE = [{"fault": name, "from_s": at, "to_s": at + 0.25} for name, at in (("flap", 2.0), ("rudder", 3.0))]
+GONE += [{"fault": "rudder", "from_s": 4.0, "to_s": 4.5}]
+
+
+@pytest.mark.parametrize(
+    ("name", "expected", "metrics", "met", "reason"),
+    [
+        ("isolated_as", "rudder", EARLY, False, "rudder was named at 1.5 s, before the fault began"),
+        ("isolated_as", ["rudder"], EARLY, True, None),
+        ("isolated_within_s", 0.5, EARLY, False, "rudder was named at 1.5 s, before the fault began"),
+        (
+            "isolated_as",
+            "rudder",
+            {"isolation": {"fault": None, "withdrawn": GONE}},
+            False,
+            "rudder was named at 4 s, and the name withdrawn at 4.5 s",
+        ),
+        ("isolated_as", "elevator", {"isolation": {"fault": None, "withdrawn": GONE}}, False, None),
+        ("detected_within_s", 0.5, {"detection": {"delay_s": 0.5}}, True, None),
+        ("detected_within_s", 0.5, {"detection": {"delay_s": None}, "isolation": {}}, False, None),
+    ],
+)
+def test_why_the_diagnosis_does_not_do_what_was_expected(name, expected, metrics, met, reason):
+    (found,) = evaluate(Expect.model_validate({name: expected}), metrics)
+    assert (found["passed"], found.get("reason")) == (met, reason)
+
+
+@pytest.mark.parametrize(
+    ("expected", "actual", "inside"),
+    [(5, -3.0, 2.0), (0.5, 0.75, -0.25), (0.5, 0.5, 0.0), (5.0, None, None), (True, 1, None), ("a", 1, None)],
+)
+def test_a_margin_is_what_is_left_to_the_limit(expected, actual, inside):
+    assert margin({"expected": expected, "actual": actual}) == inside

@@ -301,3 +301,77 @@ def test_a_limit_that_was_lifted_is_said_to_be_gone(limit, said):
     keys = ("limits", "side", "value", "in_force")
     entry = {"time_s": 20.0, "because": "trim", **dict(zip(keys, limit, strict=True))}
     assert ("limited", said) in list(verdict.facts(flown(limits=[entry])))
+
+
+LINK = {
+    "protocol": "sitl", "frames": 1200, "packets_hz": 400.0, "latency_ms": {"median": 0.25, "p99": 1.5},
+    "interval_ms": {"mean": 2.5, "jitter_rms": 0.125}, "repeated": 3, "late": 0, "missed": 4, "malformed": 0,
+    "strangers": 5, "off_rate": 0, "resets": 6,
+}  # fmt: skip
+AXIS = {
+    "beyond_s": 0.0, "least_rad_s2": -2.0, "greatest_rad_s2": 1.0, "healthy_least_rad_s2": -3.0,
+    "healthy_greatest_rad_s2": 2.0,
+}  # fmt: skip
+WHOLE = AXIS | {"least_rad_s2": -3.0, "greatest_rad_s2": 2.0}
+ENGINES = {"engines_least_rad_s2": -0.25, "engines_greatest_rad_s2": 0.5}
+NEARLY = {
+    "least_rad_s2": 0.0, "greatest_rad_s2": 995.0, "healthy_least_rad_s2": 0.0,
+    "healthy_greatest_rad_s2": 1000.0,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("changes", "what", "said"),
+    [
+        (
+            {"link": LINK},
+            "link",
+            "sitl, 1200 frames at 400 Hz, 3 sent again, 4 never came, 5 of others, 6 times begun anew; "
+            "answered in 0.25 ms (99 %: 1.50), asked every 2.50 ms, jitter 0.12 ms RMS",
+        ),
+        (
+            {"authority": {"p": AXIS, "q": WHOLE, "r": WHOLE | ENGINES}},
+            "left",
+            "of what all surfaces together give: p 60%, -2 to 1 rad/s2; "
+            "r 100%, -3 to 2 rad/s2, and engines -0.25 to 0.5",
+        ),
+        ({"authority": {"q": AXIS | NEARLY, "r": {"beyond_s": 0.0}}}, "left", None),
+        ({"departure": {"time_s": 7.5, "signal": "beta_rad"}}, "departure", "LOST at 7.50 s: beta_rad"),
+        (
+            {"saturation_s": {"aileron": 1.25, "flap": 0.0, "rudder": 2.5}},
+            "saturation",
+            "aileron 1.25 s, rudder 2.50 s",
+        ),
+    ],
+)
+def test_the_rest_of_a_flight_in_words(changes, what, said):
+    assert dict(verdict.facts(flown(**changes))).get(what) == said
+
+
+@pytest.mark.parametrize(
+    ("statements", "without", "said"),
+    [
+        (0, 0, "nothing to certify: no alarm"),
+        (0, 2, "0 statements, 2 not certified; check: beaver-ftc check runs/x"),
+        (1, 0, "1 statement; check: beaver-ftc check runs/x"),
+        (3, 1, "3 statements, 1 not certified; check: beaver-ftc check runs/x"),
+    ],
+)
+def test_a_certificate_is_counted_with_the_command_that_checks_it(statements, without, said):
+    assert verdict._certificate({"statements": statements, "without": without}, "runs/x") == said
+
+
+@pytest.mark.parametrize(
+    ("changes", "title", "mood"),
+    [
+        ({"passed": True}, "PASSED", "good"),
+        ({"passed": True, "departure": {}}, "PASSED", "good"),
+        ({"passed": True, "departure": {"time_s": 1.0}}, "PASSED, the aircraft was LOST", "lost"),
+        ({"departure": {"time_s": 1.0}}, "FAILED, the aircraft was LOST", "bad"),
+        ({"interrupted_s": 2.5}, "INTERRUPTED at 2.50 s, not passed", "bad"),
+        ({"expectations": [], "passed": True}, "flown, nothing was expected", "good"),
+    ],
+)
+def test_the_title_and_the_mood(changes, title, mood):
+    document = flown(**changes)
+    assert (verdict.title(document), verdict.mood(document)) == (f"a-flight: {title}", mood)

@@ -11,6 +11,7 @@ from reportlab.pdfgen.canvas import Canvas
 import beaver_ftc as bf
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.evidence import flown, shown
+from beaver_ftc.studies.evidence import judged as judged_module
 from beaver_ftc.studies.evidence.flown import MET, NOT_MET, NOT_SHOWN, fly_flight
 from beaver_ftc.studies.evidence.judged import document_of
 from beaver_ftc.studies.evidence.paper import as_pdf
@@ -325,3 +326,57 @@ def test_of_a_loops_margins_the_smaller_counts_upwards_and_downwards(
     assert (gain["actual"], phase["actual"]) == least
     assert (gain["margin"], phase["margin"]) == pytest.approx((least[0] - gain_db, least[1] - phase_deg))
     assert (gain["says"], phase["says"]) == ("fault: 40 % loss", "fault: total loss")
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        ([], "none"), (["a", 1.5], "a, 1.5"), ({"at_least": 2.5, "by_day": True}, "at least 2.5, by day yes"),
+        (False, "no"), (None, "none"), ("text", "text"),
+    ],
+)  # fmt: skip
+def test_what_was_asked_and_found_in_words(value, words):
+    assert shown.said(value) == words
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [(999.4, "+999"), (1000.0, "+1000"), (-12345.6, "-12346"), (0.0, "+0"), (-0.25, "-0.25")],
+)
+def test_a_margin_has_its_sign(value, words):
+    assert shown.signed(value) == words
+
+
+@pytest.mark.parametrize(
+    ("passed", "of", "plain", "verdict"),
+    [
+        (True, 9, True, MET),
+        (False, 9, True, NOT_SHOWN),
+        (False, 0, False, NOT_SHOWN),
+        (False, 9, False, NOT_MET),
+    ],
+)
+@pytest.mark.parametrize(
+    ("asked", "actual", "inside"),
+    [({"at_least": 0.75}, 0.5, -0.25), ({"at_most": 0.75}, 0.5, 0.25), ({"at_most": 0.75}, None, None)],
+)
+def test_a_statistic_beside_its_bar(passed, of, plain, verdict, asked, actual, inside):
+    found = {"name": "rate", "passed": passed, "of": of, "expected": asked, "actual": actual}
+    assert judged_module._of_bound(found, {"passed": plain}) == {
+        "name": "rate", "expected": asked, "actual": actual, "verdict": verdict, "margin": inside,
+        "says": f"{of} flights tell",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("verdict", "margin", "expected", "rank"),
+    [
+        (NOT_MET, None, 5.0, (0, -inf)), (NOT_SHOWN, None, 5.0, (1, inf)), (MET, None, 5.0, (2, inf)),
+        (MET, 2.0, -4, (2, 0.5)), (MET, 2.0, 0, (2, 2.0)), (MET, 2.0, True, (2, 2.0)),
+        (MET, 2.0, "x", (2, 2.0)),
+        (NOT_MET, -3.0, {"at_least": -6.0, "at_most": 12.0}, (0, -0.5)),
+        (MET, 3.0, {"at_least": 0.0, "at_most": 12.0}, (2, 0.25)), (MET, 3.0, {"level": 2}, (2, 3.0)),
+    ],
+)  # fmt: skip
+def test_the_worst_is_by_verdict_then_by_margin_over_the_limit(verdict, margin, expected, rank):
+    assert judged_module._rank({"verdict": verdict, "margin": margin, "expected": expected}) == rank

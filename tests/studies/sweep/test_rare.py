@@ -181,6 +181,7 @@ def test_the_likeliest_values_are_said_with_four_digits():
     part = {"low": 0.0123, "high": 0.0456, "events": 2, "of": 90}
     document = part | {
         "sweep": "drift", "expectation": "no_departure", "probability": 0.0234, "flights": 180, "plain": part,
+        "failed": 0,
         "likeliest": {"values": {"a": 1.23456, "b": -0.00987654}}, "folder": "out",
     }  # fmt: skip
     assert as_text(document).splitlines() == [
@@ -190,6 +191,12 @@ def test_the_likeliest_values_are_said_with_four_digits():
         "  likeliest    a 1.235, b -0.009877",
         "  flies it     beaver-ftc run out/flight.yaml",
         "",
+        "results: out",
+    ]
+    unknown = document | {"probability": None, "why": "too few", "failed": 7, "likeliest": None}
+    assert as_text(unknown).splitlines()[1::2] == [
+        "  probability  not known: too few, 95 % 0.012 to 0.046, 180 flights",
+        "  not flown    7 flights, counted as no event",
         "results: out",
     ]
 

@@ -185,7 +185,8 @@ class LocalWorkers:
         try:
             rows = flown.result()
         except BrokenProcessPool:
-            worker, begun = self._in_place_of(worker), worker.has_begun
+            begun = worker.has_begun
+            worker = self._in_place_of(worker)
         except Exception as error:  # not a flight's: those are in their rows
             raise SimulationFailed(f"a worker cannot go on: {error}") from error
         finally:

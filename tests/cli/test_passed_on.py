@@ -2,7 +2,6 @@
 
 import json
 import re
-import sys
 from copy import deepcopy
 from dataclasses import fields, is_dataclass
 from importlib import import_module
@@ -13,8 +12,9 @@ from typing import get_args
 
 import pytest
 
+import commands
 from beaver_ftc.cli import catalogue
-from beaver_ftc.cli.main import app, main
+from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
 
 
@@ -35,7 +35,7 @@ def _option(parameter):
 
 
 @pytest.fixture
-def beaver(monkeypatch, capsys, tmp_path):
+def beaver(monkeypatch, tmp_path):
     """Runs a command with functions put in place: (status, standard output, what these were given)."""
     monkeypatch.chdir(tmp_path)
 
@@ -45,10 +45,8 @@ def beaver(monkeypatch, capsys, tmp_path):
             module, _, name = path.replace("__", ".").rpartition(".")
             noting = _noting(name, result, given)
             monkeypatch.setattr(import_module(f"beaver_ftc.{module}"), name, noting)
-        monkeypatch.setattr(sys, "argv", ["beaver-ftc", *asked.split()])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        return ended.value.code or 0, capsys.readouterr().out, given
+        done = commands.beaver(*asked.split(), cwd=tmp_path)
+        return done.returncode, done.stdout, given
 
     return run
 

@@ -2,13 +2,12 @@
 
 import re
 import shutil
-import sys
 from pathlib import Path
 
 import pytest
 
 import beaver_ftc as bf
-from beaver_ftc.cli.main import main
+import commands
 from beaver_ftc.scenario.loader import load_text
 
 ROOT = Path(__file__).parents[2]
@@ -16,15 +15,13 @@ ALL_SENSORS = "name: x\nduration_s: 1\nsensors: tactical-grade\n"
 
 
 @pytest.fixture
-def beaver(monkeypatch, capsys, tmp_path):
+def beaver(monkeypatch, tmp_path):
     """Runs a command in a folder of its own: (exit status, standard output, standard error)."""
     monkeypatch.chdir(tmp_path)
 
     def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["beaver-ftc", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        return (ended.value.code or 0, *capsys.readouterr())
+        done = commands.beaver(*map(str, arguments), cwd=tmp_path)
+        return done.returncode, done.stdout, done.stderr
 
     return run
 

@@ -51,8 +51,9 @@ demo: $(VENV)/.demo
 	$(BIN)/beaver-ftc run elevator-partial-loss --out runs
 	@echo "report: runs/elevator-partial-loss/report.html"
 
+# What most flights use is compiled while plain kernels are tried; the second run compiles what is missing.
 test: $(VENV)/.dev
-	NUMBA_DISABLE_JIT=1 $(PYTEST) -m "not nightly" $(PLAIN)
+	$(BIN)/python tests/warm.py >/dev/null 2>&1 & NUMBA_DISABLE_JIT=1 $(PYTEST) -m "not nightly" $(PLAIN)
 	$(PYTEST) -m "not acceptance and not nightly" $(addprefix --ignore=,$(PLAIN))
 
 # Every test with all that it draws, what tests/nightly.yaml lists too; then drawn scenarios, mutants.

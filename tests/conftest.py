@@ -1,7 +1,6 @@
 """What all tests share: the helpers of tests/flying.py, and property tests that repeat themselves."""
 
 import os
-import subprocess
 import sys
 from pathlib import Path
 from zlib import crc32
@@ -64,11 +63,6 @@ def changed(request):
 
 def pytest_sessionstart(session):
     """Compile what flights use before the first test: what is said meanwhile is a test by itself."""
-    done = warm.mark()
-    if hasattr(session.config, "workerinput") or done is None or done.exists():
-        return
-    compiling = {name: value for name, value in os.environ.items() if name != "NUMBA_DISABLE_JIT"}
-    silent = subprocess.DEVNULL
-    process = subprocess.Popen([sys.executable, warm.__file__], env=compiling, stdout=silent, stderr=silent)
-    if not warm.plain():
-        process.wait()
+    plain = os.environ.get("NUMBA_DISABLE_JIT", "0") != "0"
+    if not plain and not hasattr(session.config, "workerinput"):
+        warm.main()

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc import load
-from beaver_ftc.diagnosis.statistical import FROM_END_TO_END
+from beaver_ftc.diagnosis.detection.statistical import FROM_END_TO_END
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.compare.replay import Recorder

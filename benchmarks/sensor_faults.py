@@ -28,7 +28,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.diagnosis.watch import instrument_found
+from beaver_ftc.diagnosis.monitors.sensor_records import instrument_found
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.scenario.loader import load

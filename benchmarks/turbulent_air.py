@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from beaver_ftc.diagnosis.across import AN_AXIS, weighs
+from beaver_ftc.diagnosis.detection.parity import AN_AXIS, weighs
 from beaver_ftc.diagnosis.state import LOSS
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.loop.loop import Loop

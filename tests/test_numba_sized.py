@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 from beaver_ftc import compiled
 from beaver_ftc.compiled import direct, kernel, plain, record, sized
-from beaver_ftc.diagnosis.across import USUAL, Rooms, Size
+from beaver_ftc.diagnosis.detection.parity import USUAL, Rooms, Size
 from beaver_ftc.documents.sized import Room, shape_of
 from beaver_ftc.loop.assembly import frame_dtype
 

@@ -13,8 +13,8 @@ from beaver_ftc.aircraft.loading import read
 from beaver_ftc.control import engines
 from beaver_ftc.control.power import POWER
 from beaver_ftc.control.state import control_dtype
-from beaver_ftc.diagnosis import balance
-from beaver_ftc.diagnosis.balance import BALANCE
+from beaver_ftc.diagnosis.monitors import engine_symmetry
+from beaver_ftc.diagnosis.monitors.engine_symmetry import BALANCE
 from beaver_ftc.diagnosis.state import conclusion_dtype
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.problems import ScenarioError
@@ -203,14 +203,14 @@ def judged(jet, missing_n, levers=(0.0, 0.0)):
     """Whether an alarm is raised where engines yaw as a thrust does that the left one does not give, by its
     place in JSBSim's own file."""
     aircraft, of_it = read(jet / "aircraft" / "737"), np.zeros(1, BALANCE)[0]
-    balance.configure(of_it, aircraft)
+    engine_symmetry.configure(of_it, aircraft)
     names, size = list(aircraft.signals), 11800.0 * aircraft.geometry.wing_area_m2  # N
     y, verdict = np.zeros(4 + len(names)), np.zeros(1, conclusion_dtype(3))[0]
     y[4 + names.index("thrust")] = (60_000.0 - missing_n) / size
     y[4 + names.index("engines_n")] = -missing_n * 193.0 * M_PER_IN / (size * aircraft.geometry.span_m)
     of_it, verdict = of_it.view(np.recarray), verdict.view(np.recarray)
-    balance.heed(of_it, np.array(levers))
-    balance.detect(of_it, verdict, 1e-6, y, 1.0)
+    engine_symmetry.heed(of_it, np.array(levers))
+    engine_symmetry.detect(of_it, verdict, 1e-6, y, 1.0)
     return bool(verdict["detected"])
 
 
@@ -218,7 +218,10 @@ def judged(jet, missing_n, levers=(0.0, 0.0)):
 def test_engines_that_pull_unlike_in_health_are_not_watched(jet, off, known):
     """Propellers yaw aslant, and by something else while they come to speed."""
     aircraft, boxes, thrust = read(jet / "aircraft" / "737"), [{}, {}], np.array([0.01, 0.1, 0.2])
-    of_it = {"thrust": thrust, "engines_n": balance.mean_arm(aircraft) * thrust + [0.0, off, 0.5 * off]}
+    of_it = {
+        "thrust": thrust,
+        "engines_n": engine_symmetry.mean_arm(aircraft) * thrust + [0.0, off, 0.5 * off],
+    }
     set_engines_apart(boxes, aircraft, SimpleNamespace(signals=of_it, box=np.array([0, 1, 1])))
     assert [("engines_apart" in box) for box in boxes] == [known, known]
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.model import N_Y
-from beaver_ftc.diagnosis.bank import note_closest_approach
-from beaver_ftc.diagnosis.belief import look_back, respond
+from beaver_ftc.diagnosis.belief.expectation import look_back, respond
 from beaver_ftc.diagnosis.bounds.worst_case import ROUNDING_RAD_S2, bound_now
+from beaver_ftc.diagnosis.detection.bank import note_closest_approach
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.loop.frame import diagnose
 from beaver_ftc.scenario.schema import Scenario

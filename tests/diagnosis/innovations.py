@@ -13,10 +13,10 @@ from statistics_of import Statistical
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.engine import DPT_0, KW_TO_DPT, SEA_LEVEL_DENSITY_KG_M3
 from beaver_ftc.design.fdc import MASS
-from beaver_ftc.diagnosis import likelihood, noise_model, statistical
 from beaver_ftc.diagnosis.bounds import variances
 from beaver_ftc.diagnosis.bounds.declared import Errors
-from beaver_ftc.diagnosis.likelihood import MAX_HYPOTHESES, N_SLOTS, SENSE, Rooms, block_dtype
+from beaver_ftc.diagnosis.detection import likelihood, noise_model, statistical
+from beaver_ftc.diagnosis.detection.likelihood import MAX_HYPOTHESES, N_SLOTS, SENSE, Rooms, block_dtype
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.scenario.schema import Scenario
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from beaver_ftc.diagnosis import across, statistical
+from beaver_ftc.diagnosis.detection import parity, statistical
 from beaver_ftc.plant.instruments import MEASURED
 
 
@@ -83,52 +83,52 @@ class Across:
     @staticmethod
     def part(fdi, view, innovation, i):
         parts = (fdi["statistical"][name] for name in ("forces", "air", "inertial_air"))
-        return across.part(view, *parts, innovation, i)
+        return parity.part(view, *parts, innovation, i)
 
     @staticmethod
     def turn(fdi, view, G):
         record = fdi["statistical"]
-        return across.turn(view, record["forces"], record["air"], fdi["bound"], G)
+        return parity.turn(view, record["forces"], record["air"], fdi["bound"], G)
 
     @staticmethod
     def knows_gust(record, view):
-        return across.knows_gust(view, record["air"])
+        return parity.knows_gust(view, record["air"])
 
     @staticmethod
     def blur(view, record, V):
         parts = (record[name] for name in ("noise", "block", "forces", "air", "inertial_air"))
-        across.blur(view, *parts, V)
+        parity.blur(view, *parts, V)
 
     @staticmethod
     def regress(fdi, view, innovation, share):
         view["shows_across"] = share
         parts = (fdi["statistical"][name] for name in ("block", "forces", "air", "inertial_air"))
-        across.regress(view, *parts, innovation)
+        parity.regress(view, *parts, innovation)
 
     @staticmethod
     def sign(fdi, view, Gu):
-        across.sign(view, fdi["statistical"]["forces"], Gu)
+        parity.sign(view, fdi["statistical"]["forces"], Gu)
 
     @staticmethod
     def observe(fdi, innovation, G, Gu, y, frame, latched):
         record, bound = fdi["statistical"], fdi["bound"]
         views, tests = views_of(record), record["tests"]
-        across.face(views, record["forces"], record["air"], bound, G, Gu)
+        parity.face(views, record["forces"], record["air"], bound, G, Gu)
         parts = (record[name] for name in ("noise", "block", "forces", "air", "inertial_air"))
-        across.compose(views, int(tests["tolerated"]), *parts, innovation, y[2])
-        across.observe(views, tests, record["listening"], y, fdi["config"]["dt"], frame, latched)
+        parity.compose(views, int(tests["tolerated"]), *parts, innovation, y[2])
+        parity.observe(views, tests, record["listening"], y, fdi["config"]["dt"], frame, latched)
 
     @staticmethod
     def feels(fdi, view, s, column):
-        return across.feels(view, fdi["statistical"]["forces"], s, column)
+        return parity.feels(view, fdi["statistical"]["forces"], s, column)
 
     @staticmethod
     def shown(record, view):
-        return across.shown(view, views_of(record), record["tests"], record["forces"], record["air"])
+        return parity.shown(view, views_of(record), record["tests"], record["forces"], record["air"])
 
     @staticmethod
     def alarm(record, view):
-        return across.alarm(view, views_of(record), record["tests"], record["forces"], record["air"])
+        return parity.alarm(view, views_of(record), record["tests"], record["forces"], record["air"])
 
     @staticmethod
     def excludes(fdi, s):
@@ -137,7 +137,7 @@ class Across:
             fdi["isolation"]["estimator"]["effect"]["Z"][fdi["layout"]["position_of"][s]],
         )
         views = views_of(record)
-        return across.excludes(views, record["tests"], record["forces"], record["air"], s, column)
+        return parity.excludes(views, record["tests"], record["forces"], record["air"], s, column)
 
 
 def put(record, **fields):

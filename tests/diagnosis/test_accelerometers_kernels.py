@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.diagnosis import accelerometers, redundancy
-from beaver_ftc.diagnosis.watch import (
+from beaver_ftc.diagnosis.monitors import accelerometers, redundancy
+from beaver_ftc.diagnosis.monitors.sensor_records import (
     AIRSPEED,
     ALPHA,
     ALPHA_FLOW,

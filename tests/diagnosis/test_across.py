@@ -6,11 +6,11 @@ from kernels import DT, new_fdi
 from statistics_of import Across
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.diagnosis import air
-from beaver_ftc.diagnosis.across import across_a_column, set_up_views
-from beaver_ftc.diagnosis.likelihood import STEP
+from beaver_ftc.diagnosis.belief import air
+from beaver_ftc.diagnosis.detection.likelihood import STEP
+from beaver_ftc.diagnosis.detection.parity import across_a_column, set_up_views
+from beaver_ftc.diagnosis.detection.tones import set_up_listening
 from beaver_ftc.diagnosis.state import LOSS, POSITION
-from beaver_ftc.diagnosis.tones import set_up_listening
 from beaver_ftc.loop import frame
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.scenario.diagnosis import FdiConfig

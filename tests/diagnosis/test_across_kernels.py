@@ -7,9 +7,9 @@ from kernels import DT, new_fdi
 from statistics_of import Across
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.diagnosis import across, likelihood, tones
-from beaver_ftc.diagnosis.across import AN_AXIS, USUAL, set_up_views
-from beaver_ftc.diagnosis.likelihood import LEAST_UNCERTAINTY_RAD_S2, STEP
+from beaver_ftc.diagnosis.detection import likelihood, parity, tones
+from beaver_ftc.diagnosis.detection.likelihood import LEAST_UNCERTAINTY_RAD_S2, STEP
+from beaver_ftc.diagnosis.detection.parity import AN_AXIS, USUAL, set_up_views
 from beaver_ftc.diagnosis.state import LOSS, POSITION
 
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)
@@ -147,7 +147,7 @@ def test_of_what_goes_along_a_column_that_may_be_turned_a_share_shows_across(fdi
     e = fdi["bound"]["own_per_rad"][[0, 2], AILERON]
     corners = [e * (s, t) for s in (-1, 1) for t in (-1, 1)]
     most = max(abs(m @ c) for c in corners)
-    least = max(size - max(abs(along @ c) for c in corners), across.LEAST_LENGTH * size)
+    least = max(size - max(abs(along @ c) for c in corners), parity.LEAST_LENGTH * size)
     shown = own_errors * most / least * (along @ innovation[[0, 2]])
     n = int(fdi["statistical"]["block"][1]["n_regressors"])
     assert view["block"]["regressor"][n, 0] == pytest.approx(shown)

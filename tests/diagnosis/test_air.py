@@ -15,8 +15,8 @@ from beaver_ftc.aircraft.schema import MAX_MONOMIALS
 from beaver_ftc.design.fdc import MASS
 from beaver_ftc.design.model import design_record, rate_damping
 from beaver_ftc.design.variants import jacobian
-from beaver_ftc.diagnosis import air
-from beaver_ftc.diagnosis.air import AIR
+from beaver_ftc.diagnosis.belief import air
+from beaver_ftc.diagnosis.belief.air import AIR
 from beaver_ftc.diagnosis.bounds import variances
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.scenario.diagnosis import Bounds

@@ -9,8 +9,8 @@ from beaver_ftc.aircraft.aircraft import FORCES
 from beaver_ftc.design.model import design_record
 from beaver_ftc.design.terms import fill_table
 from beaver_ftc.design.variants import response
-from beaver_ftc.diagnosis import air
-from beaver_ftc.diagnosis.air import AIR
+from beaver_ftc.diagnosis.belief import air
+from beaver_ftc.diagnosis.belief.air import AIR
 from beaver_ftc.diagnosis.bounds import variances
 from beaver_ftc.diagnosis.bounds.declared import Errors
 from beaver_ftc.scenario.sensors import Sensors

@@ -7,9 +7,10 @@ from statistics_of import Statistical
 
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS
 from beaver_ftc.design import model
-from beaver_ftc.diagnosis import air, redundancy
-from beaver_ftc.diagnosis.air import AIR
+from beaver_ftc.diagnosis.belief import air
+from beaver_ftc.diagnosis.belief.air import AIR
 from beaver_ftc.diagnosis.bounds import worst_case
+from beaver_ftc.diagnosis.monitors import redundancy
 
 X, U = np.array([0.1, -0.05, 0.07]), np.array([0.1, -0.15, 0.05, 0.2])
 Y = np.array([0.1, 0.03, 45.0, 1036.0, 0.3, 0.0, 0.0, 0.0])

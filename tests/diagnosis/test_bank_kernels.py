@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from kernels import DT, POLES, estimator, new_fdi, on, weights
 
-from beaver_ftc.diagnosis import bank
 from beaver_ftc.diagnosis.bounds.declared import poles_for_noise
+from beaver_ftc.diagnosis.detection import bank
 from beaver_ftc.scenario.schema import Scenario
 from telling import apart
 

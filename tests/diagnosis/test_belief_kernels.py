@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.diagnosis import belief as beliefs
+from beaver_ftc.diagnosis.belief import expectation as beliefs
 from beaver_ftc.diagnosis.bounds.worst_case import bound_dtype
 from beaver_ftc.scenario.schema import Scenario
 from telling import apart

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.bank import aligned_extremes, extremes
-from beaver_ftc.diagnosis.belief import begin_frame, elapse, sum_up
+from beaver_ftc.diagnosis.belief.expectation import begin_frame, elapse, sum_up
+from beaver_ftc.diagnosis.detection.bank import aligned_extremes, extremes
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.scenario.schema import Scenario
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from beaver_ftc.design.model import both_responses, design_record
 from beaver_ftc.diagnosis.bounds.declared import inertia_slack, poles_for_noise
 from beaver_ftc.diagnosis.bounds.worst_case import derived_bound, slack_per_rad
-from beaver_ftc.diagnosis.thresholds import noise_step
+from beaver_ftc.diagnosis.detection.thresholds import noise_step
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sensors import Sensors

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from kernels import DT, new_fdi, on
 
-from beaver_ftc.diagnosis import belief as beliefs
-from beaver_ftc.diagnosis import detection
-from beaver_ftc.diagnosis.detection import ALPHA_CENTRES, BETA_CENTRES, N_BASIS, NETWORK
+from beaver_ftc.diagnosis.belief import expectation as beliefs
+from beaver_ftc.diagnosis.detection import fdae
+from beaver_ftc.diagnosis.detection.fdae import ALPHA_CENTRES, BETA_CENTRES, N_BASIS, NETWORK
 from beaver_ftc.diagnosis.state import (
     EITHER,
     STATISTICS,
@@ -26,7 +26,7 @@ def new_network(**fields):
 @pytest.mark.parametrize("beta", [-0.5, 0.07, 0.3, 0.4])
 def test_the_basis_is_that_of_gaussians_as_wide_as_their_spacing(alpha, beta):
     out = np.zeros(N_BASIS)
-    detection.basis(alpha, beta, out)
+    fdae.basis(alpha, beta, out)
     parts = []
     for place, centres in ((alpha, ALPHA_CENTRES), (beta, BETA_CENTRES)):
         inside = np.clip(place, centres[0], centres[-1])
@@ -39,13 +39,13 @@ def test_the_basis_is_that_of_gaussians_as_wide_as_their_spacing(alpha, beta):
     ("residual", "left"), [(0.5, 0.2), (0.3, 0.0), (-0.3, 0.0), (-0.5, -0.2), (0.1, 0.0)]
 )
 def test_the_dead_zone_leaves_the_excess(residual, left):
-    assert detection.dead_zone(residual, 0.3) == pytest.approx(left)
+    assert fdae.dead_zone(residual, 0.3) == pytest.approx(left)
 
 
 def test_the_output_is_the_weights_on_the_basis():
     rng = np.random.default_rng(1)
     record = new_network(weights=rng.normal(size=(3, N_BASIS)))
-    detection.evaluate(record, 0.1, -0.05)
+    fdae.evaluate(record, 0.1, -0.05)
     assert record["output"] == pytest.approx(record["weights"] @ record["basis"])
 
 
@@ -56,12 +56,12 @@ def test_weights_learn_what_exceeds_the_threshold_and_leak(leaking):
     record = new_network(
         gain=30.0, leak_per_s=2.0, weight_limit=9.0, weights=before, basis=rng.uniform(0, 1, N_BASIS)
     )
-    detection.learn(record, np.array([0.5, -0.4, 0.1]), np.full(3, 0.2), leaking, DT)
+    fdae.learn(record, np.array([0.5, -0.4, 0.1]), np.full(3, 0.2), leaking, DT)
     kept = np.exp(-2.0 * DT) if leaking else 1.0
     learnt = DT * 30.0 * np.outer([0.3, -0.2, 0.0], record["basis"])
     assert record["weights"] == pytest.approx(kept * before + learnt)
     record["weight_limit"] = 0.05
-    detection.learn(record, np.array([0.5, -0.4, 0.1]), np.full(3, 0.2), leaking, DT)
+    fdae.learn(record, np.array([0.5, -0.4, 0.1]), np.full(3, 0.2), leaking, DT)
     assert np.abs(record["weights"]).max() == 0.05
     assert record["weights"].min() == -0.05
 
@@ -69,7 +69,7 @@ def test_weights_learn_what_exceeds_the_threshold_and_leak(leaking):
 def test_a_diagnosis_begins_with_no_residual_and_the_gyros_error_to_come():
     fdi = new_fdi()
     fdi["bound"]["noise"] = 0.1, 0.2, 0.3
-    on(detection.begin, fdi, np.array([1.0, 2.0, 3.0]))
+    on(fdae.begin, fdi, np.array([1.0, 2.0, 3.0]))
     assert fdi["fdae"]["xhat"] == pytest.approx([1.0, 2.0, 3.0])
     assert fdi["fdae"]["threshold_noise"] == pytest.approx([0.1, 0.2, 0.3])
     assert fdi["bank"]["noise"][:3] == pytest.approx(np.tile([0.1, 0.2, 0.3], (3, 1)))
@@ -92,13 +92,13 @@ def test_who_is_in_authority_raises_the_alarm(authority, filters, score, axis):
         0,
         (1.0, 1.0, 1.0),
     )
-    detection.form_residual(fdi["fdae"], np.array([1.5, 0.5, 1.0]))
-    on(detection.detect, fdi, authority, fdi["statistical"]["alarm"], 7.0)
+    fdae.form_residual(fdi["fdae"], np.array([1.5, 0.5, 1.0]))
+    on(fdae.detect, fdi, authority, fdi["statistical"]["alarm"], 7.0)
     assert fdi["fdae"]["residual"] == pytest.approx([0.5, -0.5, 0.0])
     assert bool(fdi["verdict"]["detected"]) == (axis is not None)
     assert fdi["verdict"]["detected_axis"] == (-1 if axis is None else axis)
     assert fdi["verdict"]["detected_at_s"] == (0.0 if axis is None else 7.0)
-    on(detection.detect, fdi, authority, fdi["statistical"]["alarm"], 8.0)
+    on(fdae.detect, fdi, authority, fdi["statistical"]["alarm"], 8.0)
     assert fdi["verdict"]["detected_at_s"] == (0.0 if axis is None else 7.0)  # the first alarm stays
 
 
@@ -106,32 +106,32 @@ def test_who_is_in_authority_raises_the_alarm(authority, filters, score, axis):
 def test_the_detection_estimator_and_its_threshold_are_convolutions(detected):
     rng, frames, fdi = np.random.default_rng(3), 15, new_fdi()
     decay = np.exp(-np.array([2.0, 3.0, 4.0]) * DT)
-    fdae = fdi["fdae"]
-    fdae["decay"], fdi["verdict"]["detected"] = decay, detected
-    fdae["network"]["output"] = output = np.array([0.1, -0.2, 0.3])
-    fdae["network"]["gain"], fdae["network"]["basis"], fdae["network"]["weight_limit"] = 1.0, 1.0, 100.0
+    record = fdi["fdae"]
+    record["decay"], fdi["verdict"]["detected"] = decay, detected
+    record["network"]["output"] = output = np.array([0.1, -0.2, 0.3])
+    record["network"]["gain"], record["network"]["basis"], record["network"]["weight_limit"] = 1.0, 1.0, 100.0
     x, believed = rng.normal(size=(frames, 3)), rng.normal(size=(frames, 3))
     eta, noise = rng.uniform(0.1, 0.3, (frames, 3)), rng.uniform(0.1, 0.3, (frames + 1, 3))
     for k in range(frames):
         fdi["bound"]["eta_bar"], fdi["bound"]["noise_then"] = eta[k], noise[k]
-        fdi["bound"]["noise"], fdae["residual"] = noise[k + 1], 99.0
-        on(detection.predict, fdi, x[k], believed[k], False)
+        fdi["bound"]["noise"], record["residual"] = noise[k + 1], 99.0
+        on(fdae.predict, fdi, x[k], believed[k], False)
     w = decay ** np.arange(frames)[::-1, None]
     shares = w * ((1.0 - decay) * x + DT * (believed + output))
-    assert fdae["xhat"] == pytest.approx(shares.sum(axis=0))
+    assert record["xhat"] == pytest.approx(shares.sum(axis=0))
     sums = DT * (w * eta).sum(axis=0), ((1.0 - decay) * w * noise[:-1]).sum(axis=0)
-    assert fdae["threshold_eta"] == pytest.approx(sums[0])
-    assert fdae["threshold_noise"] == pytest.approx(sums[1])
-    assert fdae["threshold"] == pytest.approx(sums[0] + sums[1] + noise[-1])
-    assert fdae["network"]["weights"].any() == detected
+    assert record["threshold_eta"] == pytest.approx(sums[0])
+    assert record["threshold_noise"] == pytest.approx(sums[1])
+    assert record["threshold"] == pytest.approx(sums[0] + sums[1] + noise[-1])
+    assert record["network"]["weights"].any() == detected
 
 
 def test_beyond_the_model_is_what_was_learnt_and_the_residual_beyond_noise():
     fdi, out = new_fdi(), np.zeros(3)
-    fdae = fdi["fdae"]
-    fdae["network"]["output"], fdae["pole"], fdae["residual"] = 0.1, (2.0, 3.0, 4.0), (0.5, -0.5, 0.05)
-    fdae["threshold_noise"], fdi["bound"]["noise"] = 0.1, 0.2
-    on(detection.unknown_acceleration, fdi, out)
+    record = fdi["fdae"]
+    record["network"]["output"], record["pole"], record["residual"] = 0.1, (2.0, 3.0, 4.0), (0.5, -0.5, 0.05)
+    record["threshold_noise"], fdi["bound"]["noise"] = 0.1, 0.2
+    on(fdae.unknown_acceleration, fdi, out)
     assert out == pytest.approx([0.1 + 2.0 * 0.2, 0.1 - 3.0 * 0.2, 0.1])
 
 
@@ -207,7 +207,7 @@ def test_an_estimator_forgets_by_the_frame_however_many_instants_it_has(substeps
     control = {"network_gain_per_s2": 91.0, "network_leak_per_s": 0.7, "network_weight_limit_rad_s2": 3.3}
     asked = {"fdi": {"detection_pole_per_s": 2.2}, "control": control, "rate_hz": 40, "substeps": substeps}
     record = new_fdi()["fdae"]
-    detection.configure(record, Scenario.model_validate({"name": "x", **asked}))
+    fdae.configure(record, Scenario.model_validate({"name": "x", **asked}))
     assert np.unique(record["pole"]).tolist() == [2.2]
     assert np.unique(record["decay"]) == pytest.approx([np.exp(-2.2 / 40.0)])
     network = record["network"]

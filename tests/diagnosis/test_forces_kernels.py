@@ -10,11 +10,11 @@ from beaver_ftc.aircraft.aircraft import FORCES, Aircraft
 from beaver_ftc.aircraft.schema import SIDESLIP_RATE
 from beaver_ftc.design.engine import slipstream_slopes
 from beaver_ftc.design.terms import fill_table
-from beaver_ftc.diagnosis import across, forces, statistical
-from beaver_ftc.diagnosis.across import AN_AXIS, THE_VANE, set_up_views
-from beaver_ftc.diagnosis.forces import ASIDE, UP, look, set_up_forces, tell_apart
+from beaver_ftc.diagnosis.detection import forces, parity, statistical
+from beaver_ftc.diagnosis.detection.forces import ASIDE, UP, look, set_up_forces, tell_apart
+from beaver_ftc.diagnosis.detection.parity import AN_AXIS, THE_VANE, set_up_views
+from beaver_ftc.diagnosis.detection.tones import set_up_listening
 from beaver_ftc.diagnosis.state import NORMAL, PITCH, ROLL, SIDE, YAW
-from beaver_ftc.diagnosis.tones import set_up_listening
 from beaver_ftc.plant.instruments import MEASURED
 from beaver_ftc.scenario.diagnosis import Bounds
 from telling import apart
@@ -529,7 +529,7 @@ def test_a_force_is_weighed_once_the_rate_of_sideslip_of_the_run_before_is_known
         look(statistical["forces"], statistical["air"], swinging, U, DT)
         assert statistical["forces"]["begun"] == looks
         Across.observe(fdi, np.zeros(3), np.ones((3, 4)), np.zeros((3, 4)), Y, looks, False)
-        weighed = [v for v in statistical["views"] if across.weighs(v) and across.best(v) > 0.0]
+        weighed = [v for v in statistical["views"] if parity.weighs(v) and parity.best(v) > 0.0]
         assert bool(weighed) == (looks == 2)
 
 
@@ -539,7 +539,7 @@ def test_old_evidence_of_a_force_is_forgotten_slowly(viewed):
     for block in statistical["block"]:
         block["noise"] = 1e-8
     Across.observe(viewed, np.zeros(3), G, 0.0 * G, Y, 1, False)
-    assert statistical["views"]["held"][UP_VIEW] == pytest.approx(8.0 * (1.0 - 0.01 / across.HOLDS))
+    assert statistical["views"]["held"][UP_VIEW] == pytest.approx(8.0 * (1.0 - 0.01 / parity.HOLDS))
 
 
 def test_what_errors_multiply_along_a_direction_is_that_of_rate_and_force(viewed):

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from kernels import DT, estimator, new_fdi, on, put
 
-from beaver_ftc.diagnosis import isolation, scheme
-from beaver_ftc.diagnosis.isolation import hypothesis
-from beaver_ftc.diagnosis.likelihood import STEP
+from beaver_ftc.diagnosis import scheme
+from beaver_ftc.diagnosis.detection.likelihood import STEP
+from beaver_ftc.diagnosis.isolation import estimators
+from beaver_ftc.diagnosis.isolation.estimators import hypothesis
 from beaver_ftc.diagnosis.state import (
     INTERVAL,
     LOSS,
@@ -28,7 +29,7 @@ def run_estimator(shared, theta, kind=LOSS, frames=25, eta_share=1.0, seed=0):
     fie = estimator(fdi, kind, low=-1.0, high=0.6)
     fdi["isolation"]["shared"], x = shared, rng.normal(size=3)
     fdi["bound"]["noise"] = 0.004, 0.005, 0.006
-    on(isolation.start, fdi, x)
+    on(estimators.start, fdi, x)
     fed = {name: [] for name in ("Z", "eta", "eta_bar", "noise_then", "spread")}
     for _ in range(frames):
         Z, eta_bar, noise_then = rng.normal(size=3), rng.uniform(0.1, 0.3, 3), rng.uniform(0.01, 0.02, 3)
@@ -37,12 +38,12 @@ def run_estimator(shared, theta, kind=LOSS, frames=25, eta_share=1.0, seed=0):
         offset = rng.normal(size=3)
         fie["effect"]["Z"], fie["effect"]["offset"], fie["effect"]["spread"] = Z, offset, spread
         fdi["bound"]["eta_bar"], fdi["bound"]["noise_then"] = eta_bar, noise_then
-        isolation.within_limits(fie, fdi["isolation"]["thresholds"], x)
-        on(isolation.predict_all, fdi, x, believed)
+        estimators.within_limits(fie, fdi["isolation"]["thresholds"], x)
+        on(estimators.predict_all, fdi, x, believed)
         x = x + DT * (believed + offset + theta * Z + eta)
         for name, value in zip(fed, (Z, eta, eta_bar, noise_then, spread), strict=True):
             fed[name].append(value)
-    within = isolation.within_limits(fie, fdi["isolation"]["thresholds"], x)
+    within = estimators.within_limits(fie, fdi["isolation"]["thresholds"], x)
     return fdi, fie, {name: np.array(value) for name, value in fed.items()}, within
 
 
@@ -82,7 +83,7 @@ def test_a_start_knows_nothing_but_the_set_of_theta():
     fie = estimator(fdi, low=-0.4, high=0.8)
     fie["theta_low"] = fie["theta_high"] = 0.3
     fdi["bound"]["noise"] = 0.1, 0.2, 0.3
-    on(isolation.start, fdi, np.array([1.0, 2.0, 3.0]))
+    on(estimators.start, fdi, np.array([1.0, 2.0, 3.0]))
     assert fie["xhat"] == pytest.approx([1.0, 2.0, 3.0])
     assert fie["bound_noise"] == pytest.approx([0.1, 0.2, 0.3])
     assert fie["covariance"] == pytest.approx([1.2**2 / 12.0] * 3)  # of a uniform distribution
@@ -95,15 +96,15 @@ def test_a_correction_is_the_step_of_weighted_least_squares():
     fie = estimator(new_fdi())
     fie["bound"][1], fie["omega"][1], fie["covariance"][1], fie["theta"][1] = 0.3, 0.7, 0.05, -0.5
     information = 1.0 / 0.05 + 0.7**2 / 0.3**2
-    step = isolation.correct(fie, 1, 0.2, 0.9, -1.0, 0.0)
+    step = estimators.correct(fie, 1, 0.2, 0.9, -1.0, 0.0)
     assert step == pytest.approx(0.7 / 0.3**2 * 0.2 / information)
     assert fie["theta"][1] == pytest.approx(-0.5 + step)
     assert fie["covariance"][1] == pytest.approx(1.0 / information / 0.9)
-    step = isolation.correct(fie, 1, 9.0, 1e-9, -1.0, -0.1)
+    step = estimators.correct(fie, 1, 9.0, 1e-9, -1.0, -0.1)
     assert fie["theta"][1] == -0.1
     assert fie["covariance"][1] == pytest.approx(1.0 / 12.0)
-    assert isolation.correct(fie, 1, -99.0, 1.0, -0.8, 0.0) == pytest.approx(-0.7)
-    assert isolation.correct(estimator(new_fdi()), 0, 1.0, 0.9, -1.0, 0.0) == 0.0  # nothing known yet
+    assert estimators.correct(fie, 1, -99.0, 1.0, -0.8, 0.0) == pytest.approx(-0.7)
+    assert estimators.correct(estimator(new_fdi()), 0, 1.0, 0.9, -1.0, 0.0) == 0.0  # nothing known yet
 
 
 def test_a_shared_theta_is_corrected_axis_by_axis_with_what_is_left():
@@ -113,13 +114,13 @@ def test_a_shared_theta_is_corrected_axis_by_axis_with_what_is_left():
     residual = np.array([0.02, 0.03, -0.01])
     fie["omega"], fie["bound"], fie["residual"], fie["effect"]["Z"] = omega, noise, residual, 1.0
     fie["theta"], fie["covariance"] = -0.5, 0.06
-    total = isolation.adapt_jointly(fie, 1.0)
+    total = estimators.adapt_jointly(fie, 1.0)
     information = 1.0 / 0.06 + np.sum(omega**2 / noise**2)
     assert total == pytest.approx(np.sum(omega * residual / noise**2) / information)
     assert fie["theta"] == pytest.approx([-0.5 + total] * 3)
     assert fie["covariance"] == pytest.approx([1.0 / information] * 3)
     fie["effect"]["Z"] = 0.0
-    assert isolation.adapt_jointly(fie, 0.5) == 0.0
+    assert estimators.adapt_jointly(fie, 0.5) == 0.0
 
 
 @pytest.mark.parametrize("thresholds", [INTERVAL, PUBLISHED])
@@ -138,7 +139,7 @@ def test_a_residual_at_its_limit_is_within_and_beyond_it_is_not(thresholds, axis
             limits = (-0.6 * 0.3 - 0.03, 0.6 * 0.3 + 0.03)
         x = np.zeros(3)
         x[axis] = limits[side > 0] + side * beyond
-        return bool(isolation.within_limits(fie, fdi["isolation"]["thresholds"], x))
+        return bool(estimators.within_limits(fie, fdi["isolation"]["thresholds"], x))
 
     assert within(-1e-12)
     assert not within(1e-9)
@@ -170,10 +171,10 @@ def test_the_one_left_is_the_fault(excluded, isolated):
     fdi = new_fdi()
     fdi["isolation"]["n"], fdi["isolation"]["estimator"]["excluded"][:3] = 3, excluded
     fdi["verdict"]["isolated"], fdi["verdict"]["isolated_at_s"] = NOT_ISOLATED, -1.0
-    on(isolation.decide, fdi, 4.0)
+    on(estimators.decide, fdi, 4.0)
     assert fdi["verdict"]["isolated"] == isolated
     assert fdi["verdict"]["isolated_at_s"] == (-1.0 if isolated == NOT_ISOLATED else 4.0)
-    on(isolation.decide, fdi, 5.0)
+    on(estimators.decide, fdi, 5.0)
     assert fdi["verdict"]["isolated_at_s"] != 5.0
 
 
@@ -182,10 +183,10 @@ def test_one_that_is_left_for_an_end_that_nobody_saw_begin_is_not_named(doubted,
     fdi = new_fdi()
     fdi["isolation"]["n"], fdi["isolation"]["estimator"]["excluded"][:3] = 3, (1, 0, 1)
     fdi["isolation"]["estimator"]["doubted"][1], fdi["isolation"]["estimator"]["shown"][1] = doubted, shown
-    on(isolation.decide, fdi, 4.0)
+    on(estimators.decide, fdi, 4.0)
     assert fdi["verdict"]["isolated"] == (1 if named else NOT_ISOLATED)
     fdi["isolation"]["estimator"]["excluded"][1] = 1
-    on(isolation.decide, fdi, 5.0)
+    on(estimators.decide, fdi, 5.0)
     assert fdi["verdict"]["isolated"] == UNANTICIPATED
 
 
@@ -205,12 +206,12 @@ def test_what_is_supposed_of_a_frame(memory):
     estimator(fdi, surface=2)
     G, Gu, spread = rng.normal(size=(3, 3, 4))
     fdi["isolation"]["memory"], fdi["verdict"]["detected"] = memory, 0
-    on(isolation.suppose_all, fdi, G, Gu, np.abs(spread))
+    on(estimators.suppose_all, fdi, G, Gu, np.abs(spread))
     fie = fdi["isolation"]["estimator"][0]
     assert fie["reach_low"][:3, :3].any() == memory
     assert fie["effect"]["Z"].any() == memory
     fdi["verdict"]["detected"] = 1
-    on(isolation.suppose_all, fdi, G, Gu, np.abs(spread))
+    on(estimators.suppose_all, fdi, G, Gu, np.abs(spread))
     assert fie["effect"]["Z"] == pytest.approx(Gu[:, 2])
     assert fie["effect"]["spread"] == pytest.approx(np.abs(spread[:, 2]))
 
@@ -284,22 +285,22 @@ def doubtful(kind=LOSS, **switches):
 )  # fmt: skip
 def test_each_test_that_is_switched_on_can_exclude(kind, switches, started, possible):
     fdi, fie = doubtful(kind, **switches)
-    assert on(isolation.possible, fdi, fie, np.zeros(3), started) == possible
-    assert not on(isolation.possible, fdi, fie, np.full(3, 9.0), started), "beyond its limits it is excluded"
+    assert on(estimators.possible, fdi, fie, np.zeros(3), started) == possible
+    assert not on(estimators.possible, fdi, fie, np.full(3, 9.0), started), "beyond its limits it is excluded"
 
 
 def test_a_position_is_asked_in_the_first_frame_where_the_past_is_kept():
     fdi, fie = doubtful(POSITION, memory=1)
     fdi["bank"]["residual"] = 0.0
-    assert not on(isolation.possible, fdi, fie, np.zeros(3), False)
+    assert not on(estimators.possible, fdi, fie, np.zeros(3), False)
     fdi["bank"]["innovation"] = 0.0
-    assert on(isolation.possible, fdi, fie, np.zeros(3), False)
+    assert on(estimators.possible, fdi, fie, np.zeros(3), False)
 
 
 def test_what_is_learned_of_a_constant_loss_is_kept_of_no_position():
     fdi, fie = doubtful(POSITION, membership=1, abrupt=1)
     fdi["bank"]["innovation"] = 0.0
-    on(isolation.possible, fdi, fie, np.zeros(3), True)
+    on(estimators.possible, fdi, fie, np.zeros(3), True)
     assert fie["theta_low"].tolist() == [-1.0] * 3
 
 
@@ -312,7 +313,7 @@ def test_errors_of_a_surfaces_own_terms_widen_the_room_of_its_position(kind, err
     G, Gu = rng.normal(size=(2, 3, 4))
     fdi["bound"]["own_errors"], fdi["bound"]["own_per_rad"], fdi["bound"]["frame"] = errors, 0.3, 1.0
     fdi["config"]["instants"] = 1
-    on(isolation.suppose, fdi, fie, G, Gu, np.full((3, 4), 0.1))
+    on(estimators.suppose, fdi, fie, G, Gu, np.full((3, 4), 0.1))
     assert (fie["effect"]["spread"] > 0.1).tolist() == [wider] * 3
 
 
@@ -355,10 +356,10 @@ def test_the_axes_of_a_shared_theta_agree_after_each_step():
     fie = estimator(new_fdi())
     fie["omega"], fie["bound"], fie["residual"] = (0.5, -0.8, 0.3), 0.2, (0.02, 0.03, -0.01)
     fie["theta"], fie["covariance"], fie["effect"]["Z"] = (-0.5, -0.9, -0.1), (0.06, 0.01, 0.09), 1.0
-    isolation.adapt_jointly(fie, 1.0)
+    estimators.adapt_jointly(fie, 1.0)
     assert len(set(fie["theta"])) == len(set(fie["covariance"])) == 1
     alone = estimator(new_fdi())
     alone["omega"], alone["bound"], alone["residual"] = fie["omega"], 0.2, fie["residual"]
     alone["theta"], alone["covariance"], alone["effect"]["Z"] = -0.5, 0.06, 1.0
-    isolation.adapt_jointly(alone, 1.0)
+    estimators.adapt_jointly(alone, 1.0)
     assert alone["theta"].tolist() == fie["theta"].tolist(), "that of the first axis counts"

@@ -8,8 +8,8 @@ from innovations import block_of, bounded_all, by_onset, covariance, drawn, weig
 from scipy.signal import lfilter
 from scipy.stats import kstest
 
-from beaver_ftc.diagnosis import likelihood
-from beaver_ftc.diagnosis.likelihood import ALPHA3, N_SLOTS, STEP
+from beaver_ftc.diagnosis.detection import likelihood
+from beaver_ftc.diagnosis.detection.likelihood import ALPHA3, N_SLOTS, STEP
 from beaver_ftc.diagnosis.state import LOSS
 from samples import samples
 

@@ -6,8 +6,8 @@ from innovations import block_of, by_onset, with_hypotheses
 from kernels import new_fdi
 from statistics_of import Statistical, put
 
-from beaver_ftc.diagnosis import likelihood, statistical
-from beaver_ftc.diagnosis.likelihood import ALPHA3, ENDING, GROWING, MAX_HYPOTHESES, N_SLOTS, STEP
+from beaver_ftc.diagnosis.detection import likelihood, statistical
+from beaver_ftc.diagnosis.detection.likelihood import ALPHA3, ENDING, GROWING, MAX_HYPOTHESES, N_SLOTS, STEP
 from beaver_ftc.diagnosis.state import LOSS
 
 DT = 0.02

@@ -8,8 +8,8 @@ from kernels import estimator, new_fdi, on
 
 from beaver_ftc.aircraft import Aircraft, load
 from beaver_ftc.aircraft.schema import AircraftFile
-from beaver_ftc.diagnosis import membership
 from beaver_ftc.diagnosis.bounds import worst_case
+from beaver_ftc.diagnosis.isolation import membership
 from beaver_ftc.diagnosis.state import POSITION
 
 AILERON, ELEVATOR, RUDDER = range(3)

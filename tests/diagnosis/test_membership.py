@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from kernels import estimator, new_fdi, on
 
-from beaver_ftc.diagnosis import membership
+from beaver_ftc.diagnosis.isolation import membership
 from beaver_ftc.diagnosis.state import POSITION
 
 

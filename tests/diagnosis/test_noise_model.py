@@ -12,9 +12,9 @@ from beaver_ftc.design.fdc import MASS
 from beaver_ftc.design.model import AXES, design_record
 from beaver_ftc.design.terms import evaluate, regressors
 from beaver_ftc.design.variants import response
-from beaver_ftc.diagnosis import noise_model
 from beaver_ftc.diagnosis.bounds import variances
-from beaver_ftc.diagnosis.likelihood import N_SLOTS, PITCH_BLOCK
+from beaver_ftc.diagnosis.detection import noise_model
+from beaver_ftc.diagnosis.detection.likelihood import N_SLOTS, PITCH_BLOCK
 from beaver_ftc.diagnosis.state import LOSS
 from beaver_ftc.plant.instruments import SIGNALS
 from beaver_ftc.scenario.diagnosis import Bounds

@@ -11,13 +11,14 @@ from beaver_ftc.aircraft import load
 from beaver_ftc.design.fdc import MASS
 from beaver_ftc.design.model import design_record, inertia_coefficients
 from beaver_ftc.design.variants import coefficient_slopes, jacobian
-from beaver_ftc.diagnosis import air, noise_model, statistical
+from beaver_ftc.diagnosis.belief import air
 from beaver_ftc.diagnosis.bounds import variances
 from beaver_ftc.diagnosis.bounds.declared import Errors, gust_sigma_rad_s, inertia_slack
 from beaver_ftc.diagnosis.bounds.worst_case import error_map_dtype
-from beaver_ftc.diagnosis.likelihood import ALPHA3, ENDING, GROWING, N_SLOTS, STEP
+from beaver_ftc.diagnosis.detection import noise_model, statistical
+from beaver_ftc.diagnosis.detection.likelihood import ALPHA3, ENDING, GROWING, N_SLOTS, STEP
+from beaver_ftc.diagnosis.detection.statistical import statistical_dtype
 from beaver_ftc.diagnosis.state import LOSS
-from beaver_ftc.diagnosis.statistical import statistical_dtype
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.scenario.diagnosis import Bounds, Statistical
 from beaver_ftc.scenario.schema import Scenario

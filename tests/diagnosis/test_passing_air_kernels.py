@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.diagnosis import air
+from beaver_ftc.diagnosis.belief import air
 from beaver_ftc.diagnosis.bounds import declared, variances, worst_case
 from beaver_ftc.diagnosis.bounds.worst_case import admitted_dtype
 from beaver_ftc.scenario.diagnosis import Bounds

@@ -7,9 +7,9 @@ from statistics_of import Statistical
 
 from beaver_ftc.design.engine import KW_TO_DPT
 from beaver_ftc.design.variants import response
-from beaver_ftc.diagnosis import noise_model
 from beaver_ftc.diagnosis.bounds.declared import Errors
-from beaver_ftc.diagnosis.likelihood import N_READINGS
+from beaver_ftc.diagnosis.detection import noise_model
+from beaver_ftc.diagnosis.detection.likelihood import N_READINGS
 from beaver_ftc.scenario.diagnosis import Bounds
 
 BIASES = {

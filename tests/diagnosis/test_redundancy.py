@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from beaver_ftc.diagnosis import redundancy
-from beaver_ftc.diagnosis.watch import STEP, TEST
+from beaver_ftc.diagnosis.monitors import redundancy
+from beaver_ftc.diagnosis.monitors.sensor_records import STEP, TEST
 from beaver_ftc.plant.instruments import N_SENSORS
 
 RNG = np.random.default_rng(3)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from beaver_ftc.diagnosis import redundancy, since_start
-from beaver_ftc.diagnosis.watch import (
+from beaver_ftc.diagnosis.monitors import redundancy, since_start
+from beaver_ftc.diagnosis.monitors.sensor_records import (
     AIRSPEED,
     ALPHA,
     BETA,

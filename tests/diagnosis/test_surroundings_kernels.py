@@ -13,12 +13,14 @@ from beaver_ftc.aircraft.aircraft import FORCES
 from beaver_ftc.design.model import design_record
 from beaver_ftc.design.terms import fill_table, regressors
 from beaver_ftc.design.variants import response
-from beaver_ftc.diagnosis import air, scheme, statistical, thresholds
-from beaver_ftc.diagnosis.across import USUAL
-from beaver_ftc.diagnosis.air import AIR
+from beaver_ftc.diagnosis import scheme
+from beaver_ftc.diagnosis.belief import air
+from beaver_ftc.diagnosis.belief.air import AIR
 from beaver_ftc.diagnosis.bounds import worst_case
 from beaver_ftc.diagnosis.bounds.worst_case import error_map_dtype
-from beaver_ftc.diagnosis.likelihood import block_dtype
+from beaver_ftc.diagnosis.detection import statistical, thresholds
+from beaver_ftc.diagnosis.detection.likelihood import block_dtype
+from beaver_ftc.diagnosis.detection.parity import USUAL
 from beaver_ftc.diagnosis.state import LOSS, NOT_ISOLATED, STATISTICS, WORST_CASE, verdict_dtype
 from beaver_ftc.loop import frame
 

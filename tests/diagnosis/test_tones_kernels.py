@@ -10,10 +10,10 @@ from kernels import DT, new_fdi
 from statistics_of import Across
 
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA
-from beaver_ftc.diagnosis import across, likelihood, tones
-from beaver_ftc.diagnosis.across import AN_AXIS, THE_VANE
+from beaver_ftc.diagnosis.detection import likelihood, parity, tones
+from beaver_ftc.diagnosis.detection.parity import AN_AXIS, THE_VANE
+from beaver_ftc.diagnosis.detection.tones import FREQUENCIES_RAD_S, MEMORY_S, N_TONES
 from beaver_ftc.diagnosis.state import PITCH, SIDE, YAW
-from beaver_ftc.diagnosis.tones import FREQUENCIES_RAD_S, MEMORY_S, N_TONES
 
 CHANCE, PACE, V = 1e-11, 15.0, 45.0
 EVERY = 2  # sums of 0.04 s at DT
@@ -240,9 +240,9 @@ def test_an_aircraft_that_has_all_but_stopped_or_tumbles_is_not_listened_to(list
 def test_the_loudest_tone_counts_as_the_best_test_of_a_view(view):
     view["block"]["n_hypotheses"], view["block"]["hypothesis"]["score"] = 2, 3.0
     view["tones"]["score"] = 2.0
-    assert across.best(view) == 3.0
+    assert parity.best(view) == 3.0
     view["tones"]["score"] = 4.0
-    assert across.best(view) == 4.0
+    assert parity.best(view) == 4.0
 
 
 @pytest.mark.parametrize(

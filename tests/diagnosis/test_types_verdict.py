@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from kernels import new_fdi, on, put
 
-from beaver_ftc.diagnosis.belief import means_dtype
+from beaver_ftc.diagnosis.belief.expectation import means_dtype
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, UNANTICIPATED, YAW
 from beaver_ftc.diagnosis.types import examine, pairs, verdict
 from beaver_ftc.diagnosis.types.examine import FIXED, LAGS, LOSES, SHIFTED

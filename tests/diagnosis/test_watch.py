@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.diagnosis.watch import WAIT_S, WATCH, instrument_found
+from beaver_ftc.diagnosis.monitors.sensor_records import WAIT_S, WATCH, instrument_found
 from beaver_ftc.plant.instruments import SENSORS
 from beaver_ftc.scenario.sensors import sensor_words
 

@@ -6,10 +6,9 @@ from kernels import DT, new_fdi, on
 
 from beaver_ftc.design.engine import measured_slipstream
 from beaver_ftc.design.model import DPT
-from beaver_ftc.diagnosis import instruments as watching
-from beaver_ftc.diagnosis.belief import belief_dtype
-from beaver_ftc.diagnosis.state import NOT_ISOLATED
-from beaver_ftc.diagnosis.watch import (
+from beaver_ftc.diagnosis.belief.expectation import belief_dtype
+from beaver_ftc.diagnosis.monitors import sensor_monitor as watching
+from beaver_ftc.diagnosis.monitors.sensor_records import (
     AIRSPEED,
     ALPHA,
     ALPHA_FLOW,
@@ -32,6 +31,7 @@ from beaver_ftc.diagnosis.watch import (
     WATCH,
     YES,
 )
+from beaver_ftc.diagnosis.state import NOT_ISOLATED
 from beaver_ftc.loop import frame
 from beaver_ftc.plant.instruments import (
     ALTITUDE,

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from innovations import PlainKalman, block_of, drawn, filter_all
 from scipy.linalg import solve_discrete_are
 
-from beaver_ftc.diagnosis import likelihood
+from beaver_ftc.diagnosis.detection import likelihood
 from samples import samples
 
 TOGETHER = np.array([[0.04, 0.006], [0.006, 0.003]])

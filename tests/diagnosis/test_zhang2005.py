@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from beaver_ftc.diagnosis import isolation, zhang2005
-from beaver_ftc.diagnosis.isolation import isolation_dtype
+from beaver_ftc.diagnosis import zhang2005
+from beaver_ftc.diagnosis.isolation import estimators
+from beaver_ftc.diagnosis.isolation.estimators import isolation_dtype
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plugins import DETECTORS, options_of, settings
 from beaver_ftc.scenario.loader import load_text
@@ -80,7 +81,7 @@ def test_the_network_learns_what_exceeds_the_threshold_once_there_is_an_alarm(
 
 
 def zhang2005_fdae():
-    from beaver_ftc.diagnosis.detection import FDAE
+    from beaver_ftc.diagnosis.detection.fdae import FDAE
 
     return FDAE
 
@@ -120,7 +121,7 @@ def test_the_residual_of_the_true_estimator_is_omega_times_what_the_estimate_mis
         fie.effect.Z[:] = z, -z, 0.5 * z
         before = rate.copy()
         rate = before + DT * theta * fie.effect.Z
-        isolation.predict(records, fie, bound, before, np.zeros(3), DT)
+        estimators.predict(records, fie, bound, before, np.zeros(3), DT)
         if projects:
             assert ((fie.theta >= -1.0) & (fie.theta <= 0.0)).all()
 

@@ -8,10 +8,10 @@ import pytest
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.schema import MAX_EFFECTORS
-from beaver_ftc.diagnosis.across import size_for
-from beaver_ftc.diagnosis.isolation import estimator_names
+from beaver_ftc.diagnosis.detection.parity import size_for
+from beaver_ftc.diagnosis.detection.statistical import statistical_dtype
+from beaver_ftc.diagnosis.isolation.estimators import estimator_names
 from beaver_ftc.diagnosis.rivals.rls import RlsMonitor
-from beaver_ftc.diagnosis.statistical import statistical_dtype
 from beaver_ftc.loop import plugin_frame
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.scenario.schema import Scenario

@@ -19,7 +19,7 @@ from tools.drawn.reader import doubts
 
 import beaver_ftc as bf
 from beaver_ftc.cli.main import main
-from beaver_ftc.diagnosis.watch import WATCH
+from beaver_ftc.diagnosis.monitors.sensor_records import WATCH
 from beaver_ftc.plant.instruments import SENSORS
 from beaver_ftc.results import writer
 from beaver_ftc.results.certificates import certificate as certificate_module

@@ -8,22 +8,17 @@ import numpy as np
 
 from beaver_ftc.compiled import apart, kernel, record, sized
 from beaver_ftc.design.model import AIRSPEED
-from beaver_ftc.diagnosis import (
-    air,
-    balance,
-    bank,
-    detection,
-    forces,
-    isolation,
-    state,
-    statistical,
-    zhang2005,
-)
-from beaver_ftc.diagnosis.across import USUAL, Size
-from beaver_ftc.diagnosis.bank import largest_share
+from beaver_ftc.diagnosis import state, zhang2005
+from beaver_ftc.diagnosis.belief import air
 from beaver_ftc.diagnosis.bounds import declared
 from beaver_ftc.diagnosis.bounds.worst_case import bound_dtype
-from beaver_ftc.diagnosis.isolation import start
+from beaver_ftc.diagnosis.detection import bank, fdae, forces, statistical
+from beaver_ftc.diagnosis.detection.bank import largest_share
+from beaver_ftc.diagnosis.detection.parity import USUAL, Size
+from beaver_ftc.diagnosis.isolation import estimators
+from beaver_ftc.diagnosis.isolation.estimators import start
+from beaver_ftc.diagnosis.monitors import engine_symmetry
+from beaver_ftc.diagnosis.monitors.sensor_records import WATCH
 from beaver_ftc.diagnosis.state import (
     BESIDE_DAMAGE,
     IN_PITCH,
@@ -33,7 +28,6 @@ from beaver_ftc.diagnosis.state import (
 )
 from beaver_ftc.diagnosis.types import examine, pairs, registry, verdict
 from beaver_ftc.diagnosis.types.examine import FIXED, LAGS, LOSES, SHIFTED
-from beaver_ftc.diagnosis.watch import WATCH
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.pairs import pairs_refused
 from beaver_ftc.scenario.schema import Scenario
@@ -45,21 +39,21 @@ PATIENCE_S = 4.0  # in still air what damage left over was excluded within 3.2 s
 def diagnosis_dtype(n: int, size: Size = USUAL) -> np.dtype:
     """The stages of the diagnosis of an aircraft with n surfaces; size: rooms of its record."""
     return record(
-        config=state.CONFIG, bound=bound_dtype(n, size.boxes), bank=bank.BANK, fdae=detection.FDAE,
+        config=state.CONFIG, bound=bound_dtype(n, size.boxes), bank=bank.BANK, fdae=fdae.FDAE,
         verdict=state.conclusion_dtype(n), layout=state.layout_dtype(n),
-        isolation=isolation.isolation_dtype(n),
+        isolation=estimators.isolation_dtype(n),
         types=registry.types_dtype(n), statistical=statistical.statistical_dtype(size), watch=WATCH,
-        published=zhang2005.PUBLISHED, balance=balance.BALANCE,
+        published=zhang2005.PUBLISHED, balance=engine_symmetry.BALANCE,
     )  # fmt: skip
 
 
 def configure(fdi: np.void, belief: np.void, scenario: Scenario, travel: np.ndarray) -> None:
     """Fill in the stages of the diagnosis; belief: already filled in. travel (2, n) rad: the stops."""
     config, aircraft, dt = scenario.fdi, scenario.airframe, 1.0 / scenario.rate_hz
-    members, conclusion = isolation.members_of(config.fault_class, aircraft), fdi["verdict"]
+    members, conclusion = estimators.members_of(config.fault_class, aircraft), fdi["verdict"]
     state.configure(fdi["config"], scenario)
     state.configure_layout(fdi["layout"], members, aircraft)
-    isolation.configure(fdi["isolation"], config, dt, members, travel)
+    estimators.configure(fdi["isolation"], config, dt, members, travel)
     # Damage is outside the class: who is merely left when chance has excluded the others is not yet at fault.
     doubted = BESIDE_DAMAGE if config.weighs_chance and aircraft.damage else 0
     fdi["isolation"]["estimator"]["doubted"] = doubted
@@ -70,8 +64,8 @@ def configure(fdi: np.void, belief: np.void, scenario: Scenario, travel: np.ndar
         _ask_each_plane(fdi, scenario)
     declared.configure(fdi["bound"], scenario, belief["design"])
     bank.configure(fdi["bank"], config, dt)
-    detection.configure(fdi["fdae"], scenario)
-    balance.configure(fdi["balance"], aircraft)
+    fdae.configure(fdi["fdae"], scenario)
+    engine_symmetry.configure(fdi["balance"], aircraft)
     if config.is_published:
         zhang2005.configure(fdi, scenario, travel)
     registry.configure(fdi["types"], fdi["layout"], belief["actuators"], scenario, travel)

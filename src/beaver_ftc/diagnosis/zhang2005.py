@@ -19,7 +19,7 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.model import ALPHA, BETA
-from beaver_ftc.diagnosis.detection import gaussians, note_alarm
+from beaver_ftc.diagnosis.detection.fdae import gaussians, note_alarm
 from beaver_ftc.diagnosis.state import CONSTANT, PITCH
 from beaver_ftc.plugins import DETECTORS, settings
 from beaver_ftc.scenario.schema import Scenario

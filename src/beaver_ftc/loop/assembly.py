@@ -7,9 +7,10 @@ from beaver_ftc.control import state as control
 from beaver_ftc.control.accommodation import assessment_dtype, true_faults_dtype
 from beaver_ftc.control.outer.state import AUTOPILOT, COLUMNS
 from beaver_ftc.control.supervisor import SUPERVISOR
-from beaver_ftc.diagnosis import belief, scheme
-from beaver_ftc.diagnosis.across import USUAL, Size, size_for
-from beaver_ftc.diagnosis.isolation import estimator_names
+from beaver_ftc.diagnosis import scheme
+from beaver_ftc.diagnosis.belief import expectation
+from beaver_ftc.diagnosis.detection.parity import USUAL, Size, size_for
+from beaver_ftc.diagnosis.isolation.estimators import estimator_names
 from beaver_ftc.diagnosis.state import verdict_dtype
 from beaver_ftc.loop import instrument_records, memory
 from beaver_ftc.loop.accounts import accounts_dtype
@@ -33,7 +34,7 @@ def frame_dtype(n: int, size: Size = USUAL, line: int = USUAL_LINE) -> np.dtype:
         running=RUNNING,
         since=int, logged=LOGGED,  # the frame with which this diagnosis has begun
         truth=truth_dtype(n), instruments=instruments_dtype(line), measured=MEASURED,
-        belief=belief.belief_dtype(n), fdi=scheme.diagnosis_dtype(n, size), verdict=verdict_dtype(n),
+        belief=expectation.belief_dtype(n), fdi=scheme.diagnosis_dtype(n, size), verdict=verdict_dtype(n),
         assessment=assessment_dtype(n), faults=true_faults_dtype(n), supervisor=SUPERVISOR,
         control=control.control_dtype(n), autopilot=AUTOPILOT,
         held=int, held_rad=n,  # whether another than the law commands, and what
@@ -79,7 +80,7 @@ def _assemble_design(scenario: Scenario, travel: np.ndarray, line: int) -> np.nd
     truth["factor"][: len(channels)] = [factor for _, _, factor in channels]
     instrument_records.configure(frame, scenario, instant_s)
     instrument_records.configure_watch(frame["fdi"]["watch"], scenario, instant_s)
-    belief.configure(frame["belief"], scenario, travel)
+    expectation.configure(frame["belief"], scenario, travel)
     scheme.configure(frame["fdi"], frame["belief"], scenario, travel)
     control.configure(frame["control"], scenario, travel)
     return frames

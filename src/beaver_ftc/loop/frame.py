@@ -22,19 +22,19 @@ from beaver_ftc.control.outer.autopilot import judge, steer
 from beaver_ftc.control.rivals import compiled
 from beaver_ftc.control.supervisor import MODE_REALLOCATED
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, unanticipated_pitch
-from beaver_ftc.diagnosis import (
-    across,
-    air,
-    balance,
-    bank,
-    detection,
-    instruments,
-    isolation,
-    scheme,
-    statistical,
-    zhang2005,
+from beaver_ftc.diagnosis import scheme, zhang2005
+from beaver_ftc.diagnosis.belief import air
+from beaver_ftc.diagnosis.belief.expectation import (
+    begin_frame,
+    follow_command,
+    foresee,
+    look,
+    look_back,
+    respond,
 )
-from beaver_ftc.diagnosis.belief import begin_frame, follow_command, foresee, look, look_back, respond
+from beaver_ftc.diagnosis.detection import bank, fdae, parity, statistical
+from beaver_ftc.diagnosis.isolation import estimators
+from beaver_ftc.diagnosis.monitors import engine_symmetry, sensor_monitor
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, STATISTICS, WORST_CASE
 from beaver_ftc.diagnosis.types import examine
 from beaver_ftc.diagnosis.types.examine import LAGS
@@ -54,7 +54,7 @@ def watch_instruments(frame):
     before, t = watch.alarmed, frame.k * frame.dt
     if engine.in_use:
         watch.step.command[1] = engine.command[0]
-    instruments.monitor(watch, frame.belief, frame.measured, fdi.verdict, fdi.bank, fdi.bound, frame.dt, t)
+    sensor_monitor.monitor(watch, frame.belief, frame.measured, fdi.verdict, fdi.bank, fdi.bound, frame.dt, t)
     if watch.alarmed and not (before or watch.beside):
         take_back(fdi)
 
@@ -96,13 +96,13 @@ def diagnose(frame):
     """The built-in diagnosis, from prediction to verdict; with scheme `none`, nothing is concluded."""
     fdi, k = frame.fdi, frame.k - frame.since
     if k == 0:
-        detection.begin(fdi.fdae, fdi.bank, fdi.bound.noise, frame.measured.x)
+        fdae.begin(fdi.fdae, fdi.bank, fdi.bound.noise, frame.measured.x)
     if fdi.config.enabled:
         if k > 0:
             predict(frame, k)
         else:
             bank.align(fdi.isolation, frame.belief.G)
-        balance.heed(fdi.balance, frame.control.power.command[1:])
+        engine_symmetry.heed(fdi.balance, frame.control.power.command[1:])
         conclude(fdi, frame.measured, frame.belief.u, frame.t)
     make_ready(frame, k)
 
@@ -113,13 +113,13 @@ def take_verdict(frame):
     that serves the laws is brought up to date."""
     fdi, measured, k = frame.fdi, frame.measured, frame.k - frame.since
     if k == 0:
-        detection.begin(fdi.fdae, fdi.bank, fdi.bound.noise, measured.x)
+        fdae.begin(fdi.fdae, fdi.bank, fdi.bound.noise, measured.x)
     else:
         predict(frame, k)
-    detection.form_residual(fdi.fdae, measured.x)
+    fdae.form_residual(fdi.fdae, measured.x)
     scheme.note_verdict(fdi.verdict, fdi.isolation.estimator, frame.verdict, frame.t)
     if fdi.verdict.detected:
-        detection.evaluate(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
+        fdae.evaluate(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
     make_ready(frame, k)
 
 
@@ -137,11 +137,11 @@ def predict(frame, k):
     if chances.tests.enabled:
         compare_likelihoods(frame, k)
     known, spread = conclusion.detected, mean.Gu_spread
-    isolation.suppose_all(fdi.isolation, fdi.bank, bound, config, known, mean.G, mean.Gu, spread)
+    estimators.suppose_all(fdi.isolation, fdi.bank, bound, config, known, mean.G, mean.Gu, spread)
     if config.every_type:
         examine.note_orders(fdi.types, belief.commanded, mean)
     if known:
-        isolation.predict_all(fdi.isolation, bound, x_then, expected, dt)
+        estimators.predict_all(fdi.isolation, bound, x_then, expected, dt)
         scheme.expect_known_faults(expected, mean, surfaces.effectiveness, surfaces.offset, config.every_type)
     if chances.tests.enabled:
         for i in range(3):
@@ -151,7 +151,7 @@ def predict(frame, k):
         predict_as_published(fdi, x_then, mean.acceleration)
         return
     leaking = conclusion.isolated >= 0 or conclusion.lead >= 0
-    detection.predict(fdi.fdae, bound, x_then, expected, known, leaking, dt)
+    fdae.predict(fdi.fdae, bound, x_then, expected, known, leaking, dt)
 
 
 @apart
@@ -160,7 +160,7 @@ def predict_as_published(fdi, x_then, acceleration):
     acceleration (3,) rad/s2 in it."""
     published, dt = fdi.published, fdi.config.dt
     zhang2005.approximate(published, fdi.fdae, fdi.verdict.detected, dt)
-    detection.predict(fdi.fdae, fdi.bound, x_then, acceleration, False, False, dt)
+    fdae.predict(fdi.fdae, fdi.bound, x_then, acceleration, False, False, dt)
     if published.constant > 0.0:
         estimators = fdi.isolation.estimator[: fdi.isolation.n]
         zhang2005.hold_thresholds(published.constant, fdi.bank, fdi.fdae, estimators)
@@ -180,9 +180,9 @@ def compare_likelihoods(frame, k):
     statistical.signatures(blocks, mean.Gu_foreseen, unanticipated_pitch(belief.design, y, 1.0))
     latched, ends = chances.alarm.detected_at_s >= 0.0, not fdi.config.abrupt
     statistical.observe(tests, noise.bounded, blocks, seen, innovation, dt, k, latched, ends)
-    across.face(views, felt, seen, fdi.bound, mean.G_foreseen, mean.Gu_foreseen)
-    across.compose(views, tests.tolerated, noise, blocks, felt, seen, inertial, innovation, y[AIRSPEED])
-    across.observe(views, tests, chances.listening, y, dt, k, latched)
+    parity.face(views, felt, seen, fdi.bound, mean.G_foreseen, mean.Gu_foreseen)
+    parity.compose(views, tests.tolerated, noise, blocks, felt, seen, inertial, innovation, y[AIRSPEED])
+    parity.observe(views, tests, chances.listening, y, dt, k, latched)
     known = fdi.bound.error_map.outside == 0
     statistical.score(chances.alarm, tests, blocks, views, felt, seen, frame.t, known)
 
@@ -194,25 +194,25 @@ def conclude(fdi, measured, u, t):
     Where instruments are watched, a surface waits a frame after the alarm: that much later the attitude shows
     what a gyro did; a blurred one, later. Once it or an engine is found broken, no surface is named.
     """
-    if instruments.speaks(fdi.watch):
+    if sensor_monitor.speaks(fdi.watch):
         return
     known, every_type = fdi.verdict.detected, fdi.config.every_type
-    detection.form_residual(fdi.fdae, measured.x)
+    fdae.form_residual(fdi.fdae, measured.x)
     if fdi.published.in_use:
         zhang2005.detect(fdi.fdae, fdi.verdict, t)
         zhang2005.respond(fdi.published, fdi.fdae, fdi.layout.main, measured.x, measured.y, u)
     else:
-        balance.detect(fdi.balance, fdi.verdict, fdi.bound.error_map.apart_now, measured.y, t)
-        detection.detect(fdi.bank, fdi.verdict, fdi.config.authority, fdi.statistical.alarm, t)
+        engine_symmetry.detect(fdi.balance, fdi.verdict, fdi.bound.error_map.apart_now, measured.y, t)
+        fdae.detect(fdi.bank, fdi.verdict, fdi.config.authority, fdi.statistical.alarm, t)
     if not fdi.verdict.detected:
         return
     if not known:
         scheme.begin_isolation(fdi.isolation, fdi.types, every_type, fdi.bound.noise, measured.x)
-    sound = not instruments.shown_from_the_start(fdi.watch, fdi.verdict.detected_at_s)
-    if sound and instruments.clears_surfaces(fdi.watch, known) and not fdi.balance.failed:
+    sound = not sensor_monitor.shown_from_the_start(fdi.watch, fdi.verdict.detected_at_s)
+    if sound and sensor_monitor.clears_surfaces(fdi.watch, known) and not fdi.balance.failed:
         isolate(fdi, measured.x, t, known)
     if not fdi.published.in_use:
-        detection.evaluate(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
+        fdae.evaluate(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
 
 
 @kernel
@@ -221,14 +221,14 @@ def isolate(fdi, x, t, started):
     config, records, bound = fdi.config, fdi.isolation, fdi.bound
     for s in range(records.n):
         fie = records.estimator[s]
-        can_be = isolation.possible(records, fie, fdi.bank, bound.frame, config.abrupt, x, started)
+        can_be = estimators.possible(records, fie, fdi.bank, bound.frame, config.abrupt, x, started)
         if rules_out(fdi, fie, can_be) and not fie.excluded:
             fie.excluded = 1
             fie.excluded_at_s = t
     if config.every_type:
         scheme.isolate_type(fdi.types, fdi.verdict, fdi.layout, records, fdi.bank, bound, t, started)
     else:
-        isolation.decide(records, fdi.verdict, t)
+        estimators.decide(records, fdi.verdict, t)
 
 
 @kernel
@@ -245,7 +245,7 @@ def rules_out(fdi, fie, within):
     if config.every_type:
         column, views = estimators[layout.position_of[fie.surface]].effect.Z, chances.views[: chances.n_views]
         felt, seen = chances.forces, chances.air
-        return tests.enabled and across.excludes(views, tests, felt, seen, fie.surface, column)
+        return tests.enabled and parity.excludes(views, tests, felt, seen, fie.surface, column)
     if config.authority != STATISTICS and not within:
         return True
     if not tests.enabled or chances.alarm.detected_at_s < 0.0:
@@ -270,7 +270,7 @@ def make_ready(frame, k):
 def note_names(fdi, t):
     """Note which surfaces are named: those of a pair, or the one isolated; none once an instrument is found
     broken."""
-    pairs, void = fdi.config.every_type and fdi.types.pair.enabled, instruments.speaks(fdi.watch)
+    pairs, void = fdi.config.every_type and fdi.types.pair.enabled, sensor_monitor.speaks(fdi.watch)
     only = scheme.isolated_surface(fdi.verdict, fdi.isolation.estimator)
     for s in range(fdi.types.surface.size):
         named = fdi.types.surface[s].named if pairs else s == only
@@ -338,7 +338,7 @@ def unknown_acceleration(fdi, out):
     if scheme.likelihood_counts(fdi.statistical.tests, fdi.config.authority):
         statistical.unknown_acceleration(fdi.statistical.block, fdi.statistical.air, out)
     else:
-        detection.unknown_acceleration(fdi.fdae, fdi.bound.noise, out)
+        fdae.unknown_acceleration(fdi.fdae, fdi.bound.noise, out)
 
 
 @kernel

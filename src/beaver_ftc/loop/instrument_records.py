@@ -6,12 +6,12 @@ import numpy as np
 
 from beaver_ftc.aircraft.units import GRAVITY_MPS2
 from beaver_ftc.design.context import DesignFunctions
-from beaver_ftc.diagnosis.accelerometers import NEVER_STILL
-from beaver_ftc.diagnosis.across import across_a_column
 from beaver_ftc.diagnosis.bounds.declared import GUST_LIMIT_SIGMA, SCALE_M, Errors, gust_mps, low_gust_mps
 from beaver_ftc.diagnosis.bounds.variances import gust_effect
-from beaver_ftc.diagnosis.forces import tell_apart
-from beaver_ftc.diagnosis.watch import NOBODY, POLES_PER_S
+from beaver_ftc.diagnosis.detection.forces import tell_apart
+from beaver_ftc.diagnosis.detection.parity import across_a_column
+from beaver_ftc.diagnosis.monitors.accelerometers import NEVER_STILL
+from beaver_ftc.diagnosis.monitors.sensor_records import NOBODY, POLES_PER_S
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.faults import OF_THE_SLIPSTREAM

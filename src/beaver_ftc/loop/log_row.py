@@ -5,7 +5,7 @@ What is not there, or has not begun, is left as the row is given: not a number.
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.control.outer.state import SPEED
-from beaver_ftc.diagnosis.bank import nearest
+from beaver_ftc.diagnosis.detection.bank import nearest
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.sensing import effective, first_signal, position
 

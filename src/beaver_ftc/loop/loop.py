@@ -11,8 +11,8 @@ from beaver_ftc.compiled import direct
 from beaver_ftc.control import state
 from beaver_ftc.control.outer.setup import set_up_autopilot
 from beaver_ftc.design.variants import anchor, mass_of
-from beaver_ftc.diagnosis import noise_model
-from beaver_ftc.diagnosis.air import no_longer_read
+from beaver_ftc.diagnosis.belief.air import no_longer_read
+from beaver_ftc.diagnosis.detection import noise_model
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.loop import memory, stepping
 from beaver_ftc.loop.assembly import assemble, lay_out, y_places

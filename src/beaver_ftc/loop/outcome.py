@@ -18,9 +18,9 @@ from beaver_ftc.control.outer.state import BANK_LIMIT, CHANNELS, FASTEST, LIMITE
 from beaver_ftc.control.supervisor import MODES
 from beaver_ftc.design.model import AXES
 from beaver_ftc.diagnosis.base import Verdict
+from beaver_ftc.diagnosis.monitors.sensor_records import instrument_found
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, STATISTICS, UNANTICIPATED, YAW
 from beaver_ftc.diagnosis.types.findings import estimate_of, found
-from beaver_ftc.diagnosis.watch import instrument_found
 from beaver_ftc.loop.frame import isolated_theta
 from beaver_ftc.loop.inconclusive import inconclusive_of
 from beaver_ftc.plant.channels import AIRSPEED, ALTITUDE

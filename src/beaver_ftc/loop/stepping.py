@@ -8,7 +8,7 @@ frames (1,): of `frame_dtype` (assembly.py).
 
 from beaver_ftc.compiled import apart, kernel, row_of
 from beaver_ftc.design.actuators import move
-from beaver_ftc.diagnosis import instruments
+from beaver_ftc.diagnosis.monitors import sensor_monitor
 from beaver_ftc.diagnosis.scheme import built_in_statistic as largest_statistic
 from beaver_ftc.diagnosis.scheme import likelihood_counts
 from beaver_ftc.loop import frame as whole
@@ -24,7 +24,7 @@ def begin_watch(frames):
     frame = frames[0]
     if not frame.measured.inertial:
         sample_forces(frame.instruments, frame.measured)
-    instruments.begin(frame.fdi.watch, frame.measured, frame.t)
+    sensor_monitor.begin(frame.fdi.watch, frame.measured, frame.t)
 
 
 @kernel

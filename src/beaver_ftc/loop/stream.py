@@ -10,8 +10,8 @@ from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import direct
 from beaver_ftc.design.model import N_Y
 from beaver_ftc.design.variants import anchor, mass_of
-from beaver_ftc.diagnosis import noise_model
 from beaver_ftc.diagnosis.base import Verdict
+from beaver_ftc.diagnosis.detection import noise_model
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop import stepping, watching
 from beaver_ftc.loop.assembly import assemble

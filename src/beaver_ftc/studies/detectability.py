@@ -30,7 +30,7 @@ from beaver_ftc.control.engines import ENGINES
 from beaver_ftc.control.engines import configure as configure_engines
 from beaver_ftc.design.model import AXES, N_Y, both_responses
 from beaver_ftc.design.variants import design_of
-from beaver_ftc.diagnosis.forces import ASIDE, UP, separated_by_force
+from beaver_ftc.diagnosis.detection.forces import ASIDE, UP, separated_by_force
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.results.log import Columns

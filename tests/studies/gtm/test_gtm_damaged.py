@@ -10,7 +10,7 @@ from tools.gtm.envelope import Envelope
 
 from beaver_ftc.aircraft import Aircraft, load
 from beaver_ftc.aircraft.schema import AircraftFile, DamageSection
-from beaver_ftc.diagnosis.noise_model import SLOW_RAD_S, swing_of
+from beaver_ftc.diagnosis.detection.noise_model import SLOW_RAD_S, swing_of
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.trim import trim
 from beaver_ftc.results.metrics import _type_correct

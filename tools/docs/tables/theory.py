@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from beaver_ftc.diagnosis import likelihood, noise_model, redundancy, statistical, tones, watch
 from beaver_ftc.diagnosis.bounds import declared, worst_case
+from beaver_ftc.diagnosis.detection import likelihood, noise_model, statistical, tones
+from beaver_ftc.diagnosis.monitors import redundancy, sensor_records
 from beaver_ftc.plant import instruments
 from beaver_ftc.scenario.diagnosis import Bounds, FdiConfig, Statistical
 from beaver_ftc.studies.present.tables import markdown_table
@@ -23,7 +24,7 @@ CONSTANTS = (  # (section, symbol on the page, module, name there, unit)
     (7, "", tones, "N_TONES", ""),
     (7, r"$\omega$", tones, "FREQUENCIES_RAD_S", "rad/s"),
     (7, r"$\tau$", tones, "MEMORY_S", "s"),
-    (9, "", watch, "POLES_PER_S", "1/s"),
+    (9, "", sensor_records, "POLES_PER_S", "1/s"),
     (9, "", redundancy, "TURNING_RAD_S", "rad/s"),
     (9, "", redundancy, "FALLING_M_S2", "m/s2"),
     (9, "", redundancy, "DENSITY_HEIGHT_M", "m"),

@@ -32,7 +32,7 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft, Term
 from beaver_ftc.design.context import Context
 from beaver_ftc.design.model import inertia_coefficients
-from beaver_ftc.diagnosis.air import UNSEEN
+from beaver_ftc.diagnosis.belief.air import UNSEEN
 
 UNEXPLAINED_S = 0.1
 LEAST_RATE_RAD_S = 1e-5  # what perfect instruments are taken for

@@ -19,7 +19,7 @@ types: of `types_dtype`. estimators: those of the isolation; layout: whose is wh
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis import membership
+from beaver_ftc.diagnosis.isolation import membership
 from beaver_ftc.diagnosis.types.registry import (
     HISTORY,
     OSCILLATORY,

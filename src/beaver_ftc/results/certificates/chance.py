@@ -11,9 +11,9 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis import likelihood
-from beaver_ftc.diagnosis.likelihood import N_SLOTS, STEP, Rooms, block_dtype, slot_to_start
-from beaver_ftc.diagnosis.noise_model import CHANCE
+from beaver_ftc.diagnosis.detection import likelihood
+from beaver_ftc.diagnosis.detection.likelihood import N_SLOTS, STEP, Rooms, block_dtype, slot_to_start
+from beaver_ftc.diagnosis.detection.noise_model import CHANCE
 from beaver_ftc.results.certificates.inequality import Document, History
 from beaver_ftc.results.certificates.tape import OF_BLOCK, Tape
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from beaver_ftc.diagnosis.watch import RPM
+from beaver_ftc.diagnosis.monitors.sensor_records import RPM
 from beaver_ftc.plant.instruments import ENGINE_SPEED, SENSORS
 from beaver_ftc.results.certificates.inequality import Document
 from beaver_ftc.scenario.sensors import sensor_words

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from beaver_ftc.aircraft import AXES
-from beaver_ftc.diagnosis.isolation import estimator_names
+from beaver_ftc.diagnosis.isolation.estimators import estimator_names
 from beaver_ftc.results.certificates import certificate, chance
 from beaver_ftc.results.certificates.certificate import MEASURED_MODEL_BOUND
 from beaver_ftc.results.certificates.inequality import Document

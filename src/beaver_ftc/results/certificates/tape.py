@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from beaver_ftc.compiled import direct, kernel
-from beaver_ftc.diagnosis.isolation import estimator_names
-from beaver_ftc.diagnosis.likelihood import N_SLOTS
+from beaver_ftc.diagnosis.detection.likelihood import N_SLOTS
+from beaver_ftc.diagnosis.isolation.estimators import estimator_names
 from beaver_ftc.loop import memory
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.scenario.schema import Scenario

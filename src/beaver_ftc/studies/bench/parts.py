@@ -47,21 +47,23 @@ PARTS: dict[str, dict[str, Kernel]] = {
     # the design model, the detection estimator and its bank of filters
     "fdae": {
         "design.variants.response": nothing, "loop.accounts.effect_of_faults": nothing,
-        "diagnosis.belief.look_back": nothing, "loop.frame.diagnose": nothing,
+        "diagnosis.belief.expectation.look_back": nothing, "loop.frame.diagnose": nothing,
     },
     # the isolation estimators, and the decision among them
     "fies": {
-        "diagnosis.isolation.suppose_all": nothing, "diagnosis.isolation.predict_all": nothing,
-        "diagnosis.isolation.start": nothing, "loop.frame.isolate": nothing,
+        "diagnosis.isolation.estimators.suppose_all": nothing,
+        "diagnosis.isolation.estimators.predict_all": nothing,
+        "diagnosis.isolation.estimators.start": nothing, "loop.frame.isolate": nothing,
     },
     # the bound on the uncertainty, and every threshold that follows from it
     "thresholds": {
         "diagnosis.bounds.worst_case.uncertainty_bound": nothing,
-        "diagnosis.thresholds.bound_step": unlimited, "diagnosis.thresholds.interval": all_residuals,
-        "diagnosis.thresholds.published": all_residuals,
+        "diagnosis.detection.thresholds.bound_step": unlimited,
+        "diagnosis.detection.thresholds.interval": all_residuals,
+        "diagnosis.detection.thresholds.published": all_residuals,
     },
     # the network of the detection estimator, which learns after the alarm
-    "network": {"diagnosis.detection.learn": nothing, "diagnosis.detection.evaluate": nothing},
+    "network": {"diagnosis.detection.fdae.learn": nothing, "diagnosis.detection.fdae.evaluate": nothing},
     # who is in charge
     "supervisor": {"loop.frame.decide": nothing},
     # the command, into the aircraft's properties

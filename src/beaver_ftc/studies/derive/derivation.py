@@ -19,7 +19,7 @@ from beaver_ftc.aircraft import loading
 from beaver_ftc.aircraft.aircraft import THRUST_TERM
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_SIGNALS, MAX_TERMS_OF_ONE
 from beaver_ftc.design.model import design_record
-from beaver_ftc.diagnosis.balance import THRUST
+from beaver_ftc.diagnosis.monitors.engine_symmetry import THRUST
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.plant import instrumented, trial
 from beaver_ftc.plant.adapter import Plant, translated

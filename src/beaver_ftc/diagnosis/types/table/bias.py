@@ -7,7 +7,7 @@ what runs almost as fast as a runaway counts as one.
 import numpy as np
 
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.diagnosis import membership
+from beaver_ftc.diagnosis.isolation import membership
 from beaver_ftc.diagnosis.types.contract import FaultType, intersect, middle_of, set_of, within_travel
 
 AS_FAST = 1.8  # times the least pace of a runaway, half of the rate limit at which it runs

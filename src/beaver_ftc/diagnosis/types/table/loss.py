@@ -3,7 +3,7 @@
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis import membership
+from beaver_ftc.diagnosis.isolation import membership
 from beaver_ftc.diagnosis.types.contract import FaultType, intersect, middle_of, set_of
 
 

@@ -12,15 +12,23 @@ import numpy as np
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_TERMS
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design.terms import AIRSPEED, N_SIGNALS, QDYN, evaluate, regressors
-from beaver_ftc.diagnosis import across, likelihood, noise_model
-from beaver_ftc.diagnosis import air as gusts
-from beaver_ftc.diagnosis.across import USUAL, Size, view_dtype
-from beaver_ftc.diagnosis.air import AIR
+from beaver_ftc.diagnosis.belief import air as gusts
+from beaver_ftc.diagnosis.belief.air import AIR
 from beaver_ftc.diagnosis.bounds.worst_case import UNKNOWN_TO_FILTERS_RAD_S2, beyond, uncertainty_bound
-from beaver_ftc.diagnosis.forces import FORCES_FELT
-from beaver_ftc.diagnosis.likelihood import ENDING, GROWING, LATERAL, N_BLOCKS, N_READINGS, STEP, block_dtype
+from beaver_ftc.diagnosis.detection import likelihood, noise_model, parity
+from beaver_ftc.diagnosis.detection.forces import FORCES_FELT
+from beaver_ftc.diagnosis.detection.likelihood import (
+    ENDING,
+    GROWING,
+    LATERAL,
+    N_BLOCKS,
+    N_READINGS,
+    STEP,
+    block_dtype,
+)
+from beaver_ftc.diagnosis.detection.parity import USUAL, Size, view_dtype
+from beaver_ftc.diagnosis.detection.tones import LISTENING
 from beaver_ftc.diagnosis.state import BESIDE_DAMAGE, LOSS
-from beaver_ftc.diagnosis.tones import LISTENING
 
 # Of what the best explanation explains, the part that a constant theta leaves to a loss that grows is larger
 # for every rate of growth (docs/theory.md, section 7).
@@ -141,7 +149,7 @@ def score(alarm, tests, blocks, views, forces, air, t, known=True):
             if hypothesis.alarms:
                 note(alarm, tests.alarm_level, hypothesis.score, hypothesis.axis)
     for view in views:
-        note(alarm, tests.alarm_level, across.alarm(view, views, tests, forces, air), view.axis)
+        note(alarm, tests.alarm_level, parity.alarm(view, views, tests, forces, air), view.axis)
     if alarm.score > 1.0 and alarm.detected_at_s < 0.0:
         alarm.detected_at_s = t
 
@@ -167,7 +175,7 @@ def write_shares(tests, blocks, views, forces, air, row):
                 row[place] = max(row[place], hypothesis.score / tests.alarm_level)
     for view in views:
         place = row.size - 3 + view.axis
-        row[place] = max(row[place], across.alarm(view, views, tests, forces, air) / tests.alarm_level)
+        row[place] = max(row[place], parity.alarm(view, views, tests, forces, air) / tests.alarm_level)
 
 
 @kernel

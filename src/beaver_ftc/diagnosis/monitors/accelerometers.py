@@ -16,8 +16,7 @@ instrument is named. None that may be broken is used: `measured.inertial`.
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.since_start import hidden
-from beaver_ftc.diagnosis.watch import (
+from beaver_ftc.diagnosis.monitors.sensor_records import (
     AIRSPEED,
     ALPHA,
     ALPHA_FLOW,
@@ -31,6 +30,7 @@ from beaver_ftc.diagnosis.watch import (
     OF_SPEED,
     SPEED,
 )
+from beaver_ftc.diagnosis.monitors.since_start import hidden
 from beaver_ftc.plant.instruments import AX, N_SENSORS, PHI
 
 SOON_S = 1.0  # after the alarm: later, chance has had too many tries

@@ -20,7 +20,7 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA
-from beaver_ftc.diagnosis.likelihood import share
+from beaver_ftc.diagnosis.detection.likelihood import share
 
 N_TONES = 16
 # A memory of T s tells frequencies 1 / T apart; halfway between two of the grid 0.7 of a tone is heard.

@@ -37,11 +37,11 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.schema import MAX_TERMS_OF_ONE
 from beaver_ftc.compiled import kernel, record, sized
-from beaver_ftc.diagnosis import forces, likelihood, tones
-from beaver_ftc.diagnosis.air import along, drift_beside, whole_drift
+from beaver_ftc.diagnosis.belief.air import along, drift_beside, whole_drift
 from beaver_ftc.diagnosis.bounds.variances import axis_of
-from beaver_ftc.diagnosis.forces import ASIDE, SETTLED, UP, separated_by_force, tell_apart, terms_of
-from beaver_ftc.diagnosis.likelihood import (
+from beaver_ftc.diagnosis.detection import forces, likelihood, tones
+from beaver_ftc.diagnosis.detection.forces import ASIDE, SETTLED, UP, separated_by_force, tell_apart, terms_of
+from beaver_ftc.diagnosis.detection.likelihood import (
     LATERAL,
     MAX_HYPOTHESES,
     N_READINGS,
@@ -50,8 +50,8 @@ from beaver_ftc.diagnosis.likelihood import (
     STEP,
     Rooms,
 )
+from beaver_ftc.diagnosis.detection.tones import tones_dtype
 from beaver_ftc.diagnosis.state import LOSS, NORMAL, PITCH, ROLL, SIDE, YAW
-from beaver_ftc.diagnosis.tones import tones_dtype
 from beaver_ftc.scenario.diagnosis import FdiConfig
 
 VANE_TOLERANCE = 0.1  # of what a vane's error does: its column is that of the trim

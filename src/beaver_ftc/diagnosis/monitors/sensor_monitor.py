@@ -13,11 +13,10 @@ of it, for the diagnosis and for the laws (`stand_in`); it is not trusted again 
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis import accelerometers, redundancy, since_start
-from beaver_ftc.diagnosis.bank import alarm
-from beaver_ftc.diagnosis.state import NOT_ISOLATED
-from beaver_ftc.diagnosis.thresholds import bound_step
-from beaver_ftc.diagnosis.watch import (
+from beaver_ftc.diagnosis.detection.bank import alarm
+from beaver_ftc.diagnosis.detection.thresholds import bound_step
+from beaver_ftc.diagnosis.monitors import accelerometers, redundancy, since_start
+from beaver_ftc.diagnosis.monitors.sensor_records import (
     AIRSPEED,
     ALPHA,
     ALPHA_FLOW,
@@ -41,6 +40,7 @@ from beaver_ftc.diagnosis.watch import (
     UNKNOWN,
     YES,
 )
+from beaver_ftc.diagnosis.state import NOT_ISOLATED
 from beaver_ftc.plant.instruments import (
     ALTITUDE,
     AX,

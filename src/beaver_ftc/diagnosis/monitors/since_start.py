@@ -34,8 +34,8 @@ dynamic pressure: nothing but the density shows it.
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.redundancy import STEEPEST_RAD, steepest
-from beaver_ftc.diagnosis.watch import (
+from beaver_ftc.diagnosis.monitors.redundancy import STEEPEST_RAD, steepest
+from beaver_ftc.diagnosis.monitors.sensor_records import (
     AIRSPEED,
     ALPHA,
     ALPHA_FLOW,

@@ -19,9 +19,9 @@ from math import exp
 import numpy as np
 
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.diagnosis.bank import alarm
+from beaver_ftc.diagnosis.detection.bank import alarm
+from beaver_ftc.diagnosis.detection.thresholds import bound_step, noise_step
 from beaver_ftc.diagnosis.state import STATISTICS, WORST_CASE
-from beaver_ftc.diagnosis.thresholds import bound_step, noise_step
 from beaver_ftc.scenario.schema import Scenario
 
 # Centres of the network's basis functions, rad; and its memory.

@@ -15,7 +15,7 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.terms import DPT
-from beaver_ftc.diagnosis.detection import note_alarm
+from beaver_ftc.diagnosis.detection.fdae import note_alarm
 from beaver_ftc.diagnosis.state import UNANTICIPATED, YAW
 
 THRUST, YAWING = "thrust", "engines_n"  # signals: CT and Cn

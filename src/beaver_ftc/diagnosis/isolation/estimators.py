@@ -26,8 +26,9 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import kernel, record, sized
-from beaver_ftc.diagnosis import membership
-from beaver_ftc.diagnosis.bank import explains, remember
+from beaver_ftc.diagnosis.detection.bank import explains, remember
+from beaver_ftc.diagnosis.detection.thresholds import bound_step, interval, noise_step, published
+from beaver_ftc.diagnosis.isolation import membership
 from beaver_ftc.diagnosis.state import (
     CONSTANT,
     INTERVAL,
@@ -37,7 +38,6 @@ from beaver_ftc.diagnosis.state import (
     PUBLISHED,
     UNANTICIPATED,
 )
-from beaver_ftc.diagnosis.thresholds import bound_step, interval, noise_step, published
 from beaver_ftc.scenario.diagnosis import MAX_POLES, FdiConfig
 
 # What a fault adds to the angular acceleration, as its estimator supposes: offset + theta Z, give or take.

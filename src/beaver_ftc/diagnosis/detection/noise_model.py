@@ -18,15 +18,23 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.design.engine import slipstream_slopes
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, PH, QDYN, RH, directional, whole_sum
 from beaver_ftc.design.variants import jacobian
-from beaver_ftc.diagnosis import likelihood
-from beaver_ftc.diagnosis.across import AN_AXIS, Direction, across_a_column, set_up_views, views_of
-from beaver_ftc.diagnosis.air import BY_FORCE, UNSEEN, set_up_air, set_up_jitter, set_up_passing
+from beaver_ftc.diagnosis.belief.air import BY_FORCE, UNSEEN, set_up_air, set_up_jitter, set_up_passing
 from beaver_ftc.diagnosis.bounds.declared import Errors
 from beaver_ftc.diagnosis.bounds.variances import axis_of, length_of_gusts, steady_tolerance
-from beaver_ftc.diagnosis.forces import set_up_forces
-from beaver_ftc.diagnosis.likelihood import ALPHA3, ENDING, GROWING, LATERAL, N_READINGS, N_SLOTS, STEP
+from beaver_ftc.diagnosis.detection import likelihood
+from beaver_ftc.diagnosis.detection.forces import set_up_forces
+from beaver_ftc.diagnosis.detection.likelihood import (
+    ALPHA3,
+    ENDING,
+    GROWING,
+    LATERAL,
+    N_READINGS,
+    N_SLOTS,
+    STEP,
+)
+from beaver_ftc.diagnosis.detection.parity import AN_AXIS, Direction, across_a_column, set_up_views, views_of
+from beaver_ftc.diagnosis.detection.tones import N_TONES, set_up_listening
 from beaver_ftc.diagnosis.state import LOSS, SIDE
-from beaver_ftc.diagnosis.tones import N_TONES, set_up_listening
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
 from beaver_ftc.scenario.diagnosis import Bounds, FdiConfig, Statistical
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.diagnosis.bounds.declared import poles_for_noise
-from beaver_ftc.diagnosis.thresholds import bound_step, noise_step
+from beaver_ftc.diagnosis.detection.thresholds import bound_step, noise_step
 from beaver_ftc.scenario.diagnosis import MAX_POLES, FdiConfig
 
 # The bank of detection filters; filter 0 is the published one.

@@ -40,7 +40,7 @@ from beaver_ftc.diagnosis.bounds.variances import drift as gust_drift
 from beaver_ftc.diagnosis.bounds.variances import drift_at_1_m as gust_drift_at_1_m
 from beaver_ftc.diagnosis.bounds.variances import flow_noise, jitter, length_of_gusts
 from beaver_ftc.diagnosis.bounds.worst_case import least_height
-from beaver_ftc.diagnosis.redundancy import FALLING_M_S2
+from beaver_ftc.diagnosis.monitors.redundancy import FALLING_M_S2
 from beaver_ftc.plant.instruments import wrapped
 from beaver_ftc.scenario.diagnosis import Bounds
 from beaver_ftc.scenario.warnings import MASS_TOLERANCE

@@ -17,8 +17,8 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.bounds.worst_case import LEAST_HEIGHT_M
-from beaver_ftc.diagnosis.thresholds import bound_step, noise_step
-from beaver_ftc.diagnosis.watch import (
+from beaver_ftc.diagnosis.detection.thresholds import bound_step, noise_step
+from beaver_ftc.diagnosis.monitors.sensor_records import (
     AIRSPEED,
     ALPHA,
     ALPHA_FLOW,

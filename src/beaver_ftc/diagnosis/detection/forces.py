@@ -22,9 +22,9 @@ from beaver_ftc.aircraft.schema import MAX_SURFACES, MAX_TERMS_OF_ONE, SIDESLIP_
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.engine import slipstream_slopes
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, DPT, N_Y, QDYN, evaluate
-from beaver_ftc.diagnosis.air import no_longer_read
+from beaver_ftc.diagnosis.belief.air import no_longer_read
 from beaver_ftc.diagnosis.bounds.declared import Errors, gust_mps
-from beaver_ftc.diagnosis.redundancy import FALLING_M_S2
+from beaver_ftc.diagnosis.monitors.redundancy import FALLING_M_S2
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
 from beaver_ftc.scenario.diagnosis import Bounds
 from beaver_ftc.scenario.sensors import ACCELEROMETERS

@@ -1,0 +1,1 @@
+"""Monitors of what is not a control surface: sensors by their redundancy, engines by their symmetry."""

@@ -2,7 +2,10 @@
 
 import numpy as np
 
+from beaver_ftc.aircraft import load
 from beaver_ftc.loop.loop import fly
+from beaver_ftc.scenario.declared import Declared
+from beaver_ftc.scenario.diagnosis import FdiConfig
 from beaver_ftc.scenario.schema import Scenario
 
 PUBLISHED_UNCERTAINTY = {
@@ -18,6 +21,11 @@ SINES = {
     "q": [{"sine": {"amplitude_deg_s": 3, "frequency_hz": 0.2}}],
     "r": [{"sine": {"amplitude_deg_s": 3, "frequency_hz": 0.3}}],
 }
+
+
+def declared_in(bounds, aircraft=None):
+    """What these `fdi.bounds` declare of an aircraft."""
+    return Declared.by(FdiConfig(bounds=bounds), aircraft or load())
 
 
 class Memory:

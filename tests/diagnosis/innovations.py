@@ -14,10 +14,10 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.design.engine import DPT_0, KW_TO_DPT, SEA_LEVEL_DENSITY_KG_M3
 from beaver_ftc.design.fdc import MASS
 from beaver_ftc.diagnosis.bounds import variances
-from beaver_ftc.diagnosis.bounds.declared import Errors
 from beaver_ftc.diagnosis.detection import likelihood, noise_model, statistical
 from beaver_ftc.diagnosis.detection.likelihood import MAX_HYPOTHESES, N_SLOTS, SENSE, Rooms, block_dtype
 from beaver_ftc.loop.assembly import assemble
+from beaver_ftc.scenario.declared import Declared, SensorErrors
 from beaver_ftc.scenario.schema import Scenario
 
 TRAVEL_RAD = np.array([[-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]])
@@ -165,8 +165,8 @@ class Detector:
         self.frames = assemble(scenario, np.zeros(4), TRAVEL_RAD).view(np.recarray)
         frame = self.frames[0]
         self.fdi, self.dt = frame["fdi"], 1.0 / rate_hz
-        design, aircraft = frame["belief"]["design"], scenario.airframe
-        noise_model.set_up(self.fdi, scenario.fdi, design, MASS, LEVEL_FLIGHT, rate_hz, aircraft)
+        design, declared = frame["belief"]["design"], Declared.of(scenario)
+        noise_model.set_up(self.fdi, scenario.fdi, declared, design, MASS, LEVEL_FLIGHT, rate_hz)
         self.detector = self.fdi["statistical"]
         Statistical.prepare(self.detector, self.fdi, design, *LEVEL_FLIGHT)
         self.frame = 0
@@ -222,5 +222,5 @@ def surfaces_at_work(frames, rate_hz, rng, size=0.3):
 
 def gust_jitter(sensors, design, span_m):
     """What the noise of vanes and airspeed adds to the gust they see, in level flight."""
-    flow = variances.flow_noise(Errors(sensors), LEVEL_FLIGHT[1][2])
+    flow = variances.flow_noise(SensorErrors(sensors), LEVEL_FLIGHT[1][2])
     return variances.jitter(flow, design, *LEVEL_FLIGHT[1:], span_m)

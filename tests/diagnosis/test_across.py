@@ -8,7 +8,7 @@ from statistics_of import Across
 from beaver_ftc.aircraft import load
 from beaver_ftc.diagnosis.belief import air
 from beaver_ftc.diagnosis.detection.likelihood import STEP
-from beaver_ftc.diagnosis.detection.parity import across_a_column, set_up_views
+from beaver_ftc.diagnosis.detection.parity import set_up_views
 from beaver_ftc.diagnosis.detection.tones import set_up_listening
 from beaver_ftc.diagnosis.state import LOSS, POSITION
 from beaver_ftc.loop import frame
@@ -111,7 +111,7 @@ def test_only_what_a_surface_does_not_move_excludes_it():
 def test_views_are_there_only_where_something_is_concluded_from_them(changes, instants, counts):
     """Of two faults one may move what the other does not; within a frame of instants a column turns."""
     config = FdiConfig.model_validate({"fault_class": "all", "statistical": {}, **changes})
-    assert across_a_column(config, instants) == counts
+    assert config.compares_across(instants) == counts
 
 
 @pytest.mark.parametrize("substeps", [1, 2])

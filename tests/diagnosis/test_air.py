@@ -12,16 +12,16 @@ from hypothesis import strategies as st
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS
+from beaver_ftc.design.dryden import Dryden, rotation_lengths
 from beaver_ftc.design.fdc import MASS
 from beaver_ftc.design.model import design_record, rate_damping
 from beaver_ftc.design.variants import jacobian
 from beaver_ftc.diagnosis.belief import air
 from beaver_ftc.diagnosis.belief.air import AIR
-from beaver_ftc.diagnosis.bounds import variances
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.scenario.diagnosis import Bounds
 from beaver_ftc.scenario.loader import load as load_given
-from flying import scenario
+from flying import declared_in, scenario
 
 ROOT = Path(__file__).resolve().parents[2]
 MEMORY_S = 0.05  # over which the whitening filter compares, about
@@ -31,7 +31,7 @@ FT = 0.3048
 def air_of(turbulence="light"):
     """The record as before a flight."""
     record = np.zeros(1, AIR).view(np.recarray)[0]
-    air.set_up_air(record, Bounds(turbulence=turbulence), MASS, load())
+    air.set_up_air(record, declared_in(Bounds(turbulence=turbulence), load()), MASS)
     return record
 
 
@@ -70,7 +70,7 @@ class Flown:
         """Of the random walk that differs as much over so long (3,), as a share of what is declared."""
         frames = round(over_s * self.rate_hz)
         differences = signal[frames:] - signal[:-frames]
-        declared = variances.drift(self.turbulence, 14.63) * self.airspeed
+        declared = Dryden(self.turbulence).rotation_walk(14.63) * self.airspeed
         return np.mean(differences**2, axis=0) / over_s / declared
 
 
@@ -182,7 +182,7 @@ def test_where_no_gust_is_seen_each_returns_as_late_as_it_does(without_forces):
     fdi = {"statistical": {}, "bounds": {"turbulence": "light"}}
     statistical = Loop(load_given({"aircraft": "./trainer", "fdi": fdi})).frames["fdi"]["statistical"][0]
     long, record = statistical["block"][2], statistical["air"]
-    lengths = variances.length_of_gusts(float(record["span"]))
+    lengths = rotation_lengths(float(record["span"]))
     omega = np.geomspace(1e-4, 1e2, 50)  # rad/m
     for g in range(3):
         true = 1.0 / (1.0 / lengths[g] ** 2 + omega**2)
@@ -324,7 +324,7 @@ def test_what_is_not_seen_drifts_in_body_axes_as_a_covariance_turns():
     y = np.array([0.1, 0.02, 45.0, 1036.0, 0.3])
     record["axes"] = turn = _turn(0.6, 0.1)
     air.effect(record, design, np.zeros(3), y, np.zeros(4))
-    spread = turn @ np.diag(45.0 * variances.drift("light", 14.63) * air.UNSEEN) @ turn.T
+    spread = turn @ np.diag(45.0 * Dryden("light").rotation_walk(14.63) * air.UNSEEN) @ turn.T
     expected = record["damping"] @ spread @ record["damping"].T
     found = [[air.unseen_drift(record, 45.0, i, j) for j in range(3)] for i in range(3)]
     assert np.array(found) == pytest.approx(expected, rel=1e-12)
@@ -341,7 +341,7 @@ def test_a_gust_unseen_drifts_besides_as_its_axis_turns_in_the_body():
     air.elapse(record, 1.0)
     turned = (_turn(*after[:2]) - _turn(*before[:2]))[:, 0] / dt
     lag_s = np.sqrt(0.3048 * 1750 * 14.63) / 2.6 / 45
-    variance = 45 * variances.drift("light", 14.63)[0] * lag_s / 2  # of a first-order process
+    variance = 45 * Dryden("light").rotation_walk(14.63)[0] * lag_s / 2  # of a first-order process
     expected = np.outer(D @ turned, D @ turned) * variance * lag_s
     assert record["leap"] / dt == pytest.approx(expected, rel=1e-9)
 

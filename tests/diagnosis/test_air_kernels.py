@@ -12,7 +12,7 @@ from beaver_ftc.design.variants import response
 from beaver_ftc.diagnosis.belief import air
 from beaver_ftc.diagnosis.belief.air import AIR
 from beaver_ftc.diagnosis.bounds import variances
-from beaver_ftc.diagnosis.bounds.declared import Errors
+from beaver_ftc.scenario.declared import SensorErrors
 from beaver_ftc.scenario.sensors import Sensors
 
 AIRCRAFT = load()
@@ -226,7 +226,7 @@ def test_the_noise_of_an_attitude_is_in_the_gust_that_is_followed(angle, axis):
         air.observe(record, y, blurred, DT)
         seen.append(record["gust"].copy())
     lags = np.array([4.0, 3.0]) * SPAN / (np.pi * 45.0)
-    counted, reckoned = np.std(seen, axis=0)[1:] * lags, variances.flow_noise(Errors(sensors), 45.0)
+    counted, reckoned = np.std(seen, axis=0)[1:] * lags, variances.flow_noise(SensorErrors(sensors), 45.0)
     assert (counted <= 1.02 * reckoned).all()
     if axis is not None:
         assert counted[axis - 1] == pytest.approx(reckoned[axis - 1], rel=0.05)

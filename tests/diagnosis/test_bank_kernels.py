@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from kernels import DT, POLES, estimator, new_fdi, on, weights
 
-from beaver_ftc.diagnosis.bounds.declared import poles_for_noise
+from beaver_ftc.diagnosis.bounds.admitted import poles_for_noise
 from beaver_ftc.diagnosis.detection import bank
+from beaver_ftc.scenario.declared import Declared, SensorErrors
 from beaver_ftc.scenario.schema import Scenario
 from telling import apart
 
@@ -165,11 +166,12 @@ def test_poles_are_those_asked_for_and_those_that_noise_asks_for(noisy, several)
     noise = {"sensors": {"p": {"noise_std_deg_s": 0.04}, "q": {"noise_std_deg_s": 0.09}}} if noisy else {}
     asked = {"detection_pole_per_s": 2.5, "pole_bank_per_s": [11.0, 0.7], "bounds": noise}
     asked |= {"sharpen": {"pole_bank": several}}
-    config, fdi = Scenario.model_validate({"name": "x", "fdi": asked}).fdi, new_fdi()
+    scenario, fdi = Scenario.model_validate({"name": "x", "fdi": asked}), new_fdi()
+    config = scenario.fdi
     fdi["bank"]["decay"] = 0.0
-    bank.configure(fdi["bank"], config, DT)
+    bank.configure(fdi["bank"], config, Declared.of(scenario), DT)
     bound = max(config.bounds.constant_rad_s2.as_tuple())
-    for_noise = poles_for_noise(config.bounds.sensors, bound)
+    for_noise = poles_for_noise(SensorErrors(config.bounds.sensors), bound)
     assert bool(for_noise) is noisy
     poles = [2.5, *([11.0, 0.7, *for_noise] if several else [])]
     apart(poles=poles)

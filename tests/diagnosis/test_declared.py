@@ -5,8 +5,8 @@ import pytest
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.context import Declared
-from beaver_ftc.diagnosis.bounds.declared import GUST_FT_S, SCALE_FT
-from beaver_ftc.diagnosis.bounds.variances import gust_effect, gusts
+from beaver_ftc.design.dryden import GUST_FT_S, SCALE_FT, Dryden
+from beaver_ftc.diagnosis.bounds.variances import gust_effect
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.studies.compare.replay import Recorder, record
 from flying import scenario
@@ -91,17 +91,17 @@ def test_the_turbulence_told_is_the_one_flown(severity):
 
 
 def test_the_air_rolls_more_than_it_pitches_or_yaws_and_faster_flight_meets_it_sooner():
-    slow, fast = gusts("light", 40.0, 14.63), gusts("light", 50.0, 14.63)
+    slow, fast = Dryden("light").rotation(40.0, 14.63), Dryden("light").rotation(50.0, 14.63)
     assert slow[0][0] > slow[0][2] > slow[0][1] > 0
     assert slow[0] == pytest.approx(fast[0])
     assert slow[1] == pytest.approx(1.25 * fast[1])
-    assert gusts("moderate", 40.0, 14.63)[0] == pytest.approx(10.6 / 7.4 * slow[0])
+    assert Dryden("moderate").rotation(40.0, 14.63)[0] == pytest.approx(10.6 / 7.4 * slow[0])
 
 
 def test_the_slopes_of_the_gusts_have_the_variance_of_drydens_spectrum():
     """sigma^2 of s / V / (1 + tau s) behind Dryden's vertical gusts, by numerical integration."""
     V, L, sigma = 45.0, 1750 * 0.3048, 7.4 * 0.3048
-    rotation, time_s = gusts("light", V, 14.63)
+    rotation, time_s = Dryden("light").rotation(V, 14.63)
     omega = np.linspace(0.0, 4000.0, 4_000_001)
     gust = sigma**2 * L / (np.pi * V) * (1 + 3 * (L * omega / V) ** 2) / (1 + (L * omega / V) ** 2) ** 2
     for axis in (1, 2):
@@ -113,7 +113,7 @@ def test_the_slopes_of_the_gusts_have_the_variance_of_drydens_spectrum():
 def test_gusts_turn_the_air_as_drydens_spectra_say(severity):
     """The variance of each rotation is the integral of its spectrum [MIL-F-8785C], by quadrature."""
     V, b, L = 45.0, 14.6, SCALE_FT * 0.3048
-    deviation, time_s = gusts(severity, V, b)
+    deviation, time_s = Dryden(severity).rotation(V, b)
     sigma = GUST_FT_S[severity] * 0.3048
     w = np.concatenate(([0.0], np.geomspace(1e-6, 1e6, 400_001)))
     across = sigma**2 * L / (np.pi * V) * (1.0 + 3.0 * (L * w / V) ** 2) / (1.0 + (L * w / V) ** 2) ** 2

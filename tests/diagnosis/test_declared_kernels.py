@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from beaver_ftc.aircraft import load
+from beaver_ftc.design.dryden import SCALE_FT, Dryden
 from beaver_ftc.design.model import design_record
-from beaver_ftc.diagnosis.bounds.declared import SCALE_FT
-from beaver_ftc.diagnosis.bounds.variances import declared_of, gust_effect, gusts, model_error
+from beaver_ftc.diagnosis.bounds.variances import gust_effect, model_error, variances_of
 from beaver_ftc.scenario.actuators import Actuators
 from beaver_ftc.scenario.diagnosis import Bounds
+from flying import declared_in
 
 AIRCRAFT = load()
 Y = np.array([0.1, 0.03, 45.0, 1036.0, 0.3, 0.0, 0.0, 0.0])
@@ -65,7 +66,7 @@ def test_an_error_of_an_air_datum_moves_the_model_by_it_alone(design):
 
 
 def declared(design, **bounds):
-    return declared_of(Bounds.model_validate(bounds), Actuators(), design, Y, U, AIRCRAFT)
+    return variances_of(declared_in(Bounds.model_validate(bounds), AIRCRAFT), Actuators(), design, Y, U)
 
 
 def test_of_an_air_datum_noise_bias_and_rounding_count(design):
@@ -90,13 +91,13 @@ def test_deflections_inertia_and_the_air_are_told_in_si(design):
     ]
     assert told.model_rad_s2 == pytest.approx(np.sqrt(np.square(moved).sum(axis=0)), rel=1e-6)
     assert (told.deflection_rad, told.inertia) == (pytest.approx(np.radians(1.5)), 0.1)
-    rotation, time_s = gusts("light", 45.0, AIRCRAFT.geometry.span_m)
+    rotation, time_s = Dryden("light").rotation(45.0, AIRCRAFT.geometry.span_m)
     assert (told.gust_rad_s.tolist(), told.gust_time_s.tolist()) == (rotation.tolist(), time_s.tolist())
 
 
 def test_a_tolerance_is_a_share_of_each_coefficient(design):
     bounds = Bounds.model_validate({"coefficients": 0.1})
-    told = declared_of(bounds, Actuators(), design, Y, U, AIRCRAFT)
+    told = variances_of(declared_in(bounds, AIRCRAFT), Actuators(), design, Y, U)
     assert told.coefficients == pytest.approx([0.1 * abs(term.value) for term in AIRCRAFT.moments])
 
 
@@ -105,7 +106,7 @@ def test_gusts_turn_the_air_as_their_spectra_say(b):
     """Pitch and yaw: the variance of a lagged slope behind Dryden's gusts, by quadrature in u = arctan of
     the frequency; roll: 1.9 sigma / sqrt(L b), and its lag sqrt(L b) / 2.6 V [Yeager1998]."""
     V, L, sigma = 45.0, SCALE_FT * 0.3048, 7.4 * 0.3048
-    rotation, time_s = gusts("light", V, b)
+    rotation, time_s = Dryden("light").rotation(V, b)
     nodes, weights = np.polynomial.legendre.leggauss(400)
     u = 0.25 * np.pi * (nodes + 1.0)
     w, dw = np.tan(u) * V / L, 0.25 * np.pi * weights / np.cos(u) ** 2 * V / L

@@ -6,10 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from beaver_ftc.design.model import both_responses, design_record
-from beaver_ftc.diagnosis.bounds.declared import inertia_slack, poles_for_noise
+from beaver_ftc.diagnosis.bounds.admitted import inertia_slack, poles_for_noise
 from beaver_ftc.diagnosis.bounds.worst_case import derived_bound, slack_per_rad
 from beaver_ftc.diagnosis.detection.thresholds import noise_step
 from beaver_ftc.loop.assembly import assemble
+from beaver_ftc.scenario.declared import SensorErrors
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sensors import Sensors
 from samples import samples
@@ -133,10 +134,10 @@ def test_poles_for_noise_give_the_greatest_excess():
     def smallest_fault(pole, delay_s):
         return (nbar * pole + eta) / (1 - np.exp(-pole * delay_s))
 
-    for delay_s, pole in zip((0.1, 0.5, 2.0), poles_for_noise(sensors, eta), strict=True):
+    for delay_s, pole in zip((0.1, 0.5, 2.0), poles_for_noise(SensorErrors(sensors), eta), strict=True):
         least = min(smallest_fault(other, delay_s) for other in np.geomspace(0.05, 200, 4000))
         assert smallest_fault(pole, delay_s) == pytest.approx(least, rel=1e-5)
-    assert poles_for_noise(Sensors(), eta) == ()
+    assert poles_for_noise(SensorErrors(Sensors()), eta) == ()
 
 
 def test_errors_that_have_no_bound_cannot_be_declared():

@@ -11,12 +11,13 @@ from beaver_ftc.aircraft.schema import SIDESLIP_RATE
 from beaver_ftc.design.engine import slipstream_slopes
 from beaver_ftc.design.terms import fill_table
 from beaver_ftc.diagnosis.detection import forces, parity, statistical
-from beaver_ftc.diagnosis.detection.forces import ASIDE, UP, look, set_up_forces, tell_apart
+from beaver_ftc.diagnosis.detection.forces import ASIDE, UP, look, set_up_forces
 from beaver_ftc.diagnosis.detection.parity import AN_AXIS, THE_VANE, set_up_views
 from beaver_ftc.diagnosis.detection.tones import set_up_listening
 from beaver_ftc.diagnosis.state import NORMAL, PITCH, ROLL, SIDE, YAW
 from beaver_ftc.plant.instruments import MEASURED
 from beaver_ftc.scenario.diagnosis import Bounds
+from flying import declared_in
 from telling import apart
 
 AIRCRAFT = load()
@@ -47,7 +48,7 @@ def felt(bounds=None, **admitted):
     air["area_per_mass"], air["gravity"] = AIRCRAFT.geometry.wing_area_m2 / AIRCRAFT.mass.mass_kg, GRAVITY
     air["scale"], statistical["forces"]["known"] = 533.4, 1
     air["read"] = 1
-    set_up_forces(fdi, bounds or Bounds(), AIRCRAFT, (X, Y, U), ALONG_Y, DT)
+    set_up_forces(fdi, declared_in(bounds or Bounds(), AIRCRAFT), (X, Y, U), ALONG_Y, DT)
     return fdi
 
 
@@ -687,7 +688,7 @@ def test_an_aircraft_told_apart_in_one_plane_only_has_the_views_of_that_plane(ai
     assert found == expected
     asking = [asked and view in (0, 2, 3) for view in range(5)]  # pitch, yaw, and past the aileron
     assert [bool(view["cleared_by"]) for view in views[:5]] == asking
-    assert tell_apart(aircraft)
+    assert aircraft.forces_separate_surfaces
 
 
 NOISY = {

@@ -19,6 +19,7 @@ from beaver_ftc.diagnosis.state import LOSS
 from beaver_ftc.plant.instruments import SIGNALS
 from beaver_ftc.scenario.diagnosis import Bounds
 from beaver_ftc.studies.engine.statistics import poisson
+from flying import declared_in
 
 NO_COUPLING = {"p": 0.0, "q": 0.0, "r": 0.0}
 TACTICAL = {"sensors": "tactical-grade"}
@@ -148,7 +149,7 @@ def test_a_scale_error_of_a_sensor_is_within_the_tolerances_it_is_turned_into(si
     _, y, _ = LEVEL_FLIGHT
     rng = np.random.default_rng(2)
     aircraft, table = load(), design["moments"]
-    tolerance = variances.steady_tolerance(bounds, aircraft, design, MASS, y, np.zeros(4))
+    tolerance = variances.steady_tolerance(declared_in(bounds, aircraft), design, MASS, y, np.zeros(4))
     axis = np.array([["Cl", "Cm", "Cn"].index(term.coefficient) for term in aircraft.moments])
     for _ in range(50):
         x, u = rng.uniform(-0.02, 0.02, 3), np.append(rng.uniform(-0.005, 0.005, 3), 0.0)
@@ -170,9 +171,9 @@ def test_a_scale_error_of_a_sensor_is_within_the_tolerances_it_is_turned_into(si
 def test_tolerances_of_coefficients_and_inertia_add_up():
     bounds = Bounds.model_validate({"coefficients": {"Cm_de": 0.1}, "inertia": 0.05})
     aircraft, design = load(), design_record()[0]
-    tolerance = variances.steady_tolerance(bounds, aircraft, design, MASS, *LEVEL_FLIGHT[1:])
+    tolerance = variances.steady_tolerance(declared_in(bounds, aircraft), design, MASS, *LEVEL_FLIGHT[1:])
     inertia = variances.steady_tolerance(
-        Bounds.model_validate({"inertia": 0.05}), aircraft, design, MASS, *LEVEL_FLIGHT[1:]
+        declared_in(Bounds.model_validate({"inertia": 0.05}), aircraft), design, MASS, *LEVEL_FLIGHT[1:]
     )
     i, size = aircraft.index("Cm_de"), abs(aircraft.terms["Cm_de"].value)
     assert (tolerance - inertia)[i] == pytest.approx(0.1 * size)

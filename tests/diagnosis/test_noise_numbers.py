@@ -8,20 +8,23 @@ import pytest
 from innovations import LEVEL_FLIGHT, TRAVEL_RAD, Detector, by_onset, gust_jitter
 
 from beaver_ftc.aircraft import load
+from beaver_ftc.design.dryden import Dryden, rotation_lengths
 from beaver_ftc.design.fdc import MASS
 from beaver_ftc.design.model import design_record, inertia_coefficients
 from beaver_ftc.design.variants import coefficient_slopes, jacobian
 from beaver_ftc.diagnosis.belief import air
 from beaver_ftc.diagnosis.bounds import variances
-from beaver_ftc.diagnosis.bounds.declared import Errors, gust_sigma_rad_s, inertia_slack
+from beaver_ftc.diagnosis.bounds.admitted import inertia_slack
 from beaver_ftc.diagnosis.bounds.worst_case import error_map_dtype
 from beaver_ftc.diagnosis.detection import noise_model, statistical
 from beaver_ftc.diagnosis.detection.likelihood import ALPHA3, ENDING, GROWING, N_SLOTS, STEP
 from beaver_ftc.diagnosis.detection.statistical import statistical_dtype
 from beaver_ftc.diagnosis.state import LOSS
 from beaver_ftc.loop.assembly import assemble
+from beaver_ftc.scenario.declared import Declared, SensorErrors
 from beaver_ftc.scenario.diagnosis import Bounds, Statistical
 from beaver_ftc.scenario.schema import Scenario
+from flying import declared_in
 
 AIRCRAFT = load()
 SPAN_M, CHORD_M = AIRCRAFT.geometry.span_m, AIRCRAFT.geometry.chord_m
@@ -39,11 +42,11 @@ AILERON, ELEVATOR, RUDDER = 0, 1, 2
 def test_gusts_drift_as_the_specification_has_them(turbulence):
     """Intensity over V: of a first-order process twice its variance over its lag; of a lagged slope that of
     the velocity over (V lag)^2 [MIL-F-8785C]."""
-    found = variances.drift(turbulence, SPAN_M)
+    found = Dryden(turbulence).rotation_walk(SPAN_M)
     sigma_w = 0.3048 * {"light": 7.4, "severe": 23.6}[turbulence]
     L = 0.3048 * 1750.0
     rolling_lag_s = sqrt(L * SPAN_M) / (2.6 * V)
-    rolling = 2.0 * gust_sigma_rad_s(turbulence, SPAN_M) ** 2 / rolling_lag_s
+    rolling = 2.0 * Dryden(turbulence).rotation_limit_rad_s(SPAN_M) ** 2 / rolling_lag_s
     velocity = 3.0 * sigma_w**2 * V / L
     pitching, yawing = (velocity / (V * n * SPAN_M / (pi * V)) ** 2 for n in (4, 3))
     assert found * V == pytest.approx([rolling, pitching, yawing], rel=1e-9)
@@ -191,7 +194,7 @@ def test_where_nothing_diagnoses_nothing_is_enabled():
 def _tolerance(**bounds):
     design = design_record()[0]
     given = Bounds.model_validate(bounds)
-    return variances.steady_tolerance(given, AIRCRAFT, design, MASS, Y, np.zeros(4))
+    return variances.steady_tolerance(declared_in(given, AIRCRAFT), design, MASS, Y, np.zeros(4))
 
 
 SIZE = np.array([abs(term.value) for term in AIRCRAFT.moments])
@@ -275,7 +278,7 @@ def as_set_up(bounds):
     alone = Detector(50.0)
     given = {**GIVEN, "fdi": {"statistical": {}, "bounds": bounds}}
     design, config = alone.frames[0]["belief"]["design"], Scenario.model_validate(given).fdi
-    noise_model.set_up(alone.fdi, config, design, MASS, LEVEL_FLIGHT, 50.0, AIRCRAFT)
+    noise_model.set_up(alone.fdi, config, Declared.by(config, AIRCRAFT), design, MASS, LEVEL_FLIGHT, 50.0)
     return alone.detector
 
 
@@ -317,7 +320,7 @@ def test_means_over_a_frame_are_shared_among_its_instants(instants, share):
     alone, config = Detector(50.0), Scenario.model_validate(GIVEN).fdi
     alone.fdi["config"]["instants"] = instants
     design = alone.frames[0]["belief"]["design"]
-    noise_model.set_up(alone.fdi, config, design, MASS, LEVEL_FLIGHT, 50.0, AIRCRAFT)
+    noise_model.set_up(alone.fdi, config, Declared.by(config, AIRCRAFT), design, MASS, LEVEL_FLIGHT, 50.0)
     assert alone.detector["tests"]["share"] == share
 
 
@@ -328,8 +331,8 @@ def test_an_elevator_off_trim_is_in_what_constants_multiply():
     alone, design = Detector(50.0), design_record()[0]
     scenario = Scenario.model_validate({**GIVEN, "fdi": {"statistical": {}, "bounds": config.model_dump()}})
     start = np.zeros(3), Y, u
-    noise_model.set_up(alone.fdi, scenario.fdi, design, MASS, start, 50.0, AIRCRAFT)
-    total = variances.steady_tolerance(config, AIRCRAFT, design, MASS, Y, u)
+    noise_model.set_up(alone.fdi, scenario.fdi, Declared.of(scenario), design, MASS, start, 50.0)
+    total = variances.steady_tolerance(declared_in(config, AIRCRAFT), design, MASS, Y, u)
     for block, axes in zip(alone.blocks, ((1,), (0, 2), (0, 2)), strict=True):
         of_it = total[np.isin(AXIS, axes)]
         assert block["tolerance"][: of_it.size] == pytest.approx(of_it)
@@ -363,7 +366,7 @@ def test_where_forces_are_weighed_their_noise_is_in_the_gust_that_follows_from_t
     statistical["air"]["span"] = SPAN_M
     forces["known"], forces["component"]["felt"] = known, (0.3**2, 0.2**2)
     forces["component"]["vane"][:, 1] = -6.0, 50.0
-    air.set_up_jitter(statistical, Errors(sensors.sensors), design, *LEVEL_FLIGHT[1:], dt)
+    air.set_up_jitter(statistical, SensorErrors(sensors.sensors), design, *LEVEL_FLIGHT[1:], dt)
     airspeed = LEVEL_FLIGHT[1][2]
     walked = known * np.sqrt(1.5**2 + 0.5**2) * np.array([0.2, 0.3]) * dt / airspeed
     added = variances.jitter(walked, design, *LEVEL_FLIGHT[1:], SPAN_M)
@@ -382,13 +385,13 @@ def test_what_an_aircrafts_terms_are_off_may_change_sides_within_a_frame(error, 
 
 def test_where_no_vane_shows_it_pitch_reckons_with_a_gust_no_weaker_at_any_frequency():
     """Dryden's vertical velocity, its slope lagged [MIL-F-8785C], beside the drift that stands for it."""
-    lag_m, omega = float(variances.length_of_gusts(SPAN_M)[1]), np.geomspace(1e-3, 1e3, 400)
+    lag_m, omega = float(rotation_lengths(SPAN_M)[1]), np.geomspace(1e-3, 1e3, 400)
     assert lag_m == pytest.approx(4.0 * SPAN_M / pi)
     sigma, L, tau = 0.3048 * 7.4, 0.3048 * 1750.0, lag_m / V
     x = (L * omega / V) ** 2
     velocity = sigma**2 * L / (pi * V) * (1.0 + 3.0 * x) / (1.0 + x) ** 2
     rotation = (omega / V) ** 2 * velocity / (1.0 + (tau * omega) ** 2)
-    intensity = variances.drift("light", SPAN_M)[1] * V
+    intensity = Dryden("light").rotation_walk(SPAN_M)[1] * V
     stands_for_it = intensity * tau**2 / pi / (1.0 + (tau * omega) ** 2)
     assert (rotation <= stands_for_it * (1.0 + 1e-9)).all()
     assert rotation[-1] == pytest.approx(stands_for_it[-1], rel=1e-4)

@@ -3,10 +3,14 @@
 import numpy as np
 import pytest
 
+from beaver_ftc.aircraft import load
+from beaver_ftc.design.dryden import Dryden
 from beaver_ftc.diagnosis.belief import air
-from beaver_ftc.diagnosis.bounds import declared, variances, worst_case
+from beaver_ftc.diagnosis.bounds import admitted as admitting
+from beaver_ftc.diagnosis.bounds import worst_case
 from beaver_ftc.diagnosis.bounds.worst_case import admitted_dtype
 from beaver_ftc.scenario.diagnosis import Bounds
+from flying import declared_in
 
 SPAN_M, FT = 14.63, 0.3048
 # sigma_w below 1000 ft: a tenth of 25.3, 50.6 and 76.0 ft/s; above 2000 ft: 7.4, 10.6 and 23.6 ft/s
@@ -76,8 +80,8 @@ def test_turbulence_is_as_strong_as_the_standard_has_it_at_a_height_and_no_less_
     h, b = max(height_ft, 10.0), SPAN_M / FT
     low, high = LOW[turbulence] * FT, HIGH[turbulence] * FT
     record = record_of(air.AIR)
-    record["aloft"] = variances.drift(turbulence, SPAN_M)
-    record["low"] = variances.drift_at_1_m(turbulence, SPAN_M)
+    record["aloft"] = Dryden(turbulence).rotation_walk(SPAN_M)
+    record["low"] = Dryden(turbulence).rotation_walk_at_1_m(SPAN_M)
     record["altitude_off"], record["altitude_slope"] = 0.7, 0.02
     reading = height_ft * FT / (1.0 - 0.02 / 0.98) + 0.7 / 0.98 / (1.0 - 0.02 / 0.98)
     air.reach_height(record, reading)
@@ -88,8 +92,8 @@ def test_turbulence_is_as_strong_as_the_standard_has_it_at_a_height_and_no_less_
     assert record["per_metre"] == pytest.approx(by_gusts)
 
     admitted = record_of(admitted_dtype(4))
-    admitted["gust_aloft"] = declared.GUST_LIMIT_SIGMA * declared.gust_sigma_rad_s(turbulence, SPAN_M)
-    admitted["gust_low"] = declared.GUST_LIMIT_SIGMA * declared.low_gust_sigma_rad_s(turbulence, SPAN_M)
+    admitted["gust_aloft"] = admitting.GUST_LIMIT_SIGMA * Dryden(turbulence).rotation_limit_rad_s(SPAN_M)
+    admitted["gust_low"] = admitting.GUST_LIMIT_SIGMA * Dryden(turbulence).low_rotation_limit_rad_s(SPAN_M)
     admitted["altitude_off"], admitted["altitude_slope"] = 0.7, 0.02
     worst_case.reach_height(admitted, reading)
     sigma = max(1.9 * LOW[turbulence] / np.sqrt(h * b), 1.9 * HIGH[turbulence] / np.sqrt(1750.0 * b))
@@ -113,7 +117,7 @@ def test_what_is_declared_of_drift_and_gusts_says_how_long_the_sum_lasts():
     for turbulence in ("light", "severe"):
         record = record_of(air.AIR)
         record["moving"] = record["seen"] = record["read"] = 1
-        air.set_up_passing(record, Bounds(turbulence=turbulence), 6.6, 45.0)
+        air.set_up_passing(record, declared_in(Bounds(turbulence=turbulence), load()), 6.6, 45.0)
         sigma, V_L = HIGH[turbulence] * FT, 45.0 / (1750.0 * FT)
         b = (2.0 * record["forgets"] ** 3 * sigma**2 / V_L) ** 0.5 / 2.0  # a^3 = 2 b^2 V / (L sigma^2)
         assert b == pytest.approx(2.0 * 7.292e-5 * 45.0 + 0.3 * 0.03, rel=1e-3)

@@ -7,9 +7,9 @@ from statistics_of import Statistical
 
 from beaver_ftc.design.engine import KW_TO_DPT
 from beaver_ftc.design.variants import response
-from beaver_ftc.diagnosis.bounds.declared import Errors
 from beaver_ftc.diagnosis.detection import noise_model
 from beaver_ftc.diagnosis.detection.likelihood import N_READINGS
+from beaver_ftc.scenario.declared import SensorErrors
 from beaver_ftc.scenario.diagnosis import Bounds
 
 BIASES = {
@@ -86,7 +86,7 @@ def test_without_errors_of_the_air_data_nothing_is_read():
     record = alone.detector
     admitted = alone.fdi["bound"]["admitted"]
     before = record["block"]["n_regressors"].copy()
-    noise_model.set_up_readings(record, Errors(gyros), admitted)
+    noise_model.set_up_readings(record, SensorErrors(gyros), admitted)
     assert list(record["block"]["n_regressors"]) == list(before)
     assert gyros.p.random_error == pytest.approx(np.radians(0.1))
 

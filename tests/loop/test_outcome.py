@@ -10,8 +10,8 @@ from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.diagnosis.state import STATISTICS, UNANTICIPATED
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.loop.outcome import Landing, guaranteed_delay_s, landing_of, verdict_of
-from beaver_ftc.plant.faults import TIME_TOLERANCE_S
 from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.timing import TIME_TOLERANCE_S
 
 SURFACES = ("aileron", "elevator", "rudder", "flap")
 TRIM = np.array([0.01, -0.02, 0.03, 0.04])

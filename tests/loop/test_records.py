@@ -6,11 +6,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from beaver_ftc.design.dryden import Dryden
+from beaver_ftc.diagnosis.bounds.admitted import GUST_LIMIT_SIGMA
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop import cockpit, instrument_records, memory
 from beaver_ftc.loop.assembly import lay_out, y_places
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.loop.plugin_frame import context_of, measured_of
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from kept import of_record
 
@@ -94,15 +97,13 @@ def test_for_how_long_a_sound_instrument_may_stand_still(noise, quantum, looks):
 def test_gusts_that_the_watch_reckons_with():
     """Changes of variance 3 sigma^2 V / L a second, V 1.4 times that at the start, L 533.4 m (1750 ft); the
     filter passes h / (1 - exp(-2 lam h)) of them."""
-    from beaver_ftc.diagnosis.bounds.declared import GUST_LIMIT_SIGMA, SCALE_M, gust_mps
-
-    speed, changes = instrument_records.gusts_seen("light", 45.0, 0.01)
-    sigma = gust_mps("light")
+    speed, changes = instrument_records.gusts_seen(Dryden("light"), 45.0, 0.01)
+    sigma = 7.4 * 0.3048
     assert speed == pytest.approx(GUST_LIMIT_SIGMA * sigma)
-    per_s = GUST_LIMIT_SIGMA * sigma * sqrt(3.0 * 1.4 * 45.0 / SCALE_M)
+    per_s = GUST_LIMIT_SIGMA * sigma * sqrt(3.0 * 1.4 * 45.0 / 533.4)
     expected = [per_s * sqrt(0.01 / (1 - exp(-2 * pole * 0.01))) for pole in instrument_records.POLES_PER_S]
     assert changes == pytest.approx(expected)
-    assert instrument_records.gusts_seen("none", 45.0, 0.01)[0] == 0.0
+    assert instrument_records.gusts_seen(Dryden("none"), 45.0, 0.01)[0] == 0.0
 
 
 @pytest.mark.parametrize(
@@ -117,7 +118,7 @@ def test_when_the_instruments_are_watched(monitor, scheme, breaks, watched):
     fault = {"sensor": "q", "type": "bias", "magnitude": 3, "at_s": 1.0}
     fdi = {"scheme": scheme, "sensor_monitor": monitor}
     flown = _scenario(fdi=fdi, faults=[fault] if breaks else [])
-    assert instrument_records.is_watched(flown) is watched
+    assert Declared.of(flown).monitors_sensors is watched
     assert instrument_records.breaks_instruments(flown) is breaks
     assert instrument_records.comes_to_be_watched(flown) is watched
     later = _scenario(

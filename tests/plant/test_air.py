@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.diagnosis.bounds.declared import gust_sigma_rad_s
+from beaver_ftc.design.dryden import Dryden
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.configure import NEVER, GustSchedule, configure, take_off, trim_of
 from beaver_ftc.scenario.environment import Gust
@@ -64,7 +64,7 @@ def test_dryden_turbulence_has_the_variances_and_the_memory_of_the_specification
     # high-frequency limit of their spectra, 1.5 pi / 4 and 1.5 pi / 3 times sigma^2 / (L b)
     rotation = 7.4 * np.sqrt((1.9**2 + 1.5 * np.pi / 4 + 1.5 * np.pi / 3) / (SCALE_FT * SPAN_FT))
     assert np.linalg.norm(sigma[3:]) == pytest.approx(rotation, rel=0.12)
-    assert (sigma[3:] < gust_sigma_rad_s("light", 14.63)).all()
+    assert (sigma[3:] < Dryden("light").rotation_limit_rad_s(14.63)).all()
     way = 2.0 * 45.0 / FT / SCALE_FT  # in two seconds, over the scale: the transverse correlation of Dryden
     assert np.mean(products) / sigma[2] ** 2 == pytest.approx((1 - way / 2) * np.exp(-way), abs=0.08)
 

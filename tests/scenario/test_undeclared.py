@@ -1,10 +1,14 @@
 """What the truth does and the diagnosis was not told is said, one line each."""
 
+from pathlib import Path
+
 import pytest
 
-from beaver_ftc.loop.loop import fly
-from beaver_ftc.scenario.loader import load_text
+from beaver_ftc.documents.document import Document
+from beaver_ftc.loop.loop import Loop, fly
+from beaver_ftc.scenario.loader import load_text, validate_scenario
 from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.undeclared import Kind, Reader, Undeclared, undeclared
 
 TOLD = """
 fdi: {bounds: {sensors: tactical-grade, turbulence: light, coefficients: {Cm_alpha: 0.05}, inertia: 0.05}}
@@ -144,3 +148,49 @@ def test_a_sharp_gust_is_taken_for_one_that_rotates_where_turbulence_is_declared
 
     assert alarm("light") is not None
     assert alarm("none") is None
+
+
+ALL = {"fault_class": "all", "statistical": {}}
+TRAINER = {"name": "x", "aircraft": "./trainer", "fdi": ALL}
+FOLDER = Path(__file__).parents[1] / "data" / "aircraft"
+
+
+def of_trainer(**keys):
+    """A flight of an aircraft whose forces separate no surfaces: accelerometers have no part in it."""
+    return validate_scenario(Document({**TRAINER, **keys}), folder=FOLDER)
+
+
+def test_where_forces_separate_no_surfaces_no_error_of_them_counts():
+    assert not Loop(of_trainer()).frames["fdi"]["statistical"]["forces"]["known"].any()
+    heavy = of_trainer(uncertainty={"mass": 1.06, "coefficients": {"CZ_alpha": 1.2}})
+    assert list(undeclared(heavy)) == []
+    assert heavy.warnings() == ()
+
+
+def test_a_mass_that_nothing_reads_takes_no_guarantee_away():
+    """The designer has the right inertia and another mass, which only accelerometers would show."""
+    kept = {"mass": 0.9, "inertia": dict.fromkeys(("Ix", "Iy", "Iz", "Jxz"), 1 / 0.9)}
+    fault = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.9, "at_s": 1.0}
+    given = {
+        "duration_s": 4.0, "faults": [fault], "initial": {"airspeed_mps": 30},
+        "reference": {"q": [{"sine": {"amplitude_deg_s": 4, "frequency_hz": 0.5}}]},
+    }  # fmt: skip
+    light, right = fly(of_trainer(**given, design_model=kept)), fly(of_trainer(**given))
+    assert right.guaranteed_delay_s is not None
+    assert light.guaranteed_delay_s == pytest.approx(right.guaranteed_delay_s)
+    assert light.detection_time_s == pytest.approx(right.detection_time_s)
+
+
+def test_a_fact_says_what_by_how_much_and_who_reads_it():
+    scenario = Scenario.model_validate({"name": "x", "uncertainty": {"mass": 1.2}, "fdi": ALL})
+    (fact,) = undeclared(scenario)
+    assert (fact.key, fact.value, fact.read_by) == ("uncertainty.mass", 1.2, Reader.ACCELEROMETERS)
+    assert fact.excess == pytest.approx(0.15)
+    assert (str(fact),) == scenario.warnings()
+
+
+@pytest.mark.parametrize("kind", Kind)
+def test_every_kind_of_fact_has_a_sentence(kind):
+    fact = Undeclared(kind, "a.key", "a.bound", names=("one", "two"), cure="cure it")
+    assert str(fact).startswith("a.key")
+    assert "{" not in str(fact)

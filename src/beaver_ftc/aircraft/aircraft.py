@@ -208,6 +208,11 @@ class Aircraft:
         """Cases of damage that a scenario may inflict, by name."""
         return MappingProxyType(self.file.damage)
 
+    @cached_property
+    def loses_surfaces(self) -> bool:
+        """Whether a case of damage takes any surface."""
+        return any(case.takes for case in self.damage.values())
+
     @property
     def signals(self) -> Mapping[str, SignalSection]:
         """Declared signals beside rates, alpha, beta, airspeed and dynamic pressure."""
@@ -247,6 +252,19 @@ class Aircraft:
     def measurable_forces(self) -> tuple[Term, ...]:
         """The same without what multiplies the rate of sideslip."""
         return tuple(term for term in self.forces if all(signal != SIDESLIP_RATE for signal, _ in term.of))
+
+    def separated_by_force(self, force: str) -> tuple[int, ...]:
+        """The surfaces, by number, that a force distinguishes where the rates alone do not: CZ those that
+        lead pitch, by their lift, CY the others; none if there is but one."""
+        moved = {term.surface for term in self.measurable_forces if term.coefficient == force}
+        lead = enumerate(zip(self.surfaces, self.dominant_axis, strict=True))
+        found = tuple(s for s, (name, axis) in lead if (axis == 1) == (force == "CZ") and name in moved)
+        return found if len(found) > 1 else ()
+
+    @cached_property
+    def forces_separate_surfaces(self) -> bool:
+        """Whether the side or the normal force distinguishes any surfaces."""
+        return any(self.separated_by_force(force) for force in ("CY", "CZ"))
 
     @cached_property
     def terms(self) -> Mapping[str, Term]:

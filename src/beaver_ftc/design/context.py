@@ -38,8 +38,8 @@ _ZEROS = {shape: partial(np.zeros, shape) for shape in (0, 3, 4, 7, (3, 3))}
 
 
 @dataclass(frozen=True)
-class Declared:
-    """What a designer is told of errors beside the published bounds; all zero where nothing is declared.
+class DeclaredErrors:
+    """Errors that a plug-in reckons with beside the published bounds; all zero where nothing is declared.
 
     noise, bias, resolution, slope (7,): of the instruments, in the order of SIGNALS, SI; noise is the
     standard deviation of a sample. gust_rad_s, gust_time_s (3,): rotation of the air about each axis,
@@ -96,6 +96,9 @@ class Declared:
         return share @ self.gust_time_s / np.maximum(share.sum(axis=1), 1e-300)
 
 
+Declared = DeclaredErrors  # the name that plug-ins know
+
+
 @dataclass(frozen=True)
 class Context:
     """Everything a plug-in may know before the flight; arrays are its own.
@@ -121,7 +124,7 @@ class Context:
     options: Mapping[str, float] = field(default_factory=dict)
     surfaces: tuple[str, ...] = field(default_factory=lambda: load().surfaces)
     leading: tuple[int, int, int] = (0, 1, 2)
-    declared: Declared = field(default_factory=Declared)
+    declared: DeclaredErrors = field(default_factory=DeclaredErrors)
 
     @property
     def leaders(self) -> tuple[str, ...]:

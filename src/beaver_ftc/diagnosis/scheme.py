@@ -10,7 +10,7 @@ from beaver_ftc.compiled import apart, kernel, record, sized
 from beaver_ftc.design.model import AIRSPEED
 from beaver_ftc.diagnosis import state, zhang2005
 from beaver_ftc.diagnosis.belief import air
-from beaver_ftc.diagnosis.bounds import declared
+from beaver_ftc.diagnosis.bounds import admitted
 from beaver_ftc.diagnosis.bounds.worst_case import bound_dtype
 from beaver_ftc.diagnosis.detection import bank, fdae, forces, statistical
 from beaver_ftc.diagnosis.detection.bank import largest_share
@@ -29,6 +29,7 @@ from beaver_ftc.diagnosis.state import (
 from beaver_ftc.diagnosis.types import examine, pairs, registry, verdict
 from beaver_ftc.diagnosis.types.examine import FIXED, LAGS, LOSES, SHIFTED
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.pairs import pairs_refused
 from beaver_ftc.scenario.schema import Scenario
 
@@ -62,8 +63,9 @@ def configure(fdi: np.void, belief: np.void, scenario: Scenario, travel: np.ndar
     fdi["isolation"]["taken"] = [surface in lost for surface in aircraft.surfaces]
     if config.pairs:
         _ask_each_plane(fdi, scenario)
-    declared.configure(fdi["bound"], scenario, belief["design"])
-    bank.configure(fdi["bank"], config, dt)
+    declared = Declared.of(scenario)
+    admitted.configure(fdi["bound"], scenario, declared, belief["design"])
+    bank.configure(fdi["bank"], config, declared, dt)
     fdae.configure(fdi["fdae"], scenario)
     engine_symmetry.configure(fdi["balance"], aircraft)
     if config.is_published:

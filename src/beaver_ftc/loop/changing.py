@@ -14,9 +14,10 @@ from beaver_ftc.control.laws import ADAPTING, NOMINAL, ORACLE, REJECTING
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.loop.plugin_frame import PluginFrame, named_detector, named_law, plugged
-from beaver_ftc.plant.faults import NEVER, frame_of
+from beaver_ftc.plant.faults import NEVER
 from beaver_ftc.scenario.interventions import stages
 from beaver_ftc.scenario.schema import Change, Scenario
+from beaver_ftc.scenario.timing import frame_of
 
 # What a law takes over from the one before it: where reference, command and engine are, and what is believed.
 KEPT = {

@@ -4,6 +4,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from beaver_ftc.aircraft.units import EARTH_RADIUS_M
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.addresses import GETTER, RUN, SETTER, address
@@ -11,7 +12,6 @@ from beaver_ftc.plant.native import NodeBank
 
 UNANTICIPATED = "failures/unanticipated/Cm-alpha3"
 IMMOVABLE = ("stuck", "hardover", "float")  # failures in which a surface does not follow its command
-EARTH_RADIUS_M = 6371000.0  # for the log's north and east: a local plane, not navigation
 LEAST_HEIGHT_M = 500.0  # above the ground at the start; the ground is at sea level, or lower if need be
 
 # Of aircraft that are flown again.

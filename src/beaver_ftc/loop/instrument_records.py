@@ -4,23 +4,22 @@ from math import exp
 
 import numpy as np
 
-from beaver_ftc.aircraft.units import GRAVITY_MPS2
+from beaver_ftc.aircraft.units import EARTH_RADIUS_M, GRAVITY_MPS2
 from beaver_ftc.design.context import DesignFunctions
-from beaver_ftc.diagnosis.bounds.declared import GUST_LIMIT_SIGMA, SCALE_M, Errors, gust_mps, low_gust_mps
+from beaver_ftc.design.dryden import Dryden
+from beaver_ftc.diagnosis.bounds.admitted import GUST_LIMIT_SIGMA
 from beaver_ftc.diagnosis.bounds.variances import gust_effect
-from beaver_ftc.diagnosis.detection.forces import tell_apart
-from beaver_ftc.diagnosis.detection.parity import across_a_column
 from beaver_ftc.diagnosis.monitors.accelerometers import NEVER_STILL
 from beaver_ftc.diagnosis.monitors.sensor_records import NOBODY, POLES_PER_S
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.faults import OF_THE_SLIPSTREAM
 from beaver_ftc.plant.instruments import LONGEST_DELAY, MOST_LINE, PHI, SENSORS, USUAL_LINE
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.faults import of_a_sensor
 from beaver_ftc.scenario.interventions import stages
 from beaver_ftc.scenario.schema import Scenario
 
-EARTH_RADIUS_M = 6_371_000.0
 FASTER = 1.4  # than at the start a flight may become
 TAKEN_OVER_PER_S = 3.0  # by the attitude, of a rate it stands in for, where its own noise is declared
 # What sets the counters of random numbers apart: OF_THE_FIRST, OF_THE_FURTHER, OF_FAULTS, OF_FORCES.
@@ -32,16 +31,10 @@ def breaks_instruments(scenario: Scenario) -> bool:
     return any(of_a_sensor(fault) for fault in scenario.faults)
 
 
-def is_watched(scenario: Scenario) -> bool:
-    """Whether the instruments are held against one another. A flight in which none can fail is spared it:
-    sound instruments never make the watch speak."""
-    needed = {"always": True, "auto": breaks_instruments(scenario), "never": False}
-    return needed[scenario.fdi.sensor_monitor] and scenario.fdi.is_ours
-
-
 def comes_to_be_watched(scenario: Scenario) -> bool:
     """Whether they are at some time of the flight."""
-    return any(is_watched(then) for then in (scenario, *(then for _, then in stages(scenario))))
+    flown = (scenario, *(then for _, then in stages(scenario)))
+    return any(Declared.of(then).monitors_sensors for then in flown)
 
 
 def columns_of_the_watch(scenario: Scenario) -> int:
@@ -56,27 +49,13 @@ def has_real_engine(scenario: Scenario) -> bool:
     return real and scenario.airframe.has_engine_instruments
 
 
-def weighs_forces(scenario: Scenario) -> bool:
-    """Whether accelerometers are read to tell surfaces apart by their forces."""
-    across = across_a_column(scenario.fdi, scenario.substeps)
-    return scenario.fdi.weighs_chance and across and tell_apart(scenario.airframe)
-
-
-def feels_air(scenario: Scenario) -> bool:
-    """Whether accelerometers are read to tell a gust from what moves the aircraft: where the design model has
-    no forces, and no watch may find them broken. Of aircraft alone whose damage takes surfaces: light ones,
-    whose law answers what is left of a gust, alarmed in 3 of 34 and 4 of 30 healthy flights."""
-    moving = scenario.fdi.weighs_chance and scenario.fdi.bounds.turbulence != "none"
-    aircraft = scenario.airframe
-    unknown = any(of.takes for of in aircraft.damage.values()) and not aircraft.measurable_forces
-    return moving and unknown and not is_watched(scenario)
-
-
 def truth_read(scenario: Scenario) -> tuple[ch.Channel, ...]:
     """What is read from the truth in this flight."""
     usual = ch.truth_channels(scenario.airframe)
-    reasons = is_watched, breaks_instruments, has_real_engine, weighs_forces, feels_air
-    further = any(reason(scenario) for reason in reasons)
+    declared = Declared.of(scenario)
+    accelerometers = declared.uses_accelerometers or declared.follows_gusts_by_accelerometers
+    fails = breaks_instruments(scenario) or has_real_engine(scenario)
+    further = declared.monitors_sensors or accelerometers or fails
     return (*usual, *ch.further_channels(scenario.airframe)) if further else usual
 
 
@@ -85,8 +64,9 @@ def configure(frame: np.void, scenario: Scenario, dt: float) -> None:
     instruments = frame["instruments"]
     instruments["real"] = not scenario.sensors.is_ideal
     instruments["engine"] = has_real_engine(scenario)
-    frame["fdi"]["statistical"]["forces"]["known"] = weighs_forces(scenario)
-    frame["fdi"]["statistical"]["air"]["read"] = feels_air(scenario)
+    declared, statistical = Declared.of(scenario), frame["fdi"]["statistical"]
+    statistical["forces"]["known"] = declared.uses_accelerometers
+    statistical["air"]["read"] = declared.follows_gusts_by_accelerometers
     for i, name in enumerate(SENSORS):
         sensor = getattr(scenario.sensors, name)
         instruments["noise"][i], instruments["bias"][i], instruments["quantum"][i] = sensor.noise_bias_quantum
@@ -125,25 +105,24 @@ def seed(instruments: np.void, number: int) -> None:
 
 def configure_watch(watch: np.void, scenario: Scenario, h: float) -> None:
     """Fill the watch's record; h: seconds between two looks, which is a JSBSim frame."""
-    watch["enabled"], watch["instants"] = is_watched(scenario), scenario.substeps
+    declared = Declared.of(scenario)
+    watch["enabled"], watch["instants"] = declared.monitors_sensors, scenario.substeps
     watch["past"] = scenario.substeps - 1  # the first look ends a frame
     watch["named"], watch["alarmed_at_s"], watch["named_at_s"] = NOBODY, -1.0, -1.0
     watch["engine"] = scenario.airframe.has_engine_instruments
-    step, sensors, initial = watch["step"], scenario.fdi.bounds.sensors, scenario.initial
-    errors = Errors(sensors)
+    step, errors, initial = watch["step"], declared.sensors, scenario.initial
     step["h"], step["decay"] = h, [exp(-pole * h) for pole in POLES_PER_S]
     step["gravity"] = GRAVITY_MPS2 * (1.0 + initial.altitude_m / EARTH_RADIUS_M) ** -2
-    step["gust"], step["gusts"] = gusts_seen(scenario.fdi.bounds.turbulence, initial.airspeed_mps, h)
+    step["gust"], step["gusts"] = gusts_seen(declared.air, initial.airspeed_mps, h)
     step["swift"] = FASTER * initial.airspeed_mps
-    step["low"] = low_m(scenario.fdi.bounds.turbulence)
-    step["rising"] = scenario.fdi.bounds.vertical_wind_mps
+    step["low"], step["rising"] = declared.air.low_m, declared.vertical_wind_mps
     if watch["engine"]:  # whose keys the aircraft names
         step["command"] = [getattr(initial, name) for name in ("engine_rpm", "manifold_pressure_inhg")]
     for i, name in enumerate(SENSORS):
         error = errors[name]
         step["offset"][i], step["slope"][i], step["steady"][i] = error.worst, error.slope, error.steady
         watch["longest_still"][i] = longest_still(error.noise, error.resolution)
-        step["drift"] = max(step["drift"], abs(getattr(getattr(sensors, name), "drift_rad_s", 0.0)))
+        step["drift"] = max(step["drift"], abs(getattr(getattr(errors.declared, name), "drift_rad_s", 0.0)))
     blurred = watch["blurred"] = np.any(step["offset"][PHI : PHI + 3] > step["steady"][PHI : PHI + 3])
     watch["follows"] = min(1.0, h * TAKEN_OVER_PER_S) if blurred else 1.0
 
@@ -155,23 +134,15 @@ def longest_still(noise: float, quantum: float) -> int:
     return 50 if noise > quantum / 4.0 else NEVER_STILL
 
 
-def gusts_seen(turbulence: str, airspeed_mps: float, h: float) -> tuple[float, np.ndarray]:
+def gusts_seen(air: Dryden, airspeed_mps: float, h: float) -> tuple[float, np.ndarray]:
     """Speed of gusts, m/s, and of their changes in h s what passes each filter of the watch: bounds.
 
-    A gust of deviation sigma and length L changes like a random walk of variance 2 sigma^2 V / L a second,
-    the vertical and lateral ones of half as much again [MIL-F-8785C, 3.7.1]; a filter with a pole of lam 1/s
+    The speed of a gust changes like a random walk (`Dryden.velocity_walk`); a filter with a pole of lam 1/s
     keeps 1 / 2 lam of it.
     """
-    sigma_mps = gust_mps(turbulence)
-    intensity = 3.0 * sigma_mps**2 * FASTER * airspeed_mps / SCALE_M
+    sigma_mps, intensity = air.sigma_mps, air.velocity_walk(airspeed_mps, FASTER)
     kept_s = [h / (1.0 - exp(-2.0 * pole * h)) for pole in POLES_PER_S]
     return GUST_LIMIT_SIGMA * sigma_mps, GUST_LIMIT_SIGMA * np.sqrt(intensity * np.array(kept_s))
-
-
-def low_m(turbulence: str) -> float:
-    """Height, m, below which gusts change faster than those above 2000 ft: their intensity is sigma^2 / h
-    there [MIL-F-8785C, 3.7.3]; 0 in still air."""
-    return SCALE_M * (low_gust_mps(turbulence) / gust_mps(turbulence)) ** 2 if turbulence != "none" else 0.0
 
 
 def anchor_watch(watch: np.void, design: np.ndarray, y: np.ndarray) -> None:

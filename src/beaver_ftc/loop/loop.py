@@ -29,6 +29,7 @@ from beaver_ftc.plant.instruments import AX, ENGINE_SPEED
 from beaver_ftc.plant.reuse import give_back
 from beaver_ftc.plant.sensing import FLYING, NOT_FINITE
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import sample_frames
 
@@ -125,7 +126,7 @@ class Loop:
         if fdi["watch"]["enabled"]:  # compiled code called from here: a quarter of a second, the first time
             anchor_watch(fdi["watch"], np.array([design]), y)
         mass = mass_of(scenario.design_model, self.aircraft)
-        noise_model.set_up(fdi, scenario.fdi, design, mass, trim, scenario.rate_hz, self.aircraft)
+        noise_model.set_up(fdi, scenario.fdi, Declared.of(scenario), design, mass, trim, scenario.rate_hz)
 
     def change(self, scenario: Scenario, k: int) -> None:
         """Fly by a scenario that says what changes in flight, nothing of it before frame k, the next to fly.

@@ -24,12 +24,12 @@ from beaver_ftc.diagnosis.types.findings import estimate_of, found
 from beaver_ftc.loop.frame import isolated_theta
 from beaver_ftc.loop.inconclusive import inconclusive_of
 from beaver_ftc.plant.channels import AIRSPEED, ALTITUDE
-from beaver_ftc.plant.faults import TIME_TOLERANCE_S
 from beaver_ftc.plant.sensing import DEPARTURE_SIGNALS
 from beaver_ftc.scenario.faults import of_a_sensor
 from beaver_ftc.scenario.interventions import stages
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.scenario.warnings import undeclared
+from beaver_ftc.scenario.timing import TIME_TOLERANCE_S
+from beaver_ftc.scenario.undeclared import undeclared
 
 
 @dataclass(frozen=True)
@@ -352,7 +352,7 @@ def _is_off(scenario: Scenario, certain_s: float) -> bool:
     if any(of_a_sensor(fault) and fault.at_s <= certain_s for fault in scenario.faults):
         return True
     flown = [scenario, *(then for change, then in stages(scenario) if change.at_s <= certain_s)]
-    return any(any(undeclared(each)) for each in flown)
+    return any(fact for each in flown for fact in undeclared(each))
 
 
 def landing_of(

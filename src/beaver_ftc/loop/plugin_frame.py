@@ -16,7 +16,7 @@ from beaver_ftc.control.base import Law, Reference
 from beaver_ftc.control.laws import ADAPTIVE, NOMINAL, ORACLE
 from beaver_ftc.design.context import Context, DesignFunctions
 from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
-from beaver_ftc.diagnosis.bounds.variances import declared_of
+from beaver_ftc.diagnosis.bounds.variances import variances_of
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.documents.errors import BeaverFtcError, SimulationFailed
 from beaver_ftc.loop import stepping as stages
@@ -24,6 +24,7 @@ from beaver_ftc.loop.assembly import y_places
 from beaver_ftc.loop.outcome import verdict_of
 from beaver_ftc.plant.sensing import NOT_FINITE
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled, made
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 
 _AXES = {"p": 0, "q": 1, "r": 2, None: 0}
@@ -195,7 +196,7 @@ def context_of(
     frames: np.ndarray, scenario: Scenario, start: np.ndarray, options: Mapping[str, float]
 ) -> Context:
     """What a plug-in is given before the flight; start: the truth's channels at the start, in SI."""
-    frame, bounds, aircraft = frames[0], scenario.fdi.bounds, scenario.airframe
+    frame, aircraft = frames[0], scenario.airframe
     layout, bound, design = frame["control"]["layout"], frame["fdi"]["bound"], frames["belief"]["design"]
     trim_y, trim_rad, constant = start[y_places(frame)], layout["trim"].copy(), bound["constant"].copy()
     if bound["error_map"]["n_boxes"]:
@@ -214,7 +215,7 @@ def context_of(
         surfaces=aircraft.surfaces,
         leading=(int(layout["main"][0]), int(layout["main"][1]), int(layout["main"][2])),
         options=dict(options),
-        declared=declared_of(bounds, scenario.actuators, design, trim_y, trim_rad, aircraft),
+        declared=variances_of(Declared.of(scenario), scenario.actuators, design, trim_y, trim_rad),
     )
 
 

@@ -18,6 +18,7 @@ from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.loop.outcome import estimate_now, verdict_of
 from beaver_ftc.plugins import DETECTORS, is_compiled
 from beaver_ftc.scenario.airframe import checked_against
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import FdiConfig
 from beaver_ftc.scenario.loader import load
 from beaver_ftc.scenario.schema import Scenario
@@ -89,7 +90,7 @@ class Diagnosis:
         self._theta = direct(watching.theta, self._frames)
         self._said = Verdict()
         self._fresh = True
-        self._turning_air = bool(self._scenario.fdi.bounds.turbulence != "none")
+        self._declared = Declared.of(self._scenario)
 
     @property
     def t_s(self) -> float:
@@ -118,7 +119,7 @@ class Diagnosis:
         _put("command_rad", command_rad, self._command)
         if attitude_rad is not None:
             _put("attitude_rad", attitude_rad, self._attitude)
-        elif self._turning_air:
+        elif self._declared.air.moves:
             raise BadInput("attitude_rad: is missing, allowed: (3,) rad where fdi.bounds declares turbulence")
         if altitude_m is not None:
             _put("altitude_m", np.atleast_1d(altitude_m), self._altitude)
@@ -170,11 +171,11 @@ class Diagnosis:
                 _put(what, np.asarray(given), place)
         if not all(np.isfinite(part).all() for part in (x, y, u)):
             return
-        scenario, aircraft, belief = self._scenario, self._aircraft, self._frame["belief"]
+        scenario, belief = self._scenario, self._frame["belief"]
         belief["u"] = belief["commanded"] = self._frame["control"]["layout"]["trim"] = u
-        design, mass = belief["design"], mass_of(scenario.design_model, aircraft)
+        design, mass = belief["design"], mass_of(scenario.design_model, self._aircraft)
         anchor(design, x, y, u)
-        noise_model.set_up(self._fdi, scenario.fdi, design, mass, (x, y, u), scenario.rate_hz, aircraft)
+        noise_model.set_up(self._fdi, scenario.fdi, self._declared, design, mass, (x, y, u), scenario.rate_hz)
         self._fresh = False
 
 

@@ -4,24 +4,22 @@ Turbulence and one-minus-cosine gusts are JSBSim's own models.
 """
 
 from collections.abc import Sequence
-from math import ceil, radians
+from math import radians
 
+from beaver_ftc.aircraft import AXES
 from beaver_ftc.aircraft.units import KG_PER_LB
+from beaver_ftc.design.dryden import EXCEEDENCE, WIND_AT_20_FT
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.adapter import FT_PER_M, Plant
 from beaver_ftc.plant.trim import TrimPoint, trim
 from beaver_ftc.scenario.environment import Gust
 from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.timing import frame_of
 
-_AXES = ("p", "q", "r")
 DELAY = "actuators/delay-s"
 LB_PER_KG, IN_PER_M = 1.0 / KG_PER_LB, 12.0 * FT_PER_M
 
-# JSBSim's Dryden turbulence in Tustin's form, whose spectrum does not depend on the frame. Curve of equal
-# probability of exceedence, and wind at 20 ft for what is below 2000 ft (15, 30, 45 kt) [MIL-F-8785C, 3.7].
-TUSTIN = 4
-EXCEEDENCE = {"light": 3, "moderate": 4, "severe": 6}
-WIND_AT_20_FT = {"light": 25.3, "moderate": 50.6, "severe": 76.0}  # ft/s
+TUSTIN = 4  # JSBSim's Dryden turbulence in Tustin's form, whose spectrum does not depend on the frame
 NEVER = 2**62
 _LOCAL_FRAME = 3  # of atmosphere/cosine-gust/frame: north, east, down
 
@@ -43,7 +41,7 @@ def _set(plant: Plant, key: str, name: str, value: float, neutral: float = 0.0) 
 
 def _uncertainty(plant: Plant, scenario: Scenario) -> None:
     uncertainty = scenario.uncertainty
-    for axis in _AXES:
+    for axis in AXES:
         theta = getattr(uncertainty.inertia_coupling, axis)
         key, name = f"uncertainty.inertia_coupling.{axis}", f"uncertainty/inertia-coupling/{axis}"
         _set(plant, key, name, theta)
@@ -115,7 +113,7 @@ class GustSchedule:
 
     def __init__(self, gusts: Sequence[Gust], plant: Plant, rate_hz: float) -> None:
         self._plant = plant
-        self._starts = {ceil(gust.at_s * rate_hz - 1e-9): gust for gust in gusts if any(gust.velocity_mps)}
+        self._starts = {frame_of(gust.at_s, rate_hz): gust for gust in gusts if any(gust.velocity_mps)}
 
     def apply(self, k: int) -> None:
         """Set the gust off that starts with frame k."""

@@ -15,20 +15,20 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
-from math import ceil, exp, hypot, inf
+from math import exp, hypot, inf
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from beaver_ftc.scenario.faults import DAMAGE, SensorFault, place_of
 from beaver_ftc.scenario.sensors import ENGINE, QUANTITIES, Sensors
+from beaver_ftc.scenario.timing import frame_of
 
 if TYPE_CHECKING:
     from beaver_ftc.plant.adapter import Plant
 
 _SENSORS = tuple(Sensors.model_fields)
 OF_THE_SLIPSTREAM = ("V", "qdyn", *ENGINE)  # what dpt is worked out from
-TIME_TOLERANCE_S = 1e-9
 NEVER = sys.maxsize
 OF_DAMAGE = f"failures/{DAMAGE}"
 
@@ -47,11 +47,6 @@ HEALTHY = {
     "oscillation-frequency-rad_sec": 0.0,
     "Cm-alpha3": 0.0,
 }
-
-
-def frame_of(time_s: float, rate_hz: float) -> int:
-    """The first frame k whose time k / rate_hz is not before time_s."""
-    return ceil((time_s - TIME_TOLERANCE_S) * rate_hz)
 
 
 def is_there(fault: Any, k: int, rate_hz: float) -> bool:

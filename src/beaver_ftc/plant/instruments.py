@@ -15,6 +15,7 @@ import numpy as np
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design.engine import measured_slipstream
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, DPT, N_Y, QDYN
+from beaver_ftc.scenario.sensors import NOISE_LIMIT_SIGMA
 
 SIGNALS = ("p", "q", "r", "alpha", "beta", "V", "qdyn")  # what the diagnosis compares with its model
 N_SIGNALS = len(SIGNALS)
@@ -26,7 +27,6 @@ _ALPHA, _BETA, _AIRSPEED, _QDYN = (SENSORS.index(name) for name in ("alpha", "be
 PHI, PSI, ALTITUDE, ENGINE_SPEED, MANIFOLD, AX = (
     SENSORS.index(name) for name in ("phi", "psi", "altitude", "engine_rpm", "manifold_pressure", "ax")
 )
-NOISE_LIMIT_SIGMA = 4.0
 LONGEST_DELAY = 1000  # JSBSim frames
 # Samples that all delay lines together keep: most flights', so that delays can be set in the air; any's.
 USUAL_LINE, MOST_LINE = 512, N_SENSORS * (LONGEST_DELAY + 2)

@@ -21,7 +21,7 @@ import jsbsim
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.aircraft.units import M_PER_FT
+from beaver_ftc.aircraft.units import EARTH_RADIUS_M, M_PER_FT
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.configure import configure
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
     from control import StateSpace
 
-_EARTH_RADIUS_M = 6371000.0
 
 # State by our name, with its unit (a field of FlightState, but for north and east), and by JSBSim's, with the
 # factor to ours; how far it is moved for a difference: small against the curvature of the polynomials, large
@@ -48,8 +47,8 @@ _STATES = (
     ("theta", "theta_rad", "Theta", 1.0, 1e-4),
     ("psi", "psi_rad", "Psi", 1.0, 1e-4),
     ("altitude", "altitude_m", "Alt", M_PER_FT, 10.0),
-    ("north", "north_m", "Latitude", _EARTH_RADIUS_M, 0.0),
-    ("east", "east_m", "Longitude", _EARTH_RADIUS_M, 0.0),
+    ("north", "north_m", "Latitude", EARTH_RADIUS_M, 0.0),
+    ("east", "east_m", "Longitude", EARTH_RADIUS_M, 0.0),
 )
 _MOVED = [state for state in _STATES if state[-1]]
 _UNITS = {name: unit for name, unit, *_ in _STATES}

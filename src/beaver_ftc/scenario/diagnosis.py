@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field, Strict, field_validator, model_validator
 
+from beaver_ftc.design.dryden import Severity
 from beaver_ftc.documents.base import Section, deny, entry, number, refuse
 from beaver_ftc.documents.errors import suggestion
 from beaver_ftc.plugins import DETECTORS, refusal, wrong_options
@@ -74,7 +75,7 @@ class Bounds(Section, strict=True):
     inertia: Share = number(0.0, "share of 1", examples=[0.05])
     sensors: BoundedSensors = entry(Sensors)
     deflection_deg: Deflection = entry(0.0, examples=[0.2])
-    turbulence: Literal["none", "light", "moderate", "severe"] = "none"
+    turbulence: Severity = "none"
     vertical_wind_mps: float = entry(1.0, ge=0, le=100, examples=[3])
 
     @field_validator("coefficients")
@@ -211,6 +212,17 @@ class FdiConfig(Section, strict=True):
         """Whether what a surface cannot have done may exclude it. Of two faults at once one may do what the
         other does not."""
         return self.authority != "worst-case" and self.fault_class == "all" and not self.pairs
+
+    def compares_across(self, substeps: int) -> bool:
+        """Whether motion across a surface's column excludes the surface. Within a frame of several instants
+        a column turns with the incidence while the surface moves, and shows across its mean."""
+        return self.looks_across and substeps <= 1
+
+    def monitors_sensors(self, sensor_fails: bool) -> bool:
+        """Whether the sensor monitor runs. A flight in which no instrument fails does without it: sound
+        instruments never raise its alarm."""
+        needed = {"always": True, "auto": sensor_fails, "never": False}
+        return needed[self.sensor_monitor] and self.is_ours
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:

@@ -16,6 +16,9 @@ from beaver_ftc.documents.base import Number, Section, number
 from beaver_ftc.documents.document import parse
 from beaver_ftc.scenario.airframe import checked_aircraft
 
+# Noise is normal and cut off at so many standard deviations: a bound on it can be declared, and holds.
+NOISE_LIMIT_SIGMA = 4.0
+
 
 class _Sensor(Section):
     """measured = quantised((1 + scale_error) lagged(t - delay) + bias + noise); lost: the last one.

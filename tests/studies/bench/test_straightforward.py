@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from beaver_ftc.aircraft.units import EARTH_RATE_RAD_S
 from beaver_ftc.control.reference import discretise
 from beaver_ftc.design.fdc import MASS
 from beaver_ftc.design.model import both_responses, design_record, inertia_coefficients
-from beaver_ftc.diagnosis.bounds.declared import EARTH_RATE_RAD_S
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant.faults import FaultSchedule
 from beaver_ftc.studies.bench.straightforward import (
@@ -134,7 +134,7 @@ def test_what_the_estimators_remember_frame_by_frame(missing, isolated, changed)
 
 
 def test_its_bound_is_the_published_one_and_the_turning_earths(changed):
-    """Each axis the product of the two other rates; of the Earth 2 W |x| and its square [bounds.declared]."""
+    """Each axis the product of the two other rates; of the Earth 2 W |x| and its square [WGS84]."""
     user = object.__new__(Straightforward)
     constant = {"constant_rad_s2": {"p": 0.01, "q": 0.02, "r": 0.03}}
     coupling = {"inertia_coupling": {"p": 0.1, "q": 0.2, "r": 0.3}}

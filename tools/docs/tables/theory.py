@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from beaver_ftc.diagnosis.bounds import declared, worst_case
+from beaver_ftc.aircraft import units
+from beaver_ftc.diagnosis.bounds import admitted, worst_case
 from beaver_ftc.diagnosis.detection import likelihood, noise_model, statistical, tones
 from beaver_ftc.diagnosis.monitors import redundancy, sensor_records
 from beaver_ftc.plant import instruments
@@ -10,12 +11,12 @@ from beaver_ftc.scenario.diagnosis import Bounds, FdiConfig, Statistical
 from beaver_ftc.studies.present.tables import markdown_table
 
 CONSTANTS = (  # (section, symbol on the page, module, name there, unit)
-    (2, r"$\omega_E$", declared, "EARTH_RATE_RAD_S", "rad/s"),
+    (2, r"$\omega_E$", units, "EARTH_RATE_RAD_S", "rad/s"),
     (2, r"$\rho$", worst_case, "ROUNDING_RAD_S2", "rad/s2"),
     (2, r"$\kappa$", instruments, "NOISE_LIMIT_SIGMA", ""),
-    (2, r"$\gamma$", declared, "GUST_LIMIT_SIGMA", ""),
+    (2, r"$\gamma$", admitted, "GUST_LIMIT_SIGMA", ""),
     (2, "where nobody has measured", worst_case, "UNKNOWN_RAD_S2", "rad/s2"),
-    (3, r"$\tau$", declared, "DELAYS_S", "s"),
+    (3, r"$\tau$", admitted, "DELAYS_S", "s"),
     (7, "", likelihood, "N_SLOTS", ""),
     (7, "", likelihood, "RINGING", ""),
     (7, "", noise_model, "CHANCE", ""),

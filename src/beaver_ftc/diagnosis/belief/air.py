@@ -28,22 +28,19 @@ from math import pi
 
 import numpy as np
 
-from beaver_ftc.aircraft import Aircraft, MassProperties
+from beaver_ftc.aircraft import MassProperties
 from beaver_ftc.aircraft.aircraft import FORCES
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS
-from beaver_ftc.aircraft.units import GRAVITY_MPS2
+from beaver_ftc.aircraft.units import EARTH_RATE_RAD_S, GRAVITY_MPS2
 from beaver_ftc.compiled import kernel, record
+from beaver_ftc.design.dryden import SCALE_M, rotation_lengths
 from beaver_ftc.design.model import rate_damping
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, QDYN, TABLE, evaluate, fill_table, whole_sum
-from beaver_ftc.diagnosis.bounds.declared import EARTH_RATE_RAD_S, SCALE_M, Errors, gust_mps
-from beaver_ftc.diagnosis.bounds.variances import drift as gust_drift
-from beaver_ftc.diagnosis.bounds.variances import drift_at_1_m as gust_drift_at_1_m
-from beaver_ftc.diagnosis.bounds.variances import flow_noise, jitter, length_of_gusts
+from beaver_ftc.diagnosis.bounds.variances import flow_noise, jitter
 from beaver_ftc.diagnosis.bounds.worst_case import least_height
 from beaver_ftc.diagnosis.monitors.redundancy import FALLING_M_S2
 from beaver_ftc.plant.instruments import wrapped
-from beaver_ftc.scenario.diagnosis import Bounds
-from beaver_ftc.scenario.warnings import MASS_TOLERANCE
+from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
 
 # Share of the intensity of the rolling, pitching and yawing gust that the vanes leave; on exact vanes and
 # over a filter's memory it is less (`tests/diagnosis/test_air.py`).
@@ -338,7 +335,7 @@ def sooner(air, g):
 
 @kernel
 def length(air, g):
-    """Way flown within which the gust about axis g returns, m, as of `length_of_gusts`."""
+    """Way flown within which the gust about axis g returns, m, as `design.dryden.rotation_lengths`."""
     return air.rolling if g == 0 else (4.0 if g == 1 else 3.0) * air.span / pi
 
 
@@ -425,25 +422,26 @@ def together(air, axes, i, j, g):
     return on_i * on_j
 
 
-def set_up_air(air: np.void, bounds: Bounds, mass: MassProperties, aircraft: Aircraft) -> None:
-    turbulence, errors = bounds.turbulence, Errors(bounds.sensors)
+def set_up_air(air: np.void, declared: Declared, mass: MassProperties) -> None:
+    """Fill the record with the declared turbulence, for an aircraft of so much mass."""
+    turbulence, errors, aircraft = declared.air, declared.sensors, declared.aircraft
     span_m = aircraft.geometry.span_m
-    air["moving"], air["modelled"] = turbulence != "none", bool(aircraft.measurable_forces)
+    air["moving"], air["modelled"] = turbulence.moves, bool(aircraft.measurable_forces)
     air["seen"] = air["modelled"] or air["read"]  # only where forces are known
     air["glimpsed"] = air["moving"] and not air["seen"]
     fill_table(air["forces"], aircraft, aircraft.measurable_forces, FORCES)
     air["area_per_mass"] = aircraft.geometry.wing_area_m2 / mass.mass_kg
     air["gravity"] = GRAVITY_MPS2  # standard; what is constant has no part in a change of the gust
     air["span"] = span_m
-    air["aloft"], air["low"] = gust_drift(turbulence, span_m), gust_drift_at_1_m(turbulence, span_m)
+    air["aloft"], air["low"] = turbulence.rotation_walk(span_m), turbulence.rotation_walk_at_1_m(span_m)
     air["per_metre"], air["unseen"] = air["aloft"], UNSEEN if air["seen"] else 1.0
     air["altitude_off"], air["altitude_slope"] = errors["altitude"].worst, errors["altitude"].slope
     air["scale"] = SCALE_M
-    air["rolling"] = length_of_gusts(span_m)[0]
+    air["rolling"] = rotation_lengths(span_m)[0]
 
 
 def set_up_jitter(
-    statistical: np.void, errors: Errors, design: np.void, y: np.ndarray, u: np.ndarray, dt_s: float
+    statistical: np.void, errors: SensorErrors, design: np.void, y: np.ndarray, u: np.ndarray, dt_s: float
 ) -> None:
     """What noise adds to the gust that is followed: that of the vanes, and of the force that moves the air's
     velocity on from frame to frame; where the flow follows from the forces, that of the forces too."""
@@ -458,7 +456,7 @@ def set_up_jitter(
         statistical["noise"][name] += jitter(flow, design, y, u, span_m) ** 2
 
 
-def set_up_passing(air: np.void, bounds: Bounds, level: float, airspeed_mps: float) -> None:
+def set_up_passing(air: np.void, declared: Declared, level: float, airspeed_mps: float) -> None:
     """How well the speed through the mean air is known, from an airspeed in trim, and how fast the sum of the
     gust's changes is forgotten; level: of the alarm, in standard deviations.
 
@@ -466,7 +464,7 @@ def set_up_passing(air: np.void, bounds: Bounds, level: float, airspeed_mps: flo
     deviation sigma that returns at a rate V / L such a sum misses a variance of sigma^2 a / (a + V / L). Both
     together are least near a^3 = 2 b^2 V / (L sigma^2).
     """
-    sigma, errors = gust_mps(bounds.turbulence), Errors(bounds.sensors)
+    sigma, errors = declared.air.sigma_mps, declared.sensors
     if not (air["moving"] and air["seen"]):
         return
     returns, V = airspeed_mps / SCALE_M, errors["V"]
@@ -475,9 +473,7 @@ def set_up_passing(air: np.void, bounds: Bounds, level: float, airspeed_mps: flo
     if air["read"]:
         drift += errors["ax"].steady + GRAVITY_MPS2 * DRAG * errors["ax"].slope
     else:
-        given = bounds.coefficients
-        share = max(given.values(), default=0.0) if isinstance(given, dict) else given
-        drift += GRAVITY_MPS2 * DRAG * (share + MASS_TOLERANCE)
+        drift += GRAVITY_MPS2 * DRAG * (declared.coefficients.largest + MASS_TOLERANCE)
     forgets = (2.0 * drift**2 * returns / sigma**2) ** (1.0 / 3.0)
     air["gusty"], air["strongest"], air["forgets"] = sigma**2, STRONGEST * sigma, forgets
     air["spread"] = sigma**2 * forgets / (forgets + returns) + (drift / forgets) ** 2 + V.random**2

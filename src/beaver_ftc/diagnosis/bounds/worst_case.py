@@ -28,6 +28,7 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.schema import MAX_AGES, MAX_BOXES, MAX_LEVELS, MAX_MONOMIALS, MAX_TERMS
 from beaver_ftc.compiled import kernel, record, sized
+from beaver_ftc.design.dryden import LEAST_HEIGHT_M
 from beaver_ftc.design.engine import DPT_0, KW_TO_DPT, density_ratio
 from beaver_ftc.design.terms import AIRSPEED, DPT, N_SIGNALS, N_Y, QDYN, monomials, signals
 
@@ -41,7 +42,6 @@ UNKNOWN_RAD_S2 = 1e6  # terms fitted near trim are off by thousands at 0.5 rad
 # The same to filters that carry a covariance, beside noise of 1e-4: more than any aircraft does, and no more.
 UNKNOWN_TO_FILTERS_RAD_S2 = 100.0
 _ROUNDING = 1e-9
-LEAST_HEIGHT_M = 3.048  # 10 ft: below, turbulence is what it is there
 N_PLACES = 3 + N_Y  # rates, then y with the density of the air in place of dynamic pressure
 
 

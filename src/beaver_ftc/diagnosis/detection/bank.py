@@ -15,8 +15,9 @@ from math import exp
 import numpy as np
 
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.diagnosis.bounds.declared import poles_for_noise
+from beaver_ftc.diagnosis.bounds.admitted import poles_for_noise
 from beaver_ftc.diagnosis.detection.thresholds import bound_step, noise_step
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import MAX_POLES, FdiConfig
 
 # The bank of detection filters; filter 0 is the published one.
@@ -27,12 +28,16 @@ BANK = record(
 )  # fmt: skip
 
 
-def configure(bank: np.void, config: FdiConfig, dt: float) -> None:
-    """Fill in the filters' poles: those of the scenario, and those that noise asks for."""
-    bounds = config.bounds
-    for_noise = poles_for_noise(bounds.sensors, max(bounds.constant_rad_s2.as_tuple()))
+def poles_of(config: FdiConfig, declared: Declared) -> tuple[float, ...]:
+    """The filters' poles, 1/s, the published one first."""
+    for_noise = poles_for_noise(declared.sensors, max(declared.constant_rad_s2))
     further = (*config.pole_bank_per_s, *for_noise) if config.sharpen.pole_bank else ()
-    poles = (config.detection_pole_per_s, *further)[:MAX_POLES]
+    return (config.detection_pole_per_s, *further)[:MAX_POLES]
+
+
+def configure(bank: np.void, config: FdiConfig, declared: Declared, dt: float) -> None:
+    """Fill in the filters' poles: those of the scenario, and those that noise asks for."""
+    poles = poles_of(config, declared)
     bank["n"] = len(poles)
     bank["decay"][: len(poles)] = [exp(-pole * dt) for pole in poles]
 

@@ -23,12 +23,10 @@ from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.engine import slipstream_slopes
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, DPT, N_Y, QDYN, evaluate
 from beaver_ftc.diagnosis.belief.air import no_longer_read
-from beaver_ftc.diagnosis.bounds.declared import Errors, gust_mps
 from beaver_ftc.diagnosis.monitors.redundancy import FALLING_M_S2
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
-from beaver_ftc.scenario.diagnosis import Bounds
+from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
 from beaver_ftc.scenario.sensors import ACCELEROMETERS
-from beaver_ftc.scenario.warnings import MASS_TOLERANCE
 
 ASIDE, UP = range(2)  # across the body, and normal to it
 COMPONENTS = ("CY", "CZ")
@@ -177,36 +175,20 @@ def terms_of(aircraft: Aircraft, f: int) -> list[Term]:
     return [term for term in aircraft.measurable_forces if term.coefficient == COMPONENTS[f]]
 
 
-def separated_by_force(aircraft: Aircraft, f: int) -> list[int]:
-    """The surfaces that a force tells apart: of those that pitch by their lift, of the others by the side."""
-    with_force = {term.surface for term in terms_of(aircraft, f)}
-    lead = enumerate(zip(aircraft.surfaces, aircraft.dominant_axis, strict=True))
-    found = [s for s, (surface, axis) in lead if (axis == 1) == (f == UP) and surface in with_force]
-    return found if len(found) > 1 else []
-
-
-def tell_apart(aircraft: Aircraft) -> bool:
-    """Whether accelerometers tell any surfaces of this aircraft apart."""
-    return any(separated_by_force(aircraft, f) for f in (ASIDE, UP))
-
-
-def set_up_forces(
-    fdi: np.void, bounds: Bounds, aircraft: Aircraft, trim: Trim, along_y: np.ndarray, dt_s: float
-) -> None:
+def set_up_forces(fdi: np.void, declared: Declared, trim: Trim, along_y: np.ndarray, dt_s: float) -> None:
     """Fill the record of forces that are `known` from what is declared.
 
     along_y (3, y.size): the slopes of the angular accelerations with y. dt_s: of a frame.
     """
-    y, statistical = trim[1], fdi["statistical"]
+    y, statistical, aircraft, sensors = trim[1], fdi["statistical"], declared.aircraft, declared.sensors
     forces, air, size = statistical["forces"], statistical["air"], aircraft.geometry
     forces["per_m"], forces["gravity"] = 1.0 / size.chord_m, air["gravity"]
-    declared = Errors(bounds.sensors)
-    forces["pressure"], forces["pressure_noise"] = y[QDYN], declared["qdyn"].random
+    forces["pressure"], forces["pressure_noise"] = y[QDYN], sensors["qdyn"].random
     rates = [t.value for t in aircraft.forces if t.coefficient == "CY" and t.of == ((SIDESLIP_RATE, 1),)]
     forces["span"], forces["of_rate"] = size.span_m, sum(rates)
     scale = y[QDYN] * air["area_per_mass"] * forces["per_m"]
-    errors = declared.each("random", ("alpha", "beta", "V", *AXES))
-    by_airspeed, by_others = _slipstream_noise(y, fdi["bound"]["admitted"], declared)
+    errors = sensors.each("random", ("alpha", "beta", "V", *AXES))
+    by_airspeed, by_others = _slipstream_noise(y, fdi["bound"]["admitted"], sensors)
     for f, (vane, axis) in enumerate(((BETA, 2), (ALPHA, 1))):
         force, terms = forces["component"][f], terms_of(aircraft, f)
         every = scale * _slopes(aircraft, COMPONENTS[f], trim)
@@ -218,18 +200,17 @@ def set_up_forces(
         parts = (felt * errors) ** 2
         quiet = parts.sum() + slipstream**2 * by_others
         force["quiet"] = quiet, quiet - parts[vane]
-        noise = declared[ACCELEROMETERS[1 + f]].random
+        noise = sensors[ACCELEROMETERS[1 + f]].random
         force["felt"] = (forces["per_m"] * noise) ** 2
-        _set_up_tolerances(force, bounds, terms, y, slopes[vane] / scale, f, forces["per_m"])
+        _set_up_tolerances(force, declared, terms, y, slopes[vane] / scale, f, forces["per_m"])
         turned = scale * sum(abs(term.value) for term in terms if term.surface)
-        force["deflection"] = turned * np.radians(bounds.deflection_deg)
-        force["drift"] = _drift(declared, air["gravity"], y[AIRSPEED], f)
-        gusts = 3.0 * gust_mps(bounds.turbulence) ** 2 / (air["scale"] * y[AIRSPEED])
+        force["deflection"] = turned * declared.actuators.deflection_rad
+        force["drift"] = _drift(sensors, air["gravity"], y[AIRSPEED], f)
         wander = (CHANGES * force["drift"]) ** 2 + dt_s * (noise / y[AIRSPEED]) ** 2
-        force["wander"] = slopes[vane] ** 2 * (wander + gusts)
+        force["wander"] = slopes[vane] ** 2 * (wander + declared.air.angle_walk(y[AIRSPEED]))
 
 
-def _slipstream_noise(y: np.ndarray, admitted: np.void, declared: Errors) -> tuple[float, float]:
+def _slipstream_noise(y: np.ndarray, admitted: np.void, declared: SensorErrors) -> tuple[float, float]:
     """How dpt moves with the reading of the airspeed, s/m; its variance by those of pressure and power."""
     if not admitted["engine"]:
         return 0.0, 0.0
@@ -238,7 +219,7 @@ def _slipstream_noise(y: np.ndarray, admitted: np.void, declared: Errors) -> tup
     return by_airspeed, float((by_pressure * declared["qdyn"].random) ** 2 + (per_kw * power_kw) ** 2)
 
 
-def _drift(errors: Errors, gravity: float, airspeed_mps: float, f: int) -> float:
+def _drift(errors: SensorErrors, gravity: float, airspeed_mps: float, f: int) -> float:
     """How fast the angle that is followed can drift, rad/s. Gravity acts along the path's slope only on the
     incidence, and in full on sideslip."""
     tilt = errors["phi"].steady + errors["theta"].steady
@@ -252,13 +233,12 @@ def _drift(errors: Errors, gravity: float, airspeed_mps: float, f: int) -> float
 
 
 def _set_up_tolerances(
-    force: np.void, bounds: Bounds, terms: list[Term], y: np.ndarray, of_vane: float, f: int, per_m: float
+    force: np.void, declared: Declared, terms: list[Term], y: np.ndarray, of_vane: float, f: int, per_m: float
 ) -> None:
     """Of each term: that of the coefficients, and what constant errors of vane and pressure do; of the
     accelerometer's bias, m/s2; of the whole."""
-    given, errors = bounds.coefficients, Errors(bounds.sensors)
+    share, errors = declared.coefficients.largest, declared.sensors
     vane, felt = errors["alpha" if f == UP else "beta"], errors[ACCELEROMETERS[1 + f]]
-    share = max(given.values(), default=0.0) if isinstance(given, dict) else given
     pressure = errors["qdyn"].steady / y[QDYN] + errors["qdyn"].slope
     for k, term in enumerate(terms):
         force["tolerance"][k] = (share + pressure + vane.slope) * abs(term.value)
@@ -266,7 +246,7 @@ def _set_up_tolerances(
             force["tolerance"][k] += vane.steady * abs(of_vane)
     n = len(terms)
     if f == ASIDE:
-        force["tolerance"][n], n = share + RATE_TOLERANCE[bounds.turbulence != "none"], n + 1
+        force["tolerance"][n], n = share + RATE_TOLERANCE[declared.air.moves], n + 1
     if felt.steady:
         force["tolerance"][n], force["regressor"][n], n = felt.steady, per_m, n + 1
     force["tolerance"][n], force["n"] = MASS_TOLERANCE + felt.slope, n + 1

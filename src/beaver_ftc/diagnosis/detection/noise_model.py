@@ -15,12 +15,12 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES, Aircraft, MassProperties
 from beaver_ftc.compiled import kernel
+from beaver_ftc.design.dryden import rotation_lengths
 from beaver_ftc.design.engine import slipstream_slopes
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, PH, QDYN, RH, directional, whole_sum
 from beaver_ftc.design.variants import jacobian
 from beaver_ftc.diagnosis.belief.air import BY_FORCE, UNSEEN, set_up_air, set_up_jitter, set_up_passing
-from beaver_ftc.diagnosis.bounds.declared import Errors
-from beaver_ftc.diagnosis.bounds.variances import axis_of, length_of_gusts, steady_tolerance
+from beaver_ftc.diagnosis.bounds.variances import axis_of, steady_tolerance
 from beaver_ftc.diagnosis.detection import likelihood
 from beaver_ftc.diagnosis.detection.forces import set_up_forces
 from beaver_ftc.diagnosis.detection.likelihood import (
@@ -32,11 +32,12 @@ from beaver_ftc.diagnosis.detection.likelihood import (
     N_SLOTS,
     STEP,
 )
-from beaver_ftc.diagnosis.detection.parity import AN_AXIS, Direction, across_a_column, set_up_views, views_of
+from beaver_ftc.diagnosis.detection.parity import AN_AXIS, Direction, set_up_views, views_of
 from beaver_ftc.diagnosis.detection.tones import N_TONES, set_up_listening
 from beaver_ftc.diagnosis.state import LOSS, SIDE
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
-from beaver_ftc.scenario.diagnosis import Bounds, FdiConfig, Statistical
+from beaver_ftc.scenario.declared import Declared, SensorErrors
+from beaver_ftc.scenario.diagnosis import FdiConfig, Statistical
 
 PITCH_AXES, LATERAL_AXES = (1,), (0, 2)
 _SENSORS = {"alpha": ALPHA, "beta": BETA, "V": AIRSPEED, "qdyn": QDYN}
@@ -107,35 +108,35 @@ def naming_level(misnaming: float, rate_hz: float, aircraft: Aircraft) -> float:
 def set_up(
     fdi: np.void,
     config: FdiConfig,
+    declared: Declared,
     design: np.void,
     mass: MassProperties,
     start: Start,
     rate_hz: float,
-    aircraft: Aircraft,
 ) -> None:
     """Fill the statistical part of a diagnosis record; start: x (3,), y and u (surfaces,) in trim."""
     statistical, given = fdi["statistical"], config.statistical
     statistical["alarm"]["detected_at_s"] = -1.0
     if given is None or not fdi["config"]["enabled"]:  # a plug-in diagnoses, or nothing does
         return
-    tests, air = statistical["tests"], statistical["air"]
-    errors, dt_s, instants = Errors(config.bounds.sensors), 1.0 / rate_hz, int(fdi["config"]["instants"])
+    tests, air, aircraft = statistical["tests"], statistical["air"], declared.aircraft
+    errors, dt_s, instants = declared.sensors, 1.0 / rate_hz, int(fdi["config"]["instants"])
     airspeed_mps, pace = float(start[1][AIRSPEED]), pace_of(given, aircraft, dt_s)
     tests["enabled"], tests["share"] = 1, 1.0 / max(instants, 1)
-    tests["mapped"] = aircraft.file.model_error_map is not None and not loses_surfaces(aircraft)
-    set_up_air(air, config.bounds, mass, aircraft)
+    tests["mapped"] = aircraft.file.model_error_map is not None and not aircraft.loses_surfaces
+    set_up_air(air, declared, mass)
     forces = bool(statistical["forces"]["known"])
-    across = across_a_column(config, instants)
+    across = config.compares_across(instants)
     n_tests = tests_a_frame(aircraft, *(views_of(aircraft, forces) if across else ()))
     tests["alarm_level"] = alarm_level(given.false_alarms_per_h, rate_hz, n_tests)
-    set_up_passing(air, config.bounds, float(tests["alarm_level"]), airspeed_mps)
+    set_up_passing(air, declared, float(tests["alarm_level"]), airspeed_mps)
     tests["naming_level"] = naming_level(given.misnaming, rate_hz, aircraft)
     tests["keep"] = exp(-1.0 / (rate_hz * config.forgetting_time_s))
     _set_up_blocks(statistical, errors, aircraft)
-    _set_up_bounded(statistical, config, pace, dt_s)
+    _set_up_bounded(statistical, config, declared, pace, dt_s)
     statistical["noise"]["pace"] = given.uncertainty_rad_s * dt_s
-    _set_up_noise(statistical, swing_of(given, aircraft), config.bounds, design, start, dt_s)
-    tolerance = steady_tolerance(config.bounds, aircraft, design, mass, *start[1:])
+    _set_up_noise(statistical, swing_of(given, aircraft), declared, design, start, dt_s)
+    tolerance = steady_tolerance(declared, design, mass, *start[1:])
     _set_up_tolerances(statistical, aircraft, tolerance)
     set_up_readings(statistical, errors, fdi["bound"]["admitted"])
     if across:
@@ -143,7 +144,7 @@ def set_up(
         set_up_listening(statistical["listening"], chance, airspeed_mps, pace * rate_hz, dt_s)
         if forces:
             along_y = jacobian(design, *start)[3]
-            set_up_forces(fdi, config.bounds, aircraft, start, along_y, dt_s)
+            set_up_forces(fdi, declared, start, along_y, dt_s)
             air["read"] = not fdi["watch"]["enabled"]  # which may find them broken
             statistical["inertial_air"] = air
             statistical["inertial_air"]["moving"] *= air["read"]
@@ -151,7 +152,7 @@ def set_up(
         set_up_views(statistical, aircraft)
     last, pitch = statistical["block"][-1], statistical["block"][likelihood.PITCH_BLOCK]
     rolling = float(air["rolling"]) if air["moving"] else 0.0
-    gusts_m = length_of_gusts(air["span"]) if air["glimpsed"] else [rolling]
+    gusts_m = rotation_lengths(air["span"]) if air["glimpsed"] else [rolling]
     last["lag"] = returning_length(statistical, airspeed_mps, rate_hz, float(min(gusts_m)))
     if air["moving"]:
         # the filters that reckon with no gust: as the others begin, and with a drift that goes anywhere
@@ -159,13 +160,13 @@ def set_up(
             statistical["block"]["calm"][name] = statistical["block"][name]
         last["stronger"] = (rolling / last["lag"]) ** 2
         if not air["seen"]:
-            pitching = float(length_of_gusts(air["span"])[1])
+            pitching = float(rotation_lengths(air["span"])[1])
             pitch["lag"] = returning_length(statistical, airspeed_mps, rate_hz, pitching)
             pitch["stronger"] = (pitching / pitch["lag"]) ** 2
         set_up_jitter(statistical, errors, design, *start[1:], dt_s)
 
 
-def _set_up_blocks(statistical: np.void, errors: Errors, aircraft: Aircraft) -> None:
+def _set_up_blocks(statistical: np.void, errors: SensorErrors, aircraft: Aircraft) -> None:
     blocks = blocks_of(aircraft)
     losses = [aircraft.surfaces.index(surface) for surface in aircraft.class_of_losses]
     statistical["tests"]["n_columns"] = len(losses) + len(AXES)
@@ -200,19 +201,17 @@ def swing_of(given: Statistical, aircraft: Aircraft) -> float:
     """How fast, rad/s, the swing of a bounded uncertainty is that the filters' drift stands for.
 
     What it may hide is reckoned with at its own pace, whatever the drift is (`likelihood.allowance`): that
-    shares out between this and chance. Where damage may take surfaces, a weak one finds most.
+    shares out between this and chance. Where damage may take surfaces, a weak one finds most: motion that no
+    loss explains is then likely more than an error of the model.
     """
-    return min(SLOW_RAD_S, given.uncertainty_rad_s) if loses_surfaces(aircraft) else given.uncertainty_rad_s
+    return min(SLOW_RAD_S, given.uncertainty_rad_s) if aircraft.loses_surfaces else given.uncertainty_rad_s
 
 
-def loses_surfaces(aircraft: Aircraft) -> bool:
-    """Whether damage may take surfaces: what no loss explains is then likely more than a model's error."""
-    return any(case.takes for case in aircraft.damage.values())
-
-
-def _set_up_bounded(statistical: np.void, config: FdiConfig, pace: float, dt_s: float) -> None:
+def _set_up_bounded(
+    statistical: np.void, config: FdiConfig, declared: Declared, pace: float, dt_s: float
+) -> None:
     """What an uncertainty that is bounded may do beside chance. A loss declared constant does not grow."""
-    still = config.bounds.sensors.is_ideal and config.bounds.turbulence == "none"
+    still = declared.is_noise_free
     for block in statistical["block"]:
         block["level"], block["chance"] = statistical["tests"]["alarm_level"], 0.0 if still else CHANCE
         block["pace"] = pace
@@ -223,19 +222,19 @@ def _set_up_bounded(statistical: np.void, config: FdiConfig, pace: float, dt_s: 
 
 
 def _set_up_noise(
-    statistical: np.void, omega: float, bounds: Bounds, design: np.void, start: Start, dt_s: float
+    statistical: np.void, omega: float, declared: Declared, design: np.void, start: Start, dt_s: float
 ) -> None:
     """What drifts, as swings of omega (rad/s) do, and what is white: noise of what f + G u is made of."""
-    errors = Errors(bounds.sensors).each("random")
+    errors = declared.sensors.each("random")
     noise = float(errors[:3].max())
-    largest = max(bounds.constant_rad_s2.as_tuple())
+    largest = max(declared.constant_rad_s2)
     level = float(statistical["tests"]["alarm_level"])
     statistical["noise"]["rapidity"] = rapidity(largest, omega, noise, level, dt_s)
     _, G, f_x, f_y = jacobian(design, *start)
     statistical["noise"]["own_jitter"] = f_x**2 @ errors[:3] ** 2
     in_trim = f_y[:, [ALPHA, BETA, AIRSPEED, QDYN]] ** 2 @ errors[3:] ** 2  # later as `add_readings` says
     statistical["noise"]["jitter"] = statistical["noise"]["own_jitter"] + in_trim
-    statistical["noise"]["deflection"] = np.abs(G).sum(axis=1) * np.radians(bounds.deflection_deg)
+    statistical["noise"]["deflection"] = np.abs(G).sum(axis=1) * declared.actuators.deflection_rad
 
 
 def rapidity(eta_bar: float, omega: float, noise: float, level: float, dt_s: float) -> float:
@@ -281,7 +280,7 @@ def _set_up_tolerances(statistical: np.void, aircraft: Aircraft, tolerance: np.n
     statistical["tests"]["tolerated"] = bool(np.any(tolerance))
 
 
-def set_up_readings(statistical: np.void, errors: Errors, admitted: np.void) -> None:
+def set_up_readings(statistical: np.void, errors: SensorErrors, admitted: np.void) -> None:
     """Add the readings to the regressors of the blocks, which have those of their coefficients."""
     steady, noise = np.zeros(N_READINGS), statistical["noise"]["reading"]
     for name, place in _SENSORS.items():

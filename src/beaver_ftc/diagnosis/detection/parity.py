@@ -40,7 +40,7 @@ from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.diagnosis.belief.air import along, drift_beside, whole_drift
 from beaver_ftc.diagnosis.bounds.variances import axis_of
 from beaver_ftc.diagnosis.detection import forces, likelihood, tones
-from beaver_ftc.diagnosis.detection.forces import ASIDE, SETTLED, UP, separated_by_force, tell_apart, terms_of
+from beaver_ftc.diagnosis.detection.forces import ASIDE, COMPONENTS, SETTLED, UP, terms_of
 from beaver_ftc.diagnosis.detection.likelihood import (
     LATERAL,
     MAX_HYPOTHESES,
@@ -52,7 +52,6 @@ from beaver_ftc.diagnosis.detection.likelihood import (
 )
 from beaver_ftc.diagnosis.detection.tones import tones_dtype
 from beaver_ftc.diagnosis.state import LOSS, NORMAL, PITCH, ROLL, SIDE, YAW
-from beaver_ftc.scenario.diagnosis import FdiConfig
 
 VANE_TOLERANCE = 0.1  # of what a vane's error does: its column is that of the trim
 HOLDS = 5.0  # times as long as old evidence elsewhere a force is remembered
@@ -383,7 +382,7 @@ def views_of(aircraft: Aircraft, with_force: bool = False) -> Iterator[Direction
     if not with_force:
         return
     for f, plane, movers in ((UP, IN_PITCH, in_pitch), (ASIDE, IN_YAW, lateral)):
-        found = separated_by_force(aircraft, f)
+        found = aircraft.separated_by_force(COMPONENTS[f])
         for s in found:
             own = aircraft.dominant_axis[s], plane[1]
             yield Direction(s, _along(own), own, [other for other in movers if other != s])
@@ -396,18 +395,10 @@ def _along(components: tuple[int, ...]) -> tuple[float, ...]:
     return tuple(float(i in components) for i in range(NORMAL + 1))
 
 
-def across_a_column(config: FdiConfig, instants: int) -> bool:
-    """Whether what goes on across a surface's column excludes it.
-
-    Within a frame of several instants a column turns with the incidence while the surface moves, and shows
-    across its mean.
-    """
-    return config.looks_across and instants <= 1
-
-
 def size_for(aircraft: Aircraft) -> Size:
     """What an aircraft needs room for."""
-    axes, views = [axis_of(term) for term in aircraft.moments], list(views_of(aircraft, tell_apart(aircraft)))
+    axes = [axis_of(term) for term in aircraft.moments]
+    views = list(views_of(aircraft, aircraft.forces_separate_surfaces))
     rates = N_READINGS + max(axes.count(PITCH), axes.count(ROLL) + axes.count(YAW))
     errors = max(len(terms_of(aircraft, f)) for f in (ASIDE, UP)) + forces.MAX_ERRORS - MAX_TERMS_OF_ONE
     turns = [aircraft.dominant_axis[aircraft.surfaces.index(s)] for s in aircraft.class_of_losses]
@@ -421,7 +412,7 @@ def size_for(aircraft: Aircraft) -> Size:
 def set_up_views(statistical: np.void, aircraft: Aircraft) -> None:
     """Fill the views of a statistical record whose blocks, and normal force, are set up."""
     forces = statistical["forces"]
-    separated = [separated_by_force(aircraft, f) for f in (ASIDE, UP)]
+    separated = [aircraft.separated_by_force(COMPONENTS[f]) for f in (ASIDE, UP)]
     with_air = forces["known"] and statistical["air"]["moving"] and all(separated)
     views = list(views_of(aircraft, bool(forces["known"])))[: len(statistical["views"])]
     statistical["n_views"] = len(views)

@@ -16,7 +16,7 @@ turbulence widens the bounds of flow and climb by what its gusts do within a fil
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.bounds.worst_case import LEAST_HEIGHT_M
+from beaver_ftc.design.dryden import LEAST_HEIGHT_M
 from beaver_ftc.diagnosis.detection.thresholds import bound_step, noise_step
 from beaver_ftc.diagnosis.monitors.sensor_records import (
     AIRSPEED,

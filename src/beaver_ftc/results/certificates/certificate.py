@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.design.model import AXES
-from beaver_ftc.diagnosis.bounds.declared import poles_for_noise
+from beaver_ftc.diagnosis.bank import poles_of
 from beaver_ftc.diagnosis.state import LOSS
 from beaver_ftc.diagnosis.types.registry import STUCK
 from beaver_ftc.documents.errors import BadInput
@@ -38,7 +38,7 @@ from beaver_ftc.results.certificates.inequality import (
 )
 from beaver_ftc.results.certificates.tape import MOST_AFTER, Recorder, Tape, recorded
 from beaver_ftc.results.log import Log, ParquetLog, StoredLog
-from beaver_ftc.scenario.diagnosis import MAX_POLES
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.dump import to_yaml
 from beaver_ftc.scenario.schema import Scenario
 
@@ -334,10 +334,7 @@ def _stated(found: Found, history: History, because: str, **about: Any) -> Docum
 
 def _poles(scenario: Scenario) -> list[float]:
     """Of the detection filters (theory, section 3)."""
-    config = scenario.fdi
-    for_noise = poles_for_noise(config.bounds.sensors, max(config.bounds.constant_rad_s2.as_tuple()))
-    further = (*config.pole_bank_per_s, *for_noise) if config.sharpen.pole_bank else ()
-    return [config.detection_pole_per_s, *further][:MAX_POLES]
+    return list(poles_of(scenario.fdi, Declared.of(scenario)))
 
 
 def _of_alarm(scenario: Scenario, tape: Tape, history: History, k: int) -> Found:

@@ -7,12 +7,13 @@ the modules of the loop have the sources.
 
 import numpy as np
 
+from beaver_ftc.aircraft.units import EARTH_RATE_RAD_S
 from beaver_ftc.control.reference import discretise
 from beaver_ftc.design.fdc import GEOMETRY, MASS, SURFACES, TERMS
 from beaver_ftc.design.model import inertia_coefficients
-from beaver_ftc.diagnosis.bounds.declared import EARTH_RATE_RAD_S
 from beaver_ftc.diagnosis.detection.fdae import ALPHA_CENTRES, BETA_CENTRES, N_BASIS
 from beaver_ftc.plant import channels as ch
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import sample
 from beaver_ftc.studies.bench.contenders import take_over
@@ -218,11 +219,11 @@ class Straightforward:
 
     def bound(self, x: np.ndarray) -> np.ndarray:
         """The bound on the uncertainty, (3,) rad/s2: as published, and for the turning Earth."""
-        bounds, coupling = self.scenario.fdi.bounds, self.model.coupling
+        declared, coupling = Declared.of(self.scenario), self.model.coupling
         cross = np.array([x[1] * x[2], x[0] * x[2], x[0] * x[1]])
         earth = EARTH_RATE_RAD_S * (2.0 * np.abs(x).sum() + EARTH_RATE_RAD_S)
-        published = np.array(bounds.inertia_coupling.as_tuple()) * np.abs(coupling * cross)
-        return published + bounds.constant_rad_s2.as_tuple() + earth
+        published = np.array(declared.coupling) * np.abs(coupling * cross)
+        return published + declared.constant_rad_s2 + earth
 
     def row(self, truth: dict[str, float], x: np.ndarray, reference: np.ndarray) -> dict[str, float]:
         """A row of the log."""

@@ -117,13 +117,15 @@ def load_all(names: list[str]) -> list["Scenario"]:
 
 
 def check_flyable(scenario: "Scenario", name: str) -> None:
-    """Raise BadInput, in the form of any other mistake in a file, if the flight cannot be trimmed."""
+    """Raise BadInput, in the form of any other mistake in a file, if the flight cannot be trimmed.
+
+    The trim is kept: the flight does not search for it again."""
     from beaver_ftc.documents.validation import parse_document
-    from beaver_ftc.plant.conditions import trimmed
+    from beaver_ftc.plant.conditions import find_trim
     from beaver_ftc.scenario.loader import read_file, resolve
 
     try:
-        trimmed(scenario)
+        find_trim(scenario)
     except BadInput as error:
         path = resolve(name)
         line = parse_document(read_file(path, name), str(path)).line(("initial",))

@@ -41,17 +41,31 @@ def ready(scenario: Scenario) -> tuple[Plant, TrimPoint]:
     remember the search for it: they take off in an aircraft that has not been through one.
     """
     plant = _configured(scenario)
+    point, searched = _trim_in(scenario, plant)
+    return (_configured(scenario) if searched and plant.n_engines else plant), point
+
+
+def find_trim(scenario: Scenario) -> TrimPoint:
+    """The scenario's trim, kept for its flights. Raises BadInput."""
+    plant = _configured(scenario)
+    point, _ = _trim_in(scenario, plant)
+    give_back(plant)
+    return point
+
+
+def _trim_in(scenario: Scenario, plant: Plant) -> tuple[TrimPoint, bool]:
+    """The trim, and whether it was searched for in this aircraft, which is given back if there is none."""
     key = plant.origin, texts_of(scenario, _TRIM_DEPENDS_ON)
-    if key not in _trims:
-        if len(_trims) >= _MOST_TRIMS:
-            _trims.clear()
-        try:
-            _trims[key] = trim_of(scenario, plant)
-        except BadInput:
-            give_back(plant)
-            raise
-        plant = _configured(scenario) if plant.n_engines else plant
-    return plant, _trims[key]
+    if key in _trims:
+        return _trims[key], False
+    if len(_trims) >= _MOST_TRIMS:
+        _trims.clear()
+    try:
+        _trims[key] = trim_of(scenario, plant)
+    except BadInput:
+        give_back(plant)
+        raise
+    return _trims[key], True
 
 
 def _configured(scenario: Scenario) -> Plant:

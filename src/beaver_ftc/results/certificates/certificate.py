@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.design.model import AXES
-from beaver_ftc.diagnosis.bank import poles_of
+from beaver_ftc.diagnosis.detection.bank import poles_of
 from beaver_ftc.diagnosis.state import LOSS
 from beaver_ftc.diagnosis.types.registry import STUCK
 from beaver_ftc.documents.errors import BadInput

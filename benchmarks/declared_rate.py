@@ -2,9 +2,10 @@
 
     python benchmarks/declared_rate.py [--hours 5] [--seed 1]
 
-Flights of difference equations whose coefficients are known (tests/flights/synthetic.py), each with a trim
-and a gain of its own, without labels. Prints a row for each rate asked: minutes fitted, threshold, mean and
-90 % interval of the rate that the parts left out give, and alarms an hour in healthy flights of other days.
+Flights of difference equations whose coefficients are known (tests/products/logs/synthetic.py), each with a
+trim and a gain of its own, without labels. Prints a row for each rate asked: minutes fitted, threshold, mean
+and 90 % interval of the rate that the parts left out give, and alarms an hour in healthy flights of other
+days.
 With BEAVER_FTC_FLIGHTS set the ALFA flights with a failure follow, by the model of those without: alarms
 before the failure, when it is found, and what is named.
 """
@@ -16,13 +17,13 @@ from pathlib import Path
 
 import numpy as np
 
-from beaver_ftc.flights import extremes, fitting
-from beaver_ftc.flights.diagnose import diagnose
-from beaver_ftc.flights.model import Model
-from beaver_ftc.flights.recording import Column, Recording
-from beaver_ftc.flights.samples import Samples, load_flights, sample
-from beaver_ftc.flights.vehicle import Vehicle, load_vehicle
 from beaver_ftc.studies.present.tables import markdown_table
+from beaver_ftc_logs import extremes, fitting
+from beaver_ftc_logs.diagnose import diagnose
+from beaver_ftc_logs.model import Model
+from beaver_ftc_logs.recording import Column, Recording
+from beaver_ftc_logs.samples import Samples, load_flights, sample
+from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "flights"))
 CASES = ((5.0, 6, 240.0), (1.0, 10, 600.0))  # rate, flights, seconds of each

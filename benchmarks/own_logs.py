@@ -36,15 +36,15 @@ import beaver_ftc as bf
 from beaver_ftc.design.context import DesignFunctions
 from beaver_ftc.design.model import design_record
 from beaver_ftc.design.terms import N_Y
-from beaver_ftc.flights.by_aircraft import diagnose_as, known
-from beaver_ftc.flights.diagnose import Rows, diagnose
-from beaver_ftc.flights.identification import by_pressure, identify
-from beaver_ftc.flights.model import Model, as_text
-from beaver_ftc.flights.samples import load_flights, read_for, sample
-from beaver_ftc.flights.vehicle import Vehicle, load_vehicle
 from beaver_ftc.results.exports import RECORDINGS
 from beaver_ftc.results.writer import run
 from beaver_ftc.studies.present.tables import markdown_table
+from beaver_ftc_logs.by_aircraft import diagnose_as, known
+from beaver_ftc_logs.diagnose import Rows, diagnose
+from beaver_ftc_logs.identification import by_pressure, identify
+from beaver_ftc_logs.model import Model, as_text
+from beaver_ftc_logs.samples import load_flights, read_for, sample
+from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
 
 Document = dict[str, Any]
 LAWS, TRAINING_LAWS = ("nominal", "adaptive", "fault-tolerant"), ("nominal", "adaptive")

@@ -31,9 +31,9 @@ from tools.autopilots import peers, trial
 from tools.autopilots.small import Circuit, Small
 
 import beaver_ftc as bf
-from beaver_ftc.integrations.sitl.ardupilot import Ardupilot
-from beaver_ftc.integrations.sitl.link import Link
-from beaver_ftc.integrations.sitl.vehicle import Vehicle
+from beaver_ftc_links.sitl.ardupilot import Ardupilot
+from beaver_ftc_links.sitl.link import Link
+from beaver_ftc_links.sitl.vehicle import Vehicle
 
 MOST_LATENCY_MS, MOST_GROWTH_MB = 0.5, 2.0
 HEALTHY = "elevator-loss-in-turbulence"  # its air, sensors, servos, tolerances and what is declared of them

@@ -27,8 +27,8 @@ def pytest_addoption(parser):
 
 # Files that take a worker longest: begun last, they would keep it while the other has nothing to do.
 LONGEST = (
-    "cli/test_command_line.py", "integrations/live/test_session.py", "studies/derive/test_derive.py",
-    "diagnosis/test_short_flights.py", "integrations/challenge/test_cheats.py",
+    "cli/test_command_line.py", "live/page/test_session.py", "aircraft/derive/test_derive.py",
+    "diagnosis/test_short_flights.py", "live/challenge/test_cheats.py",
     "studies/mismatch/test_command.py", "control/outer/test_thrust_of_others.py", "tools/test_mutants.py",
     "studies/bench/test_cache.py", "tools/test_site.py", "studies/compare/test_compare.py",
     "control/test_engines.py", "diagnosis/test_frames_kernels.py", "diagnosis/test_redundancy_kernels.py",

@@ -1,4 +1,4 @@
-"""The rules that keep the package readable: floors, no circles, one importer of JSBSim.
+"""The rules that keep the packages readable: floors, products apart, no circles, one importer of JSBSim.
 
 CONTRIBUTING.md has the same map in words. What a file imports is read from its syntax tree, imports inside
 functions, under TYPE_CHECKING and by a string included: an arrow is an arrow.
@@ -17,7 +17,17 @@ from beaver_ftc.plant import instrumented
 
 ROOT = Path(beaver_ftc.__file__).parent
 PACKAGE = "beaver_ftc"
-ROOTS = {PACKAGE: ROOT, "tools": Path(__file__).parents[1] / "tools"}
+PRODUCTS = sorted(path.name for path in ROOT.parent.glob(f"{PACKAGE}_*") if path.is_dir())
+ROOTS = {
+    **{name: ROOT.with_name(name) for name in (PACKAGE, *PRODUCTS)},
+    "tools": Path(__file__).parents[1] / "tools",
+}
+
+# A product stands beside the others: it imports the core, and another product only for the reason given.
+BESIDE = {
+    ("beaver_ftc_links", "beaver_ftc_live"): "the live page shows a flight that an autopilot commands",
+    ("beaver_ftc_logs", "beaver_ftc_assurance"): "the alarm in a recorded flight gets a certificate",
+}
 
 # Folders from the ground up; a folder imports what is below its own floor, and itself.
 FLOORS = (
@@ -31,10 +41,9 @@ FLOORS = (
     {"control"},
     {"loop"},
     {"results"},
-    {"flights"},
     {"studies"},
+    {"cli", "pytest_plugin"},
     {"integrations"},
-    {"cli"},
 )
 TOOLS = FLOORS[1]
 REGISTRY = "plugins"  # its rows name classes far above it, for those who ask: the same for other packages
@@ -57,7 +66,8 @@ def tree(name: str, package: str = PACKAGE) -> ast.Module:
 
 @cache
 def imports(name: str, package: str = PACKAGE) -> frozenset[str]:
-    """Every dotted name that a module imports, whole: `numpy`, `beaver_ftc.loop.frame.fly_frame`."""
+    """Every dotted name that a module imports, whole: `numpy`, `beaver_ftc.loop.frame.fly_frame`; those that
+    it names in a string included."""
     found = set()
     for node in ast.walk(tree(name, package)):
         if isinstance(node, ast.Import):
@@ -69,12 +79,12 @@ def imports(name: str, package: str = PACKAGE) -> frozenset[str]:
 
 
 def strings(name: str, package: str = PACKAGE) -> set[str]:
-    """Every string of a module that names something of this package: `beaver_ftc.loop.frame:fly_frame`."""
+    """Every string of a module that names something of our packages: `beaver_ftc.loop.frame:fly_frame`."""
     constants = (node.value for node in ast.walk(tree(name, package)) if isinstance(node, ast.Constant))
     return {
         value.replace(":", ".")
         for value in constants
-        if isinstance(value, str) and re.fullmatch(rf"{package}(\.\w+)+(:\w+)?", value)
+        if isinstance(value, str) and re.fullmatch(rf"{PACKAGE}(_[a-z]+)?(\.\w+)+(:\w+)?", value)
     }
 
 
@@ -120,6 +130,26 @@ def imported_by_registry() -> set[str]:
     return own_imports(REGISTRY) - named
 
 
+# What of the core still imports products.
+UNTIL_HOOKS = {
+    "", "cli.catalogue", "cli.compare", "cli.main", "cli.run", "cli.scenarios", "results.flight",
+    "results.writer", "studies.detectability", "studies.isolability", "studies.sweep.rare",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("package", [PACKAGE, *PRODUCTS])
+def test_products_stand_apart(package):
+    """The core imports none, and a product no other but for a stated reason."""
+    others = set(PRODUCTS) - {package} - {other for one, other in BESIDE if one == package}
+    found = {
+        f"{name} imports {target}"
+        for name in modules(package)
+        for target in imports(name, package)
+        if target.partition(".")[0] in others and not (package == PACKAGE and name in UNTIL_HOOKS)
+    }
+    assert found == set()
+
+
 @pytest.mark.parametrize("package", ROOTS)
 def test_no_two_modules_import_each_other_in_a_circle(package):
     assert circles(package) == []
@@ -150,20 +180,24 @@ def circles(package: str) -> list[set[str]]:
 
 
 def test_only_the_plant_imports_jsbsim():
-    importers = {name for name in modules() if any(i.partition(".")[0] == "jsbsim" for i in imports(name))}
-    assert importers
-    assert {name.partition(".")[0] for name in importers} == {"plant"}
+    importers = {
+        (package, name.partition(".")[0])
+        for package in (PACKAGE, *PRODUCTS)
+        for name in modules(package)
+        if any(i.partition(".")[0] == "jsbsim" for i in imports(name, package))
+    }
+    assert importers == {(PACKAGE, "plant")}
 
 
 def test_no_line_of_python_names_an_aircraft():
     """But for the built-in one, once: the default of a scenario. Documentation may."""
     names = {*builtin_names(), *instrumented.names()}
     named = []
-    for path in sorted(ROOT.rglob("*.py")):
+    for path in sorted(ROOT.parent.rglob("*.py")):
         tree = ast.parse(path.read_text(encoding="utf-8"))
         documents = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
         for node in ast.walk(tree):
             if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in documents:
                 words = re.findall(r"(?<!-)\b[\w-]+", node.value)
-                named += [(path.relative_to(ROOT).as_posix(), word) for word in words if word in names]
-    assert named == [("aircraft/loading.py", "beaver")]
+                named += [(path.relative_to(ROOT.parent).as_posix(), word) for word in words if word in names]
+    assert named == [("beaver_ftc/aircraft/loading.py", "beaver")]

@@ -208,7 +208,7 @@ def test_public_names_are_found_where_they_are_said_to_be():
 
 
 def test_what_the_first_use_of_an_aircraft_does(monkeypatch):
-    from beaver_ftc.studies.derive import first_use
+    from beaver_ftc_aircraft.derive import first_use
 
     seen = []
     monkeypatch.setattr(first_use, "derive_if_needed", seen.append)

@@ -6,7 +6,7 @@ python tools/check_certificate.py FOLDER
 import runpy
 from pathlib import Path
 
-CHECKER = Path(__file__).parents[1] / "src/beaver_ftc/results/certificates/check_certificate.py"
+CHECKER = Path(__file__).parents[1] / "src/beaver_ftc_assurance/certificates/check_certificate.py"
 
 if __name__ == "__main__":
     runpy.run_path(str(CHECKER), run_name="__main__")

@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from beaver_ftc.documents.paths import data_root
-from beaver_ftc.flights.sample_logs import files
+from beaver_ftc_logs.sample_logs import files
 
 COMMAND = [sys.executable, "-P", "-c", "from beaver_ftc.cli.main import main; main()"]
 LIMITED = ["sh", "-c", 'ulimit -t 20; ulimit -v 6291456; exec "$@"', "sh"]  # what goes on for ever is ended

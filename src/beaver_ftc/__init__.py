@@ -14,8 +14,8 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
-from beaver_ftc.integrations.environments import register_when_imported
 from beaver_ftc.plugins import first_use
+from beaver_ftc_links.environments import register_when_imported
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -85,13 +85,13 @@ def __getattr__(name: str) -> Any:
 
 
 def _derive(reference: str) -> None:
-    from beaver_ftc.studies.derive.first_use import derive_if_needed
+    from beaver_ftc_aircraft.derive.first_use import derive_if_needed
 
     derive_if_needed(reference)
 
 
 def _compare(aircraft: "Aircraft") -> None:
-    from beaver_ftc.studies.derive.first_use import compare_once
+    from beaver_ftc_aircraft.derive.first_use import compare_once
 
     compare_once(aircraft)
 

@@ -56,23 +56,23 @@ TABLE = (
     Exempt(r"python -m tools\.docs reference \S+", "in a checkout; tests/tools prints every such page"),
     Exempt(
         r"(beaver-ftc live(?: (?!--open)\S+)*)( --open)?",
-        "flies until it is ended, which the page's test does (tests/integrations/live): its address",
+        "flies until it is ended, which the page's test does (tests/products/live/page): its address",
         r"timeout --signal=INT 20 \1 | grep live:.http",
     ),
     Exempt(
         r"(beaver-ftc sitl \S+ --as ardupilot)",
-        "waits for an autopilot, which tests/integrations/sitl has: its address",
+        "waits for an autopilot, which tests/products/links/sitl has: its address",
         r"timeout --signal=INT 20 \1 --port 0 --no-report 2>&1 | grep 127.0.0.1",
     ),
     Exempt(
         r"beaver-ftc sitl .*",
-        "waits for an autopilot and wants pymavlink, both of which tests/integrations/sitl has",
+        "waits for an autopilot and wants pymavlink, both of which tests/products/links/sitl has",
         "beaver-ftc sitl --help",
     ),
     Exempt(r"(sim_vehicle.py|PX4_SIM_MODEL=).*", "needs ArduPilot or PX4"),
     Exempt(
         r"beaver-ftc compare --flights FOLDER.*",
-        "needs the recorded flights, which are not of this project (tests/flights has some of its own)",
+        "needs the recorded flights, which are not of this project (tests/products/logs has some of its own)",
     ),
     Exempt(
         r"beaver-ftc compare --tune( --errors)?",

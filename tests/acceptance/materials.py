@@ -6,9 +6,9 @@ from pathlib import Path
 
 import yaml
 
-from beaver_ftc.flights import sample_logs
-from beaver_ftc.integrations.challenge import folders, grading
-from flights.synthetic import fly, write_csv
+from beaver_ftc_live.challenge import folders, grading
+from beaver_ftc_logs import sample_logs
+from products.logs.synthetic import fly, write_csv
 
 from .documents import python_blocks, yaml_blocks
 from .installation import ROOT, Installation
@@ -138,7 +138,7 @@ def _copy(relative: str):
 def _checker(folder: Path) -> None:
     """The checker of certificates and what stands beside it in a checkout, without the package."""
     for file in (
-        Path("src/beaver_ftc/results/certificates/check_certificate.py"),
+        Path("src/beaver_ftc_assurance/certificates/check_certificate.py"),
         Path("tools/check_certificate.py"),
     ):
         (folder / file.parent).mkdir(parents=True, exist_ok=True)

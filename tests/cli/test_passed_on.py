@@ -43,8 +43,9 @@ def beaver(monkeypatch, tmp_path):
         given = []
         for path, result in instead.items():
             module, _, name = path.replace("__", ".").rpartition(".")
+            module = module if module.startswith("beaver_ftc_") else f"beaver_ftc.{module}"
             noting = _noting(name, result, given)
-            monkeypatch.setattr(import_module(f"beaver_ftc.{module}"), name, noting)
+            monkeypatch.setattr(import_module(module), name, noting)
         done = commands.beaver(*asked.split(), cwd=tmp_path)
         return done.returncode, done.stdout, given
 
@@ -106,7 +107,7 @@ def _flown(scenario, options, say):
     return SimpleNamespace(save=lambda out, report: out / f"report {report}", metrics=metrics | asked)
 
 
-SITL = {"integrations__sitl__serve__serve": _flown, "results__verdict__verdict_text": "verdict"}
+SITL = {"beaver_ftc_links__sitl__serve__serve": _flown, "results__verdict__verdict_text": "verdict"}
 SURVEY = {
     "studies__detectability__run_survey": {"points": [1], "pairs": [2]},
     "studies__detectability__text": "d",
@@ -119,9 +120,9 @@ SAID = {
 }
 BENCH = {"studies__bench__measure__bench": {"b": 1}, "studies__bench__measure__text_of": "bench"}
 DERIVE = {
-    "studies__derive__derivation__derive": "made",
-    "studies__derive__derived__document_of": {"d": 2},
-    "studies__derive__derived__text_of": "derived",
+    "beaver_ftc_aircraft__derive__derivation__derive": "made",
+    "beaver_ftc_aircraft__derive__derived__document_of": {"d": 2},
+    "beaver_ftc_aircraft__derive__derived__text_of": "derived",
 }
 COMPARE = {
     "studies__compare__trial__of_set": lambda name, most: [SimpleNamespace(set=name)] * 2,
@@ -136,11 +137,11 @@ COMPARE = {
     "studies__compare__runs__write_runs": ["r"],
     "studies__compare__runs__labels": lambda runs: ["first"],
     "studies__compare__runs__as_text": "runs",
-    "studies__recorded__benchmark__run_benchmark": {"rec": 1},
-    "studies__recorded__benchmark__as_text": "recorded",
-    "studies__recorded__benchmark__files_of": {"flights.png": b"picture"},
-    "studies__recorded__benchmark__update_page": None,
-    "studies__recorded__other_days__run_other_days": {"o": 1},
+    "beaver_ftc_logs__recorded__benchmark__run_benchmark": {"rec": 1},
+    "beaver_ftc_logs__recorded__benchmark__as_text": "recorded",
+    "beaver_ftc_logs__recorded__benchmark__files_of": {"flights.png": b"picture"},
+    "beaver_ftc_logs__recorded__benchmark__update_page": None,
+    "beaver_ftc_logs__recorded__other_days__run_other_days": {"o": 1},
 }
 FLIGHT = {"scenario": "x", "passed": True}
 RUN = {
@@ -157,7 +158,7 @@ SWEEP = {
     "results__junit__write_junit": None,
 }
 LIVE = {
-    "integrations__live__serve__serve": lambda load, out, place, say: say(
+    "beaver_ftc_live__page__serve__serve": lambda load, out, place, say: say(
         f"{load().name} at {place}", ["one"][: place.guests]
     )
 }
@@ -171,34 +172,34 @@ MISMATCH = {
     "studies__mismatch__study__run_map": [4],
 }
 IDENTIFY = {
-    "flights__vehicle__load_vehicle": "vehicle",
-    "flights__samples__load_flights": ["flight"],
-    "flights__identification__by_pressure": (
+    "beaver_ftc_logs__vehicle__load_vehicle": "vehicle",
+    "beaver_ftc_logs__samples__load_flights": ["flight"],
+    "beaver_ftc_logs__identification__by_pressure": (
         [SimpleNamespace(name="pressed", parts=2, notes=["long"])],
         "described",
     ),
-    "flights__identification__identify": SimpleNamespace(
+    "beaver_ftc_logs__identification__identify": SimpleNamespace(
         identified={"i": 1}, settings=SimpleNamespace(model_dump=lambda: {"s": 2})
     ),
-    "flights__identification__summary": "fitted",
-    "flights__model__as_text": "text",
+    "beaver_ftc_logs__identification__summary": "fitted",
+    "beaver_ftc_logs__model__as_text": "text",
     "studies__engine__store__write_whole": None,
-    "flights__pages__render_model": "page",
-    "flights__pages__check_page": None,
+    "beaver_ftc_logs__pages__render_model": "page",
+    "beaver_ftc_logs__pages__check_page": None,
 }
 DIAGNOSE = {
-    "flights__detectors__check_detector": None,
-    "flights__model__load_model": SimpleNamespace(vehicle="vehicle", groups="groups"),
-    "flights__samples__flights_of": ["one", "two"],
-    "flights__findings__as_text": lambda each: each["flight"],
-    "flights__detectors__diagnose_with": "rows",
-    "flights__findings__verdict_of": lambda of, *_: {"flight": of},
-    "flights__scoring__score": 0.5,
-    "flights__pages__write_diagnosis": "folder",
-    "flights__replay__is_own_log": lambda path: path.name == "log.parquet",
-    "flights__replay__replay": ("columns", {"flight": "ours"}),
-    "flights__replay__as_text": "replayed",
-    "flights__pages__write_results": "folder",
+    "beaver_ftc_logs__detectors__check_detector": None,
+    "beaver_ftc_logs__model__load_model": SimpleNamespace(vehicle="vehicle", groups="groups"),
+    "beaver_ftc_logs__samples__flights_of": ["one", "two"],
+    "beaver_ftc_logs__findings__as_text": lambda each: each["flight"],
+    "beaver_ftc_logs__detectors__diagnose_with": "rows",
+    "beaver_ftc_logs__findings__verdict_of": lambda of, *_: {"flight": of},
+    "beaver_ftc_logs__scoring__score": 0.5,
+    "beaver_ftc_logs__pages__write_diagnosis": "folder",
+    "beaver_ftc_logs__replay__is_own_log": lambda path: path.name == "log.parquet",
+    "beaver_ftc_logs__replay__replay": ("columns", {"flight": "ours"}),
+    "beaver_ftc_logs__replay__as_text": "replayed",
+    "beaver_ftc_logs__pages__write_results": "folder",
 }
 SMALLEST = {
     "studies__smallest__survey__run_smallest": {"folder": "f"},
@@ -206,13 +207,13 @@ SMALLEST = {
     "studies__engine__workers__cores": 7,
 }
 EVIDENCE = RUN | {
-    "studies__evidence__plan__load_plan": lambda name: SimpleNamespace(
+    "beaver_ftc_assurance__evidence__plan__load_plan": lambda name: SimpleNamespace(
         name=name, file=SimpleNamespace(name="of-" + name)
     ),
-    "studies__evidence__shown__run_plan": {"passed": False, "e": 1},
-    "studies__evidence__shown__as_text": "e",
-    "studies__evidence__shown__as_expectations": ["A"],
-    "studies__evidence__shown__of_flight": lambda plan, name: (
+    "beaver_ftc_assurance__evidence__shown__run_plan": {"passed": False, "e": 1},
+    "beaver_ftc_assurance__evidence__shown__as_text": "e",
+    "beaver_ftc_assurance__evidence__shown__as_expectations": ["A"],
+    "beaver_ftc_assurance__evidence__shown__of_flight": lambda plan, name: (
         SimpleNamespace(name=name),
         [{"name": of, "actual": f"met: {of}", "passed": of == "A"} for of in "AB"],
     ),
@@ -220,13 +221,13 @@ EVIDENCE = RUN | {
     "studies__engine__workers__cores": 7,
 }
 SEPARATE = {
-    "studies__separation__separate": lambda scenario, rate_deg_s: {"passed": rate_deg_s > 10.0},
-    "studies__separation__write": Path("folder"),
-    "studies__separation__as_text": "apart",
+    "beaver_ftc_assurance__separation__separate": lambda scenario, rate_deg_s: {"passed": rate_deg_s > 10.0},
+    "beaver_ftc_assurance__separation__write": Path("folder"),
+    "beaver_ftc_assurance__separation__as_text": "apart",
 }
 GRADE = {
-    "integrations__challenge__grading__grade": {"g": 1},
-    "integrations__challenge__grading__as_text": "graded",
+    "beaver_ftc_live__challenge__grading__grade": {"g": 1},
+    "beaver_ftc_live__challenge__grading__as_text": "graded",
     "studies__engine__workers__cores": 7,
 }
 RARE = {

@@ -21,11 +21,11 @@ from beaver_ftc.documents.problems import ScenarioError
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.instrumented import source_of
 from beaver_ftc.plant.trim import trim
-from beaver_ftc.studies.derive import derivation
-from beaver_ftc.studies.derive import sample as sampling
-from beaver_ftc.studies.derive.derivation import derive
-from beaver_ftc.studies.derive.fit import set_engines_apart
 from beaver_ftc.studies.detectability import engine_failures, of_engines
+from beaver_ftc_aircraft.derive import derivation
+from beaver_ftc_aircraft.derive import sample as sampling
+from beaver_ftc_aircraft.derive.derivation import derive
+from beaver_ftc_aircraft.derive.fit import set_engines_apart
 
 M_PER_IN, N_PER_LBF = 0.0254, 4.4482216
 DT, YAW = 0.01, 2

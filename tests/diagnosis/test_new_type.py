@@ -72,7 +72,7 @@ class Reversed(Switched):
 KNOWN = """
 import json
 from beaver_ftc.cli.catalogue import _available
-from beaver_ftc.integrations.live.session import fault_types
+from beaver_ftc_live.page.session import fault_types
 from beaver_ftc.results.metrics import faults_of
 from beaver_ftc.scenario.loader import load
 from beaver_ftc.scenario.schema import Scenario

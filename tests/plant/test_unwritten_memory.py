@@ -13,7 +13,7 @@ from math import isfinite
 from pathlib import Path
 from beaver_ftc.plant import instrumented
 from beaver_ftc.plant.trim import trim
-from beaver_ftc.studies.derive import outline
+from beaver_ftc_aircraft.derive import outline
 
 travel = {name: (-0.3, 0.3) for name in ("aileron", "elevator", "rudder")}
 model = instrumented.instrument(instrumented.source_of("fokker50"), Path(sys.argv[1]), travel)

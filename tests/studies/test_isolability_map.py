@@ -12,7 +12,7 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import MemoryLog
 from beaver_ftc.studies.detectability import SETTLED_S, Excitation, at, excitation, judge, pairs_of
 from beaver_ftc.studies.isolability import DOUBLET, TOLD, doublets, shown
-from beaver_ftc.studies.separation import LARGEST_RATE_DEG_S
+from beaver_ftc_assurance.separation import LARGEST_RATE_DEG_S
 from flying import loss, scenario
 from samples import samples
 

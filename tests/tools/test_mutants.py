@@ -64,7 +64,7 @@ def test_of_lines_that_are_alike_each_has_a_name_of_its_own(module):
 
 
 def test_a_change_elsewhere_draws_the_same_mutants(module, monkeypatch):
-    monkeypatch.setattr(scope, "PACKAGE", module.parent)
+    monkeypatch.setattr(scope, "SOURCES", module.parent)
     before = [m.name(module.parent) for _, m in scope.drawn(1, ("module.py",))[0]]
     module.write_text(SOURCE + "\n\ndef further(x):\n    return x\n")
     assert [m.name(module.parent) for _, m in scope.drawn(1, ("module.py",))[0]] == before
@@ -72,9 +72,8 @@ def test_a_change_elsewhere_draws_the_same_mutants(module, monkeypatch):
 
 
 def test_half_of_what_is_drawn_is_glue_and_a_kernel_is_what_compiled_code_is_made_of():
-    pairs, numbers = scope.drawn(
-        1, ("loop/changing.py", "diagnosis/isolation/estimators.py", "loop/frame.py")
-    )
+    named = ("loop/changing.py", "diagnosis/isolation/estimators.py", "loop/frame.py")
+    pairs, numbers = scope.drawn(1, [f"beaver_ftc/{name}" for name in named])
     assert [kind for kind, _ in pairs[:60]] == [scope.KERNELS, scope.GLUE] * 30
     files = {kind: {m.file.name for of, m in pairs if of == kind} for kind in numbers}
     assert files == {scope.KERNELS: {"estimators.py"}, scope.GLUE: {"changing.py", "estimators.py"}}
@@ -84,21 +83,21 @@ def test_half_of_what_is_drawn_is_glue_and_a_kernel_is_what_compiled_code_is_mad
 def test_what_fills_the_records_of_kernels_is_glue_and_what_lays_them_out_is_not():
     of = {}
     for name in ("isolation/estimators.py", "detection/likelihood.py"):
-        file = scope.PACKAGE / "diagnosis" / name
+        file = scope.CORE / "diagnosis" / name
         functions = [f for f in ast.parse(file.read_text()).body if isinstance(f, ast.FunctionDef)]
         for mutant in mutants(file):
             around = [f.name for f in functions if f.lineno <= mutant.lines[0] <= f.end_lineno]
             of.setdefault((*around, "a constant")[0], set()).add(scope.kind_of(mutant))
     assert of["configure"] == {scope.GLUE}
     assert of["a constant"] == of["whiten"] == {scope.KERNELS}
-    frame = {scope.kind_of(mutant) for mutant in mutants(scope.PACKAGE / "loop" / "frame.py")}
+    frame = {scope.kind_of(mutant) for mutant in mutants(scope.CORE / "loop" / "frame.py")}
     assert frame == {"fly"}
 
 
 def test_what_is_left_out_has_a_reason_and_what_is_listed_exists():
     assert sum(int(line.split()[0]) for line in scope.left_out()) < 30
-    assert scope.kind(scope.PACKAGE / "compiled.py") == "compile"
-    assert scope.kind(scope.PACKAGE / "loop" / "frame.py") == "fly"
+    assert scope.kind(scope.CORE / "compiled.py") == "compile"
+    assert scope.kind(scope.CORE / "loop" / "frame.py") == "fly"
     assert scope.stale() == []
 
 

@@ -18,11 +18,11 @@ from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.schema import AircraftFile
 from beaver_ftc.cli.main import COMMANDS
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.flights.vehicle import Vehicle
 from beaver_ftc.scenario.loader import load_text
 from beaver_ftc.scenario.signals import Signal
 from beaver_ftc.scenario.sweeps import Variation, load_sweep_text
-from beaver_ftc.studies.evidence.plan import load_plan
+from beaver_ftc_assurance.evidence.plan import load_plan
+from beaver_ftc_logs.vehicle import Vehicle
 from scenario.damageable import damageable
 
 ROOT = Path(__file__).parents[2]

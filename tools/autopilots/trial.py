@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from pymavlink.dialects.v20 import common
 
-from beaver_ftc.integrations.sitl.ardupilot import Ardupilot
-from beaver_ftc.integrations.sitl.link import Link
-from beaver_ftc.integrations.sitl.mavlink import Mavlink
-from beaver_ftc.integrations.sitl.px4 import Px4
+from beaver_ftc_links.sitl.ardupilot import Ardupilot
+from beaver_ftc_links.sitl.link import Link
+from beaver_ftc_links.sitl.mavlink import Mavlink
+from beaver_ftc_links.sitl.px4 import Px4
 from tools.autopilots import peers
 from tools.autopilots.reader import read
 

@@ -54,8 +54,10 @@ def _aircraft(name: str) -> Any:
 
 
 def _of_modules() -> Iterator[tuple[str, dict[str, Any]]]:
-    """(module's path below the package, its constants): names in capitals with numbers, texts, or such."""
-    for path in sorted((ROOT / "src" / PACKAGE).rglob("*.py")):
+    """(module's path, its constants): names in capitals with numbers, texts, or such. A module of the core
+    goes by its path below the package.
+    """
+    for path in sorted((ROOT / "src").rglob("*.py")):
         names = _constants_of(path)
         if names:
             parts = path.relative_to(ROOT / "src").with_suffix("").parts
@@ -65,7 +67,7 @@ def _of_modules() -> Iterator[tuple[str, dict[str, Any]]]:
                 found = {name: getattr(module, name, None) for name in names}
                 shown = {name: value for name, value in found.items() if _is_shown(value)}
                 if shown:
-                    yield dotted.partition(".")[2] or PACKAGE, shown
+                    yield dotted.removeprefix(f"{PACKAGE}."), shown
 
 
 def _constants_of(path: Path) -> list[str]:

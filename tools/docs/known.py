@@ -162,10 +162,10 @@ class Known:
     def schemas(self) -> tuple[Schema, ...]:
         """Of scenario, sweep, aircraft and vehicle files, and of plans."""
         from beaver_ftc.aircraft.schema import AircraftFile
-        from beaver_ftc.flights.vehicle import Vehicle
         from beaver_ftc.scenario.schema import Scenario
         from beaver_ftc.scenario.sweeps import SweepFile
-        from beaver_ftc.studies.evidence.plan import PlanFile
+        from beaver_ftc_assurance.evidence.plan import PlanFile
+        from beaver_ftc_logs.vehicle import Vehicle
 
         files = (Scenario, SweepFile, AircraftFile, Vehicle, PlanFile)
         return tuple(model.model_json_schema() for model in files)

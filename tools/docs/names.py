@@ -167,18 +167,18 @@ class Names:
         if self.known.resolves(text) or text in self.known.code.texts or text in self.shown:
             return
         first, *below = parts
-        if first == "beaver_ftc" and self._of_package(below):
+        if first.startswith("beaver_ftc") and self._of_package(parts):
             return
         members = self.known.code.members
         holds = first in members and below[0] in members[first]
-        loose = first not in members and first != "beaver_ftc"
+        loose = first not in members and not first.startswith("beaver_ftc")
         field_of = not self.known.is_section(first) and (loose or self._is_field(below[-1]))
         if not (holds or field_of) or not all(map(self._is_word, parts)):
             yield text
 
-    def _of_package(self, below: Sequence[str]) -> bool:
-        folder = "/".join(("src/beaver_ftc", *below))
-        above, name = folder.rpartition("/")[0], below[-1]
+    def _of_package(self, parts: Sequence[str]) -> bool:
+        folder = "/".join(("src", *parts))
+        above, name = folder.rpartition("/")[0], parts[-1]
         inside = {f"{folder}.py", folder} & self.known.files
         return bool(inside) or (
             bool({f"{above}.py", above} & self.known.files)

@@ -20,7 +20,9 @@ import numpy as np
 
 import beaver_ftc as bf
 from beaver_ftc.loop.loop import fly
-from beaver_ftc.results.certificates.certificate import (
+from beaver_ftc.results.log import Columns
+from beaver_ftc.scenario.dump import to_yaml
+from beaver_ftc_assurance.certificates.certificate import (
     Evidence,
     as_text,
     certificate,
@@ -29,10 +31,8 @@ from beaver_ftc.results.certificates.certificate import (
     logged,
     sealed,
 )
-from beaver_ftc.results.certificates.check_certificate import failures
-from beaver_ftc.results.certificates.tape import Recorder
-from beaver_ftc.results.log import Columns
-from beaver_ftc.scenario.dump import to_yaml
+from beaver_ftc_assurance.certificates.check_certificate import failures
+from beaver_ftc_assurance.certificates.tape import Recorder
 from tools.drawn.campaign import AIRCRAFT
 from tools.drawn.compose import OURS, PLAIN, drawn_flights
 from tools.drawn.reader import doubts

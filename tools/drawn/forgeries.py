@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 
 import beaver_ftc as bf
-from beaver_ftc.results.certificates import check_certificate as checker
-from beaver_ftc.results.certificates.certificate import as_text, sealed
 from beaver_ftc.scenario.dump import to_yaml
+from beaver_ftc_assurance.certificates import check_certificate as checker
+from beaver_ftc_assurance.certificates.certificate import as_text, sealed
 from tools.drawn.certificates import certified
 from tools.drawn.reader import doubts
 

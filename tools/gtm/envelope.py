@@ -11,8 +11,8 @@ from math import cos, radians, sin, sqrt
 
 import numpy as np
 
-from beaver_ftc.studies.gtm.parameters import cases, parameters, surfaces
-from beaver_ftc.studies.gtm.steady import (
+from beaver_ftc_aircraft.gtm.parameters import cases, parameters, surfaces
+from beaver_ftc_aircraft.gtm.steady import (
     ALTITUDE_FT,
     FT_S_PER_KNOT,
     HEADING_DEG,
@@ -20,7 +20,7 @@ from beaver_ftc.studies.gtm.steady import (
     Bench,
     pitch_angle,
 )
-from beaver_ftc.studies.gtm.systems import THROTTLE
+from beaver_ftc_aircraft.gtm.systems import THROTTLE
 
 SPEEDS_KT = tuple(range(60, 131, 10))
 BANKS_DEG = (-45, -30, -15, 0, 15, 30, 45)

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import fsolve
 
-from beaver_ftc.studies.gtm.database import read
-from beaver_ftc.studies.gtm.folder import write_model
-from beaver_ftc.studies.gtm.steady import HEADING_DEG, Bench, Condition, Steady, pitch_angle
+from beaver_ftc_aircraft.gtm.database import read
+from beaver_ftc_aircraft.gtm.folder import write_model
+from beaver_ftc_aircraft.gtm.steady import HEADING_DEG, Bench, Condition, Steady, pitch_angle
 from tools.gtm.specification import DATABASE, STEP_S, SURFACES, Controls, Servos, Specification, State
 
 # The specification's letters, and the names here.

@@ -17,7 +17,7 @@ import scipy.stats
 
 from tools.mutants.making import Mutant
 from tools.mutants.reach import Reach, few_examples, reach
-from tools.mutants.scope import GLUE, MODES, PACKAGE, drawn, left_out, stale
+from tools.mutants.scope import GLUE, MODES, SOURCES, drawn, left_out, stale
 from tools.mutants.trial import HANGS, KILLED, outcome
 
 LIBRARIES = (hypothesis, numba, pandas, pydantic, scipy)  # loaded once here, not once in each child
@@ -50,7 +50,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--start", type=int, default=0, help="leave out the first so many, to go on")
     parser.add_argument("--least", type=float, default=85.0, help="per cent that must die")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes side by side")
-    parser.add_argument("modules", nargs="*", default=["**/*.py"], help="patterns below src/beaver_ftc")
+    parser.add_argument("modules", nargs="*", default=["**/*.py"], help="patterns below src")
     return parser.parse_args()
 
 
@@ -82,7 +82,7 @@ def _trials(
 
 
 def _line(mutant: Mutant) -> str:
-    where = f"{mutant.file.relative_to(PACKAGE).as_posix()}:{mutant.lines[0]}"
+    where = f"{mutant.file.relative_to(SOURCES).as_posix()}:{mutant.lines[0]}"
     return f"{where} {mutant.kind}: {mutant.before.splitlines()[0]}  ->  {mutant.after.splitlines()[0]}"
 
 

@@ -23,7 +23,7 @@ import hypothesis
 import pytest
 
 from tools.mutants.making import Mutant
-from tools.mutants.scope import COMPILED, PACKAGE, PLAIN, ROOT, assigned, runs_at_import, tests, uses
+from tools.mutants.scope import COMPILED, PLAIN, ROOT, SOURCES, assigned, runs_at_import, tests, uses
 from tools.mutants.trial import SURVIVED, in_a_child, processor_s, pytest_quietly, turn_to
 
 SLOW_S = {
@@ -116,7 +116,7 @@ def _load(mode: str) -> None:
     """The whole package, and compiled code: once, not once a test file."""
     turn_to(mode)
     few_examples()
-    for module in pkgutil.walk_packages([str(PACKAGE)], "beaver_ftc."):
+    for module in pkgutil.walk_packages([str(SOURCES)]):
         with suppress(ImportError), warnings.catch_warnings(action="ignore"):
             importlib.import_module(module.name)
     if mode == COMPILED:
@@ -156,7 +156,7 @@ def _write(mode: str, file: Path) -> int:
 
 
 def _measured(mode: str, file: Path) -> dict:
-    watch = coverage.Coverage(data_file=None, source_pkgs=["beaver_ftc"], config_file=False, messages=False)
+    watch = coverage.Coverage(data_file=None, source=[str(SOURCES)], config_file=False, messages=False)
     timed = _Timed(watch, SLOW_S[mode], _slow_before(mode, file))
     with tempfile.TemporaryDirectory() as others:
         os.environ["MUTANTS_LINES"] = f"{others}/lines"
@@ -235,7 +235,7 @@ def forget() -> None:
     the first of a process would be known to execute it.
     """
     for name, module in list(sys.modules.items()):
-        if name.startswith("beaver_ftc.") and name not in APART:
+        if name.startswith("beaver_ftc") and name not in APART:
             for value in list(vars(module).values()):
                 if isinstance(value, functools._lru_cache_wrapper) and value.__module__ == name:
                     value.cache_clear()

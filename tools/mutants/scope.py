@@ -14,7 +14,8 @@ import yaml
 from tools.mutants.making import Mutant, mutants
 
 ROOT = Path(__file__).parents[2]
-PACKAGE = ROOT / "src" / "beaver_ftc"
+SOURCES = ROOT / "src"
+CORE = SOURCES / "beaver_ftc"
 TESTS = ROOT / "tests"
 EQUIVALENT = Path(__file__).with_name("equivalent.yaml")
 
@@ -27,8 +28,8 @@ MODES = {KERNELS: (PLAIN,), GLUE: (PLAIN, COMPILED)}
 # Compiled modules that plain Python reaches in a second.
 QUICK = ("design", "diagnosis", "control")
 APART = {
-    "compiled.py": "compile", "numba_inside.py": "compile", "numba_sized.py": "compile",
-    "results/style.py": "looks",
+    "beaver_ftc/compiled.py": "compile", "beaver_ftc/numba_inside.py": "compile",
+    "beaver_ftc/numba_sized.py": "compile", "beaver_ftc/results/style.py": "looks",
 }  # fmt: skip
 LEFT_OUT = {
     "looks": "how lines look: only the eye can judge it",
@@ -39,15 +40,15 @@ LEFT_OUT = {
 
 def kind(file: Path) -> str:
     """KERNELS, GLUE, or why no mutants are made of a module (a key of LEFT_OUT)."""
-    if reason := APART.get(file.relative_to(PACKAGE).as_posix()):
+    if reason := APART.get(file.relative_to(SOURCES).as_posix()):
         return reason
-    if file not in _compiled(PACKAGE):
+    if file not in _compiled(SOURCES):
         return GLUE
     return KERNELS if _is_quick(file) else "fly"
 
 
 def _is_quick(file: Path) -> bool:
-    return any(file.is_relative_to(PACKAGE / folder) for folder in QUICK)
+    return any(file.is_relative_to(CORE / folder) for folder in QUICK)
 
 
 def kind_of(mutant: Mutant) -> str:
@@ -58,7 +59,7 @@ def kind_of(mutant: Mutant) -> str:
 
 def _in_compiled_code(file: Path, line: int) -> bool:
     """Whether a kernel follows from a line: its own, a constant's, or one that lays out a record."""
-    if file not in _compiled(PACKAGE):
+    if file not in _compiled(SOURCES):
         return False
     around = (node for node in _tree(file).body if node.lineno <= line <= (node.end_lineno or 0))
     for node in around:
@@ -69,13 +70,13 @@ def _in_compiled_code(file: Path, line: int) -> bool:
 
 
 @cache
-def _compiled(package: Path) -> frozenset[Path]:
+def _compiled(sources: Path) -> frozenset[Path]:
     """The modules with kernels, and those whose constants they have in them."""
-    found = {file for file in package.rglob("*.py") if "beaver_ftc.compiled" in _imports(file)}
+    found = {file for file in sources.rglob("*.py") if "beaver_ftc.compiled" in _imports(file)}
     due = list(found)
     while due:
         for module, names in _imports(due.pop()).items():
-            file = (package.parent / module.replace(".", "/")).with_suffix(".py")
+            file = (sources / module.replace(".", "/")).with_suffix(".py")
             constants = any(name.lstrip("_").isupper() for name in names)
             if constants and _is_quick(file) and file not in found and file.exists():
                 found.add(file)
@@ -91,7 +92,7 @@ def _imports(file: Path) -> dict[str, list[str]]:
 
 def left_out() -> list[str]:
     """A line a reason: how many modules no mutants are made of, and why."""
-    kinds = Counter(kind(file) for file in PACKAGE.rglob("*.py"))
+    kinds = Counter(kind(file) for file in SOURCES.rglob("*.py"))
     return [f"{kinds[reason]} modules: {text}" for reason, text in LEFT_OUT.items() if kinds[reason]]
 
 
@@ -119,13 +120,13 @@ def drawn(seed: int, patterns: Sequence[str]) -> tuple[list[tuple[str, Mutant]],
     listed as equivalent are left out.
     """
     known = equivalent()
-    files = sorted({file for pattern in patterns for file in PACKAGE.glob(pattern)})
+    files = sorted({file for pattern in patterns for file in SOURCES.glob(pattern)})
     every: dict[str, list[Mutant]] = {KERNELS: [], GLUE: []}
     for mutant in chain(*map(mutants, files)):
-        if mutant.name(PACKAGE) not in known:
+        if mutant.name(SOURCES) not in known:
             every.get(kind_of(mutant), []).append(mutant)
     for found in every.values():
-        found.sort(key=lambda mutant: hashlib.sha256(f"{seed} {mutant.name(PACKAGE)}".encode()).digest())
+        found.sort(key=lambda mutant: hashlib.sha256(f"{seed} {mutant.name(SOURCES)}".encode()).digest())
     turns = zip_longest(*([(of, mutant) for mutant in found] for of, found in every.items()))
     return [pair for pair in chain(*turns) if pair], Counter({of: len(found) for of, found in every.items()})
 
@@ -139,8 +140,8 @@ def equivalent() -> set[str]:
 def stale() -> list[str]:
     """Names in the list of equivalent mutants that are none of any mutant today."""
     known = equivalent()
-    files = {PACKAGE / name.split(":")[0] for name in known}
-    there = {mutant.name(PACKAGE) for file in files if file.exists() for mutant in mutants(file)}
+    files = {SOURCES / name.split(":")[0] for name in known}
+    there = {mutant.name(SOURCES) for file in files if file.exists() for mutant in mutants(file)}
     return sorted(known - there)
 
 

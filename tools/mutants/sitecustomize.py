@@ -5,13 +5,14 @@ Python loads it first, by PYTHONPATH (reach.py); the environment names the test.
 
 import atexit
 import os
+from pathlib import Path
 
 if "MUTANTS_TEST" in os.environ:
     import coverage
 
     _watch = coverage.Coverage(
         data_file=os.environ["MUTANTS_LINES"], data_suffix=True, context=os.environ["MUTANTS_TEST"],
-        source_pkgs=["beaver_ftc"], config_file=False, messages=False,
+        source=[str(Path(__file__).parents[2] / "src")], config_file=False, messages=False,
     )  # fmt: skip
     _watch.start()
     atexit.register(_watch.save)

@@ -14,7 +14,7 @@ import numba
 import pytest
 
 from tools.mutants.making import Mutant
-from tools.mutants.scope import COMPILED, PACKAGE, PLAIN, ROOT
+from tools.mutants.scope import COMPILED, CORE, PLAIN, ROOT, SOURCES
 
 BUDGET_S = {PLAIN: 30.0, COMPILED: 60.0}  # of tests for one mutant, by what they take with the true module
 ENDLESS_S, ENDLESS = 30.0, 3.0  # of processor, and times what the tests take with the true module: it hangs
@@ -50,7 +50,7 @@ def _outcome(mutant: Mutant, mode: str, seconds: dict[str, float]) -> str:
 
 def _chosen(file: Path, seconds: dict[str, float], budget_s: float) -> list[str]:
     """As many as the budget allows: those of the module's own folder first, and the quickest of them."""
-    own = f"tests/{file.relative_to(PACKAGE).parent.as_posix()}/"
+    own = f"tests/{_place_of_tests(file)}/"
     taken, spent = [], 0.0
     for test in sorted(seconds, key=lambda test: (not test.startswith(own), seconds[test])):
         spent += seconds[test]
@@ -60,12 +60,19 @@ def _chosen(file: Path, seconds: dict[str, float], budget_s: float) -> list[str]
     return taken
 
 
+def _place_of_tests(file: Path) -> str:
+    """The folder below tests/ that mirrors a module's: `products/NAME` for beaver_ftc_NAME."""
+    package, _, folder = file.relative_to(SOURCES).parent.as_posix().partition("/")
+    product = package.removeprefix(CORE.name).removeprefix("_")
+    return "/".join(part for part in ("products" if product else "", product, folder) if part)
+
+
 @cache
 def _is_sound(mode: str, test: str) -> bool:
     """Whether a test passes alone with the true package, put in place as one with a mutant is."""
     if not test:
         return True  # none was run: the mutant cannot be imported
-    true = PACKAGE / "__init__.py"
+    true = CORE / "__init__.py"
     return _run(mode, true, true.read_text(), [test], Path(os.devnull), 1000.0) == SURVIVED
 
 
@@ -80,22 +87,22 @@ def _run(mode: str, file: Path, source: str, tests: list[str], note: Path, limit
 
 @contextlib.contextmanager
 def _instead(file: Path, source: str) -> Iterator[None]:
-    """A package of links to the true one but for one file comes first, for what tests start as well."""
+    """Packages of links to the true ones but for one file come first, for what tests start as well."""
     with tempfile.TemporaryDirectory() as folder:
-        package = Path(folder) / "src" / PACKAGE.name
-        package.mkdir(parents=True)
-        for true in PACKAGE.rglob("*"):
-            place = package / true.relative_to(PACKAGE)
+        sources = Path(folder) / "src"
+        sources.mkdir()
+        for true in SOURCES.rglob("*"):
+            place = sources / true.relative_to(SOURCES)
             if true.is_dir() and true.name != "__pycache__":
                 place.mkdir()
             elif true.parent.name != "__pycache__":
                 place.symlink_to(true)  # what Python keeps of its modules as well: it is read alone
         for data in ("aircraft", "scenarios"):
             (Path(folder) / data).symlink_to(ROOT / data)
-        mutant = package / file.relative_to(PACKAGE)
+        mutant = sources / file.relative_to(SOURCES)
         mutant.unlink()
         mutant.write_text(source)
-        with _first(str(package.parent)):
+        with _first(str(sources)):
             yield
 
 

@@ -161,7 +161,7 @@ def schema(sweep: bool = False, plan: bool = False) -> None:
     plan: Of a plan of evidence instead of a scenario.
     """
     if plan:
-        from beaver_ftc.studies.evidence.plan import plan_json_schema
+        from beaver_ftc_assurance.evidence.plan import plan_json_schema
 
         emit_json(plan_json_schema())
         return

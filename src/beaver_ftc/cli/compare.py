@@ -103,7 +103,7 @@ def _most_or_folder(flights: str | None) -> tuple[int | None, Path | None]:
 def _compare_recorded(folder: Path, out: Path, format: Format, page: Path | None) -> None:
     from beaver_ftc.results.writer import result_folder
     from beaver_ftc.studies.present.page import write_files
-    from beaver_ftc.studies.recorded.benchmark import as_text, files_of, run_benchmark, update_page
+    from beaver_ftc_logs.recorded.benchmark import as_text, files_of, run_benchmark, update_page
 
     document = run_benchmark(folder)
     with result_folder(out, "recorded-flights") as written:
@@ -117,8 +117,8 @@ def _compare_recorded(folder: Path, out: Path, format: Format, page: Path | None
 
 
 def _compare_other_days(folder: Path, format: Format, page: Path | None) -> None:
-    from beaver_ftc.studies.recorded.benchmark import as_text, update_page
-    from beaver_ftc.studies.recorded.other_days import run_other_days
+    from beaver_ftc_logs.recorded.benchmark import as_text, update_page
+    from beaver_ftc_logs.recorded.other_days import run_other_days
 
     document = {"other_days": run_other_days(folder)}
     if page is not None:

@@ -16,38 +16,38 @@ from beaver_ftc import __version__
 from beaver_ftc.cli.inputs import as_typer_reads
 from beaver_ftc.cli.output import failure_of, report_last, status_of_stop
 
-# Where each is: a module of this package, and its function there.
+# Where each is: a module, and its function there.
 COMMANDS = {
-    "run": "run:command",
-    "check": "check:command",
-    "mismatch": "mismatch:command",
-    "validate": "scenarios:validate",
-    "schema": "catalogue:schema",
-    "trim": "studies:trim",
-    "linearise": "studies:linearise",
-    "list": "catalogue:list_choices",
-    "show": "catalogue:show",
-    "new": "scenarios:new",
-    "sweep": "sweep:command",
-    "compare": "compare:command",
-    "evidence": "evidence:command",
-    "reproduce": "studies:reproduce",
-    "matrix": "surveys:matrix",
-    "power": "surveys:power",
-    "smallest": "surveys:smallest",
-    "bench": "studies:bench",
-    "derive": "studies:derive",
-    "verify": "studies:verify",
-    "detectability": "studies:detectability",
-    "separate": "separate:command",
-    "identify": "recorded:identify",
-    "diagnose": "recorded:diagnose",
-    "live": "live:command",
-    "sitl": "sitl:command",
-    "import gtm": "imports:gtm",
-    "challenge new": "challenge:new",
-    "challenge submit": "challenge:submit",
-    "challenge grade": "challenge:grade",
+    "run": "beaver_ftc.cli.run:command",
+    "check": "beaver_ftc_assurance.commands.check:command",
+    "mismatch": "beaver_ftc.cli.mismatch:command",
+    "validate": "beaver_ftc.cli.scenarios:validate",
+    "schema": "beaver_ftc.cli.catalogue:schema",
+    "trim": "beaver_ftc.cli.studies:trim",
+    "linearise": "beaver_ftc.cli.studies:linearise",
+    "list": "beaver_ftc.cli.catalogue:list_choices",
+    "show": "beaver_ftc.cli.catalogue:show",
+    "new": "beaver_ftc.cli.scenarios:new",
+    "sweep": "beaver_ftc.cli.sweep:command",
+    "compare": "beaver_ftc.cli.compare:command",
+    "evidence": "beaver_ftc_assurance.commands.evidence:command",
+    "reproduce": "beaver_ftc.cli.studies:reproduce",
+    "matrix": "beaver_ftc.cli.surveys:matrix",
+    "power": "beaver_ftc.cli.surveys:power",
+    "smallest": "beaver_ftc.cli.surveys:smallest",
+    "bench": "beaver_ftc.cli.studies:bench",
+    "derive": "beaver_ftc_aircraft.commands:derive",
+    "verify": "beaver_ftc.cli.studies:verify",
+    "detectability": "beaver_ftc.cli.studies:detectability",
+    "separate": "beaver_ftc_assurance.commands.separate:command",
+    "identify": "beaver_ftc_logs.commands:identify",
+    "diagnose": "beaver_ftc_logs.commands:diagnose",
+    "live": "beaver_ftc_live.commands.live:command",
+    "sitl": "beaver_ftc_links.commands:command",
+    "import gtm": "beaver_ftc_aircraft.commands:gtm",
+    "challenge new": "beaver_ftc_live.commands.challenge:new",
+    "challenge submit": "beaver_ftc_live.commands.challenge:submit",
+    "challenge grade": "beaver_ftc_live.commands.challenge:grade",
 }
 # Of a command that has commands of its own: what it is for.
 GROUPS = {
@@ -105,7 +105,7 @@ for _group in _groups.values():
     app.add_typer(_group, context_settings={"help_option_names": ["-h", "--help"]})
 for _name, _where in COMMANDS.items():
     _module, _, _function = _where.partition(":")
-    _command = getattr(import_module(f"beaver_ftc.cli.{_module}"), _function)
+    _command = getattr(import_module(_module), _function)
     _read = as_typer_reads(_command, flies=_name not in WITHOUT_PLUGINS)
     # the examples at the end of its help, each on a line of its own
     _read.__doc__, _, _examples = str(_read.__doc__).partition("\n\nExamples:\n")

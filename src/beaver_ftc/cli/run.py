@@ -88,7 +88,7 @@ def _shown(given: str | None) -> "Prepare | None":
     """What connects a plant to the FlightGear at HOST:PORT."""
     import socket
 
-    from beaver_ftc.plant.flightgear import show_in_flightgear
+    from beaver_ftc_links.flightgear import show_in_flightgear
 
     if given is None:
         return None
@@ -150,7 +150,7 @@ def _certificate(folder: Path) -> Document:
     """How much of the flight its certificate states."""
     import json
 
-    from beaver_ftc.results.certificates.certificate import FILE
+    from beaver_ftc_assurance.certificates.certificate import FILE
 
     written = json.loads((folder / FILE).read_text(encoding="utf-8"))
     return {"certificate": {name: len(written[name]) for name in ("statements", "without")}}

@@ -66,7 +66,7 @@ def _check(file: str) -> Document:
         if is_sweep(file):
             load_sweep(file)
         elif has_key(file, "plan", "requirements"):
-            from beaver_ftc.studies.evidence.plan import load_plan
+            from beaver_ftc_assurance.evidence.plan import load_plan
 
             load_plan(file)
         else:
@@ -114,7 +114,7 @@ def new(
 
 
 def _sample_logs(folder: Path, like: str | None) -> None:
-    from beaver_ftc.flights.sample_logs import files
+    from beaver_ftc_logs.sample_logs import files
 
     if like is not None:
         raise BadInput("new: --like and --log are given, allowed: one of them")

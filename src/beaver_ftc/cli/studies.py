@@ -1,4 +1,4 @@
-"""What is one call: `trim`, `linearise`, `bench`, `derive`, `reproduce`, `verify` and `detectability`."""
+"""What is one call: `trim`, `linearise`, `bench`, `reproduce`, `verify` and `detectability`."""
 
 import math
 import sys
@@ -121,36 +121,6 @@ def linearise(scenario: ConditionOf = None, format: FormatOption = Format.text) 
     modes = handling.over_airspeeds(given)
     document = margins.as_document(found, asked) | {"handling": handling.as_rows(modes)}
     answer(format, document, lambda: f"{margins.as_text(found, asked)}\n\n{handling.as_text(modes)}")
-
-
-def derive(
-    aircraft: Annotated[str, typer.Argument(metavar="AIRCRAFT")],
-    envelope: Path | None = None,
-    out: Path | None = None,
-    engines: bool = False,
-    format: FormatOption = Format.text,
-) -> None:
-    """Derive an aircraft's design model from JSBSim.
-
-    And measure the error that is left. It samples the aircraft over its envelope, fits sparse terms,
-    and checks them on states the fit did not see: the largest error becomes the declared bound.
-    Afterwards `aircraft: jsbsim:NAME` flies.
-
-    aircraft: jsbsim:NAME of the installed jsbsim package, a JSBSim model, or an aircraft's folder.
-    envelope: YAML with airspeed_mps, alpha_deg, altitude_m, sideslip_deg: where to sample.
-    out: Folder to write the aircraft's folder into, if not the cache.
-    engines: Each engine is an effector as well, with a lever of its own: it turns the aircraft where
-    surfaces no longer reach. With --out.
-    """
-    from beaver_ftc.documents.errors import BadInput
-    from beaver_ftc.studies.derive.derivation import derive
-    from beaver_ftc.studies.derive.derived import document_of, text_of
-
-    if engines and out is None:
-        raise BadInput("--engines: wants a folder of its own, allowed: with --out")
-    made = derive(aircraft, out, envelope, lambda what: complain(f"deriving: {what}"), engines=engines)
-    document = document_of(made)
-    answer(format, document, lambda: text_of(document))
 
 
 def reproduce(

@@ -1,1 +1,1 @@
-"""Other people's frames around ours: pytest, Gymnasium."""
+"""The former place of the pytest plug-in."""

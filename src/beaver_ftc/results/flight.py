@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from beaver_ftc.control.base import Law
     from beaver_ftc.diagnosis.base import Detector
     from beaver_ftc.loop.outcome import Landing
-    from beaver_ftc.results.certificates.proved import Proof
+    from beaver_ftc_assurance.certificates.proved import Proof
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -136,7 +136,7 @@ class Flight:
     def proof(self) -> "Proof":
         """The same with what it is checked against: the flight's log, which has further columns for it, and
         the text of its scenario."""
-        from beaver_ftc.results.certificates.proved import proof
+        from beaver_ftc_assurance.certificates.proved import proof
 
         return proof(self.scenario, self._kept())
 

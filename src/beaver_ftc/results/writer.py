@@ -74,8 +74,8 @@ def run(
     """
     from beaver_ftc.loop.loop import fly
     from beaver_ftc.results import exports as exporting
-    from beaver_ftc.results.certificates import certificate
-    from beaver_ftc.results.certificates.tape import Recorder
+    from beaver_ftc_assurance.certificates import certificate
+    from beaver_ftc_assurance.certificates.tape import Recorder
 
     recorder = Recorder(scenario) if certified else None
     watch = recorder.watch if recorder else None

@@ -37,12 +37,12 @@ from beaver_ftc.results.log import Columns
 from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies import isolability
-from beaver_ftc.studies.derive.fit import EXACT_TERMS
 from beaver_ftc.studies.engine.statistics import quantile
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.present.figures import heat_map, label_edges, panels
 from beaver_ftc.studies.present.page import Files, Heading, Part, Pictures, Table, as_html
 from beaver_ftc.studies.present.tables import aligned, as_csv
+from beaver_ftc_aircraft.derive.fit import EXACT_TERMS
 
 DETECT_WITHIN_S, ISOLATE_WITHIN_S = 0.5, 1.0
 SPEEDS_MPS, ALTITUDES_M = (36.0, 40.0, 44.0, 48.0, 52.0), (0.0, 1000.0, 2000.0, 3000.0)

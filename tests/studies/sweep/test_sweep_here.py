@@ -10,7 +10,6 @@ import pytest
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
-from beaver_ftc.results.certificates.check_certificate import failures
 from beaver_ftc.scenario.sweeps import Variation
 from beaver_ftc.studies.engine.workers import ThisProcess
 from beaver_ftc.studies.sweep import campaign, one_flight, store
@@ -18,6 +17,7 @@ from beaver_ftc.studies.sweep.campaign import Options, SweepStopped, assignment_
 from beaver_ftc.studies.sweep.one_flight import Keep, as_cell, kind_of, row_of
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan, value_at
 from beaver_ftc.studies.sweep.search import Evolution, members, score
+from beaver_ftc_assurance.certificates.check_certificate import failures
 
 from .conftest import SHORT, sweep_of
 

@@ -11,7 +11,6 @@ from beaver_ftc.aircraft import load
 from beaver_ftc.control.outer.state import COLUMNS as PROFILE
 from beaver_ftc.diagnosis.isolation.estimators import estimator_names
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.flights import pages
 from beaver_ftc.plant.channels import log_columns
 from beaver_ftc.results.log import unit_of
 from beaver_ftc.studies import detectability
@@ -20,6 +19,7 @@ from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.power.shown import rows_as_parquet
 from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc.studies.sweep.one_flight import FIXED, columns_of
+from beaver_ftc_logs import pages
 
 TEXTS = Path(__file__).with_name("columns.yaml")
 NUMBER, TEXT, FLAG = "number", "text", "true or false"

@@ -7,13 +7,13 @@ from typing import Any, NamedTuple
 import yaml
 
 from beaver_ftc.aircraft.schema import AircraftFile
-from beaver_ftc.flights.vehicle import Vehicle
 from beaver_ftc.plugins import DETECTORS, LAWS, options_of, registered
 from beaver_ftc.scenario import actuators, sensors
 from beaver_ftc.scenario.schema import json_schema
 from beaver_ftc.scenario.sweeps import sweep_json_schema
-from beaver_ftc.studies.evidence.plan import plan_json_schema
 from beaver_ftc.studies.present.tables import markdown_table
+from beaver_ftc_assurance.evidence.plan import plan_json_schema
+from beaver_ftc_logs.vehicle import Vehicle
 from tools.docs.reference.schema import Key, Node, Place, Section, Sections, dotted
 
 HEAD = ("key", "what it is", "type", "unit", "range", "default", "example")

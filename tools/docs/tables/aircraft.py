@@ -14,9 +14,9 @@ from benchmarks.any_aircraft import HEALTHY_S, TWELVE, row_of
 from benchmarks.unknown_instant import Cell, Survey, cells_of, shares_of
 
 from beaver_ftc.plant.instrumented import names
-from beaver_ftc.studies.derive.derivation import derive
-from beaver_ftc.studies.derive.first_use import derive_if_needed
 from beaver_ftc.studies.present.tables import markdown_table
+from beaver_ftc_aircraft.derive.derivation import derive
+from beaver_ftc_aircraft.derive.first_use import derive_if_needed
 from tools.docs.pages import ROOT
 
 PROGRAM = "from beaver_ftc.cli.main import main; main()"

@@ -3,8 +3,8 @@
 from importlib.resources import files
 
 import beaver_ftc as bf
-from beaver_ftc.integrations.challenge.grading import tried
 from beaver_ftc.studies.present.tables import markdown_table
+from beaver_ftc_live.challenge.grading import tried
 
 LOST = (0.001, 0.002, 0.003, 0.005, 0.007, 0.01, 0.02, 0.03, 0.05, 0.1, 0.3, 1.0)  # as in the notebook
 
@@ -62,7 +62,7 @@ def _small() -> list[tuple[str, str]]:
 
 
 def _detector() -> list[tuple[str, str]]:
-    package = "beaver_ftc.integrations.challenge"
+    package = "beaver_ftc_live.challenge"
     source = files(package).joinpath("handout/detector.py.txt").read_text(encoding="utf-8")
     handed_out = "memory_s, level = 2.0, 6.0"
     assert handed_out in source

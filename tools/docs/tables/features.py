@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from beaver_ftc.documents.errors import BeaverFtcError
-from beaver_ftc.integrations.live import messages
-from beaver_ftc.integrations.live.session import Session
 from beaver_ftc.scenario.loader import load
-from beaver_ftc.studies.derive.first_use import derive_if_needed
 from beaver_ftc.studies.matrix.fault_matrix import FAULTS, FaultCase, airspeeds_of, fly_case
 from beaver_ftc.studies.present.tables import markdown_table
+from beaver_ftc_aircraft.derive.first_use import derive_if_needed
+from beaver_ftc_live.page import messages
+from beaver_ftc_live.page.session import Session
 from tools.docs.tables.aircraft import PROGRAM
 
 PLANES = {

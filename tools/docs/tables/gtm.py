@@ -15,11 +15,11 @@ import numpy as np
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.plant.adapter import bare
-from beaver_ftc.studies.gtm.database import read
-from beaver_ftc.studies.gtm.folder import write_model
-from beaver_ftc.studies.gtm.parameters import OUTPUTS
-from beaver_ftc.studies.gtm.steady import Bench, Condition, Steady
 from beaver_ftc.studies.present.tables import markdown_table
+from beaver_ftc_aircraft.gtm.database import read
+from beaver_ftc_aircraft.gtm.folder import write_model
+from beaver_ftc_aircraft.gtm.parameters import OUTPUTS
+from beaver_ftc_aircraft.gtm.steady import Bench, Condition, Steady
 from tools.docs.tables import shared
 from tools.gtm import flights
 from tools.gtm.flights import ADAMS_BASHFORTH, FINE_S, MOTION, NAMES

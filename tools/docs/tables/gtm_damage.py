@@ -15,10 +15,10 @@ from benchmarks import gtm_damage as campaign
 from benchmarks import gtm_informed as informed
 
 import beaver_ftc as bf
-from beaver_ftc.studies.gtm.conversion import convert
-from beaver_ftc.studies.gtm.parameters import cases
-from beaver_ftc.studies.gtm.steady import Bench
 from beaver_ftc.studies.present.tables import markdown_table
+from beaver_ftc_aircraft.gtm.conversion import convert
+from beaver_ftc_aircraft.gtm.parameters import cases
+from beaver_ftc_aircraft.gtm.steady import Bench
 from tools.gtm.envelope import BANKS_DEG, SIDESLIPS_DEG, SPEEDS_KT, Envelope, Turn
 from tools.gtm.specification import DATABASE
 

@@ -10,7 +10,7 @@ from benchmarks import own_logs as own
 
 from beaver_ftc.studies.present.page import write_files
 from beaver_ftc.studies.present.tables import markdown_table
-from beaver_ftc.studies.recorded.benchmark import FIGURES, KINDS, files_of, run_benchmark
+from beaver_ftc_logs.recorded.benchmark import FIGURES, KINDS, files_of, run_benchmark
 from tools.docs.tables import shared
 
 Document = dict[str, Any]

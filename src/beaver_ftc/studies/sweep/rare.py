@@ -179,7 +179,7 @@ def score_of(scenario: Scenario, expectation: str) -> float:
     """Fly, and say how near it came to what is not expected: below 0 before, 0 and above once it has come."""
     from beaver_ftc.loop.loop import fly
     from beaver_ftc.plant.sensing import DEPARTURE_ANGLE_RAD, DEPARTURE_RATE_RAD_S
-    from beaver_ftc.studies.evidence.flown import Watched
+    from beaver_ftc_assurance.evidence.flown import Watched
 
     limits = {f"{axis}_rad_s": DEPARTURE_RATE_RAD_S for axis in "pqr"}
     limits |= {"alpha_rad": DEPARTURE_ANGLE_RAD, "beta_rad": DEPARTURE_ANGLE_RAD}

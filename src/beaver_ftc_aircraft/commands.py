@@ -1,0 +1,61 @@
+"""`beaver-ftc derive` and `beaver-ftc import`: aircraft of other people."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from beaver_ftc.cli.output import Format, FormatOption, answer, complain
+from beaver_ftc.documents.errors import BadInput
+
+
+def derive(
+    aircraft: Annotated[str, typer.Argument(metavar="AIRCRAFT")],
+    envelope: Path | None = None,
+    out: Path | None = None,
+    engines: bool = False,
+    format: FormatOption = Format.text,
+) -> None:
+    """Derive an aircraft's design model from JSBSim.
+
+    And measure the error that is left. It samples the aircraft over its envelope, fits sparse terms,
+    and checks them on states the fit did not see: the largest error becomes the declared bound.
+    Afterwards `aircraft: jsbsim:NAME` flies.
+
+    aircraft: jsbsim:NAME of the installed jsbsim package, a JSBSim model, or an aircraft's folder.
+    envelope: YAML with airspeed_mps, alpha_deg, altitude_m, sideslip_deg: where to sample.
+    out: Folder to write the aircraft's folder into, if not the cache.
+    engines: Each engine is an effector as well, with a lever of its own: it turns the aircraft where
+    surfaces no longer reach. With --out.
+    """
+    from beaver_ftc_aircraft.derive.derivation import derive
+    from beaver_ftc_aircraft.derive.derived import document_of, text_of
+
+    if engines and out is None:
+        raise BadInput("--engines: wants a folder of its own, allowed: with --out")
+    made = derive(aircraft, out, envelope, lambda what: complain(f"deriving: {what}"), engines=engines)
+    document = document_of(made)
+    answer(format, document, lambda: text_of(document))
+
+
+def gtm(
+    database: Annotated[Path, typer.Argument(metavar="DATABASE.mat")],
+    out: Path | None = None,
+    format: FormatOption = Format.text,
+) -> None:
+    """Import NASA's Generic Transport Model.
+
+    Writes an aircraft folder `gtm`: a JSBSim model of its wind-tunnel tables, with 17 surfaces, two jets and
+    six cases of damage, our own file with a derived design model, and scripts that plain JSBSim flies.
+    Afterwards `aircraft: gtm` flies.
+
+    The data base is not part of this package: gtm_design/config/T2_polynomial_aerodatabase.mat of
+    github.com/nasa/GTM_DesignSim, under the NASA Open Source Agreement.
+
+    database: Your copy of the data base.
+    out: Folder to write the aircraft's folder into, if not the cache.
+    """
+    from beaver_ftc_aircraft.gtm.conversion import convert, document_of, text_of
+
+    document = document_of(convert(database, out, tell=lambda what: complain(f"importing: {what}")))
+    answer(format, document, lambda: text_of(document))

@@ -1,0 +1,182 @@
+"""An aircraft that a scenario names for the first time: derived, or its file compared with its JSBSim model.
+
+Compared are the angular accelerations of both. What was found is kept in the user's cache under the digest of
+the folder's files, so that it costs nothing until one of them changes.
+"""
+
+import contextlib
+import hashlib
+import json
+import sys
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+from importlib.metadata import version
+from math import degrees
+from pathlib import Path
+
+import numpy as np
+
+from beaver_ftc.aircraft import AXES, Aircraft
+from beaver_ftc.aircraft.loading import FILE, FROM_JSBSIM, is_derived
+from beaver_ftc.aircraft.schema import AircraftFile
+from beaver_ftc.design.model import inertia_coefficients
+from beaver_ftc.documents.base import Location
+from beaver_ftc.documents.document import Problem
+from beaver_ftc.documents.errors import BeaverFtcError, SimulationFailed
+from beaver_ftc.documents.paths import cache_base
+from beaver_ftc.documents.problems import ScenarioError
+from beaver_ftc.documents.validation import parse_document
+from beaver_ftc.plant import trial
+from beaver_ftc.plant.adapter import Plant, translated
+from beaver_ftc.plant.model_file import refuse_deeds
+from beaver_ftc.plant.trim import trim
+from beaver_ftc.scenario.diagnosis import Bounds
+from beaver_ftc.studies.engine.store import write_whole
+from beaver_ftc_aircraft.derive.derivation import derive, source_of
+from beaver_ftc_aircraft.derive.fit import errors_of
+from beaver_ftc_aircraft.derive.outline import usual_start
+from beaver_ftc_aircraft.derive.sample import FRESH, SIDESLIP_RAD, Envelope, Moves, Samples, sample, sorted_in
+
+STATES, STARTS, SEED = 800, 8, 11
+_FORMAT = 2  # of what is kept: files of another are compared anew
+
+
+def derive_if_needed(reference: str) -> None:
+    """Derive `jsbsim:NAME` if the cache has it not, or as an earlier version made it. Raises as `derive`."""
+    if not is_derived(reference.removeprefix(FROM_JSBSIM)):
+        source_of(reference)  # raises for what is no aircraft, before anything is promised
+        _say(f"{reference}: deriving its design model, once; some seconds")
+        derive(reference)
+
+
+@lru_cache(maxsize=32)
+def compare_once(aircraft: Aircraft) -> None:
+    """Say, once a process, where the file and the model of an aircraft differ."""
+    for line in kept_or_compared(aircraft):
+        _say(f"{aircraft.folder.name}/{FILE}: warning: {line}")
+
+
+def _say(line: str) -> None:
+    print(f"beaver-ftc: {line}", file=sys.stderr, flush=True)
+
+
+def kept_or_compared(aircraft: Aircraft) -> list[str]:
+    """A line for each axis on which the model exceeds what the file declares, found now or earlier.
+
+    Raises BadInput as `refuse_deeds`, and as `compared`; ScenarioError, too, where JSBSim does not survive
+    the model: that is tried in a process of its own.
+    """
+    refuse_deeds(aircraft.jsbsim)
+    base = cache_base()
+    if base is None:
+        return _tried_and_compared(aircraft)
+    file = base / "compared" / f"{_digest(aircraft.folder)}.json"
+    try:
+        return list(json.loads(file.read_text(encoding="utf-8")))
+    except (OSError, ValueError):
+        lines = _tried_and_compared(aircraft)
+    with contextlib.suppress(OSError):  # nowhere to keep it, or another process was first
+        file.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(file, json.dumps(lines).encode())
+    return lines
+
+
+def _tried_and_compared(aircraft: Aircraft) -> list[str]:
+    if why := trial.failure(aircraft.jsbsim):
+        raise _bad(aircraft, {("jsbsim",): f"{why}, allowed: a model that JSBSim loads and flies"})
+    return compared(aircraft)
+
+
+def _digest(folder: Path) -> str:
+    digest = hashlib.sha256(f"{_FORMAT} {version('jsbsim')}".encode())
+    for path in sorted(p for p in folder.rglob("*") if p.suffix in (".xml", ".yaml") and p.is_file()):
+        digest.update(str(path.relative_to(folder)).encode() + path.read_bytes())
+    return digest.hexdigest()[:32]
+
+
+def compared(aircraft: Aircraft) -> list[str]:
+    """A line for each axis on which the model exceeds what the file declares; or why none is compared.
+
+    Raises ScenarioError where JSBSim cannot load the model, or the model lacks a property of the file.
+    """
+    plant = _loaded(aircraft)
+    try:
+        with translated(aircraft.jsbsim):
+            samples = _samples(aircraft, plant)
+    except BeaverFtcError as error:
+        return [f"it is not compared with {aircraft.file.jsbsim}: {error}"]
+    return list(_lines(aircraft, samples))
+
+
+def _loaded(aircraft: Aircraft) -> Plant:
+    try:
+        plant = Plant(100, aircraft=aircraft)
+    except SimulationFailed as error:
+        raise _bad(aircraft, {("jsbsim",): f"{error}, allowed: a model that JSBSim loads"}) from None
+    says = f"is no property of {aircraft.file.jsbsim}, allowed: one that it has"
+    wrong = {at: f"{name!r} {says}" for at, name in _properties(aircraft.file) if not plant.has(name)}
+    if wrong:
+        raise _bad(aircraft, wrong)
+    return plant
+
+
+def _properties(file: AircraftFile) -> Iterator[tuple[Location, str]]:
+    """Each property the file names, and where."""
+    for name, surface in file.surfaces.items():
+        for key in ("command", "position", "effective"):
+            yield ("surfaces", name, key), getattr(surface, key)
+    for name, signal in file.signals.items():
+        yield ("signals", name, "property"), signal.property
+    yield ("trim", "throttle"), file.trim.throttle
+    for kind in ("settings", "limits"):
+        for name, of in getattr(file.engine, kind).items():
+            yield ("engine", kind, name, "property"), of.property
+
+
+def _bad(aircraft: Aircraft, says: Mapping[Location, str]) -> ScenarioError:
+    """These mistakes, at their lines."""
+    path = aircraft.folder / FILE
+    lines = parse_document(path.read_text(encoding="utf-8"), str(path))
+    return ScenarioError(str(path), [Problem(lines.line(at), at, what) for at, what in says.items()])
+
+
+def _samples(aircraft: Aircraft, plant: Plant) -> Samples:
+    """States over the envelope, in their boxes if the file has a map."""
+    point = trim(plant=plant, **usual_start(aircraft))
+    of = aircraft.envelope
+    envelope = Envelope(of.airspeed_mps, aircraft.alpha_rad, SIDESLIP_RAD, of.altitude_m)
+    properties = {name: signal.property for name, signal in aircraft.signals.items()}
+    samples = sample(plant, envelope, point, STATES, SEED, properties, FRESH, STARTS)
+    error_map = aircraft.file.model_error_map
+    if error_map is None:
+        return samples
+    ends = [np.array(box.ends(aircraft.signals)).T for box in error_map.boxes]
+    return sorted_in(samples, ends, aircraft, Moves(error_map.travel_share, error_map.stand_ins))
+
+
+def _declared(aircraft: Aircraft, samples: Samples) -> np.ndarray:
+    """The error the file declares at each state, and what every scenario does beside it, (n, 3) rad/s2."""
+    bounds, (p, q, r), i = Bounds(), np.abs(samples.x.T), inertia_coefficients(aircraft.mass)
+    coupling = np.column_stack([abs(i.Pqr) * q * r, abs(i.Qpr) * p * r, abs(i.Rpq) * p * q])
+    published = [getattr(bounds.constant_rad_s2, axis) for axis in AXES]
+    published += coupling * [getattr(bounds.inertia_coupling, axis) for axis in AXES]
+    error_map = aircraft.file.model_error_map
+    if error_map is None:
+        return published + np.array(aircraft.model_error_rad_s2)
+    fresh = [[getattr(box, f"error_{axis}_rad_s2")[0] for axis in AXES] for box in error_map.boxes]
+    return published + np.array(fresh)[samples.box, :, samples.level]
+
+
+def _lines(aircraft: Aircraft, samples: Samples) -> Iterator[str]:
+    errors, declared = errors_of(aircraft, samples), _declared(aircraft, samples)
+    for axis, name in enumerate(AXES):
+        beyond = errors[:, axis] - declared[:, axis]
+        if len(beyond) and beyond.max() > 0.0:
+            worst = int(beyond.argmax())
+            alpha, beta, V = samples.y[worst, :3]
+            at = f"{V:.3g} m/s, angle of attack {degrees(alpha):.1f}, sideslip {degrees(beta):.1f} deg"
+            yield (
+                f"{name}: the terms are {errors[worst, axis]:.2g} rad/s2 off {aircraft.file.jsbsim} at {at}; "
+                f"{declared[worst, axis]:.2g} is declared, so alarms without a fault are possible; "
+                "`beaver-ftc derive` measures what to declare"
+            )

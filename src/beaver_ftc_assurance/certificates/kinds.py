@@ -1,0 +1,117 @@
+"""Exclusions of fault types whose parameter one number is: two frames that no such number explains.
+
+Stuck p = c, floating p = 0, a loss p = (1 + theta) u: so is a surface at fault in frames that health does not
+explain. The others are excluded by their course over many frames (courses.py). What an actuator brings back
+by and by is not certified.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from math import inf
+
+import numpy as np
+
+from beaver_ftc.diagnosis.types.registry import (
+    BIAS,
+    CONSTANT_LOSS,
+    DOWN,
+    FLOAT,
+    GROWING_BIAS,
+    NAMES,
+    OSCILLATORY,
+    STUCK,
+    UP,
+    VARYING_LOSS,
+)
+from beaver_ftc_assurance.certificates.inequality import (
+    History,
+    Hypothesis,
+    Term,
+    constant_pair,
+    of_one_frame,
+)
+from beaver_ftc_assurance.certificates.tape import Tape
+
+COURSE = "frames of quiet excluded it, or what several say together"
+SWING = "of several instants a frame, a swing that a stop cuts off may keep its sign"
+RETURN = "its actuator may be bringing the surface back"
+_COURSES = {VARYING_LOSS: " that varies", GROWING_BIAS: " that grows", UP: " up", DOWN: " down"}
+
+
+def excluded_types(tape: Tape) -> Iterator[tuple[int, int, int]]:
+    """(surface, type, frame) of each type excluded on a surface that can be at fault."""
+    layout = tape.alarm["fdi"]["layout"]
+    for s, kinds in enumerate(tape.types[-1]):
+        if tape.excluded[-1][layout["position_of"][s]]:
+            continue
+        for kind in np.flatnonzero(kinds):
+            yield s, int(kind), tape.first + int(np.argmax(tape.types[:, s, kind] > 0))
+
+
+def why_not(tape: Tape, kind: int) -> str | None:
+    """Why an exclusion of this type cannot be certified, None if it can."""
+    config = tape.alarm["fdi"]["types"]["config"]
+    if kind == OSCILLATORY and not config["whole"]:
+        return SWING
+    return RETURN if config["returns"] and kind in (STUCK, FLOAT, UP, DOWN) else None
+
+
+def name_of(surface: str, kind: int) -> str:
+    """What is excluded, in words."""
+    return f"{surface} {NAMES[kind]}{_COURSES.get(kind, '')}"
+
+
+def column_of(surface: str, kind: int) -> str:
+    """The column of the log that says whether it is excluded."""
+    return f"{name_of(surface, kind).replace(' ', '_')}_excluded"
+
+
+def row_of(tape: Tape, s: int, kind: int) -> int:
+    """The row from which on a type that is excluded at the end has been."""
+    clear = np.flatnonzero(~(tape.types[:, s, kind] > 0))
+    return tape.first + (int(clear[-1]) + 1 if len(clear) else 0)
+
+
+def hypothesis(tape: Tape, s: int, kind: int) -> Hypothesis:
+    """What a fault of this type on surface s adds to the innovation."""
+    fdi = tape.alarm["fdi"]
+    e, surface = int(fdi["layout"]["position_of"][s]), fdi["types"]["surface"][s]
+    Gu, G, spread = -tape.offset[:, e], tape.slope[:, e], tape.spread[:, e]
+    asked = tuple(i for i in range(3) if not fdi["isolation"]["estimator"][e]["unasked"][i])
+    if fdi["types"]["config"]["length"] > 1:  # blocks: the axis on which no effect changes its sign
+        asked = (int(fdi["layout"]["dominant_axis"][s]),)
+    low, high = float(surface["travel_low"]), float(surface["travel_high"])
+    if kind == STUCK:
+        return Hypothesis(tape.first, -Gu, G, spread, low, high, True, True, asked)
+    if kind == FLOAT:
+        neutral = min(max(0.0, low), high)
+        return Hypothesis(tape.first, neutral * G - Gu, 0.0 * G, spread, 0.0, 0.0, True, True, asked)
+    if kind == BIAS:  # away from the stops
+        return Hypothesis(tape.first, 0.0 * G, G, spread, low - high, high - low, True, True, asked)
+    loss = Hypothesis(tape.first, 0.0 * G, Gu, spread, -1.0, 0.0, True, True, asked)
+    return loss if kind == CONSTANT_LOSS else replace(loss, constant=False, shown=False)
+
+
+def candidates(of: Hypothesis, history: History, alarm: int, k: int) -> Iterator[list[Term]]:
+    """Inequalities that may exclude it by frame k."""
+    if not of.constant:
+        for frame in (k - 1, k):
+            yield from of_one_frame(frame, of)
+        return
+    frames = np.arange(alarm, k + 1)
+    frames = frames[wrong(history, frames)]
+    if of.slope.any():
+        yield constant_pair(of, history, frames)
+    for frame in frames[-3:].tolist():
+        yield from ([Term(sign * d, inf, frame - 1, frame)] for d in np.eye(3) for sign in (1.0, -1.0))
+
+
+def wrong(history: History, frames: np.ndarray) -> np.ndarray:
+    """In which frames health explains nothing; of several instants, nor in those beside them."""
+    rows = slice(int(frames[0]) - 1, min(int(frames[-1]) + 2, len(history.x)))
+    innovation, bound = history.innovation(rows), history.frame_bound(rows)
+    beyond = (np.abs(innovation) > bound).any(axis=1)
+    beside = np.r_[beyond, np.zeros(len(frames) + 2 - len(beyond), bool)]
+    if history.share == 1.0:
+        return np.asarray(beside[1:-1])
+    return np.asarray(beside[:-2] & beside[1:-1] & beside[2:])

@@ -1,0 +1,81 @@
+"""The certificate of frames that somebody else goes through: a log of others, a flight with a doublet."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from beaver_ftc.aircraft import AXES
+from beaver_ftc.diagnosis.isolation.estimators import estimator_names
+from beaver_ftc.results.log import Columns, Log, MemoryLog
+from beaver_ftc.scenario.dump import to_yaml
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc_assurance.certificates import certificate, chance
+from beaver_ftc_assurance.certificates.certificate import MEASURED_MODEL_BOUND
+from beaver_ftc_assurance.certificates.inequality import Document
+from beaver_ftc_assurance.certificates.tape import Recorder
+
+
+def proved(scenario: Scenario, frames: np.ndarray, flown: Iterable[int]) -> tuple[MemoryLog, Document]:
+    """Log and certificate. frames: the record (1,), of `frame_dtype`; flown: goes on by a frame whenever it
+    is asked. Raises BadInput where another scheme than ours diagnosed."""
+    certificate.check_scheme(scenario)
+    recorder = Recorder(scenario)
+    recorder.begin(frames)
+    log = _log(frames, flown, scenario, recorder)
+    recorder.land()
+    document, columns = certificate.certificate(scenario, log, recorder)
+    whole = MemoryLog()
+    certificate.copy_with(log, columns, whole)
+    return whole, document
+
+
+class Proof(NamedTuple):
+    """A certificate, the log that proves it, column -> values (rows,), and the text of scenario.yaml."""
+
+    certificate: Document
+    log: dict[str, np.ndarray]
+    scenario: str
+
+
+def proof(scenario: Scenario, log: Log) -> Proof:
+    """The certificate of a flight that kept its log, flown once more. Raises BadInput where another scheme
+    than ours diagnosed."""
+    document, columns = certificate.certificate(scenario, log)
+    whole = Columns()
+    certificate.copy_with(log, columns, whole)
+    whole.close()
+    return Proof(document, dict(whole), to_yaml(scenario))
+
+
+def write(scenario: Scenario, log: MemoryLog, document: Document, folder: Path) -> None:
+    """Write certificate, log and the scenario that declares the bounds into a folder."""
+    log.copy_to(folder / "log.parquet")
+    (folder / "scenario.yaml").write_text(to_yaml(scenario), encoding="utf-8")
+    (folder / certificate.FILE).write_text(certificate.as_text(document), encoding="utf-8")
+
+
+def _log(frames: np.ndarray, flown: Iterable[int], scenario: Scenario, recorder: Recorder) -> MemoryLog:
+    """What the diagnosis makes of each frame, in the columns that a certificate takes."""
+    frame, log, surfaces = frames[0], MemoryLog(), scenario.airframe.surfaces
+    fdi = frame["fdi"]
+    estimators = fdi["isolation"]["estimator"][: int(fdi["isolation"]["n"])]
+    names = estimator_names(scenario.fdi.fault_class, scenario.airframe)
+    columns = ["t_s", *(f"{axis}_{what}" for what in MEASURED_MODEL_BOUND for axis in AXES), "detected"]
+    columns += [f"fie_{name}_excluded" for name in names]
+    shares: dict[str, float] = {}
+    watch, rows = fdi["watch"], []
+    for k in flown:
+        recorder.keep()
+        of_frame = frame["measured"]["x"], frame["belief"]["means"]["acceleration"], fdi["bound"]["eta_bar"]
+        if scenario.fdi.statistical:
+            shares = chance.shares(fdi["statistical"], surfaces)
+        if watch["enabled"]:
+            shares |= {"watch_share": watch["share"], "watch_test": watch["furthest"]}
+        alarm = fdi["verdict"]["detected"] or watch["alarmed"]  # as in a log of ours
+        values = [alarm, *estimators["excluded"], *shares.values()]
+        rows.append(np.concatenate([[k / scenario.rate_hz], *of_frame, values]))
+    log.open([*columns, *shares])
+    log.write(np.array(rows))
+    return log

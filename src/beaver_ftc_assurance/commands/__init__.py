@@ -1,0 +1,1 @@
+"""The commands `check`, `separate` and `evidence`."""

@@ -1,0 +1,46 @@
+"""`beaver-ftc check`: whether a run's certificate follows from its log and scenario."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from beaver_ftc.cli.output import Format, FormatOption, answer
+from beaver_ftc.documents.errors import BadInput
+
+
+def command(
+    run: Annotated[Path, typer.Argument(metavar="RUN")],
+    log: Annotated[Path | None, typer.Option(metavar="FILE")] = None,
+    scenario: Annotated[Path | None, typer.Option(metavar="FILE")] = None,
+    format: FormatOption = Format.text,
+) -> None:
+    """Check a run's certificate.
+
+    Computes every statement of certificate.json anew from the log and from the bounds that the scenario
+    declares, and prints it in a sentence, or why it is refused. Exit status 0 if all hold, 1 if not.
+
+    Examples:
+      beaver-ftc run elevator-partial-loss --certificate
+      beaver-ftc check runs/elevator-partial-loss
+
+    run: The folder of a run with --certificate, or a certificate.json.
+    log: The log, if it is not log.parquet beside the certificate.
+    scenario: The resolved scenario, if it is not scenario.yaml beside the log.
+    """
+    from pyarrow import ArrowException
+
+    from beaver_ftc_assurance.certificates import check_certificate
+
+    file = run / "certificate.json" if run.is_dir() else run
+    if not file.is_file():
+        raise BadInput(f"{file}: no such file, allowed: the folder of a run with --certificate")
+    try:
+        said, why = check_certificate.check(run, log, scenario)
+    except (ArrowException, OSError, ValueError, RecursionError, check_certificate.Refused) as error:
+        said, why = [], [" ".join(f"{file}: cannot be checked: {error}".split())]
+    document = {"holds": not why, "statements": said, "refused": why}
+    count = sum(not one.startswith("not certified") for one in said)
+    lines = [*said, f"{count} statements hold"] if not why else [*why, "the certificate does not hold"]
+    answer(format, document, lambda: "\n".join(lines))
+    raise typer.Exit(int(bool(why)))

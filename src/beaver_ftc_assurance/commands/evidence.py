@@ -1,0 +1,88 @@
+"""`beaver-ftc evidence`: fly a plan of requirements, and write what it shows."""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from beaver_ftc.cli.inputs import JunitOption, NoReportOption, WorkersOption
+from beaver_ftc.cli.output import Format, FormatOption, answer, judged
+from beaver_ftc.cli.progress import progress_bar
+
+if TYPE_CHECKING:
+    from beaver_ftc_assurance.evidence.plan import EvidencePlan
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """What is wanted of it, as `command` says."""
+
+    plan: Annotated[str, typer.Argument(metavar="PLAN")]
+    out: Path | None = None
+    workers: WorkersOption = None
+    replay: Annotated[str | None, typer.Option(metavar="FLIGHT")] = None
+    format: FormatOption = Format.text
+    no_report: NoReportOption = False
+    junit: JunitOption = None
+
+
+def command(arguments: Arguments) -> None:
+    """Fly a plan of requirements and write the evidence.
+
+    Requirement by requirement met, not met or not shown, with its margin, its worst flight and the command
+    that flies it again. Writes evidence.json, evidence.html and evidence.pdf.
+
+    Exit status 1 if a requirement is not met, or not shown.
+
+    Stopped or killed, it goes on where it was with the same command.
+
+    Examples:
+      beaver-ftc evidence flight-controls
+
+    plan: A plan of evidence, or the name of a built-in one.
+    out: Folder for the evidence. Default: runs/ and the plan's name.
+    replay: Fly this one flight again, as `run` would, and judge it.
+    """
+    from beaver_ftc_assurance.evidence.plan import load_plan
+
+    def fly() -> dict[str, Any]:
+        plan = load_plan(arguments.plan)
+        return _fly(plan, arguments) if arguments.replay is None else _replay(plan, arguments)
+
+    judged(arguments.plan, arguments.format, arguments.junit, fly)
+
+
+def _fly(plan: "EvidencePlan", arguments: Arguments) -> dict[str, Any]:
+    """Fly and judge all of it; what JUnit XML says of it."""
+    from beaver_ftc.studies.engine.workers import cores
+    from beaver_ftc_assurance.evidence.shown import as_expectations, as_text, run_plan
+
+    folder = Path("runs") / plan.file.name if arguments.out is None else arguments.out
+    with progress_bar(plan.file.name) as progress:
+        document = run_plan(plan, folder.absolute(), arguments.workers or cores(), progress)
+    said = document | {"folder": str(folder)}
+    answer(arguments.format, said, lambda: as_text(document, str(folder), sys.stdout.isatty()))
+    expectations = as_expectations(document)
+    return {"scenario": plan.file.name, "passed": document["passed"], "expectations": expectations}
+
+
+def _replay(plan: "EvidencePlan", arguments: Arguments) -> dict[str, Any]:
+    """Fly one flight into a result folder of its own; what JUnit XML says of it."""
+    from beaver_ftc.results.verdict import verdict_text
+    from beaver_ftc.results.writer import run
+    from beaver_ftc_assurance.evidence.shown import of_flight
+
+    scenario, requirements = of_flight(plan, str(arguments.replay))
+    out = Path("runs") if arguments.out is None else arguments.out
+    document = run(scenario, out, not arguments.no_report)
+    folder, meets = str(out / scenario.name), all(each["passed"] for each in requirements)
+    lines = [f"{each['name']} {each['actual']}" for each in requirements]
+    said = document | {"folder": folder, "requirements": lines, "passed": meets}
+
+    def text() -> str:
+        return "\n".join([verdict_text(document, folder, sys.stdout.isatty()).rstrip(), *lines])
+
+    answer(arguments.format, said, text)
+    return {"scenario": scenario.name, "passed": meets, "expectations": requirements}

@@ -1,0 +1,224 @@
+"""What the rows of a plan amount to: requirement by requirement met, not met or not shown, by what margin and
+by which flight; what has been covered; and what it all follows from.
+"""
+
+import shlex
+import tempfile
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from itertools import pairwise
+from math import inf
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.results.metrics import versions
+from beaver_ftc.scenario.faults import DAMAGE, TYPES, UNANTICIPATED
+from beaver_ftc.scenario.sweeps import Sweep, SweepExpect
+from beaver_ftc.studies.engine.store import fingerprint, plug_ins
+from beaver_ftc.studies.sweep.one_flight import RESULTS
+from beaver_ftc.studies.sweep.outcomes import Flights
+from beaver_ftc.studies.sweep.summary import evaluate
+from beaver_ftc_assurance.evidence.flown import ALTITUDES_M, BANDS, MET, NOT_MET, NOT_SHOWN, Row, part
+from beaver_ftc_assurance.evidence.plan import EvidencePlan, OfSweep, Requirement
+
+Document = dict[str, Any]
+MOST_NAMED = 50  # flights that do not meet a requirement
+Judged = tuple[str, Row]  # a flight, and one part of what it shows
+
+
+def document_of(plan: EvidencePlan, rows: Sequence[Row], date: str) -> Document:
+    """The document of evidence.json. date: the one thing in which two of the same plan differ."""
+    requirements = [_requirement(plan, each, rows) for each in plan.file.requirements]
+    counts = _counts(each["verdict"] for each in requirements)
+    return {
+        "plan": plan.file.name,
+        "description": plan.file.description,
+        "date": date,
+        "passed": counts[MET] == len(requirements),
+        "counts": counts,
+        "requirements": requirements,
+        "coverage": [_coverage(name, plan, rows) for name in _aircraft(plan)],
+        "sources": [
+            {"name": each.name, "given": each.given, "flights": each.flights, "sha256": each.sha256}
+            for each in plan.sources.values()
+        ],
+        "flights": [
+            {key: row[key] for key in ("flight", "status", "why", "scenario", "log")} for row in rows
+        ],
+        "hashes": {"plan": plan.sha256, "flight code": fingerprint()},
+        "versions": {**versions(), **plug_ins()},
+    }
+
+
+def command(plan: EvidencePlan, flight: str) -> str:
+    """The command line that flies a flight of a plan again and judges it."""
+    return shlex.join(["beaver-ftc", "evidence", plan.given, "--replay", flight])
+
+
+def _requirement(plan: EvidencePlan, requirement: Requirement, rows: Sequence[Row]) -> Document:
+    if isinstance(requirement.bar, OfSweep):
+        judged = [
+            one for name in plan.over[requirement.id] for one in _of_sweep(plan, requirement.bar, name, rows)
+        ]
+    else:
+        judged = [(row["flight"], one) for row in rows for one in row["found"].get(requirement.id, ())]
+    flights = [row["flight"] for row in rows if row["source"] in plan.over[requirement.id]]
+    worst = {flight: _verdict(own) for flight, own in _by_flight(judged).items()}
+    flight, least = min(judged, key=lambda one: _rank(one[1]), default=("", part("", None, None, NOT_SHOWN)))
+    return {
+        "id": requirement.id,
+        "text": requirement.text,
+        "clause": requirement.clause,
+        "asked": _asked(requirement),
+        "verdict": _verdict([one for _, one in judged]),
+        "margin": least["margin"],
+        "margin_of": least["name"],
+        "worst": {"flight": flight, "command": command(plan, flight) if flight else None, **least},
+        "over": [plan.sources[name].given for name in plan.over[requirement.id]],
+        "flights": len(flights),
+        "counts": {} if isinstance(requirement.bar, OfSweep) else _counts(worst.values()),
+        "failing": [
+            {"flight": name, "verdict": verdict, "command": command(plan, name)}
+            for name, verdict in worst.items() if verdict != MET
+        ][:MOST_NAMED],
+    }  # fmt: skip
+
+
+def _counts(verdicts: Iterable[str]) -> dict[str, int]:
+    found = Counter(verdicts)
+    return {said: found[said] for said in (MET, NOT_MET, NOT_SHOWN)}
+
+
+def _asked(requirement: Requirement) -> Document:
+    """What is asked, as the plan says it."""
+    said = requirement.model_dump(mode="json", include={"expect", "formula", "bar"}, exclude_none=True)
+    return {key: value for key, value in said.items() if value is not None}
+
+
+def _by_flight(judged: Sequence[Judged]) -> dict[str, list[Row]]:
+    found: dict[str, list[Row]] = {}
+    for flight, one in judged:
+        found.setdefault(flight, []).append(one)
+    return found
+
+
+def _verdict(parts: Sequence[Row]) -> str:
+    said = {one["verdict"] for one in parts}
+    if NOT_MET in said:
+        return NOT_MET
+    return NOT_SHOWN if NOT_SHOWN in said or not said else MET
+
+
+def _rank(one: Row) -> tuple[int, float]:
+    """The worst first: by verdict, then by margin over the limit's size."""
+    order = (NOT_MET, NOT_SHOWN, MET).index(one["verdict"])
+    if one["margin"] is None:
+        return order, -inf if one["verdict"] == NOT_MET else inf
+    return order, one["margin"] / _size(one["expected"])
+
+
+def _size(expected: Any) -> float:
+    """What a margin is to be seen against."""
+    if isinstance(expected, dict):
+        expected = next((abs(expected[side]) for side in ("at_least", "at_most") if expected.get(side)), 1.0)
+    number = isinstance(expected, int | float) and not isinstance(expected, bool)
+    return abs(float(expected)) or 1.0 if number else 1.0
+
+
+def _of_sweep(plan: EvidencePlan, bar: OfSweep, name: str, rows: Sequence[Row]) -> list[Judged]:
+    """A sweep's statistics against a bar. Not shown: with a confidence, what the estimate keeps and its bound
+    does not; and what no flight tells."""
+    from beaver_ftc.studies.sweep.one_flight import schema_of, table_of
+    from beaver_ftc.studies.sweep.store import write_tables
+
+    source = plan.sources[name]
+    sweep = source.what
+    assert isinstance(sweep, Sweep)
+    schema = schema_of(sweep)
+    table = table_of(sweep, schema, [row["row"] for row in rows if row["source"] == name])
+    with tempfile.TemporaryDirectory(prefix="beaver-ftc-") as folder:
+        path = Path(folder) / "results.parquet"
+        with path.open("wb") as file:
+            write_tables(file, [table], schema)
+        flights = Flights(path, sweep)
+        found = evaluate(_levels(bar), flights)
+        plain = evaluate(_levels(bar, "confidence"), flights)
+        return [
+            (source.flight(_worst(flights, one["name"])), _of_bound(one, other))
+            for one, other in zip(found, plain, strict=True)
+        ]
+
+
+def _worst(flights: Flights, name: str) -> int:
+    """The flight that a statistic suffers from most."""
+    quantity, _, axis = name.partition(".")
+    against: dict[str, Callable[[], np.ndarray]] = {
+        "detection_rate": lambda: flights.faulted & ~flights.detected,
+        "isolation_rate": lambda: flights.faulted & ~flights.isolated,
+        "false_alarms_per_hour": lambda: flights["false_alarm"],
+        "departure_rate": lambda: flights.departed,
+        "failure_rate": lambda: ~flights.measured,
+        "pass_rate": lambda: ~flights["passed"],
+        "detection_delay_s": lambda: np.where(flights.faulted, flights.detection_delay_s, -np.inf),
+        "isolation_delay_s": lambda: np.where(flights.faulted, flights.isolation_delay_s, -np.inf),
+        "post_fault_rms_deg_s": lambda: flights.post_fault_rms_deg_s(axis),
+        "tracking_ratio": lambda: flights.tracking_ratio(axis),
+    }
+    bad = np.nan_to_num(against[quantity]().astype(float), nan=-np.inf, posinf=np.inf, neginf=-np.inf)
+    return int(flights["run"][np.argmax(bad)])
+
+
+def _levels(bar: OfSweep, but: str = "type") -> SweepExpect:
+    """What a bar says of a sweep, without some key."""
+
+    def less(said: Any) -> Any:
+        if not isinstance(said, dict):
+            return said
+        return {key: less(value) for key, value in said.items() if key not in ("type", but)}
+
+    return SweepExpect.model_validate(less(bar.model_dump(exclude_none=True)))
+
+
+def _of_bound(found: Document, plain: Document) -> Row:
+    verdict, says = MET, f"{found['of']} flights tell"
+    if not found["passed"]:
+        verdict = NOT_SHOWN if not found["of"] or plain["passed"] else NOT_MET
+    expected, actual, inside = found["expected"], found["actual"], None
+    if actual is not None:
+        inside = actual - expected["at_least"] if "at_least" in expected else expected["at_most"] - actual
+    return part(found["name"], expected, actual, verdict, inside, says)
+
+
+def _aircraft(plan: EvidencePlan) -> dict[str, Aircraft]:
+    return {source.aircraft.name: source.aircraft for source in plan.sources.values()}
+
+
+def _coverage(name: str, plan: EvidencePlan, rows: Sequence[Row]) -> Document:
+    """Of one aircraft: in how many flights each fault on each surface was flown, by cell of the envelope."""
+    aircraft = _aircraft(plan)[name]
+    slowest, fastest = aircraft.envelope.airspeed_mps
+    width = (fastest - slowest) / BANDS
+    ends_m = (None, *ALTITUDES_M, None)
+    bands = [
+        {"airspeed_mps": [slowest + k * width, slowest + (k + 1) * width], "altitude_m": [low, high]}
+        for k in range(BANDS) for low, high in pairwise(ends_m)
+    ]  # fmt: skip
+    counts: Counter[tuple[str, str, int]] = Counter()
+    for row in rows:
+        if row["aircraft"] == name and row["status"] in RESULTS:
+            kinds = {(surface, kind) for surface, kind in row["faults"] if surface} or {("none", "none")}
+            counts.update((*kind, cell) for kind in kinds for cell in row["cells"])
+    flown = [
+        {"surface": surface, "type": kind, "flights": [counts[surface, kind, k] for k in range(len(bands))]}
+        for surface, kind in sorted({key[:2] for key in counts})
+    ]
+    types, surfaces = [kind for kind in TYPES if kind not in (DAMAGE, UNANTICIPATED)], list(aircraft.surfaces)
+    with_fault = sum(n > 0 and key[0] != "none" for key, n in counts.items())
+    return {
+        "aircraft": name, "cells": bands, "flown": flown, "combinations": with_fault,
+        "of": len(types) * len(surfaces) * len(bands),
+        "never": [[s, t] for s in surfaces for t in types if not any(key[:2] == (s, t) for key in counts)],
+    }  # fmt: skip

@@ -1,0 +1,260 @@
+"""The document of a plan as text, as one HTML page and as PDF; and the study that flies it."""
+
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.results.metrics import as_json
+from beaver_ftc.studies.engine.study import Progress, Study, run_study
+from beaver_ftc.studies.present.page import Files, Heading, Part, Table, as_html, versions_line
+from beaver_ftc.studies.present.tables import aligned, number
+from beaver_ftc_assurance.evidence.flown import MET, NOT_MET, NOT_SHOWN, failed, fly_flight
+from beaver_ftc_assurance.evidence.judged import Document, document_of
+from beaver_ftc_assurance.evidence.plan import EvidencePlan
+
+ON_THE_SUMMARY = 24  # requirements: what one page holds
+MOST_LETTERS = 90  # of a requirement's text there
+MOST_SHOWN = 10  # flights of a requirement that fail
+VERDICTS = {MET: True, NOT_MET: False, NOT_SHOWN: False}
+NO_APPROVAL = (
+    "Clauses are quoted by number, with our reading of them. This document records flights of a simulation; "
+    "it claims no approval by any authority."
+)
+
+
+def run_plan(
+    plan: EvidencePlan, folder: Path, workers: int = 1, progress: Progress | None = None
+) -> Document:
+    """Fly a plan, write evidence.json, .html and .pdf into a folder, and return the document.
+
+    Raises BadInput where what writes PDF is not installed: before anything flies.
+    """
+    if find_spec("reportlab") is None:
+        raise BadInput("evidence.pdf is written by reportlab, allowed: pip install 'beaver-ftc[evidence]'")
+    now = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
+    study = Study(
+        name=folder.name,
+        cases=plan.cases,
+        fly=partial(fly_flight, plan),
+        document=lambda rows: document_of(plan, rows, now),
+        files=files,
+        follows_from=[plan.sha256, [source.sha256 for source in plan.sources.values()]],
+        lost=lambda case, why: failed(plan, case.what, why),
+    )
+    document: Document = run_study(study, folder.parent, workers, progress)
+    return document
+
+
+def files(document: Document) -> Files:
+    """What is written of a document."""
+    from beaver_ftc_assurance.evidence.paper import as_pdf
+
+    title, parts = f"Evidence: {document['plan']}", list(page(document))
+    return {
+        "evidence.json": as_json(document),
+        "evidence.html": as_html(title, parts, {}),
+        "evidence.pdf": as_pdf(title, parts, f"{document['plan']} · {document['date']}"),
+    }
+
+
+def page(document: Document) -> Iterator[Part]:
+    """The summary, which fills a page; from the first heading on the rest."""
+    if document["description"]:
+        yield document["description"].strip()
+    flights = len(document["flights"])
+    yield f"{counted(document)}, by {flights} flights. {document['date']}."
+    yield _summary(document["requirements"])
+    yield NO_APPROVAL
+    yield f"Plan {document['hashes']['plan'][:16]}, flight code {document['hashes']['flight code']}."
+    yield Heading("Requirements")
+    for each in document["requirements"]:
+        yield from _requirement(each)
+    yield Heading("Coverage")
+    for each in document["coverage"]:
+        yield from _coverage(each)
+    yield Heading("What it follows from")
+    yield f"Plan {document['hashes']['plan']}; flight code {document['hashes']['flight code']}."
+    yield versions_line(document["versions"])
+    yield Table(
+        ("flown", "as the plan names it", "flights", "SHA-256"),
+        [
+            (each["name"], each["given"], str(each["flights"]), each["sha256"][:32])
+            for each in document["sources"]
+        ],
+    )
+    yield "Of each flight evidence.json has the SHA-256 of its scenario and of its log."
+
+
+def counted(document: Document) -> str:
+    """How many requirements are what."""
+    counts = document["counts"]
+    return f"{sum(counts.values())} requirements: " + ", ".join(
+        f"{n} {verdict}" for verdict, n in counts.items()
+    )
+
+
+def _summary(requirements: list[Document]) -> Table:
+    """Of more than a page holds, those that are not met come first, and the last line counts the others."""
+    shown = requirements
+    if len(shown) > ON_THE_SUMMARY:
+        shown = sorted(shown, key=lambda each: (NOT_MET, NOT_SHOWN, MET).index(each["verdict"]))[
+            :ON_THE_SUMMARY
+        ]
+    rows = [
+        (each["id"], _short(each["text"]), each["verdict"], margin_of(each), each["worst"]["flight"])
+        for each in shown
+    ]
+    left = len(requirements) - len(shown)
+    rows += [("", f"{left} more", "", "", "")] if left else []
+    return Table(("", "requirement", "verdict", "margin", "worst flight"), rows, VERDICTS)
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= MOST_LETTERS else f"{text[: MOST_LETTERS - 3]}..."
+
+
+def margin_of(requirement: Document) -> str:
+    """A requirement's margin and what it is of, or what its worst flight says."""
+    worst = requirement["worst"]
+    if requirement["margin"] is None:
+        return worst["says"] or f"{worst['name']}: {said(worst['actual'])}"
+    return f"{signed(requirement['margin'])} ({requirement['margin_of']})"
+
+
+def signed(value: float) -> str:
+    """A margin with its sign."""
+    return f"{value:+.3g}" if abs(value) < 1000 else f"{value:+.0f}"
+
+
+def said(value: Any) -> str:
+    """What was asked for, or found, in words."""
+    if isinstance(value, dict):
+        return ", ".join(f"{key.replace('_', ' ')} {said(each)}" for key, each in value.items())
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, list):
+        return ", ".join(map(said, value)) or "none"
+    return value if isinstance(value, str) else number(value, none="none")
+
+
+def _requirement(each: Document) -> Iterator[Part]:
+    worst = each["worst"]
+    rows = [
+        ("verdict", each["verdict"]),
+        ("clause", each["clause"]),
+        ("asked", _asked(each["asked"])),
+        ("over", f"{', '.join(each['over'])} ({each['flights']} flights)"),
+        ("flights", ", ".join(f"{n} {verdict}" for verdict, n in each["counts"].items() if n)),
+        ("worst flight", worst["flight"]),
+        ("there", _found(worst)),
+        ("margin", "" if each["margin"] is None else signed(each["margin"])),
+        ("flies it again", worst["command"] or ""),
+    ]
+    failing = each["failing"]
+    if len(failing) > 1:
+        names = ", ".join(one["flight"] for one in failing[:MOST_SHOWN])
+        more = f" and {len(failing) - MOST_SHOWN} more" if len(failing) > MOST_SHOWN else ""
+        rows.append(("do not meet it", names + more))
+    yield Table((each["id"], each["text"]), [row for row in rows if row[1]], VERDICTS)
+
+
+def _asked(asked: Document) -> str:
+    if "formula" in asked:
+        return str(asked["formula"])
+    if "bar" in asked:
+        kind = asked["bar"]["type"].replace("_", " ")
+        return f"{kind}: {said({key: value for key, value in asked['bar'].items() if key != 'type'})}"
+    return said(asked["expect"])
+
+
+def _found(worst: Document) -> str:
+    if worst["name"] == "robustness":
+        return " ".join(filter(None, (f"robustness {said(worst['actual'])}", worst["says"])))
+    allowed = "" if worst["expected"] is None else f", asked {said(worst['expected'])}"
+    says = f" ({worst['says']})" if worst["says"] else ""
+    return f"{worst['name'].replace('_', ' ')}: {said(worst['actual'])}{allowed}{says}"
+
+
+def _coverage(each: Document) -> Iterator[Part]:
+    yield (
+        f"{each['aircraft']}: {each['combinations']} of {each['of']} combinations of surface, fault type and "
+        "cell of the envelope flown. Numbers are flights that were in the cell after the fault had struck."
+    )
+    head = ["surface", "fault", *(_cell(cell) for cell in each["cells"])]
+    rows = [
+        [one["surface"], one["type"].replace("_", " "), *(str(n) if n else "·" for n in one["flights"])]
+        for one in each["flown"]
+    ]
+    yield Table(head, rows)
+    never: dict[str, list[str]] = {}
+    for surface, kind in each["never"]:
+        never.setdefault(surface, []).append(kind.replace("_", " "))
+    if never:
+        yield (
+            "Never flown: "
+            + "; ".join(f"{surface}: {', '.join(kinds)}" for surface, kinds in never.items())
+            + "."
+        )
+
+
+def _cell(cell: Document) -> str:
+    slow, fast = cell["airspeed_mps"]
+    low, high = cell["altitude_m"]
+    if low is None:
+        where = f"below {high / 1000:g} km"
+    else:
+        where = f"above {low / 1000:g} km" if high is None else f"{low / 1000:g} to {high / 1000:g} km"
+    return f"{slow:.0f} to {fast:.0f} m/s, {where}"
+
+
+def as_text(document: Document, folder: str, colour: bool = False) -> str:
+    """For a terminal."""
+    table = _summary(document["requirements"])
+    lines = aligned([[row[0], *row[2:]] for row in (table.head, *table.rows)])
+    again = [
+        f"{each['id']} {each['verdict']}: {each['worst']['command']}"
+        for each in document["requirements"]
+        if each["verdict"] != MET and each["worst"]["command"]
+    ]
+    return "\n\n".join(filter(None, (lines, "\n".join(again), counted(document), f"results: {folder}")))
+
+
+def as_expectations(document: Document) -> list[Document]:
+    """What JUnit XML says of each requirement, and of one that is not met which command flies it again."""
+    return [
+        _expectation(
+            each["id"], _asked(each["asked"]), each["verdict"], each["worst"], each["worst"]["command"]
+        )
+        for each in document["requirements"]
+    ]
+
+
+def _expectation(
+    name: str, expected: str, verdict: str, found: Document, again: str | None = None
+) -> Document:
+    actual = f"{verdict}: {_found(found)}" + (f"; again: {again}" if again else "")
+    return {"name": name, "passed": verdict == MET, "expected": expected, "actual": actual}
+
+
+def of_flight(plan: EvidencePlan, name: str) -> tuple[Any, list[Document]]:
+    """A flight by name: its scenario, and what each requirement over it says, part by part.
+
+    Raises BadInput for a name that the plan does not have.
+    """
+    from beaver_ftc.documents.errors import suggestion
+
+    named = {plan.sources[source].flight(run): (source, run) for source, run in plan.cases}
+    if name not in named:
+        raise BadInput(
+            f"--replay: {plan.given} has no flight {name[:100]!r}{suggestion(name, list(named)[:50])}"
+        )
+    found, (source, run) = fly_flight(plan, named[name])["found"], named[name]
+    judged = [
+        _expectation(id, said(one["expected"]), one["verdict"], one)
+        for id, parts in found.items() for one in parts
+    ]  # fmt: skip
+    return plan.sources[source].scenario(run), judged

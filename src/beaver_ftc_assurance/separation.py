@@ -1,0 +1,521 @@
+"""The smallest doublet of the surfaces that is certain to tell the candidates left apart, or why none is.
+
+Of a fault whose parameter stays as it is, the data since the alarm leave an interval. With it the deflection
+of its surface at a command u lies in an interval: stuck [c-, c+], floating 0, a loss [e- u, e+ u], a bias
+u + [b-, b+]. Two types on one surface are told apart by a frame in which these are further from each other
+than twice what the uncertainty hides, 2 B / |G_i|, on some axis, and from the command: a frame that health
+explains says nothing of a fault that may go. Two surfaces a and b are told apart along d,
+d G_b = 0, by a frame in which a is off its command by more than 2 |d| B / |d G_a|: whatever b does, it does
+nothing there. B is the bound on a frame's innovation at the largest rates the doublet may reach.
+
+What the surfaces must reach is then linear, and so are travel, actuators, rates and angle of attack over a
+short horizon in which the rates follow dx/dt = G u: a linear programme finds the least amplitude.
+"""
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from math import degrees, inf, radians
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from beaver_ftc.diagnosis.state import UNANTICIPATED
+from beaver_ftc.diagnosis.types.registry import BIAS, CONSTANT_LOSS, FLOAT, NAMES, STUCK
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.loop.loop import fly
+from beaver_ftc.loop.simulation import Stepping
+from beaver_ftc.results.log import MemoryLog
+from beaver_ftc.results.writer import result_folder
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc_assurance.certificates import proved
+from beaver_ftc_assurance.certificates.certificate import check_scheme, history_of, logged
+from beaver_ftc_assurance.certificates.inequality import History, Hypothesis, by_each_frame, declared_of
+from beaver_ftc_assurance.certificates.kinds import hypothesis, wrong
+from beaver_ftc_assurance.certificates.tape import Recorder, Tape
+
+FILE, FLOWN = "separation.json", "flown"
+MARGIN = 1.1  # on what is asked: the aircraft flies on while the doublet is flown
+LONGEST_S = 0.5  # until the frame that tells
+LARGEST_RATE_DEG_S = 20.0
+GRID = 801  # deflections tried over the travel
+HELD_DEG = 1e-9  # by less no surface is moved
+Document = dict[str, Any]
+CONSTANT = (CONSTANT_LOSS, STUCK, FLOAT, BIAS)
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A type (one of CONSTANT, -1 for any) on a surface, its parameter between low and high."""
+
+    surface: int
+    kind: int
+    low: float
+    high: float
+
+    def deflection(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Least and greatest deflection, rad, of the surface at commands u (n,) rad."""
+        if self.kind in (STUCK, FLOAT):
+            return np.full_like(u, self.low), np.full_like(u, self.high)
+        if self.kind == BIAS:
+            return u + self.low, u + self.high
+        ends = (1.0 + self.low) * u, (1.0 + self.high) * u
+        return np.minimum(*ends), np.maximum(*ends)
+
+    def off(self, u: np.ndarray) -> np.ndarray:
+        """How far it is off its command at least, (n,) rad."""
+        low, high = self.deflection(u)
+        return np.asarray(np.maximum(0.0, np.maximum(low - u, u - high)))
+
+
+@dataclass(frozen=True)
+class Situation:
+    """The aircraft at the end of the flight: columns G (3, n) rad/s2 per rad, surfaces at u, rates x, the
+    bound on a frame's innovation (3,) rad/s2 while they stay below `rate`, stops (2, n), and of each actuator
+    the share of the way and the longest way it goes in a JSBSim frame, of which a frame has `instants`.
+    in_blocks: whether types are examined in blocks of frames."""
+
+    G: np.ndarray
+    u: np.ndarray
+    x: np.ndarray
+    rate: float
+    bound: np.ndarray
+    stops: np.ndarray
+    approach: np.ndarray
+    step: np.ndarray
+    instants: int
+    in_blocks: bool
+    dt: float
+    alpha: float
+    alpha_range: tuple[float, float]
+
+    @property
+    def held(self) -> int:
+        """For so many frames it must stay there: of several instants a frame in which it moves says little,
+        and one counts between two of its like."""
+        return 1 if self.instants == 1 else 3
+
+
+def separate(scenario: Scenario, rate_deg_s: float = LARGEST_RATE_DEG_S) -> Document:
+    """Fly it, and propose for each two of the candidates left what is certain to tell them apart.
+
+    Raises BadInput where nothing is to be told apart.
+    """
+    check_scheme(scenario)
+    if scenario.fdi.pairs:
+        raise BadInput(f"{scenario.name}: fdi.pairs: two faults leave no one parameter, allowed: false")
+    log, recorder = MemoryLog(), Recorder(scenario)
+    landing = fly(scenario, log, watch=recorder.watch)
+    if landing.detection_time_s is None:
+        raise BadInput(f"{scenario.name}: no alarm was raised, allowed with separate: a flight with one")
+    tape, history = _seen(scenario, log, recorder)
+    situation, left = situation_of(tape, scenario, radians(rate_deg_s)), [*candidates(tape, history)]
+    names = scenario.airframe.surfaces
+    if len(left) < 2:
+        raise BadInput(f"{scenario.name}: one candidate or none is left, allowed with separate: two at least")
+    pairs, both = propose(left, situation, names), combinations(left, 2)
+    if scenario.fdi.probing is not None:
+        pairs = [
+            pair | (_flown(scenario, pair, each) if pair["separates"] else {})
+            for pair, each in zip(pairs, both, strict=True)
+        ]
+    return {
+        "scenario": scenario.name,
+        "time_s": landing.frames / scenario.rate_hz,
+        "assumes": "the parameter of the fault stays as it is",
+        "largest_rate_deg_s": rate_deg_s,
+        "not_constant": open_courses(tape, names),
+        "pairs": pairs,
+        "passed": all(len(pair.get("left", ())) < 2 for pair in pairs),
+    }
+
+
+def propose(left: Sequence[Candidate], at: Situation, names: Sequence[str]) -> list[Document]:
+    """For each two candidates the smallest doublet that tells them apart, or why there is none."""
+    return [
+        {"candidates": [_words(each, names) for each in both], **tell_apart(*both, at, names)}
+        for both in combinations(left, 2)
+    ]
+
+
+def _flown(scenario: Scenario, pair: Document, candidates: Sequence[Candidate]) -> Document:
+    """Which of two candidates are left once the doublet has been flown, and exits from the envelope in it."""
+    flight = _longer(scenario, pair)
+    try:
+        before = 0
+        for k in _with_doublet(flight, scenario, pair):
+            if k == round(scenario.duration_s * scenario.rate_hz) - 1:
+                before = int(flight.record["accounts"]["envelope"]["n_exits"])
+        fdi, both = flight.record["fdi"], zip(candidates, pair["candidates"], strict=True)
+        exits = int(flight.record["accounts"]["envelope"]["n_exits"]) - before
+        return {"left": [words for one, words in both if not _gone(one, fdi)], "envelope_exits": exits}
+    finally:
+        flight.release()
+
+
+def _longer(scenario: Scenario, pair: Document) -> Stepping:
+    """The flight, with time for the doublet."""
+    spare_s = pair["duration_s"] + 10.0 / scenario.rate_hz
+    return Stepping(scenario.model_copy(update={"duration_s": scenario.duration_s + spare_s}))
+
+
+def _with_doublet(flight: Stepping, scenario: Scenario, pair: Document) -> Iterator[int]:
+    """Fly on to the scenario's end, then the doublet; yields the frame just flown."""
+    frames, names = round(scenario.duration_s * scenario.rate_hz), list(scenario.airframe.surfaces)
+    yield 0
+    for k in range(1, frames):
+        flight.step()
+        yield k
+    rest = flight.record["belief"]["u"].copy()
+    for k in range(round(pair["time_s"] * scenario.rate_hz) + 1):
+        command = rest.copy()
+        for name, course in pair["commands_rad"].items():
+            command[names.index(name)] = course[k] if k < len(course) else rest[names.index(name)]
+        flight.step(command)
+        yield frames + k
+
+
+def certified(scenario: Scenario, pair: Document) -> tuple[MemoryLog, Document]:
+    """Log and certificate of the flight with its doublet."""
+    flight = _longer(scenario, pair)
+    try:
+        return proved.proved(scenario, flight.records, _with_doublet(flight, scenario, pair))
+    finally:
+        flight.release()
+
+
+def _gone(one: Candidate, fdi: np.void) -> bool:
+    """Whether a candidate is excluded."""
+    estimators, layout = fdi["isolation"]["estimator"], fdi["layout"]
+    if not fdi["config"]["every_type"]:
+        return bool(estimators[int(layout["loss_of"][one.surface])]["excluded"])
+    whole = bool(estimators[int(layout["position_of"][one.surface])]["excluded"])
+    return whole or bool(fdi["types"]["surface"][one.surface]["type_excluded"][one.kind])
+
+
+def write(document: Document, scenario: Scenario, out: Path) -> Path:
+    """Write separation.json into its result folder, and of each doublet that was flown log and certificate,
+    flown/PLACE/; returns that."""
+    name = f"{document['scenario'][:88]}-separation"
+    with result_folder(out, name) as folder:
+        for place, pair in enumerate(document["pairs"]):
+            if "left" in pair:
+                (folder / FLOWN / str(place)).mkdir(parents=True)
+                proved.write(scenario, *certified(scenario, pair), folder / FLOWN / str(place))
+        (folder / FILE).write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    return out / name
+
+
+def _seen(scenario: Scenario, log: MemoryLog, recorder: Recorder) -> tuple[Tape, History]:
+    """What the flight has shown since the alarm."""
+    detected = log.rows[:, log.columns.index("detected")] > 0.0
+    clear = np.flatnonzero(~detected)
+    alarm = int(clear[-1]) + 1 if len(clear) else 0
+    if alarm >= len(detected) - 1:
+        raise BadInput(f"{scenario.name}: the flight ends with its alarm, allowed: a longer duration_s")
+    tape = recorder.tape([alarm, len(detected) - 1], len(detected))
+    return tape, history_of(scenario, logged(log), tape)
+
+
+def situation_of(tape: Tape, scenario: Scenario, rate: float) -> Situation:
+    """What is known of the aircraft as the flight ends; rate: rad/s at most."""
+    frame, aircraft = tape.last, scenario.airframe
+    belief, bound, declared, dt = (
+        frame["belief"],
+        frame["fdi"]["bound"],
+        declared_of(frame),
+        1.0 / scenario.rate_hz,
+    )
+    coupled = np.array(declared["inertia_coupling"]) * np.abs(declared["coupling"]) * rate**2
+    actuators = belief["actuators"]
+    return Situation(
+        G=belief["means"]["G"].copy(), u=belief["u"].copy(), x=frame["measured"]["x"].copy(), rate=rate,
+        bound=MARGIN * (bound["eta_bar"] + coupled + 2.0 * bound["noise"] / dt),
+        stops=np.array([actuators["low"], actuators["high"]]), approach=actuators["approach"].copy(),
+        step=actuators["step"].copy(), instants=scenario.substeps,
+        in_blocks=int(frame["fdi"]["types"]["config"]["length"]) > 1, dt=dt,
+        alpha=float(frame["measured"]["y"][0]), alpha_range=_radians(aircraft.envelope.alpha_deg),
+    )  # fmt: skip
+
+
+def _radians(ends: Sequence[float]) -> tuple[float, float]:
+    low, high = ends
+    return radians(low), radians(high)
+
+
+def candidates(tape: Tape, history: History) -> Iterator[Candidate]:
+    """Every fault that is left and stays as it is, with what is known of its parameter."""
+    fdi, frames = tape.last["fdi"], np.arange(_alarm(tape), tape.end)
+    shown = frames[wrong(history, frames)]
+    if int(fdi["verdict"]["isolated"]) == UNANTICIPATED or not len(shown):
+        return
+    for s, kind in _left(tape):
+        of = hypothesis(tape, s, kind)
+        if kind == FLOAT:
+            yield Candidate(s, kind, 0.0, 0.0)
+            continue
+        low, high = _interval(of, history, shown)
+        if low <= high:
+            yield Candidate(s, kind, low, high)
+
+
+def _alarm(tape: Tape) -> int:
+    """The frame of the alarm."""
+    return round(float(tape.last["fdi"]["verdict"]["detected_at_s"]) / float(tape.last["dt"]))
+
+
+def _left(tape: Tape) -> Iterator[tuple[int, int]]:
+    """Surface and type of what is not excluded and stays as it is."""
+    fdi = tape.last["fdi"]
+    estimators, layout = fdi["isolation"]["estimator"], fdi["layout"]
+    for s, surface in enumerate(fdi["types"]["surface"]):
+        if not fdi["config"]["every_type"]:
+            e = int(layout["loss_of"][s])
+            if e >= 0 and not estimators[e]["excluded"]:
+                yield s, CONSTANT_LOSS
+        elif not estimators[int(layout["position_of"][s])]["excluded"]:
+            yield from ((s, kind) for kind in CONSTANT if not surface["type_excluded"][kind])
+
+
+def open_courses(tape: Tape, names: Sequence[str]) -> list[str]:
+    """What is left whose course over many frames tells, not a frame."""
+    fdi, found = tape.last["fdi"], []
+    if not fdi["config"]["every_type"]:
+        return []
+    for s, surface in enumerate(fdi["types"]["surface"]):
+        if not fdi["isolation"]["estimator"][int(fdi["layout"]["position_of"][s])]["excluded"]:
+            kinds = np.flatnonzero(surface["type_excluded"] == 0)
+            found += [f"{names[s]} {NAMES[k]}" for k in kinds if k not in CONSTANT]
+    return sorted(set(found))
+
+
+def _interval(of: Hypothesis, history: History, frames: np.ndarray) -> tuple[float, float]:
+    """What all of these frames say of its parameter."""
+    least, most, _ = by_each_frame(of, history, frames)
+    return max(of.low, float(least.max())), min(of.high, float(most.min()))
+
+
+def tell_apart(one: Candidate, other: Candidate, at: Situation, names: Sequence[str]) -> Document:
+    """The smallest doublet that is certain to tell two candidates apart, or the reason why there is none."""
+    targets: dict[int, float] = {}
+    needs: Document = {}
+    if one.surface == other.surface and at.in_blocks:
+        because = "with noisy gyros types are told by blocks of frames, not by one"
+        return {"separates": False, "because": because, "needs": needs}
+    if one.surface == other.surface:
+        asked = [(one.surface, *_types_apart(one, other, at))]
+    else:
+        asked = [(a.surface, *_surface_shown(a, b, at)) for a, b in ((one, other), (other, one))]
+    for s, target, numbers in asked:
+        needs[names[s]] = numbers
+        if target is None:
+            return {"separates": False, "because": numbers["because"], "needs": needs}
+        targets[s] = target
+    found = doublet(targets, at)
+    if found is None:
+        says = f"no doublet within {LONGEST_S:g} s keeps the rates below {degrees(at.rate):g} deg/s"
+        return {"separates": False, "because": f"{says} and the angle of attack in its range", "needs": needs}
+    commands, tells = found
+    return {
+        "separates": True,
+        "time_s": (tells + 2) * at.dt,  # a command is in effect a frame later, a frame judged with the next
+        "duration_s": len(commands) * at.dt,
+        "amplitude_deg": degrees(max(abs(commands[:, [*targets]] - at.u[[*targets]]).max(axis=0))),
+        "needs": needs,
+        "commands_rad": {names[s]: commands[:, s].tolist() for s in targets},
+    }
+
+
+def _types_apart(one: Candidate, other: Candidate, at: Situation) -> tuple[float | None, Document]:
+    """The deflection nearest to the present at which a surface's two types differ, and from health."""
+    s = one.surface
+    room = float(np.min(2.0 * MARGIN * at.bound / np.maximum(np.abs(at.G[:, s]), 1e-12)))
+    u = _deflections(at, s)
+    (low, high), (low_too, high_too) = one.deflection(u), other.deflection(u)
+    gap = np.maximum(low - high_too, low_too - high)
+    gap = np.minimum(gap, np.minimum(one.off(u), other.off(u)))  # else health explains the frame
+    return _nearest(u, gap > room, s, at, room, "apart, and off their command,", float(gap.max()))
+
+
+def _surface_shown(one: Candidate, other: Candidate, at: Situation) -> tuple[float | None, Document]:
+    """The deflection nearest to the present at which a fault shows where the other surface does nothing."""
+    a, b = one.surface, other.surface
+    room = min(
+        (2.0 * MARGIN * np.abs(d) @ at.bound / abs(d @ at.G[:, a]) for d in _blind_to(b, at, a)), default=inf
+    )
+    u = _deflections(at, a)
+    off = one.off(u)
+    return _nearest(u, off > room, a, at, float(room), "off its command", float(off.max()))
+
+
+def _deflections(at: Situation, s: int) -> np.ndarray:
+    """Where a surface can be asked to go, (GRID + 1,) rad: all over its travel, and where it is now."""
+    return np.append(np.linspace(at.stops[0, s], at.stops[1, s], GRID), np.clip(at.u[s], *at.stops[:, s]))
+
+
+def _blind_to(b: int, at: Situation, a: int) -> Iterator[np.ndarray]:
+    """Directions in which surface b does nothing, and a does something."""
+    for i, j in combinations(range(3), 2):
+        d = np.zeros(3)
+        d[i], d[j] = at.G[j, b], -at.G[i, b]
+        for way in (d, *(np.eye(3)[k] for k in (i, j) if at.G[k, b] == 0.0)):
+            if abs(way @ at.G[:, a]) > 1e-9 * np.abs(way).max():
+                yield way
+
+
+def _nearest(
+    u: np.ndarray, tells: np.ndarray, s: int, at: Situation, room: float, what: str, most: float
+) -> tuple[float | None, Document]:
+    """Of deflections u that tell, the nearest to the present; and the numbers this rests on."""
+    numbers: Document = {"at_least_deg": degrees(room) if np.isfinite(room) else None}
+    numbers |= {"at_most_deg": degrees(most), "now_deg": degrees(at.u[s])}
+    if not tells.any():
+        asked = f"more than {degrees(room):.3g} deg" if np.isfinite(room) else "another direction"
+        says = f"they must be {what} by {asked}, and are by {degrees(most):.3g} deg at most within the travel"
+        return None, numbers | {"because": says}
+    target = float(u[tells][np.argmin(np.abs(u[tells] - at.u[s]))])
+    return target, numbers | {"target_deg": degrees(target)}
+
+
+def doublet(targets: dict[int, float], at: Situation) -> tuple[np.ndarray, int] | None:
+    """Commands (frames, n) rad of the smallest doublet that brings surfaces to these deflections, and the
+    frame in which they are there; None where no doublet does within the limits."""
+    longest = max(int(LONGEST_S / at.dt), 1)
+    tells = 1
+    while tells <= longest:
+        found = _least_amplitude(targets, at, tells)
+        if found is not None:
+            return found, tells + at.held - 1
+        tells *= 4
+    return None
+
+
+def _least_amplitude(targets: dict[int, float], at: Situation, tells: int) -> np.ndarray | None:
+    """The linear programme, with the frame that tells given: commands (frames, n) rad there and back.
+
+    Unknown, frame by frame: of each surface the command and where it is at the frame's end, less the present
+    deflection; the rates, less the present ones, and pitch; then the amplitude. A row has a few of them, so
+    that many frames stay quick.
+    """
+    if (np.abs(at.x) > at.rate).any() or not at.alpha_range[0] <= at.alpha <= at.alpha_range[1]:
+        return None
+    frames, surfaces = 2 * (tells + at.held - 1), [*targets]
+    n, there = len(surfaces), np.arange(tells - 1, tells + at.held - 1)
+    every, equal, above = np.arange(frames), _Rows(frames), _Rows(frames)
+    turning = [{(2 * n + i, 0): 1.0, (2 * n + i, -1): -1.0} for i in range(3)]
+    stops, rates = [(at.stops[:, s] - at.u[s]) for s in surfaces], [(-at.rate - x, at.rate - x) for x in at.x]
+    for j, s in enumerate(surfaces):
+        away, (left, mean_left) = targets[s] - at.u[s], _left_behind(at, s)
+        equal.add(every, {(j, 0): left - 1.0, (n + j, 0): 1.0, (n + j, -1): -left})
+        equal.add(there[1:], {(j, 0): 1.0, (j, -1): -1.0})
+        moved = {(j, 0): 1.0 - mean_left, (n + j, -1): mean_left}
+        before = {(j, -1): mean_left - 1.0, (n + j, -2): -mean_left}
+        above.add(there, {k: -np.sign(away) * v for k, v in moved.items()}, -abs(away))
+        for sign in (1.0, -1.0):
+            above.add(every, {(j, 0): sign}, amplitude=-1.0)
+            if np.isfinite(at.step[s]):
+                pace = {k: sign * v for k, v in (moved | before).items()}
+                above.add(every, pace, at.step[s] * at.instants)
+        for row, g in zip(turning, at.G[:, s], strict=True):
+            row |= {k: -at.dt * g * v for k, v in moved.items() if g}
+    for row in (*turning, {(2 * n + 3, 0): 1.0, (2 * n + 3, -1): -1.0, (2 * n + 1, 0): -at.dt}):
+        equal.add(every, row)
+    angles = np.subtract(at.alpha_range, at.alpha)
+    ends = [*stops, *[(-inf, inf)] * n, *rates, angles]
+    bounds = np.vstack([np.repeat(ends, frames, axis=0), (0.0, inf)])
+    bounds[[(2 * n + i + 1) * frames - 1 for i in range(3)]] = 0.0
+    found = _solved(equal, above, bounds)
+    if found is None:
+        return None
+    commands = np.tile(at.u, (frames, 1))
+    commands[:, surfaces] += found[: n * frames].reshape(n, frames).T
+    return commands
+
+
+class _Rows:
+    """Rows of a linear programme over blocks of unknowns, of so many frames each, and an amplitude after."""
+
+    def __init__(self, frames: int) -> None:
+        self.frames, self.height = frames, 0
+        self.parts: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+        self.limits: list[np.ndarray] = []
+
+    def add(
+        self,
+        at: np.ndarray,
+        weights: dict[tuple[int, int], float],
+        limit: float = 0.0,
+        amplitude: float = 0.0,
+    ) -> None:
+        """A row for each of these frames: of (block, lag) the weight of the unknown so many frames from it,
+        0 before the first; and of the amplitude."""
+        rows = self.height + np.arange(len(at))
+        for (block, lag), weight in weights.items():
+            there = at + lag >= 0
+            columns = block * self.frames + (at + lag)[there]
+            self.parts.append((rows[there], columns, np.full(len(columns), weight)))
+        if amplitude:
+            self.parts.append((rows, np.full(len(at), -1), np.full(len(at), amplitude)))
+        self.height += len(at)
+        self.limits.append(np.full(len(at), limit))
+
+    def matrix(self, width: int) -> Any:
+        """All of them, sparse."""
+        from scipy.sparse import csc_array
+
+        rows, columns, values = (np.concatenate(part) for part in zip(*self.parts, strict=True))
+        return csc_array((values, (rows, columns % width)), shape=(self.height, width))
+
+
+def _solved(equal: _Rows, above: _Rows, bounds: np.ndarray) -> np.ndarray | None:
+    """The unknowns with the least amplitude; None where there are none within the limits."""
+    from scipy.optimize import linprog
+
+    width = len(bounds)
+    weight = np.r_[np.zeros(width - 1), 1.0]
+    for method in ("highs-ds", "highs-ipm"):  # the second where rounding stops the first
+        result = linprog(
+            weight, above.matrix(width), np.concatenate(above.limits),
+            equal.matrix(width), np.concatenate(equal.limits), bounds, method=method,
+        )  # fmt: skip
+        if result.status in (0, 2):
+            break
+    return np.asarray(result.x) if result.status == 0 else None
+
+
+def _left_behind(at: Situation, s: int) -> tuple[float, float]:
+    """Of a surface's way to its command, while its rate limit holds nothing back: the share left at the end
+    of a frame, and its mean over the frame. Of several instants the first has the surface where it was."""
+    stays = 1.0 - at.approach[s]
+    if at.instants == 1:
+        return stays, stays
+    return stays**at.instants, float(np.mean(stays ** np.arange(at.instants)))
+
+
+def _words(one: Candidate, names: Sequence[str]) -> Document:
+    """A candidate as the document has it: angles in deg, a loss as theta."""
+    scale = 1.0 if one.kind == CONSTANT_LOSS else degrees(1.0)
+    unit = "theta" if one.kind == CONSTANT_LOSS else "deg"
+    return {"surface": names[one.surface], "type": NAMES[one.kind], unit: [scale * one.low, scale * one.high]}
+
+
+def as_text(document: Document) -> str:
+    """A line for each two candidates."""
+    lines = [f"{document['scenario']}, {document['time_s']:g} s: if {document['assumes']}"]
+    for pair in document["pairs"]:
+        one, other = (f"{each['surface']} {each['type']}" for each in pair["candidates"])
+        if pair["separates"]:
+            by, much = " and ".join(pair["commands_rad"]), pair["amplitude_deg"]
+            moves = f"by {much:.3g} deg" if much > HELD_DEG else "held as now"
+            says = f"{by} {moves}, told after {pair['time_s']:.3g} s"
+            if "left" in pair:
+                words = " and ".join(f"{each['surface']} {each['type']}" for each in pair["left"])
+                says += f"; flown, left: {words or 'neither'}"
+        else:
+            says = f"none: {pair['because']}"
+        lines.append(f"  {one} or {other}: {says}")
+    if document["not_constant"]:
+        lines.append(f"  a course over many frames tells: {', '.join(document['not_constant'])}")
+    return "\n".join(lines)

@@ -1,0 +1,1 @@
+"""Links to other programs: autopilots (`sitl`), Gymnasium (`gym`) and FlightGear (`flightgear`)."""

@@ -1,0 +1,85 @@
+"""`beaver-ftc sitl`: fly a scenario under ArduPilot or PX4."""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from beaver_ftc.cli.inputs import JunitOption, NoReportOption, ResultsOption, ScenarioArgument, load_all
+from beaver_ftc.cli.output import Format, FormatOption, complain, emit, emit_json, write_junit
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc_links.sitl import Protocol
+
+
+@dataclass(frozen=True)
+class Options:
+    """What is asked of it, as `command` says."""
+
+    scenario: ScenarioArgument
+    protocol: Annotated[Protocol, typer.Option("--as")]
+    host: str = "127.0.0.1"
+    port: Annotated[int | None, typer.Option(min=0, max=65535)] = None
+    rate: Annotated[float | None, typer.Option(metavar="HZ")] = None
+    speed: Annotated[float | None, typer.Option(min=0, max=1000)] = None
+    hold: Annotated[float, typer.Option(min=0, metavar="S")] = 0.0
+    ground: Annotated[float | None, typer.Option(metavar="M")] = None
+    mavlink: Annotated[str | None, typer.Option(metavar="HOST:PORT")] = None
+    page: Annotated[int | None, typer.Option(min=0, max=65535, metavar="PORT")] = None
+    out: ResultsOption = Path("runs")
+    format: FormatOption = Format.text
+    no_report: NoReportOption = False
+    junit: JunitOption = None
+
+
+def command(options: Options) -> None:
+    """Fly a scenario under an autopilot in software in the loop.
+
+    The autopilot's outputs move the surfaces, as the aircraft's `channels` say; the scenario's faults come
+    between, and its diagnosis watches. Ends with the scenario's duration, or with Ctrl-C.
+
+    Examples:
+      beaver-ftc sitl elevator-partial-loss --as ardupilot
+      beaver-ftc sitl elevator-partial-loss --as px4 --mavlink 127.0.0.1:14550
+
+    protocol: ArduPilot's JSON interface, or PX4's simulator interface.
+    host: Address to listen on.
+    port: Port to listen on; 9002 for ardupilot, 4560 for px4; 0: any.
+    rate: Frames a second of the autopilot; by itself what its first packet says, 250 for px4.
+    speed: Times real time; 0: as fast as it answers. By itself 0 for ardupilot, which keeps time, 1 for px4.
+    hold: The scenario's own law flies so many seconds first.
+    ground: Height of the autopilot's ground above sea level, by itself 0.
+    mavlink: A ground station: is told what the diagnosis finds, may inject failures.
+    page: Show the flight on the live page at this port, 0 any: break it there, repair it.
+    """
+    from beaver_ftc.results.verdict import verdict_text
+    from beaver_ftc_links.sitl.serve import Options as Served
+    from beaver_ftc_links.sitl.serve import serve
+
+    (scenario,) = load_all([options.scenario])
+    for warning in scenario.warnings():
+        complain(f"{scenario.name}: warning: {warning}")
+    served = Served(
+        options.protocol, options.host, options.port, options.rate, options.speed, options.hold,
+        options.ground, address(options.mavlink), options.page,
+    )  # fmt: skip
+    flight = serve(scenario, served, lambda line: complain(f"{scenario.name}: {line}"))
+    folder = flight.save(options.out, report=not options.no_report)
+    document = flight.metrics | {"folder": str(folder)}
+    if options.format is Format.json:
+        emit_json(document)
+    else:
+        emit(verdict_text(document, str(folder), colour=sys.stdout.isatty()))
+    write_junit([document], options.junit)
+    raise typer.Exit(0 if document["passed"] else 1)
+
+
+def address(given: str | None) -> tuple[str, int] | None:
+    """Host and port of HOST:PORT."""
+    if given is None:
+        return None
+    host, _, port = given.rpartition(":")
+    if not host or not port.isdecimal() or not 0 < int(port) < 65536:
+        raise BadInput(f"--mavlink: {given!r} is no address, allowed: HOST:PORT with a port of 1 to 65535")
+    return host, int(port)

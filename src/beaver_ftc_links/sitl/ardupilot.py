@@ -1,0 +1,149 @@
+"""ArduPilot's JSON interface: datagrams in, JSON out, in lockstep. No socket: see `serve`.
+
+A datagram is little-endian: magic, frame rate Hz, frame count, pulses in us [ArduPilot, libraries/SITL/
+examples/JSON/readme.md]. The answer is one line of JSON between two newlines. Whoever reads it looks for the
+first occurrence of a key as text, takes what stands right behind the colon, and a vector as `[a,b,c]`
+[libraries/SITL/SIM_JSON.cpp]: so no spaces, and a key that is part of another stands before it.
+
+The count rises with each answer received. A count that comes again is a packet sent again, since its answer
+was lost: it is answered, not flown. A lower one is late, unless it is said again: nobody repeats what has
+been answered, so that is a count begun anew, of an autopilot started again. So is 0 or 1, long after.
+"""
+
+import struct
+from collections.abc import Hashable
+from typing import NamedTuple, Protocol
+
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc_links.sitl.link import Link
+from beaver_ftc_links.sitl.vehicle import Instant
+
+_HEAD = struct.Struct("<HHI")
+FORMS = {18458: struct.Struct("<16H"), 29569: struct.Struct("<32H")}  # by magic: the pulses
+LATE = 64  # frames: so far back a packet may have been overtaken
+
+
+class Packet(NamedTuple):
+    """A datagram: frames a second, number of the frame, pulses in us."""
+
+    rate_hz: int
+    number: int
+    pulses_us: tuple[int, ...]
+
+
+class Body(Protocol):
+    """What the protocol flies: `vehicle.Vehicle`."""
+
+    @property
+    def over(self) -> bool:
+        """Whether the flight has ended."""
+
+    def begin(self, packets_hz: float, channels: int) -> None:
+        """A flight from trim. Raises BadInput for a rate it cannot be flown at, or too few outputs."""
+
+    def fly(self, outputs: tuple[int, ...], frame_hz: float) -> None:
+        """A frame of the autopilot."""
+
+    def instant(self) -> Instant:
+        """What is known of the frame just flown."""
+
+
+def decoded(datagram: bytes) -> Packet | None:
+    """The packet in a datagram, or None where it is none."""
+    if len(datagram) < _HEAD.size:
+        return None
+    magic, rate_hz, count = _HEAD.unpack_from(datagram)
+    form = FORMS.get(magic)
+    if form is None or len(datagram) != _HEAD.size + form.size:
+        return None
+    return Packet(rate_hz, count, form.unpack_from(datagram, _HEAD.size))
+
+
+def encoded(now: Instant) -> bytes:
+    """The answer: what the autopilot needs, then what it may use. SI, radians, see `Instant`.
+
+    airspeed: true. windvane: the apparent wind, clockwise from ahead. rng_1: the height above its ground.
+    """
+    gyro, force, attitude = _vector(now.gyro), _vector(now.force), _vector(now.attitude)
+    return (
+        f'\n{{"timestamp":{now.t_s!r},"imu":{{"gyro":{gyro},"accel_body":{force}}},'
+        f'"position":{_vector(now.position)},"attitude":{attitude},"velocity":{_vector(now.velocity)},'
+        f'"airspeed":{now.airspeed_mps!r},"rng_1":{-now.position[2]!r},'
+        f'"windvane":{{"direction":{now.beta_rad!r},"speed":{now.airspeed_mps!r}}}}}\n'
+    ).encode()
+
+
+def _vector(values: tuple[float, ...]) -> str:
+    x, y, z = values
+    return f"[{x!r},{y!r},{z!r}]"
+
+
+class Ardupilot:
+    """One endpoint: the first peer's packets are flown, those of others counted.
+
+    complaint: why no flight can be begun, in a line; empty where one can.
+    """
+
+    def __init__(self, body: Body, link: Link) -> None:
+        self._body, self._link = body, link
+        self._peer: Hashable = None
+        self._last = -1  # count of the frame flown last; -1: none
+        self._again = -1  # a count that came late
+        self._answer: bytes | None = None
+        self.complaint = ""
+
+    def take(self, datagram: bytes, peer: Hashable, now_s: float) -> bytes | None:
+        """What to answer to a datagram, if anything. peer: whose it is; now_s: any clock that runs on."""
+        counts, packet = self._link.counts, decoded(datagram)
+        if packet is None:
+            counts["malformed"] += 1
+            return None
+        if peer != self._peer and not self._may_take_over(packet, now_s):
+            counts["strangers"] += 1
+            return None
+        if not self._anew(packet, peer):
+            if packet.number == self._last:
+                counts["repeated"] += 1
+                return self._answer
+            if packet.number < self._last:
+                counts["late"] += 1
+                self._again = packet.number
+                return None
+            counts["missed"] += packet.number - self._last - 1
+        elif not self._begin(packet, peer):
+            counts["malformed"] += 1
+            return None
+        return self._fly(packet, now_s)
+
+    def _may_take_over(self, packet: Packet, now_s: float) -> bool:
+        """Whether somebody new may fly: the first, or an autopilot started again, from another port, once
+        nothing has come from the old one for a while."""
+        silent = self._link.silent_s(now_s) > self._link.LONG_S
+        return self._peer is None or (packet.number <= 1 and silent)
+
+    def _anew(self, packet: Packet, peer: Hashable) -> bool:
+        """Whether the count has begun anew, or at all."""
+        if self._last < 0 or peer != self._peer:
+            return True
+        starts = packet.number <= 1 and self._last > LATE
+        return starts or (packet.number < self._last and packet.number == self._again)
+
+    def _begin(self, packet: Packet, peer: Hashable) -> bool:
+        try:
+            self._body.begin(packet.rate_hz, len(packet.pulses_us))
+        except BadInput as error:
+            self.complaint = str(error)
+            return False
+        self._link.counts["resets"] += self._last >= 0
+        self._peer = peer
+        return True
+
+    def _fly(self, packet: Packet, now_s: float) -> bytes | None:
+        self._last, self._again = packet.number, -1
+        self._link.hear(now_s)
+        if self._body.over:
+            return None
+        self._body.fly(packet.pulses_us, packet.rate_hz)
+        self._link.counts["frames"] += 1
+        self._answer = encoded(self._body.instant())
+        return self._answer

@@ -1,0 +1,69 @@
+"""MAV_CMD_INJECT_FAILURE: which of a scenario's faults a MAVLink command asks for [MAVLink, common.xml, 420].
+
+param1 FAILURE_UNIT, param2 FAILURE_TYPE, param3 which of them: of servos the output's number, 0 all.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from beaver_ftc.aircraft.channels import ChannelsSection
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc_links.sitl.vehicle import Flown
+
+COMMAND = 420
+ACCEPTED, DENIED, UNSUPPORTED = 0, 2, 3  # MAV_RESULT
+SERVO = 102  # FAILURE_UNIT_SYSTEM_SERVO
+SENSORS = {0: ("p", "q", "r"), 1: ("ax", "ay", "az"), 3: ("altitude",), 8: ("V", "qdyn")}  # by FAILURE_UNIT
+OK = 0  # FAILURE_TYPE: repaired
+# By FAILURE_TYPE: off, stuck, wrong, slow; garbage is noise of an instrument and an oscillation of a servo.
+OF_SERVOS: Mapping[int, dict[str, Any]] = {
+    1: {"type": "float"},
+    2: {"type": "stuck"},
+    3: {"type": "oscillatory", "amplitude_deg": 3.0, "frequency_rad_s": 10.0},
+    4: {"type": "hardover", "direction": 1},
+    5: {"type": "rate_limit", "scale": 0.1},
+}
+OF_SENSORS: Mapping[int, dict[str, Any]] = {
+    1: {"type": "lost"},
+    2: {"type": "freeze"},
+    4: {"type": "scale", "magnitude": 0.3},
+}
+
+
+def inject(sim: Flown, channels: ChannelsSection, params: tuple[float, float, float]) -> tuple[int, str]:
+    """Break or repair what these parameters ask for, from the next frame on; returns the MAV_RESULT and what
+    was done, in words."""
+    unit, kind, which = (round(value) if abs(value) < 1e6 else -1 for value in params)
+    places = _places(unit, which, sim, channels)
+    faults = OF_SERVOS if unit == SERVO else OF_SENSORS
+    if not places or (kind != OK and kind not in faults):
+        return UNSUPPORTED, f"unit {unit}, type {kind}, number {which}: nothing of this aircraft"
+    where = "actuator" if unit == SERVO else "sensor"
+    act: Callable[[str], None] = (
+        (lambda name: sim.repair(name if unit == SERVO else f"sensor {name}"))
+        if kind == OK
+        else (lambda name: sim.inject({where: name, **faults[kind]}))
+    )
+    try:
+        for name in places:
+            act(name)
+    except BadInput as error:
+        return DENIED, str(error)
+    what = "repaired" if kind == OK else str(faults[kind]["type"]).replace("_", " ")
+    return ACCEPTED, f"{', '.join(places)}: {what}"
+
+
+def _places(unit: int, which: int, sim: Flown, channels: ChannelsSection) -> tuple[str, ...]:
+    """The surfaces of an output, or the instruments of a unit."""
+    if unit == SERVO:
+        return tuple(
+            name
+            for name, mix in channels.surfaces.items()
+            if which == 0 or any(output.channel == which for output in mix)
+        )
+    from beaver_ftc.scenario.airframe import checked_against
+    from beaver_ftc.scenario.sensors import sensors_there
+
+    with checked_against(sim.airframe):
+        there = sensors_there()
+    return tuple(name for name in SENSORS.get(unit, ()) if name in there)

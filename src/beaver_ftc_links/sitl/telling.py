@@ -1,0 +1,73 @@
+"""What the diagnosis finds in flight, as short texts: MAVLink's STATUSTEXT, and lines for people."""
+
+from typing import Any, NamedTuple
+
+from beaver_ftc_links.sitl.vehicle import Flown
+
+EMERGENCY, CRITICAL, WARNING, INFO = 0, 2, 4, 6  # MAV_SEVERITY
+MOST_KEPT = 200
+ESTIMATED_S = 1.0  # after a loss has been named, its size is said
+_PREFIX = "FDI: "
+_LOSS = "loss_of_effectiveness"
+
+
+class Text(NamedTuple):
+    """One finding: when, s of flight; MAV_SEVERITY; words."""
+
+    t_s: float
+    severity: int
+    text: str
+
+
+class Teller:
+    """Notices what is new in the verdict of a flight, from frame to frame."""
+
+    def __init__(self) -> None:
+        self.kept: list[Text] = []
+        self.begin()
+
+    def begin(self) -> None:
+        """A flight begins: nothing has been said of it."""
+        self._said: tuple[Any, ...] = (False, None, None, ())
+        self._lost, self._named_s, self._listening = False, -1.0, False
+        self.kept.clear()
+
+    def news(self, sim: Flown) -> list[Text]:
+        """What is to be said of the frame just flown; mostly nothing."""
+        begins = bool(sim.listens_from_s) and not self._listening
+        if not (begins or sim.alarmed or sim.departed):
+            return []
+        new = [(INFO, "listening")] if begins else []
+        self._listening |= begins
+        texts = [Text(sim.t_s, severity, _PREFIX + text) for severity, text in new + self._new(sim)]
+        self.kept += texts[: MOST_KEPT - len(self.kept)]
+        return texts
+
+    def _new(self, sim: Flown) -> list[tuple[int, str]]:
+        verdict, found = sim.verdict, []
+        before = self._said
+        open_between = tuple(dict.fromkeys(name.partition(":")[0] for name in verdict.candidates))
+        self._said = now = verdict.detected, verdict.isolated, verdict.type, open_between
+        if verdict.detected and not before[0]:
+            where = f"on {verdict.axis}" if verdict.axis else "between the instruments"
+            found.append((WARNING, f"alarm {where}"))
+        if verdict.isolated and before[1:3] != now[1:3]:
+            found.append((CRITICAL, _named(verdict)))
+            self._named_s = sim.t_s if verdict.type == _LOSS else -1.0
+        elif verdict.detected and not verdict.isolated and open_between and before[3] != now[3]:
+            found.append((WARNING, " or ".join(open_between)))
+        if 0.0 <= self._named_s <= sim.t_s - ESTIMATED_S and verdict.estimate is not None:
+            self._named_s = -1.0
+            found.append((INFO, f"{verdict.isolated}, {-100.0 * verdict.estimate:.0f} % lost"))
+        if sim.departed and not self._lost:
+            self._lost = True
+            found.append((EMERGENCY, "the aircraft is lost"))
+        return found
+
+
+def _named(verdict: Any) -> str:
+    """Surface and type."""
+    kind = verdict.type
+    if kind is None or kind == verdict.isolated:
+        return str(verdict.isolated)
+    return f"{verdict.isolated}, {kind.replace('_', ' ')}"

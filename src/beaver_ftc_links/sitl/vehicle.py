@@ -1,0 +1,400 @@
+"""The flight an autopilot is the pilot of: outputs in, JSBSim frames flown, an instant out."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import ceil
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.aircraft.channels import MOST_CHANNELS
+from beaver_ftc.aircraft.units import M_PER_FT
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.loop.changing import take_diagnosis
+from beaver_ftc.loop.loop import Loop
+from beaver_ftc.plant import ground
+from beaver_ftc.plant.channels import AIRSPEED, ALTITUDE
+from beaver_ftc.plant.instruments import AX, SENSORS
+from beaver_ftc.results.log import SpooledLog
+from beaver_ftc.results.simulation import Simulation
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc_links.sitl.outputs import Outputs, power_range
+
+if TYPE_CHECKING:
+    from beaver_ftc.diagnosis.base import Detector
+
+SLOWEST_HZ, FASTEST_HZ = 20.0, 400.0  # of the diagnosis: where its promises are tested
+FASTEST_PACKETS_HZ = 4000.0
+UP_M, DOWN_M = 5.0, 2.0  # wheels so far above the ground: in flight, and not any more
+SLOW_MPS = 10.0
+UNDERNEATH_M = -1e4
+GUSTY_M = 609.6  # height above which a flight from the ground is diagnosed in declared turbulence
+WHOLE = 1e-6  # JSBSim frames: so near a whole number is one
+# The surfaces are the autopilot's, and so is where it flies to.
+THEIRS = {"control.law": "nominal", "control.options": {}, "reference": {}}
+OF_THE_LAW = ("pre_fault_rms_deg_s", "post_fault_rms_deg_s")
+
+Vector = np.ndarray
+
+_NODES = (  # what no instrument of ours measures, of the truth; factors to SI
+    ("velocities/v-north-fps", M_PER_FT),
+    ("velocities/v-east-fps", M_PER_FT),
+    ("velocities/v-down-fps", M_PER_FT),
+    ("position/lat-geod-deg", 1.0),
+    ("position/long-gc-deg", 1.0),
+    ("position/h-sl-ft", M_PER_FT),
+    ("attitude/phi-rad", 1.0),
+    ("attitude/theta-rad", 1.0),
+    ("attitude/psi-rad", 1.0),
+    ("position/lat-gc-rad", 1.0),
+    ("position/long-gc-rad", 1.0),
+    ("forces/fbx-total-lbs", M_PER_FT),
+    ("forces/fby-total-lbs", M_PER_FT),
+    ("forces/fbz-total-lbs", M_PER_FT),
+    ("inertia/mass-slugs", 1.0),
+)
+_AT = {name: i for i, name in enumerate(SENSORS)}
+
+
+class Instant(NamedTuple):
+    """What the autopilot is told. SI, radians; body axes forward, right, down; earth axes north, east, down.
+
+    As the instruments say it, errors and faults included, and to the diagnosis the same: gyro, force
+    (specific: without gravity), attitude (roll, pitch, yaw), airspeed, sideslip, dynamic pressure, altitude
+    above sea level. True, since no instrument of ours measures them: position from where the flight began,
+    with the autopilot's ground as 0; velocity over the ground, latitude and longitude (deg), height above sea
+    level.
+    """
+
+    t_s: float
+    gyro: tuple[float, ...]
+    force: tuple[float, ...]
+    attitude: tuple[float, ...]
+    airspeed_mps: float
+    beta_rad: float
+    qdyn_pa: float
+    altitude_m: float
+    position: tuple[float, float, float]
+    velocity: tuple[float, ...]
+    latitude_deg: float
+    longitude_deg: float
+    height_m: float
+    true_attitude: tuple[float, ...]
+
+
+class OverGround(Loop):
+    """A flight that may begin, and end, on the ground."""
+
+    from_ground = True
+
+
+class Flown(Simulation):
+    """A flight that another than a law commands, some of JSBSim's frames at a time.
+
+    There is a ground at `ground_m` above sea level, if the aircraft's file knows one. Near it nothing is
+    diagnosed: what wheels do is no fault of a surface, and no declared bound covers it. The diagnosis begins,
+    anew, once the aircraft is up and as fast as its model has been validated for; in declared turbulence once
+    the air is what the declaration means. Its verdict stands when the aircraft comes down. listens_from_s:
+    when it began, None before.
+    """
+
+    _loop_type = OverGround
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        *,
+        detector: "Detector | None" = None,
+        log: bool | SpooledLog = True,
+        ground_m: float = 0.0,
+    ) -> None:
+        self.ground_m = ground_m
+        super().__init__(scenario, detector=detector, log=log)
+
+    def _make_ready(self) -> None:
+        super()._make_ready()
+        self._runs, self._engaged = 0, False  # JSBSim frames flown of the coming frame
+        self.listens_from_s: float | None = 0.0
+        self._listens = True
+        self._fresh: Vector | None = None  # the record as assembled: what a diagnosis begins with
+        self._slowest_mps = self.airframe.envelope.airspeed_mps[0]
+        if self.airframe.file.ground is not None:
+            self._lay_ground()
+        self._begin()
+        frames, plant = self._loop.frames, self._loop.plant
+        measured, truth = frames["measured"][0], frames["truth"][0]
+        self._signal, self._measured = measured["signal"], measured
+        self._nodes = [(plant.node(name).get_double_value, factor) for name, factor in _NODES]
+        self._origin = float(truth["latitude_0"]), float(truth["longitude_0"])
+        self._radii = float(truth["radius_m"]), float(truth["parallel_radius_m"])
+        self._power = frames["control"]["power"]
+        self._autopilot = frames["autopilot"]
+        self._seen = frames["fdi"]["verdict"], frames["fdi"]["watch"]
+
+    def _lay_ground(self) -> None:
+        loop, frame, file = self._loop, self._frame, self.airframe.file
+        assert file.ground is not None
+        loop._may_fly_again = False  # with a ground to it
+        frame["truth"]["ground_m"], frame["truth"]["slow_mps"] = self.ground_m, SLOW_MPS
+        self._standing_m = self.ground_m + file.ground.height_m
+        gusty = self._scenario.fdi.bounds.turbulence != "none"
+        self._lowest_m = GUSTY_M if gusty else DOWN_M
+        self._fresh = loop.frames.copy()
+        if not self._scenario.initial.on_ground:
+            if loop.trim.altitude_m < self._standing_m + UP_M:
+                says = f"{loop.trim.altitude_m:g} is at or below the ground at {self.ground_m:g}"
+                allowed = f"allowed: above {self._standing_m + UP_M:g}, another --ground, or on_ground"
+                raise BadInput(f"{self._scenario.name}: initial.altitude_m: {says}, {allowed}")
+            ground.lay(loop.plant, self.ground_m)
+            return
+        if loop.plugin_frame is not None:
+            says = "that begins in flight, allowed on the ground: one of this package"
+            raise BadInput(f"{self._scenario.name}: fdi.scheme: no plug-in knows {says}")
+        self.idle = power_range(self.airframe)[0]
+        settings = {
+            name: self.idle if setting.property == self.airframe.trim.throttle else loop.trim.settings[name]
+            for name, setting in self.airframe.engine.settings.items()
+        }
+        ground.stand(loop.plant, replace(loop.trim, settings=settings), self.ground_m)
+        frame["held"], frame["held_rad"] = 1, self.trim_rad
+        self._by_hand = True
+        self._stop_listening()
+        self.listens_from_s = None
+
+    def _stop_listening(self) -> None:
+        fdi = self._frame["fdi"]
+        self._listens = fdi["config"]["enabled"] = fdi["watch"]["enabled"] = False
+
+    def _heed_the_ground(self) -> None:
+        """End the diagnosis near the ground, begin it anew in flight unless it has found something."""
+        value = self._frame["truth"]["value"]
+        height_m, airspeed_mps = value[ALTITUDE] - self._standing_m, value[AIRSPEED]
+        if self._listens:
+            if height_m < self._lowest_m:
+                self._stop_listening()
+        elif (
+            height_m > self._lowest_m + UP_M - DOWN_M
+            and airspeed_mps > self._slowest_mps
+            and not self.alarmed
+        ):
+            self._listen()
+
+    def _listen(self) -> None:
+        loop, fresh = self._loop, self._fresh[0]  # type: ignore[index]
+        if loop.sensor_schedule.any:  # broken meanwhile
+            loop.enable_watch(fresh["fdi"])
+        take_diagnosis(self._frame, fresh, self._next)
+        self._listens = True
+        if self.listens_from_s is None:
+            self.listens_from_s = self._now_s
+
+    @property
+    def G(self) -> Vector:
+        """What each surface does about each axis now, (3, n) rad/s2 per rad, by the design model."""
+        return np.array(self._frame["belief"]["G"])
+
+    @property
+    def airframe(self) -> Aircraft:
+        """What flies."""
+        return self._loop.aircraft
+
+    @property
+    def alarmed(self) -> bool:
+        """Whether there is an alarm."""
+        verdict, watch = self._seen
+        return bool(verdict["detected"][0] or watch["alarmed"][0]) or self._loop.plugin_frame is not None
+
+    def pilot(self, runs: int, deflections: Vector | None, power: float | None) -> None:
+        """Fly so many of JSBSim's frames, or to the end, with these deflections (n,) rad and this setting of
+        the engine from the next frame of the loop on. None: the law's; the engine stays."""
+        while runs > 0 and not self.done:
+            if self._runs == 0:
+                self._take(deflections, power)
+            left = self._loop.scenario.substeps - self._runs
+            if runs < left:
+                self._inside(runs)
+                return
+            runs -= left
+            self._runs = 0
+            self._last.clear()
+            if self._fresh is not None:
+                self._heed_the_ground()
+            self._fly_to(self._next + 1)
+
+    def _take(self, deflections: Vector | None, power: float | None) -> None:
+        self._loop.hold(deflections)
+        if deflections is None:
+            return
+        self._by_hand = True
+        if not self._engaged:
+            self._engaged, self._autopilot["enabled"] = True, 0  # outer loops of ours are over
+        if power is not None:
+            self._power["in_use"] = 1
+            self._power["command"][0][0] = power
+            self._loop.plant.write(self._loop.aircraft.trim.throttle, power)
+
+    def _inside(self, runs: int) -> None:
+        if self._runs == 0 and self._next >= self._turn_at:
+            self._turn_at = self._loop.turn_to(self._next)
+        self._loop.fly_inside(runs)
+        self._runs += runs
+
+    def instant(self) -> Instant:
+        """What is known of the JSBSim frame just flown."""
+        signal = self._signal.tolist()
+        true = [read() * factor for read, factor in self._nodes]
+        north = (true[9] - self._origin[0]) * self._radii[0]
+        east = (true[10] - self._origin[1]) * self._radii[1]
+        force = tuple(signal[AX : AX + 3])
+        if not self._measured["inertial"]:
+            force = true[11] / true[14], true[12] / true[14], true[13] / true[14]
+        t_s = self._next_instant_s
+        return Instant(
+            t_s, tuple(signal[:3]), force, tuple(signal[_AT["phi"] : _AT["psi"] + 1]),
+            signal[_AT["V"]], signal[_AT["beta"]], signal[_AT["qdyn"]], signal[_AT["altitude"]],
+            (north, east, self.ground_m - true[5]), tuple(true[:3]),
+            true[3], true[4], true[5], tuple(true[6:9]),
+        )  # fmt: skip
+
+    @property
+    def _next_instant_s(self) -> float:
+        substeps = self._loop.scenario.substeps
+        return ((self._next - 1) * substeps + self._runs) / (substeps * self.rate_hz)
+
+
+class Vehicle:
+    """The flight, begun at the rate the packets have, and begun anew when they are.
+
+    pulses: as `Outputs` has it. rate_hz: of the packets, whatever they say themselves. hold_s: so long the
+    scenario's own law flies first, level. ground_m: the autopilot's, above sea level; by itself 0, and of a
+    flight from the ground its altitude. log: keep one.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        pulses: bool,
+        rate_hz: float | None = None,
+        hold_s: float = 0.0,
+        ground_m: float | None = None,
+        log: bool = True,
+    ) -> None:
+        self.given, self.hold_s, self._fixed_hz = scenario, hold_s, rate_hz
+        self._pulses, self._log, self._on_ground = pulses, log, bool(scenario.initial.on_ground)
+        if self._on_ground and (hold_s or ground_m is not None):
+            what = "--hold" if hold_s else "--ground"
+            says = "has no meaning on the ground, which is at initial.altitude_m, allowed: to leave it out"
+            raise BadInput(f"{scenario.name}: {what} {says}")
+        self._ground_m = scenario.initial.altitude_m if self._on_ground else ground_m or 0.0
+        self._effects = _effects(scenario) if self._on_ground else None
+        self.sim: Flown | None = None
+        self.scenario = scenario
+        self.packets_hz = 0.0
+        self.outputs: Outputs
+        self.off_rate = 0
+        self.begin(rate_hz or scenario.rate_hz)
+        self._warm_up()
+
+    def _warm_up(self) -> None:
+        """Have what such a flight uses compiled, before anybody waits for an answer."""
+        flight, substeps = self.flight, self.scenario.substeps
+        if not self._on_ground:
+            flight.pilot(2 * substeps, None, None)
+        flight.pilot(2 * substeps, flight.trim_rad, None)
+        flight.reset()
+
+    def begin(self, packets_hz: float, channels: int = MOST_CHANNELS) -> None:
+        """A flight from trim, at this rate of packets of so many outputs. Raises BadInput for one that cannot
+        be flown."""
+        if self.sim is not None:
+            self.outputs.check(channels)
+        packets_hz = self._fixed_hz or packets_hz
+        if self.sim is not None and packets_hz == self.packets_hz:
+            if self.sim.frames > 1 or self._inside:
+                self.sim.reset()
+        else:
+            before, self.scenario = self.sim, at_rate(self.given, packets_hz)
+            log = SpooledLog() if self._log else False
+            self.sim = Flown(self.scenario, log=log, ground_m=self._ground_m)
+            if before is not None:
+                before.release()
+        self.packets_hz = packets_hz
+        self._jsbsim_hz = self.scenario.rate_hz * self.scenario.substeps
+        G = self.sim.G if self._effects is None else self._effects
+        self.outputs = Outputs(
+            self.scenario.airframe, G, self.sim.trim_rad, self.sim.travel_rad, self._pulses
+        )
+
+    @property
+    def flight(self) -> Flown:
+        """The flight in progress."""
+        assert self.sim is not None
+        return self.sim
+
+    @property
+    def _inside(self) -> bool:
+        return self.sim is not None and self.sim._runs > 0
+
+    @property
+    def over(self) -> bool:
+        """Whether the flight has ended: its duration flown, or the aircraft lost."""
+        return self.flight.done
+
+    def runs_of(self, frame_hz: float) -> int:
+        """JSBSim frames in a frame of this rate; where they are no whole number, those of the rate at which
+        the flight was begun."""
+        wanted = self._jsbsim_hz / frame_hz if frame_hz >= SLOWEST_HZ else 0.0
+        runs = round(wanted)
+        if self._fixed_hz is None and runs >= 1 and abs(wanted - runs) <= WHOLE * runs:
+            return runs
+        if frame_hz != self.packets_hz:
+            self.off_rate += 1
+        return round(self._jsbsim_hz / self.packets_hz)
+
+    def fly(self, outputs: Sequence[float], frame_hz: float, in_charge: bool = True) -> None:
+        """A frame of the autopilot, with these outputs. in_charge: it flies, once `hold_s` are over."""
+        sim, runs = self.flight, self.runs_of(frame_hz)
+        if in_charge and sim.frames / sim.rate_hz > self.hold_s:
+            sim.pilot(runs, self.outputs.deflections(outputs), self.outputs.power(outputs))
+        elif self._on_ground:
+            sim.pilot(runs, sim.trim_rad, sim.idle)
+        else:
+            sim.pilot(runs, None, None)
+
+    def instant(self) -> Instant:
+        """What is known of the frame just flown."""
+        return self.flight.instant()
+
+
+def _effects(scenario: Scenario) -> Vector:
+    """What each surface does about each axis in the flight the trim is of: on the ground nothing."""
+    in_flight = Flown(scenario.with_({"initial.on_ground": None}), log=False, ground_m=UNDERNEATH_M)
+    effects = in_flight.G
+    in_flight.release()
+    return effects
+
+
+def at_rate(scenario: Scenario, packets_hz: float) -> Scenario:
+    """The scenario at the rate of the packets, or at a part of it that the diagnosis keeps up with: then
+    every packet is some of JSBSim's frames, and the outputs of each first of them count. Raises BadInput."""
+    if not SLOWEST_HZ <= packets_hz <= FASTEST_PACKETS_HZ:
+        allowed = f"{SLOWEST_HZ:g} to {FASTEST_PACKETS_HZ:g} Hz, or --rate"
+        raise BadInput(f"{scenario.name}: frames of an autopilot at {packets_hz:g} Hz, allowed: {allowed}")
+    packets = ceil(packets_hz / FASTEST_HZ - 1e-9)  # to a frame of the loop
+    substeps = packets * ceil(scenario.substeps / packets)
+    changes = {**THEIRS, "rate_hz": packets_hz / packets, "substeps": substeps}
+    return scenario.with_(changes)
+
+
+def without_reference(scenario: Scenario) -> tuple[Scenario, list[str]]:
+    """The scenario without what only a law of ours can be expected to do, and a line for each such key.
+
+    Raises BadInput for `changes`, which are of our law and our diagnosis' sensors.
+    """
+    if scenario.changes:
+        raise BadInput(f"{scenario.name}: changes: there are none under an autopilot, allowed: faults")
+    asked = [name for name in OF_THE_LAW if scenario.expect and getattr(scenario.expect, name)]
+    left_out = {f"expect.{name}": None for name in asked}
+    said = [f"expect.{name} is left out: the reference is the autopilot's own" for name in asked]
+    return scenario.with_(left_out) if asked else scenario, said

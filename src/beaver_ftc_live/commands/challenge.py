@@ -1,0 +1,96 @@
+"""`beaver-ftc challenge`: hidden flights for a class, what its students hand in, and the grades."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from beaver_ftc.cli.inputs import WorkersOption
+from beaver_ftc.cli.output import Format, FormatOption, answer
+from beaver_ftc.cli.progress import progress_bar
+from beaver_ftc.documents.errors import BadInput
+
+
+def new(
+    folder: Annotated[Path, typer.Argument(metavar="DIR")],
+    flights: Annotated[int, typer.Option(min=4, max=200)] = 16,
+    format: FormatOption = Format.text,
+) -> None:
+    """Write a challenge for a class.
+
+    DIR/public is for the students: rules, flights to practise on, a detector and a law to begin with.
+    DIR/teacher has the hidden flights, with seeds drawn anew: keep it to yourself.
+
+    Examples:
+      beaver-ftc challenge new autumn
+
+    folder: Folder of the challenge, a new one.
+    flights: Hidden flights; one in four has no fault.
+    """
+    from beaver_ftc_live.challenge import folders
+    from beaver_ftc_live.challenge.grading import rules
+
+    folders.new(folder, flights, rules())
+    parts = {part: str(folder / part) for part in (folders.PUBLIC, folders.TEACHER, folders.SUBMISSIONS)}
+    lines = (
+        f"{parts['public']}: for the students",
+        f"{parts['teacher']}: {flights} hidden flights, for you alone",
+        f"{parts['submissions']}: for `challenge submit FILE --student NAME --to {folder}`",
+    )
+    answer(format, parts | {"flights": flights}, lambda: "\n".join(lines))
+
+
+def submit(
+    file: Annotated[Path, typer.Argument(metavar="FILE|FOLDER")],
+    student: str | None = None,
+    to: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
+    format: FormatOption = Format.text,
+) -> None:
+    """Check a detector or a law, and hand it in.
+
+    It flies one practice flight as it will be graded: in a process of its own, without files, network, the
+    truth and the seed.
+
+    file: One Python file with one class that has reset and step; or a folder with one.
+    student: Whose it is; the file's name if left out.
+    to: Folder of the challenge; left out, it is only checked. Submissions are numbered, none is replaced.
+    """
+    from beaver_ftc_live.challenge import folders
+    from beaver_ftc_live.challenge.grading import tried
+
+    name = folders.check_student(student or file.resolve().stem)
+    source = folders.source_of(file)
+    document = {"student": name, **tried(source, file.name), "submitted": None}
+    if to is not None:
+        document["submitted"] = str(folders.keep(source, name, to))
+    done = f"handed in as {document['submitted']}" if to else "not handed in, which --to DIR does"
+    points = f"{document['points']:g} points in one practice flight with a loss"
+    says = f"{document['kind']} {document['class']}: {points} (a grade is the mean over all flights); {done}"
+    answer(format, document, lambda: says)
+
+
+def grade(
+    folder: Annotated[Path, typer.Argument(metavar="DIR")],
+    workers: WorkersOption = None,
+    format: FormatOption = Format.text,
+) -> None:
+    """Fly every student's last submission on the hidden flights.
+
+    Writes grades.json, grades.md and grades.html into DIR/grades. A submission that fails has a row with the
+    reason.
+
+    Stopped or killed, it goes on where it was with the same command.
+
+    folder: Folder of the challenge.
+    """
+    from beaver_ftc.studies.engine.workers import cores
+    from beaver_ftc_live.challenge import grading
+
+    if not folder.is_dir():
+        raise BadInput(f"challenge grade: {folder}: no such folder, allowed: one of `challenge new`")
+    with progress_bar("submissions") as progress:
+        document = grading.grade(folder, workers or cores(), progress)
+    results = str(folder / "grades")
+    answer(
+        format, document | {"folder": results}, lambda: f"{grading.as_text(document)}\n\nresults: {results}"
+    )

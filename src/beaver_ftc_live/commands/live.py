@@ -1,0 +1,72 @@
+"""`beaver-ftc live`: fly a scenario in the browser, with a class if you like."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from beaver_ftc.cli.inputs import ScenarioArgument
+from beaver_ftc.cli.output import emit
+
+if TYPE_CHECKING:
+    from beaver_ftc.scenario.schema import Scenario
+
+GUESTS = 10  # on another address than the loopback
+OTHERS = (
+    "live: {} is no loopback: whoever has a link and reaches this machine gets in, "
+    "and whoever can listen on the network reads flight and links (http).\n"
+)
+
+
+def command(
+    scenario: ScenarioArgument = "fault-free",
+    aircraft: Annotated[str | None, typer.Option(metavar="AIRCRAFT")] = None,
+    port: Annotated[int, typer.Option(min=0, max=65535)] = 0,
+    host: Annotated[str, typer.Option(metavar="ADDRESS")] = "127.0.0.1",
+    guests: Annotated[int | None, typer.Option(min=0, max=100)] = None,
+    out: Path = Path("runs"),
+    open_browser: Annotated[bool, typer.Option("--open")] = False,
+) -> None:
+    """Fly in the browser: break it and watch the diagnosis.
+
+    Prints an address of this machine that works once; Ctrl-C ends it.
+
+    Examples:
+      beaver-ftc live rudder-stuck
+      beaver-ftc live --host 0.0.0.0 --guests 30
+
+    aircraft: Fly this one, without the scenario's uncertainty.
+    port: Port to listen on; 0: any.
+    host: Address to listen on; 0.0.0.0: all of this machine's, for a class.
+    guests: Links for guests, who look on until you let them break; 10 if others can reach the host.
+    out: Folder in which the page's Save writes.
+    open_browser: Also open the page in a browser.
+    """
+    from beaver_ftc_live.page.serve import Place, is_loopback, serve
+
+    others = not is_loopback(host)
+    place = Place(port, host, (GUESTS if others else 0) if guests is None else guests)
+
+    def say(address: str, links: list[str]) -> None:
+        _point_to(address, links, OTHERS.format(host) if others else "")
+        if open_browser:
+            import webbrowser
+
+            webbrowser.open(address)
+
+    serve(lambda: _with(aircraft, scenario), out, place, say)
+
+
+def _with(aircraft: str | None, name: str) -> "Scenario":
+    from beaver_ftc.scenario.loader import load_scenario
+
+    loaded = load_scenario(name)
+    if aircraft is None or aircraft == loaded.aircraft:
+        return loaded
+    return loaded.with_({"aircraft": aircraft, "uncertainty": {}})  # it is of the aircraft that was meant
+
+
+def _point_to(address: str, links: list[str], others: str) -> None:
+    guests = "".join(f"guest {number}: {link}\n" for number, link in enumerate(links, 1))
+    yours = "Open the first in a browser, give a guest one of the others" if links else "Open it in a browser"
+    emit(f"live: {address}\n{guests}{others}{yours}; Ctrl-C ends the flight.")

@@ -1,0 +1,297 @@
+"""The pages of recorded flights: of an identification and of a diagnosed flight, with its files."""
+
+from base64 import b64encode
+from collections.abc import Callable, Iterable, Sequence
+from functools import cache
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.results.metrics import as_json
+from beaver_ftc.results.style import SERIES
+from beaver_ftc.results.writer import result_folder
+from beaver_ftc_logs import fitting
+from beaver_ftc_logs.diagnose import Rows
+from beaver_ftc_logs.findings import BRIEF_S, lasting, looked_at
+from beaver_ftc_logs.identification import regressor_names
+from beaver_ftc_logs.model import Model
+from beaver_ftc_logs.recording import Floats
+from beaver_ftc_logs.regression import Fit, spectrum
+from beaver_ftc_logs.replay import columns
+from beaver_ftc_logs.samples import Samples
+
+if TYPE_CHECKING:
+    from jinja2 import Template
+
+_TEMPLATES = Path(__file__).parent / "templates"
+_MOST_POINTS = 6000
+MARK = '<meta name="generator" content="beaver-ftc identify">'
+_SHOWN_S = 40.0
+_MOST_PARTS = 3
+
+
+@cache
+def template(name: str) -> "Template":
+    """A page's template by its file name."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    loader = Environment(loader=FileSystemLoader(_TEMPLATES), autoescape=True, undefined=StrictUndefined)
+    return loader.get_template(name)
+
+
+def render(samples: Samples, model: Model, rows: Rows, verdict: dict[str, Any]) -> str:
+    """The report as HTML text."""
+    quiet = f"The probability of a fault stayed below the alarm level of {model.settings.alarm}."
+    predicts = (
+        f"The model was identified at {model.rate_hz:.3g} Hz; it predicts a sample from past ones, "
+        f"{model.history} of the rates and {model.lags} of the commands."
+    )
+    words = {"bounds": "90 % bounds", "quiet": quiet, "predicts": predicts}
+    return _page(samples, list(model.vehicle.surfaces), rows, verdict, words)
+
+
+def _page(
+    samples: Samples, surfaces: Sequence[str], rows: Rows, verdict: dict[str, Any], words: dict[str, str]
+) -> str:
+    """A flight's page. words: what its bounds are called, what is said without an event, and of the model."""
+    return template("flight.html.j2").render(
+        verdict=verdict,
+        looked_at=looked_at(verdict),
+        events=lasting(verdict["events"]),
+        brief_s=BRIEF_S,
+        words=words,
+        picture=_encoded(picture(samples, surfaces, rows, words["bounds"])),
+        ages=samples.age_s,
+        notes=[*_notes(samples), words["predicts"]],
+    )
+
+
+def _notes(samples: Samples) -> list[str]:
+    gaps = int(samples.run[-1])
+    many = "1 gap" if gaps == 1 else f"{gaps} gaps"
+    said = [f"{len(samples.t_s)} samples at {1.0 / samples.dt_s:.3g} Hz, {many} in the log."]
+    said += [
+        f"{name} has its own stamps: its last value is held, {age:.2f} s old on average."
+        for name, age in samples.age_s.items()
+    ]
+    return [*said, *samples.notes]
+
+
+def picture(samples: Samples, surfaces: Sequence[str], rows: Rows, bounds: str = "90 % bounds") -> Any:
+    """The flight on one page: commands, rates, effectiveness with bounds, probability of a fault. bounds:
+    what they are called."""
+    figure = _figure(11, 3.4 + 1.25 * len(surfaces))
+    heights = [1.2, 1.2, *[1.0] * (len(surfaces) + 1)]
+    axes = figure.subplots(len(heights), sharex=True, height_ratios=heights)
+    _lines(axes[0], samples.t_s, np.rad2deg(samples.rates), ["p", "q", "r"], "rates, deg/s")
+    limit = float(np.rad2deg(np.nanpercentile(np.abs(samples.rates), 99.9))) * 1.3
+    axes[0].set_ylim(-max(limit, 1.0), max(limit, 1.0))  # a landing's spike does not flatten the flight
+    _lines(axes[1], samples.t_s, samples.commands, list(surfaces), "healthy surfaces'\nshare of travel")
+    _lines(axes[2], rows.t_s, rows.probability[:, None], ["a fault"], "probability")
+    axes[2].set_ylim(-0.05, 1.05)
+    for i, surface in enumerate(surfaces):
+        _effectiveness(axes[3 + i], rows, i, bounds)
+        _dress(axes[3 + i], f"{surface}\neffectiveness")
+    for axis in axes:
+        _shade(axis, rows)
+    axes[-1].set_xlabel("time, s")
+    axes[-1].set_xlim(samples.t_s[0], samples.t_s[-1])
+    return figure
+
+
+def _dress(axis: Any, label: str, **grid: Any) -> None:
+    """Axis label, ticks and grid."""
+    axis.set_ylabel(label, fontsize=8)
+    axis.tick_params(labelsize=8)
+    axis.grid(color="#dddddd", linewidth=0.5, **grid)
+
+
+def _lines(axis: Any, t_s: np.ndarray, values: np.ndarray, names: list[str], label: str) -> None:
+    kept = slice(None, None, max(len(t_s) // _MOST_POINTS, 1))
+    for i, name in enumerate(names):
+        axis.plot(t_s[kept], values[kept, i], color=SERIES[i % len(SERIES)], linewidth=0.7, label=name)
+    axis.legend(loc="upper left", fontsize=7, ncols=4, framealpha=0.8)
+    _dress(axis, label)
+
+
+def _effectiveness(axis: Any, rows: Rows, surface: int, bounds: str) -> None:
+    kept = slice(None, None, max(len(rows.t_s) // _MOST_POINTS, 1))
+    axis.fill_between(
+        rows.t_s[kept], rows.low[kept, surface], rows.high[kept, surface], color="#9cc4e4", step="post",
+        linewidth=0, label=bounds,
+    )  # fmt: skip
+    axis.step(rows.t_s[kept], rows.estimate[kept, surface], where="post", color="#0b3d66", linewidth=1.1)
+    axis.set_ylim(-0.05, 1.08)
+
+
+def _shade(axis: Any, rows: Rows) -> None:
+    """Where the alarm stands."""
+    edges = np.flatnonzero(np.diff(rows.faulty, prepend=0, append=0))
+    times_s = rows.t_s[np.minimum(edges, len(rows.t_s) - 1)]
+    for begin_s, end_s in zip(times_s[::2], times_s[1::2], strict=True):
+        axis.axvspan(begin_s, end_s, color="#f4d6cc", alpha=0.45, linewidth=0)
+
+
+def columns_of(surfaces: Iterable[str]) -> tuple[str, ...]:
+    """Columns of diagnosis.parquet, by the vehicle's surfaces."""
+    each = (f"{surface}_{what}" for surface in surfaces for what in ("effectiveness", "low", "high"))
+    return ("t_s", "faulty", "named", *each, "fault_probability", "credible")
+
+
+def write_diagnosis(out: Path, samples: Samples, model: Model, rows: Rows, verdict: dict[str, Any]) -> Path:
+    """Write the folder `out/<flight>` whole or not at all; returns it."""
+    each = (column for of in zip(rows.estimate.T, rows.low.T, rows.high.T, strict=True) for column in of)
+    values = rows.t_s, rows.faulty, rows.named.tolist(), *each, rows.probability, rows.credible
+    columns = dict(zip(columns_of(model.vehicle.surfaces), values, strict=True))
+    return write_results(out, samples.name, columns, verdict, render(samples, model, rows, verdict))
+
+
+def write_by_aircraft(
+    out: Path,
+    samples: Samples,
+    surfaces: Sequence[str],
+    rows: Rows,
+    verdict: dict[str, Any],
+    further: Callable[[Path], None] | None = None,
+) -> Path:
+    """The same of a flight that an aircraft's own model diagnosed; further: writes into the folder, too."""
+    from beaver_ftc_logs.stepped import STANDS_S
+
+    words = {
+        "bounds": "bounds",
+        "quiet": "No residual left the bound of the errors declared.",
+        "predicts": f"The model is that of {verdict['aircraft']}; the bounds hold while one surface alone "
+        f"is at fault, has stood for {STANDS_S:g} s, and the errors declared hold.",
+    }
+    page = _page(samples, surfaces, rows, verdict, words)
+    return write_results(out, samples.name, columns(rows, surfaces), verdict, page, further)
+
+
+def write_results(
+    out: Path,
+    name: str,
+    columns: dict[str, Any],
+    verdict: dict[str, Any],
+    page: str | None = None,
+    further: Callable[[Path], None] | None = None,
+) -> Path:
+    """Write `out/<name>` with diagnosis.parquet, verdict.json and report.html, whole or not at all."""
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    with result_folder(out, name) as folder:
+        parquet.write_table(pa.table(columns), folder / "diagnosis.parquet")
+        (folder / "verdict.json").write_text(as_json(verdict), encoding="utf-8")
+        if page is not None:
+            (folder / "report.html").write_text(page, encoding="utf-8")
+        if further is not None:
+            further(folder)
+    return out / name
+
+
+def check_page(path: Path) -> None:
+    """Raise BadInput where the page would take the place of a file that is not a page of ours."""
+    if path.exists() and (not path.is_file() or MARK not in path.read_text("utf-8", errors="replace")[:2000]):
+        raise BadInput(f"will not replace {path}: it is no page of `identify`, allowed: another --out")
+
+
+def render_model(flights: Sequence[Samples], model: Model) -> str:
+    """The page as HTML text."""
+    stretches = fitting.stretches_of(flights)
+    fit = fitting.fit_order(stretches, model.vehicle, model.history, model.lags)
+    names = ["constant", *regressor_names(model)]
+    return template("model.html.j2").render(
+        mark=MARK,
+        model=model,
+        found=model.identified,
+        used=sum(int(stretch.use.sum()) for stretch in stretches),
+        coefficients=list(zip(names, fit.coefficients.tolist(), fit.standard_errors.tolist(), strict=True)),
+        fits=_encoded(_fits(stretches, model)),
+        spectrum=_encoded(_spectrum(stretches, model)),
+        correlation=_encoded(_correlation(fit, names)),
+    )
+
+
+def _figure(width: float, height: float) -> Any:
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained", dpi=110)
+
+
+def _encoded(figure: Any) -> str:
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png")
+    return b64encode(buffer.getvalue()).decode()
+
+
+def _fits(stretches: Sequence[fitting.Stretch], model: Model) -> Any:
+    """Measured and predicted rates over the liveliest part of each flight (or half) that was left out."""
+    parts = [(fitting.fit_like(fitted, model), kept, name) for fitted, kept, name in fitting.folds(stretches)]
+    parts = [part for part in parts if part[1].use.any()][:_MOST_PARTS]
+    height = max(len(parts), 1)
+    figure = _figure(11, 4.6 * height)
+    blocks = figure.subfigures(height, squeeze=False)[:, 0]
+    for block, (fitted, kept, name) in zip(blocks, parts, strict=False):
+        axes = block.subplots(3, 1, sharex=True)
+        t_s, rates, residual = _shown(fitted, kept, round(_SHOWN_S * model.rate_hz))
+        for i, axis in enumerate(axes):
+            left, rate = np.rad2deg(residual[:, i]), np.rad2deg(rates[:, i])
+            axis.plot(t_s, rate, color="#888888", linewidth=2.2, label="measured")
+            axis.plot(t_s, rate - left, color=SERIES[0], linewidth=0.9, label="predicted")
+            axis.plot(t_s, left, color=SERIES[1], linewidth=0.7, label="residual")
+            _dress(axis, f"{'pqr'[i]}, deg/s")
+        axes[0].set_title(f"{name}, not fitted: one sample ahead", fontsize=9, loc="left")
+        axes[0].legend(loc="upper right", fontsize=7, ncols=3, framealpha=0.8)
+        axes[-1].set_xlabel("time, s", fontsize=8)
+    return figure
+
+
+def _shown(model: Model, kept: fitting.Stretch, length: int) -> tuple[Floats, Floats, Floats]:
+    """Times, rates and residual of the liveliest window; nan where nothing is known, for lines to end."""
+    rows, residual = fitting.residuals(model, kept)
+    rates, left = np.full_like(kept.samples.rates, np.nan), np.full_like(kept.samples.rates, np.nan)
+    rates[rows], left[rows] = kept.samples.rates[rows], residual
+    begin = _liveliest(rates, rows, length)
+    part = slice(begin, begin + length)
+    return kept.samples.t_s[part], rates[part], left[part]
+
+
+def _liveliest(rates: Floats, rows: NDArray[np.int64], length: int) -> int:
+    """First sample of the window in which the rates known moved most."""
+    square = np.zeros(len(rates))
+    square[rows] = (rates[rows] ** 2).sum(axis=1)
+    total = np.concatenate([[0.0], np.cumsum(square)])
+    return int(np.argmax(total[length:] - total[:-length])) if len(rates) > length else 0
+
+
+def _spectrum(stretches: Sequence[fitting.Stretch], model: Model) -> Any:
+    """Density of the residual, and what white noise of the same variance would have."""
+    residual = np.vstack([fitting.residuals(model, stretch)[1] for stretch in stretches])
+    frequency, density = spectrum(residual, 1.0 / model.rate_hz)
+    figure = _figure(7.5, 3.2)
+    axis = figure.subplots()
+    for i, name in enumerate("pqr"):
+        axis.loglog(frequency[1:], density[1:, i], color=SERIES[i], linewidth=1.1, label=name)
+        white = residual[:, i].var() / (0.5 * model.rate_hz)
+        axis.axhline(white, color=SERIES[i], linewidth=0.7, linestyle=":")
+    axis.set_xlabel("frequency, Hz", fontsize=8)
+    axis.set_title("residual (dotted: white noise of the same variance)", fontsize=9, loc="left")
+    _dress(axis, "density, (rad/s)² / Hz", which="both")
+    axis.legend(fontsize=8)
+    return figure
+
+
+def _correlation(fit: Fit, names: list[str]) -> Any:
+    """Correlation of the errors of the coefficients."""
+    size = 2.5 + 0.19 * len(names)
+    figure = _figure(size + 0.8, size)
+    axis = figure.subplots()
+    image = axis.imshow(fit.correlation, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
+    axis.set_xticks(range(len(names)), names, rotation=90, fontsize=6)
+    axis.set_yticks(range(len(names)), names, fontsize=6)
+    figure.colorbar(image, shrink=0.7).ax.tick_params(labelsize=7)
+    return figure

@@ -1,0 +1,51 @@
+"""A PX4 log (ULog). A column is named `topic.field`, `topic_1.field` for a second instance of a topic.
+
+Time counts from the first message of the log. Reading needs pyulog: the extra `flights`.
+"""
+
+from pathlib import Path
+from typing import Any
+
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc_logs.recording import Recording, columns_of, reading
+
+_STAMP = "timestamp"
+_LONGEST = 65535
+"""Bytes of a message: its length is written in 16 bits."""
+
+
+def read(path: Path) -> Recording:
+    """The flight in a .ulg file. Raises BadInput where it is none, or pyulog is missing."""
+    topics = {_name(topic): topic.data for topic in _topics(path) if len(topic.data.get(_STAMP, ()))}
+    if not topics:
+        raise BadInput(f"{path}: holds no message, allowed: a log of a flight")
+    columns, origin_s = columns_of(topics, _STAMP)
+    notes = (f"time counts from {origin_s:.3f} s of the autopilot's clock",)
+    return Recording(path.stem, columns, notes=notes)
+
+
+def _name(topic: Any) -> str:
+    return str(topic.name) if topic.multi_id == 0 else f"{topic.name}_{topic.multi_id}"
+
+
+def _topics(path: Path) -> list[Any]:
+    with reading(path, "ULog", "pyulog", "a .ulg file of PX4"):
+        from pyulog import ULog
+
+        formats = ULog(str(path), parse_header_only=True).message_formats
+        for name in formats:
+            if _length(formats, name, ()) > _LONGEST:  # pyulog writes every field of one out
+                raise ValueError(f"a message {name} would have more than {_LONGEST} bytes")
+        topics = list(ULog(str(path)).data_list)
+    return topics
+
+
+def _length(formats: dict[str, Any], name: str, within: tuple[str, ...]) -> int:
+    """Bytes of a message at least, its nested messages in it."""
+    if name in within:
+        raise ValueError(f"a message {name} holds itself")
+    if name not in formats:  # a number, or a type that pyulog complains about
+        return 1
+    return sum(
+        max(count, 1) * _length(formats, kind, (*within, name)) for kind, count, _ in formats[name].fields
+    )

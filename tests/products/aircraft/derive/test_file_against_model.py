@@ -1,0 +1,69 @@
+"""What a file declares at a state, and the line said where its model exceeds it, on states made by hand."""
+
+import numpy as np
+import pytest
+
+from beaver_ftc.aircraft.loading import read
+from beaver_ftc.design.model import inertia_coefficients
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc_aircraft.derive import first_use, fit
+from kept import in_short
+
+from .known import TRAINER, aircraft, moving, states
+
+
+def test_declared_is_the_files_error_beside_what_every_scenario_adds():
+    """0.02 rad/s2, a quarter of each product of the rates, and of the map the state's box and share."""
+    plain = aircraft()
+    samples, i = states(plain, n=60, signals=()), inertia_coefficients(plain.mass)
+    p, q, r = np.abs(samples.x.T)
+    every = 0.02 + 0.25 * np.abs(np.column_stack([i.Pqr * q * r, i.Qpr * p * r, i.Rpq * p * q]))
+    error = np.array(plain.model_error_rad_s2)
+    assert first_use._declared(plain, samples) == pytest.approx(every + error)
+    error_map, _ = fit.map_of(plain, (moving(plain, samples, [0.001, 0.002, 0.003]),), samples)
+    mapped = aircraft(model_error_map=error_map)
+    boxes = [[box[f"error_{axis}_rad_s2"][0] for axis in "pqr"] for box in error_map["boxes"]]
+    of_map = [
+        [boxes[b][axis][level] for axis in range(3)]
+        for b, level in zip(samples.box, samples.level, strict=True)
+    ]
+    assert first_use._declared(mapped, samples) == pytest.approx(every + np.array(of_map))
+
+
+def test_the_worst_state_of_an_axis_is_said_with_what_is_declared_there():
+    plain = aircraft()
+    samples = states(plain, n=60, signals=())
+    assert list(first_use._lines(plain, samples)) == []
+    beside = np.zeros((60, 3))
+    beside[:, 1] = 0.02
+    off = moving(plain, samples, beside)
+    errors, declared = fit.errors_of(plain, off), first_use._declared(plain, off)
+    worst = int((errors - declared)[:, 1].argmax())
+    alpha, beta, V = off.y[worst, :3]
+    (line,) = first_use._lines(plain, off)
+    assert line == (
+        f"q: the terms are {errors[worst, 1]:.2g} rad/s2 off trainer.xml at {V:.3g} m/s, angle of attack "
+        f"{np.degrees(alpha):.1f}, sideslip {np.degrees(beta):.1f} deg; {declared[worst, 1]:.2g} is declared"
+        ", so alarms without a fault are possible; `beaver-ftc derive` measures what to declare"
+    )
+    nobody = off.at(np.zeros(60, bool))
+    assert list(first_use._lines(plain, nobody)) == []
+
+
+def test_nothing_is_promised_of_what_is_no_aircraft(monkeypatch, tmp_path, capsys):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    with pytest.raises(BadInput, match="no such aircraft"):
+        first_use.derive_if_needed("jsbsim:nothing")
+    assert capsys.readouterr().err == ""
+
+
+def test_states_are_drawn_over_the_envelope_from_engines_just_started(changed):
+    trainer = read(TRAINER)
+    samples = first_use._samples(trainer, first_use._loaded(trainer))
+    assert len(samples) == 800
+    assert not samples.age.any()
+    low, high = samples.y[:, 2].min(), samples.y[:, 2].max()
+    assert (low, high) == pytest.approx(trainer.envelope.airspeed_mps, rel=1e-3)
+    assert not changed(
+        {name: in_short(getattr(samples, name)) for name in ("x", "y", "u", "rate", "box", "level")}
+    )

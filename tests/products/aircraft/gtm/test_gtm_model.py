@@ -1,0 +1,239 @@
+"""The converted model against the specification: coefficients, masses, trim, modes, flights."""
+
+import csv
+from math import cos, degrees, exp, radians, sin
+
+import numpy as np
+import pytest
+from tools.gtm import flights
+from tools.gtm.flights import ADAMS_BASHFORTH, FINE_S, MOTION, NAMES, STEP_S
+from tools.gtm.specification import SURFACES, Specification, State
+
+from beaver_ftc_aircraft.gtm.parameters import OUTPUTS, parameters
+from beaver_ftc_aircraft.gtm.steady import Condition
+
+SPAN = 1e-9  # of each coefficient's span
+AFT = np.array([-12.0, 12.0, -12.0])  # JSBSim's structural frame
+
+
+def at(bench, alpha, beta, V, rates, deg, case=0, gear=False):
+    """Coefficients of the converted model; stops out of the way."""
+    fdm = bench.fdm
+    for letters, name in NAMES.items():
+        fdm[f"fcs/{name}-cmd-rad"] = radians(deg[letters])
+        fdm[f"actuators/{name}/position-min-rad"], fdm[f"actuators/{name}/position-max-rad"] = -1.6, 1.6
+    fdm["gear/down"] = float(gear)
+    bench.damage(case)
+    velocity = V * np.array([cos(alpha) * cos(beta), sin(beta), sin(alpha) * cos(beta)])
+    bench.place(800.0, velocity, (0.0, 0.0, 0.0), rates)
+    found = np.array([fdm[f"aero/coefficient/{name}"] for name in OUTPUTS])
+    fdm["gear/down"] = 0.0
+    for name, of in parameters()["surfaces"].items():
+        for end, stop in zip(("min", "max"), of["travel_deg"], strict=True):
+            fdm[f"actuators/{name}/position-{end}-rad"] = radians(stop)
+        fdm[f"fcs/{name}-cmd-rad"] = 0.0
+    bench.damage(0)
+    return found
+
+
+def test_the_given_points(where, bench):
+    """Of each 10 digits are given."""
+    with (where / "points.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    given = np.array([[float(row[name]) for name in OUTPUTS] for row in rows])
+    found = [
+        at(
+            bench, radians(float(row["alpha_deg"])), radians(float(row["beta_deg"])), float(row["V_ft_s"]),
+            [float(row[f"{axis}_rad_s"]) for axis in "pqr"],
+            {name: float(row[f"{name}_deg"]) for name in SURFACES}, int(row["damage"]), row["GEAR"] != "0",
+        )
+        for row in rows
+    ]  # fmt: skip
+    assert len(rows) == 60
+    assert (np.abs(found - given) <= SPAN * np.ptp(given, axis=0)).all()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_random_points_inside_and_beyond_the_tables(bench, specified, seed):
+    """Angles and deflections beyond the ends, every case, surfaces at zero, equal and unequal."""
+    rng = np.random.default_rng(seed)
+    for k in range(40):
+        alpha, beta = radians(rng.uniform(-25, 100)), radians(rng.uniform(-70, 70))
+        deg = {name: rng.choice([0.0, 5.0, rng.uniform(-35, 35)]) for name in SURFACES}
+        deg["STAB"] = rng.choice([0.0, rng.uniform(-12, 4)])
+        case, gear, V = k % 7, bool(k % 2), rng.uniform(60, 250)
+        rates = rng.choice([0.0, 1.0], 3) * rng.normal(0, [2.0, 1.0, 1.0])
+        found = at(bench, alpha, beta, V, rates, deg, case, gear)
+        wanted = specified.coefficients(alpha, beta, V, rates, deg, case, gear)
+        assert np.abs(found - wanted).max() <= 1e-9 * (1.0 + np.abs(wanted).max()), (case, deg)
+
+
+@pytest.mark.parametrize("case", range(7))
+def test_mass_properties_of_each_case(bench, specified, case):
+    weight, cg, inertia = specified.mass(case)
+    bench.damage(case)
+    bench.place(800.0, (160.0, 0.0, 8.0), (0.0, 0.05, 0.0))
+    fdm = bench.fdm
+    found = [fdm[f"inertia/i{name}-slugs_ft2"] for name in ("xx", "yy", "zz", "xy", "xz", "yz")]
+    wanted = [*np.diag(inertia), *(-inertia[i, j] for i, j in ((0, 1), (0, 2), (1, 2)))]
+    bench.damage(0)
+    assert fdm["inertia/weight-lbs"] == pytest.approx(weight, rel=1e-6)
+    assert [fdm[f"inertia/cg-{axis}-in"] / 12.0 for axis in "xyz"] == pytest.approx(cg * AFT / 12.0, rel=1e-6)
+    np.testing.assert_allclose(np.abs(found), np.abs(wanted), atol=1e-6)
+
+
+def test_trim_at_the_check_point(bench, specified):
+    """Surfaces to the digits given; speed and throttle where the weight is that of JSBSim's Earth."""
+    here = bench.steady(Condition(alpha_deg=3.0))
+    assert round(here.elevator_deg, 3) == 2.415
+    assert round(here.aileron_deg, 3) == -0.394
+    assert round(here.rudder_deg, 3) == 0.004
+    there = flights.specified_trim(specified, Condition(alpha_deg=3.0), here)
+    assert round(there.throttle_percent, 2) == 39.84
+    assert [round(there.velocity_fps[i], 3) for i in (0, 2)] == [163.917, 8.591]
+    assert here.throttle_percent == pytest.approx(39.84, abs=0.06)
+
+
+WANTED = [
+    *(Condition(eas_kt=float(v)) for v in (46, 60, 90, 130)),
+    *(Condition(alpha_deg=float(a)) for a in (2.5, 9, 16)),
+]
+
+
+@pytest.fixture(scope="module")
+def heavy(where, bench, specified):
+    """The specification with what JSBSim's Earth leaves of gravity."""
+    return Specification(where, flights.gravity_of(bench, specified))
+
+
+@pytest.mark.parametrize("wanted", WANTED, ids=lambda c: f"{c.eas_kt or ''}{c.alpha_deg or ''}")
+def test_trim_over_speed_and_angle_of_attack(bench, heavy, wanted):
+    here = bench.steady(wanted)
+    there = flights.specified_trim(heavy, wanted, here)
+    for name in ("elevator_deg", "aileron_deg", "rudder_deg", "alpha_deg"):
+        assert getattr(here, name) == pytest.approx(getattr(there, name), abs=0.02)
+    assert here.throttle_percent == pytest.approx(there.throttle_percent, abs=0.1)
+    assert here.eas_kt == pytest.approx(there.eas_kt, abs=0.05)
+
+
+@pytest.mark.parametrize("alpha_deg", [3.0, 7.0, 11.5])
+def test_linear_modes_off_the_breakpoints(bench, heavy, alpha_deg):
+    here = bench.steady(Condition(alpha_deg=alpha_deg))
+    there = flights.specified_trim(heavy, Condition(alpha_deg=alpha_deg), here)
+    found = flights.modes(flights.linear_jsbsim(bench, here))
+    wanted = flights.modes(flights.linear_specified(heavy, there))
+    assert found.keys() == wanted.keys() == {"short period", "phugoid", "Dutch roll"}
+    for name, (frequency, damping) in wanted.items():
+        assert found[name][0] == pytest.approx(frequency, rel=2e-3), name
+        assert found[name][1] == pytest.approx(damping, abs=1e-3), name
+
+
+def test_the_spin_of_the_source(bench, heavy):
+    """Its published state is a steady spin of the specification, and JSBSim stays in it."""
+    spin = flights.spin(heavy)
+    left = heavy.rates_of_change(spin.start.array(), spin.plan(0.0), 0)[:6]
+    assert np.abs(left).max() < 0.01
+    spin = flights.Manoeuvre("spin", spin.start, spin.plan, 1.0)
+    one, other = spin.by_specification(heavy), spin.by_jsbsim(bench, FINE_S, ADAMS_BASHFORTH)
+    assert (flights.largest(one, other)[MOTION] < 0.02).all()
+    assert degrees(other[-1, 3]) == pytest.approx(-363, abs=3)
+
+
+@pytest.mark.parametrize("case", range(1, 7))
+def test_velocities_are_continuous_through_damage_and_what_follows_is_the_same(bench, heavy, case):
+    """From a state with rates and sideslip, half a second before the damage and half a second after."""
+    steady = flights.specified_trim(heavy, Condition(alpha_deg=3.0), bench.steady(Condition(alpha_deg=3.0)))
+    start = State(160.0, 3.0, 9.0, 0.1, -0.05, 0.06, 0.3, 0.08, 1.5, 800.0)
+    commands = flights.of_steady(steady)
+    commands.surfaces["FLAPLOB"] = 5.0
+    flight = flights.Manoeuvre("damage", start, lambda t: commands, 1.0, case, 0.5)
+    one, other = flight.by_specification(heavy), flight.by_jsbsim(bench, FINE_S, ADAMS_BASHFORTH)
+    assert (flights.largest(one, other)[MOTION] < 0.01).all()
+    jump = np.abs(np.diff(other[:, MOTION], axis=0)).max(axis=0)
+    assert (jump < [0.5, 0.5, 0.5, 0.1, 0.1, 0.1]).all()
+
+
+def test_damage_acts_in_the_frame_it_is_set(bench):
+    fdm = bench.fdm
+    bench.damage(0)
+    bench.place(800.0, (160.0, 3.0, 9.0), (0.3, 0.08, 1.5), (0.1, -0.05, 0.06))
+    fdm.set_dt(STEP_S)
+    fdm.run()
+    names = [f"velocities/{axis}-rad_sec" for axis in "pqr"] + [f"velocities/{axis}-fps" for axis in "uvw"]
+    accelerations = [f"accelerations/{axis}dot-rad_sec2" for axis in "pqr"]
+    fdm.suspend_integration()
+    fdm.run()
+    whole = [fdm[name] for name in names], [fdm[name] for name in accelerations], fdm["inertia/weight-lbs"]
+    bench.damage(4)
+    fdm.run()
+    broken = [fdm[name] for name in names], [fdm[name] for name in accelerations], fdm["inertia/weight-lbs"]
+    fdm.resume_integration()
+    bench.damage(0)
+    assert broken[0] == pytest.approx(whole[0], abs=1e-12)
+    assert abs(broken[1][0] - whole[1][0]) > 0.5
+    assert (whole[2], broken[2]) == pytest.approx((57.75, 56.94))
+
+
+@pytest.mark.parametrize("dt", [0.001, 0.002, 0.005, 0.01])
+def test_the_servo_is_late_by_15_ms_and_follows_at_5_hz(bench, dt):
+    """A ramp slower than the rate limit: late by the delay and the lag, whatever the frame."""
+    fdm, rate = bench.fdm, 0.2
+    bench.place(800.0, (160.0, 0.0, 8.0), (0.0, 0.05, 0.0))
+    fdm.set_dt(dt)
+    for k in range(1, round(0.4 / dt) + 1):
+        fdm["fcs/right_aileron-cmd-rad"] = rate * k * dt
+        fdm.run()
+    late_s = 0.4 - fdm["fcs/right_aileron-pos-rad"] / rate
+    fdm["fcs/right_aileron-cmd-rad"] = 0.0
+    pole = exp(-2 * np.pi * 5 * dt)
+    assert late_s == pytest.approx(0.015 + dt * pole / (1 - pole), abs=2e-4)
+
+
+def test_the_servo_is_no_faster_than_300_degrees_a_second(bench):
+    fdm, dt = bench.fdm, 0.001
+    bench.place(800.0, (160.0, 0.0, 8.0), (0.0, 0.05, 0.0))
+    fdm.set_dt(dt)
+    fdm["fcs/right_aileron-cmd-rad"] = 0.3
+    stood = []
+    for _ in range(60):
+        fdm.run()
+        stood.append(fdm["fcs/right_aileron-pos-rad"])
+    fdm["fcs/right_aileron-cmd-rad"] = 0.0
+    assert np.diff(stood).max() == pytest.approx(radians(300.0) * dt)
+
+
+@pytest.mark.parametrize("dt", [0.002, 0.01])
+def test_the_spool_dips_and_settles(bench, specified, dt):
+    """A step of throttle against the exponential of the spool's matrix; thrust first falls."""
+    fdm = bench.fdm
+    fdm["fcs/throttle-cmd-norm"] = 0.3
+    bench.place(800.0, (160.0, 0.0, 8.0), (0.0, 0.05, 0.0))
+    spool = specified.of["engines"]["spool"]
+    A, x = np.array(spool["A"]), np.array([0.0, 30.0 / 0.7314])
+    fdm.set_dt(dt)
+    found = []
+    fdm["fcs/throttle-cmd-norm"] = 0.5
+    for _ in range(round(1.0 / dt)):
+        fdm.run()
+        found.append(fdm["fcs/left_engine-lagged-percent"])
+    settle = np.array([0.0, 50.0 / 0.7314])
+    values, vectors = np.linalg.eig(A)
+    after = len(found) - 1  # the first frame only takes the throttle
+    grown = (vectors @ np.diag(np.exp(values * after * dt)) @ np.linalg.inv(vectors)).real
+    fdm["fcs/throttle-cmd-norm"] = 0.0
+    assert found[-1] == pytest.approx(np.array(spool["C"]) @ (settle + grown @ (x - settle)), abs=1e-6)
+    assert min(found) < 29.9
+
+
+def test_an_engine_fails_like_a_surface(bench):
+    fdm = bench.fdm
+    fdm["fcs/throttle-cmd-norm"] = 0.6
+    bench.place(800.0, (160.0, 0.0, 8.0), (0.0, 0.05, 0.0))
+    sound = fdm["engine/left_engine/thrust-lbs"]
+    fdm["failures/left_engine/effectiveness"] = 0.0
+    bench.place(800.0, (160.0, 0.0, 8.0), (0.0, 0.05, 0.0))
+    lost = fdm["engine/left_engine/thrust-lbs"], fdm["engine/right_engine/thrust-lbs"]
+    fdm["failures/left_engine/effectiveness"], fdm["fcs/throttle-cmd-norm"] = 1.0, 0.0
+    assert sound > 3.0
+    assert lost[0] < 0.0 + 1e-12
+    assert lost[1] == pytest.approx(sound, abs=0.2)

@@ -1,0 +1,64 @@
+"""What steady flight is told and says, without the model: densities by altitude, velocity, commands."""
+
+from math import degrees, radians
+
+import numpy as np
+import pytest
+
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc_aircraft.gtm.steady import Bench, Condition, Steady
+from beaver_ftc_aircraft.gtm.systems import THROTTLE
+from telling import apart
+
+FOUND = Steady(
+    airspeed_fps=132.0, eas_kt=77.0, alpha_deg=3.5, beta_deg=-1.2, phi_deg=0.8, theta_deg=2.7,
+    elevator_deg=1.9, aileron_deg=-0.6, rudder_deg=2.3, throttle_percent=41.0, left=1e-10,
+)  # fmt: skip
+
+
+def test_each_altitude_has_its_density_and_is_asked_once():
+    bench, asked = object.__new__(Bench), []
+    bench.fdm = {}
+
+    def place(altitude_ft, velocity_fps, angles_rad):
+        asked.append(altitude_ft)
+        bench.fdm["atmosphere/rho-slugs_ft3"] = 0.0024 * np.exp(-altitude_ft / 30000.0)
+
+    bench.place = place
+    flown = [800.0, 12000.0, 800.0, 0.0, 12000.0]
+    found = [bench.density(altitude_ft) for altitude_ft in flown]
+    assert found == pytest.approx([0.0024 * np.exp(-altitude_ft / 30000.0) for altitude_ft in flown])
+    assert asked == [800.0, 12000.0, 0.0]
+
+
+def test_the_velocity_has_the_angles_that_were_found():
+    u, v, w = FOUND.velocity_fps
+    assert np.linalg.norm((u, v, w)) == pytest.approx(132.0)
+    assert degrees(np.arctan2(w, u)) == pytest.approx(3.5)
+    assert degrees(np.arcsin(v / 132.0)) == pytest.approx(-1.2)
+
+
+def test_each_surface_is_commanded_by_its_kind_and_side():
+    apart(found=[FOUND.elevator_deg, FOUND.aileron_deg, FOUND.rudder_deg, FOUND.throttle_percent])
+    commands = FOUND.commands()
+    assert commands.pop(THROTTLE) == pytest.approx(0.41)
+    for name, value in commands.items():
+        of = {"elevator": 1.9, "rudder": 2.3, "aileron": 0.6 if "left" in name else -0.6}
+        kind = next(kind for kind in of if kind in name)
+        assert value == pytest.approx(radians(of[kind])), name
+    assert {kind for kind in ("elevator", "aileron", "rudder") if any(kind in name for name in commands)} == {
+        "elevator", "aileron", "rudder",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(("left", "is_steady"), [(0.9e-6, True), (1.1e-6, False)])
+def test_flight_is_steady_where_a_millionth_is_left_of_its_accelerations(left, is_steady, monkeypatch):
+    monkeypatch.setattr(Bench, "damage", lambda self, case: None)
+    monkeypatch.setattr(Bench, "_off", lambda self, wanted, x: np.full(6, left))
+    monkeypatch.setattr(Bench, "_found", lambda self, wanted, x, left: left)
+    still = object.__new__(Bench)
+    if is_steady:
+        assert still.steady(Condition(alpha_deg=3.0)) == left
+    else:
+        with pytest.raises(BadInput, match="no steady flight with"):
+            still.steady(Condition(alpha_deg=3.0))

@@ -1,0 +1,174 @@
+"""`beaver-ftc import gtm`: what it refuses, and the folder it writes."""
+
+import numpy as np
+import pytest
+import yaml
+from scipy.io import savemat
+from tools.gtm.specification import DATABASE
+
+from beaver_ftc.aircraft import load
+from beaver_ftc.aircraft.loading import UnknownAircraft, imported_folder
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc_aircraft.gtm import conversion, elements, folder
+from beaver_ftc_aircraft.gtm.database import read
+from beaver_ftc_aircraft.gtm.parameters import cases, parameters
+from beaver_ftc_aircraft.gtm.steady import Steady
+from telling import apart
+
+FAILURES = (
+    "effectiveness", "stuck", "stuck-at-rad", "hardover", "float", "bias-rad", "rate-scale",
+    "oscillation-amplitude-rad", "oscillation-frequency-rad_sec",
+)  # fmt: skip
+
+
+def test_without_the_data_a_line_says_where_they_are(monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    with pytest.raises(
+        UnknownAircraft, match=r"^'gtm' is not here yet.*import gtm.*github.com/nasa/GTM_DesignSim"
+    ):
+        load("gtm")
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        (b"", "is no whole MATLAB file"),
+        (b"no such thing" * 100, "is no whole MATLAB file"),
+        (b"MATLAB 5.0 MAT-file" + b" " * 97 + b"\0" * 8 + b"\0\1IM\x0f\0\0\0\xff\0\0\0xx", "is no whole"),
+    ],
+)  # fmt: skip
+def test_other_bytes_are_refused_in_a_line(tmp_path, content, says):
+    (tmp_path / "x.mat").write_bytes(content)
+    with pytest.raises(BadInput) as wrong:
+        read(tmp_path / "x.mat")
+    assert says in str(wrong.value)
+    assert "\n" not in str(wrong.value)
+    assert "allowed: the data base of github.com/nasa" in str(wrong.value)
+
+
+def test_no_file_and_a_folder_are_refused(tmp_path):
+    for path in (tmp_path / "none.mat", tmp_path):
+        with pytest.raises(BadInput, match="allowed: the data base"):
+            read(path)
+
+
+VERSION = "Polynominal Fit, with damage"
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        ({"x": 1}, "has the version ''"),
+        ({"ver": VERSION}, "has no C6_bas.data"),
+        ({"ver": VERSION, "C6_bas": 3}, "has no C6_bas.data"),
+        ({"ver": VERSION, "C6_bas": {"data": np.zeros((3, 4))}}, "is of (3, 4) values"),
+        ({"ver": VERSION, "C6_bas": {"data": "text"}}, "is no table of numbers"),
+        ({"ver": VERSION, "C6_bas": {"data": np.full((32, 27, 6), np.nan)}}, "not finite"),
+        (
+            {"ver": VERSION, "C6_bas": {"data": np.zeros((32, 27, 6)), "alpha": np.zeros(32)}},
+            "C6_bas.alpha does not rise",
+        ),
+    ],
+)  # fmt: skip
+def test_other_contents_are_refused_in_a_line(tmp_path, content, says):
+    savemat(tmp_path / "x.mat", content)
+    with pytest.raises(BadInput) as wrong:
+        read(tmp_path / "x.mat")
+    assert says in str(wrong.value)
+    assert "\n" not in str(wrong.value)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.99])
+def test_half_the_data_base_is_refused(where, tmp_path, share):
+    whole = (where / DATABASE).read_bytes()
+    (tmp_path / "half.mat").write_bytes(whole[: int(share * len(whole))])
+    with pytest.raises(BadInput, match=r"is no whole MATLAB file|has no"):
+        read(tmp_path / "half.mat")
+
+
+def test_another_folder_in_the_way_is_left_alone(tmp_path):
+    (tmp_path / "gtm").mkdir()
+    (tmp_path / "gtm" / "mine.txt").write_text("mine")
+    with pytest.raises(BadInput, match="was not imported, allowed: another folder"):
+        conversion.convert(tmp_path / "x.mat", tmp_path)
+    assert (tmp_path / "gtm" / "mine.txt").read_text() == "mine"
+
+
+def test_every_surface_and_engine_has_all_failures(bench):
+    effectors = [*parameters()["surfaces"], "left_engine", "right_engine"]
+    assert len(effectors) == 19
+    has = bench.fdm.get_property_manager().hasNode
+    for name in effectors:
+        unit = "norm" if "engine" in name else "rad"
+        wanted = [f"failures/{name}/{failure.replace('-rad', f'-{unit}', 1)}" for failure in FAILURES[:-1]]
+        wanted += [
+            f"failures/{name}/{FAILURES[-1]}",
+            *(f"fcs/{name}-{end}-{unit}" for end in ("cmd", "pos", "effective")),
+        ]
+        assert [each for each in wanted if not has(each)] == []
+    assert [case for case in cases() if not has(f"failures/damage/{case}")] == []
+
+
+@pytest.mark.parametrize("number", range(1, 7))
+def test_a_lost_surface_has_no_effect_and_a_case_takes_what_it_says(bench, number):
+    name, of = [*cases().items()][number - 1]
+    for surface in parameters()["surfaces"]:
+        bench.fdm[f"fcs/{surface}-cmd-rad"] = 0.05
+    bench.damage(number)
+    bench.place(800.0, (160.0, 0.0, 8.0), (0.0, 0.05, 0.0))
+    still = {surface: bench.fdm[f"fcs/{surface}-effective-rad"] for surface in parameters()["surfaces"]}
+    stand = {surface: bench.fdm[f"fcs/{surface}-pos-rad"] for surface in parameters()["surfaces"]}
+    bench.damage(0)
+    for surface in parameters()["surfaces"]:
+        bench.fdm[f"fcs/{surface}-cmd-rad"] = 0.0
+    assert {surface for surface, rad in still.items() if rad == 0.0} == set(of["takes"]), name
+    assert set(stand.values()) == {0.05}
+
+
+def test_the_first_of_two_cases_is_in_force(bench):
+    bench.damage(5)
+    bench.fdm["failures/damage/fin-off"] = 1.0
+    bench.place(800.0, (160.0, 0.0, 8.0), (0.0, 0.05, 0.0))
+    number = bench.fdm["failures/damage-case"]
+    bench.damage(0)
+    assert number == 2
+
+
+def test_where_it_is_kept_follows_the_cache(monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert imported_folder("gtm") == tmp_path / "beaver-ftc" / "imported" / "gtm"
+
+
+def test_our_own_file_the_start_and_the_scripts_of_a_folder(tmp_path, changed):
+    """Of a steady flight no two numbers of which are alike."""
+    flown = Steady(165.0, 91.0, 3.0, 0.7, 1.3, 3.5, 2.4, -0.4, 0.25, 39.8, 1e-10)
+    apart(steady=list(vars(flown).values()))
+    folder.write_outline(tmp_path)
+    folder.write_start(tmp_path, flown)
+    folder.write_scripts(tmp_path, flown)
+    written = {path.name: path for path in tmp_path.rglob("*.*")}
+    assert not changed(yaml.safe_load(written.pop("aircraft.yaml").read_text()), "aircraft")
+    kept = ("reset00.xml", "doublets.xml", "fin-off.xml")
+    assert not changed({name: written[name].read_text().splitlines() for name in kept}, "xml")
+    assert written.keys() == {*kept, *(f"{case}.xml" for case in cases())}
+
+
+def test_an_operation_on_one_argument_is_that_argument_where_nothing_is_to_be_done():
+    a, b = elements.value(2.0), elements.read("p")
+    for operation in ("sum", "product"):
+        assert elements.do(operation, a) == a
+        assert elements.do(operation, a, b) == f"<{operation}>{a}{b}</{operation}>"
+    assert elements.do("abs", b) == f"<abs>{b}</abs>"
+
+
+def test_what_was_imported_before_is_replaced_and_nothing_else(tmp_path, monkeypatch):
+    """Known by its notice; a folder of somebody's own is left alone before anything is read."""
+    monkeypatch.setattr(conversion, "read", lambda database: (_ for _ in ()).throw(BadInput("it was read")))
+    for notice, says in ((False, "is there already and was not imported"), (True, "it was read")):
+        (tmp_path / "gtm").mkdir(exist_ok=True)
+        (tmp_path / "gtm" / "mine.txt").write_text("mine")
+        if notice:
+            (tmp_path / "gtm" / "LICENSE.md").write_text("terms")
+        with pytest.raises(BadInput, match=says):
+            conversion.convert(tmp_path / "database", tmp_path)
+        assert (tmp_path / "gtm" / "mine.txt").exists()

@@ -1,0 +1,638 @@
+"""A certificate proves alarm and exclusions to a checker that shares no code with what wrote it."""
+
+import ast
+import copy
+import json
+import subprocess
+import sys
+from functools import lru_cache, reduce
+from operator import getitem
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from scipy.spatial.transform import Rotation
+from scipy.stats import norm
+from tools.drawn.certificates import altered, places
+from tools.drawn.reader import doubts
+
+import beaver_ftc as bf
+from beaver_ftc.cli.main import main
+from beaver_ftc.diagnosis.monitors.sensor_records import WATCH
+from beaver_ftc.plant.instruments import SENSORS
+from beaver_ftc.results import writer
+from beaver_ftc_assurance.certificates import certificate as certificate_module
+from beaver_ftc_assurance.certificates import chance, check_certificate, instruments_say
+from beaver_ftc_assurance.certificates.certificate import as_text, sealed
+from beaver_ftc_assurance.certificates.check_certificate import failures
+from beaver_ftc_assurance.certificates.instruments_say import TESTS
+from flying import SINES
+from samples import samples
+from telling import apart, fill
+
+CHECKER = Path(__file__).parents[3] / "tools/check_certificate.py"
+GYRO = {"noise_std_deg_s": 0.02, "bias_deg_s": 0.05, "scale_error": 1e-3}
+GYROS = {"p": GYRO, "q": GYRO, "r": GYRO}
+COARSE = dict.fromkeys("pqr", GYRO | {"quantum_deg_s": 0.02})
+LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.5, "at_s": 0.5}
+STUCK = {"type": "stuck", "actuator": "aileron", "position_deg": 5, "at_s": 0.5}
+FLIGHTS = {
+    "loss": {"faults": [LOSS]},
+    "loss with release": {"faults": [LOSS | {"end_s": 0.8}]},
+    "loss, slow filters": {
+        "faults": [LOSS],
+        "fdi": {"sharpen": {"pole_bank": False}},
+    },
+    "loss, as published": {
+        "faults": [LOSS],
+        "fdi": {"thresholds": "published", "sharpen": "none"},
+    },
+    "abrupt loss": {"faults": [LOSS | {"magnitude": 0.1}], "fdi": {"fault_profile": "abrupt"}},
+    "substeps": {"faults": [STUCK], "substeps": 3, "rate_hz": 50, "fdi": {"fault_class": "all"}},
+    "any type": {"faults": [STUCK], "fdi": {"fault_class": "all"}},
+    "any type with release": {"faults": [STUCK | {"end_s": 0.9}], "fdi": {"fault_class": "all"}},
+    "gyros": {"faults": [LOSS], "sensors": COARSE, "fdi": {"bounds": {"sensors": COARSE}}},
+    "filters begun long ago": {  # what a fault can have done to them before the frames kept counts
+        "faults": [LOSS | {"actuator": "rudder", "magnitude": 0.6, "at_s": 1.0}],
+        "sensors": GYROS,
+        "fdi": {"bounds": {"sensors": GYROS}},
+    },
+    "tolerances": {
+        "faults": [STUCK],
+        "fdi": {"fault_class": "all", "bounds": {"coefficients": 0.05, "inertia": 0.02}},
+    },
+    "another aircraft": {
+        "aircraft": "jsbsim:c172p",
+        "initial": {"airspeed_mps": 50},
+        "faults": [LOSS],
+    },
+    "chance": {
+        "faults": [{**LOSS, "actuator": "rudder", "magnitude": 0.9, "at_s": 1.0}],
+        "sensors": GYROS,
+        "fdi": {
+            "statistical": {},
+            "authority": "statistical",
+            "bounds": {"sensors": GYROS, "coefficients": 0.03},
+        },
+    },
+    "chance, a step": {
+        "faults": [{**LOSS, "actuator": "aileron", "magnitude": 0.9, "at_s": 1.0}],
+        "sensors": GYROS,
+        "fdi": {
+            "statistical": {},
+            "authority": "statistical",
+            "bounds": {"sensors": GYROS, "coefficients": 0.03},
+        },
+    },
+    "chance, in moving air": {
+        "faults": [{**LOSS, "actuator": "aileron", "magnitude": 0.9, "at_s": 1.0}],
+        "sensors": GYROS,
+        "environment": {"turbulence": "dryden", "severity": "light"},
+        "fdi": {
+            "statistical": {},
+            "authority": "statistical",
+            "bounds": {"sensors": GYROS, "turbulence": "light"},
+        },
+    },
+    "an altimeter": {"faults": [{"sensor": "altitude", "type": "bias", "magnitude": 3, "at_s": 1.0}]},
+    "a roll angle": {"faults": [{"sensor": "phi", "type": "bias", "magnitude": 0.1, "at_s": 1.0}]},
+    "blocks": {
+        "faults": [STUCK],
+        "sensors": GYROS,
+        "fdi": {"fault_class": "all", "bounds": {"sensors": GYROS}},
+    },
+    "no vane": {"faults": [{"sensor": "alpha", "type": "lost", "at_s": 1.0}]},
+    "no fault": {},
+}
+CHANCE = [name for name in FLIGHTS if name.startswith("chance")]
+
+
+@lru_cache
+def proved(name):
+    """A flight's certificate as it is read back, its log, and the text of its scenario."""
+    flight = bf.fly({"name": "test", "duration_s": 2.0, "reference": SINES, **FLIGHTS[name]})
+    proof = flight.proof()
+    return json.loads(as_text(proof.certificate)), proof.log, proof.scenario
+
+
+def flown(name):
+    """A flight's certificate, and its log."""
+    return proved(name)[:2]
+
+
+def refusals(name, certificate, log=None):
+    """Why the checker refuses a certificate of this flight, and why the second reader does."""
+    _, own, scenario = proved(name)
+    given = certificate, own if log is None else log, scenario
+    return [*failures(*given)], [*doubts(*given)]
+
+
+def set_at_end(log):
+    """Columns of the alarm and of the exclusions that are set as the flight ends."""
+    return {name for name in log if name == "detected" or name.endswith("_excluded") if log[name][-1] > 0}
+
+
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_the_checker_accepts_a_flights_certificate(name):
+    certificate, log = flown(name)
+    assert refusals(name, certificate) == ([], [])
+    stated = {said["column"] for said in certificate["statements"]} - {None}
+    left_out = {said["column"] for said in certificate["without"]} - {None}
+    assert stated | left_out == set_at_end(log)
+    assert all(said["column"] for said in certificate["statements"])
+    assert bool(stated) == bool(log["detected"].any())
+    assert len(as_text(certificate)) <= 200_000
+
+
+@pytest.mark.parametrize("name", [name for name in FLIGHTS if name not in ("no fault", "gyros", *CHANCE)])
+def test_with_exact_gyros_every_alarm_and_exclusion_of_a_surface_is_certified(name):
+    certificate, log = flown(name)
+    assert {said["column"] for said in certificate["statements"]} - {None} == set_at_end(log)
+
+
+@pytest.mark.parametrize("name", CHANCE)
+def test_an_alarm_of_chance_is_certified_with_level_statistic_and_variances(name):
+    certificate, log = flown(name)
+    alarm = next(said for said in certificate["statements"] if said["what"] is None)
+    (value, _), (limit, _) = alarm["sides"]
+    assert value / limit <= log[alarm["likelihood"]][alarm["frame"]] * (1.0 + 1e-5)
+    assert {"level", "R", "P", "frames"} <= set(alarm)
+
+
+def test_chance_excludes_what_moves_nothing_where_it_raised_the_alarm():
+    """A lost rudder shows in roll and yaw, which an elevator does not move."""
+    certificate, log = flown("chance")
+    (said,) = (said for said in certificate["statements"] if said["what"] == "elevator")
+    alarm = certificate["statements"][0]
+    assert said["as"] == "alarm"
+    assert 1 not in alarm["axes"]
+    assert log["fie_elevator_excluded"][said["frame"]] == 1.0
+    other = copy.deepcopy(certificate)
+    next(one for one in other["statements"] if one["what"] == "elevator")["what"] = "rudder"
+    refused, doubted = refusals("chance", sealed(other))
+    assert refused == ["rudder excluded: fie_elevator_excluded is another column than that of this event"]
+    assert doubted
+    before = copy.deepcopy(certificate)
+    before["statements"][0]["frame"] += 1
+    assert all(refusals("chance", sealed(before)))
+
+
+def looked(name):
+    """Of an alarm of instruments: the statement, the log, its row, and a look's time."""
+    certificate, log = flown(name)
+    (said,) = certificate["statements"]
+    k = said["frame"]
+    return said, log, k, log["t_s"][1]
+
+
+def attitude(log, k):
+    return Rotation.from_euler("ZYX", [log[f"{angle}_rad"][k] for angle in ("psi", "theta", "phi")])
+
+
+def test_an_altimeter_is_held_against_the_velocity_upwards():
+    """Exact instruments leave room for the wind, and for what a step leaves out."""
+    said, log, k, h = looked("an altimeter")
+    alpha, beta, V = (log[name][k - 1] for name in ("alpha_rad", "beta_rad", "airspeed_mps"))
+    along = V * np.array([np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)])
+    foretold = log["altitude_m"][k - 1] - h * attitude(log, k - 1).apply(along)[2]
+    (reading, *others, most), *_ = said["looks"]
+    assert (said["test"], k) == ("altitude", 100)
+    assert reading == pytest.approx(log["altitude_m"][k] + 3.0, abs=1e-6)
+    assert others == pytest.approx([foretold], abs=1e-6)
+    assert h * 1.0 < most < h * (1.0 + 4.0 / 3.0 * h * 30.0)
+
+
+def test_a_roll_angle_is_held_against_the_last_attitude_turned_by_the_gyros():
+    """Exact instruments leave the Earth's rate."""
+    said, log, k, h = looked("a roll angle")
+    rates = np.array([log[f"{axis}_measured_rad_s"][k - 1] for axis in "pqr"])
+    size = np.linalg.norm(rates)
+    turned = attitude(log, k - 1) * Rotation.from_rotvec(2.0 * np.arctan(0.5 * h * size) * rates / size)
+    now = log["psi_rad"][k], log["theta_rad"][k], log["phi_rad"][k] + np.radians(0.1)
+    rotation = 2.0 * (turned.inv() * Rotation.from_euler("ZYX", now)).as_quat()[0]
+    (reading, foretold, most), *_ = said["looks"]
+    assert (said["test"], k) == ("turning p", 100)
+    assert reading - foretold == pytest.approx(abs(rotation), abs=1e-12)
+    assert most == pytest.approx(h * 4e-5, rel=1e-4)
+
+
+def test_an_alarm_of_instruments_is_that_of_the_log():
+    """Larger by what nothing allows, or of another reading, it is refused."""
+    for name in ("an altimeter", "a roll angle"):
+        certificate, _ = flown(name)
+        wider, renamed = copy.deepcopy(certificate), copy.deepcopy(certificate)
+        said = wider["statements"][0]
+        said["looks"][0][0] *= 2.0
+        said["sides"][0] += certificate["statements"][0]["looks"][0][0]
+        renamed["statements"][0]["test"] = "V"
+        assert refusals(name, sealed(wider))[0] == ["alarm: the log's share is smaller"]
+        assert all(refusals(name, sealed(wider)))
+        assert all(refusals(name, sealed(renamed)))
+
+
+def test_that_a_reading_is_missing_is_what_the_log_says():
+    """Of the fourth instrument, from its fault on; of no other, and in no other row."""
+    certificate, log = flown("no vane")
+    (said,) = certificate["statements"]
+    assert (said["frame"], said["missing"]) == (100, [3])
+    assert np.isnan(log["watch_missing"][:100]).all()
+    assert (log["watch_missing"][100:] == 3.0).all()
+    assert "watch_missing" not in flown("an altimeter")[1]
+    other = log | {"watch_missing": np.full(len(log["t_s"]), 4.0)}
+    assert refusals("no vane", certificate, other)[0] == [
+        "alarm: the log says that another reading is missing, or none"
+    ]
+    assert refusals("no vane", certificate, other)[1]
+
+
+def test_of_several_missing_readings_the_log_says_the_first():
+    said = {"frame": 1, "missing": [3, 5], "because": "two", "sides": [2.0, 1.0]}
+    logged = {"frame": 1, "missing": [3, 5], "sides": [1.0, 0.0]}
+    rows = {"detected": np.array([0.0, 1.0])}
+    assert instruments_say.as_logged(said, rows) == said
+    for readings, expected in (([np.nan, 3.0], logged), ([3.0, 5.0], said)):
+        assert instruments_say.as_logged(said, rows | {"watch_missing": np.array(readings)}) == expected
+
+
+def test_in_blocks_a_jam_is_what_a_block_says_in_the_mean():
+    """With gyros as noisy, by plain sums over the rows of a block: no loss explains what it shows."""
+    certificate, log = flown("blocks")
+    said = next(one for one in certificate["statements"] if one["what"] == "aileron loss_of_effectiveness")
+    (length, begin, _), dt, limit, value = said["block"], log["t_s"][1], 0.0, 0.0
+    for one in said["terms"]:
+        rows = range(begin + one["frame"] * length, begin + (one["frame"] + 1) * length)
+        for axis, d in zip("pqr", one["d"], strict=True):
+            x, model, bound = (
+                log[f"{axis}_{of}"] for of in ("measured_rad_s", "design_rad_s2", "eta_bar_rad_s2")
+            )
+            value += one["weight"] * d * (x[rows[-1]] - x[rows[0] - 1] - dt * sum(model[rows]))
+            limit += one["weight"] * abs(d) * dt * sum(bound[rows])
+    assert length == 20
+    assert value == pytest.approx(said["sides"][0], rel=1e-12)
+    assert limit < said["sides"][1] < value  # which has noise and effects besides
+
+
+def test_before_a_block_is_whole_no_type_is_held_against_one():
+    """The flight ends in the first block after the alarm."""
+    given = {"name": "early", "duration_s": 0.15, "reference": SINES, **FLIGHTS["blocks"]}
+    flight = bf.fly(given | {"faults": [STUCK | {"at_s": 0.05}]})
+    certificate = json.loads(as_text(flight.certificate()))
+    assert flight.metrics["detection"]["detected"]
+    assert [one["what"] for one in certificate["statements"]][:1] == [None]
+    assert all("block" not in one for one in certificate["statements"])
+
+
+def test_a_path_without_a_certificate_ends_in_one_line(tmp_path):
+    (tmp_path / "text.json").write_text("no certificate")
+    (tmp_path / "list.json").write_text("[1, 2]")
+    for name in ("nothing", "text.json", "list.json", "."):
+        command = [sys.executable, CHECKER, name, "log.parquet"]
+        checked = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert checked.returncode == 1
+        assert checked.stderr.startswith("no certificate at FOLDER, or CERTIFICATE LOG [SCENARIO]: ")
+        assert checked.stderr.count("\n") == 1
+
+
+def test_many_constants_are_written_as_one_at_its_worst(monkeypatch):
+    """What each takes off the evidence, added up, is what their sum does."""
+    certificate, _ = flown("chance")
+    monkeypatch.setattr(chance, "_CONSTANTS", 99)
+    flight = bf.fly({"name": "test", "duration_s": 2.0, "reference": SINES, **FLIGHTS["chance"]})
+    summed, one_by_one = certificate["statements"][0], flight.certificate()["statements"][0]
+    assert summed["tolerance"] == [1.0]
+    assert len(one_by_one["tolerance"]) > 6
+    assert np.array(summed["sides"]) == pytest.approx(np.array(one_by_one["sides"]), rel=1e-5)
+
+
+def test_in_moving_air_the_axes_that_go_together_are_weighed_together():
+    """Both at once, with the gust that the vanes saw and what calm air would foretell."""
+    certificate, _ = flown("chance, in moving air")
+    (alarm,) = (said for said in certificate["statements"] if said["what"] is None)
+    assert alarm["axes"] == [0, 2]
+    assert any(its["drift"][0][1] for its in alarm["frames"])
+    assert all("air" in its for its in alarm["frames"])
+    apart = copy.deepcopy(certificate)
+    (said,) = (said for said in apart["statements"] if said["what"] is None)
+    for its in said["frames"]:
+        its["drift"][0][1] = its["drift"][1][0] = 0.0
+    assert all(refusals("chance, in moving air", sealed(apart)))
+
+
+def test_what_is_stuck_is_neither_floating_nor_lost_and_a_repair_proves_nothing_against_it():
+    for name in ("any type", "any type with release"):
+        certificate, _ = flown(name)
+        types = {said["what"] for said in certificate["statements"]}
+        assert {"aileron float", "aileron loss_of_effectiveness"} <= types
+        assert "aileron stuck" not in types
+
+
+def test_a_jam_excludes_every_type_that_moves_otherwise():
+    """One statement each; the true type has none, whatever it is compared with."""
+    certificate, _ = flown("any type")
+    courses = {said["what"] for said in certificate["statements"] if said.get("theta") == "course"}
+    assert {f"aileron hardover {way}" for way in ("up", "down")} <= courses
+    assert {"aileron bias", "aileron rate_limit"} <= courses
+
+
+ALTERED = [
+    "loss",
+    "gyros",
+    "substeps",
+    "any type",
+    "tolerances",
+    "another aircraft",
+    "an altimeter",
+    "a roll angle",
+    "blocks",
+    "no vane",
+    *CHANCE,
+]
+
+
+@pytest.mark.parametrize("name", ALTERED)
+def test_whatever_number_is_altered_the_checker_refuses_it(name):
+    """As it is, and with the digest written anew: no number is there that decides nothing."""
+    certificate, _ = flown(name)
+    known = [*places(certificate)]
+    rng = np.random.default_rng(7)
+    size = samples(60 if len(certificate["statements"]) < 9 else 20)
+    for i in rng.choice(len(known), size=min(size, len(known)), replace=False):
+        other = altered(certificate, known[i])
+        assert refusals(name, other)[0], known[i]
+        assert all(refusals(name, sealed(other))), known[i]
+
+
+@pytest.mark.parametrize("name", ["gyros", "blocks"])
+def test_what_gyros_may_be_off_by_is_declared_on_the_axes_that_statements_look_at(name):
+    certificate, _ = flown(name)
+    terms = [term for said in certificate["statements"] for term in said.get("terms", [])]
+    axes = {axis for term in terms for axis, d in zip("pqr", term["d"], strict=True) if d}
+    assert certificate["declared"]["B"] == pytest.approx(dict.fromkeys(axes, np.radians(0.05)))
+
+
+def test_the_fault_that_is_there_cannot_be_excluded():
+    """The numbers of another surface's exclusion say nothing of the true one."""
+    certificate, _ = flown("loss")
+    other = copy.deepcopy(certificate)
+    said = next(one for one in other["statements"] if one["what"] == "rudder")
+    said |= {"what": "elevator", "column": "fie_elevator_excluded"}
+    why, doubted = refusals("loss", sealed(other))
+    assert why == [f"elevator excluded: fie_elevator_excluded is not set in row {said['frame']}"]
+    assert doubted
+
+
+def test_a_smaller_declared_bound_is_not_that_of_the_scenario():
+    certificate, _ = flown("loss")
+    other = copy.deepcopy(certificate)
+    other["declared"]["b"] = {}
+    assert refusals("loss", sealed(other))[0] == ["b on p is smaller than the scenario's bound"]
+    _, _, scenario = proved("loss")
+    assert "SHA-256 of scenario.yaml" in next(failures(certificate, flown("loss")[1], scenario + "\n"))
+
+
+GYRO_Q = "the declared error of gyro q is not that of the scenario"
+HEAD = {
+    "dt_s": ((1 - 1e-6, 1 + 1e-6), "dt_s is not the frame of the scenario"),
+    "instants": ((2,), "instants: not those of the scenario"),
+    "omega_E": ((1 - 1e-6, 1 + 1e-6), "omega_E is not the Earth's rate"),
+    "declared o q": ((0.99, 1.01), GYRO_Q),
+    "declared B q": ((0.99, 1.01), GYRO_Q),
+    "declared m q": ((0.99, 1.01), GYRO_Q),
+    "declared g q": ((0.99,), "g on q is not allowed"),
+}
+
+
+@pytest.mark.parametrize("field", HEAD)
+def test_a_number_of_the_head_that_is_not_the_scenarios_is_refused_by_name(field):
+    certificate, _ = flown("gyros")
+    *within, name = field.split()
+    factors, says = HEAD[field]
+    for factor in factors:
+        other = copy.deepcopy(certificate)
+        reduce(getitem, within, other)[name] *= factor
+        assert refusals("gyros", sealed(other))[0] == [says]
+
+
+COURSES = {
+    ("hardover up", "pace_rad_s"): (lambda pace: 1.01 * pace, "pace_rad_s is not half the rate limit"),
+    ("hardover up", "stops"): (lambda stops: [1.01 * stops[0]], "the stop is not that of the log"),
+    ("bias", "stops"): (lambda stops: [stops[0], 1.01 * stops[1]], "stops"),
+    ("bias that grows", "stops"): (lambda stops: [1.01 * stops[0], stops[1]], "stops"),
+    ("rate_limit", "ordered"): (lambda ordered: ordered[:-1], "ordered: frames are missing"),
+    ("rate_limit", "near"): (lambda near: -near, "near is nearer than the order itself"),
+}
+
+
+@pytest.mark.parametrize(("kind", "field"), COURSES)
+def test_what_a_course_takes_from_log_and_scenario_is_refused_by_name(kind, field):
+    other = copy.deepcopy(flown("any type")[0])
+    (said,) = (one for one in other["statements"] if one["what"] == f"aileron {kind}")
+    change, says = COURSES[kind, field]
+    said[field] = change(said[field])
+    assert refusals("any type", sealed(other))[0] == [f"aileron {kind} excluded: {says}"]
+
+
+def test_a_level_of_chance_is_no_smaller_than_the_declared_rate_of_false_alarms_allows():
+    certificate, _, scenario = proved("chance")
+    rate_per_h = yaml.safe_load(scenario)["fdi"]["statistical"]["false_alarms_per_h"]
+    least = norm.isf(rate_per_h * certificate["dt_s"] / 3600.0)
+    too_small = "alarm: level: the declared rate allows no smaller one"
+    for level, refused in ((0.9999 * least, True), (1.0001 * least, False)):
+        other = copy.deepcopy(certificate)
+        other["statements"][0]["level"] = level
+        assert (refusals("chance", sealed(other))[0][0] == too_small) == refused
+
+
+EARLY = 30  # a row before any fault
+EMPTY = {name: {} for name in "cbgoBm"}
+
+
+def single_frame(k, log, **more):
+    """A term of one frame, as the log has it."""
+    of = {"x": "measured_rad_s", "F": "design_rad_s2", "eta_bar": "eta_bar_rad_s2"}
+    copies = {name: [[float(log[f"{axis}_{column}"][k]) for axis in "pqr"]] for name, column in of.items()}
+    return {"weight": 1.0, "d": [0.0, 1.0, 0.0], "first": k, "frame": k, **copies, **more}
+
+
+FORGED = {
+    "another frame than the log's": lambda log: (
+        {"dt_s": 1e-7}, {"theta": "any", "terms": [single_frame(EARLY, log)]}
+    ),
+    "noise denied": lambda log: ({"declared": EMPTY}, {"theta": "any", "terms": [single_frame(EARLY, log)]}),
+    "a constant error beyond the whole": lambda log: (
+        {"declared": EMPTY | {"B": dict.fromkeys("pqr", 1e3)}},
+        {"theta": "any", "terms": [single_frame(EARLY, log)]},
+    ),
+    "a filter that grows": lambda log: (
+        {}, {"theta": "any", "terms": [single_frame(EARLY, log, pole_per_s=-5.0, since=10)]}
+    ),
+    "a weight below zero": lambda log: (
+        {}, {"theta": "any", "terms": [single_frame(EARLY, log, weight=-1.0)]}
+    ),
+    "a bound below zero": lambda log: ({}, {"test": "V", "looks": [[1.0, 0.0, -2.0]]}),
+    "a level below zero": lambda log: ({}, {
+        "likelihood": "t_s", "level": -50.0, "sense": "either", "axes": [1], "R": [1e-6], "first": EARLY,
+        "P": [[1e-6, 0], [0, 1e-6]], "Y": [[0, 0], [0, 0]], "tolerance": [],
+        "frames": [{"jitter": [0], "drift": [[0]], "signature": [1.0]}],
+    }),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("road", FORGED)
+@pytest.mark.parametrize("event", ["before any fault", "at the alarm"])
+def test_a_statement_that_its_own_numbers_make_true_is_refused(road, event):
+    """Before any fault by the log's column; at the alarm itself by what the scenario declares. That the sides
+    are not those that it states comes after all else: then it would be accepted with others."""
+    certificate, log = flown("gyros")
+    more, evidence = FORGED[road](log)
+    early = {"what": "rudder", "column": "fie_rudder_excluded", "frame": EARLY}
+    alarm = {"what": None, "column": "detected", "frame": int(np.argmax(log["detected"]))}
+    said = (early if event == "before any fault" else alarm) | evidence
+    said["sides"] = [[9.0, 9.0], [1.0, 1.0]] if "likelihood" in said else [9.0, 1.0]
+    refused, doubted = refusals("gyros", sealed(certificate | more | {"statements": [said]}))
+    assert refused
+    assert doubted
+    assert not any("the stated sides" in why for why in refused)
+
+
+def test_the_effect_of_a_fault_is_that_of_the_log():
+    """A stuck aileron at another deflection would be excluded; h, Z and r are recomputed, stated or not."""
+    certificate, _ = flown("any type")
+    altered_fields = set()
+    for what in ("aileron float", "aileron loss_of_effectiveness"):
+        for name in "hZr":
+            other = copy.deepcopy(certificate)
+            said = next(one for one in other["statements"] if one["what"] == what)
+            for term in said["terms"]:
+                if name in term:
+                    term[name] = [2.0 * value + 1.0 for value in term[name]]
+                    altered_fields.add(name)
+            assert other == certificate or all(refusals("any type", sealed(other))), (what, name)
+    assert {"h", "Z"} <= altered_fields
+
+
+@pytest.mark.parametrize("where", ["document", "statement", "term"])
+def test_no_field_is_there_that_is_not_known(where):
+    certificate, _ = flown("loss")
+    other = copy.deepcopy(certificate)
+    said = other["statements"][0]
+    {"document": other, "statement": said, "term": said["terms"][0]}[where]["comment"] = "true"
+    assert "the field comment is not known" in refusals("loss", sealed(other))[0][0]
+
+
+def test_the_checker_takes_numpy_and_readers_of_the_files_alone():
+    tree = ast.parse(Path(check_certificate.__file__).read_text())
+    imported = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
+    imported |= {str(node.module) for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+    others = {name.partition(".")[0] for name in imported} - set(sys.stdlib_module_names)
+    assert others == {"numpy", "pyarrow", "yaml"}  # the log's and the scenario's reader
+
+
+@pytest.mark.parametrize(
+    ("place", "error", "says"),
+    [
+        ("metrics", ZeroDivisionError("of the test"), "ZeroDivisionError: of the test"),
+        ("figures", OSError(28, "of the test"), "no space left on device"),
+        ("certificate", PermissionError(13, "of", "the test"), "PermissionError: [Errno 13] of: 'the test'"),
+    ],
+)
+def test_whatever_fails_while_results_are_written_the_log_is_kept(
+    place, error, says, tmp_path, monkeypatch, capsys
+):
+    """One line says what failed; nothing half written is left."""
+
+    def fails(*_, **__):
+        raise error
+
+    modules = {"metrics": writer, "figures": writer, "certificate": certificate_module}
+    names = {"metrics": "metrics", "figures": "write_report_files", "certificate": "certificate"}
+    monkeypatch.setattr(modules[place], names[place], fails)
+    monkeypatch.chdir(tmp_path)
+    Path("mine.yaml").write_text(
+        json.dumps({"name": "mine", "duration_s": 0.2, "faults": [LOSS | {"at_s": 0.1}]})
+    )
+    monkeypatch.setattr(sys, "argv", ["beaver-ftc", "run", "mine.yaml", "--certificate"])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 3
+    written = {path.name for path in Path("runs/mine").iterdir()}
+    assert {"log.parquet", "scenario.yaml"} <= written
+    lost = {"metrics": "metrics.json", "figures": "report.html", "certificate": "certificate.json"}[place]
+    assert ("metrics.json" in written) == (place != "metrics")
+    assert lost not in written
+    said = capsys.readouterr().err.strip().splitlines()
+    words = f"the flight and its log are kept, but {lost} could not be written: {says}"
+    assert len([line for line in said if words in line]) == 1
+
+
+def test_a_fault_in_the_first_row_has_a_certificate():
+    given = {"name": "zero", "duration_s": 0.5, "reference": SINES, "fdi": {"fault_class": "all"}}
+    proof = bf.fly(given | {"faults": [STUCK | {"at_s": 0}]}).proof()
+    certificate = json.loads(as_text(proof.certificate))
+    assert certificate["statements"][0]["frame"] == 1
+    assert [*failures(certificate, proof.log, proof.scenario)] == []
+    assert [*doubts(certificate, proof.log, proof.scenario)] == []
+
+
+def test_by_the_command_line(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    scenario = {"name": "mine", "duration_s": 1.0, "reference": SINES, "faults": [LOSS]}
+    Path("mine.yaml").write_text(json.dumps(scenario))
+    monkeypatch.setattr(sys, "argv", ["beaver-ftc", "run", "mine.yaml", "--certificate", "--no-report"])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert not ended.value.code
+    checked = subprocess.run(
+        [sys.executable, CHECKER, "runs/mine"], capture_output=True, text=True, check=False
+    )
+    assert (checked.returncode, checked.stdout.splitlines()[-1]) == (0, "3 statements hold")
+    monkeypatch.setattr(sys, "argv", ["beaver-ftc", "check", "runs/mine"])
+    capsys.readouterr()
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert not ended.value.code
+    assert capsys.readouterr().out == checked.stdout
+    written = Path("runs/mine/certificate.json")
+    written.write_text(written.read_text().replace('"frame":51', '"frame":52', 1))
+    checked = subprocess.run(
+        [sys.executable, CHECKER, "runs/mine/certificate.json", "runs/mine/log.parquet"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert checked.returncode == 1
+    assert checked.stderr == "SHA-256 does not match: the file was edited, or belongs to another log\n"
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 1
+    capsys.readouterr()
+    monkeypatch.setattr(sys, "argv", ["beaver-ftc", "run", "mine.yaml", "--certificate", "--no-report"])
+    Path("mine.yaml").write_text(json.dumps(scenario | {"fdi": {"scheme": "zhang2005"}}))
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 2
+    assert "mine: fdi.scheme: 'zhang2005'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("turned", [1.0, -1.0])
+def test_an_alarm_of_instruments_adds_up_to_its_test_whatever_is_declared(turned):
+    """Of a watch every number of which is another, gusts among them: the last look by its own limit, and what
+    the filter nearest to its bound keeps of those before."""
+    watch = fill(np.zeros(1, WATCH)[0], seed=2, size=0.3)
+    watch["furthest"], watch["share"] = TESTS.index("alpha"), 1.2
+    step = watch["step"]
+    test = step["test"][TESTS.index("alpha")]
+    test["filtered"], test["bound"] = turned * np.array([3.0, 8.0, 5.5]), (2.9, 4.7, 5.1)
+    test["residual"] = turned * 0.9
+    apart(looked=[step["h"], test["rate"], test["noise"], test["air"], *step["gusts"]])
+    said = instruments_say.of_alarm(watch)
+    (now, then, most), (before, nothing, most_before) = said["looks"]
+    foretold = float(step["predicted"][SENSORS.index("alpha")])
+    assert said["test"] == "alpha"
+    assert sorted([now, then]) == pytest.approx(sorted([foretold + turned * 0.9, foretold]))
+    assert now - then == pytest.approx(0.9)
+    assert most == pytest.approx(step["h"] * test["rate"] + test["noise"] + test["air"] * step["gusts"][1])
+    assert before - nothing == pytest.approx(8.0 - 0.9)
+    assert most_before == pytest.approx(4.7 - most)
+    assert said["sides"] == pytest.approx([8.0, 4.7])

@@ -1,0 +1,147 @@
+"""Plans: what they may name, and every mistake in a line with its place."""
+
+import json
+
+import pytest
+
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.scenario.loader import builtin_plans
+from beaver_ftc_assurance.evidence.plan import load_plan, plan_json_schema
+
+GOOD = """\
+name: mine
+flights:
+  own: {duration_s: 2}
+  many:
+    base: elevator-stuck
+    vary: {"faults[0].position_deg": {linspace: [-2, 2, 3]}}
+requirements:
+  - {id: A, over: [own, many, elevator-stuck], expect: {no_departure: true}}
+  - {id: B, over: [many, deeper/also.yaml], formula: "always(abs(q_rad_s) <= 1)"}
+  - {id: C, over: [own], bar: {type: margins}}
+"""
+
+
+@pytest.fixture
+def write(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "deeper").mkdir()
+    (tmp_path / "deeper" / "also.yaml").write_text("name: also\\nduration_s: 3\\n".replace("\\n", "\n"))
+
+    def written(text):
+        (tmp_path / "plan.yaml").write_text(text)
+        return "plan.yaml"
+
+    return written
+
+
+def test_a_plan_names_its_own_flights_built_in_ones_and_files_beside_it(write):
+    plan = load_plan(write(GOOD))
+    assert plan.over == {"A": ("own", "many", "elevator-stuck"), "B": ("many", "also"), "C": ("own",)}
+    assert plan.cases == [
+        ("own", 0),
+        ("many", 0),
+        ("many", 1),
+        ("many", 2),
+        ("elevator-stuck", 0),
+        ("also", 0),
+    ]
+    assert [plan.sources["many"].flight(run) for run in range(3)] == ["many-0000", "many-0001", "many-0002"]
+    assert plan.sources["many"].scenario(2).faults[0].position_deg == 2
+    assert plan.sources["also"].scenario(0).duration_s == 3
+    assert [each.id for each in plan.of("many")] == ["A", "B"]
+    assert plan.formulas["B"].columns == {"q_rad_s"}
+    assert plan.expect["A"].no_departure is True
+
+
+def test_flights_that_are_named_twice_count_once(write):
+    plan = load_plan(write(GOOD.replace("deeper/also.yaml]", "deeper/also.yaml, many]")))
+    assert plan.over["B"] == ("many", "also")
+    assert len(plan.cases) == len(load_plan(write(GOOD)).cases)
+
+
+def test_what_a_source_says_is_in_its_digest(write):
+    before = load_plan(write(GOOD)).sources
+    after = load_plan(write(GOOD.replace("[-2, 2, 3]", "[-2, 2.1, 3]"))).sources
+    assert before["many"].sha256 != after["many"].sha256
+    assert before["own"].sha256 == after["own"].sha256
+
+
+MISTAKES = {
+    "unknown": ("id: A,", "idd: A,", "8: requirements[0].idd: unknown key, did you mean id?"),
+    "no-id": ("id: A, ", "", "8: requirements[0].id: required key is missing"),
+    "twice": ("id: B", "id: A", "9: requirements[1].id: A is there twice, allowed: each id once"),
+    "nothing": (", expect: {no_departure: true}", "", "8: requirements[0]: has nothing that can be judged"),
+    "two-kinds": ("bar: {", "formula: q_rad_s <= 1, bar: {", "10: requirements[2]: has formula and bar"),
+    "expect": ("no_departure", "no_departur", "8: requirements[0].expect.no_departur: unknown key, did yo"),
+    "no-fault": ("no_departure: true", "detected_within_s: 1", "8: requirements[0].expect.detected_within"),
+    "name": ("[own, many,", "[own, manny,", "8: requirements[0].over[1]: 'manny' is no flight of the plan"),
+    "outside": ("deeper/also", "../also", "9: requirements[1].over[1]: '../also.yaml' is outside, allowed"),
+    "absolute": ("deeper/also", "/etc/also", "9: requirements[1].over[1]: '/etc/also.yaml' is outside"),
+    "absent": ("deeper/also", "deeper/alzo", "9: requirements[1].over[1]: no such file: 'deeper/alzo.yaml'"),
+    "formula": ("<= 1)", "<= )", "9: requirements[1].formula: ')' where a column, a number or ( is due"),
+    "column": ("q_rad_s", "q_rad", "9: requirements[1].formula: 'q_rad' is no column of many's log, did y"),
+    "ahead": ("always(", "always[0:3.5](", "9: requirements[1].formula: looks 3.5 s ahead, allowed over d"),
+    "bar": ("type: margins", "type: margin", "10: requirements[2].bar.type: 'margin' is not known, did yo"),
+    "bar-key": ("type: margins", "type: margins, gain: 6", "10: requirements[2].bar.gain: unknown key, di"),
+    "of-sweep": ("type: margins", "type: sweep, pass_rate: {at_least: 1}", "10: requirements[2].over[0]:"),
+    "level": ("type: margins", "type: handling_qualities, level: 4", "10: requirements[2].bar.level: 4 is"),
+    "own": ("duration_s: 2", "duration: 2", "3: flights.own.duration: unknown key, did you mean duration_s?"),
+    "sweep": ("position_deg\"", "position\"", "6: flights.many.vary.faults[0].position: "),
+    "unused": ("[own, many, elevator-stuck]", "[elevator-stuck]", "4: flights.many: no requirement is ove"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_is_a_line_with_its_place(mistake, write):
+    before, after, line = MISTAKES[mistake]
+    assert before in GOOD
+    text = GOOD.replace(before, after)
+    if mistake == "unused":
+        text = text.replace("[many, deeper", "[deeper")
+    with pytest.raises(BadInput) as error:
+        load_plan(write(text))
+    assert f"plan.yaml:{line}" in str(error.value)
+
+
+@pytest.mark.parametrize("meant", ["many", "elevator-stuck", "surfaces-grid"])
+def test_flights_of_the_plan_built_in_scenarios_and_sweeps_are_suggested(meant, write):
+    with pytest.raises(BadInput, match=f"no flight of the plan and not built in, did you mean {meant}[?]"):
+        load_plan(write(GOOD.replace("[many,", f"[{meant[:-1]},")))
+
+
+def test_a_mistake_in_a_file_that_is_named_is_in_that_file(write, tmp_path):
+    (tmp_path / "deeper" / "also.yaml").write_text("name: also\nduration: 3\n")
+    with pytest.raises(BadInput, match=r"^.*deeper/also.yaml:2: duration: unknown key"):
+        load_plan(write(GOOD))
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[]", "name: x", "requirements: []", "requirements: [{}]", "a: !!python/name:os.system"]
+)
+def test_no_plan_is_a_line(text, write):
+    with pytest.raises(BadInput) as error:
+        load_plan(write(text))
+    assert all(line.startswith("plan.yaml:") for line in str(error.value).splitlines())
+
+
+def test_names_that_are_something_else():
+    with pytest.raises(
+        BadInput, match="elevator-stuck is a scenario, allowed: a plan; `beaver-ftc run elevator-stuck`"
+    ):
+        load_plan("elevator-stuck")
+    with pytest.raises(
+        BadInput, match="no such file or built-in plan: 'flight-control', did you mean flight-controls"
+    ):
+        load_plan("flight-control")
+
+
+def test_the_plans_that_come_with_the_project_are_right():
+    for name in builtin_plans():
+        plan = load_plan(name)
+        assert plan.file.name == name
+        assert all(each.text and each.clause for each in plan.file.requirements)
+
+
+def test_the_schema_of_a_plan(changed):
+    assert not changed(json.loads(json.dumps(plan_json_schema()["properties"])))

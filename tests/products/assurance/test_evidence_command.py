@@ -1,0 +1,97 @@
+"""`beaver-ftc evidence`: exit statuses, what it prints and writes, one flight again."""
+
+import json
+from xml.etree import ElementTree
+
+import pytest
+import typer
+
+from beaver_ftc.cli.output import Format
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc_assurance.commands.evidence import Arguments, command
+
+PLAN = """\
+name: mine
+flights:
+  own: {duration_s: 0.4}
+requirements:
+  - {id: A, over: [own], expect: {no_departure: true}}
+  - {id: B, over: [own], formula: "always(altitude_m <= LIMIT)"}
+"""
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    def ended(limit=5000, **options):
+        (tmp_path / "plan.yaml").write_text(PLAN.replace("LIMIT", str(limit)))
+        with pytest.raises(typer.Exit) as end:
+            command(Arguments("plan.yaml", workers=1, **options))
+        return end.value.exit_code
+
+    return ended
+
+
+def test_all_met(here, tmp_path, capsys):
+    assert here() == 0
+    assert "2 requirements: 2 met, 0 not met, 0 not shown" in capsys.readouterr().out
+    assert sorted(path.name for path in (tmp_path / "runs" / "mine").iterdir()) == [
+        "evidence.html", "evidence.json", "evidence.pdf"
+    ]  # fmt: skip
+
+
+def test_one_not_met_and_that_flight_again(here, tmp_path, capsys):
+    assert here(1000, out=tmp_path / "there", format=Format.json) == 1
+    document = json.loads(capsys.readouterr().out)
+    assert [each["verdict"] for each in document["requirements"]] == ["met", "not met"]
+    assert document["requirements"][1]["worst"]["command"] == "beaver-ftc evidence plan.yaml --replay own"
+    assert document["folder"] == str(tmp_path / "there")
+    assert (tmp_path / "there" / "evidence.json").exists()
+    assert here(1000, replay="own", no_report=True) == 1
+    assert "B not met: robustness -829" in capsys.readouterr().out
+    assert (tmp_path / "runs" / "own" / "log.parquet").exists()
+    assert here(5000, replay="own", no_report=True, format=Format.json) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["requirements"][0] == "A met: no departure: yes, asked yes"
+
+
+def test_ci_reads_a_case_a_requirement(here, tmp_path):
+    def cases():
+        (suite,) = ElementTree.parse(tmp_path / "j.xml").getroot()
+        found = {case.get("name"): [*case] for case in suite}
+        assert suite.get("failures") == str(sum(each != [] for each in found.values()))
+        return suite.get("name"), found
+
+    assert here(1000, junit=tmp_path / "j.xml") == 1
+    name, found = cases()
+    assert (name, found["A"], list(found)) == ("mine", [], ["A", "B"])
+    says = found["B"][0].get("message")
+    assert says.startswith("expected always(altitude_m <= 1000), actual not met: robustness -829")
+    assert says.endswith("; again: beaver-ftc evidence plan.yaml --replay own")
+    assert here(1000, replay="own", no_report=True, junit=tmp_path / "j.xml") == 1
+    name, found = cases()
+    assert (name, found["A"], found["B"][0].tag) == ("own", [], "failure")
+
+
+def test_ci_reads_why_a_plan_does_not_fly(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(BadInput):
+        command(Arguments("none.yaml", junit=tmp_path / "j.xml", format=Format.json))
+    (suite,) = ElementTree.parse(tmp_path / "j.xml").getroot()
+    assert "no such file" in suite[0].find("error").get("message")
+    assert json.loads(capsys.readouterr().out)["passed"] is False
+
+
+def test_a_folder_of_somebody_else_stays(here, tmp_path):
+    (tmp_path / "theirs").mkdir()
+    (tmp_path / "theirs" / "letter.txt").write_text("dear")
+    with pytest.raises(Exception, match=r"letter\.txt"):
+        here(out=tmp_path / "theirs")
+    assert [path.name for path in (tmp_path / "theirs").iterdir()] == ["letter.txt"]
+
+
+def test_a_plan_that_is_not_there(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(BadInput, match="no such file"):
+        command(Arguments("none.yaml"))

@@ -1,0 +1,306 @@
+"""Proposals that tell candidates apart do so when they are flown, and what is said to be impossible is."""
+
+import json
+import sys
+from dataclasses import replace
+from math import radians
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pyarrow.parquet import read_table
+from scipy.optimize import linprog
+
+import beaver_ftc as bf
+from beaver_ftc.cli.main import main
+from beaver_ftc.diagnosis.types.registry import BIAS, CONSTANT_LOSS, FLOAT, STUCK
+from beaver_ftc_assurance.certificates.check_certificate import failures
+from beaver_ftc_assurance.separation import (
+    Candidate,
+    Situation,
+    as_text,
+    doublet,
+    separate,
+    situation_of,
+    tell_apart,
+    write,
+)
+from samples import samples
+from telling import apart, fill
+
+SMALL = {
+    "p": [{"sine": {"amplitude_deg_s": 1, "frequency_hz": 0.5}}],
+    "r": [{"sine": {"amplitude_deg_s": 0.5, "frequency_hz": 0.3}}],
+}
+STUCK_AILERON = {"type": "stuck", "actuator": "aileron", "position_deg": 0.6, "at_s": 1}
+NAMES = ("aileron", "elevator", "rudder", "flap")
+PLAIN = Situation(
+    G=np.array([[-10.0, 0.0, 2.0, 0.0], [0.0, -8.0, 0.0, -4.0], [-1.0, 0.0, -3.0, 0.0]]),
+    u=np.zeros(4), x=np.zeros(3), rate=radians(20), bound=np.full(3, 0.02),
+    stops=np.array([[-0.3] * 4, [0.3] * 4]), approach=np.ones(4), step=np.full(4, np.inf), instants=1,
+    in_blocks=False, dt=0.01, alpha=0.05, alpha_range=(-0.1, 0.28),
+)  # fmt: skip
+
+
+def ambiguous(**more):
+    """A flight that ends while two candidates are left."""
+    fdi = {"fault_class": "all", **more.pop("fdi", {})}
+    return bf.load(
+        {"name": "open", "duration_s": 1.1, "fdi": fdi, "reference": SMALL, "faults": [STUCK_AILERON], **more}
+    )
+
+
+def test_what_is_left_of_a_bias_holds_the_true_one():
+    bias = {"type": "bias", "actuator": "aileron", "bias_deg": 2.0, "at_s": 1}
+    pairs = separate(ambiguous(faults=[bias], duration_s=1.03))["pairs"]
+    left = [one["deg"] for pair in pairs for one in pair["candidates"] if one["type"] == "bias"]
+    assert left
+    assert all(low <= 2.0 <= high for low, high in left)
+
+
+def test_a_doublet_that_was_flown_leaves_log_and_certificate(tmp_path):
+    """What it excluded is proved by its own log."""
+    scenario = ambiguous(fdi={"probing": {}})
+    document = separate(scenario)
+    folder = write(document, scenario, tmp_path)
+    flown = [place for place, pair in enumerate(document["pairs"]) if "left" in pair]
+    assert [int(one.name) for one in sorted((folder / "flown").iterdir())] == flown
+    for place in flown:
+        own, pair = folder / "flown" / str(place), document["pairs"][place]
+        proof, table = json.loads((own / "certificate.json").read_text()), read_table(own / "log.parquet")
+        log = {name: table[name].to_numpy() for name in table.column_names}
+        assert [*failures(proof, log, (own / "scenario.yaml").read_text())] == []
+        said = {one["what"] for one in proof["statements"]}
+        gone = [one for one in pair["candidates"] if one not in pair["left"]]
+        assert gone
+        assert {f"{one['surface']} {one['type']}" for one in gone} <= said
+
+
+@pytest.mark.parametrize("substeps", [1, 3])
+def test_what_is_proposed_tells_apart_when_it_is_flown(substeps):
+    document = separate(ambiguous(fdi={"probing": {}}, substeps=substeps))
+    told = [pair for pair in document["pairs"] if pair["separates"]]
+    assert told
+    assert document["passed"]
+    for pair in told:
+        assert [one["type"] for one in pair["left"]] in ([], ["stuck"])
+
+
+def test_it_takes_what_the_two_intervals_ask_for():
+    """Jammed at 2 deg, or a loss of all: apart by 2 deg wherever it is commanded."""
+    jam, floating = Candidate(1, STUCK, 0.03, 0.031), Candidate(1, FLOAT, 0.0, 0.0)
+    assert tell_apart(jam, floating, PLAIN, NAMES)["separates"]
+    room = 2 * 1.1 * 0.02 / 8.0
+    near = replace(jam, low=0.9 * room, high=0.95 * room)
+    pair = tell_apart(near, floating, PLAIN, NAMES)
+    assert not pair["separates"]
+    assert pair["needs"]["elevator"]["at_least_deg"] == pytest.approx(np.degrees(room))
+    biased = Candidate(1, BIAS, 1.2 * room, 1.25 * room)
+    pair = tell_apart(near, biased, PLAIN, NAMES)
+    assert pair["separates"]  # one of them follows the command: from 1.25 - 1.35 to less than 0.9 - 1
+    assert pair["amplitude_deg"] == pytest.approx(np.degrees(1.35 * room), abs=0.06)
+    assert not tell_apart(near, replace(biased, low=0.9 * room), PLAIN, NAMES)["separates"]  # as health is
+
+
+def test_surfaces_that_act_along_one_direction_cannot_be_told_apart_by_a_frame():
+    pair = tell_apart(Candidate(1, STUCK, 0.1, 0.11), Candidate(3, STUCK, 0.2, 0.22), PLAIN, NAMES)
+    assert not pair["separates"]
+    assert "another direction" in pair["because"]
+
+
+def test_surfaces_that_act_along_two_directions_can():
+    pair = tell_apart(
+        Candidate(0, CONSTANT_LOSS, -0.6, -0.5), Candidate(2, CONSTANT_LOSS, -0.9, -0.8), PLAIN, NAMES
+    )
+    assert pair["separates"]
+    assert set(pair["commands_rad"]) == {"aileron", "rudder"}
+
+
+@settings(max_examples=samples(25), deadline=None)
+@given(st.floats(-0.2, 0.2), st.sampled_from([1, 2, 4]), st.floats(0.3, 1.0), st.floats(0.005, 0.1))
+def test_a_doublet_is_there_and_back_within_every_limit(target, instants, approach, step):
+    at = replace(PLAIN, instants=instants, approach=np.full(4, approach), step=np.full(4, step))
+    found = doublet({0: target}, at)
+    if found is None:
+        return
+    commands, tells = found
+    p, last, rates, seen = 0.0, 0.0, np.zeros(3), []
+    for command in commands[:, 0]:
+        mean = 0.0
+        for instant in range(instants):
+            if instants == 1 or instant:
+                p += approach * (command - p)
+            mean += p / instants
+        if instants > 1:
+            p += approach * (command - p)
+        assert abs(mean - last) <= step * instants + 1e-7
+        last = mean
+        rates = rates + at.dt * at.G[:, 0] * mean
+        assert (abs(rates) <= at.rate + 1e-7).all()
+        seen.append(mean)
+    assert abs(rates) == pytest.approx(0.0, abs=1e-6)
+    assert (abs(commands) <= 0.3 + 1e-7).all()
+    there = np.array(seen[tells - at.held : tells]) * np.sign(target)
+    assert (there >= abs(target) - 1e-7).all()
+
+
+def test_where_frames_are_examined_in_blocks_no_frame_tells_types_apart():
+    both = Candidate(0, STUCK, 0.1, 0.11), Candidate(0, BIAS, 0.1, 0.11)
+    assert tell_apart(*both, PLAIN, NAMES)["separates"]
+    assert "blocks of frames" in tell_apart(*both, replace(PLAIN, in_blocks=True), NAMES)["because"]
+
+
+def test_where_a_surface_already_tells_it_is_held():
+    """A jam at neutral and a bias differ by 0.15 rad where the surface is: between two deflections tried."""
+    there = replace(PLAIN, u=np.array([0.0, -0.2001, 0.0, 0.0]))
+    found = tell_apart(Candidate(1, STUCK, 0.0, 0.0), Candidate(1, BIAS, 0.05, 0.06), there, NAMES)
+    assert found["amplitude_deg"] == pytest.approx(0.0, abs=1e-9)
+    assert np.array(found["commands_rad"]["elevator"]) == pytest.approx(-0.2001, abs=1e-12)
+    kinds = [{"surface": "elevator", "type": kind} for kind in ("stuck", "bias")]
+    document = {"scenario": "mine", "time_s": 1.0, "assumes": "it stays", "not_constant": []}
+    text = as_text(document | {"pairs": [found | {"candidates": kinds}]})
+    assert "elevator stuck or elevator bias: elevator held as now, told after 0.03 s" in text
+
+
+def test_a_limit_on_the_rates_can_leave_none():
+    pair = tell_apart(
+        Candidate(0, STUCK, 0.1, 0.11), Candidate(0, BIAS, 0.1, 0.11), replace(PLAIN, rate=1e-4), NAMES
+    )
+    assert not pair["separates"]
+    assert "keeps the rates below" in pair["because"]
+
+
+@pytest.mark.parametrize(
+    ("scenario", "says"),
+    [
+        ({"faults": []}, "no alarm was raised"),
+        ({"fdi": {"fault_class": "published"}}, "one candidate or none is left"),
+        ({"fdi": {"scheme": "none"}}, "'none' states no bounds"),
+        ({"fdi": {"pairs": True}}, "fdi.pairs: two faults"),
+        ({"duration_s": 1.07}, "the flight ends with its alarm"),
+    ],
+)
+def test_what_cannot_be_asked_is_refused_in_a_line(scenario, says):
+    with pytest.raises(bf.BadInput, match=says):
+        separate(ambiguous(**scenario))
+
+
+def test_by_the_command_line(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("open.yaml").write_text(json.dumps(ambiguous().model_dump(mode="json", exclude_none=True)))
+    monkeypatch.setattr(sys, "argv", ["beaver-ftc", "separate", "open.yaml", "--format", "json"])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert not ended.value.code
+    answered = json.loads(capsys.readouterr().out)
+    written = json.loads(Path("runs/open-separation/separation.json").read_text())
+    assert answered == written | {"folder": "runs/open-separation"}
+    assert "aileron" in as_text(written)
+
+
+@settings(max_examples=samples(15), deadline=None)
+@given(
+    st.sampled_from([1, 2, 3]), st.floats(0.05, 1.0), st.lists(st.floats(-0.3, 0.3), min_size=1, max_size=6)
+)
+def test_what_a_surface_has_left_of_its_way(instants, approach, commands):
+    """Instant by instant, against what the linear programme takes of a frame."""
+    from beaver_ftc_assurance.separation import _left_behind
+
+    at = replace(PLAIN, instants=instants, approach=np.full(4, approach))
+    left, mean_left = _left_behind(at, 0)
+    p = end = 0.0
+    for command in commands:
+        seen = []
+        for _ in range(instants):
+            if instants == 1:
+                p += approach * (command - p)
+            seen.append(p)
+            if instants > 1:
+                p += approach * (command - p)
+        assert (1 - mean_left) * command + mean_left * end == pytest.approx(np.mean(seen), abs=1e-12)
+        end = (1 - left) * command + left * end
+        assert end == pytest.approx(p, abs=1e-12)
+
+
+def flown_by_hand(command, at):
+    """Mean deflection of surface 0 in each frame, and the rates after it."""
+    p, moved = 0.0, []
+    for c in command:
+        seen = []
+        for instant in range(at.instants):
+            if at.instants == 1 or instant:
+                p += at.approach[0] * (c - p)
+            seen.append(p)
+        if at.instants > 1:
+            p += at.approach[0] * (c - p)
+        moved.append(np.mean(seen))
+    return np.array(moved), at.dt * np.outer(at.G[:, 0], np.cumsum(moved))
+
+
+@settings(max_examples=samples(12), deadline=None)
+@given(
+    st.floats(0.02, 0.25),
+    st.sampled_from([1, 2]),
+    st.floats(0.1, 1.0),
+    st.floats(0.02, 0.1),
+    st.floats(5, 20),
+)
+def test_the_amplitude_is_that_of_the_programme_without_states(target, instants, approach, step, rate):
+    """The same limits as full matrices of the commands alone, from impulses flown by hand."""
+    at = replace(
+        PLAIN, instants=instants, approach=np.full(4, approach), step=np.full(4, step), rate=radians(rate)
+    )
+    found = doublet({0: target}, at)
+    tells = [t for t in (1, 4, 16) if found is None or t <= found[1] - at.held + 1]
+    least = [by_impulses(target, at, t) for t in tells]
+    assert least[:-1] == [None] * (len(least) - 1)
+    if found is None:
+        assert least[-1] is None
+    else:
+        assert abs(found[0]).max() == pytest.approx(least[-1], rel=1e-6)
+
+
+def by_impulses(target, at, tells):
+    frames = 2 * (tells + at.held - 1)
+    pulses = [flown_by_hand(row, at) for row in np.eye(frames)]
+    moved, rates = (np.moveaxis(np.array(each), 0, -1) for each in zip(*pulses, strict=True))
+    pitch, there = at.dt * np.cumsum(rates[1], axis=0), slice(tells - 1, tells + at.held - 1)
+    pace = np.diff(moved, axis=0, prepend=0.0)
+    parts = [(-moved[there], -target), (pace, at.step[0] * at.instants), (-pace, at.step[0] * at.instants)]
+    parts += [(sign * each, at.rate) for each in rates for sign in (1, -1)]
+    parts += [(pitch, at.alpha_range[1] - at.alpha), (-pitch, at.alpha - at.alpha_range[0])]
+    rows = [np.hstack([part, np.zeros((len(part), 1))]) for part, _ in parts]
+    rows += [np.hstack([sign * np.eye(frames), -np.ones((frames, 1))]) for sign in (1, -1)]
+    most = np.concatenate([*(np.full(len(part), limit) for part, limit in parts), np.zeros(2 * frames)])
+    same = np.vstack([rates[[0, 2], -1], np.diff(np.eye(frames)[there], axis=0)])
+    same = np.hstack([same, np.zeros((len(same), 1))])
+    found = linprog(
+        np.r_[np.zeros(frames), 1.0], np.vstack(rows), most, same, np.zeros(len(same)),
+        [(-0.3, 0.3)] * frames + [(0, None)],
+    )  # fmt: skip
+    return found.x[-1] if found.status == 0 else None
+
+
+def test_where_the_flight_ends_is_what_its_record_says_of_the_frame_just_flown():
+    """Of a record every number of which is another: of the bound, what the rates add to it, and the errors of
+    two readings a frame apart."""
+    record = bf.Simulation(ambiguous(substeps=2))._loop.frames
+    frame = fill(record.copy()[0], seed=1)
+    frame["fdi"]["bound"]["admitted"]["any"], frame["fdi"]["types"]["config"]["length"] = 1, 1
+    bound, design, means = frame["fdi"]["bound"], frame["belief"]["design"], frame["belief"]["means"]
+    x, y, actuators = frame["measured"]["x"], frame["measured"]["y"], frame["belief"]["actuators"]
+    apart(eta_bar=bound["eta_bar"], noise=bound["noise"], inertia=bound["inertia"], G=means["G"], x=x)
+    at = situation_of(SimpleNamespace(last=frame), ambiguous(substeps=2), 0.3)
+    coupling = np.array([abs(design[name]) for name in ("Pqr", "Qpr", "Rpq")])
+    turning = bound["inertia"] * coupling * 0.3**2
+    assert at.bound == pytest.approx(1.1 * (bound["eta_bar"] + turning + 2.0 * bound["noise"] * 100.0))
+    for found, expected in (
+        (at.G, means["G"]), (at.u, frame["belief"]["u"]), (at.x, x), (at.alpha, y[0]),
+        (at.stops, [actuators["low"], actuators["high"]]), (at.step, actuators["step"]),
+        (at.approach, actuators["approach"]), (at.alpha_range, (-0.1, 0.28)),
+    ):  # fmt: skip
+        assert found == pytest.approx(np.array(expected))
+    assert (at.instants, at.held, at.in_blocks, at.dt, at.rate) == (2, 3, False, 0.01, 0.3)

@@ -1,0 +1,50 @@
+"""The environment's name is known once both packages are imported, in either order."""
+
+import subprocess
+import sys
+
+import pytest
+
+pytest.importorskip("gymnasium")
+
+NAME = "beaver_ftc/Beaver-v0"
+
+
+@pytest.mark.parametrize("imports", ["beaver_ftc, gymnasium", "gymnasium, beaver_ftc"])
+def test_the_name_is_registered_in_either_order_of_imports(imports):
+    script = (
+        f"import {imports}\n"
+        f"spec = gymnasium.spec('{NAME}')\n"
+        "print(spec.entry_point, spec.vector_entry_point)\n"
+    )
+    shown = subprocess.run(
+        [sys.executable, "-W", "error", "-c", script], capture_output=True, text=True, check=False
+    )
+    assert shown.stderr == ""
+    ours = "beaver_ftc_links.gym:Beaver"
+    assert shown.stdout.split() == [f"{ours}Env", f"{ours}VectorEnv"]
+
+
+def test_without_gymnasium_nothing_is_imported_for_it():
+    script = "import sys, beaver_ftc; print([m for m in sys.modules if m.startswith('gymnasium')])"
+    shown = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert shown.stdout.strip() == "[]"
+
+
+def test_it_is_made_by_its_name_once_the_package_is_imported(tmp_path):
+    script = (
+        "import beaver_ftc, gymnasium, numpy as np\n"
+        "if __name__ == '__main__':\n"
+        f"    one = gymnasium.make('{NAME}')\n"
+        f"    two = gymnasium.make_vec('{NAME}', num_envs=2)\n"
+        "    seen = one.reset(seed=3)[0], *two.reset(seed=np.int64(3))[0]\n"
+        "    print(type(two).__name__, [each.shape for each in seen], np.array_equal(seen[0], seen[1]))\n"
+        "    one.step(np.zeros(one.action_space.shape)), two.step(np.zeros(two.action_space.shape))\n"
+        "    one.close(), two.close()\n"
+    )
+    (tmp_path / "made.py").write_text(script)
+    shown = subprocess.run(
+        [sys.executable, "-W", "error", tmp_path / "made.py"], capture_output=True, text=True, check=False
+    )
+    assert shown.stdout == "BeaverVectorEnv [(16,), (16,), (16,)] True\n", shown.stderr
+    assert shown.returncode == 0

@@ -1,0 +1,118 @@
+"""ArduPilot's packets and answers: both forms, and the reader on the other side, in Python and in C."""
+
+import json
+import re
+import shutil
+import struct
+import subprocess
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tools.autopilots.reader import Unreadable, read
+
+from beaver_ftc_links.sitl.ardupilot import decoded, encoded
+from beaver_ftc_links.sitl.vehicle import Instant
+
+PAGE = Path(__file__).parents[4] / "docs/autopilots.md"
+COMPILER = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
+NUMBER = st.floats(-1e6, 1e6)
+THREE = st.tuples(NUMBER, NUMBER, NUMBER)
+INSTANTS = st.builds(
+    Instant, st.floats(0, 1e6), THREE, THREE, THREE, NUMBER, NUMBER, NUMBER, NUMBER, THREE, THREE,
+    NUMBER, NUMBER, NUMBER, THREE,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("magic", "channels"), [(18458, 16), (29569, 32)])
+def test_both_forms_of_a_packet(magic, channels):
+    pulses = tuple(range(1000, 1000 + channels))
+    datagram = struct.pack(f"<HHI{channels}H", magic, 400, 70_000, *pulses)
+    assert len(datagram) == 8 + 2 * channels
+    assert decoded(datagram) == (400, 70_000, pulses)
+
+
+@given(st.binary(max_size=120))
+def test_what_is_no_packet_is_none(noise):
+    known = {18458: 40, 29569: 72}
+    is_one = len(noise) > 8 and known.get(struct.unpack_from("<H", noise)[0]) == len(noise)
+    assert (decoded(noise) is not None) == is_one
+
+
+@pytest.mark.parametrize(
+    "wrong", [(18459, 16, 0), (18458, 32, 0), (29569, 16, 0), (18458, 16, 1), (18458, 16, -1)]
+)
+def test_wrong_magic_and_wrong_length(wrong):
+    magic, channels, more = wrong
+    datagram = struct.pack(f"<HHI{channels}H", magic, 400, 1, *range(channels)) + b"x"
+    assert decoded(datagram[: len(datagram) - 1 + more]) is None
+
+
+@given(INSTANTS)
+def test_the_reader_of_the_protocol_reads_what_was_meant(now):
+    values = read(encoded(now))
+    meant = {
+        "timestamp": (now.t_s,), "imu/gyro": now.gyro, "imu/accel_body": now.force, "position": now.position,
+        "attitude": now.attitude, "velocity": now.velocity, "rng_1": (-now.position[2],),
+        "windvane/direction": (now.beta_rad,), "windvane/speed": (now.airspeed_mps,),
+        "airspeed": (now.airspeed_mps,),
+    }  # fmt: skip
+    assert values == meant
+
+
+def test_an_answer_is_one_line_between_newlines():
+    answer = encoded(INSTANT)
+    assert answer[:1] == answer[-1:] == b"\n"
+    assert answer.count(b"\n") == 2
+    assert b" " not in answer
+    assert len(answer) < 1400  # a datagram that no network cuts
+
+
+def test_the_page_has_the_packet_and_every_key_of_the_answer():
+    page = PAGE.read_text(encoding="utf-8")
+    packed = re.search(r"`(struct\.pack\(.*?\))`", page)[1]
+    datagram = eval(packed, {"struct": struct}, {"frame": 7, "pulses": range(1100, 1116)})
+    assert decoded(datagram) == (400, 7, tuple(range(1100, 1116)))
+    rows = page.partition("|`timestamp`|")[1] + page.partition("|`timestamp`|")[2].partition("\n\n")[0]
+    answered = {
+        f"{key}.{below}" if isinstance(of, dict) else key
+        for key, of in json.loads(encoded(INSTANT)).items()
+        for below in (of if isinstance(of, dict) else [""])
+    }
+    said = [name for row in rows.splitlines() for name in re.findall(r"`(.*?)`", row.split("|")[1])]
+    whole = {f"windvane{name}" if name.startswith(".") else name for name in said}
+    assert whole == answered
+
+
+def test_the_reader_takes_the_last_whole_line():
+    one, other = encoded(INSTANT), encoded(INSTANT._replace(t_s=2.0))
+    assert read(one + other)["timestamp"] == (2.0,)
+
+
+@pytest.mark.parametrize("broken", ['"gyro": [', '"gyro":[nan', '"gyr":[', '"attitud":['])
+def test_the_reader_stops_at_what_it_cannot_read(broken):
+    """The twin has the quirks: a blank behind the colon, a key that is not there."""
+    key = '"attitude":[' if "att" in broken else '"gyro":['
+    answer = encoded(INSTANT).replace(key.encode(), broken.encode())
+    with pytest.raises(Unreadable):
+        read(answer)
+
+
+INSTANT = Instant(
+    1.0, (0.1, -0.25, 1e-9), (0.5, -0.0, -9.80665), (0.01, 0.2, 6.2), 45.5, -0.01, 1040.0, 1829.0,
+    (10.0, -3.0, -1829.0), (44.0, 1.0, -0.5), 45.0, 1e-7, 1829.0, (0.0, 0.1, 0.2),
+)  # fmt: skip
+
+
+@pytest.mark.skipif(COMPILER is None, reason="there is no C compiler; its twin in Python is tried above")
+def test_strstr_and_sscanf_read_what_the_twin_reads(tmp_path):
+    source = Path(__file__).parents[4] / "tools" / "autopilots" / "reader.c"
+    program = tmp_path / "reader"
+    subprocess.run([COMPILER, "-O1", "-Wall", "-Werror", "-o", program, source], check=True)
+    answer = encoded(INSTANT._replace(t_s=0.5)) + encoded(INSTANT)
+    printed = subprocess.run([program], input=answer, capture_output=True, check=True).stdout.decode()
+    lines = (line.split() for line in printed.splitlines())
+    assert {key: tuple(map(float, values)) for key, *values in lines} == read(answer)
+    lacking = answer.replace(b'"velocity"', b'"speed"')
+    assert subprocess.run([program], input=lacking, capture_output=True, check=False).returncode == 1

@@ -1,0 +1,244 @@
+"""The flight under an autopilot: as in process, at any rate of packets, its faults and its instant."""
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tools.autopilots import peers
+from tools.autopilots.small import Small
+
+import beaver_ftc as bf
+from beaver_ftc.design.atmosphere import standard_air
+from beaver_ftc.diagnosis.rivals.rls import RlsMonitor
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc_links.sitl.ardupilot import Ardupilot
+from beaver_ftc_links.sitl.link import Link
+from beaver_ftc_links.sitl.px4 import quaternion, rotation
+from beaver_ftc_links.sitl.vehicle import Flown, Vehicle, at_rate, without_reference
+
+NO_PULSE = 0
+
+
+def scenario(**keys):
+    """Level, as published otherwise; 1.5 s."""
+    base = bf.load("elevator-partial-loss")
+    keys = {"faults": [], "reference": {}, "expect": {}, "duration_s": 1.5, "control.law": "nominal", **keys}
+    return base.with_(keys)
+
+
+def flown_by(vehicle, packets):
+    """The log of a flight driven by datagrams."""
+    end = Ardupilot(vehicle, Link())
+    for datagram in packets:
+        assert end.take(datagram, "it", 0.0) is not None
+    return vehicle.flight.land().log
+
+
+def recorded(frames, rate_hz, seed=3):
+    """Datagrams, and the pulses in them."""
+    rng = np.random.default_rng(seed)
+    pulses = rng.integers(1400, 1600, (frames, 4))
+    pulses[:, 2] = NO_PULSE  # of the throttle: the engine stays as it is
+    return [peers.packet(k, rate_hz, row.tolist()) for k, row in enumerate(pulses)], pulses
+
+
+def commands(pulses, trim_rad):
+    """What the Beaver's surfaces make of them, by hand: full output is the stop."""
+    share = (pulses - 1500) / 500
+    aileron, elevator, rudder = -share[:, 0] * 0.52, -share[:, 1] * 0.49, -share[:, 3] * 0.44
+    return np.column_stack([aileron, elevator, rudder, np.full(len(pulses), trim_rad[3])])
+
+
+@pytest.mark.parametrize("noisy", [False, True])
+def test_recorded_packets_fly_what_the_same_commands_fly_in_process(noisy):
+    """To the bit; with a fault of a surface and one of an instrument, turbulence, sensors and servos."""
+    keys = {
+        "faults": [
+            {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4, "at_s": 0.5},
+            {"type": "bias", "sensor": "p", "magnitude": 2.0, "at_s": 0.8},
+        ]
+    }
+    if noisy:
+        keys |= {
+            "sensors": "tactical-grade", "actuators": "servo", "fdi.bounds.sensors": "tactical-grade",
+            "environment": {"turbulence": "dryden", "severity": "light"},
+        }  # fmt: skip
+    packets, pulses = recorded(149, 100)
+    log = flown_by(Vehicle(scenario(**keys), pulses=True), packets)
+    sim = bf.Simulation(scenario(**keys))
+    for command in commands(pulses, sim.trim_rad):
+        sim.step(command)
+    assert log.columns.tolist() == list(sim.columns)
+    assert len(log) == 150
+    assert np.array_equal(log.to_numpy(), sim.log.to_numpy(), equal_nan=True)
+    assert log["detected"].iloc[-1] == 1
+
+
+@pytest.mark.parametrize("packets_hz", [50, 400, 1200])
+def test_the_flight_follows_the_rate_of_the_packets(packets_hz):
+    """At most 400 frames of the diagnosis a second: of faster packets the first in each counts."""
+    loss = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4, "at_s": 0.2}
+    air = {"duration_s": 1.0, "environment": {"turbulence": "dryden", "severity": "light"}, "faults": [loss]}
+    packets, pulses = recorded(round(0.5 * packets_hz), packets_hz)
+    vehicle = Vehicle(scenario(**air), pulses=True)
+    log = flown_by(vehicle, packets)
+    frames_hz = min(packets_hz, 400)
+    each = packets_hz // frames_hz
+    assert vehicle.scenario.rate_hz == frames_hz
+    assert vehicle.instant().t_s == pytest.approx(0.5)
+    sim = bf.Simulation(scenario(**air, rate_hz=frames_hz, substeps=each))
+    for command in commands(pulses[::each], sim.trim_rad):
+        sim.step(command)
+    assert np.array_equal(log.to_numpy(), sim.log.to_numpy(), equal_nan=True)
+
+
+def test_a_plug_in_sees_whole_frames_however_they_are_flown():
+    flown = at_rate(scenario(duration_s=0.5), 100).with_({"substeps": 4})
+    whole, parts = (Flown(flown, detector=RlsMonitor()) for _ in range(2))
+    for k in range(40):
+        command = whole.trim_rad + 0.01 * np.sin(k)
+        whole.pilot(4, command, None)
+        for runs in (1, 2, 1):
+            parts.pilot(runs, command, None)
+    assert np.array_equal(whole.log.to_numpy(), parts.log.to_numpy(), equal_nan=True)
+
+
+def test_the_example_finds_its_fault_under_the_small_autopilot():
+    """`examples/autopilot`, sooner."""
+    file = Path(__file__).parents[4] / "examples" / "autopilot" / "under-an-autopilot.yaml"
+    base = bf.load(file).with_({"duration_s": 9, "faults[0].at_s": 6})
+    assert base.warnings() == ()
+    vehicle = Vehicle(base, pulses=True, log=False)
+    end, autopilot = Ardupilot(vehicle, Link()), peers.Ardupilot(Small().outputs, 100)
+    while not vehicle.over:
+        autopilot.hear(end.take(autopilot.next(), "it", 0.0))
+    flight = vehicle.flight.land()
+    assert flight.passed, flight
+
+
+def test_packets_inside_a_frame_see_the_truth_move():
+    vehicle = Vehicle(scenario(), pulses=True)
+    vehicle.begin(1200)
+    seen = []
+    for _ in range(12):
+        vehicle.fly([2000, 1500, 0, 1500], 1200)
+        seen.append(vehicle.instant())
+    times = [now.t_s for now in seen]
+    assert times == pytest.approx([k / 1200 for k in range(1, 13)])
+    rolling = [now.gyro[0] for now in seen]
+    assert all(later > earlier for earlier, later in pairwise(rolling[2:]))
+
+
+def test_another_rate_in_flight_is_followed_where_it_is_whole_and_counted_where_not():
+    vehicle = Vehicle(scenario(), pulses=True)
+    vehicle.begin(100)
+    for rate_hz, t_s in ((100, 0.01), (50, 0.03), (101, 0.04), (0, 0.05), (25, 0.09)):
+        vehicle.fly([0] * 16, rate_hz)
+        assert vehicle.instant().t_s == pytest.approx(t_s)
+    assert vehicle.off_rate == 2
+
+
+def test_a_rate_that_is_said_counts_whatever_the_packets_say():
+    vehicle = Vehicle(scenario(), pulses=True, rate_hz=200)
+    vehicle.begin(1200)
+    vehicle.fly([0] * 16, 1200)
+    assert vehicle.instant().t_s == pytest.approx(0.005)
+    assert vehicle.off_rate == 1
+
+
+@pytest.mark.parametrize("packets_hz", [10, 5000])
+def test_rates_that_cannot_be_flown(packets_hz):
+    with pytest.raises(BadInput, match=f"at {packets_hz} Hz, allowed: 20 to 4000 Hz, or --rate"):
+        at_rate(scenario(), packets_hz)
+
+
+def test_a_flight_begun_anew_is_the_first_one_again():
+    packets, _ = recorded(60, 100)
+    vehicle = Vehicle(scenario(), pulses=True)
+    first = flown_by(vehicle, packets)
+    second = flown_by(vehicle, packets)
+    assert np.array_equal(first.to_numpy(), second.to_numpy(), equal_nan=True)
+
+
+def test_the_law_flies_until_the_autopilot_may():
+    vehicle = Vehicle(scenario(), pulses=True, hold_s=0.2)
+    vehicle.begin(100)
+    for _ in range(60):
+        vehicle.fly([2000, 1500, 0, 1500], 100)
+    log = vehicle.flight.land().log
+    own = log["t_s"] < 0.2 + 1e-9  # the command computed at 0.2 s is in force from the next frame on
+    assert (log["aileron_cmd_rad"][own] > -0.5).all()
+    assert (log["aileron_cmd_rad"][~own & (log["t_s"] < 0.58)] == -0.52).all()
+
+
+def test_the_throttle_moves_the_engine():
+    given = {}
+    for pulse in (1000, 2000):
+        vehicle = Vehicle(scenario(), pulses=True)
+        for _ in range(100):
+            vehicle.fly([1500, 1500, pulse, 1500], 100)
+        given[pulse] = vehicle.flight.read("engine/manifold-pressure-inhg"), vehicle.instant().airspeed_mps
+    assert [setting for setting, _ in given.values()] == [10.0, 36.5]
+    assert given[2000][1] > given[1000][1] + 1.0
+
+
+def test_what_the_autopilot_is_told_is_one_motion():
+    """In a flight that banks and climbs: position, velocity, attitude, rates and specific force agree."""
+    vehicle = Vehicle(scenario(duration_s=6.0), pulses=True, rate_hz=200, ground_m=100.0)
+    end, autopilot = Ardupilot(vehicle, Link()), peers.Ardupilot(Small().outputs, 200)
+    seen = []
+    while not vehicle.over:
+        autopilot.hear(end.take(autopilot.next(), "it", 0.0))
+        seen.append(vehicle.instant())
+    t, position, velocity, rates, attitude, force = (
+        np.array([getattr(now, name) for now in seen[1:]])
+        for name in ("t_s", "position", "velocity", "gyro", "attitude", "force")
+    )
+    assert position[0, 2] == pytest.approx(100.0 - 1828.8, abs=0.1)
+    moved = np.gradient(position, t, axis=0)[2:-2]
+    assert np.allclose(moved, velocity[2:-2], atol=0.1)
+    turned = np.gradient(np.unwrap(attitude[:, 0]), t)[2:-2]
+    phi, theta = attitude[2:-2, 0], attitude[2:-2, 1]
+    p, q, r = rates[2:-2].T
+    assert np.allclose(turned, p + np.tan(theta) * (q * np.sin(phi) + r * np.cos(phi)), atol=2e-3)
+    down = np.array([rotation(*angles).T @ f for angles, f in zip(attitude, force, strict=True)])
+    felt = np.gradient(velocity, t, axis=0)[2:-2] - [0.0, 0.0, 9.806]
+    assert np.allclose(felt, down[2:-2], atol=0.06)  # the Earth turns, and is round
+
+
+def test_a_broken_gyro_breaks_what_the_autopilot_is_told():
+    fault = {"type": "bias", "sensor": "q", "magnitude": 3.0, "at_s": 0.0}
+    told = {}
+    for name, faults in (("sound", []), ("broken", [fault])):
+        vehicle = Vehicle(scenario(faults=faults), pulses=True)
+        vehicle.fly([0] * 16, 100)
+        told[name] = vehicle.instant().gyro
+    assert np.subtract(told["broken"], told["sound"]) == pytest.approx([0, np.radians(3), 0], abs=1e-12)
+
+
+def test_what_only_our_law_can_be_asked_for_is_left_out():
+    base = bf.load("elevator-partial-loss")
+    left, said = without_reference(base)
+    assert said == ["expect.post_fault_rms_deg_s is left out: the reference is the autopilot's own"]
+    assert left.expect.post_fault_rms_deg_s is None
+    assert left.expect.isolated_as == "elevator"
+    with pytest.raises(BadInput, match="changes: there are none under an autopilot, allowed: faults"):
+        without_reference(base.with_({"changes": [{"at_s": 5, "law": "lqr"}]}))
+
+
+def test_quaternions_and_the_standard_air():
+    """The rotation by the quaternion is that of the angles; pressures are the tables' [ISA]."""
+    angles = 0.3, -0.4, 2.0
+    w, x, y, z = quaternion(*angles)
+    to_earth = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+    assert np.allclose(rotation(*angles).T, to_earth)
+    pressures = [standard_air(altitude_m) for altitude_m in (0, 1000, 5000, 11000, 15000)]
+    table = [(1013.25, 15.0), (898.75, 8.5), (540.20, -17.5), (226.32, -56.5), (120.45, -56.5)]
+    assert pressures == [pytest.approx(row, rel=2e-4) for row in table]

@@ -1,0 +1,255 @@
+"""Both protocols in lockstep: what is flown once, answered again, ignored; and when a flight begins anew."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tools.autopilots import peers, trial
+from tools.autopilots.reader import read
+
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc_links.sitl.ardupilot import Ardupilot, Packet
+from beaver_ftc_links.sitl.link import Link
+from beaver_ftc_links.sitl.mavlink import Mavlink
+from beaver_ftc_links.sitl.px4 import Px4, gps, quaternion, sensor, state
+from beaver_ftc_links.sitl.vehicle import Instant
+from samples import samples
+from telling import apart
+
+ZERO = (0.0, 0.0, 0.0)
+
+
+class Stub:
+    """A body without a flight: it counts. refuses: rates it cannot be flown at."""
+
+    def __init__(self, rate_hz=400.0):
+        self.packets_hz, self.frames, self.begun, self.given = rate_hz, 0, 0, []
+        self.over = False
+
+    def begin(self, packets_hz, channels=16):
+        if packets_hz < 20:
+            raise BadInput(f"{packets_hz} Hz, allowed: 20 to 4000")
+        self.packets_hz, self.frames, self.begun = packets_hz, 0, self.begun + 1
+
+    def fly(self, outputs, frame_hz, in_charge=True):
+        self.frames += 1
+        self.given.append((tuple(outputs), frame_hz, in_charge))
+
+    def instant(self):
+        t_s = self.frames / self.packets_hz
+        return Instant(t_s, ZERO, ZERO, ZERO, 45.0, 0.0, 1e3, 1e3, ZERO, ZERO, 45.0, 0.0, 1e3, ZERO)
+
+
+@pytest.fixture
+def ardupilot():
+    body, link = Stub(), Link()
+    end = Ardupilot(body, link)
+
+    def take(number, peer="it", now_s=0.0, rate_hz=400, channels=16):
+        answer = end.take(peers.packet(number, rate_hz, [1500] * 4, channels), peer, now_s)
+        return None if answer is None else read(answer)["timestamp"][0]
+
+    return SimpleNamespace(body=body, counts=link.counts, take=take, end=end, link=link)
+
+
+def test_each_packet_is_answered_with_its_frame(ardupilot):
+    assert [ardupilot.take(k) for k in range(4)] == [0.0025, 0.005, 0.0075, 0.01]
+    assert ardupilot.take(4, channels=32) == 0.0125
+    assert ardupilot.body.begun == 1
+
+
+def test_a_packet_sent_again_is_answered_again_and_not_flown(ardupilot):
+    once = [ardupilot.take(k) for k in (0, 1, 1, 1, 2)]
+    assert once == [0.0025, 0.005, 0.005, 0.005, 0.0075]
+    assert (ardupilot.body.frames, ardupilot.counts["repeated"]) == (3, 2)
+
+
+def test_a_packet_that_was_overtaken_is_late(ardupilot):
+    for k in range(10):
+        ardupilot.take(k)
+    assert ardupilot.take(6) is None
+    assert ardupilot.take(10) == pytest.approx(11 / 400)
+    assert (ardupilot.counts["late"], ardupilot.counts["resets"]) == (1, 0)
+
+
+@pytest.mark.parametrize("flown", [5, 500])
+def test_a_count_begun_anew_begins_the_flight_anew(ardupilot, flown):
+    """Long after at once; soon after with the second packet, since a late one would look the same."""
+    for k in range(flown):
+        ardupilot.take(k)
+    answers = [ardupilot.take(0), ardupilot.take(0)]
+    assert answers[-1] == 0.0025
+    assert (ardupilot.body.begun, ardupilot.counts["resets"]) == (2, 1)
+
+
+def test_frames_that_never_came_are_counted(ardupilot):
+    ardupilot.take(0)
+    assert ardupilot.take(4) == 0.005
+    assert ardupilot.counts["missed"] == 3
+
+
+def test_only_the_first_peer_flies_until_it_has_gone(ardupilot):
+    for k in range(3):
+        ardupilot.take(k, now_s=0.1 * k)
+    assert ardupilot.take(3, "other", 0.3) is None
+    assert ardupilot.take(0, "other", 0.3) is None
+    assert ardupilot.take(7, "other", 9.0) is None  # it has not begun anew
+    assert ardupilot.take(0, "other", 9.1) == 0.0025
+    assert ardupilot.take(3, "it", 9.2) is None
+    assert (ardupilot.counts["strangers"], ardupilot.counts["resets"]) == (4, 1)
+
+
+def test_a_rate_that_cannot_be_flown_is_complained_of(ardupilot):
+    assert ardupilot.take(0, rate_hz=10) is None
+    assert ardupilot.end.complaint == "10 Hz, allowed: 20 to 4000"
+    assert ardupilot.take(0, rate_hz=50) == 0.02
+    assert ardupilot.counts["resets"] == 0
+
+
+def test_a_flight_that_is_over_answers_nothing(ardupilot):
+    ardupilot.take(0)
+    ardupilot.body.over = True
+    assert ardupilot.take(1) is None
+
+
+def test_silence_waits(ardupilot):
+    assert [ardupilot.take(k, now_s=t) for k, t in enumerate((0.0, 0.1, 7.3))] == [0.0025, 0.005, 0.0075]
+    assert ardupilot.counts["silences"] == 1
+    assert ardupilot.link.document()["longest_silence_s"] == 7.2
+
+
+@pytest.fixture
+def px4():
+    body, link, mavlink = Stub(250.0), Link(), Mavlink()
+    end = Px4(body, link, mavlink, lambda params: (0, "done"))
+    autopilot = peers.Px4(lambda told: (0.1, 0.2, 0.3, 0.4), silent=0, armed_after=0)
+    return SimpleNamespace(body=body, counts=link.counts, end=end, autopilot=autopilot, link=link)
+
+
+def test_an_answer_of_the_last_stamp_is_flown_once(px4):
+    answer = px4.autopilot.hear(px4.end.connect(0.0))
+    for k in range(5):
+        sent = px4.end.take(answer, 0.004 * k)
+        assert px4.end.take(answer, 0.004 * k) == b""
+        answer = px4.autopilot.hear(sent)
+    assert px4.body.frames == 5
+    assert px4.counts["repeated"] == 5
+    assert px4.autopilot.stamps == [1_000_000 + 4000 * k for k in range(6)]
+    outputs, rate_hz, in_charge = px4.body.given[-1]
+    assert (outputs[:4], rate_hz, in_charge) == (pytest.approx((0.1, 0.2, 0.3, 0.4)), 250.0, True)
+
+
+def test_time_passes_while_it_starts_and_our_law_flies_until_it_is_armed(px4):
+    px4.autopilot._silent, px4.autopilot._armed_after = 3, 2
+    told = px4.autopilot.hear(px4.end.connect(0.0))
+    for k in range(1, 4):
+        assert told == b""
+        assert px4.end.tick(0.004 * k - 0.001, 0.004) == b""
+        told = px4.autopilot.hear(px4.end.tick(0.004 * k, 0.004))
+    for k in range(4):
+        told = px4.autopilot.hear(px4.end.take(told, 0.1 + 0.004 * k))
+    assert [in_charge for _, _, in_charge in px4.body.given] == [False] * 5 + [True] * 2
+    assert px4.counts["frames"] == 4
+
+
+def test_once_it_answers_the_flight_waits_and_says_its_last_again(px4):
+    first = px4.end.connect(0.0)
+    sent = px4.end.take(px4.autopilot.hear(first), 0.0)
+    assert px4.end.tick(0.5, 0.004) == b""
+    again = px4.end.tick(1.2, 0.004)
+    assert again
+    assert sent.endswith(again)
+    assert px4.end.tick(1.5, 0.004) == b""
+    assert px4.body.frames == 1
+
+
+def test_a_new_connection_is_a_new_flight(px4):
+    answer = px4.autopilot.hear(px4.end.connect(0.0))
+    px4.end.take(answer, 0.0)
+    autopilot = peers.Px4(lambda told: (0, 0, 0, 0), silent=0)
+    autopilot.hear(px4.end.connect(5.0))
+    assert (px4.body.begun, px4.counts["resets"], autopilot.stamps) == (1, 1, [1_000_000])
+    assert not px4.end.armed
+
+
+def test_what_a_command_has_done_is_acknowledged(px4):
+    px4.end.connect(0.0)
+    px4.autopilot.hear(px4.end.take(px4.autopilot.inject(102, 2, 2), 0.0))
+    assert px4.autopilot.acks == [(420, 0)]
+    assert px4.end.done == ["done"]
+
+
+@settings(max_examples=samples(8), deadline=None)
+@given(seed=st.integers(0, 10_000))
+@pytest.mark.parametrize("protocol", ["ardupilot", "px4"])
+def test_on_a_bad_line_nothing_is_flown_twice_or_lost(protocol, seed):
+    """`benchmarks/sitl.py lockstep` flies 100,000 frames of each so, with JSBSim behind."""
+    found = getattr(trial, protocol)(Stub(), 600, seed, a_flight=120)
+    assert (found.frames, found.twice, found.lost) == (600, 0, 0)
+    assert len(found.meant) > 3
+
+
+def test_the_bad_line_would_notice():
+    """A body that is shown frames twice, or not at all."""
+    found = trial.Found(meant=[[0, 1, 2]], flown=[[0, 1, 1, 2]])
+    assert (found.twice, found.lost > 0) == (1, True)
+    assert trial.Found(meant=[[0, 1, 2]], flown=[[0, 2]]).lost > 0
+    assert trial.Found(meant=[[0, 1]], flown=[[0, 1]]).lost == 0
+
+
+ALOFT = Instant(
+    12.5, (0.11, -0.23, 0.37), (1.3, -2.9, -9.1), (0.05, 0.21, 6.1), 61.0, -0.04, 1520.0, 3050.0,
+    (410.0, -75.0, -2890.0), (58.0, -13.0, 2.5), 45.0036, -0.00095, 2890.0, (0.07, 0.19, 0.6),
+)  # fmt: skip
+
+
+def test_a_state_is_read_again_as_it_was_at_altitude():
+    """MAVLink's fields by their names and units; at 3000 m an airspeed is indicated as less than it is."""
+    apart(instant=[one for part in ALOFT for one in np.atleast_1d(part) if abs(one) != 2890.0])
+    line = Mavlink()
+    (read_again,) = line.unpack(line.pack(state(line.messages, ALOFT, 4_000_000)))
+    found = read_again.to_dict()
+    g = 9.80665
+    expected = {
+        "time_usec": 4_000_000, "rollspeed": 0.11, "pitchspeed": -0.23, "yawspeed": 0.37,
+        "lat": 450036000, "lon": -9500, "alt": 2_890_000, "vx": 5800, "vy": -1300, "vz": 250,
+        "ind_airspeed": round(100.0 * np.sqrt(2.0 * 1520.0 / 1.225)), "true_airspeed": 6100,
+        "xacc": round(1300 / g), "yacc": round(-2900 / g), "zacc": round(-9100 / g),
+    }  # fmt: skip
+    assert {name: found[name] for name in expected} == pytest.approx(expected)
+    assert found["attitude_quaternion"] == pytest.approx(quaternion(*ALOFT.true_attitude))
+    (fix,) = line.unpack(line.pack(gps(line.messages, ALOFT, 4_000_000)))
+    found = fix.to_dict()
+    course = round(100.0 * np.degrees(np.arctan2(-13.0, 58.0))) % 36000
+    expected = {"lat": 450036000, "lon": -9500, "alt": 2_890_000, "vn": 5800, "ve": -1300, "vd": 250,
+                "vel": round(100.0 * np.hypot(58.0, 13.0)), "cog": course, "fix_type": 3}  # fmt: skip
+    assert {name: found[name] for name in expected} == expected
+    (felt,) = line.unpack(line.pack(sensor(line.messages, ALOFT, 4_000_000, True)))
+    found = felt.to_dict()
+    expected = {"xacc": 1.3, "yacc": -2.9, "zacc": -9.1, "xgyro": 0.11, "ygyro": -0.23, "zgyro": 0.37,
+                "diff_pressure": 15.2, "pressure_alt": 3050.0, "abs_pressure": 696.8}  # fmt: skip
+    assert {name: found[name] for name in expected} == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize(("last", "again", "number", "peer", "anew"), [
+    (-1, -1, 7, "a", True), (5, -1, 6, "b", True), (5, -1, 6, "a", False), (64, -1, 1, "a", False),
+    (65, -1, 1, "a", True), (65, -1, 0, "a", True), (65, -1, 2, "a", False), (65, 2, 2, "a", True),
+    (65, 65, 65, "a", False), (65, 3, 2, "a", False), (0, -1, 0, "a", False),
+])  # fmt: skip
+def test_when_a_count_begins_anew(last, again, number, peer, anew):
+    endpoint = Ardupilot(None, Link())
+    endpoint._last, endpoint._again, endpoint._peer = last, again, "a"
+    assert endpoint._anew(Packet(400, number, ()), peer) is anew
+
+
+@pytest.mark.parametrize(("of", "number", "now_s", "may"), [
+    (None, 9, 0.0, True), ("a", 1, 3.01, True), ("a", 0, 3.01, True), ("a", 2, 9.0, False),
+    ("a", 1, 3.0, False),
+])  # fmt: skip
+def test_another_may_fly_after_more_than_a_second_of_silence(of, number, now_s, may):
+    endpoint = Ardupilot(None, Link())
+    endpoint._peer = of
+    endpoint._link.hear(2.0)
+    assert endpoint._may_take_over(Packet(400, number, ()), now_s) is may

@@ -1,0 +1,273 @@
+"""A class from outside: its links, who breaks what, who comes back, who is slow, and at which address."""
+
+import contextlib
+import json
+import socket
+import time
+import urllib.request
+
+import pytest
+from live_cockpit import browser, ended, own_address, started
+from live_site import EVERYTHING
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc_live.page import serve
+from beaver_ftc_live.page.serve import Place
+
+
+class Seat:
+    """What a link has yielded to a browser: its cookie, and websockets of it."""
+
+    def __init__(self, link):
+        opener, jar = browser()
+        self.home, self.page = link.partition("?")[0], opener.open(link)
+        assert (self.page.status, self.page.geturl()) == (200, self.home)
+        (only,) = jar
+        self.cookie = f"{only.name}={only.value}"
+
+    def open(self, **more):
+        origin = self.home.rpartition("/")[0].rpartition("/")[0]
+        headers = {"Cookie": self.cookie}
+        place = self.home.replace("http", "ws", 1) + "socket"
+        return connect(place, origin=more.pop("origin", origin), additional_headers=headers, **more)
+
+
+@pytest.fixture(scope="module")
+def cockpit(tmp_path_factory):
+    """A class of four; whoever flies has taken the first link."""
+    running = started(tmp_path_factory.mktemp("class"), "--guests", "4")
+    running.links = [running.process.stdout.readline().split()[-1] for _ in range(4)]
+    running.seat = Seat(running.address)
+    yield running
+    assert ended(running) == (0, "")
+
+
+def until(link, *kinds, having=lambda told: True, timeout_s=600.0):
+    """The next message of these kinds with that; a machine on which nothing has flown yet compiles first."""
+    end_s = time.monotonic() + timeout_s
+    while time.monotonic() < end_s:
+        told = json.loads(link.recv(timeout=timeout_s))
+        if told["k"] in kinds and having(told):
+            return told
+    raise AssertionError(f"no {kinds}")
+
+
+def ask(link, n=1, **request):
+    link.send(json.dumps({"n": n, **request}))
+    return until(link, "ack", having=lambda told: told["n"] == n)
+
+
+LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4}
+
+
+def test_a_class_breaks_what_it_is_let_and_the_record_says_who(cockpit):
+    one = Seat(cockpit.links[0])
+    with cockpit.seat.open() as flyer, one.open() as guest:
+        assert until(guest, "you") == {"k": "you", "number": 1, "name": "", "is_invited": False}
+        for do, more in EVERYTHING.items():
+            assert ask(guest, do=do, **more)["ok"] == (do == "name")
+        hidden = "</script><i onload=x>"
+        assert ask(guest, do="name", name=hidden)["says"] == f"you are {hidden} (guest 1)"
+        roster = until(flyer, "class", having=lambda told: told["guests"][0]["name"] == hidden)
+        assert [seat["pages"] for seat in roster["guests"]] == [1, 0, 0, 0]
+        assert until(flyer, "s")["broken"] == []
+        assert ask(flyer, do="let", guest=1, on=True)["ok"]
+        assert until(guest, "you", having=lambda told: told["is_invited"])
+        assert ask(guest, do="break", fault=LOSS)["ok"]
+        (fault,) = until(flyer, "s", having=lambda told: told["broken"])["faults"]
+        assert fault == {**LOSS, "profile": "abrupt", "by": f"{hidden} (guest 1)"}
+        assert ask(flyer, do="break", fault={"type": "stuck", "actuator": "rudder"})["ok"]
+        told = until(flyer, "e", having=lambda told: told["events"][0]["kind"] == "broken")["events"][0]
+        assert "by" not in told
+        assert ask(flyer, do="let", on=False)["ok"]
+        for do in ("break", "repair", "blow"):
+            assert not ask(guest, do=do, **EVERYTHING[do])["ok"]
+        assert ask(flyer, do="save")["ok"]
+        saved = until(guest, "e", having=lambda told: told["events"][-1]["kind"] == "saved")
+        assert "/" not in saved["events"][-1]["says"]  # no folder of whoever flies
+        drawn = until(guest, "e", having=lambda told: told["events"][-1]["says"].endswith("report.html"))
+        assert drawn["events"][-1]["says"] == f"{saved['events'][-1]['says']}/report.html"
+        assert ask(flyer, do="fresh")["ok"]
+    (folder,) = cockpit.out.iterdir()
+    by = {
+        fault["actuator"]: fault.get("by")
+        for fault in json.loads((folder / "metrics.json").read_text())["faults"]
+    }
+    assert by == {"elevator": f"{hidden} (guest 1)", "rudder": None}
+    report = (folder / "report.html").read_text()
+    assert hidden not in report
+    assert "</script><i" not in report
+    secrets = [cockpit.seat.cookie, one.cookie, *(part for link in (cockpit.address, *cockpit.links)
+               for part in (link.rpartition("=")[2], link.split("/")[3]))]  # fmt: skip
+    for path in cockpit.out.rglob("*"):
+        kept = path.read_bytes() if path.is_file() else b""
+        assert not [each for each in secrets if each.partition("=")[2].encode() in kept and "=" in each]
+        assert not [each for each in secrets if each.encode() in kept]
+
+
+def test_a_guest_comes_back_by_the_same_link_and_is_the_same_guest(cockpit):
+    first, again = Seat(cockpit.links[1]), Seat(cockpit.links[1])
+    assert first.cookie == again.cookie
+    with cockpit.seat.open() as flyer:
+        with first.open() as guest:
+            ask(guest, do="name", name="Ada")
+            with again.open() as other:  # a second browser by the same link is the same guest
+                assert until(other, "you", having=lambda told: told["name"] == "Ada")["number"] == 2
+                two = until(flyer, "class", having=lambda told: told["guests"][1]["pages"] == 2)
+                assert two["guests"][1]["name"] == "Ada"
+                ask(flyer, do="let", guest=2, on=True)
+                assert ask(other, do="repair")["ok"]
+        assert until(flyer, "class", having=lambda told: told["guests"][1]["pages"] == 0)
+        with first.open() as guest:
+            told = until(guest, "you")
+            assert (told["name"], told["is_invited"]) == ("Ada", True)
+    with cockpit.seat.open() as flyer:  # the page of whoever flies, closed and opened again
+        roster = until(flyer, "class")["guests"]
+        assert (roster[1]["name"], roster[1]["is_invited"]) == ("Ada", True)
+        ask(flyer, do="let", on=False)
+
+
+def test_a_browser_that_was_closed_is_given_a_new_address_in_the_terminal(cockpit):
+    with pytest.raises(urllib.error.HTTPError, match="403"):
+        browser()[0].open(cockpit.address)
+    for line in iter(cockpit.process.stdout.readline, ""):
+        if line.startswith("live: http"):
+            break
+    with Seat(line.split()[1]).open() as flyer:
+        assert until(flyer, "class")
+
+
+def test_a_guest_who_takes_nothing_holds_nobody_up(cockpit):
+    """Its socket is opened and never read: the flight keeps its pace, the others their frames."""
+    seat = Seat(cockpit.links[2])
+    with contextlib.ExitStack() as pages:
+        flyer = pages.enter_context(cockpit.seat.open())
+        until(flyer, "f")
+        host, _, rest = seat.home.removeprefix("http://").partition("/")
+        for _ in range(3):
+            idle = pages.enter_context(socket.create_connection(("127.0.0.1", cockpit.port)))
+            idle.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
+            idle.sendall(
+                f"GET /{rest}socket HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\n"
+                f"Cookie: {seat.cookie}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+                "Sec-WebSocket-Version: 13\r\n"
+                "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n".encode()
+            )
+            assert idle.recv(12) == b"HTTP/1.1 101"
+        until(flyer, "class", having=lambda told: told["guests"][2]["pages"] == 3)
+        from_s, frames = time.monotonic(), 0
+        start_s = until(flyer, "f")["v"][0]
+        while frames < 60:
+            now_s, frames = until(flyer, "f")["v"][0], frames + 1
+        took_s = time.monotonic() - from_s
+        assert now_s - start_s == pytest.approx(took_s, rel=0.5)
+
+
+def status(address, **headers):
+    try:
+        return urllib.request.urlopen(urllib.request.Request(address, headers=headers)).status
+    except urllib.error.HTTPError as error:
+        return error.code
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "own", "::1"])
+def test_it_is_reached_at_the_address_given_and_by_its_name_alone(tmp_path, host):
+    shown = {"::1": "[::1]"}.get(host, own_address())
+    if shown is None:
+        pytest.skip("this machine has no other address")
+    running = started(tmp_path, "--host", own_address() if host == "own" else host, "--guests", "1")
+    try:
+        (link, *_) = [running.process.stdout.readline().split()[-1]]
+        assert link.startswith(f"http://{shown}:{running.port}/")
+        means = running.process.stdout.readline()
+        assert ("is no loopback" in means) == (host in ("0.0.0.0", "own"))
+        seat, flyer = Seat(link), Seat(running.address)
+        with flyer.open() as one, seat.open() as other:
+            assert until(one, "class", having=lambda told: told["guests"][0]["pages"] == 1)
+            assert until(other, "you")["number"] == 1
+        for name in ("evil.example", f"{shown}.evil.example", "192.0.2.77", "[2001:db8::77]"):
+            assert status(seat.home, Cookie=seat.cookie, Host=f"{name}:{running.port}") == 421
+            for origin in (f"http://{name}:{running.port}", "null", f"https://{shown}:{running.port}"):
+                with pytest.raises(InvalidStatus):
+                    seat.open(origin=origin)
+        policy = seat.page.headers["content-security-policy"]
+        assert f"connect-src 'self' ws://{shown}:{running.port};" in policy
+        if host == "own":
+            assert not can_connect("127.0.0.1", running.port)
+        if host == "0.0.0.0":  # other addresses that it has will do, each by its own name
+            other = seat.home.replace(shown, "127.0.0.1")
+            assert status(other, Cookie=seat.cookie) == 200
+            assert status(other, Cookie=seat.cookie, Host=f"{shown}:{running.port}") == 200
+    finally:
+        assert ended(running) == (0, "")
+
+
+def can_connect(host, port):
+    with socket.socket() as probe:
+        probe.settimeout(2.0)
+        return probe.connect_ex((host, port)) == 0
+
+
+@pytest.mark.parametrize(
+    ("host", "says"),
+    [
+        ("192.0.2.77", "192.0.2.77 is no address of this machine"), ("2001:db8::77", "is no address of"),
+        ("1", "1 is no address of this machine"), ("", "'' is no address"), ("x.invalid", "is no address"),
+        ("a b", "'a b' is no address"), ("224.0.0.1", "is none that a browser can open"),
+        ("255.255.255.255", "is none that a browser can open"),
+        ("fe80::1", "is none that a browser can open"), ("1.2.3.4:80", "'1.2.3.4:80' is no address"),
+        ("http://127.0.0.1", "is no address"),
+    ],
+)  # fmt: skip
+def test_an_address_that_cannot_be_had_is_said_in_a_line(host, says):
+    with pytest.raises(BadInput) as refused, serve._listening(Place(host=host)):
+        pytest.fail("it listens")
+    (line,) = str(refused.value).splitlines()
+    assert line.startswith("--host: ")
+    assert says in line
+    assert "allowed: one that it has, 0.0.0.0 for all of them" in line
+
+
+@pytest.mark.parametrize(
+    ("host", "alone"),
+    [("127.0.0.1", True), ("::1", True), ("localhost", True), ("127.3.2.1", True), ("0.0.0.0", False),
+     ("::", False), ("192.0.2.77", False)],
+)  # fmt: skip
+def test_which_addresses_are_this_machines_alone(host, alone):
+    assert serve.is_loopback(host) is alone
+
+
+@pytest.mark.parametrize(
+    ("host", "names"),
+    [
+        ("127.0.0.1", ("127.0.0.1", "localhost")), ("127.3.2.1", ("127.3.2.1", "localhost")),
+        ("LocalHost", ("localhost", "127.0.0.1")),
+        ("0.0.0.0", ("198.51.100.9", "127.0.0.1", "localhost")),
+        ("::", ("198.51.100.9", "127.0.0.1", "localhost")), ("::1", ("[::1]", "localhost")),
+    ],
+)  # fmt: skip
+def test_by_which_names_it_is_called(host, names, monkeypatch):
+    monkeypatch.setattr(serve, "_outward", lambda: "198.51.100.9")
+    found = [(socket.AF_INET, 0, 0, "", ("127.0.0.1", 0))]
+    if host == "LocalHost":  # a name may have addresses of both kinds
+        monkeypatch.setattr(serve.socket, "getaddrinfo", lambda *_, **__: found)
+    with serve._listening(Place(host=host)) as listener:
+        assert serve.names_of(listener, host) == names
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "::1", "0.0.0.0", "::"])
+def test_a_port_in_use_is_said_whatever_the_address(host):
+    with serve._listening(Place(host=host)) as listener:
+        listener.listen()
+        port = listener.getsockname()[1]
+        says = f"^--port: {port} cannot be had .Address already in use., allowed: another, 0 for any$"
+        with pytest.raises(BadInput, match=says), serve._listening(Place(port, host)):
+            pytest.fail("two servers have one port")
+
+
+def test_a_machine_without_a_way_to_others_is_told_to_name_its_address(monkeypatch):
+    monkeypatch.setattr(serve, "NOBODY", ((socket.AF_INET, "255.255.255.255"),))
+    with pytest.raises(BadInput, match="allowed: the address that they know it by"):
+        serve._outward()

@@ -1,0 +1,522 @@
+"""The flight behind the page: it breaks, is diagnosed, saved, and flies again to the bit."""
+
+import gc
+import json
+import tracemalloc
+
+import numpy as np
+import pytest
+
+import beaver_ftc as bf
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc_live.page import messages
+from beaver_ftc_live.page.messages import encode
+from beaver_ftc_live.page.session import Session, level_turn
+
+LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4}
+
+
+def asked(session, **request):
+    """Say it as a page does."""
+    return session.handle(messages.parse(json.dumps(request)))
+
+
+def flown(session, frames):
+    for _ in range(frames):
+        session.step()
+    return session
+
+
+@pytest.fixture
+def session(tmp_path):
+    return Session(bf.load("fault-free"), tmp_path, seed=1)
+
+
+def told(session, kind):
+    return [event for event in session.events if event["kind"] == kind]
+
+
+def test_a_loss_is_detected_named_and_told(session):
+    flown(session, 300)
+    asked(session, do="break", fault=LOSS)
+    flown(session, 500)
+    frame = session.frame()
+    assert (frame["axis"], frame["isolated"], frame["mode"]) == ("q", "elevator", "reallocated")
+    assert frame["estimate"] == pytest.approx(-0.4, abs=0.05)
+    kinds = [event["kind"] for event in session.events if event["kind"] not in ("candidates", "supervisor")]
+    assert kinds[:4] == ["flight", "broken", "alarm", "named"]
+    truth = dict(zip(session.surfaces, frame["effectiveness"], strict=True))
+    assert truth == {"aileron": 1.0, "elevator": 0.6, "rudder": 1.0, "flap": 1.0}
+    asked(session, do="repair", actuator="elevator")
+    flown(session, 2)
+    assert session.frame()["effectiveness"] == [1.0] * 4
+    assert session.state()["broken"] == []
+
+
+def test_what_is_saved_flies_again_to_the_bit(session, tmp_path):
+    flown(session, 250)
+    asked(session, do="break", fault=LOSS)
+    asked(session, do="stick", rates_deg_s=[2.5, -1, 0.5])
+    flown(session, 130)
+    asked(session, do="stick", rates_deg_s=[0, 0, 0])
+    asked(session, do="blow", velocity_mps=[0, 0, -4])
+    flown(session, 220)
+    asked(session, do="repair")
+    asked(session, do="break", fault={"type": "bias", "actuator": "rudder", "bias_deg": 2})
+    flown(session, 100)
+    says = asked(session, do="save")
+    (folder,) = tmp_path.iterdir()
+    assert str(folder) in says
+    again = bf.fly(folder / "scenario.yaml")
+    kept = bf.open_run(folder)
+    assert len(kept.log) == 702
+    assert np.array_equal(kept.log.to_numpy(), again.log.to_numpy(), equal_nan=True)
+    assert kept.metrics["detection"] == again.metrics["detection"]
+    flown(session, 10)  # and goes on
+    assert session.sim.frames == 712
+
+
+def test_the_page_may_name_scenarios_and_no_files(session, tmp_path):
+    (tmp_path / "mine.yaml").write_text("name: mine\n")
+    with pytest.raises(BadInput, match="is not known"):
+        asked(session, do="fresh", scenario="mine")
+    asked(session, do="fresh", scenario="rudder-stuck", law="adaptive", fault_class="all")
+    assert session.scenario.control.law == "adaptive"
+    assert session.scenario.faults[0].actuator == "rudder"
+    assert session.sim.frames == 2
+
+
+def test_a_flight_that_cannot_begin_leaves_the_old_one(session):
+    flown(session, 20)
+    with pytest.raises(BadInput):
+        asked(session, do="fresh", law="no-such-law")
+    assert session.sim.frames == 22
+
+
+def test_a_wrong_fault_is_refused_in_words(session):
+    with pytest.raises(BadInput, match="actuator"):
+        asked(session, do="break", fault={"type": "stuck", "actuator": "nose"})
+    assert session.state()["broken"] == []
+
+
+def test_law_diagnosis_and_sensors_are_changed_in_flight_and_fly_again_to_the_bit(session, tmp_path):
+    flown(session, 150)
+    asked(session, do="change", law="lqr")
+    flown(session, 100)
+    asked(session, do="break", fault=LOSS)
+    flown(session, 100)
+    assert session.frame()["isolated"] == "elevator"
+    asked(session, do="change", law="fault-tolerant", scheme="adaptive-estimators", sensors="tactical-grade")
+    flown(session, 1)
+    assert session.frame()["isolated"] is None
+    assert session.state()["flying"] == {
+        "law": "fault-tolerant",
+        "scheme": "adaptive-estimators",
+        "sensors": "tactical-grade",
+    }
+    flown(session, 350)  # found again; and open, for it was broken when the watch began
+    assert session.frame()["detected"]
+    assert session.frame()["isolated"] is None
+    assert any(of.startswith("elevator") for of in session.frame()["candidates"])
+    assert len(told(session, "changed")) == 2
+    with pytest.raises(BadInput, match="unknown law"):
+        asked(session, do="change", law="none-such")
+    with pytest.raises(BadInput, match="says no change"):
+        asked(session, do="change")
+    asked(session, do="save")
+    (folder,) = tmp_path.iterdir()
+    log = session.sim.log
+    assert np.array_equal(log.to_numpy(), bf.fly(folder / "scenario.yaml").log.to_numpy(), equal_nan=True)
+    asked(session, do="game", move="second")
+    with pytest.raises(BadInput, match="a round is on"):
+        asked(session, do="change", law="lqr")
+
+
+def test_a_sensor_is_broken_named_and_looked_at_anew_and_flies_again_to_the_bit(session, tmp_path):
+    assert {"p", "alpha", "V", "engine_rpm"} <= set(session.hello()["sensors"])
+    flown(session, 200)
+    asked(session, do="break", fault={"sensor": "q", "type": "bias", "magnitude": 3})
+    flown(session, 200)
+    frame = session.frame()
+    assert (frame["detected"], frame["isolated"]) == (True, "sensor q")
+    assert session.state()["broken"] == ["q"]
+    assert told(session, "alarm")
+    asked(session, do="change", scheme="adaptive-estimators")
+    flown(session, 300)
+    asked(session, do="repair", actuator="q")
+    flown(session, 50)
+    asked(session, do="save")
+    (folder,) = tmp_path.iterdir()
+    log = session.sim.log
+    assert np.array_equal(log.to_numpy(), bf.fly(folder / "scenario.yaml").log.to_numpy(), equal_nan=True)
+
+
+def by_surface(session, values):
+    return dict(zip(session.surfaces, values, strict=True))
+
+
+def test_what_breaks_later_is_not_broken_from_the_start(tmp_path):
+    """The scenario's own faults, at 0.2 s and from 0.3 to 0.5 s: each is shown while it is there."""
+    jam = {"type": "stuck", "actuator": "rudder", "at_s": 0.3, "end_s": 0.5}
+    faults = [{**LOSS, "at_s": 0.2}, jam, {"type": "bias", "sensor": "q", "magnitude": 1, "at_s": 9.0}]
+    session = Session(bf.load({"name": "later", "faults": faults}), tmp_path)
+    seen = {}
+    while session.sim.t_s < 0.6:
+        now = {fault["type"] for fault in session.state()["faults"]}
+        seen.setdefault(tuple(session.state()["broken"]), session.sim.frames)
+        assert len(now) == len(session.state()["broken"])
+        flown(session, 1)
+    assert seen == {(): 2, ("elevator",): 20, ("elevator", "rudder"): 30}
+    assert session.state()["broken"] == ["elevator"]
+    own = [(event["t"], event["says"]) for event in session.events if event["kind"] in ("broken", "repaired")]
+    assert own == [
+        (0.2, "elevator: loss of effectiveness (magnitude 0.4)"),
+        (0.3, "rudder: stuck"),
+        (0.5, "rudder: stuck"),
+    ]
+
+
+def test_repair_all_leaves_nothing_broken(session):
+    for fault in (
+        LOSS,
+        {"type": "stuck", "actuator": "rudder"},
+        {"type": "noise", "sensor": "p", "magnitude": 1},
+    ):
+        asked(session, do="break", fault=fault)
+    flown(session, 5)
+    assert session.state()["broken"] == ["elevator", "p", "rudder"]
+    assert {fault["type"] for fault in session.state()["faults"]} == {
+        "loss_of_effectiveness", "stuck", "noise"
+    }  # fmt: skip
+    asked(session, do="repair", actuator="rudder")
+    assert session.state()["broken"] == ["elevator", "p"]
+    asked(session, do="repair")
+    assert (session.state()["broken"], session.state()["faults"]) == ([], [])
+    flown(session, 2)
+    assert session.frame()["effectiveness"] == [1.0] * 4
+    assert [event["says"] for event in told(session, "repaired")] == ["rudder", "everything"]
+
+
+def test_a_repair_is_told_once_whatever_the_scenario_breaks_later(tmp_path):
+    """Of three faults of the scenario one is repaired by hand; the others come and go by themselves."""
+    faults = [
+        {**LOSS, "at_s": 0.1}, {"type": "stuck", "actuator": "rudder", "at_s": 0.4, "end_s": 0.6},
+        {"type": "bias", "actuator": "aileron", "bias_deg": 1, "at_s": 0.5},
+    ]  # fmt: skip
+    session = flown(Session(bf.load({"name": "later", "faults": faults}), tmp_path), 20)
+    asked(session, do="repair", actuator="elevator")
+    flown(session, 60)
+    assert [event["says"] for event in told(session, "repaired")] == ["elevator", "rudder: stuck"]
+    assert [event["says"].partition(":")[0] for event in told(session, "broken")] == [
+        "elevator", "rudder", "aileron",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("fault", "left"),
+    [
+        ({"type": "stuck"}, 0.0),
+        ({"type": "float"}, 0.0),
+        ({"type": "hardover", "direction": -1}, 0.0),
+        ({"type": "loss_of_effectiveness", "magnitude": 0.25}, 0.75),
+        ({"type": "bias", "bias_deg": 2}, 1.0),
+    ],
+)
+def test_a_surface_that_does_not_follow_its_command_has_no_effectiveness(session, fault, left):
+    asked(session, do="break", fault={**fault, "actuator": "rudder"})
+    flown(session, 1)
+    expected = dict.fromkeys(session.surfaces, 1.0) | {"rudder": left}
+    assert by_surface(session, session.frame()["effectiveness"]) == expected
+
+
+@pytest.mark.parametrize(
+    ("given", "knows"),
+    [
+        ({}, "all"),
+        ({"fdi": {"fault_class": "published"}}, "published"),
+        ({"fdi": {"scheme": "rls-monitor"}}, "all"),
+    ],
+)
+def test_the_diagnosis_knows_what_can_be_broken_unless_told_otherwise(tmp_path, given, knows):
+    session = Session(bf.load({"name": "one", **given}), tmp_path)
+    says = {"all": "knows every fault type", "published": "knows partial loss alone"}
+    assert session.hello()["fault_class"] == knows
+    assert session.state()["knows"] == ("" if "scheme" in given.get("fdi", {}) else says[knows])
+    asked(session, do="fresh", scheme="adaptive-estimators")
+    assert session.state()["knows"] == says[knows]
+    asked(session, do="fresh", fault_class="published")
+    assert session.state()["knows"] == says["published"]
+    asked(session, do="change", scheme="none")
+    assert session.state()["knows"] == ""
+
+
+def test_a_jam_is_named_as_one(session):
+    flown(session, 400)
+    asked(session, do="break", fault={"type": "stuck", "actuator": "elevator"})
+    flown(session, 900)
+    frame = session.frame()
+    where = session.columns.index("elevator_effective_rad")
+    assert (frame["isolated"], frame["type"]) == ("elevator", "stuck")
+    assert frame["estimate"] == pytest.approx(frame["v"][where], abs=np.radians(0.2))
+
+
+# What is asked of a new flight, and what of its scenario is then other than the default.
+FRESH = {
+    "law": ("lqr", {"control.law": "lqr"}),
+    "scheme": ("none", {"fdi.scheme": "none"}),
+    "fault_class": ("published", {"fdi.fault_class": "published"}),
+    "sensors": ("tactical-grade", {"sensors.p.noise_std_deg_s": 0.0208,
+        "fdi.bounds.sensors.p.noise_std_deg_s": 0.0208,
+    }),
+    "turbulence": ("light", {
+        "environment.turbulence": "dryden", "environment.severity": "light", "fdi.bounds.turbulence": "light",
+    }),
+    "autopilot": (True, {f"autopilot.{held}": 1 for held in ("altitude_m", "airspeed_mps", "heading_deg")}),
+}  # fmt: skip
+
+
+def value_at(scenario, key):
+    """At a dotted key; of a list its length."""
+    for part in key.split("."):
+        scenario = getattr(scenario, part)
+    return len(scenario) if isinstance(scenario, tuple) else scenario
+
+
+@pytest.mark.parametrize("key", FRESH)
+def test_a_new_flight_is_what_was_asked_for_and_declared(session, key):
+    value, expected = FRESH[key]
+    assert set(FRESH) == set(messages.Fresh.model_fields) - {"do", "n", "scenario"}
+    asked(session, do="fresh", **{key: value})
+    assert {place: value_at(session.scenario, place) for place in expected} == expected
+    again = session.scenario.with_({"name": "fault-free"})
+    asked(session, do="fresh")  # and stays so
+    assert session.scenario.with_({"name": "fault-free"}) == again
+
+
+def test_turbulence_that_is_asked_for_raises_no_alarm_and_can_be_ended(session):
+    asked(session, do="fresh", turbulence="moderate")
+    flown(session, 1500)
+    assert not session.frame()["detected"]
+    asked(session, do="fresh", turbulence="none")
+    given = session.scenario
+    assert (given.environment.turbulence, given.environment.severity) == ("none", None)
+    assert given.fdi.bounds.turbulence == "none"
+
+
+def test_the_score_goes_on_from_round_to_round(session):
+    for won in (1, 2):
+        asked(session, do="game", move="second")
+        flown(session, 20)
+        asked(session, do="break", fault={"type": "bias", "actuator": "rudder", "bias_deg": 0.01})
+        flown(session, 20)
+        asked(session, do="game", move="answer", answer="rudder")
+        flown(session, 1005)
+        assert session.state()["game"]["score"] == [won, 0]
+        assert session.state()["game"]["winner"] == "you"
+
+
+def test_a_stick_left_is_centred_by_no_stick(session):
+    asked(session, do="stick", rates_deg_s=[5, 0, 0])
+    flown(session, 3)
+    assert session.frame()["stick"] == pytest.approx([np.radians(5), 0.0, 0.0])
+    asked(session, do="stick", rates_deg_s=[0, 0, 0])
+    flown(session, 1)
+    assert session.frame()["stick"] is None
+
+
+def test_instruments_are_watched_from_the_start_so_that_it_flies_again_to_the_bit(session, tmp_path):
+    """A surface breaks, and only then an instrument: what was found before is found again."""
+    asked(session, do="break", fault={"type": "float", "actuator": "aileron"})
+    flown(session, 40)
+    asked(session, do="break", fault={"sensor": "q", "type": "bias", "magnitude": 0.3})
+    flown(session, 40)
+    asked(session, do="save")
+    (folder,) = tmp_path.iterdir()
+    log = session.sim.log
+    assert np.array_equal(log.to_numpy(), bf.fly(folder / "scenario.yaml").log.to_numpy(), equal_nan=True)
+    assert session.scenario.fdi.sensor_monitor == "always"
+    own = {"fdi": {"sensor_monitor": "never"}}
+    assert Session(bf.load({"name": "one", **own}), tmp_path).scenario.fdi.sensor_monitor == "never"
+
+
+def test_what_broke_and_was_mended_a_hundred_times_and_more_flies_again(session, tmp_path):
+    for i in range(130):
+        surface = session.surfaces[i % 4]
+        asked(session, do="break", fault={"type": "bias", "actuator": surface, "bias_deg": 0.5})
+        flown(session, 1)
+        asked(session, do="repair", actuator=surface)
+        flown(session, i % 2)
+    asked(session, do="save")
+    (folder,) = tmp_path.iterdir()
+    kept = bf.open_run(folder)
+    again = bf.fly(folder / "scenario.yaml")
+    assert len(bf.load(folder / "scenario.yaml").faults) == 130
+    assert np.array_equal(kept.log.to_numpy(), again.log.to_numpy(), equal_nan=True)
+
+
+def test_who_broke_what_is_told_and_kept(session, tmp_path):
+    """Of two guests and whoever flies; repaired and broken again by another; not of the flight after it."""
+    jam = messages.Break(do="break", fault={"type": "stuck", "actuator": "rudder"})
+    session.handle(messages.Break(do="break", fault=LOSS), by="Ada (guest 1)")
+    session.handle(jam, by="guest 2")
+    session.handle(jam, by="guest 3")  # it is jammed already
+    flown(session, 3)
+    by = {fault["actuator"]: fault["by"] for fault in session.state()["faults"]}
+    assert by == {"elevator": "Ada (guest 1)", "rudder": "guest 2"}
+    session.handle(messages.Repair(do="repair", actuator="rudder"), by="guest 3")
+    flown(session, 3)
+    session.handle(jam)
+    flown(session, 3)
+    assert [fault.get("by") for fault in session.state()["faults"]] == ["Ada (guest 1)", None]
+    assert [event.get("by") for event in told(session, "repaired")] == ["guest 3"]
+    assert [event.get("by") for event in told(session, "broken")][:2] == ["Ada (guest 1)", "guest 2"]
+    flight, kept = session.sim.land(), {}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(session.sim, "land", lambda: flight)
+        patch.setattr(bf.Flight, "save", lambda flight, out, report: kept.update(flight.metrics) or out)
+        asked(session, do="save")
+    said = [(fault["actuator"], fault["end_s"], fault.get("by")) for fault in kept["faults"]]
+    assert said == [
+        ("elevator", None, "Ada (guest 1)"), ("rudder", 0.05, "guest 2"), ("rudder", None, None),
+    ]  # fmt: skip
+    asked(session, do="fresh")
+    session.handle(messages.Break(do="break", fault=LOSS))
+    assert [fault.get("by") for fault in session.state()["faults"]] == [None]
+
+
+def test_more_faults_than_a_scenario_holds_are_refused_in_words(session, monkeypatch):
+    monkeypatch.setattr("beaver_ftc.loop.simulation.MOST_FAULTS", 3)
+    for _ in range(3):
+        asked(session, do="break", fault=LOSS)
+    with pytest.raises(BadInput, match="this flight has had 3, allowed: a new flight"):
+        asked(session, do="break", fault=LOSS)
+    assert len(session.state()["faults"]) == 3
+
+
+def test_a_new_flight_gives_back_the_memory_of_the_one_before(session):
+    """Changes of sensors tie a flight's parts together, so that only a collector would find it."""
+    gc.collect()
+    gc.disable()
+    tracemalloc.start()
+    try:
+        for _ in range(12):
+            asked(session, do="change", sensors="tactical-grade")
+            flown(session, 2)
+            asked(session, do="fresh")
+        grown, _ = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+        gc.enable()
+    log = session.sim.values.nbytes * 8192  # of a flight in progress; some are kept for flights to come
+    assert grown < 6 * log
+
+
+def test_one_gust_at_a_time(session):
+    asked(session, do="blow", velocity_mps=[0, 3, 0])
+    with pytest.raises(BadInput, match="one at a time"):
+        asked(session, do="blow", velocity_mps=[0, 3, 0])
+    assert session.state()["gust"]
+    flown(session, 205)
+    assert not session.state()["gust"]
+    asked(session, do="blow", velocity_mps=[0, 3, 0])
+
+
+def test_the_game_hides_what_is_broken_and_what_the_diagnosis_says(session):
+    asked(session, do="game", move="second")
+    flown(session, 100)
+    asked(session, do="break", fault=LOSS)
+    flown(session, 200)
+    frame, columns = session.frame(), session.columns
+    assert "isolated" not in frame
+    assert "effectiveness" not in frame
+    hidden = {name for name, value in zip(columns, frame["v"], strict=True) if value is None}
+    assert {"elevator_effective_rad", "elevator_pos_rad", "mode", "detected", "fie_rudder_excluded"} <= hidden
+    assert "elevator_cmd_rad" not in hidden
+    assert session.state()["broken"] == []
+    assert {event["kind"] for event in session.take_events()} == {"flight", "game"}
+    assert {event["kind"] for event in session.hello()["events"]} == {"flight", "game"}
+    asked(session, do="game", move="answer", answer="elevator")
+    flown(session, 1)
+    game = session.state()["game"]
+    assert (game["phase"], game["winner"]) == ("over", "detector")
+    assert game["its_delay_s"] < game["your_delay_s"] == pytest.approx(2.0, abs=0.02)
+    assert {"broken", "alarm", "named"} <= {event["kind"] for event in session.take_events()}
+
+
+def test_by_chance_something_breaks(session):
+    asked(session, do="game", move="random")
+    flown(session, 2001)
+    assert session.game.broken_s == pytest.approx(session.game.due_s, abs=0.02)
+    assert session.game.fault["actuator"] in session.surfaces
+
+
+def test_a_lost_aircraft_ends_the_flight_and_can_still_be_saved(session, tmp_path):
+    asked(session, do="stick", rates_deg_s=[20, 0, 0])
+    while not session.over:
+        session.step()
+    assert told(session, "lost")
+    with pytest.raises(BadInput, match="is over"):
+        asked(session, do="break", fault=LOSS)
+    asked(session, do="save")
+    (folder,) = tmp_path.iterdir()
+    assert bf.fly(folder / "scenario.yaml").departure == session.sim.land().departure
+
+
+def test_every_message_is_strict_json(session):
+    flown(session, 30)
+    for message in (session.hello(), session.frame(), session.state()):
+        assert json.loads(encode(message))["k"] == message["k"]
+
+
+def test_the_rates_of_a_level_turn():
+    """At 60 degrees of bank, level, 98.0665 tan(60 deg) m/s: psi' is 0.1 rad/s; half of it is yaw."""
+    rates = level_turn(np.pi / 3, 0.0, 98.0665 * np.tan(np.pi / 3))
+    assert rates == pytest.approx([0.0, 0.1 * np.sin(np.pi / 3), 0.05])
+    assert np.linalg.norm(level_turn(0.4, 0.3, 45.0)) == pytest.approx(9.80665 * np.tan(0.4) / 45.0)
+
+
+def test_a_coordinated_turn_keeps_the_aircraft_and_flies_again_to_the_bit(session, tmp_path):
+    asked(session, do="stick", rates_deg_s=[5, 0, 0], coordinated=True)
+    flown(session, 400)
+    asked(session, do="stick", rates_deg_s=[0, 0, 0], coordinated=True)
+    flown(session, 1500)
+    log = session.sim.log
+    assert not session.over
+    assert log["beta_rad"].abs().max() < np.radians(10)
+    assert log["psi_rad"].iloc[-1] > np.radians(60)
+    asked(session, do="save")
+    (folder,) = tmp_path.iterdir()
+    assert np.array_equal(log.to_numpy(), bf.fly(folder / "scenario.yaml").log.to_numpy(), equal_nan=True)
+
+
+def test_the_autopilot_goes_where_it_is_sent_and_flies_again_to_the_bit(session, tmp_path):
+    with pytest.raises(BadInput, match="this flight has none"):
+        asked(session, do="aim", altitude_m=1850)
+    asked(session, do="fresh", autopilot=True)
+    flown(session, 500)
+    start_m = session.sim.log["altitude_m"].iloc[-1]
+    asked(session, do="aim", altitude_m=start_m + 40, heading_deg=30)
+    flown(session, 6000)
+    log = session.sim.log
+    assert log["altitude_m"].iloc[-1] == pytest.approx(start_m + 40, abs=8)
+    assert np.degrees(log["psi_rad"].iloc[-1]) == pytest.approx(30, abs=5)
+    with pytest.raises(BadInput, match="airspeed_mps"):
+        asked(session, do="aim", airspeed_mps=500)
+    asked(session, do="save")
+    (folder,) = tmp_path.iterdir()
+    assert np.array_equal(log.to_numpy(), bf.fly(folder / "scenario.yaml").log.to_numpy(), equal_nan=True)
+    asked(session, do="fresh", autopilot=False)
+    assert session.hello()["autopilot"] == []
+
+
+def test_rounds_of_the_game_follow_from_the_seed(tmp_path):
+    """Five rounds in a row of two sessions of one seed, and of one of another."""
+    rounds = {}
+    for name, seed in (("one", 3), ("again", 3), ("other", 4)):
+        session = Session(bf.load("fault-free"), tmp_path / name, seed=seed)
+        rounds[name] = []
+        for _ in range(5):
+            asked(session, do="game", move="random")
+            rounds[name].append((session.game.fault, session.game.due_s))
+    assert rounds["one"] == rounds["again"] != rounds["other"]
+    assert len({due_s for _, due_s in rounds["one"]}) == 5

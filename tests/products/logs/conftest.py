@@ -1,0 +1,42 @@
+"""What the tests of recorded flights share: a synthetic vehicle, and the real flights if there are any."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from beaver_ftc_logs.identification import identify
+from beaver_ftc_logs.samples import load_flights
+from beaver_ftc_logs.vehicle import load_vehicle
+from products.logs import synthetic
+
+REAL = "BEAVER_FTC_FLIGHTS"
+
+
+@pytest.fixture(scope="session")
+def real_flights():
+    """The folder of the recorded data sets; the tests that want it are skipped where it is absent."""
+    default = Path(__file__).parents[4] / "shared" / "flights"
+    folder = Path(os.environ.get(REAL, default))
+    if not (folder / "enac" / "flight-21.csv").is_file():
+        pytest.skip(f"no recorded flights at ../shared/flights beside the checkout, nor at ${REAL}")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def wing_folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("wing")
+
+
+@pytest.fixture(scope="session")
+def wing(wing_folder):
+    path = wing_folder / "wing.yaml"
+    path.write_text(synthetic.VEHICLE)
+    return load_vehicle(path)
+
+
+@pytest.fixture(scope="session")
+def wing_model(wing, wing_folder):
+    flown = synthetic.fly(400.0, parts=((150, 220, 1.0, 0.5), (300, 340, 0.4, 1.0)), seed=5)
+    path = synthetic.write_csv(wing_folder / "training.csv", flown)
+    return identify(load_flights([path], wing), wing)

@@ -1,0 +1,148 @@
+"""The benchmark on recorded flights, on data sets of our own making."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from beaver_ftc.cli.main import app
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc_logs.detectors import detector_names
+from beaver_ftc_logs.recorded import benchmark, other_days
+from beaver_ftc_logs.recorded.benchmark import OURS, data_sets, run_benchmark
+from products.logs import synthetic
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Two labelled flights of the synthetic wing."""
+    root = tmp_path_factory.mktemp("flights")
+    (root / "wing").mkdir()
+    (root / "wing" / "vehicle.yaml").write_text(synthetic.VEHICLE)
+    parts = ((60, 130, 1.0, 0.5), (170, 230, 0.4, 1.0))
+    for seed in (21, 22):
+        flown = synthetic.fly(280.0, parts=parts, seed=seed)
+        synthetic.write_csv(root / "wing" / f"flight-{seed}.csv", flown)
+    return root
+
+
+@pytest.fixture(scope="module")
+def document(folder):
+    return run_benchmark(folder)
+
+
+def test_every_method_has_a_row_and_ours_is_right(document):
+    (part,) = document["sets"]
+    rows = {row["method"]: row for row in part["rows"]}
+    assert len(rows) == len(detector_names())  # no freeze rule: this vehicle names no servo outputs
+    assert rows[OURS]["classes"] > 0.9
+    assert rows[OURS]["mean_error"] < 0.03
+    sliding = next(row for name, row in rows.items() if name.startswith("sliding"))
+    assert 0.5 < sliding["classes"] < rows[OURS]["classes"]
+
+
+def test_tables_have_a_line_a_method(document):
+    text, page = benchmark.as_text(document), benchmark.as_markdown(document)
+    for row in document["sets"][0]["rows"]:
+        assert row["method"] in text
+        assert f"| {row['method']} |" in page
+
+
+def test_the_page_keeps_what_stands_around_the_tables(document, tmp_path):
+    page = tmp_path / "page.md"
+    begin, end = benchmark.marks(document)
+    page.write_text(f"before\n{begin}\nold\n{end}\nafter\n")
+    benchmark.update_page(document, page)
+    text = page.read_text()
+    assert text.startswith("before\n")
+    assert text.endswith("after\n")
+    assert "old" not in text
+    page.write_text("no marks")
+    with pytest.raises(BadInput, match="has no place for the tables"):
+        benchmark.update_page(document, page)
+
+
+def test_other_days_have_a_row_each_and_a_worst(folder, monkeypatch, tmp_path):
+    days = other_days.drawn(2, range(2))
+    monkeypatch.setattr(other_days, "grid", lambda mixer, commands: days[:1])
+    monkeypatch.setattr(other_days, "drawn", lambda surfaces, seeds: days[1:])
+    page = tmp_path / "page.md"
+    page.write_text("<!-- other days: begin -->\n<!-- other days: end -->\n")
+    arguments = ["compare", "--flights", str(folder), "--other-days", "--format", "json"]
+    done = CliRunner().invoke(app, [*arguments, "--leaderboard", str(page)])
+    (part,) = json.loads(done.stdout)["other_days"]["sets"]
+    assert [row["day"] for row in part["rows"]] == ["drawn 0", "drawn 1", "drawn 1"]
+    assert all(row["classes"] > 0.7 for row in part["rows"])
+    for one in part["summary"]:
+        assert one["worst"]["classes"] <= one["mean"]["classes"]
+        assert one["worst"]["mean_error"] >= one["mean"]["mean_error"]
+    assert "| drawn, not looked at: worst |" in page.read_text()
+
+
+def test_other_days_without_a_folder():
+    done = CliRunner().invoke(app, ["compare", "--other-days", "--benchmark"])
+    assert "--other-days: allowed: only with --flights FOLDER" in str(done.exception)
+
+
+def test_a_folder_without_flights_is_refused(tmp_path):
+    with pytest.raises(BadInput, match="holds no data set"):
+        data_sets(tmp_path)
+    with pytest.raises(BadInput, match="no such folder"):
+        data_sets(tmp_path / "none")
+
+
+def test_the_command_writes_both_files(folder, tmp_path):
+    done = CliRunner().invoke(
+        app, ["compare", "--flights", str(folder), "--out", str(tmp_path), "--format", "json"]
+    )
+    assert done.exit_code == 0, done.output
+    assert json.loads(done.stdout)["sets"][0]["set"] == "wing"
+    names = {path.name for path in (tmp_path / "recorded-flights").iterdir()}
+    assert names == {"flights.json", "flights.md", "flights.png"}
+
+
+def _flight(failure, false_alarms=0, delay=None, right=True):
+    return {
+        "failure": failure, "failure_s": None if failure is None else 50.0, "healthy_s": 50.0,
+        "false_alarms": false_alarms, "detected": delay is not None, "delay_s": delay, "named": {},
+        "right_group": right if delay is not None else None,
+    }  # fmt: skip
+
+
+def test_the_tally_counts_by_hand():
+    flights = [
+        _flight("left_aileron", delay=4.0),
+        _flight("right_aileron", delay=8.0, false_alarms=2),
+        _flight("rudder", delay=1.0, right=False),
+        _flight("elevator"),
+        _flight(None),
+        _flight(None, false_alarms=1),
+        _flight("engine", delay=3.0),
+    ]
+    found = benchmark.by_events(flights)
+    assert (found["surface_failures"], found["found"]) == (4, 3)
+    assert found["precision"] == pytest.approx(3 / 5)
+    assert found["recall"] == pytest.approx(3 / 4)
+    assert found["accuracy"] == pytest.approx(4 / 6)
+    assert found["delay_s"]["aileron"] == {"failures": 2, "found": 2, "within_5_s": 1, "mean": 6.0}
+    assert found["wrong_group"] == 1
+    assert found["engine_failures_with_an_alarm"] == 1
+    assert found["false_alarms_per_hour"]["value"] == pytest.approx(3 / (7 * 50 / 3600))
+
+
+def test_labels_are_weighted_by_rows():
+    keys = ("classes", "healthy_or_faulty", "side", "mean_error", "held_by_bounds")
+    one, other = dict.fromkeys(keys, 1.0), dict.fromkeys(keys, 0.0)
+    found = benchmark.by_labels([one | {"rows": 30}, other | {"rows": 10}])
+    assert found["rows"] == 40
+    assert np.allclose([found[key] for key in keys], 0.75)
+
+
+def test_of_the_healthy_flights_those_with_an_alarm_are_counted():
+    quiet = {"failure": None, "false_alarms": 0, "healthy_s": 1800.0, "detected": False}
+    flights = [quiet, quiet, {**quiet, "false_alarms": 2}]
+    found = benchmark.by_events(flights)
+    assert (found["healthy_flights"], found["healthy_flights_with_an_alarm"]) == (3, 1)
+    assert found["false_alarms_per_hour"]["value"] == pytest.approx(2 / 1.5)
+    assert found["accuracy"] == pytest.approx(2 / 3)

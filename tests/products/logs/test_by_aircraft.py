@@ -1,0 +1,384 @@
+"""A log diagnosed by its aircraft's own model: the flight's own verdict, and refusals of what a log lacks."""
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pyarrow import csv as arrow
+from pyarrow import parquet
+from typer.testing import CliRunner
+
+import beaver_ftc as bf
+from beaver_ftc.cli.main import app
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.results.exports import RECORDINGS, write_recording
+from beaver_ftc_logs import by_aircraft, stepped
+from beaver_ftc_logs.by_aircraft import diagnose_as, known
+from beaver_ftc_logs.recording import Column, Recording
+from beaver_ftc_logs.samples import read_for
+from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
+
+LOSS = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.4, "at_s": 6.0}
+BEAVER = known("beaver")
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("flown")
+    scenario = bf.load("elevator-partial-loss").with_({"duration_s": 9.0, "faults[0].at_s": 6.0})
+    flight = bf.fly(scenario)
+    flight.save(folder)
+    return folder / "elevator-partial-loss", flight
+
+
+def exported(folder, kind, to):
+    travel = bf.aircraft("beaver").travel
+    stops = {name: max(abs(one.min_rad), abs(one.max_rad)) for name, one in travel.items()}
+    write_recording(folder / "log.parquet", stops, kind, to, ("dpt",))
+    return to / RECORDINGS[kind], load_vehicle(to / "vehicle.yaml")
+
+
+@pytest.fixture(scope="module")
+def log(flown, tmp_path_factory):
+    """A table of the flight, and what its vehicle file says."""
+    path, vehicle = exported(flown[0], "table", tmp_path_factory.mktemp("log"))
+    return read_for(path, vehicle), vehicle
+
+
+def changed(recording, **columns):
+    """The recording with some columns as functions of their values."""
+    known = dict(recording.columns)
+    for name, of in columns.items():
+        known[name] = Column(known[name].t_s, of(known[name].values))
+    return Recording(recording.name, known)
+
+
+def only(recording, rows):
+    columns = {name: Column(one.t_s[rows], one.values[rows]) for name, one in recording.columns.items()}
+    return Recording(recording.name, columns)
+
+
+@pytest.mark.parametrize("kind", RECORDINGS)
+def test_the_verdict_is_that_of_the_flight(flown, tmp_path, kind):
+    pytest.importorskip("pyulog")
+    pytest.importorskip("pymavlink")
+    path, vehicle = exported(flown[0], kind, tmp_path)
+    _, rows, verdict = diagnose_as(read_for(path, vehicle), vehicle, BEAVER)
+    flight = flown[1]
+    assert verdict["detection_s"] == pytest.approx(flight.detection.time_s, abs=1e-9)
+    assert verdict["isolation_s"] == pytest.approx(flight.isolation.time_s, abs=1e-9)
+    assert (verdict["isolated"], verdict["type"]) == ("elevator", "loss_of_effectiveness")
+    assert rows.faulty.tolist() == [int(flag) for flag in flight.log["detected"]]
+    assert verdict["credible"] == {"share": 1.0, "reasons": []}
+
+
+def test_bounds_hold_but_for_the_second_in_which_the_fault_begins(log):
+    recording, vehicle = log
+    _, rows, _ = diagnose_as(recording, vehicle, BEAVER)
+    truth = np.ones((len(rows.t_s), 4))
+    truth[rows.t_s >= 6.0 - 1e-9, 1] = 0.6
+    held = (rows.low <= truth) & (truth <= rows.high)
+    wrong = rows.t_s[~held.all(axis=1)]
+    assert ((wrong >= 6.0 - 1e-9) & (wrong < 6.0 + stepped.STANDS_S)).all()
+    later = rows.t_s > 7.0
+    assert np.median((rows.high - rows.low)[later, 1]) < 0.1
+
+
+def test_a_flight_cut_short_says_the_same_up_to_the_cut(log):
+    recording, vehicle = log
+    _, whole, _ = diagnose_as(recording, vehicle, BEAVER)
+    _, cut, _ = diagnose_as(only(recording, slice(0, 700)), vehicle, BEAVER)
+    for name in ("faulty", "named", "estimate", "low", "high", "credible"):
+        np.testing.assert_array_equal(getattr(whole, name)[:700], getattr(cut, name), err_msg=name)
+
+
+def test_nothing_is_said_across_a_gap_and_where_a_number_is_missing(log):
+    recording, vehicle = log
+    rows = np.r_[0:300, 330:900]
+    holed = changed(only(recording, rows), p_rad_s=lambda p: np.where(np.arange(len(p)) == 100, np.nan, p))
+    _, found, verdict = diagnose_as(holed, vehicle, BEAVER)
+    assert found.credible[100] == 0
+    assert (found.credible == 0).sum() == 1
+    assert (found.low[[100, 101, 300]] == 0.0).all()  # a frame has to end before anything is known
+    assert [one["says"] for one in verdict["credible"]["reasons"]] == ["a number is missing"]
+    assert verdict["isolated"] == "elevator"
+
+
+def test_outside_the_envelope_nothing_is_said(log):
+    recording, vehicle = log
+    fast = changed(recording, airspeed_mps=lambda v: 2.0 * v, qdyn_pa=lambda q: 4.0 * q)
+    _, rows, verdict = diagnose_as(fast, vehicle, BEAVER)
+    assert not rows.faulty.any()
+    assert rows.credible.mean() < 0.02
+    assert verdict["detection_s"] is None
+    assert "airspeed is outside 30 to 55 m/s" in str(verdict["credible"]["reasons"])
+
+
+def test_a_log_of_another_aircraft_is_not_credible(log):
+    """Rates twice as large as this aircraft's commands can make them: no fault of a surface does that."""
+    recording, vehicle = log
+    turned = changed(recording, **dict.fromkeys(("p_rad_s", "q_rad_s", "r_rad_s"), lambda rate: 2.0 * rate))
+    vehicle = vehicle.model_copy(update={"attitude": None})
+    _, rows, verdict = diagnose_as(turned, vehicle, BEAVER)
+    assert not rows.faulty.any()
+    assert "another aircraft" in verdict["credible"]["reasons"][0]["says"]
+
+
+@pytest.mark.parametrize(
+    ("theta", "gain"), [((0.0, 0.0), (1.0, 1.0)), ((-0.9, 0.0), (0.1, 1.0)), ((0.0, -2.0), (1.0, -1.0))]
+)
+def test_what_each_command_does_in_all_of_a_flight(theta, gain):
+    """Innovations that are theta times what was expected, a trim and noise: a little over 1 + theta."""
+    rng = np.random.default_rng(6)
+    expected, noise = rng.standard_normal((4000, 3, 2)), 0.1 * rng.standard_normal((4000, 3))
+    innovation = np.einsum("nas,s->na", expected, theta) + np.array([0.5, 0.0, -0.2]) + noise
+    found = stepped._gains(innovation, expected)
+    assert np.all(found > gain)
+    assert found == pytest.approx(gain, abs=0.05)
+    assert (stepped._gains(innovation[:200], expected[:200]) == 1.0).all()
+
+
+def test_a_command_of_the_other_sign_is_refused_but_in_declared_turbulence(tmp_path):
+    sine = [{"sine": {"amplitude_deg_s": 3.0, "frequency_hz": 0.4}}]
+    scenario = bf.load({"name": "swung", "duration_s": 8.0, "reference": dict.fromkeys("pqr", sine)})
+    bf.fly(scenario).save(tmp_path)
+    path, vehicle = exported(tmp_path / "swung", "table", tmp_path)
+    recording = read_for(path, vehicle)
+    turned = changed(recording, rudder_command=np.negative)
+    assert diagnose_as(recording, vehicle, BEAVER)[2]["faulty"] is False
+    with pytest.raises(BadInput, match=r"answer the command of rudder the other way round.*`scale: -1` fit"):
+        diagnose_as(turned, vehicle, BEAVER)
+    (tmp_path / "moving.yaml").write_text("name: moving\nfdi: {bounds: {turbulence: light}}\n")
+    moving = known("beaver", str(tmp_path / "moving.yaml"))
+    assert diagnose_as(turned, vehicle, moving)[2]["faulty"] in (False, True)
+
+
+def without(vehicle, **keys):
+    return Vehicle.model_validate(vehicle.model_dump(exclude_unset=True) | keys)
+
+
+LACKS = [
+    ({"flow": {"alpha_rad": "alpha_rad"}}, {}, "flow: no beta_rad, allowed: a column for each of alpha_rad"),
+    ({"airspeed": None}, {}, "airspeed: is missing"),
+    ({"airspeed": "tas"}, {}, "no column tas, allowed: a log that has it; it has "),
+    ({}, {"alpha_rad": 57.3 * 12}, "flow.alpha_rad is .* in the middle, allowed: rad"),
+    ({}, {"qdyn_pa": 0.01}, "make a density of 0.01.* kg/m3, allowed: 0.2 to 1.6"),
+    ({}, {"elevator_command": 60.0}, "command of elevator reaches .* rad, allowed: its stop, 0.49 rad"),
+]
+
+
+@pytest.mark.parametrize(("keys", "factors", "says"), LACKS, ids=[one[2][:24] for one in LACKS])
+def test_what_a_log_lacks_is_said(log, keys, factors, says):
+    recording, vehicle = log
+    scaled = {name: (lambda values, by=by: values * by) for name, by in factors.items()}
+    with pytest.raises(BadInput, match=says):
+        diagnose_as(changed(recording, **scaled), without(vehicle, **keys), BEAVER)
+
+
+@pytest.mark.parametrize(("rate_hz", "taken"), [(20.0, True), (19.98, False), (1e3, True), (1001.0, False)])
+def test_rates_that_an_aircraft_s_model_takes(rate_hz, taken):
+    samples = SimpleNamespace(name="log", t_s=np.arange(500) / rate_hz, dt_s=1.0 / rate_hz)
+    if taken:
+        assert by_aircraft._rate_hz(samples) == rate_hz
+    else:
+        with pytest.raises(BadInput, match=f"log: is logged at {rate_hz:g} Hz, allowed: .* 20 to 1000 Hz"):
+            by_aircraft._rate_hz(samples)
+
+
+def test_a_log_too_slow_or_uneven_is_refused(log):
+    recording, vehicle = log
+    with pytest.raises(
+        BadInput, match="is logged at 10 Hz, allowed: an aircraft's model takes 20 to 1000 Hz"
+    ):
+        diagnose_as(only(recording, slice(0, None, 10)), vehicle, BEAVER)
+    rng = np.random.default_rng(3)
+    uneven = only(recording, np.flatnonzero(rng.uniform(size=900) < 0.7))
+    with pytest.raises(BadInput, match="no 50 samples in turn, evenly spaced"):
+        diagnose_as(uneven, vehicle, BEAVER)
+
+
+def test_turbulence_wants_the_attitude(log, tmp_path):
+    recording, vehicle = log
+    (tmp_path / "rough.yaml").write_text("name: rough\nfdi: {bounds: {turbulence: light}}\n")
+    rough = known("beaver", str(tmp_path / "rough.yaml"))
+    level = without(vehicle, attitude={"roll": "roll_rad", "pitch": "pitch_rad"})
+    with pytest.raises(BadInput, match=r"attitude.yaw: is missing, allowed: its column, where fdi.bounds"):
+        diagnose_as(recording, level, rough)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("aircraft: beaver-split\n", "flies beaver-split, allowed: a scenario of beaver"),
+        ("fdi: {sensor_monitor: always}\n", "wants accelerations, which a log has not"),
+    ],
+)
+def test_a_scenario_that_does_not_fit_is_refused(tmp_path, text, says):
+    (tmp_path / "other.yaml").write_text(f"name: other\n{text}")
+    with pytest.raises(BadInput, match=says):
+        known("beaver", str(tmp_path / "other.yaml"))
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (["--aircraft", "beavr"], "--aircraft: 'beavr'"),
+        (["--aircraft", "beaver", "--model", "m.json"], "--model and --aircraft: allowed: one of them"),
+        (["--scenario", "fault-free"], "--scenario fault-free: allowed: only with --aircraft NAME"),
+        (["--aircraft", "beaver", "--detector", "x"], "--aircraft with --detector x: allowed: none"),
+        (["--aircraft", "beaver"], "no vehicle.yaml beside it, allowed: --vehicle FILE"),
+    ],
+)
+def test_options_that_contradict(tmp_path, options, says):
+    (tmp_path / "flight.csv").write_text("t_s,p\n0,1\n")
+    done = CliRunner().invoke(app, ["diagnose", str(tmp_path / "flight.csv"), *options])
+    assert isinstance(done.exception, BadInput)
+    assert says in str(done.exception)
+
+
+def test_the_command_writes_rows_verdict_and_page(flown, tmp_path):
+    path, _ = exported(flown[0], "table", tmp_path)
+    truth = arrow.read_csv(path).to_pandas()
+    truth["elevator_truth"] = np.where(truth["t_s"] >= 6.0 - 1e-9, 0.6, 1.0)
+    truth.to_csv(path, index=False)
+    with (tmp_path / "vehicle.yaml").open("a") as file:
+        file.write("labels: {elevator: elevator_truth}\n")
+    told = ["--aircraft", "beaver", "--scenario", str(flown[0] / "scenario.yaml"), "--score"]
+    arguments = ["diagnose", str(path), *told, "--out", str(tmp_path / "d"), "--format", "json"]
+    (verdict,) = json.loads(CliRunner().invoke(app, arguments).stdout)["flights"]
+    assert (verdict["aircraft"], verdict["isolated"]) == ("beaver", "elevator")
+    assert verdict["score"]["mean_error"] < 0.01
+    rows = parquet.read_table(tmp_path / "d" / "flight" / "diagnosis.parquet")
+    surfaces = ("aileron", "elevator", "rudder", "flap")
+    each = [f"{name}_{what}" for name in surfaces for what in ("effectiveness", "low", "high")]
+    assert rows.column_names == ["t_s", "faulty", "named", *each, "credible"]
+    page = (tmp_path / "d" / "flight" / "report.html").read_text()
+    assert "effectiveness left, with bounds" in page
+    assert "The model is that of beaver" in page
+
+
+shares, sizes = st.floats(-1.0, 0.0), st.floats(-3.0, 3.0)
+
+
+@given(theta=shares, slopes=st.tuples(sizes, sizes, sizes), off=st.tuples(sizes, sizes, sizes))
+def test_a_loss_explains_what_it_does_within_the_bound(theta, slopes, off):
+    bound = np.abs(off)
+    expected = np.array(slopes)[None, :, None]
+    innovation = (theta * expected[0, :, 0] + 0.999 * np.array(off))[None, :, None]
+    least, greatest = stepped._explaining(innovation, bound[None, :, None], expected)
+    assert least[0, 0] <= theta <= greatest[0, 0]
+
+
+def test_a_loss_that_explains_nothing_has_no_place():
+    expected = np.array([1.0, 0.0, 0.0])[None, :, None]
+    innovation = np.array([0.5, 0.0, 0.0])[None, :, None]
+    least, greatest = stepped._explaining(innovation, np.full((1, 3, 1), 0.1), expected)
+    assert least[0, 0] > greatest[0, 0]  # a loss cannot add to what is commanded
+    unmoved = np.array([-0.5, 0.3, 0.0])[None, :, None]
+    least, greatest = stepped._explaining(unmoved, np.full((1, 3, 1), 0.1), expected)
+    assert least[0, 0] > greatest[0, 0]  # nor move another axis
+
+
+@given(st.lists(st.floats(-1, 1), min_size=1, max_size=30), st.integers(1, 12))
+def test_the_latest_greatest_looks_back_only(values, reach):
+    found = stepped._latest(np.array(values)[:, None], reach)[:, 0]
+    assert found.tolist() == [max(values[max(0, k - reach + 1) : k + 1]) for k in range(len(values))]
+
+
+PLANE = SimpleNamespace(
+    envelope=SimpleNamespace(airspeed_mps=(20.0, 50.0)), alpha_rad=(-0.1, 0.3), surfaces=("aileron",),
+    travel={"aileron": SimpleNamespace(min_rad=-0.4, max_rad=0.2)},
+)  # fmt: skip
+
+
+def true(mask):
+    return np.flatnonzero(mask).tolist()
+
+
+def test_a_stretch_has_fifty_even_samples_that_are_all_known():
+    """Row 50 is unknown, 49 rows follow up to a step that is a fifth too long; one a twentieth too long
+    parts nothing."""
+    steps = np.full(150, 0.05)
+    steps[[100, 120]] *= 1.2, 1.05
+    unknown = np.arange(150) == 50
+    found = by_aircraft._stretches(SimpleNamespace(t_s=np.cumsum(steps)), unknown, 20.0)
+    assert found == [(0, 50), (100, 150)]
+
+
+def test_what_is_at_a_limit_of_the_envelope_is_inside():
+    airspeed, alpha = [19.9, 20.0, 50.0, 50.1, np.nan, 30.0], [0.0, -0.1, 0.3, 0.31, -0.11, np.nan]
+    signals = np.column_stack([alpha, np.full(6, 9.0), airspeed])
+    found = by_aircraft._outside(signals, PLANE, np.arange(6) == 5, [(1, 5)])
+    assert {says: true(mask) for says, mask in found.items()} == {
+        "a number is missing": [5], "samples are not evenly spaced": [0],
+        "airspeed is outside 20 to 50 m/s": [0, 3],
+        "angle of attack is outside -0.1 to 0.3 rad": [3, 4],
+    }  # fmt: skip
+
+
+def test_a_stretch_misleads_that_nothing_explains_within_its_first_second():
+    """From its alarm on; of what comes after a second, or outside all stretches, nothing is said."""
+    verdicts = [by_aircraft.Verdict()] * 10
+    for k in (0, 3, 6):
+        verdicts[k] = by_aircraft.Verdict(True, isolated="unanticipated")
+    verdicts[5] = by_aircraft.Verdict(True)
+    given = SimpleNamespace(verdicts=verdicts)
+    ((says, mask),) = by_aircraft._misled(np.arange(10) * 0.5, [(1, 5), (5, 10)], given).items()
+    assert (says.partition(":")[0], true(mask)) == (
+        "no fault explains it from the first second on", [5, 6, 7, 8, 9],
+    )  # fmt: skip
+
+
+def test_an_alarm_raised_where_nothing_is_said_is_none_in_its_stretch():
+    rows = SimpleNamespace(t_s=np.arange(8.0), faulty=np.array([0, 1, 1, 0, 0, 1, 0, 1]))
+    reasons = {name: np.arange(8) == at for name, at in (("one", 1), ("six", 6), ("none", 9))}
+    found = by_aircraft._since([(0, 4), (4, 8)], rows, reasons)
+    says = "the alarm was raised where nothing can be said"
+    assert {name: true(mask) for name, mask in found.items()} == {"one": [1], "six": [6], says: [2, 3]}
+
+
+def test_the_loss_that_shows_is_the_median_of_the_rows_that_are_quiet_and_credible():
+    low = np.array([[0.9, 0.0], [0.8, 0.5], [0.6, 0.0], [0.1, 0.9], [0.1, 0.9]])
+    rows = SimpleNamespace(faulty=np.array([0, 0, 0, 1, 0]), credible=np.array([1, 1, 1, 1, 0]), low=low)
+    assert by_aircraft._separable(rows, ["right", "left"]) == [
+        "right: a loss of more than 20 % shows within a second in half of the flight.",
+        "left: in half of the flight not even a complete loss would show within a second.",
+    ]
+    rows.credible = np.array([0, 0, 0, 1, 0])
+    assert by_aircraft._separable(rows, ["right", "left"]) == []
+
+
+@pytest.mark.parametrize(("alpha", "beta", "density", "command", "says"), [
+    (1.5, -1.5, 0.21, 0.43, None), (-1.6, 0.0, 1.2, 0.0, "flow.alpha_rad is 1.6 in the middle"),
+    (0.0, -1.7, 1.2, 0.0, "flow.beta_rad is 1.7 in the middle"), (0.0, 0.0, 1.59, -0.43, None),
+    (0.0, 0.0, 0.19, 0.0, "a density of 0.19 kg/m3"), (0.0, 0.0, 1.61, 0.0, "a density of 1.61 kg/m3"),
+    (0.0, 0.0, 1.2, 0.45, "of aileron reaches 0.45 rad, allowed: its stop, 0.4 rad; full_deflection_rad"),
+])  # fmt: skip
+def test_flow_and_commands_in_another_unit_are_refused(alpha, beta, density, command, says):
+    """A missing number, and the density of a row at half the least airspeed, count for nothing."""
+    airspeed = np.array([30.0, 40.0, np.nan, 10.0, 10.0, 10.0])
+    dynamic = 0.5 * density * airspeed**2 * [1.0, 1.0, 1.0, 9.0, 9.0, 9.0]
+    signals = np.column_stack(
+        [[alpha, 0.0, alpha, np.nan, alpha, alpha], np.full(6, beta), airspeed, dynamic]
+    )
+    commands = np.array([[0.0], [np.nan], [command], [0.0], [0.0], [0.0]])
+    if says is None:
+        by_aircraft._plausible("log", [np.empty(0), signals, commands], PLANE)
+        return
+    with pytest.raises(BadInput, match=f"^log: .*{says}"):
+        by_aircraft._plausible("log", [np.empty(0), signals, commands], PLANE)
+
+
+def test_stretches_make_one_flight():
+    one = stepped.Stepped([1, 2], np.full((2, 2), 0.2), np.full((2, 2), 0.7), np.array([0.5, 0.9]))
+    other = stepped.Stepped([3], np.full((1, 2), 0.3), np.full((1, 2), 0.8), np.array([0.6, 0.4]))
+    found = by_aircraft._whole(5, 2, [(1, 3), (4, 5)], [one, other])
+    assert found.verdicts == [by_aircraft.Verdict(), 1, 2, by_aircraft.Verdict(), 3]
+    assert (found.low[:, 1].tolist(), found.high[:, 0].tolist()) == (
+        [0, 0.2, 0.2, 0, 0.3],
+        [1, 0.7, 0.7, 1, 0.8],
+    )
+    assert found.gains.tolist() == [0.5, 0.4]

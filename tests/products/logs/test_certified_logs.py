@@ -1,0 +1,59 @@
+"""A log of others has a certificate as a flight of ours has: proved by what the diagnosis made of it."""
+
+import json
+
+import pytest
+from pyarrow import parquet
+from tools.drawn.reader import doubts
+from typer.testing import CliRunner
+
+import beaver_ftc as bf
+from beaver_ftc.cli.main import app
+from beaver_ftc.results.exports import RECORDINGS, write_recording
+from beaver_ftc_assurance.certificates.check_certificate import failures
+from flying import SINES
+
+LOSS = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.5, "at_s": 1.0}
+GYROS = {axis: {"noise_std_deg_s": 0.02} for axis in "pqr"}
+FDI = {
+    "published": {},
+    "all": {"fault_class": "all"},
+    "chance": {"statistical": {}, "authority": "statistical", "bounds": {"sensors": GYROS}},
+}
+
+
+def proved(folder):
+    """Certificate, its log, and whether two readers accept it."""
+    document = json.loads((folder / "certificate.json").read_text())
+    table = parquet.read_table(folder / "log.parquet")
+    log = {name: table[name].to_numpy() for name in table.column_names}
+    scenario = (folder / "scenario.yaml").read_text()
+    return document, log, [*failures(document, log, scenario)], [*doubts(document, log, scenario)]
+
+
+@pytest.mark.parametrize("faults", [[LOSS], []])
+@pytest.mark.parametrize("name", FDI)
+def test_a_logs_alarm_and_exclusions_are_proved(name, faults, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    scenario = {
+        "name": "mine", "duration_s": 2.5, "reference": SINES, "faults": faults, "fdi": FDI[name],
+        "sensors": GYROS if name == "chance" else {},
+    }  # fmt: skip
+    folder = bf.fly(scenario).save(tmp_path, report=False)
+    stops = {s: max(abs(to.min_rad), abs(to.max_rad)) for s, to in bf.aircraft("beaver").travel.items()}
+    write_recording(folder / "log.parquet", stops, "table", tmp_path, ("dpt",))
+    asked = ["--aircraft", "beaver", "--scenario", str(folder / "scenario.yaml"), "--certificate"]
+    done = CliRunner().invoke(app, ["diagnose", RECORDINGS["table"], *asked])
+    assert done.exit_code == 0, done.output
+    document, log, *refused = proved(tmp_path / "diagnoses" / "flight")
+    assert refused == [[], []]
+    set_at_end = {column for column in log if "likelihood" not in column and column != "t_s"}
+    set_at_end = {c for c in set_at_end if (c == "detected" or c.endswith("_excluded")) and log[c][-1] > 0}
+    told = [said["column"] for said in (*document["statements"], *document["without"])]
+    assert set(told) - {None} == set_at_end
+    assert bool(faults) == ("detected" in set_at_end)
+
+
+def test_without_an_aircraft_there_is_none():
+    done = CliRunner().invoke(app, ["diagnose", "x.parquet", "--certificate"])
+    assert "--certificate: allowed: only with --aircraft" in str(done.exception or done.output)

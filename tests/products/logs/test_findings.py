@@ -1,0 +1,200 @@
+"""What a verdict says, of rows and flights made by hand."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from beaver_ftc_logs import findings
+from beaver_ftc_logs.findings import (
+    as_text,
+    events_of,
+    lasting,
+    looked_at,
+    sentences,
+    statement,
+    verdict_of,
+)
+from beaver_ftc_logs.regression import predicted
+from products.logs import small
+
+NAMES = ["right", "left"]
+SOUND, HALF, LESS = ("", [1.0, 1.0]), ("left", [1.0, 0.5]), ("left", [1.0, 0.4])
+PARTS = {
+    "nothing": [(20, *SOUND)],
+    "one": [(20, *SOUND), (20, *HALF), (20, *SOUND)],
+    "to the end": [(3, *SOUND), (20, *HALF)],
+    "two in turn": [(8, *HALF), (9, *LESS), (7, "right", [0.2, 1.0])],
+    "a brief level within": [(10, *HALF), (3, *LESS), (10, *HALF), (5, *SOUND)],
+    "just brief, just not": [(10, *HALF), (6, *LESS), (10, *HALF), (7, *LESS)],
+    "brief ones alone": [(5, *SOUND), (6, *HALF), (5, *SOUND), (2, "right", [0.1, 1.0]), (5, *SOUND)],
+    "brief before one that lasts": [(4, *LESS), (9, *SOUND), (9, *HALF)],
+    "no one knows which": [(4, *SOUND), (9, "unknown", [0.9, 0.8])],
+    "both": [(4, *SOUND), (9, "right+left", [0.3, 0.6]), (3, *SOUND)],
+}
+
+
+@pytest.mark.parametrize("name", PARTS)
+def test_rows_become_events(changed, name):
+    assert not changed(events_of(small.rows(PARTS[name]), NAMES))
+
+
+def test_an_event_says_what_stood_for_most_of_it():
+    """The brief level within another is part of it: name and level are those of the longer."""
+    (event,) = events_of(small.rows(PARTS["a brief level within"]), NAMES)
+    assert (event["from_s"], event["to_s"], event["named"], event["brief"]) == (10.0, 21.0, "left", False)
+    assert event["effectiveness"] == {"left": {"estimate": 0.5, "low": 0.4, "high": 0.75}}
+    assert event["probability"] == pytest.approx(0.9 + 0.022)
+
+
+@pytest.mark.parametrize(("count", "brief"), [(6, True), (7, False)])
+def test_three_seconds_are_not_brief(count, brief):
+    events = events_of(small.rows([(4, *SOUND), (count, *HALF), (4, *SOUND)]), NAMES)
+    assert [event["brief"] for event in events] == [brief]
+    assert lasting(events) == events  # where every one is brief they are all there is to say
+
+
+WORLD = {
+    "wing": (small.model(settings={"power": 0.8, "levels": {"left": [0.4]}}), {}),
+    "tail": (
+        small.model(small.TAIL, settings={"alarm": 0.9}),
+        {"gap": 150, "notes": ("a remark",), "age_s": {"roll": 0.123456}},
+    ),
+}
+
+
+@pytest.fixture(scope="module", params=WORLD)
+def flown(request):
+    model, changes = WORLD[request.param]
+    return model, small.flight(model, **changes)
+
+
+def test_the_document_of_a_verdict(changed, flown):
+    model, samples = flown
+    surfaces = list(model.vehicle.surfaces)
+    left = [1.0, 0.5, 0.7][: len(surfaces)]
+    rows = small.rows([(8, "", [1.0] * len(left)), (9, "+".join(surfaces[1:]), left)], len(left))
+    assert not changed(verdict_of(samples, model, rows))
+
+
+def events(*parts):
+    return events_of(small.rows(parts), NAMES)
+
+
+VERDICT = {
+    "flight": "one", "gaps": 0, "duration_s": 61.4, "recorded_s": 41.6, "events": [],
+    "can_separate": ["First.", "Second."], "notes": [], "credible": {"share": 1.0, "reasons": []},
+}  # fmt: skip
+
+
+def test_the_text_of_a_verdict(changed):
+    one, two = events(*PARTS["one"]), events(*PARTS["two in turn"])
+    mixed = events(*PARTS["brief before one that lasts"])
+    unknown = events(*PARTS["no one knows which"])
+    brief = events(*PARTS["brief ones alone"])
+    score = {"classes": 0.98765, "rows": 4, "side": None}
+    cases = [
+        VERDICT,
+        VERDICT | {"events": one, "gaps": 1},
+        VERDICT | {"events": two, "gaps": 2, "notes": ["A remark."]},
+        VERDICT | {"events": mixed, "score": score},
+        VERDICT | {"events": unknown},
+        VERDICT | {"events": brief},
+        VERDICT | {"credible": {"share": 0.0, "reasons": [{"says": "a rate is clipped", "share": 1.0}]}},
+    ]
+    assert not changed([as_text(case).splitlines() for case in cases])
+    assert [looked_at(case) for case in cases[:3]] == [
+        "61 s", "42 s, 1 gap in the log left out", "42 s, 2 gaps in the log left out",
+    ]  # fmt: skip
+
+
+def test_what_a_flight_can_separate_in_words():
+    """By size, by none, and of groups that move the rates alike."""
+    losses = {"5": None, "20": 0.5, "60": 0.123}
+    groups = [
+        {"surfaces": ["right"], "smallest_loss": losses},
+        {"surfaces": ["left", "flap"], "smallest_loss": dict.fromkeys(losses)},
+    ]
+    pairs = [
+        {"surfaces": [["right"], ["left", "flap"]], "cosine": -0.954, "separable": False},
+        {"surfaces": [["right"], ["rudder"]], "cosine": 0.1, "separable": True},
+    ]
+    together = [{"surfaces": ["left", "flap"], "says": "They move together."}]
+    assert sentences({"together": together, "groups": groups, "alike": pairs}) == [
+        "They move together.",
+        "right: the smallest loss that shows on average is 50% within 20 s, 12% within 60 s.",
+        "left, flap: not even a complete loss would show within 60 s by the mean of this flight's commands.",
+        "In this flight the effects of right and of left and flap were nearly proportional (cosine -0.95): "
+        "one may be named for the other.",
+    ]
+
+
+def test_what_motion_alone_tells_is_what_is_left_of_the_regression(flown):
+    """The Schur complement of the whole information matrix, trim of each axis and the other groups out."""
+    model, samples = flown
+    ok_answers = _whitened_answers(samples, model)
+    n, groups, _ = ok_answers.shape
+    design = np.concatenate([ok_answers.transpose(0, 2, 1), np.tile(np.eye(3), (n, 1, 1))], axis=2)
+    flat = design.reshape(-1, groups + 3)
+    covariance = np.linalg.inv(flat.T @ flat)
+    for group, entry in enumerate(statement(samples, model)["groups"]):
+        left = 1.0 / covariance[group, group] / n / samples.dt_s
+        assert entry["information_per_s_of_its_motion"] == pytest.approx(left, rel=1e-9)
+
+
+def _whitened_answers(samples, model):
+    ok, _, answers = predicted(samples, model)
+    root = np.linalg.inv(np.linalg.cholesky(np.array(model.noise))) * np.sqrt(model.settings.power)
+    return answers[ok] @ root.T
+
+
+def test_where_nothing_can_be_predicted_nothing_shows():
+    model = WORLD["wing"][0]
+    samples = small.flight(model, 40)
+    found = statement(replace(samples, commands=np.full_like(samples.commands, np.nan)), model)
+    nothing = {"5": None, "20": None, "60": None}
+    assert [entry["information_per_s"] for entry in found["groups"]] == [0.0, 0.0]
+    assert all(entry["smallest_loss"] == nothing for entry in found["groups"])
+    assert found["alike"][0]["cosine"] == 0.0
+
+
+@pytest.mark.parametrize(("share", "separable"), [(0.899, True), (0.901, False)])
+def test_nearly_proportional_is_a_cosine_of_nine_tenths(share, separable):
+    """Answers of the second group: as much of the first's as the share says, the rest at right angles."""
+    noise = np.eye(3).tolist()
+    response = [[[1.0, 0.0, 0.0]], [[share, float(np.sqrt(1.0 - share**2)), 0.0]]]
+    model = small.model(lags=1, response=response, response_sd=response, noise=noise)
+    samples = small.flight(small.model(), 60)
+    (pair,) = statement(replace(samples, commands=samples.commands[:, [0, 0]]), model)["alike"]
+    assert pair["cosine"] == pytest.approx(share)
+    assert pair["separable"] is separable
+
+
+@pytest.mark.parametrize(
+    ("share", "says"),
+    [
+        (1.0, "no fault shows"), (0.999, "no fault shows where the model is credible,"),
+        (0.92, "no fault shows where the model is credible,"), (0.0, "no verdict"),
+    ],
+)  # fmt: skip
+def test_that_nothing_shows_is_said_of_the_rows_that_are_credible(share, says):
+    """Of all of them without a word more; of hardly any there is no verdict."""
+    assert findings._nothing({"credible": {"share": share}}) == says
+    little = findings._LITTLE
+    assert findings._nothing({"credible": {"share": 0.99 * little}}) == "no verdict"
+    assert findings._nothing({"credible": {"share": 1.01 * little}}).startswith("no fault shows where")
+
+
+def test_the_smallest_loss_passes_the_odds_by_the_information_gathered():
+    """Half of the square of the loss times the information; a complete loss is one."""
+    assert findings._smallest(0.5, 5.0) == {"5": None, "20": 1.0, "60": pytest.approx(3.0**-0.5)}
+    assert findings._smallest(0.0, 5.0) == {"5": None, "20": None, "60": None}
+
+
+def test_odds_against_a_change_are_those_of_its_median_share():
+    weight = np.array([0.5, 0.2, 0.1, 0.3])
+    bank = SimpleNamespace(weight=weight, faulty=lambda group: np.arange(4) % 2 == (1 if group else 5))
+    model = small.model(settings={"alarm": 0.9, "changes_per_hour": 36.0})
+    assert findings._odds_against(model, bank, 1, 0.1) == pytest.approx(np.log(9.0) - np.log(0.00025))
+    assert findings._odds_against(model, bank, 0, 0.1) == np.inf

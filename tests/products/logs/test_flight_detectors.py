@@ -1,0 +1,238 @@
+"""Plain estimators, the freeze rule and the loop's detectors, on small flights: by another road, or whole."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from beaver_ftc.diagnosis.base import Verdict
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc_logs import detectors
+from beaver_ftc_logs.recording import Column, Recording
+from beaver_ftc_logs.regression import predicted
+from kept import in_short
+from products.logs import small
+
+WING = small.model(settings={"levels": {"left": [0.4, 0.8]}, "level_step": 0.25, "trim_sd": 0.3})
+BARE = small.model()
+TAIL = small.model(small.TAIL)
+LOST = ((1, 150, 400, 0.4),)
+METHODS = {"sliding": "sliding-least-squares", "forgetting": "forgetting-least-squares"}
+
+
+def batch(samples, model, k, forget):
+    """Least squares of trim and lost effectiveness up to sample k, every one of them at once."""
+    ok, unexplained, answers = predicted(samples, model)
+    sd = np.sqrt(np.diag(model.noise))
+    whiten = np.linalg.inv(np.linalg.cholesky(np.array(model.noise)))
+    information, score = np.diag([1.0 / 0.3**2] * 3 + [4.0, 4.0]), np.zeros(5)
+    for i in range(k + 1):
+        age_s = (k - i) * samples.dt_s
+        if not ok[i] or (not forget and age_s > 19.95):
+            continue
+        weight = np.exp(-age_s / 20.0) if forget else 1.0
+        x = whiten @ np.column_stack([np.diag(sd), answers[i].T])
+        y = whiten @ (unexplained[i] - np.array(model.intercept) - answers[i].sum(axis=0))
+        information = information + weight * x.T @ x
+        score = score + weight * x.T @ y
+    covariance = np.linalg.inv(information)
+    return 1.0 + (covariance @ score)[3:], np.sqrt(np.diag(covariance))[3:]
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_least_squares_by_one_batch(name):
+    """Levels of a flight are those seen, or the nearest of the grid; bounds 1.645 sd away and around them."""
+    samples = small.flight(WING, 400, lost=LOST, gap=250)
+    rows = detectors.diagnose_with(METHODS[name], samples, WING)
+    for k in (60, 199, 200, 230, 399):
+        value, sd = batch(samples, WING, k, name == "forgetting")
+        levels = ([0.0, 0.25, 0.5, 0.75, 1.0], [0.4, 0.8, 1.0])
+        nearest = [
+            min(of, key=lambda level, v=v: abs(level - np.clip(v, 0, 1)))
+            for v, of in zip(value, levels, strict=True)
+        ]
+        assert rows.estimate[k].tolist() == nearest
+        low, high = (np.clip(value + side * 1.645 * sd, 0.0, 1.0) for side in (-1, 1))
+        np.testing.assert_allclose(rows.low[k], np.minimum(low, nearest), atol=1e-9)
+        np.testing.assert_allclose(rows.high[k], np.maximum(high, nearest), atol=1e-9)
+        named = "+".join(side for side, level in zip(("right", "left"), nearest, strict=True) if level < 1.0)
+        assert (rows.named[k], rows.faulty[k], rows.probability[k]) == (named, bool(named), bool(named))
+    assert rows.named[399] == "left"
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_without_labels_a_loss_is_sure_by_five_sd(name):
+    model = small.model(settings={"trim_sd": 0.3})
+    samples = small.flight(model, 400, lost=LOST)
+    rows = detectors.diagnose_with(METHODS[name], samples, model)
+    sure = []
+    for k in range(0, 400, 25):
+        value, sd = batch(samples, model, k, name == "forgetting")
+        np.testing.assert_allclose(rows.estimate[k], np.clip(value, 0, 1), atol=1e-9)
+        lost = [side for side, v, s in zip(("right", "left"), value, sd, strict=True) if v + 5.0 * s < 1.0]
+        assert rows.named[k] == "+".join(lost)
+        sure.append(bool(lost))
+    assert 3 < sum(sure) < 14
+
+
+@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("of", ["wing", "tail"])
+def test_rows_of_least_squares(changed, name, of):
+    model = {"wing": WING, "tail": TAIL}[of]
+    rows = detectors.diagnose_with(METHODS[name], small.flight(model, 300, lost=LOST), model)
+    said = {
+        what: in_short(getattr(rows, what)) for what in ("estimate", "low", "high", "probability", "faulty")
+    }
+    assert not changed(said | {"named": rows.named[::25]})
+
+
+def logged(*columns):
+    return Recording("one", {name: Column(np.array(t), np.array(v)) for name, t, v in columns})
+
+
+def test_an_output_that_stands_still_for_six_seconds_is_frozen():
+    """Still from 2 s on, until 20 s; each sample knows the last output up to its own time."""
+    t_s = np.arange(1.0, 30.0, 2.0)
+    values = np.where((t_s > 2.0) & (t_s < 20.0), 5.0, t_s)
+    moving = ("elevator_output", np.arange(0.0, 30.0, 3.0), np.arange(10.0))
+    samples = small.flight(TAIL, 60, dt_s=0.5, t_s=0.5 * np.arange(60))
+    rows = detectors.freeze(logged(("left_output", t_s, values), moving), samples, TAIL)
+    frozen = [3.0 + 6.0 < t < 21.0 for t in samples.t_s]
+    assert rows.faulty.tolist() == frozen
+    assert set(rows.named[np.array(frozen)]) == {"left_aileron"}
+    np.testing.assert_array_equal(rows.estimate, np.column_stack([1.0 - np.array(frozen), np.ones((60, 2))]))
+    np.testing.assert_array_equal(rows.probability, np.array(frozen, dtype=float))
+    np.testing.assert_array_equal(rows.low, rows.estimate)
+    np.testing.assert_array_equal(rows.high, rows.estimate)
+
+
+def test_before_its_first_stamp_an_output_is_not_frozen():
+    samples = small.flight(TAIL, 40, dt_s=1.0, t_s=np.arange(40.0))
+    late = logged(("elevator_output", [20.0, 21.0], [1.0, 1.0]))
+    rows = detectors.freeze(late, samples, TAIL)
+    assert np.flatnonzero(rows.faulty).tolist() == list(range(27, 40))
+    assert set(rows.named) == {"", "elevator"}
+    assert detectors.freeze(logged(), samples, TAIL) is None
+    assert detectors.freeze(late, samples, BARE) is None
+
+
+@pytest.mark.parametrize("model", [WING, TAIL], ids=["wing", "tail"])
+def test_what_a_detector_of_the_loop_is_given(model):
+    """The innovation is the one-step residual, nothing where the model is silent; commands of each group."""
+    samples = small.flight(model, 60, gap=30)
+    samples.rates[45, 2] = samples.commands[50, 0] = np.nan
+    stream = detectors.stream_of(samples, model)
+    ok, unexplained, answers = predicted(samples, model)
+    intercept, x = np.array(model.intercept), np.nan_to_num(samples.rates)
+    members = [[0], [1]] if model is WING else [[0, 2], [1]]
+    for k, (now, command) in enumerate(stream):
+        assert now.t_s == samples.t_s[k]
+        np.testing.assert_array_equal(now.x, x[k])
+        assert now.y.tolist() == [0.0] * len(now.y)
+        innovation = now.x - x[max(k - 1, 0)] - 0.1 * now.acceleration
+        left = unexplained[k] - intercept - answers[k].sum(axis=0) if ok[k] else np.zeros(3)
+        np.testing.assert_allclose(innovation, left, atol=1e-12)
+        of_groups = answers[k].T if ok[k] else np.zeros((3, 2))
+        np.testing.assert_allclose(now.contribution[:, :2] * 0.1, of_groups, atol=1e-12)
+        assert now.contribution[:, 2:].tolist() == [[0.0, 0.0]] * 3
+        moved = [samples.commands[k, group].sum() for group in members]
+        np.testing.assert_allclose(command, [*np.nan_to_num(moved), 0.0, 0.0], atol=1e-12)
+        np.testing.assert_allclose(now.eta_bar, np.sqrt(np.diag(model.noise)) * 10.0)
+    assert stream[3][0].eta_bar is not stream[4][0].eta_bar
+
+
+def test_a_detector_of_the_loop_knows_three_groups():
+    table = {"a": {"roll": 1.0}, "b": {"pitch": 1.0}, "c": {"roll": 1.0, "pitch": 1.0}}
+    three = small.model(small.WING | {"surfaces": table, "labels": {}})
+    assert len(detectors.stream_of(small.flight(three, 20), three)) == 20
+    four = small.WING | {"surfaces": table | {"d": {"roll": 1.0, "pitch": -1.0}}, "labels": {}}
+    model = small.model(four)
+    with pytest.raises(
+        BadInput, match="wing: 4 groups of surfaces, allowed for a detector of the loop: at most 3"
+    ):
+        detectors.stream_of(small.flight(model, 20), model)
+
+
+def test_what_a_detector_is_told_before_the_flight(changed):
+    told = detectors.context_of(WING)
+    assert isinstance(told.model, detectors.Linear)
+    fields = {name: value for name, value in vars(told).items() if name not in ("model", "declared")}
+    assert not changed(fields | {"declared": vars(told.declared)})
+    x = np.array([[0.1, 0.2, -0.3], [0.4, 0.0, 0.2]])
+    past = np.array(WING.past)[:3]
+    np.testing.assert_allclose(told.model.f(x, np.zeros(4)), (x @ past - x) / 0.1)
+    assert told.model.G(np.zeros(4)).tolist() == [[0.0] * 4] * 3
+
+
+LOSS = Verdict(True, "q", "elevator", "loss_of_effectiveness", -0.4, None, 2.0)
+
+
+def left(share):
+    return LOSS._replace(effectiveness=np.array([0.9, share, 0.2, 0.1]))
+
+
+VERDICTS = {
+    "nothing": (Verdict(), ("", 0, [1, 1], [1, 1], 0.0)),
+    "below one": (Verdict(statistic=0.3), ("", 0, [1, 1], [1, 1], 0.3)),
+    "at one": (LOSS._replace(statistic=1.0), ("", 0, [1, 1], [1, 1], 1.0)),
+    "beyond": (LOSS, ("left", 1, [1, 0.6], [1, 0], 1.0)),
+    "a negative statistic": (LOSS._replace(statistic=-1.0), ("", 0, [1, 1], [1, 1], 0.0)),
+    "no statistic": (LOSS._replace(statistic=np.nan), ("left", 1, [1, 0.6], [1, 0], 1.0)),
+    "latched alone": (Verdict(True, statistic=0.2), ("", 0, [1, 1], [1, 1], 0.2)),
+    "no place": (Verdict(True, isolated="rudder"), ("unknown", 1, [1, 1], [0, 0], 1.0)),
+    "not isolated": (Verdict(True), ("unknown", 1, [1, 1], [0, 0], 1.0)),
+    "first place": (LOSS._replace(isolated="aileron"), ("right", 1, [0.6, 1], [0, 1], 1.0)),
+    "too much lost": (LOSS._replace(estimate=-1.4), ("left", 1, [1, 0], [1, 0], 1.0)),
+    "nothing lost": (LOSS._replace(estimate=0.3), ("left", 1, [1, 1], [1, 0], 1.0)),
+    "no estimate": (LOSS._replace(estimate=None), ("left", 1, [1, 1], [1, 0], 1.0)),
+    "of every surface": (
+        left(0.3), ("left", 1, [1, 0.3], [1, 0], 1.0),
+    ),
+    "more than all": (left(1.3), ("left", 1, [1, 1], [1, 0], 1.0)),
+    "less than none": (left(-0.3), ("left", 1, [1, 0], [1, 0], 1.0)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", VERDICTS)
+def test_a_verdict_of_the_loop_becomes_a_row(name):
+    verdict, (named, faulty, estimate, low, probability) = VERDICTS[name]
+    samples = small.flight(BARE, 3)
+    rows = detectors.rows_of([Verdict(), verdict, Verdict()], samples, BARE)
+    assert (rows.named.tolist(), rows.faulty.tolist()) == (["", named, ""], [0, faulty, 0])
+    np.testing.assert_allclose(rows.estimate, [[1, 1], estimate, [1, 1]])
+    np.testing.assert_allclose(rows.low, [[1, 1], low, [1, 1]])
+    np.testing.assert_allclose(rows.high, np.ones((3, 2)))
+    np.testing.assert_allclose(rows.probability, [0.0, probability, 0.0])
+
+
+def test_surfaces_that_move_together_share_a_verdict():
+    both = LOSS._replace(isolated="aileron")
+    rows = detectors.rows_of([both], small.flight(TAIL, 1), TAIL)
+    assert rows.named.tolist() == ["left_aileron+right_aileron"]
+    assert rows.estimate.tolist() == [[0.6, 1.0, 0.6]]
+    assert rows.low.tolist() == [[0.0, 1.0, 0.0]]
+
+
+def test_a_detector_is_stepped_through_the_whole_flight():
+    told = []
+    detector = SimpleNamespace(
+        reset=lambda context: told.append(context.dt_s),
+        step=lambda measured, command: told.append(measured.t_s) or Verdict(statistic=measured.t_s),
+    )
+    samples = small.flight(BARE, 30)
+    rows = detectors.run_detector(detector, samples, BARE)
+    assert told == [0.1, *samples.t_s]
+    assert np.flatnonzero(rows.faulty)[0] == 11
+
+
+def test_detectors_of_flights_come_first_and_others_are_refused():
+    names = detectors.detector_names()
+    assert names[:3] == ["bank-of-filters", "sliding-least-squares", "forgetting-least-squares"]
+    assert len(names) > 3
+    with pytest.raises(BadInput, match="--detector banc: is not known"):
+        detectors.check_detector("banc")
+    for name in names:
+        detectors.check_detector(name)
+    slow = small.flight(BARE, 60, dt_s=0.2)
+    with pytest.raises(BadInput, match="allowed: within 25% of the 10 Hz"):
+        detectors.diagnose_with(names[1], slow, BARE)

@@ -1,0 +1,87 @@
+"""Identification of a vehicle whose coefficients are known."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc_logs.fitting import usable
+from beaver_ftc_logs.identification import identify
+from beaver_ftc_logs.regression import least_squares, variance_inflation
+from beaver_ftc_logs.samples import constant_parts, load_flights
+from products.logs import synthetic
+
+
+def test_the_responses_are_those_of_the_vehicle(wing_model):
+    true = np.array([synthetic.RIGHT, synthetic.LEFT])
+    found = np.array(wing_model.response)[:, :3]
+    error = np.abs(found - true) / np.array(wing_model.response_sd)[:, :3]
+    assert error.max() < 4.5
+    assert np.abs(found - true).max() < 0.06
+
+
+def test_the_noise_is_that_of_the_vehicle(wing_model):
+    assert np.sqrt(np.diag(wing_model.noise)) == pytest.approx(synthetic.NOISE, rel=0.05)
+
+
+def test_what_is_left_of_white_noise_is_white_in_every_band_up_to_half_the_rate(wing_model):
+    bands = wing_model.identified["spectrum"]
+    ends = [(band["from_hz"], band["to_hz"]) for band in bands]
+    assert [ends[0][0], ends[-1][1]] == [0.0, synthetic.RATE_HZ / 2]
+    assert all(one[1] == other[0] for one, other in itertools.pairwise(ends))
+    assert [band[axis] for band in bands for axis in "pqr"] == pytest.approx([1.0] * 3 * len(bands), abs=0.4)
+
+
+def test_what_the_labels_say_becomes_the_prior(wing_model):
+    assert wing_model.settings.levels == {"right": [0.4], "left": [0.5]}
+
+
+def test_edges_of_labels_are_not_fitted(wing, wing_folder):
+    flown = synthetic.fly(60.0, parts=((30, 40, 1.0, 0.5),))
+    flown["left_effectiveness"][:50] = np.nan
+    samples = load_flights([synthetic.write_csv(wing_folder / "edges.csv", flown)], wing)[0]
+    use, t_s = usable(samples), samples.t_s
+    assert not use[t_s < 5.0].any()
+    assert not use[np.abs(t_s - 30.0) < 1.4].any()
+    assert use[(t_s > 32) & (t_s < 38)].all()
+
+
+def test_constant_parts_cover_everything_once():
+    labels = np.array([[1.0], [1.0], [0.5], [np.nan], [np.nan], [1.0]])
+    assert constant_parts(labels) == [(0, 2), (2, 3), (3, 5), (5, 6)]
+
+
+def test_too_short_a_flight_is_refused(wing, wing_folder):
+    path = synthetic.write_csv(wing_folder / "short.csv", synthetic.fly(8.0))
+    with pytest.raises(BadInput, match="samples known to be healthy, allowed: at least"):
+        identify(load_flights([path], wing), wing)
+
+
+def test_coloured_residuals_widen_the_standard_errors():
+    """Slopes over many draws scatter as the corrected standard error says, not as the white one does."""
+    rng = np.random.default_rng(2)
+    n, slopes, said, colour = 600, [], [], []
+    for _ in range(200):
+        x, e = _coloured(rng, n), _coloured(rng, n)
+        fit = least_squares(x[:, None], np.tile(e[:, None], 3), np.zeros(n, dtype=int), 40)
+        slopes.append(fit.coefficients[0, 0])
+        said.append(fit.standard_errors[0, 0])
+        colour.append(fit.colour[0, 0])
+    assert np.mean(colour) > 1.8
+    assert np.median(said) == pytest.approx(np.std(slopes), rel=0.25)
+
+
+def _coloured(rng, n):
+    x = np.zeros(n)
+    for k in range(1, n):
+        x[k] = 0.8 * x[k - 1] + rng.standard_normal()
+    return x
+
+
+def test_variance_inflation_is_one_over_one_less_r_squared():
+    rng = np.random.default_rng(3)
+    a, b = rng.standard_normal((2, 4000))
+    x = np.column_stack([a, a + 0.5 * b])
+    r2 = np.corrcoef(x.T)[0, 1] ** 2
+    assert variance_inflation(x) == pytest.approx([1 / (1 - r2)] * 2, rel=1e-6)

@@ -1,0 +1,99 @@
+"""The isolability statement against flights: what it says would show shows, and what would not does not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from beaver_ftc_logs.bank import bank_of
+from beaver_ftc_logs.diagnose import diagnose
+from beaver_ftc_logs.findings import sentences, statement
+from beaver_ftc_logs.identification import identify
+from beaver_ftc_logs.samples import load_flights
+from beaver_ftc_logs.vehicle import load_vehicle
+from products.logs import synthetic
+
+SLAVED = synthetic.VEHICLE.replace("pitch_command: 0.5}, left", "pitch_command: 0.0}, left").replace(
+    "pitch_command: -0.5", "pitch_command: 0.0"
+)
+FLIGHTS = 6
+
+
+def sampled(wing, folder, name, **flown):
+    return load_flights([synthetic.write_csv(folder / f"{name}.csv", synthetic.fly(**flown))], wing)[0]
+
+
+def shares_found(wing, folder, model, loss):
+    """Share of drawn flights in which a loss of the left elevon is found within 60 s of its begin."""
+    found = []
+    for seed in range(FLIGHTS):
+        part = (100, 160, 1.0, 1.0 - loss)
+        samples = sampled(wing, folder, "drawn", duration_s=160.0, parts=(part,), seed=50 + seed)
+        rows = diagnose(samples, model)
+        found.append(bool((rows.faulty[(rows.t_s > 102) & (rows.t_s < 160)]).mean() > 0.1))
+    return np.mean(found)
+
+
+def test_the_smallest_loss_is_where_flights_begin_to_show_it(wing, wing_folder, wing_model):
+    healthy = sampled(wing, wing_folder, "said", duration_s=160.0, seed=49)
+    said = {tuple(one["surfaces"]): one for one in statement(healthy, wing_model)["groups"]}
+    smallest = said[("left",)]["smallest_loss"]["60"]
+    assert 0.02 < smallest < 0.4
+    assert shares_found(wing, wing_folder, wing_model, min(3.0 * smallest, 1.0)) > 0.8
+    assert shares_found(wing, wing_folder, wing_model, smallest / 4.0) < 0.3
+
+
+def test_surfaces_that_move_together_are_said_to_and_named_together(wing_folder):
+    """Two surfaces on one command: a loss in either gives the same rates, so both are named."""
+    (wing_folder / "slaved.yaml").write_text(SLAVED)
+    slaved = load_vehicle(wing_folder / "slaved.yaml")
+    healthy = synthetic.fly(300.0, seed=61)
+    del healthy["right_effectiveness"], healthy["left_effectiveness"]
+    model = identify(load_flights([synthetic.write_csv(wing_folder / "slaved.csv", healthy)], slaved), slaved)
+    assert model.groups == [["right", "left"]]
+    named = []
+    for part in ((80, 160, 0.2, 1.0), (80, 160, 1.0, 0.2)):
+        samples = sampled(slaved, wing_folder, "one", duration_s=160.0, parts=(part,), seed=62)
+        assert statement(samples, model)["together"][0]["surfaces"] == ["right", "left"]
+        rows = diagnose(samples, model)
+        named.append(set(rows.named[rows.faulty == 1]) - {"unknown"})
+        suspected = rows.faulty == 1
+        assert (rows.low[suspected] == 0.0).mean() > 0.9
+    assert named[0] == named[1] == {"right+left"}
+
+
+@pytest.mark.parametrize(("sign", "named"), [(1.0, "1.00"), (-1.0, "-1.00")])
+def test_groups_that_act_alike_or_opposed_are_not_separable(wing, wing_folder, wing_model, sign, named):
+    """The left elevon's response made that of the right one, or its opposite, under the same commands."""
+    samples = sampled(wing, wing_folder, "opposed", duration_s=40.0, seed=47)
+    right = np.array(wing_model.response[0])
+    model = wing_model.model_copy(update={"response": [right.tolist(), (sign * right).tolist()]})
+    moved = replace(samples, commands=samples.commands[:, [0, 0]])
+    found = statement(moved, model)
+    (pair,) = found["alike"]
+    assert pair["separable"] is False
+    assert pair["cosine"] == pytest.approx(sign)
+    assert f"nearly proportional (cosine {named}): one may be named for the other." in sentences(found)[-1]
+    assert statement(samples, wing_model)["alike"][0]["separable"] is True
+
+
+def test_the_smallest_loss_by_its_closed_form(wing, wing_folder, wing_model):
+    """d^2 / 2 times the information gathered equals the odds, sample by sample from the model file; the same
+    samples taken for half as long each carry twice as much a second."""
+    samples = sampled(wing, wing_folder, "closed", duration_s=40.0, seed=46)
+    inverse = np.linalg.inv(np.array(wing_model.noise))
+    response, lags = np.array(wing_model.response), wing_model.lags
+    first = max(lags, wing_model.history)
+    information = []
+    for k in range(first, len(samples.t_s)):
+        moved = sum(samples.commands[k - j, 0] * response[0][j - 1] for j in range(1, lags + 1))
+        information.append(moved @ inverse @ moved)
+    settings = wing_model.settings
+    for rate_hz in (10.0, 20.0):
+        found = statement(replace(samples, dt_s=1.0 / rate_hz), wing_model)["groups"][0]
+        per_s = settings.power * np.mean(information) * rate_hz
+        assert found["information_per_s"] == pytest.approx(per_s, rel=1e-9)
+        odds = 0.5 * found["smallest_loss"]["60"] ** 2 * per_s * 60.0
+        share = np.median(bank_of(wing_model).weight[bank_of(wing_model).faulty(0)])
+        change = settings.changes_per_hour / 3600.0 / rate_hz * share
+        assert odds == pytest.approx(np.log(settings.alarm / (1.0 - settings.alarm) / change), rel=1e-9)

@@ -1,0 +1,77 @@
+"""Model files of strangers: numbers, shapes and covariances are checked before a flight is diagnosed."""
+
+import json
+
+import pytest
+
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc_logs.model import load_model
+
+G, LAGS, HISTORY = 2, 3, 2
+MODEL = {
+    "vehicle": {
+        "name": "wing", "rates": {axis: {"column": axis} for axis in "pqr"}, "commands": ["a", "b"],
+        "surfaces": {"left": {"a": 0.5, "b": 0.4}, "right": {"a": 0.3, "b": -0.6}},
+    },
+    "rate_hz": 20.0, "groups": [["left"], ["right"]], "history": HISTORY, "lags": LAGS,
+    "intercept": [0.01, 0.02, 0.03],
+    "past": [[0.1 * i + 0.01 * k for k in range(3)] for i in range(3 * HISTORY)],
+    "response": [[[0.2 + g + 0.1 * n + 0.01 * k for k in range(3)] for n in range(LAGS)] for g in range(G)],
+    "response_sd": [[[0.1 + g + 0.1 * n + 0.01 * k for k in range(3)] for n in range(LAGS)] for g in range(G)],  # noqa: E501
+    "noise": [[2.0, 0.1, 0.2], [0.1, 3.0, 0.3], [0.2, 0.3, 4.0]],
+    "colours": [{"average": [1.0, 0.5], "noise": [[2.5, 0.1, 0.2], [0.1, 3.5, 0.3], [0.2, 0.3, 4.5]]}],
+    "fitted": {
+        "commands": [[-0.5, 0.4], [-0.3, 0.6]], "rates": [[-1, 2], [-2, 3], [-3, 4]], "spread": [0.1, 0.2, 0.3],  # noqa: E501
+        "correlation": [[1, 0.3], [0.3, 1]], "tied": [0.1, 0.2], "gain_sd": [0.3, 0.4],
+    },
+}  # fmt: skip
+
+
+def written(tmp_path, *changes):
+    data = json.loads(json.dumps(MODEL))
+    for (*above, last), value in changes:
+        section = data
+        for key in above:
+            section = section[key]
+        section[last] = value
+    path = tmp_path / "m.json"
+    path.write_text(json.dumps(data))
+    return path
+
+
+def test_the_model_itself_is_one(tmp_path):
+    assert load_model(written(tmp_path)).lags == LAGS
+
+
+SINGULAR = [[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+WRONG = [
+    (("groups",), [["left"], []], "groups[1]"), (("groups",), [["left"], ["left"]], "groups[1][0]"),
+    (("groups",), [["left"], ["tail"]], "groups[1][0]"), (("groups",), [["left"]], "response"),
+    (("response",), MODEL["response"][:1], "response"),
+    (("response", 1, 2), [0.1, 0.2], "response"), (("response_sd", 0), [[0.1, 0.2, 0.3]], "response_sd"),
+    (("response_sd", 1, 2, 0), -0.1, "response_sd"), (("past", 3), [0.1, 0.2], "past"),
+    (("past", 3, 1), 1e300, "past[3][1]"), (("noise",), [[1, 0], [0, 1]], "noise"),
+    (("noise",), SINGULAR, "noise"), (("noise", 0, 1), 0.11, "noise"), (("noise", 1, 1), -3.0, "noise"),
+    (("noise", 2, 2), 1e-13, "noise"), (("colours", 0, "noise"), SINGULAR, "colours[0].noise"),
+    (("colours", 0, "average"), [2.0], "colours[0].average"),
+    (("colours", 0, "before"), [[1.0, 0, 0]], "colours[0].before"),
+    (("fitted", "rates"), [[-1, 2]], "fitted.rates"), (("fitted", "airspeed"), [1.0], "fitted.airspeed"),
+    (("fitted", "correlation"), [[1.0]], "fitted.correlation"), (("fitted", "tied"), [0.1], "fitted.tied"),
+    (("fitted", "gain_sd"), [0.1, -0.4], "fitted"), (("fitted", "commands"), [[1.0]], "fitted.commands"),
+    (("settings",), {"level_step": 1e-9}, "settings.level_step"),
+    (("settings",), {"levels": {"tail": [0.5]}}, "settings.levels.tail"),
+    (("settings",), {"levels": {"left": [1.5]}}, "settings.levels.left[0]"),
+    (("settings",), {"delays_s": [0.0, 0.06]}, "settings.delays_s[1]"),
+    (("settings",), {"trim_walk": [0.1, -0.1, 0.2]}, "settings.trim_walk[1]"),
+    (("settings",), {"gain_time_s": 1e300}, "settings.gain_time_s"), (("rate_hz",), 1e-9, "rate_hz"),
+    (("rate_hz",), 1e9, "rate_hz"), (("intercept", 0), 1e7, "intercept[0]"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("place", "value", "key"), WRONG)
+def test_what_is_wrong_is_said_in_a_line(tmp_path, place, value, key):
+    path = written(tmp_path, (place, value))
+    with pytest.raises(BadInput) as caught:
+        load_model(path)
+    lines = str(caught.value).splitlines()
+    assert any(line.startswith(f"{path}:1: {key}: ") and ", allowed: " in line for line in lines), lines

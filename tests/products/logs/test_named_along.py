@@ -1,0 +1,53 @@
+"""A name stands only where what is left unexplained lies along what the named surface turns."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from beaver_ftc_logs.diagnose import _along, diagnose, healthy_residual
+from beaver_ftc_logs.regression import predicted
+from beaver_ftc_logs.samples import load_flights
+from products.logs import synthetic
+
+BIAS, FROM_S = 0.4, 60.0
+
+
+@pytest.fixture(scope="module")
+def biased(wing, wing_folder):
+    """A flight whose left elevon is off by a share of its travel: the linear wing's answer to that, added."""
+    columns = synthetic.fly(120.0, seed=31)
+    more, names = np.zeros((len(columns["t_s"]), 3)), ["p_rad_s", "q_rad_s", "r_rad_s"]
+    offset = np.where(columns["t_s"] >= FROM_S, BIAS, 0.0)
+    for k in range(3, len(more)):
+        more[k] = more[k - 1] @ synthetic.PAST + offset[k - 3 : k] @ synthetic.LEFT[::-1]
+    columns |= {name: columns[name] + of for name, of in zip(names, more.T, strict=True)}
+    return load_flights([synthetic.write_csv(wing_folder / "biased.csv", columns)], wing)[0]
+
+
+def named(biased, wing_model, name):
+    rows = diagnose(biased, wing_model)
+    given = replace(rows, named=np.full(len(rows.t_s), name, dtype=object))
+    return _along(biased, wing_model, given, 12.0)
+
+
+def test_the_other_surface_is_taken_back_and_its_bounds_with_it(biased, wing_model):
+    found = named(biased, wing_model, "right")
+    late = found.t_s > FROM_S + 1.0
+    assert (found.named[late] == "unknown").mean() > 0.99
+    assert (found.low[late & (found.named == "unknown")] == 0.0).all()
+    assert (found.named[found.t_s < FROM_S] == "right").mean() > 0.95
+
+
+def test_the_surface_at_fault_keeps_its_name(biased, wing_model):
+    assert (named(biased, wing_model, "left").named == "left").all()
+    assert (named(biased, wing_model, "right+left").named == "right+left").mean() < 1.0
+
+
+def test_the_residual_is_white_in_health_and_along_the_bias_after_it(biased, wing_model):
+    rest, late = healthy_residual(wing_model, *predicted(biased, wing_model)), biased.t_s > FROM_S + 1.0
+    assert rest[~late][10:590].std(axis=0) == pytest.approx(1.0, abs=0.15)
+    whiten = np.linalg.inv(np.linalg.cholesky(np.diag(synthetic.NOISE**2)))
+    expected = whiten @ (BIAS * synthetic.LEFT.sum(axis=0))
+    mean = rest[late].mean(axis=0)
+    assert mean @ expected / np.linalg.norm(mean) / np.linalg.norm(expected) > 0.98

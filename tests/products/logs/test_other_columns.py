@@ -1,0 +1,101 @@
+"""Columns that are not what the model's were: signs and units that no effectiveness explains."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc_logs.diagnose import diagnose
+from beaver_ftc_logs.model import Fitted
+from beaver_ftc_logs.samples import load_flights
+from beaver_ftc_logs.trust import check_columns, span
+from products.logs import small, synthetic
+
+
+@pytest.fixture(scope="module")
+def flown(wing, wing_folder):
+    columns = synthetic.fly(120.0, seed=41)
+    return load_flights([synthetic.write_csv(wing_folder / "columns.csv", columns)], wing)[0]
+
+
+def other_commands(samples, signs):
+    return replace(samples, commands=samples.commands * np.array(signs))
+
+
+@pytest.mark.parametrize(("signs", "name"), [((-1, 1), "right"), ((1, -1), "left"), ((-1, -1), "right")])
+def test_a_command_of_the_other_sign_is_refused(flown, wing_model, signs, name):
+    with pytest.raises(BadInput, match=f"answer the command of {name} the other way round"):
+        diagnose(other_commands(flown, signs), wing_model)
+
+
+def test_a_sign_that_turns_about_in_flight_is_no_column(flown, wing_model):
+    """What is reversed from the middle on is no mistake of the file: nothing is believed from there on."""
+    signs = np.where(flown.t_s < 60.0, 1.0, -1.0)[:, None]
+    rows = diagnose(replace(flown, commands=flown.commands * signs), wing_model)
+    assert rows.credible[rows.t_s < 60.0].mean() > 0.9
+    assert rows.credible[rows.t_s > 90.0].mean() < 0.1
+
+
+def test_one_rate_in_another_unit_is_refused(flown, wing_model):
+    with pytest.raises(BadInput, match="columns, signs and units as in the flights of the model"):
+        diagnose(replace(flown, rates=flown.rates * np.array([57.3, 1.0, 1.0])), wing_model)
+
+
+def test_a_surface_lost_from_the_first_second_is_none_of_that(wing, wing_folder, wing_model):
+    columns = synthetic.fly(120.0, parts=((0, 120, 1.0, 0.0),), seed=42)
+    samples = load_flights([synthetic.write_csv(wing_folder / "lost.csv", columns)], wing)[0]
+    rows = diagnose(samples, wing_model)
+    assert rows.faulty[rows.t_s > 30.0].mean() > 0.9
+
+
+@pytest.fixture(scope="module")
+def felt():
+    """A model whose rates feel a signal, with what it was fitted on, and a flight by it."""
+    past = [*small.model(small.TAIL).past[:-1], [0.3, 0.2, -0.1]]
+    model = small.model(small.TAIL, past=past)
+    flight = small.flight(model, n=1200, seed=7)
+    known = Fitted(commands=span(flight.commands), rates=span(flight.rates))
+    return model.model_copy(update={"fitted": known}), flight
+
+
+@pytest.mark.parametrize("share", [-1.0, 0.0])
+def test_a_signal_that_does_not_do_what_it_did_is_refused(felt, share):
+    model, flight = felt
+    assert check_columns(flight, model) is None
+    noise = np.random.default_rng(2).standard_normal(flight.signals.shape)
+    other = replace(flight, signals=share * flight.signals if share else 20.0 + 3.0 * noise)
+    with pytest.raises(BadInput, match=r"what the rates answer to .*airspeed_m_s.* is not"):
+        check_columns(other, model)
+
+
+def test_a_rate_of_the_other_sign_is_refused_by_what_it_does_to_the_others(felt):
+    """A lost surface changes nothing of it."""
+    model, _ = felt
+    lost = small.flight(model, n=1200, seed=8, lost=((1, 0, 1200, 0.0),))
+    assert check_columns(lost, model) is None
+    past = np.array(model.past)
+    past[:3] += np.array([[0.0, 0.2, 0.0], [0.0, 0.0, 0.0], [0.4, 0.0, 0.0]])
+    coupled = model.model_copy(update={"past": past.tolist()})
+    idle = coupled.model_copy(update={"response": np.zeros_like(model.response).tolist()})
+    flight = small.flight(idle, n=6000, seed=9)
+    assert check_columns(flight, coupled) is None
+    with pytest.raises(BadInput, match=r"what the rates answer to .* is not what it is in the model"):
+        check_columns(replace(flight, rates=flight.rates * np.array([1.0, 1.0, -1.0])), coupled)
+
+
+@pytest.mark.parametrize(("factor", "left", "refused"), [
+    (10.0, 1.0, True), (10.0, 0.05, True), (2.0, 0.05, False), (4.0, 1.0, False),
+])  # fmt: skip
+def test_a_command_that_moves_far_more_and_does_hardly_anything_is_refused(felt, factor, left, refused):
+    """Less than what the rates alone tell from another unit, where what it did is gone as well."""
+    model, _ = felt
+    flight = small.flight(model, n=1200, seed=10, lost=((1, 0, 1200, left),))
+    more = replace(flight, commands=flight.commands * np.array([1.0, factor, 1.0]))
+    if refused:
+        with pytest.raises(
+            BadInput, match=r"the command of elevator moves .* times as much as in the flights"
+        ):
+            check_columns(more, model)
+    else:
+        assert check_columns(more, model) is None

@@ -1,0 +1,190 @@
+"""Readers give what was written, and say in one line why a log cannot be used."""
+
+import struct
+
+import numpy as np
+import pytest
+
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc_logs.readers import read_flight
+from beaver_ftc_logs.samples import _held, load_flights
+from beaver_ftc_logs.vehicle import load_vehicle
+from products.logs import synthetic
+
+
+@pytest.mark.parametrize("suffix", ["csv", "parquet"])
+def test_a_table_comes_back_as_it_was_written(tmp_path, suffix):
+    columns = synthetic.fly(10.0)
+    columns["left_effectiveness"][:5] = np.nan
+    write = {"csv": synthetic.write_csv, "parquet": synthetic.write_parquet}[suffix]
+    recording = read_flight(write(tmp_path / f"flight.{suffix}", columns))
+    assert recording.name == "flight"
+    for name, values in columns.items():
+        if name != "t_s":
+            np.testing.assert_array_equal(recording.columns[name].values, values)
+            np.testing.assert_array_equal(recording.columns[name].t_s, columns["t_s"])
+
+
+def test_an_alfa_folder(tmp_path):
+    folder = synthetic.write_alfa(tmp_path / "carbonZ_left_aileron_failure", failure_s=40.0)
+    recording = read_flight(folder)
+    columns = recording.columns
+    assert columns["p_rad_s"].t_s[:3] == pytest.approx([0.0, 0.1, 0.2], abs=1e-6)
+    assert columns["roll_error_rad"].t_s[0] == pytest.approx(0.02, abs=1e-6)
+    flown = synthetic.fly(60.0, seed=3, trim=(0.0, 0.0))
+    np.testing.assert_allclose(columns["roll_error_rad"].values, flown["roll_command"], atol=1e-12)
+    assert [(event.surface, round(event.t_s, 3)) for event in recording.events] == [("left_aileron", 40.0)]
+
+
+def test_a_held_column_is_never_newer_than_its_row(tmp_path):
+    folder = synthetic.write_alfa(tmp_path / "flight", duration_s=20.0)
+    recording = read_flight(folder)
+    held, age_s = _held(recording.columns["roll_error_rad"], recording.columns["p_rad_s"].t_s)
+    np.testing.assert_allclose(held[1:], recording.columns["roll_error_rad"].values[:-1])
+    assert np.isnan(held[0])
+    assert age_s == pytest.approx(0.08, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("time,p\n1,2\n2,3\n", "no column t_s"),
+        ("t_s,p\n1,2\n1,3\n", "t_s: row 2: time does not increase"),
+        ("t_s,p\n1,2\n", "has 1 rows, allowed: at least 2"),
+        ("t_s,p\n1,2,3\n", "is no table that can be read"),
+        ("", "is no table that can be read"),
+    ],
+)
+def test_an_unusable_table_says_why(tmp_path, text, says):
+    path = tmp_path / "flight.csv"
+    path.write_text(text)
+    with pytest.raises(BadInput, match=says):
+        read_flight(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [("missing.csv", "no such file or folder"), ("flight.xyz", "what kind of log this is cannot be seen")],
+)
+def test_a_path_that_is_no_log(tmp_path, name, says):
+    (tmp_path / "flight.xyz").write_text("")
+    with pytest.raises(BadInput, match=says):
+        read_flight(tmp_path / name)
+
+
+def test_a_log_without_a_named_column(tmp_path, wing):
+    columns = synthetic.fly(20.0)
+    del columns["roll_command"]
+    path = synthetic.write_csv(tmp_path / "flight.csv", columns)
+    with pytest.raises(BadInput, match="no column roll_command, allowed: a log that has it"):
+        load_flights([path], wing)
+
+
+def test_every_unusable_log_is_named(tmp_path, wing):
+    with pytest.raises(BadInput) as error:
+        load_flights([tmp_path / "a.csv", tmp_path / "b.csv"], wing)
+    assert len(str(error.value).splitlines()) == 2
+
+
+def test_rates_logged_too_slowly(tmp_path, wing):
+    columns = {name: values[::5] for name, values in synthetic.fly(60.0).items()}
+    with pytest.raises(BadInput, match="rates are logged at 2 Hz, allowed: at least 4 Hz"):
+        load_flights([synthetic.write_csv(tmp_path / "slow.csv", columns)], wing)
+
+
+def test_a_fast_log_is_averaged_and_its_delay_said(tmp_path, wing):
+    t_s = np.arange(0.0, 30.0, 0.01)
+    columns = {name: np.sin(t_s) for name in synthetic.fly(5.0)} | {"t_s": t_s}
+    samples = load_flights([synthetic.write_csv(tmp_path / "fast.csv", columns)], wing)[0]
+    assert samples.dt_s == pytest.approx(0.05)
+    assert samples.age_s["p_rad_s"] == pytest.approx(0.025)
+    late = np.sin(samples.t_s - 0.02)  # five stamps, 0 to 0.04 s old
+    np.testing.assert_allclose(samples.rates[5:, 0], late[5:], atol=2e-3)
+
+
+def test_a_ulog_comes_back_as_it_was_written(tmp_path):
+    pytest.importorskip("pyulog")
+    columns = synthetic.fly(10.0)
+    recording = read_flight(synthetic.write_ulog(tmp_path / "flight.ulg", columns))
+    for name in ("p_rad_s", "roll_command"):
+        read = recording.columns[f"vehicle_rates.{name}"]
+        np.testing.assert_allclose(read.t_s, columns["t_s"], atol=1e-6)
+        np.testing.assert_array_equal(read.values, columns[name])
+
+
+def test_an_ardupilot_log_comes_back_as_it_was_written(tmp_path):
+    pytest.importorskip("pymavlink")
+    columns = synthetic.fly(10.0)
+    recording = read_flight(synthetic.write_ardupilot(tmp_path / "flight.log", columns))
+    read = recording.columns["RATE.roll_command"]
+    np.testing.assert_allclose(read.t_s, columns["t_s"], atol=1e-6)
+    np.testing.assert_array_equal(read.values, columns["roll_command"])
+
+
+@pytest.mark.parametrize(("name", "module"), [("a.ulg", "pyulog"), ("a.bin", "pymavlink")])
+def test_a_damaged_log_says_so(tmp_path, name, module):
+    pytest.importorskip(module)
+    (tmp_path / name).write_bytes(b"not a log of any kind")
+    with pytest.raises(BadInput, match=r"is no .* that can be read|holds no message"):
+        read_flight(tmp_path / name)
+
+
+def test_a_log_in_another_format_gives_the_same_samples(tmp_path, wing):
+    pytest.importorskip("pyulog")
+    columns = synthetic.fly(20.0)
+    text = synthetic.VEHICLE
+    for name in ("p_rad_s", "q_rad_s", "r_rad_s", "roll_command", "pitch_command"):
+        text = text.replace(f": {name}", f": vehicle_rates.{name}").replace(
+            f"[{name}", f"[vehicle_rates.{name}"
+        )
+    text = text.replace(", pitch_command]", ", vehicle_rates.pitch_command]")
+    for name in ("roll_command", "pitch_command"):
+        text = text.replace(f"{{{name}:", f"{{vehicle_rates.{name}:").replace(
+            f" {name}: ", f" vehicle_rates.{name}: "
+        )
+    (tmp_path / "px4.yaml").write_text(text)
+    path = synthetic.write_ulog(tmp_path / "flight.ulg", columns)
+    one = load_flights([path], load_vehicle(tmp_path / "px4.yaml"))[0]
+    other = load_flights([synthetic.write_csv(tmp_path / "flight.csv", columns)], wing)[0]
+    np.testing.assert_array_equal(one.commands, other.commands)
+    np.testing.assert_array_equal(one.rates, other.rates)
+
+
+@pytest.mark.parametrize("number", ["I", "C"])
+def test_two_instances_of_a_message_are_two_sets_of_columns(tmp_path, number):
+    """Two gyros that log in turn, the second with its own bias, a tenth of a step later."""
+    pytest.importorskip("pymavlink")
+    t_s = np.arange(80) * 0.1
+    rows = [
+        ("IMU", {"TimeUS": round((t + 1.0 + 0.01 * i) * 1e6), number: i, "GyrX": np.sin(t) + 0.5 * i})
+        for t in t_s
+        for i in (0, 1)
+    ]
+    columns = read_flight(synthetic.write_dataflash(tmp_path / "flight.bin", rows)).columns
+    for i, name in enumerate(("IMU.GyrX", "IMU1.GyrX")):
+        np.testing.assert_allclose(columns[name].t_s, t_s + 0.01 * i, atol=1e-6)
+        np.testing.assert_array_equal(columns[name].values, np.sin(t_s) + 0.5 * i)
+        assert columns[name].note == ""
+
+
+def test_a_ulogs_messages_without_a_stamp_are_left_out(tmp_path):
+    """Of three one has no stamp, and one never came."""
+    pytest.importorskip("pyulog")
+
+    def message(kind, body):
+        return struct.pack("<HB", len(body), ord(kind)) + body
+
+    data = b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0)
+    names = {"good": "uint64_t timestamp;", "timeless": "", "silent": "uint64_t timestamp;"}
+    for name, stamp in names.items():
+        data += message("F", f"{name}:{stamp}double x;".encode())
+    for number, name in enumerate(names):
+        data += message("A", struct.pack("<BH", 0, number) + name.encode())
+    for k in range(3):
+        data += message("D", struct.pack("<HQd", 0, 1_000_000 + 100_000 * k, 7.0 + k))
+    data += message("D", struct.pack("<Hd", 1, 9.0))
+    path = tmp_path / "flight.ulg"
+    path.write_bytes(data)
+    (column,) = read_flight(path).columns.values()
+    assert column.values.tolist() == [7.0, 8.0, 9.0]
+    assert column.t_s == pytest.approx([0.0, 0.1, 0.2])

@@ -1,0 +1,83 @@
+"""The log of a flight of ours, diagnosed again: the verdicts of the flight, to the bit."""
+
+import json
+
+import pytest
+from pyarrow import parquet
+from typer.testing import CliRunner
+
+import beaver_ftc as bf
+from beaver_ftc.cli.main import app
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc_logs.replay import replay
+
+DECLARED = {"rate_hz": 50, "actuators": "servo", "fdi": {"sharpen": "none"}}
+WITHDRAWN = {"design_model": {"linearised": True}, "fdi": {"bounds": {"coefficients": 0.05}}}
+
+
+@pytest.fixture(scope="module", params=[{}, DECLARED, WITHDRAWN], ids=["as usual", "declared", "withdrawn"])
+def run(request, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("runs")
+    flight = bf.fly(bf.load("elevator-partial-loss").with_({"duration_s": 16.0, **request.param}))
+    flight.save(folder)
+    return folder / "elevator-partial-loss", flight
+
+
+def test_detection_and_isolation_are_those_of_the_flight(run):
+    folder, flight = run
+    columns, verdict = replay(folder / "log.parquet")
+    assert verdict["as_flown"] is True
+    assert verdict["rows_that_differ"] == 0
+    assert verdict["left_out"] == []
+    assert verdict["detection_s"] == pytest.approx(flight.detection.time_s)
+    assert columns["faulty"].tolist() == [int(flag) for flag in flight.log["detected"]]
+
+
+def test_a_changed_log_is_not_as_flown(run, tmp_path):
+    """One rate of one row is off: the replay reads the log, it does not copy the flight's verdict."""
+    folder, flight = run
+    table = parquet.read_table(folder / "log.parquet").to_pandas()
+    at = table.index[table["t_s"] >= 5.0][0]
+    table.loc[at, "q_measured_rad_s"] += 0.2
+    for name in ("scenario.yaml", "metrics.json"):
+        (tmp_path / name).write_bytes((folder / name).read_bytes())
+    table.to_parquet(tmp_path / "log.parquet")
+    _, verdict = replay(tmp_path / "log.parquet")
+    assert verdict["as_flown"] is False
+    assert verdict["detection_s"] == pytest.approx(5.0, abs=0.02)
+    assert flight.detection.time_s > 5.1
+
+
+@pytest.mark.parametrize(
+    ("rows", "stamp", "says"),
+    [(0, None, "has 0 rows, allowed: at least 2"), (600, 3.0, "t_s: row 501: time does not increase")],
+    ids=["empty", "back"],
+)
+def test_a_damaged_log_is_told(run, tmp_path, rows, stamp, says):
+    folder, _ = run
+    table = parquet.read_table(folder / "log.parquet").to_pandas()[:rows]
+    if stamp is not None:
+        table.loc[500, "t_s"] = stamp
+    (tmp_path / "scenario.yaml").write_bytes((folder / "scenario.yaml").read_bytes())
+    table.to_parquet(tmp_path / "log.parquet")
+    with pytest.raises(BadInput, match=says):
+        replay(tmp_path / "log.parquet")
+
+
+def test_the_command_writes_rows_and_verdict(run, tmp_path):
+    folder, flight = run
+    arguments = ["diagnose", str(folder / "log.parquet"), "--out", str(tmp_path), "--format", "json"]
+    done = CliRunner().invoke(app, arguments)
+    (verdict,) = json.loads(done.stdout)["flights"]
+    assert verdict["as_flown"] is True
+    rows = parquet.read_table(tmp_path / folder.name / "diagnosis.parquet")
+    assert rows.column_names[:3] == ["t_s", "faulty", "named"]
+    assert rows.num_rows == len(flight.log)
+
+
+def test_another_table_wants_a_model(tmp_path):
+    path = tmp_path / "flight.csv"
+    path.write_text("t_s,p\n0,1\n1,2\n")
+    done = CliRunner().invoke(app, ["diagnose", str(path), "--out", str(tmp_path)])
+    assert isinstance(done.exception, BadInput)
+    assert "--model is missing" in str(done.exception)

@@ -1,0 +1,146 @@
+"""What a replay says of verdicts, and of what stands beside the log: by verdicts made by hand."""
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from beaver_ftc.diagnosis.base import Verdict
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.scenario.schema import Sensors
+from beaver_ftc_logs import replay as of
+from beaver_ftc_logs import stepped
+from products.logs import synthetic
+
+SURFACES = ["aileron", "elevator", "rudder", "flap"]
+SAID = [
+    Verdict(),
+    Verdict(True),
+    Verdict(True, isolated="elevator", type="loss_of_effectiveness", estimate=-0.4),
+    Verdict(True, isolated="rudder", estimate=-0.25),
+    Verdict(True, isolated="rudder", type="jam", estimate=-0.25),
+    Verdict(True, isolated="aileron", type="loss_of_effectiveness"),
+    Verdict(True, isolated="unanticipated"),
+]
+T_S = np.arange(len(SAID)) * 0.5
+
+
+ALONE = (np.tile([0.9, 0.5, 0.7, 0.0], (len(SAID), 1)), np.tile([1.0, 0.7, 0.8, 1.0], (len(SAID), 1)))
+
+
+def test_verdicts_as_columns():
+    fdi = SimpleNamespace(is_ours=True, pairs=False)
+    rows = stepped.rows_of(T_S, stepped.Stepped(SAID, *ALONE, np.ones(4)), SURFACES, fdi)
+    columns = of.columns(rows, SURFACES)
+    assert list(columns) == [
+        "t_s", "faulty", "named",
+        *(f"{name}_{what}" for name in SURFACES for what in ("effectiveness", "low", "high")), "credible",
+    ]  # fmt: skip
+    columns = {name: list(values) for name, values in columns.items()}
+    assert columns["faulty"] == [0, 1, 1, 1, 1, 1, 1]
+    assert columns["named"] == ["", "unknown", "elevator", "rudder", "rudder", "aileron", "unknown"]
+    assert columns["elevator_effectiveness"] == [1, 1, 0.6, 1, 1, 1, 1]
+    assert columns["rudder_effectiveness"] == [1, 1, 1, 0.75, 1, 1, 1]
+    assert columns["aileron_effectiveness"] == [1] * 7
+    lows = [
+        [0.9, 0, 1, 1, 1, 0, 0],
+        [0.5, 0, 0.5, 1, 1, 1, 0],
+        [0.7, 0, 1, 0, 0, 1, 0],
+        [0, 0, 1, 1, 1, 1, 0],
+    ]
+    highs = [[1] * 7, [1, 1, 0.7, 1, 1, 1, 1], [1] * 7, [1] * 7]
+    highs[0][5], lows[0][5] = 1.0, 0.9
+    for name, low, high in zip(SURFACES, lows, highs, strict=True):
+        assert columns[f"{name}_low"] == low, name
+        assert columns[f"{name}_high"] == high, name
+    assert columns["credible"] == [1] * 7
+
+
+def scenario(**sensors):
+    return SimpleNamespace(name="one", sensors=Sensors.model_validate(sensors))
+
+
+@pytest.mark.parametrize(("beside", "as_flown"), [
+    (None, None), ((0.5, 3.0), True), ((0.5 + 1e-12, 3.0 - 1e-12), True), ((0.5, 1.0), False),
+    ((1.0, 3.0), False), ((None, None), False), ((0.5, None), False),
+])  # fmt: skip
+def test_whether_a_replay_is_as_flown(tmp_path, beside, as_flown):
+    if beside is not None:
+        document = {"detection": {"time_s": beside[0]}, "isolation": {"time_s": beside[1]}}
+        (tmp_path / "metrics.json").write_text(json.dumps(document))
+    log = {"t_s": T_S, "detected": np.array([1, 1, 0, 1, 1, 1, 1])}
+    assert of._verdict(tmp_path / "log.parquet", scenario(), log, SAID) == {
+        "flight": "one", "replay": True, "duration_s": 3.0, "faulty": True, "detection_s": 0.5,
+        "isolation_s": 3.0, "isolated": "unanticipated", "rows_that_differ": 2, "left_out": [],
+        "as_flown": as_flown, "credible": {"share": 1.0, "reasons": []},
+    }  # fmt: skip
+
+
+def test_what_is_withdrawn_is_not_what_is_named():
+    """The name that stands at the end, since it has stood there."""
+    assert of._named(T_S[:4], SAID[:4]) == (1.5, "rudder")
+    assert of._named(T_S[:5], SAID[:5]) == (1.5, "rudder")
+    assert of._named(T_S[:5], [*SAID[:4], Verdict(True)]) == (None, None)
+    again = [SAID[0], SAID[2], SAID[1], SAID[2], SAID[2]]
+    assert of._named(T_S[:5], again) == (1.5, "elevator")
+
+
+def test_a_replay_that_finds_nothing(tmp_path):
+    found = of._verdict(tmp_path / "log.parquet", scenario(), {"t_s": T_S[:2] + 1.0}, [Verdict(), Verdict()])
+    assert (found["faulty"], found["detection_s"], found["isolation_s"], found["isolated"]) == (
+        False,
+        None,
+        None,
+        None,
+    )
+    assert (found["duration_s"], found["rows_that_differ"]) == (0.5, 0)
+
+
+def test_errors_of_the_flow_sensors_are_left_out():
+    """Those of the gyros are in the measured rates."""
+    flawed = scenario(alpha={"bias_deg": 0.1}, q={"bias_deg_s": 0.1})
+    assert of._left_out(flawed) == ["the declared errors of alpha: the log has the true value"]
+
+
+FOUND = {
+    "flight": "one", "detection_s": 5.126, "isolation_s": 6.5, "isolated": "rudder", "as_flown": True,
+    "left_out": [],
+}  # fmt: skip
+
+
+def test_a_replay_in_words():
+    assert of.as_text(FOUND) == "one: detected at 5.13 s, rudder isolated at 6.50 s; as flown"
+    other = FOUND | {"isolated": None, "as_flown": False, "left_out": ["this", "that"]}
+    assert of.as_text(other).splitlines() == [
+        "one: detected at 5.13 s; not as flown", "  left out: this", "  left out: that",
+    ]  # fmt: skip
+    nothing = FOUND | {"detection_s": None, "isolated": None, "as_flown": None}
+    assert of.as_text(nothing) == "one: nothing detected; nothing beside it to compare with"
+
+
+def test_a_log_of_ours_stands_beside_its_scenario(tmp_path):
+    path = tmp_path / "log.parquet"
+    assert not of.is_own_log(path)
+    (tmp_path / "scenario.yaml").write_text("")
+    assert of.is_own_log(path)
+    assert not of.is_own_log(tmp_path / "other.parquet")
+
+
+def test_columns_that_a_log_must_have(tmp_path):
+    path = synthetic.write_parquet(
+        tmp_path / "log.parquet", {"t_s": [0.0, 1.0], "a": [1.0, 2.0], "b": [3.0, 4.0]}
+    )
+    assert {name: values.tolist() for name, values in of._columns_of(path, ["t_s", "b"]).items()} == {
+        "t_s": [0.0, 1.0],
+        "b": [3.0, 4.0],
+    }
+    with pytest.raises(BadInput, match=r"no column c, allowed: a log\.parquet as `run` writes it"):
+        of._columns_of(path, ["t_s", "c"])
+    aircraft = SimpleNamespace(signals=["dpt"], surfaces=SURFACES)
+    assert stepped.inputs_of(aircraft) == (
+        ["p_measured_rad_s", "q_measured_rad_s", "r_measured_rad_s"],
+        ["alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", "dpt"],
+        [f"{name}_cmd_rad" for name in SURFACES],
+        ["phi_rad", "theta_rad", "psi_rad"],
+    )

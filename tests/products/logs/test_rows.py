@@ -1,0 +1,242 @@
+"""From probabilities of hypotheses to rows: each step by hand, and the whole as it was kept."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc_logs import diagnose
+from beaver_ftc_logs.bank import IDLE, UNKNOWN, bank_of
+from kept import in_short
+from products.logs import small
+
+SETTINGS = {"level_step": 0.25, "alarm": 0.5, "bounds": 0.8}
+WING = small.model(settings=SETTINGS)
+TAIL = small.model(small.TAIL, settings=SETTINGS)
+
+
+@pytest.mark.parametrize(("at_hz", "of_hz", "taken"), [
+    (10.0, 8.0, True), (10.001, 8.0, False), (6.0, 8.0, True), (5.999, 8.0, False),
+])  # fmt: skip
+def test_a_log_may_be_a_quarter_off_the_rate(at_hz, of_hz, taken):
+    samples, model = small.flight(WING, 20, dt_s=1.0 / at_hz), small.model(rate_hz=of_hz)
+    if taken:
+        assert diagnose.check_rate(samples, model) is None
+        return
+    with pytest.raises(BadInput, match=r"allowed: within 25% of the 8 Hz the model was identified at"):
+        diagnose.check_rate(samples, model)
+
+
+@pytest.mark.parametrize(("hold_s", "stands"), [
+    (0.0, [0, 1, 1, 1, 1, 0, 1, 0]), (0.1, [0, 0, 1, 1, 1, 0, 0, 0]), (0.2, [0, 0, 0, 1, 1, 0, 0, 0]),
+    (0.26, [0, 0, 0, 0, 1, 0, 0, 0]), (0.4, [0, 0, 0, 0, 0, 0, 0, 0]),
+])  # fmt: skip
+def test_a_condition_stands_once_it_has_held(hold_s, stands):
+    model = small.model(settings={"hold_s": hold_s})
+    raised = np.array([0, 1, 1, 1, 1, 0, 1, 0], dtype=bool)
+    assert diagnose._standing(raised, model).astype(int).tolist() == stands
+    assert diagnose._standing(raised[1:], model).astype(int).tolist() == stands[1:]
+
+
+@pytest.mark.parametrize(("raised", "well", "alarm"), [
+    ("0100000", "0000100", "0111000"),  # until health is likelier again
+    ("0100000", "0111000", "0100000"),  # raised goes before well
+    ("0001001", "1110010", "0001101"),
+    ("0000000", "0000000", "0000000"),
+    ("1000000", "0000000", "1111111"),  # from the first row on
+    ("1000000", "1100000", "1000000"),
+])  # fmt: skip
+def test_an_alarm_stands_until_health_is_the_likelier(raised, well, alarm):
+    given = (np.array([flag == "1" for flag in flags]) for flags in (raised, well))
+    assert "".join(str(int(flag)) for flag in diagnose._latched(*given)) == alarm
+
+
+LEVELS = np.array([0.0, 0.25, 0.5, 1.0])
+
+
+@pytest.mark.parametrize(("mass", "median"), [
+    ([0.0, 0.5, 0.0, 0.5], 0.25), ([0.0, 0.499, 0.002, 0.499], 0.5), ([0.2, 0.2, 0.1, 0.5], 0.5),
+    ([0.6, 0.2, 0.1, 0.1], 0.0), ([0.1, 0.1, 0.1, 0.7], 1.0),
+])  # fmt: skip
+def test_half_of_the_probability_is_on_either_side_of_the_median(mass, median):
+    assert diagnose._median(LEVELS, np.array([mass])).tolist() == [median]
+
+
+@pytest.mark.parametrize(("mass", "bounds"), [
+    ([0.0, 0.9, 0.1, 0.0], (0.125, 0.375)),
+    ([0.1, 0.5, 0.4, 0.0], (0.125, 0.75)),  # two hold it: half a step more each way
+    ([0.8, 0.1, 0.1, 0.0], (0.0, 0.125)),  # just so much is enough
+    ([0.79, 0.01, 0.0, 0.2], (0.0, 1.0)),
+    ([0.1, 0.0, 0.0, 0.9], (0.75, 1.0)),
+    ([0.3, 0.3, 0.3, 0.1], (0.0, 0.75)),
+    ([0.4, 0.0, 0.5, 0.1], (0.0, 0.75)),  # what lies between is inside
+])  # fmt: skip
+def test_bounds_are_of_the_fewest_levels_that_hold_the_share(mass, bounds):
+    low, high = diagnose._bounds(LEVELS, np.array([mass]), 0.8)
+    assert (low[0], high[0]) == bounds
+
+
+def test_a_groups_levels_are_over_all_hypotheses_but_the_idle_one():
+    bank = bank_of(WING)
+    posterior = np.arange(1.0, len(bank.kind) + 1)[None, :] / 1000.0
+    for group in (0, 1):
+        levels, mass = diagnose._marginal(bank, posterior[:, : bank.idle], group)
+        assert levels.tolist() == [0.0, 0.25, 0.5, 0.75, 1.0]
+        for level, found in zip(levels, mass[0], strict=True):
+            its = (bank.effectiveness[:-1, group] == level).nonzero()[0]
+            assert found == pytest.approx(sum(k + 1 for k in its) / 1000.0)
+
+
+def posterior(bank, *shares):
+    """A row each: {what: probability}, what being `idle`, `unknown` or (level of each group)."""
+    rows = np.zeros((len(shares), len(bank.kind)))
+    for row, said in zip(rows, shares, strict=True):
+        for what, share in said.items():
+            if isinstance(what, str):
+                row[(bank.kind == {"idle": IDLE, "unknown": UNKNOWN}[what]).argmax()] = share
+                continue
+            row[((bank.effectiveness == what).all(axis=1) & (bank.kind != UNKNOWN)).argmax()] = share
+    return rows
+
+
+ONE = np.array([1])
+SOUND, RIGHT, LEFT, BOTH = (1.0, 1.0), (0.5, 1.0), (1.0, 0.25), (0.5, 0.25)
+SHARES = {
+    "found and gone": [
+        {SOUND: 1.0}, {SOUND: 0.5, LEFT: 0.5}, {SOUND: 0.51, LEFT: 0.49}, {LEFT: 0.9, SOUND: 0.1},
+    ],
+    "which of them": [
+        {LEFT: 0.5, RIGHT: 0.5}, {LEFT: 0.51, RIGHT: 0.49}, {BOTH: 0.6, LEFT: 0.4}, {RIGHT: 1.0},
+    ],
+    "on the ground": [
+        {"idle": 1.0}, {"idle": 0.5, LEFT: 0.5}, {"idle": 0.51, LEFT: 0.49}, {"idle": 0.2, LEFT: 0.8},
+    ],
+    "well again by being idle": [
+        {LEFT: 1.0}, {LEFT: 0.45, "idle": 0.3, SOUND: 0.25}, {LEFT: 0.9, SOUND: 0.1},
+    ],
+}  # fmt: skip
+STUCK = [
+    {LEFT: 1.0}, {"unknown": 0.6, LEFT: 0.4}, {"unknown": 0.5, LEFT: 0.5}, {"unknown": 0.7, RIGHT: 0.3},
+    {SOUND: 1.0}, {RIGHT: 0.6, "unknown": 0.4}, {"unknown": 1.0}, {SOUND: 0.9, RIGHT: 0.1},
+]  # fmt: skip
+
+
+def held(rows):
+    return {name: value for name, value in vars(rows).items() if name != "t_s"}
+
+
+@pytest.mark.parametrize("name", SHARES)
+def test_rows_of_probabilities(changed, name):
+    bank = bank_of(WING)
+    shares = posterior(bank, *SHARES[name])
+    samples = small.flight(WING, len(shares))
+    found = diagnose.rows_of(samples, WING, bank, shares)
+    assert not changed(held(found))
+    assert found.t_s is samples.t_s
+
+
+def test_rows_of_surfaces_together_that_may_be_stuck(changed):
+    bank = bank_of(TAIL)
+    shares = posterior(bank, *STUCK)
+    assert not changed(held(diagnose.rows_of(small.flight(TAIL, len(shares)), TAIL, bank, shares)))
+
+
+def test_names_by_hand():
+    """An offset of no known cause keeps the name that stood; none is named where the fault is split."""
+    bank = bank_of(TAIL)
+    found = diagnose.rows_of(small.flight(TAIL, len(STUCK)), TAIL, bank, posterior(bank, *STUCK))
+    assert found.faulty.tolist() == [1, 1, 1, 1, 0, 1, 1, 0]
+    aileron = "left_aileron+right_aileron"
+    assert found.named.tolist() == ["elevator"] * 3 + ["elevator", "", aileron, aileron, ""]
+    assert found.estimate[0].tolist() == [1.0, 0.25, 1.0]
+    assert (found.low[5].tolist(), found.high[5].tolist()) == ([0.0, 0.875, 0.0], [1.0, 1.0, 1.0])
+    first = diagnose._names(TAIL, bank, posterior(bank, {"unknown": 0.9, LEFT: 0.1}), ONE, ONE > 0)
+    assert first.tolist() == ["elevator"]
+    split = diagnose._names(TAIL, bank, posterior(bank, {LEFT: 0.5, RIGHT: 0.5}), ONE, ONE > 0)
+    assert split.tolist() == ["unknown"]
+
+
+def test_names_under_other_laws(monkeypatch):
+    """Unknown until the evidence is four times the threshold; another name waits a second; one group."""
+    settings = WING.settings.model_copy(update={"threshold": 2.0})
+    asks = settings.model_copy(update={"name_evidence": 4.0, "rename_s": 1.0, "one_group": True})
+    model = WING.model_copy(update={"settings": asks})
+    reach = round(WING.rate_hz)
+    gained = np.concatenate([[1.0, 1.0, 5.0, 1.0], np.zeros(2 * reach + 2)])
+    monkeypatch.setattr(diagnose, "evidence", lambda posterior, bank: gained)
+    shares = [{LEFT: 1.0}] * 4 + [{BOTH: 0.6, LEFT: 0.4}] + [{RIGHT: 1.0}] * (2 * reach + 1)
+    bank = bank_of(model)
+
+    def named_by(of):
+        found = diagnose.rows_of(small.flight(of, len(shares)), of, bank, posterior(bank, *shares))
+        assert found.faulty.tolist() == [0, 1] + [1] * (len(shares) - 2)
+        return found.named.tolist()
+
+    assert named_by(model) == ["", "unknown", "unknown", *["left"] * (2 + reach), *["right"] * (reach + 1)]
+    same = model.model_copy(update={"settings": settings})
+    assert named_by(same) == ["", *["left"] * 3, "right+left", *["right"] * (2 * reach + 1)]
+
+
+def test_where_an_engine_may_have_failed_nothing_is_said_of_the_surface(monkeypatch):
+    rows = small.rows([(1, "left", [1.0, 0.5]), (1, "left", [1.0, 0.4]), (1, "right", [0.3, 1.0])])
+    given = []
+
+    def renamed(*of):
+        given.append(of[3:])
+        return np.array(["left", UNKNOWN, "right"], dtype=object)
+
+    monkeypatch.setattr(diagnose.energy, "renamed", renamed)
+    model = SimpleNamespace(fitted=SimpleNamespace(energy_climb=-1.5))
+    found = diagnose._without_power(SimpleNamespace(energy_climb="climb"), model, rows)
+    assert given[0][:2] == ("climb", -1.5)
+    assert found.named.tolist() == ["left", UNKNOWN, "right"]
+    for name, value in (("estimate", 1.0), ("low", 0.0), ("high", 1.0)):
+        values = getattr(rows, name).copy()
+        values[1] = value
+        np.testing.assert_array_equal(getattr(found, name), values)
+    for fitted, climb in (
+        (None, "climb"),
+        (SimpleNamespace(energy_climb=None), "climb"),
+        (model.fitted, None),
+    ):
+        alike = diagnose._without_power(
+            SimpleNamespace(energy_climb=climb), SimpleNamespace(fitted=fitted), rows
+        )
+        assert alike is rows
+
+
+def test_rows_at_the_stamps_of_a_faster_log():
+    """Each stamp has the last row up to it; those before the first have the first."""
+    rows = small.rows(
+        [(1, "", [1.0, 1.0]), (1, "left", [1.0, 0.5]), (1, "right", [0.4, 1.0])]
+    )  # at 10, 10.5, 11
+    samples = small.flight(WING, 3, stamps=np.array([9.0, 10.0, 10.4, 10.5, 10.9, 11.0, 20.0]))
+    found = diagnose._at_stamps(samples, rows)
+    last = [0, 0, 0, 1, 1, 2, 2]
+    np.testing.assert_array_equal(found.t_s, samples.stamps)
+    for name in ("faulty", "named", "estimate", "low", "high", "probability"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(rows, name)[last])
+    same = small.flight(WING, 3, stamps=rows.t_s)
+    assert diagnose._at_stamps(same, rows) is rows
+    late = replace(same, stamps=rows.t_s + 0.1)
+    np.testing.assert_array_equal(diagnose._at_stamps(late, rows).t_s, rows.t_s + 0.1)
+
+
+@pytest.mark.parametrize(("of", "settings"), [
+    (small.WING, {"delays_s": [-0.03, 0.0, 0.04], "levels": {"left": [0.4]}, "trim_shift": 0.02}),
+    (small.TAIL, {"alarm": 0.9, "hold_s": 0.3, "noise_memory_s": 5.0}),
+], ids=["wing", "tail"])  # fmt: skip
+def test_a_short_flight_through_the_bank(changed, of, settings):
+    """20 s, weak from the seventh second on, over a gap: of every tenth row all, of the rest in short."""
+    model = small.model(of, settings=settings | {"level_step": 0.25})
+    samples = small.flight(model, 200, lost=((1, 70, 140, 0.4),), gap=100)
+    rows = diagnose.diagnose(samples, model)
+    assert not changed({
+        "named": rows.named[::10], "faulty": rows.faulty[::10], "of_a_fault": rows.probability[::10],
+        **{name: in_short(getattr(rows, name)) for name in ("estimate", "low", "high", "probability")},
+    })  # fmt: skip
+    late = slice(110, 140)
+    assert set(rows.named[late]) == {"left" if of is small.WING else "elevator"}
+    assert np.median(rows.estimate[late, 1]) == pytest.approx(0.4, abs=0.11)

@@ -1,0 +1,137 @@
+"""A diagnosis against the log's own word, by hand."""
+
+import numpy as np
+import pytest
+
+from beaver_ftc_logs import scoring
+from beaver_ftc_logs.diagnose import Rows
+from beaver_ftc_logs.recording import Event
+from products.logs import small
+
+GROUPS = [["left_aileron", "right_aileron"], ["elevator"], ["rudder"]]
+
+
+def rows(estimate, low, high, faulty=None):
+    estimate = np.array(estimate, dtype=float)
+    faulty = np.zeros(len(estimate), dtype=int) if faulty is None else np.array(faulty)
+    n = len(estimate)
+    named = np.full(n, "", dtype=object)
+    return Rows(np.arange(n) * 1.0, faulty, named, estimate, np.array(low), np.array(high), np.zeros(n))
+
+
+def test_figures_by_labels():
+    """Five rows known of six: classes, health, side, error and bounds each differ."""
+    labels = np.array([[1, 1], [1, 0.5], [1, 0.5], [0.2, 1], [np.nan, 1], [1, 1]], dtype=float)
+    estimate = [[1, 1], [1, 0.6], [1, 0.9], [0.3, 1], [0, 0], [0.9, 1]]
+    low = np.array([[1, 1], [1, 0.5], [1, 0.6], [0.2, 0.9], [0, 0], [0.8, 1]])
+    high = np.array([[1, 1], [1, 0.7], [1, 1.0], [0.4, 0.95], [0, 0], [0.9, 1]])
+    assert scoring.by_labels(rows(estimate, low, high, [0, 1, 0, 1, 1, 1]), labels) == {
+        "rows": 5,
+        "settings": [[0.2, 1.0], [1.0, 0.5], [1.0, 1.0]],
+        "classes": pytest.approx(4 / 5),
+        "healthy_or_faulty": pytest.approx(3 / 5),
+        "side": pytest.approx(4 / 5),
+        "mean_error": pytest.approx((0.1 + 0.4 + 0.1 + 0.1) / 10),
+        "held_by_bounds": pytest.approx(7 / 10),
+    }
+
+
+@pytest.mark.parametrize(("count", "is_one"), [(1, True), (0, False)])
+def test_a_setting_is_what_holds_for_a_two_hundredth_of_the_flight(count, is_one):
+    labels = np.ones((200 + 200 * (not count), 1))
+    labels[5] = 0.5
+    found = scoring.by_labels(rows(labels, labels, labels), labels)
+    assert ([0.5] in found["settings"]) is is_one
+    assert found["rows"] == len(labels)
+
+
+def test_the_nearest_setting_is_the_first_of_two():
+    settings = np.array([[1.0, 1.0], [0.0, 1.0], [1.0, 0.0]])
+    estimate = np.array([[0.9, 0.9], [0.4, 1.0], [0.5, 0.5], [0.6, 0.3]])
+    assert scoring.nearest(estimate, settings).tolist() == [0, 1, 0, 2]
+
+
+FAILURE = (Event(12.0, "right_aileron"), Event(13.99, "rudder"), Event(14.0, "elevator"))
+
+
+def told(parts):
+    """Rows a half second apart from 10 s: (count, name); faulty where there is a name."""
+    return small.rows([(count, name, [1.0]) for count, name in parts], 1)
+
+
+def test_an_alarm_before_and_after_the_failure():
+    """False before 12 s, one more begun there; late by the first row with an alarm."""
+    found = scoring.by_event(
+        told([(1, "rudder"), (1, ""), (2, "elevator"), (2, ""), (3, "left_aileron"), (1, "unknown")]),
+        FAILURE,
+        GROUPS,
+    )
+    assert found == {
+        "failure": "right_aileron+rudder",
+        "failure_s": 12.0,
+        "healthy_s": 1.5,
+        "false_alarms": 2,
+        "detected": True,
+        "delay_s": 1.0,
+        "named": {"left_aileron": 0.75, "unknown": 0.25},
+        "right_group": True,
+    }
+
+
+def test_a_failure_that_is_not_found_and_a_flight_without_any():
+    missed = scoring.by_event(told([(9, "")]), FAILURE, GROUPS)
+    assert (missed["detected"], missed["delay_s"], missed["named"], missed["right_group"]) == (
+        False,
+        None,
+        {},
+        None,
+    )
+    quiet = scoring.by_event(told([(4, ""), (2, "rudder"), (3, "")]), (), GROUPS)
+    assert quiet == {
+        "failure": None, "failure_s": None, "healthy_s": 4.0, "false_alarms": 1, "detected": False,
+        "delay_s": None, "named": {}, "right_group": None,
+    }  # fmt: skip
+    from_the_start = scoring.by_event(told([(3, "rudder")]), (Event(10.0, "rudder"),), GROUPS)
+    assert (from_the_start["healthy_s"], from_the_start["false_alarms"], from_the_start["delay_s"]) == (
+        0.0,
+        0,
+        0.0,
+    )
+
+
+RIGHT = {
+    "the other of the group": ({"left_aileron": 1.0}, ["right_aileron"], True),
+    "both": ({"left_aileron+right_aileron": 1.0}, ["right_aileron"], True),
+    "a kind of either side": ({"left_aileron": 1.0}, ["aileron"], True),
+    "another": ({"elevator": 0.6, "rudder": 0.4}, ["rudder"], False),
+    "one more": ({"elevator+rudder": 1.0}, ["rudder"], False),
+    "longest counts": ({"elevator": 0.4, "rudder": 0.6}, ["rudder"], True),
+    "unknown does not": ({"unknown": 0.9, "rudder": 0.1}, ["rudder"], True),
+    "unknown alone": ({"unknown": 1.0}, ["rudder"], None),
+    "no surface": ({"rudder": 1.0}, ["engine"], None),
+    "nothing failed": ({"rudder": 1.0}, [], None),
+}
+
+
+@pytest.mark.parametrize("name", RIGHT)
+def test_whether_the_group_is_the_right_one(name):
+    named, surfaces, right = RIGHT[name]
+    assert scoring._right_group(named, surfaces, GROUPS) is right
+
+
+def test_a_score_is_by_labels_where_there_are_any():
+    model = small.model()
+    samples = small.flight(model, 100, lost=((1, 40, 80, 0.5),))
+    rows = small.rows([(100, "left", [1.0, 0.5])], step_s=0.1)
+    assert "classes" in scoring.score(samples, rows, model.groups)
+    tail = small.model(small.TAIL)
+    bare = small.flight(tail, 100, events=small.FAILURE)
+    assert scoring.score(bare, rows, tail.groups)["failure"] == "elevator+left_aileron"
+
+
+def test_rows_before_the_first_sample_have_its_label():
+    model = small.model()
+    samples = small.flight(model, 4, lost=((1, 0, 1, 0.5),))
+    given = small.rows([(3, "left", [1.0, 0.5])])  # at 10, 10.5, 11
+    early = Rows(**(vars(given) | {"t_s": np.array([-1.0, 0.05, 0.1])}))
+    assert scoring.score(samples, early, model.groups)["mean_error"] == pytest.approx(0.5 / 6)

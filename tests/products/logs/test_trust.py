@@ -1,0 +1,391 @@
+"""A model is believed where it was fitted, and silent elsewhere."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc_logs import fitting, identification, trust
+from beaver_ftc_logs.bank import adaptation_of
+from beaver_ftc_logs.diagnose import diagnose, silenced
+from beaver_ftc_logs.findings import as_text, statement, verdict_of
+from beaver_ftc_logs.model import Fitted
+from beaver_ftc_logs.readings import Reading
+from products.logs import small
+from telling import apart
+
+HEALTHY = small.flight(small.model(), n=1200, seed=2)
+
+
+def trusted(flown=HEALTHY, **changes):
+    """A model by hand that knows what it was fitted on."""
+    model = small.model(**changes)
+    stretches = fitting.stretches_of([flown])
+    return fitting.trusted(stretches, model)
+
+
+@pytest.fixture(scope="module")
+def model():
+    return trusted()
+
+
+def silent(rows):
+    """Rows that say nothing at all."""
+    return (
+        (rows.named == "")
+        & (rows.faulty == 0)
+        & (rows.low == 0.0).all(axis=1)
+        & (rows.high == 1.0).all(axis=1)
+    )
+
+
+def test_a_flight_like_those_fitted_is_credible(model):
+    rows = diagnose(small.flight(model, n=600, lost=((1, 300, 600, 0.3),), seed=8), model)
+    assert rows.credible.mean() == 1.0
+    assert rows.reasons == {}
+    assert "left" in set(rows.named[450:])
+
+
+@pytest.mark.parametrize(("change", "says"), [
+    (lambda f: f.commands.__setitem__((slice(300, None), 0), f.commands[300:, 0] * 8.0),
+     "command of right is outside"),
+    (lambda f: f.rates.__setitem__((slice(300, None), 1), f.rates[300:, 1] + 9.0), "q_rad_s is outside"),
+])  # fmt: skip
+def test_where_it_was_not_fitted_it_says_nothing(model, change, says):
+    flown = small.flight(model, n=600, seed=4)
+    change(flown)
+    rows = diagnose(flown, model)
+    assert rows.credible[:300].all()
+    out = rows.credible == 0
+    assert out[-50:].all()
+    assert silent(rows)[out].all()
+    assert any(says in reason for reason in rows.reasons)
+    verdict = verdict_of(flown, model, rows) | {"score": {}}
+    assert verdict["credible"]["share"] == pytest.approx(1.0 - out.mean())
+    assert says in as_text(verdict)
+
+
+def test_a_residual_that_is_larger_than_any_fitted_does_not_make_a_row_incredible(model):
+    """Noise of 2.5 times the standard deviation: the rows are credible, and a large loss is still named."""
+    noise = (6.25 * np.array(small.model().noise)).tolist()
+    noisy = model.model_copy(update={"noise": noise})
+    flown = small.flight(noisy, n=1500, lost=((1, 600, 1500, 0.0),), seed=21)
+    rows = diagnose(flown, model)
+    assert rows.credible.mean() > 0.9
+    assert (rows.named[900:] == "left").mean() > 0.9
+    assert rows.faulty[:600].sum() == 0
+
+
+def test_a_signal_that_stands_still_is_named_and_not_learnt_from(model):
+    still = np.zeros(600)
+    still[300:400] = 0.1 * np.arange(100)
+    flown = small.flight(model, n=600, seed=4, still_s={"q_rad_s": still})
+    rows = diagnose(flown, model)
+    assert (rows.credible == 0).tolist() == (still > 1.5).tolist()
+    assert list(rows.reasons) == ["q_rad_s stands still, for longer than 1.5 s"]
+
+
+@pytest.mark.parametrize(("usual", "most"), [(0.0, 0.5), (0.25, 0.75)])
+def test_a_rate_that_never_stood_still_may_for_half_a_second(model, usual, most):
+    """A filter that follows a dead gyro for longer finds a fault of it."""
+    known = model.model_copy(
+        update={"fitted": model.fitted.model_copy(update={"still_s": {"q_rad_s": usual}})}
+    )
+    still = np.zeros(600)
+    still[300:320] = 0.1 * np.arange(20)
+    flown = small.flight(model, n=600, seed=4, still_s={"q_rad_s": still})
+    assert (diagnose(flown, known).credible == 0).tolist() == (still > most).tolist()
+
+
+def test_a_command_may_stand_still_thrice_as_long_as_it_did(model):
+    trained = model.fitted.model_copy(update={"still_s": {"roll": 4.0}})
+    known = model.model_copy(update={"fitted": trained})
+    for longest, share in ((11.9, 1.0), (12.5, 0.98)):
+        flown = small.flight(
+            model, n=600, seed=4, still_s={"roll": np.where(np.arange(600) < 12, longest, 0.0)}
+        )
+        assert diagnose(flown, known).credible.mean() == pytest.approx(share)
+
+
+def test_rows_use_nothing_later(model):
+    flown = small.flight(model, n=600, seed=4)
+    flown.rates[300:] += 5.0
+    whole = diagnose(flown, model)
+    part = {
+        name: getattr(flown, name)[:350]
+        for name in ("t_s", "rates", "commands", "signals", "labels", "run", "stamps")
+    }
+    cut = diagnose(small.flight(model, n=600, seed=4, **part), model)
+    np.testing.assert_array_equal(cut.credible, whole.credible[:350])
+    np.testing.assert_array_equal(cut.low, whole.low[:350])
+
+
+@pytest.mark.parametrize(("factor", "says"), [
+    (57.29578, r"a factor of 0\.01745 \(`unit: deg/s`\) fits"),
+    (1.0 / 57.29578, r"a factor of 57\.3 fits"),
+    (3.0, None),
+])  # fmt: skip
+def test_rates_in_another_unit_than_the_models_own(model, factor, says):
+    flown = small.flight(model, n=300, seed=4, rates=HEALTHY.rates[:300] * factor)
+    if says is None:
+        trust.check_units(flown, model.fitted)
+        return
+    with pytest.raises(BadInput, match=says):
+        diagnose(flown, model)
+
+
+def test_what_the_law_ties_together_is_not_claimed(model):
+    """The right surface follows the rates of the sample, the left one moves by itself."""
+    flown = small.flight(model, n=2000, seed=3)
+    follows = np.vstack([np.zeros(3), flown.rates[:-1]]) @ [0.4, -0.3, 0.2]
+    commands = np.column_stack([follows, flown.commands[:, 1]])
+    share = trust.tied(
+        [(small.flight(model, n=2000, commands=commands, rates=flown.rates), np.ones(2000, bool))],
+        small.model(history=4, lags=3),
+    )
+    assert share[0] > 0.98
+    assert share[1] < 0.9
+    loose = 1000.0 * (follows + 0.05 * follows.std() * np.random.default_rng(4).standard_normal(2000))
+    commands[:, 0] = loose  # all but 1 of 400, of an effect that is a million times the noise
+    far = small.flight(model, n=2000, commands=commands, rates=flown.rates)
+    assert trust.tied([(far, np.ones(2000, bool))], small.model(history=4, lags=3))[0] == 0.0
+
+
+def test_a_surface_that_never_moved_is_not_claimed(model):
+    still = small.flight(model, n=1200, seed=2)
+    still.commands[:, 0] = 0.2
+    known = trusted(still)
+    assert trust.claimed(known) == [False, True]
+    rows = diagnose(small.flight(model, n=600, lost=((0, 200, 600, 0.0),), seed=8), known)
+    assert (rows.low[:, 0] == 0.0).all()
+    assert (rows.high[:, 0] == 1.0).all()
+    assert not any("right" in name for name in rows.named)
+    assert not (rows.faulty & (rows.named == "")).any()
+    (line,) = trust.unclaimed_lines(known)
+    assert line.startswith("of what right does, 100.0%")
+    with np.errstate(all="raise"):  # no median of nothing: none of its losses is asked for
+        right, left = statement(still, known)["groups"]
+    assert set(right["smallest_loss"].values()) == {None}
+    assert left["smallest_loss"]["60"] < 0.5
+
+
+def test_few_minutes_mean_wide_bounds():
+    """Standard errors of gains fall as the root of the time."""
+    errors = []
+    for n in (400, 6400):
+        flown = small.flight(small.model(), n=n, seed=6)
+        model = fitting.fit_model(fitting.stretches_of([flown]), small.vehicle())
+        errors.append(np.array(fitting.trusted(fitting.stretches_of([flown]), model).fitted.gain_sd))
+    assert (errors[0] / errors[1] > 2.0).all()
+    assert (errors[0] / errors[1] < 8.0).all()
+
+
+def test_under_other_laws_the_gain_is_known_as_a_factor_of_the_whole_response():
+    """As of one regressor, the response to the commands, with what the others make up of it taken off."""
+    flown = small.flight(small.model(), n=3000, seed=6)
+    model = fitting.fit_model(fitting.stretches_of([flown]), small.vehicle(other_laws=True))
+    stretches = fitting.stretches_of([flown])
+    x, _, _ = fitting.stacked(stretches, model.vehicle, model.history, model.lags)
+    fit = fitting.fit_order(stretches, model.vehicle, model.history, model.lags)
+    white = replace(fit, standard_errors=fit.standard_errors / fit.colour)
+    sd = np.sqrt(np.diag(fit.covariance))
+    for g, found in enumerate(fitting.gain_sd(white, model)):
+        first = x.shape[1] - (len(model.groups) - g) * model.lags
+        place = np.arange(x.shape[1])
+        own = (place >= first) & (place < first + model.lags)
+        answer, others = x[:, own] @ fit.coefficients[own] / sd, x[:, ~own]
+        left = answer - others @ np.linalg.lstsq(others, answer, rcond=None)[0]
+        assert found == pytest.approx(1.0 / np.sqrt((left**2).sum()), rel=1e-6)
+
+
+def test_a_model_that_explains_less_than_the_mean_is_refused():
+    tests = [
+        {"samples": 100, "explained": {"p": -71.0, "q": 0.5, "r": 0.1}},
+        {"samples": 300, "explained": {"p": 0.5, "q": -0.1, "r": 0.1}},
+    ]
+    frozen = replace(HEALTHY, notes=("q_rad_s: stands still for 600 s", "pitch: another"))
+    stretches = fitting.stretches_of([frozen])
+    with pytest.raises(BadInput) as error:
+        identification.check_explains(tests, stretches, small.model())
+    said = str(error.value)
+    assert "explains less of p than the mean does (p -17.375)" in said
+    assert said.endswith("follows; q_rad_s: stands still for 600 s")
+    assert "more than these 1.9 min" in said
+    identification.check_explains(
+        tests[1:] + [tests[1] | {"explained": {"p": 0.5, "q": 0.2, "r": 0.1}}] * 3, stretches, small.model()
+    )
+
+
+def test_a_gain_known_worse_than_a_step_of_the_levels_is_free_by_as_much(model):
+    def spread(*errors):
+        known = model.fitted.model_copy(update={"gain_sd": list(errors)})
+        given = model.model_copy(update={"fitted": known})
+        return np.diag(adaptation_of(given).covariance)[4:]
+
+    step, own = model.settings.level_step, model.settings.own_gain_sd
+    assert spread(0.0, step) == pytest.approx([own**2, own**2])
+    assert spread(0.3, 0.2) == pytest.approx([own**2 + 0.09 - step**2, own**2 + 0.04 - step**2])
+
+
+def test_a_model_that_was_fitted_on_little_says_little(model):
+    """A weak surface from the start, or a gain less than the fit says? Bounds hold both."""
+    flown = small.flight(model, n=600, lost=((1, 0, 600, 0.5),), seed=8)
+    widths = []
+    for error in (0.0, 0.3):
+        known = model.fitted.model_copy(update={"gain_sd": [error, error]})
+        rows = diagnose(flown, model.model_copy(update={"fitted": known}))
+        widths.append((rows.high - rows.low)[100:].mean())
+    assert widths[1] > 1.5 * widths[0]
+
+
+def test_commands_that_nothing_follows_are_not_credible(model):
+    flown = small.flight(model, n=600, seed=4)
+    still = np.arange(600) >= 400
+    rows = silenced(flown, model, diagnose(flown, model), still=still)
+    assert (rows.credible == 0).tolist() == still.tolist()
+    assert silent(rows)[still].all()
+    assert [reason.split(":")[0] for reason in rows.reasons] == ["nothing answers the commands"]
+
+
+def test_after_a_clipped_rate_nothing_is_said_for_half_a_minute(model):
+    clipped = np.arange(600) == 100
+    rows = diagnose(small.flight(model, n=600, seed=4, clipped=clipped), model)
+    assert np.flatnonzero(rows.credible == 0).tolist() == list(range(100, 401))
+    assert list(rows.reasons) == ["a rate was clipped in the last 30 s"]
+
+
+def test_a_model_that_claims_nothing_says_nothing(model):
+    """Neither a name nor an alarm in a flight whose surfaces' effects are all made up by the rates."""
+    fitted = model.fitted.model_copy(update={"tied": [0.99, 1.0]})
+    known = model.model_copy(update={"fitted": fitted})
+    rows = diagnose(small.flight(model, n=600, lost=((1, 200, 600, 0.0),), seed=8), known)
+    assert silent(rows).all()
+    assert not rows.credible.any()
+    assert list(rows.reasons) == ["of no surface is the effect known from the flights fitted"]
+
+
+@pytest.mark.parametrize(
+    ("factor", "turned", "refused"),
+    [(57.3, 1.0, True), (0.01, 1.0, True), (8.0, 1.0, False), (57.3, 5.0, False), (57.3, 4.0, True),
+     (57.3, 0.1, True), (0.01, 0.1, False), (0.0, 1.0, False)],
+)  # fmt: skip
+def test_a_command_in_another_unit_is_refused_where_rates_move_alike_or_far_less(factor, turned, refused):
+    n = np.arange(2000)
+    rates = np.column_stack([np.sin(0.01 * (k + 1) * n) for k in range(3)])
+    commands = np.column_stack([np.sin(0.03 * n), np.cos(0.02 * n)])
+    fitted = Fitted(commands=trust.span(commands), rates=trust.span(rates))
+    flown = commands * [1.0, factor], rates * [1.0, turned, 1.0]
+    if refused:
+        with pytest.raises(BadInput, match=rf"log: the command of elevator moves {factor:g} times"):
+            trust.check_commands("log", *flown, fitted, ["aileron", "elevator"])
+    else:
+        trust.check_commands("log", *flown, fitted, ["aileron", "elevator"])
+
+
+SPANS = {"commands": [[2.0, 3.0], [-7.0, -6.5]], "rates": [[0.5, 1.1], [-2.2, 0.8], [4.0, 4.4]]}
+
+
+@pytest.mark.parametrize(
+    ("kind", "column", "low", "high", "name"),
+    [
+        ("commands", 0, 1.5, 3.5, "command of right"), ("commands", 1, -7.25, -6.25, "command of left"),
+        ("rates", 0, 0.2, 1.4, "p_rad_s"), ("rates", 1, -3.7, 2.3, "q_rad_s"),
+        ("rates", 2, 3.8, 4.6, "r_rad_s"),
+    ],
+)  # fmt: skip
+def test_a_range_is_passed_by_half_its_span_at_either_end(model, kind, column, low, high, name):
+    apart(**SPANS)
+    fitted = model.fitted.model_copy(update=SPANS)
+    known = model.model_copy(update={"fitted": fitted})
+    middle = {of: np.mean(spans, axis=1) for of, spans in SPANS.items()}
+    for value in (low - 0.02, low + 0.02, high - 0.02, high + 0.02):
+        flown = {of: np.tile(values, (300, 1)) for of, values in middle.items()}
+        flown[kind][:, column] = value
+        found = trust.outside(small.flight(model, **flown), known)
+        first, last = SPANS[kind][column]
+        says = f"{name} is outside {first:.3g} to {last:.3g}, where the model was fitted"
+        assert list(found) == ([] if low < value < high else [says])
+
+
+def test_a_condition_counts_where_it_holds_in_more_than_half_of_the_last_five_seconds():
+    rows = np.array([1, 0, 1, 1, 0, 0, 0, 0, 1, 1, 1], dtype=bool)
+    found = trust._often(rows, small.flight(small.model(), 20, dt_s=1.0))
+    assert found.astype(int).tolist() == [1, 0, 1, 1, 1, 0, 0, 0, 0, 0, 1]
+
+
+def test_what_was_clipped_is_remembered_for_half_a_minute():
+    for at, found in ((2, [2, 3, 4, 5]), (9, [])):
+        assert np.flatnonzero(trust._lately(np.arange(8) == at, 10.0)).tolist() == found
+
+
+def test_for_how_long_each_column_may_stand_still():
+    """A rate for a third of 1.5 s where it is known, any column thrice as long as it did; others for ever."""
+    names = ["p_rad_s", "q_rad_s", "r_rad_s", "roll", "pitch", "air"]
+    samples = small.flight(small.model(), 20, still_s=dict.fromkeys(names, np.zeros(20)))
+    known = {"p_rad_s": 0.4, "r_rad_s": 0.1, "roll": 2.0, "pitch": 0.3, "other": 9.0}
+    model = small.model(fitted={"commands": [], "rates": [], "still_s": known})
+    most = dict(zip(names, [pytest.approx(1.2), 1.5, 0.5, 6.0, 1.5, np.inf], strict=True))
+    assert trust._most_still(samples, model) == most
+    assert trust._most_still(samples, small.model()) == dict(
+        zip(names, [1.5] * 3 + [np.inf] * 3, strict=True)
+    )
+    still_s = {"q_rad_s": np.array([1.5, 1.51, 0.0]), "air": np.full(3, 99.0)}
+    short = replace(samples, t_s=np.arange(3.0), still_s=still_s)
+    assert trust.dead(short, model).tolist() == [False, True, False]
+    clipped = replace(short, clipped=np.array([False, False, True]))
+    assert trust.dead(clipped, model).tolist() == [False, True, True]
+
+
+def test_a_group_that_is_tied_to_98_of_a_hundred_is_not_claimed():
+    model = small.model(fitted={"commands": [], "rates": [], "tied": [0.98, 0.979]})
+    assert (trust.claimed(model), trust.unclaimed(model)) == ([False, True], {"right"})
+    says = (
+        "of what right does, 98.0% follows from the rates, signals and other surfaces of the flights fitted"
+    )
+    assert trust.unclaimed_lines(model) == [f"{says}: its effect cannot be told, nothing is said of it"]
+    for unknown in (small.model(), small.model(fitted={"commands": [], "rates": []})):
+        assert (trust.claimed(unknown), trust.unclaimed_lines(unknown)) == ([True, True], [])
+
+
+def test_what_is_kept_of_the_flights_fitted():
+    """Of each column the longest stand; of the energy height the lowest 15 of a hundred; of commands their
+    reach over that of the fit."""
+    climbs = np.append(np.arange(22.0), np.nan)  # 0 to 20 are used, and what is no number
+    use = np.arange(23) != 21
+    one = small.flight(small.model(), 23, energy_climb=climbs, still_s={"roll": np.array([0.3, 0.2])})
+    other = small.flight(small.model(), 23, still_s={"roll": np.array([0.4]), "air": np.array([0.7])})
+    flights = [(other, use), (one, use)]
+    assert trust._unpowered(flights) == pytest.approx(3.0)
+    assert trust._unpowered(flights[:1]) is None
+    assert trust._longest_still(flights) == {"roll": 0.4, "air": 0.7}
+    model = small.model(fitted={"commands": [[0.0, 1.0], [1.0, 3.0]], "rates": []})
+    commands = np.linspace([-1.0, 0.0], [3.0, 3.0], 1001)
+    flown = replace(other, commands=commands)
+    assert trust._moved(flown, model, ["left"]) == pytest.approx(2.994 / 2.0)
+    assert trust._moved(flown, model, ["left", "right"]) == pytest.approx(3.992)
+    assert trust._moved(flown, small.model(), ["left"]) == 0.0
+    assert trust.span(np.array([[np.nan, 2.0], [np.nan, 2.0]])) == [[0.0, 0.0], [2.0, 2.0]]
+    assert trust.span(np.empty((3, 0))) == []
+
+
+def test_reasons_come_with_their_shares_the_largest_first():
+    found = {"one": np.array([1, 0, 0, 0], bool), "other": np.array([1, 1, 0, 1], bool)}
+    assert trust.account(found, np.array([0, 0, 1, 0])) == {
+        "share": 0.25, "reasons": [{"says": "other", "share": 0.75}, {"says": "one", "share": 0.25}],
+    }  # fmt: skip
+    assert trust.account({}, np.array([])) == {"share": 0.0, "reasons": []}
+
+
+@pytest.mark.parametrize(("counted", "says"), [(19.0, None), (19.01, 3), (100.0, 17)])
+def test_a_mistake_is_told_where_it_explains_every_part_more_than_chance(monkeypatch, counted, says):
+    """Of two readings by more than 2000 times: in the part that gains least 0.3, and 0.1 by its unit."""
+    found = trust._InAll([], {}, 1.0, np.zeros(4), counted)
+    parts = {"as it is": found, "short": None, "other": found._replace(likely=np.array([0.9, 0.3, 0.5, 0.7]))}
+    read = [Reading(*one) for one in (("A", "short"), ("B", "other", 0.1))]
+    monkeypatch.setattr(trust, "_in_all_parts", lambda samples, *_: parts[samples])
+    monkeypatch.setattr(trust, "mended", lambda *_: read)
+    told = None if says is None else f"each part of the flight is at least 10^{says} times as likely with B"
+    assert trust._likelier("as it is", small.model()) == told
+    parts["as it is"] = None
+    assert trust._likelier("as it is", small.model()) is None

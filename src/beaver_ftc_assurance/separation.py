@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.diagnosis.state import UNANTICIPATED
-from beaver_ftc.diagnosis.types.registry import BIAS, CONSTANT_LOSS, FLOAT, NAMES, STUCK
+from beaver_ftc.diagnosis.types.registry import NAMES
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.loop.simulation import Stepping
@@ -33,7 +33,7 @@ from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc_assurance.certificates import proved
 from beaver_ftc_assurance.certificates.certificate import check_scheme, history_of, logged
 from beaver_ftc_assurance.certificates.inequality import History, Hypothesis, by_each_frame, declared_of
-from beaver_ftc_assurance.certificates.kinds import hypothesis, wrong
+from beaver_ftc_assurance.certificates.kinds import BIAS, CONSTANT_LOSS, FLOAT, STUCK, hypothesis, wrong
 from beaver_ftc_assurance.certificates.tape import Recorder, Tape
 
 FILE, FLOWN = "separation.json", "flown"

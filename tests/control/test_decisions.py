@@ -18,7 +18,7 @@ from beaver_ftc.control.supervisor import (
 )
 from beaver_ftc.design.model import design_record, unanticipated_pitch
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
-from beaver_ftc.diagnosis.types.examine import FIXED, LAGS, LOSES, SHIFTED
+from beaver_ftc.diagnosis.types.contract import FIXED, LAGS, LOSES, SHIFTED
 from beaver_ftc.loop import frame as whole
 from beaver_ftc.loop.assembly import frame_dtype
 from law_records import put

@@ -17,11 +17,12 @@ from beaver_ftc.control.laws import (
 from beaver_ftc.control.rivals import compiled
 from beaver_ftc.control.supervisor import MODE_ADAPTIVE
 from beaver_ftc.diagnosis.state import LOSS, NOT_ISOLATED, WORST_CASE
-from beaver_ftc.diagnosis.types.examine import FIXED, LAGS, LOSES, SHIFTED
-from beaver_ftc.diagnosis.types.registry import BIAS, CONSTANT_LOSS, N_TYPES, STUCK
+from beaver_ftc.diagnosis.types.contract import FIXED, LAGS, LOSES, SHIFTED
+from beaver_ftc.diagnosis.types.registry import N_TYPES
 from beaver_ftc.loop import frame as whole
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.scenario.schema import Scenario
+from fault_kinds import BIAS, CONSTANT_LOSS, STUCK
 from law_records import put
 
 TRAVEL_RAD = np.array([[-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]])

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from test_fault_types import TYPES, shares, starts, surfaces
 from test_release import HELD, Repaired
 
+import fault_kinds
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.model import both_responses, design_record
 from beaver_ftc.diagnosis.types import registry as types
@@ -79,8 +80,8 @@ def test_an_estimate_is_certain_to_lie_in_its_interval(noisy):
     """An aileron stuck a quarter up its travel."""
     plant = fly(4, noisy, "stuck", 0, 30, 0.25, 900)
     known = plant.fdi["types"]["surface"][0]
-    assert known["set_low"][types.STUCK] <= -0.26 <= known["set_high"][types.STUCK]
-    assert known["set_high"][types.STUCK] - known["set_low"][types.STUCK] < np.deg2rad(4)
+    assert known["set_low"][fault_kinds.STUCK] <= -0.26 <= known["set_high"][fault_kinds.STUCK]
+    assert known["set_high"][fault_kinds.STUCK] - known["set_low"][fault_kinds.STUCK] < np.deg2rad(4)
     assert found(plant.fdi, SURFACES)["isolated"] == "aileron"
 
 

@@ -6,6 +6,7 @@ from design_plant import TRAVEL_RAD, UNCERTAINTIES, DesignPlant
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import fault_kinds
 from beaver_ftc.diagnosis.types import registry as types
 from beaver_ftc.diagnosis.types.findings import found
 from samples import samples
@@ -84,16 +85,16 @@ def slow(surface, at, share, dt):
 
 
 TYPES = {
-    "constant loss": (lost, types.CONSTANT_LOSS),
-    "varying loss": (fading, types.VARYING_LOSS),
-    "stuck": (stuck, types.STUCK),
-    "float": (floating, types.FLOAT),
-    "bias": (bias, types.BIAS),
-    "growing bias": (growing, types.GROWING_BIAS),
-    "hardover up": (runaway(1), types.UP),
-    "hardover down": (runaway(-1), types.DOWN),
-    "oscillatory": (swinging, types.OSCILLATORY),
-    "rate limit": (slow, types.SLOW),
+    "constant loss": (lost, fault_kinds.CONSTANT_LOSS),
+    "varying loss": (fading, fault_kinds.VARYING_LOSS),
+    "stuck": (stuck, fault_kinds.STUCK),
+    "float": (floating, fault_kinds.FLOAT),
+    "bias": (bias, fault_kinds.BIAS),
+    "growing bias": (growing, fault_kinds.GROWING_BIAS),
+    "hardover up": (runaway(1), fault_kinds.UP),
+    "hardover down": (runaway(-1), fault_kinds.DOWN),
+    "oscillatory": (swinging, fault_kinds.OSCILLATORY),
+    "rate limit": (slow, fault_kinds.SLOW),
 }
 cases = st.fixed_dictionaries({
     "seed": st.integers(0, 2**32),

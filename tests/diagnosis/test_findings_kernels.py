@@ -8,18 +8,9 @@ from beaver_ftc.diagnosis.scheme import diagnosis_dtype
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.diagnosis.types import findings
 from beaver_ftc.diagnosis.types.pairs import IN_PITCH
-from beaver_ftc.diagnosis.types.registry import (
-    BIAS,
-    CONSTANT_LOSS,
-    FLOAT,
-    NAMES,
-    SLOW,
-    STUCK,
-    TYPES,
-    UP,
-    VARYING_LOSS,
-)
+from beaver_ftc.diagnosis.types.registry import NAMES, TYPES
 from beaver_ftc.diagnosis.types.verdict import BY_DEDUCTION, RULED_OUT
+from fault_kinds import BIAS, CONSTANT_LOSS, FLOAT, SLOW, STUCK, UP, VARYING_LOSS
 from telling import apart, fill
 
 SURFACES = ("aileron", "elevator", "rudder", "flap")

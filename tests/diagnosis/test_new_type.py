@@ -12,6 +12,7 @@ import pytest
 import beaver_ftc
 from beaver_ftc.diagnosis.types import contract, registry
 from beaver_ftc.documents.paths import data_root
+from fault_kinds import DOWN, UP
 
 HERE = Path(__file__).parent
 
@@ -157,4 +158,4 @@ def test_types_stand_by_their_rank_those_of_a_constant_parameter_first():
         ("hardover", True), ("bias", True), ("loss_of_effectiveness", False), ("oscillatory", False),
         ("rate_limit", False), ("bias", False),
     ]  # fmt: skip
-    assert (registry.UP, registry.DOWN) == (3, 4)
+    assert (UP, DOWN) == (3, 4)

@@ -6,22 +6,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 from kernels import new_fdi, on, put
 
-from beaver_ftc.diagnosis.types import contract, examine, release
-from beaver_ftc.diagnosis.types.registry import (
+from beaver_ftc.diagnosis.types import contract, examine, release, sets
+from beaver_ftc.diagnosis.types.registry import N_TYPES, TYPES
+from beaver_ftc.diagnosis.types.table import bias, hardover, loss, oscillatory, rate_limit, stuck
+from fault_kinds import (
     BIAS,
     CONSTANT_LOSS,
     DOWN,
     FLOAT,
     GROWING_BIAS,
-    N_TYPES,
     OSCILLATORY,
     SLOW,
     STUCK,
-    TYPES,
     UP,
     VARYING_LOSS,
 )
-from beaver_ftc.diagnosis.types.table import bias, hardover, loss, oscillatory, rate_limit, stuck
 
 LOW, HIGH, DT = -0.4, 0.5, 0.02
 ALL = set(range(N_TYPES))
@@ -42,6 +41,16 @@ def new_surface(left=ALL, low=-0.01, high=0.01, command=0.0, **fields):
     for name, value in fields.items():
         surface[name] = value
     return fdi, surface
+
+
+def judged(judge, fdi, surface, kind, *given):
+    """Take in what a type's row makes of the judged frame."""
+    sets.intersect(surface, kind, on(judge, fdi, surface, kind, *given))
+
+
+def restored(surface):
+    """Take in what a jam was before the earliest release still possible."""
+    sets.replace(surface, STUCK, stuck.restored(surface, STUCK))
 
 
 def test_what_is_known_of_a_surface_as_it_begins():
@@ -68,8 +77,8 @@ def test_what_is_known_of_a_surface_as_it_begins():
 )  # fmt: skip
 def test_a_constant_loss_keeps_the_shares_that_explain_the_frame(low, high, command, expected):
     fdi, surface = new_surface(low=low, high=high, command=command)
-    on(loss.judge, fdi, surface, CONSTANT_LOSS, 5)
-    on(loss.judge_varying, fdi, surface, VARYING_LOSS, 5)
+    judged(loss.judge, fdi, surface, CONSTANT_LOSS, 5)
+    judged(loss.judge_varying, fdi, surface, VARYING_LOSS, 5)
     assert (
         surface["type_excluded"][CONSTANT_LOSS]
         == surface["type_excluded"][VARYING_LOSS]
@@ -86,20 +95,20 @@ def test_over_a_block_in_which_the_command_swings_any_mean_may_be_a_varying_loss
         fdi, surface = new_surface(low=0.11, high=0.2, command=0.1)
         fdi["types"]["config"]["length"], surface["orders"]["least"][1] = 5, least
         surface["orders"]["greatest"][1] = greatest
-        on(loss.judge_varying, fdi, surface, VARYING_LOSS, 5)
+        judged(loss.judge_varying, fdi, surface, VARYING_LOSS, 5)
         assert surface["type_excluded"][VARYING_LOSS] == excluded
 
 
 def test_sets_shrink_to_what_is_left_and_end_when_nothing_is():
     _, surface = new_surface()
-    contract.intersect(surface, STUCK, -0.1, 0.2)
-    contract.intersect(surface, STUCK, 0.0, 0.9)
+    sets.intersect(surface, STUCK, (-0.1, 0.2))
+    sets.intersect(surface, STUCK, (0.0, 0.9))
     assert (surface["set_low"][STUCK], surface["set_high"][STUCK]) == (0.0, 0.2)
     assert contract.middle(surface, STUCK) == 0.1
     assert not surface["type_excluded"][STUCK]
-    contract.intersect(surface, STUCK, 0.2, 0.9)  # one point is not nothing
+    sets.intersect(surface, STUCK, (0.2, 0.9))  # one point is not nothing
     assert not surface["type_excluded"][STUCK]
-    contract.intersect(surface, STUCK, 0.21, 0.9)
+    sets.intersect(surface, STUCK, (0.21, 0.9))
     assert surface["type_excluded"][STUCK]
 
 
@@ -117,7 +126,7 @@ def test_no_offset_takes_a_surface_beyond_its_stops(low, high):
     """A loss does, where neutral is out of reach."""
     fdi, surface = new_surface(low=low, high=high, command=0.2, travel_low=0.1)
     for kind, judge in ((BIAS, bias.judge), (GROWING_BIAS, bias.judge_growing)):
-        on(judge, fdi, surface, kind, 5)
+        judged(judge, fdi, surface, kind, 5)
         assert surface["type_excluded"][kind]
 
 
@@ -136,9 +145,9 @@ def test_within_what_is_seen_at_once_a_stop_may_have_been_met_at_its_furthest_or
 
 def test_a_bias_keeps_the_offsets_that_explain_every_frame():
     fdi, surface = new_surface(low=0.1, high=0.15, command=0.3)
-    on(bias.judge, fdi, surface, BIAS, 5)
+    judged(bias.judge, fdi, surface, BIAS, 5)
     surface["low_then"], surface["high_then"], surface["command_then"] = 0.23, 0.4, 0.4
-    on(bias.judge, fdi, surface, BIAS, 6)
+    judged(bias.judge, fdi, surface, BIAS, 6)
     assert (surface["set_low"][BIAS], surface["set_high"][BIAS]) == pytest.approx((-0.17, -0.15))
     surface["command"] = 0.05
     assert on(bias.deflection, fdi, surface, BIAS) == pytest.approx((-0.12, -0.1))
@@ -164,14 +173,14 @@ def test_a_growing_bias_keeps_its_sign_and_never_shrinks(offsets, excluded):
     fdi, surface = new_surface()
     for offset in offsets:
         surface["low_then"], surface["high_then"] = offset - 0.01, offset + 0.01
-        on(bias.judge_growing, fdi, surface, GROWING_BIAS, 5)
+        judged(bias.judge_growing, fdi, surface, GROWING_BIAS, 5)
     assert surface["type_excluded"][GROWING_BIAS] == excluded
 
 
 def test_at_a_stop_a_growing_bias_says_nothing():
     for low, high in ((0.45, 0.5), (-0.4, -0.35)):
         fdi, surface = new_surface(low=low, high=high)
-        on(bias.judge_growing, fdi, surface, GROWING_BIAS, 5)
+        judged(bias.judge_growing, fdi, surface, GROWING_BIAS, 5)
         assert surface["growing_bias"]["up"] == surface["growing_bias"]["down"] == 0.0
 
 
@@ -187,12 +196,12 @@ def test_at_a_stop_a_growing_bias_says_nothing():
 def test_a_growing_bias_is_as_fast_as_a_runaway_only_where_that_is_certain(places, ran):
     fdi, surface = new_surface(least_runaway_rate=0.05 / DT)
     for place in places:
-        on(bias.watch_growing, fdi, surface, GROWING_BIAS)
+        on(bias.widen_growing, fdi, surface, GROWING_BIAS)
         if place == "well":
-            on(bias.pass_over_growing, fdi, surface, GROWING_BIAS)
+            on(bias.skip_growing, fdi, surface, GROWING_BIAS)
         elif place is not None:
             surface["low_then"], surface["high_then"] = place - 0.01, min(place + 0.01, HIGH)
-            on(bias.judge_growing, fdi, surface, GROWING_BIAS, 5)
+            judged(bias.judge_growing, fdi, surface, GROWING_BIAS, 5)
     assert surface["growing_bias"]["ran"].tolist() == ran
 
 
@@ -200,9 +209,9 @@ def test_of_several_instants_a_mean_may_be_that_of_the_last():
     fdi, surface = new_surface(least_runaway_rate=0.05 / DT)
     fdi["types"]["config"]["whole"] = 0
     for place, ran in ((0.0, 0), (0.19, 0), (0.31, 1)):  # beyond 0.01 + 3 * 0.09 after two frames
-        on(bias.watch_growing, fdi, surface, GROWING_BIAS)
+        on(bias.widen_growing, fdi, surface, GROWING_BIAS)
         surface["low_then"], surface["high_then"] = place - 0.01, place + 0.01
-        on(bias.judge_growing, fdi, surface, GROWING_BIAS, 5)
+        judged(bias.judge_growing, fdi, surface, GROWING_BIAS, 5)
         assert surface["growing_bias"]["ran"][1] == ran
 
 
@@ -212,7 +221,7 @@ def slow_run(places, orders=(0.0, 0.0), whole=1, frames=None, slowest_step=0.0):
     surface["orders"]["low"], surface["orders"]["high"] = orders[0], orders[1]
     for k, place in enumerate(places):
         surface["low_then"], surface["high_then"] = place - 0.01, place + 0.01
-        on(rate_limit.judge, fdi, surface, SLOW, (frames or range(99))[k])
+        judged(rate_limit.judge, fdi, surface, SLOW, (frames or range(99))[k])
     return surface["type_excluded"][SLOW]
 
 
@@ -261,8 +270,8 @@ def swung(signs, patience=20):
     for frame, sign in enumerate(signs):
         fdi["types"]["frame"] = frame + 1
         surface["low_then"], surface["high_then"] = 0.1 * sign - 0.02, 0.1 * sign + 0.02
-        on(oscillatory.watch, fdi, surface, OSCILLATORY)
-        on(oscillatory.judge, fdi, surface, OSCILLATORY, frame)
+        on(oscillatory.add_square, fdi, surface, OSCILLATORY)
+        judged(oscillatory.judge, fdi, surface, OSCILLATORY, frame)
     return fdi, surface
 
 
@@ -271,8 +280,8 @@ def test_an_oscillation_is_counted_by_half_cycles():
     swing = surface["oscillatory"]
     assert swing["half_cycles"] == 3
     assert (swing["first_end"], swing["last_end"]) == (5, 15)
-    assert oscillatory.shown(surface)
-    assert not oscillatory.shown(swung([1] * 5 + [-1] * 5 + [1])[1])
+    assert oscillatory.has_shown(surface)
+    assert not oscillatory.has_shown(swung([1] * 5 + [-1] * 5 + [1])[1])
     assert oscillatory.frequency_rad_s(fdi, 0, OSCILLATORY) == pytest.approx(2 * np.pi / (10 * DT))
     # the first half-cycle is cut off and does not count: ten frames, each 0.1 rad off; its first frame is
     # summed before the half-cycle before it is seen to have ended
@@ -290,7 +299,7 @@ def test_a_sign_that_stays_for_longer_than_the_slowest_half_cycle_is_none():
     assert swung([-1] * 22)[1]["type_excluded"][OSCILLATORY]
     assert not swung([1] * 15 + [0] + [1] * 15)[1]["type_excluded"][OSCILLATORY]
     fdi, surface = swung([1] * 20)
-    on(oscillatory.pass_over, fdi, surface, OSCILLATORY)
+    on(oscillatory.skip, fdi, surface, OSCILLATORY)
     assert surface["oscillatory"]["steady_since"] == 20
 
 
@@ -320,7 +329,7 @@ def test_what_holds_a_surface_is_excluded_where_it_is_not(kind, inside, outside)
         fdi, surface = new_surface(low=low, high=high, started_at=3, start_low=0.1, start_high=0.2)
         surface["least_runaway_rate"] = 1.0
         surface["set_low"][STUCK], surface["set_high"][STUCK] = 0.05, 0.3
-        on(TYPES[kind].judge, fdi, surface, kind, 5)
+        judged(TYPES[kind].judge, fdi, surface, kind, 5)
         assert surface["type_excluded"][kind] == excluded
     if kind == STUCK:
         assert TYPES[kind].estimate(fdi, 0, kind) == pytest.approx(0.175)
@@ -334,7 +343,7 @@ def test_at_a_stop_the_mean_of_a_quick_swing_keeps_its_sign(whole, hides, exclud
     fdi, surface = new_surface(low=-0.2, high=-0.1, command=0.1)  # below its command all the time
     fdi["types"]["config"]["whole"], surface["hides_then"] = whole, hides
     for frame in range(30):
-        on(oscillatory.judge, fdi, surface, OSCILLATORY, frame)
+        judged(oscillatory.judge, fdi, surface, OSCILLATORY, frame)
     assert surface["type_excluded"][OSCILLATORY] == excluded
 
 
@@ -350,7 +359,7 @@ def test_a_stop_hides_what_is_no_wider_than_the_interval_of_a_deflection(least, 
 
 def test_a_jam_narrows_to_where_it_is_seen():
     fdi, surface = new_surface(low=0.1, high=0.2)
-    on(stuck.judge, fdi, surface, STUCK, 5)
+    judged(stuck.judge, fdi, surface, STUCK, 5)
     assert on(stuck.deflection, fdi, surface, STUCK) == (0.1, 0.2)
     assert contract.set_of(fdi, 0, STUCK) == (0.1, 0.2)
 
@@ -443,20 +452,20 @@ def test_a_return_has_the_room_that_an_uneven_effectiveness_gives_it(length, ins
 
 def test_what_is_let_go_joins_the_later_releases_and_is_carried_on():
     fdi, surface = released(low=np.inf, high=-np.inf)
-    release.let_go(surface, STUCK, 0.2, 0.3)
-    release.let_go(surface, STUCK, 0.1, 0.15)
-    release.let_go(surface, STUCK, 0.5, 0.4)  # nowhere
+    release.note_release(surface, STUCK, 0.2, 0.3)
+    release.note_release(surface, STUCK, 0.1, 0.15)
+    release.note_release(surface, STUCK, 0.5, 0.4)  # nowhere
     held = surface["release"]
     assert (held["low"][1, STUCK], held["high"][1, STUCK]) == (0.1, 0.3)
     held["released"][STUCK] = 1
-    release.let_go(surface, STUCK, -0.4, 0.5)
+    release.note_release(surface, STUCK, -0.4, 0.5)
     assert (held["low"][1, STUCK], held["high"][1, STUCK]) == (0.1, 0.3)
     surface["wrong_then"] = 1
-    on(release.bring_back, fdi, surface, STUCK)
+    on(release.propagate, fdi, surface, STUCK)
     assert (held["low"][1, STUCK], held["high"][1, STUCK]) == pytest.approx((0.05, 0.2))
     assert held["released"][STUCK] == 1
     surface["wrong_then"] = 0
-    on(release.bring_back, fdi, surface, STUCK)
+    on(release.propagate, fdi, surface, STUCK)
     assert held["released"][STUCK] == 0
 
 
@@ -464,15 +473,16 @@ def test_what_is_let_go_joins_the_later_releases_and_is_carried_on():
 def test_a_type_that_no_longer_holds_is_excluded_unless_a_return_explains_it(returns):
     fdi, surface = released(judged=(0.2, 0.3))
     fdi["types"]["config"]["returns"] = returns
-    assert not on(release.holds, fdi, surface, STUCK, -0.1, 0.1)
+    elsewhere = release.RETURNING if returns else release.REFUTED
+    judged(release.explains, fdi, surface, STUCK, -0.1, 0.1)
     assert surface["type_excluded"][STUCK] == (not returns)
     assert surface["release"]["released"][STUCK] == returns
     fdi, surface = released(judged=(0.2, 0.3))
     fdi["types"]["config"]["returns"] = returns
-    assert on(release.holds, fdi, surface, STUCK, 0.3, 0.4)
-    assert on(release.holds, fdi, surface, STUCK, 0.1, 0.2)
+    assert on(release.status, fdi, surface, STUCK, 0.3, 0.4) == release.HELD
+    assert on(release.status, fdi, surface, STUCK, 0.1, 0.2) == release.HELD
     surface["release"]["released"][STUCK] = 1
-    assert not on(release.holds, fdi, surface, STUCK, 0.1, 0.2)
+    assert on(release.status, fdi, surface, STUCK, 0.1, 0.2) == elsewhere
 
 
 def test_where_a_surface_was_as_the_judged_frame_began():
@@ -494,7 +504,7 @@ def test_from_where_each_type_lets_go(kind):
             surface["release"]["low"][release.EARLIER, STUCK],
             surface["release"]["high"][release.EARLIER, STUCK],
         ) = 0.0, 0.1
-    on(TYPES[kind].let_go, fdi, surface, kind)
+    on(TYPES[kind].on_release, fdi, surface, kind)
     held = surface["release"]
     expected = {STUCK: (0.05, 0.2), FLOAT: (0.0, 0.0), UP: (0.04, 0.2), DOWN: (-0.1, 0.06)}[kind]
     assert (held["low"][1, kind], held["high"][1, kind]) == pytest.approx(expected)
@@ -506,16 +516,16 @@ def test_within_a_frame_of_several_instants_a_runaway_may_be_let_go_further_on(k
     surface["low_before"], surface["high_before"], fdi["types"]["config"]["whole"] = -0.1, 0.2, 0
     for which in (0, 1):
         release.forget(surface, which, kind)
-    on(TYPES[kind].let_go, fdi, surface, kind)
+    on(TYPES[kind].on_release, fdi, surface, kind)
     held = surface["release"]
     assert (held["low"][1, kind], held["high"][1, kind]) == pytest.approx(expected)
 
 
 def test_a_jam_that_may_have_let_go_returns_to_what_was_known_before():
-    fdi, surface = released(low=0.2, high=0.3, wrong_then=0)
+    _, surface = released(low=0.2, high=0.3, wrong_then=0)
     surface["stuck"]["kept_low"], surface["stuck"]["kept_high"] = (0.0, 0.1), (0.2, 0.4)
     surface["set_low"][STUCK], surface["set_high"][STUCK] = 0.25, 0.26
-    stuck.settle(surface, STUCK)
+    restored(surface)
     assert (surface["set_low"][STUCK], surface["set_high"][STUCK]) == (0.1, 0.4)
     stuck.renew(surface, STUCK)  # no earlier release: the later are the earlier ones now
     held = surface["release"]
@@ -525,10 +535,10 @@ def test_a_jam_that_may_have_let_go_returns_to_what_was_known_before():
         [0.1, 0.1],
         [0.4, 0.4],
     )
-    stuck.settle(surface, STUCK)
+    restored(surface)
     assert (surface["set_low"][STUCK], surface["set_high"][STUCK]) == (0.1, 0.4)
     surface["wrong_then"], surface["set_low"][STUCK] = 1, 0.3
-    on(stuck.bring_back, fdi, surface, STUCK)
+    restored(surface)
     assert surface["set_low"][STUCK] == 0.3
 
 
@@ -578,17 +588,17 @@ def test_a_release_within_the_block_explains_what_lies_between_with_some_room(en
     edge = mean + side * room
     beyond = edge - side * 1e-6 if inside else edge + side * 1e-6
     surface["low_then"], surface["high_then"] = (-1.0, beyond) if end == "low" else (beyond, 1.0)
-    assert on(release.let_go_within, fdi, surface, STUCK) == inside
+    assert on(release.released_within, fdi, surface, STUCK) == inside
     assert on(release.possible, fdi, surface, STUCK) == inside
     held = surface["release"]["held_low"][STUCK] <= surface["release"]["held_high"][STUCK]
     assert held == inside, "what explains nothing is forgotten"
     fdi["types"]["config"]["length"] = 1
-    assert not on(release.let_go_within, fdi, surface, STUCK)
+    assert not on(release.released_within, fdi, surface, STUCK)
 
 
 def test_what_is_held_nowhere_is_not_let_go_within():
     fdi, surface = within_block(ORDERS, held=(0.3, 0.2))
-    assert not on(release.let_go_within, fdi, surface, STUCK)
+    assert not on(release.released_within, fdi, surface, STUCK)
 
 
 @pytest.mark.parametrize("joined", [False, True])
@@ -597,13 +607,13 @@ def test_after_a_block_releases_within_it_join_the_later_ones(joined):
     held = surface["release"]
     if joined:
         held["low"][1, STUCK], held["high"][1, STUCK] = 0.25, 0.251
-    on(release.bring_back, fdi, surface, STUCK)
+    on(release.propagate, fdi, surface, STUCK)
     low, high = (on(release.carried, fdi, surface, *of)[1] for of in ((0.2, -1), (0.3, 1)))
     assert (held["low"][1, STUCK], held["high"][1, STUCK]) == pytest.approx((low, high))
     assert not release.any_release(surface, release.EARLIER, STUCK)
     fdi["types"]["config"]["length"], before = 1, held["high"][1, STUCK].copy()
     release.forget(surface, release.LATER, STUCK)
-    on(release.bring_back, fdi, surface, STUCK)
+    on(release.propagate, fdi, surface, STUCK)
     assert not release.any_release(surface, release.LATER, STUCK), "in one frame nothing is let go within"
     assert before == pytest.approx(high)
 
@@ -633,7 +643,7 @@ def test_where_the_effectiveness_changes_a_return_has_a_share_of_its_way_as_room
 def test_a_jam_let_go_without_an_earlier_release_is_the_earlier_one_then():
     fdi, surface = released(low=0.1, high=0.3, judged=(0.0, 0.25))
     surface["set_low"][STUCK], surface["set_high"][STUCK] = 0.15, 0.22
-    on(stuck.let_go, fdi, surface, STUCK)
+    on(stuck.on_release, fdi, surface, STUCK)
     held = surface["release"]
     assert (held["low"][0, STUCK], held["high"][0, STUCK]) == (0.1, 0.3)
     assert (held["low"][1, STUCK], held["high"][1, STUCK]) == (0.15, 0.22)
@@ -641,22 +651,22 @@ def test_a_jam_let_go_without_an_earlier_release_is_the_earlier_one_then():
 
 
 def test_a_jam_that_looks_healthy_is_what_it_was_before():
-    fdi, surface = released(low=0.2, high=0.3, wrong_then=0)
+    _, surface = released(low=0.2, high=0.3, wrong_then=0)
     surface["stuck"]["kept_low"], surface["stuck"]["kept_high"] = (0.0, 0.1), (0.2, 0.4)
     surface["set_low"][STUCK], surface["set_high"][STUCK] = 0.25, 0.26
-    on(stuck.bring_back, fdi, surface, STUCK)
+    restored(surface)
     assert (surface["set_low"][STUCK], surface["set_high"][STUCK]) == (0.1, 0.4)
     surface["release"]["low"][0, STUCK], surface["release"]["high"][0, STUCK] = 0.1, 0.2
-    on(stuck.bring_back, fdi, surface, STUCK)
+    restored(surface)
     assert (surface["set_low"][STUCK], surface["set_high"][STUCK]) == (0.0, 0.2)
 
 
 def test_a_frame_that_may_be_on_either_side_ends_no_half_cycle_and_begins_the_count_anew():
     fdi, surface = new_surface(low=-0.1, high=0.2)
-    on(oscillatory.judge, fdi, surface, OSCILLATORY, 10)
+    judged(oscillatory.judge, fdi, surface, OSCILLATORY, 10)
     swing = surface["oscillatory"]
     assert (swing["sign"], swing["half_cycles"], swing["steady_since"]) == (0, 0, 11)
     for low, high in ((0.0, 0.3), (-0.3, 0.0)):
         surface["low_then"], surface["high_then"] = low, high
-        on(oscillatory.judge, fdi, surface, OSCILLATORY, 10)
+        judged(oscillatory.judge, fdi, surface, OSCILLATORY, 10)
         assert swing["sign"] == 0, "on its command it is on no side of it"

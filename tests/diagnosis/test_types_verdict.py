@@ -7,21 +7,21 @@ from kernels import new_fdi, on, put
 from beaver_ftc.diagnosis.belief.expectation import means_dtype
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, UNANTICIPATED, YAW
 from beaver_ftc.diagnosis.types import examine, pairs, verdict
-from beaver_ftc.diagnosis.types.examine import FIXED, LAGS, LOSES, SHIFTED
-from beaver_ftc.diagnosis.types.registry import (
+from beaver_ftc.diagnosis.types.contract import FIXED, LAGS, LOSES, SHIFTED
+from beaver_ftc.diagnosis.types.registry import N_TYPES
+from beaver_ftc.diagnosis.types.verdict import BY_DEDUCTION, NO_SURFACE, RULED_OUT, SEVERAL
+from fault_kinds import (
     BIAS,
     CONSTANT_LOSS,
     DOWN,
     FLOAT,
     GROWING_BIAS,
-    N_TYPES,
     OSCILLATORY,
     SLOW,
     STUCK,
     UP,
     VARYING_LOSS,
 )
-from beaver_ftc.diagnosis.types.verdict import BY_DEDUCTION, NO_SURFACE, RULED_OUT, SEVERAL
 
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)
 PATIENCE, DT = 20, 0.02
@@ -90,20 +90,20 @@ NOBODY_ELSE = {"aileron": None, "elevator": None, "flap": None}
 
 
 @pytest.mark.parametrize(
-    ("kinds", "constant", "explained", "only_a_swing", "swung"),
+    ("kinds", "constant", "explained"),
     [
-        # what explains the flight, and whether nothing but a swing is left: before it has shown, and after
-        ((), False, (False, False), (True, True), False),
-        ((STUCK,), True, (True, True), (False, False), False),
-        ((BIAS, OSCILLATORY), True, (True, True), (False, False), True),
-        ((SLOW,), False, (True, True), (False, False), False),
-        ((OSCILLATORY,), False, (False, True), (True, False), True),
-        ((VARYING_LOSS, OSCILLATORY), False, (True, True), (False, False), True),
-        ((GROWING_BIAS,), False, (True, True), (False, False), False),
-        (ALL, True, (True, True), (False, False), True),
+        # whether a type explains the flight: before an oscillation has shown itself, and after
+        ((), False, (False, False)),
+        ((STUCK,), True, (True, True)),
+        ((BIAS, OSCILLATORY), True, (True, True)),
+        ((SLOW,), False, (True, True)),
+        ((OSCILLATORY,), False, (False, True)),
+        ((VARYING_LOSS, OSCILLATORY), False, (True, True)),
+        ((GROWING_BIAS,), False, (True, True)),
+        (ALL, True, (True, True)),
     ],
 )
-def test_questions_about_the_types_left(kinds, constant, explained, only_a_swing, swung):
+def test_questions_about_the_types_left(kinds, constant, explained):
     _, surface = one(*kinds)
     assert sum(map(bool, (verdict.left(surface, kind) for kind in ALL))) == len(kinds)
     assert all(verdict.left(surface, kind) for kind in kinds)
@@ -112,34 +112,30 @@ def test_questions_about_the_types_left(kinds, constant, explained, only_a_swing
     for k, half_cycles in enumerate((2, 3)):
         surface["oscillatory"]["half_cycles"] = half_cycles
         assert bool(verdict.explained(surface)) == explained[k]
-        assert bool(verdict.only_a_swing(surface)) == only_a_swing[k]
-        assert bool(verdict.swings(surface)) == (swung if half_cycles == 3 else False)
 
 
 @pytest.mark.parametrize(
-    ("kinds", "loses", "held", "fixed", "one_type", "sole_type"),
+    ("kinds", "fixed", "one_type", "sole_type"),
     [
-        ((CONSTANT_LOSS,), 1, 0, 0, CONSTANT_LOSS, CONSTANT_LOSS),
-        ((VARYING_LOSS,), 1, 0, 0, -1, CONSTANT_LOSS),
-        ((VARYING_LOSS, BIAS), 0, 0, 0, BIAS, -1),
-        ((STUCK,), 0, 1, 1, STUCK, STUCK),
-        ((STUCK, BIAS), 0, 1, 0, -1, -1),
-        ((STUCK, CONSTANT_LOSS), 1, 1, 0, -1, -1),
-        ((STUCK, CONSTANT_LOSS, FLOAT), 1, 1, 1, -1, -1),
-        ((UP, DOWN), 0, 1, 1, UP, UP),
-        ((UP, DOWN, STUCK), 0, 1, 1, -1, -1),
-        ((FLOAT,), 0, 0, 0, FLOAT, FLOAT),
-        ((OSCILLATORY,), 0, 0, 0, -1, -1),
-        ((SLOW, STUCK), 0, 1, 1, STUCK, -1),
+        ((CONSTANT_LOSS,), 0, CONSTANT_LOSS, CONSTANT_LOSS),
+        ((VARYING_LOSS,), 0, -1, CONSTANT_LOSS),
+        ((VARYING_LOSS, BIAS), 0, BIAS, -1),
+        ((STUCK,), 1, STUCK, STUCK),
+        ((STUCK, BIAS), 0, -1, -1),
+        ((STUCK, CONSTANT_LOSS), 0, -1, -1),
+        ((STUCK, CONSTANT_LOSS, FLOAT), 1, -1, -1),
+        ((UP, DOWN), 1, UP, UP),
+        ((UP, DOWN, STUCK), 1, -1, -1),
+        ((FLOAT,), 0, FLOAT, FLOAT),
+        ((OSCILLATORY,), 0, -1, -1),
+        ((SLOW, STUCK), 1, STUCK, -1),
     ],
 )
-def test_what_kind_of_fault_it_may_be(kinds, loses, held, fixed, one_type, sole_type):
+def test_what_kind_of_fault_it_may_be(kinds, fixed, one_type, sole_type):
     _, surface = one(*kinds)
     same_name = verdict.FAMILY[sole_type] if sole_type >= 0 else -1
-    assert bool(verdict.loses(surface)) == loses
-    assert bool(verdict.held_elsewhere(surface)) == held
-    assert bool(verdict.is_fixed(surface)) == fixed
-    assert verdict.one_type(surface) == one_type
+    assert (verdict.mode_for(surface) == FIXED) == fixed
+    assert verdict.one_constant(surface) == one_type
     found = verdict.sole_type(surface)
     assert (verdict.FAMILY[found] if found >= 0 else -1) == same_name
 
@@ -168,25 +164,36 @@ def test_the_sole_surface_that_is_possible():
 )
 def test_what_looks_like_a_jam_may_be_slow_until_it_has_stood_off_for_long(evidence, quiet, slow):
     fdi, surface = one(STUCK, SLOW, evidence=evidence, quiet=quiet)
-    assert bool(on(verdict.may_be_slow, fdi, surface)) == slow
-    assert not on(verdict.may_be_slow, *one(STUCK, evidence=evidence, quiet=quiet))
-    assert not on(verdict.may_be_slow, *one(SLOW, evidence=evidence, quiet=quiet))
+    assert bool(on(verdict.may_be_unseen, fdi, surface)) == slow
+    assert not on(verdict.may_be_unseen, *one(STUCK, evidence=evidence, quiet=quiet))
+    assert not on(verdict.may_be_unseen, *one(SLOW, evidence=evidence, quiet=quiet))
+
+
+def looked_like_by(kind):
+    """The constant types that are not named while `kind` is left."""
+    constant = set(ALL) - set(COURSES)
+    return {other for other in constant if verdict.may_be_mistaken(one(other, kind)[1], other, True)}
 
 
 def test_what_stands_still_may_be_slow_until_that_is_excluded():
-    _, surface = one(SLOW)
-    assert {k for k in range(N_TYPES) if verdict.may_creep(surface, k)} == {STUCK, FLOAT, UP, DOWN}
-    assert not verdict.may_creep(one(STUCK)[1], STUCK)
+    assert looked_like_by(SLOW) == {STUCK, FLOAT, UP, DOWN}
+    assert not verdict.may_be_mistaken(one(STUCK)[1], STUCK, True)
     assert on(verdict.type_at_fault, *one(STUCK)) == STUCK
     assert on(verdict.type_at_fault, *one(STUCK, SLOW)) == -1
     assert on(verdict.type_at_fault, *one(BIAS, SLOW)) == BIAS
 
 
 def test_a_bias_that_grows_may_look_like_a_jam_or_a_loss():
-    _, surface = one(GROWING_BIAS)
-    may = {kind for kind in range(N_TYPES) if verdict.may_be_growing(surface, kind)}
-    assert may == {CONSTANT_LOSS, STUCK, FLOAT}
-    assert not verdict.may_be_growing(one(STUCK)[1], STUCK)
+    assert looked_like_by(GROWING_BIAS) == {CONSTANT_LOSS, STUCK, FLOAT, UP, DOWN}
+    assert not verdict.may_be_mistaken(one(STUCK)[1], STUCK, True)
+    for direction, stop in ((UP, 1), (DOWN, 0)):  # what has run to the stop has not come there by and by
+        _, surface = one(direction, GROWING_BIAS)
+        surface["growing_bias"]["ran"][stop] = 1
+        assert not verdict.may_be_mistaken(surface, direction, True)
+        surface["growing_bias"]["ran"][:] = 1 - surface["growing_bias"]["ran"]
+        assert verdict.may_be_mistaken(surface, direction, True)
+    assert not verdict.may_be_mistaken(one(STUCK, SLOW)[1], STUCK, False)  # it follows the command
+    assert verdict.may_be_mistaken(one(STUCK, GROWING_BIAS)[1], STUCK, False)
 
 
 @pytest.mark.parametrize(
@@ -242,7 +249,7 @@ def test_what_a_stop_may_have_hidden_is_waited_for(kind):
     ],
 )  # fmt: skip
 def test_what_is_done_about_a_surface(kinds, measure):
-    assert verdict.measure_for(one(*kinds)[1]) == measure
+    assert verdict.mode_for(one(*kinds)[1]) == measure
 
 
 def test_the_surface_at_fault():
@@ -728,7 +735,7 @@ def test_a_second_begins_with_what_was_known_of_the_first():
         "wrong_before"
     ] = 1
     assert on(pairs.two_in_pitch, fdi)
-    assert verdict.one_type(elevator) == STUCK
+    assert verdict.one_constant(elevator) == STUCK
     assert (elevator["set_low"][STUCK], elevator["set_high"][STUCK]) == (0.1, 0.14)
     assert not flap["type_excluded"].any()
     for surface in (elevator, flap):

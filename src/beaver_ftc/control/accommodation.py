@@ -13,7 +13,7 @@ import numpy as np
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.control.laws import ORACLE, REJECTING, rejecting
 from beaver_ftc.control.laws.answering import effectiveness_of
-from beaver_ftc.diagnosis.types.examine import FIXED
+from beaver_ftc.diagnosis.types.contract import FIXED
 from beaver_ftc.scenario.control import ControlConfig
 
 

@@ -27,7 +27,7 @@ from beaver_ftc.diagnosis.state import (
     WORST_CASE,
 )
 from beaver_ftc.diagnosis.types import examine, pairs, registry, verdict
-from beaver_ftc.diagnosis.types.examine import FIXED, LAGS, LOSES, SHIFTED
+from beaver_ftc.diagnosis.types.contract import FIXED, LAGS, LOSES, SHIFTED
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.pairs import pairs_refused

@@ -37,7 +37,7 @@ from beaver_ftc.diagnosis.isolation import estimators
 from beaver_ftc.diagnosis.monitors import engine_symmetry, sensor_monitor
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, STATISTICS, WORST_CASE
 from beaver_ftc.diagnosis.types import examine
-from beaver_ftc.diagnosis.types.examine import LAGS
+from beaver_ftc.diagnosis.types.contract import LAGS
 from beaver_ftc.loop import accounts, log_row
 from beaver_ftc.loop.log_row import put
 from beaver_ftc.plant import channels as ch

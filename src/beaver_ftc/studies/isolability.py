@@ -13,13 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.diagnosis.types.registry import CONSTANT_LOSS
+from beaver_ftc.diagnosis.types.registry import kind_of
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.engine.statistics import quantile
 from beaver_ftc.studies.present.figures import heat_map, label_edges, panels
 from beaver_ftc_assurance.certificates.tape import recorded
 from beaver_ftc_assurance.separation import LARGEST_RATE_DEG_S, Candidate, situation_of, tell_apart
 
+CONSTANT_LOSS = kind_of("loss_of_effectiveness")
 SHOWN = ("magnitude", "magnitude_median", "longest_s", "median_s")
 DOUBLET = ("doublet_deg", "doublet_s", "why")
 HEAD = ("loss of", "against", "x reference", "half the time from", "in", "always at", "from", "in", "doublet")

@@ -17,7 +17,7 @@ import numpy as np
 from beaver_ftc.design.model import AXES
 from beaver_ftc.diagnosis.detection.bank import poles_of
 from beaver_ftc.diagnosis.state import LOSS
-from beaver_ftc.diagnosis.types.registry import STUCK
+from beaver_ftc.diagnosis.types.registry import WORDS
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import LogSink
 from beaver_ftc.results.log import Log, ParquetLog, StoredLog
@@ -308,11 +308,14 @@ def _of_types(scenario: Scenario, tape: Tape, history: History, alarm: int) -> I
             "what": kinds.name_of(surface, kind), "column": kinds.column_of(surface, kind),
             "frame": kinds.row_of(frames[0], s, kind),
         }  # fmt: skip
+        followed = WORDS[kind] in courses.RULES
+        if because is None and not followed and kind not in kinds.BY_FRAMES:
+            because = kinds.UNKNOWN
         if because is not None:
             yield about | {"because": because}
             continue
-        followed = kind in courses.RULES  # by where the surface was, as if it were held there
-        of = kinds.hypothesis(tape, s, STUCK if followed else kind)
+        # by its course: of where the surface was, as if it were held there
+        of = kinds.hypothesis(tape, s, kinds.STUCK if followed else kind)
         if followed:
             said = courses.excludes(scenario, tape, history, of, s, kind, alarm)
             yield about | (history.said | said if said else {"because": kinds.COURSE})

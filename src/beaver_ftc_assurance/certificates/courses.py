@@ -11,7 +11,7 @@ from math import pi
 
 import numpy as np
 
-from beaver_ftc.diagnosis.types.registry import BIAS, DOWN, GROWING_BIAS, OSCILLATORY, SLOW, UP
+from beaver_ftc.diagnosis.types.registry import TYPES, WORDS
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc_assurance.certificates.inequality import Document, History, Hypothesis, by_each_frame
 from beaver_ftc_assurance.certificates.kinds import wrong
@@ -165,8 +165,10 @@ def _beyond(ahead: np.ndarray, run: range) -> list[Pair]:
     return [(here.min(), 0.0), (here.sum(), 0.0)]
 
 
-RULES: dict[int, Callable[[Seen, Surface, np.void], Iterator[Found]]] = {
-    UP: _runaway, DOWN: _runaway, BIAS: _bias, GROWING_BIAS: _growing, OSCILLATORY: _swing, SLOW: _slow,
+# By the type in words; a type without a rule is not certified by its course.
+RULES: dict[str, Callable[[Seen, Surface, np.void], Iterator[Found]]] = {
+    "hardover up": _runaway, "hardover down": _runaway, "bias": _bias, "bias that grows": _growing,
+    "oscillatory": _swing, "rate_limit": _slow,
 }  # fmt: skip
 
 
@@ -178,9 +180,10 @@ def excludes(
     of: that the surface is held somewhere, theta.
     """
     fdi = tape.last["fdi"]["types"]
-    for sign in {UP: (1,), DOWN: (-1,)}.get(kind, (1, -1)):
+    direction = TYPES[kind].direction
+    for sign in (direction,) if direction else (1, -1):
         seen = _seen(tape, history, of, s, alarm, sign, scenario.fdi.slowest_oscillation_rad_s)
-        for found in RULES[kind](seen, fdi["surface"][s], fdi["config"]):
+        for found in RULES[WORDS[kind]](seen, fdi["surface"][s], fdi["config"]):
             return _written(found, seen, of)
     return None
 

@@ -11,18 +11,7 @@ from math import inf
 
 import numpy as np
 
-from beaver_ftc.diagnosis.types.registry import (
-    BIAS,
-    CONSTANT_LOSS,
-    DOWN,
-    FLOAT,
-    GROWING_BIAS,
-    NAMES,
-    OSCILLATORY,
-    STUCK,
-    UP,
-    VARYING_LOSS,
-)
+from beaver_ftc.diagnosis.types.registry import TYPES, WORDS, kind_of
 from beaver_ftc_assurance.certificates.inequality import (
     History,
     Hypothesis,
@@ -34,8 +23,11 @@ from beaver_ftc_assurance.certificates.tape import Tape
 
 COURSE = "frames of quiet excluded it, or what several say together"
 SWING = "of several instants a frame, a swing that a stop cuts off may keep its sign"
+UNKNOWN = "no certificate is known for this type"
 RETURN = "its actuator may be bringing the surface back"
-_COURSES = {VARYING_LOSS: " that varies", GROWING_BIAS: " that grows", UP: " up", DOWN: " down"}
+CONSTANT_LOSS, STUCK, FLOAT, BIAS = map(kind_of, ("loss_of_effectiveness", "stuck", "float", "bias"))
+VARYING_LOSS = kind_of("loss_of_effectiveness", constant=False)
+BY_FRAMES = (CONSTANT_LOSS, VARYING_LOSS, STUCK, FLOAT)  # what single frames can exclude
 
 
 def excluded_types(tape: Tape) -> Iterator[tuple[int, int, int]]:
@@ -51,14 +43,14 @@ def excluded_types(tape: Tape) -> Iterator[tuple[int, int, int]]:
 def why_not(tape: Tape, kind: int) -> str | None:
     """Why an exclusion of this type cannot be certified, None if it can."""
     config = tape.alarm["fdi"]["types"]["config"]
-    if kind == OSCILLATORY and not config["whole"]:
+    if TYPES[kind].has_shown is not None and not config["whole"]:
         return SWING
-    return RETURN if config["returns"] and kind in (STUCK, FLOAT, UP, DOWN) else None
+    return RETURN if config["returns"] and TYPES[kind].on_release is not None else None
 
 
 def name_of(surface: str, kind: int) -> str:
     """What is excluded, in words."""
-    return f"{surface} {NAMES[kind]}{_COURSES.get(kind, '')}"
+    return f"{surface} {WORDS[kind]}"
 
 
 def column_of(surface: str, kind: int) -> str:

@@ -14,7 +14,7 @@ from beaver_ftc.control.supervisor import (
     MODE_UNANTICIPATED,
 )
 from beaver_ftc.diagnosis.state import NOT_ISOLATED
-from beaver_ftc.diagnosis.types.examine import FIXED, LAGS, LOSES, SHIFTED
+from beaver_ftc.diagnosis.types.contract import FIXED, LAGS, LOSES, SHIFTED
 from beaver_ftc.loop import frame as whole
 from beaver_ftc.loop.assembly import assemble
 from flying import scenario

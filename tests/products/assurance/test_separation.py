@@ -16,7 +16,6 @@ from scipy.optimize import linprog
 
 import beaver_ftc as bf
 from beaver_ftc.cli.main import main
-from beaver_ftc.diagnosis.types.registry import BIAS, CONSTANT_LOSS, FLOAT, STUCK
 from beaver_ftc_assurance.certificates.check_certificate import failures
 from beaver_ftc_assurance.separation import (
     Candidate,
@@ -28,6 +27,7 @@ from beaver_ftc_assurance.separation import (
     tell_apart,
     write,
 )
+from fault_kinds import BIAS, CONSTANT_LOSS, FLOAT, STUCK
 from samples import samples
 from telling import apart, fill
 

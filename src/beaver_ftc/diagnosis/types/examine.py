@@ -20,20 +20,21 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.isolation import membership
+from beaver_ftc.diagnosis.types import sets
+from beaver_ftc.diagnosis.types.contract import EXCLUDED, FIXED, STANDS
 from beaver_ftc.diagnosis.types.registry import (
+    AT_REST,
     HISTORY,
-    OSCILLATORY,
-    STUCK,
+    N_TYPES,
     begin_each,
-    bring_back_each,
+    fill_each,
     judge_each,
-    let_go_each,
-    pass_over_each,
-    watch_each,
+    on_frame_each,
+    on_release_each,
+    on_skipped_frame_each,
+    propagate_release_each,
+    restore_each,
 )
-
-# What is done about a fault: scale the command, give the surface up, add an offset, or leave it to its pace.
-LOSES, FIXED, SHIFTED, LAGS = range(4)
 
 
 @kernel
@@ -46,8 +47,8 @@ def start(types):
 @kernel
 def begin(surface):
     """Nothing is known of this surface yet."""
-    surface.set_low[:], surface.set_high[:] = -np.inf, np.inf
-    surface.type_excluded[:] = 0
+    sets.begin(surface)
+    fill_each(surface)
     surface.low, surface.high = surface.reach_low, surface.reach_high
     surface.started_at = -1
     surface.evidence = surface.quiet = surface.unhidden = 0
@@ -152,18 +153,19 @@ def judge_all(types):
     """Judge the frame before the elapsed one."""
     config, k = types.config, types.frame - 1
     for s, surface in enumerate(types.surface):
-        watch_each(config, surface)
+        on_frame_each(config, surface)
         if config.returns and types.frame > 0:
-            let_go_each(config, surface, k)
+            on_release_each(config, surface, k)
         if config.abrupt and surface.measure == FIXED and not surface.wrong_then:
             note_quiet(types, s)
         elif surface.wrong_then and (config.whole or (surface.wrong_before and surface.wrong)):
             note_evidence(surface)
             judge(config, surface, k)
         else:
-            pass_over_each(config, surface, k)
+            on_skipped_frame_each(config, surface, k)
         if config.returns and types.frame > 0:
-            bring_back_each(config, surface)
+            restore_each(surface)
+            propagate_release_each(config, surface)
         if surface.hides_then[0] or surface.hides_then[1]:
             surface.unhidden = 0
     types.frame += 1
@@ -226,15 +228,27 @@ def examine_block(types, layout, estimators, innovation, bound):
 def note_quiet(types, s):
     """A surface given up, and commanded to where it happens to be, shows by its quiet that it does not swing.
 
-    That is evidence against the others too, as far as one of them all is in question. It takes a fault that
-    is declared to stay: of one that may go, the quiet may be that of health.
+    That is evidence against the other surfaces too, as far as only one of them all is in question. It takes a
+    fault that is declared to stay: of one that may go, the quiet may be that of health.
     """
     surface = types.surface[s]
-    if surface.low_then > surface.set_high[STUCK] or surface.high_then < surface.set_low[STUCK]:
+    if not may_stand(surface):
         return
     for i, other in enumerate(types.surface):
         if i == s or (surface.in_question and other.in_question):
             note_evidence(other)
     surface.quiet += 1
     if surface.quiet > types.config.patience and not types.config.own_errors:
-        surface.type_excluded[OSCILLATORY] = 1
+        for kind in range(N_TYPES):
+            if AT_REST[kind] == EXCLUDED:
+                sets.exclude(surface, kind)
+
+
+@kernel
+def may_stand(surface):
+    """Whether the judged frame agrees with where the surface is known to stand."""
+    for kind in range(N_TYPES):
+        apart = surface.low_then > surface.set_high[kind] or surface.high_then < surface.set_low[kind]
+        if AT_REST[kind] == STANDS and apart:
+            return False
+    return True

@@ -11,17 +11,8 @@ import numpy as np
 
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.diagnosis.types import registry
+from beaver_ftc.diagnosis.types.contract import FIXED, LOSES
 from beaver_ftc.diagnosis.types.pairs import IN_PITCH
-from beaver_ftc.diagnosis.types.registry import (
-    BIAS,
-    CONSTANT_LOSS,
-    DOWN,
-    FLOAT,
-    SLOW,
-    STUCK,
-    UP,
-    VARYING_LOSS,
-)
 from beaver_ftc.diagnosis.types.verdict import BY_DEDUCTION, RULED_OUT
 
 Found = dict[str, Any]
@@ -117,20 +108,26 @@ def _possible(fdi: np.void, s: int) -> bool:
 def _types_left(fdi: np.void, s: int) -> list[str]:
     """Types still possible on surface s, each once.
 
-    Where a constant explains the flight, a loss that may take any course and a slow surface count only until
-    the constant has been seen for long enough; beside a surface that stands still, until it is excluded.
+    Where a constant explains the flight, a type that varies and need not show itself counts only until the
+    constant has been seen for long enough, or until those types are excluded that it can look like.
     """
     surface = fdi["types"]["surface"][s]
     left = [kind for kind, out in enumerate(surface["type_excluded"]) if _possible(fdi, s) and not out]
-    if any(kind < registry.N_CONSTANT for kind in left) and not fdi["types"]["config"]["own_errors"]:
+    constant = [kind for kind in left if kind < registry.N_CONSTANT]
+    if constant and not fdi["types"]["config"]["own_errors"]:
         early = surface["evidence"] - surface["quiet"] < fdi["types"]["config"]["patience"]
-        still = bool({STUCK, FLOAT, UP, DOWN} & set(left))  # so may a slow one
-        beside = {VARYING_LOSS: early, SLOW: early or still}
-        left = [kind for kind in left if beside.get(kind, True)]
+        left = [kind for kind in left if kind in constant or early or _is_open(kind, constant)]
     beside_another = fdi["types"]["pair"]["enabled"] and fdi["layout"]["group"][s] == IN_PITCH
-    if beside_another and {STUCK, UP, DOWN} & set(left):
-        left += [STUCK, FLOAT, UP, BIAS, CONSTANT_LOSS]  # if the other one is off as well
+    if beside_another and any(registry.ACCOMMODATION[kind] == FIXED for kind in constant):
+        # if the other surface is off as well, each constant may be one of another type
+        left += sorted(range(registry.N_CONSTANT), key=lambda kind: registry.ACCOMMODATION[kind] == LOSES)
     return list(dict.fromkeys(registry.NAMES[kind] for kind in left))
+
+
+def _is_open(kind: int, constant: list[int]) -> bool:
+    """Whether a type that varies counts beside these constant ones: it may yet show itself, or looks like
+    one of them."""
+    return bool(registry.MUST_SHOW[kind] or registry.MISTAKEN_FOR[kind, constant].any())
 
 
 def _open_questions(fdi: np.void, among: Iterable[int], names: Sequence[str]) -> Iterator[str]:

@@ -20,9 +20,9 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis import state
 from beaver_ftc.diagnosis.state import IN_PITCH, IN_ROLL_AND_YAW, PITCH, ROLL, YAW
 from beaver_ftc.diagnosis.types import examine as frames
-from beaver_ftc.diagnosis.types import verdict
-from beaver_ftc.diagnosis.types.examine import FIXED, LOSES, SHIFTED
-from beaver_ftc.diagnosis.types.registry import DOWN, N_CONSTANT, STUCK, UP, deflection
+from beaver_ftc.diagnosis.types import sets, verdict
+from beaver_ftc.diagnosis.types.contract import FIXED, LOSES, SHIFTED
+from beaver_ftc.diagnosis.types.registry import ACCOMMODATION, N_CONSTANT, deflection
 from beaver_ftc.diagnosis.types.verdict import NO_SURFACE, any_constant, left, possible
 
 
@@ -138,7 +138,7 @@ def decide_roll_and_yaw(types, layout, t):
     both = not one_left and not other_left
     no_pair = pair.no_lateral_pair == 1 or not verdict.anything_left(one) or not verdict.anything_left(other)
     outside = both and no_pair
-    open_yet = both and (verdict.only_a_swing(one) or verdict.only_a_swing(other))
+    open_yet = both and not (verdict.explained(one) and verdict.explained(other))
     certain = pair.alarmed[IN_ROLL_AND_YAW] == 1 and not (outside or open_yet)
     name(one, certain and not other_left, verdict.type_at_fault(config, one), t)
     name(other, certain and not one_left, verdict.type_at_fault(config, other), t)
@@ -167,8 +167,7 @@ def note_first(types, s):
 def begin_second(types, layout):
     """The one known pitch fault no longer explains the flight: there is another beside it."""
     first, second = types.surface[types.pair.first], types.surface[layout.partner[types.pair.first]]
-    first.set_low[:], first.set_high[:] = first.known.low, first.known.high
-    first.type_excluded[:] = first.known.excluded
+    sets.recall(first)
     frames.begin(second)
     for surface in (first, second):
         surface.in_question, surface.standing = 0, verdict.BY_DEDUCTION
@@ -178,9 +177,9 @@ def begin_second(types, layout):
 @kernel
 def patient(config, surface):
     """Whether a slow oscillation, a slow surface or a growing bias would have shown by now."""
-    growing = verdict.may_be_growing(surface, verdict.one_type(surface))
-    open_yet = growing or verdict.may_be_slow(config, surface)
-    return surface.evidence >= config.patience and verdict.would_have_swung(config, surface) and not open_yet
+    growing = verdict.may_be_mistaken(surface, verdict.one_constant(surface), False)
+    open_yet = growing or verdict.may_be_unseen(config, surface)
+    return surface.evidence >= config.patience and verdict.would_have_shown(config, surface) and not open_yet
 
 
 @kernel
@@ -201,7 +200,7 @@ def type_in_pitch(config, surface):
     A jam may as well be a trailing surface or one at its stop, if the other surface is off by a constant.
     """
     kind = verdict.type_at_fault(config, surface)
-    return -1 if kind in (STUCK, UP, DOWN) else kind
+    return verdict.OPEN if kind >= 0 and ACCOMMODATION[kind] == FIXED else kind
 
 
 @kernel
@@ -287,7 +286,7 @@ def act(types, conclusion, layout):
         surface.measure = -1
         if acted_upon(types, layout, s):
             at_fault = surface.named == 1 or possible(surface)
-            measure = verdict.measure_for(surface) if at_fault else SHIFTED
+            measure = verdict.mode_for(surface) if at_fault else SHIFTED
             if verdict.still_there(types.config, surface, measure, at_fault):
                 surface.measure = measure
                 replaced = s == layout.main[PITCH] and measure in (LOSES, FIXED)

@@ -1,10 +1,9 @@
-"""The fault types there are, the kernels that ask all of them, and the records of the stage.
+"""The rows of the table, as arrays over types; the kernels that call a part of every row; and the records.
 
-Every file under `table/` is read: a new type is one more.
+Every file under `table/` is read, in the order of its name: a new type is one more file.
 """
 
 import pkgutil
-from collections.abc import Callable
 from functools import lru_cache
 from importlib import import_module
 from math import ceil, pi, radians
@@ -14,9 +13,8 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.diagnosis.state import IN_PITCH
-from beaver_ftc.diagnosis.types import table
-from beaver_ftc.diagnosis.types.contract import FaultType
-from beaver_ftc.diagnosis.types.table import bias, hardover, loss, oscillatory, rate_limit, stuck
+from beaver_ftc.diagnosis.types import sets, table
+from beaver_ftc.diagnosis.types.contract import NOTHING, FaultType, Kernel
 from beaver_ftc.scenario.schema import Scenario
 
 BLOCK_S = 0.2  # to be examined at once where gyros are noisy: short beside the slowest half-cycle, 3.1 s
@@ -24,8 +22,8 @@ RUNAWAY_RATE_RAD_S = pi / 3.0  # of an actuator with no declared rate limit: the
 
 
 def _rows() -> tuple[FaultType, ...]:
-    """Those of a constant parameter first: a type's number is its place."""
-    names = (f"{table.__name__}.{info.name}" for info in pkgutil.iter_modules(table.__path__))
+    """Those of a constant parameter first, then by rank: a type's number is its place."""
+    names = sorted(f"{table.__name__}.{info.name}" for info in pkgutil.iter_modules(table.__path__))
     rows = [row for name in names for row in import_module(name).TYPES]
     return tuple(sorted(rows, key=lambda row: (not row.constant, row.rank, row.name)))
 
@@ -34,53 +32,94 @@ TYPES = _rows()
 N_TYPES = len(TYPES)
 N_CONSTANT = sum(row.constant for row in TYPES)
 NAMES: tuple[str, ...] = tuple(row.name for row in TYPES)
+WORDS: tuple[str, ...] = tuple(row.words or row.name for row in TYPES)
 FAMILY = tuple(NAMES.index(name) for name in NAMES)  # the first type of the same name
-CONSTANT_LOSS, VARYING_LOSS = TYPES.index(loss.CONSTANT), TYPES.index(loss.VARYING)
-STUCK, FLOAT = TYPES.index(stuck.STUCK), TYPES.index(stuck.FLOAT)
-UP, DOWN = TYPES.index(hardover.UP), TYPES.index(hardover.DOWN)
-BIAS, GROWING_BIAS = TYPES.index(bias.CONSTANT), TYPES.index(bias.GROWING)
-OSCILLATORY, SLOW = TYPES.index(oscillatory.OSCILLATORY), TYPES.index(rate_limit.RATE_LIMIT)
 
 
-def _written_out(name: str, arguments: str, lines: list[str]) -> Callable[..., Any]:
-    """A kernel whose body is `lines`, in which `part_3` is that part of type 3.
+def _column(name: str) -> np.ndarray:
+    """A column of whole numbers or flags of the table, by type."""
+    return np.array([int(getattr(row, name)) for row in TYPES])
+
+
+def _parts(name: str) -> dict[int, Kernel]:
+    """This part of each type that has it."""
+    parts = {kind: getattr(row, name) for kind, row in enumerate(TYPES)}
+    return {kind: part for kind, part in parts.items() if part is not None}
+
+
+def _looks_like(row: FaultType, other: FaultType) -> bool:
+    return other.name in row.mistaken_for
+
+
+# The columns that verdict.py reads; contract.py says what they are.
+ACCOMMODATION, DIRECTION, AT_REST = (_column(name) for name in ("accommodation", "direction", "at_rest"))
+SHOWS_WITHIN, HALF_CYCLES = _column("shows_within"), _column("half_cycles")
+FOLLOWS_COMMAND = _column("follows_command")
+MUST_SHOW = np.array([row.has_shown is not None for row in TYPES])
+MISTAKEN_FOR = np.array([[_looks_like(row, other) for other in TYPES] for row in TYPES])
+SERVES = np.array([[mode == row.accommodation or mode in row.also for row in TYPES] for mode in range(4)])
+# Types that say how far a surface is off its command, the one with the first say first.
+ERROR_ORDER = np.array(sorted(_parts("expected_error"), key=lambda kind: TYPES[kind].error_rank), dtype=int)
+LIMIT = np.array([NAMES.index(row.limit) if row.limit else -1 for row in TYPES])
+
+
+def kind_of(name: str, *, constant: bool = True, direction: int = 0) -> int:
+    """The number of a type, by its name in the table; direction: the stop to which it runs, if it does."""
+    sought = (name, constant, direction)
+    return [(row.name, row.constant, row.direction) for row in TYPES].index(sought)
+
+
+def _compiled(name: str, arguments: str, lines: list[str], space: dict[str, Any]) -> Kernel:
+    """A kernel whose body is `lines`, in which `part_3` is a part of type 3.
 
     Compiled code calls only what it can name, so the calls are written out, one a type.
     """
-    space = {f"part_{kind}": getattr(row, name) for kind, row in enumerate(TYPES)}
-    space["__name__"] = __name__
-    source = "\n    ".join([f"def {name}_each({arguments}):", *lines])
+    source = "\n    ".join([f"def {name}({arguments}):", *lines])
     exec(compile(source, __file__, "exec"), space)
-    return kernel(space[f"{name}_each"])
+    return kernel(space[name])
 
 
-def _having(name: str) -> list[int]:
-    """The types that have this part."""
-    return [kind for kind, row in enumerate(TYPES) if getattr(row, name) is not None]
+def _call(kind: int, arguments: str) -> str:
+    """The call of a part of type `kind`; the argument of that name is its number."""
+    given = (str(kind) if argument == "kind" else argument for argument in arguments.split(", "))
+    return f"part_{kind}({', '.join(given)})"
 
 
-def _all_of(name: str, arguments: str) -> Callable[..., Any]:
-    """A kernel that calls this part of every type; `kind` among the arguments is each type's own."""
+def _space(parts: dict[int, Kernel], **further: Any) -> dict[str, Any]:
+    """The names that a kernel which calls these parts needs."""
+    return {"__name__": __name__, **{f"part_{kind}": part for kind, part in parts.items()}, **further}
+
+
+def _of_all(name: str, arguments: str, then: Kernel | None = None) -> Kernel:
+    """A kernel that calls this part of every type; then(surface, kind, interval): with what that returns."""
+    parts = _parts(name)
     taken = ", ".join(argument for argument in arguments.split(", ") if argument != "kind")
-    calls = [f"part_{kind}({arguments})".replace("kind", str(kind)) for kind in _having(name)]
-    return _written_out(name, taken, calls)
+    calls = {kind: _call(kind, arguments) for kind in parts}
+    lines = [f"then(surface, {kind}, {call})" if then else call for kind, call in calls.items()]
+    return _compiled(f"{name}_each", taken, [*lines, "return"], _space(parts, then=then))
 
 
-def _one_of(name: str, arguments: str, passed: str, otherwise: str) -> Callable[..., Any]:
-    """A kernel that calls this part of the type `kind` and returns what that returns."""
-    calls = [f"if kind == {kind}: return part_{kind}({passed})" for kind in _having(name)]
-    return _written_out(name, arguments, [*calls, f"return {otherwise}"])
+def _of_one(name: str, arguments: str, otherwise: Any) -> Kernel:
+    """A kernel that returns what this part of the type `kind` returns; `otherwise` for a type without it."""
+    parts = _parts(name)
+    lines = [f"if kind == {kind}: return {_call(kind, arguments)}" for kind in parts]
+    taken = arguments if "kind" in arguments.split(", ") else f"{arguments}, kind"
+    return _compiled(f"{name}_of", taken, [*lines, "return otherwise"], _space(parts, otherwise=otherwise))
 
 
-begin_each = _all_of("begin", "surface, kind")
-watch_each = _all_of("watch", "config, surface, kind")
-pass_over_each = _all_of("pass_over", "config, surface, kind, k")
-judge_each = _all_of("judge", "config, surface, kind, k")
-let_go_each = _all_of("let_go", "config, surface, kind, k")
-bring_back_each = _all_of("bring_back", "config, surface, kind")
-shown = _one_of("shown", "surface, kind", "surface", "True")
-_OF_ONE = "config, surface, kind, k"
-deflection = _one_of("deflection", _OF_ONE, _OF_ONE, f"part_0({_OF_ONE})")
+_FRAME = "config, surface, kind, k"
+begin_each = _of_all("begin", "surface, kind")
+fill_each = _of_all("whole_range", "surface", sets.replace)
+on_frame_each = _of_all("on_frame", "config, surface, kind")
+on_skipped_frame_each = _of_all("on_skipped_frame", _FRAME)
+judge_each = _of_all("judge", _FRAME, sets.intersect)
+on_release_each = _of_all("on_release", _FRAME)
+restore_each = _of_all("restored", "surface, kind", sets.replace)
+propagate_release_each = _of_all("propagate_release", "config, surface, kind")
+has_shown = _of_one("has_shown", "surface", True)
+differs = _of_one("differs", "surface, direction", False)
+deflection = _of_one("deflection", _FRAME, NOTHING)
+expected_error = _of_one("expected_error", "surface, kind", np.nan)
 
 MAX_BLOCK = 256  # frames of a block: examine.py
 HISTORY = 3  # frames, or blocks, of which the orders are kept: the elapsed one and two before it

@@ -25,8 +25,10 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.actuators import nearer
+from beaver_ftc.diagnosis.types.contract import ANYTHING, NOTHING
 
 EARLIER, LATER = 0, 1
+HELD, RETURNING, REFUTED = range(3)
 # What is nearer to a healthy surface acts as one: it must do less than the bound allows for rounding.
 NOT_BACK_RAD = 1e-14
 
@@ -80,7 +82,7 @@ def carried(config, surface, held, side=0):
 
 
 @kernel
-def let_go_within(config, surface, kind):
+def released_within(config, surface, kind):
     """Whether a release inside the judged block explains it."""
     held_low, held_high = surface.release.held_low[kind], surface.release.held_high[kind]
     if config.length == 1 or held_low > held_high:
@@ -93,7 +95,7 @@ def let_go_within(config, surface, kind):
 @kernel
 def possible(config, surface, kind):
     """Whether a return from this type explains the judged frame; forget those releases that do not."""
-    left = let_go_within(config, surface, kind)
+    left = released_within(config, surface, kind)
     if not left:
         not_held(surface, kind)
     for which in (EARLIER, LATER):
@@ -126,26 +128,38 @@ def agrees(config, surface, which, kind):
 
 
 @kernel
+def renew(surface, kind):
+    """Take the later releases for the earlier ones, when no earlier one is possible any more."""
+    held = surface.release
+    held.low[EARLIER, kind], held.high[EARLIER, kind] = held.low[LATER, kind], held.high[LATER, kind]
+    forget(surface, LATER, kind)
+
+
+@kernel
 def keep(held, which, kind, low, high):
     """Take [low, high] for where a return can be; ends that meet may have passed by rounding."""
     held.low[which, kind], held.high[which, kind] = min(low, high), max(low, high)
 
 
 @kernel
-def holds(config, surface, kind, least, greatest):
-    """Whether a type can be holding the surface between least and greatest (rad) in the judged frame.
-
-    If not, it may have let go, and the actuator be bringing the surface back; else the type is excluded.
-    """
+def status(config, surface, kind, least, greatest):
+    """Whether a type holds the surface between least and greatest (rad) in the judged frame: HELD; or has
+    released it, and the actuator may be bringing it back: RETURNING; or neither explains it: REFUTED."""
     returning = config.returns and possible(config, surface, kind)
     released = surface.release.released
     if least <= surface.high_then and greatest >= surface.low_then and not released[kind]:
-        return True
-    if returning:
-        released[kind] = 1
-    else:
-        surface.type_excluded[kind] = 1
-    return False
+        return HELD
+    if not returning:
+        return REFUTED
+    released[kind] = 1
+    return RETURNING
+
+
+@kernel
+def explains(config, surface, kind, least, greatest):
+    """The parameters that explain the judged frame: all if the surface is held there or returns from there,
+    none otherwise."""
+    return NOTHING if status(config, surface, kind, least, greatest) == REFUTED else ANYTHING
 
 
 @kernel
@@ -160,7 +174,7 @@ def beginning(config, surface, k):
 
 
 @kernel
-def let_go(surface, kind, low, high):
+def note_release(surface, kind, low, high):
     """A type that holds the surface between low and high (rad) may let go of it there; none if low > high."""
     held = surface.release
     not_held(surface, kind)
@@ -171,7 +185,7 @@ def let_go(surface, kind, low, high):
 
 
 @kernel
-def bring_back(config, surface, kind):
+def propagate(config, surface, kind):
     """Carry what has been let go to the next frame; a surface that looks healthy may be held again."""
     held = surface.release
     if not surface.wrong_then:

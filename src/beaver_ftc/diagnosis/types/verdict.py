@@ -1,36 +1,40 @@
 """From the types left to a verdict: the surface at fault, the type of its fault, and what the law does.
 
-Kernels of one surface answer under the premise that it is at fault; `possible` says whether it can be.
-types: of `types_dtype`; conclusion: of `conclusion_dtype`; estimators: those of the isolation.
+No type is named here: the columns of the table (contract.py) say what distinguishes one from another. Kernels
+of one surface answer under the premise that it is at fault; `possible` says whether it can be. types: of
+`types_dtype`; conclusion: of `conclusion_dtype`; estimators: those of the isolation.
 """
 
 import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, UNANTICIPATED
-from beaver_ftc.diagnosis.types.contract import middle, within_travel
-from beaver_ftc.diagnosis.types.examine import FIXED, LAGS, LOSES, SHIFTED
+from beaver_ftc.diagnosis.types.contract import FIXED, LAGS, LOSES, SHIFTED, UNSEEN, middle
 from beaver_ftc.diagnosis.types.registry import (
-    BIAS,
-    CONSTANT_LOSS,
-    DOWN,
+    ACCOMMODATION,
+    AT_REST,
+    DIRECTION,
+    ERROR_ORDER,
     FAMILY,
-    FLOAT,
-    GROWING_BIAS,
+    FOLLOWS_COMMAND,
+    HALF_CYCLES,
+    LIMIT,
+    MISTAKEN_FOR,
+    MUST_SHOW,
     N_CONSTANT,
     N_TYPES,
-    OSCILLATORY,
-    SLOW,
-    STUCK,
-    UP,
-    VARYING_LOSS,
-    shown,
+    SERVES,
+    SHOWS_WITHIN,
+    differs,
+    expected_error,
+    has_shown,
 )
 
 NO_SURFACE, SEVERAL = -1, -2
+OPEN, NO_TYPE = -1, -2  # the type of a fault of which more than one type is left, or none
 # What decides whether a surface can be at fault: its estimator, or what is known of the other (pairs.py).
 BY_ESTIMATOR, BY_DEDUCTION, RULED_OUT = range(3)
-ABSENT_S = 0.2  # a fault that has not shown for so long is let go
+ABSENT_S = 0.2  # a fault that has not shown for so long is taken for gone
 _ROUNDING = 1e-9
 
 
@@ -71,100 +75,78 @@ def anything_left(surface):
 def explained(surface):
     """Whether some type explains the flight: it is left, and if it must show itself it has."""
     for kind in range(N_TYPES):
-        if left(surface, kind) and shown(surface, kind):
+        if left(surface, kind) and has_shown(surface, kind):
             return True
     return False
 
 
 @kernel
-def swings(surface):
-    """Whether the surface is known to have swung for two half-cycles and more."""
-    return left(surface, OSCILLATORY) and shown(surface, OSCILLATORY)
-
-
-@kernel
-def would_have_swung(config, surface):
-    """Whether there is no oscillation, or a whole one of the slowest would have shown, hidden by no stop."""
-    return not left(surface, OSCILLATORY) or surface.unhidden >= 2 * config.patience
-
-
-@kernel
-def only_a_swing(surface):
-    """Whether nothing but an oscillation is left, and it has not swung for long enough."""
+def would_have_shown(config, surface):
+    """Whether each type that must show itself is excluded, or has had the time to, hidden by no stop."""
     for kind in range(N_TYPES):
-        if kind != OSCILLATORY and left(surface, kind):
+        if left(surface, kind) and surface.unhidden < SHOWS_WITHIN[kind] * config.patience:
             return False
-    return not swings(surface)
-
-
-@kernel
-def loses(surface):
-    """Whether a loss of effectiveness is left; one that varies counts only when no constant explains it."""
-    varies = left(surface, VARYING_LOSS) and not any_constant(surface)
-    return left(surface, CONSTANT_LOSS) or varies
-
-
-@kernel
-def held_elsewhere(surface):
-    """Whether a jam or a runaway is left."""
-    return left(surface, STUCK) or left(surface, UP) or left(surface, DOWN)
-
-
-@kernel
-def is_fixed(surface):
-    """Whether the surface is known to ignore its command."""
-    other = left(surface, BIAS) or (loses(surface) and not left(surface, FLOAT))
-    return held_elsewhere(surface) and not other
+    return True
 
 
 @kernel
 def one_of(surface, n):
-    """The one of the first n types that is left, or -1; of one name, such as a runaway's two, the first."""
-    found = -1
+    """The one of the first n types that is left, or OPEN; of one name, such as a runaway's two, the first."""
+    found = OPEN
     for kind in range(n):
         if left(surface, kind):
             if found >= 0 and FAMILY[kind] != FAMILY[found]:
-                return -1
+                return OPEN
             found = kind if found < 0 else found
     return found
 
 
 @kernel
-def one_type(surface):
-    """The one type of constant parameter left, or -1."""
+def one_constant(surface):
+    """The one type of constant parameter left, or OPEN."""
     return one_of(surface, N_CONSTANT)
 
 
 @kernel
 def sole_type(surface):
-    """The one type left whatever its course, or -1: in coarse sets a constant proves nothing."""
+    """The one type left whatever its course, or OPEN: in coarse sets a constant proves nothing."""
     found = one_of(surface, N_TYPES)
-    return found if found >= 0 and shown(surface, found) else -1
+    return found if found >= 0 and has_shown(surface, found) else OPEN
 
 
 @kernel
-def may_be_slow(config, surface):
-    """Whether what looks like a jam may be a slow surface that has come to where it is commanded: it has not
-    stood off its command for long."""
-    loud = surface.evidence - surface.quiet
-    return any_constant(surface) and left(surface, SLOW) and loud < config.patience
+def may_be_unseen(config, surface):
+    """Whether what a constant explains may be a type that does not show in a surface at rest, such as a slow
+    surface that has come to where it is commanded: it has not stood off its command for long."""
+    if not any_constant(surface) or surface.evidence - surface.quiet >= config.patience:
+        return False
+    for kind in range(N_TYPES):
+        if AT_REST[kind] == UNSEEN and left(surface, kind):
+            return True
+    return False
 
 
 @kernel
-def may_creep(surface, found):
-    """Whether what stands still may be a slow surface that has not been seen to do so for long enough."""
-    return found in (STUCK, FLOAT, UP, DOWN) and left(surface, SLOW)
+def may_look_like(surface, kind, found):
+    """Whether a fault of type `kind` may look like one of the type `found`, or of another type left of that
+    name and of constant parameter."""
+    for other in range(N_CONSTANT):
+        alike = FAMILY[other] == FAMILY[found] and MISTAKEN_FOR[kind, other] and left(surface, other)
+        if alike and not differs(surface, DIRECTION[other], kind):
+            return True
+    return False
 
 
 @kernel
-def may_be_growing(surface, found):
-    """Whether what looks like a jam or a loss may be a bias that grows as the command happens to go; or what
-    looks like a runaway, one that has come to the stop by and by."""
-    if found in (UP, DOWN):
-        ran = surface.growing_bias.ran
-        slowly = (left(surface, UP) and not ran[1]) or (left(surface, DOWN) and not ran[0])
-        return slowly and left(surface, GROWING_BIAS)
-    return found in (CONSTANT_LOSS, STUCK, FLOAT) and left(surface, GROWING_BIAS)
+def may_be_mistaken(surface, found, whatever):
+    """Whether what looks like the constant type `found` may be another type that is left; unless `whatever`,
+    one that does not follow the command."""
+    if found >= 0:
+        for kind in range(N_CONSTANT, N_TYPES):
+            counts = left(surface, kind) and (whatever or not FOLLOWS_COMMAND[kind])
+            if counts and may_look_like(surface, kind, found):
+                return True
+    return False
 
 
 @kernel
@@ -196,51 +178,68 @@ def surface_at_fault(types, layout):
 
 @kernel
 def others_refuted(types, chosen):
-    """Whether nothing but a fault that follows the chosen one's commands is left on the other surfaces.
+    """Whether every other surface can only have a fault that depends on the command of the chosen one.
 
-    An oscillation is given one half-cycle of the slowest to show, a whole one if still possible. An offset
-    that grows is as good as constant in the end, whatever the commands; where errors are declared that a
-    course can hide in, every type of the others must have been excluded.
+    A type that must show itself is given the time to. Where errors are declared that a course can hide in,
+    every type of the others must have been excluded.
     """
-    config, waits = types.config, 1
+    config, half_cycles = types.config, 1
     for s, surface in enumerate(types.surface):
         if s != chosen and surface.in_question and possible(surface):
-            if left(surface, GROWING_BIAS) or (config.own_errors and anything_left(surface)):
+            if config.own_errors and anything_left(surface):
                 return False
-            if not would_have_swung(config, surface):
+            if not would_have_shown(config, surface):
                 return False
-            if left(surface, VARYING_LOSS):
-                waits = 2
-    return types.surface[chosen].evidence >= waits * config.patience
+            for kind in range(N_TYPES):
+                if left(surface, kind):
+                    if not FOLLOWS_COMMAND[kind]:
+                        return False
+                    half_cycles = max(half_cycles, HALF_CYCLES[kind])
+    return types.surface[chosen].evidence >= half_cycles * config.patience
 
 
 @kernel
 def type_at_fault(config, surface):
-    """The type of the fault on a surface, taken to be at fault; -1 while more than one fits or an
-    oscillation may yet show."""
-    if surface.evidence < config.patience or may_be_slow(config, surface):
-        return -1
+    """The type of the fault on a surface, taken to be at fault; OPEN while more than one fits or one may yet
+    show itself."""
+    if surface.evidence < config.patience or may_be_unseen(config, surface):
+        return OPEN
     if config.own_errors:
         return sole_type(surface)
-    patient = would_have_swung(config, surface)
+    patient = would_have_shown(config, surface)
     if any_constant(surface):
-        found = one_type(surface)
-        open_yet = may_be_growing(surface, found) or may_creep(surface, found)
-        return found if patient and not open_yet else -1
+        found = one_constant(surface)
+        return found if patient and not may_be_mistaken(surface, found, True) else OPEN
     return one_course(surface, patient)
 
 
 @kernel
 def one_course(surface, patient):
-    """The same when no constant explains it: a loss, pace or bias that varies, or an oscillation."""
-    fading, slow, growing = left(surface, VARYING_LOSS), left(surface, SLOW), left(surface, GROWING_BIAS)
-    if fading + slow + growing > 1 or (slow and left(surface, OSCILLATORY)):
-        return -1
-    if slow:
-        return SLOW
-    if fading or growing:
-        return (VARYING_LOSS if fading else GROWING_BIAS) if patient else -1
-    return OSCILLATORY if swings(surface) else -1
+    """The same when no constant explains it: the one type left that need not show itself; else the one that
+    has."""
+    found = sole_course(surface, False)
+    if found == NO_TYPE:
+        found = sole_course(surface, True)
+        return found if found >= 0 and has_shown(surface, found) else OPEN
+    if found < 0 or not patient:
+        return OPEN
+    for kind in range(N_CONSTANT, N_TYPES):
+        if left(surface, kind) and MISTAKEN_FOR[kind, found]:
+            return OPEN
+    return found
+
+
+@kernel
+def sole_course(surface, must_show):
+    """The one type of a parameter that varies which is left, of those that must show themselves or of those
+    that need not; NO_TYPE, or OPEN if there are several."""
+    found = NO_TYPE
+    for kind in range(N_CONSTANT, N_TYPES):
+        if left(surface, kind) and MUST_SHOW[kind] == must_show:
+            found = kind if found == NO_TYPE else OPEN
+            if found == OPEN:
+                return OPEN
+    return found
 
 
 @kernel
@@ -260,23 +259,47 @@ def decide(types, conclusion, layout, estimators, t):
 
 @kernel
 def estimator_for(layout, s, kind):
-    """The estimator that stands for a fault of this type (-1 if open) on surface s."""
-    return layout.loss_of[s] if kind in (CONSTANT_LOSS, VARYING_LOSS) else layout.position_of[s]
+    """The estimator that stands for a fault of this type (OPEN if open) on surface s."""
+    return layout.loss_of[s] if kind >= 0 and ACCOMMODATION[kind] == LOSES else layout.position_of[s]
 
 
 @kernel
-def measure_for(surface):
-    """What is to be done about a surface at fault as far as is known: LOSES, FIXED, LAGS or SHIFTED.
+def mode_for(surface):
+    """The mode of accommodation for a surface at fault as far as is known: LOSES, FIXED, LAGS or SHIFTED.
 
-    To add what the last frame shows to be off is right for a bias and an oscillation, serves a loss of
-    effectiveness meanwhile, and moves the command so that a jam shows in the next frame.
+    SHIFTED subtracts what the last frame shows to be off: that is right for a bias and an oscillation, serves
+    a loss of effectiveness meanwhile, and moves the command so that a jam shows in the next frame.
     """
-    if is_fixed(surface):
-        return FIXED
-    if not any_constant(surface) and not left(surface, VARYING_LOSS):
-        return LAGS if left(surface, SLOW) else SHIFTED
-    open_yet = held_elsewhere(surface) or left(surface, BIAS)
-    return LOSES if loses(surface) and not open_yet else SHIFTED
+    constant = any_constant(surface)
+    for mode in (FIXED, LOSES, LAGS):
+        if constant and serves_all_constant(surface, mode):
+            return mode
+    for mode in (LOSES, LAGS, FIXED):
+        if not constant and suits_a_course(surface, mode):
+            return mode
+    return SHIFTED
+
+
+@kernel
+def serves_all_constant(surface, mode):
+    """Whether a mode is that of some type of constant parameter left, and serves all of them."""
+    suits = False
+    for kind in range(N_CONSTANT):
+        if left(surface, kind):
+            suits = suits or ACCOMMODATION[kind] == mode
+            at_limit = LIMIT[kind] >= 0 and left(surface, LIMIT[kind]) and SERVES[mode, LIMIT[kind]]
+            if not (SERVES[mode, kind] or at_limit):
+                return False
+    return suits
+
+
+@kernel
+def suits_a_course(surface, mode):
+    """Whether a mode is that of some type left whose parameter varies."""
+    for kind in range(N_CONSTANT, N_TYPES):
+        if left(surface, kind) and ACCOMMODATION[kind] == mode:
+            return True
+    return False
 
 
 @kernel
@@ -306,7 +329,7 @@ def take_the_lead(types, conclusion, layout, estimators):
     conclusion.lead, conclusion.lead_kind = NO_SURFACE, -1
     if s >= 0:
         surface = types.surface[s]
-        conclusion.lead_kind = measure_for(surface)
+        conclusion.lead_kind = mode_for(surface)
         if still_there(types.config, surface, conclusion.lead_kind, True):
             conclusion.lead, surface.measure = s, conclusion.lead_kind
 
@@ -325,13 +348,12 @@ def deflection_error(surface, at_fault):
     """How far a surface is off its command, rad: by the types left if it is at fault, or as the last frame
     shows it."""
     if at_fault:
-        if left(surface, FLOAT):
-            return within_travel(surface, 0.0) - surface.command
-        stuck, biased = left(surface, STUCK), left(surface, BIAS)
-        if stuck and not biased:
-            return middle(surface, STUCK) - surface.command
-        if biased and surface.set_high[BIAS] - surface.set_low[BIAS] < np.inf:
-            return middle(surface, BIAS)
+        for kind in ERROR_ORDER:
+            if left(surface, kind):
+                error = expected_error(surface, kind)
+                if np.isfinite(error):
+                    return error
+                break
     return 0.5 * (surface.low + surface.high) - surface.command
 
 
@@ -339,9 +361,11 @@ def deflection_error(surface, at_fault):
 def effectiveness_left(types, layout, estimators, s):
     """What surface s has left of its effectiveness.
 
-    The estimator fits both axes of a surface, so beside another fault the set of the constant is asked.
+    The estimator fits both axes of a surface, so beside another fault the set of a constant loss says it.
     """
     surface = types.surface[s]
-    if types.pair.enabled and possible(surface) and left(surface, CONSTANT_LOSS):
-        return middle(surface, CONSTANT_LOSS)
+    if types.pair.enabled and possible(surface):
+        for kind in range(N_CONSTANT):
+            if ACCOMMODATION[kind] == LOSES and left(surface, kind):
+                return middle(surface, kind)
     return 1.0 + estimators[layout.loss_of[s]].theta[layout.dominant_axis[s]]

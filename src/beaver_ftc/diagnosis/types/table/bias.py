@@ -8,7 +8,16 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.diagnosis.isolation import membership
-from beaver_ftc.diagnosis.types.contract import FaultType, intersect, middle_of, set_of, within_travel
+from beaver_ftc.diagnosis.types.contract import (
+    ANYTHING,
+    NOTHING,
+    SHIFTED,
+    FaultType,
+    middle,
+    middle_of,
+    set_of,
+    within_travel,
+)
 
 AS_FAST = 1.8  # times the least pace of a runaway, half of the rate limit at which it runs
 
@@ -30,9 +39,15 @@ def offset(surface):
 
 @kernel
 def judge(config, surface, kind, k):
-    """Keep the offsets that also explain this frame."""
-    least, greatest = offset(surface)
-    intersect(surface, kind, least, greatest)
+    """The offsets that explain this frame."""
+    return offset(surface)
+
+
+@kernel
+def error(surface, kind):
+    """Off its command, rad, by the middle of its set; unlimited while an end of that is open."""
+    low, high = surface.set_low[kind], surface.set_high[kind]
+    return middle(surface, kind) if high - low < np.inf else np.inf
 
 
 @kernel
@@ -78,7 +93,7 @@ def pace(config, surface):
 
 
 @kernel
-def watch_growing(config, surface, kind):
+def widen_growing(config, surface, kind):
     """A slower one has moved on."""
     way = pace(config, surface)
     surface.growing_bias.least -= way
@@ -86,7 +101,7 @@ def watch_growing(config, surface, kind):
 
 
 @kernel
-def pass_over_growing(config, surface, kind, k):
+def skip_growing(config, surface, kind, k):
     """It may have gone, and begin anew."""
     forget_pace(surface.growing_bias)
 
@@ -111,13 +126,20 @@ def judge_growing(config, surface, kind, k):
     if least <= greatest:
         note_pace(config, surface, least, greatest)
     if np.isinf(least) or np.isinf(greatest):
-        return
+        return ANYTHING
     grown = surface.growing_bias
     grown.up, grown.down = max(grown.up, least), min(grown.down, greatest)
     above, below = grown.up > 0.0, grown.down < 0.0
     shrinks = (above and greatest < grown.up) or (below and least > grown.down)
-    if least > greatest or (above and below) or shrinks:
-        surface.type_excluded[kind] = 1
+    return NOTHING if least > greatest or (above and below) or shrinks else ANYTHING
+
+
+@kernel
+def ran(surface, direction):
+    """Whether the surface has moved towards that stop as fast as only a runaway does."""
+    if direction == 0:
+        return False
+    return surface.growing_bias.ran[1 if direction > 0 else 0] == 1
 
 
 def last_offset(fdi: np.void, s: int, kind: int) -> float | None:
@@ -127,16 +149,23 @@ def last_offset(fdi: np.void, s: int, kind: int) -> float | None:
 
 
 CONSTANT = FaultType(
-    name="bias", constant=True, rank=6, judge=judge, deflection=deflection, estimate=middle_of,
-    interval=interval,
+    name="bias", constant=True, rank=6,
+    judge=judge, deflection=deflection,
+    accommodation=SHIFTED, expected_error=error, error_rank=2, estimate=middle_of, interval=interval,
 )  # fmt: skip
 GROWING = FaultType(
-    name="bias", constant=False, rank=4, begin=begin_growing, watch=watch_growing, judge=judge_growing,
-    pass_over=pass_over_growing, estimate=last_offset, record="growing_bias",
+    name="bias", words="bias that grows", constant=False, rank=4,
+    begin=begin_growing, on_frame=widen_growing, judge=judge_growing, on_skipped_frame=skip_growing,
+    record="growing_bias",
     memory=record(
         up=float, down=float,  # how far it has certainly grown, rad
         # between what a slower one lies, rad; whether it has certainly run as fast as a runaway, down and up
         least=float, greatest=float, ran=(int, 2),
     ),
+    # in the end an offset that grows is as good as a constant one, whatever the commands
+    follows_command=False,
+    # as the command happens to go it looks like a jam or a loss; come to the stop by and by, like a runaway
+    mistaken_for=("loss_of_effectiveness", "stuck", "float", "hardover"), differs=ran,
+    accommodation=SHIFTED, estimate=last_offset,
 )  # fmt: skip
 TYPES = CONSTANT, GROWING

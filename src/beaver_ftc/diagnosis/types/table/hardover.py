@@ -4,7 +4,7 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.types import release
-from beaver_ftc.diagnosis.types.contract import FaultType
+from beaver_ftc.diagnosis.types.contract import FIXED, FaultType
 
 
 @kernel
@@ -35,33 +35,33 @@ def downwards(config, surface, k):
 @kernel
 def judge_up(config, surface, kind, k):
     """It is beyond where its least rate takes it, or at the stop."""
-    release.holds(config, surface, kind, upwards(config, surface, k), surface.travel_high)
+    return release.explains(config, surface, kind, upwards(config, surface, k), surface.travel_high)
 
 
 @kernel
 def judge_down(config, surface, kind, k):
     """The same downwards."""
-    release.holds(config, surface, kind, surface.travel_low, downwards(config, surface, k))
+    return release.explains(config, surface, kind, surface.travel_low, downwards(config, surface, k))
 
 
 @kernel
-def let_go_up(config, surface, kind, k):
+def on_release_up(config, surface, kind, k):
     """It may be let go on its way; within a frame of several instants, further on."""
     low, high, shown = release.beginning(config, surface, k)
     low = max(low, upwards(config, surface, shown))
     if not config.whole and low <= high:
         high = surface.travel_high
-    release.let_go(surface, kind, low, high)
+    release.note_release(surface, kind, low, high)
 
 
 @kernel
-def let_go_down(config, surface, kind, k):
+def on_release_down(config, surface, kind, k):
     """The same downwards."""
     low, high, shown = release.beginning(config, surface, k)
     high = min(high, downwards(config, surface, shown))
     if not config.whole and low <= high:
         low = surface.travel_low
-    release.let_go(surface, kind, low, high)
+    release.note_release(surface, kind, low, high)
 
 
 @kernel
@@ -87,11 +87,13 @@ def lower_stop(fdi: np.void, s: int, kind: int) -> float | None:
 
 
 UP = FaultType(
-    name="hardover", constant=True, rank=4, begin=release.start, judge=judge_up, let_go=let_go_up,
-    bring_back=release.bring_back, deflection=deflection_up, estimate=upper_stop,
+    name="hardover", words="hardover up", constant=True, rank=4,
+    begin=release.start, judge=judge_up, on_release=on_release_up, propagate_release=release.propagate,
+    deflection=deflection_up, direction=1, accommodation=FIXED, estimate=upper_stop,
 )  # fmt: skip
 DOWN = FaultType(
-    name="hardover", constant=True, rank=5, begin=release.start, judge=judge_down, let_go=let_go_down,
-    bring_back=release.bring_back, deflection=deflection_down, estimate=lower_stop,
+    name="hardover", words="hardover down", constant=True, rank=5,
+    begin=release.start, judge=judge_down, on_release=on_release_down, propagate_release=release.propagate,
+    deflection=deflection_down, direction=-1, accommodation=FIXED, estimate=lower_stop,
 )  # fmt: skip
 TYPES = UP, DOWN

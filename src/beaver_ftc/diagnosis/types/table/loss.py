@@ -4,7 +4,7 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.isolation import membership
-from beaver_ftc.diagnosis.types.contract import FaultType, intersect, middle_of, set_of
+from beaver_ftc.diagnosis.types.contract import ANYTHING, LOSES, NOTHING, FaultType, middle_of, set_of
 
 
 @kernel
@@ -15,16 +15,15 @@ def effectiveness(surface):
 
 
 @kernel
-def begin(surface, kind):
-    """Anything between all and nothing may be left."""
-    surface.set_low[kind], surface.set_high[kind] = 0.0, 1.0
+def whole_range(surface):
+    """Of 1 + theta: between nothing and all may be left."""
+    return 0.0, 1.0
 
 
 @kernel
 def judge(config, surface, kind, k):
-    """Keep what also explains this frame."""
-    low, high = effectiveness(surface)
-    intersect(surface, kind, low, high)
+    """The effectiveness that explains this frame."""
+    return effectiveness(surface)
 
 
 @kernel
@@ -39,8 +38,7 @@ def judge_varying(config, surface, kind, k):
     """Some effectiveness explains this frame; over a block in which the command changes sign, any mean."""
     low, high = effectiveness(surface)
     swung = config.length > 1 and surface.orders.least[1] < 0.0 < surface.orders.greatest[1]
-    if low > high and not swung:
-        surface.type_excluded[kind] = 1
+    return NOTHING if low > high and not swung else ANYTHING
 
 
 def estimate(fdi: np.void, s: int, kind: int) -> float | None:
@@ -61,10 +59,12 @@ def interval(fdi: np.void, s: int, kind: int) -> tuple[float, float] | None:
 
 
 CONSTANT = FaultType(
-    name="loss_of_effectiveness", constant=True, rank=1, begin=begin, judge=judge, deflection=deflection,
-    estimate=estimate, interval=interval,
+    name="loss_of_effectiveness", constant=True, rank=1,
+    whole_range=whole_range, judge=judge, deflection=deflection,
+    accommodation=LOSES, limit="float", estimate=estimate, interval=interval,
 )  # fmt: skip
 VARYING = FaultType(
-    name="loss_of_effectiveness", constant=False, rank=1, judge=judge_varying, estimate=fitted
-)
+    name="loss_of_effectiveness", words="loss_of_effectiveness that varies", constant=False, rank=1,
+    judge=judge_varying, half_cycles=2, accommodation=LOSES, estimate=fitted,
+)  # fmt: skip
 TYPES = CONSTANT, VARYING

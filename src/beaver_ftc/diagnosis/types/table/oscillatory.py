@@ -9,7 +9,7 @@ from math import pi, sqrt
 import numpy as np
 
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.diagnosis.types.contract import FaultType
+from beaver_ftc.diagnosis.types.contract import ANYTHING, EXCLUDED, NOTHING, SHIFTED, FaultType
 
 HALF_CYCLES_THAT_SHOW = 3
 
@@ -21,7 +21,7 @@ def begin(surface, kind):
 
 
 @kernel
-def watch(config, surface, kind):
+def add_square(config, surface, kind):
     """Sum the squares of the deflection error."""
     error = 0.5 * (surface.low_then + surface.high_then) - surface.command_then
     surface.oscillatory.square += error**2
@@ -39,12 +39,11 @@ def judge(config, surface, kind, k):
     sign = 1 if low > 0.0 else (-1 if high < 0.0 else 0)
     if sign == 0 or (not config.whole and surface.hides_then[0 if sign > 0 else 1]):
         swing.steady_since = k + 1
-        return
+        return ANYTHING
     if sign != swing.sign:
         end_half_cycle(swing, k)
         swing.sign, swing.steady_since = sign, k
-    if k - swing.steady_since > config.patience:
-        surface.type_excluded[kind] = 1
+    return NOTHING if k - swing.steady_since > config.patience else ANYTHING
 
 
 @kernel
@@ -61,13 +60,13 @@ def end_half_cycle(swing, k):
 
 
 @kernel
-def pass_over(config, surface, kind, k):
+def skip(config, surface, kind, k):
     """In a frame that is not judged it may have swung to the other side, unseen."""
     surface.oscillatory.steady_since = k + 1
 
 
 @kernel
-def shown(surface):
+def has_shown(surface):
     """Whether it has swung for two half-cycles and more."""
     return surface.oscillatory.half_cycles >= HALF_CYCLES_THAT_SHOW
 
@@ -86,12 +85,14 @@ def frequency_rad_s(fdi: np.void, s: int, kind: int) -> float | None:
 
 
 OSCILLATORY = FaultType(
-    name="oscillatory", constant=False, rank=2, begin=begin, watch=watch, judge=judge, pass_over=pass_over,
-    shown=shown, estimate=estimate, frequency_rad_s=frequency_rad_s, record="oscillatory",
+    name="oscillatory", constant=False, rank=2,
+    begin=begin, on_frame=add_square, judge=judge, on_skipped_frame=skip, record="oscillatory",
     memory=record(
         sign=int, steady_since=int,
         half_cycles=int, first_end=int, last_end=int,  # ends of half-cycles, frames
         square=float, squares=float,  # of the deflection error, rad2: this half-cycle, those before
     ),
+    has_shown=has_shown, shows_within=2, at_rest=EXCLUDED, mistaken_for=("rate_limit",),
+    accommodation=SHIFTED, estimate=estimate, frequency_rad_s=frequency_rad_s,
 )  # fmt: skip
 TYPES = (OSCILLATORY,)

@@ -4,7 +4,7 @@ Slower than that it is a jam: the two are one another's limit, and only a least 
 """
 
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.diagnosis.types.contract import FaultType
+from beaver_ftc.diagnosis.types.contract import ANYTHING, LAGS, NOTHING, UNSEEN, FaultType
 
 
 @kernel
@@ -20,15 +20,15 @@ def judge(config, surface, kind, k):
     Of several JSBSim frames in one of ours the first is the old command's.
     """
     low, high, run = surface.low_then, surface.high_then, surface.rate_limit
-    sign = side(config, surface)
+    sign, retreats = side(config, surface), False
     if sign == 0 or sign != run.sign or k != run.at + 1:
         run.low, run.high = low, high
     else:
-        if (sign > 0 and low > run.high) or (sign < 0 and high < run.low):
-            surface.type_excluded[kind] = 1
+        retreats = (sign > 0 and low > run.high) or (sign < 0 and high < run.low)
         come_nearer(config, surface, run, sign)
     run.low, run.high = max(run.low, low), min(run.high, high)
     run.sign, run.at = sign, k
+    return NOTHING if retreats else ANYTHING
 
 
 @kernel
@@ -60,10 +60,13 @@ def side(config, surface):
 
 
 RATE_LIMIT = FaultType(
-    name="rate_limit", constant=False, rank=3, begin=begin, judge=judge, record="rate_limit",
+    name="rate_limit", constant=False, rank=3,
+    begin=begin, judge=judge, record="rate_limit",
     memory=record(
         low=float, high=float,  # where it can be while it stands on one side of its command, rad
         sign=int, at=int,  # which side, and the last frame of which that is known
     ),
+    # a slow surface that has not been seen to creep looks as if it stood still
+    at_rest=UNSEEN, mistaken_for=("stuck", "float", "hardover"), accommodation=LAGS,
 )  # fmt: skip
 TYPES = (RATE_LIMIT,)

@@ -8,60 +8,71 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.diagnosis.types import release
-from beaver_ftc.diagnosis.types.contract import FaultType, intersect, middle_of, set_of, within_travel
-from beaver_ftc.diagnosis.types.release import EARLIER, LATER
+from beaver_ftc.diagnosis.types.contract import (
+    ANYTHING,
+    FIXED,
+    LOSES,
+    NOTHING,
+    SHIFTED,
+    STANDS,
+    FaultType,
+    middle,
+    middle_of,
+    set_of,
+    within_travel,
+)
+from beaver_ftc.diagnosis.types.release import EARLIER, HELD, LATER, REFUTED
+
+
+@kernel
+def travel(surface):
+    """It may be anywhere in its travel, rad."""
+    return surface.travel_low, surface.travel_high
 
 
 @kernel
 def begin(surface, kind):
     """It may be anywhere in its travel."""
-    surface.set_low[kind], surface.set_high[kind] = surface.travel_low, surface.travel_high
-    surface.stuck.kept_low[:], surface.stuck.kept_high[:] = surface.travel_low, surface.travel_high
+    surface.stuck.kept_low[:], surface.stuck.kept_high[:] = travel(surface)
     release.start(surface, kind)
 
 
 @kernel
 def judge(config, surface, kind, k):
     """It stays where it is."""
-    if release.holds(config, surface, kind, surface.set_low[kind], surface.set_high[kind]):
-        intersect(surface, kind, surface.low_then, surface.high_then)
+    status = release.status(config, surface, kind, surface.set_low[kind], surface.set_high[kind])
+    if status == HELD:
+        return surface.low_then, surface.high_then
+    return NOTHING if status == REFUTED else ANYTHING
 
 
 @kernel
-def let_go(config, surface, kind, k):
+def on_release(config, surface, kind, k):
     """It may be let go where it is jammed."""
     renew(surface, kind)
     low, high, _ = release.beginning(config, surface, k)
-    release.let_go(surface, kind, max(low, surface.set_low[kind]), min(high, surface.set_high[kind]))
+    release.note_release(surface, kind, max(low, surface.set_low[kind]), min(high, surface.set_high[kind]))
 
 
 @kernel
 def renew(surface, kind):
     """When no earlier release is possible any more, the later ones are the earlier ones."""
-    held, jam = surface.release, surface.stuck
+    jam = surface.stuck
     if not release.any_release(surface, EARLIER, kind):
-        held.low[EARLIER, kind], held.high[EARLIER, kind] = held.low[LATER, kind], held.high[LATER, kind]
         jam.kept_low[EARLIER], jam.kept_high[EARLIER] = jam.kept_low[LATER], jam.kept_high[LATER]
         jam.kept_low[LATER], jam.kept_high[LATER] = surface.set_low[kind], surface.set_high[kind]
-        release.forget(surface, LATER, kind)
+        release.renew(surface, kind)
 
 
 @kernel
-def bring_back(config, surface, kind):
-    """Where the surface looks healthy the jam may take hold again, where it was before."""
+def restored(surface, kind):
+    """Where the surface looks healthy the jam may take hold again: its set as it was before the earliest
+    release still possible."""
     if not surface.wrong_then:
-        settle(surface, kind)
-    release.bring_back(config, surface, kind)
-
-
-@kernel
-def settle(surface, kind):
-    """Return to the set as it was before the earliest release still possible."""
-    for which in (EARLIER, LATER):
-        if release.any_release(surface, which, kind):
-            surface.set_low[kind] = surface.stuck.kept_low[which]
-            surface.set_high[kind] = surface.stuck.kept_high[which]
-            return
+        for which in (EARLIER, LATER):
+            if release.any_release(surface, which, kind):
+                return surface.stuck.kept_low[which], surface.stuck.kept_high[which]
+    return surface.set_low[kind], surface.set_high[kind]
 
 
 @kernel
@@ -74,15 +85,15 @@ def deflection(config, surface, kind, k):
 def judge_float(config, surface, kind, k):
     """It is at neutral, or at the stop that is nearest to it."""
     neutral = within_travel(surface, 0.0)
-    release.holds(config, surface, kind, neutral, neutral)
+    return release.explains(config, surface, kind, neutral, neutral)
 
 
 @kernel
-def let_go_float(config, surface, kind, k):
+def on_release_float(config, surface, kind, k):
     """It may be let go at neutral."""
     low, high, _ = release.beginning(config, surface, k)
     neutral = within_travel(surface, 0.0)
-    release.let_go(surface, kind, max(low, neutral), min(high, neutral))
+    release.note_release(surface, kind, max(low, neutral), min(high, neutral))
 
 
 @kernel
@@ -98,13 +109,30 @@ def neutral_of(fdi: np.void, s: int, kind: int) -> float | None:
     return float(min(max(0.0, surface["travel_low"]), surface["travel_high"]))
 
 
+@kernel
+def error(surface, kind):
+    """Off its command, rad, by the middle of where it can be jammed."""
+    return middle(surface, kind) - surface.command
+
+
+@kernel
+def error_of_float(surface, kind):
+    """Off its command, rad: at neutral."""
+    return within_travel(surface, 0.0) - surface.command
+
+
 STUCK = FaultType(
-    name="stuck", constant=True, rank=2, begin=begin, judge=judge, let_go=let_go, bring_back=bring_back,
+    name="stuck", constant=True, rank=2,
+    whole_range=travel, begin=begin, judge=judge, restored=restored,
     record="stuck", memory=record(kept_low=2, kept_high=2),  # rad; EARLIER and LATER
-    deflection=deflection, estimate=middle_of, interval=set_of,
+    on_release=on_release, propagate_release=release.propagate, deflection=deflection, at_rest=STANDS,
+    accommodation=FIXED, expected_error=error, error_rank=3, estimate=middle_of, interval=set_of,
 )  # fmt: skip
 FLOAT = FaultType(
-    name="float", constant=True, rank=3, begin=release.start, judge=judge_float, let_go=let_go_float,
-    bring_back=release.bring_back, deflection=deflection_float, estimate=neutral_of,
+    name="float", constant=True, rank=3,
+    begin=release.start, judge=judge_float, on_release=on_release_float, propagate_release=release.propagate,
+    deflection=deflection_float,
+    accommodation=SHIFTED, also=(FIXED, LOSES), expected_error=error_of_float, error_rank=1,
+    estimate=neutral_of,
 )  # fmt: skip
 TYPES = STUCK, FLOAT

@@ -1,0 +1,48 @@
+"""The feasible set of each type's parameter on one surface: the only writer of these sets.
+
+A type is excluded once its set is empty, and stays excluded until the surface's diagnosis begins anew.
+interval: (low, high) of a parameter; low > high is the empty set.
+"""
+
+import numpy as np
+
+from beaver_ftc.compiled import kernel
+
+
+@kernel
+def begin(surface):
+    """Allow every type with any parameter."""
+    surface.set_low[:], surface.set_high[:] = -np.inf, np.inf
+    surface.type_excluded[:] = 0
+
+
+@kernel
+def replace(surface, kind, interval):
+    """Put an interval in place of the set of a type."""
+    surface.set_low[kind], surface.set_high[kind] = interval
+
+
+@kernel
+def intersect(surface, kind, interval):
+    """Keep of the set of a type what is also in an interval; exclude the type when nothing is left."""
+    low, high = interval
+    if low > high:
+        surface.type_excluded[kind] = 1
+        return
+    surface.set_low[kind] = max(surface.set_low[kind], low)
+    surface.set_high[kind] = min(surface.set_high[kind], high)
+    if surface.set_low[kind] > surface.set_high[kind]:
+        surface.type_excluded[kind] = 1
+
+
+@kernel
+def exclude(surface, kind):
+    """Exclude a type."""
+    surface.type_excluded[kind] = 1
+
+
+@kernel
+def recall(surface):
+    """Return to the sets that were kept when the surface was named (pairs.py)."""
+    surface.set_low[:], surface.set_high[:] = surface.known.low, surface.known.high
+    surface.type_excluded[:] = surface.known.excluded

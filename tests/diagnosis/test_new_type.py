@@ -21,14 +21,13 @@ REVERSED = '''
 """A surface rigged the wrong way round: p = -u."""
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.types.contract import FaultType
+from beaver_ftc.diagnosis.types.contract import ANYTHING, NOTHING, FaultType
 
 
 @kernel
 def judge(config, surface, kind, k):
     """Whether the mirrored command explains this frame."""
-    if not surface.low_then <= -surface.command_then <= surface.high_then:
-        surface.type_excluded[kind] = 1
+    return ANYTHING if surface.low_then <= -surface.command_then <= surface.high_then else NOTHING
 
 
 @kernel

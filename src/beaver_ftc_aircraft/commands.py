@@ -6,9 +6,11 @@ from typing import Annotated
 import typer
 
 from beaver_ftc.cli.output import Format, FormatOption, answer, complain
+from beaver_ftc.commands import declare
 from beaver_ftc.documents.errors import BadInput
 
 
+@declare(plugins=False)
 def derive(
     aircraft: Annotated[str, typer.Argument(metavar="AIRCRAFT")],
     envelope: Path | None = None,
@@ -38,6 +40,7 @@ def derive(
     answer(format, document, lambda: text_of(document))
 
 
+@declare(plugins=False)
 def gtm(
     database: Annotated[Path, typer.Argument(metavar="DATABASE.mat")],
     out: Path | None = None,

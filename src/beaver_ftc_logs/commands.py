@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from beaver_ftc.cli.output import Document, Format, FormatOption, answer
+from beaver_ftc.commands import declare
 from beaver_ftc.documents.errors import BadInput
 
 if TYPE_CHECKING:
@@ -124,6 +125,7 @@ class Options:
     format: FormatOption = Format.text
 
 
+@declare("diagnosis.parquet", "verdict.json")
 def diagnose(options: Options) -> None:
     """Diagnose recorded flights by a model or an aircraft.
 

@@ -4,7 +4,6 @@ import io
 import signal
 import sys
 from dataclasses import dataclass
-from functools import reduce
 from inspect import signature
 from types import SimpleNamespace
 from typing import Annotated, get_args
@@ -74,18 +73,11 @@ def test_the_version_is_asked_before_all_else():
 
 
 def test_which_commands_fly(changed):
-    """Where each is, whether plug-ins can be registered for it, and its examples."""
+    """Whether plug-ins can be registered for it, and its examples."""
     assert not changed({
-        name: [where, name not in command_line.WITHOUT_PLUGINS, *(typed(name).epilog or "").splitlines()[2:]]
-        for name, where in command_line.COMMANDS.items()
+        name: ["plugin" in [each.name for each in command.params], *(command.epilog or "").splitlines()[2:]]
+        for name, command in command_line.every_command().items()
     })  # fmt: skip
-
-
-def typed(name):
-    """The command of this name, or of these names."""
-    return reduce(
-        lambda group, part: group.commands[part], name.split(), typer.main.get_command(command_line.app)
-    )
 
 
 @dataclass(frozen=True)

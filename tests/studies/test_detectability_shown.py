@@ -13,6 +13,7 @@ from beaver_ftc.scenario.loader import load_text
 from beaver_ftc.studies import detectability, isolability
 from beaver_ftc.studies.detectability import (
     ALTITUDES_M,
+    FILES,
     MAGNITUDES,
     Excitation,
     at,
@@ -21,7 +22,6 @@ from beaver_ftc.studies.detectability import (
     draw,
     excitation,
     exclusion_magnitude,
-    files_of,
     judge,
     mismatch,
     run_survey,
@@ -29,7 +29,7 @@ from beaver_ftc.studies.detectability import (
     text,
 )
 from beaver_ftc.studies.isolability import DOUBLET, SHOWN
-from beaver_ftc.studies.present.page import write_files
+from beaver_ftc.studies.present.page import contents, write_files
 from flying import loss, scenario
 from kept import in_short, picture
 
@@ -86,7 +86,7 @@ def test_the_survey_as_it_is_shown(changed, tmp_path):
     pairs = pairs_made()
     parts = {"points": rows[:8], "pairs": pairs[:6]}, {"points": rows[8:], "pairs": pairs[6:]}
     document = document_of("made", parts)
-    files = files_of(document)
+    files = contents(FILES, document)
     assert not changed(files["detectability.csv"].splitlines(), "csv")
     assert json.loads(files["detectability.json"]) == {
         "scenario": "made", "detect_within_s": 0.5, "isolate_within_s": 1.0, "points": rows, "pairs": pairs
@@ -213,7 +213,7 @@ def pointed(monkeypatch):
     monkeypatch.setattr(
         detectability, "_point", lambda given, point: seen.append(point) or {"points": [], "pairs": []}
     )
-    monkeypatch.setattr(detectability, "files_of", lambda document: {})
+    monkeypatch.setattr(detectability, "FILES", {})
     return seen
 
 

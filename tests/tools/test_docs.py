@@ -6,7 +6,7 @@ from tools.docs import first_figure
 from tools.docs.pictures import lighten
 from tools.docs.properties import as_markdown, meaning_of
 
-from beaver_ftc.cli.main import COMMANDS
+from beaver_ftc.commands import COMMANDS
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.model_file import with_systems

@@ -16,7 +16,8 @@ from tools.docs.reference.schema import ITEM, NAME, Key, Sections
 import beaver_ftc as bf
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.schema import AircraftFile
-from beaver_ftc.cli.main import COMMANDS
+from beaver_ftc.cli.main import every_command
+from beaver_ftc.commands import COMMANDS
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.loader import load_text
 from beaver_ftc.scenario.signals import Signal
@@ -227,7 +228,7 @@ def test_every_command_and_option_is_there():
         section = text.partition(f"\n## {name}\n")[2].partition("\n## ")[0]
         assert "| option | what it is |" in section, name
     assert "`--flightgear HOST:PORT`" in text
-    options = [each.name for _, command in commands.leaves(commands.PARSER) for each in command.params]
+    options = [each.name for command in every_command().values() for each in command.params]
     assert text.count("`--format <text") == options.count("format")
 
 

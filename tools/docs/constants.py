@@ -22,7 +22,7 @@ def constants() -> dict[str, Any]:
     of modules by the module's path, and how many there are of what can be listed.
     """
     from beaver_ftc.cli.catalogue import _available
-    from beaver_ftc.cli.main import COMMANDS
+    from beaver_ftc.commands import COMMANDS
     from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled, options_of, registered
     from beaver_ftc.scenario.loader import load_text
     from beaver_ftc.scenario.schema import Scenario

@@ -173,12 +173,10 @@ class Known:
     @cached_property
     def commands(self) -> dict[str, frozenset[str]]:
         """{command: its options}, and of scripts of the repository under the empty name."""
-        import typer
-
-        from beaver_ftc.cli.main import app
+        from beaver_ftc.cli.main import every_command
 
         found: dict[str, frozenset[str]] = {}
-        for name, command in typer.main.get_command(app).commands.items():  # type: ignore[attr-defined]
+        for name, command in every_command().items():
             found[name] = frozenset(
                 word
                 for parameter in command.params

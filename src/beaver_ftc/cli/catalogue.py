@@ -8,6 +8,7 @@ import typer
 
 from beaver_ftc.cli.inputs import complete_names
 from beaver_ftc.cli.output import Document, Format, FormatOption, answer, emit, emit_json
+from beaver_ftc.commands import declare
 from beaver_ftc.documents.errors import BadInput, suggestion
 
 Entries = list[dict[str, str]]
@@ -126,6 +127,7 @@ def _names(kind: str, entries: Entries) -> str:
     return f"{kind}\n{indent(names, '  ')}"
 
 
+@declare(plugins=False)
 def show(
     name: Annotated[str, typer.Argument(metavar="NAME", autocompletion=complete_names)],
 ) -> None:
@@ -149,6 +151,7 @@ def show(
     emit(path.read_text(encoding="utf-8"))
 
 
+@declare(plugins=False)
 def schema(sweep: bool = False, plan: bool = False) -> None:
     """Print the JSON Schema of a scenario.
 

@@ -9,7 +9,13 @@ import typer
 from beaver_ftc.cli.inputs import listed
 from beaver_ftc.cli.output import Format, FormatOption, answer
 from beaver_ftc.cli.progress import progress_bar
+from beaver_ftc.commands import declare
 from beaver_ftc.documents.errors import BadInput
+
+FILES = (
+    "comparison.json", "comparison.png", "comparison.html", "runs.json", "runs.png", "runs.html",
+    "flights.json", "flights.md", "flights.png",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -33,6 +39,7 @@ class Options:
     format: FormatOption = Format.text
 
 
+@declare(*FILES)
 def command(options: Options) -> None:
     """Compare runs; or schemes and laws on the same flights.
 

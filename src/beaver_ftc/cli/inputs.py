@@ -3,7 +3,6 @@
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import is_dataclass
-from enum import StrEnum
 from functools import wraps
 from inspect import Parameter, Signature, signature
 from pathlib import Path
@@ -13,32 +12,25 @@ import typer
 
 from beaver_ftc.documents.docstrings import split_docstring
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.studies.engine.command import (
+    SCENARIO,
+    ScenarioArgument,
+    WorkersOption,
+    complete_names,
+    listed,
+)
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
 
+__all__ = ["ScenarioArgument", "WorkersOption", "complete_names", "listed"]  # those that studies have as well
 
-TurbulenceName = StrEnum("TurbulenceName", ["none", "light", "moderate"])  # the air there is to fly in
-
-
-def complete_names(incomplete: str) -> list[str]:
-    """Built-in scenarios whose names begin so, for the shell."""
-    from beaver_ftc.scenario.loader import builtin_names
-
-    return [name for name in builtin_names() if name.startswith(incomplete)]
-
-
-_SCENARIO = typer.Argument(
-    metavar="SCENARIO", help="A file, or the name of a built-in scenario.", autocompletion=complete_names
-)
-ScenarioArgument = Annotated[str, _SCENARIO]
-ScenariosArgument = Annotated[list[str], _SCENARIO]
+ScenariosArgument = Annotated[list[str], SCENARIO]
 ResultsOption = Annotated[Path, typer.Option(help="Folder for the results, one folder a scenario in it.")]
 NoReportOption = Annotated[bool, typer.Option("--no-report", help="Skip report.html and the figures.")]
 JunitOption = Annotated[
     Path | None, typer.Option(metavar="FILE", help="Also write the verdict as JUnit XML, for CI.")
 ]
-WorkersOption = Annotated[int | None, typer.Option(min=1, max=1024, help="Processes; default: one a core.")]
 PluginOption = Annotated[
     list[str] | None,
     typer.Option(
@@ -89,11 +81,6 @@ def _annotated(parameter: Parameter, help: str | None) -> Parameter:
     if help:
         option.help = help
     return parameter.replace(annotation=Annotated[kind, option])
-
-
-def listed(names: str) -> list[str]:
-    """What a list with commas in it names."""
-    return [name.strip() for name in names.split(",") if name.strip()]
 
 
 def load_all(names: list[str]) -> list["Scenario"]:

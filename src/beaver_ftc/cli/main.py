@@ -1,75 +1,75 @@
 """The command `beaver-ftc`: its commands, and what becomes of errors.
 
-A command is one thin function of a module of this package, that imports what it needs when it runs, and one
-row here. Its docstring is its help: what it does, examples, what each option means. `--help` must answer at
-once.
+`commands.py` has a row each. A command is a study, or a thin function of a module of this package. Its
+docstring is its help: what it does, examples, what each option means. `--help` must answer at once.
 """
 
 import signal
 import sys
-from importlib import import_module
-from typing import Annotated, NoReturn
+from collections.abc import Callable
+from typing import Annotated, Any, NoReturn
 
 import typer
+from typer.core import TyperCommand, TyperGroup
 
-from beaver_ftc import __version__
+from beaver_ftc import __version__, commands
 from beaver_ftc.cli.inputs import as_typer_reads
 from beaver_ftc.cli.output import failure_of, report_last, status_of_stop
+from beaver_ftc.cli.study import command_of
 
-# Where each is: a module, and its function there.
-COMMANDS = {
-    "run": "beaver_ftc.cli.run:command",
-    "check": "beaver_ftc_assurance.commands.check:command",
-    "mismatch": "beaver_ftc.cli.mismatch:command",
-    "validate": "beaver_ftc.cli.scenarios:validate",
-    "schema": "beaver_ftc.cli.catalogue:schema",
-    "trim": "beaver_ftc.cli.studies:trim",
-    "linearise": "beaver_ftc.cli.studies:linearise",
-    "list": "beaver_ftc.cli.catalogue:list_choices",
-    "show": "beaver_ftc.cli.catalogue:show",
-    "new": "beaver_ftc.cli.scenarios:new",
-    "sweep": "beaver_ftc.cli.sweep:command",
-    "compare": "beaver_ftc.cli.compare:command",
-    "evidence": "beaver_ftc_assurance.commands.evidence:command",
-    "reproduce": "beaver_ftc.cli.studies:reproduce",
-    "matrix": "beaver_ftc.cli.surveys:matrix",
-    "power": "beaver_ftc.cli.surveys:power",
-    "smallest": "beaver_ftc.cli.surveys:smallest",
-    "bench": "beaver_ftc.cli.studies:bench",
-    "derive": "beaver_ftc_aircraft.commands:derive",
-    "verify": "beaver_ftc.cli.studies:verify",
-    "detectability": "beaver_ftc.cli.studies:detectability",
-    "separate": "beaver_ftc_assurance.commands.separate:command",
-    "identify": "beaver_ftc_logs.commands:identify",
-    "diagnose": "beaver_ftc_logs.commands:diagnose",
-    "live": "beaver_ftc_live.commands.live:command",
-    "sitl": "beaver_ftc_links.commands:command",
-    "import gtm": "beaver_ftc_aircraft.commands:gtm",
-    "challenge new": "beaver_ftc_live.commands.challenge:new",
-    "challenge submit": "beaver_ftc_live.commands.challenge:submit",
-    "challenge grade": "beaver_ftc_live.commands.challenge:grade",
-}
 # Of a command that has commands of its own: what it is for.
 GROUPS = {
     "import": "Make aircraft of data that others publish.",
     "challenge": "Grade a class's detectors and laws on hidden flights.",
 }
-# Those that fly no scenario of the user's choice: no plug-in can be registered for them.
-WITHOUT_PLUGINS = {
-    "check",
-    "schema",
-    "show",
-    "new",
-    "reproduce",
-    "bench",
-    "derive",
-    "verify",
-    "detectability",
-}
-WITHOUT_PLUGINS |= {"import gtm", "challenge new", "challenge submit", "challenge grade"}
+
+
+class Row(TyperCommand):
+    """A command by its row: its summary is read from the source, the rest imported when it is called."""
+
+    def __init__(self, name: str, target: str) -> None:
+        super().__init__(name)
+        self.target = target
+
+    def get_short_help_str(self, limit: int = 45) -> str:
+        """The first line of its help."""
+        return TyperCommand(self.name, help=commands.summary(self.target)).get_short_help_str(limit)
+
+    def read(self) -> Callable[..., None]:
+        """What the row names, as typer reads it."""
+        found = commands.load(self.target)
+        command = command_of(found) if isinstance(found, type) else found
+        return as_typer_reads(command, getattr(found, "PLUGINS", True))
+
+    def whole(self) -> Any:
+        """The command with its options and its help; the examples at its end on lines of their own."""
+        read = self.read()
+        read.__doc__, _, examples = str(read.__doc__).partition("\n\nExamples:\n")
+        alone = typer.Typer(add_completion=False, rich_markup_mode=None)
+        alone.command(self.name, epilog=f"\b\nExamples:\n{examples}" if examples else None)(read)
+        return typer.main.get_command(alone)
+
+
+class Rows(TyperGroup):
+    """Commands by their rows, those of a group without its name."""
+
+    def __init__(self, **attributes: Any) -> None:
+        super().__init__(**attributes)
+        above = f"{self.name} " if self.name in GROUPS else ""
+        for name, target in commands.registered().items():
+            last = name.removeprefix(above)
+            if name.startswith(above) and " " not in last:
+                self.add_command(Row(last, target))
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """The command that is called, whole."""
+        name, command, rest = super().resolve_command(ctx, args)
+        return name, command.whole() if isinstance(command, Row) else command, rest
+
 
 app = typer.Typer(
     name="beaver-ftc",
+    cls=Rows,
     no_args_is_help=True,
     add_completion=True,
     rich_markup_mode=None,  # plain help: importing rich for it would cost a third of the time to answer
@@ -97,21 +97,14 @@ def options(
     """
 
 
-_groups = {
-    name: typer.Typer(name=name, help=says, no_args_is_help=True, rich_markup_mode=None)
-    for name, says in GROUPS.items()
-}
-for _group in _groups.values():
+for _name, _says in GROUPS.items():
+    _group = typer.Typer(name=_name, cls=Rows, help=_says, no_args_is_help=True, rich_markup_mode=None)
     app.add_typer(_group, context_settings={"help_option_names": ["-h", "--help"]})
-for _name, _where in COMMANDS.items():
-    _module, _, _function = _where.partition(":")
-    _command = getattr(import_module(_module), _function)
-    _read = as_typer_reads(_command, flies=_name not in WITHOUT_PLUGINS)
-    # the examples at the end of its help, each on a line of its own
-    _read.__doc__, _, _examples = str(_read.__doc__).partition("\n\nExamples:\n")
-    _above, _, _last = _name.rpartition(" ")
-    _place = _groups.get(_above, app)
-    _place.command(_last, epilog=f"\b\nExamples:\n{_examples}" if _examples else None)(_read)
+
+
+def every_command() -> dict[str, Any]:
+    """Each command by name, whole, with its options and its help."""
+    return {name: Row(name.rpartition(" ")[2], at).whole() for name, at in commands.registered().items()}
 
 
 def main() -> NoReturn:

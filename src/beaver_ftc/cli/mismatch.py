@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from beaver_ftc.cli.inputs import NoReportOption, ResultsOption, ScenariosArgument, load_all
 from beaver_ftc.cli.output import Document, Format, FormatOption, complain, emit, emit_json
 from beaver_ftc.cli.progress import progress_bar
+from beaver_ftc.commands import declare
 from beaver_ftc.documents.errors import BadInput
 
 if TYPE_CHECKING:
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 Say = Callable[[str], None]
 
 
+@declare("mismatch.json", "mismatch.csv", "mismatch.parquet")
 def command(
     scenarios: ScenariosArgument,
     out: ResultsOption = Path("runs"),

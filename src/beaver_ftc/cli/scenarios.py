@@ -8,6 +8,7 @@ import typer
 
 from beaver_ftc.cli.inputs import check_flyable, complete_names
 from beaver_ftc.cli.output import Document, Format, FormatOption, complain, emit, emit_json
+from beaver_ftc.commands import declare
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 
 _NAME = re.compile(r"[A-Za-z0-9_-]{1,100}")  # as of a scenario
@@ -78,6 +79,7 @@ def _check(file: str) -> Document:
     return {"file": file, "valid": not errors, "errors": errors, "warnings": warnings}
 
 
+@declare(plugins=False)
 def new(
     name: Annotated[str, typer.Argument(metavar="NAME")],
     like: Annotated[str | None, typer.Option(metavar="SCENARIO", autocompletion=complete_names)] = None,

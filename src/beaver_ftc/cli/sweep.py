@@ -13,6 +13,7 @@ import typer
 
 from beaver_ftc.cli.inputs import JunitOption, NoReportOption
 from beaver_ftc.cli.output import Document, Format, FormatOption, answer, complain, judged
+from beaver_ftc.commands import declare
 from beaver_ftc.documents.errors import BadInput
 
 if TYPE_CHECKING:
@@ -46,6 +47,7 @@ class Arguments:
     certificate: bool = False
 
 
+@declare("results.parquet", "summary.json", "rare.json", "flight.yaml")
 def command(arguments: Arguments) -> None:
     """Fly a sweep: many flights of one scenario, varied.
 

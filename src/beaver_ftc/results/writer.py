@@ -10,12 +10,13 @@ import ctypes
 import errno
 import os
 import shutil
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 from uuid import uuid4
 
+from beaver_ftc.commands import files_of_commands
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import Document, as_json, metrics
@@ -29,19 +30,10 @@ try:
 except ImportError:  # not a POSIX system: nothing can be locked, so nothing is taken for stale
     fcntl = None  # type: ignore[assignment]
 
-FILES_OF_A_RESULT = frozenset({
-    "scenario.yaml", "log.parquet", "metrics.json", "report.html", "figures",
-    "log.csv", "flight.acmi", "results.parquet", "summary.json", "mismatch.json", "mismatch.csv",
-    "mismatch.parquet", "comparison.json", "comparison.png", "comparison.html", "runs.json", "runs.png",
-    "runs.html", "reproduction.json", "reproduction.md", "reproduction.html", "detectability.json",
-    "detectability.csv", "detectability.png", "detectability.html", "isolability.csv", "isolability.png",
-    "fault-matrix.json", "fault-matrix.txt", "fault-matrix.png",
-    "power.json", "power.txt", "power.parquet", "pitch-lost.json", "pitch-lost.txt",
-    "diagnosis.parquet", "verdict.json", "flights.json", "flights.md", "flights.png",
-    "flight.csv", "flight.ulg", "flight.bin", "vehicle.yaml", "grades.json", "grades.md", "grades.html",
-    "aircraft", "certificate.json", "separation.json", "flown",
-    "smallest.json", "smallest.csv", "smallest.html",
-    "rare.json", "flight.yaml", "evidence.json", "evidence.html", "evidence.pdf",
+# What a run leaves; what else lies in a result folder is declared by the commands that write it.
+FILES_OF_A_RUN = frozenset({
+    "scenario.yaml", "log.parquet", "metrics.json", "report.html", "figures", "aircraft",
+    "log.csv", "flight.acmi", "flight.csv", "flight.ulg", "flight.bin", "vehicle.yaml",
 })  # fmt: skip
 AIRCRAFT, MODEL_FILES = "aircraft", frozenset({".xml", ".yaml"})  # an own aircraft, to fly it again
 MARK = "beaver-ftc"  # the software that a picture of ours names in its metadata
@@ -187,15 +179,16 @@ def add_report(folder: Path, document: Document) -> str:
 
 
 @contextlib.contextmanager
-def result_folder(out: Path, name: str) -> Iterator[Path]:
+def result_folder(out: Path, name: str, files: Iterable[str] = ()) -> Iterator[Path]:
     """Yield an empty folder to fill; on success it becomes `out/name`, on any failure it vanishes.
 
-    Raises SimulationFailed where the folder cannot be written, or `out/name` is not a result of ours.
+    files: the names that an earlier result of this kind has. Raises SimulationFailed where the folder cannot
+    be written, or `out/name` is not a result of ours.
     """
     final = out / name
     before = "the result that was there is as it was" if final.is_dir() else "nothing is left there"
     with clear_disk_errors(final, f"; {before}"):
-        refuse_foreign(final)
+        refuse_foreign(final, files)
         created = _make_parents(out)
         _remove_stale(out, name)
         own = uuid4().hex
@@ -206,7 +199,7 @@ def result_folder(out: Path, name: str) -> Iterator[Path]:
                 unnamed.rename(partial)
                 yield partial
                 _sync(partial)
-                _move_into_place(partial, final)
+                _move_into_place(partial, final, files)
         except BaseException:
             shutil.rmtree(partial, ignore_errors=True)
             with contextlib.suppress(OSError):
@@ -215,13 +208,16 @@ def result_folder(out: Path, name: str) -> Iterator[Path]:
             raise
 
 
-def refuse_foreign(folder: Path) -> None:
-    """Raise SimulationFailed if `folder` exists and holds anything that is not a result: it would be lost."""
+def refuse_foreign(folder: Path, files: Iterable[str] = ()) -> None:
+    """Raise SimulationFailed if `folder` exists and holds anything that is not a result: it would be lost.
+
+    files: names that are known to be of a result, beside those that commands declare.
+    """
     if not os.path.lexists(folder):
         return
     if folder.is_symlink() or not folder.is_dir():
         raise SimulationFailed(f"cannot write {folder}: it exists and is not a folder")
-    strangers = _strangers_in(folder)
+    strangers = _strangers_in(folder, files)
     if strangers:
         raise SimulationFailed(
             f"will not replace {folder}: it holds {strangers[0]}, which is no result of beaver-ftc; "
@@ -229,9 +225,10 @@ def refuse_foreign(folder: Path) -> None:
         )
 
 
-def _strangers_in(folder: Path) -> list[str]:
+def _strangers_in(folder: Path, files: Iterable[str]) -> list[str]:
     """What lies in a result folder and is none of ours, by its name or beside our pictures."""
-    strangers = [entry.name for entry in folder.iterdir() if entry.name not in FILES_OF_A_RESULT]
+    unknown = {entry.name for entry in folder.iterdir()} - FILES_OF_A_RUN - {*files}
+    strangers = [*(unknown and unknown - {*files_of_commands()})]
     pictures = (folder / "figures").rglob("*")
     strangers += [str(path.relative_to(folder)) for path in pictures if not _is_our_picture(path)]
     copied = (path for path in (folder / AIRCRAFT).rglob("*") if not path.is_dir())
@@ -317,8 +314,8 @@ def sync(path: Path) -> None:
         os.close(descriptor)
 
 
-def _move_into_place(partial: Path, final: Path) -> None:
-    refuse_foreign(final)
+def _move_into_place(partial: Path, final: Path, files: Iterable[str]) -> None:
+    refuse_foreign(final, files)
     try:
         partial.rename(final)  # tried, not asked first: another run of this name may end in between
         return

@@ -35,12 +35,20 @@ from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.results.log import Columns
 from beaver_ftc.scenario.airframe import find_aircraft
+from beaver_ftc.scenario.loader import load_scenario
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies import isolability
+from beaver_ftc.studies.engine.command import (
+    AirspeedsOption,
+    AltitudesOption,
+    Reporter,
+    ScenarioArgument,
+    StudyCommand,
+)
 from beaver_ftc.studies.engine.statistics import quantile
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.present.figures import heat_map, label_edges, panels
-from beaver_ftc.studies.present.page import Files, Heading, Part, Pictures, Table, as_html
+from beaver_ftc.studies.present.page import Heading, Makers, Part, Pictures, Table, as_html
 from beaver_ftc.studies.present.tables import aligned, as_csv
 from beaver_ftc_aircraft.derive.fit import EXACT_TERMS
 
@@ -56,6 +64,7 @@ ALIKE_DEG = 3.0  # told apart from no less on: the rates move alike
 TOO_SHORT = "the flight ends before a fault could be isolated"
 MOTION = {"p": "roll", "q": "pitch", "r": "yaw"}
 COLUMNS = (*PLACE, "fault", *MAGNITUDES, "confused_with", "why")
+PARTS = ("points", "pairs")  # of the document: a row a fault, and a row a fault and another
 PAIRS = (*PLACE, "fault", "other", *isolability.SHOWN, *isolability.DOUBLET)
 SUMMARY = ("fault", "excit.", "certain at", "from", "half the time at", "from")
 CERTAIN = "certain: detected and isolated in time, from some magnitude on; of so many grid points"
@@ -184,7 +193,7 @@ def run_survey(
     points = list(product(speeds_mps, altitudes_m, excitations))
     survey = Study(
         survey_name(scenario), points, partial(_point, scenario), partial(document_of, scenario.name),
-        files_of, row=dict[str, list[Document]], follows_from=scenario,
+        FILES, row=dict[str, list[Document]], follows_from=scenario,
     )  # fmt: skip
     return run_study(survey, out, progress=progress)
 
@@ -410,21 +419,19 @@ def document_of(name: str, points: Sequence[Mapping[str, Sequence[Document]]]) -
         "scenario": name,
         "detect_within_s": DETECT_WITHIN_S,
         "isolate_within_s": ISOLATE_WITHIN_S,
-        **{what: [row for point in points for row in point[what]] for what in ("points", "pairs")},
+        **{what: [row for point in points for row in point[what]] for what in PARTS},
     }
 
 
-def files_of(document: Document) -> Files:
-    """The document, its rows and their maps, and a page; a cell is empty where nothing is certain."""
-    name, rows, pairs = (document[key] for key in ("scenario", "points", "pairs"))
-    return {
-        "detectability.json": json.dumps(document, indent=1) + "\n",
-        "detectability.csv": as_csv(rows),
-        "isolability.csv": as_csv(pairs),
-        "detectability.png": draw(name, rows),
-        "isolability.png": isolability.draw(name, pairs),
-        "detectability.html": partial(_page, document),
-    }
+# A cell is empty where nothing is certain.
+FILES: Makers = {
+    "detectability.json": lambda document: json.dumps(document, indent=1) + "\n",
+    "detectability.csv": lambda document: as_csv(document["points"]),
+    "isolability.csv": lambda document: as_csv(document["pairs"]),
+    "detectability.png": lambda document: draw(document["scenario"], document["points"]),
+    "isolability.png": lambda document: isolability.draw(document["scenario"], document["pairs"]),
+    "detectability.html": lambda document: partial(_page, document),
+}
 
 
 def _page(document: Document, folder: Path) -> str:
@@ -512,3 +519,61 @@ def _line(row: Document) -> str:
     place = f"{row['fault']:<10}{row['airspeed_mps']:>6g}{row['altitude_m']:>7g}{row['excitation']:>8g}"
     found = [f"{_short(row[name]):>{width}}" for name, width in zip(MAGNITUDES, (10, 8, 10, 8), strict=True)]
     return f"{place}{''.join(found)}   {row['why']}"
+
+
+@dataclass(frozen=True)
+class Detectability(StudyCommand):
+    """Survey the smallest fault that is certain to be found.
+
+    Over speed, altitude and excitation: the smallest loss certain to be detected, and to be isolated.
+
+    Certain: within 0.5 s and 1 s, whatever the declared uncertainty does, along the scenario's references
+    scaled by 0.25 to 2; `median` where the fault strikes at half of all instants. With --surface it answers
+    in a line for each place.
+
+    And the map of isolability: which loss is told from which other surface, how small and how soon, and
+    by which doublet.
+
+    Stopped or killed, it goes on where it was with the same command.
+
+    airspeed: Airspeed, m/s; once for each.
+    altitude: Altitude above sea level, m; once for each.
+    aircraft: In place of the scenario's: built-in name, jsbsim:NAME, or ./FOLDER in the working directory.
+    surface: The surface to answer for.
+    out: Folder for the maps, a page, CSV and JSON.
+    """
+
+    scenario: ScenarioArgument
+    airspeed: AirspeedsOption = None
+    altitude: AltitudesOption = None
+    aircraft: str | None = None
+    surface: str | None = None
+    out: Path = Path("runs")
+
+    FILES = FILES
+    PLUGINS = False
+
+    def run(self, reporter: Reporter) -> Document:
+        """Survey every place; of one surface with the answers in words."""
+        scenario = load_scenario(self.scenario)
+        if self.aircraft is not None:
+            scenario = with_aircraft(scenario, self.aircraft)
+        known = scenario.airframe.class_of_losses
+        if self.surface is not None and self.surface not in known:
+            raise BadInput(f"--surface {self.surface!r:.60}: allowed: {', '.join(known)}")
+        speeds_mps, altitudes_m = self.airspeed or (), self.altitude or ()
+        found = run_survey(self.out, scenario, speeds_mps, altitudes_m, progress=reporter.progress)
+        folder = str(self.out / survey_name(scenario))
+        if self.surface is not None:
+            found |= {part: [row for row in found[part] if row["fault"] == self.surface] for part in PARTS}
+            return found | {"answers": answers(scenario, found["points"]), "folder": folder}
+        failures = engine_failures(scenario)
+        found |= {"alike": alike(scenario), "folder": folder}
+        return found | ({"engines": failures} if failures else {})
+
+    def as_text(self, document: Document, colour: bool) -> str:
+        """The answers in words, else the tables."""
+        if "answers" in document:
+            return "\n".join([*document["answers"], POINTER])
+        lines = [*geometry(document["alike"]), *of_engines(document.get("engines", ()))]
+        return "\n".join([text(document["points"], document["pairs"]), *lines, document["folder"]])

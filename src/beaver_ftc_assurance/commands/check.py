@@ -6,9 +6,11 @@ from typing import Annotated
 import typer
 
 from beaver_ftc.cli.output import Format, FormatOption, answer
+from beaver_ftc.commands import declare
 from beaver_ftc.documents.errors import BadInput
 
 
+@declare("certificate.json", plugins=False)
 def command(
     run: Annotated[Path, typer.Argument(metavar="RUN")],
     log: Annotated[Path | None, typer.Option(metavar="FILE")] = None,

@@ -10,6 +10,7 @@ import typer
 from beaver_ftc.cli.inputs import JunitOption, NoReportOption, WorkersOption
 from beaver_ftc.cli.output import Format, FormatOption, answer, judged
 from beaver_ftc.cli.progress import progress_bar
+from beaver_ftc.commands import declare
 
 if TYPE_CHECKING:
     from beaver_ftc_assurance.evidence.plan import EvidencePlan
@@ -28,6 +29,7 @@ class Arguments:
     junit: JunitOption = None
 
 
+@declare("evidence.json", "evidence.html", "evidence.pdf")
 def command(arguments: Arguments) -> None:
     """Fly a plan of requirements and write the evidence.
 

@@ -7,8 +7,10 @@ import typer
 
 from beaver_ftc.cli.inputs import ScenarioArgument
 from beaver_ftc.cli.output import Format, FormatOption, answer
+from beaver_ftc.commands import declare
 
 
+@declare("separation.json", "flown")
 def command(
     scenario: ScenarioArgument,
     rate_deg_s: Annotated[float, typer.Option(min=0.1, max=360)] = 20.0,

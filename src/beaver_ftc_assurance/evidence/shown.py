@@ -10,7 +10,7 @@ from typing import Any
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.metrics import as_json
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
-from beaver_ftc.studies.present.page import Files, Heading, Part, Table, as_html, versions_line
+from beaver_ftc.studies.present.page import Heading, Makers, Part, Table, as_html, versions_line
 from beaver_ftc.studies.present.tables import aligned, number
 from beaver_ftc_assurance.evidence.flown import MET, NOT_MET, NOT_SHOWN, failed, fly_flight
 from beaver_ftc_assurance.evidence.judged import Document, document_of
@@ -41,7 +41,7 @@ def run_plan(
         cases=plan.cases,
         fly=partial(fly_flight, plan),
         document=lambda rows: document_of(plan, rows, now),
-        files=files,
+        files=FILES,
         follows_from=[plan.sha256, [source.sha256 for source in plan.sources.values()]],
         lost=lambda case, why: failed(plan, case.what, why),
     )
@@ -49,16 +49,21 @@ def run_plan(
     return document
 
 
-def files(document: Document) -> Files:
-    """What is written of a document."""
+def _html(document: Document) -> str:
+    return as_html(_title(document), list(page(document)), {})
+
+
+def _pdf(document: Document) -> bytes:
     from beaver_ftc_assurance.evidence.paper import as_pdf
 
-    title, parts = f"Evidence: {document['plan']}", list(page(document))
-    return {
-        "evidence.json": as_json(document),
-        "evidence.html": as_html(title, parts, {}),
-        "evidence.pdf": as_pdf(title, parts, f"{document['plan']} · {document['date']}"),
-    }
+    return as_pdf(_title(document), list(page(document)), f"{document['plan']} · {document['date']}")
+
+
+def _title(document: Document) -> str:
+    return f"Evidence: {document['plan']}"
+
+
+FILES: Makers = {"evidence.json": as_json, "evidence.html": _html, "evidence.pdf": _pdf}
 
 
 def page(document: Document) -> Iterator[Part]:

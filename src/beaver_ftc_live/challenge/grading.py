@@ -18,7 +18,7 @@ from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, Entry, Result,
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.engine.workers import Case
 from beaver_ftc.studies.present import page
-from beaver_ftc.studies.present.page import Files
+from beaver_ftc.studies.present.page import Makers
 from beaver_ftc.studies.present.tables import aligned, finite, number
 from beaver_ftc_live.challenge import confine, folders, line
 from beaver_ftc_live.challenge.folders import Submission
@@ -67,7 +67,7 @@ def grade(challenge: Path, workers: int, progress: Progress | None) -> Document:
     flown = hashlib.sha256(repr(flights).encode()).hexdigest()  # what is kept on the way hides them, too
     study = Study(
         folders.GRADES, cases, partial(grade_case, flights=flights),
-        partial(document_of, flights=len(flights)), files_of, row=Graded, follows_from=flown, lost=_lost,
+        partial(document_of, flights=len(flights)), FILES, row=Graded, follows_from=flown, lost=_lost,
     )  # fmt: skip
     return run_study(study, challenge, workers, progress)
 
@@ -274,11 +274,8 @@ def parts_of(document: Document) -> list[page.Part]:
     return [*parts, page.versions_line(document["versions"])]
 
 
-def files_of(document: Document) -> Files:
-    """The grades as document and pages."""
-    parts = parts_of(document)
-    return {
-        "grades.json": as_json(document),
-        "grades.md": page.as_markdown(parts),
-        "grades.html": page.as_html("Grades", parts, {}),
-    }
+FILES: Makers = {
+    "grades.json": as_json,
+    "grades.md": lambda document: page.as_markdown(parts_of(document)),
+    "grades.html": lambda document: page.as_html("Grades", parts_of(document), {}),
+}

@@ -8,9 +8,11 @@ import typer
 from beaver_ftc.cli.inputs import WorkersOption
 from beaver_ftc.cli.output import Format, FormatOption, answer
 from beaver_ftc.cli.progress import progress_bar
+from beaver_ftc.commands import declare
 from beaver_ftc.documents.errors import BadInput
 
 
+@declare(plugins=False)
 def new(
     folder: Annotated[Path, typer.Argument(metavar="DIR")],
     flights: Annotated[int, typer.Option(min=4, max=200)] = 16,
@@ -40,6 +42,7 @@ def new(
     answer(format, parts | {"flights": flights}, lambda: "\n".join(lines))
 
 
+@declare(plugins=False)
 def submit(
     file: Annotated[Path, typer.Argument(metavar="FILE|FOLDER")],
     student: str | None = None,
@@ -69,6 +72,7 @@ def submit(
     answer(format, document, lambda: says)
 
 
+@declare("grades.json", "grades.md", "grades.html", plugins=False)
 def grade(
     folder: Annotated[Path, typer.Argument(metavar="DIR")],
     workers: WorkersOption = None,

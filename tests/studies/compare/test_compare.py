@@ -21,7 +21,7 @@ from beaver_ftc.studies.compare.leaderboard import (
     DIAGNOSIS,
     MARK,
     as_text,
-    files_of,
+    makers_of,
     write_leaderboard,
 )
 from beaver_ftc.studies.compare.replay import Trace
@@ -44,7 +44,7 @@ from beaver_ftc.studies.compare.trial import (
 )
 from beaver_ftc.studies.compare.tune import _best_detector, alarm_level, candidates, grids
 from beaver_ftc.studies.engine.study import fly_all
-from beaver_ftc.studies.present.page import write_files
+from beaver_ftc.studies.present.page import contents, write_files
 from commands import beaver
 from flying import scenario
 
@@ -170,7 +170,7 @@ def test_a_set_without_faults_can_be_drawn(tmp_path):
     document = document_of([fly_case(SetFlight("healthy", scenario), entries)], entries)
     row = document["sets"]["healthy"]["lines"][0]
     assert (row["detection_rate"], row["false_alarms_per_h"]) == (None, 0.0)
-    write_files(tmp_path, files_of(document, "still"))
+    write_files(tmp_path, contents(makers_of("still"), document))
     assert as_text(document)
     assert "Comparison: still" in (tmp_path / "comparison.html").read_text()
 

@@ -13,8 +13,8 @@ from beaver_ftc.studies.compare.leaderboard import (
     MARK,
     as_text,
     figure_of,
-    files_of,
     lost,
+    makers_of,
     page_of,
     write_leaderboard,
 )
@@ -88,7 +88,7 @@ def test_all_that_is_shown(compared, changed, tmp_path):
         f"# Benchmark\n\n{MARK}\n\nMade with ours 1, theirs 2.\n\n## faulty: 5 flights\n\n| scheme "
     )
     assert not changed([line for line in text.splitlines() if not line.startswith("|")], "board")
-    assert list(files_of(compared, "made")) == ["comparison.json", "comparison.png", "comparison.html"]
+    assert list(makers_of("made")) == ["comparison.json", "comparison.png", "comparison.html"]
 
 
 def test_one_set_without_a_curve_that_came_to_anything(compared, changed):

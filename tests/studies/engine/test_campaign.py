@@ -124,6 +124,6 @@ def test_a_flight_is_given_up_only_when_lost_alone_three_times(losses, status):
 
 def test_in_rounds_a_case_that_ends_its_process_has_the_row_that_the_study_gives_it(tmp_path, monkeypatch):
     monkeypatch.setattr(study, "ThisProcess", lambda work: Unreliable(1, deadly=frozenset({1})))
-    asked = study.Study("s", (), None, lambda rows: None, lambda document: {}, lost=lost)
+    asked = study.Study("s", (), None, lambda rows: None, {}, lost=lost)
     with study.in_rounds(asked, tmp_path) as fly_round:
         assert [row["status"] for row in fly_round(0, "abc")] == ["flown", "crashed", "flown"]

@@ -46,7 +46,7 @@ def rows_of(folder, cases, fly, workers=1, progress=None, **options):
 
 
 def study_of(folder, cases, fly, **options):
-    return Study(folder.name, cases, fly, list, dict, Row, **options)
+    return Study(folder.name, cases, fly, list, {}, Row, **options)
 
 
 def hidden(folder):
@@ -63,7 +63,7 @@ def test_rows_come_in_order_and_nothing_is_left(tmp_path):
 def test_a_study_leaves_its_files_and_gives_its_document(tmp_path):
     study = Study(
         "squares", range(3), square, lambda rows: {"sum": sum(row.delay_s for row in rows)},
-        lambda document: {"sum.txt": f"{document['sum']:.4f}"}, Row,
+        {"sum.txt": lambda document: f"{document['sum']:.4f}"}, Row,
     )  # fmt: skip
     assert run_study(study, tmp_path) == {"sum": pytest.approx(5 / 7)}
     assert hidden(tmp_path) == ["squares"]

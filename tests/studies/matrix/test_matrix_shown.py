@@ -7,12 +7,12 @@ import pytest
 from beaver_ftc.studies.matrix import fault_matrix
 from beaver_ftc.studies.matrix.fault_matrix import (
     FAULTS,
+    FILES,
     FaultCase,
     airspeeds_of,
     as_text,
     cases,
     document_of,
-    files_of,
     fly_case,
     heat_map_of,
     name_of,
@@ -20,6 +20,7 @@ from beaver_ftc.studies.matrix.fault_matrix import (
     scenario_of,
     verdict,
 )
+from beaver_ftc.studies.present.page import contents
 from kept import picture
 
 LOST = {"departure_s": 20.0, "departure_signal": "alpha_rad"}
@@ -82,7 +83,7 @@ def test_the_matrix_as_it_is_shown(made, changed):
     figure = heat_map_of(document)
     assert not changed(picture(figure), "figure")
     assert figure.get_size_inches().tolist() == [11.0, 0.5 * len(FAULTS) + 1.8]
-    files = files_of(document)
+    files = contents(FILES, document)
     assert list(files) == ["fault-matrix.json", "fault-matrix.txt", "fault-matrix.png"]
     assert files["fault-matrix.txt"] == as_text(document) + "\n"
     assert '"wrong"' in files["fault-matrix.json"]

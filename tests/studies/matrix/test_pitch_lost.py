@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from beaver_ftc.results.writer import FILES_OF_A_RESULT
 from beaver_ftc.scenario.control import EnginePower
+from beaver_ftc.studies.matrix.command import Matrix
 from beaver_ftc.studies.matrix.pitch_lost import (
     LAWS,
     LOST,
@@ -59,7 +59,7 @@ def test_what_is_written_is_what_was_found(found):
 
 
 def test_it_can_be_written_again(found):
-    assert {entry.name for entry in found[1].iterdir()} <= set(FILES_OF_A_RESULT)
+    assert {entry.name for entry in found[1].iterdir()} <= {*Matrix.FILES}
 
 
 def test_a_row_is_the_same_flown_alone(found):

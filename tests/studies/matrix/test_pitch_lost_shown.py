@@ -6,6 +6,7 @@ import pytest
 from beaver_ftc.scenario.control import EnginePower
 from beaver_ftc.studies.matrix import pitch_lost
 from beaver_ftc.studies.matrix.pitch_lost import (
+    FILES,
     LAWS,
     LOST,
     PitchCase,
@@ -13,13 +14,13 @@ from beaver_ftc.studies.matrix.pitch_lost import (
     as_text,
     closed_loop,
     document_of,
-    files_of,
     fly_case,
     loop_response,
     margins,
     run_pitch_lost,
     scenario_of,
 )
+from beaver_ftc.studies.present.page import contents
 from kept import in_short
 
 UNLIMITED = {
@@ -53,8 +54,8 @@ def test_the_report(changed):
     document["margins"].append(UNLIMITED)
     assert not changed(as_text(document).splitlines(), "text")
     assert not changed({key: value for key, value in document.items() if key != "flights"})
-    assert files_of(document)["pitch-lost.txt"] == as_text(document) + "\n"
-    assert list(files_of(document)) == ["pitch-lost.json", "pitch-lost.txt"]
+    assert contents(FILES, document)["pitch-lost.txt"] == as_text(document) + "\n"
+    assert list(contents(FILES, document)) == ["pitch-lost.json", "pitch-lost.txt"]
     assert document_of(rows_of((45.0,))[:3], (45.0,))["passed"]
 
 

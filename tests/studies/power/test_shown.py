@@ -23,6 +23,7 @@ from beaver_ftc.studies.power.survey import (
     scenario_of,
     strikes_at_s,
 )
+from beaver_ftc.studies.present.page import contents
 from kept import in_short, looks, picture
 
 GRID = replace(
@@ -82,7 +83,7 @@ def files(surveyed):
     """Of the survey without the rudder in light turbulence, as if that had not been flown."""
     document, rows = surveyed
     flown = [row for row in rows if (row["turbulence"], row["surface"]) != ("light", "rudder")]
-    return flown, shown.files_of((document, flown))
+    return flown, contents(shown.FILES, (document, flown))
 
 
 def test_every_row_is_written(files, changed):

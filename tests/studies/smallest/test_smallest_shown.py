@@ -2,7 +2,8 @@
 
 import json
 
-from beaver_ftc.studies.smallest.shown import as_text, files_of, sentences
+from beaver_ftc.studies.present.page import contents
+from beaver_ftc.studies.smallest.shown import FILES, as_text, sentences
 from kept import page
 from telling import alike
 
@@ -62,11 +63,11 @@ def test_what_is_said_of_every_kind_of_answer(changed):
     assert not changed({name: as_text(of).splitlines() for name, of in CASES.items()})
 
 
-def test_files_hold_every_row(changed, tmp_path):
-    files = files_of(CASES["all known"])
+def test_files_hold_every_row(changed):
+    files = contents(FILES, CASES["all known"])
     assert json.loads(files["smallest.json"]) == CASES["all known"]
     assert not changed(files["smallest.csv"].splitlines(), "csv")
-    assert not changed(page(files["smallest.html"](tmp_path)), "page")
+    assert not changed(page(files["smallest.html"]), "page")
 
 
 def test_what_limits_most_is_the_variant_that_finds_the_smallest():

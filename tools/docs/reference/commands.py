@@ -6,7 +6,7 @@ from typing import Any
 
 import typer
 
-from beaver_ftc.cli.main import app
+from beaver_ftc.cli.main import app, every_command
 from beaver_ftc.documents import errors
 from beaver_ftc.studies.present.tables import markdown_table
 
@@ -17,18 +17,9 @@ def page() -> str:
     """Every command."""
     says = "Which commands are there, and what does each take? `beaver-ftc COMMAND --help` says the same."
     parts = ["# Commands", says, *_described(PARSER, "beaver-ftc")]
-    for name, command in leaves(PARSER):
+    for name, command in every_command().items():
         parts += [f"## {name}", *_described(command, f"beaver-ftc {name}")]
     return "\n\n".join(parts) + "\n"
-
-
-def leaves(group: Any, above: str = "") -> Iterator[tuple[str, Any]]:
-    """(name, command) of each command of a group, those of groups in it with the group's name before."""
-    for name, command in group.commands.items():
-        if hasattr(command, "commands"):
-            yield from leaves(command, f"{above}{name} ")
-        else:
-            yield f"{above}{name}", command
 
 
 def _described(command: Any, called: str) -> Iterator[str]:

@@ -5,11 +5,13 @@ import tempfile
 import time
 from collections.abc import Callable
 from contextlib import nullcontext
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+import typer
 
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.plant import addresses, conditions
@@ -30,6 +32,7 @@ from beaver_ftc.studies.bench.contenders import (
 )
 from beaver_ftc.studies.bench.parts import PARTS, frame_with
 from beaver_ftc.studies.bench.straightforward import Straightforward
+from beaver_ftc.studies.engine.command import Reporter, StudyCommand
 from beaver_ftc.studies.engine.workers import cores, environment
 from beaver_ftc.studies.sweep.one_flight import row_of, scenario_of
 from beaver_ftc.studies.sweep.sampling import Plan
@@ -309,3 +312,28 @@ def _kinds(kinds: Document) -> list[str]:
 def _line(what: str, figures: Document, us: str = "us") -> str:
     low, high = figures[f"{us}_quartiles"]
     return f"{what:42}{figures[us]:9.3f}  [{low:.3f}, {high:.3f}]{figures['ratio']:9.3f} x"
+
+
+@dataclass(frozen=True)
+class Bench(StudyCommand):
+    """Time the closed loop against the bare aircraft.
+
+    Side by side, and part by part. The first time, the frame is compiled once more for each part that
+    is taken out: about two minutes.
+
+    rounds: How often everything is timed.
+    no_parts: Time the whole loop only, not part by part.
+    """
+
+    rounds: Annotated[int, typer.Option(min=3, max=10000)] = 60
+    no_parts: bool = False
+
+    PLUGINS = False
+
+    def run(self, reporter: Reporter) -> Document:
+        """Time everything."""
+        return bench(self.rounds, not self.no_parts, say=lambda what: reporter.say(f"timing {what}"))
+
+    def as_text(self, document: Document, colour: bool) -> str:
+        """The times."""
+        return text_of(document)

@@ -13,7 +13,7 @@ from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.engine.workers import Case
 from beaver_ftc.studies.present import page
 from beaver_ftc.studies.present.figures import curve_look, marker, panels
-from beaver_ftc.studies.present.page import Files
+from beaver_ftc.studies.present.page import Makers
 from beaver_ftc.studies.present.tables import aligned
 
 if TYPE_CHECKING:
@@ -185,17 +185,17 @@ def run_comparison(
     """Write `out/<name>/` (document, figure, page) of every case with every entry; return the document."""
     study = Study(
         name, cases, partial(fly_case, entries=tuple(entries)), partial(document_of, entries=entries),
-        partial(files_of, name=name), row=Trial, follows_from=entries, lost=lost,
+        makers_of(name), row=Trial, follows_from=entries, lost=lost,
     )  # fmt: skip
     return run_study(study, out, workers, progress)
 
 
-def files_of(document: Document, name: str) -> Files:
-    """Document, figure and page."""
+def makers_of(name: str) -> Makers:
+    """The document, its figure and the page of this name."""
     return {
-        "comparison.json": as_json(document),
-        "comparison.png": figure_of(document),
-        "comparison.html": partial(page_of, document, f"Comparison: {name}"),
+        "comparison.json": as_json,
+        "comparison.png": figure_of,
+        "comparison.html": lambda document: partial(page_of, document, f"Comparison: {name}"),
     }
 
 

@@ -29,7 +29,7 @@ from beaver_ftc.studies.engine.workers import (
     Work,
     Workers,
 )
-from beaver_ftc.studies.present.page import Files, write_files
+from beaver_ftc.studies.present.page import Makers, contents, write_files
 
 Progress = Callable[[float], None]
 Fly = Callable[[Any], Any]
@@ -127,16 +127,16 @@ class Study:
     """What is a study's own: its cases, how each is flown, what their rows amount to, and its files.
 
     name: of the result folder. fly: from a case to its row, a value of the type `row`; it can be pickled, as
-    the cases can. document: of all rows. files: of the document. follows_from: what the rows follow from
-    beside the cases. lost: the row of a case that kills its process each time; without it that is a
-    SimulationFailed. warm_up: of the workers that fly rounds.
+    the cases can. document: of all rows. files: their names, with what makes the content of each from the
+    document. follows_from: what the rows follow from beside the cases. lost: the row of a case that kills
+    its process each time; without it that is a SimulationFailed. warm_up: of the workers that fly rounds.
     """
 
     name: str
     cases: Sequence[Any]
     fly: Fly
     document: Callable[[list[Any]], Any]
-    files: Callable[[Any], Files]
+    files: Makers
     row: Any = dict
     follows_from: Any = None
     lost: Lost | None = None
@@ -145,9 +145,9 @@ class Study:
 
 def run_study(study: Study, out: Path, workers: int = 1, progress: Progress | None = None) -> Any:
     """Fly a study and write `out/<name>/`; return its document."""
-    with flown(study, out, workers, progress) as rows, result_folder(out, study.name) as folder:
+    with flown(study, out, workers, progress) as rows, result_folder(out, study.name, study.files) as folder:
         document = study.document(rows)
-        write_files(folder, study.files(document))
+        write_files(folder, contents(study.files, document))
     return document
 
 

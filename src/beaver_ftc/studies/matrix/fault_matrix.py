@@ -27,7 +27,7 @@ from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.matrix.clairvoyant import columns_of, seen_when_told
 from beaver_ftc.studies.present.figures import heat_map, panels
-from beaver_ftc.studies.present.page import Files
+from beaver_ftc.studies.present.page import Makers
 from beaver_ftc.studies.reproduce.choices import SETTING
 
 if TYPE_CHECKING:
@@ -304,17 +304,8 @@ def run_matrix(
 ) -> Document:  # fmt: skip
     """Write table, JSON and heat map into the folder that `name_of` says, in `out`; return the document."""
     all_cases = cases(airspeeds_mps or airspeeds_of(aircraft), declared, aircraft, turbulence)
-    matrix = Study(name_of(declared, turbulence), all_cases, fly_case, document_of, files_of)
+    matrix = Study(name_of(declared, turbulence), all_cases, fly_case, document_of, FILES)
     return run_study(matrix, out, workers, progress)
-
-
-def files_of(document: Document) -> Files:
-    """The document, its table, and the heat map."""
-    return {
-        f"{NAME}.json": as_json(document),
-        f"{NAME}.txt": as_text(document) + "\n",
-        f"{NAME}.png": heat_map_of(document),
-    }
 
 
 LEGEND = (
@@ -393,6 +384,13 @@ def heat_map_of(document: Document) -> "Figure":
     bar.ax.set_yticklabels([f"{2**n}" for n in range(most)] + [f"{2**most} or more"])
     bar.set_label("tracking RMS over the oracle's, worst airspeed")
     return figure
+
+
+FILES: Makers = {
+    f"{NAME}.json": as_json,
+    f"{NAME}.txt": lambda document: as_text(document) + "\n",
+    f"{NAME}.png": heat_map_of,
+}
 
 
 def _doublings(cell: Document) -> float:

@@ -23,7 +23,7 @@ from beaver_ftc.scenario.schema import Initial, Scenario
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.linear_systems import zeros
 from beaver_ftc.studies.matrix.fault_matrix import AIRSPEEDS_MPS, AT_S, REFERENCE, UNCERTAINTY, trimmed_deg
-from beaver_ftc.studies.present.page import Files
+from beaver_ftc.studies.present.page import Makers
 
 Document = dict[str, Any]
 NAME = "pitch-lost"
@@ -111,12 +111,7 @@ def run_pitch_lost(
     airspeeds_mps = airspeeds_mps or AIRSPEEDS_MPS
     cases = [PitchCase(name, V, law) for law in LAWS for name in LOST for V in airspeeds_mps]
     document = partial(document_of, airspeeds_mps=airspeeds_mps)
-    return run_study(Study(NAME, cases, fly_case, document, files_of), out, workers, progress)
-
-
-def files_of(document: Document) -> Files:
-    """The document and its table."""
-    return {f"{NAME}.json": as_json(document), f"{NAME}.txt": as_text(document) + "\n"}
+    return run_study(Study(NAME, cases, fly_case, document, FILES), out, workers, progress)
 
 
 def document_of(rows: list[Document], airspeeds_mps: Sequence[float]) -> Document:
@@ -229,6 +224,9 @@ def as_text(document: Document) -> str:
     )
     tables, linear = [line.rstrip() for line in lines], [_margin(one) for one in document["margins"]]
     return "\n".join([*tables, LEGEND, "", _row(MARGIN_HEAD), *linear, "", totals])
+
+
+FILES: Makers = {f"{NAME}.json": as_json, f"{NAME}.txt": lambda document: as_text(document) + "\n"}
 
 
 def _cell(row: Document) -> str:

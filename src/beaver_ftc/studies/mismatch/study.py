@@ -199,15 +199,15 @@ def run_map(
     One entry per axis, speed and altitude: worst share of the bound, smallest constant, and why.
     """
 
-    def files_of(found: Document) -> Files:
-        drawn = {f"{MAP}.png": charts.map_figure(found["map"], scenario.name)} if report else None
-        return {**_as_files(found, found["map"]), "figures": drawn}
+    def drawn(found: Document) -> Files | None:
+        return {f"{MAP}.png": charts.map_figure(found["map"], scenario.name)} if report else None
 
     conditions = [(V, h) for h in ALTITUDES_M for V in AIRSPEEDS_MPS]
     flights = Study(
         map_name(scenario), conditions, partial(_cell, scenario),
         lambda cells: {"scenario": scenario.name, "map": [entry for cell in cells for entry in cell]},
-        files_of, row=list[Document], follows_from=scenario,
+        {"mismatch.json": as_json, "mismatch.csv": lambda found: as_csv(found["map"]), "figures": drawn},
+        row=list[Document], follows_from=scenario,
     )  # fmt: skip
     return run_study(flights, out, progress=progress)["map"]
 

@@ -1,7 +1,10 @@
-"""The survey as people see it: a table a condition, where ours is better or worse, maps and curves."""
+"""The survey as people see it: a table a condition, where ours is better or worse, maps and curves; and the
+command `power`."""
 
 import io
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -10,11 +13,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from beaver_ftc.results.metrics import Document, as_json
+from beaver_ftc.studies.engine.command import (
+    AirspeedOption,
+    AltitudeOption,
+    Reporter,
+    StudyCommand,
+    TurbulenceName,
+    WorkersOption,
+    listed,
+)
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
+from beaver_ftc.studies.power import chances, survey
 from beaver_ftc.studies.power.chances import JUDGED_S, SIGNIFICANT, Row, document_of, grouped, limit, summary
-from beaver_ftc.studies.power.survey import BUILT_IN, WITHIN_S, Grid, Watched, fly_block, lost
+from beaver_ftc.studies.power.survey import BUILT_IN, GRIDS, WITHIN_S, Grid, Watched, fly_block, lost
 from beaver_ftc.studies.present.figures import curve_look, heat_map, label_edges, marker, panels
-from beaver_ftc.studies.present.page import Files
+from beaver_ftc.studies.present.page import Files, Makers
 from beaver_ftc.studies.present.tables import plain, printed, seconds
 
 if TYPE_CHECKING:
@@ -136,23 +149,10 @@ def run_power(
     cases = [*((block, False) for block in healthy), *((block, True) for block in grid.faulted())]
     study = Study(
         NAME, cases, partial(fly_block, grid=grid, schemes=schemes),
-        lambda watched: document_of(grid, watched[: len(healthy)], watched[len(healthy) :]), files_of,
+        lambda watched: document_of(grid, watched[: len(healthy)], watched[len(healthy) :]), FILES,
         row=Watched, follows_from=(grid, schemes), lost=lost,
     )  # fmt: skip
     return run_study(study, out, workers, progress)[0]
-
-
-def files_of(survey: tuple[Document, list[Row]]) -> Files:
-    """Document, text, one row a flight and scheme, and everything drawn, as PNG and as SVG."""
-    document, rows = survey
-    return {
-        f"{NAME}.json": as_json(document),
-        f"{NAME}.txt": as_text(document) + "\n",
-        f"{NAME}.parquet": rows_as_parquet(rows),
-        "figures": {
-            f"{name}.{kind}": figure for name, figure in _figures(document, rows) for kind in ("png", "svg")
-        },
-    }
 
 
 def rows_as_parquet(rows: Sequence[Row]) -> bytes:
@@ -170,6 +170,21 @@ def rows_as_parquet(rows: Sequence[Row]) -> bytes:
     content = io.BytesIO()
     pq.write_table(pa.Table.from_pylist(list(rows), schema=pa.schema(columns)), content)
     return content.getvalue()
+
+
+def figures_of(document: Document, rows: Sequence[Row]) -> Files:
+    """Everything drawn, as PNG and as SVG."""
+    drawn = _figures(document, rows)
+    return {f"{name}.{kind}": figure for name, figure in drawn for kind in ("png", "svg")}
+
+
+# Of the document and of one row a flight and scheme.
+FILES: Makers = {
+    f"{NAME}.json": lambda survey: as_json(survey[0]),
+    f"{NAME}.txt": lambda survey: as_text(survey[0]) + "\n",
+    f"{NAME}.parquet": lambda survey: rows_as_parquet(survey[1]),
+    "figures": lambda survey: figures_of(*survey),
+}
 
 
 def _figures(document: Document, rows: Sequence[Row]) -> Iterator[tuple[str, "Figure"]]:
@@ -265,3 +280,64 @@ def _draw(panel: "Axes", rows: Sequence[Row], schemes: Sequence[str], per_h: flo
     panel.set_xlim(left=0)
     panel.grid(alpha=0.3)
     panel.tick_params(labelsize=8)
+
+
+GridName = StrEnum("GridName", ["quick", "full"])
+SensorsName = StrEnum("SensorsName", {"ideal": "ideal", "tactical_grade": "tactical-grade"})
+
+
+@dataclass(frozen=True)
+class Power(StudyCommand):
+    """Map how likely and how soon faults are detected.
+
+    Over surface, magnitude, excitation, sensors and turbulence.
+
+    Every scheme watches the same flights, at the alarm level that gives all the same false-alarm rate on the
+    same healthy flights. Writes power.json, power.parquet, power.txt, and maps as PNG and SVG.
+
+    Stopped or killed, it goes on where it was with the same command.
+
+    grid: quick: a minute of CPU; full: ten or so.
+    schemes: Comma-separated schemes beside ours; all registered ones if left out.
+    sensors: Only with these sensors; left out: all of the grid.
+    turbulence: Only in this air; left out: all of the grid.
+    airspeed: Airspeed, m/s.
+    altitude: Altitude above sea level, m.
+    aircraft: Built-in name, jsbsim:NAME, or ./FOLDER in the working directory.
+    surface: Only losses of this one, with an answer in a line for each of them.
+    rates_alone: Do not show plug-ins the air as our detector sees it by the vanes.
+    out: Folder for the results: `power` in it.
+    """
+
+    grid: GridName = GridName.quick
+    schemes: str | None = None
+    sensors: SensorsName | None = None
+    turbulence: TurbulenceName | None = None
+    airspeed: AirspeedOption = None
+    altitude: AltitudeOption = None
+    aircraft: str | None = None
+    surface: str | None = None
+    rates_alone: bool = False
+    workers: WorkersOption = None
+    out: Path = Path("runs")
+
+    FILES = FILES
+
+    @property
+    def label(self) -> str:
+        """The words before the progress bar."""
+        return f"power, {self.grid.value} grid"
+
+    def run(self, reporter: Reporter) -> Document:
+        """Fly the grid; of one surface with the answers in words."""
+        chosen = survey.contenders(None if self.schemes is None else listed(self.schemes))
+        grid = replace(GRIDS[self.grid].only(self.sensors, self.turbulence), vanes=not self.rates_alone)
+        grid = grid.elsewhere(self.aircraft, self.airspeed, self.altitude, self.surface)
+        document = run_power(self.out, grid, chosen, self.processes, reporter.progress)
+        said = chances.answers(document, self.surface) if self.surface else []
+        return document | ({"answers": said} if said else {}) | {"folder": str(self.out / NAME)}
+
+    def as_text(self, document: Document, colour: bool) -> str:
+        """The answers in words, else the tables; and where the files are."""
+        text = "\n".join(document.get("answers", ())) or as_text(document)
+        return f"{text}\n\nresults: {document['folder']}"

@@ -113,6 +113,12 @@ def versions_line(versions: Mapping[str, str]) -> str:
 
 Content = Any  # text, bytes, a figure, a folder of these, or a function that makes one, given the folder
 Files = Mapping[str, Content]
+Makers = Mapping[str, Callable[[Any], Content]]  # by the name of a file what makes its content of a document
+
+
+def contents(files: Makers, document: Any) -> Files:
+    """The content of each file of a document."""
+    return {name: make(document) for name, make in files.items()}
 
 
 def write_files(folder: Path, files: Files) -> None:

@@ -5,11 +5,14 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+import typer
 
 from beaver_ftc.results.metrics import Document, as_json, versions
+from beaver_ftc.studies.engine.command import Reporter, StudyCommand
 from beaver_ftc.studies.engine.study import Progress, Study, fly_all, run_study
-from beaver_ftc.studies.present.page import Files
+from beaver_ftc.studies.present.page import Makers
 from beaver_ftc.studies.present.tables import finite
 from beaver_ftc.studies.reproduce import beside, truth_and_design
 from beaver_ftc.studies.reproduce.cases import BEYOND, GAINS, PUBLISHED, VARIANTS, Changed, Flown, fly_case
@@ -25,7 +28,7 @@ from beaver_ftc.studies.reproduce.claims import (
     Claim,
 )
 from beaver_ftc.studies.reproduce.published_figures import figures_of
-from beaver_ftc.studies.reproduce.words import NAME, as_html, as_markdown
+from beaver_ftc.studies.reproduce.words import NAME, as_html, as_markdown, as_text
 
 NUMBERS, FALSE_ALARM = "numbers", "false alarm"
 ELSEWHERE = (*BEYOND, *VARIANTS, *GAINS)  # wherever the paper did not fly
@@ -170,20 +173,18 @@ def _missed(ours: list[float], numbers: list[float]) -> list[Document]:
     ]
 
 
-def files_of(found: tuple[Document, Flights]) -> Files:
-    """The figures, the document, and its page as Markdown and as HTML."""
-    document, flights = found
-    return {
-        "figures": figures_of(document, flights.published),
-        f"{NAME}.json": as_json(document),
-        f"{NAME}.md": as_markdown(document, "figures"),
-        f"{NAME}.html": partial(as_html, document),
-    }
+# Of the document and the flights of its figures.
+FILES: Makers = {
+    "figures": lambda found: figures_of(found[0], found[1].published),
+    f"{NAME}.json": lambda found: as_json(found[0]),
+    f"{NAME}.md": lambda found: as_markdown(found[0], "figures"),
+    f"{NAME}.html": lambda found: partial(as_html, found[0]),
+}
 
 
 def reproduce(out: Path, workers: int = 2, progress: Progress | None = None) -> Document:
     """Write `out/reproduction/` (tables as JSON, Markdown and HTML, and the figures); return the document."""
-    study = Study(NAME, STUDIED, row_of, _found, files_of, row=list[float])
+    study = Study(NAME, STUDIED, row_of, _found, FILES, row=list[float])
     document: Document = run_study(study, out, workers, progress)[0]
     return document
 
@@ -196,3 +197,39 @@ def reproduced(workers: int = 2) -> tuple[Document, Flights]:
 def _found(rows: Sequence[Any]) -> tuple[Document, Flights]:
     flights = fly_published()
     return document_of(flights, rows), flights
+
+
+@dataclass(frozen=True)
+class Reproduce(StudyCommand):
+    """Fly the published study and judge its statements.
+
+    Every figure, every statement with our number, the number without the mechanism it speaks of, and a
+    verdict; the same cases flown by our defaults, side by side.
+
+    Exit status 1 if a statement is not borne out and the reason is not known.
+
+    Stopped or killed, it goes on where it was with the same command.
+
+    out: Folder for the results: `reproduction` in it.
+    workers: Processes that fly them.
+    """
+
+    out: Path = Path("runs")
+    workers: Annotated[int, typer.Option(min=1)] = 2
+
+    FILES = FILES
+    PLUGINS = False
+
+    @property
+    def label(self) -> str:
+        """The words before the progress bar."""
+        return "ablations, and changes to what the paper leaves open"
+
+    def run(self, reporter: Reporter) -> Document:
+        """Fly the published cases, the ablations and the variants."""
+        document = reproduce(self.out, self.workers, reporter.progress)
+        return document | {"folder": str(self.out / NAME)}
+
+    def as_text(self, document: Document, colour: bool) -> str:
+        """The tables, and what the sensitivity study says."""
+        return as_text(document, document["folder"], colour)

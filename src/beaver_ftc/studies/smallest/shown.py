@@ -2,12 +2,10 @@
 
 import json
 from collections.abc import Iterator, Sequence
-from functools import partial
-from pathlib import Path
 from typing import Any
 
 from beaver_ftc.results.metrics import ON_THE_BOUND
-from beaver_ftc.studies.present.page import Files, Part, Table, as_html
+from beaver_ftc.studies.present.page import Makers, Part, Table, as_html
 from beaver_ftc.studies.present.tables import aligned, as_csv
 
 HEAD = ("", "found in 90 %", "95 % interval", "flights", "certain")
@@ -145,23 +143,21 @@ def _interval(found: Document) -> str:
     return f"{low} % or more" if found["high"] is None else f"{low} to {_percent(found['high'])}"
 
 
-def files_of(document: Document) -> Files:
-    """The document, its rows and a page."""
-    rows = [document, *document["compared"]]
-    return {
-        "smallest.json": json.dumps(document, indent=1) + "\n",
-        "smallest.csv": as_csv([_flat(row) for row in rows]),
-        "smallest.html": partial(_page, document),
-    }
-
-
 def _flat(row: Document) -> Document:
     found = {f"found_{name}": value for name, value in row["found"].items()}
     certain = {f"certain_{name}": value for name, value in row["certain"].items()}
     return {"variant": row["variant"], **found, **certain, "total_loss_found": row["total_loss"]["value"]}
 
 
-def _page(document: Document, folder: Path) -> str:
+def page_of(document: Document) -> str:
+    """The answers and the table."""
     rows = [document, *document["compared"]]
     parts: list[Part] = [*sentences(document), Table(HEAD, [list(_cells(row)) for row in rows])]
     return as_html(f"How small: {document['surface']} of {document['scenario']}", parts, {})
+
+
+FILES: Makers = {
+    "smallest.json": lambda document: json.dumps(document, indent=1) + "\n",
+    "smallest.csv": lambda document: as_csv([_flat(row) for row in (document, *document["compared"])]),
+    "smallest.html": page_of,
+}

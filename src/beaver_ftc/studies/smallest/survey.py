@@ -13,21 +13,24 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
+import typer
 
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import metrics, versions
 from beaver_ftc.results.writer import result_folder
+from beaver_ftc.scenario.loader import load_scenario
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.detectability import SETTLED_S
+from beaver_ftc.studies.engine.command import Reporter, ScenarioArgument, StudyCommand, WorkersOption
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial
 from beaver_ftc.studies.engine.study import FlyRound, Study, in_rounds
-from beaver_ftc.studies.present.page import write_files
+from beaver_ftc.studies.present.page import contents, write_files
 from beaver_ftc.studies.present.tables import finite
-from beaver_ftc.studies.smallest.shown import files_of
+from beaver_ftc.studies.smallest.shown import FILES, as_text
 from beaver_ftc.studies.smallest.thresholds import LARGEST, STAGES, Threshold, of_all, threshold
 
 SHARE = 0.9  # of flights
@@ -89,14 +92,14 @@ def run_smallest(
     variants = dict(variants_of(scenario, asked.surface))
     study = Study(
         f"{scenario.name[:70]}-smallest-{asked.surface}", (), partial(fly_one, variants, asked),
-        lambda rows: None, lambda document: {}, follows_from=[scenario, asked],
+        lambda rows: None, FILES, follows_from=[scenario, asked],
         lost=lambda flight, why: _row(failed=True),
     )  # fmt: skip
     with in_rounds(study, out, workers) as rounds:
         flown = _Flown(rounds, tell)
         document = _document(scenario, asked, variants, flown)
-        with result_folder(out, study.name) as folder:
-            write_files(folder, files_of(document))
+        with result_folder(out, study.name, study.files) as folder:
+            write_files(folder, contents(study.files, document))
     return document | {"folder": str(out / study.name)}
 
 
@@ -249,3 +252,44 @@ def _shares(found: Threshold) -> Document:
 
 def _counted(count: int, of: int) -> Document:
     return {"count": count, "of": of, **vars(binomial(count, of))}
+
+
+@dataclass(frozen=True)
+class Smallest(StudyCommand):
+    """Find how small a loss of one surface is found in time.
+
+    The size that is certain to be detected, and the size that is found in 90 % of flights with its 95 %
+    interval. Flies the scenario without its own faults; seed and instant of the loss are drawn, and flights
+    are added until the interval is narrow, 480 at most.
+
+    Then what limits it: turbulence, sensors, servos and uncertainty of the model, each left out of the same
+    flights; and which reference would help: twice the amplitude, twice the frequency.
+
+    Stopped or killed, it goes on where it was with the same command.
+
+    Examples:
+      beaver-ftc smallest elevator-partial-loss --surface elevator --within 0.5
+
+    surface: The surface that loses effectiveness.
+    within: From the loss to the alarm, s.
+    seed: Of everything drawn.
+    out: Folder for the results: SCENARIO-smallest-SURFACE in it, with a page, CSV and JSON.
+    """
+
+    scenario: ScenarioArgument
+    surface: Annotated[str, typer.Option()]
+    within: Annotated[float, typer.Option(min=0.01, max=60)] = 0.5
+    seed: Annotated[int, typer.Option(min=0)] = 1
+    workers: WorkersOption = None
+    out: Path = Path("runs")
+
+    FILES = FILES
+
+    def run(self, reporter: Reporter) -> Document:
+        """Fly until the interval is narrow, then what limits the answer."""
+        asked = Asked(self.surface, self.within, self.seed)
+        return run_smallest(self.out, load_scenario(self.scenario), asked, self.processes, reporter.say)
+
+    def as_text(self, document: Document, colour: bool) -> str:
+        """The answers, a table, and where the files are."""
+        return f"{as_text(document)}\n\nresults: {document['folder']}"

@@ -245,7 +245,7 @@ def run_rare(
         return {"score": -math.inf, "failed": True}
 
     study = Study(
-        name, (), partial(_fly, sweep, expectation), lambda rows: None, lambda document: {},
+        name, (), partial(_fly, sweep, expectation), lambda rows: None, {},
         follows_from=[identity_of(sweep, expectation), RUNS, MEMBERS], lost=lost,
         warm_up=partial(warm_up, sweep),
     )  # fmt: skip

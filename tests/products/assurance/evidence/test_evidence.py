@@ -11,7 +11,7 @@ from reportlab.pdfgen.canvas import Canvas
 import beaver_ftc as bf
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.margins import Margin
-from beaver_ftc.studies.present.page import Heading
+from beaver_ftc.studies.present.page import Heading, contents
 from beaver_ftc.studies.sweep import one_flight
 from beaver_ftc_assurance.evidence import flown, shown
 from beaver_ftc_assurance.evidence import judged as judged_module
@@ -19,7 +19,7 @@ from beaver_ftc_assurance.evidence.flown import MET, NOT_MET, NOT_SHOWN, fly_fli
 from beaver_ftc_assurance.evidence.judged import document_of
 from beaver_ftc_assurance.evidence.paper import as_pdf
 from beaver_ftc_assurance.evidence.plan import OfMargins, load_plan
-from beaver_ftc_assurance.evidence.shown import as_text, files, of_flight, page, run_plan
+from beaver_ftc_assurance.evidence.shown import FILES, as_text, of_flight, page, run_plan
 from telling import apart
 
 from .plans import FAULTY, HEALTHY, seeded
@@ -89,7 +89,7 @@ def test_two_runs_of_a_plan_differ_in_nothing_but_the_date(tmp_path, monkeypatch
         made = {path.name: path.read_bytes() for path in (tmp_path / folder).iterdir()}
         assert sorted(made) == ["evidence.html", "evidence.json", "evidence.pdf"]
         assert json.loads(made["evidence.json"]) == document
-        assert made["evidence.pdf"] == files(document)["evidence.pdf"]
+        assert made["evidence.pdf"] == FILES["evidence.pdf"](document)
         texts.append([made[name].decode().replace(Clock.now_is, "WHEN") for name in sorted(made)[:2]])
         assert all(Clock.now_is not in text and "WHEN" in text for text in texts[-1])
     assert texts[0] == texts[1]
@@ -292,7 +292,7 @@ def test_the_plan_of_a_stranger_is_text_in_page_and_paper(tmp_path):
             {"id": "A", "text": text, "clause": text, "over": ["healthy"], "expect": {"no_departure": True}}
         ],
     )
-    made = files(judged(plan))
+    made = contents(FILES, judged(plan))
     assert "<script>" not in made["evidence.html"]
     assert "&lt;script&gt;" in made["evidence.html"]
     assert made["evidence.pdf"].startswith(b"%PDF")

@@ -1,0 +1,77 @@
+"""`beaver-ftc trim`: a trimmed flight condition."""
+
+import math
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from beaver_ftc.cli.output import Format, FormatOption, answer
+
+if TYPE_CHECKING:
+    from beaver_ftc.plant.trim import TrimPoint
+
+_RESIDUALS = ("udot_mps2", "vdot_mps2", "wdot_mps2", "pdot_rad_s2", "qdot_rad_s2", "rdot_rad_s2")
+_CONDITION = (("airspeed", "airspeed_mps", "m/s"), ("altitude", "altitude_m", "m"))
+_ATTITUDE = (  # what, attribute, unit; angles in degrees
+    ("angle of attack", "alpha_rad", "deg"),
+    ("sideslip", "beta_rad", "deg"),
+    ("pitch attitude", "theta_rad", "deg"),
+    ("flight path", "gamma_rad", "deg"),
+)
+
+ConditionOf = Annotated[str | None, typer.Argument(metavar="SCENARIO")]
+
+
+@dataclass(frozen=True)
+class Condition:
+    """The flight condition to trim: but for the first and the last, keys of a scenario's `initial`."""
+
+    scenario: ConditionOf = None
+    airspeed_mps: Annotated[float | None, typer.Option(min=1, max=1000)] = None
+    altitude_m: Annotated[float | None, typer.Option(min=-300, max=30000)] = None
+    engine_rpm: Annotated[float | None, typer.Option(min=0, max=3000)] = None
+    manifold_pressure_inhg: Annotated[float | None, typer.Option(min=0, max=50)] = None
+    flap_deg: Annotated[float | None, typer.Option(min=-6, max=60)] = None
+    format: FormatOption = Format.text
+
+
+def command(condition: Condition) -> None:
+    """Print a trimmed flight condition.
+
+    Steady straight flight, wings level; what cannot be trimmed is bad input (2). What is not given
+    is the scenario's, or else its default: 45 m/s at 1828.8 m, 1800 rpm, 20 inHg, no flap.
+    Engine and flap are those of an aircraft that has them.
+
+    Examples:
+      beaver-ftc trim --airspeed-mps 40 --altitude-m 1000
+
+    scenario: Take the flight condition from it.
+    airspeed_mps: True airspeed, m/s.
+    altitude_m: Altitude, m.
+    engine_rpm: Engine speed, rpm.
+    manifold_pressure_inhg: Manifold pressure, inHg.
+    flap_deg: Flap deflection, deg.
+    """
+    from beaver_ftc.plant import conditions
+
+    given = asdict(condition)
+    name, format = given.pop("scenario"), given.pop("format")
+    point = conditions.trim(name, **{key: value for key, value in given.items() if value is not None})
+    residual = dict(zip(_RESIDUALS, point.residual, strict=True))
+    answer(format, point.as_dict() | {"residual": residual}, lambda: _table(point))
+
+
+def _table(point: "TrimPoint") -> str:
+    settings = tuple((name.replace("_", " "), name, "") for name in point.settings)
+    surfaces = tuple((name, f"{name}_rad", "deg") for name in point.surfaces_rad)
+    shown = (*_CONDITION, *settings, *_ATTITUDE, *surfaces)
+    lines = []
+    for what, name, unit in shown:
+        value = getattr(point, name)
+        text = f"{math.degrees(value):.4f}" if unit == "deg" else f"{value:g}"
+        lines.append(f"{what:22}{text:>12} {unit}".rstrip())
+    lines.append(f"{'worst residual':22}{max(map(abs, point.residual)):>12.1e} m/s2 or rad/s2")
+    if not point.envelope_valid:
+        lines.append("outside the flight-validated envelope")
+    return "\n".join(lines)

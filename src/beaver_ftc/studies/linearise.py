@@ -1,0 +1,47 @@
+"""The command `linearise`: margins of the closed loop, and handling qualities of the aircraft alone."""
+
+from dataclasses import dataclass
+from math import inf
+from typing import Annotated
+
+import typer
+
+from beaver_ftc.scenario.loader import load
+from beaver_ftc.studies import handling, margins
+from beaver_ftc.studies.engine.command import Document, Reporter, StudyCommand
+
+
+@dataclass(frozen=True)
+class Linearise(StudyCommand):
+    """Linearise the closed loop and print its margins.
+
+    Over the airspeeds of the envelope. Aircraft, actuators, sensors' lag and delay, frame rate and the
+    default law, broken at each surface in turn; healthy, and with losses of each surface that the law
+    knows.
+
+    And the handling qualities of the aircraft alone: short period, phugoid, Dutch roll, roll and spiral mode
+    against the levels of MIL-F-8785C; of a scenario in which something breaks, also where its flight ends.
+
+    scenario: Take sensors, actuators and law from it.
+    """
+
+    scenario: Annotated[str | None, typer.Argument(metavar="SCENARIO")] = None
+
+    def run(self, reporter: Reporter) -> Document:
+        """The margins over the airspeeds, and the modes."""
+        scenario = load({} if self.scenario is None else self.scenario)
+        asked = scenario.control.gain_margin_db, scenario.control.phase_margin_deg
+        document = margins.as_document(margins.study(scenario), asked)
+        return document | {"handling": handling.as_rows(handling.over_airspeeds(scenario))}
+
+    def as_text(self, document: Document, colour: bool) -> str:
+        """A line a fault and surface, then a line a flight condition."""
+        found = [margins.Margin(**_numbers(row, leave_out="keeps")) for row in document["margins"]]
+        modes = [handling.Quality(**_numbers(row)) for row in document["handling"]]
+        asked = document["gain_margin_db"], document["phase_margin_deg"]
+        return f"{margins.as_text(found, asked)}\n\n{handling.as_text(modes)}"
+
+
+def _numbers(row: Document, leave_out: str = "") -> Document:
+    """A row of the document with its numbers: null stands for one without end."""
+    return {key: inf if value is None else value for key, value in row.items() if key != leave_out}

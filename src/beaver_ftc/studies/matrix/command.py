@@ -1,0 +1,90 @@
+"""The command `matrix`: every fault type on every surface, or elevator and flap lost at once."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from beaver_ftc.aircraft import DEFAULT
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.studies.engine.command import (
+    AirspeedsOption,
+    Document,
+    Reporter,
+    StudyCommand,
+    TurbulenceName,
+)
+from beaver_ftc.studies.matrix import fault_matrix
+from beaver_ftc.studies.matrix import pitch_lost as lost
+
+
+@dataclass(frozen=True)
+class Matrix(StudyCommand):
+    """Fly every fault type on every surface.
+
+    Says which are detected and named, and how well the rates are tracked beside the oracle's.
+
+    With --declared also how many of the faults that a test told the fault sees are named.
+
+    Exit status 1 if a fault is named wrongly or an alarm is false; with --pitch-lost, if engine power loses
+    an aircraft that is kept without it.
+
+    Stopped or killed, it goes on where it was with the same command.
+
+    out: Folder for the results: `fault-matrix`, with what is declared, or `pitch-lost`.
+    airspeed: Airspeed, m/s; once for each.
+    workers: Processes.
+    pitch_lost: Elevator and flap lost at once instead, with engine power and without.
+    declared: With tactical-grade sensors, servos and, where the model lets them be, 5 % wrong moment
+      coefficients, and told so.
+    turbulence: Of --declared: flown, and told so.
+    aircraft: Built-in name, jsbsim:NAME, or ./FOLDER in the working directory.
+    """
+
+    out: Path = Path("runs")
+    airspeed: AirspeedsOption = None
+    workers: Annotated[int, typer.Option(min=1)] = 1
+    pitch_lost: bool = False
+    declared: bool = False
+    turbulence: TurbulenceName = TurbulenceName.none
+    aircraft: str | None = None
+
+    FILES = (*fault_matrix.FILES, *lost.FILES)
+
+    @property
+    def label(self) -> str:
+        """The words before the progress bar."""
+        return "faults flown"
+
+    def run(self, reporter: Reporter) -> Document:
+        """Fly the faults, or the pairs of faults."""
+        self._check()
+        speeds_mps = tuple(self.airspeed) if self.airspeed else None
+        reporter.progress(0.0)
+        if self.pitch_lost:
+            name = lost.NAME
+            document = lost.run_pitch_lost(self.out, speeds_mps, self.workers, reporter.progress)
+        else:
+            name = fault_matrix.name_of(self.declared, self.turbulence)
+            document = fault_matrix.run_matrix(
+                self.out, speeds_mps, self.workers, reporter.progress, self.declared,
+                self.aircraft or DEFAULT, self.turbulence.value,
+            )  # fmt: skip
+        return document | {"folder": str(self.out / name)}
+
+    def _check(self) -> None:
+        if self.pitch_lost and self.declared:
+            raise BadInput("--pitch-lost and --declared exclude each other, allowed: one of them")
+        if self.pitch_lost and self.aircraft:
+            raise BadInput(
+                "--pitch-lost needs a flap and engine power in place of the elevator: the built-in aircraft "
+                "has these, allowed: without --aircraft"
+            )
+        if self.turbulence is not TurbulenceName.none and not self.declared:
+            raise BadInput("--turbulence is declared or not flown, allowed: with --declared")
+
+    def as_text(self, document: Document, colour: bool) -> str:
+        """Table, remarks and totals, and where the files are."""
+        shown = lost.as_text if self.pitch_lost else fault_matrix.as_text
+        return f"{shown(document)}\n\nresults: {document['folder']}"

@@ -30,7 +30,6 @@ from beaver_ftc.control.engines import ENGINES
 from beaver_ftc.control.engines import configure as configure_engines
 from beaver_ftc.design.model import AXES, N_Y, both_responses
 from beaver_ftc.design.variants import design_of
-from beaver_ftc.diagnosis.detection.forces import ASIDE, UP, separated_by_force
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.results.log import Columns
@@ -212,7 +211,7 @@ def alike(scenario: Scenario) -> list[Document]:
     from the other, None where none is; and whether the accelerometers of this diagnosis weigh them."""
     short = scenario.model_copy(update={"duration_s": SETTLED_S + 1.0})
     seen, aircraft = excitation(short), scenario.airframe
-    by_force = [{*separated_by_force(aircraft, f)} for f in (ASIDE, UP)]
+    by_force = [{*aircraft.separated_by_force(force)} for force in ("CY", "CZ")]
     found = []
     for s, other in combinations(range(aircraft.n), 2):
         pairs = ((s, other), (other, s))

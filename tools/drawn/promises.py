@@ -13,15 +13,15 @@ import numpy as np
 import yaml
 
 import beaver_ftc as bf
-from beaver_ftc.control.supervisor import MODES
 from beaver_ftc.results import verdict
+from beaver_ftc.scenario.control import MODES
 from beaver_ftc.scenario.dump import to_yaml
+from beaver_ftc.scenario.faults import UNANTICIPATED
 from beaver_ftc.scenario.loader import load_text
 
 Document = dict[str, Any]
 
 OURS, NONE = "adaptive-estimators", "none"
-UNANTICIPATED = "unanticipated"
 LOSS = "loss_of_effectiveness"
 PLANES = (("elevator", "flap"), ("aileron", "rudder"))
 DUST_S = 1e-6

@@ -9,9 +9,9 @@ from beaver_ftc.compiled import kernel, record
 from beaver_ftc.control.laws import FAULT_TOLERANT, NOMINAL
 from beaver_ftc.diagnosis.state import PITCH, UNANTICIPATED
 from beaver_ftc.diagnosis.types.contract import FIXED, LOSES
+from beaver_ftc.scenario.control import MODES
 
-MODES = ("nominal", "adaptive", "reallocated", "unanticipated")
-MODE_NOMINAL, MODE_ADAPTIVE, MODE_REALLOCATED, MODE_UNANTICIPATED = range(4)
+MODE_NOMINAL, MODE_ADAPTIVE, MODE_REALLOCATED, MODE_UNANTICIPATED = range(len(MODES))
 MAX_EVENTS = 64
 
 SUPERVISOR = record(mode=int, n_modes=int, mode_at_s=MAX_EVENTS, mode_is=(int, MAX_EVENTS))

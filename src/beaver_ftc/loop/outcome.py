@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.control.outer.state import BANK_LIMIT, CHANNELS, FASTEST, LIMITED, NOT_JUDGED, SLOWEST, SPEED
-from beaver_ftc.control.supervisor import MODES
 from beaver_ftc.design.model import AXES
 from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.diagnosis.monitors.sensor_records import instrument_found
@@ -25,6 +24,7 @@ from beaver_ftc.loop.frame import isolated_theta
 from beaver_ftc.loop.inconclusive import inconclusive_of
 from beaver_ftc.plant.channels import AIRSPEED, ALTITUDE
 from beaver_ftc.plant.sensing import DEPARTURE_SIGNALS
+from beaver_ftc.scenario.control import MODES
 from beaver_ftc.scenario.faults import of_a_sensor
 from beaver_ftc.scenario.interventions import stages
 from beaver_ftc.scenario.schema import Scenario

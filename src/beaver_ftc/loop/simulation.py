@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from beaver_ftc.control.outer.setup import set_up_profile
-from beaver_ftc.control.supervisor import MODES
 from beaver_ftc.documents.errors import BadInput, suggestion
 from beaver_ftc.loop.inconclusive import inconclusive_now
 from beaver_ftc.loop.loop import CHUNK_ROWS, FLYING, ONE_FLIES, LogSink, Loop
@@ -22,6 +21,7 @@ from beaver_ftc.plant.configure import GustSchedule
 from beaver_ftc.plant.faults import is_there
 from beaver_ftc.scenario import interventions
 from beaver_ftc.scenario.airframe import checked_against
+from beaver_ftc.scenario.control import MODES
 from beaver_ftc.scenario.faults import DAMAGE, MOST_FAULTS, UNANTICIPATED, fault_name, place_of
 from beaver_ftc.scenario.interventions import StickTrack, fault_of, is_same_again
 from beaver_ftc.scenario.schema import Scenario

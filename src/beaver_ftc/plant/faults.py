@@ -15,14 +15,14 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
-from math import exp, hypot, inf
+from math import hypot, inf
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from beaver_ftc.scenario.faults import DAMAGE, SensorFault, place_of
 from beaver_ftc.scenario.sensors import ENGINE, QUANTITIES, Sensors
-from beaver_ftc.scenario.timing import frame_of
+from beaver_ftc.scenario.timing import frame_of, grown_share
 
 if TYPE_CHECKING:
     from beaver_ftc.plant.adapter import Plant
@@ -80,8 +80,7 @@ class _Event:
 
     def share(self, k: int) -> float:
         """B(t - at_s): how far the fault has grown by frame k, 0 to 1."""
-        age_s = max(0.0, k / self.rate_hz - self.fault.at_s)
-        return 1.0 if k >= self.grown else 1.0 - exp(-self.kappa_per_s * age_s)
+        return 1.0 if k >= self.grown else grown_share(self.fault, k / self.rate_hz)
 
     def next_change(self, k: int) -> int:
         """The first frame after k in which this fault changes something."""

@@ -25,10 +25,14 @@ from beaver_ftc.plant.instruments import (
 from beaver_ftc.plant.native import read_nodes, write_nodes
 
 FLYING, DEPARTED, NOT_FINITE = 0, 1, 2
-DEPARTURE_ANGLE_RAD = 0.6
 AT_REST_MPS = 1.0  # of an aircraft on its wheels: as slow as the truth itself reckons
-DEPARTURE_RATE_RAD_S = 6.0
+# Beyond these the flight has departed: body rates, incidence and sideslip; or below the ground.
+DEPARTURE_RATE_RAD_S, DEPARTURE_ANGLE_RAD = 6.0, 0.6
 DEPARTURE_SIGNALS = ("p", "q", "r", "alpha", "beta", "altitude")
+DEPARTURE_LIMITS = {  # by the column of the log
+    **dict.fromkeys(("p_rad_s", "q_rad_s", "r_rad_s"), DEPARTURE_RATE_RAD_S),
+    **dict.fromkeys(("alpha_rad", "beta_rad"), DEPARTURE_ANGLE_RAD),
+}
 
 
 @sized

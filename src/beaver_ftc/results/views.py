@@ -15,11 +15,11 @@ from pathlib import Path
 
 import numpy as np
 
+from beaver_ftc.aircraft import AXES
 from beaver_ftc.results import log
+from beaver_ftc.scenario.control import MODES
 
-AXES = ("p", "q", "r")
 AXIS_NAMES = {"p": "roll rate p", "q": "pitch rate q", "r": "yaw rate r"}
-MODES = ("nominal", "adaptive", "reallocated", "unanticipated")
 
 SIDES = ("left", "right")
 SURFACE_ROLES = tuple(f"surface {i}" for i in range(8))  # looks of the surfaces, in the aircraft's order

@@ -9,6 +9,8 @@ from beaver_ftc.documents.base import Section, deny, entry, number, refuse
 from beaver_ftc.plugins import LAWS, refusal, wrong_options
 from beaver_ftc.scenario.airframe import named
 
+MODES = ("nominal", "adaptive", "reallocated", "unanticipated")  # of the supervisor, as the log numbers them
+
 Law = Annotated[str, named(partial(refusal, LAWS))]
 
 

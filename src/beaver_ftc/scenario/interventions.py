@@ -6,6 +6,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from beaver_ftc.aircraft import AXES
 from beaver_ftc.documents.base import Section
 from beaver_ftc.documents.document import Document, Problem
 from beaver_ftc.documents.errors import BadInput, suggestion
@@ -21,7 +22,6 @@ from beaver_ftc.scenario.loader import validate_scenario
 from beaver_ftc.scenario.schema import Change, Scenario
 from beaver_ftc.scenario.signals import MAX_ROWS
 
-AXES = ("p", "q", "r")
 STICKS = "sticks.csv"  # what such a table is said to come from; its values are in the scenario itself
 
 

@@ -22,11 +22,11 @@ from beaver_ftc.documents.base import Number, Section, deny, entry, number, orde
 from beaver_ftc.documents.files import UnreadableError, read_text
 from beaver_ftc.documents.paths import inside
 from beaver_ftc.scenario.airframe import folder_of
+from beaver_ftc.scenario.timing import TIME_TOLERANCE_S
 
 Samples = NDArray[np.float64]
 
 RAD_PER_DEG = pi / 180.0
-_INSTANT_S = 1e-9
 """Frame times are k / rate in floating point: a signal starts on the frame its start names."""
 
 _LATEST_S = 360_000.0
@@ -51,8 +51,8 @@ def _start() -> Any:
 
 def _during(tau_s: Samples, length_s: float | None) -> NDArray[np.bool_]:
     """0 <= tau < length, where length None is for ever."""
-    begun = tau_s >= -_INSTANT_S
-    return begun if length_s is None else begun & (tau_s < length_s - _INSTANT_S)
+    begun = tau_s >= -TIME_TOLERANCE_S
+    return begun if length_s is None else begun & (tau_s < length_s - TIME_TOLERANCE_S)
 
 
 class _Window(Section):
@@ -118,7 +118,7 @@ class Square(_Wave):
 
     def rate_deg_s(self, t_s: Samples) -> Samples:
         tau_s = t_s - self.start_s
-        turns = (tau_s + _INSTANT_S) * self.frequency_hz + self.phase_deg / 360.0
+        turns = (tau_s + TIME_TOLERANCE_S) * self.frequency_hz + self.phase_deg / 360.0
         wave = np.where(turns % 1.0 < 0.5, self.amplitude_deg_s, -self.amplitude_deg_s)
         return np.where(_during(tau_s, self.length_s), wave, 0.0)
 

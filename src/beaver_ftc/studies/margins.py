@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from beaver_ftc.aircraft import AXES
 from beaver_ftc.control.laws import COMPILED, REJECTING
 from beaver_ftc.control.laws.gains import margins
 from beaver_ftc.control.laws.rejecting import STAND_IN
@@ -35,7 +36,6 @@ from beaver_ftc.studies.present.tables import aligned, finite
 
 N_FREQUENCIES = 600
 LOWEST_RAD_S = 0.3  # below, the autopilot flies: a body rate says little of a phugoid
-RATES = ("p", "q", "r")
 
 
 @dataclass(frozen=True)
@@ -240,7 +240,7 @@ def outputs(states: tuple[str, ...], y: np.ndarray) -> np.ndarray:
     qdyn goes with V^2, the slipstream (the Beaver's one declared signal) with V^-3; with altitude neither.
     """
     C = np.zeros((3 + len(y), len(states)))
-    for row, name in enumerate((*RATES, "alpha", "beta", "airspeed")):
+    for row, name in enumerate((*AXES, "alpha", "beta", "airspeed")):
         C[row, states.index(name)] = 1.0
     V = states.index("airspeed")
     C[6, V] = 2.0 * y[QDYN] / y[2]
@@ -251,7 +251,7 @@ def outputs(states: tuple[str, ...], y: np.ndarray) -> np.ndarray:
 def sensors(scenario: Scenario, m: int, dt: float) -> np.ndarray:
     """delay_s and keep, (2, m), of what is measured."""
     found = np.zeros((2, m))
-    for i, name in enumerate((*RATES, "alpha", "beta", "V", "qdyn")):
+    for i, name in enumerate((*AXES, "alpha", "beta", "V", "qdyn")):
         sensor = getattr(scenario.sensors, name)
         found[:, i] = sensor.delay_s, exp(-sensor.bandwidth_rad_s * dt) if sensor.bandwidth_rad_s else 0.0
     return found

@@ -18,7 +18,7 @@ import numpy as np
 import typer
 
 from beaver_ftc import __version__
-from beaver_ftc.aircraft import load
+from beaver_ftc.aircraft import AXES, load
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.loop.outcome import Landing
@@ -33,7 +33,6 @@ from beaver_ftc.studies.engine.study import conduct as fly_missing
 from beaver_ftc.studies.engine.workers import Batch, Work
 from beaver_ftc.studies.present.tables import finite, number
 
-AXES = ("p", "q", "r")
 HEALTHY_S = 100.0  # attitude is open loop: a longer flight wanders out of the validated envelope
 AFTER_FAULT_S = 15.0  # more than a period of the slowest reference
 _AIRSPEED_MPS, _ALTITUDE_M = (35.0, 52.0), (0.0, 3000.0)

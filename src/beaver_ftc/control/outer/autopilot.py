@@ -24,6 +24,7 @@ from beaver_ftc.control.outer.thrust import gained, look_up, power_for, thrust_p
 from beaver_ftc.control.power import ceiling
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
+from beaver_ftc.scenario.timing import TIME_TOLERANCE_S
 
 MOST_PATH_RAD = 0.15
 MOST_SIDESLIP_RAD = 0.14
@@ -33,7 +34,6 @@ USUAL_S, USUAL_MPS = 20.0, 3.0  # airspeed that power alone can hold: within so 
 CUT_INHG_S, RAISE_INHG_S = 8.0, 1.0  # about as fast as the engine follows; and slower than a gust lasts
 KEPT_ASIDE = 0.15  # of the power's range at either end, for engines that alone yaw the aircraft
 PACE_BY_POWER, BY_POWER_S = 0.25, 5.0  # of the loops of bank and heading there, and since when it counts
-INSTANT_S = 1e-9  # frame times are k / rate in floating point
 SETTLED_S = 30.0  # after a change of heading
 MEAN_S = 10.0  # over which airspeed and arrival are judged: what comes and goes faster is a gust
 
@@ -71,7 +71,10 @@ def begin_leg(autopilot, c, now, t):
 def advance(autopilot, measured, t):
     """Bring every channel's command to t s; measured (N_CHANNELS,): where they are."""
     for c in range(N_CHANNELS):
-        while autopilot.leg[c] < autopilot.legs[c] and t >= autopilot.at_s[c, autopilot.leg[c]] - INSTANT_S:
+        while (
+            autopilot.leg[c] < autopilot.legs[c]
+            and t >= autopilot.at_s[c, autopilot.leg[c]] - TIME_TOLERANCE_S
+        ):
             begin_leg(autopilot, c, measured[c], t)
         if autopilot.commanded[c]:
             away, most = autopilot.goal[c] - autopilot.command[c], autopilot.pace[c] * autopilot.dt

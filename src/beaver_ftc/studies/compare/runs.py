@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from beaver_ftc.aircraft import AXES
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.problems import one_line
 from beaver_ftc.results.style import BLACK
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
 
 Document = dict[str, Any]
 
-_AXES = ("p", "q", "r")
 NOTHING = "-"
 STAR = "* differs between the runs"
 _ALLOWED = "allowed: a result folder of beaver-ftc run"
@@ -75,7 +75,7 @@ def rows_of(run: Document) -> dict[str, str]:
         **{
             f"{when} RMS {axis}, deg/s": number((tracking[f"{when}_fault_rms_deg_s"] or {}).get(axis))
             for when in ("pre", "post")
-            for axis in _AXES
+            for axis in AXES
         },
         "outside the envelope, s": number(outside_s),
         "departure": f"{departure['signal']} at {departure['time_s']:.2f} s" if departure else NOTHING,
@@ -119,7 +119,7 @@ def figure_of(runs: Sequence[Document]) -> "Figure":
     for run, label in zip(runs, labels(runs), strict=True):
         _draw(axes, Path(run["folder"]), label)
     struck = sorted({run["fault"]["at_s"] for run in runs if run["fault"]})
-    for axis, letter in zip(axes, _AXES, strict=True):
+    for axis, letter in zip(axes, AXES, strict=True):
         for at_s in struck:
             axis.axvline(at_s, color=BLACK, linewidth=0.9, linestyle=":")
         axis.set_ylabel(f"{letter} tracking error, deg/s")
@@ -155,9 +155,9 @@ def _draw(axes: Any, folder: Path, label: str) -> None:
 
     from beaver_ftc.results.log import read
 
-    names = ["t_s", *(f"{a}_{what}_rad_s" for a in _AXES for what in ("model", "measured"))]
+    names = ["t_s", *(f"{a}_{what}_rad_s" for a in AXES for what in ("model", "measured"))]
     log = read(folder / "log.parquet", names)
     every = max(1, len(log["t_s"]) // 20_000)
-    for axis, letter in zip(axes, _AXES, strict=True):
+    for axis, letter in zip(axes, AXES, strict=True):
         error = np.degrees(log[f"{letter}_model_rad_s"] - log[f"{letter}_measured_rad_s"])
         axis.plot(log["t_s"][::every], error[::every], linewidth=1.0, label=label)

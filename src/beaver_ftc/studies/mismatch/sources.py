@@ -45,6 +45,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.aircraft import AXES
+from beaver_ftc.aircraft.units import EARTH_RADIUS_M, EARTH_RATE_RAD_S
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.fdc import GEOMETRY, SURFACES, TRAVEL
 from beaver_ftc.design.model import InertiaCoefficients, inertial
@@ -52,6 +53,7 @@ from beaver_ftc.plant.state import START_LATITUDE_DEG
 from beaver_ftc.scenario.actuators import ActuatorDynamics
 from beaver_ftc.scenario.faults import UNANTICIPATED, place_of
 from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.timing import grown_share, is_before, is_in_force
 from beaver_ftc.studies.mismatch.models import (
     ENGINE_TERMS,
     MOMENT_TERMS,
@@ -70,9 +72,6 @@ SOURCES = (
     "inertia_coupling", "sinusoids", "wind_turbulence", "earth_rotation", "integration",
 )  # fmt: skip
 LOSS = "loss_of_effectiveness"
-TIME_TOLERANCE_S = 1e-9
-EARTH_RATE_RAD_S = 7.292115e-5  # [WGS84]
-MEAN_RADIUS_M = 6371000.0  # what the log's north is measured with
 Contributions = dict[str, np.ndarray]
 
 
@@ -169,17 +168,10 @@ def name_of(fault: Any) -> str:
     return f"{place}{fault.type.replace('_', ' ')} at {fault.at_s:g} s"
 
 
-def in_force(fault: Any, t_s: np.ndarray) -> np.ndarray:
-    """Whether a fault is there, (n,) bool."""
-    end_s = np.inf if fault.end_s is None else fault.end_s
-    return (t_s >= fault.at_s - TIME_TOLERANCE_S) & (t_s < end_s - TIME_TOLERANCE_S)
-
-
 def share(fault: Any, t_s: np.ndarray) -> np.ndarray:
-    """B(t - T0) (n,): how far a fault has grown, 0 where it is not there [Zhang2005]."""
-    age = np.maximum(t_s - fault.at_s, 0.0)
-    grown = 1.0 - np.exp(-fault.kappa_per_s * age) if fault.profile == "incipient" else 1.0
-    return np.where(in_force(fault, t_s), grown, 0.0)
+    """B(t - T0) (n,): how far a fault has grown, 0 where it is not there."""
+    grown = np.array([grown_share(fault, t) for t in t_s])
+    return np.where(is_in_force(fault, t_s), grown, 0.0)
 
 
 def unanticipated(fault: Any, belief: Belief, states: States) -> np.ndarray:
@@ -203,8 +195,8 @@ def _displaced(faults: list, t_s: np.ndarray, way: np.ndarray) -> Iterator[tuple
     """Which of the other faults moves the surface so far, (n,) rad: who struck last, also what lingers after
     a repair."""
     order = sorted((fault for fault in faults if fault.type != LOSS), key=lambda fault: fault.at_s)
-    struck = [t_s >= fault.at_s - TIME_TOLERANCE_S for fault in order]
-    there = [in_force(fault, t_s) for fault in order]
+    struck = [~is_before(t_s, fault.at_s) for fault in order]
+    there = [is_in_force(fault, t_s) for fault in order]
     owner = np.full(t_s.size, -1)
     for of in (struck, there):  # who is there now goes before who has been
         for i, mask in enumerate(of):
@@ -277,7 +269,7 @@ def wind_turbulence(m: Models, s: States) -> np.ndarray:
 
 def earth(m: Models, s: States) -> np.ndarray:
     """The Earth's rotation on the flight's path; real gravity makes no moment about the centre of gravity."""
-    latitude = radians(START_LATITUDE_DEG) + s.north_m / (MEAN_RADIUS_M + m.scenario.initial.altitude_m)
+    latitude = radians(START_LATITUDE_DEG) + s.north_m / (EARTH_RADIUS_M + m.scenario.initial.altitude_m)
     return earth_rotation(m.truth.inertia, s.x, s.attitude, latitude)
 
 

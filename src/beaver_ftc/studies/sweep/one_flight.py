@@ -38,8 +38,6 @@ RESULTS = (FLOWN, DEPARTED)  # the statuses of a flight that has metrics
 # Columns of every sweep, and their types: what varies stands behind the first.
 FIXED = {"run": "int", "seed": "int", "status": "text", "reason": "text"}
 
-AXES = ("p", "q", "r")
-
 
 def _faults(document: Document, flight: "Landing") -> str:
     """surface:type of each fault that was named, of several at once."""

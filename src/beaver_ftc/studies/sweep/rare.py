@@ -178,17 +178,16 @@ def check(sweep: Sweep, expectation: str) -> None:
 def score_of(scenario: Scenario, expectation: str) -> float:
     """Fly, and say how near it came to what is not expected: below 0 before, 0 and above once it has come."""
     from beaver_ftc.loop.loop import fly
-    from beaver_ftc.plant.sensing import DEPARTURE_ANGLE_RAD, DEPARTURE_RATE_RAD_S
+    from beaver_ftc.plant.sensing import DEPARTURE_LIMITS
     from beaver_ftc_assurance.evidence.flown import Watched
 
-    limits = {f"{axis}_rad_s": DEPARTURE_RATE_RAD_S for axis in "pqr"}
-    limits |= {"alpha_rad": DEPARTURE_ANGLE_RAD, "beta_rad": DEPARTURE_ANGLE_RAD}
-    log = Watched(list(limits)) if expectation == "no_departure" else None
+    log = Watched(list(DEPARTURE_LIMITS)) if expectation == "no_departure" else None
     flight = fly(scenario, log)
     document = metrics(flight)
     found = next(one for one in evaluate(scenario.expect, document) if one["name"] == expectation)
     if log is not None:
-        score = max(float(np.abs(log.columns[name]).max()) / limit for name, limit in limits.items()) - 1.0
+        shares = (np.abs(log.columns[name]).max() / limit for name, limit in DEPARTURE_LIMITS.items())
+        score = float(max(shares)) - 1.0
     elif expectation == "no_false_alarm":
         score = flight.worst_residual_ratio - 1.0
     elif found["actual"] is not None:

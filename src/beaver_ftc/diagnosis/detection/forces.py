@@ -19,6 +19,7 @@ import numpy as np
 from beaver_ftc.aircraft import AXES, Aircraft, Term
 from beaver_ftc.aircraft.aircraft import FORCES
 from beaver_ftc.aircraft.schema import MAX_SURFACES, MAX_TERMS_OF_ONE, SIDESLIP_RATE
+from beaver_ftc.aircraft.units import EARTH_RATE_RAD_S
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.engine import slipstream_slopes
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, DPT, N_Y, QDYN, evaluate
@@ -31,7 +32,6 @@ from beaver_ftc.scenario.sensors import ACCELEROMETERS
 ASIDE, UP = range(2)  # across the body, and normal to it
 COMPONENTS = ("CY", "CZ")
 CY = FORCES.index("CY")
-EARTH_RATE_RAD_S = 7.3e-5
 LIVELY_RAD_S, STEEP_RAD = 0.2, 0.3  # rates and slope of the path that a drift is reckoned with
 SETTLED = 2  # looks: from the second on the rate of sideslip is that of the run before
 UNSETTLED_S = 0.002  # that force and flow of one instant may be apart, of JSBSim's own: seen to 0.001

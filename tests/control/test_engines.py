@@ -14,8 +14,7 @@ from beaver_ftc.control import engines
 from beaver_ftc.control.power import POWER
 from beaver_ftc.control.state import control_dtype
 from beaver_ftc.diagnosis.monitors import engine_symmetry
-from beaver_ftc.diagnosis.monitors.engine_symmetry import BALANCE
-from beaver_ftc.diagnosis.state import conclusion_dtype
+from beaver_ftc.diagnosis.monitors.engine_symmetry import ENGINES
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.problems import ScenarioError
 from beaver_ftc.plant.adapter import Plant
@@ -202,16 +201,18 @@ def test_levers_that_move_as_one_alarm_nobody(jet):
 def judged(jet, missing_n, levers=(0.0, 0.0)):
     """Whether an alarm is raised where engines yaw as a thrust does that the left one does not give, by its
     place in JSBSim's own file."""
-    aircraft, of_it = read(jet / "aircraft" / "737"), np.zeros(1, BALANCE)[0]
-    engine_symmetry.configure(of_it, aircraft)
+    aircraft, of_it = read(jet / "aircraft" / "737"), np.zeros(1, ENGINES)[0]
+    engine_symmetry.configure(of_it["config"], aircraft)
     names, size = list(aircraft.signals), 11800.0 * aircraft.geometry.wing_area_m2  # N
-    y, verdict = np.zeros(4 + len(names)), np.zeros(1, conclusion_dtype(3))[0]
+    y = np.zeros(4 + len(names))
     y[4 + names.index("thrust")] = (60_000.0 - missing_n) / size
     y[4 + names.index("engines_n")] = -missing_n * 193.0 * M_PER_IN / (size * aircraft.geometry.span_m)
-    of_it, verdict = of_it.view(np.recarray), verdict.view(np.recarray)
-    engine_symmetry.heed(of_it, np.array(levers))
-    engine_symmetry.detect(of_it, verdict, 1e-6, y, 1.0)
-    return bool(verdict["detected"])
+    of_it, before = of_it.view(np.recarray), of_it["config"].copy()
+    engine_symmetry.disable_if_differential_thrust(of_it, np.array(levers))
+    alarmed = engine_symmetry.detect(of_it, 1e-6, y)
+    assert of_it["config"] == before
+    assert of_it["output"]["failed"] == alarmed
+    return alarmed
 
 
 @pytest.mark.parametrize(("off", "known"), [(1e-8, True), (1e-4, False)])

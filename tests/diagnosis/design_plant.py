@@ -34,7 +34,7 @@ def conclude(frames):
     frame = frames[0]
     look_back(frame.belief, frame.fdi.bound, frame.measured, frame.k, frame.dt)
     diagnose(frame)
-    note_closest_approach(frame.fdi.bank, frame.fdi.statistical.alarm)
+    note_closest_approach(frame.fdi.bank)
 
 
 class DesignPlant:

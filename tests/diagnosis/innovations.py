@@ -16,6 +16,7 @@ from beaver_ftc.design.fdc import MASS
 from beaver_ftc.diagnosis.bounds import variances
 from beaver_ftc.diagnosis.detection import likelihood, noise_model, statistical
 from beaver_ftc.diagnosis.detection.likelihood import MAX_HYPOTHESES, N_SLOTS, SENSE, Rooms, block_dtype
+from beaver_ftc.diagnosis.detection.signatures import sign_blocks
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.scenario.declared import Declared, SensorErrors
 from beaver_ftc.scenario.schema import Scenario
@@ -197,7 +198,7 @@ def watch_all(detector, innovations, Gu, cubic, first, renew, dt, scores):
     """The frames of a flight without one: innovations (k, 3), Gu (k, 3, 4) rad/s2, cubic (k,)."""
     for k in range(len(innovations)):
         blocks, alarm, tests = detector.block, detector.alarm, detector.tests
-        statistical.signatures(blocks, Gu[k], cubic[k])
+        sign_blocks(blocks, Gu[k], cubic[k])
         bounded, still = detector.noise.bounded, detector.air
         statistical.observe(tests, bounded, blocks, still, innovations[k], dt, first + k, 0)
         views = detector.views[: detector.n_views]

@@ -47,7 +47,7 @@ def of_stages(fdi, kernel):
         "instants": fdi["config"]["instants"], "bank": fdi["bank"], "fdae": fdi["fdae"],
         "innovation": fdi["bank"]["innovation"], "detected": fdi["verdict"]["detected"],
         "frame_bound": fdi["bound"]["frame"], "noise": fdi["bound"]["noise"], "dt": fdi["config"]["dt"],
-        "chances": fdi["statistical"]["alarm"],
+        "statistical_alarm": fdi["statistical"]["alarm"],
         **({"k": types["frame"] if later else types["frame"] - 1} if whole else {}),
     }  # fmt: skip
 

@@ -3,6 +3,7 @@
 import numpy as np
 
 from beaver_ftc.diagnosis.detection import parity, statistical
+from beaver_ftc.diagnosis.detection.signatures import sign_blocks
 from beaver_ftc.plant.instruments import MEASURED
 
 
@@ -23,7 +24,7 @@ class Statistical:
 
     @staticmethod
     def signatures(record, Gu, cubic):
-        statistical.signatures(record["block"], Gu, cubic)
+        sign_blocks(record["block"], Gu, cubic)
 
     @staticmethod
     def score(record, t, known=True):

@@ -5,7 +5,7 @@ import pytest
 from kernels import DT, POLES, estimator, new_fdi, on, weights
 
 from beaver_ftc.diagnosis.bounds.admitted import poles_for_noise
-from beaver_ftc.diagnosis.detection import bank
+from beaver_ftc.diagnosis.detection import bank, statistical
 from beaver_ftc.scenario.declared import Declared, SensorErrors
 from beaver_ftc.scenario.schema import Scenario
 from telling import apart
@@ -54,12 +54,14 @@ def test_the_alarm_is_of_the_first_axis_on_which_a_filter_leaves_its_bound():
 
 def test_the_closest_approach_of_every_filter_is_kept():
     fdi = with_shares(*LEAVES)
-    fdi["bank"]["closest"][:3], fdi["statistical"]["alarm"]["score"] = (0.6, 0.0, 0.0), 0.4
-    bank.note_closest_approach(fdi["bank"], fdi["statistical"]["alarm"])
+    alarm = fdi["statistical"]["alarm"]
+    fdi["bank"]["closest"][:3], alarm["score"] = (0.6, 0.0, 0.0), 0.4
+    bank.note_closest_approach(fdi["bank"])
+    statistical.note_closest_approach(alarm)
     assert fdi["bank"]["closest"][:3] == pytest.approx([0.6, 1.5, 1.2])
-    assert fdi["statistical"]["alarm"]["closest"] == 0.4
+    assert alarm["closest"] == 0.4
     silent = new_fdi()
-    bank.note_closest_approach(silent["bank"], silent["statistical"]["alarm"])
+    bank.note_closest_approach(silent["bank"])
     assert not silent["bank"]["closest"].any()
     assert on(bank.largest_share, silent) == 0.0
 
@@ -137,7 +139,7 @@ def test_a_filter_without_a_bound_has_no_share_of_it():
     with np.errstate(divide="ignore"):
         assert on(bank.largest_share, fdi) == pytest.approx(1.5)
         assert [bank.nearest(fdi["bank"], i) for i in range(3)] == [2, 1, 2]
-        bank.note_closest_approach(fdi["bank"], fdi["statistical"]["alarm"])
+        bank.note_closest_approach(fdi["bank"])
     assert fdi["bank"]["closest"][:3] == pytest.approx([0.0, 1.5, 1.2])
     assert on(bank.alarm, fdi) == 0
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from kernels import DT, new_fdi, on
 
+from beaver_ftc.diagnosis import conclusion
 from beaver_ftc.diagnosis.belief import expectation as beliefs
 from beaver_ftc.diagnosis.detection import fdae
 from beaver_ftc.diagnosis.detection.fdae import ALPHA_CENTRES, BETA_CENTRES, N_BASIS, NETWORK
@@ -85,7 +86,7 @@ def test_a_diagnosis_begins_with_no_residual_and_the_gyros_error_to_come():
 )  # fmt: skip
 def test_who_is_in_authority_raises_the_alarm(authority, filters, score, axis):
     fdi = new_fdi()
-    fdi["config"]["authority"], fdi["verdict"]["detected_axis"] = authority, -1
+    fdi["config"]["authority"] = authority
     fdi["bank"]["threshold"][:3], fdi["bank"]["residual"][1, 2] = 0.1, 0.1 * filters
     fdi["statistical"]["alarm"]["score"], fdi["statistical"]["alarm"]["axis"], fdi["fdae"]["xhat"] = (
         score,
@@ -93,13 +94,16 @@ def test_who_is_in_authority_raises_the_alarm(authority, filters, score, axis):
         (1.0, 1.0, 1.0),
     )
     fdae.form_residual(fdi["fdae"], np.array([1.5, 0.5, 1.0]))
-    on(fdae.detect, fdi, authority, fdi["statistical"]["alarm"], 7.0)
     assert fdi["fdae"]["residual"] == pytest.approx([0.5, -0.5, 0.0])
-    assert bool(fdi["verdict"]["detected"]) == (axis is not None)
-    assert fdi["verdict"]["detected_axis"] == (-1 if axis is None else axis)
-    assert fdi["verdict"]["detected_at_s"] == (0.0 if axis is None else 7.0)
-    on(fdae.detect, fdi, authority, fdi["statistical"]["alarm"], 8.0)
-    assert fdi["verdict"]["detected_at_s"] == (0.0 if axis is None else 7.0)  # the first alarm stays
+    assert on(fdae.detect, fdi, authority) == (-1 if axis is None else axis)
+
+
+def test_the_first_alarm_stays():
+    fdi = new_fdi()
+    on(conclusion.latch_alarm, fdi, 2, 7.0)
+    on(conclusion.latch_alarm, fdi, 0, 8.0)
+    found = fdi["verdict"]
+    assert (found["detected"], found["detected_axis"], found["detected_at_s"]) == (1, 2, 7.0)
 
 
 @pytest.mark.parametrize("detected", [0, 1])

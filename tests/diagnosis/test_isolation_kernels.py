@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from kernels import DT, estimator, new_fdi, on, put
 
-from beaver_ftc.diagnosis import scheme
+from beaver_ftc.diagnosis import conclusion, scheme
 from beaver_ftc.diagnosis.detection.likelihood import STEP
 from beaver_ftc.diagnosis.isolation import estimators
 from beaver_ftc.diagnosis.isolation.estimators import hypothesis
@@ -171,11 +171,11 @@ def test_the_one_left_is_the_fault(excluded, isolated):
     fdi = new_fdi()
     fdi["isolation"]["n"], fdi["isolation"]["estimator"]["excluded"][:3] = 3, excluded
     fdi["verdict"]["isolated"], fdi["verdict"]["isolated_at_s"] = NOT_ISOLATED, -1.0
-    on(estimators.decide, fdi, 4.0)
-    assert fdi["verdict"]["isolated"] == isolated
-    assert fdi["verdict"]["isolated_at_s"] == (-1.0 if isolated == NOT_ISOLATED else 4.0)
-    on(estimators.decide, fdi, 5.0)
-    assert fdi["verdict"]["isolated_at_s"] != 5.0
+    assert on(estimators.decide, fdi, 4.0) == isolated
+    for t in (4.0, 5.0):
+        on(conclusion.note_isolated, fdi, isolated, t)
+        assert fdi["verdict"]["isolated"] == isolated
+        assert fdi["verdict"]["isolated_at_s"] == (-1.0 if isolated == NOT_ISOLATED else 4.0)
 
 
 @pytest.mark.parametrize(("doubted", "shown", "named"), [(1, 0, False), (1, 1, True), (0, 0, True)])
@@ -183,11 +183,9 @@ def test_one_that_is_left_for_an_end_that_nobody_saw_begin_is_not_named(doubted,
     fdi = new_fdi()
     fdi["isolation"]["n"], fdi["isolation"]["estimator"]["excluded"][:3] = 3, (1, 0, 1)
     fdi["isolation"]["estimator"]["doubted"][1], fdi["isolation"]["estimator"]["shown"][1] = doubted, shown
-    on(estimators.decide, fdi, 4.0)
-    assert fdi["verdict"]["isolated"] == (1 if named else NOT_ISOLATED)
+    assert on(estimators.decide, fdi, 4.0) == (1 if named else NOT_ISOLATED)
     fdi["isolation"]["estimator"]["excluded"][1] = 1
-    on(estimators.decide, fdi, 5.0)
-    assert fdi["verdict"]["isolated"] == UNANTICIPATED
+    assert on(estimators.decide, fdi, 5.0) == UNANTICIPATED
 
 
 @pytest.mark.parametrize("kind", [LOSS, POSITION])

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from kernels import new_fdi
 
-from beaver_ftc.diagnosis.scheme import note_name
-from beaver_ftc.diagnosis.state import MAX_WITHDRAWN, NOT_ISOLATED
+from beaver_ftc.diagnosis.conclusion import MAX_WITHDRAWN, note_name
+from beaver_ftc.diagnosis.state import NOT_ISOLATED
 from beaver_ftc.loop.frame import note_names
 
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)

@@ -13,14 +13,16 @@ from beaver_ftc.aircraft.aircraft import FORCES
 from beaver_ftc.design.model import design_record
 from beaver_ftc.design.terms import fill_table, regressors
 from beaver_ftc.design.variants import response
-from beaver_ftc.diagnosis import scheme
-from beaver_ftc.diagnosis.belief import air
+from beaver_ftc.diagnosis import assessment, conclusion, scheme
+from beaver_ftc.diagnosis.belief import air, expectation
 from beaver_ftc.diagnosis.belief.air import AIR
+from beaver_ftc.diagnosis.belief.expectation import belief_dtype
 from beaver_ftc.diagnosis.bounds import worst_case
 from beaver_ftc.diagnosis.bounds.worst_case import error_map_dtype
 from beaver_ftc.diagnosis.detection import statistical, thresholds
 from beaver_ftc.diagnosis.detection.likelihood import block_dtype
 from beaver_ftc.diagnosis.detection.parity import USUAL
+from beaver_ftc.diagnosis.isolation import estimators
 from beaver_ftc.diagnosis.state import LOSS, NOT_ISOLATED, STATISTICS, WORST_CASE, verdict_dtype
 from beaver_ftc.loop import frame
 
@@ -327,12 +329,27 @@ def test_instants_inside_a_frame_add_to_the_mean():
 @pytest.mark.parametrize("offsets_count", [0, 1])
 def test_what_is_known_of_a_fault_is_expected(offsets_count):
     rng = np.random.default_rng(2)
-    mean = np.zeros(1, [("G", "f8", (3, 4)), ("Gu", "f8", (3, 4))]).view(np.recarray)[0]
+    belief = np.zeros(1, belief_dtype(4)).view(np.recarray)[0]
+    mean = belief["means"]
     mean["G"], mean["Gu"] = rng.normal(size=(2, 3, 4))
-    expected, effectiveness, offset = np.ones(3), np.array([0.4, 1.0, 0.0, 1.0]), np.array([0.1, 0, -0.2, 0])
-    scheme.expect_known_faults(expected, mean, effectiveness, offset, offsets_count)
+    mean["acceleration"] = rng.normal(size=3)
+    effectiveness, offset = np.array([0.4, 1.0, 0.0, 1.0]), np.array([0.1, 0, -0.2, 0])
+    expectation.expect(belief, 0, effectiveness, offset, offsets_count)
+    assert (belief["expected"] == mean["acceleration"]).all()
+    expectation.expect(belief, 1, effectiveness, offset, offsets_count)
     off = mean["G"] @ offset if offsets_count else 0.0
-    assert expected == pytest.approx(1.0 + mean["Gu"] @ (effectiveness - 1.0) + off)
+    expected = mean["acceleration"] + mean["Gu"] @ (effectiveness - 1.0) + off
+    assert belief["expected"] == pytest.approx(expected)
+    belief["x_then"], x = (0.1, 0.2, 0.3), np.array([0.3, 0.1, 0.3])
+    expectation.form_innovation(belief, x, 0.5)
+    innovation = np.array([0.4, -0.2, 0.0]) - expected
+    assert belief["innovation_after_known_faults"] == pytest.approx(innovation)
+
+
+def take(fdi, given, t):
+    """A frame's verdict of a plug-in, as the frame of the loop takes it."""
+    on(conclusion.note_plugin, fdi, given, t)
+    estimators.take_estimate(fdi["isolation"], fdi["verdict"]["isolated"], given["theta"])
 
 
 def test_a_plug_ins_verdict_takes_the_place_of_the_built_in_one():
@@ -340,22 +357,22 @@ def test_a_plug_ins_verdict_takes_the_place_of_the_built_in_one():
     fdi["verdict"]["isolated"] = NOT_ISOLATED
     given["isolated"], given["axis"], given["theta"], given["estimates"] = 2, 1, -0.3, 1
     given["effectiveness"] = 0.5
-    on(scheme.note_verdict, fdi, given, 3.0)
+    take(fdi, given, 3.0)
     assert (fdi["verdict"]["detected"], fdi["verdict"]["isolated"]) == (0, NOT_ISOLATED)
     given["detected"] = 1
-    on(scheme.note_verdict, fdi, given, 4.0)
+    take(fdi, given, 4.0)
     found = fdi["verdict"]
     assert (found["detected"], found["detected_at_s"], found["detected_axis"]) == (1, 4.0, 1)
     assert (found["isolated"], found["isolated_at_s"], found["estimates"]) == (2, 4.0, 1)
     assert fdi["isolation"]["estimator"]["theta"][2] == pytest.approx([-0.3] * 3)
     assert found["effectiveness"] == pytest.approx([0.5] * 4)
-    on(scheme.note_verdict, fdi, given, 5.0)
+    take(fdi, given, 5.0)
     assert (found["detected_at_s"], found["isolated_at_s"]) == (4.0, 4.0)
     given["isolated"] = NOT_ISOLATED
-    on(scheme.note_verdict, fdi, given, 6.0)
+    take(fdi, given, 6.0)
     assert (found["isolated"], found["isolated_at_s"]) == (NOT_ISOLATED, 6.0)
     given["isolated"], given["theta"] = 0, -0.7  # the first is as good as any
-    on(scheme.note_verdict, fdi, given, 7.0)
+    take(fdi, given, 7.0)
     assert fdi["isolation"]["estimator"]["theta"][0] == pytest.approx([-0.7] * 3)
 
 
@@ -379,7 +396,7 @@ def test_the_built_in_statistic(enabled, authority, score, share, statistic):
         score,
     )
     fdi["bank"]["threshold"][0], fdi["bank"]["residual"][0, 1] = 0.5, 0.5 * share
-    likely = scheme.likelihood_counts(fdi["statistical"]["tests"], authority)
+    likely = assessment.likelihood_counts(fdi["statistical"]["tests"], authority)
     alarm = fdi["statistical"]["alarm"]
     found = scheme.built_in_statistic(fdi["bank"], alarm, authority, likely)
     assert found == pytest.approx(statistic)
@@ -403,7 +420,7 @@ def test_the_estimate_is_that_of_whoever_counts():
         -0.6,
         1.0,
     )
-    assert on(scheme.isolated_surface, fdi) == 2
+    assert on(conclusion.isolated_surface, fdi) == 2
     assert frame.isolated_theta(fdi, 2) == -0.2
     out = np.zeros(3)
     fdi["fdae"]["network"]["output"], block["rest"] = 0.3, (0, 0, 0.7, 0)
@@ -414,7 +431,7 @@ def test_the_estimate_is_that_of_whoever_counts():
     frame.unknown_acceleration(fdi, out)
     assert out[1] == 0.7
     fdi["verdict"]["isolated"] = NOT_ISOLATED
-    assert on(scheme.isolated_surface, fdi) == -1
+    assert on(conclusion.isolated_surface, fdi) == -1
 
 
 @pytest.mark.parametrize("share", [1.0, 0.25])

@@ -239,11 +239,11 @@ def test_an_alarm_voids_what_a_moment_ago_was_made_of_it(isolated):
     assert watch["alarmed_at_s"] == 9.6  # the same fault, seen first in the rates
     assert watch["misnamed"] == (isolated >= 0)
     assert not watch["beside"]
+    frame.reset_surface_diagnosis(fdi)
     verdict = fdi["verdict"]
     assert [verdict[name] for name in ("detected", "isolated", "type")] == [0, NOT_ISOLATED, -1]
     assert [verdict[name] for name in ("detected_at_s", "isolated_at_s")] == [-1.0, -1.0]
     assert [verdict[name] for name in ("lead", "lead_kind")] == [-1, -1]
-    frame.take_back(fdi)
     assert (fdi["types"]["surface"]["measure"] == -1).all()
     assert not fdi["fdae"]["network"]["weights"].any()
     assert not fdi["fdae"]["network"]["output"].any()
@@ -300,7 +300,7 @@ def asked(
     error=(0.0, 0.0, 0.0), then=(0.0, 0.0, 0.0), innovation=(0.0, 0.0, 0.0), noise=0.0, spike=0.0, **fields
 ):
     """What the rates say by axis; by default the bound of a frame is 1 rad/s2."""
-    watch, fdi = new_watch(error=error, error_then=then, spike_before=spike, **fields), new_fdi()
+    watch, fdi = new_watch(gyro_error=error, gyro_error_then=then, spike_before=spike, **fields), new_fdi()
     fdi["bank"]["innovation"], fdi["bound"]["frame"] = innovation, 1.0
     fdi["bank"]["threshold"][:3] = 1.0
     watch["step"]["test"]["noise"] = noise
@@ -360,7 +360,7 @@ def test_what_the_rates_have_said_stays_said():
 @pytest.mark.parametrize(("first", "say"), [(1.0, UNKNOWN), (0.5, UNKNOWN), (0.2, NO)])
 def test_a_first_error_of_a_gyro_need_not_be_in_the_filter(first, say):
     """An error there from the first look on, which brought no innovation: 0.7 of it is within the bound."""
-    watch = new_watch(begun=1, past=0, error=(first, -first, 2.0 * first))
+    watch = new_watch(begun=1, past=0, gyro_error=(first, -first, 2.0 * first))
     for past in (0, 1, 2, 3):
         watch["past"] = past
         watching.note_first_errors(watch)
@@ -372,7 +372,7 @@ def test_a_first_error_of_a_gyro_need_not_be_in_the_filter(first, say):
 
 @pytest.mark.parametrize(("begun", "asked"), [(1, False), (2, False), (3, True)])
 def test_the_first_whole_frame_shows_no_jump(begun, asked):
-    watch, fdi = with_shares({TURN: 2.0, ANGLE: 1.5}, past=0, error=(0, 0.3, 0), begun=begun), new_fdi()
+    watch, fdi = with_shares({TURN: 2.0, ANGLE: 1.5}, past=0, gyro_error=(0, 0.3, 0), begun=begun), new_fdi()
     fdi["bank"]["threshold"], fdi["bound"]["frame"] = 1.0, 1.0
     on(watching.decide, fdi, watch, seen(), 5.0)
     assert (watch["rates_say"][1] == NO) == asked
@@ -519,14 +519,14 @@ def test_looks_of_a_frame_follow_one_another():
         assert watch["past"] == (k + 1) % 4
     assert watch["W"][0] == pytest.approx(0.5 * DT)  # once a frame
     # the gyro's error as the frame began, and the largest inside it: the attitude moved, the rates did not
-    assert watch["error"] == pytest.approx(np.zeros(3), abs=1e-12)
+    assert watch["gyro_error"] == pytest.approx(np.zeros(3), abs=1e-12)
     assert watch["spike"][0] == pytest.approx(1e-3 / H, rel=1e-3)
     before = watch["spike"].copy()
     looked(watch, fdi, phi=2e-3)
-    assert watch["error"][0] == pytest.approx(-1e-3 / H, rel=1e-2)
+    assert watch["gyro_error"][0] == pytest.approx(-1e-3 / H, rel=1e-2)
     assert watch["spike_then"] == pytest.approx(before)
     assert not watch["spike"].any()
-    assert watch["error_then"] == pytest.approx(np.zeros(3), abs=1e-12)
+    assert watch["gyro_error_then"] == pytest.approx(np.zeros(3), abs=1e-12)
     assert watch["W"][0] == pytest.approx(2 * 0.5 * DT)
 
 
@@ -545,7 +545,7 @@ def test_a_broken_altimeter_is_named_and_replaced_from_then_on():
 @pytest.mark.parametrize(("past", "asked"), [(0, True), (1, False)])
 def test_the_rates_are_asked_once_a_frame(past, asked):
     watch, fdi = (
-        with_shares({TURN: 2.0, ANGLE: 1.5}, past=past, error=(0, 0.3, 0), begun=watching.ASKED),
+        with_shares({TURN: 2.0, ANGLE: 1.5}, past=past, gyro_error=(0, 0.3, 0), begun=watching.ASKED),
         new_fdi(),
     )
     fdi["bank"]["threshold"], fdi["bound"]["frame"] = 1.0, 1.0
@@ -628,8 +628,8 @@ def test_suspicions_of_the_frame_before_are_gone():
 
 def test_an_alarm_on_roll_counts_as_one():
     """The first axis of the bank has number 0, and no axis is -1."""
-    watch, fdi = new_watch(error=(0.0, 0.3, 0.0), W_bound=(9.0, 9.0, 9.0)), new_fdi()
-    fdi["bound"]["frame"], fdi["bank"]["threshold"][:3], watch["error_then"] = 1.0, 1.0, (0.0, 0.3, 0.0)
+    watch, fdi = new_watch(gyro_error=(0.0, 0.3, 0.0), W_bound=(9.0, 9.0, 9.0)), new_fdi()
+    fdi["bound"]["frame"], fdi["bank"]["threshold"][:3], watch["gyro_error_then"] = 1.0, 1.0, (0.0, 0.3, 0.0)
     fdi["bank"]["residual"][0, 0] = 2.0
     on(watching.ask_rates, fdi, watch)
     assert watch["rates_say"].tolist() == [YES] * 3

@@ -27,18 +27,6 @@ def surfaces_dtype(n: int) -> np.dtype:
 
 
 @sized
-def assessment_dtype(n: int) -> np.dtype:
-    """What the diagnosis says of n surfaces: whether it has detected a fault, none that it knows or can tell
-    (unknown), and which surface it names, -1 for none. measure: what is to be done about each, -1 where that
-    is open, or for faults of every type not asked; effectiveness; offset, lag rad; at_once: whether its
-    effectiveness need not be eased in. hedge: a surface is slow."""
-    return record(
-        detected=int, unknown=int, every_type=int, named=int, hedge=int, measure=(int, n), effectiveness=n,
-        at_once=(int, n), offset=n, lag=n,
-    )  # fmt: skip
-
-
-@sized
 def true_faults_dtype(n: int) -> np.dtype:
     """present: 1 from the first fault on. effectiveness (n,): 1 healthy. immovable (n,): does not follow its
     command. effective (n,) rad: the deflection that acts. Cm_alpha3: the unanticipated pitching moment."""

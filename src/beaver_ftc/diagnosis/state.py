@@ -17,29 +17,12 @@ _AUTHORITIES = {"either": EITHER, "worst-case": WORST_CASE, "statistical": STATI
 LOSS, POSITION = 0, 1  # kinds of hypothesis: isolation.py
 IN_PITCH, IN_ROLL_AND_YAW = 0, 1  # groups of surfaces
 ROLL, PITCH, YAW, SIDE, NORMAL = range(5)  # axes, and the accelerometers beside them: forces.py
-MAX_WITHDRAWN = 16
-
-# A name that was taken back: the surface, named from when to when, s.
-WITHDRAWN = record(surface=int, from_s=float, to_s=float)
 
 
 @sized
 def verdict_dtype(n: int) -> np.dtype:
     """A plug-in's verdict. isolated: a surface, NOT_ISOLATED or UNANTICIPATED."""
     return record(detected=int, axis=int, isolated=int, theta=float, estimates=int, effectiveness=n)
-
-
-@sized
-def conclusion_dtype(n: int) -> np.dtype:
-    """What is concluded about n surfaces. isolated: an estimator, NOT_ISOLATED or UNANTICIPATED. type: of the
-    isolated fault, -1 if open. lead: the surface the law acts upon, and what it does about it. effectiveness:
-    of every surface, where a plug-in `estimates` it. named_from_s: since when each surface is named, -1 if it
-    is not; withdrawn: what was named before."""
-    return record(
-        detected=int, detected_at_s=float, detected_axis=int, isolated=int, isolated_at_s=float, type=int,
-        type_at_s=float, lead=int, lead_kind=int, estimates=int, effectiveness=n, named_from_s=n,
-        n_withdrawn=int, withdrawn=(WITHDRAWN, MAX_WITHDRAWN),
-    )  # fmt: skip
 
 
 @sized

@@ -19,7 +19,7 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.model import ALPHA, BETA
-from beaver_ftc.diagnosis.detection.fdae import gaussians, note_alarm
+from beaver_ftc.diagnosis.detection.fdae import gaussians
 from beaver_ftc.diagnosis.state import CONSTANT, PITCH
 from beaver_ftc.plugins import DETECTORS, settings
 from beaver_ftc.scenario.schema import Scenario
@@ -133,11 +133,12 @@ def respond(published, fdae, main, x, y, u):
 
 
 @kernel
-def detect(fdae, conclusion, t):
-    """Raise the alarm at t s if a residual of the FDAE exceeds its threshold."""
+def detect(fdae):
+    """The first axis on which the residual of the FDAE exceeds its threshold, or -1."""
     for i in range(3):
         if abs(fdae.residual[i]) > fdae.threshold[i]:
-            note_alarm(conclusion, i, t)
+            return i
+    return -1
 
 
 @kernel

@@ -4,10 +4,11 @@ import numpy as np
 
 from beaver_ftc.compiled import record, sized
 from beaver_ftc.control import state as control
-from beaver_ftc.control.accommodation import assessment_dtype, true_faults_dtype
+from beaver_ftc.control.accommodation import true_faults_dtype
 from beaver_ftc.control.outer.state import AUTOPILOT, COLUMNS
 from beaver_ftc.control.supervisor import SUPERVISOR
 from beaver_ftc.diagnosis import scheme
+from beaver_ftc.diagnosis.assessment import assessment_dtype
 from beaver_ftc.diagnosis.belief import expectation
 from beaver_ftc.diagnosis.detection.parity import USUAL, Size, size_for
 from beaver_ftc.diagnosis.isolation.estimators import estimator_names

@@ -22,28 +22,30 @@ from beaver_ftc.control.outer.autopilot import judge, steer
 from beaver_ftc.control.rivals import compiled
 from beaver_ftc.control.supervisor import MODE_REALLOCATED
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, unanticipated_pitch
-from beaver_ftc.diagnosis import scheme, zhang2005
+from beaver_ftc.diagnosis import assessment, conclusion, scheme, zhang2005
+from beaver_ftc.diagnosis.assessment import assess
 from beaver_ftc.diagnosis.belief import air
 from beaver_ftc.diagnosis.belief.expectation import (
     begin_frame,
+    expect,
     follow_command,
     foresee,
+    form_innovation,
     look,
     look_back,
     respond,
 )
 from beaver_ftc.diagnosis.detection import bank, fdae, parity, statistical
-from beaver_ftc.diagnosis.isolation import estimators
+from beaver_ftc.diagnosis.detection.signatures import sign_blocks
+from beaver_ftc.diagnosis.isolation import by_chance, estimators
 from beaver_ftc.diagnosis.monitors import engine_symmetry, sensor_monitor
-from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, STATISTICS, WORST_CASE
-from beaver_ftc.diagnosis.types import examine
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, STATISTICS, UNANTICIPATED, WORST_CASE, YAW
+from beaver_ftc.diagnosis.types import examine, verdict
 from beaver_ftc.diagnosis.types.contract import LAGS
 from beaver_ftc.loop import accounts, log_row
 from beaver_ftc.loop.log_row import put
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.sensing import NOT_FINITE, flight_status, hand_over, measure
-
-SURE = 400.0  # one over the variance of an effectiveness known to 0.05, which need not be eased in
 
 
 @apart
@@ -56,15 +58,15 @@ def watch_instruments(frame):
         watch.step.command[1] = engine.command[0]
     sensor_monitor.monitor(watch, frame.belief, frame.measured, fdi.verdict, fdi.bank, fdi.bound, frame.dt, t)
     if watch.alarmed and not (before or watch.beside):
-        take_back(fdi)
+        reset_surface_diagnosis(fdi)
 
 
 @kernel
-def take_back(fdi):
-    """What the diagnosis of the surfaces made of a broken instrument is void."""
-    for s in range(fdi.types.surface.size):
-        fdi.types.surface[s].measure = -1
-    fdi.fdae.network.weights[:], fdi.fdae.network.output[:] = 0.0, 0.0
+def reset_surface_diagnosis(fdi):
+    """Discard what the diagnosis of the surfaces made of a broken sensor."""
+    conclusion.void(fdi.verdict)
+    verdict.clear_measures(fdi.types.surface)
+    fdae.reset_network(fdi.fdae.network)
 
 
 @kernel
@@ -102,7 +104,7 @@ def diagnose(frame):
             predict(frame, k)
         else:
             bank.align(fdi.isolation, frame.belief.G)
-        engine_symmetry.heed(fdi.balance, frame.control.power.command[1:])
+        engine_symmetry.disable_if_differential_thrust(fdi.engines, frame.control.power.command[1:])
         conclude(fdi, frame.measured, frame.belief.u, frame.t)
     make_ready(frame, k)
 
@@ -117,7 +119,8 @@ def take_verdict(frame):
     else:
         predict(frame, k)
     fdae.form_residual(fdi.fdae, measured.x)
-    scheme.note_verdict(fdi.verdict, fdi.isolation.estimator, frame.verdict, frame.t)
+    conclusion.note_plugin(fdi.verdict, frame.verdict, frame.t)
+    estimators.take_estimate(fdi.isolation, fdi.verdict.isolated, frame.verdict.theta)
     if fdi.verdict.detected:
         fdae.evaluate(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
     make_ready(frame, k)
@@ -130,28 +133,26 @@ def predict(frame, k):
     What the law takes each surface for is expected: what is known of a fault is no surprise.
     """
     fdi, belief, chances, surfaces = frame.fdi, frame.belief, frame.fdi.statistical, frame.control.surfaces
-    config, bound, conclusion, dt = fdi.config, fdi.bound, fdi.verdict, fdi.config.dt
-    x, x_then, mean, expected = frame.measured.x, belief.x_then, belief.means, belief.expected
-    expected[:] = mean.acceleration
-    bank.innovate(fdi.bank, bound, x, x_then, expected, dt)
+    config, bound, found, dt = fdi.config, fdi.bound, fdi.verdict, fdi.config.dt
+    x, x_then, mean = frame.measured.x, belief.x_then, belief.means
+    bank.innovate(fdi.bank, bound, x, x_then, mean.acceleration, dt)
     if chances.tests.enabled:
         compare_likelihoods(frame, k)
-    known, spread = conclusion.detected, mean.Gu_spread
+    known, spread = found.detected, mean.Gu_spread
     estimators.suppose_all(fdi.isolation, fdi.bank, bound, config, known, mean.G, mean.Gu, spread)
     if config.every_type:
         examine.note_orders(fdi.types, belief.commanded, mean)
     if known:
-        estimators.predict_all(fdi.isolation, bound, x_then, expected, dt)
-        scheme.expect_known_faults(expected, mean, surfaces.effectiveness, surfaces.offset, config.every_type)
+        estimators.predict_all(fdi.isolation, bound, x_then, mean.acceleration, dt)
+    expect(belief, known, surfaces.effectiveness, surfaces.offset, config.every_type)
     if chances.tests.enabled:
-        for i in range(3):
-            belief.surprise[i] = (x[i] - x_then[i]) / dt - expected[i]
-        statistical.follow_rest(chances.block, chances.air, belief.surprise, dt)
+        form_innovation(belief, x, dt)
+        statistical.follow_rest(chances.block, chances.air, belief.innovation_after_known_faults, dt)
     if fdi.published.in_use:
         predict_as_published(fdi, x_then, mean.acceleration)
         return
-    leaking = conclusion.isolated >= 0 or conclusion.lead >= 0
-    fdae.predict(fdi.fdae, bound, x_then, expected, known, leaking, dt)
+    leaking = found.isolated >= 0 or found.lead >= 0
+    fdae.predict(fdi.fdae, bound, x_then, belief.expected, known, leaking, dt)
 
 
 @apart
@@ -177,7 +178,7 @@ def compare_likelihoods(frame, k):
     if inertial.moving:
         air.elapse(inertial, belief.share)
     foresee(mean)
-    statistical.signatures(blocks, mean.Gu_foreseen, unanticipated_pitch(belief.design, y, 1.0))
+    sign_blocks(blocks, mean.Gu_foreseen, unanticipated_pitch(belief.design, y, 1.0))
     latched, ends = chances.alarm.detected_at_s >= 0.0, not fdi.config.abrupt
     statistical.observe(tests, noise.bounded, blocks, seen, innovation, dt, k, latched, ends)
     parity.face(views, felt, seen, fdi.bound, mean.G_foreseen, mean.Gu_foreseen)
@@ -199,20 +200,32 @@ def conclude(fdi, measured, u, t):
     known, every_type = fdi.verdict.detected, fdi.config.every_type
     fdae.form_residual(fdi.fdae, measured.x)
     if fdi.published.in_use:
-        zhang2005.detect(fdi.fdae, fdi.verdict, t)
+        axis = zhang2005.detect(fdi.fdae)
         zhang2005.respond(fdi.published, fdi.fdae, fdi.layout.main, measured.x, measured.y, u)
     else:
-        engine_symmetry.detect(fdi.balance, fdi.verdict, fdi.bound.error_map.apart_now, measured.y, t)
-        fdae.detect(fdi.bank, fdi.verdict, fdi.config.authority, fdi.statistical.alarm, t)
+        axis = detect(fdi, measured.y, t)
+    if axis >= 0:
+        conclusion.latch_alarm(fdi.verdict, axis, t)
     if not fdi.verdict.detected:
         return
     if not known:
         scheme.begin_isolation(fdi.isolation, fdi.types, every_type, fdi.bound.noise, measured.x)
     sound = not sensor_monitor.shown_from_the_start(fdi.watch, fdi.verdict.detected_at_s)
-    if sound and sensor_monitor.clears_surfaces(fdi.watch, known) and not fdi.balance.failed:
+    if sound and sensor_monitor.clears_surfaces(fdi.watch, known) and not fdi.engines.output.failed:
         isolate(fdi, measured.x, t, known)
     if not fdi.published.in_use:
         fdae.evaluate(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
+
+
+@kernel
+def detect(fdi, y, t):
+    """The axis on which a detector raises the alarm, or -1. An engine that has failed is outside the class:
+    no surface is isolated then. y: measured signals."""
+    apart, found = fdi.bound.error_map.apart_now, fdi.verdict
+    if not found.detected and engine_symmetry.detect(fdi.engines, apart, y):
+        conclusion.note_isolated(found, UNANTICIPATED, t)
+        return YAW
+    return fdae.detect(fdi.bank, fdi.config.authority, fdi.statistical.alarm)
 
 
 @kernel
@@ -222,13 +235,12 @@ def isolate(fdi, x, t, started):
     for s in range(records.n):
         fie = records.estimator[s]
         can_be = estimators.possible(records, fie, fdi.bank, bound.frame, config.abrupt, x, started)
-        if rules_out(fdi, fie, can_be) and not fie.excluded:
-            fie.excluded = 1
-            fie.excluded_at_s = t
+        if rules_out(fdi, fie, can_be):
+            estimators.exclude(fie, t)
     if config.every_type:
         scheme.isolate_type(fdi.types, fdi.verdict, fdi.layout, records, fdi.bank, bound, t, started)
     else:
-        estimators.decide(records, fdi.verdict, t)
+        conclusion.note_isolated(fdi.verdict, estimators.decide(records, t), t)
 
 
 @kernel
@@ -251,7 +263,8 @@ def rules_out(fdi, fie, within):
     if not tests.enabled or chances.alarm.detected_at_s < 0.0:
         return False
     hidden = fdi.watch.enabled and chances.air.moving
-    return scheme.is_unlikely(fie, tests, chances.block, fdi.isolation, layout.loss_of, config.abrupt, hidden)
+    by_chance.weigh(fie, tests, chances.block, fdi.isolation, layout.loss_of, config.abrupt, hidden)
+    return fie.improbable == 1
 
 
 @kernel
@@ -262,7 +275,10 @@ def make_ready(frame, k):
         look_ahead(frame, k)
     begin_frame(belief, fdi.bound, fdi.layout, fdi.config.every_type, frame.measured)
     accounts.follow_guarantee(frame.accounts.guarantee, fdi.bank, fdi.config.dt, belief.share, k, frame.t)
-    assess(fdi, frame.assessment)
+    assess(
+        frame.assessment, fdi.config, fdi.verdict, fdi.types, fdi.layout, fdi.isolation.estimator,
+        fdi.statistical,
+    )  # fmt: skip
     note_names(fdi, frame.t)
 
 
@@ -271,10 +287,10 @@ def note_names(fdi, t):
     """Note which surfaces are named: those of a pair, or the one isolated; none once an instrument is found
     broken."""
     pairs, void = fdi.config.every_type and fdi.types.pair.enabled, sensor_monitor.speaks(fdi.watch)
-    only = scheme.isolated_surface(fdi.verdict, fdi.isolation.estimator)
+    only = conclusion.isolated_surface(fdi.verdict, fdi.isolation.estimator)
     for s in range(fdi.types.surface.size):
         named = fdi.types.surface[s].named if pairs else s == only
-        scheme.note_name(fdi.verdict, s, named and not (void and not fdi.watch.beside), t)
+        conclusion.note_name(fdi.verdict, s, named and not (void and not fdi.watch.beside), t)
 
 
 @apart
@@ -304,38 +320,17 @@ def look_on(frame):
 
 
 @kernel
-def assess(fdi, assessment):
-    """Put what the diagnosis says of each surface where the law reads it (`assessment_dtype`)."""
-    conclusion, types, estimators = fdi.verdict, fdi.types, fdi.isolation.estimator
-    every_type, named = fdi.config.every_type, scheme.isolated_surface(conclusion, estimators)
-    assessment.detected, assessment.every_type = conclusion.detected, every_type
-    assessment.named, assessment.hedge, assessment.unknown = named, 0, scheme.is_unknown(conclusion)
-    for s in range(assessment.measure.size):
-        assessment.measure[s] = types.surface[s].measure if every_type else -1
-        assessment.effectiveness[s], assessment.at_once[s] = 1.0, 0
-        assessment.offset[s], assessment.lag[s] = 0.0, 0.0
-        if conclusion.estimates and conclusion.detected:
-            assessment.effectiveness[s] = conclusion.effectiveness[s]
-        elif assessment.measure[s] >= 0:
-            scheme.assess_type(assessment, types, fdi.layout, estimators, s)
-        elif s == named and not every_type:
-            likely = scheme.likelihood_counts(fdi.statistical.tests, fdi.config.authority)
-            sure = likely and statistical.estimated_loss(fdi.statistical.block, s)[1] > SURE
-            assessment.effectiveness[s], assessment.at_once[s] = 1.0 + isolated_theta(fdi, s), sure
-
-
-@kernel
 def isolated_theta(fdi, s):
-    """Estimated theta of the isolated loss of surface s: under noise, the most likely one."""
-    if scheme.likelihood_counts(fdi.statistical.tests, fdi.config.authority):
-        return statistical.estimated_loss(fdi.statistical.block, s)[0]
-    return fdi.isolation.estimator[fdi.verdict.isolated].theta[fdi.layout.dominant_axis[s]]
+    """Estimated theta of the isolated loss of surface s: see assessment.py."""
+    return assessment.isolated_theta(
+        fdi.config, fdi.verdict, fdi.layout, fdi.isolation.estimator, fdi.statistical, s
+    )
 
 
 @kernel
 def unknown_acceleration(fdi, out):
     """Fill out (3,) rad/s2 with what goes on beyond the model and the known faults, as it is estimated."""
-    if scheme.likelihood_counts(fdi.statistical.tests, fdi.config.authority):
+    if assessment.likelihood_counts(fdi.statistical.tests, fdi.config.authority):
         statistical.unknown_acceleration(fdi.statistical.block, fdi.statistical.air, out)
     else:
         fdae.unknown_acceleration(fdi.fdae, fdi.bound.noise, out)
@@ -544,7 +539,8 @@ def account(frame):
     if truth.faulted:
         accounts.account_authority(sums.authority, control.axes)
     else:
-        bank.note_closest_approach(frame.fdi.bank, frame.fdi.statistical.alarm)
+        bank.note_closest_approach(frame.fdi.bank)
+        statistical.note_closest_approach(frame.fdi.statistical.alarm)
     accounts.account_surfaces(sums, truth, control.allocation.saturated, frame.k, control.reference.dt)
     accounts.note_envelope(sums.envelope, truth.value[ch.ENVELOPE] < 0.5, frame.t)
     accounts.note_inconclusive(sums.inconclusive, frame.fdi, frame.t)

@@ -8,9 +8,9 @@ frames (1,): of `frame_dtype` (assembly.py).
 
 from beaver_ftc.compiled import apart, kernel, row_of
 from beaver_ftc.design.actuators import move
+from beaver_ftc.diagnosis.assessment import likelihood_counts
 from beaver_ftc.diagnosis.monitors import sensor_monitor
 from beaver_ftc.diagnosis.scheme import built_in_statistic as largest_statistic
-from beaver_ftc.diagnosis.scheme import likelihood_counts
 from beaver_ftc.loop import frame as whole
 from beaver_ftc.loop.accounts import add_effect
 from beaver_ftc.plant.native import advance

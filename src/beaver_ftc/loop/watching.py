@@ -7,7 +7,7 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.belief.expectation import follow_command, look_back, respond
-from beaver_ftc.diagnosis.scheme import isolated_surface
+from beaver_ftc.diagnosis.conclusion import isolated_surface
 from beaver_ftc.loop.frame import accommodate, isolated_theta
 
 MEMORY = 8 + 5 * 8  # of the verdict's words: `news`

@@ -54,7 +54,7 @@ def belief_dtype(n: int) -> np.dtype:
         x_then=3,  # measured as the elapsed frame began
         sums=sums_dtype(n), means=means_dtype(n),
         expected=3,  # mean acceleration with the known faults in it
-        surprise=3,  # what the rates did beyond it
+        innovation_after_known_faults=3,  # what the rates did beyond it
     )  # fmt: skip
 
 
@@ -188,6 +188,33 @@ def look(belief, bound, layout, every_type, measured):
     bound_now(bound, belief.design, measured, belief.u)
     sum_up(belief, bound, layout, every_type)
     move(belief.actuators, belief.commanded, belief.u)
+
+
+@kernel
+def expect(belief, known, effectiveness, offset, offsets_count):
+    """Fill expected (3,) rad/s2: f + G u, mean over the elapsed frame, with the faults that are `known`.
+
+    effectiveness (n,): of each surface; offset (n,) rad: its bias, where offsets_count.
+    """
+    expected, mean = belief.expected, belief.means
+    expected[:] = mean.acceleration
+    if not known:
+        return
+    for s in range(effectiveness.size):
+        lost = 1.0 - effectiveness[s]
+        for i in range(3):
+            expected[i] -= lost * mean.Gu[i, s]
+    if offsets_count:
+        for s in range(offset.size):
+            for i in range(3):
+                expected[i] += mean.G[i, s] * offset[s]
+
+
+@kernel
+def form_innovation(belief, x, dt):
+    """Fill innovation_after_known_faults (3,) rad/s2 of the elapsed frame, of dt s; x (3,) rad/s now."""
+    for i in range(3):
+        belief.innovation_after_known_faults[i] = (x[i] - belief.x_then[i]) / dt - belief.expected[i]
 
 
 @kernel

@@ -113,10 +113,8 @@ def largest_share(bank):
 
 
 @kernel
-def note_closest_approach(bank, chances):
-    """Keep the largest share of its bound that each filter has reached, and of its level the statistical
-    detector, `chances` of its ALARM."""
-    chances.closest = max(chances.closest, chances.score)
+def note_closest_approach(bank):
+    """Keep the largest share of its bound that each filter has reached."""
     for m in range(bank.n):
         for i in range(3):
             bank.closest[m] = max(bank.closest[m], share_of(bank, m, i))

@@ -127,6 +127,12 @@ def begin(fdae, bank, noise, x):
 
 
 @kernel
+def reset_network(network):
+    """Discard what the network has learnt."""
+    network.weights[:], network.output[:] = 0.0, 0.0
+
+
+@kernel
 def form_residual(fdae, x):
     """Fill the residual for the measured x (3,) rad/s."""
     for i in range(3):
@@ -134,20 +140,15 @@ def form_residual(fdae, x):
 
 
 @kernel
-def detect(bank, conclusion, authority, chances, t):
-    """Raise the alarm if a detector in authority does, at t s; chances: the statistical one's, of `ALARM`."""
+def detect(bank, authority, statistical_alarm):
+    """The axis on which a detector in authority raises the alarm, or -1.
+
+    statistical_alarm: `ALARM` of the statistical detector.
+    """
     axis = alarm(bank) if authority != STATISTICS else -1
-    if axis < 0 and authority != WORST_CASE and chances.score > 1.0:
-        axis = chances.axis
-    if axis >= 0:
-        note_alarm(conclusion, axis, t)
-
-
-@kernel
-def note_alarm(conclusion, axis, t):
-    """Note an alarm at t s that showed on an axis: the first one counts."""
-    if not conclusion.detected:
-        conclusion.detected, conclusion.detected_at_s, conclusion.detected_axis = 1, t, axis
+    if axis < 0 and authority != WORST_CASE and statistical_alarm.score > 1.0:
+        axis = statistical_alarm.axis
+    return axis
 
 
 @kernel

@@ -50,6 +50,7 @@ from beaver_ftc.diagnosis.detection.likelihood import (
     STEP,
     Rooms,
 )
+from beaver_ftc.diagnosis.detection.signatures import sign_view
 from beaver_ftc.diagnosis.detection.tones import tones_dtype
 from beaver_ftc.diagnosis.state import LOSS, NORMAL, PITCH, ROLL, SIDE, YAW
 
@@ -239,27 +240,13 @@ def regress(view, blocks, forces, air, inertial_air, innovation):
 
 
 @kernel
-def sign(view, forces, Gu):
-    """Fill the signatures: a step, and losses; Gu (3, n) rad/s2."""
-    block, m = view.block, view.mix
-    for hypothesis in block.hypothesis[: block.n_hypotheses]:
-        s = hypothesis.surface
-        hypothesis.signature[0] = 1.0
-        if hypothesis.kind != STEP:
-            moment = m[0] * Gu[0, s] + m[1] * Gu[1, s] + m[2] * Gu[2, s]
-            for f in range(2):
-                moment += m[SIDE + f] * forces.component[f].moment[s]
-            hypothesis.signature[0] = moment
-
-
-@kernel
 def face(views, forces, air, bound, G, Gu):
     """Turn each view to where it looks in this frame, with its signatures; G, Gu (3, n): of it."""
     for view in views:
         view.weighed = not weighs(view) or (forces.known and forces.begun == SETTLED)
         if view.weighed:
             view.shows_across = turn(view, forces, air, bound, G) if view.surface != AN_AXIS else 0.0
-            sign(view, forces, Gu)
+            sign_view(view, forces, Gu)
 
 
 @kernel

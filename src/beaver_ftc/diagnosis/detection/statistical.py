@@ -23,7 +23,6 @@ from beaver_ftc.diagnosis.detection.likelihood import (
     LATERAL,
     N_BLOCKS,
     N_READINGS,
-    STEP,
     block_dtype,
 )
 from beaver_ftc.diagnosis.detection.parity import USUAL, Size, view_dtype
@@ -70,21 +69,6 @@ def statistical_dtype(size: Size = USUAL) -> np.dtype:
         n_views=int, views=(view_dtype(size.view), size.views), listening=LISTENING,
         forces=FORCES_FELT, air=AIR, inertial_air=AIR,
     )  # fmt: skip
-
-
-@kernel
-def signatures(blocks, Gu, cubic):
-    """What each fault would have done in the elapsed frame, times theta. Gu (3, surfaces) rad/s2: what each
-    surface gave, mean over it; cubic rad/s2: a pitching moment on alpha^3."""
-    for block in blocks:
-        for hypothesis in block.hypothesis[: block.n_hypotheses]:
-            for i in range(block.n):
-                if hypothesis.surface >= 0:
-                    hypothesis.signature[i] = Gu[block.axis[i], hypothesis.surface]
-                elif hypothesis.kind == STEP:
-                    hypothesis.signature[i] = 1.0 if hypothesis.axis == block.axis[i] else 0.0
-                else:
-                    hypothesis.signature[i] = cubic
 
 
 @kernel
@@ -152,6 +136,12 @@ def score(alarm, tests, blocks, views, forces, air, t, known=True):
         note(alarm, tests.alarm_level, parity.alarm(view, views, tests, forces, air), view.axis)
     if alarm.score > 1.0 and alarm.detected_at_s < 0.0:
         alarm.detected_at_s = t
+
+
+@kernel
+def note_closest_approach(alarm):
+    """Keep the largest share of its level that the detector has reached."""
+    alarm.closest = max(alarm.closest, alarm.score)
 
 
 @kernel

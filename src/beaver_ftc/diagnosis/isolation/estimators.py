@@ -30,15 +30,18 @@ from beaver_ftc.diagnosis.detection.bank import explains, remember
 from beaver_ftc.diagnosis.detection.thresholds import bound_step, interval, noise_step, published
 from beaver_ftc.diagnosis.isolation import membership
 from beaver_ftc.diagnosis.state import (
+    BESIDE_DAMAGE,
     CONSTANT,
     INTERVAL,
     LOSS,
     NOT_ISOLATED,
+    PITCH,
     POSITION,
     PUBLISHED,
     UNANTICIPATED,
 )
-from beaver_ftc.scenario.diagnosis import MAX_POLES, FdiConfig
+from beaver_ftc.scenario.diagnosis import MAX_POLES
+from beaver_ftc.scenario.schema import Scenario
 
 # What a fault adds to the angular acceleration, as its estimator supposes: offset + theta Z, give or take.
 EFFECT = record(offset=3, Z=3, spread=3)
@@ -46,8 +49,9 @@ EFFECT = record(offset=3, Z=3, spread=3)
 ESTIMATOR = record(
     kind=int, surface=int,
     low=float, high=float,  # the known set of theta
-    excluded=int, excluded_at_s=float, unasked=(int, 3), shown=int, doubted=int, xhat=3, residual=3, lower=3,
-    upper=3, omega=3, rise=3, fall=3, bound=3, bound_eta=3, bound_noise=3, theta=3, covariance=3,
+    excluded=int, excluded_at_s=float, unasked=(int, 3), xhat=3, residual=3, lower=3, upper=3,
+    shown=int, doubted=int, improbable=int,  # by_chance.py
+    omega=3, rise=3, fall=3, bound=3, bound_eta=3, bound_noise=3, theta=3, covariance=3,
     effect=EFFECT, block_effect=EFFECT,  # of the frame; mean over a block
     furthest=float, used=float,  # rad from neutral, share of its travel, where it can have been in the frame
     # what bank.py and membership.py keep
@@ -68,6 +72,7 @@ def isolation_dtype(surfaces: int) -> np.dtype:
     )  # fmt: skip
 
 
+PATIENCE_S = 4.0  # in still air what damage left over was excluded within 3.2 s, in 210 flights
 PARAMETER_SET = {LOSS: (-1.0, 0.0)}
 _THRESHOLDS = {"interval": INTERVAL, "published": PUBLISHED}
 
@@ -94,9 +99,10 @@ def estimator_names(fault_class: str, aircraft: Aircraft) -> tuple[str, ...]:
 
 
 def configure(
-    isolation: np.void, config: FdiConfig, dt: float, members: tuple[Member, ...], travel: np.ndarray
+    isolation: np.void, scenario: Scenario, members: tuple[Member, ...], travel: np.ndarray
 ) -> None:
     """Fill in the estimators and how the decision among them is sharpened; travel (2, n) rad."""
+    config, aircraft, dt = scenario.fdi, scenario.airframe, 1.0 / scenario.rate_hz
     sharpen = config.sharpen
     isolation["thresholds"] = _THRESHOLDS[config.thresholds]
     isolation["forgetting"] = exp(-dt / config.forgetting_time_s)
@@ -107,6 +113,15 @@ def configure(
     for fie, (_, kind, surface) in zip(isolation["estimator"], members, strict=False):
         fie["kind"], fie["surface"] = kind, surface
         fie["low"], fie["high"] = PARAMETER_SET[kind] if kind == LOSS else reach[:, surface]
+        if config.pairs:  # each plane by itself: pitch by its two surfaces, roll and yaw by theirs
+            fie["unasked"] = (1, 0, 1) if aircraft.dominant_axis[surface] == PITCH else (0, 1, 0)
+    # Damage is outside the class: what is merely left when chance has excluded the others is not yet at
+    # fault.
+    doubted = BESIDE_DAMAGE if config.weighs_chance and aircraft.damage else 0
+    isolation["estimator"]["doubted"] = doubted
+    isolation["patience_s"] = PATIENCE_S if aircraft.damage else 0.0
+    lost = {surface for case in aircraft.damage.values() for surface in case.takes}
+    isolation["taken"] = [surface in lost for surface in aircraft.surfaces]
 
 
 @kernel
@@ -156,9 +171,7 @@ def start(isolation, noise, x):
     for fie in isolation.estimator[: isolation.n]:
         fie.xhat[:], fie.bound_noise[:] = x, noise
         fie.covariance[:] = (fie.high - fie.low) ** 2 / 12.0  # of a uniform distribution
-        fie.theta_low[:], fie.theta_high[:] = fie.low, fie.high
-        if isolation.unprojected:
-            fie.theta_low[:], fie.theta_high[:] = -np.inf, np.inf
+        membership.start(fie, isolation.unprojected)
 
 
 @kernel
@@ -196,11 +209,19 @@ def possible(isolation, fie, bank, frame_bound, abrupt, x, started):
 
 
 @kernel
-def decide(isolation, conclusion, t):
-    """The generalised observer scheme: the one left is the fault; none left means it is outside the class.
+def exclude(fie, t):
+    """Exclude a fault from t s on."""
+    if not fie.excluded:
+        fie.excluded, fie.excluded_at_s = 1, t
 
-    One that is doubted and does not show by itself is not named, nor, of an aircraft that declares damage,
-    one that has not yet been the only one left for a while.
+
+@kernel
+def decide(isolation, t):
+    """The isolated fault by the generalised observer scheme: the estimator left, NOT_ISOLATED, or, with none
+    left, UNANTICIPATED: the fault is outside the class.
+
+    An estimator that is doubted and does not show by itself is not named, nor, of an aircraft that declares
+    damage, one that has not yet been the only one left for `patience_s`.
     """
     left, last, since_s = 0, NOT_ISOLATED, -np.inf
     for s, fie in enumerate(isolation.estimator[: isolation.n]):
@@ -211,10 +232,14 @@ def decide(isolation, conclusion, t):
             last = NOT_ISOLATED if fie.doubted and not fie.shown else s
     if t - since_s < isolation.patience_s:
         last = NOT_ISOLATED
-    named = NOT_ISOLATED if left > 1 else (last if left == 1 else UNANTICIPATED)
-    if named != conclusion.isolated:
-        conclusion.isolated = named
-        conclusion.isolated_at_s = t
+    return NOT_ISOLATED if left > 1 else (last if left == 1 else UNANTICIPATED)
+
+
+@kernel
+def take_estimate(isolation, isolated, theta):
+    """Replace theta of the isolated estimator, where there is one, by the estimate of a plug-in."""
+    if isolated >= 0:
+        isolation.estimator[isolated].theta[:] = theta
 
 
 @kernel

@@ -7,6 +7,8 @@ there is of a parameter that may change in any way; of a constant one (`fdi.faul
 sets of all frames since the alarm may be intersected.
 """
 
+import numpy as np
+
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.bounds.worst_case import covering, share_used
 
@@ -105,6 +107,14 @@ def agree(fie, innovation, frame_bound):
         axis_low, axis_high = agreeing(innovation, frame_bound, fie, fie.effect, i)
         low, high = max(low, axis_low), min(high, axis_high)
     return low <= high
+
+
+@kernel
+def start(fie, unprojected):
+    """Begin with the known set of theta on every axis; `unprojected`: with no limit."""
+    fie.theta_low[:], fie.theta_high[:] = fie.low, fie.high
+    if unprojected:
+        fie.theta_low[:], fie.theta_high[:] = -np.inf, np.inf
 
 
 @kernel

@@ -1,13 +1,14 @@
-"""Whether engines under one lever pull alike: one that fails yaws the aircraft, and nothing else does so.
+"""The engine symmetry monitor: engines under one lever that thrust unlike yaw the aircraft.
 
-The moments of engines that are effectors are signals, which the innovation does not contain. So they are held
-against the thrust beside them. With all levers where one is, in health
+The moments of engines that are effectors are signals, which the innovation does not contain. They are
+compared with the thrust. With all levers alike, a healthy aircraft has
 
     |Cn - a CT| <= bound + OFF_CENTRE_M / b |CT|,    a = -sum share right / b
 
-bound: measured where the terms were derived, box by box of the map of the model's error (propellers yaw
-aslant); and for fuel burns from one side first. Beyond it an engine has failed: no surface can do that. An
-engine in the middle does not show, nor do all that fail alike.
+CT, Cn: coefficients of thrust and of its yawing moment; b m: span; right m: place of an engine. bound:
+measured where the terms were derived, box by box of the map of the model's error (propellers yaw aslant); the
+second term is for fuel that burns from one side first. Beyond the limit an engine has failed: no surface can
+do that. An engine in the middle does not show, nor do engines that fail alike.
 """
 
 import numpy as np
@@ -15,48 +16,48 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.terms import DPT
-from beaver_ftc.diagnosis.detection.fdae import note_alarm
-from beaver_ftc.diagnosis.state import UNANTICIPATED, YAW
 
 THRUST, YAWING = "thrust", "engines_n"  # signals: CT and Cn
 OFF_CENTRE_M = 0.05
 
-# n: engines there are, 0: nothing is said of them. thrust, yawing: where the signals are in y. arm: a, and
-# off_centre: of the bound, per CT. failed: one has.
-BALANCE = record(n=int, thrust=int, yawing=int, arm=float, off_centre=float, failed=int)
+# n: engines, 0 where they are not monitored. thrust, yawing: places of the signals in y. arm: a. off_centre:
+# of the bound, per CT.
+CONFIG = record(n=int, thrust=int, yawing=int, arm=float, off_centre=float)
+MEMORY = record(disabled=int)  # a law has moved an engine apart: the levers are no longer alike
+OUTPUT = record(failed=int)  # an engine has failed
+ENGINES = record(config=CONFIG, memory=MEMORY, output=OUTPUT)
 
 
 def mean_arm(aircraft: Aircraft) -> float:
-    """a: what thrust yaws by with all levers alike."""
+    """a: the yawing moment of the thrust with all levers alike, per CT."""
     return -sum(of.share * of.right_m for of in aircraft.effectors.values()) / aircraft.geometry.span_m
 
 
-def configure(balance: np.void, aircraft: Aircraft) -> None:
-    """Fill the record (dtype BALANCE); it stays empty where nobody has measured how alike engines pull."""
+def configure(config: np.void, aircraft: Aircraft) -> None:
+    """Fill the record (dtype CONFIG); it stays empty where the symmetry of the engines is not measured."""
     known, signals = aircraft.file.model_error_map, list(aircraft.signals)
     if known is None or not known.knows_engines or not {THRUST, YAWING} <= set(signals):
         return
-    balance["n"], balance["arm"] = len(aircraft.effectors), mean_arm(aircraft)
-    balance["thrust"], balance["yawing"] = (DPT + signals.index(name) for name in (THRUST, YAWING))
-    balance["off_centre"] = OFF_CENTRE_M / aircraft.geometry.span_m
+    config["n"], config["arm"] = len(aircraft.effectors), mean_arm(aircraft)
+    config["thrust"], config["yawing"] = (DPT + signals.index(name) for name in (THRUST, YAWING))
+    config["off_centre"] = OFF_CENTRE_M / aircraft.geometry.span_m
 
 
 @kernel
-def heed(balance, levers):
-    """Say nothing more once a law has moved an engine apart; levers (n and more,): of each, beside the
+def disable_if_differential_thrust(engines, levers):
+    """Disable the monitor once a law has moved an engine apart; levers (n and more,): of each, beside the
     common one."""
-    for e in range(balance.n):
+    for e in range(engines.config.n):
         if levers[e] != 0.0:
-            balance.n = 0
+            engines.memory.disabled = 1
 
 
 @kernel
-def detect(balance, conclusion, bound, y, t):
-    """Raise the alarm at t s, and name it `unanticipated`, if an engine has failed; bound: here."""
-    if balance.n == 0 or conclusion.detected:
-        return
-    thrust = y[balance.thrust]
-    if abs(y[balance.yawing] - balance.arm * thrust) > bound + balance.off_centre * abs(thrust):
-        note_alarm(conclusion, YAW, t)
-        conclusion.isolated, conclusion.isolated_at_s = UNANTICIPATED, t
-        balance.failed = 1
+def detect(engines, bound, y):
+    """Whether an engine has failed, by these signals y or before; bound: on |Cn - a CT| here."""
+    config = engines.config
+    if config.n > 0 and not engines.memory.disabled:
+        thrust = y[config.thrust]
+        if abs(y[config.yawing] - config.arm * thrust) > bound + config.off_centre * abs(thrust):
+            engines.output.failed = 1
+    return engines.output.failed == 1

@@ -40,7 +40,6 @@ from beaver_ftc.diagnosis.monitors.sensor_records import (
     UNKNOWN,
     YES,
 )
-from beaver_ftc.diagnosis.state import NOT_ISOLATED
 from beaver_ftc.plant.instruments import (
     ALTITUDE,
     AX,
@@ -67,7 +66,7 @@ CROSS_DAMPING_PER_S = 10.0  # by which a gyro's own error moves the innovation
 def monitor(watch, belief, measured, conclusion, bank, bound, dt, t):
     """Look at the instruments at one instant, t s; replace in `measured` what is known to be broken.
 
-    bank, bound: of the innovation of the elapsed frame, of dt s. conclusion: void from an alarm on.
+    bank, bound: of the innovation of the elapsed frame, of dt s. conclusion: about the surfaces, so far.
     """
     step, signal = watch.step, measured.signal
     if not watch.begun:
@@ -79,13 +78,13 @@ def monitor(watch, belief, measured, conclusion, bank, bound, dt, t):
     since_start.follow(step, watch.since, signal)
     accelerometers.note_stillness(watch, signal)
     if watch.past == 0:
-        watch.error_then[:], watch.spike_before[:] = watch.error, watch.spike_then
+        watch.gyro_error_then[:], watch.spike_before[:] = watch.gyro_error, watch.spike_then
         watch.spike_then[:] = watch.spike
         watch.spike[:] = 0.0
     for i in range(3):
         error = -step.test[TURN + i].residual / step.h
         if watch.past == 0:
-            watch.error[i] = error
+            watch.gyro_error[i] = error
         else:
             watch.spike[i] = max(watch.spike[i], abs(error))
     if watch.begun < ASKED:
@@ -119,7 +118,7 @@ def note_first_errors(watch):
         watch.begun += 1
     if watch.begun == ASKED - 1 and watch.past == 0:
         for i in range(3):
-            watch.W_bound[i] += abs(watch.error[i])
+            watch.W_bound[i] += abs(watch.gyro_error[i])
 
 
 @kernel
@@ -196,7 +195,8 @@ def note_furthest(watch):
 
 @kernel
 def raise_alarm(watch, conclusion, t):
-    """An instrument is broken; what the diagnosis of the surfaces concluded a moment ago is void."""
+    """Raise the alarm of the sensors at t s. A surface detected long before was detected with sound sensors:
+    then the alarm is `beside` it. Otherwise the conclusion about surfaces is void."""
     if watch.alarmed:
         return
     watch.alarmed, watch.alarmed_at_s = 1, t
@@ -206,9 +206,6 @@ def raise_alarm(watch, conclusion, t):
     if conclusion.detected:
         watch.alarmed_at_s = conclusion.detected_at_s  # the same fault, seen first in the rates
     watch.misnamed = conclusion.isolated >= 0
-    conclusion.detected, conclusion.isolated, conclusion.type = 0, NOT_ISOLATED, -1
-    conclusion.detected_at_s = conclusion.isolated_at_s = -1.0
-    conclusion.lead = conclusion.lead_kind = -1
 
 
 @kernel
@@ -229,12 +226,15 @@ def ask_rates(watch, bank, bound, dt):
     for i in range(3):
         if watch.rates_say[i] != UNKNOWN:
             continue
-        error, jump = watch.error[i], (watch.error[i] - watch.error_then[i]) / dt
-        own = CROSS_DAMPING_PER_S * max(abs(error), abs(watch.error_then[i])) + 0.1 * abs(jump)
+        error, jump = watch.gyro_error[i], (watch.gyro_error[i] - watch.gyro_error_then[i]) / dt
+        own = CROSS_DAMPING_PER_S * max(abs(error), abs(watch.gyro_error_then[i])) + 0.1 * abs(jump)
         blur = 4.0 * watch.step.test[TURN + i].noise / watch.step.h  # of `error`, by the attitude's noise
         most = bound.frame[i] + 1e-6
         seen = abs(innovation[i]) > most or alarmed >= 0 or abs(watch.W[i]) > watch.W_bound[i] + 1e-6
-        spike, left = watch.spike_before[i], max(abs(watch.error_then[i]), watch.spike_then[i], abs(error))
+        spike, left = (
+            watch.spike_before[i],
+            max(abs(watch.gyro_error_then[i]), watch.spike_then[i], abs(error)),
+        )
         sudden = left < GONE * spike and spike > 2.0 * blur
         explained = abs(innovation[i] - jump) <= most + own + blur / dt
         slow = 0.7 * abs(error) <= watch.W_bound[i] + abs(watch.W[i]) + blur

@@ -66,7 +66,7 @@ WATCH = record(
     fired=(int, N_TESTS), suspect=(int, N_SENSORS), named=int, named_at_s=float, replaced=(int, N_SENSORS),
     trim=N_SENSORS, follows=float,  # share of its error a replaced rate makes up a look
     # what tells a gyro from the attitude, by axis
-    error=3, error_then=3,  # of the gyro, as each frame began, rad/s
+    gyro_error=3, gyro_error_then=3,  # as each frame began, rad/s
     spike=3, spike_then=3, spike_before=3, damping=(3, 3), W=3, W_bound=3, W_then=3, before=3,
     # no gyro can be what the rates show: what attitude and W make of that, and how far one gyro goes
     blurred=int, no_gyro=int, apart=(3, N_POLES), apart_bound=(3, N_POLES),

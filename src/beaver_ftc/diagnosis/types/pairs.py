@@ -232,30 +232,22 @@ def one_in_pitch(types, layout):
 
 @kernel
 def decide(types, conclusion, layout, t):
-    """Name surfaces and types plane by plane; t s. `isolated` is the one named first, the law acts on all."""
+    """Name surfaces and types plane by plane; t s. Returns the finding as `conclusion.note_type` takes it:
+    `isolated` is the one named first, the law acts on all. conclusion: that of the frame before."""
     outside = decide_roll_and_yaw(types, layout, t)
     decide_pitch(types, layout, t)
     earliest = NO_SURFACE
     for s, surface in enumerate(types.surface):
         if surface.named and (earliest < 0 or surface.named_at_s < types.surface[earliest].named_at_s):
             earliest = s
-    summarise(types, conclusion, layout, earliest, outside, t)
-    act(types, conclusion, layout)
-
-
-@kernel
-def summarise(types, conclusion, layout, s, outside, t):
-    """The verdict on surface s, the first named, as that of a single fault."""
-    before = conclusion.isolated
-    if s < 0:
-        conclusion.isolated, conclusion.type = state.UNANTICIPATED if outside else state.NOT_ISOLATED, -1
-    else:
-        surface = types.surface[s]
-        conclusion.isolated = verdict.estimator_for(layout, s, surface.type)
-        conclusion.type, conclusion.type_at_s = surface.type, surface.type_at_s
-        conclusion.isolated_at_s = surface.named_at_s
-    if s < 0 and conclusion.isolated != before:
-        conclusion.isolated_at_s = t
+    lead, lead_kind = act(types, layout)
+    if earliest >= 0:
+        first = types.surface[earliest]
+        isolated = verdict.estimator_for(layout, earliest, first.type)
+        return isolated, first.named_at_s, first.type, first.type_at_s, lead, lead_kind
+    isolated = state.UNANTICIPATED if outside else state.NOT_ISOLATED
+    isolated_at_s = t if isolated != conclusion.isolated else conclusion.isolated_at_s
+    return isolated, isolated_at_s, -1, conclusion.type_at_s, lead, lead_kind
 
 
 @kernel
@@ -279,9 +271,10 @@ def acted_upon(types, layout, s):
 
 
 @kernel
-def act(types, conclusion, layout):
-    """What the law does about each surface. The supervisor follows the lead: a replaced elevator first."""
-    conclusion.lead, conclusion.lead_kind = NO_SURFACE, -1
+def act(types, layout):
+    """Settle what the law does about each surface. Returns the lead, which the supervisor follows, and what
+    is done about it: a replaced elevator leads before all others."""
+    lead, lead_kind = NO_SURFACE, -1
     for s, surface in enumerate(types.surface):
         surface.measure = -1
         if acted_upon(types, layout, s):
@@ -290,5 +283,6 @@ def act(types, conclusion, layout):
             if verdict.still_there(types.config, surface, measure, at_fault):
                 surface.measure = measure
                 replaced = s == layout.main[PITCH] and measure in (LOSES, FIXED)
-                if conclusion.lead == NO_SURFACE or replaced:
-                    conclusion.lead, conclusion.lead_kind = s, measure
+                if lead == NO_SURFACE or replaced:
+                    lead, lead_kind = s, measure
+    return lead, lead_kind

@@ -244,17 +244,19 @@ def sole_course(surface, must_show):
 
 @kernel
 def decide(types, conclusion, layout, estimators, t):
-    """Name the surface and, when it is certain, the type; t s."""
+    """The finding on the surface and, when it is certain, on the type, as `conclusion.note_type` takes it.
+
+    conclusion: that of the frame before, which gives the instants of what has not changed; t s.
+    """
     s, before = surface_at_fault(types, layout), conclusion.isolated
     if before >= 0:
         before = estimators[before].surface
     kind = type_at_fault(types.config, types.surface[s]) if s >= 0 else -1
-    if s != before:
-        conclusion.isolated_at_s = t
-    if kind != conclusion.type:
-        conclusion.type, conclusion.type_at_s = kind, t
-    conclusion.isolated = estimator_for(layout, s, kind) if s >= 0 else s
-    take_the_lead(types, conclusion, layout, estimators)
+    isolated_at_s = t if s != before else conclusion.isolated_at_s
+    type_at_s = t if kind != conclusion.type else conclusion.type_at_s
+    isolated = estimator_for(layout, s, kind) if s >= 0 else s
+    lead, lead_kind = take_the_lead(types, isolated, layout, estimators)
+    return isolated, isolated_at_s, kind, type_at_s, lead, lead_kind
 
 
 @kernel
@@ -303,14 +305,14 @@ def suits_a_course(surface, mode):
 
 
 @kernel
-def presumed(types, conclusion, layout, estimators):
+def presumed(types, isolated, layout, estimators):
     """The surface the law acts upon: the one at fault, or the likeliest; NO_SURFACE yet.
 
     It acts before all doubt is gone, since it can take it back. Of elevator and flap it does not matter which
     is thought to be off, as long as both follow their commands: the moment is the same.
     """
-    if conclusion.isolated >= 0:
-        return estimators[conclusion.isolated].surface
+    if isolated >= 0:
+        return estimators[isolated].surface
     s = sole(types.surface, True)
     if s >= 0:
         return s
@@ -321,17 +323,25 @@ def presumed(types, conclusion, layout, estimators):
 
 
 @kernel
-def take_the_lead(types, conclusion, layout, estimators):
-    """Settle on which surface the law acts and how."""
-    s = presumed(types, conclusion, layout, estimators)
-    for other in types.surface:
-        other.measure = -1
-    conclusion.lead, conclusion.lead_kind = NO_SURFACE, -1
-    if s >= 0:
-        surface = types.surface[s]
-        conclusion.lead_kind = mode_for(surface)
-        if still_there(types.config, surface, conclusion.lead_kind, True):
-            conclusion.lead, surface.measure = s, conclusion.lead_kind
+def clear_measures(surfaces):
+    """Let the law act upon no surface."""
+    for surface in surfaces:
+        surface.measure = -1
+
+
+@kernel
+def take_the_lead(types, isolated, layout, estimators):
+    """The surface on which the law acts, or NO_SURFACE, and how; isolated: an estimator, if any."""
+    s = presumed(types, isolated, layout, estimators)
+    clear_measures(types.surface)
+    if s < 0:
+        return NO_SURFACE, -1
+    surface = types.surface[s]
+    measure = mode_for(surface)
+    if still_there(types.config, surface, measure, True):
+        surface.measure = measure
+        return s, measure
+    return NO_SURFACE, measure
 
 
 @kernel

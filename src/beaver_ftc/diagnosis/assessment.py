@@ -1,0 +1,79 @@
+"""The assessment: effectiveness, offset and lag of each surface, by whichever stage estimates them.
+
+It is the output of the diagnosis that the laws read. No other file writes it.
+"""
+
+import numpy as np
+
+from beaver_ftc.compiled import kernel, record, sized
+from beaver_ftc.diagnosis.conclusion import is_unknown, isolated_surface
+from beaver_ftc.diagnosis.detection import statistical
+from beaver_ftc.diagnosis.state import WORST_CASE
+from beaver_ftc.diagnosis.types import verdict
+from beaver_ftc.diagnosis.types.contract import FIXED, LAGS, LOSES, SHIFTED
+
+SURE = 400.0  # one over the variance of an effectiveness known to 0.05, which need not be eased in
+
+
+@sized
+def assessment_dtype(n: int) -> np.dtype:
+    """The assessment of n surfaces. detected: a fault; unknown: no surface is isolated or leads; named: the
+    isolated surface, -1 for none. measure: accommodation mode of each, -1 where it is open, or where faults
+    of every type are not diagnosed; effectiveness; offset, lag rad; at_once: whether its effectiveness need
+    not be eased in. hedge: a surface is slow."""
+    return record(
+        detected=int, unknown=int, every_type=int, named=int, hedge=int, measure=(int, n), effectiveness=n,
+        at_once=(int, n), offset=n, lag=n,
+    )  # fmt: skip
+
+
+@kernel
+def assess(assessment, config, conclusion, types, layout, estimators, statistics):
+    """Bring the assessment to this frame, by the stages' outputs; statistics: of `statistical_dtype`."""
+    every_type, named = config.every_type, isolated_surface(conclusion, estimators)
+    assessment.detected, assessment.every_type = conclusion.detected, every_type
+    assessment.named, assessment.hedge, assessment.unknown = named, 0, is_unknown(conclusion)
+    for s in range(assessment.measure.size):
+        assessment.measure[s] = types.surface[s].measure if every_type else -1
+        assessment.effectiveness[s], assessment.at_once[s] = 1.0, 0
+        assessment.offset[s], assessment.lag[s] = 0.0, 0.0
+        if conclusion.estimates and conclusion.detected:
+            assessment.effectiveness[s] = conclusion.effectiveness[s]
+        elif assessment.measure[s] >= 0:
+            assess_type(assessment, types, layout, estimators, s)
+        elif s == named and not every_type:
+            likely = likelihood_counts(statistics.tests, config.authority)
+            sure = likely and statistical.estimated_loss(statistics.block, s)[1] > SURE
+            theta = isolated_theta(config, conclusion, layout, estimators, statistics, s)
+            assessment.effectiveness[s], assessment.at_once[s] = 1.0 + theta, sure
+
+
+@kernel
+def assess_type(assessment, types, layout, estimators, s):
+    """Fill the assessment of surface s, at fault by the diagnosis of every type."""
+    surface = types.surface[s]
+    at_fault = verdict.possible(surface)
+    if surface.measure == LOSES:
+        assessment.effectiveness[s] = verdict.effectiveness_left(types, layout, estimators, s)
+    elif surface.measure == FIXED:
+        assessment.effectiveness[s], assessment.at_once[s] = 0.0, 1
+        assessment.offset[s] = surface.command + verdict.deflection_error(surface, at_fault)
+    elif surface.measure == SHIFTED:
+        assessment.offset[s] = verdict.deflection_error(surface, at_fault)
+    elif surface.measure == LAGS:
+        assessment.lag[s] = 0.5 * (surface.low + surface.high) - surface.command
+        assessment.hedge = 1
+
+
+@kernel
+def isolated_theta(config, conclusion, layout, estimators, statistics, s):
+    """Estimated theta of the isolated loss of surface s: under noise, the most likely one."""
+    if likelihood_counts(statistics.tests, config.authority):
+        return statistical.estimated_loss(statistics.block, s)[0]
+    return estimators[conclusion.isolated].theta[layout.dominant_axis[s]]
+
+
+@kernel
+def likelihood_counts(tests, authority):
+    """Whether the estimates of the statistical detector are used."""
+    return tests.enabled and authority != WORST_CASE

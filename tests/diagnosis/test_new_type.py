@@ -51,7 +51,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from beaver_ftc.scenario.faults.base import Button, Properties, Switched
+from beaver_ftc.scenario.faults.base import Button, Past, Properties, Switched
 from beaver_ftc.scenario.airframe import Actuator
 
 
@@ -65,7 +65,7 @@ class Reversed(Switched):
     type: Literal["reversed"]
     actuator: Actuator = Field(description="the surface that fails")
 
-    def strike(self, of: Properties, share: float, was_rad: float) -> None:
+    def strike(self, of: Properties, share: float, past: Past) -> None:
         of["effectiveness"] *= 1.0 - 2.0 * share
 '''
 # Who has to know of it beside the diagnosis: scenario and schema, documents, `matrix`, `list`, the live page.
@@ -81,7 +81,7 @@ schema = Scenario.model_json_schema()["$defs"]
 fault = scenario_of(FaultCase("rigged wrongly", "rudder", 45.0), "nominal", 0.0).faults[0]
 expected = load({"name": "r", "faults": [fault.model_dump()], "expect": {"isolated_type": "reversed"}})
 of = {"effectiveness": 1.0}
-fault.strike(of, 1.0, 0.0)
+fault.strike(of, 1.0, None)
 said = [schema["Reversed"]["description"], expected.expect.isolated_type, fault.type, of["effectiveness"]]
 said.append(faults_of(expected)[0]["type"])
 said.append("reversed" in [entry["name"] for entry in _available()["faults"]])

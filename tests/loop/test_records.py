@@ -14,6 +14,7 @@ from beaver_ftc.loop.assembly import lay_out, y_places
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.loop.plugin_frame import context_of, measured_of
 from beaver_ftc.scenario.declared import Declared
+from beaver_ftc.scenario.faults import HOLDING
 from beaver_ftc.scenario.schema import Scenario
 from kept import of_record
 
@@ -229,7 +230,7 @@ def test_the_command_and_the_engine_are_handed_over_through_python():
 
 
 @pytest.mark.parametrize("surface", [0, 2])
-@pytest.mark.parametrize("how", cockpit.IMMOVABLE)
+@pytest.mark.parametrize("how", HOLDING)
 def test_which_surfaces_stand_still_is_noted(surface, how):
     names = ("aileron", "elevator", "rudder", "flap")
     on = {f"failures/{names[surface]}/{how}": 1.0, cockpit.UNANTICIPATED: 10.0}

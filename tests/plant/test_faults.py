@@ -6,8 +6,8 @@ from typing import get_args
 import pytest
 from pydantic import TypeAdapter
 
-from beaver_ftc.plant.faults import HEALTHY, NEVER, FaultSchedule, frame_of
-from beaver_ftc.scenario.faults import TYPES, Fault, FaultType
+from beaver_ftc.plant.faults import NEVER, FaultSchedule, frame_of
+from beaver_ftc.scenario.faults import HEALTHY, TYPES, Fault, FaultType
 from beaver_ftc.scenario.faults.base import SurfaceFault
 
 RATE_HZ = 100

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from beaver_ftc.plant.faults import (
-    HEALTHY,
     NEVER,
     FaultSchedule,
     SensorFaultSchedule,
@@ -15,6 +14,7 @@ from beaver_ftc.plant.faults import (
     is_there,
 )
 from beaver_ftc.plant.instruments import SENSORS, instruments_dtype
+from beaver_ftc.scenario.faults import HEALTHY
 from beaver_ftc.scenario.loader import load
 
 LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.5, "at_s": 0.1}

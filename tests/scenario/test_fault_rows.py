@@ -4,6 +4,7 @@ import pytest
 
 from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.faults import TYPES, fault_name, of_a_sensor, place_of
+from beaver_ftc.scenario.faults.base import Past
 from beaver_ftc.scenario.interventions import fault_of
 from beaver_ftc.scenario.sensors import QUANTITIES, Sensors
 from scenario.damageable import damageable
@@ -48,14 +49,14 @@ def fault(kind, **keys):
 def test_a_quarter_of_a_fault_and_then_the_whole_of_it(kind):
     found = dict(BEFORE)
     for share in (0.25, 1.0):
-        fault(kind, **GIVEN[kind]).strike(found, share, was_rad=0.7)
+        fault(kind, **GIVEN[kind]).strike(found, share, Past(at_rad=0.7))
     assert found == pytest.approx(BEFORE | AFTER[kind])
 
 
 def test_a_jam_where_the_surface_was_is_not_moved_by_another():
     found = dict(BEFORE)
-    fault("stuck").strike(found, 1.0, was_rad=0.7)
-    fault("stuck", position_deg=3.0).strike(found, 1.0, was_rad=0.9)
+    fault("stuck").strike(found, 1.0, Past(at_rad=0.7))
+    fault("stuck", position_deg=3.0).strike(found, 1.0, Past(at_rad=0.9))
     assert found == BEFORE | {"stuck": 1.0, "stuck-at-rad": 0.7}
 
 

@@ -9,9 +9,9 @@ from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.addresses import GETTER, RUN, SETTER, address
 from beaver_ftc.plant.native import NodeBank
+from beaver_ftc.scenario.faults import HOLDING
 
 UNANTICIPATED = "failures/unanticipated/Cm-alpha3"
-IMMOVABLE = ("stuck", "hardover", "float")  # failures in which a surface does not follow its command
 LEAST_HEIGHT_M = 500.0  # above the ground at the start; the ground is at sea level, or lower if need be
 
 # Of aircraft that are flown again.
@@ -96,6 +96,6 @@ def set_origin(truth: np.void, plant: Plant, altitude_m: float) -> None:
 def note_failures(truth: np.void, plant: Plant) -> None:
     """Which surfaces cannot move now, and the unanticipated fault, for the oracle and the accounts."""
     truth["immovable"] = [
-        any(plant.read(f"failures/{s}/{how}") for how in IMMOVABLE) for s in plant.aircraft.surfaces
+        any(plant.read(f"failures/{s}/{how}") for how in HOLDING) for s in plant.aircraft.surfaces
     ]
     truth["Cm_alpha3"] = plant.read(UNANTICIPATED)

@@ -12,15 +12,16 @@ else.
 """
 
 import sys
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import zip_longest
 from math import hypot, inf
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from beaver_ftc.scenario.faults import DAMAGE, SensorFault, place_of
+from beaver_ftc.scenario.faults import DAMAGE, HEALTHY, SensorFault, place_of
+from beaver_ftc.scenario.faults.base import Past, SurfaceFault
 from beaver_ftc.scenario.sensors import ENGINE, QUANTITIES, Sensors
 from beaver_ftc.scenario.timing import frame_of, grown_share
 
@@ -35,19 +36,6 @@ OF_DAMAGE = f"failures/{DAMAGE}"
 # 1 - exp(-kappa t) is 1 to the last bit from here on: an incipient fault is then as good as an abrupt one.
 _FULLY_GROWN = 37.0
 
-HEALTHY = {
-    "effectiveness": 1.0,
-    "stuck": 0.0,
-    "stuck-at-rad": 0.0,
-    "hardover": 0.0,
-    "float": 0.0,
-    "bias-rad": 0.0,
-    "rate-scale": 1.0,
-    "oscillation-amplitude-rad": 0.0,
-    "oscillation-frequency-rad_sec": 0.0,
-    "Cm-alpha3": 0.0,
-}
-
 
 def is_there(fault: Any, k: int, rate_hz: float) -> bool:
     """Whether a fault is in force in frame k: begun, and neither repaired nor over."""
@@ -60,8 +48,9 @@ class _Event:
 
     fault: Any
     rate_hz: float
-    was_rad: float = 0.0
+    past: Past = field(default_factory=Past)
     struck: bool = False
+    followed: int = -1  # the last frame that its memory has taken in
 
     def __post_init__(self) -> None:
         fault, rate_hz = self.fault, self.rate_hz
@@ -88,7 +77,18 @@ class _Event:
             return self.first
         if k >= self.last:
             return NEVER
-        return min(k + 1 if k < self.grown else NEVER, self.last)
+        changes = k < self.grown or getattr(self.fault, "follows_actuator", False)
+        return min(k + 1 if changes else NEVER, self.last)
+
+    def note(self, k: int, actuator_rad: Callable[[str], float]) -> None:
+        """Bring the fault's memory to frame k; actuator_rad: where the actuator of a surface is now."""
+        if not self.in_force(k) or not isinstance(self.fault, SurfaceFault):
+            return
+        if self.fault.stays_where_it_is and not self.struck:
+            self.past.at_rad = actuator_rad(place_of(self.fault))
+        if self.fault.follows_actuator and k > self.followed:
+            self.fault.follow(self.past, actuator_rad(place_of(self.fault)))
+        self.struck, self.followed = True, k
 
 
 class _Schedule:
@@ -141,7 +141,8 @@ class FaultSchedule(_Schedule):
 
     def apply(self, k: int) -> None:
         """Bring the aircraft's failures to frame k. Call it before that frame's runs; again is harmless."""
-        self._note_where_surfaces_were(k)
+        for event in self._events:
+            event.note(k, self._actuator_rad)
         wanted = self._wanted(k)
         changed = {name: value for name, value in wanted.items() if self._written.get(name) != value}
         for name, value in changed.items():
@@ -150,13 +151,8 @@ class FaultSchedule(_Schedule):
         if changed and k == 0:
             self._plant.settle()  # nothing runs before frame 0 is read: its accelerations must show the fault
 
-    def _note_where_surfaces_were(self, k: int) -> None:
-        for event in self._events:
-            if event.in_force(k) and not event.struck:
-                event.struck = True
-                if event.fault.stays_where_it_is:
-                    surface = self._plant.aircraft.surface[event.fault.actuator]
-                    event.was_rad = self._plant.read(surface.position)
+    def _actuator_rad(self, surface: str) -> float:
+        return self._plant.read(self._plant.aircraft.surface[surface].position)
 
     def _wanted(self, k: int) -> dict[str, float]:
         """Failure properties at frame k, of every place a fault of this flight touches."""
@@ -165,7 +161,7 @@ class FaultSchedule(_Schedule):
             places[OF_DAMAGE] = dict.fromkeys(self._plant.aircraft.damage, 0.0)
         for event in sorted(self._events, key=lambda event: event.first):
             if event.in_force(k):
-                event.fault.strike(places[event.place], event.share(k), event.was_rad)
+                event.fault.strike(places[event.place], event.share(k), event.past)
         found = {
             self._property(place, name): (value, HEALTHY.get(name, 0.0))
             for place, properties in places.items()

@@ -243,25 +243,15 @@ def _limit(limit: Document) -> str:
     return f"{what} from {_time(limit['time_s'])}{until}: {limit['because']}"
 
 
-_SIZES = {
-    "magnitude": lambda value: f"{100 * value:g} %",
-    "position_deg": lambda value: f"{value:g} deg",
-    "direction": lambda value: "to the upper stop" if value > 0 else "to the lower stop",
-    "bias_deg": lambda value: f"{value:+g} deg",
-    "scale": lambda value: f"{100 * value:g} % of its rate",
-    "amplitude_deg": lambda value: f"{value:g} deg",
-    "frequency_rad_s": lambda value: f"{value:g} rad/s",
-    "case": lambda value: value.replace("-", " "),
-    "Cm_alpha3": lambda value: f"Cm_alpha3 {value:g}",
-    "kappa_per_s": lambda value: f"growing at {value:g} /s",
-}
-
-
 def _sizes(fault: Document) -> list[str]:
     """How large a declared fault is, in words."""
     if "sensor" in fault:
         return _sensor_sizes(fault)
-    return [_SIZES[key](value) for key, value in fault.get("size", {}).items() if key in _SIZES]
+    from beaver_ftc.scenario.faults import TYPES
+
+    row = TYPES.get(fault["type"])
+    in_words = row.in_words if row else {}
+    return [in_words[key](value) for key, value in fault.get("size", {}).items() if key in in_words]
 
 
 def _sensor_sizes(fault: Document) -> list[str]:

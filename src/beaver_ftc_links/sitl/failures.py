@@ -8,6 +8,7 @@ from typing import Any
 
 from beaver_ftc.aircraft.channels import ChannelsSection
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.scenario.faults import TYPES
 from beaver_ftc_links.sitl.vehicle import Flown
 
 COMMAND = 420
@@ -17,11 +18,7 @@ SENSORS = {0: ("p", "q", "r"), 1: ("ax", "ay", "az"), 3: ("altitude",), 8: ("V",
 OK = 0  # FAILURE_TYPE: repaired
 # By FAILURE_TYPE: off, stuck, wrong, slow; garbage is noise of an instrument and an oscillation of a servo.
 OF_SERVOS: Mapping[int, dict[str, Any]] = {
-    1: {"type": "float"},
-    2: {"type": "stuck"},
-    3: {"type": "oscillatory", "amplitude_deg": 3.0, "frequency_rad_s": 10.0},
-    4: {"type": "hardover", "direction": 1},
-    5: {"type": "rate_limit", "scale": 0.1},
+    row.mavlink[0]: {"type": kind, **row.mavlink[1]} for kind, row in TYPES.items() if row.mavlink
 }
 OF_SENSORS: Mapping[int, dict[str, Any]] = {
     1: {"type": "lost"},

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.documents.errors import BadInput, suggestion
+from beaver_ftc.scenario.faults import TYPES
 from beaver_ftc_live.page.messages import Message
 
 EARLIEST_S, LATEST_S = 4.0, 20.0  # of the hidden fault, after the start of the round
@@ -108,15 +109,11 @@ class Game:
 
 def hidden_faults(surfaces: tuple[str, ...], primary: tuple[str, ...]) -> list[Fault]:
     """What may break unseen: what can be felt. A surface that only stands in for others is still while all is
-    well: of it only a runaway shows."""
-    felt: tuple[tuple[str, Fault], ...] = (
-        ("hardover", {"direction": 1}),
-        ("stuck", {}),
-        ("loss_of_effectiveness", {"magnitude": 0.4}),
-        ("loss_of_effectiveness", {"magnitude": 0.7}),
-    )
+    well: on it only some faults show, such as a runaway."""
+    hidden = sorted((of.place, kind, of) for kind, row in TYPES.items() for of in row.hidden)
     return [
-        {"type": kind, "actuator": surface, **size}
+        {"type": kind, "actuator": surface, **of.keys}
         for surface in surfaces
-        for kind, size in (felt if surface in primary else felt[:1])
+        for _, kind, of in hidden
+        if surface in primary or of.on_any_surface
     ]

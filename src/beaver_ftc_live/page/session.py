@@ -12,12 +12,11 @@ import beaver_ftc as bf
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.units import GRAVITY_MPS2
 from beaver_ftc.documents.errors import BadInput, suggestion
-from beaver_ftc.loop.cockpit import IMMOVABLE
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled, registered
 from beaver_ftc.results.log import SpooledLog
 from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.autopilot import channels_of
-from beaver_ftc.scenario.faults import TYPES, place_of
+from beaver_ftc.scenario.faults import HOLDING, TYPES, place_of
 from beaver_ftc.scenario.sensors import sensors_there
 from beaver_ftc_live.page import messages
 from beaver_ftc_live.page.game import NOTHING, Fault, Game, hidden_faults
@@ -303,7 +302,7 @@ class Session:
 
     def _effectiveness(self, surface: str) -> float:
         """How much of its moment a surface gives for its command: none while it does not follow that."""
-        stands = any(self.sim.read(f"failures/{surface}/{how}") for how in IMMOVABLE)
+        stands = any(self.sim.read(f"failures/{surface}/{how}") for how in HOLDING)
         return 0.0 if stands else self.sim.read(f"failures/{surface}/effectiveness")
 
     def state(self) -> Message:

@@ -19,7 +19,8 @@ from beaver_ftc.scenario.faults.surfaces import Bias, LossOfEffectiveness, Unant
 from beaver_ftc.scenario.sensors import sensor_words, sensors_there
 
 __all__ = [
-    "DAMAGE", "MOST_FAULTS", "TYPES", "UNANTICIPATED", "Bias", "Damage", "Fault", "FaultType",
+    "DAMAGE", "HEALTHY", "HOLDING", "MOST_FAULTS", "TYPES", "UNANTICIPATED", "Bias", "Damage", "Fault",
+    "FaultType",
     "LossOfEffectiveness", "Nameable", "SensorFault", "Unanticipated", "fault_name", "of_a_sensor",
     "place_of",
 ]  # fmt: skip
@@ -42,6 +43,9 @@ def _rows() -> dict[str, type[SurfaceFault]]:
 
 
 TYPES = _rows()
+# Failure properties of a surface, and those by which it does not follow its command.
+HEALTHY = {name: value for row in TYPES.values() for name, value in row.properties}
+HOLDING = tuple(row.holds for row in TYPES.values() if row.holds)
 
 
 def place_of(fault: Any) -> str:

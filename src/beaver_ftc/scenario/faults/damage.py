@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from beaver_ftc.documents.base import entry
 from beaver_ftc.documents.errors import suggestion
 from beaver_ftc.scenario.airframe import checked_aircraft, named
-from beaver_ftc.scenario.faults.base import Properties, Switched
+from beaver_ftc.scenario.faults.base import Past, Properties, Switched, constant
 
 
 def _wrong(case: str) -> str | None:
@@ -25,9 +25,10 @@ class Damage(Switched):
     """
 
     adds = False
+    in_words = constant(case=lambda case: case.replace("-", " "))
 
     type: Literal["damage"]
     case: Annotated[str, named(_wrong)] = entry(..., examples=["left-wing-tip-off"])
 
-    def strike(self, of: Properties, share: float, was_rad: float) -> None:
+    def strike(self, of: Properties, share: float, past: Past) -> None:
         of[self.case] = 1.0

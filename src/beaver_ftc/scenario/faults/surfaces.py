@@ -5,7 +5,16 @@ from typing import Literal
 
 from beaver_ftc.documents.base import Conflict, Number, entry, number
 from beaver_ftc.scenario.airframe import Actuator, checked_aircraft
-from beaver_ftc.scenario.faults.base import Button, Gradual, Properties, Switched
+from beaver_ftc.scenario.faults.base import (
+    Button,
+    Gradual,
+    Hidden,
+    Past,
+    Properties,
+    Switched,
+    constant,
+    growing,
+)
 
 _ROUNDED = 1e-4  # of a stop in degrees as people write it
 
@@ -17,15 +26,18 @@ class LossOfEffectiveness(Gradual):
     magnitude: effectiveness lost: 0 healthy, 1 no moment at all, share of 1
     """
 
+    properties = (("effectiveness", 1.0),)
     truth, size = ("magnitude", -1.0), ("of", "%")
+    in_words = growing(magnitude=lambda value: f"{100 * value:g} %")
     examples = (("40 % loss", {"magnitude": 0.4}), ("total loss", {"magnitude": 1.0}))
     button = Button(1, "lose 40 %", {"magnitude": 0.4})
+    hidden = (Hidden(3, {"magnitude": 0.4}), Hidden(4, {"magnitude": 0.7}))
 
     type: Literal["loss_of_effectiveness"]
     actuator: Actuator
     magnitude: Number = number(..., "share of 1", ge=0, le=1, examples=[0.4])
 
-    def strike(self, of: Properties, share: float, was_rad: float) -> None:
+    def strike(self, of: Properties, share: float, past: Past) -> None:
         of["effectiveness"] *= 1.0 - share * self.magnitude
 
 
@@ -36,9 +48,11 @@ class Stuck(Switched):
     position_deg: where it jams, between its stops; left out: where it happens to be, deg
     """
 
+    properties, holds = (("stuck", 0.0), ("stuck-at-rad", 0.0)), "stuck"
     adds, stays_where_it_is, truth, size = False, True, ("position_deg", 1.0), ("at", "deg")
+    in_words = constant(position_deg="{:g} deg".format)
     examples = (("stuck +3 deg", {"off_deg": 3.0}), ("stuck -3 deg", {"off_deg": -3.0}))
-    button = Button(2, "jam", {})
+    button, hidden, mavlink = Button(2, "jam", {}), (Hidden(2, {}),), (2, {})
 
     type: Literal["stuck"]
     actuator: Actuator
@@ -54,45 +68,50 @@ class Stuck(Switched):
             found.append((("position_deg",), says))
         return found
 
-    def strike(self, of: Properties, share: float, was_rad: float) -> None:
+    def strike(self, of: Properties, share: float, past: Past) -> None:
         if of["stuck"] == 0.0:
             of["stuck"] = 1.0
-            of["stuck-at-rad"] = was_rad if self.position_deg is None else radians(self.position_deg)
+            of["stuck-at-rad"] = past.at_rad if self.position_deg is None else radians(self.position_deg)
 
 
 class Hardover(Switched):
     """The surface runs at its rate limit to a stop."""
 
+    properties, holds = (("hardover", 0.0),), "hardover"
     adds, size = False, ("at", "deg")
+    in_words = constant(direction=lambda value: f"to the {'upper' if value > 0 else 'lower'} stop")
     examples = (("hardover +", {"direction": 1}), ("hardover -", {"direction": -1}))
-    button = Button(4, "run away", {"direction": 1})
+    button, hidden = Button(4, "run away", {"direction": 1}), (Hidden(1, {"direction": 1}, True),)
+    mavlink = 4, {"direction": 1}
 
     type: Literal["hardover"]
     actuator: Actuator = entry(..., "the surface that fails")
     direction: Literal[1, -1] = entry(1, "the stop it runs to: 1 positive, -1 negative deflection")
 
-    def strike(self, of: Properties, share: float, was_rad: float) -> None:
+    def strike(self, of: Properties, share: float, past: Past) -> None:
         of["hardover"] = float(self.direction)
 
 
 class Float(Switched):
     """The surface trails in the wind and gives no moment."""
 
-    adds = False
+    properties, holds, adds = (("float", 0.0),), "float", False
     examples = (("float", {}),)
-    button = Button(3, "float", {})
+    button, mavlink = Button(3, "float", {}), (1, {})
 
     type: Literal["float"]
     actuator: Actuator = entry(..., "the surface that fails")
 
-    def strike(self, of: Properties, share: float, was_rad: float) -> None:
+    def strike(self, of: Properties, share: float, past: Past) -> None:
         of["float"] = 1.0
 
 
 class Bias(Gradual):
     """The surface stands off its command by a constant."""
 
+    properties = (("bias-rad", 0.0),)
     truth, size = ("bias_deg", 1.0), ("of", "deg")
+    in_words = growing(bias_deg="{:+g} deg".format)
     examples = (("bias +2 deg", {"bias_deg": 2.0}), ("bias -2 deg", {"bias_deg": -2.0}))
     button = Button(6, "bias", {"bias_deg": 3})
 
@@ -100,34 +119,39 @@ class Bias(Gradual):
     actuator: Actuator = entry(..., "the surface that fails")
     bias_deg: Number = number(..., "deg", "added to the actuator's output", ge=-90, le=90, examples=[2])
 
-    def strike(self, of: Properties, share: float, was_rad: float) -> None:
+    def strike(self, of: Properties, share: float, past: Past) -> None:
         of["bias-rad"] += share * radians(self.bias_deg)
 
 
 class RateLimit(Gradual):
     """The surface moves slowly."""
 
+    properties = (("rate-scale", 1.0),)
+    in_words = growing(scale=lambda value: f"{100 * value:g} % of its rate")
     examples = (("rate limit 1.2 deg/s", {"scale": 0.02}),)
-    button = Button(7, "slow", {"scale": 0.05})
+    button, mavlink = Button(7, "slow", {"scale": 0.05}), (5, {"scale": 0.1})
 
     type: Literal["rate_limit"]
     actuator: Actuator = entry(..., "the surface that fails")
     scale: Number = number(..., "share of 1", "what is left of the rate limit", ge=0, le=1, examples=[0.05])
 
-    def strike(self, of: Properties, share: float, was_rad: float) -> None:
+    def strike(self, of: Properties, share: float, past: Past) -> None:
         of["rate-scale"] *= 1.0 - share * (1.0 - self.scale)
 
 
 class Oscillatory(Gradual):
     """The surface swings about its command by itself."""
 
+    properties = (("oscillation-amplitude-rad", 0.0), ("oscillation-frequency-rad_sec", 0.0))
     truth, size = ("amplitude_deg", 1.0), ("by", "deg")
+    in_words = growing(amplitude_deg="{:g} deg".format, frequency_rad_s="{:g} rad/s".format)
     examples = (
         ("oscillation 0.5 deg, 1 rad/s", {"amplitude_deg": 0.5, "frequency_rad_s": 1.0}),
         ("oscillation 0.5 deg, 10 rad/s", {"amplitude_deg": 0.5, "frequency_rad_s": 10.0}),
         ("oscillation 2 deg, 5 rad/s", {"amplitude_deg": 2.0, "frequency_rad_s": 5.0}),
     )
     button = Button(5, "oscillate", {"amplitude_deg": 3, "frequency_rad_s": 6})
+    mavlink = 3, {"amplitude_deg": 3.0, "frequency_rad_s": 10.0}
 
     type: Literal["oscillatory"]
     actuator: Actuator = entry(..., "the surface that fails")
@@ -136,7 +160,7 @@ class Oscillatory(Gradual):
         ..., "rad/s", "angular frequency of the swing", gt=0, le=1000, examples=[5]
     )
 
-    def strike(self, of: Properties, share: float, was_rad: float) -> None:
+    def strike(self, of: Properties, share: float, past: Past) -> None:
         of["oscillation-amplitude-rad"] = share * radians(self.amplitude_deg)
         of["oscillation-frequency-rad_sec"] = self.frequency_rad_s
 
@@ -144,8 +168,11 @@ class Oscillatory(Gradual):
 class Unanticipated(Gradual):
     """A fault outside the declared class: an extra pitching moment coefficient on alpha^3 [Zhang2005]."""
 
+    properties = (("Cm-alpha3", 0.0),)
+    in_words = growing(Cm_alpha3="Cm_alpha3 {:g}".format)
+
     type: Literal["unanticipated"]
     Cm_alpha3: Number = number(10.0, "1/rad^3", "extra Cm on alpha^3, published case 10", ge=-1000, le=1000)
 
-    def strike(self, of: Properties, share: float, was_rad: float) -> None:
+    def strike(self, of: Properties, share: float, past: Past) -> None:
         of["Cm-alpha3"] += share * self.Cm_alpha3

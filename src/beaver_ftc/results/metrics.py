@@ -28,7 +28,7 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.results.expectations import evaluate
-from beaver_ftc.scenario.faults import DAMAGE, Damage, of_a_sensor
+from beaver_ftc.scenario.faults import DAMAGE, Damage, is_share, of_a_sensor
 from beaver_ftc.scenario.pairs import failing, of_several
 
 if TYPE_CHECKING:
@@ -189,7 +189,7 @@ def _named(
     were named before."""
     estimate, kind = found.get("estimate"), found["isolation_type"]
     premature = _premature(found["isolated"], found["isolation_time_s"], fault)
-    angle_rad = None if kind == LOSS_OF_EFFECTIVENESS else estimate
+    angle_rad = None if is_share(kind) else estimate
     return {
         "fault": found["isolated"],
         "type": kind,

@@ -370,7 +370,10 @@ def _estimate(isolation: Document) -> str:
     if isolation["estimate"] is None:
         return ""
     if isolation["estimate_deg"] is None:
-        return f", estimated theta {_value(isolation['estimate'])}"
+        from beaver_ftc.scenario.faults import TYPES
+
+        said = f"{TYPES[isolation['type']].symbol} {_value(isolation['estimate'])}"
+        return f", estimated {said.strip()}"
     return f", estimated {_value(isolation['estimate_deg'])} deg"
 
 

@@ -20,9 +20,8 @@ from beaver_ftc.scenario.sensors import sensor_words, sensors_there
 
 __all__ = [
     "DAMAGE", "HEALTHY", "HOLDING", "MOST_FAULTS", "TYPES", "UNANTICIPATED", "Bias", "Damage", "Fault",
-    "FaultType",
-    "LossOfEffectiveness", "Nameable", "SensorFault", "Unanticipated", "fault_name", "of_a_sensor",
-    "place_of",
+    "FaultType", "LossOfEffectiveness", "Nameable", "SensorFault", "Unanticipated", "fault_name", "is_share",
+    "of_a_sensor", "place_of",
 ]  # fmt: skip
 
 UNANTICIPATED, DAMAGE = "unanticipated", "damage"
@@ -51,6 +50,12 @@ HOLDING = tuple(row.holds for row in TYPES.values() if row.holds)
 def place_of(fault: Any) -> str:
     """What a fault is of: a surface, a sensor, else its type: `unanticipated`, `damage`."""
     return str(getattr(fault, "sensor", getattr(fault, "actuator", fault.type)))
+
+
+def is_share(kind: str | None) -> bool:
+    """Whether the estimate of a type is a share of 1, and not an angle."""
+    row = TYPES.get(kind or "")
+    return row is not None and row.size is not None and row.size[1] == "%"
 
 
 def of_a_sensor(fault: Any) -> bool:

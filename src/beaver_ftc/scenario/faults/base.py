@@ -54,6 +54,7 @@ class SurfaceFault(Section):
     follows_actuator: ClassVar[bool] = False  # whether `follow` is called in every frame
     truth: ClassVar[tuple[str, float] | None] = None  # the key that an estimate is of, and the sign of that
     size: ClassVar[tuple[str, str] | None] = None  # an estimate in words: "of" so many "%", or "deg"
+    symbol: ClassVar[str] = ""  # of an estimate that is no angle
     in_words: ClassVar[InWords] = {}  # its parameters
     examples: ClassVar[tuple[tuple[str, Keys], ...]] = ()  # of `matrix`: name, fault; off_deg: off the trim
     button: ClassVar[Button | None] = None

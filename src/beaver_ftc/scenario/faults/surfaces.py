@@ -27,7 +27,7 @@ class LossOfEffectiveness(Gradual):
     """
 
     properties = (("effectiveness", 1.0),)
-    truth, size = ("magnitude", -1.0), ("of", "%")
+    truth, size, symbol = ("magnitude", -1.0), ("of", "%"), "theta"
     in_words = growing(magnitude=lambda value: f"{100 * value:g} %")
     examples = (("40 % loss", {"magnitude": 0.4}), ("total loss", {"magnitude": 1.0}))
     button = Button(1, "lose 40 %", {"magnitude": 0.4})

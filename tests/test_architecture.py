@@ -32,7 +32,7 @@ BESIDE = {
 # Folders from the ground up; a folder imports what is below its own floor, and itself.
 FLOORS = (
     {"documents"},
-    {"commands", "compiled", "numba_inside", "numba_sized", "plugins"},
+    {"commands", "compiled", "extensions", "numba_inside", "numba_sized", "plugins"},
     {"aircraft"},
     {"design"},
     {"scenario"},
@@ -126,13 +126,6 @@ def test_imports_run_downwards_only():
     assert upwards == []
 
 
-# What of the core still imports products.
-UNTIL_HOOKS = {
-    "", "cli.catalogue", "cli.compare", "cli.run", "cli.scenarios", "results.flight",
-    "results.writer", "studies.detectability", "studies.isolability", "studies.sweep.rare",
-}  # fmt: skip
-
-
 @pytest.mark.parametrize("package", [PACKAGE, *PRODUCTS])
 def test_products_stand_apart(package):
     """The core imports none, and a product no other but for a stated reason."""
@@ -141,7 +134,7 @@ def test_products_stand_apart(package):
         f"{name} imports {target}"
         for name in modules(package)
         for target in imports(name, package)
-        if target.partition(".")[0] in others and not (package == PACKAGE and name in UNTIL_HOOKS)
+        if target.partition(".")[0] in others
     }
     assert found == set()
 

@@ -205,14 +205,3 @@ def test_public_names_are_found_where_they_are_said_to_be():
     with pytest.raises(AttributeError, match="module 'beaver_ftc' has no attribute 'flight'"):
         bf.flight  # noqa: B018
     assert set(dir(bf)) >= set(bf.__all__)
-
-
-def test_what_the_first_use_of_an_aircraft_does(monkeypatch):
-    from beaver_ftc_aircraft.derive import first_use
-
-    seen = []
-    monkeypatch.setattr(first_use, "derive_if_needed", seen.append)
-    monkeypatch.setattr(first_use, "compare_once", seen.append)
-    plugins.first_use.derive("jsbsim:x")
-    plugins.first_use.compare("own")
-    assert seen == ["jsbsim:x", "own"]

@@ -14,8 +14,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
-from beaver_ftc.plugins import first_use
-from beaver_ftc_links.environments import register_when_imported
+from beaver_ftc.extensions import watch_imports
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -84,20 +83,7 @@ def __getattr__(name: str) -> Any:
     return found
 
 
-def _derive(reference: str) -> None:
-    from beaver_ftc_aircraft.derive.first_use import derive_if_needed
-
-    derive_if_needed(reference)
-
-
-def _compare(aircraft: "Aircraft") -> None:
-    from beaver_ftc_aircraft.derive.first_use import compare_once
-
-    compare_once(aircraft)
-
-
-first_use.derive, first_use.compare = _derive, _compare
-register_when_imported()
+watch_imports()
 
 
 def __dir__() -> list[str]:

@@ -2,6 +2,8 @@
 
     [project.entry-points."beaver_ftc.commands"]         # in the pyproject.toml of the package
     "class grade" = "my_package.grading:Grade"
+    [project.entry-points."beaver_ftc.command_groups"]   # a class whose docstring says what they are for
+    class = "my_package.grading:Group"
 
 A row names a study (`studies/engine/command.py`) or a function whose parameters are the options. It is
 imported when the command is called. Its docstring is its help; the first line of it is read from the source,
@@ -10,15 +12,15 @@ so that `--help` answers at once.
 
 import re
 from collections.abc import Callable, Iterator
-from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-GROUP = "beaver_ftc.commands"
+from beaver_ftc.extensions import entries, loaded
+
+GROUP, GROUPS = "beaver_ftc.commands", "beaver_ftc.command_groups"
 COMMANDS = {
     "run": "beaver_ftc.cli.run:command",
-    "check": "beaver_ftc_assurance.commands.check:command",
     "mismatch": "beaver_ftc.cli.mismatch:command",
     "validate": "beaver_ftc.cli.scenarios:validate",
     "schema": "beaver_ftc.cli.catalogue:schema",
@@ -29,39 +31,24 @@ COMMANDS = {
     "new": "beaver_ftc.cli.scenarios:new",
     "sweep": "beaver_ftc.cli.sweep:command",
     "compare": "beaver_ftc.cli.compare:command",
-    "evidence": "beaver_ftc_assurance.commands.evidence:command",
     "reproduce": "beaver_ftc.studies.reproduce.reproduction:Reproduce",
     "matrix": "beaver_ftc.studies.matrix.command:Matrix",
     "power": "beaver_ftc.studies.power.shown:Power",
     "smallest": "beaver_ftc.studies.smallest.survey:Smallest",
     "bench": "beaver_ftc.studies.bench.measure:Bench",
-    "derive": "beaver_ftc_aircraft.commands:derive",
     "verify": "beaver_ftc.studies.verify:Verify",
     "detectability": "beaver_ftc.studies.detectability:Detectability",
-    "separate": "beaver_ftc_assurance.commands.separate:command",
-    "identify": "beaver_ftc_logs.commands:identify",
-    "diagnose": "beaver_ftc_logs.commands:diagnose",
-    "live": "beaver_ftc_live.commands.live:command",
-    "sitl": "beaver_ftc_links.commands:command",
-    "import gtm": "beaver_ftc_aircraft.commands:gtm",
-    "challenge new": "beaver_ftc_live.commands.challenge:new",
-    "challenge submit": "beaver_ftc_live.commands.challenge:submit",
-    "challenge grade": "beaver_ftc_live.commands.challenge:grade",
 }
 
 
 def registered() -> dict[str, str]:
     """Every command by name, ours first: `module:function` or `module:Study`. Imports none of them."""
-    from importlib.metadata import entry_points
-
-    others = {point.name: point.value for point in entry_points(group=GROUP)}
-    return COMMANDS | {name: others[name] for name in sorted(others) if name not in COMMANDS}
+    return COMMANDS | {name: where for name, where in entries(GROUP).items() if name not in COMMANDS}
 
 
-def load(target: str) -> Any:
-    """The study or function that a row names."""
-    module, _, name = target.partition(":")
-    return getattr(import_module(module), name)
+def groups() -> dict[str, str]:
+    """What each group of commands is for, by the word that stands before theirs."""
+    return {name: summary(target) for name, target in entries(GROUPS).items()}
 
 
 def summary(target: str) -> str:
@@ -86,4 +73,4 @@ def declare(*files: str, plugins: bool = True) -> Callable[[Any], Any]:
 def files_of_commands() -> Iterator[str]:
     """The names of all that any command writes into a result folder; imports one command after the other."""
     for target in registered().values():
-        yield from getattr(load(target), "FILES", ())
+        yield from getattr(loaded(target), "FILES", ())

@@ -13,7 +13,7 @@ environment variable.
 import os
 import re
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from importlib import import_module
@@ -211,18 +211,3 @@ def made(group: str, name: str) -> Any:
     except (Exception, SystemExit) as error:
         reason = " ".join(str(error).split())
         raise BadInput(f"plug-in {name}: cannot be made: {type(error).__name__}: {reason}") from error
-
-
-@dataclass
-class FirstUse:
-    """What is done when a scenario names an aircraft for the first time: it is flown, far above.
-
-    derive: make the file of `jsbsim:NAME`; raises BeaverFtcError. compare: say on standard error where an
-    aircraft of the user's own (an `Aircraft`) flies otherwise than its file declares.
-    """
-
-    derive: Callable[[str], None] = lambda reference: None
-    compare: Callable[[Any], None] = lambda aircraft: None
-
-
-first_use = FirstUse()  # filled when the package is imported

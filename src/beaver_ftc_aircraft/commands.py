@@ -10,6 +10,10 @@ from beaver_ftc.commands import declare
 from beaver_ftc.documents.errors import BadInput
 
 
+class Import:
+    """Make aircraft of data that others publish."""
+
+
 @declare(plugins=False)
 def derive(
     aircraft: Annotated[str, typer.Argument(metavar="AIRCRAFT")],

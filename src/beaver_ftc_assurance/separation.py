@@ -30,11 +30,12 @@ from beaver_ftc.loop.simulation import Stepping
 from beaver_ftc.results.log import MemoryLog
 from beaver_ftc.results.writer import result_folder
 from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.studies.isolability import DOUBLET
 from beaver_ftc_assurance.certificates import proved
 from beaver_ftc_assurance.certificates.certificate import check_scheme, history_of, logged
 from beaver_ftc_assurance.certificates.inequality import History, Hypothesis, by_each_frame, declared_of
 from beaver_ftc_assurance.certificates.kinds import BIAS, CONSTANT_LOSS, FLOAT, STUCK, hypothesis, wrong
-from beaver_ftc_assurance.certificates.tape import Recorder, Tape
+from beaver_ftc_assurance.certificates.tape import Recorder, Tape, recorded
 
 FILE, FLOWN = "separation.json", "flown"
 MARGIN = 1.1  # on what is asked: the aircraft flies on while the doublet is flown
@@ -377,6 +378,21 @@ def _nearest(
         return None, numbers | {"because": says}
     target = float(u[tells][np.argmin(np.abs(u[tells] - at.u[s]))])
     return target, numbers | {"target_deg": degrees(target)}
+
+
+def doublets(scenario: Scenario, after_s: float, told: float) -> dict[tuple[str, str], Document]:
+    """Of each two surfaces that lead an axis: the smallest doublet that tells losses of this share apart, so
+    long after the start of a healthy flight, or why there is none."""
+    frames = round(after_s * scenario.rate_hz)
+    healthy = scenario.model_copy(update={"faults": (), "duration_s": after_s})
+    at = situation_of(recorded(healthy, [frames - 1], frames), healthy, radians(LARGEST_RATE_DEG_S))
+    names, found = scenario.airframe.surfaces, {}
+    for pair in combinations(scenario.airframe.class_of_losses, 2):
+        one, other = (Candidate(names.index(name), CONSTANT_LOSS, -told, -told) for name in pair)
+        apart = tell_apart(one, other, at, names)
+        asked = apart.get("amplitude_deg"), apart.get("time_s"), apart.get("because", "")
+        found[pair] = found[pair[::-1]] = dict(zip(DOUBLET, asked, strict=True))
+    return found
 
 
 def doublet(targets: dict[int, float], at: Situation) -> tuple[np.ndarray, int] | None:

@@ -242,3 +242,31 @@ def _diagnose(samples: "Samples", model: "Model", out: Path, scored: bool, detec
         verdict["score"] = score(samples, rows, model.groups)
     folder = write_diagnosis(out, samples, model, rows, verdict)
     return verdict | {"folder": str(folder)}
+
+
+def compare_recorded(folder: Path, out: Path, format: Format, page: Path | None) -> None:
+    """Compare ways to diagnose the recorded flights in a folder; page: a page of Markdown to update."""
+    from beaver_ftc.results.writer import result_folder
+    from beaver_ftc.studies.present.page import write_files
+    from beaver_ftc_logs.recorded.benchmark import as_text, files_of, run_benchmark, update_page
+
+    document = run_benchmark(folder)
+    with result_folder(out, "recorded-flights") as written:
+        write_files(written, files_of(document))
+    if page is not None:
+        update_page(document, page)
+        picture = page.parent / "images" / "recorded-flights.png"
+        if picture.parent.is_dir():
+            picture.write_bytes((out / "recorded-flights" / "flights.png").read_bytes())
+    answer(format, document | {"folder": str(out / "recorded-flights")}, lambda: as_text(document))
+
+
+def compare_other_days(folder: Path, format: Format, page: Path | None) -> None:
+    """The same on days made of the labelled flights."""
+    from beaver_ftc_logs.recorded.benchmark import as_text, update_page
+    from beaver_ftc_logs.recorded.other_days import run_other_days
+
+    document = {"other_days": run_other_days(folder)}
+    if page is not None:
+        update_page(document, page)
+    answer(format, document, lambda: as_text(document))

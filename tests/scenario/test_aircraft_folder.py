@@ -8,7 +8,8 @@ import pytest
 from beaver_ftc.aircraft.loading import load as load_aircraft
 from beaver_ftc.aircraft.loading import read
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.scenario.airframe import find_aircraft, first_use
+from beaver_ftc.scenario import airframe
+from beaver_ftc.scenario.airframe import find_aircraft
 
 TRAINER = Path(__file__).parents[1] / "data" / "aircraft" / "trainer"
 
@@ -92,6 +93,6 @@ def test_a_link_out_of_the_scenarios_folder_is_refused(folder, linked):
 def test_an_aircraft_of_the_users_own_alone_is_compared_with_its_model(folder, monkeypatch):
     """Of any other nothing is found out again, wherever the file lies that names it."""
     asked = []
-    monkeypatch.setattr(first_use, "compare", asked.append)
+    monkeypatch.setattr(airframe, "offered", {"compare": asked.append}.get)
     own = [find_aircraft(name, folder) for name in ("beaver", "./trainer")][1]
     assert asked == [own]

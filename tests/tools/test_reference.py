@@ -17,7 +17,7 @@ import beaver_ftc as bf
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.schema import AircraftFile
 from beaver_ftc.cli.main import every_command
-from beaver_ftc.commands import COMMANDS
+from beaver_ftc.commands import registered as registered_commands
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.loader import load_text
 from beaver_ftc.scenario.signals import Signal
@@ -224,7 +224,7 @@ def test_the_command_prints_a_page():
 
 def test_every_command_and_option_is_there():
     text = commands.page()
-    for name in COMMANDS:
+    for name in registered_commands():
         section = text.partition(f"\n## {name}\n")[2].partition("\n## ")[0]
         assert "| option | what it is |" in section, name
     assert "`--flightgear HOST:PORT`" in text

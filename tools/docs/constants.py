@@ -22,7 +22,7 @@ def constants() -> dict[str, Any]:
     of modules by the module's path, and how many there are of what can be listed.
     """
     from beaver_ftc.cli.catalogue import _available
-    from beaver_ftc.commands import COMMANDS
+    from beaver_ftc.commands import registered as registered_commands
     from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled, options_of, registered
     from beaver_ftc.scenario.loader import load_text
     from beaver_ftc.scenario.schema import Scenario
@@ -43,7 +43,7 @@ def constants() -> dict[str, Any]:
         "options": options,
         "aircraft": {name: _aircraft(name) for name in ("beaver",)},
         "modules": dict(_of_modules()),
-        "counts": {**counts, "commands": len(COMMANDS)},
+        "counts": {**counts, "commands": len(registered_commands())},
     })  # fmt: skip
 
 

@@ -164,9 +164,9 @@ def schema(sweep: bool = False, plan: bool = False) -> None:
     plan: Of a plan of evidence instead of a scenario.
     """
     if plan:
-        from beaver_ftc_assurance.evidence.plan import plan_json_schema
+        from beaver_ftc.extensions import required
 
-        emit_json(plan_json_schema())
+        emit_json(required("plan_json_schema", "schema --plan")())
         return
     if sweep:
         from beaver_ftc.scenario.sweeps import sweep_json_schema

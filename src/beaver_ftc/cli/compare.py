@@ -11,6 +11,7 @@ from beaver_ftc.cli.output import Format, FormatOption, answer
 from beaver_ftc.cli.progress import progress_bar
 from beaver_ftc.commands import declare
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.extensions import required
 
 FILES = (
     "comparison.json", "comparison.png", "comparison.html", "runs.json", "runs.png", "runs.html",
@@ -72,9 +73,10 @@ def command(options: Options) -> None:
     if options.runs:
         _compare_runs(options.runs, options.out, options.format)
     elif folder is not None and options.other_days:
-        _compare_other_days(folder, options.format, options.leaderboard)
+        required("compare_other_days", "compare --flights")(folder, options.format, options.leaderboard)
     elif folder is not None:
-        _compare_recorded(folder, options.out, options.format, options.leaderboard)
+        compare = required("compare_recorded", "compare --flights")
+        compare(folder, options.out, options.format, options.leaderboard)
     elif options.tune:
         _tune(options, most)
     else:
@@ -105,32 +107,6 @@ def _most_or_folder(flights: str | None) -> tuple[int | None, Path | None]:
     if int(flights) < 1:
         raise BadInput(f"compare: --flights {flights}: allowed: at least 1, or a folder of recorded flights")
     return int(flights), None
-
-
-def _compare_recorded(folder: Path, out: Path, format: Format, page: Path | None) -> None:
-    from beaver_ftc.results.writer import result_folder
-    from beaver_ftc.studies.present.page import write_files
-    from beaver_ftc_logs.recorded.benchmark import as_text, files_of, run_benchmark, update_page
-
-    document = run_benchmark(folder)
-    with result_folder(out, "recorded-flights") as written:
-        write_files(written, files_of(document))
-    if page is not None:
-        update_page(document, page)
-        picture = page.parent / "images" / "recorded-flights.png"
-        if picture.parent.is_dir():
-            picture.write_bytes((out / "recorded-flights" / "flights.png").read_bytes())
-    answer(format, document | {"folder": str(out / "recorded-flights")}, lambda: as_text(document))
-
-
-def _compare_other_days(folder: Path, format: Format, page: Path | None) -> None:
-    from beaver_ftc_logs.recorded.benchmark import as_text, update_page
-    from beaver_ftc_logs.recorded.other_days import run_other_days
-
-    document = {"other_days": run_other_days(folder)}
-    if page is not None:
-        update_page(document, page)
-    answer(format, document, lambda: as_text(document))
 
 
 def _compare_runs(folders: list[Path], out: Path, format: Format) -> None:

@@ -16,12 +16,7 @@ from beaver_ftc import __version__, commands
 from beaver_ftc.cli.inputs import as_typer_reads
 from beaver_ftc.cli.output import failure_of, report_last, status_of_stop
 from beaver_ftc.cli.study import command_of
-
-# Of a command that has commands of its own: what it is for.
-GROUPS = {
-    "import": "Make aircraft of data that others publish.",
-    "challenge": "Grade a class's detectors and laws on hidden flights.",
-}
+from beaver_ftc.extensions import loaded
 
 
 class Row(TyperCommand):
@@ -37,7 +32,7 @@ class Row(TyperCommand):
 
     def read(self) -> Callable[..., None]:
         """What the row names, as typer reads it."""
-        found = commands.load(self.target)
+        found = loaded(self.target)
         command = command_of(found) if isinstance(found, type) else found
         return as_typer_reads(command, getattr(found, "PLUGINS", True))
 
@@ -55,7 +50,7 @@ class Rows(TyperGroup):
 
     def __init__(self, **attributes: Any) -> None:
         super().__init__(**attributes)
-        above = f"{self.name} " if self.name in GROUPS else ""
+        above = f"{self.name} " if self.name in commands.groups() else ""
         for name, target in commands.registered().items():
             last = name.removeprefix(above)
             if name.startswith(above) and " " not in last:
@@ -97,7 +92,7 @@ def options(
     """
 
 
-for _name, _says in GROUPS.items():
+for _name, _says in commands.groups().items():
     _group = typer.Typer(name=_name, cls=Rows, help=_says, no_args_is_help=True, rich_markup_mode=None)
     app.add_typer(_group, context_settings={"help_option_names": ["-h", "--help"]})
 

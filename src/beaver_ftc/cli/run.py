@@ -31,6 +31,7 @@ from beaver_ftc.cli.output import (
 )
 from beaver_ftc.cli.progress import progress_bar
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.extensions import required
 
 if TYPE_CHECKING:
     from beaver_ftc.plant.adapter import Plant
@@ -88,8 +89,6 @@ def _shown(given: str | None) -> "Prepare | None":
     """What connects a plant to the FlightGear at HOST:PORT."""
     import socket
 
-    from beaver_ftc_links.flightgear import show_in_flightgear
-
     if given is None:
         return None
     host, _, port = given.rpartition(":")
@@ -99,7 +98,7 @@ def _shown(given: str | None) -> "Prepare | None":
         socket.getaddrinfo(host, int(port), socket.AF_INET, socket.SOCK_DGRAM)
     except (OSError, UnicodeError):
         raise BadInput(f"--flightgear: there is no host {host!r}") from None
-    return partial(show_in_flightgear, host=host, port=int(port))
+    return partial(required("flightgear", "--flightgear"), host=host, port=int(port))
 
 
 def _run_all(scenarios: list["Scenario"], options: Options) -> int:
@@ -150,7 +149,7 @@ def _certificate(folder: Path) -> Document:
     """How much of the flight its certificate states."""
     import json
 
-    from beaver_ftc_assurance.certificates.certificate import FILE
+    from beaver_ftc.results.writer import CERTIFICATE
 
-    written = json.loads((folder / FILE).read_text(encoding="utf-8"))
+    written = json.loads((folder / CERTIFICATE).read_text(encoding="utf-8"))
     return {"certificate": {name: len(written[name]) for name in ("statements", "without")}}

@@ -10,6 +10,7 @@ from beaver_ftc.cli.inputs import check_flyable, complete_names
 from beaver_ftc.cli.output import Document, Format, FormatOption, complain, emit, emit_json
 from beaver_ftc.commands import declare
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
+from beaver_ftc.extensions import required
 
 _NAME = re.compile(r"[A-Za-z0-9_-]{1,100}")  # as of a scenario
 _NAME_LINE = re.compile(r"^name:.*$", re.MULTILINE)
@@ -67,9 +68,7 @@ def _check(file: str) -> Document:
         if is_sweep(file):
             load_sweep(file)
         elif has_key(file, "plan", "requirements"):
-            from beaver_ftc_assurance.evidence.plan import load_plan
-
-            load_plan(file)
+            required("load_plan", file)(file)
         else:
             scenario = load_scenario(file)
             check_flyable(scenario, file)
@@ -116,11 +115,9 @@ def new(
 
 
 def _sample_logs(folder: Path, like: str | None) -> None:
-    from beaver_ftc_logs.sample_logs import files
-
     if like is not None:
         raise BadInput("new: --like and --log are given, allowed: one of them")
-    for name, text in files().items():
+    for name, text in required("sample_logs", "new --log")().items():
         _write(folder / name, text)
     emit(f"{folder}: written; `beaver-ftc identify --check {folder}/healthy.csv` says what it is")
 

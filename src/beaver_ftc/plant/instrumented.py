@@ -53,6 +53,7 @@ SIGNALS = {
     "engines_n": "aero/engines-yaw-coefficient",
     "mach": "velocities/mach",
 }
+ENGINE_SIGNALS = ("engines_l", "engines_m", "engines_n")  # moments of the engines, in the order of the axes
 
 LEVER, DIFFERENCE = "fcs/actuated-throttle-norm", "fcs/actuated-throttle-{i}-difference"
 AT_IDLE = "failures/engine-{i}-at-idle"

@@ -7,9 +7,12 @@ from functools import cached_property
 from html import escape
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
 
 from beaver_ftc.documents.errors import BadInput, SimulationFailed, suggestion
+from beaver_ftc.extensions import required
 from beaver_ftc.results import typed, verdict
 from beaver_ftc.results.log import Log, MemoryLog, StoredLog
 from beaver_ftc.results.metrics import Document, metrics
@@ -23,7 +26,14 @@ if TYPE_CHECKING:
     from beaver_ftc.control.base import Law
     from beaver_ftc.diagnosis.base import Detector
     from beaver_ftc.loop.outcome import Landing
-    from beaver_ftc_assurance.certificates.proved import Proof
+
+
+class Proof(NamedTuple):
+    """A certificate, the log that proves it, column -> values (rows,), and the text of scenario.yaml."""
+
+    certificate: Document
+    log: dict[str, np.ndarray]
+    scenario: str
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -133,12 +143,11 @@ class Flight:
         """
         return self.proof().certificate
 
-    def proof(self) -> "Proof":
+    def proof(self) -> Proof:
         """The same with what it is checked against: the flight's log, which has further columns for it, and
         the text of its scenario."""
-        from beaver_ftc_assurance.certificates.proved import proof
-
-        return proof(self.scenario, self._kept())
+        found: Proof = required("proof", "certificate")(self.scenario, self._kept())
+        return found
 
     def save(self, out: str | PathLike[str] = "runs", *, report: bool = True) -> Path:
         """Write `out/<name>/` as `beaver-ftc run` does, whole or not at all; returns that folder.

@@ -18,6 +18,7 @@ from uuid import uuid4
 
 from beaver_ftc.commands import files_of_commands
 from beaver_ftc.documents.errors import SimulationFailed
+from beaver_ftc.extensions import required
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import Document, as_json, metrics
 
@@ -30,6 +31,7 @@ try:
 except ImportError:  # not a POSIX system: nothing can be locked, so nothing is taken for stale
     fcntl = None  # type: ignore[assignment]
 
+CERTIFICATE = "certificate.json"
 # What a run leaves; what else lies in a result folder is declared by the commands that write it.
 FILES_OF_A_RUN = frozenset({
     "scenario.yaml", "log.parquet", "metrics.json", "report.html", "figures", "aircraft",
@@ -66,13 +68,9 @@ def run(
     """
     from beaver_ftc.loop.loop import fly
     from beaver_ftc.results import exports as exporting
-    from beaver_ftc_assurance.certificates import certificate
-    from beaver_ftc_assurance.certificates.tape import Recorder
 
-    recorder = Recorder(scenario) if certified else None
-    watch = recorder.watch if recorder else None
-    if certified:
-        certificate.check_scheme(scenario)
+    certificate = required("certificate", "certified")(scenario) if certified else None
+    watch = certificate.watch if certificate else None
     failed: list[Exception] = []
     with result_folder(out, scenario.name) as folder:
         log_path, aircraft = folder / "log.parquet", scenario.airframe
@@ -83,9 +81,9 @@ def run(
         with _kept_whatever(folder, "metrics.json", failed):
             document = metrics(flight)
             (folder / "metrics.json").write_text(as_json(document), encoding="utf-8")
-        if recorder:
-            with _kept_whatever(folder, "certificate.json", failed):
-                certificate.write(scenario, recorder, folder)
+        if certificate:
+            with _kept_whatever(folder, CERTIFICATE, failed):
+                certificate.write(folder)
         if report and document:
             with _kept_whatever(folder, "report.html", failed):
                 write_report_files(folder, document)

@@ -12,7 +12,7 @@ from beaver_ftc.aircraft import DEFAULT, Aircraft, load
 from beaver_ftc.aircraft.loading import BESIDE, NotDerived, UnknownAircraft
 from beaver_ftc.documents.base import Number, deny
 from beaver_ftc.documents.errors import BeaverFtcError, suggestion
-from beaver_ftc.plugins import first_use
+from beaver_ftc.extensions import offered, required
 
 _CHECKED: ContextVar[tuple[Aircraft, str | None] | None] = ContextVar("aircraft", default=None)
 
@@ -27,12 +27,12 @@ def find_aircraft(reference: str = DEFAULT, beside: Path | None = None) -> Aircr
         aircraft = load(reference, beside)
     except NotDerived:
         try:
-            first_use.derive(reference)
+            required("derive", reference)(reference)
         except BeaverFtcError as error:
             raise UnknownAircraft(str(error)) from None
         aircraft = load(reference, beside)
-    if reference.startswith(BESIDE):
-        first_use.compare(aircraft)
+    if reference.startswith(BESIDE) and (compare := offered("compare")):
+        compare(aircraft)
     return aircraft
 
 

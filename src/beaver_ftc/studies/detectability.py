@@ -32,6 +32,7 @@ from beaver_ftc.design.model import AXES, N_Y, both_responses
 from beaver_ftc.design.variants import design_of
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.loop.loop import Loop, fly
+from beaver_ftc.plant.instrumented import ENGINE_SIGNALS
 from beaver_ftc.results.log import Columns
 from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc.scenario.loader import load_scenario
@@ -49,7 +50,6 @@ from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.present.figures import heat_map, label_edges, panels
 from beaver_ftc.studies.present.page import Heading, Makers, Part, Pictures, Table, as_html
 from beaver_ftc.studies.present.tables import aligned, as_csv
-from beaver_ftc_aircraft.derive.fit import EXACT_TERMS
 
 DETECT_WITHIN_S, ISOLATE_WITHIN_S = 0.5, 1.0
 SPEEDS_MPS, ALTITUDES_M = (36.0, 40.0, 44.0, 48.0, 52.0), (0.0, 1000.0, 2000.0, 3000.0)
@@ -254,7 +254,7 @@ def engine_failures(scenario: Scenario) -> list[Document]:
     ]
     gained = np.interp(setting, thrust.setting, force_n) / aircraft.mass.mass_kg
     loop.release()
-    known, found = any(name in EXACT_TERMS.values() for name in aircraft.signals), []
+    known, found = any(name in ENGINE_SIGNALS for name in aircraft.signals), []
     mapped = aircraft.file.model_error_map
     held = known and mapped is not None and mapped.knows_engines
     for e, name in enumerate(aircraft.effectors):

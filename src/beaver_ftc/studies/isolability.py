@@ -7,22 +7,20 @@ of both apart.
 """
 
 from collections.abc import Sequence
-from itertools import combinations, permutations, product
-from math import inf, radians
+from itertools import permutations, product
+from math import inf
 from typing import Any
 
 import numpy as np
 
-from beaver_ftc.diagnosis.types.registry import kind_of
+from beaver_ftc.extensions import offered
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.engine.statistics import quantile
 from beaver_ftc.studies.present.figures import heat_map, label_edges, panels
-from beaver_ftc_assurance.certificates.tape import recorded
-from beaver_ftc_assurance.separation import LARGEST_RATE_DEG_S, Candidate, situation_of, tell_apart
 
-CONSTANT_LOSS = kind_of("loss_of_effectiveness")
 SHOWN = ("magnitude", "magnitude_median", "longest_s", "median_s")
 DOUBLET = ("doublet_deg", "doublet_s", "why")
+NO_DOUBLET = dict(zip(DOUBLET, (None, None, "no installed package offers 'doublets'"), strict=True))
 HEAD = ("loss of", "against", "x reference", "half the time from", "in", "always at", "from", "in", "doublet")
 TOLD = 0.5  # of the losses that a doublet tells apart
 SAYS = (
@@ -53,16 +51,9 @@ def shown(excluded: np.ndarray, frames: int, dt: float) -> Document:
 def doublets(scenario: Scenario, after_s: float) -> dict[tuple[str, str], Document]:
     """Of each two surfaces that lead an axis: the smallest doublet that tells losses of TOLD apart, so long
     after the start of a healthy flight, or why there is none."""
-    frames = round(after_s * scenario.rate_hz)
-    healthy = scenario.model_copy(update={"faults": (), "duration_s": after_s})
-    at = situation_of(recorded(healthy, [frames - 1], frames), healthy, radians(LARGEST_RATE_DEG_S))
-    names, found = scenario.airframe.surfaces, {}
-    for pair in combinations(scenario.airframe.class_of_losses, 2):
-        one, other = (Candidate(names.index(name), CONSTANT_LOSS, -TOLD, -TOLD) for name in pair)
-        told = tell_apart(one, other, at, names)
-        asked = told.get("amplitude_deg"), told.get("time_s"), told.get("because", "")
-        found[pair] = found[pair[::-1]] = dict(zip(DOUBLET, asked, strict=True))
-    return found
+    find = offered("doublets")
+    pairs = permutations(scenario.airframe.class_of_losses, 2)
+    return find(scenario, after_s, TOLD) if find else dict.fromkeys(pairs, NO_DOUBLET)
 
 
 def nothing(faults: Sequence[str], why: str) -> list[Document]:

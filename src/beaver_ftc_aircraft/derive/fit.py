@@ -18,6 +18,7 @@ from beaver_ftc.aircraft import AXES, Aircraft, MassProperties
 from beaver_ftc.aircraft.aircraft import MOMENTS
 from beaver_ftc.design.model import inertia_coefficients, inertial
 from beaver_ftc.diagnosis.monitors import engine_symmetry
+from beaver_ftc.plant.instrumented import ENGINE_SIGNALS
 from beaver_ftc_aircraft.derive.sample import (
     AGES_S,
     REACHES,
@@ -52,7 +53,7 @@ _WITH_SURFACE: tuple[dict[str, int], ...] = (
 _OF_DECLARED: tuple[dict[str, int], ...] = (
     {}, {"alpha": 1}, {"alpha": 2}, {"beta": 1}, {"ph": 1}, {"qh": 1}, {"rh": 1},
 )  # fmt: skip
-EXACT_TERMS = {"Cl": "engines_l", "Cm": "engines_m", "Cn": "engines_n"}  # with 1, by their definition
+EXACT_TERMS = dict(zip(MOMENTS, ENGINE_SIGNALS, strict=True))  # with 1, by their definition
 PLAIN = ("alpha_rate", "beta_rate", *EXACT_TERMS.values())
 ANY_MOMENT = 1.0  # more than engines have, as a coefficient
 MATTERS_RAD_S2 = 1e-3  # what an engine's moment must do in flight to be worth a signal

@@ -146,6 +146,20 @@ def _shows(history: History, of: list[tuple[Document, Document]]) -> bool:
     return True
 
 
+class OfRun:
+    """The certificate of a flight that is about to be flown: `watch` keeps what it needs."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        """Raises BadInput for a flight whose alarm is not our scheme's."""
+        check_scheme(scenario)
+        self._scenario, self._recorder = scenario, Recorder(scenario)
+        self.watch = self._recorder.watch
+
+    def write(self, folder: Path) -> None:
+        """Write it into the flight's result folder, which has log and scenario."""
+        write(self._scenario, self._recorder, folder)
+
+
 def check_scheme(scenario: Scenario) -> None:
     """Refuse flights whose alarm is not our scheme's."""
     if not scenario.fdi.is_ours:

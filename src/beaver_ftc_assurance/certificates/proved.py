@@ -2,12 +2,12 @@
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.diagnosis.isolation.estimators import estimator_names
+from beaver_ftc.results.flight import Proof
 from beaver_ftc.results.log import Columns, Log, MemoryLog
 from beaver_ftc.scenario.dump import to_yaml
 from beaver_ftc.scenario.schema import Scenario
@@ -29,14 +29,6 @@ def proved(scenario: Scenario, frames: np.ndarray, flown: Iterable[int]) -> tupl
     whole = MemoryLog()
     certificate.copy_with(log, columns, whole)
     return whole, document
-
-
-class Proof(NamedTuple):
-    """A certificate, the log that proves it, column -> values (rows,), and the text of scenario.yaml."""
-
-    certificate: Document
-    log: dict[str, np.ndarray]
-    scenario: str
 
 
 def proof(scenario: Scenario, log: Log) -> Proof:

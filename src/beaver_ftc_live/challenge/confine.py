@@ -70,7 +70,9 @@ def readable() -> list[str]:
 
 
 def _sources() -> list[str]:
-    return [str(folder) for folder in Path(__file__).resolve().parents[2].glob("beaver_ftc*")]
+    """The folders of the core and of this package."""
+    here = Path(__file__).resolve().parents[1]
+    return [str(here.with_name("beaver_ftc")), str(here)]
 
 
 def _names_in(folder: str) -> list[str]:

@@ -12,6 +12,10 @@ from beaver_ftc.commands import declare
 from beaver_ftc.documents.errors import BadInput
 
 
+class Challenge:
+    """Grade a class's detectors and laws on hidden flights."""
+
+
 @declare(plugins=False)
 def new(
     folder: Annotated[Path, typer.Argument(metavar="DIR")],

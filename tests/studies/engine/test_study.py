@@ -187,7 +187,6 @@ def test_every_module_that_makes_rows_is_in_the_fingerprint(tmp_path):
     imported = {Path(line).resolve() for line in done.stdout.splitlines()}
     assert {"sampling.py", "metrics.py", "kalman.py", "one_flight.py"} <= {path.name for path in imported}
     hashed = set(hashed_files())
-    names = PACKAGE.parent / "beaver_ftc_links"  # only registers a name with Gymnasium
-    assert imported - hashed == {names / "__init__.py", names / "environments.py"}
+    assert imported <= hashed
     assert {path.name for path in hashed} >= {"beaver.xml", "tuned.json"}
     assert not [path for path in hashed if path.is_relative_to(PACKAGE / "cli")]

@@ -13,6 +13,7 @@ from typing import IO, Any, Protocol
 
 from beaver_ftc.documents.errors import BadInput, SimulationFailed, say_once
 from beaver_ftc.documents.paths import data_root
+from beaver_ftc.extensions import SERVICES, folders
 from beaver_ftc.results.metrics import versions
 from beaver_ftc.results.writer import clear_disk_errors, sync
 
@@ -158,7 +159,7 @@ def batches_of(count: int, size: int) -> Iterator[tuple[int, range]]:
 
 
 PACKAGE = Path(__file__).resolve().parents[2]
-NO_ROWS = ("cli", "commands", "pytest_plugin")  # rooms that ask for rows, or show them, and make none
+NO_ROWS = ("cli", "commands", "pytest_plugin")  # they ask for rows, or show them, and make none
 
 
 def identity(what: str, asked: Document) -> Document:
@@ -207,11 +208,20 @@ def plug_ins() -> dict[str, str]:
 
 
 def hashed_files() -> list[Path]:
-    """The sources and data that rows may follow from: all but the rooms that make none."""
-    ours = (path for path in PACKAGE.rglob("*") if path.suffix in (".py", ".json", ".yaml"))
-    sources = [path for path in ours if path.relative_to(PACKAGE).parts[0] not in NO_ROWS]
+    """The sources and data that rows may follow from: of the core, and of each package that offers it a
+    service, all but the folders that make none."""
+    sources = [
+        path
+        for package in (PACKAGE, *folders(SERVICES))
+        for path in package.rglob("*")
+        if path.suffix in (".py", ".json", ".yaml") and _makes_rows(path.relative_to(package))
+    ]
     aircraft = [path for path in (data_root() / "aircraft").rglob("*") if path.is_file()]
     return sorted({*sources, *aircraft})
+
+
+def _makes_rows(path: Path) -> bool:
+    return path.with_suffix("").parts[0] not in NO_ROWS
 
 
 @cache

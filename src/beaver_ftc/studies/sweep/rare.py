@@ -20,6 +20,7 @@ import numpy as np
 
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFailed, say_once, suggestion
 from beaver_ftc.results.expectations import evaluate
+from beaver_ftc.results.log import Columns
 from beaver_ftc.results.metrics import as_json, metrics, versions
 from beaver_ftc.results.writer import result_folder
 from beaver_ftc.scenario.dump import to_yaml
@@ -179,14 +180,13 @@ def score_of(scenario: Scenario, expectation: str) -> float:
     """Fly, and say how near it came to what is not expected: below 0 before, 0 and above once it has come."""
     from beaver_ftc.loop.loop import fly
     from beaver_ftc.plant.sensing import DEPARTURE_LIMITS
-    from beaver_ftc_assurance.evidence.flown import Watched
 
-    log = Watched(list(DEPARTURE_LIMITS)) if expectation == "no_departure" else None
+    log = Columns(*DEPARTURE_LIMITS) if expectation == "no_departure" else None
     flight = fly(scenario, log)
     document = metrics(flight)
     found = next(one for one in evaluate(scenario.expect, document) if one["name"] == expectation)
     if log is not None:
-        shares = (np.abs(log.columns[name]).max() / limit for name, limit in DEPARTURE_LIMITS.items())
+        shares = (np.abs(log[name]).max() / limit for name, limit in DEPARTURE_LIMITS.items())
         score = float(max(shares)) - 1.0
     elif expectation == "no_false_alarm":
         score = flight.worst_residual_ratio - 1.0

@@ -1,0 +1,90 @@
+"""What packages beside the core add to it: found as the standard library finds it, called when wanted."""
+
+import sys
+from importlib.metadata import entry_points
+
+import pytest
+
+from beaver_ftc import commands, extensions
+from beaver_ftc.documents.errors import BadInput
+
+OURS = (commands.GROUP, commands.GROUPS, extensions.SERVICES, extensions.WHEN_IMPORTED)
+METADATA = """[console_scripts]
+other = other:main
+
+[beaver_ftc.services]
+count = counting:count
+gone = not_there:nothing
+derive = counting:count
+
+[beaver_ftc.when_imported]
+waited_for = counting:note
+"""
+MODULE = (
+    "seen = []\ndef count(*given):\n    return len(given)\ndef note(module):\n    seen.append(module.VALUE)\n"
+)
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    """Another package, the last on the path."""
+    (tmp_path / "counting-1.dist-info").mkdir()
+    (tmp_path / "counting-1.dist-info" / "entry_points.txt").write_text(METADATA)
+    (tmp_path / "counting.py").write_text(MODULE)
+    (tmp_path / "waited_for.py").write_text("VALUE = 7\n")
+    monkeypatch.setattr(sys, "path", [*sys.path, str(tmp_path)])
+    monkeypatch.delitem(sys.modules, "gymnasium.envs.registration", raising=False)  # named in it for good
+    monkeypatch.setattr(sys, "meta_path", list(sys.meta_path))
+    extensions._all_entries.cache_clear()
+    yield tmp_path
+    extensions._all_entries.cache_clear()
+    for name in ("counting", "waited_for"):
+        sys.modules.pop(name, None)
+
+
+@pytest.mark.parametrize("group", OURS)
+def test_it_finds_what_the_standard_library_finds(group):
+    found = extensions.entries(group)
+    assert found == {point.name: point.value for point in entry_points(group=group)}
+    assert list(found) == sorted(found)
+    for target in found.values():
+        assert extensions.loaded(target)
+
+
+def test_a_service_of_another_package_is_called_by_its_name(package):
+    assert extensions.required("count", "--count")(1, 2, 3) == 3
+    assert extensions.offered("count")() == 0
+
+
+def test_of_two_of_a_name_the_first_on_the_path_is_taken(package):
+    assert extensions.entries(extensions.SERVICES)["derive"].startswith("beaver_ftc_")
+
+
+def test_what_nobody_offers_or_whose_package_is_gone_is_refused_in_a_line(package):
+    assert extensions.offered("gone") is None
+    with pytest.raises(BadInput) as caught:
+        extensions.required("gone", "--gone")
+    assert str(caught.value) == (
+        "--gone: no installed package offers 'gone', allowed: with all of `pip install beaver-ftc`"
+    )
+
+
+def test_a_function_is_called_once_its_module_is_imported(package):
+    extensions.watch_imports()
+    assert "counting" not in sys.modules
+    import waited_for  # noqa: F401
+
+    assert sys.modules["counting"].seen == [7]
+
+
+def test_of_a_module_that_is_there_already_it_is_called_at_once(package):
+    import waited_for  # noqa: F401
+
+    extensions.watch_imports()
+    assert sys.modules["counting"].seen == [7]
+
+
+def test_the_folders_of_those_who_offer_something():
+    found = extensions.folders(extensions.SERVICES)
+    assert {folder.name for folder in found} >= {"beaver_ftc_aircraft", "beaver_ftc_assurance"}
+    assert all((folder / "__init__.py").is_file() for folder in found)

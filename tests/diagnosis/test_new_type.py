@@ -1,10 +1,14 @@
-"""A new fault type is a row of two tables, what happens and what tells it: the package with both."""
+"""A new fault type is a row of two tables, what happens and what tells it: the package with both, in a copy.
+
+Two are added that are not like those there: one of a constant parameter, and one with memory.
+"""
 
 import json
 import os
 import shutil
 import subprocess
 import sys
+from filecmp import dircmp
 from pathlib import Path
 
 import pytest
@@ -15,6 +19,7 @@ from beaver_ftc.documents.paths import data_root
 from fault_kinds import DOWN, UP
 
 HERE = Path(__file__).parent
+IN_FAULTS, IN_TABLE = "scenario/faults/{}.py", "diagnosis/types/table/{}.py"
 
 # A surface that follows its command with the sign reversed: p = -u.
 REVERSED = '''
@@ -43,50 +48,104 @@ def estimate(fdi, s, kind):
 
 TYPES = (FaultType(name="reversed", constant=True, judge=judge, deflection=deflection, estimate=estimate),)
 '''
-# What happens to the surface: all of its moment, the other way round.
-HAPPENS = '''
-"""A surface rigged the wrong way round."""
+# A servo whose feedback wears: both the fault and the set of its parameter have a memory.
+WEARS = '''
+"""A servo whose feedback wears: its surface moves too far, the more so the more it has moved."""
 
+from math import degrees
 from typing import Literal
 
-from pydantic import Field
-
-from beaver_ftc.scenario.faults.base import Button, Past, Properties, Switched
+from beaver_ftc.documents.base import Number, entry, number
 from beaver_ftc.scenario.airframe import Actuator
+from beaver_ftc.scenario.faults.base import Button, Past, Properties, Switched, constant
 
 
-class Reversed(Switched):
-    """The surface goes the wrong way."""
+class Overdrive(Switched):
+    """The surface moves too far, the more so the more it has moved."""
 
-    size = ("by", "deg")
-    examples = (("rigged wrongly", {}),)
-    button = Button(8, "reverse", {})
+    follows_actuator, size = True, ("by", "%")
+    in_words = constant(growth_per_deg=lambda value: f"{100 * value:g} % more with each degree")
+    examples = (("worn feedback", {"growth_per_deg": 0.01}),)
+    button = Button(8, "wear", {"growth_per_deg": 0.02})
 
-    type: Literal["reversed"]
-    actuator: Actuator = Field(description="the surface that fails")
+    type: Literal["overdrive"]
+    actuator: Actuator = entry(..., "the surface that fails")
+    growth_per_deg: Number = number(..., "share of 1", "more with each degree", gt=0, le=1, examples=[0.02])
+
+    def follow(self, past: Past, actuator_rad: float) -> None:
+        was_rad = past.kept.get("was_rad", actuator_rad)
+        past.kept["travel_rad"] = past.kept.get("travel_rad", 0.0) + abs(actuator_rad - was_rad)
+        past.kept["was_rad"] = actuator_rad
 
     def strike(self, of: Properties, share: float, past: Past) -> None:
-        of["effectiveness"] *= 1.0 - 2.0 * share
+        of["effectiveness"] *= 1.0 + min(self.growth_per_deg * degrees(past.kept["travel_rad"]), 1.0)
+'''
+WORN = '''
+"""A surface that moves further than it is told, by a factor that never becomes smaller: p = g u, g >= 1."""
+
+from beaver_ftc.compiled import kernel, record
+from beaver_ftc.diagnosis.isolation import membership
+from beaver_ftc.diagnosis.types.contract import ANYTHING, NOTHING, SHIFTED, FaultType
+
+MOST = 2.0
+
+
+@kernel
+def begin(surface, kind):
+    """It does what it is told."""
+    surface.overdrive.least = 1.0
+
+
+@kernel
+def judge(config, surface, kind, k):
+    """A factor explains this frame that is no smaller than one that was needed before."""
+    low, high, worn = surface.low_then, surface.high_then, surface.overdrive
+    middle, slack = 0.5 * (low + high), 0.5 * (high - low)
+    low, high = membership.solve(middle, slack, surface.command_then, worn.least, MOST)
+    if low > high:
+        return NOTHING
+    worn.least = max(worn.least, low)
+    return ANYTHING
+
+
+def estimate(fdi, s, kind):
+    """By how much too far, share of 1."""
+    return float(fdi["types"]["surface"][s]["overdrive"]["least"]) - 1.0
+
+
+TYPES = (
+    FaultType(
+        name="overdrive", constant=False, rank=5, begin=begin, judge=judge, record="overdrive",
+        memory=record(least=float), accommodation=SHIFTED, estimate=estimate,
+    ),
+)  # fmt: skip
 '''
 # Who has to know of it beside the diagnosis: scenario and schema, documents, `matrix`, `list`, the live page.
 KNOWN = """
 import json
 from beaver_ftc.cli.catalogue import _available
-from beaver_ftc_live.page.session import fault_types
 from beaver_ftc.results.metrics import faults_of
+from beaver_ftc.scenario.faults.base import Past
 from beaver_ftc.scenario.loader import load
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.matrix.fault_matrix import FaultCase, scenario_of
 schema = Scenario.model_json_schema()["$defs"]
-fault = scenario_of(FaultCase("rigged wrongly", "rudder", 45.0), "nominal", 0.0).faults[0]
-expected = load({"name": "r", "faults": [fault.model_dump()], "expect": {"isolated_type": "reversed"}})
-of = {"effectiveness": 1.0}
-fault.strike(of, 1.0, None)
-said = [schema["Reversed"]["description"], expected.expect.isolated_type, fault.type, of["effectiveness"]]
+fault = scenario_of(FaultCase("worn feedback", "rudder", 45.0), "nominal", 0.0).faults[0]
+expected = load({"name": "r", "faults": [fault.model_dump()], "expect": {"isolated_type": "overdrive"}})
+of, past = {"effectiveness": 1.0}, Past()
+for place in (0.0, 0.5, -0.1, -0.1):
+    fault.follow(past, place)
+fault.strike(of, 1.0, past)
+said = [schema["Overdrive"]["description"], expected.expect.isolated_type, fault.type, of["effectiveness"]]
 said.append(faults_of(expected)[0]["type"])
-said.append("reversed" in [entry["name"] for entry in _available()["faults"]])
+said.append("overdrive" in [entry["name"] for entry in _available()["faults"]])
+print(json.dumps(said))
+"""
+PAGE = """
+import json
+from beaver_ftc_live.page.session import fault_types
 live = fault_types()
-print(json.dumps([*said, live["breaks"][-1], live["sizes"]["reversed"]]))
+print(json.dumps([live["breaks"][-1], live["sizes"]["overdrive"]]))
 """
 FLIGHT = """
 import sys
@@ -100,18 +159,58 @@ plant.fly(220, UNCERTAINTIES["random"], until=lambda plant: found(plant.fdi, SUR
 said = found(plant.fdi, SURFACES)
 print(said["isolated"], said["isolation_type"], said["estimate"])
 """
+# Whether the type is excluded, frame by frame, on the surface that has it: against every uncertainty; and on
+# one whose excess shrinks again.
+PROMISE = """
+import sys, json
+sys.path.insert(0, {folder!r})
+from design_plant import UNCERTAINTIES, DesignPlant
+from beaver_ftc.diagnosis.types.registry import kind_of
+KIND = kind_of("overdrive", constant=False)
+
+def worn(sign):
+    past = dict(travel=0.0, last=0.0)
+    def position(k, u):
+        if k < 20:
+            return u
+        past["travel"], past["last"] = past["travel"] + abs(u - past["last"]), u
+        grown = min(past["travel"] / 4.0, 1.0)
+        return u * (1.0 + 0.25 * (grown if sign > 0 else 1.0 - grown))
+    return position
+
+def flown(name, sign):
+    plant, excluded, judged = DesignPlant(4, 50.0, surface=0, position=worn(sign), fault_class="all"), 0, 0
+    for _ in range(130):
+        plant.fly(1, UNCERTAINTIES[name])
+        excluded += plant.fdi["types"]["surface"]["type_excluded"][0][KIND] or plant.position_excluded(0)
+        judged = int(plant.fdi["types"]["surface"]["evidence"][0])
+    return int(excluded), judged
+
+print(json.dumps(dict(worn=[flown(name, 1.0) for name in UNCERTAINTIES], heals=flown("random", -1.0))))
+"""
+SCENARIO = """
+import json
+import beaver_ftc as bf
+def flown(law):
+    return bf.fly(dict(
+        name="worn", duration_s=13.5, rate_hz=25, fdi=dict(fault_class="all"), control=dict(law=law),
+        reference=dict(p=[dict(sine=dict(amplitude_deg_s=6, frequency_hz=0.3))]),
+        faults=[dict(actuator="aileron", type="overdrive", growth_per_deg=0.02, at_s=2)],
+        expect=dict(isolated_as="aileron", isolated_type="overdrive"),
+    ))
+flights = [flown(law) for law in ("fault-tolerant", "nominal")]
+print(json.dumps([flights[0].metrics, flights[1].metrics, str(flights[0])]))
+"""
 
 
-@pytest.fixture(scope="module")
-def in_a_copy(tmp_path_factory):
-    """A copy of the package with the new type: what a text prints there."""
-    root = tmp_path_factory.mktemp("copy")
-    package = root / "beaver_ftc"
-    shutil.copytree(beaver_ftc.__path__[0], package, ignore=shutil.ignore_patterns("__pycache__"))
-    shutil.copytree(data_root() / "aircraft", package / "data" / "aircraft")
-    shutil.copytree(data_root() / "scenarios", package / "data" / "scenarios")
-    (package / "scenario" / "faults" / "backwards.py").write_text(HAPPENS)
-    (package / "diagnosis" / "types" / "table" / "backwards.py").write_text(REVERSED)
+def copied(root, **modules):
+    """A copy of the packages with a module more in each of the two tables; runs a text there."""
+    for package in ("beaver_ftc", "beaver_ftc_live"):
+        shutil.copytree(SOURCE / package, root / package, ignore=shutil.ignore_patterns("__pycache__"))
+    for folder in ("aircraft", "scenarios"):
+        shutil.copytree(data_root() / folder, root / "beaver_ftc" / "data" / folder)
+    for place, text in modules.items():
+        (root / "beaver_ftc" / place).write_text(text)
 
     def printed(text):
         done = subprocess.run(
@@ -126,15 +225,77 @@ def in_a_copy(tmp_path_factory):
     return printed
 
 
-def test_a_new_type_is_found_and_named(in_a_copy):
-    assert in_a_copy(FLIGHT.format(folder=str(HERE))).split() == ["rudder", "reversed", "-1.0"]
+SOURCE = Path(beaver_ftc.__path__[0]).parent
+OVERDRIVE = {IN_FAULTS.format("wear"): WEARS, IN_TABLE.format("wear"): WORN}
 
 
-def test_scenario_documents_matrix_list_and_live_page_know_it(in_a_copy):
-    assert json.loads(in_a_copy(KNOWN)) == [
-        "The surface goes the wrong way.", "reversed", "reversed", -1.0, "reversed", True,
-        ["reverse", {"type": "reversed"}], ["by", "deg"],
+@pytest.fixture(scope="module")
+def root(tmp_path_factory):
+    return tmp_path_factory.mktemp("copy")
+
+
+@pytest.fixture(scope="module")
+def in_a_copy(root):
+    """The copy with the type that has a memory."""
+    return copied(root, **OVERDRIVE)
+
+
+def differing(one, other):
+    """Files below `one` that `other` has not, or not the same."""
+
+    def below(compared, place=""):
+        yield from (place + name for name in (*compared.left_only, *compared.diff_files))
+        for name, folder in compared.subdirs.items():
+            yield from below(folder, f"{place}{name}/")
+
+    return sorted(below(dircmp(one, other, ignore=["__pycache__", "data"])))
+
+
+def test_a_type_with_memory_is_two_files(in_a_copy, root):
+    assert differing(root / "beaver_ftc", SOURCE / "beaver_ftc") == sorted(OVERDRIVE)
+    assert differing(root / "beaver_ftc_live", SOURCE / "beaver_ftc_live") == []
+    assert len(OVERDRIVE) <= 2
+
+
+def test_it_is_injected_named_accommodated_and_put_in_words(in_a_copy):
+    tolerant, nominal, said = json.loads(in_a_copy(SCENARIO))
+    isolation = tolerant["isolation"]
+    assert (isolation["fault"], isolation["type"]) == ("aileron", "overdrive")
+    assert isolation["correct"] is isolation["type_correct"] is True
+    assert [each["passed"] for each in tolerant["expectations"]] == [True, True]
+    assert 0.0 < isolation["estimate"] < 1.0
+    assert isolation["estimate_deg"] is None  # it is a share, no angle
+    off = [flight["tracking"]["post_fault_rms_deg_s"]["p"] for flight in (tolerant, nominal)]
+    assert off[0] < 0.7 * off[1]
+    assert "aileron overdrive (2 % more with each degree) at 2.00 s" in said
+    assert f"correct, overdrive, estimated {isolation['estimate']:.3g}" in said
+
+
+def test_it_is_never_excluded_while_it_acts(in_a_copy):
+    """And is, where the excess over the command shrinks: the set has a memory."""
+    found = json.loads(in_a_copy(PROMISE.format(folder=str(HERE))))
+    assert [excluded for excluded, _ in found["worn"]] == [0] * len(found["worn"])
+    assert sum(judged > 20 for _, judged in found["worn"]) > 2  # some uncertainties hide it
+    assert found["heals"][0] > 0
+
+
+def test_a_type_of_a_constant_parameter_is_found_and_named(tmp_path):
+    printed = copied(tmp_path, **{IN_TABLE.format("backwards"): REVERSED})
+    assert printed(FLIGHT.format(folder=str(HERE))).split() == ["rudder", "reversed", "-1.0"]
+
+
+def test_scenario_documents_matrix_and_list_know_it(in_a_copy):
+    *said, known = json.loads(in_a_copy(KNOWN))
+    assert known is True
+    assert said == [
+        "The surface moves too far, the more so the more it has moved.", "overdrive",
+        "overdrive", pytest.approx(1.0 + 0.01 * 1.1 * 57.29577951), "overdrive",
     ]  # fmt: skip
+
+
+def test_the_live_page_knows_it(in_a_copy):
+    button = ["wear", {"type": "overdrive", "growth_per_deg": 0.02}]
+    assert json.loads(in_a_copy(PAGE)) == [button, ["by", "%"]]
 
 
 def test_every_type_keeps_the_contract():

@@ -96,8 +96,8 @@ def take(recording: Recording, vehicle: Vehicle, by: Known) -> Taken:
     )
     rate_hz = _rate_hz(samples)
     diagnosis = Diagnosis(by.aircraft, rate_hz, **by.declared)
-    fdi = diagnosis.config
-    inputs, ages = _inputs(samples, recording, vehicle, by.aircraft, turning=fdi.bounds.turbulence != "none")
+    turning = diagnosis.declared.air.moves
+    inputs, ages = _inputs(samples, recording, vehicle, by.aircraft, turning)
     _plausible(samples.name, inputs, by.aircraft)
     unknown = np.asarray(~np.isfinite(np.hstack(inputs)).all(axis=1))
     parts = _stretches(samples, unknown, rate_hz)
@@ -123,7 +123,7 @@ def diagnosed(taken: Taken, by: Known) -> tuple[Rows, Document]:
     for begin, end in parts:
         diagnosis.reset()
         found.append(step_through(diagnosis, [part[begin:end] for part in inputs], taken.rate_hz))
-    if diagnosis.config.bounds.turbulence == "none":  # a law that answers gusts opposes what they turn
+    if not diagnosis.declared.air.moves:  # a law that answers gusts opposes what they turn
         _check_signs(samples.name, by.aircraft, found)
     stepped = _whole(len(samples.t_s), len(by.aircraft.surfaces), parts, found)
     rows = rows_of(samples.t_s, stepped, by.aircraft.surfaces, diagnosis.config)

@@ -15,6 +15,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.loop.plugin_frame import PluginFrame, named_detector, named_law, plugged
 from beaver_ftc.plant.faults import NEVER
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.interventions import stages
 from beaver_ftc.scenario.schema import Change, Scenario
 from beaver_ftc.scenario.timing import frame_of
@@ -142,7 +143,7 @@ def renews_diagnosis(change: Change, then: Scenario) -> bool:
     errors, or with other sensors of declared errors, since a constant error is then another, and our
     thresholds hold for one that stays."""
     told = change.scheme is not None or change.declared_sensors is not None
-    declared = change.sensors is not None and not then.fdi.bounds.sensors.is_ideal
+    declared = change.sensors is not None and not Declared.of(then).sensors.is_ideal
     return told or (declared and then.fdi.is_ours)
 
 

@@ -39,6 +39,8 @@ class Diagnosis:
     actuators, design_model: likewise, if they are not ideal. start: rates, signals and surfaces of the trim
     that what is linearised or statistical holds on to; the first sample, if it is left out. Raises BadInput
     that names the key. Everything it remembers is one record of fixed size.
+
+    declared: what `fdi.bounds` declare, and who relies on it.
     """
 
     def __init__(
@@ -60,6 +62,7 @@ class Diagnosis:
         with checked_against(aircraft):
             self._scenario = load(given)
         self._aircraft, self._start = aircraft, start
+        self.declared = Declared.of(self._scenario)
         if not is_compiled(DETECTORS, scheme := self._scenario.fdi.scheme):
             allowed = "adaptive-estimators (step a plug-in itself)"
             raise BadInput(f"fdi.scheme: {scheme} is plugged in, allowed: {allowed}")
@@ -90,7 +93,6 @@ class Diagnosis:
         self._theta = direct(watching.theta, self._frames)
         self._said = Verdict()
         self._fresh = True
-        self._declared = Declared.of(self._scenario)
 
     @property
     def t_s(self) -> float:
@@ -119,7 +121,7 @@ class Diagnosis:
         _put("command_rad", command_rad, self._command)
         if attitude_rad is not None:
             _put("attitude_rad", attitude_rad, self._attitude)
-        elif self._declared.air.moves:
+        elif self.declared.air.moves:
             raise BadInput("attitude_rad: is missing, allowed: (3,) rad where fdi.bounds declares turbulence")
         if altitude_m is not None:
             _put("altitude_m", np.atleast_1d(altitude_m), self._altitude)
@@ -175,7 +177,7 @@ class Diagnosis:
         belief["u"] = belief["commanded"] = self._frame["control"]["layout"]["trim"] = u
         design, mass = belief["design"], mass_of(scenario.design_model, self._aircraft)
         anchor(design, x, y, u)
-        noise_model.set_up(self._fdi, scenario.fdi, self._declared, design, mass, (x, y, u), scenario.rate_hz)
+        noise_model.set_up(self._fdi, scenario.fdi, self.declared, design, mass, (x, y, u), scenario.rate_hz)
         self._fresh = False
 
 

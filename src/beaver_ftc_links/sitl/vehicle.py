@@ -18,6 +18,7 @@ from beaver_ftc.plant.channels import AIRSPEED, ALTITUDE
 from beaver_ftc.plant.instruments import AX, SENSORS
 from beaver_ftc.results.log import SpooledLog
 from beaver_ftc.results.simulation import Simulation
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc_links.sitl.outputs import Outputs, power_range
 
@@ -138,8 +139,7 @@ class Flown(Simulation):
         loop._may_fly_again = False  # with a ground to it
         frame["truth"]["ground_m"], frame["truth"]["slow_mps"] = self.ground_m, SLOW_MPS
         self._standing_m = self.ground_m + file.ground.height_m
-        gusty = self._scenario.fdi.bounds.turbulence != "none"
-        self._lowest_m = GUSTY_M if gusty else DOWN_M
+        self._lowest_m = GUSTY_M if Declared.of(self._scenario).air.moves else DOWN_M
         self._fresh = loop.frames.copy()
         if not self._scenario.initial.on_ground:
             if loop.trim.altitude_m < self._standing_m + UP_M:

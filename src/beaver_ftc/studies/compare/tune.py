@@ -30,6 +30,7 @@ from typing import Any
 
 from beaver_ftc.diagnosis.rivals import TUNED, TUNED_FOR_ERRORS
 from beaver_ftc.loop.loop import fly
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.studies.compare.replay import Trace, record, replay
 from beaver_ftc.studies.compare.trial import (
     CALIBRATION,
@@ -76,7 +77,7 @@ def tune(
     detectors = grids()["detectors for errors" if errors else "detectors"]
     laws = {} if errors else grids()["laws"]
     played = fly_all(partial(_play, grids=detectors), cases, workers, progress)
-    air = [case.scenario.fdi.bounds.turbulence for case in cases]
+    air = [Declared.of(case.scenario).air.severity for case in cases]
     options = {
         name: _best_detector(name, grid, played, air, target_per_h) for name, grid in detectors.items()
     }

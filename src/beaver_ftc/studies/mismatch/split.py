@@ -15,6 +15,7 @@ from beaver_ftc.aircraft import AXES
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.results.log import ParquetLog, column_names, read_chunks
 from beaver_ftc.results.metrics import metrics
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.mismatch.models import LOGGED, Columns, States, states_of
 from beaver_ftc.studies.mismatch.sources import SOURCES, Contributions, Models, instantaneous, integration
@@ -153,7 +154,7 @@ class Tally:
     @classmethod
     def of(cls, scenario: Scenario, stretches: Iterable[Stretch]) -> "Tally":
         """The tally of a scenario's flight."""
-        kept = cls(np.array(scenario.fdi.bounds.constant_rad_s2.as_tuple()), 1.0 / scenario.rate_hz)
+        kept = cls(np.array(Declared.of(scenario).constant_rad_s2), 1.0 / scenario.rate_hz)
         for stretch in stretches:
             kept.add(stretch)
         return kept

@@ -22,6 +22,7 @@ from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import metrics, versions
 from beaver_ftc.results.writer import result_folder
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.loader import load_scenario
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.detectability import SETTLED_S
@@ -156,10 +157,10 @@ def variants_of(scenario: Scenario, surface: str) -> Iterator[tuple[str, Scenari
 
 def _left_out(scenario: Scenario) -> Iterator[tuple[str, Document]]:
     """What may hide a fault, left out of the flight and of what is declared."""
-    bounds, environment = scenario.fdi.bounds, scenario.environment
-    if environment.severity or environment.gusts or bounds.turbulence != "none":
+    declared, environment = Declared.of(scenario), scenario.environment
+    if environment.severity or environment.gusts or declared.air.moves:
         yield "without turbulence", {"environment": {}, "fdi.bounds.turbulence": "none"}
-    if not (scenario.sensors.is_ideal and bounds.sensors.is_ideal):
+    if not (scenario.sensors.is_ideal and declared.sensors.is_ideal):
         yield "with perfect sensors", {"sensors": "ideal", "fdi.bounds.sensors": "ideal"}
     if not scenario.actuators.is_ideal:
         yield "with perfect servos", {"actuators": "ideal", "fdi.bounds.deflection_deg": 0.0}

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from beaver_ftc.aircraft import AXES
 from beaver_ftc.scenario.sweeps import Sweep
-from beaver_ftc.studies.sweep.one_flight import AXES, DEPARTED, FLOWN, flight_name, kind_of
+from beaver_ftc.studies.sweep.one_flight import DEPARTED, FLOWN, flight_name, kind_of
 
 NO_FAULT = "no fault"
 

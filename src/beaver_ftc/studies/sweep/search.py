@@ -12,12 +12,13 @@ from typing import Any
 
 import numpy as np
 
+from beaver_ftc.aircraft import AXES
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.sweeps import Sweep
 from beaver_ftc.studies.engine.store import batches_of
 from beaver_ftc.studies.engine.workers import Batch
 from beaver_ftc.studies.present.tables import finite
-from beaver_ftc.studies.sweep.one_flight import AXES, DEPARTED
+from beaver_ftc.studies.sweep.one_flight import DEPARTED
 from beaver_ftc.studies.sweep.sampling import Assignment, value_at
 from beaver_ftc.studies.sweep.store import Store
 

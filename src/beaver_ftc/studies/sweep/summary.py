@@ -11,12 +11,13 @@ from functools import partial
 
 import numpy as np
 
+from beaver_ftc.aircraft import AXES
 from beaver_ftc.results.metrics import ON_THE_BOUND
 from beaver_ftc.scenario.faults import UNANTICIPATED
 from beaver_ftc.scenario.sweeps import AxisLevels, Level, QuantileLevel, Sweep, SweepExpect
 from beaver_ftc.studies.engine import statistics
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, Estimate, quantile, wilson
-from beaver_ftc.studies.sweep.one_flight import AXES, Document
+from beaver_ftc.studies.sweep.one_flight import Document
 from beaver_ftc.studies.sweep.outcomes import NO_FAULT, Flights, Ranking, rank
 
 QUANTILES = {"median": 0.5, "p90": 0.9, "p95": 0.95, "p99": 0.99, "max": 1.0}

@@ -68,6 +68,12 @@ def is_compiled(group: str, name: str) -> bool:
     return name in _ours(group) and "class" not in _ours(group)[name]
 
 
+def compiled_rows(group: str) -> dict[str, dict[str, Any]]:
+    """Rows of plugins.yaml whose kernels are compiled, by name; of a plug-in of ours they fly in its
+    place."""
+    return {name: row for name, row in _ours(group).items() if "kernels" in row}
+
+
 def options_of(group: str, name: str) -> dict[str, dict[str, Any]]:
     """The options of what the compiled frame does itself, as plugins.yaml has them."""
     return _ours(group)[name].get("options", {})

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from beaver_ftc.aircraft.aircraft import Travel
 from beaver_ftc.control import allocation, reference
-from law_records import new_control
+from law_records import fields, new_control
 from telling import apart
 
 DT = 0.01
@@ -20,7 +20,9 @@ LOW, HIGH = np.array([-0.52, -0.49, -0.44, -0.1]), np.array([0.52, 0.49, 0.44, 1
 def control_record():
     control = new_control(main=(0, 1, 2), stand_in=3, dt=DT, effectiveness=1.0, scale=1.0)
     control["layout"]["low"], control["layout"]["high"] = LOW, HIGH
-    control["reference"]["A"], control["reference"]["B"] = reference.discretise(10.0, 1.0, DT)
+    control["reference"]["config"]["A"], control["reference"]["config"]["B"] = reference.discretise(
+        10.0, 1.0, DT
+    )
     return control
 
 
@@ -28,7 +30,7 @@ def control_record():
 def test_the_attainable_interval_is_spanned_by_the_corners_of_the_travel(row):
     G = np.array([row] * 3)
     corners = [G[1] @ np.array(corner) for corner in product(*zip(LOW, HIGH, strict=True))]
-    least, greatest = allocation.attainable(G, control_record()["layout"], 1)
+    least, greatest = allocation.attainable(G, control_record()["layout"], np.zeros((2, 3)), 1)
     assert least == pytest.approx(min(corners), abs=1e-12)
     assert greatest == pytest.approx(max(corners), abs=1e-12)
 
@@ -37,33 +39,35 @@ def test_without_a_loss_the_law_follows_the_reference_model_to_the_bit():
     control = control_record()
     for k in range(50):
         wanted = np.array([0.05 * np.sin(k / 9), 0.02, -0.01])
-        reference.follow(control["reference"], wanted)
-        reference.govern(control["reference"], wanted, control["axes"]["shortfall"])
-        assert np.array_equal(control["reference"]["governed_rate"], control["reference"]["model_rate"])
+        reference.follow(control["reference"]["config"], control["reference"]["output"], wanted)
+        reference.govern(control["reference"], wanted, control["axes"]["shortfall"], False)
+        assert np.array_equal(
+            control["reference"]["output"]["governed_rate"], control["reference"]["output"]["model_rate"]
+        )
 
 
 def test_a_shortfall_on_one_side_scales_the_reference_on_both_and_in_time_it_comes_back():
     control = control_record()
-    control["reference"]["hedging"] = 1
+    control["reference"]["memory"]["active"] = 1
     control["axes"]["shortfall"] = [0.0, 0.5, 0.0]
     for _ in range(10):
-        reference.govern(control["reference"], np.full(3, 0.05), control["axes"]["shortfall"])
+        reference.govern(control["reference"], np.full(3, 0.05), control["axes"]["shortfall"], False)
     missed = 10 * DT * 0.5 / reference.MISSED_RAD_S
-    assert control["reference"]["scale"][1] == pytest.approx(1 - missed, abs=0.01)
-    assert control["reference"]["scale"][[0, 2]] == pytest.approx([1, 1])
+    assert control["reference"]["memory"]["scale"][1] == pytest.approx(1 - missed, abs=0.01)
+    assert control["reference"]["memory"]["scale"][[0, 2]] == pytest.approx([1, 1])
     control["axes"]["shortfall"] = 0.0
     for _ in range(round(5 * reference.RECOVERY_S / DT)):
-        reference.govern(control["reference"], np.full(3, 0.05), control["axes"]["shortfall"])
-    assert control["reference"]["governed_rate"] == pytest.approx(0.05, rel=0.01)
+        reference.govern(control["reference"], np.full(3, 0.05), control["axes"]["shortfall"], False)
+    assert control["reference"]["output"]["governed_rate"] == pytest.approx(0.05, rel=0.01)
 
 
 def test_a_demand_beyond_the_stops_is_noted():
     control = control_record()
-    out = control["allocation"]
-    out["G"][1, 3], out["command"] = 2.2, (0.0, 0.0, 0.0, -0.1)  # nothing but the flap is left
+    out, by_engines = control["allocation"]["output"], np.zeros((2, 3))
+    control["axes"]["G"][1, 3], out["command"] = 2.2, (0.0, 0.0, 0.0, -0.1)  # nothing but the flap is left
     control["axes"]["demand"] = [0.0, -1.0, 0.0]
     control["axes"]["hold"] = [0.0, -0.5, 0.0]
-    allocation.note_shortfall(control["axes"], out, control["layout"], np.zeros(4))
+    allocation.note_shortfall(control["axes"], out["command"], control["layout"], np.zeros(4), by_engines)
     assert control["axes"]["shortfall"][1] == pytest.approx(-1.0 + 0.22)
     assert list(control["axes"]["beyond"]) == [0, 1, 0]
 
@@ -72,19 +76,21 @@ def test_what_a_lagging_surface_still_gives_is_no_shortfall():
     control, rng = control_record(), np.random.default_rng(3)
     G, u, lag = rng.normal(size=(3, 4)), rng.uniform(-0.1, 0.1, 4), rng.uniform(-0.1, 0.1, 4)
     control["axes"]["demand"] = rng.normal(size=3)
-    control["allocation"]["G"], control["allocation"]["command"] = G, u
-    allocation.note_shortfall(control["axes"], control["allocation"], control["layout"], lag)
+    control["axes"]["G"], control["allocation"]["output"]["command"] = G, u
+    command, by_engines = control["allocation"]["output"]["command"], np.zeros((2, 3))
+    allocation.note_shortfall(control["axes"], command, control["layout"], lag, by_engines)
     assert control["axes"]["shortfall"] == pytest.approx(control["axes"]["demand"] - G @ (u + lag), abs=1e-12)
 
 
 class TestProbing:
     def probed(self, wanted):
-        probe = control_record()["probe"]
+        record = control_record()["probe"]
+        probe = fields(record)
         probe["amplitude"], probe["step"], probe["frames"] = 0.05, np.pi * DT, 400
         probe["from_s"] = probe["to_s"] = -1.0
         history = []
         for k in range(1000):
-            allocation.advance_probe(probe, wanted(k), k * DT)
+            allocation.advance_probe(record, wanted(k), k * DT)
             history.append(float(probe["deflection"]))
         return probe, np.array(history)
 
@@ -103,9 +109,10 @@ class TestProbing:
     @given(st.floats(0, 0.1), st.floats(-0.5, 0.5))
     def test_a_healthy_aircraft_feels_nothing(self, probe, needed):
         control = control_record()
-        out = control["allocation"]
-        out["G"] = G = np.array([[-9.0, 0, 0.6, 0], [0, -10.0, 0, 2.1], [-0.2, 0, -2.0, 0]])
-        allocation.allocate(out, control["layout"], np.array([0.0, needed, 0.0]), np.ones(4), 0.0, probe)
+        out, axes = control["allocation"]["output"], control["axes"]
+        axes["G"] = G = np.array([[-9.0, 0, 0.6, 0], [0, -10.0, 0, 2.1], [-0.2, 0, -2.0, 0]])
+        axes["demand"] = 0.0, needed, 0.0
+        allocation.allocate(axes, out, control["layout"], np.ones(4), 0.0, probe)
         assert (G @ out["command"])[1] == pytest.approx(needed, abs=1e-12)
 
 
@@ -122,7 +129,7 @@ def test_whose_the_authority_is_goes_by_effect_times_the_whole_travel(aside):
         n=6, surfaces=tuple(SIX), primary=("left", "elevator", "rudder"), stand_ins=aside, effect=EFFECT,
         travel={name: Travel(*stops) for name, stops in SIX.items()}, dominant_axis=(0, 0, 1, 1, 2, 1),
     )  # fmt: skip
-    shares = allocation._authority(of, {"main": [0, 2, 4], "aside": [name in aside for name in SIX]})
+    shares = allocation._authority(of, {"main": [0, 2, 4], "is_backup": [name in aside for name in SIX]})
     pitch = np.array([0.0, 0.0, 9.0 * 0.8, 11.0 * 0.2, 0.0, 0.0 if aside else 2.0 * 1.1])
     assert shares[1] == pytest.approx(pitch / pitch.sum())
     assert shares[0] == pytest.approx(np.array([7.0 * 0.5, 6.0 * 0.45, 0, 0, 0, 0]) / 6.2)

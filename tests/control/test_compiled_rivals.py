@@ -1,15 +1,18 @@
 """The compiled rivals against their classes, frame by frame on random rates: no aircraft, no flight."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from beaver_ftc.control.base import Reference
-from beaver_ftc.control.rivals import compiled
+from beaver_ftc.control.rivals import compiled_rivals
 from beaver_ftc.control.rivals.indi import IncrementalInversion
 from beaver_ftc.control.rivals.lqr import FixedGainLqr
+from beaver_ftc.control.supervisor import MODE_NOMINAL
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.base import Measured, Verdict
-from law_records import new_control
+from law_records import fields, new_control
 
 DT = 0.02
 A = np.array([[-4.0, 0.3, 1.0], [0.2, -3.0, 0.1], [-0.2, 0.4, -0.8]])
@@ -42,17 +45,18 @@ def test_both_command_the_same_within_the_travel_and_at_the_stops(rival, most):
     control = new_control(main=(0, 1, 2), dt=DT)
     control["layout"]["trim"] = TRIM
     control["layout"]["low"], control["layout"]["high"] = -most, 0.8 * most
-    control["inner"] = law.compile_into(control["rival"])
+    law.compile_into(control["compiled_rivals"])
+    frame = SimpleNamespace(G=G), SimpleNamespace(x=None)
     stops = 0
     for k in range(40):
         x, rate, acceleration = 0.02 * rng.normal(size=(3, 3))
         seen = Measured(k * DT, x, np.zeros(5), np.zeros(3), np.zeros((3, 4)), np.zeros(3))
         wanted = law.step(seen, Reference(rate, rate, acceleration), Verdict())
-        control["reference"]["model_rate"], control["reference"]["model_acceleration"] = rate, acceleration
-        parts = (control[part] for part in ("rival", "reference", "axes", "allocation", "layout"))
-        compiled.command(int(control["inner"]), *parts, G, x)
-        assert control["allocation"]["command"] == pytest.approx(wanted, abs=1e-9)
+        reference, out = fields(control["reference"]), control["allocation"]["output"]
+        reference["model_rate"], reference["model_acceleration"], frame[1].x = rate, acceleration, x
+        compiled_rivals.command(control, None, None, *frame, MODE_NOMINAL, k * DT)
+        assert out["command"] == pytest.approx(wanted, abs=1e-9)
         at_stop = np.isclose(wanted, -most) | np.isclose(wanted, 0.8 * most)
-        assert control["allocation"]["saturated"].tolist() == at_stop.tolist()
+        assert out["saturated"].tolist() == at_stop.tolist()
         stops += at_stop.sum()
     assert (stops > 5) == (most < 1.0)

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 import law_records
-from beaver_ftc.control import accommodation, supervisor
-from beaver_ftc.control.accommodation import true_faults_dtype
-from beaver_ftc.control.laws import ADAPTIVE, FAULT_TOLERANT, NOMINAL, ORACLE, REJECTING, gains, rejecting
-from beaver_ftc.control.laws.rejecting import N_POINTS, rejection_dtype
+from beaver_ftc.control import accommodation, allocation, supervisor
+from beaver_ftc.control.laws import gains, rejecting
+from beaver_ftc.control.laws.effectiveness_estimator import OBSERVER_ERROR, observer_response
+from beaver_ftc.control.laws.gains import N_POINTS
+from beaver_ftc.control.laws.rejecting import rejecting_dtype
 from beaver_ftc.control.supervisor import (
     MAX_EVENTS,
     MODE_ADAPTIVE,
@@ -20,6 +21,7 @@ from beaver_ftc.design.model import design_record, unanticipated_pitch
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.diagnosis.types.contract import FIXED, LAGS, LOSES, SHIFTED
 from beaver_ftc.loop import frame as whole
+from beaver_ftc.loop.accounts import true_faults_dtype
 from beaver_ftc.loop.assembly import frame_dtype
 from law_records import put
 
@@ -32,7 +34,7 @@ def record(dtype):
 
 
 def new_control(**fields):
-    control = law_records.new_control(main=(0, 1, 2), stand_in=FLAP, dt=DT, law=FAULT_TOLERANT)
+    control = law_records.new_control(main=(0, 1, 2), stand_in=FLAP, dt=DT, law="fault-tolerant-published")
     return put(control, **({"effectiveness": 1.0, "least_effectiveness": 0.1} | fields))
 
 
@@ -46,26 +48,19 @@ def new_frame(faults=None, **fields):
 
 def given_up(frame):
     """The command, once what does not follow is given up."""
-    whole.assess(frame["fdi"], frame["assessment"])
+    whole.assess_faults(frame)
     control = frame["control"]
-    accommodation.give_up(
-        control["law"],
-        frame["assessment"],
-        control["surfaces"],
-        control["rejection"]["withdrawn"],
-        frame["faults"],
-        control["layout"],
-        control["allocation"],
-        control["reference"],
-    )
-    return control["allocation"]
+    output, informed = control["surfaces"]["output"], control["config"]["informed"]
+    accommodation.park_failed_surfaces(output, frame["assessment"], frame["faults"], informed)
+    allocation.park(control["allocation"]["output"], control["layout"], output["parked"])
+    return control["allocation"]["output"]
 
 
 def accommodated(frame):
     """The surfaces as the law takes them, from what the diagnosis says."""
-    whole.assess(frame["fdi"], frame["assessment"])
+    whole.assess_faults(frame)
     whole.accommodate(frame)
-    return frame["control"]["surfaces"]
+    return frame["control"]["surfaces"]["output"]
 
 
 def new_faults(**fields):
@@ -124,9 +119,9 @@ def test_the_mode_that_the_diagnosis_asks_for(every_type, isolated, lead, lead_k
 
 def asked_for(frame):
     """The mode that the diagnosis asks for."""
-    whole.assess(frame["fdi"], frame["assessment"])
-    law, layout = frame["control"]["law"], frame["control"]["layout"]
-    return supervisor.mode_from(law, layout, frame["fdi"]["verdict"], frame["assessment"])
+    whole.assess_faults(frame)
+    config, layout = frame["control"]["config"], frame["control"]["layout"]
+    return supervisor.mode_from(config, layout, frame["fdi"]["verdict"], frame["assessment"])
 
 
 @pytest.mark.parametrize(
@@ -146,65 +141,62 @@ def test_the_oracles_mode_is_that_of_the_true_fault(faults, mode):
 
 def test_the_oracle_takes_each_surface_for_what_it_is():
     faults = new_faults(present=1, effectiveness=(0.6, 0.7, 1, 1), immovable=(0, 1, 0, 0), effective=0.1)
-    surfaces = new_control()["surfaces"]
-    for s in range(2):
-        accommodation.take_truth(surfaces, faults, s, 0.2)
-    assert surfaces["target"][:2].tolist() == [0.6, 0.0]
-    assert surfaces["offset"][:2] == pytest.approx([0.1 - 0.6 * 0.2, 0.1])
+    output = new_control()["surfaces"]["output"]
+    targets = [accommodation.reported(output, None, faults, s, 0.2, True) for s in range(2)]
+    assert targets == [0.6, 0.0]
+    assert output["offset"][:2] == pytest.approx([0.1 - 0.6 * 0.2, 0.1])
     faults["present"] = 0
-    surfaces = new_control()["surfaces"]
-    accommodation.take_truth(surfaces, faults, 0, 0.2)
-    assert surfaces["offset"][0] == 0.0
+    accommodation.reported(output, None, faults, 0, 0.2, True)
+    assert output["offset"][0] == 0.0
 
 
-def compensated(law, detected=1, inner=0, lead=-1, lead_kind=-1):
-    frame = new_frame({"Cm_alpha3": 0.5}, law=law, inner=inner, fhat=9.0)
+def compensated(law, detected=1, lead=-1, lead_kind=-1):
+    frame = new_frame({"Cm_alpha3": 0.5}, law=law, fhat=9.0)
     fdi, belief, measured = frame["fdi"], frame["belief"], frame["measured"]
     belief["design"], measured["y"][:5] = design_record()[0], (0.2, 0.0, 45.0, 1000.0, 0.3)
     fdi["verdict"]["detected"], fdi["fdae"]["network"]["output"] = detected, (0.1, 0.2, 0.3)
     fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"] = lead, lead_kind
-    whole.compensate(frame)
     expected = unanticipated_pitch(belief["design"], measured["y"], 0.5)
-    return frame["control"]["feedback"]["fhat"].tolist(), float(expected)
+    return accommodated(frame)["unknown"].tolist(), float(expected)
 
 
 def test_what_the_law_takes_the_unknown_for():
-    assert compensated(ADAPTIVE)[0] == pytest.approx([0.1, 0.2, 0.3])
-    assert compensated(ADAPTIVE, detected=0)[0] == [0.0] * 3
-    assert compensated(NOMINAL)[0] == [0.0] * 3
-    assert compensated(ADAPTIVE, inner=REJECTING)[0] == [0.0] * 3
-    assert compensated(ADAPTIVE, lead=ELEVATOR, lead_kind=LAGS)[0] == [0.0] * 3
-    assert compensated(ADAPTIVE, lead=ELEVATOR, lead_kind=SHIFTED)[0] == pytest.approx([0.1, 0.2, 0.3])
-    assert compensated(ADAPTIVE, lead=AILERON, lead_kind=LAGS)[0] == [0.0] * 3
-    known, expected = compensated(ORACLE)
+    assert compensated("adaptive")[0] == pytest.approx([0.1, 0.2, 0.3])
+    assert compensated("adaptive", detected=0)[0] == [0.0] * 3
+    assert compensated("nominal")[0] == [0.0] * 3
+    assert compensated("adaptive", lead=ELEVATOR, lead_kind=LAGS)[0] == [0.0] * 3
+    assert compensated("adaptive", lead=ELEVATOR, lead_kind=SHIFTED)[0] == pytest.approx([0.1, 0.2, 0.3])
+    assert compensated("adaptive", lead=AILERON, lead_kind=LAGS)[0] == [0.0] * 3
+    known, expected = compensated("oracle-published")
     assert known == [0.0, expected, 0.0]
     assert expected != 0.0
 
 
 @pytest.mark.parametrize("which", ["healthy", "immovable", "jammed", "moving jam", "abandoned"])
 def test_a_surface_given_up_goes_to_its_trim(which):
-    frame = new_frame({"immovable": (0, 0, 1, 0)}, law=ORACLE if which == "immovable" else ADAPTIVE)
+    frame = new_frame({"immovable": (0, 0, 1, 0)}, law="oracle" if which == "immovable" else "adaptive")
     control, fdi = frame["control"], frame["fdi"]
-    control["layout"]["trim"], out = 0.3, control["allocation"]
+    control["layout"]["trim"], out = 0.3, control["allocation"]["output"]
+    surfaces = control["surfaces"]["output"]
     out["command"], out["saturated"], fdi["config"]["every_type"] = 0.1, 1, 1
     if "jam" in which:
         fdi["types"]["surface"]["measure"][RUDDER] = FIXED
-        control["surfaces"]["effectiveness"][RUDDER] = 0.0 if which == "jammed" else 0.5
-    control["rejection"]["withdrawn"][RUDDER] = which == "abandoned"
+        surfaces["effectiveness"][RUDDER] = 0.0 if which == "jammed" else 0.5
+    surfaces["given_up"][RUDDER] = which == "abandoned"
     given_up(frame)
     up = which not in ("healthy", "moving jam")
     assert out["command"].tolist() == [0.1, 0.1, 0.3 if up else 0.1, 0.1]
     assert out["saturated"].tolist() == [1, 1, 0 if up else 1, 1]
-    assert control["reference"]["hedging"] == up
+    assert surfaces["authority_lost"] == up
 
 
 def test_the_answer_of_the_observer_is_its_own_error_dynamics():
-    """e' = a - dd; e is corrected by `pull`, dd by `learn` of what was missed."""
-    memory, rng = record(rejection_dtype(4))["healthy"], np.random.default_rng(1)
+    """e' = a - dd; e is corrected by L_rate, dd by L_disturbance of the innovation."""
+    memory, rng = record(OBSERVER_ERROR), np.random.default_rng(1)
     e = dd = 0.0
     for a in rng.normal(size=10):
         missed = e + DT * (a - dd)
-        assert rejecting.answer(memory, 1, a, 0.3, 2.0, DT) == pytest.approx(missed)
+        assert observer_response(memory, 1, a, 0.3, 2.0, DT) == pytest.approx(missed)
         e, dd = 0.7 * missed, dd + 2.0 * missed
     assert memory["rate"].tolist()[::2] == [0.0, 0.0]
 
@@ -212,16 +204,16 @@ def test_the_answer_of_the_observer_is_its_own_error_dynamics():
 def lost_rudder(theta, believed=1.0, frames=400, noise=0.0):
     """What is learnt of a rudder with this loss: its moment, and what the observer misses of it."""
     control, rng = new_control(), np.random.default_rng(2)
-    rejection = control["rejection"]
-    rejection["pull"], rejection["learn"], rejection["found"]["fading"] = 0.3, 2.0, rejecting.fading(DT)
-    observer = record(rejection_dtype(4))["healthy"]
+    law, observer = control["rejecting"], record(OBSERVER_ERROR)
+    config, memory = law["config"], law["memory"]
+    memory["L_rate"], memory["L_disturbance"], config["fading"] = 0.3, 2.0, gains.fading(DT)
     for k in range(frames):
         given = np.zeros((3, 4))
         given[2, RUDDER] = 0.5 * np.sin(0.2 * k)
         unexplained = (theta - (believed - 1.0)) * given[2, RUDDER]
-        missed = rejecting.answer(observer, 2, unexplained, 0.3, 2.0, DT) + noise * rng.normal()
-        rejecting.learn(rejection, 2, believed, given[2, RUDDER], missed)
-    return rejection["found"]
+        missed = observer_response(observer, 2, unexplained, 0.3, 2.0, DT) + noise * rng.normal()
+        rejecting.accumulate(config, memory, 2, believed, given[2, RUDDER], missed)
+    return memory["sums"]
 
 
 @pytest.mark.parametrize("believed", [1.0, 0.6])
@@ -230,13 +222,13 @@ def test_what_is_left_is_found_by_least_squares(theta, believed):
     """Without noise exactly, but for the share of the diagnosis' own estimate, whose weight follows."""
     found = lost_rudder(theta, believed)
     assert found["product"][2] == pytest.approx(theta * found["square"][2], rel=1e-6)
-    assert found["missed"][2] == pytest.approx(theta**2 * found["square"][2], rel=1e-6)
-    assert found["frames"][2] == pytest.approx((1 - (1 - rejecting.fading(DT)) ** 400) / rejecting.fading(DT))
-    prior = found["missed"][2] / found["frames"][2] / 0.2**2
+    assert found["innovation"][2] == pytest.approx(theta**2 * found["square"][2], rel=1e-6)
+    assert found["frames"][2] == pytest.approx((1 - (1 - gains.fading(DT)) ** 400) / gains.fading(DT))
+    prior = found["innovation"][2] / found["frames"][2] / 0.2**2
     share = prior / (prior + found["square"][2])
     expected = 1.0 + (1 - share) * theta + share * -0.5
     assert rejecting.effectiveness_seen(found, 2, 0.5) == pytest.approx(expected, rel=1e-6)
-    assert bool(rejecting.acts(found, (0, 1, 2), RUDDER, 0.1)) == (theta > -0.9)
+    assert bool(rejecting.is_effective(found, (0, 1, 2), RUDDER, 0.1)) == (theta > -0.9)
     assert rejecting.effectiveness_seen(found, 1, 0.5) == 0.5  # of pitch nothing has been seen
 
 
@@ -252,27 +244,23 @@ def test_what_is_left_is_found_by_least_squares(theta, believed):
     ],
 )
 def test_the_larger_of_both_estimates_is_believed(named, seen, kept):
-    control = new_control(target=named)
-    found = control["rejection"]["found"]
-    found["frames"], found["square"], found["named"], found["missed"] = 10.0, 4.0, 1, 0.0
+    found = new_control()["rejecting"]["memory"]["sums"]
+    found["frames"], found["square"], found["named"], found["innovation"] = 10.0, 4.0, 1, 0.0
     found["product"] = 4.0 * (seen - 1.0)
-    rejecting.believe_larger_of(found, control["surfaces"], RUDDER, 2)
-    assert control["surfaces"]["target"][RUDDER] == pytest.approx(kept)
+    assert rejecting.larger_estimate(found, named, 2, 0.1) == pytest.approx(kept)
 
 
 def test_what_was_seen_before_a_surface_was_named_counts_no_longer():
-    control = new_control(target=0.3)
-    found = control["rejection"]["found"]
-    found["frames"], found["square"], found["product"], found["missed"] = 10.0, 4.0, -0.4, 1.0
-    rejecting.believe_larger_of(found, control["surfaces"], RUDDER, 2)
-    assert control["surfaces"]["target"][RUDDER] == pytest.approx(0.3)
+    found = new_control()["rejecting"]["memory"]["sums"]
+    found["frames"], found["square"], found["product"], found["innovation"] = 10.0, 4.0, -0.4, 1.0
+    assert rejecting.larger_estimate(found, 0.3, 2, 0.1) == pytest.approx(0.3)
     assert found["named"].tolist() == [0, 0, 1]
     assert (found["square"][2], found["product"][2]) == (0.0, 0.0)
     assert found["square"][0] == 4.0
 
 
 def test_the_schedule_has_the_fastest_loop_of_each_point_and_its_observer():
-    rejection = np.zeros(1, rejection_dtype(4))[0]
+    law = np.zeros(1, rejecting_dtype(4))[0]["config"]
     qdyn = np.linspace(500.0, 1500.0, N_POINTS)
     G = np.zeros((N_POINTS, 3, 4))
     G[:, 0, AILERON], G[:, 1, ELEVATOR], G[:, 2, RUDDER], G[:, 1, FLAP] = (
@@ -284,50 +272,50 @@ def test_the_schedule_has_the_fastest_loop_of_each_point_and_its_observer():
     approach = np.array([0.3, 0.3, 0.3, 0.05])
     gyros = [gains.Gyro(), gains.Gyro(1e-3), gains.Gyro(1e-3, 0.01, 0.2)]
     gains.set_up(
-        rejection, dt_s=DT, substeps=4, approach=approach, speed_rad_s=np.full(4, 0.05), gyros=gyros,
+        law, dt_s=DT, substeps=4, approach=approach, speed_rad_s=np.full(4, 0.05), gyros=gyros,
         margin=(6.0, 45.0), qdyn=qdyn, G=G, carriers=[(0, AILERON), (1, ELEVATOR), (2, RUDDER), (1, FLAP)],
     )  # fmt: skip
     whole = 1.0 - (1.0 - approach) ** 4  # four JSBSim frames
-    assert rejection["share"] == 0.25
-    assert rejection["qdyn"] == pytest.approx(qdyn)
-    assert rejection["lead"] == pytest.approx(np.minimum(1.0 / whole, 4.0))
-    assert rejection["found"]["fading"] == pytest.approx(1.0 - np.exp(-DT / 5.0))
+    assert law["share"] == 0.25
+    assert law["qdyn"] == pytest.approx(qdyn)
+    assert law["lead"] == pytest.approx(np.minimum(1.0 / whole, 4.0))
+    assert law["fading"] == pytest.approx(1.0 - np.exp(-DT / 5.0))
     for row, (axis, surface) in enumerate([(0, AILERON), (1, ELEVATOR), (2, RUDDER), (1, FLAP)]):
         gyro = gyros[axis]
         loop = gains.Loop(DT, 0.25, whole[surface], min(1 / whole[surface], 4.0), gyro.delay_s, gyro.keep)
         for j in range(N_POINTS):
             s = gains.fastest(loop, (6.0, 45.0), gyro.noise_rad_s, G[j, axis, surface], 0.05)
-            assert rejection["Kp_at"][row, j] == pytest.approx(s)
+            assert law["Kp_at"][row, j] == pytest.approx(s)
             pole = np.exp(-6.5 * s * DT)
-            assert rejection["pull_at"][row, j] == pytest.approx(1.0 - pole**2)
-            assert rejection["learn_at"][row, j] == pytest.approx((1.0 - pole) ** 2 / DT)
+            assert law["L_rate_at"][row, j] == pytest.approx(1.0 - pole**2)
+            assert law["L_disturbance_at"][row, j] == pytest.approx((1.0 - pole) ** 2 / DT)
     # without noise a loop is as fast as its margins let it, wherever it flies; with it, faster for a larger G
-    assert np.ptp(rejection["Kp_at"][0]) == 0.0
-    assert (np.diff(rejection["Kp_at"][2]) > 0.0).all()
+    assert np.ptp(law["Kp_at"][0]) == 0.0
+    assert (np.diff(law["Kp_at"][2]) > 0.0).all()
 
 
 @pytest.mark.parametrize(
-    ("inner", "law", "fixed", "kept"),
+    ("law", "fixed", "kept"),
     [
-        (REJECTING, FAULT_TOLERANT, False, 0.5), (REJECTING, FAULT_TOLERANT, True, 0.0),
-        (REJECTING, ORACLE, False, 0.2), (0, FAULT_TOLERANT, False, 0.1), (0, FAULT_TOLERANT, True, 0.0),
+        ("fault-tolerant", False, 0.5), ("fault-tolerant", True, 0.0), ("oracle", False, 0.2),
+        ("fault-tolerant-published", False, 0.1), ("fault-tolerant-published", True, 0.0),
     ],
 )  # fmt: skip
-def test_only_what_may_still_act_is_taken_for_what_the_observer_sees(inner, law, fixed, kept):
+def test_only_what_may_still_act_is_taken_for_what_the_observer_sees(law, fixed, kept):
     """The verdict leaves an aileron a tenth, the observer sees a half; a fixed one gives nothing."""
     true = {"present": 1, "effectiveness": (0.2, 1.0, 1.0, 1.0)}
-    frame = new_frame(true, inner=inner, law=law, effectiveness_step=1.0)
+    frame = new_frame(true, law=law, effectiveness_step=1.0)
     fdi, control = frame["fdi"], frame["control"]
     fdi["verdict"]["detected"], fdi["verdict"]["isolated"] = 1, 0
     fdi["isolation"]["estimator"]["surface"][:4], fdi["isolation"]["estimator"]["theta"][0] = range(4), -0.9
     fdi["types"]["surface"]["measure"][AILERON], fdi["config"]["every_type"] = FIXED if fixed else -1, fixed
-    found = control["rejection"]["found"]
+    found = control["rejecting"]["memory"]["sums"]
     found["named"], found["frames"], found["square"], found["product"] = 1, 1.0, 2.0, -1.0
     frame["belief"]["design"], frame["measured"]["y"][:4] = design_record()[0], (0.2, 0.0, 45.0, 1000.0)
     surfaces = accommodated(frame)
     assert surfaces["target"] == pytest.approx([kept, 1.0, 1.0, 1.0])
     assert surfaces["effectiveness"] == pytest.approx(surfaces["target"])
-    assert not control["rejection"]["withdrawn"].any()
+    assert not control["rejecting"]["memory"]["withdrawn"].any()
 
 
 def test_what_no_verdict_names_is_whole_and_a_plug_ins_estimates_count_from_its_alarm_on():

@@ -11,7 +11,7 @@ import yaml
 import beaver_ftc as bf
 from beaver_ftc.aircraft.loading import read
 from beaver_ftc.control import engines
-from beaver_ftc.control.power import POWER
+from beaver_ftc.control.power import POWER, move_differences
 from beaver_ftc.control.state import control_dtype
 from beaver_ftc.diagnosis.monitors import engine_symmetry
 from beaver_ftc.diagnosis.monitors.engine_symmetry import ENGINES
@@ -73,7 +73,7 @@ def test_the_column_is_arm_times_thrust_over_inertia(jet):
         thrust_n = [plant.read(f"propulsion/engine[{e}]/thrust-lbs") * N_PER_LBF for e in range(2)]
         seen.append((*thrust_n, plant.read("accelerations/rdot-rad_sec2")))
     left, right, turned = np.subtract(seen[1], seen[0])
-    per_n = record["B"][YAW, :2] / (aircraft.mass.mass_kg * 0.5)
+    per_n = record["config"]["B"][YAW, :2] / (aircraft.mass.mass_kg * 0.5)
     assert per_n[0] == pytest.approx(4.902 / aircraft.mass.Iz_kg_m2, rel=2e-3)
     assert turned == pytest.approx(per_n[0] * left + per_n[1] * right, rel=0.02)
 
@@ -82,24 +82,28 @@ def records(jet, lag_s):
     """What the law of the jet keeps, its rudder given up; the engines' table is a straight line."""
     control = np.zeros(1, control_dtype(3)).view(np.recarray)[0]
     engines.configure(control["engines"], scenario(jet, rate_hz=100))
-    control["engines"]["part"] = DT / (2.0 * lag_s)
+    control["engines"]["config"]["part"] = DT / (2.0 * lag_s)
     control["power"] = np.zeros(1, POWER)[0]
-    control["power"]["command"][0] = 0.5
+    control["power"]["output"]["command"][0] = 0.5
     control["layout"]["main"], control["layout"]["authority"] = (0, 1, 2), np.eye(3)
-    control["surfaces"]["effectiveness"], control["surfaces"]["least_effectiveness"] = (1, 1, 0), 0.1
+    control["surfaces"]["output"]["effectiveness"], control["surfaces"]["config"]["least_effectiveness"] = (
+        (1, 1, 0),
+        0.1,
+    )
     return control
 
 
 def answer(control, demand, lag_s, frames):
     """The yaw acceleration (frames,) that engines with a lag give for a constant demand, rad/s2."""
-    given, out, parts = 0.0, np.empty(frames), control["engines"]
+    given, out, parts, power = 0.0, np.empty(frames), control["engines"], control["power"]
+    saturated, config = control["allocation"]["output"]["saturated"], control["engines"]["config"]
     for k in range(frames):
         control["axes"]["shortfall"][YAW] = demand - given
         engines.steer(
-            parts, control["power"], control["axes"], control["layout"], control["allocation"],
-            control["surfaces"], 139.0, k * DT,
+            parts, power, control["axes"], control["layout"], saturated, control["surfaces"], 139.0,
         )  # fmt: skip
-        given += DT / lag_s * (float(parts["wanted"][YAW]) - given)
+        move_differences(power, parts["output"]["difference"], config["n"], config["step"])
+        given += DT / lag_s * (float(parts["memory"]["wanted"][YAW]) - given)
         out[k] = given
     return out
 
@@ -110,9 +114,9 @@ def test_they_take_the_slow_part_damped_by_0_7(jet):
     given = answer(control, demand, lag_s, 1500)
     assert given.max() / demand == pytest.approx(1.0 + np.exp(-np.pi), abs=2e-3)
     assert given[-1] == pytest.approx(demand, rel=1e-3)
-    moved = control["power"]["command"][1:3]
+    moved = control["power"]["output"]["command"][1:3]
     assert moved[0] > 0.0 > moved[1]  # left forward turns right
-    table = control["engines"]["problem"]["u"][:2]
+    table = control["engines"]["memory"]["problem"]["u"][:2]
     assert table.sum() == pytest.approx(0.0, abs=1e-9)  # and the airspeed stays
 
 
@@ -120,7 +124,7 @@ def test_what_they_cannot_give_is_not_integrated(jet):
     """Beyond reach they stand at their limit, and leave it as soon as the demand comes back."""
     control = records(jet, 1.0)
     given = answer(control, 1.0, 1.0, 1500)
-    most = float(control["layout"]["beside"][1, YAW])
+    most = float(control["engines"]["output"]["authority"][1, YAW])
     assert given[-1] == pytest.approx(most, rel=1e-3)
     back = answer(control, -most, 1.0, 400)
     assert back[-1] < 0.0
@@ -129,8 +133,8 @@ def test_what_they_cannot_give_is_not_integrated(jet):
 def test_without_engines_as_effectors_nothing_is_moved():
     record = np.zeros(1, engines.ENGINES)[0]
     engines.configure(record, bf.load("fault-free"))
-    assert record["n"] == 0
-    assert not record["B"].any()
+    assert record["config"]["n"] == 0
+    assert not record["config"]["B"].any()
 
 
 def lost(surface):

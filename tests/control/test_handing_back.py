@@ -38,7 +38,7 @@ def test_the_flight_of_fig_7_ends_with_the_elevator_flying(law):
     document, log, frame = unanticipated(law, 45.0)
     assert MODES[frame["supervisor"]["mode"]] == "unanticipated"
     assert [change["mode"] for change in document["supervisor"]][-2:] == ["reallocated", "unanticipated"]
-    assert frame["control"]["allocation"]["hand_over"] == 0.0
+    assert frame["control"]["allocation"]["output"]["hand_over"] == 0.0
     assert document["departure"] is None
     back = log["t_s"] > document["supervisor"][-1]["time_s"] + 1.1
     assert np.ptp(log["flap_cmd_rad"][back]) == 0.0
@@ -86,7 +86,7 @@ def test_the_unanticipated_fault_is_never_left_named_by_the_sharpened_estimators
     assert document["isolation"]["so_far"] is False
     assert document["isolation"]["withdrawn"] == []
     assert document["supervisor"][-1]["mode"] == "unanticipated"
-    assert frame["control"]["allocation"]["hand_over"] == 0.0
+    assert frame["control"]["allocation"]["output"]["hand_over"] == 0.0
 
 
 @pytest.mark.parametrize(("airspeed_mps", "named"), [(43.0, "unanticipated"), (48.0, "elevator")])

@@ -3,18 +3,9 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.control.laws import (
-    ADAPTIVE,
-    FAULT_TOLERANT,
-    INDI,
-    LQR,
-    NOMINAL,
-    ORACLE,
-    PUBLISHED,
-    REJECTING,
-    published,
-)
-from beaver_ftc.control.rivals import compiled
+from beaver_ftc.control.laws import published
+from beaver_ftc.control.laws.rows import row_of
+from beaver_ftc.control.rivals import compiled_rivals
 from beaver_ftc.control.supervisor import MODE_ADAPTIVE
 from beaver_ftc.diagnosis.state import LOSS, NOT_ISOLATED, WORST_CASE
 from beaver_ftc.diagnosis.types.contract import FIXED, LAGS, LOSES, SHIFTED
@@ -23,7 +14,7 @@ from beaver_ftc.loop import frame as whole
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.scenario.schema import Scenario
 from fault_kinds import BIAS, CONSTANT_LOSS, STUCK
-from law_records import put
+from law_records import fields, put
 
 TRAVEL_RAD = np.array([[-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]])
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)
@@ -43,8 +34,8 @@ def new_frame(law_name="adaptive", **fdi):
 
 def commanded(frame, mode=MODE_ADAPTIVE):
     frame["supervisor"]["mode"], frame["t"] = mode, 1.0
-    whole.assess(frame["fdi"], frame["assessment"])
-    whole.command_by_law(frame)
+    whole.assess_faults(frame)
+    whole.command(frame)
     return frame["control"]
 
 
@@ -52,24 +43,25 @@ def accommodated(frame, **faults):
     """What the law takes the surfaces for."""
     for name, value in ({"effectiveness": 1.0} | faults).items():
         frame["faults"][name] = value
-    whole.assess(frame["fdi"], frame["assessment"])
+    whole.assess_faults(frame)
     whole.accommodate(frame)
-    return frame["control"]["surfaces"]
+    return frame["control"]["surfaces"]["output"]
 
 
 @pytest.mark.parametrize("name", ["nominal", "adaptive", "fault-tolerant-published"])
 def test_the_published_law_inverts_the_model_and_integrates(name):
     """G u = xm' + Kp (xm - x) + Ki int - f, the flap in trim; within the travel nothing is taken back."""
     frame = new_frame(name)
-    control = put(frame["control"], governed_rate=0.01, governed_acceleration=0.02, integral=0.003)
-    feedback, out, f = control["feedback"], control["allocation"], frame["belief"]["f"]
+    control = put(frame["control"], governed_rate=0.01, governed_acceleration=0.02)
+    feedback, out, f = fields(control["published"]), control["allocation"]["output"], frame["belief"]["f"]
+    feedback["integral"] = 0.003
     before = feedback["integral"].copy()
     commanded(frame)
     error = 0.01 - X
     wanted = 0.02 + feedback["Kp"] * error + feedback["Ki"] * before - f
     assert G @ out["command"] == pytest.approx(wanted)
     assert out["command"][FLAP] == pytest.approx(control["layout"]["trim"][FLAP])
-    assert feedback["integral"] == pytest.approx(before + control["reference"]["dt"] * error)
+    assert feedback["integral"] == pytest.approx(before + control["reference"]["config"]["dt"] * error)
     assert control["axes"]["hold"] == pytest.approx(-f)
 
 
@@ -77,9 +69,9 @@ def test_the_rejecting_law_has_no_integral_and_begins_with_what_is_measured():
     frame = new_frame("fault-tolerant")
     commanded(frame)
     control = frame["control"]
-    assert control["rejection"]["begun"] == 1
-    assert control["rejection"]["rate"] == pytest.approx(X)
-    assert not control["feedback"]["integral"].any()
+    assert control["rejecting"]["observer"]["begun"] == 1
+    assert control["rejecting"]["observer"]["rate"] == pytest.approx(X)
+    assert not control["published"]["memory"]["integral"].any()
     assert control["axes"]["hold"] == pytest.approx(-frame["belief"]["f"])
 
 
@@ -98,7 +90,7 @@ def test_an_isolated_loss_scales_its_own_surface_alone():
     fdi = believed(frame, RUDDER)
     surfaces = accommodated(frame)
     assert surfaces["target"] == pytest.approx([1.0, 1.0, 0.4, 1.0])
-    expected = max(0.4, 1.0 - surfaces["effectiveness_step"])
+    expected = max(0.4, 1.0 - frame["control"]["surfaces"]["config"]["effectiveness_step"])
     assert surfaces["effectiveness"][RUDDER] == pytest.approx(expected)
     assert surfaces["effectiveness"][AILERON] == 1.0
     assert not surfaces["offset"].any()
@@ -134,7 +126,7 @@ def test_what_is_done_about_each_kind_of_fault(measure):
     offset = {FIXED: 0.15, SHIFTED: 0.15}.get(measure, 0.0)  # where it is jammed; how far it is off
     assert surfaces["offset"][RUDDER] == pytest.approx(offset)
     assert surfaces["lag"][RUDDER] == pytest.approx(0.27 if measure == LAGS else 0.0)
-    assert frame["control"]["reference"]["hedging"] == (measure == LAGS)
+    assert surfaces["authority_lost"] == (measure == LAGS)
     assert (surfaces["effectiveness"][RUDDER] == 0.0) == (measure == FIXED)  # a jam bypasses the rate limit
 
 
@@ -156,7 +148,9 @@ def test_when_it_has_long_been_open_whether_elevator_or_flap(
     types["config"]["patience"], types["surface"]["evidence"] = 4, 0
     types["surface"]["evidence"][ELEVATOR] = evidence
     fdi["verdict"]["detected"], fdi["verdict"]["isolated"] = detected, isolated
-    assert bool(whole.in_doubt(frame)) == doubt
+    frame["control"]["probe"]["config"]["frames"], frame["control"]["probe"]["memory"]["from_s"] = 8, -1.0
+    commanded(frame)
+    assert (frame["control"]["probe"]["memory"]["from_s"] == 1.0) == doubt
 
 
 def alarmed(known=0, speaks=0, score=2.0):
@@ -187,50 +181,51 @@ def test_the_alarm_starts_the_estimators_once_and_the_network_answers():
 
 
 def test_known_laws_are_those_of_the_page():
-    uses = {
-        name: int(new_frame(name)["control"]["law"]) for name in ("nominal", "adaptive", "oracle-published")
-    }
-    assert uses == {"nominal": NOMINAL, "adaptive": ADAPTIVE, "oracle-published": ORACLE}
-    inner = {
-        name: int(new_frame(name)["control"]["inner"])
-        for name in ("fault-tolerant", "fault-tolerant-published")
-    }
-    assert inner == {"fault-tolerant": REJECTING, "fault-tolerant-published": PUBLISHED}
-    assert int(new_frame("fault-tolerant")["control"]["law"]) == FAULT_TOLERANT
+    given = {
+        "nominal": (0, 0, 0), "adaptive": (1, 0, 0), "fault-tolerant": (1, 1, 0),
+        "oracle-published": (1, 1, 1),
+    }  # fmt: skip
+    for name, what in given.items():
+        assert tuple(new_frame(name)["control"]["config"])[1:] == what
+    files = {name: row_of(name).file for name in ("fault-tolerant", "fault-tolerant-published")}
+    assert files == {"fault-tolerant": "rejecting", "fault-tolerant-published": "published"}
     assert LOSS == 0
 
 
 @pytest.mark.parametrize(("name", "share"), [("nominal", 1.0), ("adaptive", 0.5)])
 def test_all_but_the_nominal_law_reckon_with_what_is_believed_of_a_surface(name, share):
     frame = new_frame(name)
-    surfaces = frame["control"]["surfaces"]
+    surfaces = fields(frame["control"]["surfaces"])
     surfaces["effectiveness"][RUDDER], surfaces["effectiveness_step"] = 0.5, 0.0
-    believed = commanded(frame)["allocation"]["G"]
+    believed = commanded(frame)["axes"]["G"]
     assert believed[:, RUDDER] == pytest.approx(share * G[:, RUDDER])
     assert believed[:, AILERON] == pytest.approx(G[:, AILERON])
 
 
 def test_what_the_unknown_is_taken_for_is_taken_off_the_demand():
     control, f, fhat = new_frame()["control"], np.array([0.3, -0.2, 0.1]), np.array([0.05, 0.07, -0.09])
-    put(control, governed_rate=0.01, governed_acceleration=0.02, integral=0.003, fhat=fhat)
-    feedback, axes = control["feedback"], control["axes"]
-    published.demand(feedback, axes, control["reference"], X, f)
+    put(control, governed_rate=0.01, governed_acceleration=0.02)
+    law, feedback = control["published"], fields(control["published"])
+    feedback["integral"] = 0.003
+    published.demand(law, control["reference"]["output"], X, f, fhat)
     wanted = 0.02 + feedback["Kp"] * (0.01 - X) + feedback["Ki"] * 0.003 - f - fhat
-    assert axes["demand"] == pytest.approx(wanted)
+    assert feedback["demand"] == pytest.approx(wanted)
 
 
-@pytest.mark.parametrize("inner", [INDI, LQR])
-def test_a_compiled_rival_commands_by_itself(inner):
+@pytest.mark.parametrize("incremental", [1, 0])
+def test_a_compiled_rival_commands_by_itself(incremental):
     """From what is measured and G, and nothing that the law of ours keeps is moved."""
     frame, alone = new_frame(), new_frame()
     for each in (frame, alone):
-        control, rival = each["control"], each["control"]["rival"]
-        put(control, inner=inner, model_rate=0.01, model_acceleration=0.02)
+        control, rival = each["control"], fields(each["control"]["compiled_rivals"])
+        put(control, law="lqr", model_rate=0.01, model_acceleration=0.02)
+        rival["incremental"] = incremental
         rival["K"], rival["B_inverse"], rival["A"] = 0.1, np.eye(3) * 0.2, np.eye(3)
-        rival["Kp"], rival["Ki"], rival["keep"], rival["given"] = 2.0, 1.0, 0.5, 0.01
+        rival["Kp"], rival["Ki"], rival["keep"], rival["commanded"] = 2.0, 1.0, 0.5, 0.01
     given, told = commanded(frame), alone["control"]
-    parts = (told[part] for part in ("rival", "reference", "axes", "allocation", "layout"))
-    compiled.command(inner, *parts, G, X)
-    assert given["allocation"]["command"].tolist() == told["allocation"]["command"].tolist()
-    assert (given["allocation"]["command"] != 0.01).any()
+    parts = alone["assessment"], alone["faults"], alone["belief"], alone["measured"]
+    compiled_rivals.command(told, *parts, MODE_ADAPTIVE, 1.0)
+    command = given["allocation"]["output"]["command"]
+    assert command.tolist() == told["allocation"]["output"]["command"].tolist()
+    assert (command != 0.01).any()
     assert given["axes"]["hold"].tolist() == told["axes"]["hold"].tolist()

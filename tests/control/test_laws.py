@@ -19,7 +19,7 @@ def control_record(Kp=2.0, Ki=1.0):
     control = new_control(
         main=(0, 1, 2), stand_in=3, dt=DT, effectiveness=1.0, least_effectiveness=0.1, hand_over_step=DT
     )
-    control["feedback"]["Kp"], control["feedback"]["Ki"] = Kp, Ki
+    control["published"]["config"]["Kp"], control["published"]["config"]["Ki"] = Kp, Ki
     layout = control["layout"]
     layout["low"], layout["high"] = [-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]
     return control
@@ -27,18 +27,19 @@ def control_record(Kp=2.0, Ki=1.0):
 
 def allocated(control, G):
     """The surfaces, rad, for the demand in the record."""
-    out, effectiveness = control["allocation"], control["surfaces"]["effectiveness"]
-    out["G"], share = G, allocation.smooth(out["hand_over"])
-    allocation.allocate(out, control["layout"], control["axes"]["demand"], effectiveness, share, 0.0)
+    out, effectiveness = control["allocation"]["output"], control["surfaces"]["output"]["effectiveness"]
+    control["axes"]["G"], share = G, allocation.smooth(out["hand_over"])
+    allocation.allocate(control["axes"], out, control["layout"], effectiveness, share, 0.0)
     return out["command"]
 
 
 def pulled(control, x, f):
     """The surfaces, rad, by the published law for measured rates x; its integrators go a frame on."""
-    feedback, axes, model = control["feedback"], control["axes"], control["reference"]
-    published.demand(feedback, axes, model, x, f)
+    law, axes, model = control["published"], control["axes"], control["reference"]
+    published.demand(law, model["output"], x, f, np.zeros(3))
+    allocation.form_demand(axes, law["output"], np.zeros(4), G_TYPICAL, False)
     u = allocated(control, G_TYPICAL)
-    published.integrate(feedback, axes, model, control["allocation"], x)
+    published.integrate(law, axes, model, control["allocation"]["output"]["command"], x)
     return u
 
 
@@ -53,11 +54,14 @@ class TestReferenceModel:
 
     def test_a_step_is_reached_without_overshoot_when_critically_damped(self):
         control = control_record()
-        control["reference"]["A"], control["reference"]["B"] = reference.discretise(10.0, 1.0, DT)
+        control["reference"]["config"]["A"], control["reference"]["config"]["B"] = reference.discretise(
+            10.0, 1.0, DT
+        )
         history = []
         for _ in range(200):
-            reference.follow(control["reference"], np.array([0.1, 0.0, -0.2]))
-            history.append(control["reference"]["model_rate"].copy())
+            model = control["reference"]
+            reference.follow(model["config"], model["output"], np.array([0.1, 0.0, -0.2]))
+            history.append(control["reference"]["output"]["model_rate"].copy())
         t = DT * np.arange(1, 201)
         assert np.array(history)[:, 0] == pytest.approx(0.1 * (1 - (1 + 10 * t) * np.exp(-10 * t)), abs=1e-9)
         assert np.array(history)[-1] == pytest.approx([0.1, 0, -0.2], abs=1e-6)
@@ -83,7 +87,7 @@ class TestNominal:
         for _ in range(3000):
             pulled(control, x, np.zeros(3))
         attainable = 10 * 0.49
-        assert control["allocation"]["saturated"][ELEVATOR] == 1
+        assert control["allocation"]["output"]["saturated"][ELEVATOR] == 1
         # in equilibrium the demand stands off what can be given by Kp times the error, and no further
         assert control["axes"]["demand"][1] == pytest.approx(attainable + 2.0 * 3.0, rel=1e-3)
 
@@ -95,21 +99,21 @@ class TestAllocation:
     @given(demand=st.tuples(small, small, small), hand_over=st.floats(0, 1), loss=st.floats(0, 0.8))
     def test_what_is_demanded_is_what_the_surfaces_give(self, demand, hand_over, loss):
         control = control_record()
-        control["axes"]["demand"], control["allocation"]["hand_over"] = demand, hand_over
-        control["surfaces"]["effectiveness"][ELEVATOR] = 1 - loss
-        G = np.zeros((3, 4))
-        accommodation.believed_effectiveness(control["surfaces"], G_TYPICAL, G)
+        control["axes"]["demand"], control["allocation"]["output"]["hand_over"] = demand, hand_over
+        control["surfaces"]["output"]["effectiveness"][ELEVATOR] = 1 - loss
+        allocation.form_effectiveness_matrix(control["axes"], G_TYPICAL, control["surfaces"], True)
+        G = control["axes"]["G"].copy()
         u = allocated(control, G)
-        if not control["allocation"]["saturated"][[AILERON, ELEVATOR, RUDDER]].any():
+        if not control["allocation"]["output"]["saturated"][[AILERON, ELEVATOR, RUDDER]].any():
             assert G @ u == pytest.approx(demand, abs=1e-12)
 
     def test_after_the_hand_over_the_elevator_keeps_its_trimmed_moment(self):
         control = control_record()
-        control["layout"]["trim"][ELEVATOR], control["allocation"]["hand_over"] = -0.04, 1.0
-        control["surfaces"]["effectiveness"][ELEVATOR] = 0.6
+        control["layout"]["trim"][ELEVATOR], control["allocation"]["output"]["hand_over"] = -0.04, 1.0
+        control["surfaces"]["output"]["effectiveness"][ELEVATOR] = 0.6
         control["axes"]["demand"] = [0.0, 0.4 + 0.2, 0.0]
-        G = np.zeros((3, 4))
-        accommodation.believed_effectiveness(control["surfaces"], G_TYPICAL, G)
+        allocation.form_effectiveness_matrix(control["axes"], G_TYPICAL, control["surfaces"], True)
+        G = control["axes"]["G"].copy()
         u = allocated(control, G)
         assert u[ELEVATOR] == pytest.approx(-0.04 / 0.6)
         assert u[FLAP] == pytest.approx(0.2 / 2.1)
@@ -121,17 +125,20 @@ class TestAllocation:
         shares = np.linspace(0, 1, 101)
         flap = []
         for share in shares:
-            control["allocation"]["hand_over"] = share
+            control["allocation"]["output"]["hand_over"] = share
             flap.append(float(allocated(control, G_TYPICAL)[FLAP]))
         assert np.max(np.abs(np.diff(flap))) < 0.02 * np.ptp(flap)
         assert np.abs(np.diff(flap)[[0, -1]]).max() < 0.001 * np.ptp(flap)  # no kink at either end
 
     def test_a_lost_elevator_is_not_asked_for_anything(self):
         control = control_record()
-        control["surfaces"]["effectiveness"][ELEVATOR], control["allocation"]["hand_over"] = 0.05, 1.0
+        (
+            control["surfaces"]["output"]["effectiveness"][ELEVATOR],
+            control["allocation"]["output"]["hand_over"],
+        ) = 0.05, 1.0
         control["axes"]["demand"] = [0.0, 0.3, 0.0]
-        G = np.zeros((3, 4))
-        accommodation.believed_effectiveness(control["surfaces"], G_TYPICAL, G)
+        allocation.form_effectiveness_matrix(control["axes"], G_TYPICAL, control["surfaces"], True)
+        G = control["axes"]["G"].copy()
         u = allocated(control, G)
         assert u[ELEVATOR] == 0.0
         assert u[FLAP] == pytest.approx(0.3 / 2.1)
@@ -140,17 +147,19 @@ class TestAllocation:
         control = control_record()
         control["axes"]["demand"] = [0.5, 0.0, 3.0]
         u = allocated(control, G_TYPICAL)
-        assert control["allocation"]["saturated"][RUDDER] == 1
+        assert control["allocation"]["output"]["saturated"][RUDDER] == 1
         assert (G_TYPICAL @ u)[0] == pytest.approx(0.5, abs=1e-12)
 
 
-def test_believed_effectiveness_moves_no_faster_than_allowed():
+def test_effectiveness_moves_no_faster_than_allowed():
     control = control_record()
-    control["surfaces"]["effectiveness_step"] = 0.04
-    control["surfaces"]["target"] = target = np.array([1.0, 0.5, 1.0, 0.98])
+    surfaces, effectiveness = control["surfaces"], control["surfaces"]["output"]["effectiveness"]
+    surfaces["config"]["effectiveness_step"], target = 0.04, np.array([1.0, 0.5, 1.0, 0.98])
     seen = []
     for _ in range(20):
-        accommodation.approach(control["surfaces"])
-        seen.append(control["surfaces"]["effectiveness"].copy())
+        for s in range(4):
+            accommodation.approach(surfaces, s, effectiveness[s], target[s], False)
+        seen.append(effectiveness.copy())
     assert seen[0] == pytest.approx([1, 0.96, 1, 0.98])
     assert seen[-1] == pytest.approx(target)
+    assert surfaces["output"]["target"] == pytest.approx(target)

@@ -16,8 +16,8 @@ from samples import samples
 def problem_of(n, rng, at=None):
     problem = np.zeros(1, problem_dtype(n)).view(np.recarray)[0]
     problem["low"], problem["high"] = -rng.uniform(0.05, 0.6, n), rng.uniform(0.05, 0.6, n)
-    problem["preferred"] = rng.uniform(-0.2, 0.2, n)
-    problem["willing"] = 10.0 ** rng.uniform(-3, 0, n)
+    problem["u_preferred"] = rng.uniform(-0.2, 0.2, n)
+    problem["weight"] = 10.0 ** rng.uniform(-3, 0, n)
     problem["at"] = 0 if at is None else at
     return problem
 
@@ -28,16 +28,16 @@ def columns(n, rng, gone=0.2):
 
 
 def by_scipy(problem, B, demand):
-    root = np.sqrt(problem["slack"] / problem["willing"])
+    root = np.sqrt(problem["slack"] / problem["weight"])
     A = np.vstack([B, np.diag(root)])
-    b = np.concatenate([demand, root * problem["preferred"]])
+    b = np.concatenate([demand, root * problem["u_preferred"]])
     limits = problem["low"], problem["high"]
     return lsq_linear(A, b, limits, method="bvls", tol=1e-14, max_iter=1000).x
 
 
 def cost(problem, B, demand, u):
     lack = B @ u - demand
-    away = (u - problem["preferred"]) ** 2 / problem["willing"]
+    away = (u - problem["u_preferred"]) ** 2 / problem["weight"]
     return float(lack @ lack + problem["slack"] * away.sum())
 
 
@@ -81,14 +81,14 @@ def test_started_from_its_own_solution_one_system_is_solved(n, seed):
 
 def test_with_nothing_left_every_surface_stays_where_it_is_preferred():
     problem = problem_of(5, np.random.default_rng(1))
-    problem["preferred"] = np.clip(problem["preferred"], problem["low"], problem["high"])
+    problem["u_preferred"] = np.clip(problem["u_preferred"], problem["low"], problem["high"])
     least_squares.solve(problem, np.zeros((3, 5)), np.array([1.0, -2.0, 3.0]))
-    assert problem["u"] == pytest.approx(problem["preferred"])
+    assert problem["u"] == pytest.approx(problem["u_preferred"])
 
 
-def test_an_unwilling_surface_does_not_move():
+def test_an_unweight_surface_does_not_move():
     problem, B = problem_of(4, np.random.default_rng(2)), columns(4, np.random.default_rng(3), 0.0)
-    problem["willing"][2], problem["preferred"][2] = 0.0, 0.03
+    problem["weight"][2], problem["u_preferred"][2] = 0.0, 0.03
     least_squares.solve(problem, B, np.array([0.2, 0.1, -0.1]))
     assert problem["u"][2] == pytest.approx(0.03)
 
@@ -100,10 +100,10 @@ TRIM, LOWEST, HIGHEST = [0.01, -0.05, 0.02, 0.0], [-0.52, -0.49, -0.44, -0.1], [
 
 def beaver_law(left=1.0):
     control = new_control(main=(0, 1, 2), stand_in=3, least_effectiveness=0.1)
-    layout, allocated = control["layout"], control["allocation"]
+    layout = control["layout"]
     layout["trim"], layout["low"], layout["high"] = TRIM, LOWEST, HIGHEST
-    control["surfaces"]["effectiveness"] = (1.0, left, 1.0, 1.0)
-    allocated["G"] = G * control["surfaces"]["effectiveness"]
+    control["surfaces"]["output"]["effectiveness"] = (1.0, left, 1.0, 1.0)
+    control["axes"]["G"] = G * control["surfaces"]["output"]["effectiveness"]
     belief = np.zeros(1, belief_dtype(4)).view(np.recarray)[0]
     belief["share"], belief["actuators"]["step"] = 1.0, np.inf
     return control, belief
@@ -111,9 +111,9 @@ def beaver_law(left=1.0):
 
 def published(demand, left, share, probe=0.0):
     control, _ = beaver_law(left)
-    allocated, layout = control["allocation"], control["layout"]
-    effectiveness = control["surfaces"]["effectiveness"]
-    allocation.allocate(allocated, layout, np.array(demand), effectiveness, share, probe)
+    allocated, control["axes"]["demand"] = control["allocation"]["output"], demand
+    effectiveness = control["surfaces"]["output"]["effectiveness"]
+    allocation.allocate(control["axes"], allocated, control["layout"], effectiveness, share, probe)
     return allocated["command"].copy()
 
 
@@ -121,9 +121,10 @@ def generally(demand, left, share, probe=0.0, at=None, step=np.inf):
     control, belief = beaver_law(left)
     control["axes"]["demand"], belief["actuators"]["step"] = demand, step
     belief["u"] = TRIM if at is None else at
-    parts = control["allocation"], control["layout"], control["surfaces"], control["axes"]
+    effectiveness = control["surfaces"]["output"]["effectiveness"]
+    parts = control["axes"], control["allocation"], control["layout"], effectiveness
     allocation.allocate_generally(*parts, belief, share, probe)
-    return control["allocation"]
+    return control["allocation"]["output"]
 
 
 @settings(max_examples=samples(60), deadline=None)
@@ -169,11 +170,12 @@ def test_no_surface_goes_further_than_its_rate_lets_it():
 def test_both_elevator_and_ailerons_gone_the_rest_gives_what_it_can():
     """No surface that is left moves pitch or roll but flap and rudder."""
     control, belief = beaver_law()
-    control["allocation"]["G"] = G * (0.0, 0.0, 1.0, 1.0)
-    control["surfaces"]["effectiveness"] = (0.0, 0.0, 1.0, 1.0)
+    control["axes"]["G"] = G * (0.0, 0.0, 1.0, 1.0)
+    control["surfaces"]["output"]["effectiveness"] = (0.0, 0.0, 1.0, 1.0)
     control["axes"]["demand"], belief["u"] = (0.0, 0.5, 0.3), TRIM
-    parts = control["allocation"], control["layout"], control["surfaces"], control["axes"]
+    effectiveness = control["surfaces"]["output"]["effectiveness"]
+    parts = control["axes"], control["allocation"], control["layout"], effectiveness
     allocation.allocate_generally(*parts, belief, 0.0, 0.0)
-    given_ = control["allocation"]["G"] @ control["allocation"]["command"]
+    given_ = control["axes"]["G"] @ control["allocation"]["output"]["command"]
     assert given_[1] == pytest.approx(0.5, abs=1e-3)
-    assert control["allocation"]["command"][:2] == pytest.approx(TRIM[:2])
+    assert control["allocation"]["output"]["command"][:2] == pytest.approx(TRIM[:2])

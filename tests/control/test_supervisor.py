@@ -4,9 +4,9 @@ import itertools
 
 import pytest
 
-from beaver_ftc.control.laws import ADAPTIVE, FAULT_TOLERANT, LAWS, NOMINAL
 from beaver_ftc.control.supervisor import MODES, mode_of, next_mode
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
+from law_records import new_control
 
 SITUATIONS = {  # detected, isolated, whether another surface can relieve it
     "healthy": (0, NOT_ISOLATED, False),
@@ -32,11 +32,8 @@ EXPECTED = {
 
 @pytest.mark.parametrize(("law", "situation"), list(itertools.product(EXPECTED, SITUATIONS)))
 def test_mode(law, situation):
-    assert MODES[mode_of(LAWS.index(law), *SITUATIONS[situation])] == EXPECTED[law][situation]
-
-
-def test_the_laws_are_numbered_as_they_are_named():
-    assert [LAWS[NOMINAL], LAWS[ADAPTIVE], LAWS[FAULT_TOLERANT]] == ["nominal", "adaptive", "fault-tolerant"]
+    config = new_control(law=law)["config"]
+    assert MODES[mode_of(config, *SITUATIONS[situation])] == EXPECTED[law][situation]
 
 
 @pytest.mark.parametrize(("now", "wanted"), list(itertools.product(MODES, MODES)))
@@ -47,4 +44,4 @@ def test_the_way_out_of_nominal_leads_through_adaptive(now, wanted):
 
 def test_a_relieved_surface_is_whichever_it_is():
     """An elevator may come first among an aircraft's surfaces."""
-    assert MODES[mode_of(FAULT_TOLERANT, 1, 0, True)] == "reallocated"
+    assert MODES[mode_of(new_control(law="fault-tolerant")["config"], 1, 0, True)] == "reallocated"

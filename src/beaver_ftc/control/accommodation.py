@@ -1,139 +1,127 @@
-"""What the law takes each surface for: effectiveness, offset and lag, moved smoothly.
+"""How effective the law takes each surface to be: effectiveness, offset and lag, moved smoothly.
 
-From the diagnosis (`assessment_dtype`): an isolated loss scales the command, a surface that does not follow
-is given up, one that is off is corrected, a slow one is left to its pace. The oracle has it from the truth:
-its true faults of this instant are filled in by the loop, and no other law reads them.
+From the diagnosis (diagnosis/assessment.py): an isolated loss scales the command, a surface that does not
+follow its command is parked, an offset is subtracted, a slow surface is left to its pace. The oracle is
+informed of the truth instead: the loop fills in the true faults of the instant (loop/accounts.py), and no
+other law reads them.
 
-What becomes of it is the effectiveness that the laws divide by. It is rate limited, so that a decision never
-kicks the surfaces, and projected: a surface weaker than `least_effectiveness` is given up.
+The laws divide by the effectiveness in `output`. It is rate limited, so that a decision never kicks the
+surfaces, and projected: a surface weaker than `least_effectiveness` is given up.
 """
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel, record, sized
-from beaver_ftc.control.laws import ORACLE, REJECTING, rejecting
-from beaver_ftc.control.laws.answering import effectiveness_of
+from beaver_ftc.compiled import apart, kernel, record, sized
+from beaver_ftc.design.model import unanticipated_pitch
+from beaver_ftc.diagnosis.state import PITCH
 from beaver_ftc.diagnosis.types.contract import FIXED
 from beaver_ftc.scenario.control import ControlConfig
 
+# The largest change of an effectiveness a frame; the least that a law divides by.
+CONFIG = record(effectiveness_step=float, least_effectiveness=float)
+
 
 @sized
-def surfaces_dtype(n: int) -> np.dtype:
-    """What n surfaces are taken for: effectiveness, on its way to target by at most a step a frame; offset
-    and lag, rad."""
+def output_dtype(n: int) -> np.dtype:
+    """Of n surfaces: effectiveness, on its way to target by at most a step a frame; offset and lag, rad;
+    given_up: by the law's own observer; parked: commanded to its trim. authority_lost: whether a surface is
+    slow or parked in this frame. unknown (3,) rad/s2: acceleration that no known fault explains."""
     return record(
-        target=n, effectiveness=n, effectiveness_step=float, least_effectiveness=float, offset=n, lag=n,
+        target=n, effectiveness=n, offset=n, lag=n, given_up=(int, n), parked=(int, n), authority_lost=int,
+        unknown=3,
     )  # fmt: skip
 
 
 @sized
-def true_faults_dtype(n: int) -> np.dtype:
-    """present: 1 from the first fault on. effectiveness (n,): 1 healthy. immovable (n,): does not follow its
-    command. effective (n,) rad: the deflection that acts. Cm_alpha3: the unanticipated pitching moment."""
-    return record(present=int, Cm_alpha3=float, effectiveness=n, immovable=(int, n), effective=n)
+def surfaces_dtype(n: int) -> np.dtype:
+    """The stage's records for n surfaces."""
+    return record(config=CONFIG, output=output_dtype(n))
 
 
-def configure(surfaces: np.void, config: ControlConfig, law: int, dt_s: float) -> None:
-    """Fill the record (`surfaces_dtype`); law: what use is made of the verdict."""
-    surfaces["effectiveness"], surfaces["least_effectiveness"] = 1.0, config.least_effectiveness
-    surfaces["effectiveness_step"] = config.effectiveness_rate_per_s * dt_s if law != ORACLE else np.inf
+def configure(surfaces: np.void, config: ControlConfig, informed: bool, dt_s: float) -> None:
+    """Fill the record (`surfaces_dtype`); informed: whether the law knows the true faults, at once."""
+    surfaces["output"]["effectiveness"] = 1.0
+    surfaces["config"]["least_effectiveness"] = config.least_effectiveness
+    surfaces["config"]["effectiveness_step"] = np.inf if informed else config.effectiveness_rate_per_s * dt_s
 
 
-@kernel
-def accommodate(law, inner, assessment, surfaces, rejection, layout, saturated, faults, u):
-    """Bring effectiveness, offset and lag (n,) to this frame.
-
-    faults: `true_faults_dtype`, looked at by the oracle alone. u (n,) rad: where healthy surfaces would be.
-    """
-    learns = inner == REJECTING and law != ORACLE
-    if learns:
-        rejecting.look_for_losses(rejection, layout, assessment.detected)
-    for s in range(surfaces.target.size):
-        surfaces.target[s], surfaces.offset[s], surfaces.lag[s] = 1.0, 0.0, 0.0
-        if law == ORACLE:
-            take_truth(surfaces, faults, s, u[s])
-        else:
-            take_assessment(surfaces, assessment, s)
-        if learns:
-            if assessment.unknown and rejection.answering.listening:
-                surfaces.target[s] = effectiveness_of(rejection.answering, s)
-            elif assessment.measure[s] != FIXED:
-                rejecting.believe_larger(rejection, surfaces, layout, s)
-            named = assessment.detected and s == assessment.named
-            suspected = named and is_doubtful(assessment, surfaces, rejection, layout, s)
-            rejecting.withdraw(rejection, surfaces, layout, s, saturated[s], suspected)
-    approach(surfaces)
+@apart
+def accommodate(control, assessment, faults, belief, measured):
+    """Bring the estimates of all surfaces and of the unknown acceleration to this frame
+    (base.CompiledLaw)."""
+    surfaces, informed = control.surfaces, control.config.informed
+    begin_frame(surfaces.output, assessment, informed)
+    for s in range(surfaces.output.target.size):
+        target = reported(surfaces.output, assessment, faults, s, belief.u[s], informed)
+        approach(surfaces, s, start_of(surfaces.output, assessment, s, informed), target, False)
+    estimate_unknown(surfaces.output, control.config, assessment, faults, belief, measured.y)
 
 
 @kernel
-def take_truth(surfaces, faults, s, u):
-    """Take the true effectiveness of surface s, none if it does not move, and what it is off besides.
+def begin_frame(output, assessment, informed):
+    """Nothing is given up or parked yet; a slow surface has lost authority."""
+    output.given_up[:], output.parked[:] = 0, 0
+    output.authority_lost = assessment.hedge and not informed
 
-    u rad: where it would be if healthy.
-    """
-    surfaces.target[s] = 0.0 if faults.immovable[s] else faults.effectiveness[s]
+
+@kernel
+def reported(output, assessment, faults, s, u, informed):
+    """Take offset and lag of surface s from the diagnosis, from the truth if the law is `informed`; returns
+    its effectiveness, 0 if it does not move. u rad: where it would be if healthy."""
+    if not informed:
+        output.offset[s], output.lag[s] = assessment.offset[s], assessment.lag[s]
+        return assessment.effectiveness[s]
+    effectiveness = 0.0 if faults.immovable[s] else faults.effectiveness[s]
+    output.offset[s], output.lag[s] = 0.0, 0.0
     if faults.present:
-        surfaces.offset[s] = faults.effective[s] - surfaces.target[s] * u
+        output.offset[s] = faults.effective[s] - effectiveness * u
+    return effectiveness
 
 
 @kernel
-def take_assessment(surfaces, assessment, s):
-    """Take surface s for what the diagnosis says. Jams bypass the rate limit, as does what is well known."""
-    surfaces.target[s] = assessment.effectiveness[s]
-    surfaces.offset[s], surfaces.lag[s] = assessment.offset[s], assessment.lag[s]
-    if assessment.at_once[s]:
-        surfaces.effectiveness[s] = surfaces.target[s]
+def start_of(output, assessment, s, informed):
+    """Effectiveness of surface s from which this frame's step begins. A jam bypasses the rate limit, as does
+    an effectiveness that is well known."""
+    jumps = assessment.at_once[s] and not informed
+    return assessment.effectiveness[s] if jumps else output.effectiveness[s]
 
 
 @kernel
-def is_doubtful(assessment, surfaces, rejection, layout, s):
-    """Whether surface s, which is named, may be of no use: another can take its place, or its type is open or
-    nothing of it seems to be left, and the law's observer sees nothing of it either."""
-    if rejecting.is_replaced(layout, s):
-        return True
-    least = surfaces.least_effectiveness
-    is_open = assessment.every_type and assessment.measure[s] < 0
-    useless = is_open or surfaces.target[s] < least
-    return useless and not rejecting.acts(rejection.found, layout.main, s, least)
+def approach(surfaces, s, start, target, given_up):
+    """Move the effectiveness of surface s from `start` towards `target` by at most one step; to zero at once
+    if the law has given it up."""
+    output, step = surfaces.output, surfaces.config.effectiveness_step
+    if given_up:
+        start, target = 0.0, 0.0
+    output.given_up[s], output.target[s] = given_up, target
+    output.effectiveness[s] = start + min(max(target - start, -step), step)
 
 
 @kernel
-def approach(surfaces):
-    """Move the effectiveness the law uses towards its target by at most one step."""
-    step = surfaces.effectiveness_step
-    for s in range(surfaces.target.size):
-        change = surfaces.target[s] - surfaces.effectiveness[s]
-        surfaces.effectiveness[s] += min(max(change, -step), step)
+def estimate_unknown(output, config, assessment, faults, belief, y):
+    """Fill output.unknown (3,) rad/s2: the truth's pitching moment for an informed law, the diagnosis'
+    estimate for others that use the verdict."""
+    output.unknown[:] = 0.0
+    if config.informed:
+        output.unknown[PITCH] = unanticipated_pitch(belief.design, y, faults.Cm_alpha3)
+    elif config.uses_verdict:
+        output.unknown[:] = assessment.unknown_acceleration
 
 
 @kernel
-def allow_for_offsets(axes, offset, G):
-    """Take off the demand what the surfaces give unasked: G (3, n) rad/s2 per rad times the offsets (n,)."""
-    for i in range(3):
-        for s in range(G.shape[1]):
-            axes.demand[i] -= G[i, s] * offset[s]
-            axes.hold[i] -= G[i, s] * offset[s]
+def usable_effectiveness(surfaces, s):
+    """Effectiveness of surface s that a law divides by: none of a surface that is given up."""
+    effectiveness = surfaces.output.effectiveness[s]
+    return 0.0 if effectiveness < surfaces.config.least_effectiveness else effectiveness
 
 
 @kernel
-def believed_effectiveness(surfaces, G, G_believed):
-    """Fill G_believed (3, n): G with each column scaled by its surface's effectiveness, or given up."""
-    for s in range(G.shape[1]):
-        effectiveness = surfaces.effectiveness[s]
-        if effectiveness < surfaces.least_effectiveness:
-            effectiveness = 0.0
-        for i in range(3):
-            G_believed[i, s] = G[i, s] * effectiveness
-
-
-@kernel
-def give_up(law, assessment, surfaces, withdrawn, faults, layout, allocation, reference):
-    """Command a surface that does not follow to its trim: should it come loose, that is where it goes, and it
-    shows. From then on the reference is bent to what is left. withdrawn (n,): by the law's observer."""
-    for s in range(layout.trim.size):
-        truly = faults.immovable[s] and law == ORACLE
-        fixed = assessment.measure[s] == FIXED
-        if truly or withdrawn[s] or (fixed and surfaces.effectiveness[s] == 0.0):
-            allocation.command[s] = layout.trim[s]
-            allocation.saturated[s] = 0
-            reference.hedging = 1
+def park_failed_surfaces(output, assessment, faults, informed):
+    """Park a surface that does not follow its command. Its trim is where it goes if it comes loose, and that
+    shows. From then on the reference is governed."""
+    for s in range(output.parked.size):
+        immovable = informed and faults.immovable[s]
+        fixed = assessment.measure[s] == FIXED and output.effectiveness[s] == 0.0
+        output.parked[s] = immovable or output.given_up[s] or fixed
+        if output.parked[s]:
+            output.authority_lost = 1

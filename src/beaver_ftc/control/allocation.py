@@ -5,7 +5,7 @@ The attainable moment set is the image of the travels under G, with what is give
 in it [Durham1993]; here the interval it spans on each axis. A demand outside it no law can meet.
 
 Where more surfaces move than one an axis and a stand-in, least squares with limits and rates take the place
-of these few lines (least_squares.py); the hand-over is there a matter of how willingly each moves.
+of these few lines (least_squares.py); the hand-over is there a matter of each surface's weight.
 
 The probe is active diagnosis: a healthy aircraft feels nothing of it. The flap goes down and back by
 (1 - cos) / 2; the allocation gives the elevator what the flap does not leave. A surface that does not follow
@@ -19,50 +19,53 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import apart, kernel, record, sized
 from beaver_ftc.control import least_squares
+from beaver_ftc.control.accommodation import usable_effectiveness
 from beaver_ftc.control.least_squares import problem_dtype
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW, leaders_of
 from beaver_ftc.scenario.control import ControlConfig
 from beaver_ftc.scenario.diagnosis import Probing
 
-# Of each axis, rad/s2: what is demanded, what of it only holds the rates, what of it was not given; and
-# whether not even the rates can be held.
-AXES = record(demand=3, hold=3, shortfall=3, beyond=(int, 3))
+RELUCTANT, TINY = 1e-4, 1e-300  # weight of a backup that is not asked, beside the others
 
-RELUCTANT, TINY = 1e-4, 1e-300  # how willingly a stand-in moves that is not asked, beside the others
-
-# deflection rad of the flap, by step rad of phase a frame; frames: how many at most, 0 for no probe at all;
-# probed: those of the present movement.
-PROBE = record(
-    amplitude=float, step=float, frames=int, deflection=float, probed=int, from_s=float, to_s=float,
-)  # fmt: skip
+# Of the flap's movement. amplitude rad; step: rad of phase a frame; frames: how many at most, 0 for no probe.
+PROBE_CONFIG = record(amplitude=float, step=float, frames=int)
+# deflection rad of the flap; probed: frames of the present movement; from_s, to_s: when it began and ended.
+PROBE_MEMORY = record(deflection=float, probed=int, from_s=float, to_s=float)
+PROBE = record(config=PROBE_CONFIG, memory=PROBE_MEMORY)
 
 
 @sized
 def layout_dtype(n: int) -> np.dtype:
-    """n surfaces: the one that leads each axis, who stands in for pitch's, or -1; trim and stops, rad. aside:
-    which of them wait until pitch is handed over; authority: what part of the authority about each axis is
-    whose, those aside without part in pitch; beside: the least and the greatest that engines give about each
-    axis, rad/s2. general: there are more than lead or stand in first."""
+    """Configuration of n surfaces: the one that leads each axis, who stands in for pitch's, or -1; trim and
+    stops, rad. is_backup: which of them wait until pitch is handed over; authority: what part of the
+    authority about each axis is whose, backups without part in pitch. general: there are more than lead or
+    stand in first."""
     return record(
-        main=(int, 3),
-        stand_in=int,
-        trim=n,
-        low=n,
-        high=n,
-        general=int,
-        aside=(int, n),
-        authority=(3, n),
-        beside=(2, 3),
+        main=(int, 3), stand_in=int, trim=n, low=n, high=n, general=int, is_backup=(int, n), authority=(3, n)
     )
+
+
+# Output of a law that demands accelerations, rad/s2: what is demanded, what of it only holds the rates, and
+# the disturbance that the law's observer finds, zero of a law without one.
+DEMAND = record(demand=3, hold=3, disturbance=3)
+
+
+@sized
+def axes_dtype(n: int) -> np.dtype:
+    """Output of the allocation, by axis. G (3, n) rad/s2 per rad: with the effectiveness of each surface in
+    it. rad/s2: demand, hold and disturbance as the law has them, the offsets of surfaces subtracted;
+    shortfall: what of the demand was not given; beyond: whether not even the rates can be held."""
+    return record(G=(3, n), demand=3, hold=3, disturbance=3, shortfall=3, beyond=(int, 3))
 
 
 @sized
 def allocation_dtype(n: int) -> np.dtype:
-    """n surfaces: effectiveness matrix with what is believed of each in it; the command, rad, and which stand
-    at a stop; how far pitch is handed over, and by how much that changes in a frame; the least squares."""
+    """hand_over_step: change of hand_over in a frame. Of n surfaces, the command, rad, and which stand at a
+    stop; hand_over: how far pitch is handed over to its stand-in, 0 to 1; lost_share: what part of pitch the
+    main surface has lost; transfer_share: the part of pitch that the stand-in carries now."""
     return record(
-        G=(3, n), command=n, saturated=(int, n), hand_over=float, hand_over_step=float,
-        problem=problem_dtype(n),
+        config=record(hand_over_step=float), memory=record(problem=problem_dtype(n)),
+        output=record(command=n, saturated=(int, n), hand_over=float, lost_share=float, transfer_share=float),
     )  # fmt: skip
 
 
@@ -71,18 +74,19 @@ def configure(control: np.void, config: ControlConfig, travel: np.ndarray, aircr
     layout = control["layout"]
     layout["low"], layout["high"] = travel
     layout["main"], layout["stand_in"] = leaders_of(aircraft), _stand_in(aircraft)
-    layout["aside"] = [surface in aircraft.stand_ins for surface in aircraft.surfaces]
+    layout["is_backup"] = [surface in aircraft.stand_ins for surface in aircraft.surfaces]
     layout["authority"], layout["general"] = _authority(aircraft, layout), _is_general(aircraft)
-    control["allocation"]["hand_over_step"] = control["reference"]["dt"] / config.hand_over_s
+    step = control["reference"]["config"]["dt"] / config.hand_over_s
+    control["allocation"]["config"]["hand_over_step"] = step
 
 
 def configure_probe(probe: np.void, probing: Probing | None, dt: float) -> None:
     """Fill the record (dtype PROBE) for frames of dt s."""
     if probing is not None:
-        probe["amplitude"] = radians(probing.amplitude_deg)
-        probe["step"] = 2.0 * pi * probing.frequency_hz * dt
-        probe["frames"] = round(probing.duration_s / dt)
-        probe["from_s"] = probe["to_s"] = -1.0
+        probe["config"]["amplitude"] = radians(probing.amplitude_deg)
+        probe["config"]["step"] = 2.0 * pi * probing.frequency_hz * dt
+        probe["config"]["frames"] = round(probing.duration_s / dt)
+        probe["memory"]["from_s"] = probe["memory"]["to_s"] = -1.0
 
 
 def _stand_in(aircraft: Aircraft) -> int:
@@ -103,7 +107,7 @@ def _authority(aircraft: Aircraft, layout: np.void) -> np.ndarray:
         shares[range(3), layout["main"]] = 1.0
         return shares
     for s, (surface, axis) in enumerate(zip(aircraft.surfaces, aircraft.dominant_axis, strict=True)):
-        if axis != PITCH or not layout["aside"][s]:
+        if axis != PITCH or not layout["is_backup"][s]:
             travel = aircraft.travel[surface]
             shares[axis, s] = abs(aircraft.effect[surface][axis]) * (travel.max_rad - travel.min_rad)
     return shares / shares.sum(axis=1, keepdims=True)
@@ -119,10 +123,10 @@ def remaining(layout, effectiveness, i):
 
 
 @kernel
-def clip(allocation, layout, s, deflection):
+def clip(output, layout, s, deflection):
     """Limit a deflection (rad) to the travel of surface s and note saturation."""
     limited = min(max(deflection, layout.low[s]), layout.high[s])
-    allocation.saturated[s] = limited != deflection
+    output.saturated[s] = limited != deflection
     return limited
 
 
@@ -133,16 +137,42 @@ def divide(moment, effectiveness):
 
 
 @kernel
-def lateral(allocation, layout, demand):
+def form_demand(axes, law, offset, G, subtracts_offsets):
+    """Fill axes.demand and axes.hold (3,) rad/s2 with what a law demands; law: its Output, of type DEMAND. If
+    subtracts_offsets, the moments of the surfaces' offsets are subtracted: G (3, n) rad/s2 per rad times the
+    offsets (n,) rad."""
+    for i in range(3):
+        axes.demand[i], axes.hold[i], axes.disturbance[i] = law.demand[i], law.hold[i], law.disturbance[i]
+        if subtracts_offsets:
+            for s in range(G.shape[1]):
+                axes.demand[i] -= G[i, s] * offset[s]
+                axes.hold[i] -= G[i, s] * offset[s]
+
+
+@kernel
+def form_effectiveness_matrix(axes, G, surfaces, uses_verdict):
+    """Fill axes.G (3, n) rad/s2 per rad: the design model's G, with the surfaces' effectiveness in it for a
+    law that uses the verdict."""
+    if not uses_verdict:
+        axes.G[:] = G
+        return
+    for s in range(G.shape[1]):
+        effectiveness = usable_effectiveness(surfaces, s)
+        for i in range(3):
+            axes.G[i, s] = G[i, s] * effectiveness
+
+
+@kernel
+def lateral(axes, output, layout):
     """Aileron and rudder for the roll and yaw demand; when one saturates the other makes the best of its
     own axis."""
-    G, u = allocation.G, allocation.command
+    G, u = axes.G, output.command
     a, r = layout.main[ROLL], layout.main[YAW]
-    roll, yaw = demand[ROLL], demand[YAW]
+    roll, yaw = axes.demand[ROLL], axes.demand[YAW]
     determinant = G[ROLL, a] * G[YAW, r] - G[ROLL, r] * G[YAW, a]
-    u[a] = clip(allocation, layout, a, divide(roll * G[YAW, r] - yaw * G[ROLL, r], determinant))
-    u[r] = clip(allocation, layout, r, divide(yaw - G[YAW, a] * u[a], G[YAW, r]))
-    u[a] = clip(allocation, layout, a, divide(roll - G[ROLL, r] * u[r], G[ROLL, a]))
+    u[a] = clip(output, layout, a, divide(roll * G[YAW, r] - yaw * G[ROLL, r], determinant))
+    u[r] = clip(output, layout, r, divide(yaw - G[YAW, a] * u[a], G[YAW, r]))
+    u[a] = clip(output, layout, a, divide(roll - G[ROLL, r] * u[r], G[ROLL, a]))
 
 
 @kernel
@@ -152,108 +182,140 @@ def smooth(share):
 
 
 @kernel
-def pitch(allocation, layout, needed, effectiveness, share, probe):
-    """Elevator and flap for the pitch demand `needed`, rad/s2.
+def pitch(axes, output, layout, effectiveness, share, probe):
+    """Elevator and flap for the pitch demand, rad/s2.
 
     Before the hand-over (share 0) the elevator carries all. After it (1), the elevator holds its trimmed
     moment, the flap carries what moves, and what the flap's short upward travel cannot give goes back to what
     is left of the elevator. Without a flap the elevator carries what it can. effectiveness: of the elevator;
     probe: rad of the flap.
     """
-    G, u = allocation.G, allocation.command
+    G, u, needed = axes.G, output.command, axes.demand[PITCH]
     e, f = layout.main[PITCH], layout.stand_in
     if f >= 0:
         hold = divide(G[PITCH, e], effectiveness) * layout.trim[e]
         flap = layout.trim[f] + share * (divide(needed - hold, G[PITCH, f]) - layout.trim[f])
-        u[f] = clip(allocation, layout, f, flap + probe)
+        u[f] = clip(output, layout, f, flap + probe)
         needed -= G[PITCH, f] * u[f]
-    u[e] = clip(allocation, layout, e, divide(needed, G[PITCH, e]))
+    u[e] = clip(output, layout, e, divide(needed, G[PITCH, e]))
 
 
 @kernel
-def allocate(allocation, layout, demand, effectiveness, share, probe):
-    """Fill the command (n,) rad for a demand (3,) rad/s2; effectiveness (n,); the rest: see `pitch`."""
-    lateral(allocation, layout, demand)
-    pitch(allocation, layout, demand[PITCH], effectiveness[layout.main[PITCH]], share, probe)
+def allocate(axes, output, layout, effectiveness, share, probe):
+    """Fill the command (n,) rad for axes.demand (3,) rad/s2; effectiveness (n,); the rest: see `pitch`."""
+    lateral(axes, output, layout)
+    pitch(axes, output, layout, effectiveness[layout.main[PITCH]], share, probe)
 
 
 @kernel
-def set_problem(allocation, layout, effectiveness, belief, share, probe):
-    """Say where the surfaces may go within a frame, where they had rather be, and how willingly they leave
-    that; effectiveness (n,); share, probe: as in `pitch`.
+def set_problem(problem, G, layout, effectiveness, belief, share, probe):
+    """Set the limits of the surfaces within a frame, where each of them prefers to be, and the weight with
+    which it leaves that; G (3, n); effectiveness (n,); share, probe: as in `pitch`.
 
-    A stand-in gives `share` of what pitch demands beyond the trimmed moments: of two that move pitch alone
+    A backup gives `share` of what pitch demands beyond the trimmed moments: of two that move pitch alone
     that is the published hand-over. A probe is held, and the others give what it does not leave.
     """
-    problem, own, waiting, u = allocation.problem, 0.0, 0.0, belief.u
+    own, waiting, u = 0.0, 0.0, belief.u
     for s in range(u.size):
         reach = belief.actuators.step[s] / belief.share
         half, left = 0.5 * (layout.high[s] - layout.low[s]), effectiveness[s]
         hold = layout.trim[s] / left if left > 0.0 else layout.trim[s]
-        problem.preferred[s] = min(max(hold, layout.low[s]), layout.high[s])
-        problem.willing[s] = half * half
+        problem.u_preferred[s] = min(max(hold, layout.low[s]), layout.high[s])
+        problem.weight[s] = half * half
         problem.low[s] = min(max(layout.low[s], u[s] - reach), layout.high[s])
         problem.high[s] = max(min(layout.high[s], u[s] + reach), problem.low[s])
-        moment = half * half * allocation.G[PITCH, s] ** 2
-        own, waiting = own + (0.0 if layout.aside[s] else moment), waiting + moment * layout.aside[s]
+        moment = half * half * G[PITCH, s] ** 2
+        own, waiting = own + (0.0 if layout.is_backup[s] else moment), waiting + moment * layout.is_backup[s]
     ratio = share * own / max((1.0 - share) * waiting, TINY)
     for s in range(u.size):
-        if layout.aside[s]:
-            problem.willing[s] *= min(max(ratio, RELUCTANT), 1.0 / RELUCTANT)
+        if layout.is_backup[s]:
+            problem.weight[s] *= min(max(ratio, RELUCTANT), 1.0 / RELUCTANT)
     if probe != 0.0 and layout.stand_in >= 0:
         f = layout.stand_in
         held = min(max(layout.trim[f] + probe, problem.low[f]), problem.high[f])
-        problem.preferred[f] = problem.low[f] = problem.high[f] = held
+        problem.u_preferred[f] = problem.low[f] = problem.high[f] = held
 
 
 @apart
-def allocate_generally(allocation, layout, surfaces, axes, belief, share, probe):
+def allocate_generally(axes, allocation, layout, effectiveness, belief, share, probe):
     """Fill the command (n,) rad for any number of surfaces, within stops and rates (least_squares.py).
 
-    axes: of dtype AXES; share, probe: as in `pitch`. With several elevators the stand-ins take over no
-    more than what they have lost.
+    effectiveness (n,); share, probe: as in `pitch`. With several elevators the backups take over no more than
+    what they have lost.
     """
-    left = remaining(layout, surfaces.effectiveness, PITCH)
+    problem, output, left = (
+        allocation.memory.problem,
+        allocation.output,
+        remaining(layout, effectiveness, PITCH),
+    )
     if layout.authority[PITCH, layout.main[PITCH]] < 1.0:
         share = min(share, 1.0 - left)
-    set_problem(allocation, layout, surfaces.effectiveness, belief, share, probe)
-    least_squares.solve(allocation.problem, allocation.G, axes.demand)
-    for s in range(allocation.command.size):
-        allocation.command[s] = allocation.problem.u[s]
-        at = allocation.problem.at[s]
+    set_problem(problem, axes.G, layout, effectiveness, belief, share, probe)
+    least_squares.solve(problem, axes.G, axes.demand)
+    for s in range(output.command.size):
+        output.command[s], at = problem.u[s], problem.at[s]
         stop = layout.low[s] if at < 0 else layout.high[s]
-        allocation.saturated[s] = at != 0 and allocation.problem.u[s] == stop
+        output.saturated[s] = at != 0 and problem.u[s] == stop
 
 
 @kernel
-def relieve(allocation, layout, demand):
-    """Give the flap what an elevator at its stop leaves of the pitch demand (rad/s2), as allocated.
+def spill_to_flap(axes, output, layout):
+    """Give the flap what an elevator at its stop leaves of the pitch demand, as allocated.
 
     The observer has by then found what the elevator does not do, jammed or too weak, and asked it for more
     than it can give: the flap need not wait until that has a name.
     """
-    G, u = allocation.G, allocation.command
+    G, u = axes.G, output.command
     e, f = layout.main[PITCH], layout.stand_in
-    if f >= 0 and allocation.saturated[e]:
-        u[f] = clip(allocation, layout, f, divide(demand - G[PITCH, e] * u[e], G[PITCH, f]))
+    if f >= 0 and output.saturated[e]:
+        left = axes.demand[PITCH] - G[PITCH, e] * u[e]
+        u[f] = clip(output, layout, f, divide(left, G[PITCH, f]))
 
 
 @kernel
-def advance_hand_over(allocation, reallocated, at_once, lost):
-    """Hand the pitch demand to the flap, or back, as soon as nothing is `reallocated` any more, by the same
-    step. `at_once`: the share that is lost, by a jam."""
+def park(output, layout, parked):
+    """Command each surface that is `parked` (n,) to its trim."""
+    for s in range(layout.trim.size):
+        if parked[s]:
+            output.command[s], output.saturated[s] = layout.trim[s], 0
+
+
+@kernel
+def lead_compensate(output, layout, lead, u):
+    """Command beyond what is wanted, by `lead` (n,), so that a lagging actuator at u (n,) rad is there
+    sooner."""
+    command = output.command
+    for s in range(u.size):
+        if lead[s] > 1.0:
+            command[s] = min(max(u[s] + lead[s] * (command[s] - u[s]), layout.low[s]), layout.high[s])
+
+
+@kernel
+def hand_over_pitch(allocation, reallocated, at_once, remains, least):
+    """Hand the pitch demand to the flap, or back as soon as it is `reallocated` no longer, by the same step.
+
+    at_once: the lost part goes at once, after a jam. remains: effectiveness of the main surface; less than
+    `least` is none. While pitch is handed back, the loss of before counts: the main surface may be believed
+    whole at once, and nothing is to leap.
+    """
+    config, output = allocation.config, allocation.output
     if reallocated:
-        allocation.hand_over = min(allocation.hand_over + allocation.hand_over_step, 1.0)
+        output.hand_over = min(output.hand_over + config.hand_over_step, 1.0)
         if at_once:
-            allocation.hand_over = max(allocation.hand_over, lost)
+            output.hand_over = max(output.hand_over, 1.0 - remains)
     else:
-        allocation.hand_over = max(allocation.hand_over - allocation.hand_over_step, 0.0)
+        output.hand_over = max(output.hand_over - config.hand_over_step, 0.0)
+    given = output.hand_over if remains > 0.0 else 1.0
+    if reallocated or remains <= 0.0:
+        output.lost_share = 1.0 - remains if remains >= least else 1.0
+    output.transfer_share = smooth(given) * output.lost_share
 
 
 @kernel
-def attainable(G, layout, i):
-    """Least and greatest acceleration of axis i, rad/s2, within the travel; G (3, n)."""
-    least, greatest = layout.beside[0, i], layout.beside[1, i]
+def attainable(G, layout, engine_authority, i):
+    """Least and greatest acceleration of axis i, rad/s2, within the travel; G (3, n). engine_authority (2, 3)
+    rad/s2: what engines give at least and at most."""
+    least, greatest = engine_authority[0, i], engine_authority[1, i]
     for s in range(layout.low.size):
         one, other = G[i, s] * layout.low[s], G[i, s] * layout.high[s]
         least += min(one, other)
@@ -262,37 +324,38 @@ def attainable(G, layout, i):
 
 
 @kernel
-def note_shortfall(axes, allocation, layout, lag):
-    """What was demanded and is not given; and whether the rates could at least be held. lag (n,) rad: of
-    surfaces behind their command."""
-    G, u = allocation.G, allocation.command
+def note_shortfall(axes, command, layout, lag, engine_authority):
+    """What was demanded and is not given by the command (n,) rad; and whether the rates could at least be
+    held. lag (n,) rad: of surfaces behind their command; engine_authority: as in `attainable`."""
+    G = axes.G
     for i in range(3):
         given = 0.0
-        for s in range(u.size):
-            given += G[i, s] * (u[s] + lag[s])
+        for s in range(command.size):
+            given += G[i, s] * (command[s] + lag[s])
         axes.shortfall[i] = axes.demand[i] - given
-        least, greatest = attainable(G, layout, i)
+        least, greatest = attainable(G, layout, engine_authority, i)
         axes.beyond[i] = not least <= axes.hold[i] <= greatest
 
 
 @kernel
 def advance_probe(probe, wanted, t):
     """Bring the probe to the next frame, t s: begin when wanted, end with the movement when no longer."""
-    if probe.probed == 0:
-        if not wanted or probe.from_s >= 0.0:
+    config, memory = probe.config, probe.memory
+    if memory.probed == 0:
+        if not wanted or memory.from_s >= 0.0:
             return
-        probe.from_s = t
-    phase = probe.step * probe.probed
-    at_rest = phase % (2.0 * np.pi) < probe.step
-    if probe.probed > 0 and at_rest and (not wanted or probe.probed >= probe.frames):
-        probe.deflection, probe.probed, probe.to_s = 0.0, 0, t
+        memory.from_s = t
+    phase = config.step * memory.probed
+    at_rest = phase % (2.0 * np.pi) < config.step
+    if memory.probed > 0 and at_rest and (not wanted or memory.probed >= config.frames):
+        memory.deflection, memory.probed, memory.to_s = 0.0, 0, t
         return
-    probe.deflection = 0.5 * probe.amplitude * (1.0 - np.cos(phase))
-    probe.probed += 1
+    memory.deflection = 0.5 * config.amplitude * (1.0 - np.cos(phase))
+    memory.probed += 1
 
 
 @kernel
-def take_command(allocation, layout, deflections):
-    """Take a plug-in's command (n,) rad, within the travel of each surface."""
+def take_command(output, layout, deflections):
+    """Take a command (n,) rad from outside, within the travel of each surface."""
     for s in range(deflections.size):
-        allocation.command[s] = clip(allocation, layout, s, deflections[s])
+        output.command[s] = clip(output, layout, s, deflections[s])

@@ -1,6 +1,8 @@
-"""What a law is: the contract between the loop and a control law that is plugged in."""
+"""What a law is: the contract of a law that is plugged in (`Law`), and of one that is compiled
+(`CompiledLaw`)."""
 
-from typing import NamedTuple, Protocol, runtime_checkable
+from collections.abc import Callable
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -34,3 +36,36 @@ class Law(Protocol):
     def step(self, measured: Measured, reference: Reference, verdict: Verdict) -> np.ndarray:
         """Called every frame: the command (4,) rad for aileron, elevator, rudder, flap. The loop limits
         it."""
+
+
+class CompiledLaw(NamedTuple):
+    """A law that flies compiled. Its file ends with `LAW`, one of these; a row of plugins.yaml names the
+    file.
+
+    records: function of the number of surfaces n that returns the type of the law's own record,
+    `control.NAME` for a file NAME.py. The law's kernels alone write that record.
+
+    Lazy kernels (compiled.py), called once a frame with `control` (control/state.py), `assessment` (what the
+    diagnosis says of each surface) and the records `belief` and `measured`:
+
+        accommodate(control, assessment, faults, belief, measured)   how effective each surface is taken to be
+        command(control, assessment, faults, belief, measured, mode, t)   where each surface is to go
+
+    `command` leaves the deflections (n,) rad in control.allocation.output.command.
+
+    faults: the true faults, for laws whose row says `informed`. mode: the supervisor's; t s.
+
+    configure(law, control, scenario, travel): fill the law's configuration; travel (2, n) rad, the stops.
+    anchor(law, control, belief, scenario, y): derive what depends on the trim; y: the measured signals there.
+    unexplained(control): acceleration (3,) rad/s2 that the law in charge attributes to no model.
+    begin(control, before, unexplained, learnt): take over in flight from the law whose records are `before`,
+    without a bump; learnt (3,) rad/s2: what the diagnosis' network explains of `unexplained`.
+    """
+
+    records: Callable[[int], np.dtype]
+    command: Callable[..., None]
+    accommodate: Callable[..., None] | None = None
+    configure: Callable[..., None] | None = None
+    anchor: Callable[..., None] | None = None
+    unexplained: Callable[[Any], np.ndarray] | None = None
+    begin: Callable[..., None] | None = None

@@ -24,7 +24,7 @@ from beaver_ftc.aircraft.schema import MAX_EFFECTORS
 from beaver_ftc.compiled import apart, kernel, record
 from beaver_ftc.control import least_squares
 from beaver_ftc.control.allocation import remaining
-from beaver_ftc.control.laws import NOMINAL, law_of
+from beaver_ftc.control.laws.rows import row_of
 from beaver_ftc.control.least_squares import problem_dtype
 from beaver_ftc.control.outer.thrust import ENGINE, gained, power_for, set_up_engine
 from beaver_ftc.control.outer.thrust import look_up as at_airspeed
@@ -36,84 +36,96 @@ from beaver_ftc.scenario.schema import Scenario
 LEAST_LAG_S, RELEASE_S = 0.5, 20.0
 
 # n: how many; low, high: of the setting, step: in a frame; part, release: shares a frame. B (3, n) rad/s2 per
-# m/s2, rows of the axes they serve now in `serving`; wanted (3,) rad/s2: w; from_s: since when they turn.
-ENGINES = record(
-    n=int, low=float, high=float, step=float, part=float, release=float, thrust=ENGINE,
-    B=(3, MAX_EFFECTORS), serving=(3, MAX_EFFECTORS), wanted=3, problem=problem_dtype(MAX_EFFECTORS),
-    from_s=float,
+# m/s2.
+CONFIG = record(
+    n=int, low=float, high=float, step=float, part=float, release=float, B=(3, MAX_EFFECTORS)
 )  # fmt: skip
+# serving: rows of B of the axes they serve now; wanted (3,) rad/s2: w; from_s: since when they turn.
+MEMORY = record(
+    thrust=ENGINE, serving=(3, MAX_EFFECTORS), wanted=3, problem=problem_dtype(MAX_EFFECTORS), from_s=float,
+)  # fmt: skip
+# difference: of each engine's setting from the common lever; authority (2, 3) rad/s2: the least and the
+# greatest that all give about each axis.
+OUTPUT = record(difference=MAX_EFFECTORS, authority=(2, 3))
+ENGINES = record(config=CONFIG, memory=MEMORY, output=OUTPUT)
 
 
 def configure(engines: np.void, scenario: Scenario) -> None:
     """Fill the record (dtype ENGINES); it stays empty where no engine is an effector, or none may be used."""
-    aircraft, dt = scenario.airframe, 1.0 / scenario.rate_hz
+    aircraft, dt, config = scenario.airframe, 1.0 / scenario.rate_hz, engines["config"]
     named, thrust = aircraft.file.power_setting, aircraft.engine.thrust
-    law, _ = law_of(scenario.control.law)
-    if not aircraft.effectors or law == NOMINAL or not scenario.control.power.enabled or named is None:
+    may_use = row_of(scenario.control.law).uses_verdict and scenario.control.power.enabled
+    if not aircraft.effectors or not may_use or named is None:
         return
-    engines["n"], engines["from_s"] = len(aircraft.effectors), -1.0
-    engines["low"], engines["high"] = low, high = named[1].range
-    engines["step"] = (high - low) / WHOLE_RANGE_S * dt
-    engines["part"] = dt / (2.0 * max(thrust.lag_s if thrust else 0.0, LEAST_LAG_S))
-    engines["release"] = dt / RELEASE_S
+    config["n"], engines["memory"]["from_s"] = len(aircraft.effectors), -1.0
+    config["low"], config["high"] = low, high = named[1].range
+    config["step"] = (high - low) / WHOLE_RANGE_S * dt
+    config["part"] = dt / (2.0 * max(thrust.lag_s if thrust else 0.0, LEAST_LAG_S))
+    config["release"] = dt / RELEASE_S
     mass, i = aircraft.mass, inertia_coefficients(aircraft.mass)
-    set_up_engine(engines["thrust"], thrust, mass.mass_kg)
+    set_up_engine(engines["memory"]["thrust"], thrust, mass.mass_kg)
     for e, of in enumerate(aircraft.effectors.values()):
         force_n = of.share * mass.mass_kg
         pitching, yawing = of.down_m * force_n, -of.right_m * force_n
-        engines["B"][:, e] = i.Pn * yawing, i.Qm * pitching, i.Rn * yawing
-        engines["problem"]["willing"][e] = 1.0
+        config["B"][:, e] = i.Pn * yawing, i.Qm * pitching, i.Rn * yawing
+        engines["memory"]["problem"]["weight"][e] = 1.0
 
 
 @kernel
-def reaches(layout, allocation, surfaces, i):
-    """Whether the surface that leads axis i is neither given up nor at its stop."""
-    given_up = remaining(layout, surfaces.effectiveness, i) < surfaces.least_effectiveness
-    return not given_up and allocation.saturated[layout.main[i]] == 0
+def reaches(layout, saturated, surfaces, i):
+    """Whether the surface that leads axis i is neither given up nor at its stop; saturated (n,)."""
+    least = surfaces.config.least_effectiveness
+    given_up = remaining(layout, surfaces.output.effectiveness, i) < least
+    return not given_up and saturated[layout.main[i]] == 0
 
 
 @kernel
-def want(engines, axes, layout, allocation, surfaces):
+def want(config, memory, axes, layout, saturated, surfaces):
     """Bring what they are to give to this frame."""
     for i in (PITCH, YAW):
-        if reaches(layout, allocation, surfaces, i):
-            engines.wanted[i] -= engines.release * engines.wanted[i]
+        if reaches(layout, saturated, surfaces, i):
+            memory.wanted[i] -= config.release * memory.wanted[i]
         else:
-            engines.wanted[i] += engines.part * axes.shortfall[i]
-        for e in range(engines.n):
-            engines.serving[i, e] = engines.B[i, e] if engines.wanted[i] != 0.0 else 0.0
+            memory.wanted[i] += config.part * axes.shortfall[i]
+        for e in range(config.n):
+            memory.serving[i, e] = config.B[i, e] if memory.wanted[i] != 0.0 else 0.0
 
 
 @kernel
-def limit(engines, layout, base):
-    """How far each goes from the common lever `base`, and what all give about each axis at most: as far up as
-    down, so that their sum, which holds the airspeed, stays."""
-    problem, table = engines.problem, engines.thrust
-    layout.beside[:] = 0.0
-    most = min(gained(table, 0.0, base, engines.high), -gained(table, 0.0, base, engines.low))
-    for e in range(engines.n):
+def limit(config, memory, authority, base):
+    """How far each goes from the common lever `base`, and what all give about each axis at most, `authority`
+    (2, 3) rad/s2: as far up as down, so that their sum, which holds the airspeed, stays."""
+    problem, table = memory.problem, memory.thrust
+    authority[:] = 0.0
+    most = min(gained(table, 0.0, base, config.high), -gained(table, 0.0, base, config.low))
+    for e in range(config.n):
         problem.low[e], problem.high[e] = -most, most
         for i in (PITCH, YAW):
-            one, other = engines.B[i, e] * problem.low[e], engines.B[i, e] * problem.high[e]
-            layout.beside[0, i] += min(one, other)
-            layout.beside[1, i] += max(one, other)
+            one, other = config.B[i, e] * problem.low[e], config.B[i, e] * problem.high[e]
+            authority[0, i] += min(one, other)
+            authority[1, i] += max(one, other)
 
 
 @apart
-def steer(engines, power, axes, layout, allocation, surfaces, airspeed, t):
-    """Move the power of each engine by one frame, at t s; airspeed m/s."""
-    at_airspeed(engines.thrust, airspeed)
-    base = power.command[0]
-    limit(engines, layout, base)
-    want(engines, axes, layout, allocation, surfaces)
-    least_squares.solve(engines.problem, engines.serving, engines.wanted)
-    engines.wanted[:] = 0.0  # what cannot be given is not integrated
-    for e in range(engines.n):
-        u, before = engines.problem.u[e], power.command[1 + e]
+def steer(engines, power, axes, layout, saturated, surfaces, airspeed):
+    """Fill output.difference, the setting of each engine beside the common lever; airspeed m/s."""
+    config, memory, output = engines.config, engines.memory, engines.output
+    at_airspeed(memory.thrust, airspeed)
+    base = power.output.command[0]
+    limit(config, memory, output.authority, base)
+    want(config, memory, axes, layout, saturated, surfaces)
+    least_squares.solve(memory.problem, memory.serving, memory.wanted)
+    memory.wanted[:] = 0.0  # what cannot be given is not integrated
+    for e in range(config.n):
+        u = memory.problem.u[e]
         for i in (PITCH, YAW):
-            engines.wanted[i] += engines.serving[i, e] * u
-        difference = power_for(engines.thrust, 0.0, base, u) - base
-        power.command[1 + e] = min(max(difference, before - engines.step), before + engines.step)
-        power.in_use = power.in_use or power.command[1 + e] != 0.0
-    if power.in_use and engines.from_s < 0.0 and power.command[1] != 0.0:
-        engines.from_s = t
+            memory.wanted[i] += memory.serving[i, e] * u
+        output.difference[e] = power_for(memory.thrust, 0.0, base, u) - base
+
+
+@kernel
+def note_use(engines, power_output, t):
+    """Note since when engines turn the aircraft, t s."""
+    used = power_output.in_use and power_output.command[1] != 0.0
+    if used and engines.memory.from_s < 0.0:
+        engines.memory.from_s = t

@@ -3,7 +3,7 @@
     min  |B u - d|^2 + slack sum (u - p)^2 / v        low <= u <= high        [Harkegard2002, Bodson2002]
 
 B (3, n) rad/s2 per rad: what is left of each surface; d (3,) rad/s2; p (n,) rad: where a surface is that has
-nothing to do; v (n,) rad2: how willingly it moves, 0 for not at all. slack is small beside B v B', so that
+nothing to do; v (n,) rad2: the weight of its movement, 0 for none. slack is small beside B v B', so that
 what can be given is given, and p and v choose among the ways to give it.
 
 Primal active set [Nocedal2006, alg. 16.3]. With the surfaces at their limits held, the others follow from a
@@ -32,7 +32,7 @@ def problem_dtype(n: int) -> np.dtype:
     """A problem of n surfaces and its solution u. at: which limits hold, kept for the next frame; y: the
     multipliers; steps: systems solved."""
     return record(
-        preferred=n, willing=n, low=n, high=n, u=n, at=(int, n), y=3, S=(3, 3), steps=int, slack=float
+        u_preferred=n, weight=n, low=n, high=n, u=n, at=(int, n), y=3, S=(3, 3), steps=int, slack=float
     )
 
 
@@ -40,7 +40,7 @@ def problem_dtype(n: int) -> np.dtype:
 def solve(problem, B, demand):
     """Fill u (n,) rad, from B (3, n) rad/s2 per rad and a demand (3,) rad/s2."""
     begin(problem, B)
-    n, u, target = problem.u.size, problem.u, problem.preferred
+    n, u, target = problem.u.size, problem.u, problem.u_preferred
     problem.steps = 0
     for _ in range(4 * n + 4):
         problem.steps += 1
@@ -48,7 +48,7 @@ def solve(problem, B, demand):
         blocking, share = furthest(problem, B)
         for s in range(n):
             if problem.at[s] == FREE:
-                wanted = target[s] + problem.willing[s] * along(B, s, problem.y)
+                wanted = target[s] + problem.weight[s] * along(B, s, problem.y)
                 u[s] = u[s] + share * (wanted - u[s]) if blocking >= 0 else wanted
         if blocking >= 0:
             hold(problem, B, blocking)
@@ -67,7 +67,7 @@ def begin(problem, B):
             problem.u[s] = problem.high[s]
         problem.u[s] = min(max(problem.u[s], problem.low[s]), problem.high[s])
         for i in range(3):
-            total += B[i, s] * B[i, s] * problem.willing[s]
+            total += B[i, s] * B[i, s] * problem.weight[s]
     problem.slack = max(SLACK * total / 3.0, LEAST_SLACK)
 
 
@@ -88,7 +88,7 @@ def multipliers(problem, B, demand):
         p, q, r = B[0, s], B[1, s], B[2, s]
         at = problem.u[s]
         if problem.at[s] == FREE:
-            at, v = problem.preferred[s], problem.willing[s]
+            at, v = problem.u_preferred[s], problem.weight[s]
             a, b, c = a + v * p * p, b + v * q * q, c + v * r * r
             ba, ca, cb = ba + v * q * p, ca + v * r * p, cb + v * r * q
         y0, y1, y2 = y0 - p * at, y1 - q * at, y2 - r * at
@@ -112,7 +112,7 @@ def furthest(problem, B):
     for s in range(problem.u.size):
         if problem.at[s] != FREE:
             continue
-        wanted, now = problem.preferred[s] + problem.willing[s] * along(B, s, problem.y), problem.u[s]
+        wanted, now = problem.u_preferred[s] + problem.weight[s] * along(B, s, problem.y), problem.u[s]
         limit = problem.low[s] if wanted < problem.low[s] else problem.high[s]
         if wanted < problem.low[s] or wanted > problem.high[s]:
             part = (limit - now) / (wanted - now) if wanted != now else 0.0
@@ -124,7 +124,7 @@ def furthest(problem, B):
 @kernel
 def hold(problem, B, s):
     """Put surface s on the limit it has met."""
-    wanted = problem.preferred[s] + problem.willing[s] * along(B, s, problem.y)
+    wanted = problem.u_preferred[s] + problem.weight[s] * along(B, s, problem.y)
     problem.at[s] = LOW if wanted < problem.low[s] else HIGH
     problem.u[s] = problem.low[s] if wanted < problem.low[s] else problem.high[s]
 
@@ -137,7 +137,7 @@ def release(problem, B):
         if problem.at[s] == FREE:
             continue
         # in rad: how far inside of its limit it would be
-        wanted = problem.preferred[s] + problem.willing[s] * along(B, s, problem.y)
+        wanted = problem.u_preferred[s] + problem.weight[s] * along(B, s, problem.y)
         inside = problem.at[s] * (problem.u[s] - wanted)
         if inside > most:
             worst, most = s, inside

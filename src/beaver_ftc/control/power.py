@@ -21,7 +21,7 @@ from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.schema import MAX_LEVERS
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.control.allocation import remaining
-from beaver_ftc.control.laws import ADAPTING, FAULT_TOLERANT, ORACLE, law_of
+from beaver_ftc.control.laws.rows import row_of
 from beaver_ftc.design.engine import engine_power_kw, slipstream
 from beaver_ftc.design.model import AIRSPEED, DPT, QDYN
 from beaver_ftc.diagnosis.state import PITCH, YAW
@@ -31,24 +31,27 @@ LEAST_LACK_RAD_S2 = 0.05  # of pitch acceleration: what 2 to 3 inHg give
 WHOLE_RANGE_S = 5.0  # in which a lever goes from stop to stop
 YAW_SHARE = 0.5  # of the rudder, that engine power may claim: the rest is there to fly with
 
-# Settings, state, and what is reported of it.
-POWER = record(
-    enabled=int, impatience=float, forgiveness=float,  # shares per frame
-    speed_gain=float, attitude_gain=float,  # inHg per m/s, inHg per rad
-    smoothing=float, washout=float, leak=float,  # shares per frame
-    trim=float, low=float, high=float, step=float,  # in the units of the setting, as is the command
-    dpt_factor=float, highest_dpt=float, lost=float, engaged=int, in_use=int, moved=int, speed=float,
-    usual_speed=float, attitude=float,
-    command=MAX_LEVERS,  # of all engines, then what each that is an effector has beside it (engines.py)
-    from_s=float, frames=int, least=float, greatest=float,
+# impatience, forgiveness: shares a frame; speed_gain inHg per m/s, attitude_gain inHg per rad; smoothing,
+# washout, leak: shares a frame; trim, low, high, step: in the units of the setting, as is the command.
+CONFIG = record(
+    enabled=int, impatience=float, forgiveness=float, speed_gain=float, attitude_gain=float,
+    smoothing=float, washout=float, leak=float, trim=float, low=float, high=float, step=float,
+    dpt_factor=float, highest_dpt=float,
 )  # fmt: skip
+# base: the setting unless engaged, in trim or by the autopilot.
+SETPOINT = record(base=float)
+MEMORY = record(lost=float, engaged=int, moved=int, speed=float, usual_speed=float, attitude=float)
+# command: of all engines, then what each that is an effector has beside it (engines.py); in_use: whether the
+# levers are commanded; what is reported: since when and how long engaged, the lowest and highest setting.
+OUTPUT = record(command=MAX_LEVERS, in_use=int, from_s=float, frames=int, least=float, greatest=float)
+POWER = record(config=CONFIG, setpoint=SETPOINT, memory=MEMORY, output=OUTPUT)
 
 
 def is_at_hand(scenario: Scenario) -> bool:
     """Whether the built-in law of a scenario may use the engine."""
-    law, inner = law_of(scenario.control.law)
-    every_type = scenario.fdi.fault_class == "all" and inner != ADAPTING
-    wanted = scenario.control.power.enabled and (law == ORACLE or (law == FAULT_TOLERANT and every_type))
+    law = row_of(scenario.control.law)
+    every_type = scenario.fdi.fault_class == "all" and law.pitch_by_power
+    wanted = scenario.control.power.enabled and (law.informed or (law.reallocates and every_type))
     return wanted and _has_piston_engine(scenario.airframe)
 
 
@@ -59,28 +62,33 @@ def _has_piston_engine(aircraft: Aircraft) -> bool:
 
 def configure(power: np.void, layout: np.void, scenario: Scenario) -> None:
     """Fill the record (dtype POWER); layout: of the surfaces."""
-    config, dt = scenario.control.power, 1.0 / scenario.rate_hz
+    settings, dt, config = scenario.control.power, 1.0 / scenario.rate_hz, power["config"]
     initial: Any = scenario.initial  # its engine's keys are the aircraft's
-    power["enabled"], power["from_s"] = is_at_hand(scenario), -1.0
-    power["impatience"], power["forgiveness"] = dt / config.patience_s, dt / config.release_s
-    power["speed_gain"] = config.speed_gain_inhg_per_mps
-    power["attitude_gain"] = config.attitude_gain_inhg_per_deg / radians(1.0)
-    lags_s = {"smoothing": config.smoothing_s, "washout": config.washout_s, "leak": config.attitude_memory_s}
+    config["enabled"], power["output"]["from_s"] = is_at_hand(scenario), -1.0
+    config["impatience"], config["forgiveness"] = dt / settings.patience_s, dt / settings.release_s
+    config["speed_gain"] = settings.speed_gain_inhg_per_mps
+    config["attitude_gain"] = settings.attitude_gain_inhg_per_deg / radians(1.0)
+    lags_s = {
+        "smoothing": settings.smoothing_s,
+        "washout": settings.washout_s,
+        "leak": settings.attitude_memory_s,
+    }
     for name, lag_s in lags_s.items():
-        power[name] = 1.0 - exp(-dt / lag_s)
+        config[name] = 1.0 - exp(-dt / lag_s)
     named = scenario.airframe.file.power_setting
     if named is None:
         return
     name, setting = named
     trim = getattr(initial, name)
-    power["trim"] = power["command"][0] = power["least"] = power["greatest"] = trim
-    power["low"], power["high"] = low, high = setting.range
+    config["trim"] = power["setpoint"]["base"] = power["output"]["command"][0] = trim
+    power["output"]["least"] = power["output"]["greatest"] = trim
+    config["low"], config["high"] = low, high = setting.range
     per_s = (high - low) / WHOLE_RANGE_S
     if _has_piston_engine(scenario.airframe):
-        power["low"], power["high"] = min(config.lowest_inhg, trim), max(config.highest_inhg, trim)
-        power["dpt_factor"], power["highest_dpt"] = _slipstream_limits(scenario, layout)
-        per_s = config.rate_inhg_s
-    power["step"] = per_s * dt
+        config["low"], config["high"] = min(settings.lowest_inhg, trim), max(settings.highest_inhg, trim)
+        config["dpt_factor"], config["highest_dpt"] = _slipstream_limits(scenario, layout)
+        per_s = settings.rate_inhg_s
+    config["step"] = per_s * dt
 
 
 def _slipstream_limits(scenario: Scenario, layout: np.void) -> tuple[float, float]:
@@ -101,7 +109,8 @@ def _slipstream_limits(scenario: Scenario, layout: np.void) -> tuple[float, floa
 @kernel
 def unable(surfaces, saturated, s):
     """Whether surface s is given up or stands at a stop."""
-    return surfaces.effectiveness[s] < surfaces.least_effectiveness or saturated[s] == 1
+    given_up = surfaces.output.effectiveness[s] < surfaces.config.least_effectiveness
+    return given_up or saturated[s] == 1
 
 
 @kernel
@@ -111,12 +120,13 @@ def pitch_is_lost(layout, surfaces, saturated, shortfall):
     A flap that can still act is asked for what the elevator lacks, so a lack says that it has nothing left.
     shortfall (3,) rad/s2; saturated (n,).
     """
-    elevator, most = layout.main[PITCH], remaining(layout, surfaces.effectiveness, PITCH)
-    for s in range(surfaces.effectiveness.size):
-        if layout.aside[s]:
-            most = max(most, surfaces.effectiveness[s])
+    effectiveness, elevator = surfaces.output.effectiveness, layout.main[PITCH]
+    most = remaining(layout, effectiveness, PITCH)
+    for s in range(effectiveness.size):
+        if layout.is_backup[s]:
+            most = max(most, effectiveness[s])
     lacking = unable(surfaces, saturated, elevator) and abs(shortfall[PITCH]) > LEAST_LACK_RAD_S2
-    return most < surfaces.least_effectiveness or lacking
+    return most < surfaces.config.least_effectiveness or lacking
 
 
 @kernel
@@ -125,25 +135,26 @@ def watch(power, is_lost, t):
 
     lost counts up while it is and down while it is not, between 0 and 1: swings past zero keep what they add.
     """
-    change = power.impatience if is_lost else -power.forgiveness
-    power.lost = min(max(power.lost + change, 0.0), 1.0)
-    if power.lost == 1.0 and not power.engaged:
-        power.engaged, power.attitude = 1, 0.0
-        if power.from_s < 0.0:
-            power.from_s = t
-    elif power.lost == 0.0:
-        power.engaged = 0
+    config, memory, output = power.config, power.memory, power.output
+    change = config.impatience if is_lost else -config.forgiveness
+    memory.lost = min(max(memory.lost + change, 0.0), 1.0)
+    if memory.lost == 1.0 and not memory.engaged:
+        memory.engaged, memory.attitude = 1, 0.0
+        if output.from_s < 0.0:
+            output.from_s = t
+    elif memory.lost == 0.0:
+        memory.engaged = 0
 
 
 @kernel
-def follow(power, reference, x, y):
+def follow(config, memory, reference, x, y):
     """Bring airspeed, its slow mean and the attitude missed to this frame; x (3,) rad/s, y (5,)."""
-    if power.usual_speed == 0.0:
-        power.speed = power.usual_speed = y[AIRSPEED]
-    power.speed += power.smoothing * (y[AIRSPEED] - power.speed)
-    power.usual_speed += power.washout * (power.speed - power.usual_speed)
-    error = x[PITCH] - reference.governed_rate[PITCH]
-    power.attitude += reference.dt * error - power.leak * power.attitude
+    if memory.usual_speed == 0.0:
+        memory.speed = memory.usual_speed = y[AIRSPEED]
+    memory.speed += config.smoothing * (y[AIRSPEED] - memory.speed)
+    memory.usual_speed += config.washout * (memory.speed - memory.usual_speed)
+    error = x[PITCH] - reference.output.governed_rate[PITCH]
+    memory.attitude += reference.config.dt * error - config.leak * memory.attitude
 
 
 @kernel
@@ -153,20 +164,21 @@ def ceiling(power, y, highest_dpt):
     The propeller yaws with dpt^3: slow and at full power, more than the rudder can hold. No limit where
     nothing is known of a slipstream.
     """
-    if power.dpt_factor == 0.0:
+    if power.config.dpt_factor == 0.0:
         return np.inf
-    per_inhg = power.dpt_factor / (2.0 * y[QDYN] * y[AIRSPEED])
-    return power.command[0] + (highest_dpt - y[DPT]) / per_inhg
+    per_inhg = power.config.dpt_factor / (2.0 * y[QDYN] * y[AIRSPEED])
+    return power.output.command[0] + (highest_dpt - y[DPT]) / per_inhg
 
 
 @kernel
 def wanted(power, y):
-    """The law: manifold pressure, inHg, within its limits; the trimmed one unless engaged."""
-    if not power.engaged:
-        return power.trim
-    deviation = power.speed - power.usual_speed
-    pressure = power.trim - power.speed_gain * deviation + power.attitude_gain * power.attitude
-    return max(min(pressure, ceiling(power, y, power.highest_dpt), power.high), power.low)
+    """The law: manifold pressure, inHg, within its limits; the set one unless engaged."""
+    config, memory = power.config, power.memory
+    if not memory.engaged:
+        return power.setpoint.base
+    deviation = memory.speed - memory.usual_speed
+    pressure = power.setpoint.base - config.speed_gain * deviation + config.attitude_gain * memory.attitude
+    return max(min(pressure, ceiling(power, y, config.highest_dpt), config.high), config.low)
 
 
 @kernel
@@ -175,14 +187,41 @@ def steer(power, reference, x, y, watched, is_lost, t):
 
     watched: whether it may take over, since there is an alarm; is_lost: `pitch_is_lost` now.
     """
-    follow(power, reference, x, y)
+    memory, output = power.memory, power.output
+    follow(power.config, memory, reference, x, y)
     if watched:
         watch(power, is_lost, t)
-    before = power.command[0]
-    power.command[0] = min(max(wanted(power, y), before - power.step), before + power.step)
-    power.in_use = power.engaged or power.moved
-    power.moved = power.command[0] != power.trim
-    if power.in_use:
-        power.frames += power.engaged
-        power.least = min(power.least, power.command[0])
-        power.greatest = max(power.greatest, power.command[0])
+    output.command[0] = moved(output.command[0], wanted(power, y), power.config.step)
+    output.in_use = memory.engaged or memory.moved
+    memory.moved = output.command[0] != power.setpoint.base
+    if output.in_use:
+        output.frames += memory.engaged
+        output.least = min(output.least, output.command[0])
+        output.greatest = max(output.greatest, output.command[0])
+
+
+@kernel
+def moved(before, wanted, step):
+    """The setting `wanted`, as far as one `step` of a frame reaches from `before`."""
+    return min(max(wanted, before - step), before + step)
+
+
+@kernel
+def follow_autopilot(power, setting, airspeed):
+    """Take the setting that the autopilot asks for, and the airspeed (m/s) to hold while power stands in for
+    a lost pitch: this law has an airspeed loop of its own."""
+    power.output.in_use, power.setpoint.base = 1, setting
+    if power.memory.engaged:
+        power.memory.usual_speed = airspeed
+    if not power.config.enabled:
+        power.output.command[0] = moved(power.output.command[0], setting, power.config.step)
+
+
+@kernel
+def move_differences(power, difference, n, step):
+    """Move what each of n engines has beside the common lever towards `difference` (n,), by at most a
+    step."""
+    output = power.output
+    for e in range(n):
+        output.command[1 + e] = moved(output.command[1 + e], difference[e], step)
+        output.in_use = output.in_use or output.command[1 + e] != 0.0

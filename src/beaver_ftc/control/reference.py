@@ -18,18 +18,21 @@ from beaver_ftc.scenario.control import ControlConfig
 MISSED_RAD_S = 0.1  # a rate missed in all by this much: the reference is given up
 RECOVERY_S = 30.0  # and asked for again within this time: several periods of a slow reference
 
-# The model A, B over dt s; its answer to what is commanded, and the one that is governed: rad/s, rad/s2.
-# hedging: from when on it is; steered: by outer loops.
-REFERENCE = record(
-    dt=float, A=(2, 2), B=2, steered=int, commanded_rate=3, model_rate=3, model_acceleration=3,
-    governed_rate=3, governed_acceleration=3, hedging=int, scale=3,
-)  # fmt: skip
+# The model A, B over dt s; steered: whether outer loops ask for the rates.
+CONFIG = record(dt=float, A=(2, 2), B=2, steered=int)
+# active: whether the reference is governed, from the first loss of authority on; scale: of what is commanded.
+GOVERNOR = record(active=int, scale=3)
+# The commanded rate, the model's answer to it and the governed one that the law follows: rad/s, rad/s2.
+OUTPUT = record(
+    commanded_rate=3, model_rate=3, model_acceleration=3, governed_rate=3, governed_acceleration=3
+)
+REFERENCE = record(config=CONFIG, memory=GOVERNOR, output=OUTPUT)
 
 
 def configure(reference: np.void, config: ControlConfig, dt_s: float) -> None:
     """Fill the record (dtype REFERENCE) for frames of dt_s seconds."""
-    reference["dt"], reference["scale"] = dt_s, 1.0
-    reference["A"], reference["B"] = discretise(
+    reference["config"]["dt"], reference["memory"]["scale"] = dt_s, 1.0
+    reference["config"]["A"], reference["config"]["B"] = discretise(
         config.reference_natural_frequency_rad_s, config.reference_damping, dt_s
     )
 
@@ -51,39 +54,43 @@ def discretise(wn: float, zeta: float, dt: float) -> tuple[np.ndarray, np.ndarra
 
 
 @kernel
-def advance(reference, rate, acceleration, wanted):
+def advance(config, rate, acceleration, wanted):
     """Rate (rad/s) and acceleration (rad/s2) of the model a frame on, `wanted` (rad/s) held."""
-    A, B = reference.A, reference.B
+    A, B = config.A, config.B
     following = A[0, 0] * rate + A[0, 1] * acceleration + B[0] * wanted
     return following, A[1, 0] * rate + A[1, 1] * acceleration + B[1] * wanted
 
 
 @kernel
-def follow(reference, commanded):
+def follow(config, output, commanded):
     """Advance the model by one frame towards `commanded` (3,) rad/s."""
-    reference.commanded_rate[:] = commanded
+    output.commanded_rate[:] = commanded
     for i in range(3):
-        rate, acceleration = reference.model_rate[i], reference.model_acceleration[i]
-        rate, acceleration = advance(reference, rate, acceleration, commanded[i])
-        reference.model_rate[i], reference.model_acceleration[i] = rate, acceleration
+        rate, acceleration = output.model_rate[i], output.model_acceleration[i]
+        rate, acceleration = advance(config, rate, acceleration, commanded[i])
+        output.model_rate[i], output.model_acceleration[i] = rate, acceleration
 
 
 @kernel
-def govern(reference, commanded, shortfall):
+def govern(reference, commanded, shortfall, authority_lost):
     """Bring what the law follows to the next frame.
 
-    commanded (3,) rad/s; shortfall (3,) rad/s2: what was demanded and not given.
+    commanded (3,) rad/s; shortfall (3,) rad/s2: what was demanded and not given. authority_lost: whether a
+    surface is slow or parked now: from then on the reference is governed.
     """
-    if not reference.hedging:
-        reference.governed_rate[:] = reference.model_rate
-        reference.governed_acceleration[:] = reference.model_acceleration
+    config, governor, output = reference.config, reference.memory, reference.output
+    if authority_lost:
+        governor.active = 1
+    if not governor.active:
+        output.governed_rate[:] = output.model_rate
+        output.governed_acceleration[:] = output.model_acceleration
         return
-    dt = reference.dt
+    dt = config.dt
     for i in range(3):
-        scale = reference.scale[i] - dt * abs(shortfall[i]) / MISSED_RAD_S
-        if not reference.steered:  # outer loops ask again for what was missed
-            reference.scale[i] = max(scale + dt / RECOVERY_S * (1.0 - scale), 0.0)
-        rate, acceleration = reference.governed_rate[i], reference.governed_acceleration[i]
-        rate, acceleration = advance(reference, rate, acceleration, reference.scale[i] * commanded[i])
-        reference.governed_rate[i] = rate - dt * shortfall[i]
-        reference.governed_acceleration[i] = acceleration
+        scale = governor.scale[i] - dt * abs(shortfall[i]) / MISSED_RAD_S
+        if not config.steered:  # outer loops ask again for what was missed
+            governor.scale[i] = max(scale + dt / RECOVERY_S * (1.0 - scale), 0.0)
+        rate, acceleration = output.governed_rate[i], output.governed_acceleration[i]
+        rate, acceleration = advance(config, rate, acceleration, governor.scale[i] * commanded[i])
+        output.governed_rate[i] = rate - dt * shortfall[i]
+        output.governed_acceleration[i] = acceleration

@@ -1,49 +1,76 @@
-"""The control stage: the records of the law, one a part of it, and how they are filled from a scenario."""
+"""The control stage: the records of its parts, how they are filled from a scenario, and what a change of law
+keeps of them."""
 
 import numpy as np
 
 from beaver_ftc.compiled import record, sized
 from beaver_ftc.control import accommodation, allocation, engines, power, reference
 from beaver_ftc.control.accommodation import surfaces_dtype
-from beaver_ftc.control.allocation import AXES, PROBE, allocation_dtype, layout_dtype
+from beaver_ftc.control.allocation import PROBE, allocation_dtype, axes_dtype, layout_dtype
+from beaver_ftc.control.base import CompiledLaw
 from beaver_ftc.control.engines import ENGINES
-from beaver_ftc.control.laws import ADAPTING, REJECTING, gains, law_of, zhang2005
-from beaver_ftc.control.laws.published import FEEDBACK
-from beaver_ftc.control.laws.rejecting import rejection_dtype
+from beaver_ftc.control.laws.rows import row_of
+from beaver_ftc.control.laws.table import FILES
 from beaver_ftc.control.power import POWER
 from beaver_ftc.control.reference import REFERENCE
-from beaver_ftc.control.rivals.compiled import RIVAL
 from beaver_ftc.scenario.schema import Scenario
+
+# law: place of its file in laws/table.py; what the law is given: see plugins.yaml.
+CONFIG = record(law=int, uses_verdict=int, reallocates=int, informed=int)
+
+# What a law takes over from the one before: how the reference stands, what is known of the surfaces, where
+# they and the engine are. All else begins anew.
+KEPT = (
+    ("reference", "output"), ("surfaces", "output"), ("allocation", "output"), ("probe", "memory"),
+    ("power", "memory"), ("power", "output"),
+)  # fmt: skip
 
 
 @sized
 def control_dtype(n: int) -> np.dtype:
-    """What the law of an aircraft with n surfaces keeps: a record of each part, which alone writes it."""
+    """The records of the control stage for n surfaces, one a part; each part's file alone writes its own."""
     return record(
-        law=int, inner=int,  # laws/__init__.py
-        reference=REFERENCE, layout=layout_dtype(n), surfaces=surfaces_dtype(n), feedback=FEEDBACK,
-        adaptation=zhang2005.ADAPTATION,
-        rejection=rejection_dtype(n), rival=RIVAL, axes=AXES, allocation=allocation_dtype(n), probe=PROBE,
-        power=POWER, engines=ENGINES,
+        config=CONFIG, reference=REFERENCE, layout=layout_dtype(n), surfaces=surfaces_dtype(n),
+        axes=axes_dtype(n), allocation=allocation_dtype(n), probe=PROBE, power=POWER, engines=ENGINES,
+        **{file: law.records(n) for file, law in FILES.items()},
     )  # fmt: skip
 
 
 def configure(control: np.void, scenario: Scenario, travel: np.ndarray) -> None:
     """Fill a law's record from a scenario; travel (2, n) rad: the stops. A plug-in: loop/plugin_frame.py."""
-    config, dt = scenario.control, 1.0 / scenario.rate_hz
-    control["law"], control["inner"] = law_of(config.law)
+    config, dt, row = scenario.control, 1.0 / scenario.rate_hz, row_of(scenario.control.law)
+    control["config"] = row.place, row.uses_verdict, row.reallocates, row.informed
     reference.configure(control["reference"], config, dt)
-    accommodation.configure(control["surfaces"], config, int(control["law"]), dt)
-    control["feedback"]["Kp"], control["feedback"]["Ki"] = config.proportional_per_s, config.integral_per_s2
+    accommodation.configure(control["surfaces"], config, row.informed, dt)
     allocation.configure(control, config, travel, scenario.airframe)
     allocation.configure_probe(control["probe"], scenario.fdi.probing, dt)
-    if control["inner"] == ADAPTING:
-        zhang2005.configure(control, config, travel)
     power.configure(control["power"], control["layout"], scenario)
     engines.configure(control["engines"], scenario)
+    if (law := FILES[row.file]).configure is not None:
+        law.configure(control[row.file], control, scenario, travel)
 
 
 def anchor(control: np.void, belief: np.void, scenario: Scenario, y: np.ndarray) -> None:
-    """Show an inner law the trim, if it derives its gains there; y: the measured signals."""
-    if control["inner"] == REJECTING:
-        gains.configure(control["rejection"], control["layout"], belief, scenario, y)
+    """Show a law the trim, if it derives its gains there; y: the measured signals."""
+    row = row_of(scenario.control.law)
+    if (law := FILES[row.file]).anchor is not None:
+        law.anchor(control[row.file], control, belief, scenario, y)
+
+
+def take_over(new: np.void, before: np.void, learnt: np.ndarray) -> None:
+    """Let a law, configured in `new`, take over from the one in `before` without a bump: the stages in KEPT
+    go on, and its integrators begin where the demand is.
+
+    learnt (3,) rad/s2: what the diagnosis' network explains.
+    """
+    for stage, part in KEPT:
+        new[stage][part] = before[stage][part]
+    law, next_law = in_charge(before), in_charge(new)
+    unexplained = law.unexplained(before) if law.unexplained else before["surfaces"]["output"]["unknown"]
+    if next_law.begin is not None:
+        next_law.begin(new, before, unexplained, learnt)
+
+
+def in_charge(control: np.void) -> CompiledLaw:
+    """The law that a record flies by."""
+    return list(FILES.values())[int(control["config"]["law"])]

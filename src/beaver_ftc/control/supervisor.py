@@ -6,7 +6,6 @@ rudder: no second surface), or unanticipated (no known fault fits).
 """
 
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.control.laws import FAULT_TOLERANT, NOMINAL
 from beaver_ftc.diagnosis.state import PITCH, UNANTICIPATED
 from beaver_ftc.diagnosis.types.contract import FIXED, LOSES
 from beaver_ftc.scenario.control import MODES
@@ -28,32 +27,32 @@ def next_mode(now, wanted):
 
 
 @kernel
-def mode_of(law, detected, isolated, relieved):
+def mode_of(config, detected, isolated, relieved):
     """The mode for a law, given the diagnosis: detected 0/1, isolated (estimator index, -1 or -2), and
-    whether another surface can relieve the one isolated.
+    whether another surface can relieve the one isolated. config: what the law is given (control/state.py).
 
-    The nominal law has nothing to reconfigure: it stays as it is.
+    A law that does not use the verdict has nothing to reconfigure: it stays as it is.
     """
-    if law == NOMINAL or not detected:
+    if not config.uses_verdict or not detected:
         return MODE_NOMINAL
     if isolated == UNANTICIPATED:
         return MODE_UNANTICIPATED
-    if law == FAULT_TOLERANT and isolated >= 0 and relieved:
+    if config.reallocates and isolated >= 0 and relieved:
         return MODE_REALLOCATED
     return MODE_ADAPTIVE
 
 
 @kernel
-def mode_from(law, layout, verdict, assessment):
-    """The mode that the diagnosis asks for; verdict: what it concludes."""
+def mode_from(config, layout, verdict, assessment):
+    """The mode that the diagnosis asks for; verdict: what it concludes; config: as in `mode_of`."""
     elevator, relievable = layout.main[PITCH], layout.stand_in >= 0
     if not assessment.every_type:
         relieved = assessment.named == elevator and relievable
-        return mode_of(law, verdict.detected, verdict.isolated, relieved)
+        return mode_of(config, verdict.detected, verdict.isolated, relieved)
     replaced = verdict.lead_kind in (LOSES, FIXED)
     relieved = replaced and verdict.lead == elevator and relievable
     isolated = verdict.lead if replaced else min(verdict.isolated, 0)
-    return mode_of(law, verdict.detected, isolated, relieved)
+    return mode_of(config, verdict.detected, isolated, relieved)
 
 
 @kernel

@@ -7,8 +7,8 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.diagnosis.conclusion import is_unknown, isolated_surface
-from beaver_ftc.diagnosis.detection import statistical
-from beaver_ftc.diagnosis.state import WORST_CASE
+from beaver_ftc.diagnosis.detection import fdae, statistical
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, WORST_CASE
 from beaver_ftc.diagnosis.types import verdict
 from beaver_ftc.diagnosis.types.contract import FIXED, LAGS, LOSES, SHIFTED
 
@@ -20,10 +20,11 @@ def assessment_dtype(n: int) -> np.dtype:
     """The assessment of n surfaces. detected: a fault; unknown: no surface is isolated or leads; named: the
     isolated surface, -1 for none. measure: accommodation mode of each, -1 where it is open, or where faults
     of every type are not diagnosed; effectiveness; offset, lag rad; at_once: whether its effectiveness need
-    not be eased in. hedge: a surface is slow."""
+    not be eased in. hedge: a surface is slow. unknown_acceleration (3,) rad/s2: that no known fault explains;
+    pitch_is_open: whether elevator or flap is at fault and it has long been open which."""
     return record(
         detected=int, unknown=int, every_type=int, named=int, hedge=int, measure=(int, n), effectiveness=n,
-        at_once=(int, n), offset=n, lag=n,
+        at_once=(int, n), offset=n, lag=n, unknown_acceleration=3, pitch_is_open=int,
     )  # fmt: skip
 
 
@@ -77,3 +78,21 @@ def isolated_theta(config, conclusion, layout, estimators, statistics, s):
 def likelihood_counts(tests, authority):
     """Whether the estimates of the statistical detector are used."""
     return tests.enabled and authority != WORST_CASE
+
+
+@kernel
+def assess_unknown(assessment, config, conclusion, types, layout, statistics, detector, bound):
+    """Fill unknown_acceleration and pitch_is_open; detector: the FDAE's record; bound: what is declared.
+
+    No acceleration is asked for what a slow surface lags: it would only wind the command up.
+    """
+    unknown, every_type = assessment.unknown_acceleration, config.every_type
+    unknown[:] = 0.0
+    lags = conclusion.lead >= 0 and conclusion.lead_kind == LAGS
+    if conclusion.detected and not lags and likelihood_counts(statistics.tests, config.authority):
+        statistical.unknown_acceleration(statistics.block, statistics.air, unknown)
+    elif conclusion.detected and not lags:
+        fdae.unknown_acceleration(detector, bound.noise, unknown)
+    is_open = every_type and conclusion.detected and conclusion.isolated == NOT_ISOLATED
+    long = types.surface[layout.main[PITCH]].evidence >= types.config.patience
+    assessment.pitch_is_open = is_open and long

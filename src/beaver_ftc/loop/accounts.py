@@ -42,21 +42,28 @@ INCONCLUSIVE = record(
 
 @sized
 def accounts_dtype(n: int) -> np.dtype:
-    """Accounts of a flight with n surfaces; travelled (n,) rad, hurried
+    """Accounts of a flight with n surfaces; actuator_travel (n,) rad, actuator_energy
     (n,) rad2/s: the integral of the speed's square."""
     return record(
         guarantee=GUARANTEE, tracking=TRACKING, authority=AUTHORITY, envelope=ENVELOPE,
         inconclusive=INCONCLUSIVE,
-        saturated_frames=(int, n), travelled=n, hurried=n, position_then=n,
+        saturated_frames=(int, n), actuator_travel=n, actuator_energy=n, position_then=n,
     )  # fmt: skip
 
 
+@sized
+def true_faults_dtype(n: int) -> np.dtype:
+    """present: 1 from the first fault on. effectiveness (n,): 1 healthy. immovable (n,): does not follow its
+    command. effective (n,) rad: the deflection that acts. Cm_alpha3: the unanticipated pitching moment."""
+    return record(present=int, Cm_alpha3=float, effectiveness=n, immovable=(int, n), effective=n)
+
+
 @kernel
-def share_faults(truth, faults, oracle):
-    """Put into `faults` what the law may know of the truth: to the oracle all, to others whether to account
-    for authority."""
+def share_faults(truth, faults, informed):
+    """Fill `faults` (`true_faults_dtype`): for an informed law all, for others whether to account for
+    authority."""
     faults.present = truth.faulted
-    if oracle:
+    if informed:
         faults.Cm_alpha3 = truth.Cm_alpha3
         for s in range(faults.effectiveness.size):
             faults.effectiveness[s] = effectiveness(truth, s)
@@ -120,14 +127,14 @@ def track(tracking, truth, model_rate):
 
 @kernel
 def account_surfaces(accounts, truth, saturated, k, dt):
-    """How long each surface was saturated, how far it has travelled and how fast."""
+    """How long each surface was saturated, how far it has actuator_travel and how fast."""
     for s in range(saturated.size):
         now = position(truth, s)
         accounts.saturated_frames[s] += saturated[s]
         if k > 0:
             moved = now - accounts.position_then[s]
-            accounts.travelled[s] += abs(moved)
-            accounts.hurried[s] += moved * moved / dt
+            accounts.actuator_travel[s] += abs(moved)
+            accounts.actuator_energy[s] += moved * moved / dt
         accounts.position_then[s] = now
 
 

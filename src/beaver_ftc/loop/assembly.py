@@ -4,7 +4,6 @@ import numpy as np
 
 from beaver_ftc.compiled import record, sized
 from beaver_ftc.control import state as control
-from beaver_ftc.control.accommodation import true_faults_dtype
 from beaver_ftc.control.outer.state import AUTOPILOT, COLUMNS
 from beaver_ftc.control.supervisor import SUPERVISOR
 from beaver_ftc.diagnosis import scheme
@@ -14,7 +13,7 @@ from beaver_ftc.diagnosis.detection.parity import USUAL, Size, size_for
 from beaver_ftc.diagnosis.isolation.estimators import estimator_names
 from beaver_ftc.diagnosis.state import verdict_dtype
 from beaver_ftc.loop import instrument_records, memory
-from beaver_ftc.loop.accounts import accounts_dtype
+from beaver_ftc.loop.accounts import accounts_dtype, true_faults_dtype
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.instruments import MEASURED, USUAL_LINE, instruments_dtype
 from beaver_ftc.plant.native import RUNNING
@@ -65,7 +64,7 @@ def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.nda
     frames = memory.copied(_designs[key])
     frame = frames[0]
     frame["belief"]["u"] = frame["belief"]["commanded"] = trim
-    frame["control"]["layout"]["trim"] = frame["control"]["allocation"]["command"] = trim
+    frame["control"]["layout"]["trim"] = frame["control"]["allocation"]["output"]["command"] = trim
     instrument_records.seed(frame["instruments"], scenario.seed)
     return frames
 
@@ -100,8 +99,8 @@ def lay_out(frame: np.void, scenario: Scenario, diagnoses_itself: bool) -> tuple
     estimators = estimator_names(scenario.fdi.fault_class, aircraft) if diagnoses_itself else ()
     logged["estimators"] = fdi["isolation"]["n"] if diagnoses_itself else 0
     watched = logged["watch"] = instrument_records.columns_of_the_watch(scenario)
-    moved = frame["control"]["power"]["enabled"] or (profile and aircraft.airspeed_by == "power")
-    moved |= bool(frame["control"]["engines"]["n"])
+    moved = frame["control"]["power"]["config"]["enabled"] or (profile and aircraft.airspeed_by == "power")
+    moved |= bool(frame["control"]["engines"]["config"]["n"])
     power = aircraft.power_setting if moved else ""
     logged["power"] = 1 + len(aircraft.effectors) if power else 0
     logged["tests"] = tests["n_columns"] if tests["enabled"] else 0

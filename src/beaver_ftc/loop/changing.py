@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from beaver_ftc.control.laws import ADAPTING, NOMINAL, ORACLE, REJECTING
+from beaver_ftc.control.state import take_over
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.loop.plugin_frame import PluginFrame, named_detector, named_law, plugged
@@ -20,19 +20,6 @@ from beaver_ftc.scenario.interventions import stages
 from beaver_ftc.scenario.schema import Change, Scenario
 from beaver_ftc.scenario.timing import frame_of
 
-# What a law takes over from the one before it: where reference, command and engine are, and what is believed.
-KEPT = {
-    "reference": (
-        "commanded_rate", "model_rate", "model_acceleration", "governed_rate", "governed_acceleration",
-    ),
-    "surfaces": ("effectiveness", "offset", "lag"),
-    "allocation": ("command", "saturated", "hand_over"),
-    "probe": ("deflection", "probed", "from_s", "to_s"),
-    "power": (
-        "lost", "engaged", "in_use", "moved", "speed", "usual_speed", "attitude", "command",
-        "from_s", "frames", "least", "greatest",
-    ),
-}  # fmt: skip
 OF_INSTRUMENTS = (
     "real", "gain", "bias", "noise", "quantum", "dropout", "drift", "keep", "delay", "first", "length",
     "engine",
@@ -111,7 +98,7 @@ class Changing:
         forces = statistical["forces"]["known"] or statistical["air"]["read"]
         if frame["fdi"]["watch"]["enabled"] or frame["instruments"]["engine"] or forces:
             loop.read_more()
-        frame["control"]["power"]["enabled"] = new["control"]["power"]["enabled"]
+        frame["control"]["power"]["config"]["enabled"] = new["control"]["power"]["config"]["enabled"]
         before = loop.plugin_frame
         if stage.plugins is not None and before is not None and stage.plugins.detector is before.detector:
             stage.plugins.verdict = before.verdict  # which still stands
@@ -148,29 +135,11 @@ def renews_diagnosis(change: Change, then: Scenario) -> bool:
 
 
 def take_law(frame: np.void, new: np.void) -> None:
-    """Put a law in the place of another, without a bump: its integrators begin where the demand is."""
-    control, verdict = frame["control"], frame["fdi"]["verdict"]
-    disturbance = _unexplained(control)
-    for part, names in KEPT.items():
-        for name in names:
-            new[part][name] = control[part][name]
-    if new["inner"] == REJECTING:
-        # Where there is no observer yet it begins with what is measured.
-        for name in ("begun", "rate", "part"):
-            new["rejection"][name] = control["rejection"][name]
-        new["rejection"]["disturbance"] = disturbance
-    elif new["feedback"]["Ki"] > 0.0:
-        learns = verdict["detected"] and new["law"] not in (NOMINAL, ORACLE) and new["inner"] != ADAPTING
-        learnt = frame["fdi"]["fdae"]["network"]["output"] if learns else 0.0
-        new["feedback"]["integral"] = (learnt - disturbance) / new["feedback"]["Ki"]
+    """Put a law, configured in `new`, in the place of another, without a bump."""
+    fdi = frame["fdi"]
+    learnt = fdi["fdae"]["network"]["output"].copy() if fdi["verdict"]["detected"] else np.zeros(3)
+    take_over(new, frame["control"], learnt)
     frame["control"] = new
-
-
-def _unexplained(control: np.void) -> np.ndarray:
-    """What the law in charge takes for acceleration that no model explains, (3,) rad/s2."""
-    feedback, rejection = control["feedback"], control["rejection"]
-    learnt: np.ndarray = feedback["fhat"] - feedback["Ki"] * feedback["integral"]
-    return rejection["disturbance"].copy() if control["inner"] == REJECTING else learnt
 
 
 def take_diagnosis(frame: np.void, new: np.void, k: int) -> None:

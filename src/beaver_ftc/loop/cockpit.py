@@ -48,7 +48,7 @@ class Cockpit:
     def write(self) -> None:
         """Hand the command over, through Python."""
         self._write.write(self._frames["belief"]["commanded"][0])
-        power = self._frames["control"]["power"]
+        power = self._frames["control"]["power"]["output"]
         if power["in_use"][0]:
             self._engine.write(power["command"][0, : len(self._engine.nodes)])
 

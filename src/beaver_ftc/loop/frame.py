@@ -15,15 +15,13 @@ effect from the next on.
 import numpy as np
 
 from beaver_ftc.compiled import apart, kernel
-from beaver_ftc.control import accommodation, allocation, engines, power, reference, supervisor
-from beaver_ftc.control.laws import ADAPTING, INDI, LQR, NOMINAL, ORACLE, REJECTING, published, rejecting
-from beaver_ftc.control.laws import zhang2005 as adapting
+from beaver_ftc.control import allocation, power, reference, supervisor
+from beaver_ftc.control.laws import table
 from beaver_ftc.control.outer.autopilot import judge, steer
-from beaver_ftc.control.rivals import compiled
-from beaver_ftc.control.supervisor import MODE_REALLOCATED
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, unanticipated_pitch
-from beaver_ftc.diagnosis import assessment, conclusion, scheme, zhang2005
-from beaver_ftc.diagnosis.assessment import assess
+from beaver_ftc.diagnosis import assessment as assessed
+from beaver_ftc.diagnosis import conclusion, scheme, zhang2005
+from beaver_ftc.diagnosis.assessment import assess, assess_unknown
 from beaver_ftc.diagnosis.belief import air
 from beaver_ftc.diagnosis.belief.expectation import (
     begin_frame,
@@ -39,9 +37,8 @@ from beaver_ftc.diagnosis.detection import bank, fdae, parity, statistical
 from beaver_ftc.diagnosis.detection.signatures import sign_blocks
 from beaver_ftc.diagnosis.isolation import by_chance, estimators
 from beaver_ftc.diagnosis.monitors import engine_symmetry, sensor_monitor
-from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, STATISTICS, UNANTICIPATED, WORST_CASE, YAW
+from beaver_ftc.diagnosis.state import PITCH, STATISTICS, UNANTICIPATED, WORST_CASE, YAW
 from beaver_ftc.diagnosis.types import examine, verdict
-from beaver_ftc.diagnosis.types.contract import LAGS
 from beaver_ftc.loop import accounts, log_row
 from beaver_ftc.loop.log_row import put
 from beaver_ftc.plant import channels as ch
@@ -52,7 +49,7 @@ from beaver_ftc.plant.sensing import NOT_FINITE, flight_status, hand_over, measu
 def watch_instruments(frame):
     """Hold the instruments against one another; what is known to be broken is replaced. What an instant
     inside a frame shows is known with that frame."""
-    fdi, watch, engine = frame.fdi, frame.fdi.watch, frame.control.power
+    fdi, watch, engine = frame.fdi, frame.fdi.watch, frame.control.power.output
     before, t = watch.alarmed, frame.k * frame.dt
     if engine.in_use:
         watch.step.command[1] = engine.command[0]
@@ -104,7 +101,8 @@ def diagnose(frame):
             predict(frame, k)
         else:
             bank.align(fdi.isolation, frame.belief.G)
-        engine_symmetry.disable_if_differential_thrust(fdi.engines, frame.control.power.command[1:])
+        differences = frame.control.power.output.command[1:]
+        engine_symmetry.disable_if_differential_thrust(fdi.engines, differences)
         conclude(fdi, frame.measured, frame.belief.u, frame.t)
     make_ready(frame, k)
 
@@ -144,7 +142,7 @@ def predict(frame, k):
         examine.note_orders(fdi.types, belief.commanded, mean)
     if known:
         estimators.predict_all(fdi.isolation, bound, x_then, mean.acceleration, dt)
-    expect(belief, known, surfaces.effectiveness, surfaces.offset, config.every_type)
+    expect(belief, known, surfaces.output.effectiveness, surfaces.output.offset, config.every_type)
     if chances.tests.enabled:
         form_innovation(belief, x, dt)
         statistical.follow_rest(chances.block, chances.air, belief.innovation_after_known_faults, dt)
@@ -275,11 +273,17 @@ def make_ready(frame, k):
         look_ahead(frame, k)
     begin_frame(belief, fdi.bound, fdi.layout, fdi.config.every_type, frame.measured)
     accounts.follow_guarantee(frame.accounts.guarantee, fdi.bank, fdi.config.dt, belief.share, k, frame.t)
-    assess(
-        frame.assessment, fdi.config, fdi.verdict, fdi.types, fdi.layout, fdi.isolation.estimator,
-        fdi.statistical,
-    )  # fmt: skip
+    assess_faults(frame)
     note_names(fdi, frame.t)
+
+
+@kernel
+def assess_faults(frame):
+    """Put what the diagnosis says of each surface, and of what is unknown, where the law reads it."""
+    fdi, assessment = frame.fdi, frame.assessment
+    config, found, types, layout, chances = fdi.config, fdi.verdict, fdi.types, fdi.layout, fdi.statistical
+    assess(assessment, config, found, types, layout, fdi.isolation.estimator, chances)
+    assess_unknown(assessment, config, found, types, layout, chances, fdi.fdae, fdi.bound)
 
 
 @kernel
@@ -322,210 +326,61 @@ def look_on(frame):
 @kernel
 def isolated_theta(fdi, s):
     """Estimated theta of the isolated loss of surface s: see assessment.py."""
-    return assessment.isolated_theta(
+    return assessed.isolated_theta(
         fdi.config, fdi.verdict, fdi.layout, fdi.isolation.estimator, fdi.statistical, s
     )
 
 
 @kernel
-def unknown_acceleration(fdi, out):
-    """Fill out (3,) rad/s2 with what goes on beyond the model and the known faults, as it is estimated."""
-    if assessment.likelihood_counts(fdi.statistical.tests, fdi.config.authority):
-        statistical.unknown_acceleration(fdi.statistical.block, fdi.statistical.air, out)
-    else:
-        fdae.unknown_acceleration(fdi.fdae, fdi.bound.noise, out)
-
-
-@kernel
 def decide(frame):
     """The mode for this frame."""
-    control, layout = frame.control, frame.control.layout
-    oracle = control.law == ORACLE
-    accounts.share_faults(frame.truth, frame.faults, oracle)
-    if oracle:
+    control, layout, informed = frame.control, frame.control.layout, frame.control.config.informed
+    accounts.share_faults(frame.truth, frame.faults, informed)
+    if informed:
         wanted = supervisor.true_mode(layout.main[PITCH], frame.faults)
     else:
-        wanted = supervisor.mode_from(control.law, layout, frame.fdi.verdict, frame.assessment)
+        wanted = supervisor.mode_from(control.config, layout, frame.fdi.verdict, frame.assessment)
     supervisor.supervise(frame.supervisor, wanted, frame.t)
 
 
 @kernel
 def accommodate(frame):
-    """What the law takes each surface for, and the unknown."""
-    control, surfaces = frame.control, frame.control.surfaces
-    if control.inner == ADAPTING:
-        adapt(frame)
-        return
-    accommodation.accommodate(
-        control.law, control.inner, frame.assessment, surfaces, control.rejection, control.layout,
-        control.allocation.saturated, frame.faults, frame.belief.u,
-    )  # fmt: skip
-    if frame.assessment.hedge and control.law != ORACLE:
-        control.reference.hedging = 1
-    compensate(frame)
-
-
-@apart
-def adapt(frame):
-    """The adaptive law of two parts: what it takes surfaces and the unknown for, brought to this frame."""
-    control, belief, x = frame.control, frame.belief, frame.measured.x
-    adaptation, feedback = control.adaptation, control.feedback
-    if frame.fdi.verdict.detected and adaptation.adapts:
-        adapting.adapt(
-            adaptation, feedback, control.surfaces, control.layout, control.allocation.saturated,
-            control.reference.governed_rate - x, belief.G, belief.u, control.reference.dt,
-        )  # fmt: skip
-    zhang2005.evaluate(adaptation.network, control.layout.main, x, frame.measured.y, belief.u)
-    feedback.fhat[:] = adaptation.network.output
-
-
-@kernel
-def compensate(frame):
-    """Fill fhat (3,) rad/s2: what the law takes the unknown for."""
-    control, fdi, fhat = frame.control, frame.fdi, frame.control.feedback.fhat
-    fhat[:] = 0.0
-    if control.inner == REJECTING:
-        return  # its observer finds what is unknown
-    if control.law == ORACLE:
-        fhat[PITCH] = unanticipated_pitch(frame.belief.design, frame.measured.y, frame.faults.Cm_alpha3)
-    elif control.law != NOMINAL and fdi.verdict.detected:
-        unknown_acceleration(fdi, fhat)
-        if fdi.verdict.lead >= 0 and fdi.verdict.lead_kind == LAGS:
-            fhat[:] = 0.0  # to ask a slow surface for what it lacks would only wind the command up
-
-
-@kernel
-def in_doubt(frame):
-    """Whether elevator or flap is at fault and it has long been open which."""
-    fdi, law = frame.fdi, frame.control.law
-    open_question = fdi.config.every_type and fdi.verdict.detected and fdi.verdict.isolated == NOT_ISOLATED
-    long = fdi.types.surface[frame.control.layout.main[PITCH]].evidence >= fdi.types.config.patience
-    return open_question and long and law not in (NOMINAL, ORACLE)
-
-
-@kernel
-def hand_over_pitch(frame):
-    """Hand the pitch demand to the flap, or back. What a jammed elevator no longer carries goes at once."""
-    control, surfaces = frame.control, frame.control.surfaces
-    remains = allocation.remaining(control.layout, surfaces.effectiveness, PITCH)
-    least = surfaces.least_effectiveness
-    at_once = control.reference.hedging or (remains < least and frame.fdi.config.every_type)
-    reallocated = frame.supervisor.mode == MODE_REALLOCATED
-    allocation.advance_hand_over(control.allocation, reallocated, at_once, 1.0 - remains)
-    rejecting.hand_over(control.rejection, control.allocation.hand_over, reallocated, remains, least)
-
-
-@kernel
-def demand(frame):
-    """The angular accelerations (3,) rad/s2 that the inner law asks of the surfaces."""
-    control, belief, measured, axes = frame.control, frame.belief, frame.measured, frame.control.axes
-    surfaces, reference = control.surfaces, control.reference
-    if control.inner == REJECTING:
-        rejecting.demand(control.rejection, axes, reference, surfaces, control.layout.main, belief, measured)
-    else:
-        published.demand(control.feedback, axes, reference, measured.x, belief.f)
-    if control.law != NOMINAL:
-        accommodation.allow_for_offsets(axes, surfaces.offset, belief.G)
-
-
-@kernel
-def allocate(frame):
-    """The surfaces that give it; what does not follow goes to its trim."""
-    control, out, layout = frame.control, frame.control.allocation, frame.control.layout
-    wanted, surfaces, rejects = control.axes.demand, control.surfaces, control.inner == REJECTING
-    share = control.rejection.lost if rejects else allocation.smooth(out.hand_over)
-    probe = control.probe.deflection
-    if layout.general:
-        allocation.allocate_generally(out, layout, surfaces, control.axes, frame.belief, share, probe)
-    else:
-        allocation.allocate(out, layout, wanted, surfaces.effectiveness, share, probe)
-    if not layout.general and rejects and control.law != NOMINAL and frame.assessment.detected:
-        allocation.relieve(out, layout, wanted[PITCH])
-    accommodation.give_up(
-        control.law, frame.assessment, surfaces, control.rejection.withdrawn, frame.faults, layout, out,
-        control.reference,
-    )  # fmt: skip
-
-
-@kernel
-def note_what_is_missing(frame):
-    """Whether the demand is met; what is missing in pitch is left to the engine."""
-    control, measured, engine = frame.control, frame.measured, frame.control.power
-    detected, saturated = frame.assessment.detected, control.allocation.saturated
-    used = detected and (engine.enabled or control.engines.n > 0)
-    if frame.faults.present or control.reference.hedging or used:
-        allocation.note_shortfall(control.axes, control.allocation, control.layout, control.surfaces.lag)
-    if engine.enabled:
-        watched, lacking = detected or control.law == ORACLE, control.axes.shortfall
-        lost = watched and power.pitch_is_lost(control.layout, control.surfaces, saturated, lacking)
-        power.steer(engine, control.reference, measured.x, measured.y, watched, lost, frame.t)
-    if control.engines.n > 0 and detected:
-        state, given, speed_mps = control.surfaces, control.allocation, measured.y[AIRSPEED]
-        engines.steer(control.engines, engine, control.axes, control.layout, given, state, speed_mps, frame.t)
-
-
-@apart
-def command_as_rival(frame):
-    """The command of a compiled rival."""
-    control = frame.control
-    compiled.command(
-        control.inner, control.rival, control.reference, control.axes, control.allocation,
-        control.layout, frame.belief.G, frame.measured.x,
-    )  # fmt: skip
-
-
-@kernel
-def command_by_law(frame):
-    """The built-in law: accommodate, demand, allocate, give back what cannot be had."""
-    control, out, belief = frame.control, frame.control.allocation, frame.belief
-    accommodate(frame)
-    if control.inner in (INDI, LQR):
-        command_as_rival(frame)
-        return
-    if control.law == NOMINAL:
-        out.G[:] = belief.G
-    else:
-        accommodation.believed_effectiveness(control.surfaces, belief.G, out.G)
-    hand_over_pitch(frame)
-    if control.probe.frames > 0:
-        allocation.advance_probe(control.probe, in_doubt(frame), frame.t)
-    demand(frame)
-    allocate(frame)
-    if control.inner != REJECTING:
-        published.integrate(control.feedback, control.axes, control.reference, out, frame.measured.x)
-    note_what_is_missing(frame)
-    if control.inner == REJECTING:
-        rejecting.lead_actuators(control.rejection, control.layout, out.command, belief.u)
+    """How effective the law takes each surface to be."""
+    law, belief = frame.control.config.law, frame.belief
+    table.accommodate(law, frame.control, frame.assessment, frame.faults, belief, frame.measured)
 
 
 @kernel
 def take_command(frame, deflections):
     """A command (n,) rad from outside, within the travel of each surface."""
     accommodate(frame)
-    allocation.take_command(frame.control.allocation, frame.control.layout, deflections)
+    allocation.take_command(frame.control.allocation.output, frame.control.layout, deflections)
 
 
 @kernel
 def command(frame):
-    """The built-in law; or whoever commands in its place."""
+    """The law's command; or that of whoever commands in its place."""
+    control, mode = frame.control, frame.supervisor.mode
     if frame.held:
         take_command(frame, frame.held_rad)
-    else:
-        command_by_law(frame)
+        return
+    accommodate(frame)
+    table.command(
+        control.config.law, control, frame.assessment, frame.faults, frame.belief, frame.measured, mode,
+        frame.t,
+    )  # fmt: skip
 
 
 @apart
 def fly_profile(frame, commanded):
     """Add the outer loops' body rates to what is commanded (3,) rad/s, and set the engine."""
     autopilot, control, belief, value = frame.autopilot, frame.control, frame.belief, frame.truth.value
-    unexplained = 0.0
-    if control.inner == REJECTING:
-        elevator = control.layout.main[PITCH]
-        unexplained = control.rejection.disturbance[PITCH] / belief.G[PITCH, elevator]
-    steer(
-        autopilot, control.layout, control.surfaces, control.allocation, control.axes.hold,
-        control.power, belief.u, frame.measured, unexplained, frame.t,
-    )  # fmt: skip
+    unexplained, elevator = control.axes.disturbance[PITCH], control.layout.main[PITCH]
+    if unexplained != 0.0:
+        unexplained /= belief.G[PITCH, elevator]  # rad of the elevator
+    steer(autopilot, control, belief.u, frame.measured, unexplained, frame.t)
+    if autopilot.sets_power:
+        power.follow_autopilot(control.power, autopilot.setting, autopilot.power_airspeed)
     judge(autopilot, value[ch.ALTITUDE], value[ch.AIRSPEED], value[ch.PHI + 2], value[ch.PHI], frame.t)
     for i in range(3):
         commanded[i] += autopilot.rates[i]
@@ -535,13 +390,14 @@ def fly_profile(frame, commanded):
 def account(frame):
     """Advance the metrics' sums by this frame; before a fault, the closest approach to an alarm."""
     control, truth, sums = frame.control, frame.truth, frame.accounts
-    accounts.track(sums.tracking, truth, control.reference.model_rate)
+    accounts.track(sums.tracking, truth, control.reference.output.model_rate)
     if truth.faulted:
         accounts.account_authority(sums.authority, control.axes)
     else:
         bank.note_closest_approach(frame.fdi.bank)
         statistical.note_closest_approach(frame.fdi.statistical.alarm)
-    accounts.account_surfaces(sums, truth, control.allocation.saturated, frame.k, control.reference.dt)
+    saturated, dt = control.allocation.output.saturated, control.reference.config.dt
+    accounts.account_surfaces(sums, truth, saturated, frame.k, dt)
     accounts.note_envelope(sums.envelope, truth.value[ch.ENVELOPE] < 0.5, frame.t)
     accounts.note_inconclusive(sums.inconclusive, frame.fdi, frame.t)
 
@@ -550,12 +406,13 @@ def account(frame):
 def record(frame, commanded, row):
     """Write the row of a frame in the order of channels.log_columns; commanded (3,) rad/s."""
     control, fdi, belief, logged = frame.control, frame.fdi, frame.belief, frame.logged
+    saturated, effectiveness = control.allocation.output.saturated, control.surfaces.output.effectiveness
     row[:] = np.nan
     column = log_row.record_truth(frame.truth, frame.t, row)
     column = put(row, column, frame.measured.x)
     column = put(row, column, commanded)
-    column = put(row, column, control.reference.model_rate)
-    column = log_row.record_surfaces(frame.truth, belief.commanded, control.allocation.saturated, row, column)
+    column = put(row, column, control.reference.output.model_rate)
+    column = log_row.record_surfaces(frame.truth, belief.commanded, saturated, row, column)
     column = log_row.record_alarm(fdi.bank, row, column)
     column = put(row, column, fdi.fdae.residual)
     column = put(row, column, fdi.fdae.threshold)
@@ -567,12 +424,12 @@ def record(frame, commanded, row):
             log_row.record_estimator(fdi.isolation.estimator[e], fdi.verdict.detected, row, column)
         column += log_row.PER_ESTIMATOR
     column = put(row, column, frame.assessment.effectiveness)
-    column = log_row.record_used(control.surfaces.effectiveness, control.law != NOMINAL, row, column)
+    column = log_row.record_used(effectiveness, control.config.uses_verdict, row, column)
     row[column], row[column + 1] = frame.supervisor.mode, fdi.verdict.detected or fdi.watch.alarmed
     column += 2
     if logged.watch:
         column = log_row.record_watch(fdi.watch, frame.measured.missing, row, column, logged.watch)
-    column = put(row, column, control.power.command[: logged.power])
+    column = put(row, column, control.power.output.command[: logged.power])
     if frame.autopilot.enabled:
         log_row.record_profile(frame.autopilot, row, column)
     chances = fdi.statistical
@@ -589,9 +446,10 @@ def finish(frame, commanded, row):
         fly_profile(frame, commanded)
     account(frame)
     record(frame, commanded, row)
-    reference.follow(control.reference, commanded)
-    reference.govern(control.reference, commanded, control.axes.shortfall)
-    follow_command(belief, control.allocation.command)
-    hand_over(frame.truth, belief.commanded, control.power)
+    reference.follow(control.reference.config, control.reference.output, commanded)
+    authority_lost = control.surfaces.output.authority_lost
+    reference.govern(control.reference, commanded, control.axes.shortfall, authority_lost)
+    follow_command(belief, control.allocation.output.command)
+    hand_over(frame.truth, belief.commanded, control.power.output)
     frame.k += 1
     frame.row += 1

@@ -161,8 +161,8 @@ def _envelope_exits(frame: np.void) -> tuple[tuple[float, float], ...]:
 def _probing_s(frame: np.void) -> tuple[float, float] | None:
     """When the active diagnosis began and ended."""
     probe = frame["control"]["probe"]
-    began, ended = float(probe["from_s"]), float(probe["to_s"])
-    if not probe["frames"] or began < 0.0:
+    began, ended = float(probe["memory"]["from_s"]), float(probe["memory"]["to_s"])
+    if not probe["config"]["frames"] or began < 0.0:
         return None
     return began, (ended if ended >= 0.0 else float(frame["t"]))
 
@@ -179,7 +179,8 @@ def _authority(frame: np.void) -> dict[str, dict[str, float]] | None:
         share = 1.0 - float(lack / asked) if asked > 0.0 else 1.0
         authority[axis] = {"given_share": share, "beyond_s": int(beyond) * float(frame["dt"])}
     control = frame["control"]
-    if (control["layout"]["general"] or control["engines"]["n"]) and np.any(control["allocation"]["G"]):
+    has_more = control["layout"]["general"] or control["engines"]["config"]["n"]
+    if has_more and np.any(control["axes"]["G"]):
         for i, axis in enumerate(AXES):
             authority[axis] |= _left(frame, i)
     return authority
@@ -189,22 +190,22 @@ def _left(frame: np.void, i: int) -> dict[str, float]:
     """What all surfaces together give about axis i at most, either way, rad/s2: what is believed to be left,
     and healthy; and what the engines give beside them, where they are effectors."""
     stops = frame["control"]["layout"]["low"], frame["control"]["layout"]["high"]
-    left = np.array([frame["control"]["allocation"]["G"][i] * stop for stop in stops])
+    left = np.array([frame["control"]["axes"]["G"][i] * stop for stop in stops])
     healthy = np.array([frame["belief"]["G"][i] * stop for stop in stops])
-    engines = frame["control"]["layout"]["beside"][:, i]
+    engines = frame["control"]["engines"]["output"]["authority"][:, i]
     given = {"engines_least_rad_s2": float(engines[0]), "engines_greatest_rad_s2": float(engines[1])}
     return {
         "least_rad_s2": float(left.min(axis=0).sum()),
         "greatest_rad_s2": float(left.max(axis=0).sum()),
         "healthy_least_rad_s2": float(healthy.min(axis=0).sum()),
         "healthy_greatest_rad_s2": float(healthy.max(axis=0).sum()),
-    } | (given if frame["control"]["engines"]["n"] else {})
+    } | (given if frame["control"]["engines"]["config"]["n"] else {})
 
 
 def _engine_power(frame: np.void) -> dict[str, float] | None:
     """Since when and for how long pitch was left to the engine, and how far it went; None if it never was."""
-    power = frame["control"]["power"]
-    if not power["enabled"] or power["from_s"] < 0.0:
+    enabled, power = frame["control"]["power"]["config"]["enabled"], frame["control"]["power"]["output"]
+    if not enabled or power["from_s"] < 0.0:
         return None
     return {
         "from_s": float(power["from_s"]),
@@ -240,7 +241,7 @@ def _limits(frame: np.void, surfaces: Sequence[str]) -> tuple[dict[str, Any], ..
     if not frame["autopilot"]["enabled"]:
         return ()
     holding, main = frame["autopilot"]["holding"], frame["control"]["layout"]["main"]
-    effectiveness = frame["control"]["surfaces"]["effectiveness"]
+    effectiveness = frame["control"]["surfaces"]["output"]["effectiveness"]
     pitch = f"{surfaces[main[PITCH]]} acts as at {degrees(holding['acting']):.1f} deg"
     lateral = min((main[ROLL], main[YAW]), key=lambda s: float(effectiveness[s]))
     left = f"{100 * effectiveness[lateral]:.0f} % of the {surfaces[lateral]} left"
@@ -398,7 +399,9 @@ def landing_of(
         changes=replaced,
         withdrawn=_withdrawn(fdi, surfaces),
         inconclusive=None if verdict is not None else inconclusive_of(frame, scenario.airframe),
-        surface_travel_rad={s: float(x) for s, x in zip(surfaces, accounts["travelled"], strict=True)},
-        surface_energy_rad2_s={s: float(x) for s, x in zip(surfaces, accounts["hurried"], strict=True)},
+        surface_travel_rad={s: float(x) for s, x in zip(surfaces, accounts["actuator_travel"], strict=True)},
+        surface_energy_rad2_s={
+            s: float(x) for s, x in zip(surfaces, accounts["actuator_energy"], strict=True)
+        },
         **(_findings(frame, surfaces) if verdict is None else _of_verdict(fdi, verdict)),
     )

@@ -13,7 +13,7 @@ import numpy as np
 
 from beaver_ftc.compiled import direct
 from beaver_ftc.control.base import Law, Reference
-from beaver_ftc.control.laws import ADAPTIVE, NOMINAL, ORACLE
+from beaver_ftc.control.laws.rows import has_kernels, row_of
 from beaver_ftc.design.context import Context, DesignFunctions
 from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
 from beaver_ftc.diagnosis.bounds.variances import variances_of
@@ -126,7 +126,7 @@ class PluginFrame:
         if self.law is None or frame["held"]:
             self._stage(stages.command, frames)
             return
-        name, model = self._names[1], frame["control"]["reference"]
+        name, model = self._names[1], frame["control"]["reference"]["output"]
         reference = Reference(
             commanded.copy(), model["model_rate"].copy(), model["model_acceleration"].copy()
         )
@@ -235,11 +235,12 @@ def named_law(frames: np.ndarray, scenario: Scenario, start: np.ndarray) -> Law 
         return None
     law = made(LAWS, scenario.control.law)
     compile_into = getattr(law, "compile_into", None)
-    if compile_into is None:
+    if compile_into is None or not has_kernels(scenario.control.law):
         return law
     law.reset(context_of(frames, scenario, start, scenario.control.options))
-    frames["control"]["power"]["enabled"] = 0
-    frames["control"]["inner"] = compile_into(frames["control"]["rival"][0])
+    control = frames["control"][0]
+    control["power"]["config"]["enabled"] = 0
+    compile_into(control[row_of(scenario.control.law).file])
     return None
 
 
@@ -261,8 +262,11 @@ def plugged(
         fdi["statistical"]["tests"]["enabled"] = fdi["watch"]["enabled"] = fdi["published"]["in_use"] = 0
         n = fdi["types"]["surface"].size
         fdi["isolation"]["estimator"]["surface"][:n] = range(n)
-    if law is not None or frames["control"]["law"][0] != ORACLE:
-        frames["control"]["power"]["enabled"] = 0
+    control = frames["control"][0]
+    if law is not None or not control["config"]["informed"]:
+        control["power"]["config"]["enabled"] = 0
     if law is not None:
-        frames["control"]["law"] = ADAPTIVE if getattr(law, "fault_tolerant", False) else NOMINAL
+        config = control["config"]
+        config["uses_verdict"], config["reallocates"] = getattr(law, "fault_tolerant", False), 0
+        config["informed"] = 0
     return PluginFrame(frames, scenario, start, detector, law, begun)

@@ -87,7 +87,7 @@ def hold(frames):
     belief.commanded[:] = frame.held_rad
     belief.u[:] = belief.u_then
     move(belief.actuators, belief.commanded, belief.u)
-    hand_over(frame.truth, belief.commanded, frame.control.power)
+    hand_over(frame.truth, belief.commanded, frame.control.power.output)
 
 
 @kernel

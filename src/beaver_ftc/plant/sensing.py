@@ -152,9 +152,9 @@ def flight_status(value, ground_m, slow_mps):
 
 
 @kernel
-def hand_over(truth, commanded, power):
+def hand_over(truth, commanded, levers):
     """Write the command (n,) rad, and the engine's where it is used, where nodes are native."""
     if truth.native:
         write_nodes(truth.setter, truth.write_pointers, commanded)
-        if power.in_use:
-            write_nodes(truth.setter, truth.lever_pointers[: truth.levers], power.command[: truth.levers])
+        if levers.in_use:
+            write_nodes(truth.setter, truth.lever_pointers[: truth.levers], levers.command[: truth.levers])

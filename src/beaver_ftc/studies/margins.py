@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.aircraft import AXES
-from beaver_ftc.control.laws import COMPILED, REJECTING
 from beaver_ftc.control.laws.gains import margins
 from beaver_ftc.control.laws.rejecting import STAND_IN
+from beaver_ftc.control.laws.rows import flown_by
 from beaver_ftc.design.model import QDYN
 from beaver_ftc.design.variants import jacobian
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
@@ -40,12 +40,12 @@ LOWEST_RAD_S = 0.3  # below, the autopilot flies: a body rate says little of a p
 
 @dataclass(frozen=True)
 class LawGains:
-    """Of one flight condition. Kp 1/s, pull 1, learn 1/s (3,); demand (n, 3): command of each surface for a
-    demanded acceleration, rad per rad/s2; lead (n,); share: of a frame until a command acts."""
+    """Of one flight condition. Kp 1/s, L_rate 1, L_disturbance 1/s (3,); demand (n, 3): command of each
+    surface for a demanded acceleration, rad per rad/s2; lead (n,); share: of a frame until a command acts."""
 
     Kp: np.ndarray
-    pull: np.ndarray
-    learn: np.ndarray
+    L_rate: np.ndarray
+    L_disturbance: np.ndarray
     demand: np.ndarray
     lead: np.ndarray
     share: float
@@ -71,11 +71,11 @@ class OpenLoop:
     dt_s: float
 
 
-def interpolated(rejection: np.void, qdyn: float, lost: float) -> np.ndarray:
-    """Kp, pull and learn, (3, 3) over the axes, of the schedule at a dynamic pressure (Pa), a share `lost` of
-    pitch handed over."""
-    schedules = (rejection[name] for name in ("Kp_at", "pull_at", "learn_at"))
-    found = np.array([[np.interp(qdyn, rejection["qdyn"], row) for row in rows] for rows in schedules])
+def interpolated(law: np.void, qdyn: float, lost: float) -> np.ndarray:
+    """Kp, L_rate and L_disturbance, (3, 3) over the axes, of the law's schedule at a dynamic pressure (Pa), a
+    share `lost` of pitch handed over."""
+    schedules = (law[name] for name in ("Kp_at", "L_rate_at", "L_disturbance_at"))
+    found = np.array([[np.interp(qdyn, law["qdyn"], row) for row in rows] for rows in schedules])
     found[:, PITCH] += lost * (found[:, STAND_IN] - found[:, PITCH])
     return found[:, :3]
 
@@ -103,7 +103,7 @@ def law_response(loop: OpenLoop, law: LawGains, z: complex) -> np.ndarray:
     n, dt, one = len(loop.effectiveness), loop.dt_s, np.eye(3)
     back = 1.0 / z
     mean = law.share * back + 1.0 - law.share  # of what acts over the elapsed frame
-    keep, learn, Kp = np.diag(1.0 - law.pull), np.diag(law.learn), np.diag(law.Kp)
+    keep, L_disturbance, Kp = np.diag(1.0 - law.L_rate), np.diag(law.L_disturbance), np.diag(law.Kp)
     actuator = np.diag(loop.approach / (z - 1.0 + loop.approach))
     ahead = one + law.share * dt * Kp
     lead, none = np.diag(law.lead), np.zeros
@@ -111,14 +111,16 @@ def law_response(loop: OpenLoop, law: LawGains, z: complex) -> np.ndarray:
     # unknowns: rate, disturbance, position, command; driven by what is measured
     M = np.block([
         [one - keep * back, -keep * dt * back, -keep @ loop.G * dt * mean, none((3, n))],
-        [learn * back, one - one * back + learn * dt * back, learn @ loop.G * dt * mean, none((3, n))],
+        [L_disturbance * back, one - one * back + L_disturbance * dt * back, L_disturbance @ loop.G * dt *
+        mean,
+         none((3, n))],
         [none((n, 3)), none((n, 3)), np.eye(n), -actuator],
         [lead @ law.demand @ Kp, lead @ law.demand @ ahead, of_position, np.eye(n)],
     ])  # fmt: skip
     rates = np.eye(3, loop.C.shape[0])
     driven = np.vstack([
-        np.diag(law.pull) @ rates + keep @ loop.f * dt * mean,
-        learn @ (rates - loop.f * dt * mean),
+        np.diag(law.L_rate) @ rates + keep @ loop.f * dt * mean,
+        L_disturbance @ (rates - loop.f * dt * mean),
         none((n, len(loop.C))),
         -lead @ law.demand @ ahead @ loop.f,
     ])  # fmt: skip
@@ -183,7 +185,7 @@ def study(scenario: Scenario) -> list[Margin]:
 
 def refuse_other_laws(scenario: Scenario) -> None:
     """Raise BadInput unless the law is one whose loop this is."""
-    allowed = [name for name, (_, inner) in COMPILED.items() if inner == REJECTING]
+    allowed = flown_by("rejecting")
     if scenario.control.law not in allowed:
         says = f"margins are known of the default law's loop, allowed: {', '.join(allowed)}"
         raise BadInput(f"{scenario.name}: control.law: {scenario.control.law}: {says}")
@@ -219,7 +221,7 @@ def open_loop(
 ) -> tuple[OpenLoop, LawGains]:
     """The loop with this effectiveness (n,), the law knowing it; y: the measured signals in trim."""
     control, belief, dt = frame["control"], frame["belief"], 1.0 / scenario.rate_hz
-    rejection, layout = control["rejection"], control["layout"]
+    law, layout = control["rejecting"]["config"], control["layout"]
     _, G, f_x, f_y = jacobian(belief["design"], np.zeros(3), y, layout["trim"])
     lost = 1.0 - effectiveness[layout["main"][PITCH]] if layout["stand_in"] >= 0 else 0.0
     whole = 1.0 - (1.0 - belief["actuators"]["approach"]) ** scenario.substeps
@@ -230,8 +232,8 @@ def open_loop(
         whole, delay_s, keep, dt,
     )  # fmt: skip
     demand = allocation(G * effectiveness, layout["main"], layout["stand_in"], lost)
-    Kp, pull, learn = interpolated(rejection, y[QDYN], lost)
-    return loop, LawGains(Kp, pull, learn, demand, np.array(rejection["lead"]), float(rejection["share"]))
+    Kp, L_rate, L_disturbance = interpolated(law, y[QDYN], lost)
+    return loop, LawGains(Kp, L_rate, L_disturbance, demand, np.array(law["lead"]), float(law["share"]))
 
 
 def outputs(states: tuple[str, ...], y: np.ndarray) -> np.ndarray:

@@ -129,7 +129,7 @@ class Flown(Simulation):
         self._nodes = [(plant.node(name).get_double_value, factor) for name, factor in _NODES]
         self._origin = float(truth["latitude_0"]), float(truth["longitude_0"])
         self._radii = float(truth["radius_m"]), float(truth["parallel_radius_m"])
-        self._power = frames["control"]["power"]
+        self._power = frames["control"]["power"]["output"]
         self._autopilot = frames["autopilot"]
         self._seen = frames["fdi"]["verdict"], frames["fdi"]["watch"]
 

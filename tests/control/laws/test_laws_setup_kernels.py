@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from beaver_ftc.control import reference, state
-from beaver_ftc.control.laws import REJECTING, gains
-from beaver_ftc.control.laws.rejecting import N_POINTS
+from beaver_ftc.control.laws import gains
+from beaver_ftc.control.laws.gains import N_POINTS
 from beaver_ftc.design.model import AIRSPEED, QDYN, design_record
 from beaver_ftc.design.variants import response
 from beaver_ftc.diagnosis.belief.expectation import belief_dtype
 from beaver_ftc.scenario.schema import Scenario
-from law_records import new_control
+from law_records import fields, new_control
 from telling import apart
 
 Y = np.array([0.1, 0.02, 44.0, 1000.0, 0.3, 0.0, 0.0, 0.0])
@@ -29,10 +29,10 @@ def given(control=None, **keys):
 def asked(monkeypatch):
     """What `gains.set_up` is asked for."""
 
-    def ask(scenario, stand_in=3, inner=REJECTING):
+    def ask(scenario, stand_in=3):
         found = {}
-        monkeypatch.setattr(gains, "set_up", lambda rejection, **of: found.update(of))
-        control = new_control(inner=inner, main=(0, 1, 2), stand_in=stand_in)
+        monkeypatch.setattr(gains, "set_up", lambda config, **of: found.update(of))
+        control = new_control(main=(0, 1, 2), stand_in=stand_in)
         belief = np.zeros(1, belief_dtype(4))[0]
         belief["design"] = design_record()[0]
         belief["actuators"]["approach"] = (0.2, 0.3, 0.4, 0.05)
@@ -43,7 +43,7 @@ def asked(monkeypatch):
 
 
 def test_other_laws_ask_for_nothing(asked):
-    assert asked(given(), inner=REJECTING + 1) == {}
+    assert asked(given({"law": "adaptive"})) == {}
 
 
 def test_the_points_are_airspeeds_of_the_envelope_at_the_same_density(asked):
@@ -108,15 +108,16 @@ def test_a_laws_record_is_what_its_scenario_says_frame_by_frame():
     scenario = given(control, substeps=3, fdi={"fault_class": "all", "probing": probing})
     record = np.zeros(1, state.control_dtype(4))[0]
     state.configure(record, scenario, travel)
-    assert (record["feedback"]["Kp"], record["feedback"]["Ki"]) == (3.1, 0.7)
-    assert (record["layout"]["low"].tolist(), record["layout"]["high"].tolist()) == tuple(travel.tolist())
-    assert record["allocation"]["hand_over_step"] == pytest.approx(0.02 / 0.8)
-    assert record["surfaces"]["effectiveness_step"] == pytest.approx(1.7 * 0.02)
-    assert record["surfaces"]["least_effectiveness"] == 0.15
-    probe = record["probe"]
+    law, reach = fields(record["published"]), fields(record["layout"])
+    assert (law["Kp"], law["Ki"]) == (3.1, 0.7)
+    assert (reach["low"].tolist(), reach["high"].tolist()) == tuple(travel.tolist())
+    surfaces, probe, model = (fields(record[stage]) for stage in ("surfaces", "probe", "reference"))
+    assert fields(record["allocation"])["hand_over_step"] == pytest.approx(0.02 / 0.8)
+    assert surfaces["effectiveness_step"] == pytest.approx(1.7 * 0.02)
+    assert surfaces["least_effectiveness"] == 0.15
     assert probe["amplitude"] == pytest.approx(np.radians(4.0))
     assert probe["step"] == pytest.approx(2.0 * np.pi * 1.25 * 0.02)
     assert (probe["frames"], probe["from_s"], probe["to_s"]) == (120, -1.0, -1.0)
     A, B = reference.discretise(9.0, 0.6, 0.02)
-    assert record["reference"]["A"] == pytest.approx(np.array(A))
-    assert record["reference"]["B"] == pytest.approx(np.array(B))
+    assert model["A"] == pytest.approx(np.array(A))
+    assert model["B"] == pytest.approx(np.array(B))

@@ -104,7 +104,7 @@ class Gain:
 
     def at(self):
         loop = Loop(scenario(initial={"airspeed_mps": self.V}, duration_s=1, control=NEW, **REAL))
-        return loop.frames[0]["control"]["rejection"]["Kp_at"]
+        return loop.frames[0]["control"]["rejecting"]["config"]["Kp_at"]
 
 
 def test_the_schedule_rises_with_dynamic_pressure_where_noise_limits_it():
@@ -118,7 +118,7 @@ def test_the_schedule_does_not_depend_on_where_the_flight_starts():
 
 def test_other_laws_carry_no_schedule():
     frames = assemble(scenario(control=OLD), np.zeros(4), np.array([[-0.5] * 4, [0.5] * 4]))
-    assert not frames[0]["control"]["rejection"]["Kp_at"].any()
+    assert not frames[0]["control"]["rejecting"]["config"]["Kp_at"].any()
 
 
 def test_the_same_flight_twice():

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from beaver_ftc.control import accommodation, allocation, reference
-from beaver_ftc.control.laws import ADAPTIVE, FAULT_TOLERANT, NOMINAL, ORACLE, REJECTING, rejecting
+from beaver_ftc.control import accommodation, allocation, inversion, reference
+from beaver_ftc.control.laws import rejecting
 from beaver_ftc.control.supervisor import (
     MODE_ADAPTIVE,
     MODE_NOMINAL,
@@ -18,7 +18,7 @@ from beaver_ftc.diagnosis.types.contract import FIXED, LAGS, LOSES, SHIFTED
 from beaver_ftc.loop import frame as whole
 from beaver_ftc.loop.assembly import assemble
 from flying import scenario
-from law_records import new_control, put
+from law_records import fields, new_control, put
 
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)
 DT = 0.01
@@ -31,17 +31,19 @@ def record(seed=0):
     control = new_control(main=(0, 1, 2), stand_in=FLAP, dt=DT, least_effectiveness=0.1)
     control["layout"]["low"], control["layout"]["high"] = TRAVEL
     put(control, effectiveness=rng.uniform(0.2, 1.0, 4), offset=rng.normal(0, 0.02, 4))
-    model = control["reference"]
+    model = fields(control["reference"])
     model["A"], model["B"] = reference.discretise(10.0, 1.0, DT)
     for name in ("governed_rate", "governed_acceleration", "commanded_rate", "scale"):
         model[name] = rng.normal(0, 0.1, 3)
-    rejection = control["rejection"]
-    rejection["qdyn"] = [500.0, 700.0, 1000.0, 1400.0, 2000.0]
-    for name in ("Kp_at", "pull_at", "learn_at"):
-        rejection[name] = rng.uniform(0.1, 5.0, (4, 5))
-    for name in ("rate", "disturbance", "Kp", "pull", "learn"):
-        rejection[name] = rng.normal(0, 0.3, 3)
-    rejection["share"] = 0.4
+    config, law = control["rejecting"]["config"], control["rejecting"]
+    config["qdyn"] = [500.0, 700.0, 1000.0, 1400.0, 2000.0]
+    for name in ("Kp_at", "L_rate_at", "L_disturbance_at"):
+        config[name] = rng.uniform(0.1, 5.0, (4, 5))
+    for name in ("rate", "disturbance"):
+        law["observer"][name] = rng.normal(0, 0.3, 3)
+    for name in ("Kp", "L_rate", "L_disturbance"):
+        law["memory"][name] = rng.normal(0, 0.3, 3)
+    config["share"] = 0.4
     return control, rng
 
 
@@ -49,23 +51,27 @@ def record(seed=0):
 @pytest.mark.parametrize("qdyn", [300.0, 500.0, 640.0, 700.0, 810.0, 1000.0, 1390.0, 1400.0, 1999.0, 2400.0])
 def test_the_schedule_is_interpolated_and_held_beyond_its_ends(qdyn, lost):
     control, _ = record()
-    rejection = control["rejection"]
-    rejection["lost"] = lost
-    rejecting.schedule(rejection, qdyn)
-    for name in ("Kp", "pull", "learn"):
-        table = rejection[f"{name}_at"]
-        of = [np.interp(qdyn, rejection["qdyn"], row) for row in table]
+    config, memory = control["rejecting"]["config"], control["rejecting"]["memory"]
+    rejecting.schedule(config, memory, qdyn, lost)
+    for name in ("Kp", "L_rate", "L_disturbance"):
+        of = [np.interp(qdyn, config["qdyn"], row) for row in config[f"{name}_at"]]
         expected = [of[0], (1 - lost) * of[1] + lost * of[3], of[2]]
-        assert rejection[name] == pytest.approx(expected, rel=1e-12)
+        assert memory[name] == pytest.approx(expected, rel=1e-12)
+
+
+def handed_over(allocated, reallocated, left):
+    """The share of pitch that the stand-in carries, once it is brought to a frame."""
+    allocation.hand_over_pitch(allocated, reallocated, 0, left, 0.1)
+    return float(allocated["output"]["transfer_share"])
 
 
 @pytest.mark.parametrize("given", [0.0, 0.25, 0.5, 1.0])
 @pytest.mark.parametrize(("left", "lost"), [(1.0, 0.0), (0.6, 0.4), (0.1, 0.9), (0.09, 1.0), (0.0, 1.0)])
 def test_the_stand_in_carries_what_is_lost_and_takes_it_over_smoothly(given, left, lost):
-    control, _ = record()
-    rejecting.hand_over(control["rejection"], given, 1, left, 0.1)
+    allocated = record()[0]["allocation"]
+    allocated["output"]["hand_over"] = given
     part = 1.0 if left == 0.0 else 3 * given**2 - 2 * given**3
-    assert control["rejection"]["lost"] == pytest.approx(part * lost, abs=1e-15)
+    assert handed_over(allocated, 1, left) == pytest.approx(part * lost, abs=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -77,14 +83,14 @@ def test_the_stand_in_carries_what_is_lost_and_takes_it_over_smoothly(given, lef
 )  # fmt: skip
 def test_what_nothing_replaces_is_divided_by_no_less_than_the_law_may_or_given_up(surface, believed, kept):
     control, _ = record()
-    control["surfaces"]["target"][surface] = believed
-    rejecting.believe_larger(control["rejection"], control["surfaces"], control["layout"], surface)
-    assert control["surfaces"]["target"][surface] == kept
+    sums = control["rejecting"]["memory"]["sums"]
+    assert rejecting.clamp_to_observer_estimate(sums, control["layout"], surface, believed, 0.1) == kept
 
 
 def withdraw(control, s, suspected):
-    parts, saturated = (control["rejection"], control["surfaces"], control["layout"]), control["allocation"]
-    rejecting.withdraw(*parts, s, saturated["saturated"][s], suspected)
+    memory, saturated = control["rejecting"]["memory"], control["allocation"]["output"]["saturated"]
+    rejecting.withdraw(memory, control["layout"], s, saturated[s], suspected, DT)
+    accommodation.approach(control["surfaces"], s, 1.0, 1.0, memory["withdrawn"][s])
 
 
 class TestWithdraw:
@@ -92,10 +98,10 @@ class TestWithdraw:
         """(frames until it is given up or None, the record) of a surface at its stop."""
         control, _ = record()
         put(control, target=1.0, effectiveness=1.0)
-        control["allocation"]["saturated"][surface] = saturated
+        control["allocation"]["output"]["saturated"][surface] = saturated
         for k in range(frames):
             withdraw(control, surface, suspected)
-            if control["rejection"]["withdrawn"][surface]:
+            if control["rejecting"]["memory"]["withdrawn"][surface]:
                 return k + 1, control
         return None, control
 
@@ -103,45 +109,49 @@ class TestWithdraw:
     def test_a_suspect_at_its_stop_is_given_up_in_time(self, surface, patience_s):
         frames, control = self.held(surface, 300)
         assert frames == pytest.approx(patience_s / DT, abs=2)
-        assert control["surfaces"]["target"][surface] == control["surfaces"]["effectiveness"][surface] == 0.0
-        assert control["rejection"]["at_stop_s"][surface] == 0.0
-        assert control["rejection"]["withdrawn"].sum() == 1
+        assert (
+            control["surfaces"]["output"]["target"][surface]
+            == control["surfaces"]["output"]["effectiveness"][surface]
+            == 0.0
+        )
+        assert control["rejecting"]["memory"]["at_stop_s"][surface] == 0.0
+        assert control["rejecting"]["memory"]["withdrawn"].sum() == 1
 
     def test_neither_a_healthy_one_nor_one_within_its_travel(self):
         assert self.held(RUDDER, 300, suspected=False)[0] is None
         none, control = self.held(RUDDER, 300, saturated=False)
         assert none is None
-        assert control["surfaces"]["target"][RUDDER] == 1.0
+        assert control["surfaces"]["output"]["target"][RUDDER] == 1.0
 
     def test_time_within_the_travel_counts_back_by_half_of_what_it_lasts(self):
         control, _ = record()
-        control["allocation"]["saturated"][RUDDER] = 1
+        control["allocation"]["output"]["saturated"][RUDDER] = 1
         for _ in range(60):
             withdraw(control, RUDDER, True)
-        control["allocation"]["saturated"][RUDDER] = 0
+        control["allocation"]["output"]["saturated"][RUDDER] = 0
         for _ in range(40):
             withdraw(control, RUDDER, True)
-        assert control["rejection"]["at_stop_s"][RUDDER] == pytest.approx(0.6 - 0.5 * 0.4)
+        assert control["rejecting"]["memory"]["at_stop_s"][RUDDER] == pytest.approx(0.6 - 0.5 * 0.4)
 
     @pytest.mark.parametrize(("surface", "again"), [(ELEVATOR, True), (RUDDER, False)])
     def test_only_what_is_replaced_is_tried_again(self, surface, again):
         _, control = self.held(surface, 300)
-        control["allocation"]["saturated"][surface] = 0
+        control["allocation"]["output"]["saturated"][surface] = 0
         tried = None
         for k in range(2500):
             withdraw(control, surface, True)
-            if not control["rejection"]["withdrawn"][surface]:
+            if not control["rejecting"]["memory"]["withdrawn"][surface]:
                 tried = k + 1
                 break
         assert tried == (pytest.approx(20.0 / DT, abs=2) if again else None)
         if again:
-            assert control["rejection"]["at_stop_s"][surface] == 0.0
+            assert control["rejecting"]["memory"]["at_stop_s"][surface] == 0.0
 
     def test_a_suspicion_that_is_taken_back_frees_it(self):
         _, control = self.held(RUDDER, 300)
         withdraw(control, RUDDER, False)
-        assert control["rejection"]["withdrawn"][RUDDER] == 0
-        assert control["rejection"]["at_stop_s"][RUDDER] == 0.0
+        assert control["rejecting"]["memory"]["withdrawn"][RUDDER] == 0
+        assert control["rejecting"]["memory"]["at_stop_s"][RUDDER] == 0.0
 
 
 @given(st.integers(0, 50))
@@ -149,15 +159,16 @@ def test_the_observer_is_that_of_its_equations(seed):
     control, rng = record(seed)
     x, design = rng.normal(0, 0.1, 3), rng.normal(0, 1, 3)
     Gu, G = rng.normal(0, 1, (3, 4)), rng.normal(0, 5, (3, 4))
-    rejection, surfaces, main = control["rejection"], control["surfaces"], control["layout"]["main"]
-    rejecting.observe(rejection, surfaces, main, x, design, Gu, G)
-    assert list(rejection["rate"]) == list(x), "it begins with what is measured"
-    z, d = rejection["rate"].copy(), rejection["disturbance"].copy()
+    law, surfaces, main = control["rejecting"], control["surfaces"]["output"], control["layout"]["main"]
+    observer, memory = law["observer"], law["memory"]
+    rejecting.observe(law, surfaces, main, x, design, Gu, G)
+    assert list(observer["rate"]) == list(x), "it begins with what is measured"
+    z, d = observer["rate"].copy(), observer["disturbance"].copy()
     x = x + 0.01
-    rejecting.observe(rejection, surfaces, main, x, design, Gu, G)
+    rejecting.observe(law, surfaces, main, x, design, Gu, G)
     z = z + DT * (design + Gu @ (surfaces["effectiveness"] - 1.0) + G @ surfaces["offset"] + d)
-    assert rejection["disturbance"] == pytest.approx(d + rejection["learn"] * (x - z), abs=1e-12)
-    assert rejection["rate"] == pytest.approx(z + rejection["pull"] * (x - z), abs=1e-12)
+    assert observer["disturbance"] == pytest.approx(d + memory["L_disturbance"] * (x - z), abs=1e-12)
+    assert observer["rate"] == pytest.approx(z + memory["L_rate"] * (x - z), abs=1e-12)
 
 
 @given(st.integers(0, 50))
@@ -165,14 +176,15 @@ def test_the_demand_is_that_of_its_equation(seed):
     """demand = xm' + Kp (xm - x+) - f - d, xm and x+ when the command acts."""
     control, rng = record(seed)
     frames = assemble(scenario(), np.zeros(4), TRAVEL).view(np.recarray)
-    belief, measured, rejection = frames[0]["belief"], frames[0]["measured"], control["rejection"]
+    belief, measured, law = frames[0]["belief"], frames[0]["measured"], control["rejecting"]
     f, G, u = rng.normal(0, 1, 3), rng.normal(0, 5, (3, 4)), rng.normal(0, 0.1, 4)
     belief["f"], belief["G"], belief["u"] = f, G, u
     measured["x"], measured["y"][3] = rng.normal(0, 0.1, 3), 900.0
-    axes, model, surfaces = control["axes"], control["reference"], control["surfaces"]
+    axes, model, surfaces = law["output"], fields(control["reference"]), control["surfaces"]["output"]
     main = control["layout"]["main"]
-    rejecting.demand(rejection, axes, model, surfaces, main, belief, measured)  # the observer begins with x
-    share, d, x = rejection["share"], rejection["disturbance"], measured["x"]
+    rejecting.demand(law, control["reference"], surfaces, main, 0.0, belief, measured)  # begins with x
+    share, d, x = law["config"]["share"], law["observer"]["disturbance"], measured["x"]
+    assert axes["disturbance"].tolist() == d.tolist()
     ahead = x + share * DT * (f + d + G @ (surfaces["effectiveness"] * u + surfaces["offset"]))
     A, B = model["A"], model["B"]
     wanted = model["scale"] * model["commanded_rate"]
@@ -183,17 +195,17 @@ def test_the_demand_is_that_of_its_equation(seed):
     after = (1 - share) * first[0] + share * second[0]
     hold = -f - d
     assert axes["hold"] == pytest.approx(hold, abs=1e-12)
-    expected = (after - target) / DT + rejection["Kp"] * (target - ahead) + hold
+    expected = (after - target) / DT + law["memory"]["Kp"] * (target - ahead) + hold
     assert axes["demand"] == pytest.approx(expected, abs=1e-9)
 
 
 def led(lead, command, u):
     """What becomes of a command (4,) rad to actuators that are at u."""
     control, _ = record()
-    control["allocation"]["command"], control["rejection"]["lead"] = command, lead
-    command = control["allocation"]["command"]
-    rejecting.lead_actuators(control["rejection"], control["layout"], command, np.array(u))
-    return command
+    out = control["allocation"]["output"]
+    out["command"] = command
+    allocation.lead_compensate(out, control["layout"], np.broadcast_to(lead, 4), np.array(u))
+    return out["command"]
 
 
 def test_a_command_leads_a_lagging_actuator_within_the_travel():
@@ -202,15 +214,14 @@ def test_a_command_leads_a_lagging_actuator_within_the_travel():
 
 
 @given(st.floats(0.0, 1.0), st.floats(0.01, 1.0), st.floats(0.001, 0.1))
-def test_handed_back_the_share_of_the_stand_in_leaps_by_no_more_than_its_step(handed_over, left, step):
+def test_handed_back_the_share_of_the_stand_in_leaps_by_no_more_than_its_step(given, left, step):
     """Whatever the main surface is believed to be from then on; in the end it carries nothing."""
-    rejection = record()[0]["rejection"]
-    rejecting.hand_over(rejection, handed_over, 1, left, 0.1)
-    shares = [float(rejection["lost"])]
-    while handed_over > 0.0:
-        handed_over = max(handed_over - step, 0.0)
-        rejecting.hand_over(rejection, handed_over, 0, 1.0, 0.1)
-        shares.append(float(rejection["lost"]))
+    allocated = record()[0]["allocation"]
+    allocated["output"]["hand_over"] = given
+    shares = [handed_over(allocated, 1, left)]
+    allocated["config"]["hand_over_step"] = step
+    while allocated["output"]["hand_over"] > 0.0:
+        shares.append(handed_over(allocated, 0, 1.0))
     assert shares[-1] == 0.0 or len(shares) == 1
     assert np.all(np.diff(shares) <= 0.0)
     assert np.all(np.diff(shares) >= -1.5 * step)  # the steepest of 3 s^2 - 2 s^3
@@ -233,18 +244,21 @@ def test_handed_back_the_share_of_the_stand_in_leaps_by_no_more_than_its_step(ha
 def test_pitch_is_handed_over_by_steps_and_back(mode, every_type, hedging, left, before, after):
     frame = assemble(scenario(), np.zeros(4), TRAVEL).view(np.recarray)[0]
     control = put(frame["control"], hand_over=before, hand_over_step=0.1, hedging=hedging)
-    control["surfaces"]["effectiveness"][ELEVATOR], control["rejection"]["part"] = left, 0.3
-    frame["fdi"]["config"]["every_type"], frame["supervisor"]["mode"] = every_type, mode
-    whole.hand_over_pitch(frame)
-    assert control["allocation"]["hand_over"] == pytest.approx(after)
+    control["surfaces"]["output"]["effectiveness"][ELEVATOR] = left
+    control["allocation"]["output"]["lost_share"], assessment = 0.3, frame["assessment"]
+    assessment["every_type"] = every_type
+    inversion.prepare(control, assessment, frame["belief"], mode, 0.0)
+    assert control["allocation"]["output"]["hand_over"] == pytest.approx(after)
     now = 1.0 - left if left >= 0.1 else 1.0
     lost = now if mode == MODE_REALLOCATED else 0.3
-    assert control["rejection"]["lost"] == pytest.approx((3 * after**2 - 2 * after**3) * lost)
+    assert control["allocation"]["output"]["transfer_share"] == pytest.approx(
+        (3 * after**2 - 2 * after**3) * lost
+    )
 
 
 def test_a_plug_ins_command_is_kept_within_the_travel_and_that_is_noted():
     control, _ = record()
-    out = control["allocation"]
+    out = control["allocation"]["output"]
     allocation.take_command(out, control["layout"], np.array([0.6, 0.1, -0.5, -0.1]))
     assert list(out["command"]) == [0.52, 0.1, -0.44, -0.1]
     assert list(out["saturated"]) == [1, 0, 1, 0]
@@ -262,9 +276,9 @@ class TestVerdict:
 
     def taken(self, frame):
         """What the law takes the surfaces for."""
-        whole.assess(frame["fdi"], frame["assessment"])
+        whole.assess_faults(frame)
         whole.accommodate(frame)
-        return frame["control"]["surfaces"]
+        return frame["control"]["surfaces"]["output"]
 
     def test_of_a_plug_ins_estimates_once_it_has_detected(self, frame):
         verdict = frame["fdi"]["verdict"]
@@ -277,7 +291,8 @@ class TestVerdict:
     @pytest.mark.parametrize("effectiveness", [0.0, 0.6])
     def test_of_the_truth_for_the_oracle(self, frame, effectiveness):
         faults = frame["faults"]
-        frame["control"]["law"], faults["present"] = ORACLE, 1
+        put(frame["control"], law="oracle-published")
+        faults["present"] = 1
         faults["effectiveness"], faults["effective"] = [1.0, effectiveness, 1.0, 1.0], [0.1, 0.2, 0.3, 0.4]
         faults["immovable"][FLAP] = 1
         frame["belief"]["u"] = [0.1, 0.25, 0.3, 0.05]
@@ -289,7 +304,7 @@ class TestVerdict:
         surface, frame["fdi"]["config"]["every_type"] = frame["fdi"]["types"]["surface"][RUDDER], 1
         surface["measure"], surface["command"], surface["low"], surface["high"] = LAGS, 0.1, 0.02, 0.06
         assert self.taken(frame)["lag"] == pytest.approx([0, 0, 0.04 - 0.1, 0])
-        assert frame["control"]["reference"]["hedging"] == 1
+        assert frame["control"]["surfaces"]["output"]["authority_lost"] == 1
 
     @pytest.mark.parametrize(
         ("every_type", "measure", "target", "surface", "doubtful"),
@@ -302,40 +317,38 @@ class TestVerdict:
     def test_what_may_be_of_no_use(self, frame, every_type, measure, target, surface, doubtful):
         control, assessment = frame["control"], frame["assessment"]
         assessment["every_type"], assessment["measure"][surface] = every_type, measure
-        control["surfaces"]["target"], control["surfaces"]["least_effectiveness"] = 1.0, 0.1
-        control["surfaces"]["target"][surface] = target
-        parts = assessment, control["surfaces"], control["rejection"], control["layout"]
-        assert bool(accommodation.is_doubtful(*parts, surface)) is doubtful
+        parts = assessment, control["rejecting"]["memory"]["sums"], control["layout"]
+        assert bool(rejecting.is_doubtful(*parts, surface, target, 0.1)) is doubtful
 
     @pytest.mark.parametrize("why", ["truth", "withdrawn", "fixed", None])
     def test_what_does_not_follow_is_commanded_to_its_trim(self, frame, why):
-        control, assessment, law = (
-            frame["control"],
-            frame["assessment"],
-            ORACLE if why == "truth" else ADAPTIVE,
-        )
-        out, surfaces, withdrawn = (
-            control["allocation"],
-            control["surfaces"],
-            control["rejection"]["withdrawn"],
-        )
+        control, assessment = frame["control"], frame["assessment"]
+        out, surfaces = control["allocation"]["output"], control["surfaces"]["output"]
         out["command"], out["saturated"], surfaces["effectiveness"] = 0.3, 1, 1.0
         frame["faults"]["immovable"][RUDDER] = 1  # which only the oracle may know
-        withdrawn[RUDDER] = why == "withdrawn"
+        surfaces["given_up"][RUDDER] = why == "withdrawn"
         assessment["measure"], assessment["measure"][RUDDER] = -1, FIXED
         surfaces["effectiveness"][RUDDER] = 0.0 if why == "fixed" else 0.5
-        rest = frame["faults"], control["layout"], out, control["reference"]
-        accommodation.give_up(law, assessment, surfaces, withdrawn, *rest)
+        accommodation.park_failed_surfaces(surfaces, assessment, frame["faults"], why == "truth")
+        allocation.park(out, control["layout"], surfaces["parked"])
         given_up = why is not None
         assert list(out["command"]) == [0.3, 0.3, 0.02 if given_up else 0.3, 0.3]
         assert list(out["saturated"]) == [1, 1, 0 if given_up else 1, 1]
-        assert control["reference"]["hedging"] == given_up
+        assert surfaces["authority_lost"] == given_up
 
-    @pytest.mark.parametrize("law_is", [NOMINAL, FAULT_TOLERANT])
-    def test_the_unknown_is_for_the_observer_where_there_is_one(self, frame, law_is):
-        control = put(frame["control"], fhat=1.0, inner=REJECTING, law=law_is)
-        whole.compensate(frame)
-        assert list(control["feedback"]["fhat"]) == [0.0] * 3
+    @pytest.mark.parametrize("law", ["fault-tolerant", "oracle"])
+    def test_the_unknown_is_for_the_observer_where_there_is_one(self, frame, law):
+        """What the diagnosis or the truth has of it is not taken off the demand a second time."""
+        config = frame["control"]["rejecting"]["config"]
+        config["qdyn"], config["dt"] = np.linspace(500.0, 900.0, 5), DT
+        put(frame["control"], law=law)
+        demands = []
+        for unknown in (0.0, 1.0):
+            frame["assessment"]["unknown_acceleration"] = frame["faults"]["Cm_alpha3"] = unknown
+            frame["control"]["rejecting"]["observer"]["begun"] = 0
+            whole.command(frame)
+            demands.append(frame["control"]["axes"]["demand"].tolist())
+        assert demands[0] == demands[1]
 
 
 def test_a_command_to_an_actuator_that_does_not_lag_stays_to_the_last_digit():
@@ -345,25 +358,28 @@ def test_a_command_to_an_actuator_that_does_not_lag_stays_to_the_last_digit():
 def test_a_surface_that_is_whole_is_not_asked_about():
     """What the observer has seen of it stays, for the day on which it is named."""
     control, _ = record()
-    control["surfaces"]["target"] = 1.0
-    control["rejection"]["found"]["product"] = 3.0
+    sums = control["rejecting"]["memory"]["sums"]
+    sums["product"] = 3.0
     for s in (AILERON, RUDDER):
-        rejecting.believe_larger(control["rejection"], control["surfaces"], control["layout"], s)
-    assert control["rejection"]["found"]["product"].tolist() == [3.0] * 3
-    assert not control["rejection"]["found"]["named"].any()
+        assert rejecting.clamp_to_observer_estimate(sums, control["layout"], s, 1.0, 0.1) == 1.0
+    assert sums["product"].tolist() == [3.0] * 3
+    assert not sums["named"].any()
 
 
 def test_only_the_main_surface_of_an_axis_is_seen_to_act():
-    control, _ = record()
-    found = control["rejection"]["found"]
-    found["square"], found["product"] = 1.0, (-0.5, -1.0, -0.95)
-    assert [bool(rejecting.acts(found, (0, 1, 2), s, 0.1)) for s in range(4)] == [True, False, False, False]
-    found["product"] = -0.95, -1.0, -0.5
-    assert [bool(rejecting.acts(found, (0, 1, 2), s, 0.1)) for s in range(4)] == [False, False, True, False]
+    sums = record()[0]["rejecting"]["memory"]["sums"]
+
+    def acting():
+        return [bool(rejecting.is_effective(sums, (0, 1, 2), s, 0.1)) for s in range(4)]
+
+    sums["square"], sums["product"] = 1.0, (-0.5, -1.0, -0.95)
+    assert acting() == [True, False, False, False]
+    sums["product"] = -0.95, -1.0, -0.5
+    assert acting() == [False, False, True, False]
 
 
 def test_of_nothing_seen_the_verdict_is_believed():
     """An observer that has missed nothing yet says nothing about a surface."""
-    control, _ = record()
-    control["rejection"]["found"]["frames"] = 5.0
-    assert rejecting.effectiveness_seen(control["rejection"]["found"], 0, 0.4) == 0.4
+    sums = record()[0]["rejecting"]["memory"]["sums"]
+    sums["frames"] = 5.0
+    assert rejecting.effectiveness_seen(sums, 0, 0.4) == 0.4

@@ -8,7 +8,7 @@ from scipy.linalg import solve_continuous_lyapunov
 
 from beaver_ftc.control.laws import zhang2005
 from beaver_ftc.loop.loop import fly
-from beaver_ftc.scenario.control import ControlConfig
+from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.reproduce.choices import scenario as published
 from flying import Memory, flown, loss
 from law_records import new_control
@@ -20,56 +20,59 @@ LAW = {"law": "zhang2005"}
 
 
 def law(**options):
-    control = new_control(main=(0, 1, 2), law=2, inner=4, effectiveness=1.0)
-    zhang2005.configure(control, ControlConfig(law="zhang2005", options=options), TRAVEL)
+    return configured(new_control(main=(0, 1, 2), law="zhang2005", effectiveness=1.0), options=options)
+
+
+def configured(control, **keys):
+    """The law's record filled from a scenario with these keys of `control`."""
+    scenario = Scenario.model_validate({"name": "x", "control": {"law": "zhang2005", **keys}})
+    zhang2005.configure(control["zhang2005"], control, scenario, TRAVEL)
     return control
 
 
 @given(st.floats(0.5, 6.0), st.floats(0.1, 9.0), st.floats(0.02, 50.0))
 def test_the_signal_is_that_of_lyapunovs_equation(Kp, Ki, q):
     """A' P + P A = -diag(1, q) by SciPy: the second row of P, over its last element."""
-    control = new_control(main=(0, 1, 2))
-    config = ControlConfig(
-        law="zhang2005", options={"rate_weight": q}, proportional_per_s=Kp, integral_per_s2=Ki
-    )
-    zhang2005.configure(control, config, TRAVEL)
+    keys = {"options": {"rate_weight": q}, "proportional_per_s": Kp, "integral_per_s2": Ki}
+    control = configured(new_control(main=(0, 1, 2)), **keys)
     A = np.array([[0.0, 1.0], [-Ki, -Kp]])
     P = solve_continuous_lyapunov(A.T, -np.diag([1.0, q]))
-    assert control["adaptation"]["integral_weight"] == pytest.approx(P[1, 0] / P[1, 1])
+    assert control["zhang2005"]["config"]["integral_weight"] == pytest.approx(P[1, 0] / P[1, 1])
 
 
 def adapt(control, error, u=(0.1, -0.2, 0.05, 0.0), dt=0.01):
     G = np.zeros((3, 4))
     G[0, 0], G[2, 0], G[1, 1], G[2, 2], G[0, 2] = -8.0, -0.4, -10.0, -5.0, 0.3
-    zhang2005.adapt(
-        control.adaptation, control.feedback, control.surfaces, control.layout,
-        control.allocation.saturated, np.array(error), G, np.array(u), dt,
-    )  # fmt: skip
+    saturated = control.allocation.output.saturated
+    main, error = control.layout.main, np.array(error)
+    zhang2005.adapt(control.zhang2005, control.surfaces, main, saturated, error, G, np.array(u), dt)
     return G, np.array(u)
 
 
 def test_effectiveness_follows_the_gradient_and_stays_in_its_set():
     control = law(parametric_gain=20.0)
-    control.feedback.integral[:] = 0.02, -0.01, 0.0
-    control.surfaces.effectiveness[:3] = 0.8
+    control.zhang2005.feedback.memory.integral[:] = 0.02, -0.01, 0.0
+    control.surfaces.output.effectiveness[:3] = 0.8
     error = np.array([0.03, -0.02, 0.01])
     G, u = adapt(control, error)
-    s = error + control.adaptation.integral_weight * control.feedback.integral
+    s = error + control.zhang2005.config.integral_weight * control.zhang2005.feedback.memory.integral
     expected = 0.8 - 0.01 * 20.0 * (s @ (G * u))[:3]
-    np.testing.assert_allclose(control.surfaces.effectiveness[:3], expected)
-    assert control.surfaces.effectiveness[3] == 1.0
+    np.testing.assert_allclose(control.surfaces.output.effectiveness[:3], expected)
+    assert control.surfaces.output.effectiveness[3] == 1.0
     for _ in range(2000):
         adapt(control, 9.0 * error)
-    assert ((control.surfaces.effectiveness >= 0.1) & (control.surfaces.effectiveness <= 1.0)).all()
+    assert (
+        (control.surfaces.output.effectiveness >= 0.1) & (control.surfaces.output.effectiveness <= 1.0)
+    ).all()
 
 
 def test_what_a_saturated_surface_misses_teaches_nothing():
     control = law()
-    control.allocation.saturated[1] = 1
-    control.adaptation.network.basis[:] = 0.1
+    control.allocation.output.saturated[1] = 1
+    control.zhang2005.network.basis[:] = 0.1
     adapt(control, (0.0, 0.3, 0.0))
-    assert (control.surfaces.effectiveness == 1.0).all()
-    assert not control.adaptation.network.weights.any()
+    assert (control.surfaces.output.effectiveness == 1.0).all()
+    assert not control.zhang2005.network.weights.any()
 
 
 @settings(max_examples=samples(15))
@@ -77,13 +80,13 @@ def test_what_a_saturated_surface_misses_teaches_nothing():
 def test_the_lyapunov_function_falls(unknown, e0):
     """e' = -Kp e - Ki int e + fhat - phi, phi constant, in small steps: V with the weights in it."""
     control, dt = law(network_gain=60.0, rate_weight=20.0), 1e-3
-    q, Gamma, network = 20.0, 60.0, control.adaptation.network
+    q, Gamma, network = 20.0, 60.0, control.zhang2005.network
     network.basis[:, 0] = 1.0
     A = np.array([[0.0, 1.0], [-1.0, -2.0]])
     P = solve_continuous_lyapunov(A.T, -np.diag([1.0, q]))
     e, integral, before = e0, 0.0, np.inf
     for k in range(3000):
-        control.feedback.integral[1] = integral
+        control.zhang2005.feedback.memory.integral[1] = integral
         missed = network.weights[1, 0] - unknown
         z = np.array([integral, e])
         V = z @ P @ z / P[1, 1] + missed**2 / Gamma

@@ -6,6 +6,7 @@ import pytest
 import law_records
 from beaver_ftc.control.outer import autopilot as loops
 from beaver_ftc.control.outer.state import ALTITUDE, AUTOPILOT, BANK, HEADING, N_CHANNELS, SPEED
+from beaver_ftc.control.power import follow_autopilot
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, DPT, QDYN
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 from law_records import put
@@ -29,7 +30,7 @@ def new_autopilot(*channels, **fields):
     pilot = record(AUTOPILOT)
     pilot["dt"], pilot["gravity"], pilot["airspeed"], pilot["alpha"] = DT, G, V, ALPHA_NOW
     pilot["dihedral"], pilot["slowest_mps"], pilot["steepest_alpha"] = 0.02, 35.0, 0.26
-    pilot["trim_power"], pilot["low_power"], pilot["high_power"], pilot["step_power"] = 20.0, 12.0, 28.0, 0.5
+    pilot["trim_power"], pilot["low_power"], pilot["high_power"] = 20.0, 12.0, 28.0
     pilot["allowed_power"] = 28.0
     pilot["most"], pilot["limit"], pilot["most_bank"], pilot["bank_limit"] = (0.2, 0.1, 0.15), 10.0, 0.5, 0.5
     pilot["flying"], pilot["thrust"], pilot["climb_in_trim"] = 1, (0.2, 0.1), 0.01
@@ -44,20 +45,25 @@ def new_autopilot(*channels, **fields):
 
 def new_control(**fields):
     control = law_records.new_control(main=(0, 1, 2), effectiveness=1.0, least_effectiveness=0.1)
-    control["power"]["dpt_factor"], control["power"]["highest_dpt"] = 40.0, 0.9
+    control["power"]["config"]["dpt_factor"], control["power"]["config"]["highest_dpt"] = 40.0, 0.9
     return put(control, **fields)
 
 
 def follow(pilot, control, y):
-    loops.follow(pilot, control["layout"], control["surfaces"], control["allocation"]["saturated"], y)
+    saturated = control["allocation"]["output"]["saturated"]
+    loops.follow(pilot, control["layout"], control["surfaces"], saturated, False, y)
 
 
 def limit(pilot, control):
-    loops.limit(pilot, control["layout"], control["allocation"]["G"], control["axes"]["hold"])
+    axes, by_engines = control["axes"], np.zeros((2, 3))
+    loops.limit(pilot, control["layout"], axes["G"], axes["hold"], by_engines)
 
 
 def full_power(pilot, control, y):
-    left, at_stop = control["surfaces"]["effectiveness"], control["allocation"]["saturated"]
+    left, at_stop = (
+        control["surfaces"]["output"]["effectiveness"],
+        control["allocation"]["output"]["saturated"],
+    )
     return loops.full_power(pilot, control["power"], left[RUDDER], at_stop[RUDDER], y)
 
 
@@ -86,7 +92,7 @@ def test_it_takes_over_in_trim():
 @pytest.mark.parametrize("left", [0.0, 0.0999, 0.1, 1.0])
 def test_signals_are_smoothed_and_a_lost_surface_is_noticed(surface, share, left):
     pilot, control = new_autopilot(jammed=0.5, loose=0.5), new_control()
-    control["surfaces"]["effectiveness"][surface] = left
+    control["surfaces"]["output"]["effectiveness"][surface] = left
     follow(pilot, control, new_y())
     assert pilot["alpha"] == pytest.approx(ALPHA_NOW + DT / 2.0 * (0.1 - ALPHA_NOW))
     assert pilot["airspeed"] == pytest.approx(V + DT / 3.0 * (46.0 - V))
@@ -97,7 +103,7 @@ def test_signals_are_smoothed_and_a_lost_surface_is_noticed(surface, share, left
 
 def limited(jammed=0.0, loose=0.0, hold=(0.0, 0.0, 0.0)):
     pilot, control = new_autopilot(jammed=jammed, loose=loose), new_control(hold=hold)
-    control["allocation"]["G"] = np.diag([0.1, 0.2, 0.05, 0.0])[:3]
+    control["axes"]["G"] = np.diag([0.1, 0.2, 0.05, 0.0])[:3]
     control["layout"]["low"], control["layout"]["high"] = -0.5, (1.0, 0.5, 2.0, 0.0)
     limit(pilot, control)
     return pilot
@@ -279,19 +285,22 @@ def test_upside_down_the_turn_stays_finite():
 def throttled(path=0.03, y=None, power=(), rudder=1.0, **fields):
     pilot, control = new_autopilot(SPEED, **{"usual": 43.0, "throttle": 0.05, **fields}), new_control()
     pilot["held"], pilot["held_moving"], pilot["weathercock"] = 45.0, 0.04, 0.2
-    control["surfaces"]["effectiveness"][RUDDER] = rudder
-    control["power"]["command"][0] = 21.0
+    control["surfaces"]["output"]["effectiveness"][RUDDER] = rudder
+    control["power"]["output"]["command"][0] = 21.0
     for name, value in dict(power).items():
-        control["power"][name] = value
+        law_records.fields(control["power"])[name] = value
     pilot["full_power"] = full_power(pilot, control, new_y(dpt=0.2) if y is None else y)
-    loops.throttle(pilot, control["power"], new_y(dpt=0.2) if y is None else y, path, PUSH)
-    return pilot, control["power"]
+    power, engine = law_records.fields(control["power"]), control["power"]
+    power["step"] = 0.5
+    loops.throttle(pilot, engine, new_y(dpt=0.2) if y is None else y, path, PUSH)
+    follow_autopilot(engine, pilot["setting"], pilot["power_airspeed"])
+    return pilot, power
 
 
 def test_power_holds_the_airspeed_and_carries_the_climb():
     pilot, power = throttled()
     wanted = 20.0 + (0.04 + 0.05 + 0.3 * 1.0 + G * (0.03 - 0.01)) / PUSH
-    assert power["trim"] == pytest.approx(wanted)
+    assert power["base"] == pytest.approx(wanted)
     assert power["in_use"] == 1
     assert pilot["throttle"] == pytest.approx(0.05 + DT * 0.015 * 1.0)
     assert pilot["usual"] == pytest.approx(43.0 + DT / 20.0 * 1.0)
@@ -300,18 +309,18 @@ def test_power_holds_the_airspeed_and_carries_the_climb():
 
 def test_power_goes_down_as_slowly_and_to_the_lowest():
     pilot, power = throttled(path=-0.5)
-    assert power["trim"] == 12.0
+    assert power["base"] == 12.0
     assert power["command"][0] == 20.5
     assert pilot["throttle"] == 0.05  # what a limit cuts off is not integrated
-    assert throttled(path=0.5)[1]["trim"] == 28.0
+    assert throttled(path=0.5)[1]["base"] == 28.0
     assert throttled(throttle=5.0, path=-0.45)[0]["throttle"] == pytest.approx(0.1 * G)
     assert throttled(power={"enabled": 1})[1]["command"][0] == 21.0
 
 
 def test_small_steps_of_power_are_taken_at_once():
     _, power = throttled(path=0.01 + (0.9 * PUSH + 0.2 - 0.05 - 0.04 - 0.3 - 0.2 + 0.001) / G)
-    assert power["command"][0] == pytest.approx(power["trim"])
-    assert abs(power["trim"] - 21.0) < 0.5
+    assert power["command"][0] == pytest.approx(power["base"])
+    assert abs(power["base"] - 21.0) < 0.5
 
 
 @pytest.mark.parametrize("rudder", [1.0, 0.5, 0.02])
@@ -319,17 +328,17 @@ def test_power_leaves_the_rudder_enough(rudder):
     """The propeller yaws with dpt^3; the rudder holds what is left of it, sideslip what that lacks."""
     y = new_y(dpt=0.85)
     _, power = throttled(path=0.5, y=y, rudder=rudder)
-    dpt = y[DPT] + (power["trim"] - 21.0) * 40.0 / (2.0 * y[QDYN] * y[AIRSPEED])
+    dpt = y[DPT] + (power["base"] - 21.0) * 40.0 / (2.0 * y[QDYN] * y[AIRSPEED])
     yawing = (dpt / 0.9) ** 3
     held = rudder + (1.0 - rudder) * 0.2 / 0.9**3
-    assert yawing == pytest.approx(held, rel=1e-9) or power["trim"] in (12.0, 28.0)
+    assert yawing == pytest.approx(held, rel=1e-9) or power["base"] in (12.0, 28.0)
 
 
 def test_while_power_stands_in_for_pitch_it_gets_the_airspeed_to_hold():
     _, power = throttled(power={"engaged": 1})
     usual = 43.0 + DT / 20.0
     assert power["usual_speed"] == pytest.approx(45.0)
-    assert power["trim"] == pytest.approx(20.0 + (0.04 + 0.05 + G * 0.02) / PUSH)
+    assert power["base"] == pytest.approx(20.0 + (0.04 + 0.05 + G * 0.02) / PUSH)
     _, power = throttled(power={"engaged": 1}, usual=38.0)
     usual = 38.0 + DT / 20.0 * (V - 38.0)
     assert power["usual_speed"] == pytest.approx(usual + 3.0)
@@ -365,20 +374,20 @@ def test_a_frame_is_its_loops_one_after_the_other():
     pilot, control = new_autopilot(flying=0), new_control()
     put(control, G=np.eye(3, 4))
     control["layout"]["low"], control["layout"]["high"] = -1.0, 1.0
-    control["power"]["command"][0] = 20.0
+    control["power"]["output"]["command"][0] = 20.0
     pilot["legs"], pilot["value"][:, 0] = (1, 1, 1, 0), np.nan
     pilot["speed"] = np.inf
     measured = seen(attitude=(0.0, 0.11, 0.5), alpha=0.1, beta=0.02)
-    power, u = control["power"], np.zeros(4)
-    parts = control["layout"], control["surfaces"], control["allocation"], control["axes"]["hold"]
-    loops.steer(pilot, *parts, power, u, measured, 0.0, 0.0)
+    loops.steer(pilot, control, np.zeros(4), measured, 0.0, 0.0)
+    assert pilot["sets_power"]
+    follow_autopilot(control["power"], pilot["setting"], pilot["power_airspeed"])
     assert pilot["held"] == 46.0
     assert pilot["commanded"][:3].all()
     assert pilot["command"][:3] == pytest.approx([1000.0, 46.0, 0.5])
     assert pilot["changed_at_s"] == pytest.approx(np.zeros(N_CHANNELS))
     # pitch: path 0 + alpha - theta; yaw: the sideslip washed out
     assert pilot["rates"] == pytest.approx([0.0, max(3.0 * -0.01, -0.1), 0.5 * 0.02])
-    assert control["power"]["trim"] == pytest.approx(
+    assert control["power"]["setpoint"]["base"] == pytest.approx(
         20.0 - G * 0.01 / loops.slope_of(pilot, control["power"], measured["y"])
     )
 
@@ -399,18 +408,18 @@ def test_a_whole_rudder_leaves_the_whole_engine():
 def test_power_goes_back_while_the_rudder_stands_at_its_stop():
     """From what is commanded, to what sideslip alone holds, and slowly up again."""
     pilot, control = new_autopilot(weathercock=0.027), new_control()
-    control["power"]["command"][0], control["allocation"]["saturated"][RUDDER] = 24.0, 1
+    control["power"]["output"]["command"][0], control["allocation"]["output"]["saturated"][RUDDER] = 24.0, 1
     y = new_y(dpt=0.4)
     inhg_per_dpt = 2.0 * y[QDYN] * y[AIRSPEED] / 40.0
     lowest = 24.0 + (0.3 - 0.4) * inhg_per_dpt
     assert lowest < 12.0  # a low ceiling: what follows is not bounded by it
     assert full_power(pilot, control, y) == pytest.approx(24.0 - 8.0 * DT)
     assert full_power(pilot, control, y) == pytest.approx(24.0 - 16.0 * DT)
-    control["power"]["command"][0] = 20.0
+    control["power"]["output"]["command"][0] = 20.0
     assert full_power(pilot, control, y) == pytest.approx(20.0 - 8.0 * DT)
     pilot["weathercock"] = 0.4**3  # sideslip holds what there is: no less than that
     assert full_power(pilot, control, y) == pytest.approx(20.0)
-    control["allocation"]["saturated"][RUDDER] = 0
+    control["allocation"]["output"]["saturated"][RUDDER] = 0
     assert full_power(pilot, control, y) == pytest.approx(20.0 + DT)
     pilot["allowed_power"] = 27.9999
     assert full_power(pilot, control, y) == 28.0
@@ -418,10 +427,10 @@ def test_power_goes_back_while_the_rudder_stands_at_its_stop():
 
 def test_ailerons_at_their_stop_are_gone_whatever_is_believed_of_them():
     pilot, control = new_autopilot(), new_control()
-    control["allocation"]["saturated"][AILERON] = 1
+    control["allocation"]["output"]["saturated"][AILERON] = 1
     follow(pilot, control, new_y())
     assert pilot["jammed"] == pytest.approx(DT / pilot["gain"]["jammed_s"])
-    control["allocation"]["saturated"][:] = (0, 1, 1, 1)
+    control["allocation"]["output"]["saturated"][:] = (0, 1, 1, 1)
     follow(pilot, control, new_y())
     assert pilot["jammed"] < DT / pilot["gain"]["jammed_s"]
 
@@ -430,8 +439,8 @@ def test_ailerons_at_their_stop_are_gone_whatever_is_believed_of_them():
 def test_a_weak_rudder_and_sideslip_hold_the_propellers_yaw_together(left):
     """dpt^3 at the ceiling: what is left of the rudder's share, and the sideslip's for what is not."""
     pilot, control, y = new_autopilot(weathercock=0.2, high_power=1e9), new_control(), new_y(dpt=0.4)
-    pilot["allowed_power"], control["surfaces"]["effectiveness"][RUDDER] = 1e9, left
-    control["power"]["command"][0] = 21.0
+    pilot["allowed_power"], control["surfaces"]["output"]["effectiveness"][RUDDER] = 1e9, left
+    control["power"]["output"]["command"][0] = 21.0
     dpt = y[DPT] + (full_power(pilot, control, y) - 21.0) * 40.0 / (2.0 * y[QDYN] * y[AIRSPEED])
     assert dpt**3 == pytest.approx(max(left, 0.0) * 0.9**3 + (1.0 - left) * 0.2)
 
@@ -439,4 +448,4 @@ def test_a_weak_rudder_and_sideslip_hold_the_propellers_yaw_together(left):
 def test_what_power_misses_is_integrated_by_how_much_it_is():
     pilot, power = throttled(airspeed=43.5)
     assert pilot["throttle"] == pytest.approx(0.05 + DT * 0.015 * 1.5)
-    assert power["trim"] == pytest.approx(20.0 + (0.04 + 0.05 + 0.3 * 1.5 + G * (0.03 - 0.01)) / PUSH)
+    assert power["base"] == pytest.approx(20.0 + (0.04 + 0.05 + 0.3 * 1.5 + G * (0.03 - 0.01)) / PUSH)

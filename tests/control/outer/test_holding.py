@@ -90,15 +90,15 @@ def test_a_limit_moves_the_command_at_its_pace_and_lets_it_go_again():
 
 def test_the_flap_takes_what_an_elevator_at_its_stop_leaves():
     control = new_control(main=(0, 1, 2), stand_in=3, command=(0.0, -0.4, 0.0, 0.0), saturated=(0, 1, 0, 0))
-    layout, out = control["layout"], control["allocation"]
+    layout, out, axes = control["layout"], control["allocation"]["output"], control["axes"]
     layout["low"], layout["high"] = [-0.5, -0.4, -0.4, -0.1], [0.5, 0.4, 0.4, 1.0]
-    G, u = out["G"], out["command"]
+    G, u, axes["demand"] = axes["G"], out["command"], (0.0, 5.0, 0.0)
     G[1, 1], G[1, 3] = -10.0, 2.5
-    allocation.relieve(out, layout, 5.0)
+    allocation.spill_to_flap(axes, out, layout)
     assert u[3] == pytest.approx(0.4)
     assert (G @ u)[1] == pytest.approx(5.0)
     out["saturated"][1], u[3] = 0, 0.2
-    allocation.relieve(out, layout, 5.0)
+    allocation.spill_to_flap(axes, out, layout)
     assert u[3] == 0.2
 
 

@@ -34,7 +34,8 @@ def new(command=45.0, **fields):
     control = new_control(main=(0, 1, 2), stand_in=FLAP, least_effectiveness=0.1)
     layout, surfaces = control["layout"], control["surfaces"]
     layout["low"], layout["high"] = (-0.5, -0.4, -0.3, -0.1), (0.5, 0.3, 0.3, 1.0)
-    surfaces["effectiveness"], surfaces["offset"][ELEVATOR] = (1.0, 0.6, 1.0, 1.0), 0.02
+    surfaces["output"]["effectiveness"] = 1.0, 0.6, 1.0, 1.0
+    surfaces["output"]["offset"][ELEVATOR] = 0.02
     put(control, **fields)
     y = np.zeros(8)
     y[AIRSPEED], y[QDYN] = 44.0, 0.5 * DENSITY * 44.0**2
@@ -73,7 +74,7 @@ def at(elevator, flap):
 def test_the_airspeeds_are_those_of_flap_and_elevator_at_their_ends(flap_left, up, down):
     """What is left of the elevator's travel, about where it acts; of the flap all but a reserve."""
     pilot, layout, surfaces, y = new(effectiveness=(1.0, 0.05, 1.0, flap_left))
-    surfaces["offset"][FLAP] = 0.12
+    surfaces["output"]["offset"][FLAP] = 0.12
     hold = pilot["holding"]
     hold["acting"], hold["centre"] = -0.03, 0.005
     holding.find(pilot["holding"], layout, surfaces, y)
@@ -86,7 +87,7 @@ def test_the_airspeeds_are_those_of_flap_and_elevator_at_their_ends(flap_left, u
 @pytest.mark.parametrize(("offset", "stands"), [(-0.3, -0.1), (1.2, 1.0)])
 def test_a_lost_flap_stands_within_its_travel(offset, stands):
     pilot, layout, surfaces, y = new(effectiveness=(1.0, 0.0, 1.0, 0.0))
-    surfaces["offset"][FLAP] = offset
+    surfaces["output"]["offset"][FLAP] = offset
     pilot["holding"]["acting"] = needed(40.0, stands)
     holding.find(pilot["holding"], layout, surfaces, y)
     assert pilot["holding"]["fastest"] == pytest.approx(40.0 / np.sqrt(DENSITY), abs=0.05)
@@ -121,7 +122,7 @@ def test_only_a_pitch_that_is_not_whole_is_watched(effectiveness, stand_in, know
 
 def test_nothing_is_concluded_within_the_first_half_second():
     pilot, layout, surfaces, y = new(effectiveness=(1.0, 0.0, 1.0, 0.0))
-    surfaces["offset"][[ELEVATOR, FLAP]] = needed(40.0, 0.2), 0.2
+    surfaces["output"]["offset"][[ELEVATOR, FLAP]] = needed(40.0, 0.2), 0.2
     fastest = []
     for k in range(12):
         holding.protect(pilot, layout, surfaces, np.zeros(4), 0.0, y, k * DT)
@@ -137,7 +138,7 @@ def noted(command=45.0, fastest=np.inf, slowest=0.0, commanded=1, effectiveness=
     hold = pilot["holding"]
     hold["fastest"], hold["slowest"], pilot["commanded"][SPEED] = fastest, slowest, commanded
     pilot["bank_limit"] = limit
-    holding.announce(pilot, layout["main"], surfaces["effectiveness"], 7.0)
+    holding.announce(pilot, layout["main"], surfaces["output"]["effectiveness"], 7.0)
     return hold
 
 
@@ -166,7 +167,7 @@ def test_a_bank_limit_is_announced_as_it_has_been_on_average(surface):
     pilot, layout, surfaces, _ = new(effectiveness=effectiveness)
     pilot["bank_limit"] = 0.1
     for k in range(6):
-        holding.announce(pilot, layout["main"], surfaces["effectiveness"], float(k))
+        holding.announce(pilot, layout["main"], surfaces["output"]["effectiveness"], float(k))
     assert pilot["holding"]["in_force"][BANK_LIMIT] == 1
     assert pilot["holding"]["from_s"][BANK_LIMIT] == 4.0
     left = 0.1 + 0.4 * (1.0 - DT / 4.0) ** 6

@@ -28,8 +28,8 @@ def set_up(stand_in=3, autopilot=LEGS, **keys):
     pilot, control = np.zeros(1, AUTOPILOT)[0], np.zeros(1, control_dtype(4))[0]
     control["layout"]["main"], control["layout"]["stand_in"] = (0, 1, 2), stand_in
     control["layout"]["low"], control["layout"]["high"] = (-0.5, -0.4, -0.3, -0.1), (0.5, 0.4, 0.3, 1.0)
-    control["power"]["trim"], control["power"]["low"] = 20.0, 12.0
-    control["power"]["high"], control["power"]["step"] = 28.0, 0.5
+    control["power"]["config"]["trim"], control["power"]["config"]["low"] = 20.0, 12.0
+    control["power"]["config"]["high"], control["power"]["config"]["step"] = 28.0, 0.5
     setup.set_up_autopilot(pilot, control, Scenario.model_validate(given))
     return pilot, control
 
@@ -48,12 +48,12 @@ def coefficient(name, **of):
 def test_without_a_profile_it_is_off():
     pilot, control = set_up(autopilot=None)
     assert pilot.tobytes() == np.zeros(1, AUTOPILOT)[0].tobytes()
-    assert control["reference"]["steered"] == 0
+    assert control["reference"]["config"]["steered"] == 0
 
 
 def test_the_legs_are_in_si_and_what_is_held_has_no_value(filled):
     pilot, control = filled
-    assert (pilot["enabled"], control["reference"]["steered"]) == (1, 1)
+    assert (pilot["enabled"], control["reference"]["config"]["steered"]) == (1, 1)
     assert pilot["dt"] == pytest.approx(0.01)
     assert pilot["legs"].tolist() == [2, 1, 1, 0]
     assert pilot["at_s"][:3, :2].tolist() == [[0.0, 20.0], [5.0, 0.0], [0.0, 0.0]]
@@ -104,7 +104,7 @@ def test_each_loop_is_a_few_times_slower_than_the_one_inside_it(filled):
 
 def test_limits_and_the_engines_range_are_taken_over(filled):
     pilot, _ = filled
-    assert [pilot[f"{name}_power"] for name in ("trim", "low", "high", "step")] == [20.0, 12.0, 28.0, 0.5]
+    assert [pilot[f"{name}_power"] for name in ("trim", "low", "high")] == [20.0, 12.0, 28.0]
     assert pilot["most"] == pytest.approx(np.radians([12.0, 6.0, 10.0]))
     assert (pilot["most_bank"], pilot["steepest_alpha"]) == pytest.approx((radians(30.0), radians(15.0)))
     assert pilot["slowest_mps"] == AIRCRAFT.envelope.airspeed_mps[0] + 2.0

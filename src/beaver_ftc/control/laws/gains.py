@@ -19,13 +19,15 @@ from math import exp, hypot, inf, pi, radians, sqrt
 
 import numpy as np
 
-from beaver_ftc.control.laws.rejecting import N_POINTS, fading
 from beaver_ftc.design.model import AIRSPEED, QDYN
 from beaver_ftc.design.variants import effectiveness, own_damping
 from beaver_ftc.diagnosis.state import PITCH
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sensors import RateGyro
 
+N_POINTS = 5  # of the schedule over dynamic pressure
+N_LOOPS = 4  # roll, pitch, yaw, and pitch by the surface that stands in
+MEMORY_S = 5.0  # of the effectiveness seen by the observer: a slow reference's swing
 RATIO = 6.5  # observer over feedback: of those with the same margins, near the least error in turbulence
 LEAST_LEAD_RATIO, MOST_LEAD = 1.0, 4.0  # an actuator hurried to at most this many times its bandwidth
 RESERVE_DB, RESERVE_DEG = 0.5, 2.0  # kept for what an integrator is not: the rest of the aircraft
@@ -68,7 +70,7 @@ def frequencies(dt_s: float) -> np.ndarray:
 
 
 def corrections(observer_per_s: float, dt_s: float) -> tuple[float, float]:
-    """pull and learn (1/s) of an observer with both poles at exp(-w dt)."""
+    """L_rate and L_disturbance (1/s) of an observer with both poles at exp(-w dt)."""
     pole = np.exp(-observer_per_s * dt_s)
     return 1.0 - pole * pole, (1.0 - pole) ** 2 / dt_s
 
@@ -76,20 +78,20 @@ def corrections(observer_per_s: float, dt_s: float) -> tuple[float, float]:
 def controller(loop: Loop, s: float, z: np.ndarray) -> np.ndarray:
     """Actuator command over measured rate, times -G: the law's own response (n,), 1/s, at z (n,)."""
     dt, share = loop.dt_s, loop.share
-    pull, learn = corrections(RATIO * s, dt)
+    L_rate, L_disturbance = corrections(RATIO * s, dt)
     back = 1.0 / z
     mean = share * back + 1.0 - share  # of the surface's moment over the elapsed frame
     actuator = loop.approach / (z - 1.0 + loop.approach)
     one, none = np.ones_like(z), np.zeros_like(z)
     # unknowns: rate, disturbance, position (times G), command (times G); driven by the measured rate
     rows = [
-        [one - (1 - pull) * back, -(1 - pull) * dt * back, -(1 - pull) * dt * mean, none],
-        [learn * back, one - back + learn * dt * back, learn * dt * mean, none],
+        [one - (1 - L_rate) * back, -(1 - L_rate) * dt * back, -(1 - L_rate) * dt * mean, none],
+        [L_disturbance * back, one - back + L_disturbance * dt * back, L_disturbance * dt * mean, none],
         [none, none, one, -actuator],
         [loop.lead * s * one, loop.lead * (1 + s * share * dt) * one,
          (loop.lead - 1 + loop.lead * s * share * dt) * one, one],
     ]  # fmt: skip
-    driven = np.stack([pull * one, learn * one, none, none], 1)
+    driven = np.stack([L_rate * one, L_disturbance * one, none, none], 1)
     return -np.linalg.solve(np.moveaxis(np.array(rows), 2, 0), driven[..., None])[..., 3, 0]
 
 
@@ -162,8 +164,13 @@ def fastest(
     return float(np.exp(np.interp(np.log(allowed), np.log(speeds), np.log(values))))
 
 
+def fading(dt_s: float) -> float:
+    """Share of the past that is forgotten in a frame of dt_s seconds."""
+    return 1.0 - exp(-dt_s / MEMORY_S)
+
+
 def set_up(
-    rejection: np.void,
+    config: np.void,
     *,
     dt_s: float,
     substeps: int,
@@ -175,16 +182,16 @@ def set_up(
     G: np.ndarray,
     carriers: Sequence[tuple[int, int]],
 ) -> None:
-    """Fill the schedule of a rejection record, and the leads.
+    """Fill the schedule of the law's configuration, and the leads.
 
     approach (n,): share of the way an actuator goes in a JSBSim frame. speed_rad_s (n,): mean speed of a
     surface that noise may cause. margin: dB and deg. qdyn (N_POINTS,) Pa and G (N_POINTS, 3, n) there.
     carriers: axis and surface of each loop.
     """
     whole = 1.0 - (1.0 - approach) ** substeps
-    rejection["dt"], rejection["share"], rejection["qdyn"] = dt_s, 1.0 / substeps, qdyn
-    rejection["found"]["fading"] = fading(dt_s)
-    rejection["lead"] = [lead_of(float(a)) for a in whole]
+    config["dt"], config["share"], config["qdyn"] = dt_s, 1.0 / substeps, qdyn
+    config["fading"] = fading(dt_s)
+    config["lead"] = [lead_of(float(a)) for a in whole]
     for row, (axis, surface) in enumerate(carriers):
         gyro = gyros[axis]
         reach = float(whole[surface])
@@ -192,15 +199,14 @@ def set_up(
         for j in range(len(qdyn)):
             speed = float(speed_rad_s[surface])
             s = fastest(loop, margin, gyro.noise_rad_s, float(G[j, axis, surface]), speed)
-            rejection["Kp_at"][row, j] = s
-            rejection["pull_at"][row, j], rejection["learn_at"][row, j] = corrections(RATIO * s, dt_s)
+            config["Kp_at"][row, j] = s
+            config["L_rate_at"][row, j], config["L_disturbance_at"][row, j] = corrections(RATIO * s, dt_s)
 
 
-def configure(
-    rejection: np.void, layout: np.void, belief: np.void, scenario: Scenario, y: np.ndarray
-) -> None:
-    """Derive the gains of a scenario; y: the measured signals in trim."""
-    config, dt = scenario.control, 1.0 / scenario.rate_hz
+def anchor(law: np.void, control: np.void, belief: np.void, scenario: Scenario, y: np.ndarray) -> None:
+    """Derive the gains of a scenario into the law's configuration (base.CompiledLaw); y: the measured signals
+    in trim."""
+    config, dt, layout = scenario.control, 1.0 / scenario.rate_hz, control["layout"]
     speeds_mps = np.linspace(*scenario.airframe.envelope.airspeed_mps, N_POINTS)
     signals = np.tile(y, (N_POINTS, 1))
     signals[:, AIRSPEED], signals[:, QDYN] = speeds_mps, y[QDYN] * (speeds_mps / y[AIRSPEED]) ** 2
@@ -208,7 +214,7 @@ def configure(
     if layout["stand_in"] >= 0:
         carriers.append((PITCH, int(layout["stand_in"])))
     set_up(
-        rejection,
+        law["config"],
         dt_s=dt,
         substeps=scenario.substeps,
         approach=belief["actuators"]["approach"],

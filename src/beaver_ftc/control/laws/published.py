@@ -2,37 +2,95 @@
 
     demand = xm' + Kp e + Ki int e - f - fhat,    e = xm - x,    then G u = demand
 
-The published laws share it; they differ in fhat, in the effectiveness they believe and in who carries the
-demand.
+The laws nominal, adaptive, fault-tolerant-published and oracle-published are this one. They differ in fhat,
+in the effectiveness in G and in who carries the demand: plugins.yaml says what each is given.
 """
 
-from beaver_ftc.compiled import kernel, record
+import numpy as np
 
-# Gains 1/s, 1/s2; the integral of the error, rad; fhat, what the unknown is taken for, rad/s2.
-FEEDBACK = record(Kp=float, Ki=float, integral=3, fhat=3)
+from beaver_ftc.compiled import apart, kernel, record, sized
+from beaver_ftc.control import inversion
+from beaver_ftc.control.allocation import DEMAND
+from beaver_ftc.control.base import CompiledLaw
+from beaver_ftc.scenario.schema import Scenario
+
+CONFIG = record(Kp=float, Ki=float)  # gains 1/s, 1/s2
+MEMORY = record(integral=3)  # of the error, rad
+FEEDBACK = record(config=CONFIG, memory=MEMORY, output=DEMAND)
+
+
+@sized
+def published_dtype(n: int) -> np.dtype:
+    """The law's records; they do not depend on the number of surfaces n."""
+    return FEEDBACK
+
+
+def configure(law: np.void, control: np.void, scenario: Scenario, travel: np.ndarray) -> None:
+    """Fill the gains (base.CompiledLaw)."""
+    config = scenario.control
+    law["config"]["Kp"], law["config"]["Ki"] = config.proportional_per_s, config.integral_per_s2
+
+
+@apart
+def command(control, assessment, faults, belief, measured, mode, t):
+    """From what is measured to the command of each surface (base.CompiledLaw)."""
+    law, reference, unknown = control.published, control.reference, control.surfaces.output.unknown
+    inversion.prepare(control, assessment, belief, mode, t)
+    demand(law, reference.output, measured.x, belief.f, unknown)
+    inversion.command_surfaces(control, law.output, assessment, faults, belief, False)
+    integrate(law, control.axes, reference, control.allocation.output.command, measured.x)
+    inversion.complete(control, assessment, faults, measured, t)
 
 
 @kernel
-def demand(feedback, axes, reference, x, f):
-    """Fill axes.demand (3,) rad/s2: what the surfaces must give. x (3,) rad/s; f (3,) rad/s2."""
-    fhat = feedback.fhat
+def demand(law, reference, x, f, fhat):
+    """Fill the law's demand and hold (3,) rad/s2. x (3,) rad/s; f, fhat (3,) rad/s2: the model's acceleration
+    and what is unknown beside it; reference: the Output of reference.py."""
+    config, output = law.config, law.output
     for i in range(3):
         error = reference.governed_rate[i] - x[i]
-        pulled = feedback.Kp * error + feedback.Ki * feedback.integral[i]
-        axes.demand[i] = reference.governed_acceleration[i] + pulled - f[i] - fhat[i]
-        axes.hold[i] = -f[i] - fhat[i]
+        feedback = config.Kp * error + config.Ki * law.memory.integral[i]
+        output.demand[i] = reference.governed_acceleration[i] + feedback - f[i] - fhat[i]
+        output.hold[i] = -f[i] - fhat[i]
 
 
 @kernel
-def integrate(feedback, axes, reference, allocation, x):
+def integrate(law, axes, reference, u, x):
     """Advance the integrators; what the limited surfaces could not give is taken back (anti-windup).
 
-    x (3,) rad/s. The back-calculation gain 1/Kp unwinds within one closed-loop time constant.
+    u (n,) rad: the command; x (3,) rad/s. The back-calculation gain 1/Kp unwinds within one closed-loop time
+    constant.
     """
-    G, u = allocation.G, allocation.command
+    G, dt = axes.G, reference.config.dt
     for i in range(3):
         given = 0.0
         for s in range(u.size):
             given += G[i, s] * u[s]
-        error = reference.governed_rate[i] - x[i]
-        feedback.integral[i] += reference.dt * (error + (given - axes.demand[i]) / feedback.Kp)
+        error = reference.output.governed_rate[i] - x[i]
+        law.memory.integral[i] += dt * (error + (given - axes.demand[i]) / law.config.Kp)
+
+
+def unexplained(control: np.void) -> np.ndarray:
+    """What the law attributes to no model, (3,) rad/s2 (base.CompiledLaw)."""
+    return unexplained_by(control["published"], control["surfaces"]["output"]["unknown"])
+
+
+def unexplained_by(law: np.void, fhat: np.ndarray) -> np.ndarray:
+    """The same of a record of type FEEDBACK: fhat (3,) rad/s2 and what the integrators stand for."""
+    found: np.ndarray = fhat - law["config"]["Ki"] * law["memory"]["integral"]
+    return found
+
+
+def begin(control: np.void, before: np.void, unexplained: np.ndarray, learnt: np.ndarray) -> None:
+    """Take over in flight: the integrators begin where the demand is (base.CompiledLaw)."""
+    uses_network = control["config"]["uses_verdict"] and not control["config"]["informed"]
+    begin_integrators(control["published"], unexplained, learnt if uses_network else np.zeros(3))
+
+
+def begin_integrators(law: np.void, unexplained: np.ndarray, fhat: np.ndarray) -> None:
+    """Let the integrators of a record of type FEEDBACK stand for what fhat (3,) rad/s2 does not explain."""
+    if law["config"]["Ki"] > 0.0:
+        law["memory"]["integral"] = (fhat - unexplained) / law["config"]["Ki"]
+
+
+LAW = CompiledLaw(published_dtype, command, configure=configure, unexplained=unexplained, begin=begin)

@@ -3,110 +3,148 @@
     z' = f + G u + d + 2 w (x - z),   d' = w^2 (x - z)                 [Han2009, Chen2016]
     demand = xm' + Kp (xm - x+) - f - d,                                then G u = demand
 
-d is what the model does not explain: rotation of the air, wrong coefficients, a fault nobody has named yet.
-u is where the actuators are, not what they were told, so that neither their lag nor their stops is taken
-for a disturbance: there is nothing that could wind up. x+ is the rate at the instant from which the command
+d is what the model does not explain: rotation of the air, wrong coefficients, a fault that is not named yet.
+u is where the actuators are, not their command, so that neither their lag nor their stops count as a
+disturbance: there is nothing that could wind up. x+ is the rate at the instant from which the command
 acts, one JSBSim frame from now, and xm is taken there too.
 
-Discrete: z and d are corrected by `pull` = 1 - e^{-2 w dt} and `learn` = (1 - e^{-w dt})^2 / dt of what the
-observer missed. gains.py derives w, Kp and the lead.
+Discrete: z and d are corrected by L_rate = 1 - e^{-2 w dt} and L_disturbance = (1 - e^{-w dt})^2 / dt of the
+innovation. gains.py derives w, Kp and the lead.
 
-How much of a surface is left, the observer sees as well, in what it misses (answering.py). A surface with
+The innovation also shows how much of a surface is left (effectiveness_estimator.py). A surface with
 effectiveness 1 + theta gives theta G u more than a healthy one: theta is the least-squares fit of that, so
-filtered, to what was missed [Ljung1999, ch. 13: a prediction error in a closed loop]. The last MEMORY_S
-count.
+filtered, to the innovation [Ljung1999, ch. 13: a prediction error in a closed loop]. The last MEMORY_S count.
 
-An equation error in a closed loop takes a surface for weaker than it is, since the command answers the gust
-it is hidden in. This one errs the other way, with what the gyro's noise commands. The larger of both is
-believed: a loop is then no faster than its margins allow.
+An equation error in a closed loop estimates a surface as weaker than it is, since the command answers the
+gust that hides it. This estimate errs the other way, with what the gyro's noise commands. The law uses the
+larger of both: a loop is then no faster than its margins allow.
 """
-
-from math import exp
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel, record, sized
-from beaver_ftc.control.laws import answering
-from beaver_ftc.control.laws.answering import ANSWER, answer, answering_dtype
+from beaver_ftc.compiled import apart, kernel, record, sized
+from beaver_ftc.control import accommodation, allocation, inversion
+from beaver_ftc.control.accommodation import approach, begin_frame, reported, start_of
+from beaver_ftc.control.allocation import DEMAND
+from beaver_ftc.control.base import CompiledLaw
+from beaver_ftc.control.laws import effectiveness_estimator as estimator
+from beaver_ftc.control.laws.effectiveness_estimator import (
+    OBSERVER_ERROR,
+    effectiveness_of,
+    estimator_dtype,
+    observer_response,
+)
+from beaver_ftc.control.laws.gains import N_LOOPS, N_POINTS, anchor
 from beaver_ftc.control.reference import advance
 from beaver_ftc.design.model import QDYN
 from beaver_ftc.diagnosis.state import PITCH
+from beaver_ftc.diagnosis.types.contract import FIXED
 
-N_POINTS = 5  # of the schedule over dynamic pressure
-N_LOOPS, STAND_IN = 4, 3  # roll, pitch, yaw, and pitch by the surface that stands in
+STAND_IN = 3  # the loop of pitch by the surface that stands in
 PATIENCE_S, LONG_PATIENCE_S, RETRY_S = 0.5, 1.0, 20.0
-MEMORY_S = 5.0  # a slow reference's swing
-UNSURE = 0.2  # standard deviation of the diagnosis' estimate reckoned with: it settles the start
+UNSURE = 0.2  # standard deviation of the diagnosis' estimate that is assumed: it settles the start
 NOTHING_LEFT = 0.05  # half of what the law divides by
 
-# The sums of the least squares.
-FOUND = record(fading=float, product=3, square=3, missed=3, frames=3, named=(int, 3))
+# begun: whether rate (3,) rad/s and disturbance (3,) rad/s2 are estimates; a change of law keeps it.
+OBSERVER = record(begun=int, rate=3, disturbance=3)
+# Sums of the least squares, of the main surface of each axis; named: whether the diagnosis has named it.
+SUMS = record(product=3, square=3, innovation=3, frames=3, named=(int, 3))
 
 
 @sized
-def rejection_dtype(surfaces: int) -> np.dtype:
-    """The law's record for an aircraft with so many surfaces.
-
-    qdyn (N_POINTS,) Pa: the schedule's points, ascending. Kp 1/s, pull 1, learn 1/s (N_LOOPS, N_POINTS):
-    feedback, and the observer's corrections of rate and disturbance for what it missed.
-    rate (3,) rad/s, disturbance (3,) rad/s2: its estimates. ahead (3,) rad/s: the rate when the command
-    acts. lost: share of pitch that the stand-in carries; part: the same once all is handed over. lead (n,):
-    command beyond the actuator's position over what is wanted beyond it. at_stop_s, withdrawn (n,): see
-    `withdraw`. missed (3,) rad/s: what the estimates were off.
-    """
+def config_dtype(n: int) -> np.dtype:
+    """qdyn (N_POINTS,) Pa: the schedule's points, ascending. Kp 1/s, L_rate 1, L_disturbance 1/s (N_LOOPS,
+    N_POINTS): feedback, and the observer's gains. share: of a frame until a command acts. lead (n,): command
+    beyond the actuator's position over what is wanted beyond it. fading: share of SUMS that goes in a
+    frame."""
+    table = (N_LOOPS, N_POINTS)
     return record(
-        begun=int, dt=float, share=float, lost=float, part=float, qdyn=N_POINTS, Kp_at=(N_LOOPS, N_POINTS),
-        pull_at=(N_LOOPS, N_POINTS), learn_at=(N_LOOPS, N_POINTS), Kp=3, pull=3, learn=3, rate=3,
-        disturbance=3, ahead=3, lead=surfaces, at_stop_s=surfaces, withdrawn=(int, surfaces),
-        healthy=ANSWER, believed=ANSWER, found=FOUND, missed=3, answering=answering_dtype(surfaces),
+        dt=float, share=float, fading=float, qdyn=N_POINTS, Kp_at=table, L_rate_at=table,
+        L_disturbance_at=table, lead=n,
     )  # fmt: skip
 
 
-def fading(dt_s: float) -> float:
-    """Share of the past that goes in a frame of dt_s seconds."""
-    return 1.0 - exp(-dt_s / MEMORY_S)
+@sized
+def memory_dtype(n: int) -> np.dtype:
+    """Kp, L_rate, L_disturbance (3,): the gains of this frame. ahead (3,) rad/s: the rate when the command
+    acts. innovation (3,) rad/s. at_stop_s, withdrawn (n,): see `withdraw`. healthy, reckoned: the observer's
+    errors for the moments of healthy main surfaces and for those that the law reckons with."""
+    return record(
+        Kp=3, L_rate=3, L_disturbance=3, ahead=3, innovation=3, at_stop_s=n, withdrawn=(int, n),
+        healthy=OBSERVER_ERROR, reckoned=OBSERVER_ERROR, sums=SUMS, estimator=estimator_dtype(n),
+    )  # fmt: skip
+
+
+@sized
+def rejecting_dtype(n: int) -> np.dtype:
+    """The law's records for n surfaces."""
+    return record(config=config_dtype(n), observer=OBSERVER, memory=memory_dtype(n), output=DEMAND)
+
+
+@apart
+def accommodate(control, assessment, faults, belief, measured):
+    """Bring the effectiveness of all surfaces to this frame (base.CompiledLaw): the diagnosis' estimate, and
+    where the law is not informed of the truth also what its observer sees."""
+    if control.config.informed:
+        accommodation.accommodate(control, assessment, faults, belief, measured)
+        return
+    law, surfaces, layout = control.rejecting, control.surfaces, control.layout
+    memory, dt, least = law.memory, law.config.dt, surfaces.config.least_effectiveness
+    begin_frame(surfaces.output, assessment, False)
+    start_or_end_estimator(memory, layout, assessment.detected, dt)
+    for s in range(surfaces.output.target.size):
+        target = reported(surfaces.output, assessment, faults, s, 0.0, False)
+        start = start_of(surfaces.output, assessment, s, False)
+        if assessment.unknown and memory.estimator.active:
+            target = effectiveness_of(memory.estimator, s)
+        elif assessment.measure[s] != FIXED:
+            target = clamp_to_observer_estimate(memory.sums, layout, s, target, least)
+        named = assessment.detected and s == assessment.named
+        suspected = named and is_doubtful(assessment, memory.sums, layout, s, target, least)
+        withdraw(memory, layout, s, control.allocation.output.saturated[s], suspected, dt)
+        approach(surfaces, s, start, target, memory.withdrawn[s])
+
+
+@apart
+def command(control, assessment, faults, belief, measured, mode, t):
+    """From what is measured to the command of each surface (base.CompiledLaw)."""
+    law, out, surfaces = control.rejecting, control.allocation.output, control.surfaces.output
+    inversion.prepare(control, assessment, belief, mode, t)
+    main, share = control.layout.main, out.transfer_share
+    demand(law, control.reference, surfaces, main, share, belief, measured)
+    inversion.command_surfaces(control, law.output, assessment, faults, belief, True)
+    inversion.complete(control, assessment, faults, measured, t)
+    allocation.lead_compensate(out, control.layout, law.config.lead, belief.u)
 
 
 @kernel
-def schedule(rejection, qdyn):
-    """Gains for a dynamic pressure (Pa), held beyond the ends of the table; pitch also for who carries it."""
-    points = rejection.qdyn
+def schedule(config, memory, qdyn, transfer_share):
+    """Gains for a dynamic pressure (Pa), held beyond the ends of the table; pitch also for who carries it:
+    transfer_share, the part of pitch that its stand-in carries."""
+    points = config.qdyn
     last = points.size - 1
     j = 0
     while j < last - 1 and qdyn > points[j + 1]:
         j += 1
-    part = min(max((qdyn - points[j]) / (points[j + 1] - points[j]), 0.0), 1.0)
-    look_up(rejection.Kp, rejection.Kp_at, j, part, rejection.lost)
-    look_up(rejection.pull, rejection.pull_at, j, part, rejection.lost)
-    look_up(rejection.learn, rejection.learn_at, j, part, rejection.lost)
+    fraction = min(max((qdyn - points[j]) / (points[j + 1] - points[j]), 0.0), 1.0)
+    look_up(memory.Kp, config.Kp_at, j, fraction, transfer_share)
+    look_up(memory.L_rate, config.L_rate_at, j, fraction, transfer_share)
+    look_up(memory.L_disturbance, config.L_disturbance_at, j, fraction, transfer_share)
 
 
 @kernel
-def look_up(gains, table, j, part, lost):
-    """Fill gains (3,) from a table; lost: the share of pitch that its stand-in carries."""
+def look_up(gains, table, j, fraction, transfer_share):
+    """Fill gains (3,) from a table; transfer_share: the part of pitch that its stand-in carries."""
     for i in range(3):
-        gains[i] = between(table, i, j, part)
-    if lost > 0.0:
-        gains[PITCH] += lost * (between(table, STAND_IN, j, part) - gains[PITCH])
+        gains[i] = between(table, i, j, fraction)
+    if transfer_share > 0.0:
+        gains[PITCH] += transfer_share * (between(table, STAND_IN, j, fraction) - gains[PITCH])
 
 
 @kernel
-def between(table, i, j, part):
-    """Row i of a table, `part` of the way from point j to the next."""
-    return table[i, j] + part * (table[i, j + 1] - table[i, j])
-
-
-@kernel
-def hand_over(rejection, given, reallocated, remains, least):
-    """The share of pitch its stand-in carries, once `given` is handed over: what the main surface has lost.
-
-    remains: its effectiveness; less than `least` is none. While pitch is handed back, `reallocated` no
-    longer, that of before counts: the main surface may be believed whole at once, and nothing is to leap.
-    """
-    given = given if remains > 0.0 else 1.0
-    if reallocated or remains <= 0.0:
-        rejection.part = 1.0 - remains if remains >= least else 1.0
-    rejection.lost = given * given * (3.0 - 2.0 * given) * rejection.part
+def between(table, i, j, fraction):
+    """Row i of a table, `fraction` of the way from point j to the next."""
+    return table[i, j] + fraction * (table[i, j + 1] - table[i, j])
 
 
 @kernel
@@ -116,157 +154,179 @@ def is_replaced(layout, s):
 
 
 @kernel
-def believe_larger(rejection, surfaces, layout, s):
-    """Take a loss of a surface that nothing replaces for no larger than the observer sees it."""
+def clamp_to_observer_estimate(sums, layout, s, target, least):
+    """Effectiveness of surface s: of a loss reported as `target`, of a main surface that nothing replaces, no
+    less than the observer sees. least: of the effectiveness that is used."""
     for i in range(3):
-        if s == layout.main[i] and surfaces.target[s] < 1.0 and not is_replaced(layout, s):
-            believe_larger_of(rejection.found, surfaces, s, i)
+        if s == layout.main[i] and target < 1.0 and not is_replaced(layout, s):
+            target = larger_estimate(sums, target, i, least)
+    return target
 
 
 @kernel
-def believe_larger_of(found, surfaces, s, i):
-    """Believe the larger of both estimates of surface s, main one of axis i; nothing of it is nothing."""
-    named = surfaces.target[s]
-    if not found.named[i]:  # it is not what it was: what was seen before counts no longer
-        found.named[i], found.product[i], found.square[i] = 1, 0.0, 0.0
-    larger = max(named, min(effectiveness_seen(found, i, named), 1.0))
-    least = surfaces.least_effectiveness
-    surfaces.target[s] = larger if larger < NOTHING_LEFT else max(larger, least)
+def larger_estimate(sums, named, i, least):
+    """The larger of both estimates of the main surface of axis i, `named` and the observer's; nothing of it
+    is nothing."""
+    if not sums.named[i]:  # it is not what it was: what was seen before counts no longer
+        sums.named[i], sums.product[i], sums.square[i] = 1, 0.0, 0.0
+    larger = max(named, min(effectiveness_seen(sums, i, named), 1.0))
+    return larger if larger < NOTHING_LEFT else max(larger, least)
 
 
 @kernel
-def effectiveness_seen(found, i, named):
-    """Effectiveness of the main surface of axis i; named: what the diagnosis takes it for."""
-    if found.frames[i] == 0.0:
+def effectiveness_seen(sums, i, named):
+    """Effectiveness of the main surface of axis i by the observer; named: by the diagnosis."""
+    if sums.frames[i] == 0.0:
         return named
-    prior = found.missed[i] / found.frames[i] / (UNSURE * UNSURE)
-    weight = found.square[i] + prior
-    return 1.0 + (found.product[i] + prior * (named - 1.0)) / weight if weight > 0.0 else named
+    prior = sums.innovation[i] / sums.frames[i] / (UNSURE * UNSURE)
+    weight = sums.square[i] + prior
+    return 1.0 + (sums.product[i] + prior * (named - 1.0)) / weight if weight > 0.0 else named
 
 
 @kernel
-def acts(found, main, s, least):
+def is_effective(sums, main, s, least):
     """Whether the law's observer sees surface s act, enough to be divided by; main (3,), least: of the
     effectiveness."""
     for i in range(3):
-        if s == main[i] and found.product[i] > (least - 1.0) * found.square[i]:
+        if s == main[i] and sums.product[i] > (least - 1.0) * sums.square[i]:
             return True
     return False
 
 
 @kernel
-def withdraw(rejection, surfaces, layout, s, saturated, suspected):
+def is_doubtful(assessment, sums, layout, s, target, least):
+    """Whether surface s, which is named, may be of no use: another can take its place, or its type is open or
+    its effectiveness `target` below `least`, and the observer does not see it act either."""
+    if is_replaced(layout, s):
+        return True
+    is_open = assessment.every_type and assessment.measure[s] < 0
+    useless = is_open or target < least
+    return useless and not is_effective(sums, layout.main, s, least)
+
+
+@kernel
+def withdraw(memory, layout, s, saturated, suspected, dt):
     """Give up surface s if it is suspected of a fault and has stood at its stop for a while.
 
-    It does not give what it is told, and at its stop it is told nothing that would show why: jams, offsets
-    and losses look alike. In trim it shows; where another takes its place, it is tried again after RETRY_S.
+    It does not follow its command, and at its stop the command shows nothing of the reason: jams, offsets and
+    losses look alike. In trim the reason shows; where another surface takes its place, it is tried again
+    after RETRY_S.
     """
-    rejection.at_stop_s[s] += rejection.dt
+    memory.at_stop_s[s] += dt
     if not suspected:
-        rejection.withdrawn[s], rejection.at_stop_s[s] = 0, 0.0
-    elif rejection.withdrawn[s]:
-        if rejection.at_stop_s[s] > RETRY_S and is_replaced(layout, s):
-            rejection.withdrawn[s], rejection.at_stop_s[s] = 0, 0.0
+        memory.withdrawn[s], memory.at_stop_s[s] = 0, 0.0
+    elif memory.withdrawn[s]:
+        if memory.at_stop_s[s] > RETRY_S and is_replaced(layout, s):
+            memory.withdrawn[s], memory.at_stop_s[s] = 0, 0.0
     elif not saturated:
-        rejection.at_stop_s[s] = max(rejection.at_stop_s[s] - 1.5 * rejection.dt, 0.0)  # a dead one swings
-    elif rejection.at_stop_s[s] > (PATIENCE_S if is_replaced(layout, s) else LONG_PATIENCE_S):
-        rejection.withdrawn[s], rejection.at_stop_s[s] = 1, 0.0
-    if rejection.withdrawn[s]:
-        surfaces.target[s] = surfaces.effectiveness[s] = 0.0
+        memory.at_stop_s[s] = max(memory.at_stop_s[s] - 1.5 * dt, 0.0)  # a dead one swings
+    elif memory.at_stop_s[s] > (PATIENCE_S if is_replaced(layout, s) else LONG_PATIENCE_S):
+        memory.withdrawn[s], memory.at_stop_s[s] = 1, 0.0
 
 
 @kernel
-def look_for_losses(rejection, layout, detected):
-    """Listen from the alarm on which surfaces answer, where more move than lead an axis or stand in."""
-    if not (detected and layout.general and rejection.answering.found.size > 1):
-        rejection.answering.listening = 0
-    elif not rejection.answering.listening:
-        answering.begin(rejection.answering, rejection.found.missed, rejection.found.frames, rejection.dt)
+def start_or_end_estimator(memory, layout, detected, dt):
+    """From the alarm on estimate which surfaces act, where more move than lead an axis or stand in."""
+    if not (detected and layout.general and memory.estimator.found.size > 1):
+        estimator.end(memory.estimator)
+    elif not memory.estimator.active:
+        estimator.begin(memory.estimator, memory.sums.innovation, memory.sums.frames, dt)
 
 
 @kernel
-def explained(surfaces, i, design, given, G):
-    """Acceleration of axis i that the law believes in, rad/s2: the design model's with the faults in it."""
+def explained(surfaces, i, design, moments, G):
+    """Acceleration of axis i that the law reckons with, rad/s2: the design model's with the faults in it;
+    surfaces: the Output of accommodation.py."""
     total = design[i]
     for s in range(G.shape[1]):
-        total += (surfaces.effectiveness[s] - 1.0) * given[i, s] + G[i, s] * surfaces.offset[s]
+        total += (surfaces.effectiveness[s] - 1.0) * moments[i, s] + G[i, s] * surfaces.offset[s]
     return total
 
 
 @kernel
-def observe(rejection, surfaces, main, x, design, given, G):
-    """Bring rate and disturbance to this frame: x (3,) rad/s; design (3,) rad/s2, given, G (3, n): f + G u
+def observe(law, surfaces, main, x, design, moments, G):
+    """Bring rate and disturbance to this frame: x (3,) rad/s; design (3,) rad/s2, moments, G (3, n): f + G u
     of healthy surfaces, their moments and effectiveness, means over the frame that has elapsed."""
-    if not rejection.begun:
-        rejection.begun = 1
-        rejection.rate[:] = x
+    observer, memory = law.observer, law.memory
+    if not observer.begun:
+        observer.begun = 1
+        observer.rate[:] = x
         return
     for i in range(3):
-        expected = explained(surfaces, i, design, given, G) + rejection.disturbance[i]
-        rejection.rate[i] += rejection.dt * expected
-        missed = rejection.missed[i] = x[i] - rejection.rate[i]
-        learn(rejection, i, surfaces.effectiveness[main[i]], given[i, main[i]], missed)
-        rejection.rate[i] += rejection.pull[i] * missed
-        rejection.disturbance[i] += rejection.learn[i] * missed
+        expected = explained(surfaces, i, design, moments, G) + observer.disturbance[i]
+        observer.rate[i] += law.config.dt * expected
+        innovation = memory.innovation[i] = x[i] - observer.rate[i]
+        accumulate(law.config, memory, i, surfaces.effectiveness[main[i]], moments[i, main[i]], innovation)
+        observer.rate[i] += memory.L_rate[i] * innovation
+        observer.disturbance[i] += memory.L_disturbance[i] * innovation
 
 
 @kernel
-def learn(rejection, i, effectiveness, given, missed):
-    """Take in what was missed of axis i, rad/s; effectiveness: believed of its main surface, given: moment
-    of a healthy one, rad/s2."""
-    found = rejection.found
-    pull, into, dt = rejection.pull[i], rejection.learn[i], rejection.dt
-    believed = (effectiveness - 1.0) * given
-    psi = answer(rejection.healthy, i, given, pull, into, dt)
-    missed += answer(rejection.believed, i, believed, pull, into, dt)
-    found.product[i] += psi * missed - found.fading * found.product[i]
-    found.square[i] += psi * psi - found.fading * found.square[i]
-    found.missed[i] += missed * missed - found.fading * found.missed[i]
-    found.frames[i] += 1.0 - found.fading * found.frames[i]
+def accumulate(config, memory, i, effectiveness, moment, innovation):
+    """Add this frame to the sums of axis i; innovation rad/s; effectiveness: that the law reckons with, of
+    the main surface; moment: of a healthy one, rad/s2."""
+    sums, fading, dt = memory.sums, config.fading, config.dt
+    L_rate, L_disturbance = memory.L_rate[i], memory.L_disturbance[i]
+    reckoned = (effectiveness - 1.0) * moment
+    psi = observer_response(memory.healthy, i, moment, L_rate, L_disturbance, dt)
+    innovation += observer_response(memory.reckoned, i, reckoned, L_rate, L_disturbance, dt)
+    sums.product[i] += psi * innovation - fading * sums.product[i]
+    sums.square[i] += psi * psi - fading * sums.square[i]
+    sums.innovation[i] += innovation * innovation - fading * sums.innovation[i]
+    sums.frames[i] += 1.0 - fading * sums.frames[i]
 
 
 @kernel
-def demand(rejection, axes, reference, surfaces, main, belief, measured):
-    """Fill axes.demand and axes.hold (3,) rad/s2; main (3,): the surface that leads each axis."""
-    means = belief.means
-    schedule(rejection, measured.y[QDYN])
-    observe(rejection, surfaces, main, measured.x, means.acceleration, means.Gu, means.G)
-    if rejection.answering.listening:
-        answering.listen(
-            rejection.answering, rejection.missed, rejection.pull, rejection.learn, rejection.dt, measured.x,
+def demand(law, reference, surfaces, main, transfer_share, belief, measured):
+    """Fill the law's demand and hold (3,) rad/s2; main (3,): the surface that leads each axis;
+    transfer_share: the part of pitch that its stand-in carries."""
+    config, observer, memory, output, means = law.config, law.observer, law.memory, law.output, belief.means
+    schedule(config, memory, measured.y[QDYN], transfer_share)
+    observe(law, surfaces, main, measured.x, means.acceleration, means.Gu, means.G)
+    if memory.estimator.active:
+        estimator.estimate(
+            memory.estimator, memory.innovation, memory.L_rate, memory.L_disturbance, config.dt, measured.x,
             measured.y, surfaces.effectiveness, means.Gu,
         )  # fmt: skip
     for i in range(3):
-        look_ahead(rejection, surfaces, i, belief.f, belief.G, belief.u)
-        target, after = targets(reference, i, rejection.share)
-        feedback = rejection.Kp[i] * (target - rejection.ahead[i])
-        axes.hold[i] = -belief.f[i] - rejection.disturbance[i]
-        axes.demand[i] = (after - target) / rejection.dt + feedback + axes.hold[i]
+        look_ahead(law, surfaces, i, belief.f, belief.G, belief.u)
+        target, after = targets(reference, i, config.share)
+        feedback = memory.Kp[i] * (target - memory.ahead[i])
+        output.disturbance[i] = observer.disturbance[i]
+        output.hold[i] = -belief.f[i] - observer.disturbance[i]
+        output.demand[i] = (after - target) / config.dt + feedback + output.hold[i]
 
 
 @kernel
-def look_ahead(rejection, surfaces, i, f, G, u):
+def look_ahead(law, surfaces, i, f, G, u):
     """Rate of axis i when the command acts; f (3,), G (3, n), u (n,) rad: of this instant."""
-    now = f[i] + rejection.disturbance[i]
+    now = f[i] + law.observer.disturbance[i]
     for s in range(u.size):
         now += G[i, s] * (surfaces.effectiveness[s] * u[s] + surfaces.offset[s])
-    rejection.ahead[i] = rejection.rate[i] + rejection.share * rejection.dt * now
+    law.memory.ahead[i] = law.observer.rate[i] + law.config.share * law.config.dt * now
 
 
 @kernel
 def targets(reference, i, share):
     """The reference of axis i when the command acts, and a frame later, rad/s."""
-    rate = reference.governed_rate[i]
-    wanted = reference.scale[i] * reference.commanded_rate[i]
-    following, acceleration = advance(reference, rate, reference.governed_acceleration[i], wanted)
-    last, _ = advance(reference, following, acceleration, wanted)
+    config, output = reference.config, reference.output
+    rate, acceleration = output.governed_rate[i], output.governed_acceleration[i]
+    wanted = reference.memory.scale[i] * output.commanded_rate[i]
+    following, acceleration = advance(config, rate, acceleration, wanted)
+    last, _ = advance(config, following, acceleration, wanted)
     return rate + share * (following - rate), following + share * (last - following)
 
 
-@kernel
-def lead_actuators(rejection, layout, command, u):
-    """Command (n,) rad beyond what is wanted, so that a lagging actuator at u (n,) rad is there sooner."""
-    lead = rejection.lead
-    for s in range(u.size):
-        if lead[s] > 1.0:
-            command[s] = min(max(u[s] + lead[s] * (command[s] - u[s]), layout.low[s]), layout.high[s])
+def unexplained(control: np.void) -> np.ndarray:
+    """What the law attributes to no model, (3,) rad/s2 (base.CompiledLaw)."""
+    found: np.ndarray = control["rejecting"]["observer"]["disturbance"].copy()
+    return found
+
+
+def begin(control: np.void, before: np.void, unexplained: np.ndarray, learnt: np.ndarray) -> None:
+    """Take over in flight (base.CompiledLaw): the observer goes on, or begins with what is measured."""
+    control["rejecting"]["observer"] = before["rejecting"]["observer"]
+    control["rejecting"]["observer"]["disturbance"] = unexplained
+
+
+LAW = CompiledLaw(rejecting_dtype, command, accommodate, anchor=anchor, unexplained=unexplained, begin=begin)

@@ -16,54 +16,102 @@ isolated (supervisor.py, allocation.py); the structure of the law stays.
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel, record
-from beaver_ftc.control.laws import ADAPTIVE
-from beaver_ftc.diagnosis.zhang2005 import NETWORK, configure_network, learn
+from beaver_ftc.compiled import apart, kernel, record, sized
+from beaver_ftc.control import inversion
+from beaver_ftc.control.accommodation import approach, begin_frame
+from beaver_ftc.control.base import CompiledLaw
+from beaver_ftc.control.laws import published
+from beaver_ftc.control.laws.published import FEEDBACK
+from beaver_ftc.diagnosis.zhang2005 import NETWORK, configure_network, evaluate, learn
 from beaver_ftc.plugins import LAWS, settings
-from beaver_ftc.scenario.control import ControlConfig
+from beaver_ftc.scenario.schema import Scenario
 
 # adapts: whether anything does; networks: and a network. gain: of effectiveness, s3/rad2. integral_weight: c.
-# signal: what both parts learn from, -s, rad/s. least, most: of an effectiveness, projection P, or infinite.
-ADAPTATION = record(
-    adapts=int, networks=int, gain=float, integral_weight=float, signal=3, least=float, most=float,
-    network=NETWORK,
-)  # fmt: skip
+# least, most: of an effectiveness, projection P, or infinite.
+CONFIG = record(adapts=int, networks=int, gain=float, integral_weight=float, least=float, most=float)
+MEMORY = record(signal=3)  # -s, rad/s, that both parts learn from
 
 
-def configure(control: np.void, config: ControlConfig, travel: np.ndarray) -> None:
-    """Fill `adaptation` of a law's record, filled in otherwise; travel (2, n) rad: the stops."""
-    option, adaptation = settings(LAWS, config.law, config.options), control["adaptation"]
+@sized
+def zhang2005_dtype(n: int) -> np.dtype:
+    """The law's records: its own, and those of the feedback and of the network, the second part."""
+    return record(config=CONFIG, memory=MEMORY, feedback=FEEDBACK, network=NETWORK)
+
+
+def configure(law: np.void, control: np.void, scenario: Scenario, travel: np.ndarray) -> None:
+    """Fill the law's configuration (base.CompiledLaw)."""
+    settled, config = scenario.control, law["config"]
+    option = settings(LAWS, settled.law, settled.options)
+    published.configure(law["feedback"], control, scenario, travel)
     if not option["hand_over"]:
-        control["law"] = ADAPTIVE
-    adaptation["adapts"], adaptation["networks"] = option["adaptation"], option["network"]
-    adaptation["gain"] = option["parametric_gain"]
-    Kp, Ki = config.proportional_per_s, config.integral_per_s2
-    adaptation["integral_weight"] = Kp / (option["rate_weight"] * Ki + 1.0)
+        control["config"]["reallocates"] = 0
+    config["adapts"], config["networks"] = option["adaptation"], option["network"]
+    config["gain"] = option["parametric_gain"]
+    Kp, Ki = settled.proportional_per_s, settled.integral_per_s2
+    config["integral_weight"] = Kp / (option["rate_weight"] * Ki + 1.0)
     limit = option["network_limit_rad_s2"] if option["projection"] else np.inf
     main = control["layout"]["main"]
-    configure_network(adaptation["network"], option["network_gain"], limit, travel[:, main])
-    adaptation["least"], adaptation["most"] = -np.inf, np.inf
+    configure_network(law["network"], option["network_gain"], limit, travel[:, main])
+    config["least"], config["most"] = -np.inf, np.inf
     if option["projection"]:
-        adaptation["least"], adaptation["most"] = config.least_effectiveness, 1.0
+        config["least"], config["most"] = settled.least_effectiveness, 1.0
+
+
+@apart
+def accommodate(control, assessment, faults, belief, measured):
+    """Bring both parts to this frame: what surfaces and the unknown are taken for (base.CompiledLaw)."""
+    law, surfaces, main, x = control.zhang2005, control.surfaces, control.layout.main, measured.x
+    begin_frame(surfaces.output, assessment, True)
+    if assessment.detected and law.config.adapts:
+        saturated, reference = control.allocation.output.saturated, control.reference
+        error = reference.output.governed_rate - x
+        adapt(law, surfaces, main, saturated, error, belief.G, belief.u, reference.config.dt)
+    evaluate(law.network, main, x, measured.y, belief.u)
 
 
 @kernel
-def adapt(adaptation, feedback, surfaces, layout, saturated, error, G, u, dt):
+def adapt(law, surfaces, main, saturated, error, G, u, dt):
     """Both parts, by a step of dt s. error (3,) rad/s: e; G (3, n) rad/s2 per rad; u (n,) rad.
 
     While the surface that leads an axis is at its stop, what the axis misses teaches nothing.
     """
-    main, signal = layout.main, adaptation.signal
+    config, signal = law.config, law.memory.signal
     for i in range(3):
-        signal[i] = -(error[i] + adaptation.integral_weight * feedback.integral[i])
+        signal[i] = -(error[i] + config.integral_weight * law.feedback.memory.integral[i])
         if saturated[main[i]]:
             signal[i] = 0.0
     for s in main:
         slope = 0.0
         for i in range(3):
             slope += signal[i] * G[i, s] * u[s]
-        moved = surfaces.effectiveness[s] + dt * adaptation.gain * slope
-        surfaces.effectiveness[s] = min(max(moved, adaptation.least), adaptation.most)
-        surfaces.target[s] = surfaces.effectiveness[s]
-    if adaptation.networks:
-        learn(adaptation.network, signal, dt)
+        moved = surfaces.output.effectiveness[s] + dt * config.gain * slope
+        estimate = min(max(moved, config.least), config.most)
+        approach(surfaces, s, estimate, estimate, False)
+    if config.networks:
+        learn(law.network, signal, dt)
+
+
+@apart
+def command(control, assessment, faults, belief, measured, mode, t):
+    """From what is measured to the command of each surface (base.CompiledLaw)."""
+    law, reference = control.zhang2005, control.reference
+    inversion.prepare(control, assessment, belief, mode, t)
+    published.demand(law.feedback, reference.output, measured.x, belief.f, law.network.output)
+    inversion.command_surfaces(control, law.feedback.output, assessment, faults, belief, False)
+    u = control.allocation.output.command
+    published.integrate(law.feedback, control.axes, reference, u, measured.x)
+    inversion.complete(control, assessment, faults, measured, t)
+
+
+def unexplained(control: np.void) -> np.ndarray:
+    """What the law attributes to no model, (3,) rad/s2 (base.CompiledLaw)."""
+    law = control["zhang2005"]
+    return published.unexplained_by(law["feedback"], law["network"]["output"])
+
+
+def begin(control: np.void, before: np.void, unexplained: np.ndarray, learnt: np.ndarray) -> None:
+    """Take over in flight: the integrators begin where the demand is (base.CompiledLaw)."""
+    published.begin_integrators(control["zhang2005"]["feedback"], unexplained, np.zeros(3))
+
+
+LAW = CompiledLaw(zhang2005_dtype, command, accommodate, configure, unexplained=unexplained, begin=begin)

@@ -84,25 +84,27 @@ def advance(autopilot, measured, t):
 
 
 @kernel
-def steer(autopilot, layout, surfaces, allocation, hold, power, u, measured, unexplained, t):
-    """One frame, at t s: fill autopilot.rates (3,) rad/s; move the engine where an airspeed is commanded.
-
-    hold (3,) rad/s2: what only holds the rates. u, unexplained: see `holding.protect`.
+def steer(autopilot, control, u, measured, unexplained, t):
+    """One frame, at t s: fill autopilot.rates (3,) rad/s, and the engine setting where an airspeed is
+    commanded. control: the records of the law (control/state.py). u, unexplained: see `holding.protect`.
     """
+    layout, surfaces, saturated = control.layout, control.surfaces, control.allocation.output.saturated
+    axes, power, by_engines = control.axes, control.power, control.engines.output.authority
     y, attitude = measured.y, measured.attitude
     if not autopilot.flying:
         take_over(autopilot, y, attitude)
     advance(autopilot, (measured.altitude, y[AIRSPEED], attitude[YAW], attitude[ROLL]), t)
-    follow(autopilot, layout, surfaces, allocation.saturated, y)
-    limit(autopilot, layout, allocation.G, hold)
+    follow(autopilot, layout, surfaces, saturated, by_engines[1, YAW] > 0.0, y)
+    limit(autopilot, layout, axes.G, axes.hold, by_engines)
     protect(autopilot, layout, surfaces, u, unexplained, y, t)
     push = slope_of(autopilot, power, y)
     rudder = layout.main[YAW]
-    left, at_stop = surfaces.effectiveness[rudder], allocation.saturated[rudder]
+    left, at_stop = surfaces.output.effectiveness[rudder], saturated[rudder]
     autopilot.full_power = full_power(autopilot, power, left, at_stop, y)
     path = path_of(autopilot, measured, push)
     to_body(autopilot, y, attitude, rolling(autopilot, attitude), pitching(autopilot, y, attitude, path))
-    if autopilot.commanded[SPEED] and not autopilot.glides:
+    autopilot.sets_power = autopilot.commanded[SPEED] and not autopilot.glides
+    if autopilot.sets_power:
         throttle(autopilot, power, y, path, push)
 
 
@@ -116,28 +118,33 @@ def take_over(autopilot, y, attitude):
 
 
 @kernel
-def follow(autopilot, layout, surfaces, saturated, y):
+def follow(autopilot, layout, surfaces, saturated, engines_yaw, y):
     """Smooth what is noisy, and note whether the ailerons or the rudder are gone; ailerons at their stop give
-    no more roll, whatever is believed of them."""
-    dt, least = autopilot.dt, surfaces.least_effectiveness
+    no more roll, whatever their estimated effectiveness. engines_yaw: whether engines can yaw the
+    aircraft."""
+    dt, least, effectiveness = (
+        autopilot.dt,
+        surfaces.config.least_effectiveness,
+        surfaces.output.effectiveness,
+    )
     autopilot.alpha += dt / autopilot.gain.alpha_s * (y[ALPHA] - autopilot.alpha)
     autopilot.airspeed += dt / autopilot.gain.airspeed_s * (y[AIRSPEED] - autopilot.airspeed)
     at_stop = saturated[layout.main[ROLL]] == 1
-    gone = remaining(layout, surfaces.effectiveness, ROLL) < least or at_stop
+    gone = remaining(layout, effectiveness, ROLL) < least or at_stop
     autopilot.jammed += dt / autopilot.gain.jammed_s * (gone - autopilot.jammed)
-    free = remaining(layout, surfaces.effectiveness, YAW) < least
+    free = remaining(layout, effectiveness, YAW) < least
     autopilot.loose += dt / autopilot.gain.jammed_s * (free - autopilot.loose)
-    if layout.beside[1, YAW] > 0.0:  # there are engines for it
+    if engines_yaw:
         by_power = free or saturated[layout.main[YAW]] == 1
         autopilot.by_power += dt / BY_POWER_S * (by_power - autopilot.by_power)
 
 
 @kernel
-def limit(autopilot, layout, G, hold):
+def limit(autopilot, layout, G, hold, engine_authority):
     """Rates and bank that the surfaces left can give: their spare acceleration for a while. G (3, n): with
-    what is believed of each; hold (3,) rad/s2."""
+    the effectiveness of each in it; hold (3,) rad/s2; engine_authority: as in `allocation.attainable`."""
     for i in range(3):
-        least, greatest = attainable(G, layout, i)
+        least, greatest = attainable(G, layout, engine_authority, i)
         spare = max(min(greatest - hold[i], hold[i] - least), 0.0)
         autopilot.limit[i] = min(autopilot.most[i], spare * autopilot.gain.authority_s)
     by_sideslip = autopilot.jammed * autopilot.dihedral * autopilot.airspeed * MOST_SIDESLIP_RAD
@@ -167,13 +174,13 @@ def full_power(autopilot, power, left, at_stop, y):
     high = autopilot.high_power
     if at_stop:
         lowest = ceiling(power, y, autopilot.weathercock ** (1.0 / 3.0))
-        cut = min(autopilot.allowed_power, power.command[0]) - CUT_INHG_S * autopilot.dt
+        cut = min(autopilot.allowed_power, power.output.command[0]) - CUT_INHG_S * autopilot.dt
         autopilot.allowed_power = min(max(cut, lowest), high)
     else:
         autopilot.allowed_power = min(autopilot.allowed_power + RAISE_INHG_S * autopilot.dt, high)
     if left >= 1.0:
         return autopilot.allowed_power
-    held = max(left, 0.0) * power.highest_dpt**3 + (1.0 - left) * autopilot.weathercock
+    held = max(left, 0.0) * power.config.highest_dpt**3 + (1.0 - left) * autopilot.weathercock
     return min(autopilot.allowed_power, ceiling(power, y, held ** (1.0 / 3.0)))
 
 
@@ -287,28 +294,24 @@ def to_body(autopilot, y, attitude, rolling, pitching):
 
 @kernel
 def throttle(autopilot, power, y, path, push):
-    """Move the power; while power stands in for a lost pitch, give its law our airspeed and what
-    the path takes: it has an airspeed loop of its own."""
-    power.in_use = 1
+    """Set the power; while power stands in for a lost pitch, also the airspeed for its law and the
+    acceleration that the path takes: that law has an airspeed loop of its own."""
     error = autopilot.held - autopilot.airspeed
     autopilot.usual += autopilot.dt / USUAL_S * (autopilot.airspeed - autopilot.usual)
     along = autopilot.held_moving + autopilot.throttle
-    if power.engaged:
-        power.usual_speed = autopilot.usual + clamp(autopilot.held - autopilot.usual, USUAL_MPS)
-        error = power.usual_speed - autopilot.airspeed
+    if power.memory.engaged:
+        autopilot.power_airspeed = autopilot.usual + clamp(autopilot.held - autopilot.usual, USUAL_MPS)
+        error = autopilot.power_airspeed - autopilot.airspeed
     else:
         along += autopilot.gain.speed * error
     climbing = autopilot.gravity * (path - autopilot.climb_in_trim)
     wanted = power_for(autopilot.engine, push, autopilot.trim_power, along + climbing)
-    high = min(autopilot.full_power, ceiling(power, y, power.highest_dpt))
+    high = min(autopilot.full_power, ceiling(power, y, power.config.highest_dpt))
     room = KEPT_ASIDE * autopilot.by_power * (autopilot.high_power - autopilot.low_power)
     limited = max(min(wanted, high - room), autopilot.low_power + room)
     if limited == wanted:
         find_missing(autopilot, error)
-    power.trim = limited
-    if not power.enabled:
-        before = power.command[0]
-        power.command[0] = min(max(limited, before - autopilot.step_power), before + autopilot.step_power)
+    autopilot.setting = limited
 
 
 @kernel

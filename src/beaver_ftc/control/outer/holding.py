@@ -30,16 +30,17 @@ def protect(autopilot, layout, surfaces, u, unexplained, y, t):
     """
     hold, e, f = autopilot.holding, layout.main[PITCH], layout.stand_in
     hold.fastest, hold.slowest = np.inf, 0.0
-    left = surfaces.effectiveness[e]
-    whole = left >= 1.0 and (f < 0 or surfaces.effectiveness[f] >= 1.0)
+    effectiveness, offset = surfaces.output.effectiveness, surfaces.output.offset
+    left = effectiveness[e]
+    whole = left >= 1.0 and (f < 0 or effectiveness[f] >= 1.0)
     if whole or not hold.known:
         hold.frames = 0
     else:
-        watch(hold, autopilot.dt, surfaces.offset[e], left * u[e], unexplained)
+        watch(hold, autopilot.dt, offset[e], left * u[e], unexplained)
         if hold.frames * autopilot.dt > SETTLED_S:
             find(hold, layout, surfaces, y)
     approach(autopilot)
-    announce(autopilot, layout.main, surfaces.effectiveness, t)
+    announce(autopilot, layout.main, effectiveness, t)
 
 
 @kernel
@@ -57,12 +58,12 @@ def watch(hold, dt, offset, commanded, unexplained):
 def find(hold, layout, surfaces, y):
     """The fastest and the slowest airspeed that can be held, m/s."""
     e, f = layout.main[PITCH], layout.stand_in
-    left = surfaces.effectiveness[e]
+    left, effectiveness = surfaces.output.effectiveness[e], surfaces.output.effectiveness[f]
     least = hold.acting - hold.centre + left * layout.low[e]
     greatest = hold.acting - hold.centre + left * layout.high[e]
     up, down = layout.low[f] + hold.reserve, layout.high[f] - hold.reserve
-    if surfaces.effectiveness[f] < surfaces.least_effectiveness:
-        up = down = min(max(surfaces.offset[f], layout.low[f]), layout.high[f])
+    if effectiveness < surfaces.config.least_effectiveness:
+        up = down = min(max(surfaces.output.offset[f], layout.low[f]), layout.high[f])
     per_pa = 2.0 * y[QDYN] / y[AIRSPEED] ** 2
     hold.fastest = np.sqrt(2.0 * limit_of(hold, up, greatest, True) / per_pa)
     hold.slowest = np.sqrt(2.0 * limit_of(hold, down, least, False) / per_pa)

@@ -53,10 +53,10 @@ def set_up_autopilot(autopilot: np.void, control: np.void, scenario: Scenario) -
     less, more = (scenario.airframe.envelope.alpha_deg[1] - spare for spare in SPARE_ALPHA_DEG)
     autopilot["steepest_alpha"] = radians(min(less, max(STEEPEST_ALPHA_DEG, more)))
     autopilot["most"], autopilot["most_bank"] = np.radians(MOST_DEG_S), radians(MOST_BANK_DEG)
-    for name in ("trim", "low", "high", "step"):
-        autopilot[f"{name}_power"] = control["power"][name]
-    autopilot["allowed_power"] = control["power"]["high"]
-    control["reference"]["steered"] = 1
+    for name in ("trim", "low", "high"):
+        autopilot[f"{name}_power"] = control["power"]["config"][name]
+    autopilot["allowed_power"] = control["power"]["config"]["high"]
+    control["reference"]["config"]["steered"] = 1
     _know_what_holds(autopilot["holding"], control["layout"], scenario)
 
 

@@ -52,7 +52,7 @@ AUTOPILOT = record(
     # what is known of the aircraft
     gravity=float, thrust=2,  # m/s2 per dpt and Pa: at no alpha, and per alpha
     engine=ENGINE, glides=int,  # what else is known of it; whether pitch holds the airspeed
-    trim_power=float, low_power=float, high_power=float, step_power=float,  # in the units of its setting
+    trim_power=float, low_power=float, high_power=float,  # in the units of its setting
     climb_in_trim=float,  # rad, with the engine as trimmed
     dihedral=float,  # roll rate per sideslip and airspeed, 1/m
     full_power=float, allowed_power=float,  # the highest there is now, and that the rudder allows
@@ -70,6 +70,8 @@ AUTOPILOT = record(
     loose=float,  # 1: nothing acts in yaw
     by_power=float,  # share of the time of late in which engines alone act there
     rates=3, gain=GAIN,
+    sets_power=int, setting=float,  # whether the engine is set by now, and to what
+    power_airspeed=float,  # m/s, to hold while power stands in for a lost pitch
     held=float, held_moving=float, holding=HOLDING,  # airspeed to fly, m/s, and its change
     # how far off, at most; and the mean deviation of late, from what is commanded and, airspeed, held
     # `worst` is NOT_JUDGED until a channel is: of angles that takes SETTLED_S

@@ -52,7 +52,7 @@ def look_up(engine, airspeed):
 @kernel
 def thrust_per_inhg(thrust, alpha, airspeed, power, y):
     """Acceleration along the path per inHg of manifold pressure, m/s2; thrust (2,): of the slipstream."""
-    dpt_per_inhg = power.dpt_factor / (2.0 * y[QDYN] * airspeed)
+    dpt_per_inhg = power.config.dpt_factor / (2.0 * y[QDYN] * airspeed)
     slope = thrust[0] + 2.0 * thrust[1] * alpha * y[DPT]
     return max(y[QDYN] * slope * dpt_per_inhg, LEAST_PUSH)
 

@@ -14,7 +14,6 @@ from typing import ClassVar
 import numpy as np
 
 from beaver_ftc.control.base import Reference
-from beaver_ftc.control.laws import INDI
 from beaver_ftc.control.rivals.tracking import DELAY_FRAMES, GAINS, Rival
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.base import Measured, Verdict
@@ -51,13 +50,13 @@ class IncrementalInversion(Rival):
         self.given = [trim] * (DELAY_FRAMES + 1)
         self.before: np.ndarray | None = None
 
-    def compile_into(self, rival: np.void) -> int:
-        """Fill the record of compiled.py (dtype RIVAL), in trim; which inner law that is."""
-        trim = self.context.trim_rad[self.leading]
-        rival["Kp"], rival["Ki"] = self.option["proportional_per_s"], self.option["integral_per_s2"]
-        rival["keep"] = exp(-self.option["filter_per_s"] * self.context.dt_s)
-        rival["given"] = rival["command_filter"] = trim
-        return INDI
+    def compile_into(self, law: np.void) -> None:
+        """Fill the record of compiled_rivals.py, in trim."""
+        config, memory, trim = law["config"], law["memory"], self.context.trim_rad[self.leading]
+        config["incremental"] = 1
+        config["Kp"], config["Ki"] = self.option["proportional_per_s"], self.option["integral_per_s2"]
+        config["keep"] = exp(-self.option["filter_per_s"] * self.context.dt_s)
+        memory["commanded"] = memory["command_filter"] = trim
 
     def step(self, measured: Measured, reference: Reference, verdict: Verdict) -> np.ndarray:
         """u0 + G^-1 (nu - xdot0)."""

@@ -12,7 +12,6 @@ from typing import ClassVar
 import numpy as np
 
 from beaver_ftc.control.base import Reference
-from beaver_ftc.control.laws import LQR
 from beaver_ftc.control.rivals.tracking import Rival
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.base import Measured, Verdict
@@ -47,11 +46,11 @@ class FixedGainLqr(Rival):
         R = np.eye(3) / np.radians(option["deflection_deg"]) ** 2
         self.K = gains(A, B, Q, R)
 
-    def compile_into(self, rival: np.void) -> int:
-        """Fill the record of compiled.py (dtype RIVAL), in trim; which inner law that is."""
-        rival["K"], rival["A"], rival["B_inverse"] = self.K, self.A, np.linalg.inv(self.B)
-        rival["trim_x"] = self.context.trim_x
-        return LQR
+    def compile_into(self, law: np.void) -> None:
+        """Fill the record of compiled_rivals.py, in trim."""
+        config = law["config"]
+        config["K"], config["A"], config["B_inverse"] = self.K, self.A, np.linalg.inv(self.B)
+        config["trim_x"] = self.context.trim_x
 
     def step(self, measured: Measured, reference: Reference, verdict: Verdict) -> np.ndarray:
         """Trim, what the linear model asks for to follow the reference, and K times what is missing."""

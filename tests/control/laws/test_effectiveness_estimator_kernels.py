@@ -1,10 +1,10 @@
-"""Which surfaces answer, from what an observer misses: against least squares over the whole past at once."""
+"""Effectiveness of every surface from an observer's innovation: against one regression over the past."""
 
 import numpy as np
 import pytest
 
-from beaver_ftc.control.laws import answering
-from beaver_ftc.control.laws.answering import answering_dtype
+from beaver_ftc.control.laws import effectiveness_estimator
+from beaver_ftc.control.laws.effectiveness_estimator import estimator_dtype
 from beaver_ftc.design.model import ALPHA, BETA
 
 N, DT, FRAMES = 6, 0.02, 200
@@ -48,8 +48,8 @@ def flown(seed=1, tied=0.0):
 
 def listened(given, signals, missed, believed=None, airframe=True, forgets=True):
     """The record after all frames; believed (N,): the effectiveness that the observer reckoned with."""
-    record = np.zeros(1, answering_dtype(N)).view(np.recarray)[0]
-    answering.begin(record, np.zeros(3), np.zeros(3), DT)
+    record = np.zeros(1, estimator_dtype(N)).view(np.recarray)[0]
+    effectiveness_estimator.begin(record, np.zeros(3), np.zeros(3), DT)
     record.unsure[:] *= forgets
     if not airframe:
         record.P[N:, N:] = record.unsure[N:] = 0.0
@@ -57,7 +57,7 @@ def listened(given, signals, missed, believed=None, airframe=True, forgets=True)
     y = np.zeros(8)
     for moments, signal, off in zip(given, signals, missed, strict=True):
         y[ALPHA], y[BETA] = signal[:2]
-        answering.listen(record, off, PULL, INTO, DT, signal[2:], y, effectiveness, moments)
+        effectiveness_estimator.estimate(record, off, PULL, INTO, DT, signal[2:], y, effectiveness, moments)
     return record
 
 
@@ -94,7 +94,7 @@ def test_it_is_least_squares_over_the_whole_past():
 def test_each_surface_is_found_while_the_airframe_has_changed(seed):
     record = listened(*flown(seed))
     assert [1.0 + theta for theta in record.found[:N]] == pytest.approx(1.0 + THETA, abs=0.1)
-    assert answering.effectiveness_of(record, 0) == pytest.approx(0.1, abs=0.1)
+    assert effectiveness_estimator.effectiveness_of(record, 0) == pytest.approx(0.1, abs=0.1)
 
 
 def test_without_the_airframe_a_surface_is_blamed_for_what_it_answers():
@@ -127,4 +127,4 @@ def test_noise_never_leads_it_away():
 
 
 def test_few_surfaces_need_no_room():
-    assert answering_dtype(4).itemsize < 300 < answering_dtype(6).itemsize
+    assert estimator_dtype(4).itemsize < 300 < estimator_dtype(6).itemsize

@@ -1,0 +1,144 @@
+"""The rivals that fly compiled, so that a comparison is of laws: lqr.py and indi.py have their equations.
+
+The surfaces that lead roll, pitch and yaw move; the others stay in trim.
+"""
+
+import numpy as np
+
+from beaver_ftc.compiled import apart, kernel, record, sized
+from beaver_ftc.control.allocation import DEMAND, form_demand, take_command
+from beaver_ftc.control.base import CompiledLaw
+from beaver_ftc.control.rivals.tracking import DELAY_FRAMES
+
+# Filled by `compile_into` of the rival's class. incremental: whether it is incremental inversion, else the
+# regulator. The regulator: gains on error and integral, the linear model, its inverse, the trim. Incremental
+# inversion: gains, and what its filter keeps from frame to frame.
+CONFIG = record(
+    incremental=int, K=(3, 6), A=(3, 3), B_inverse=(3, 3), trim_x=3, Kp=float, Ki=float, keep=float
+)
+# Of incremental inversion: rates and commands of before, and both filters. inherited (3,) rad/s2: what the
+# law before attributed to no model.
+MEMORY = record(
+    integral=3, saturated=int, begun=int, x_before=3, commanded=(DELAY_FRAMES, 3), rate_filter=(2, 3),
+    command_filter=(2, 3), inherited=3,
+)  # fmt: skip
+
+
+@sized
+def rival_dtype(n: int) -> np.dtype:
+    """The rivals' records for n surfaces; command (n,) rad before it is limited, axes: of incremental
+    inversion, what it demands."""
+    return record(config=CONFIG, memory=MEMORY, output=record(command=n, axes=DEMAND))
+
+
+@apart
+def command(control, assessment, faults, belief, measured, mode, t):
+    """From what is measured to the command of each surface (base.CompiledLaw)."""
+    law, reference, layout, x = control.compiled_rivals, control.reference, control.layout, measured.x
+    memory, out, allocated = law.memory, law.output, control.allocation.output
+    out.command[:] = layout.trim
+    if law.config.incremental:
+        increment(law, reference, layout.main, belief.G, x)
+        form_demand(control.axes, out.axes, control.surfaces.output.offset, belief.G, False)
+    else:
+        regulate(law, reference, layout.main, x)
+    take_command(allocated, layout, out.command)
+    memory.saturated = 0
+    for s in range(out.command.size):
+        memory.saturated += allocated.saturated[s]
+    if law.config.incremental:
+        remember(memory, allocated.command, layout.main, x)
+
+
+@kernel
+def missed(memory, reference, i, x):
+    """Error of axis i, rad/s; its integral stands still while a surface is at its stop."""
+    error = reference.output.model_rate[i] - x[i]
+    if not memory.saturated:
+        memory.integral[i] += reference.config.dt * error
+    return error
+
+
+@kernel
+def regulate(law, reference, main, x):
+    """Add to the output's command, in trim, what the linear model asks for to follow the reference, and K
+    times what is missing."""
+    config, memory, target = law.config, law.memory, reference.output
+    for i in range(3):
+        error = missed(memory, reference, i, x)
+        needed = target.model_acceleration[i]
+        for j in range(3):
+            needed -= config.A[i, j] * (target.model_rate[j] - config.trim_x[j])
+        for s in range(3):
+            back = config.K[s, i] * error + config.K[s, 3 + i] * memory.integral[i]
+            law.output.command[main[s]] += config.B_inverse[s, i] * needed + back
+
+
+@kernel
+def increment(law, reference, main, G, x):
+    """u0 + G^-1 (nu - xdot0), into the output's command; nu - xdot0 into its axes' demand (3,) rad/s2."""
+    config, memory, demand, out = law.config, law.memory, law.output.axes.demand, law.output.command
+    if not memory.begun:
+        memory.begun, memory.x_before[:] = 1, x
+    for i in range(3):
+        error = missed(memory, reference, i, x)
+        xdot0 = smooth(memory.rate_filter, i, (x[i] - memory.x_before[i]) / reference.config.dt, config.keep)
+        nu = reference.output.model_acceleration[i] + config.Kp * error + config.Ki * memory.integral[i]
+        demand[i] = nu - xdot0
+    solve(G, main, demand, out)
+    for i in range(3):
+        u0 = smooth(memory.command_filter, i, memory.commanded[0, i], config.keep)
+        out[main[i]] += u0
+
+
+@kernel
+def smooth(filtered, i, value, keep):
+    """Two equal poles, exact for an input held over the frame; filtered (2, 3), in place."""
+    filtered[0, i] = keep * filtered[0, i] + (1.0 - keep) * value
+    filtered[1, i] = keep * filtered[1, i] + (1.0 - keep) * filtered[0, i]
+    return filtered[1, i]
+
+
+@kernel
+def remember(memory, command, main, x):
+    """Keep the rates and the last commands for the frames to come."""
+    for i in range(3):
+        for k in range(DELAY_FRAMES - 1):
+            memory.commanded[k, i] = memory.commanded[k + 1, i]
+        memory.commanded[DELAY_FRAMES - 1, i] = command[main[i]]
+        memory.x_before[i] = x[i]
+
+
+@kernel
+def cross(G, i, j, k):
+    """Cofactor sum of three columns of the leading rows: component k of column i x column j."""
+    a, b = (k + 1) % 3, (k + 2) % 3
+    return G[a, i] * G[b, j] - G[b, i] * G[a, j]
+
+
+@kernel
+def solve(G, main, demand, out):
+    """Put into out the deflections of the surfaces main (3,) that give demand (3,), by Cramer's rule."""
+    determinant = 0.0
+    for k in range(3):
+        determinant += G[k, main[0]] * cross(G, main[1], main[2], k)
+    for s in range(3):
+        total = 0.0
+        for k in range(3):
+            total += demand[k] * cross(G, main[(s + 1) % 3], main[(s + 2) % 3], k)
+        out[main[s]] = total / determinant
+
+
+def unexplained(control: np.void) -> np.ndarray:
+    """What the law attributes to no model, (3,) rad/s2: the rivals estimate nothing, and hand on what the law
+    before them had found (base.CompiledLaw)."""
+    inherited: np.ndarray = control["compiled_rivals"]["memory"]["inherited"].copy()
+    return inherited
+
+
+def begin(control: np.void, before: np.void, unexplained: np.ndarray, learnt: np.ndarray) -> None:
+    """Take over in flight (base.CompiledLaw)."""
+    control["compiled_rivals"]["memory"]["inherited"] = unexplained
+
+
+LAW = CompiledLaw(rival_dtype, command, unexplained=unexplained, begin=begin)

@@ -29,12 +29,13 @@ def allocate_all(control, belief, demands, G, failed):
         for i in range(3):
             control.axes.demand[i] = demands[k, i]
             for s in range(n):
-                control.allocation.G[i, s] = G[i, s] if k < failed[s] else 0.0
+                control.axes.G[i, s] = G[i, s] if k < failed[s] else 0.0
+        effectiveness = control.surfaces.output.effectiveness
         allocation.allocate_generally(
-            control.allocation, control.layout, control.surfaces, control.axes, belief, 0.0, 0.0
+            control.axes, control.allocation, control.layout, effectiveness, belief, 0.0, 0.0
         )
-        total += control.allocation.problem.steps
-        belief.u[:] = control.allocation.command
+        total += control.allocation.memory.problem.steps
+        belief.u[:] = control.allocation.output.command
     return total
 
 
@@ -52,7 +53,7 @@ def us_a_frame(n: int, rng: np.random.Generator) -> tuple[float, float]:
         layout = control["layout"]
         layout["low"], layout["high"], layout["stand_in"] = -0.4, 0.4, -1
         layout["authority"][:, 0] = 1.0
-        control["surfaces"]["effectiveness"], belief["share"] = 1.0, 1.0
+        control["surfaces"]["output"]["effectiveness"], belief["share"] = 1.0, 1.0
         belief["actuators"]["step"] = RATE_RAD_S * DT_S
         begun = time.perf_counter()
         systems = allocate_all(control, belief, demands, G, failed) / FRAMES

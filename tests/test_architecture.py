@@ -32,7 +32,7 @@ BESIDE = {
 # Folders from the ground up; a folder imports what is below its own floor, and itself.
 FLOORS = (
     {"documents"},
-    {"commands", "compiled", "extensions", "numba_inside", "numba_sized", "plugins"},
+    {"choice", "commands", "compiled", "extensions", "numba_inside", "numba_sized", "plugins"},
     {"aircraft"},
     {"design"},
     {"scenario"},

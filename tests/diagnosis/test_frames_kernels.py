@@ -132,8 +132,8 @@ def test_what_is_known_of_a_fault_is_expected_from_the_alarm_on(known, whole_cla
     for _ in range(40):
         flown.fly(1, exactly)
         if flown.fdi["verdict"]["detected"] and known:
-            control["surfaces"]["effectiveness"][ELEVATOR] = 0.0 if whole_class else 1.0 + THETA
-            control["surfaces"]["offset"][ELEVATOR] = stuck_at if whole_class else 0.0
+            control["surfaces"]["output"]["effectiveness"][ELEVATOR] = 0.0 if whole_class else 1.0 + THETA
+            control["surfaces"]["output"]["offset"][ELEVATOR] = stuck_at if whole_class else 0.0
     left = flown.frame["belief"]["expected"] - flown.frame["belief"]["means"]["acceleration"]
     phi = np.array(flown.innovations[-2])
     assert np.abs(phi).max() > 0.05

@@ -80,7 +80,7 @@ def at(record, path):
 
 EXPECTED = {
     "dt": DT, "belief.share": 0.5, "belief.u": TRIM, "belief.commanded": TRIM, "control.layout.trim": TRIM,
-    "control.allocation.command": TRIM,
+    "control.allocation.output.command": TRIM,
     "fdi.config.enabled": 1, "fdi.config.dt": DT, "fdi.isolation.forgetting": exp(-DT / 2.0),
     "fdi.isolation.decay": exp(-2.5 * DT),
     "fdi.fdae.pole": 1.5, "fdi.fdae.decay": exp(-1.5 * DT), "fdi.isolation.n": 8,
@@ -103,28 +103,28 @@ EXPECTED = {
     "fdi.types.surface.1.least_runaway_rate": pi / 4,
     "fdi.types.surface.1.slowest_step": radians(3.0) * DT / 2,
     "fdi.bank.n": 3, "fdi.isolation.memory": 0, "fdi.isolation.membership": 1,
-    "control.reference.dt": DT, "control.feedback.Kp": 3.0, "control.feedback.Ki": 1.5,
-    "control.surfaces.effectiveness": 1.0,
-    "control.surfaces.effectiveness_step": 2.5 * DT, "control.reference.scale": 1.0,
-    "control.surfaces.least_effectiveness": 0.15,
+    "control.reference.config.dt": DT,
+    "control.surfaces.output.effectiveness": 1.0,
+    "control.surfaces.config.effectiveness_step": 2.5 * DT, "control.reference.memory.scale": 1.0,
+    "control.surfaces.config.least_effectiveness": 0.15,
     "control.layout.low": TRAVEL[0], "control.layout.high": TRAVEL[1],
-    "control.allocation.hand_over_step": DT / 1.6,
+    "control.allocation.config.hand_over_step": DT / 1.6,
     "control.layout.main": (AILERON, ELEVATOR, RUDDER), "control.layout.stand_in": FLAP,
-    "control.probe.amplitude": radians(1.5), "control.probe.step": 2 * pi * 1.25 * DT,
-    "control.probe.frames": 150, "control.probe.from_s": -1.0, "control.probe.to_s": -1.0,
+    "control.probe.config.amplitude": radians(1.5), "control.probe.config.step": 2 * pi * 1.25 * DT,
+    "control.probe.config.frames": 150, "control.probe.memory.from_s": -1.0, "control.probe.memory.to_s": -1.0,
     "belief.actuators.real": 1, "belief.actuators.low": TRAVEL[0], "belief.actuators.high": TRAVEL[1],
     "belief.actuators.approach.2": 1.0 - exp(-12.0 * DT / 2), "belief.actuators.approach.1": 1 - exp(-0.25),
     "belief.actuators.step.1": pi / 2 * DT / 2,
-    "control.power.enabled": 1, "control.power.from_s": -1.0, "control.power.impatience": DT / 1.25,
-    "control.power.forgiveness": DT / 8.0, "control.power.speed_gain": 0.7,
-    "control.power.attitude_gain": 0.3 * 180 / pi, "control.power.smoothing": 1 - exp(-DT / 0.4),
-    "control.power.washout": 1 - exp(-DT / 9.0), "control.power.leak": 1 - exp(-DT / 7.0),
-    "control.power.trim": 21.0, "control.power.command": [21.0, *MAX_EFFECTORS * [0.0]],
-    "control.power.least": 21.0,
-    "control.power.greatest": 21.0, "control.power.low": 11.0, "control.power.high": 30.0,
-    "control.power.step": 4.0 * DT,
+    "control.power.config.enabled": 1, "control.power.output.from_s": -1.0, "control.power.config.impatience": DT / 1.25,
+    "control.power.config.forgiveness": DT / 8.0, "control.power.config.speed_gain": 0.7,
+    "control.power.config.attitude_gain": 0.3 * 180 / pi, "control.power.config.smoothing": 1 - exp(-DT / 0.4),
+    "control.power.config.washout": 1 - exp(-DT / 9.0), "control.power.config.leak": 1 - exp(-DT / 7.0),
+    "control.power.config.trim": 21.0, "control.power.output.command": [21.0, *MAX_EFFECTORS * [0.0]],
+    "control.power.output.least": 21.0,
+    "control.power.output.greatest": 21.0, "control.power.config.low": 11.0, "control.power.config.high": 30.0,
+    "control.power.config.step": 4.0 * DT,
     # half of the rudder's smaller travel holds the propeller: 0.08265 0.3 / 2 = 0.003026 dpt^3 [TM88]
-    "control.power.highest_dpt": (0.08265 * 0.15 / 0.003026) ** (1 / 3),
+    "control.power.config.highest_dpt": (0.08265 * 0.15 / 0.003026) ** (1 / 3),
     "truth.declared": 1,
 }  # fmt: skip
 
@@ -142,13 +142,15 @@ def test_poles_are_that_of_detection_and_the_bank(frame):
 def test_the_slipstream_per_manifold_pressure_is_that_of_the_engine(frame):
     """dpt = 0.08696 + 191.18 P / (rho V^3 / 2), P = 0.7355 (0.00412 (pz + 7.4) (n + 2010) + ...) [FDC]."""
     per_inhg_kw = 0.7355 * 0.00412 * (2000 + 2010)
-    assert frame["control"]["power"]["dpt_factor"] == pytest.approx(2 * 191.18 * per_inhg_kw, rel=1e-6)
+    assert frame["control"]["power"]["config"]["dpt_factor"] == pytest.approx(
+        2 * 191.18 * per_inhg_kw, rel=1e-6
+    )
 
 
 def test_the_model_of_the_reference_is_a_critically_damped_second_order():
     """x'' = w^2 (r - x) - 2 w x': its step response after a second is 1 - (1 + w) e^-w."""
     control = assembled()["control"]
-    A, B, x = control["reference"]["A"], control["reference"]["B"], np.zeros(2)
+    A, B, x = control["reference"]["config"]["A"], control["reference"]["config"]["B"], np.zeros(2)
     for _ in range(50):
         x = A @ x + B.ravel()
     assert x[0] == pytest.approx(1 - 11 * np.exp(-10.0))
@@ -178,9 +180,9 @@ def test_in_pairs_each_plane_is_asked_for_itself():
 
 
 def test_what_is_trimmed_beyond_the_engines_range_is_within_it():
-    power = assembled(initial={"manifold_pressure_inhg": 10.5})["control"]["power"]
+    power = assembled(initial={"manifold_pressure_inhg": 10.5})["control"]["power"]["config"]
     assert (power["low"], power["high"]) == (10.5, 30.0)
-    power = assembled(initial={"manifold_pressure_inhg": 33.0})["control"]["power"]
+    power = assembled(initial={"manifold_pressure_inhg": 33.0})["control"]["power"]["config"]
     assert (power["low"], power["high"]) == (11.0, 33.0)
 
 
@@ -200,8 +202,7 @@ def test_a_plug_in_that_diagnoses_has_the_record_to_itself():
         fdi["config"]["every_type"],
         fdi["watch"]["enabled"],
     )
-    assert (*off, fdi["statistical"]["tests"]["enabled"], frames["control"]["power"]["enabled"][0]) == (
-        0,
-    ) * 6
+    power = frames["control"]["power"]["config"]
+    assert (*off, fdi["statistical"]["tests"]["enabled"], power["enabled"][0]) == (0,) * 6
     assert fdi["isolation"]["estimator"]["surface"][:4].tolist() == [AILERON, ELEVATOR, RUDDER, FLAP]
     assert plugin_frame.plugged(frames, scenario, np.ones(40), None, None) is None

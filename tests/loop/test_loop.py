@@ -5,7 +5,6 @@ import dataclasses
 import numpy as np
 import pytest
 
-from beaver_ftc.control.laws import ORACLE
 from beaver_ftc.control.supervisor import MAX_EVENTS
 from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
@@ -227,7 +226,7 @@ def test_more_events_than_there_is_room_for_are_counted_and_the_last_is_kept():
 
 def test_the_final_mode_is_right_after_any_number_of_changes():
     frames = np.zeros(1, assembly.frame_dtype(4))
-    frames["control"]["law"] = ORACLE
+    frames["control"]["config"]["informed"] = 1
     supervisor = frames[0]["supervisor"]
     for k in range(201):
         frames["t"], frames["truth"]["faulted"] = k, k % 2

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.control.laws import ADAPTIVE, NOMINAL, ORACLE
 from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
@@ -146,15 +145,16 @@ class Tolerant(Answers):
 @pytest.mark.parametrize(
     ("detector", "law", "named", "expected"),
     [
-        (None, Answers(np.zeros(4)), "fault-tolerant", (1, NOMINAL, 0)),
-        (None, Tolerant(np.zeros(4)), "oracle", (1, ADAPTIVE, 0)),
+        (None, Answers(np.zeros(4)), "fault-tolerant", (1, (0, 0), 0)),
+        (None, Tolerant(np.zeros(4)), "oracle", (1, (1, 0), 0)),
         (Answers(Verdict()), None, "fault-tolerant", (0, None, 0)),
-        (Answers(Verdict()), None, "oracle", (0, ORACLE, 1)),
+        (Answers(Verdict()), None, "oracle", (0, (1, 1), 1)),
     ],
 )
 def test_what_a_record_is_made_ready_for(detector, law, named, expected):
     frames = Loop(_scenario(control={"law": named}), detector, law).frames
-    power, of_law = frames["control"]["power"]["enabled"][0], frames["control"]["law"][0]
+    config, power = frames["control"]["config"][0], frames["control"]["power"]["config"]["enabled"][0]
+    of_law = config["uses_verdict"], config["informed"]
     assert (
         frames["fdi"]["config"]["enabled"][0],
         of_law if expected[1] is not None else None,

@@ -215,12 +215,15 @@ def test_the_command_and_the_engine_are_handed_over_through_python():
     loop = Loop(_scenario())
     frame = loop.frames[0]
     frame["belief"]["commanded"] = [0.1, -0.2, 0.05, 0.3]
-    frame["control"]["power"]["command"], before = 12.5, loop.plant.read(loop.aircraft.trim.throttle)
+    frame["control"]["power"]["output"]["command"], before = (
+        12.5,
+        loop.plant.read(loop.aircraft.trim.throttle),
+    )
     loop.cockpit.write()
     commanded = [loop.plant.read(f"fcs/{s}-cmd-rad") for s in loop.aircraft.surfaces]
     assert commanded == pytest.approx([0.1, -0.2, 0.05, 0.3])
     assert loop.plant.read(loop.aircraft.trim.throttle) == before
-    frame["control"]["power"]["in_use"] = 1
+    frame["control"]["power"]["output"]["in_use"] = 1
     loop.cockpit.write()
     assert loop.plant.read(loop.aircraft.trim.throttle) == pytest.approx(12.5)
     truth, fresh = frame["truth"], loop.start.copy()
@@ -248,7 +251,7 @@ def test_columns_of_what_a_flight_has():
     assert frame["logged"]["estimators"] == 0
     assert set(with_diagnosis) > set(without)
     assert not any(name.startswith("fie_") for name in without)
-    frame["control"]["power"]["enabled"] = 0
+    frame["control"]["power"]["config"]["enabled"] = 0
     lay_out(frame, loop.scenario, True)
     assert (frame["logged"]["estimators"], frame["logged"]["power"]) == (8, 0)
 

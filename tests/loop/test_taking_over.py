@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 import beaver_ftc as bf
-from beaver_ftc.control.laws import REJECTING
+from beaver_ftc.control.laws.rows import row_of
 from beaver_ftc.design.model import N_Y
 from beaver_ftc.loop import stream
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.loop.changing import Changing, _check_delays, renews_diagnosis, take_diagnosis, take_law
 from beaver_ftc.loop.loop import fly
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.matrix.fault_matrix import trimmed_deg
 from flying import loss, scenario
@@ -29,11 +30,12 @@ def _frame(law, **control):
 def _taken(before, after, detected=1, **control):
     """The control record after a law has been changed in a flight that has learnt something."""
     frame, new = _frame(before, integral_per_s2=0.5), _frame(after, **control)["control"]
-    feedback, rejection = frame["control"]["feedback"], frame["control"]["rejection"]
-    feedback["fhat"], feedback["integral"], rejection["disturbance"] = FHAT, INTEGRAL, DISTURBANCE
-    rejection["begun"], rejection["rate"] = 1, [1.0, 2.0, 3.0]
+    feedback, observer = frame["control"]["published"], frame["control"]["rejecting"]["observer"]
+    frame["control"]["surfaces"]["output"]["unknown"] = FHAT
+    feedback["memory"]["integral"], observer["disturbance"] = INTEGRAL, DISTURBANCE
+    feedback["config"]["Ki"], observer["begun"], observer["rate"] = 0.5, 1, [1.0, 2.0, 3.0]
     frame["fdi"]["verdict"]["detected"], frame["fdi"]["fdae"]["network"]["output"] = detected, LEARNT
-    new["feedback"]["integral"] = 99.0
+    new["published"]["memory"]["integral"] = 99.0
     take_law(frame, new)
     return frame["control"]
 
@@ -47,10 +49,11 @@ UNEXPLAINED = FHAT - 0.5 * INTEGRAL
 )
 def test_an_observer_begins_with_what_the_law_before_it_has_found(before, found):
     control = _taken(before, "fault-tolerant")
-    assert control["inner"] == REJECTING
-    assert control["rejection"]["disturbance"] == pytest.approx(found)
-    assert (control["rejection"]["begun"], control["rejection"]["rate"].tolist()) == (1, [1.0, 2.0, 3.0])
-    assert control["feedback"]["integral"].tolist() == [99.0] * 3
+    observer = control["rejecting"]["observer"]
+    assert control["config"]["law"] == row_of("fault-tolerant").place
+    assert observer["disturbance"] == pytest.approx(found)
+    assert (observer["begun"], observer["rate"].tolist()) == (1, [1.0, 2.0, 3.0])
+    assert control["published"]["memory"]["integral"].tolist() == [99.0] * 3
 
 
 @pytest.mark.parametrize(
@@ -66,11 +69,21 @@ def test_an_observer_begins_with_what_the_law_before_it_has_found(before, found)
 )
 def test_an_integrator_begins_where_the_demand_is(before, after, detected, integral):
     control = _taken(before, after, detected, integral_per_s2=0.8)
-    assert control["feedback"]["integral"] == pytest.approx(integral)
+    assert control["published"]["memory"]["integral"] == pytest.approx(integral)
 
 
 def test_a_law_without_an_integrator_has_nothing_to_begin_with():
-    assert _taken("adaptive", "nominal", integral_per_s2=0.0)["feedback"]["integral"].tolist() == [99.0] * 3
+    taken = _taken("adaptive", "nominal", integral_per_s2=0.0)
+    assert taken["published"]["memory"]["integral"].tolist() == [99.0] * 3
+
+
+def test_a_rival_hands_on_what_the_law_before_it_has_found():
+    """The regulator estimates nothing: the observer after it begins where the first one had ended."""
+    frame = _frame("fault-tolerant")
+    frame["control"]["rejecting"]["observer"]["disturbance"] = DISTURBANCE
+    for law in ("lqr", "fault-tolerant"):
+        take_law(frame, _frame(law)["control"])
+    assert frame["control"]["rejecting"]["observer"]["disturbance"].tolist() == DISTURBANCE.tolist()
 
 
 def _change(law=None, scheme=None, sensors=None, declared_sensors=None):
@@ -85,9 +98,10 @@ def _change(law=None, scheme=None, sensors=None, declared_sensors=None):
         (_change(sensors="ideal"), False, True, True), (_change(sensors="ideal"), False, False, False),
     ],
 )  # fmt: skip
-def test_when_a_diagnosis_begins_anew(change, ideal, ours, renewed):
-    bounds = SimpleNamespace(sensors=SimpleNamespace(is_ideal=ideal))
-    then = SimpleNamespace(fdi=SimpleNamespace(bounds=bounds, is_ours=ours))
+def test_when_a_diagnosis_begins_anew(monkeypatch, change, ideal, ours, renewed):
+    declared = SimpleNamespace(sensors=SimpleNamespace(is_ideal=ideal))
+    monkeypatch.setattr(Declared, "of", lambda then: declared)
+    then = SimpleNamespace(fdi=SimpleNamespace(is_ours=ours))
     assert renews_diagnosis(change, then) is renewed
 
 
@@ -226,18 +240,27 @@ def test_a_law_in_its_own_place_goes_on_where_it_was(law):
         sim.step()
     frame = sim._loop.frames[0]
     before, layout = frame["control"].copy(), frame["control"]["layout"]
-    power = before["power"]
-    assert power["least"] < power["trim"] < power["greatest"]
+    power = before["power"]["output"]
+    assert power["least"] < before["power"]["setpoint"]["base"] < power["greatest"]
     new = assemble(given, layout["trim"], np.array([layout["low"], layout["high"]]))[0]["control"]
-    parts = "reference", "surfaces", "allocation", "probe", "power"
     fresh = new.copy()
     take_law(frame, new)
-    changed, kept = set(), set()
-    for part in parts:
-        for name in before[part].dtype.names:
-            if before[part][name].tobytes() != fresh[part][name].tobytes():
-                changed.add(f"{part}.{name}")
-                if frame["control"][part][name].tobytes() == before[part][name].tobytes():
-                    kept.add(f"{part}.{name}")
-    assert changed - kept == {"allocation.G", "surfaces.target", "reference.hedging", "reference.scale"}
-    assert {f"power.{name}" for name in ("least", "greatest", "from_s", "frames", "command")} <= kept
+    parts = [f"{stage}.{part}" for stage in STAGES for part in before[stage].dtype.names]
+    bits = {
+        part: [_part(record, part).tobytes() for record in (before, fresh, frame["control"])]
+        for part in parts
+    }
+    changed = {part for part, (then, begun, _) in bits.items() if then != begun}
+    kept = {part for part in changed if bits[part][2] == bits[part][0]}
+    assert changed - kept == {"reference.memory"}
+    assert {"power.memory", "power.output", "reference.output", "surfaces.output"} <= kept
+    assert all(bits[part][2] == bits[part][1] for part in parts if part.endswith("config"))
+
+
+STAGES = ("reference", "surfaces", "allocation", "probe", "power")
+
+
+def _part(control, part):
+    """A stage's record by its dotted name."""
+    stage, name = part.split(".")
+    return control[stage][name]

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 import beaver_ftc
-from beaver_ftc.control.accommodation import true_faults_dtype
 from beaver_ftc.control.state import control_dtype
 from beaver_ftc.diagnosis.belief.expectation import belief_dtype
 from beaver_ftc.diagnosis.scheme import diagnosis_dtype
+from beaver_ftc.loop.accounts import true_faults_dtype
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plant.instruments import MEASURED
 from beaver_ftc.plant.sensing import truth_dtype

@@ -96,7 +96,7 @@ def test_the_law_answers_in_frequency_as_it_does_frame_by_frame():
             model = loop.f @ seen + loop.G @ acting
             ahead = rate + dt * (model + disturbance)
             missed = y[:3] - ahead
-            rate, disturbance = ahead + law.pull * missed, disturbance + law.learn * missed
+            rate, disturbance = ahead + law.L_rate * missed, disturbance + law.L_disturbance * missed
             demand = -law.Kp * (rate + share * dt * (loop.f @ y + loop.G @ position + disturbance))
             demand = demand - disturbance - loop.f @ y
             command = position + law.lead * (law.demand @ demand - position)
@@ -142,11 +142,11 @@ def test_commands_do_what_is_demanded():
 
 def test_the_schedule_between_its_points_and_handed_over():
     kind = np.dtype(
-        [("qdyn", float, 2), *((name, float, (4, 2)) for name in ("Kp_at", "pull_at", "learn_at"))]
+        [("qdyn", float, 2), *((name, float, (4, 2)) for name in ("Kp_at", "L_rate_at", "L_disturbance_at"))]
     )
     rejection = np.zeros((), kind)
     rejection["qdyn"] = 500.0, 1500.0
-    for i, name in enumerate(("Kp_at", "pull_at", "learn_at")):
+    for i, name in enumerate(("Kp_at", "L_rate_at", "L_disturbance_at")):
         rejection[name] = [[axis + 10 * i, axis + 10 * i + 1.0] for axis in (1, 2, 3, 6)]
     np.testing.assert_allclose(interpolated(rejection, 750.0, 0.0)[1], [11.25, 12.25, 13.25])
     np.testing.assert_allclose(interpolated(rejection, 750.0, 0.5), [[x + 10 * i for x in (1.25, 4.25, 3.25)]

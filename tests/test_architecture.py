@@ -7,11 +7,14 @@ functions, under TYPE_CHECKING and by a string included: an arrow is an arrow.
 import ast
 import re
 from functools import cache
+from importlib import import_module
 from pathlib import Path
+from types import FunctionType
 
 import pytest
 
 import beaver_ftc
+from beaver_ftc import public
 from beaver_ftc.aircraft.loading import builtin_names
 from beaver_ftc.plant import instrumented
 
@@ -31,6 +34,7 @@ BESIDE = {
 
 # Folders from the ground up; a folder imports what is below its own floor, and itself.
 FLOORS = (
+    {"public"},
     {"documents"},
     {"choice", "commands", "compiled", "extensions", "numba_inside", "numba_sized", "plugins"},
     {"aircraft"},
@@ -45,7 +49,7 @@ FLOORS = (
     {"cli", "pytest_plugin"},
     {"integrations"},
 )
-TOOLS = FLOORS[1]
+TOOLS = FLOORS[2]
 # Their rows name what is far above them, for those who ask; the same for other packages.
 REGISTRIES = {"plugins", "commands"}
 
@@ -137,6 +141,73 @@ def test_products_stand_apart(package):
         if target.partition(".")[0] in others
     }
     assert found == set()
+
+
+@pytest.mark.parametrize("package", PRODUCTS)
+def test_products_use_public_names_of_the_core_alone(package):
+    """Of a folder what its __init__.py publishes, of a module beside the folders what is in its __all__."""
+    private = {
+        f"{name}: {target}"
+        for name in modules(package)
+        for target in imports(name, package)
+        if target.startswith(f"{PACKAGE}.") and not is_public(target.removeprefix(f"{PACKAGE}."))
+    }
+    assert private == set()
+
+
+def is_public(target: str) -> bool:
+    """Whether `plant.Plant` or `load` is a public name of the core. A module in a folder is none."""
+    place, _, name = target.rpartition(".")
+    if name.startswith("_") or (place and place not in modules()):
+        return False
+    if modules()[place].name != "__init__.py" or not place:
+        return name in getattr(import_module(f"{PACKAGE}.{place}".rstrip(".")), "__all__", ())
+    return name in {*published_by(place), *defined_in(place)}
+
+
+def published_by(folder: str) -> dict[str, tuple[str, str]]:
+    return public.published(import_module(f"{PACKAGE}.{folder}").__name__)
+
+
+def defined_in(folder: str) -> set[str]:
+    """What an __init__.py defines or imports itself."""
+    found = set()
+    for node in tree(folder).body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            found.add(node.name)
+        elif isinstance(node, ast.ImportFrom):
+            found |= {alias.asname or alias.name for alias in node.names}
+        elif isinstance(node, ast.Assign):
+            found |= {each.id for each in ast.walk(node) if isinstance(each, ast.Name)}
+    return found
+
+
+@pytest.mark.parametrize("name", ["plant.Plant", "load", "compiled.kernel", "scenario.faults.TYPES"])
+def test_names_that_are_public(name):
+    assert is_public(name)
+
+
+@pytest.mark.parametrize(
+    "name", ["plant.adapter.Plant", "plant.adapter", "compiled.compile_into", "plant._Plant", "loop.frame"]
+)
+def test_names_that_are_not_public(name):
+    assert not is_public(name)
+
+
+@pytest.mark.parametrize(
+    "folder", [name for name, path in modules().items() if path.name == "__init__.py" and name]
+)
+def test_every_public_name_exists_is_used_by_a_product_and_has_a_docstring(folder):
+    used = {target for package in PRODUCTS for name in modules(package) for target in imports(name, package)}
+    used |= {target for name in modules() for target in imports(name)}
+    package = import_module(f"{PACKAGE}.{folder}")
+    for name in published_by(folder):
+        found = getattr(package, name)
+        assert f"{PACKAGE}.{folder}.{name}" in used, name
+        assert found.__doc__ or not isinstance(found, type | FunctionType), name
+        assert name in dir(package)
+    with pytest.raises(AttributeError, match=f"module 'beaver_ftc.{folder}' has no attribute 'nothing'"):
+        package.nothing  # noqa: B018
 
 
 @pytest.mark.parametrize("package", ROOTS)

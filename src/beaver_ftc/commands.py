@@ -18,6 +18,8 @@ from typing import Any
 
 from beaver_ftc.extensions import entries, loaded
 
+__all__ = ["COMMANDS", "GROUP", "GROUPS", "declare", "files_of_commands", "groups", "registered", "summary"]
+
 GROUP, GROUPS = "beaver_ftc.commands", "beaver_ftc.command_groups"
 COMMANDS = {
     "run": "beaver_ftc.cli.run:command",

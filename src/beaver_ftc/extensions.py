@@ -25,6 +25,10 @@ from typing import Any
 
 from beaver_ftc.documents.errors import BadInput
 
+__all__ = [
+    "SERVICES", "WHEN_IMPORTED", "entries", "folders", "loaded", "offered", "required", "watch_imports",
+]  # fmt: skip
+
 SERVICES, WHEN_IMPORTED = "beaver_ftc.services", "beaver_ftc.when_imported"
 _METADATA = (".dist-info", ".egg-info")
 

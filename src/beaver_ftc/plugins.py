@@ -23,6 +23,11 @@ from typing import Any
 
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError, suggestion
 
+__all__ = [
+    "DETECTORS", "LAWS", "OURS", "Registered", "is_compiled", "made", "options_of", "plugin_class", "refusal",
+    "register", "registered", "settings", "wrong_options",
+]  # fmt: skip
+
 DETECTORS, LAWS = "beaver_ftc.detectors", "beaver_ftc.laws"
 OURS = "beaver-ftc"
 VARIABLE = "BEAVER_FTC_PLUGINS"  # what is registered for this run: NAME=MODULE:CLASS, separated by spaces

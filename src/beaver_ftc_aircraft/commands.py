@@ -5,9 +5,9 @@ from typing import Annotated
 
 import typer
 
-from beaver_ftc.cli.output import Format, FormatOption, answer, complain
+from beaver_ftc.cli import Format, FormatOption, answer, complain
 from beaver_ftc.commands import declare
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents import BadInput
 
 
 class Import:

@@ -22,15 +22,13 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.diagnosis.state import UNANTICIPATED
-from beaver_ftc.diagnosis.types.registry import NAMES
-from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.loop.loop import fly
-from beaver_ftc.loop.simulation import Stepping
-from beaver_ftc.results.log import MemoryLog
-from beaver_ftc.results.writer import result_folder
-from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.studies.isolability import DOUBLET
+from beaver_ftc.diagnosis import UNANTICIPATED
+from beaver_ftc.diagnosis.types import TYPE_NAMES as NAMES
+from beaver_ftc.documents import BadInput
+from beaver_ftc.loop import Stepping, fly
+from beaver_ftc.results import MemoryLog, result_folder
+from beaver_ftc.scenario import Scenario
+from beaver_ftc.studies import DOUBLET_COLUMNS as DOUBLET
 from beaver_ftc_assurance.certificates import proved
 from beaver_ftc_assurance.certificates.certificate import check_scheme, history_of, logged
 from beaver_ftc_assurance.certificates.inequality import History, Hypothesis, by_each_frame, declared_of

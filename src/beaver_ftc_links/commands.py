@@ -7,9 +7,20 @@ from typing import Annotated
 
 import typer
 
-from beaver_ftc.cli.inputs import JunitOption, NoReportOption, ResultsOption, ScenarioArgument, load_all
-from beaver_ftc.cli.output import Format, FormatOption, complain, emit, emit_json, write_junit
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.cli import (
+    Format,
+    FormatOption,
+    JunitOption,
+    NoReportOption,
+    ResultsOption,
+    ScenarioArgument,
+    complain,
+    emit,
+    emit_json,
+    load_all,
+    write_junit,
+)
+from beaver_ftc.documents import BadInput
 from beaver_ftc_links.sitl import Protocol
 
 
@@ -53,7 +64,7 @@ def command(options: Options) -> None:
     mavlink: A ground station: is told what the diagnosis finds, may inject failures.
     page: Show the flight on the live page at this port, 0 any: break it there, repair it.
     """
-    from beaver_ftc.results.verdict import verdict_text
+    from beaver_ftc.results import verdict_text
     from beaver_ftc_links.sitl.serve import Options as Served
     from beaver_ftc_links.sitl.serve import serve
 

@@ -3,9 +3,9 @@
 import time
 from collections.abc import Callable
 
-from beaver_ftc.aircraft.loading import DEFAULT
-from beaver_ftc.documents.errors import SimulationFailed
-from beaver_ftc.plant.adapter import Plant
+from beaver_ftc.aircraft import DEFAULT
+from beaver_ftc.documents import SimulationFailed
+from beaver_ftc.plant import Plant
 
 DIRECTIVE = f"aircraft/{DEFAULT}/flightgear.xml"
 

@@ -36,11 +36,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from beaver_ftc.aircraft import load as aircraft
 from beaver_ftc.compiled import direct
-from beaver_ftc.documents.errors import BadInput, SimulationFailed
-from beaver_ftc.loop.agent import BESIDE_SURFACES, LARGEST, LOOK, act, cost, observe
-from beaver_ftc.results.simulation import Simulation
-from beaver_ftc.scenario.loader import ScenarioLike, load
-from beaver_ftc.studies.engine.workers import context, cores, single_threaded
+from beaver_ftc.documents import BadInput, SimulationFailed
+from beaver_ftc.loop import LARGEST_OBSERVATION as LARGEST
+from beaver_ftc.loop import OBSERVED_BESIDE_SURFACES as BESIDE_SURFACES
+from beaver_ftc.loop import OBSERVED_COLUMNS as LOOK
+from beaver_ftc.loop import act_as_agent as act
+from beaver_ftc.loop import cost_of_agent as cost
+from beaver_ftc.loop import observe_as_agent as observe
+from beaver_ftc.results import Simulation
+from beaver_ftc.scenario import ScenarioLike, load
+from beaver_ftc.studies.engine import cores, single_threaded
+from beaver_ftc.studies.engine import process_context as context
 
 DEPARTURE = -100.0
 NOBODY = {"control.law": "nominal", "control.options": {}}  # the surfaces are the agent's

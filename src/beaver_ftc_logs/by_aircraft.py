@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.diagnosis.base import Verdict
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.diagnosis import Verdict
+from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import findings, trust
 from beaver_ftc_logs.diagnose import Rows
 from beaver_ftc_logs.recording import Floats, Recording, nearest_ten
@@ -24,7 +24,7 @@ from beaver_ftc_logs.stepped import Stepped, declared_of, rows_of, step_through
 from beaver_ftc_logs.vehicle import Quantity, Vehicle
 
 if TYPE_CHECKING:
-    from beaver_ftc.loop.stream import Diagnosis
+    from beaver_ftc.loop import Diagnosis
 
 Document = dict[str, Any]
 Mask = NDArray[np.bool_]
@@ -49,9 +49,8 @@ class Known:
 def known(reference: str, scenario: str | None = None) -> Known:
     """The aircraft of a name, and the errors that a scenario (file or name) declares: the published ones
     where None. Raises BadInput where the scenario is of another aircraft."""
-    from beaver_ftc.aircraft.loading import UnknownAircraft
-    from beaver_ftc.scenario.airframe import find_aircraft
-    from beaver_ftc.scenario.loader import load_scenario
+    from beaver_ftc.aircraft import UnknownAircraft
+    from beaver_ftc.scenario import find_aircraft, load_scenario
 
     try:
         aircraft = find_aircraft(reference, Path.cwd())
@@ -88,7 +87,7 @@ class Taken:
 
 def take(recording: Recording, vehicle: Vehicle, by: Known) -> Taken:
     """Read what the diagnosis is given. Raises BadInput for what the log lacks."""
-    from beaver_ftc.loop.stream import Diagnosis
+    from beaver_ftc.loop import Diagnosis
 
     _check(recording, vehicle, by.aircraft)
     samples = sample(

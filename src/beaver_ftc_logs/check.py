@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import physics
 from beaver_ftc_logs.readers import check_exists, evident, read_parts
 from beaver_ftc_logs.readers.table import TIME, first_of, names_of

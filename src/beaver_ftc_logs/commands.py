@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from beaver_ftc.cli.output import Document, Format, FormatOption, answer
+from beaver_ftc.cli import Document, Format, FormatOption, answer
 from beaver_ftc.commands import declare
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents import BadInput
 
 if TYPE_CHECKING:
     from beaver_ftc_logs.model import Model
@@ -47,8 +47,8 @@ def identify(
     if vehicle is None or out is None:
         option = "--vehicle" if vehicle is None else "--out"
         raise BadInput(f"identify: {option} is missing, allowed: --vehicle FILE --out MODEL, or --check")
-    from beaver_ftc.results.writer import clear_disk_errors
-    from beaver_ftc.studies.engine.store import write_whole
+    from beaver_ftc.results import clear_disk_errors
+    from beaver_ftc.studies.engine import write_whole
     from beaver_ftc_logs.identification import by_pressure, identify, summary
     from beaver_ftc_logs.model import as_text
     from beaver_ftc_logs.pages import check_page, render_model
@@ -101,7 +101,7 @@ def _check(
 
 
 def _write_new(path: Path, text: str) -> None:
-    from beaver_ftc.results.writer import clear_disk_errors
+    from beaver_ftc.results import clear_disk_errors
 
     with clear_disk_errors(path):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -246,8 +246,8 @@ def _diagnose(samples: "Samples", model: "Model", out: Path, scored: bool, detec
 
 def compare_recorded(folder: Path, out: Path, format: Format, page: Path | None) -> None:
     """Compare ways to diagnose the recorded flights in a folder; page: a page of Markdown to update."""
-    from beaver_ftc.results.writer import result_folder
-    from beaver_ftc.studies.present.page import write_files
+    from beaver_ftc.results import result_folder
+    from beaver_ftc.studies.present import write_files
     from beaver_ftc_logs.recorded.benchmark import as_text, files_of, run_benchmark, update_page
 
     document = run_benchmark(folder)

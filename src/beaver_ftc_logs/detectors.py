@@ -22,10 +22,9 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.design.context import Context, Declared
-from beaver_ftc.design.model import N_Y
-from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
-from beaver_ftc.documents.errors import BadInput, suggestion
+from beaver_ftc.design import N_Y, Context, Declared
+from beaver_ftc.diagnosis import Detector, Measured, Verdict
+from beaver_ftc.documents import BadInput, suggestion
 from beaver_ftc.plugins import DETECTORS, is_compiled, made, registered
 from beaver_ftc_logs.bank import bank_of
 from beaver_ftc_logs.diagnose import (

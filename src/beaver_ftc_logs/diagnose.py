@@ -10,7 +10,7 @@ from itertools import compress
 import numpy as np
 from numpy.typing import NDArray
 
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import energy, trust
 from beaver_ftc_logs.bank import UNKNOWN as UNKNOWN_OFFSET
 from beaver_ftc_logs.bank import Bank, bank_of

@@ -8,7 +8,7 @@ fast as in the lowest part of healthy flight, with the engine idling, no surface
 
 import numpy as np
 
-from beaver_ftc.aircraft.units import GRAVITY_MPS2
+from beaver_ftc.aircraft import GRAVITY_MPS2
 from beaver_ftc_logs.recording import Floats
 
 ENGINE, UNKNOWN = "engine", "unknown"

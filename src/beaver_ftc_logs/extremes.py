@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydantic import Field
 
-from beaver_ftc.documents.base import Number, Section
+from beaver_ftc.documents import Number, Section
 from beaver_ftc_logs.recording import TINY, Floats
 
 _SHAPE_SD, _SHAPES = 0.2, np.linspace(-0.5, 0.5, 41)

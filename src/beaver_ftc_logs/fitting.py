@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import extremes, regression, trust
 from beaver_ftc_logs.bank import adaptation_of, bank_of
 from beaver_ftc_logs.diagnose import Rows, rows_of

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import extremes, fitting, regression, trust
 from beaver_ftc_logs.model import Fitted, Model
 from beaver_ftc_logs.recording import Floats

@@ -10,8 +10,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, model_validator
 
-from beaver_ftc.documents.base import Conflict, Location, Number, Section, Whole, refuse
-from beaver_ftc.documents.validation import read_file
+from beaver_ftc.documents import Conflict, Location, Number, Section, Whole, read_file, refuse
 from beaver_ftc_logs.extremes import Tail
 from beaver_ftc_logs.recording import Floats
 from beaver_ftc_logs.vehicle import Vehicle

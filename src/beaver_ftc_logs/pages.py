@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.results.metrics import as_json
-from beaver_ftc.results.style import SERIES
-from beaver_ftc.results.writer import result_folder
+from beaver_ftc.documents import BadInput
+from beaver_ftc.results import SERIES_COLOURS as SERIES
+from beaver_ftc.results import as_json, result_folder
 from beaver_ftc_logs import fitting
 from beaver_ftc_logs.diagnose import Rows
 from beaver_ftc_logs.findings import BRIEF_S, lasting, looked_at

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents import BadInput
 
 Floats = NDArray[np.float64]
 _US = 1e-6

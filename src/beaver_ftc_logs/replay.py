@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.results.metrics import TIME_TOLERANCE_S
+from beaver_ftc.documents import BadInput
+from beaver_ftc.results import TIME_TOLERANCE_S
 from beaver_ftc_logs.readers.table import check_time, read_numbers
 from beaver_ftc_logs.recording import Floats
 
@@ -29,8 +29,8 @@ def is_own_log(path: Path) -> bool:
 def replay(path: Path) -> tuple[dict[str, Any], Document]:
     """Step the diagnosis through a log: columns of diagnosis.parquet by name, and the document of
     verdict.json. Raises BadInput where the flight's diagnosis was none of ours."""
-    from beaver_ftc.loop.stream import Diagnosis
-    from beaver_ftc.scenario.loader import load_scenario
+    from beaver_ftc.loop import Diagnosis
+    from beaver_ftc.scenario import load_scenario
     from beaver_ftc_logs import stepped
 
     scenario = load_scenario(path.with_name("scenario.yaml"))

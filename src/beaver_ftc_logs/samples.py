@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import energy, physics, signals
 from beaver_ftc_logs.readers import read_flight, read_parts
 from beaver_ftc_logs.recording import Column, Event, Floats, Recording, nearest_ten

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.diagnosis.base import Verdict
-from beaver_ftc.loop.stream import FLOW, Diagnosis
+from beaver_ftc.diagnosis import Verdict
+from beaver_ftc.loop import FLOW, Diagnosis
 from beaver_ftc_logs.diagnose import UNKNOWN, Rows
 from beaver_ftc_logs.recording import TINY, Floats
 from beaver_ftc_logs.regression import at_most, quarters

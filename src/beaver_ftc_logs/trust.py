@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import energy, regression
 from beaver_ftc_logs.model import Fitted, Model
 from beaver_ftc_logs.readings import mended

@@ -2,7 +2,7 @@
 
 from math import pi
 
-from beaver_ftc.aircraft.units import GRAVITY_MPS2, M_PER_FT
+from beaver_ftc.aircraft import GRAVITY_MPS2, M_PER_FT
 
 RATE, ANGLE, SPEED, ACCELERATION, LENGTH, SHARE, TIME = (
     "rate", "angle", "speed", "acceleration", "length", "share", "time",

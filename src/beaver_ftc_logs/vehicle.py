@@ -11,10 +11,20 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_serializer, model_validator
 
-from beaver_ftc.documents.base import Conflict, Location, Number, Section, number, refuse
-from beaver_ftc.documents.errors import BadInput, suggestion
-from beaver_ftc.documents.validation import parse_document, text_of, validate
-from beaver_ftc.scenario.loader import looks_like_a_path
+from beaver_ftc.documents import (
+    BadInput,
+    Conflict,
+    Location,
+    Number,
+    Section,
+    number,
+    parse_document,
+    refuse,
+    suggestion,
+    text_of,
+)
+from beaver_ftc.documents import validate_model as validate
+from beaver_ftc.scenario import looks_like_a_path
 from beaver_ftc_logs.units import ACCELERATION, ANGLE, LENGTH, RATE, SECONDS, SPEED, UNITS, units_of
 
 _MAX_BYTES = 1_000_000

@@ -1,0 +1,11 @@
+"""Whether there is a fault, which it is, and how large: detection, isolation, fault types, monitors."""
+
+from typing import TYPE_CHECKING
+
+from beaver_ftc.public import lazily
+
+if TYPE_CHECKING:
+    from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
+    from beaver_ftc.diagnosis.state import LOSS, UNANTICIPATED
+else:
+    __getattr__, __dir__ = lazily(__name__)

@@ -1,1 +1,34 @@
 """The truth: the Beaver in JSBSim. The only package that imports jsbsim."""
+
+from typing import TYPE_CHECKING
+
+from beaver_ftc.public import lazily
+
+if TYPE_CHECKING:
+    from beaver_ftc.plant.adapter import PA_PER_PSF, Plant, bare, translated
+    from beaver_ftc.plant.channels import AIRSPEED, ALTITUDE
+    from beaver_ftc.plant.configure import DELAY as ACTUATOR_DELAY
+    from beaver_ftc.plant.ground import lay as lay_ground
+    from beaver_ftc.plant.ground import stand as stand_on_ground
+    from beaver_ftc.plant.instrumented import (
+        AT_IDLE,
+        ENGINE_SIGNALS,
+        GEAR,
+        actuator_system,
+        others_of,
+        seen_by_aerodynamics,
+        surfaces_of,
+    )
+    from beaver_ftc.plant.instrumented import DIFFERENCE as LEVER_DIFFERENCE
+    from beaver_ftc.plant.instrumented import SIGNALS as SIGNAL_PROPERTIES
+    from beaver_ftc.plant.instrumented import instrument as instrument_model
+    from beaver_ftc.plant.instrumented import is_told as is_known_to_jsbsim
+    from beaver_ftc.plant.instrumented import source_of as source_of_jsbsim
+    from beaver_ftc.plant.instruments import AX, ENGINE_SPEED, SENSORS
+    from beaver_ftc.plant.model_file import copy_of, refuse_deeds
+    from beaver_ftc.plant.state import FlightState
+    from beaver_ftc.plant.trial import failure as failure_of_trial
+    from beaver_ftc.plant.trim import TrimPoint
+    from beaver_ftc.plant.trim import trim as trim_plant
+else:
+    __getattr__, __dir__ = lazily(__name__)

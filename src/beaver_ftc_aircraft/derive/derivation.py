@@ -15,17 +15,40 @@ from time import perf_counter
 import numpy as np
 import yaml
 
-from beaver_ftc.aircraft import loading
-from beaver_ftc.aircraft.aircraft import THRUST_TERM
-from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_SIGNALS, MAX_TERMS_OF_ONE
-from beaver_ftc.design.model import design_record
-from beaver_ftc.diagnosis.monitors.engine_symmetry import THRUST
-from beaver_ftc.documents.errors import BadInput, SimulationFailed
-from beaver_ftc.plant import instrumented, trial
-from beaver_ftc.plant.adapter import Plant, translated
-from beaver_ftc.plant.model_file import copy_of, refuse_deeds
-from beaver_ftc.plant.trim import TrimPoint
-from beaver_ftc.plant.trim import trim as trim_at
+from beaver_ftc.aircraft import (
+    AIRCRAFT_FILE,
+    DERIVED_FORMAT,
+    FROM_JSBSIM,
+    MAX_MONOMIALS,
+    MAX_SIGNALS,
+    MAX_TERMS_OF_ONE,
+    THRUST_TERM,
+    builtin_names,
+    derived_folder,
+    first_line_of,
+    load,
+    read_aircraft,
+)
+from beaver_ftc.design import design_record
+from beaver_ftc.diagnosis.monitors import THRUST
+from beaver_ftc.documents import BadInput, SimulationFailed
+from beaver_ftc.plant import (
+    AT_IDLE,
+    GEAR,
+    SIGNAL_PROPERTIES,
+    Plant,
+    TrimPoint,
+    copy_of,
+    failure_of_trial,
+    instrument_model,
+    is_known_to_jsbsim,
+    refuse_deeds,
+    seen_by_aerodynamics,
+    source_of_jsbsim,
+    surfaces_of,
+    translated,
+)
+from beaver_ftc.plant import trim_plant as trim_at
 from beaver_ftc_aircraft.derive import outline
 from beaver_ftc_aircraft.derive.derived import NAME as PAGE
 from beaver_ftc_aircraft.derive.derived import Derived, page_of
@@ -82,21 +105,21 @@ class Source:
     @property
     def says(self) -> str:
         """What to call it."""
-        return f"{loading.FROM_JSBSIM}{self.name}" if self.target else self.name
+        return f"{FROM_JSBSIM}{self.name}" if self.target else self.name
 
 
 def source_of(reference: str) -> Source:
     """What a reference means. Raises BadInput for what is no aircraft, or would act on the machine."""
-    if reference.startswith(loading.FROM_JSBSIM):
-        name = reference.removeprefix(loading.FROM_JSBSIM)
-        target = loading.derived_folder(name)
-        return Source(name, instrumented.source_of(name), target=target)
-    if reference in loading.builtin_names():
-        aircraft = loading.load(reference)
+    if reference.startswith(FROM_JSBSIM):
+        name = reference.removeprefix(FROM_JSBSIM)
+        target = derived_folder(name)
+        return Source(name, source_of_jsbsim(name), target=target)
+    if reference in builtin_names():
+        aircraft = load(reference)
         return Source(reference, aircraft.jsbsim, aircraft.folder)
     path = Path(reference)
-    if (path / loading.FILE).is_file():
-        aircraft = loading.read(path.resolve())
+    if (path / AIRCRAFT_FILE).is_file():
+        aircraft = read_aircraft(path.resolve())
         return Source(aircraft.name, aircraft.jsbsim, aircraft.folder)
     if path.is_dir() and (path / f"{path.resolve().name}.xml").is_file():
         path = path / f"{path.resolve().name}.xml"
@@ -124,7 +147,7 @@ def try_out(source: Source) -> tuple[str, ...]:
 def _failure(source: Source, absent: list[str]) -> str | None:
     """Why the model does not fly with these properties at 0; None if it does."""
     with tempfile.TemporaryDirectory(prefix="beaver-ftc-") as here:
-        return trial.failure(copy_of(source.model, Path(here) / source.name), absent)
+        return failure_of_trial(copy_of(source.model, Path(here) / source.name), absent)
 
 
 def derive(
@@ -167,12 +190,12 @@ def derive(
                 thrust = thrust_of(outline.plant_of(data, folder), trim)
                 data["engine"] |= {"thrust": thrust} if thrust else {}
         aircraft = outline.aircraft_of(data, target)
-        as_filed = loading.read(source.folder) if source.folder else None
+        as_filed = read_aircraft(source.folder) if source.folder else None
         took_s = perf_counter() - started_s
         found = Derived(aircraft, trim, *made, tuple(notes), as_filed, further, took_s)
         twice = json.loads(json.dumps(data))  # what is there twice is written twice, not as an alias
         text = yaml.safe_dump(twice, sort_keys=False, default_flow_style=None, width=120)
-        (folder / loading.FILE).write_text(loading.first_line() + text, encoding="utf-8")
+        (folder / AIRCRAFT_FILE).write_text(first_line_of() + text, encoding="utf-8")
         (folder / PAGE).write_text(page_of(found), encoding="utf-8")
         target.parent.mkdir(parents=True, exist_ok=True)
         if target.exists():
@@ -196,17 +219,17 @@ def _prepared(
         tell("trim")
         return outline.level_as_filed(source.folder, folder, wanted)
     tell("instrument")
-    seen = instrumented.surfaces_of(source.model)
+    seen = surfaces_of(source.model)
     if len(seen) < 3:
         says = ", ".join(seen) or "no surface"
         raise BadInput(f"{source.says}: its aerodynamics see {says}, allowed: aileron, elevator, rudder")
-    absent = tuple(name for name in try_out(source) if not instrumented.is_told(name))
+    absent = tuple(name for name in try_out(source) if not is_known_to_jsbsim(name))
     if absent:
         notes.append(f"JSBSim alone gives it no {', '.join(absent)}: 0 in the copy")
-    own = instrumented.instrument(source.model, folder.parent.parent / "own", {}, absent)
+    own = instrument_model(source.model, folder.parent.parent / "own", {}, absent)
     travel = outline.travel_of(source.model, own, notes)
     notes += outline.own_control(source.model, own)
-    model = instrumented.instrument(source.model, folder, travel, absent, apart=engines)
+    model = instrument_model(source.model, folder, travel, absent, apart=engines)
     outlines = [outline.outline(source.name, model, travel, lift) for lift in outline.LIFT_COEFFICIENTS]
     for data in outlines:
         if wanted.altitude_m is not None:
@@ -217,9 +240,9 @@ def _prepared(
     tried, said = outlines[: 1 if wanted.airspeed_mps else None], list[str]()
     level = outline.level_flight(tried, folder, said)
     sinks = level[2].gamma_rad <= -outline.LEVEL_RAD and level[1].n_engines
-    if sinks and instrumented.GEAR in instrumented.seen_by_aerodynamics(source.model):
+    if sinks and GEAR in seen_by_aerodynamics(source.model):
         shutil.rmtree(folder)
-        instrumented.instrument(source.model, folder, travel, absent, gear_up=True, apart=engines)
+        instrument_model(source.model, folder, travel, absent, gear_up=True, apart=engines)
         said = ["its landing gear is retracted in the copy: with it, its power does not hold it level"]
         level = outline.level_flight(tried, folder, said)
     notes += said
@@ -235,9 +258,7 @@ def _with_engines(source: Source, level: outline.Level, folder: Path) -> outline
         raise BadInput(f"{source.says}: its engines do not yaw it, allowed: engines beside one another")
     data["engine"] |= {"thrust": thrust}
     data["effectors"] = found
-    data["damage"] = {
-        f"{name}-at-idle": {"property": instrumented.AT_IDLE.format(i=i)} for i, name in enumerate(found)
-    }
+    data["damage"] = {f"{name}-at-idle": {"property": AT_IDLE.format(i=i)} for i, name in enumerate(found)}
     return data, outline.plant_of(data, folder), trim
 
 
@@ -262,7 +283,7 @@ def _derived(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Sample, fit and check; the data get their terms and errors. Returns the largest errors, (3,) rad/s2."""
     declared = {name: of["property"] for name, of in data["signals"].items()}
-    known = {name: of for name, of in instrumented.SIGNALS.items() if plant.has(of)}
+    known = {name: of for name, of in SIGNAL_PROPERTIES.items() if plant.has(of)}
     properties = declared or known
     tell("sample")
     flown = joined([fly_about(plant, of.trim, 3, properties) for of in about])
@@ -329,8 +350,8 @@ def _target(source: Source, out: Path | None) -> Path:
     target = out / source.name if out else source.target
     if target is None:
         raise BadInput(f"{source.name}: give --out DIR, the folder to write {source.name}/ into")
-    file = target / loading.FILE
-    derived = file.is_file() and file.read_text(encoding="utf-8").startswith(loading.DERIVED)
+    file = target / AIRCRAFT_FILE
+    derived = file.is_file() and file.read_text(encoding="utf-8").startswith(DERIVED_FORMAT)
     if target.exists() and not derived:
         raise BadInput(f"{target} is there already and was not derived, allowed: another folder")
     return target

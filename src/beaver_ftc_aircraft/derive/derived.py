@@ -10,15 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.aircraft import AXES, Aircraft
-from beaver_ftc.aircraft.aircraft import MOMENTS
-from beaver_ftc.aircraft.schema import ErrorMapSection
-from beaver_ftc.design.context import DesignFunctions
-from beaver_ftc.design.model import design_record
-from beaver_ftc.design.terms import N_Y
-from beaver_ftc.plant.trim import TrimPoint
-from beaver_ftc.scenario.diagnosis import Bounds
-from beaver_ftc.scenario.measured import measured_spans, plural, span_in_words
+from beaver_ftc.aircraft import AXES, MOMENTS, Aircraft, ErrorMapSection
+from beaver_ftc.design import N_Y, DesignFunctions, design_record
+from beaver_ftc.plant import TrimPoint
+from beaver_ftc.scenario import Bounds, measured_spans, plural, span_in_words
 
 DEFLECTION_DEG = 3.0  # beside neutral: what flight with the built-in references asks of a surface
 _NEAR = 1  # box and share of the travel of such a flight, as `fit` makes them

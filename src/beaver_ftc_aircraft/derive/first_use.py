@@ -16,22 +16,22 @@ from pathlib import Path
 
 import numpy as np
 
-from beaver_ftc.aircraft import AXES, Aircraft
-from beaver_ftc.aircraft.loading import FILE, FROM_JSBSIM, is_derived
-from beaver_ftc.aircraft.schema import AircraftFile
-from beaver_ftc.design.model import inertia_coefficients
-from beaver_ftc.documents.base import Location
-from beaver_ftc.documents.document import Problem
-from beaver_ftc.documents.errors import BeaverFtcError, SimulationFailed
-from beaver_ftc.documents.paths import cache_base
-from beaver_ftc.documents.problems import ScenarioError
-from beaver_ftc.documents.validation import parse_document
-from beaver_ftc.plant import trial
-from beaver_ftc.plant.adapter import Plant, translated
-from beaver_ftc.plant.model_file import refuse_deeds
-from beaver_ftc.plant.trim import trim
-from beaver_ftc.scenario.diagnosis import Bounds
-from beaver_ftc.studies.engine.store import write_whole
+from beaver_ftc.aircraft import AIRCRAFT_FILE as FILE
+from beaver_ftc.aircraft import AXES, FROM_JSBSIM, Aircraft, AircraftFile, is_derived
+from beaver_ftc.design import inertia_coefficients
+from beaver_ftc.documents import (
+    BeaverFtcError,
+    Location,
+    Problem,
+    ScenarioError,
+    SimulationFailed,
+    cache_base,
+    parse_document,
+)
+from beaver_ftc.plant import Plant, failure_of_trial, refuse_deeds, translated
+from beaver_ftc.plant import trim_plant as trim
+from beaver_ftc.scenario import Bounds
+from beaver_ftc.studies.engine import write_whole
 from beaver_ftc_aircraft.derive.derivation import derive, source_of
 from beaver_ftc_aircraft.derive.fit import errors_of
 from beaver_ftc_aircraft.derive.outline import usual_start
@@ -82,7 +82,7 @@ def kept_or_compared(aircraft: Aircraft) -> list[str]:
 
 
 def _tried_and_compared(aircraft: Aircraft) -> list[str]:
-    if why := trial.failure(aircraft.jsbsim):
+    if why := failure_of_trial(aircraft.jsbsim):
         raise _bad(aircraft, {("jsbsim",): f"{why}, allowed: a model that JSBSim loads and flies"})
     return compared(aircraft)
 

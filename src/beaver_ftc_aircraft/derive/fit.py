@@ -14,11 +14,10 @@ from typing import Any
 import numpy as np
 from scipy.linalg import lstsq
 
-from beaver_ftc.aircraft import AXES, Aircraft, MassProperties
-from beaver_ftc.aircraft.aircraft import MOMENTS
-from beaver_ftc.design.model import inertia_coefficients, inertial
-from beaver_ftc.diagnosis.monitors import engine_symmetry
-from beaver_ftc.plant.instrumented import ENGINE_SIGNALS
+from beaver_ftc.aircraft import AXES, MOMENTS, Aircraft, MassProperties
+from beaver_ftc.design import inertia_coefficients, inertial
+from beaver_ftc.diagnosis.monitors import THRUST, YAWING, mean_arm
+from beaver_ftc.plant import ENGINE_SIGNALS
 from beaver_ftc_aircraft.derive.sample import (
     AGES_S,
     REACHES,
@@ -293,9 +292,7 @@ def set_engines_apart(boxes: Sequence[dict[str, Any]], aircraft: Aircraft, alike
     """Fill in how unlike engines pull in each box, if they are mirrored; alike: states with all their levers
     where one is. Of others nobody has measured what they do while levers move: a c310's alarmed."""
     of = alike.signals
-    apart = np.abs(
-        of[engine_symmetry.YAWING] - engine_symmetry.mean_arm(aircraft) * of[engine_symmetry.THRUST]
-    )
+    apart = np.abs(of[YAWING] - mean_arm(aircraft) * of[THRUST])
     for i, box in enumerate(boxes if apart.max() < MIRRORED else ()):
         box["engines_apart"] = _rounded(MARGIN * float(apart[alike.box <= i].max()) + LEAST_APART, np.ceil)
 

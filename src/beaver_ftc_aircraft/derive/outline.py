@@ -15,19 +15,20 @@ from typing import Any
 import numpy as np
 import yaml
 
-from beaver_ftc.aircraft import AXES, Aircraft
-from beaver_ftc.aircraft.loading import read
-from beaver_ftc.aircraft.schema import AircraftFile, Interval
-from beaver_ftc.aircraft.units import KG_PER_SLUG, M_PER_FT
-from beaver_ftc.documents.base import Number, Section, number
-from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFailed
-from beaver_ftc.documents.validation import read_file
-from beaver_ftc.plant import instrumented
-from beaver_ftc.plant.adapter import Plant, bare, translated
-from beaver_ftc.plant.model_file import copy_of
-from beaver_ftc.plant.state import FlightState
-from beaver_ftc.plant.trim import TrimPoint, trim
-from beaver_ftc.scenario.initial import initial_of
+from beaver_ftc.aircraft import AXES, KG_PER_SLUG, M_PER_FT, Aircraft, AircraftFile, Interval
+from beaver_ftc.aircraft import read_aircraft as read
+from beaver_ftc.documents import (
+    BadInput,
+    BeaverFtcError,
+    Number,
+    Section,
+    SimulationFailed,
+    number,
+    read_file,
+)
+from beaver_ftc.plant import FlightState, Plant, TrimPoint, bare, copy_of, others_of, surfaces_of, translated
+from beaver_ftc.plant import trim_plant as trim
+from beaver_ftc.scenario import initial_of
 
 SLUG_FT2 = KG_PER_SLUG * M_PER_FT**2
 OUTLINE = Path(__file__).with_name("outline.yaml")
@@ -86,7 +87,7 @@ def travel_of(source: Path, model: Path, notes: list[str]) -> Travel:
     model: a copy that writes no files. What had to be supposed is added to the notes.
     """
     travel = {}
-    for surface in instrumented.surfaces_of(source):
+    for surface in surfaces_of(source):
         low, high = sorted(own_deflection(model, surface, command) for command in (-1.0, 1.0))
         if not (isfinite(low) and isfinite(high) and low < -_LEAST_TRAVEL_RAD and high > _LEAST_TRAVEL_RAD):
             low, high = -LIKELY_TRAVEL_RAD, LIKELY_TRAVEL_RAD
@@ -162,7 +163,7 @@ def not_affine(plant: Plant, trim: FlightState) -> list[str]:
 
 def further_surfaces(source: Path, plant: Plant) -> dict[str, float]:
     """What else of its flight control its aerodynamics see, by property, and where it is in trim."""
-    names = [name for name in instrumented.others_of(source) if _SURFACE.match(name)]
+    names = [name for name in others_of(source) if _SURFACE.match(name)]
     return {name: round(plant.read(name), 4) for name in names if plant.has(name)}
 
 
@@ -187,7 +188,7 @@ def own_control(source: Path, model: Path) -> list[str]:
 
     It moves surfaces with the rates, and with the command of a surface what else the aerodynamics see.
     """
-    notes, surfaces = [], instrumented.surfaces_of(source)
+    notes, surfaces = [], surfaces_of(source)
     for surface in surfaces:
         moved = own_deflection(model, surface, 0.0, _RATE_RAD_S) - own_deflection(model, surface, 0.0)
         if abs(moved) > _MOVED_RAD:
@@ -195,7 +196,7 @@ def own_control(source: Path, model: Path) -> list[str]:
                 f"{surface}: its own flight control moves it {degrees(moved):.1f} deg at "
                 f"{degrees(_RATE_RAD_S):.1f} deg/s, command or not: the copy flies without"
             )
-    others = instrumented.others_of(source)
+    others = others_of(source)
     still = np.round(_settled(model, {}, others), 6)
     for surface in surfaces:
         moved = np.round(_settled(model, {f"fcs/{surface}-cmd-norm": 1.0}, others), 6) != still

@@ -12,11 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from beaver_ftc.aircraft import AXES, Aircraft
-from beaver_ftc.aircraft.schema import FLOW_SIGNALS
-from beaver_ftc.aircraft.units import M_PER_FT
-from beaver_ftc.plant.adapter import PA_PER_PSF, Plant
-from beaver_ftc.plant.state import FlightState
+from beaver_ftc.aircraft import AXES, FLOW_SIGNALS, M_PER_FT, Aircraft
+from beaver_ftc.plant import PA_PER_PSF, FlightState, Plant
 
 REACHES = (0.25, 0.5, 0.75, 1.0)  # of the boxes, as shares of the envelope's half widths
 SHARES = (0.15, 0.35, 0.65, 1.0)  # of the surfaces' travel

@@ -11,10 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.aircraft.units import M_PER_FT, N_PER_LBF
-from beaver_ftc.plant.adapter import Plant
-from beaver_ftc.plant.instrumented import DIFFERENCE
-from beaver_ftc.plant.state import FlightState
+from beaver_ftc.aircraft import M_PER_FT, N_PER_LBF
+from beaver_ftc.plant import LEVER_DIFFERENCE as DIFFERENCE
+from beaver_ftc.plant import FlightState, Plant
 
 OF_ENGINES, FORCE = (
     "forces/fbx-prop-lbs",

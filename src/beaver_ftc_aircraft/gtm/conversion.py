@@ -9,8 +9,8 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from beaver_ftc.aircraft.loading import imported_folder
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.aircraft import imported_folder
+from beaver_ftc.documents import BadInput
 from beaver_ftc_aircraft.derive.derivation import derive
 from beaver_ftc_aircraft.gtm.database import read
 from beaver_ftc_aircraft.gtm.folder import (

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents import BadInput
 
 WHERE = "github.com/nasa/GTM_DesignSim, gtm_design/config/T2_polynomial_aerodatabase.mat"
 _VERSION = "with damage"

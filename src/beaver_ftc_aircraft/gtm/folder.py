@@ -9,9 +9,8 @@ from xml.sax.saxutils import escape
 import numpy as np
 import yaml
 
-from beaver_ftc.aircraft.loading import FILE
-from beaver_ftc.aircraft.schema import MAX_SURFACES
-from beaver_ftc.aircraft.units import KG_PER_LB, M_PER_FT
+from beaver_ftc.aircraft import AIRCRAFT_FILE as FILE
+from beaver_ftc.aircraft import KG_PER_LB, M_PER_FT, MAX_SURFACES
 from beaver_ftc_aircraft.derive.sample import Envelope, Moves
 from beaver_ftc_aircraft.gtm.aerodynamics import aerodynamics
 from beaver_ftc_aircraft.gtm.database import WHERE, Database

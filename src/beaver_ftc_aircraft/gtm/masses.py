@@ -11,7 +11,7 @@ from itertools import product
 
 import numpy as np
 
-from beaver_ftc.aircraft.units import M_PER_FT
+from beaver_ftc.aircraft import M_PER_FT
 from beaver_ftc_aircraft.gtm.elements import table
 from beaver_ftc_aircraft.gtm.parameters import DAMAGE_CASE, cases, parameters
 

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.plant.adapter import bare
+from beaver_ftc.documents import BadInput
+from beaver_ftc.plant import bare
 from beaver_ftc_aircraft.gtm.parameters import cases, parameters, surfaces
 from beaver_ftc_aircraft.gtm.systems import THROTTLE, damage_property
 

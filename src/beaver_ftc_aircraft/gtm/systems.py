@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.plant.configure import DELAY
-from beaver_ftc.plant.instrumented import actuator_system
+from beaver_ftc.plant import ACTUATOR_DELAY as DELAY
+from beaver_ftc.plant import actuator_system
 from beaver_ftc_aircraft.gtm.elements import component, declared, do, function, piecewise, read, value
 from beaver_ftc_aircraft.gtm.masses import structural_in, weights_by_case
 from beaver_ftc_aircraft.gtm.parameters import DAMAGE_CASE, GEAR, can_be_taken, cases, parameters

@@ -14,16 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.design.model import AXES
-from beaver_ftc.diagnosis.detection.bank import poles_of
-from beaver_ftc.diagnosis.state import LOSS
-from beaver_ftc.diagnosis.types.registry import WORDS
-from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.loop.loop import LogSink
-from beaver_ftc.results.log import Log, ParquetLog, StoredLog
-from beaver_ftc.scenario.declared import Declared
-from beaver_ftc.scenario.dump import to_yaml
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.design import AXES
+from beaver_ftc.diagnosis import LOSS
+from beaver_ftc.diagnosis.detection import poles_of
+from beaver_ftc.diagnosis.types import TYPE_WORDS as WORDS
+from beaver_ftc.documents import BadInput
+from beaver_ftc.loop import LogSink
+from beaver_ftc.results import Log, ParquetLog, StoredLog
+from beaver_ftc.scenario import Declared, Scenario, to_yaml
 from beaver_ftc_assurance.certificates import chance, courses, instruments_say, kinds
 from beaver_ftc_assurance.certificates.blocks import Blocks, by_blocks, in_blocks, rows_of
 from beaver_ftc_assurance.certificates.inequality import (

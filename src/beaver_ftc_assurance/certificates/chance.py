@@ -11,9 +11,17 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.detection import likelihood
-from beaver_ftc.diagnosis.detection.likelihood import N_SLOTS, STEP, Rooms, block_dtype, slot_to_start
-from beaver_ftc.diagnosis.detection.noise_model import CHANCE
+from beaver_ftc.diagnosis.detection import (
+    CHANCE,
+    N_SLOTS,
+    Rooms,
+    advance_block,
+    block_dtype,
+    reach_of_block,
+    slot_to_start,
+    whiten_frame,
+)
+from beaver_ftc.diagnosis.detection import STEP_HYPOTHESIS as STEP
 from beaver_ftc_assurance.certificates.inequality import Document, History
 from beaver_ftc_assurance.certificates.tape import OF_BLOCK, Tape
 
@@ -288,10 +296,10 @@ def follow(blocks, inputs, drift, of_frame, states, sums, room, dt):
             block.jitter[i] = given[JITTER, i]
             for j in range(block.n):
                 block.P_dd[i, j] += drift[k, i, j]
-        likelihood.advance(block, dt)
-        likelihood.reach(block, given[BOUNDED], dt)
+        advance_block(block, dt)
+        reach_of_block(block, given[BOUNDED], dt)
         for c in range(len(states)):
-            likelihood.whiten(block, states[c], inputs[k, c], dt, g[c])
+            whiten_frame(block, states[c], inputs[k, c], dt, g[c])
         room[2] = 0.0
         for i in range(block.n):
             before, w[i] = w[i], 0.0

@@ -11,8 +11,9 @@ from math import pi
 
 import numpy as np
 
-from beaver_ftc.diagnosis.types.registry import TYPES, WORDS
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.diagnosis.types import TYPE_ROWS as TYPES
+from beaver_ftc.diagnosis.types import TYPE_WORDS as WORDS
+from beaver_ftc.scenario import Scenario
 from beaver_ftc_assurance.certificates.inequality import Document, History, Hypothesis, by_each_frame
 from beaver_ftc_assurance.certificates.kinds import wrong
 from beaver_ftc_assurance.certificates.tape import Tape

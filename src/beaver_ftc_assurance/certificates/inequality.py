@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.design.model import AXES
-from beaver_ftc.diagnosis.bounds.worst_case import ROUNDING_RAD_S2
+from beaver_ftc.design import AXES
+from beaver_ftc.diagnosis.bounds import ROUNDING_RAD_S2
 
 WINDOW = 16  # frames that are written out; what was before them is the filter's state
 _LEAST = 1e-9  # of a margin, as a share of the limit: more than another order of summation makes

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from beaver_ftc.diagnosis.monitors.sensor_records import RPM
-from beaver_ftc.plant.instruments import ENGINE_SPEED, SENSORS
-from beaver_ftc.scenario.sensors import sensor_words
+from beaver_ftc.diagnosis.monitors import RPM
+from beaver_ftc.plant import ENGINE_SPEED, SENSORS
+from beaver_ftc.scenario import sensor_words
 from beaver_ftc_assurance.certificates.inequality import Document
 
 TESTS = (

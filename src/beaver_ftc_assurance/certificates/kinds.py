@@ -11,7 +11,9 @@ from math import inf
 
 import numpy as np
 
-from beaver_ftc.diagnosis.types.registry import TYPES, WORDS, kind_of
+from beaver_ftc.diagnosis.types import TYPE_ROWS as TYPES
+from beaver_ftc.diagnosis.types import TYPE_WORDS as WORDS
+from beaver_ftc.diagnosis.types import kind_of
 from beaver_ftc_assurance.certificates.inequality import (
     History,
     Hypothesis,

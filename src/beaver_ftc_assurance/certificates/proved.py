@@ -6,11 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from beaver_ftc.aircraft import AXES
-from beaver_ftc.diagnosis.isolation.estimators import estimator_names
-from beaver_ftc.results.flight import Proof
-from beaver_ftc.results.log import Columns, Log, MemoryLog
-from beaver_ftc.scenario.dump import to_yaml
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.diagnosis.isolation import estimator_names
+from beaver_ftc.results import Columns, Log, MemoryLog, Proof
+from beaver_ftc.scenario import Scenario, to_yaml
 from beaver_ftc_assurance.certificates import certificate, chance
 from beaver_ftc_assurance.certificates.certificate import MEASURED_MODEL_BOUND
 from beaver_ftc_assurance.certificates.inequality import Document

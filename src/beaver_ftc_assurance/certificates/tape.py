@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from beaver_ftc.compiled import direct, kernel
-from beaver_ftc.diagnosis.detection.likelihood import N_SLOTS
-from beaver_ftc.diagnosis.isolation.estimators import estimator_names
-from beaver_ftc.loop import memory
-from beaver_ftc.loop.loop import Loop, fly
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.diagnosis.detection import N_SLOTS
+from beaver_ftc.diagnosis.isolation import estimator_names
+from beaver_ftc.loop import Loop, copy_memory, fly, give_back_memory, take_memory
+from beaver_ftc.scenario import Scenario
 
 BEFORE = 40  # frames kept before the alarm: what was before them is in the filters
 BEFORE_CHANCE = 2**N_SLOTS + 2  # with the statistical detector: its oldest onset
@@ -91,22 +90,22 @@ class Recorder:
 
     def begin(self, frames: np.ndarray) -> None:
         """Begin to keep frames of the record `frames`, the first of them number 0."""
-        numbers = memory.taken((1,), frames.dtype)
+        numbers = take_memory((1,), frames.dtype)
         _words_of(numbers)[:] = np.arange(frames.nbytes // 8)
         n, config, fdi = int(frames["fdi"]["isolation"]["n"][0]), self._scenario.fdi, numbers[0]["fdi"]
         self._always = _Places(_always(numbers[0], n, config.fault_class == "all"))
         self._early = _Places(_early(fdi, n, config.statistical is not None))
         self._state = np.array([0, -1, 0, fdi["verdict"]["detected"], fdi["watch"]["alarmed"]])
-        memory.give_back(numbers)
+        give_back_memory(numbers)
         ring = 1 + (BEFORE if config.statistical is None else BEFORE_CHANCE)
         self._ring = np.empty((ring, len(self._early.words)), np.int64)
         self._kept = np.empty((ring + _AT_ONCE, len(self._always.words)), np.int64)
-        self._frames, self._alarm = frames, memory.copied(frames)
+        self._frames, self._alarm = frames, copy_memory(frames)
         self._take_arguments()
 
     def land(self) -> None:
         """Keep the record as it is at the end."""
-        self._last = memory.copied(self._frames)
+        self._last = copy_memory(self._frames)
 
     def _take_arguments(self) -> None:
         words, alarm = _words_of(self._frames), _words_of(self._alarm)

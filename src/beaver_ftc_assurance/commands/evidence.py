@@ -7,9 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from beaver_ftc.cli.inputs import JunitOption, NoReportOption, WorkersOption
-from beaver_ftc.cli.output import Format, FormatOption, answer, judged
-from beaver_ftc.cli.progress import progress_bar
+from beaver_ftc.cli import (
+    Format,
+    FormatOption,
+    JunitOption,
+    NoReportOption,
+    WorkersOption,
+    answer,
+    judged,
+    progress_bar,
+)
 from beaver_ftc.commands import declare
 
 if TYPE_CHECKING:
@@ -58,7 +65,7 @@ def command(arguments: Arguments) -> None:
 
 def _fly(plan: "EvidencePlan", arguments: Arguments) -> dict[str, Any]:
     """Fly and judge all of it; what JUnit XML says of it."""
-    from beaver_ftc.studies.engine.workers import cores
+    from beaver_ftc.studies.engine import cores
     from beaver_ftc_assurance.evidence.shown import as_expectations, as_text, run_plan
 
     folder = Path("runs") / plan.file.name if arguments.out is None else arguments.out
@@ -72,8 +79,8 @@ def _fly(plan: "EvidencePlan", arguments: Arguments) -> dict[str, Any]:
 
 def _replay(plan: "EvidencePlan", arguments: Arguments) -> dict[str, Any]:
     """Fly one flight into a result folder of its own; what JUnit XML says of it."""
-    from beaver_ftc.results.verdict import verdict_text
-    from beaver_ftc.results.writer import run
+    from beaver_ftc.results import run_scenario as run
+    from beaver_ftc.results import verdict_text
     from beaver_ftc_assurance.evidence.shown import of_flight
 
     scenario, requirements = of_flight(plan, str(arguments.replay))

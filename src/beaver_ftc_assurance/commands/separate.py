@@ -5,8 +5,7 @@ from typing import Annotated
 
 import typer
 
-from beaver_ftc.cli.inputs import ScenarioArgument
-from beaver_ftc.cli.output import Format, FormatOption, answer
+from beaver_ftc.cli import Format, FormatOption, ScenarioArgument, answer
 from beaver_ftc.commands import declare
 
 
@@ -29,7 +28,7 @@ def command(
     rate_deg_s: Body rates stay below it, deg/s.
     out: Folder for separation.json.
     """
-    from beaver_ftc.scenario.loader import load_scenario
+    from beaver_ftc.scenario import load_scenario
     from beaver_ftc_assurance import separation
 
     loaded = load_scenario(scenario)

@@ -7,22 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.documents.errors import BadInput, BeaverFtcError
-from beaver_ftc.results.expectations import evaluate, margin
-from beaver_ftc.results.metrics import faults_of, metrics
-from beaver_ftc.results.temporal import Formula
-from beaver_ftc.scenario.dump import to_yaml
-from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.studies.present.tables import finite
-from beaver_ftc.studies.sweep.one_flight import (
-    BAD_INPUT,
-    CRASHED,
-    DEPARTED,
-    FAILED,
-    FLOWN,
-    row_of,
-    row_of_failure,
-)
+from beaver_ftc.documents import BadInput, BeaverFtcError
+from beaver_ftc.results import Formula, faults_of
+from beaver_ftc.results import evaluate_expectations as evaluate
+from beaver_ftc.results import margin_of_expectation as margin
+from beaver_ftc.results import metrics_of as metrics
+from beaver_ftc.scenario import Scenario, to_yaml
+from beaver_ftc.studies.present import finite
+from beaver_ftc.studies.sweep import BAD_INPUT, CRASHED, DEPARTED, FAILED, FLOWN, row_of, row_of_failure
 from beaver_ftc_assurance.evidence.plan import EvidencePlan, OfHandling, OfMargins, Requirement
 
 Row = dict[str, Any]
@@ -98,7 +90,7 @@ def failed(plan: EvidencePlan, case: tuple[str, int], why: str, status: str = CR
 
 
 def _flown(plan: EvidencePlan, name: str, run: int) -> Row:
-    from beaver_ftc.loop.loop import fly
+    from beaver_ftc.loop import fly
 
     source = plan.sources[name]
     scenario = source.scenario(run)
@@ -176,7 +168,8 @@ def _of_formula(text: str, formula: Formula, rate_hz: float, document: Row, log:
 
 
 def _of_handling(bar: OfHandling, scenario: Scenario, document: Row, log: Watched) -> list[Row]:
-    from beaver_ftc.studies.handling import LIMITS, where_ended, where_trimmed
+    from beaver_ftc.studies import HANDLING_LIMITS as LIMITS
+    from beaver_ftc.studies import where_ended, where_trimmed
 
     if document["departure"]:
         return [part("handling qualities", bar.level, None, NOT_SHOWN, says="the aircraft was lost")]
@@ -195,7 +188,8 @@ def _of_handling(bar: OfHandling, scenario: Scenario, document: Row, log: Watche
 
 
 def _of_margins(bar: OfMargins, scenario: Scenario) -> list[Row]:
-    from beaver_ftc.studies.margins import at, refuse_other_laws
+    from beaver_ftc.studies import margins_at as at
+    from beaver_ftc.studies import refuse_laws_without_margins as refuse_other_laws
 
     refuse_other_laws(scenario)
     found = list(at(scenario))

@@ -14,13 +14,12 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.results.metrics import versions
+from beaver_ftc.results import versions
+from beaver_ftc.scenario import Sweep, SweepExpect
 from beaver_ftc.scenario.faults import DAMAGE, TYPES, UNANTICIPATED
-from beaver_ftc.scenario.sweeps import Sweep, SweepExpect
-from beaver_ftc.studies.engine.store import fingerprint, plug_ins
-from beaver_ftc.studies.sweep.one_flight import RESULTS
-from beaver_ftc.studies.sweep.outcomes import Flights
-from beaver_ftc.studies.sweep.summary import evaluate
+from beaver_ftc.studies.engine import fingerprint, plug_ins
+from beaver_ftc.studies.sweep import RESULTS, Flights
+from beaver_ftc.studies.sweep import evaluate_summary as evaluate
 from beaver_ftc_assurance.evidence.flown import ALTITUDES_M, BANDS, MET, NOT_MET, NOT_SHOWN, Row, part
 from beaver_ftc_assurance.evidence.plan import EvidencePlan, OfSweep, Requirement
 
@@ -131,8 +130,7 @@ def _size(expected: Any) -> float:
 def _of_sweep(plan: EvidencePlan, bar: OfSweep, name: str, rows: Sequence[Row]) -> list[Judged]:
     """A sweep's statistics against a bar. Not shown: with a confidence, what the estimate keeps and its bound
     does not; and what no flight tells."""
-    from beaver_ftc.studies.sweep.one_flight import schema_of, table_of
-    from beaver_ftc.studies.sweep.store import write_tables
+    from beaver_ftc.studies.sweep import schema_of, table_of, write_tables
 
     source = plan.sources[name]
     sweep = source.what

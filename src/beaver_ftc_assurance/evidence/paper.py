@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import escape
 
-from beaver_ftc.studies.present.page import Heading, Part, Table
+from beaver_ftc.studies.present import Heading, Part, Table
 
 MARGIN_PT, FOOT_PT = 45, 24
 MOST_OF_HEAD = 9  # letters of a column's head that are kept together

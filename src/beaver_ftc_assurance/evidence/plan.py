@@ -12,30 +12,47 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, StringConstraints, model_validator
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.documents.base import Location, Number, Section, Whole, deny, entry, number
-from beaver_ftc.documents.document import Document, Problem
-from beaver_ftc.documents.errors import BadInput, suggestion
-from beaver_ftc.documents.paths import inside
-from beaver_ftc.documents.problems import ScenarioError
-from beaver_ftc.documents.validation import parse_document, validate
-from beaver_ftc.results.temporal import Formula, FormulaError, parse
-from beaver_ftc.scenario.airframe import checked_against
-from beaver_ftc.scenario.consistency import conflicts
-from beaver_ftc.scenario.dump import to_yaml
-from beaver_ftc.scenario.loader import (
+from beaver_ftc.documents import (
+    BadInput,
+    Document,
+    Location,
+    Number,
+    Problem,
+    ScenarioError,
+    Section,
+    Whole,
+    deny,
+    entry,
+    inside,
+    number,
+    parse_document,
+    suggestion,
+)
+from beaver_ftc.documents import validate_model as validate
+from beaver_ftc.results import Formula, FormulaError
+from beaver_ftc.results import parse_formula as parse
+from beaver_ftc.scenario import (
+    NAME_PATTERN,
+    Expect,
+    Scenario,
+    Sweep,
+    SweepExpect,
     builtin_names,
     builtin_sweeps,
+    checked_against,
+    conflicts,
     is_of_a_sweep,
+    is_sweep,
     load_scenario,
+    load_sweep,
     looks_like_a_path,
     read_file,
     resolve,
+    to_yaml,
     validate_scenario,
+    validate_sweep,
 )
-from beaver_ftc.scenario.schema import NAME_PATTERN, Expect, Scenario
-from beaver_ftc.scenario.sweeps import Sweep, SweepExpect, is_sweep, load_sweep, validate_sweep
-from beaver_ftc.studies.sweep.one_flight import flight_name, scenario_of
-from beaver_ftc.studies.sweep.sampling import Assignment, Plan
+from beaver_ftc.studies.sweep import Assignment, Plan, flight_name, scenario_of
 
 MOST_REQUIREMENTS, MOST_FLIGHTS = 500, 100_000
 _KEYS = "name, flights and requirements"
@@ -365,7 +382,7 @@ def _below(document: Document, at: Location) -> Document:
 
 def _columns(scenario: Scenario) -> tuple[str, ...]:
     """The columns of a flight's log; none of what cannot fly, which its row will say."""
-    from beaver_ftc.loop.loop import Loop
+    from beaver_ftc.loop import Loop
 
     with contextlib.suppress(BadInput):
         return Loop(scenario).columns

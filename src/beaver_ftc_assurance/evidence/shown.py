@@ -7,11 +7,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.results.metrics import as_json
-from beaver_ftc.studies.engine.study import Progress, Study, run_study
-from beaver_ftc.studies.present.page import Heading, Makers, Part, Table, as_html, versions_line
-from beaver_ftc.studies.present.tables import aligned, number
+from beaver_ftc.documents import BadInput
+from beaver_ftc.results import as_json
+from beaver_ftc.studies.engine import Progress, Study, run_study
+from beaver_ftc.studies.present import Heading, Makers, Part, Table, aligned, as_html, number, versions_line
 from beaver_ftc_assurance.evidence.flown import MET, NOT_MET, NOT_SHOWN, failed, fly_flight
 from beaver_ftc_assurance.evidence.judged import Document, document_of
 from beaver_ftc_assurance.evidence.plan import EvidencePlan
@@ -250,7 +249,7 @@ def of_flight(plan: EvidencePlan, name: str) -> tuple[Any, list[Document]]:
 
     Raises BadInput for a name that the plan does not have.
     """
-    from beaver_ftc.documents.errors import suggestion
+    from beaver_ftc.documents import suggestion
 
     named = {plan.sources[source].flight(run): (source, run) for source, run in plan.cases}
     if name not in named:

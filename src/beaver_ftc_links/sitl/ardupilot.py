@@ -14,7 +14,7 @@ import struct
 from collections.abc import Hashable
 from typing import NamedTuple, Protocol
 
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents import BadInput
 from beaver_ftc_links.sitl.link import Link
 from beaver_ftc_links.sitl.vehicle import Instant
 

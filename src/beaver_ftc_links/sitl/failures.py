@@ -6,8 +6,8 @@ param1 FAILURE_UNIT, param2 FAILURE_TYPE, param3 which of them: of servos the ou
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from beaver_ftc.aircraft.channels import ChannelsSection
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.aircraft import ChannelsSection
+from beaver_ftc.documents import BadInput
 from beaver_ftc.scenario.faults import TYPES
 from beaver_ftc_links.sitl.vehicle import Flown
 
@@ -58,8 +58,7 @@ def _places(unit: int, which: int, sim: Flown, channels: ChannelsSection) -> tup
             for name, mix in channels.surfaces.items()
             if which == 0 or any(output.channel == which for output in mix)
         )
-    from beaver_ftc.scenario.airframe import checked_against
-    from beaver_ftc.scenario.sensors import sensors_there
+    from beaver_ftc.scenario import checked_against, sensors_there
 
     with checked_against(sim.airframe):
         there = sensors_there()

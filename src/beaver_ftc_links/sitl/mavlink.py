@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from importlib import import_module
 from typing import Any
 
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents import BadInput
 from beaver_ftc_links.sitl import failures
 from beaver_ftc_links.sitl.telling import Text
 

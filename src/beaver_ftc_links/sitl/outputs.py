@@ -5,9 +5,8 @@ from math import isfinite
 
 import numpy as np
 
-from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.aircraft.channels import ChannelsSection, OutputSection
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.aircraft import Aircraft, ChannelsSection, OutputSection
+from beaver_ftc.documents import BadInput
 
 Vector = np.ndarray
 # Where both autopilots have them for a plain aeroplane: roll, pitch, yaw [ArduPilot SERVO1, 2 and 4 by

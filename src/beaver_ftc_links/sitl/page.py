@@ -5,7 +5,7 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection
 from pathlib import Path
 
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents import BadInput
 from beaver_ftc_links.sitl.vehicle import Vehicle
 from beaver_ftc_live.page import messages
 from beaver_ftc_live.page.flying import TICK_S, Flying

@@ -15,8 +15,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from beaver_ftc.aircraft.units import GRAVITY_MPS2
-from beaver_ftc.design.atmosphere import standard_air
+from beaver_ftc.aircraft import GRAVITY_MPS2
+from beaver_ftc.design import standard_air
 from beaver_ftc_links.sitl.link import Link
 from beaver_ftc_links.sitl.mavlink import Inject, Mavlink
 from beaver_ftc_links.sitl.vehicle import Instant

@@ -11,9 +11,9 @@ from math import inf
 from multiprocessing.connection import Connection
 from typing import Any
 
-from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.results.flight import Flight
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.documents import BadInput
+from beaver_ftc.results import Flight
+from beaver_ftc.scenario import Scenario
 from beaver_ftc_links.sitl import PORTS, Protocol, failures, px4
 from beaver_ftc_links.sitl.ardupilot import Ardupilot
 from beaver_ftc_links.sitl.link import Link

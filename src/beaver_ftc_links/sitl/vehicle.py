@@ -7,23 +7,16 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.aircraft.channels import MOST_CHANNELS
-from beaver_ftc.aircraft.units import M_PER_FT
-from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.loop.changing import take_diagnosis
-from beaver_ftc.loop.loop import Loop
-from beaver_ftc.plant import ground
-from beaver_ftc.plant.channels import AIRSPEED, ALTITUDE
-from beaver_ftc.plant.instruments import AX, SENSORS
-from beaver_ftc.results.log import SpooledLog
-from beaver_ftc.results.simulation import Simulation
-from beaver_ftc.scenario.declared import Declared
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.aircraft import M_PER_FT, MOST_CHANNELS, Aircraft
+from beaver_ftc.documents import BadInput
+from beaver_ftc.loop import Loop, take_diagnosis
+from beaver_ftc.plant import AIRSPEED, ALTITUDE, AX, SENSORS, lay_ground, stand_on_ground
+from beaver_ftc.results import Simulation, SpooledLog
+from beaver_ftc.scenario import Declared, Scenario
 from beaver_ftc_links.sitl.outputs import Outputs, power_range
 
 if TYPE_CHECKING:
-    from beaver_ftc.diagnosis.base import Detector
+    from beaver_ftc.diagnosis import Detector
 
 SLOWEST_HZ, FASTEST_HZ = 20.0, 400.0  # of the diagnosis: where its promises are tested
 FASTEST_PACKETS_HZ = 4000.0
@@ -146,7 +139,7 @@ class Flown(Simulation):
                 says = f"{loop.trim.altitude_m:g} is at or below the ground at {self.ground_m:g}"
                 allowed = f"allowed: above {self._standing_m + UP_M:g}, another --ground, or on_ground"
                 raise BadInput(f"{self._scenario.name}: initial.altitude_m: {says}, {allowed}")
-            ground.lay(loop.plant, self.ground_m)
+            lay_ground(loop.plant, self.ground_m)
             return
         if loop.plugin_frame is not None:
             says = "that begins in flight, allowed on the ground: one of this package"
@@ -156,7 +149,7 @@ class Flown(Simulation):
             name: self.idle if setting.property == self.airframe.trim.throttle else loop.trim.settings[name]
             for name, setting in self.airframe.engine.settings.items()
         }
-        ground.stand(loop.plant, replace(loop.trim, settings=settings), self.ground_m)
+        stand_on_ground(loop.plant, replace(loop.trim, settings=settings), self.ground_m)
         frame["held"], frame["held_rad"] = 1, self.trim_rad
         self._by_hand = True
         self._stop_listening()

@@ -16,12 +16,12 @@ from pathlib import Path
 from textwrap import dedent
 from typing import TYPE_CHECKING
 
-from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.results.writer import clear_disk_errors
+from beaver_ftc.documents import BadInput
+from beaver_ftc.results import clear_disk_errors
 from beaver_ftc_live.challenge.confine import readable
 
 if TYPE_CHECKING:
-    from beaver_ftc.scenario.schema import Scenario
+    from beaver_ftc.scenario import Scenario
 
 PUBLIC, TEACHER, SUBMISSIONS, GRADES = "public", "teacher", "submissions", "grades"
 MOST_BYTES = 64 * 1024
@@ -85,15 +85,15 @@ def _base() -> str:
 
 def practice() -> "Scenario":
     """The flight that a submission is tried on."""
-    from beaver_ftc.documents.document import parse
-    from beaver_ftc.scenario.loader import load
+    from beaver_ftc.documents import parse_yaml as parse
+    from beaver_ftc.scenario import load
 
     return load(parse(_base()).data)
 
 
 def hidden_flights(challenge: Path) -> list["Scenario"]:
     """The flights of every sweep file of the teacher's part. Raises BadInput, also if others may read it."""
-    from beaver_ftc.studies.compare.trial import of_sweep
+    from beaver_ftc.studies.compare import of_sweep
 
     files = sorted((challenge / TEACHER).glob("*.yaml"))
     if not files:

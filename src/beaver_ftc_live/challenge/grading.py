@@ -12,14 +12,25 @@ from pathlib import Path
 from statistics import fmean, median
 from typing import TYPE_CHECKING, Any
 
-from beaver_ftc.documents.errors import BadInput, BeaverFtcError
-from beaver_ftc.results.metrics import as_json, versions
-from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, Entry, Result, result_of, with_entry
-from beaver_ftc.studies.engine.study import Progress, Study, run_study
-from beaver_ftc.studies.engine.workers import Case
-from beaver_ftc.studies.present import page
-from beaver_ftc.studies.present.page import Makers
-from beaver_ftc.studies.present.tables import aligned, finite, number
+from beaver_ftc.documents import BadInput, BeaverFtcError
+from beaver_ftc.results import as_json, versions
+from beaver_ftc.studies.compare import ORACLE_LAW as ORACLE
+from beaver_ftc.studies.compare import OUR_LAW as LAW
+from beaver_ftc.studies.compare import OUR_SCHEME as SCHEME
+from beaver_ftc.studies.compare import Entry, Result, result_of, with_entry
+from beaver_ftc.studies.engine import Case, Progress, Study, run_study
+from beaver_ftc.studies.present import (
+    Heading,
+    Makers,
+    Part,
+    Table,
+    aligned,
+    as_html,
+    as_markdown,
+    finite,
+    number,
+    versions_line,
+)
 from beaver_ftc_live.challenge import confine, folders, line
 from beaver_ftc_live.challenge.folders import Submission
 from beaver_ftc_live.challenge.line import (
@@ -32,7 +43,7 @@ from beaver_ftc_live.challenge.line import (
 )
 
 if TYPE_CHECKING:
-    from beaver_ftc.scenario.schema import Scenario
+    from beaver_ftc.scenario import Scenario
 
 Document = dict[str, Any]
 DETECTOR, BUILT_IN_LAW = "built-in scheme", "built-in law"
@@ -138,7 +149,7 @@ def fly_stranger(first: Stranger, source: str, name: str, allowance: Allowance, 
 
 
 def _flown(scenario: "Scenario", entry: Entry, **plugged: Any) -> Result:
-    from beaver_ftc.loop.loop import fly
+    from beaver_ftc.loop import fly
 
     return result_of(fly(scenario, **plugged), entry, 0.0)
 
@@ -245,10 +256,10 @@ _COLUMNS = {
 }  # fmt: skip
 
 
-def _table(rows: Sequence[Document]) -> page.Table:
+def _table(rows: Sequence[Document]) -> Table:
     keys = [key for key in _COLUMNS if key in rows[0]]
     cells = [[_cell(key, row[key]) for key in keys] for row in rows]
-    return page.Table([_COLUMNS[key] for key in keys], cells)
+    return Table([_COLUMNS[key] for key in keys], cells)
 
 
 def _cell(key: str, value: Any) -> str:
@@ -266,16 +277,16 @@ def as_text(document: Document) -> str:
     return "\n\n".join(blocks)
 
 
-def parts_of(document: Document) -> list[page.Part]:
+def parts_of(document: Document) -> list[Part]:
     """For pages."""
-    parts: list[page.Part] = [f"{document['flights']} hidden flights, the same for everybody."]
+    parts: list[Part] = [f"{document['flights']} hidden flights, the same for everybody."]
     for name in ("detectors", "laws"):
-        parts += [page.Heading(name.capitalize()), _table(document[name])]
-    return [*parts, page.versions_line(document["versions"])]
+        parts += [Heading(name.capitalize()), _table(document[name])]
+    return [*parts, versions_line(document["versions"])]
 
 
 FILES: Makers = {
     "grades.json": as_json,
-    "grades.md": lambda document: page.as_markdown(parts_of(document)),
-    "grades.html": lambda document: page.as_html("Grades", parts_of(document), {}),
+    "grades.md": lambda document: as_markdown(parts_of(document)),
+    "grades.html": lambda document: as_html("Grades", parts_of(document), {}),
 }

@@ -21,11 +21,11 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.control.base import Reference
-from beaver_ftc.design.context import Context
-from beaver_ftc.diagnosis.base import Measured, Verdict
-from beaver_ftc.documents.errors import SimulationFailed
-from beaver_ftc.studies.engine.workers import ONE_THREAD_EACH
+from beaver_ftc.control import Reference
+from beaver_ftc.design import Context
+from beaver_ftc.diagnosis import Measured, Verdict
+from beaver_ftc.documents import SimulationFailed
+from beaver_ftc.studies.engine import ONE_THREAD_EACH
 from beaver_ftc_live.challenge import confine, pilot
 
 START_S, LOAD_S, FRAME_S, ALL_S = 60.0, 10.0, 1.0, 60.0

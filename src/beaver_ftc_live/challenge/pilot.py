@@ -20,8 +20,8 @@ if __name__ == "__main__":
 
 import numpy as np
 
-from beaver_ftc.control.base import Reference
-from beaver_ftc.diagnosis.base import Measured, Verdict
+from beaver_ftc.control import Reference
+from beaver_ftc.diagnosis import Measured, Verdict
 from beaver_ftc_live.challenge.confine import confine
 
 HEAD = struct.Struct("<cII")  # kind, frame, length of what follows

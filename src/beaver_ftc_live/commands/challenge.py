@@ -5,11 +5,9 @@ from typing import Annotated
 
 import typer
 
-from beaver_ftc.cli.inputs import WorkersOption
-from beaver_ftc.cli.output import Format, FormatOption, answer
-from beaver_ftc.cli.progress import progress_bar
+from beaver_ftc.cli import Format, FormatOption, WorkersOption, answer, progress_bar
 from beaver_ftc.commands import declare
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents import BadInput
 
 
 class Challenge:
@@ -91,7 +89,7 @@ def grade(
 
     folder: Folder of the challenge.
     """
-    from beaver_ftc.studies.engine.workers import cores
+    from beaver_ftc.studies.engine import cores
     from beaver_ftc_live.challenge import grading
 
     if not folder.is_dir():

@@ -5,11 +5,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from beaver_ftc.cli.inputs import ScenarioArgument
-from beaver_ftc.cli.output import emit
+from beaver_ftc.cli import ScenarioArgument, emit
 
 if TYPE_CHECKING:
-    from beaver_ftc.scenario.schema import Scenario
+    from beaver_ftc.scenario import Scenario
 
 GUESTS = 10  # on another address than the loopback
 OTHERS = (
@@ -58,7 +57,7 @@ def command(
 
 
 def _with(aircraft: str | None, name: str) -> "Scenario":
-    from beaver_ftc.scenario.loader import load_scenario
+    from beaver_ftc.scenario import load_scenario
 
     loaded = load_scenario(name)
     if aircraft is None or aircraft == loaded.aircraft:

@@ -8,12 +8,11 @@ import contextlib
 import os
 import time
 from collections import deque
-from importlib import import_module
 from math import sqrt
 from multiprocessing.connection import Connection
 from pathlib import Path
 
-from beaver_ftc.documents.errors import BadInput, BeaverFtcError
+from beaver_ftc.documents import BadInput, BeaverFtcError
 from beaver_ftc_live.page import BAD_INPUT, EVERYONE, messages
 from beaver_ftc_live.page.reports import Reports
 from beaver_ftc_live.page.session import NO_STICK, Session
@@ -73,7 +72,8 @@ class Pace:
 
 def main(connection: Connection, out: str) -> None:
     """The process. Ends when told, or when the server is gone; a flight that cannot be begun says why."""
-    import_module("beaver_ftc.loop.loop")  # most of the way to the first frame, while the scenario is read
+    from beaver_ftc.loop import fly  # noqa: F401  most of the way to the first frame, while the scenario is read
+
     try:
         scenario = connection.recv()
     except EOFError:  # the server is gone

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.documents.errors import BadInput, suggestion
+from beaver_ftc.documents import BadInput, suggestion
 from beaver_ftc.scenario.faults import TYPES
 from beaver_ftc_live.page.messages import Message
 

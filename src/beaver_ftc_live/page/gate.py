@@ -18,7 +18,7 @@ from typing import Any
 
 from starlette.datastructures import Headers
 
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents import BadInput
 
 COOKIE = "beaver-ftc-live"
 LOOPBACK_NAMES = ("127.0.0.1", "localhost")

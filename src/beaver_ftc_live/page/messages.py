@@ -13,7 +13,7 @@ from unicodedata import category
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents import BadInput
 from beaver_ftc_live.page import MAX_BYTES, MAX_GUESTS
 
 FASTEST = 20.0  # times real time

@@ -65,7 +65,7 @@ def _begun(*folders: Path) -> "subprocess.Popen[str]":
 
 def draw() -> None:
     """What that process does: draw the report of each folder it is given; the last failure is its end."""
-    from beaver_ftc.results.writer import add_report
+    from beaver_ftc.results import add_report
 
     if hasattr(os, "nice"):
         os.nice(COURTESY)

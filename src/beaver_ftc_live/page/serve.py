@@ -14,7 +14,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from beaver_ftc.documents.errors import BadInput, SimulationFailed
+from beaver_ftc.documents import BadInput, SimulationFailed
 from beaver_ftc_live.page import BAD_INPUT, EVERYONE, MAX_BYTES
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     import uvicorn
 
-    from beaver_ftc.scenario.schema import Scenario
+    from beaver_ftc.scenario import Scenario
 
 LOOPBACK = "127.0.0.1"
 NOBODY = ((socket.AF_INET, "198.51.100.1"), (socket.AF_INET6, "2001:db8::1"))  # addresses for documents

@@ -9,15 +9,12 @@ from typing import Any
 import numpy as np
 
 import beaver_ftc as bf
-from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.aircraft.units import GRAVITY_MPS2
-from beaver_ftc.documents.errors import BadInput, suggestion
+from beaver_ftc.aircraft import GRAVITY_MPS2, Aircraft
+from beaver_ftc.documents import BadInput, suggestion
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled, registered
-from beaver_ftc.results.log import SpooledLog
-from beaver_ftc.scenario.airframe import checked_against
-from beaver_ftc.scenario.autopilot import channels_of
+from beaver_ftc.results import SpooledLog
+from beaver_ftc.scenario import channels_of, checked_against, sensors_there
 from beaver_ftc.scenario.faults import HOLDING, TYPES, place_of
-from beaver_ftc.scenario.sensors import sensors_there
 from beaver_ftc_live.page import messages
 from beaver_ftc_live.page.game import NOTHING, Fault, Game, hidden_faults
 from beaver_ftc_live.page.messages import WHEN, Message, in_words, short

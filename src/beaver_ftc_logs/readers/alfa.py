@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents import BadInput
 from beaver_ftc_logs.readers.table import read_numbers
 from beaver_ftc_logs.recording import Column, Event, Floats, Recording, in_order
 

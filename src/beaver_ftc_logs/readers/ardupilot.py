@@ -14,7 +14,7 @@ from math import nan
 from pathlib import Path
 from typing import Any
 
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents import BadInput
 from beaver_ftc_logs.recording import Recording, columns_of, reading
 
 _TIME, _INSTANCES = "TimeUS", ("I", "C", "Instance")

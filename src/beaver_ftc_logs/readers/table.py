@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents import BadInput
 from beaver_ftc_logs.readers.text import (
     Cells,
     Layout,

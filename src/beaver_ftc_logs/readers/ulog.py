@@ -6,7 +6,7 @@ Time counts from the first message of the log. Reading needs pyulog: the extra `
 from pathlib import Path
 from typing import Any
 
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents import BadInput
 from beaver_ftc_logs.recording import Recording, columns_of, reading
 
 _STAMP = "timestamp"

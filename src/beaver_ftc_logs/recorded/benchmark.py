@@ -12,13 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.results.metrics import as_json
-from beaver_ftc.results.style import SERIES
-from beaver_ftc.studies.engine.statistics import poisson
-from beaver_ftc.studies.present.figures import GRID, marker, panels
-from beaver_ftc.studies.present.page import Files, replace_between
-from beaver_ftc.studies.present.tables import aligned, markdown_table
+from beaver_ftc.documents import BadInput
+from beaver_ftc.results import SERIES_COLOURS as SERIES
+from beaver_ftc.results import as_json
+from beaver_ftc.studies.engine import poisson
+from beaver_ftc.studies.present import GRID, Files, aligned, markdown_table, marker, panels, replace_between
 from beaver_ftc_logs import scoring
 from beaver_ftc_logs.detectors import detector_names, diagnose_with, freeze
 from beaver_ftc_logs.diagnose import Rows

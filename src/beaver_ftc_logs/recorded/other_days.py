@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import scoring
 from beaver_ftc_logs.detectors import BANK, diagnose_with
 from beaver_ftc_logs.fitting import Stretch, fit_model, folds, stretches_of

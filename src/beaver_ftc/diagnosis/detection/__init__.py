@@ -1,1 +1,16 @@
 """Is something wrong? The worst-case filters and their thresholds; the likelihood ratios beside them."""
+
+from typing import TYPE_CHECKING
+
+from beaver_ftc.public import lazily
+
+if TYPE_CHECKING:
+    from beaver_ftc.diagnosis.detection.bank import poles_of
+    from beaver_ftc.diagnosis.detection.likelihood import N_SLOTS, Rooms, block_dtype, slot_to_start
+    from beaver_ftc.diagnosis.detection.likelihood import STEP as STEP_HYPOTHESIS
+    from beaver_ftc.diagnosis.detection.likelihood import advance as advance_block
+    from beaver_ftc.diagnosis.detection.likelihood import reach as reach_of_block
+    from beaver_ftc.diagnosis.detection.likelihood import whiten as whiten_frame
+    from beaver_ftc.diagnosis.detection.noise_model import CHANCE
+else:
+    __getattr__, __dir__ = lazily(__name__)

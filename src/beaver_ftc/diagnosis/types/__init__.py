@@ -23,3 +23,15 @@ candidate.
 One file a type under table/ (contract.py says what is in it); registry.py reads them; examine.py shows them
 each frame; verdict.py and pairs.py conclude; findings.py says it in words.
 """
+
+from typing import TYPE_CHECKING
+
+from beaver_ftc.public import lazily
+
+if TYPE_CHECKING:
+    from beaver_ftc.diagnosis.types.registry import NAMES as TYPE_NAMES
+    from beaver_ftc.diagnosis.types.registry import TYPES as TYPE_ROWS
+    from beaver_ftc.diagnosis.types.registry import WORDS as TYPE_WORDS
+    from beaver_ftc.diagnosis.types.registry import kind_of
+else:
+    __getattr__, __dir__ = lazily(__name__)

@@ -106,7 +106,7 @@ def test_what_a_model_lacks_is_given_until_it_flies(monkeypatch):
 def test_a_copy_of_the_model_is_put_on_trial(monkeypatch):
     asked = []
     monkeypatch.setattr(
-        derivation.trial, "failure", lambda model, absent: asked.append((model, absent)) or "no"
+        derivation, "failure_of_trial", lambda model, absent: asked.append((model, absent)) or "no"
     )
     assert derivation._failure(Source("mine", TRAINER / "trainer.xml"), ["of/0"]) == "no"
     ((model, absent),) = asked
@@ -145,10 +145,10 @@ def test_where_to_sample_is_read_from_a_file(tmp_path):
 def test_a_wish_for_speed_and_altitude_is_in_every_outline_that_is_tried(monkeypatch, tmp_path):
     """One speed that is wished for is tried alone; without, five."""
     tried = []
-    names = "surfaces_of", "instrument"
-    monkeypatch.setattr(derivation.instrumented, names[0], lambda model: ["aileron", "elevator", "rudder"])
-    monkeypatch.setattr(derivation.instrumented, names[1], lambda *of, **how: Path("copy.xml"))
-    monkeypatch.setattr(derivation.instrumented, "is_told", lambda name: name == "of/told")
+    names = "surfaces_of", "instrument_model"
+    monkeypatch.setattr(derivation, names[0], lambda model: ["aileron", "elevator", "rudder"])
+    monkeypatch.setattr(derivation, names[1], lambda *of, **how: Path("copy.xml"))
+    monkeypatch.setattr(derivation, "is_known_to_jsbsim", lambda name: name == "of/told")
     monkeypatch.setattr(derivation, "try_out", lambda source: ("of/told", "of/other"))
     monkeypatch.setattr(outline, "travel_of", lambda *of: {})
     monkeypatch.setattr(outline, "own_control", lambda *of: ["note of its control"])
@@ -169,6 +169,6 @@ def test_a_wish_for_speed_and_altitude_is_in_every_outline_that_is_tried(monkeyp
     assert notes == ["JSBSim alone gives it no of/other: 0 in the copy", "note of its control"]
     assert told == ["instrument", "trim"] * 2
     for seen, says in ((["aileron", "rudder"], "aileron, rudder"), ([], "no surface")):
-        monkeypatch.setattr(derivation.instrumented, names[0], lambda model, seen=seen: seen)
+        monkeypatch.setattr(derivation, names[0], lambda model, seen=seen: seen)
         with pytest.raises(BadInput, match=f"^mine: its aerodynamics see {says}, allowed: aileron"):
             derivation._prepared(source, folder, wish, [], told.append)

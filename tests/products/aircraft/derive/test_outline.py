@@ -57,7 +57,7 @@ ENDS = [
 
 @pytest.mark.parametrize(("ends", "travel", "noted"), ENDS)
 def test_travel_is_from_stop_to_stop_or_supposed_and_noted(ends, travel, noted, monkeypatch):
-    monkeypatch.setattr(outline.instrumented, "surfaces_of", lambda source: ["elevator"])
+    monkeypatch.setattr(outline, "surfaces_of", lambda source: ["elevator"])
     monkeypatch.setattr(outline, "own_deflection", lambda model, surface, command: ends[command > 0])
     notes = []
     assert outline.travel_of(Path("a.xml"), Path("b.xml"), notes) == {"elevator": travel}

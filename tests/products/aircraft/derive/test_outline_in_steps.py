@@ -110,8 +110,8 @@ def test_what_its_own_control_does_beside_is_noted(monkeypatch):
     surfaces, others = ["aileron", "elevator", "rudder"], ["fcs/flap", "fcs/slat", "fcs/tab"]
     answer = {"aileron": 0.0031, "elevator": 0.0029, "rudder": -0.01}  # rad: 0.003 is too much
     along = {"fcs/aileron-cmd-norm": [0.1, 0.2, 0.5], "fcs/rudder-cmd-norm": [0.1, 0.2000004, 0.3]}
-    monkeypatch.setattr(outline.instrumented, "surfaces_of", lambda source: surfaces)
-    monkeypatch.setattr(outline.instrumented, "others_of", lambda source: others)
+    monkeypatch.setattr(outline, "surfaces_of", lambda source: surfaces)
+    monkeypatch.setattr(outline, "others_of", lambda source: others)
     monkeypatch.setattr(
         outline, "own_deflection",
         lambda model, surface, command, rate=0.0: 0.2 + answer[surface] * (rate == 0.1) + command,
@@ -139,7 +139,7 @@ def test_other_surfaces_are_those_of_flight_control_that_nobody_commands_with(mo
         "fcs/slat",
         "fcs/x",
     ]
-    monkeypatch.setattr(outline.instrumented, "others_of", lambda source: names)
+    monkeypatch.setattr(outline, "others_of", lambda source: names)
     plant = Bench({"fcs/flap-pos-deg": lambda bench: 12.34567, "fcs/slat": lambda bench: 0.0})
     assert outline.further_surfaces(Path("a.xml"), plant) == {"fcs/flap-pos-deg": 12.3457, "fcs/slat": 0.0}
 

@@ -68,6 +68,7 @@ test: $(VENV)/.dev
 nightly: $(VENV)/.dev
 	BEAVER_FTC_NIGHT=1 NUMBA_DISABLE_JIT=1 $(PYTEST) $(PLAIN)
 	BEAVER_FTC_NIGHT=1 $(PYTEST) -m "not acceptance" $(addprefix --ignore=,$(PLAIN))
+	BEAVER_FTC_NIGHT=1 $(MAKE) acceptance
 	$(BIN)/python -m tools.drawn
 	$(BIN)/python -m tools.mutants --seed $(SEED)
 

@@ -1,6 +1,6 @@
 """What the acceptance tests share: the installed wheel, and an empty folder to use it in."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
@@ -18,9 +18,16 @@ def pytest_collection_modifyitems(items):
 
 
 @pytest.fixture(scope="session")
-def installation() -> Installation:
-    """The wheel of this checkout, installed."""
+def started() -> Installation:
+    """The wheel of this checkout, installed, its command started as it is."""
     return installed()
+
+
+@pytest.fixture(scope="session")
+def installation(started) -> Iterator[Installation]:
+    """The same, its command forked from a process that has imported it."""
+    with started.served() as served:
+        yield served
 
 
 @pytest.fixture

@@ -125,10 +125,16 @@ TABLE = (
     Exempt(
         r"beaver-ftc run SCENARIO (--as \w+)", "stands for any", r"beaver-ftc run brief.yaml \1 --no-report"
     ),
-    Exempt(r"(beaver-ftc sweep my-sweep.yaml --replay) \d+", "the sweep is shortened", r"\1 1"),
+    Exempt(r"(beaver-ftc sweep my-sweep.yaml --replay) \d+", "the sweep is shortened", r"\1 1 --no-report"),
     Exempt(
-        r"(beaver-ftc run elevator-partial-loss --(?:csv|acmi))",
-        "seconds of figures, which the same command without the option draws",
+        r"(beaver-ftc sweep my-sweep.yaml --(?:workers|resume|backend).*)",
+        "seconds of figures, which the same command with --junit draws",
+        r"\1 --no-report",
+    ),
+    Exempt(
+        r"(beaver-ftc run (?!elevator-partial-loss$)(?:[\w./-]+|scenarios/\*\.yaml|\S+ --(?:csv|acmi))"
+        r"(?: --junit \S+)?(?: --plugin \S+)?)",
+        "seconds of figures: test_scenarios.py draws them, and the same command with elevator-partial-loss",
         r"\1 --no-report",
     ),
     Exempt(

@@ -14,10 +14,13 @@ import sysconfig
 import tempfile
 import venv
 import zipfile
-from dataclasses import dataclass
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from filelock import FileLock
+from tools.served import POSSIBLE, Served
 
 ROOT = Path(__file__).resolve().parents[2]
 KEPT = 3  # environments of earlier wheels
@@ -28,9 +31,10 @@ SCRIPTS = {"pytest": "import pytest, sys; sys.exit(pytest.console_main())", "jsb
 
 @dataclass(frozen=True)
 class Installation:
-    """An environment that has the wheel."""
+    """An environment that has the wheel. before: a folder whose commands are found before its own."""
 
     folder: Path
+    before: Path | None = None
 
     @property
     def bin(self) -> Path:
@@ -45,8 +49,14 @@ class Installation:
     def environment(self, **more: str) -> dict[str, str]:
         """The environment variables of a user who has activated it; nothing of the checkout is on a path."""
         inherited = {name: value for name, value in os.environ.items() if not _is_ours(name)}
-        path = f"{self.bin}{os.pathsep}{os.environ.get('PATH', os.defpath)}"
-        return {**inherited, "PATH": path, "VIRTUAL_ENV": str(self.folder), "COLUMNS": "80", **more}
+        places = filter(None, (self.before, self.bin, os.environ.get("PATH", os.defpath)))
+        return {
+            **inherited,
+            "PATH": os.pathsep.join(map(str, places)),
+            "VIRTUAL_ENV": str(self.folder),
+            "COLUMNS": "80",
+            **more,
+        }
 
     def run(
         self, *command: object, cwd: Path, timeout_s: float = 300, **more: str
@@ -65,7 +75,21 @@ class Installation:
 
     def beaver(self, *arguments: object, cwd: Path, **more: str) -> subprocess.CompletedProcess:
         """Run `beaver-ftc` with these arguments in a folder."""
-        return self.run(self.bin / "beaver-ftc", *arguments, cwd=cwd, **more)
+        return self.run((self.before or self.bin) / "beaver-ftc", *arguments, cwd=cwd, **more)
+
+    @contextmanager
+    def served(self) -> Iterator["Installation"]:
+        """The same with `beaver-ftc` forked from one process that has imported it (tools/served.py)."""
+        if not POSSIBLE:
+            yield self
+            return
+        with tempfile.TemporaryDirectory() as folder:
+            served = Served(self.python, self.bin, self.environment())
+            try:
+                served.script(Path(folder))
+                yield replace(self, before=Path(folder))
+            finally:
+                served.end()
 
 
 def _is_ours(name: str) -> bool:

@@ -167,14 +167,14 @@ def test_a_folder_that_cannot_be_written_is_status_3(command, out, beaver, tmp_p
     assert _left_behind(tmp_path) == ["few.yaml", "file", "fine.yaml"]
 
 
-def test_an_output_that_cannot_be_written_is_status_3(installation, tmp_path):
-    done = installation.run("bash", "-c", "beaver-ftc list > /dev/full", cwd=tmp_path)
+def test_an_output_that_cannot_be_written_is_status_3(started, tmp_path):
+    done = started.run("bash", "-c", "beaver-ftc list > /dev/full", cwd=tmp_path)
     (line,) = _lines(done, 3)
     assert "standard output" in line
 
 
-def test_a_reader_that_goes_away_is_no_error(installation, tmp_path):
-    done = installation.run("bash", "-o", "pipefail", "-c", "beaver-ftc schema | head -n 1", cwd=tmp_path)
+def test_a_reader_that_goes_away_is_no_error(started, tmp_path):
+    done = started.run("bash", "-o", "pipefail", "-c", "beaver-ftc schema | head -n 1", cwd=tmp_path)
     assert (done.returncode, done.stdout, done.stderr) == (0, "{\n", "")
 
 

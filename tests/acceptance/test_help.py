@@ -71,7 +71,7 @@ def test_no_command_at_all_shows_the_help(beaver, helps):
     assert "Usage: beaver-ftc" in done.stdout + done.stderr
 
 
-def test_version(beaver):
-    done = beaver("--version")
+def test_version(started, tmp_path):
+    done = started.beaver("--version", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     assert re.fullmatch(r"beaver-ftc \d+\.\d+\.\d+\n", done.stdout)

@@ -12,18 +12,18 @@ print(json.dumps({"files": [file for file in files if file], "path": sys.path}))
 """
 
 
-def test_every_module_comes_from_the_wheel(installation, tmp_path):
-    done = installation.run(installation.python, "-c", IMPORTED, cwd=tmp_path)
+def test_every_module_comes_from_the_wheel(started, tmp_path):
+    done = started.run(started.python, "-c", IMPORTED, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
     assert len(found["files"]) > 20
-    assert [file for file in found["files"] if not file.startswith(str(installation.folder))] == []
+    assert [file for file in found["files"] if not file.startswith(str(started.folder))] == []
     assert str(ROOT / "src") not in found["path"]
-    assert not installation.folder.is_relative_to(ROOT)
+    assert not started.folder.is_relative_to(ROOT)
 
 
-def test_the_wheel_carries_the_aircraft_and_the_scenarios_as_they_are_here(installation):
-    (data,) = installation.folder.glob("lib/python*/site-packages/beaver_ftc/data")
+def test_the_wheel_carries_the_aircraft_and_the_scenarios_as_they_are_here(started):
+    (data,) = started.folder.glob("lib/python*/site-packages/beaver_ftc/data")
     for kind in ("aircraft", "scenarios", "evidence"):
         ours = {
             path.relative_to(ROOT): path.read_bytes() for path in (ROOT / kind).rglob("*") if path.is_file()
@@ -34,8 +34,8 @@ def test_the_wheel_carries_the_aircraft_and_the_scenarios_as_they_are_here(insta
         assert ours == theirs
 
 
-def test_list_names_every_built_in_scenario_and_sweep(beaver):
-    done = beaver("list", "--format", "json")
+def test_list_names_every_built_in_scenario_and_sweep(started, tmp_path):
+    done = started.beaver("list", "--format", "json", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     listed = json.loads(done.stdout)
     for kind, folder in (

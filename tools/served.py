@@ -1,0 +1,192 @@
+"""Commands of the package as processes of their own, without half a second to two for what each imports.
+
+One process imports the package and flies once; each command is forked from it, with the arguments, folder,
+environment, files and signals of whoever called it. `Served(python, bin)` starts it, with another
+installation's interpreter if need be; `script(folder)` puts a `beaver-ftc` there that asks it, for shells.
+It needs Linux. Where the environment says of kernels what it did not say to the one process (where they are
+kept, whether they are compiled), the script starts the command as it is.
+"""
+
+import array
+import gc
+import json
+import os
+import select
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from contextlib import redirect_stderr, redirect_stdout, suppress
+from pathlib import Path
+from typing import Any, NoReturn
+
+POSSIBLE = hasattr(os, "pidfd_open")
+SECONDS = "BEAVER_FTC_SERVED_SECONDS"  # a file to which the script adds the processor time of each command
+FIRST = ("run", "elevator-partial-loss", "--certificate")  # what the one process does before it serves
+DECIDES = ("XDG_CACHE_HOME", "NUMBA_DISABLE_JIT", "BEAVER_FTC_COMPILER")  # read when kernels are imported
+_PATIENCE_S = 600.0
+_SCRIPT = """\
+#!{python} -IS
+import array, json, os, signal, socket, sys
+if any(os.environ.get(name) != value for name, value in {decides!r}.items()):
+    os.execv({command!r}, [{command!r}, *sys.argv[1:]])
+asked = {{"argv": sys.argv[1:], "cwd": os.getcwd(), "environment": dict(os.environ)}}
+server = socket.socket(socket.AF_UNIX)
+server.connect({address!r})
+files = array.array("i", (0, 1, 2))
+server.sendmsg([b"x"], [(socket.SOL_SOCKET, socket.SCM_RIGHTS, files)])
+server.sendall(json.dumps(asked).encode() + b"\\n")
+answers = server.makefile()
+started = int(answers.readline())
+for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    if signal.getsignal(number) is not signal.SIG_IGN:
+        signal.signal(number, lambda number, _: os.kill(started, number))
+status, seconds = answers.readline().split()
+log = os.environ.get({seconds!r})
+if log:
+    with open(log, "a") as file:
+        file.write(seconds + "\\n")
+status = int(status)
+if status < 0:
+    signal.signal(-status, signal.SIG_DFL)
+    os.kill(os.getpid(), -status)
+os._exit(status)
+"""
+
+
+class Served:
+    """The one process from which commands are forked. bin: where the installation's own command lies."""
+
+    def __init__(self, python: Path, bin: Path, environment: dict[str, str] | None = None) -> None:
+        self._python, self._command = python, bin / "beaver-ftc"
+        self._environment = dict(os.environ if environment is None else environment)
+        self._folder = tempfile.TemporaryDirectory(prefix="served-")
+        self._address = str(Path(self._folder.name) / "socket")
+        self._process = subprocess.Popen(
+            [python, __file__, self._address, self._command],
+            env=self._environment,
+            cwd=self._folder.name,
+            stdin=subprocess.PIPE,  # closed when this process ends, however it ends: the server ends too
+            start_new_session=True,
+        )
+
+    def script(self, folder: Path) -> Path:
+        """A command `beaver-ftc` in this folder that is served, once the one process is ready."""
+        end = time.monotonic() + _PATIENCE_S
+        while not Path(self._address).exists():
+            if self._process.poll() is not None or time.monotonic() > end:
+                raise RuntimeError("the process that serves commands did not begin")
+            time.sleep(0.02)
+        script = folder / "beaver-ftc"
+        script.write_text(
+            _SCRIPT.format(
+                python=self._python,
+                decides={name: self._environment.get(name) for name in DECIDES},
+                command=str(self._command),
+                address=self._address,
+                seconds=SECONDS,
+            )
+        )
+        script.chmod(0o755)
+        return script
+
+    def end(self) -> None:
+        """End the one process; commands that still run end by themselves."""
+        if self._process.stdin:
+            self._process.stdin.close()
+        self._process.wait()
+        self._folder.cleanup()
+
+
+def _serve(address: str, command: str) -> NoReturn:
+    """Fork a process for each that connects, until standard input is closed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _begin(command)
+    gc.collect()
+    gc.freeze()
+    ready = f"{address}-"
+    server = socket.socket(socket.AF_UNIX)
+    server.bind(ready)
+    server.listen(16)
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # nobody waits for those that wait for the commands
+    os.rename(ready, address)
+    while True:
+        readable, _, _ = select.select([server, 0], [], [])
+        if 0 in readable:
+            os._exit(0)
+        asking, _ = server.accept()
+        if os.fork() == 0:
+            server.close()
+            _attend(asking, command)
+        asking.close()
+
+
+def _begin(command: str) -> None:
+    """Import, load kernels and draw figures, once: as the command would, with its words left unsaid."""
+    sys.path[0] = str(Path(command).parent)
+    from beaver_ftc.cli.main import main
+
+    sys.argv = [command, *FIRST]
+    with (
+        open(os.devnull, "w") as nothing,
+        redirect_stdout(nothing),
+        redirect_stderr(nothing),
+        suppress(SystemExit),
+    ):
+        main()
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
+
+
+def _attend(asking: socket.socket, command: str) -> NoReturn:
+    """Fork the command, say its number, wait for it, say its status; if the asker goes away, end it."""
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+    files = array.array("i")
+    _, given, _, _ = asking.recvmsg(1, socket.CMSG_LEN(3 * files.itemsize))
+    files.frombytes(given[0][2])
+    asked = json.loads(asking.makefile().readline())
+    child = os.fork()
+    if child == 0:
+        os.setsid()
+        asking.close()
+        _become(asked, files, command)
+    for number in files:
+        os.close(number)
+    asking.sendall(f"{child}\n".encode())
+    ended = os.pidfd_open(child)
+    readable, _, _ = select.select([ended, asking], [], [])
+    if ended not in readable:
+        with suppress(ProcessLookupError):
+            os.killpg(child, signal.SIGKILL)
+    _, status, used = os.wait4(child, 0)
+    with suppress(OSError):
+        asking.sendall(f"{os.waitstatus_to_exitcode(status)} {used.ru_utime + used.ru_stime}\n".encode())
+    os._exit(0)
+
+
+def _become(asked: dict[str, Any], files: array.array, command: str) -> NoReturn:
+    """The command itself, in a process that has imported it."""
+    for number, file in enumerate(files):
+        os.dup2(file, number)
+        os.close(file)
+    os.chdir(asked["cwd"])
+    os.environ.clear()
+    os.environ.update(asked["environment"])
+    sys.argv = [command, *asked["argv"]]
+    sys.path[1:1] = filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    for name, number, mode in (("stdin", 0, "r"), ("stdout", 1, "w"), ("stderr", 2, "w")):
+        stream = open(number, mode, encoding="utf-8", buffering=1 if number == 2 else -1, closefd=False)  # noqa: SIM115
+        setattr(sys, name, stream)
+        setattr(sys, f"__{name}__", stream)
+    from beaver_ftc.cli.begin import main
+    from beaver_ftc.documents.errors import say_once
+
+    say_once.cache_clear()
+    main()
+
+
+if __name__ == "__main__":
+    _serve(*sys.argv[1:])

@@ -2,7 +2,8 @@
 
 One process imports the package and flies once; each command is forked from it, with the arguments, folder,
 environment, files and signals of whoever called it. `Served(python, bin)` starts it, with another
-installation's interpreter if need be; `script(folder)` puts a `beaver-ftc` there that asks it, for shells.
+installation's interpreter if need be; `scripts(folder)` puts a `beaver-ftc` and a `python` there that ask it,
+for shells: the latter for modules (`python -m tools.docs`), with any other arguments it is the interpreter.
 It needs Linux. Where the environment says of kernels what it did not say to the one process (where they are
 kept, whether they are compiled), the script starts the command as it is.
 """
@@ -11,6 +12,7 @@ import array
 import gc
 import json
 import os
+import runpy
 import select
 import signal
 import socket
@@ -30,9 +32,12 @@ _PATIENCE_S = 600.0
 _SCRIPT = """\
 #!{python} -IS
 import array, json, os, signal, socket, sys
-if any(os.environ.get(name) != value for name, value in {decides!r}.items()):
-    os.execv({command!r}, [{command!r}, *sys.argv[1:]])
-asked = {{"argv": sys.argv[1:], "cwd": os.getcwd(), "environment": dict(os.environ)}}
+name = os.path.basename(sys.argv[0])
+elsewhere = any(os.environ.get(name) != value for name, value in {decides!r}.items())
+if elsewhere or (name == "python" and sys.argv[1:2] != ["-m"]):
+    own = {bin!r} + "/" + name
+    os.execv(own, [own, *sys.argv[1:]])
+asked = {{"argv": [name, *sys.argv[1:]], "cwd": os.getcwd(), "environment": dict(os.environ)}}
 server = socket.socket(socket.AF_UNIX)
 server.connect({address!r})
 files = array.array("i", (0, 1, 2))
@@ -60,37 +65,35 @@ class Served:
     """The one process from which commands are forked. bin: where the installation's own command lies."""
 
     def __init__(self, python: Path, bin: Path, environment: dict[str, str] | None = None) -> None:
-        self._python, self._command = python, bin / "beaver-ftc"
+        self._python, self._bin = python, bin
         self._environment = dict(os.environ if environment is None else environment)
         self._folder = tempfile.TemporaryDirectory(prefix="served-")
         self._address = str(Path(self._folder.name) / "socket")
         self._process = subprocess.Popen(
-            [python, __file__, self._address, self._command],
+            [python, __file__, self._address, bin],
             env=self._environment,
             cwd=self._folder.name,
             stdin=subprocess.PIPE,  # closed when this process ends, however it ends: the server ends too
             start_new_session=True,
         )
 
-    def script(self, folder: Path) -> Path:
-        """A command `beaver-ftc` in this folder that is served, once the one process is ready."""
+    def scripts(self, folder: Path) -> None:
+        """`beaver-ftc` and `python` in this folder that are served, once the one process is ready."""
         end = time.monotonic() + _PATIENCE_S
         while not Path(self._address).exists():
             if self._process.poll() is not None or time.monotonic() > end:
                 raise RuntimeError("the process that serves commands did not begin")
             time.sleep(0.02)
-        script = folder / "beaver-ftc"
-        script.write_text(
-            _SCRIPT.format(
-                python=self._python,
-                decides={name: self._environment.get(name) for name in DECIDES},
-                command=str(self._command),
-                address=self._address,
-                seconds=SECONDS,
-            )
+        text = _SCRIPT.format(
+            python=self._python,
+            decides={name: self._environment.get(name) for name in DECIDES},
+            bin=str(self._bin),
+            address=self._address,
+            seconds=SECONDS,
         )
-        script.chmod(0o755)
-        return script
+        for name in ("beaver-ftc", "python"):
+            (folder / name).write_text(text)
+            (folder / name).chmod(0o755)
 
     def end(self) -> None:
         """End the one process; commands that still run end by themselves."""
@@ -100,10 +103,10 @@ class Served:
         self._folder.cleanup()
 
 
-def _serve(address: str, command: str) -> NoReturn:
+def _serve(address: str, bin: str) -> NoReturn:
     """Fork a process for each that connects, until standard input is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    _begin(command)
+    _begin(bin)
     gc.collect()
     gc.freeze()
     ready = f"{address}-"
@@ -119,16 +122,16 @@ def _serve(address: str, command: str) -> NoReturn:
         asking, _ = server.accept()
         if os.fork() == 0:
             server.close()
-            _attend(asking, command)
+            _attend(asking, bin)
         asking.close()
 
 
-def _begin(command: str) -> None:
+def _begin(bin: str) -> None:
     """Import, load kernels and draw figures, once: as the command would, with its words left unsaid."""
-    sys.path[0] = str(Path(command).parent)
+    sys.path[0] = bin
     from beaver_ftc.cli.main import main
 
-    sys.argv = [command, *FIRST]
+    sys.argv = [f"{bin}/beaver-ftc", *FIRST]
     with (
         open(os.devnull, "w") as nothing,
         redirect_stdout(nothing),
@@ -140,7 +143,7 @@ def _begin(command: str) -> None:
         signal.signal(number, signal.SIG_DFL)
 
 
-def _attend(asking: socket.socket, command: str) -> NoReturn:
+def _attend(asking: socket.socket, bin: str) -> NoReturn:
     """Fork the command, say its number, wait for it, say its status; if the asker goes away, end it."""
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     files = array.array("i")
@@ -151,7 +154,7 @@ def _attend(asking: socket.socket, command: str) -> NoReturn:
     if child == 0:
         os.setsid()
         asking.close()
-        _become(asked, files, command)
+        _become(asked, files, bin)
     for number in files:
         os.close(number)
     asking.sendall(f"{child}\n".encode())
@@ -166,7 +169,7 @@ def _attend(asking: socket.socket, command: str) -> NoReturn:
     os._exit(0)
 
 
-def _become(asked: dict[str, Any], files: array.array, command: str) -> NoReturn:
+def _become(asked: dict[str, Any], files: array.array, bin: str) -> NoReturn:
     """The command itself, in a process that has imported it."""
     for number, file in enumerate(files):
         os.dup2(file, number)
@@ -174,17 +177,22 @@ def _become(asked: dict[str, Any], files: array.array, command: str) -> NoReturn
     os.chdir(asked["cwd"])
     os.environ.clear()
     os.environ.update(asked["environment"])
-    sys.argv = [command, *asked["argv"]]
+    name, *rest = asked["argv"]
+    sys.argv = [f"{bin}/{name}", *rest]
     sys.path[1:1] = filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    for name, number, mode in (("stdin", 0, "r"), ("stdout", 1, "w"), ("stderr", 2, "w")):
-        stream = open(number, mode, encoding="utf-8", buffering=1 if number == 2 else -1, closefd=False)  # noqa: SIM115
-        setattr(sys, name, stream)
-        setattr(sys, f"__{name}__", stream)
+    for stream, number, mode in (("stdin", 0, "r"), ("stdout", 1, "w"), ("stderr", 2, "w")):
+        anew = open(number, mode, encoding="utf-8", buffering=1 if number == 2 else -1, closefd=False)  # noqa: SIM115
+        setattr(sys, stream, anew)
+        setattr(sys, f"__{stream}__", anew)
     from beaver_ftc.cli.begin import main
     from beaver_ftc.documents.errors import say_once
 
     say_once.cache_clear()
+    if name == "python":  # -m MODULE
+        sys.path[0], sys.argv = asked["cwd"], rest[1:]
+        runpy.run_module(rest[1], run_name="__main__", alter_sys=True)
+        sys.exit()
     main()
 
 

@@ -79,14 +79,14 @@ class Installation:
 
     @contextmanager
     def served(self) -> Iterator["Installation"]:
-        """The same with `beaver-ftc` forked from one process that has imported it (tools/served.py)."""
+        """The same with commands forked from one process that has imported the package (tools/served.py)."""
         if not POSSIBLE:
             yield self
             return
         with tempfile.TemporaryDirectory() as folder:
             served = Served(self.python, self.bin, self.environment())
             try:
-                served.script(Path(folder))
+                served.scripts(Path(folder))
                 yield replace(self, before=Path(folder))
             finally:
                 served.end()

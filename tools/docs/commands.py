@@ -13,11 +13,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from tools.docs.pages import ROOT
+from tools.served import POSSIBLE, SECONDS, Served
 
 LONGEST_S = 120.0  # of processor, for a command that is not dear
 PATIENCE = 5.0  # so many times longer by the clock, on a busy machine
 SHARED = "BEAVER_FTC_DOCS_SHARED"  # the folder of what table makers share
 _OURS = ("PYTEST", "COV_", "COVERAGE", "BEAVER_FTC", "FORCE_COLOR", "NUMBA_DISABLE")  # no reader has them
+BIN = "bin"  # in the shared folder: commands that are served
+_BIN = Path(sys.executable).parent
 PICTURES = "images"  # what a command draws, below its folder and below docs/
 
 
@@ -41,7 +44,7 @@ class Checkout:
         inherited = {name: value for name, value in os.environ.items() if name not in own}
         self.environment = {
             **inherited,
-            "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', os.defpath)}",
+            "PATH": os.pathsep.join((str(shared / BIN), str(_BIN), os.environ.get("PATH", os.defpath))),
             "PYTHONPATH": f"{ROOT}{os.pathsep}{ROOT / 'src'}",
             "COLUMNS": "80",
             "NO_COLOR": "1",
@@ -50,11 +53,15 @@ class Checkout:
 
     def run(self, line: str, cwd: Path, longest_s: float | None) -> tuple[int, str, str, float]:
         """(status, standard output, standard error, processor time in s) of a line in bash."""
-        with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+        with (
+            tempfile.TemporaryFile() as out,
+            tempfile.TemporaryFile() as err,
+            tempfile.NamedTemporaryFile() as served,
+        ):
             process = subprocess.Popen(
                 ["bash", "-c", line],
                 cwd=cwd,
-                env=self.environment,
+                env=self.environment | {SECONDS: served.name},
                 stdin=subprocess.DEVNULL,
                 stdout=out,
                 stderr=err,
@@ -70,7 +77,8 @@ class Checkout:
             self._running.discard(process.pid)
             process.returncode = os.waitstatus_to_exitcode(status)
             said = [stream.seek(0) or stream.read().decode(errors="replace") for stream in (out, err)]
-        return process.returncode, *said, used.ru_utime + used.ru_stime
+            seconds = sum(map(float, served.read().split()))
+        return process.returncode, *said, used.ru_utime + used.ru_stime + seconds
 
     def end(self) -> None:
         """End what is running, with everything it has started."""
@@ -104,6 +112,7 @@ def outputs(
     limits = [None if line in dear else LONGEST_S for line in lines]
     with tempfile.TemporaryDirectory() as shared, ThreadPoolExecutor(jobs or os.cpu_count()) as threads:
         checkout = Checkout(Path(shared), needed)
+        served = _served(checkout, Path(shared) / BIN) if POSSIBLE else None
         try:
             done = threads.map(lambda line, limit: _output(checkout, line, limit), lines, limits)
             return dict(zip(lines, done, strict=True))
@@ -111,6 +120,17 @@ def outputs(
             threads.shutdown(wait=False, cancel_futures=True)
             checkout.end()
             raise
+        finally:
+            if served:
+                served.end()
+
+
+def _served(checkout: Checkout, folder: Path) -> Served:
+    """Commands are forked from one process that has imported the package."""
+    folder.mkdir()
+    served = Served(Path(sys.executable), _BIN, checkout.environment)
+    served.scripts(folder)
+    return served
 
 
 def _output(checkout: Checkout, line: str, longest_s: float | None) -> Output:

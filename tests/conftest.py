@@ -3,14 +3,13 @@
 import os
 import sys
 from pathlib import Path
-from zlib import crc32
 
 import pytest
 from hypothesis import settings
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from tools.promises import is_at_night, thinned
+from tools.promises import is_at_night, is_spared
 
 import kept
 import warm
@@ -41,8 +40,7 @@ def pytest_collection_modifyitems(items):
     seen = set()
     for item in items:
         of = item.nodeid.partition("[")[0]
-        spared = of.startswith(thinned()) and of in seen and crc32(item.nodeid.encode()) % 3
-        if spared or is_at_night(item.nodeid):
+        if (of in seen and is_spared(item.nodeid)) or is_at_night(item.nodeid):
             item.add_marker("nightly")
         seen.add(of)
 

@@ -15,6 +15,7 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.plugins import DETECTORS, LAWS, VARIABLE, _hyphenated, plugin_class, register, registered
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.scenario.loader import load_text
+from commands import beaver
 from flying import Memory, scenario
 
 FAULT = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.4, "at_s": 3}
@@ -286,7 +287,7 @@ def test_a_failed_flight_leaves_nothing_behind(tmp_path):
 )
 def test_an_unknown_name_is_bad_input_at_its_line(tmp_path, key, value, says):
     (tmp_path / "s.yaml").write_text(f"name: s\n{key}: {{{value}}}\n")
-    done = _beaver(tmp_path, "validate", "s.yaml")
+    done = beaver("validate", "s.yaml", cwd=tmp_path)
     assert done.returncode == 2
     assert done.stderr.startswith(f"s.yaml:2: {key}.{value.partition(':')[0]}: {says}")
 

@@ -30,7 +30,7 @@ def flown(tmp_path_factory):
     folder = tmp_path_factory.mktemp("flown")
     scenario = bf.load("elevator-partial-loss").with_({"duration_s": 9.0, "faults[0].at_s": 6.0})
     flight = bf.fly(scenario)
-    flight.save(folder)
+    flight.save(folder, report=False)
     return folder / "elevator-partial-loss", flight
 
 
@@ -144,7 +144,7 @@ def test_what_each_command_does_in_all_of_a_flight(theta, gain):
 def test_a_command_of_the_other_sign_is_refused_but_in_declared_turbulence(tmp_path):
     sine = [{"sine": {"amplitude_deg_s": 3.0, "frequency_hz": 0.4}}]
     scenario = bf.load({"name": "swung", "duration_s": 8.0, "reference": dict.fromkeys("pqr", sine)})
-    bf.fly(scenario).save(tmp_path)
+    bf.fly(scenario).save(tmp_path, report=False)
     path, vehicle = exported(tmp_path / "swung", "table", tmp_path)
     recording = read_for(path, vehicle)
     turned = changed(recording, rudder_command=np.negative)

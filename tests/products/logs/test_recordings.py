@@ -17,7 +17,7 @@ TRAVEL_RAD = {"aileron": 0.5, "elevator": 0.4, "rudder": 0.3, "flap": 1.0}
 @pytest.fixture(scope="module")
 def log_path(tmp_path_factory):
     folder = tmp_path_factory.mktemp("flown")
-    bf.fly(bf.load("elevator-partial-loss").with_({"duration_s": 16.0})).save(folder)
+    bf.fly(bf.load("elevator-partial-loss").with_({"duration_s": 16.0})).save(folder, report=False)
     return folder / "elevator-partial-loss" / "log.parquet"
 
 

@@ -19,7 +19,7 @@ WITHDRAWN = {"design_model": {"linearised": True}, "fdi": {"bounds": {"coefficie
 def run(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp("runs")
     flight = bf.fly(bf.load("elevator-partial-loss").with_({"duration_s": 16.0, **request.param}))
-    flight.save(folder)
+    flight.save(folder, report=False)
     return folder / "elevator-partial-loss", flight
 
 

@@ -552,7 +552,8 @@ def test_whatever_fails_while_results_are_written_the_log_is_kept(
     Path("mine.yaml").write_text(
         json.dumps({"name": "mine", "duration_s": 0.2, "faults": [LOSS | {"at_s": 0.1}]})
     )
-    monkeypatch.setattr(sys, "argv", ["beaver-ftc", "run", "mine.yaml", "--certificate"])
+    asked = ["--certificate", *["--no-report"] * (place != "figures")]
+    monkeypatch.setattr(sys, "argv", ["beaver-ftc", "run", "mine.yaml", *asked])
     with pytest.raises(SystemExit) as ended:
         main()
     assert ended.value.code == 3

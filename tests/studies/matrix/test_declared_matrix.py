@@ -9,9 +9,10 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.studies.matrix.fault_matrix import declared, run_matrix, verdict
 from flying import scenario
+from samples import samples
 
 NAMES = [term.name for term in load().moments]
-FLIGHTS = 50
+FLIGHTS = samples(200)
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,9 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.studies.matrix.fault_matrix import verdict
 from flying import scenario
+from samples import samples
 
-FAULTS = 100
+FAULTS = samples(300)
 
 
 def drawn(rng, at_s):

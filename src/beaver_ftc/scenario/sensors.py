@@ -1,12 +1,14 @@
-"""The instruments: a row each, what they do to the truth, and their names.
+"""The sensors: a row each, with its errors, its place in the diagnosis and its name in words.
 
-What is left out of `sensors` is measured perfectly.
+A sensor that is left out of a scenario's `sensors` measures perfectly. To add a sensor, add a row to ROWS,
+and what its presets are to `presets.yaml`: it is then read at its own rate, logged, broken by scenarios, and
+compared with the reading that it should equal. Nothing else has to be written.
 """
 
 from collections.abc import Callable
 from math import hypot, radians, sqrt
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, TypeVar
 
 from pydantic import Field, GetJsonSchemaHandler, create_model, model_validator
 from pydantic.json_schema import JsonSchemaValue
@@ -29,8 +31,9 @@ class _Sensor(Section):
     dropout_share: samples lost, the last one standing in, share of 1
     """
 
-    # Keys of noise, bias and resolution, and their unit in SI.
+    # Keys of noise, bias and resolution, their unit, and that unit in SI.
     si: ClassVar[tuple[str, str, str, float]]
+    unit: ClassVar[str]
 
     scale_error: Number = number(0.0, "share of 1", ge=-0.9, le=1, examples=[0.01])
     delay_s: Number = number(0.0, "s", ge=0, le=1, examples=[0.02])
@@ -77,7 +80,7 @@ def _reads(suffix: str, unit: str, most: float, si: float = 1.0) -> Callable[[ty
     }
 
     def made(cls: type[_S]) -> type[_S]:
-        cls.si = (*keys, si)
+        cls.si, cls.unit = (*keys, si), unit
         return create_model(
             cls.__name__, __base__=cls, __module__=cls.__module__, __doc__=cls.__doc__, **fields
         )
@@ -138,8 +141,61 @@ class Accelerometer(_Sensor):
     """Specific force along a body axis at the centre of mass: all forces but gravity, over the mass."""
 
 
+class Equal(NamedTuple):
+    """The reading that a sensor should equal, and by how much the two quantities may differ, SI."""
+
+    reading: str
+    within: float
+
+
+class Row(NamedTuple):
+    """One sensor.
+
+    name: its key in `sensors`. errors: the model of them. most: the largest offset or noise of a fault, in
+    the unit of its errors. test: the test of the sensor monitor (`diagnosis/monitors/sensor_records.py`) in
+    which a jump of its reading appears at once. words: another name of it in a scenario's faults.
+
+    Only of a sensor that no equation of the diagnosis uses: truth is the JSBSim property that it measures,
+    and that property's unit in SI; column is its log column; rate_hz is how often it is read, 0 for every
+    JSBSim frame; equal is its redundancy.
+    """
+
+    name: str
+    errors: type[_Sensor]
+    most: float
+    test: str = ""
+    words: str = ""
+    truth: tuple[str, float] = ("", 1.0)
+    column: str = ""
+    rate_hz: float = 0.0
+    equal: Equal | None = None
+
+
+# Equations of the diagnosis use the first sixteen by their places: flow and rates, attitude and altitude,
+# engine, accelerometers. Sensors that only the monitor compares stand below them.
+ROWS = (
+    Row("p", RateGyro, 200.0, "roll"),
+    Row("q", RateGyro, 200.0, "pitch"),
+    Row("r", RateGyro, 200.0, "yaw"),
+    Row("alpha", FlowVane, 90.0, "incidence"),
+    Row("beta", FlowVane, 90.0, "sideslip"),
+    Row("V", Airspeed, 100.0, "speed", "airspeed"),
+    Row("qdyn", DynamicPressure, 5000.0, "density", "dynamic_pressure"),
+    Row("phi", AttitudeAngle, 90.0, "bank angle"),
+    Row("theta", AttitudeAngle, 90.0, "pitch angle"),
+    Row("psi", AttitudeAngle, 90.0, "heading"),
+    Row("altitude", Altimeter, 5000.0, "climb"),
+    Row("engine_rpm", Tachometer, 3000.0, "engine speed"),
+    Row("manifold_pressure", ManifoldGauge, 50.0, "manifold pressure"),
+    Row("ax", Accelerometer, 100.0),
+    Row("ay", Accelerometer, 100.0),
+    Row("az", Accelerometer, 100.0),
+)
+N_IN_EQUATIONS = 16  # of these rows, from the first on
+
+
 class Quantity(NamedTuple):
-    """What an instrument measures: unit, in SI, the largest offset or noise of a fault, in words."""
+    """The unit of a sensor's errors, that unit in SI, the largest offset or noise of a fault, its words."""
 
     unit: str
     si: float
@@ -147,19 +203,9 @@ class Quantity(NamedTuple):
     words: str = ""
 
 
-_DEG = radians(1.0)
-QUANTITIES = {
-    **dict.fromkeys("pqr", Quantity("deg/s", _DEG, 200.0)),
-    **dict.fromkeys(("alpha", "beta", "phi", "theta", "psi"), Quantity("deg", _DEG, 90.0)),
-    "V": Quantity("m/s", 1.0, 100.0, "airspeed"),
-    "qdyn": Quantity("Pa", 1.0, 5000.0, "dynamic_pressure"),
-    "altitude": Quantity("m", 1.0, 5000.0),
-    "engine_rpm": Quantity("rpm", 1.0, 3000.0),
-    "manifold_pressure": Quantity("inHg", 1.0, 50.0),
-    **dict.fromkeys(("ax", "ay", "az"), Quantity("m/s2", 1.0, 100.0)),
-}
-ALIASES = {of.words: name for name, of in QUANTITIES.items() if of.words}
-ENGINE = ("engine_rpm", "manifold_pressure")  # instruments of an engine like the Beaver's
+QUANTITIES = {row.name: Quantity(row.errors.unit, row.errors.si[-1], row.most, row.words) for row in ROWS}
+ALIASES = {row.words: row.name for row in ROWS if row.words}
+ENGINE = ("engine_rpm", "manifold_pressure")  # sensors of an engine like the Beaver's
 ACCELEROMETERS = ("ax", "ay", "az")
 
 
@@ -167,25 +213,12 @@ _FILE = Path(__file__).with_name("presets.yaml")
 PRESETS: dict[str, dict[str, dict[str, float]]] = parse(_FILE.read_text(encoding="utf-8")).data
 
 
-class Sensors(Section):
+class _Sensors(Section):
     """The measurements the diagnosis and the law live on."""
 
-    p: RateGyro = Field(default_factory=RateGyro)
-    q: RateGyro = Field(default_factory=RateGyro)
-    r: RateGyro = Field(default_factory=RateGyro)
-    alpha: FlowVane = Field(default_factory=FlowVane)
-    beta: FlowVane = Field(default_factory=FlowVane)
-    V: Airspeed = Field(default_factory=Airspeed)
-    qdyn: DynamicPressure = Field(default_factory=DynamicPressure)
-    phi: AttitudeAngle = Field(default_factory=AttitudeAngle)
-    theta: AttitudeAngle = Field(default_factory=AttitudeAngle)
-    psi: AttitudeAngle = Field(default_factory=AttitudeAngle)
-    altitude: Altimeter = Field(default_factory=Altimeter)
-    engine_rpm: Tachometer = Field(default_factory=Tachometer)
-    manifold_pressure: ManifoldGauge = Field(default_factory=ManifoldGauge)
-    ax: Accelerometer = Field(default_factory=Accelerometer)
-    ay: Accelerometer = Field(default_factory=Accelerometer)
-    az: Accelerometer = Field(default_factory=Accelerometer)
+    if TYPE_CHECKING:  # its fields are the rows
+
+        def __getattr__(self, name: str) -> Any: ...
 
     @model_validator(mode="before")
     @classmethod
@@ -207,6 +240,15 @@ class Sensors(Section):
         signals = handler.resolve_ref_schema(handler(core))
         preset = {"enum": list(PRESETS), "type": "string", "description": "a preset"}
         return {"anyOf": [preset, signals]}
+
+
+Sensors = create_model(
+    "Sensors",
+    __base__=_Sensors,
+    __module__=__name__,
+    __doc__=_Sensors.__doc__,
+    **{row.name: (row.errors, Field(default_factory=row.errors)) for row in ROWS},  # type: ignore[call-overload]
+)
 
 
 def sensors_there() -> tuple[str, ...]:

@@ -15,14 +15,15 @@ from beaver_ftc.diagnosis.state import verdict_dtype
 from beaver_ftc.loop import instrument_records, memory
 from beaver_ftc.loop.accounts import accounts_dtype, true_faults_dtype
 from beaver_ftc.plant import channels as ch
-from beaver_ftc.plant.instruments import MEASURED, USUAL_LINE, instruments_dtype
+from beaver_ftc.plant.instruments import MEASURED, N_SAMPLED, USUAL_LINE, instruments_dtype
 from beaver_ftc.plant.native import RUNNING
 from beaver_ftc.plant.sensing import truth_dtype
 from beaver_ftc.scenario.dump import texts_of
 from beaver_ftc.scenario.schema import Scenario
 
-# How many columns the log has for estimators, the watch, the engine, statistical tests.
-LOGGED = record(estimators=int, watch=int, power=int, tests=int)
+# How many columns the log has for estimators, the watch, sensors with rates of their own, the engine,
+# statistical tests.
+LOGGED = record(estimators=int, watch=int, sampled=int, power=int, tests=int)
 
 
 @sized
@@ -99,10 +100,12 @@ def lay_out(frame: np.void, scenario: Scenario, diagnoses_itself: bool) -> tuple
     estimators = estimator_names(scenario.fdi.fault_class, aircraft) if diagnoses_itself else ()
     logged["estimators"] = fdi["isolation"]["n"] if diagnoses_itself else 0
     watched = logged["watch"] = instrument_records.columns_of_the_watch(scenario)
+    sampled = instrument_records.reads_further(scenario)
+    logged["sampled"] = N_SAMPLED if sampled else 0
     moved = frame["control"]["power"]["config"]["enabled"] or (profile and aircraft.airspeed_by == "power")
     moved |= bool(frame["control"]["engines"]["config"]["n"])
     power = aircraft.power_setting if moved else ""
     logged["power"] = 1 + len(aircraft.effectors) if power else 0
     logged["tests"] = tests["n_columns"] if tests["enabled"] else 0
     tested, columns = bool(tests["enabled"]), COLUMNS if profile else ()
-    return ch.log_columns(aircraft, estimators, watched, power, columns, tested)
+    return ch.log_columns(aircraft, estimators, watched, power, columns, tested, sampled)

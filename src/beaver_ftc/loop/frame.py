@@ -429,6 +429,7 @@ def record(frame, commanded, row):
     column += 2
     if logged.watch:
         column = log_row.record_watch(fdi.watch, frame.measured.missing, row, column, logged.watch)
+    column = log_row.record_sampled(frame.measured.signal, row, column, logged.sampled)
     column = put(row, column, control.power.output.command[: logged.power])
     if frame.autopilot.enabled:
         log_row.record_profile(frame.autopilot, row, column)

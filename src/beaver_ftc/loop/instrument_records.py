@@ -19,11 +19,13 @@ from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.faults import of_a_sensor
 from beaver_ftc.scenario.interventions import stages
 from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.sensors import N_IN_EQUATIONS, ROWS
 
 FASTER = 1.4  # than at the start a flight may become
 TAKEN_OVER_PER_S = 3.0  # by the attitude, of a rate it stands in for, where its own noise is declared
-# What sets the counters of random numbers apart: OF_THE_FIRST, OF_THE_FURTHER, OF_FAULTS, OF_FORCES.
-COUNTERS = (0, 0xD1B54A32D192ED03, 0x8CB92BA72F3D8DD7, 0xA0761D6478BD642F)
+# What sets the counters of random numbers apart: OF_THE_FIRST, OF_THE_FURTHER, OF_FAULTS, OF_FORCES,
+# OF_THE_SAMPLED.
+COUNTERS = (0, 0xD1B54A32D192ED03, 0x8CB92BA72F3D8DD7, 0xA0761D6478BD642F, 0xE7037ED1A0B428DB)
 
 
 def breaks_instruments(scenario: Scenario) -> bool:
@@ -52,11 +54,16 @@ def has_real_engine(scenario: Scenario) -> bool:
 def truth_read(scenario: Scenario) -> tuple[ch.Channel, ...]:
     """What is read from the truth in this flight."""
     usual = ch.truth_channels(scenario.airframe)
+    return (*usual, *ch.further_channels(scenario.airframe)) if reads_further(scenario) else usual
+
+
+def reads_further(scenario: Scenario) -> bool:
+    """Whether accelerometers, the engine's instruments and what the monitor alone compares are read."""
     declared = Declared.of(scenario)
     accelerometers = declared.uses_accelerometers or declared.follows_gusts_by_accelerometers
     fails = breaks_instruments(scenario) or has_real_engine(scenario)
-    further = declared.monitors_sensors or accelerometers or fails
-    return (*usual, *ch.further_channels(scenario.airframe)) if further else usual
+    sampled = any(not getattr(scenario.sensors, row.name).is_ideal for row in ROWS[N_IN_EQUATIONS:])
+    return declared.monitors_sensors or accelerometers or fails or sampled
 
 
 def configure(frame: np.void, scenario: Scenario, dt: float) -> None:
@@ -75,6 +82,7 @@ def configure(frame: np.void, scenario: Scenario, dt: float) -> None:
         instruments["keep"][i] = exp(-sensor.bandwidth_rad_s * dt) if sensor.bandwidth_rad_s else 0.0
         instruments["delay"][i] = sensor.delay_s / dt
         instruments["length"][i] = _samples(sensor.delay_s / dt)
+        instruments["every"][i] = _frames_apart(i, dt)
         if sensor.delay_s / dt > LONGEST_DELAY:
             raise BadInput(
                 f"{scenario.name}: sensors.{name}.delay_s is {sensor.delay_s:g} s, "
@@ -82,6 +90,11 @@ def configure(frame: np.void, scenario: Scenario, dt: float) -> None:
             )
 
     instruments["first"] = np.cumsum(instruments["length"]) - instruments["length"]
+
+
+def _frames_apart(i: int, dt: float) -> int:
+    """JSBSim frames from one sample of sensor i to the next, dt s each."""
+    return max(round(1.0 / ROWS[i].rate_hz / dt), 1) if ROWS[i].rate_hz else 1
 
 
 def line_for(scenario: Scenario) -> int:
@@ -121,7 +134,7 @@ def configure_watch(watch: np.void, scenario: Scenario, h: float) -> None:
     for i, name in enumerate(SENSORS):
         error = errors[name]
         step["offset"][i], step["slope"][i], step["steady"][i] = error.worst, error.slope, error.steady
-        watch["longest_still"][i] = longest_still(error.noise, error.resolution)
+        watch["longest_still"][i] = longest_still(error.noise, error.resolution) * _frames_apart(i, h)
         step["drift"] = max(step["drift"], abs(getattr(getattr(errors.declared, name), "drift_rad_s", 0.0)))
     blurred = watch["blurred"] = np.any(step["offset"][PHI : PHI + 3] > step["steady"][PHI : PHI + 3])
     watch["follows"] = min(1.0, h * TAKEN_OVER_PER_S) if blurred else 1.0

@@ -92,6 +92,15 @@ def record_watch(watch, missing, row, column, columns):
 
 
 @kernel
+def record_sampled(signal, row, column, columns):
+    """The readings of the last `columns` sensors, those with rates of their own. Returns the next column."""
+    first = signal.size - columns
+    for i in range(columns):
+        row[column + i] = signal[first + i]
+    return column + columns
+
+
+@kernel
 def record_profile(autopilot, row, column):
     """The commanded profile, of the channels that are flown, and the airspeed of it that can be held."""
     for c in range(autopilot.command.size):

@@ -25,7 +25,7 @@ from beaver_ftc.plant.adapter import Plant, translated
 from beaver_ftc.plant.conditions import ready
 from beaver_ftc.plant.configure import GustSchedule, take_off
 from beaver_ftc.plant.faults import FaultSchedule, SensorFaultSchedule
-from beaver_ftc.plant.instruments import AX, ENGINE_SPEED
+from beaver_ftc.plant.instruments import AX, ENGINE_SPEED, N_SAMPLED
 from beaver_ftc.plant.reuse import give_back
 from beaver_ftc.plant.sensing import FLYING, NOT_FINITE
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled
@@ -260,9 +260,10 @@ class Loop:
         """Put among the readings what further instruments would say of this frame, without errors."""
         further = ch.further_channels(self.aircraft)
         values = [self.plant.read(name) * factor for _, name, factor in further]
-        measured["signal"][AX:] = np.array(values[:3]) / values[3]
-        if len(values) > 4:
-            measured["engine"], measured["signal"][ENGINE_SPEED:AX] = 1, values[4:]
+        measured["signal"][AX : AX + 3] = np.array(values[:3]) / values[3]
+        measured["signal"][AX + 3 :] = values[4 : 4 + N_SAMPLED]
+        if len(values) > 4 + N_SAMPLED:
+            measured["engine"], measured["signal"][ENGINE_SPEED:AX] = 1, values[4 + N_SAMPLED :]
 
     def fly_segment(self, k: int, stop: int) -> int:
         """Frames k to stop, in which no fault changes."""

@@ -10,6 +10,7 @@ from functools import lru_cache
 from beaver_ftc.aircraft import AXES, Aircraft, load
 from beaver_ftc.aircraft.schema import MAX_SIGNALS
 from beaver_ftc.aircraft.units import M_PER_FT
+from beaver_ftc.scenario.sensors import N_IN_EQUATIONS, ROWS
 
 PSF = 47.88025898033584  # Pa per lbf/ft2
 
@@ -58,15 +59,17 @@ def truth_channels(aircraft: Aircraft) -> tuple[Channel, ...]:
     )
 
 
-# What further instruments would read, where somebody asks for them: m/s2 times slug, slug; then the engine's.
+# Read where a flight needs more than the usual sensors: m/s2 times slug, slug; then the sensors that the
+# monitor alone uses; then the engine's.
 _INERTIAL: tuple[Channel, ...] = (
     ("force_x", "forces/fbx-total-lbs", M_PER_FT),
     ("force_y", "forces/fby-total-lbs", M_PER_FT),
     ("force_z", "forces/fbz-total-lbs", M_PER_FT),
     ("mass_slug", "inertia/mass-slugs", 1.0),
 )
+_SAMPLED: tuple[Channel, ...] = tuple((row.name, *row.truth) for row in ROWS[N_IN_EQUATIONS:])
 _ENGINE = ("engine_rpm", "manifold_pressure_inhg")
-N_FURTHER = len(_INERTIAL) + len(_ENGINE)
+N_FURTHER = len(_INERTIAL) + len(_SAMPLED) + len(_ENGINE)
 
 
 @lru_cache(maxsize=32)
@@ -74,7 +77,7 @@ def further_channels(aircraft: Aircraft) -> tuple[Channel, ...]:
     """What is read from the truth after `truth_channels` where there are more instruments than usual."""
     settings = aircraft.engine.settings
     engine = [(name, settings[name].property, 1.0) for name in _ENGINE if aircraft.has_engine_instruments]
-    return (*_INERTIAL, *engine)
+    return (*_INERTIAL, *_SAMPLED, *engine)
 
 
 def most_channels(n: int) -> int:
@@ -122,11 +125,13 @@ def log_columns(
     power: str,
     profile: tuple[str, ...],
     tests: bool,
+    sampled: bool = False,
 ) -> tuple[str, ...]:
     """The log's columns in order, for the isolation estimators of these names; watch: how many where
     instruments are held against one another; power: the engine setting commanded, empty where none is, and
     what each engine that is an effector has beside it; profile: columns of the commanded profile; tests:
-    there is a statistical detector, whose tests are logged as shares of its level.
+    there is a statistical detector, whose tests are logged as shares of its level; sampled: sensors that are
+    read at rates of their own are read.
 
     Of each surface's effectiveness the `estimate` is the diagnosis', 1 where nothing is estimated; `used` is
     what the law takes it for, on its way there at a limited rate, and 1 throughout under the nominal law.
@@ -145,6 +150,7 @@ def log_columns(
         *(f"{s}_effectiveness_{which}" for which in ("estimate", "used") for s in surfaces),
         "mode", "detected",
         *("watch_share", "watch_test", "watch_missing")[:watch],
+        *(row.column for row in ROWS[N_IN_EQUATIONS:] if sampled),
         *((power, *(f"{engine}_difference" for engine in aircraft.effectors)) if power else ()),
         *profile,
         *(likelihoods(aircraft) if tests else ()),

@@ -15,14 +15,13 @@ import numpy as np
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design.engine import measured_slipstream
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, DPT, N_Y, QDYN
-from beaver_ftc.scenario.sensors import NOISE_LIMIT_SIGMA
+from beaver_ftc.scenario.sensors import N_IN_EQUATIONS, NOISE_LIMIT_SIGMA, ROWS
 
 SIGNALS = ("p", "q", "r", "alpha", "beta", "V", "qdyn")  # what the diagnosis compares with its model
 N_SIGNALS = len(SIGNALS)
-SENSORS = (
-    *SIGNALS, "phi", "theta", "psi", "altitude", "engine_rpm", "manifold_pressure", "ax", "ay", "az"
-)  # fmt: skip
+SENSORS = tuple(row.name for row in ROWS)
 N_SENSORS = len(SENSORS)
+N_SAMPLED = N_SENSORS - N_IN_EQUATIONS  # those that the sensor monitor alone uses, each read at its own rate
 _ALPHA, _BETA, _AIRSPEED, _QDYN = (SENSORS.index(name) for name in ("alpha", "beta", "V", "qdyn"))
 PHI, PSI, ALTITUDE, ENGINE_SPEED, MANIFOLD, AX = (
     SENSORS.index(name) for name in ("phi", "psi", "altitude", "engine_rpm", "manifold_pressure", "ax")
@@ -32,8 +31,8 @@ LONGEST_DELAY = 1000  # JSBSim frames
 USUAL_LINE, MOST_LINE = 512, N_SENSORS * (LONGEST_DELAY + 2)
 
 # Counters of random numbers: those of one draw change nothing in the noise of another.
-OF_THE_FIRST, OF_THE_FURTHER, OF_FAULTS, OF_FORCES = range(4)
-N_COUNTERS = 4
+OF_THE_FIRST, OF_THE_FURTHER, OF_FAULTS, OF_FORCES, OF_THE_SAMPLED = range(5)
+N_COUNTERS = 5
 
 # What is broken of an instrument: offset, relative error, added noise; held and frozen at; no reading at all.
 SENSOR_FAULT = record(
@@ -52,7 +51,7 @@ def instruments_dtype(line: int = USUAL_LINE) -> np.dtype:
         # JSBSim frames; samples of the line that are the signal's, and the first of them
         delay=N_SENSORS, length=(int, N_SENSORS), first=(int, N_SENSORS),
         lagged=N_SENSORS, line=line,
-        taken=(int, N_SENSORS),  # samples
+        taken=(int, N_SENSORS), every=(int, N_SENSORS),  # samples; JSBSim frames from one reading to the next
         reading=N_SENSORS,
         engine=int,  # dpt is worked out from readings
         broken=int, fault=(SENSOR_FAULT, N_SENSORS),
@@ -61,10 +60,11 @@ def instruments_dtype(line: int = USUAL_LINE) -> np.dtype:
 
 # What is known of an instant: every sensor's reading, and sorted by use. attitude: phi, theta, psi, rad;
 # altitude m. force (3,) m/s2 without gravity, from accelerometers, where `inertial`: they are read, and none
-# may be broken. missing: no reading.
+# may be broken. missing: no reading. fresh: of those with a rate of their own, whether it is a new sample.
 MEASURED = record(
     signal=N_SENSORS, x=3, y=N_Y, attitude=3, altitude=float,
     inertial=int, engine=int, force=3, missing=(int, N_SENSORS),
+    fresh=(int, max(N_SAMPLED, 1)),
 )  # fmt: skip
 
 _GOLDEN, _FIRST, _SECOND = (
@@ -167,7 +167,22 @@ def read_all(instruments, signals):
 def read_forces(instruments, signals):
     """The same of the accelerometers, which are not read in every flight."""
     instruments.counter = OF_FORCES
-    read_each(instruments, signals, AX, N_SENSORS)
+    read_each(instruments, signals, AX, N_IN_EQUATIONS)
+
+
+@kernel
+def read_sampled(instruments, signals, fresh):
+    """The same of the sensors with a rate of their own: between two samples the last reading stands."""
+    instruments.counter = OF_THE_SAMPLED
+    for i in range(N_IN_EQUATIONS, N_SENSORS):
+        value, first = read_one(instruments, i, signals[i]), instruments.taken[i] == 0
+        lost = instruments.dropout[i] > 0.0 and uniform(instruments) < instruments.dropout[i]
+        due = instruments.taken[i] % instruments.every[i] == 0 and (first or not lost)
+        if due:
+            instruments.reading[i] = value
+        fresh[i - N_IN_EQUATIONS] = due
+        instruments.taken[i] += 1
+        signals[i] = instruments.reading[i]
 
 
 @kernel

@@ -15,11 +15,13 @@ from beaver_ftc.plant.instruments import (
     AX,
     ENGINE_SPEED,
     MANIFOLD,
+    N_SAMPLED,
     PHI,
     break_all,
     note_slipstream,
     read_all,
     read_forces,
+    read_sampled,
     share_out,
 )
 from beaver_ftc.plant.native import read_nodes, write_nodes
@@ -94,6 +96,8 @@ def measure(truth, instruments, measured):
         read_all(instruments, signal)
         if truth.n > further:
             read_forces(instruments, signal)
+    if N_SAMPLED > 0 and truth.n > further:
+        read_sampled(instruments, signal, measured.fresh)
     if instruments.broken:
         break_all(instruments, signal, measured.missing)
     sort(truth, instruments, measured)
@@ -101,13 +105,15 @@ def measure(truth, instruments, measured):
 
 @kernel
 def read_further(value, first, n, measured):
-    """Take what further instruments there are: accelerometers, and those of the engine."""
-    measured.inertial = 1
+    """Take the readings of accelerometers, of sensors that the monitor alone uses, and of the engine's."""
+    measured.inertial, engine = 1, first + 4 + N_SAMPLED
     for i in range(3):
         measured.signal[AX + i] = value[first + i] / value[first + 3]
-    if n > first + 4:
+    for i in range(N_SAMPLED):
+        measured.signal[AX + 3 + i] = value[first + 4 + i]
+    if n > engine:
         measured.engine = 1
-        measured.signal[ENGINE_SPEED], measured.signal[MANIFOLD] = value[first + 4], value[first + 5]
+        measured.signal[ENGINE_SPEED], measured.signal[MANIFOLD] = value[engine], value[engine + 1]
 
 
 @kernel
@@ -116,7 +122,7 @@ def sample_forces(instruments, measured):
     measured.inertial = 1
     if instruments.real:
         read_forces(instruments, measured.signal)
-    measured.force[:] = measured.signal[AX:]
+    measured.force[:] = measured.signal[AX : AX + 3]
 
 
 @kernel

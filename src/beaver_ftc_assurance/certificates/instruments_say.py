@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from beaver_ftc.diagnosis.monitors import RPM
+from beaver_ftc.diagnosis.monitors import N_COMPUTED, RPM
 from beaver_ftc.plant import ENGINE_SPEED, SENSORS
 from beaver_ftc.scenario import sensor_words
 from beaver_ftc_assurance.certificates.inequality import Document
@@ -16,6 +16,7 @@ TESTS = (
     "engine_rpm", "manifold_pressure",
 )  # fmt: skip
 NOT_STATED = "instruments raised it between two rows of the log"
+NOT_COMPUTED = "a sensor raised it that no equation of the diagnosis uses"
 _LEAST = 1e-13  # of the limit: less is rounding
 
 
@@ -25,6 +26,8 @@ def of_alarm(watch: np.void) -> Document:
     watch: of the flight's record at the alarm, of `WATCH`.
     """
     number = int(watch["furthest"])
+    if watch["share"] > 1.0 and number >= N_COMPUTED:
+        return {"because": NOT_COMPUTED}
     if watch["share"] > 1.0:
         looks = [look for look in _looks(watch["step"], number) if any(look)]
         value, limit = sum(z - then for z, then, _ in looks), sum(most for *_, most in looks)

@@ -32,6 +32,7 @@ from beaver_ftc.diagnosis.monitors.sensor_records import (
 )
 from beaver_ftc.diagnosis.monitors.since_start import hidden
 from beaver_ftc.plant.instruments import AX, N_SENSORS, PHI
+from beaver_ftc.scenario.sensors import N_IN_EQUATIONS
 
 SOON_S = 1.0  # after the alarm: later, chance has had too many tries
 CALMED_S = 2.0  # in which a leap of an accelerometer is forgotten
@@ -70,7 +71,7 @@ def note_stillness(watch, signal):
     watch.restless *= 1.0 - watch.step.h / CALMED_S
     for i in range(N_SENSORS):
         watch.still[i] = watch.still[i] + 1 if signal[i] == watch.step.then[i] else 0
-        if i >= AX:
+        if AX <= i < N_IN_EQUATIONS:
             watch.restless = max(watch.restless, abs(signal[i] - watch.step.then[i]))
 
 
@@ -92,7 +93,7 @@ def weigh(watch, signal):
     if stands_still(watch, flow) or (watch.lead == SPEED and watch.fired[DENSITY]):
         clear_accelerometers(watch)
     frozen = False
-    for i in range(AX, N_SENSORS):
+    for i in range(AX, N_IN_EQUATIONS):
         frozen = frozen or stands_still(watch, i)
     if frozen or goes_on(watch) or would_show_elsewhere(watch, signal):
         watch.cleared[flow] = 1
@@ -182,7 +183,7 @@ def suspect_accelerometers(watch, shown):
     for i in range(3):
         size = max(size, abs(made_up[i]))
         frozen = AX + i if stands_still(watch, AX + i) else frozen
-    for i in range(AX, N_SENSORS):
+    for i in range(AX, N_IN_EQUATIONS):
         along = frozen == i or (frozen < 0 and abs(made_up[i - AX]) + doubt >= 0.5 * size)
         who[i] = along and not shown and not watch.cleared[i]
 
@@ -190,6 +191,6 @@ def suspect_accelerometers(watch, shown):
 @kernel
 def discard(watch, measured):
     """Have no accelerometer used once one may be broken."""
-    for i in range(AX, N_SENSORS):
+    for i in range(AX, N_IN_EQUATIONS):
         if watch.replaced[i] or (watch.alarmed and watch.suspect[i]):
             measured.inertial = 0

@@ -5,6 +5,7 @@
     density     2 qdyn / V^2 changes with height only
     climb       altitude[k+1] = altitude[k] + h (v upwards)
     engine      speed and manifold pressure are as commanded
+    equal       a sensor that no equation uses, and the reading that its row says it should equal
 
 h is the time between two looks, a JSBSim frame: the truth's own integrators are followed (rates held over the
 step; velocity by Adams and Bashforth's second order), so that residuals of sound instruments are what is left
@@ -27,7 +28,11 @@ from beaver_ftc.diagnosis.monitors.sensor_records import (
     BETA_FLOW,
     CLIMB,
     DENSITY,
+    EQUAL_READING,
+    EQUAL_SENSOR,
+    EQUAL_WITHIN,
     LEAP_M_S2,
+    N_COMPUTED,
     PSI,
     QDYN,
     RPM,
@@ -39,6 +44,7 @@ from beaver_ftc.diagnosis.monitors.sensor_records import (
     R,
 )
 from beaver_ftc.plant.instruments import ALTITUDE, AX, ENGINE_SPEED, MANIFOLD, N_SENSORS, PHI, wrapped
+from beaver_ftc.scenario.sensors import N_IN_EQUATIONS
 
 TURNING_RAD_S = 4e-5  # Earth rate is in the rates; the level turns with the flight over the round Earth
 FALLING_M_S2 = 0.03  # Coriolis, centrifugal, and gravity's change with place
@@ -317,6 +323,21 @@ def follow_engine(step, signal):
     for which in range(2):
         size = step.error[ENGINE_SPEED + which] + 1e-6
         step.test[RPM + which].share = abs(step.test[RPM + which].residual) / size
+
+
+@kernel
+def compare_equals(step, signal, fresh):
+    """Compare each sensor that should equal a reading with that reading, when it gives a new sample, `fresh`:
+    beyond what the errors of both and the two quantities may differ by, one of the two is broken."""
+    for k in range(EQUAL_SENSOR.size):
+        i, reading, test = EQUAL_SENSOR[k], EQUAL_READING[k], step.test[N_COMPUTED + k]
+        test.share = 0.0
+        if fresh[i - N_IN_EQUATIONS]:
+            test.residual = signal[i] - signal[reading]
+            if PHI <= reading <= PSI:
+                test.residual = wrapped(test.residual)
+            test.bound[0] = EQUAL_WITHIN[k] + step.error[i] + step.error[reading] + 1e-6
+            test.share = abs(test.residual) / test.bound[0]
 
 
 @kernel

@@ -25,6 +25,10 @@ from beaver_ftc.diagnosis.monitors.sensor_records import (
     BETA_FLOW,
     CLIMB,
     DENSITY,
+    EQUAL_READING,
+    EQUAL_SENSOR,
+    EQUAL_SHOWS,
+    N_COMPUTED,
     N_TESTS,
     NO,
     NOBODY,
@@ -50,6 +54,7 @@ from beaver_ftc.plant.instruments import (
     note_slipstream,
     share_out,
 )
+from beaver_ftc.scenario.sensors import N_IN_EQUATIONS
 
 INVOLVED = 0.03  # of the largest residual of its kind: less is what a large error does to its neighbours
 ASKED = 3  # `begun`: after the first look 1, with the first whole frame 2, from the next one on 3
@@ -75,6 +80,9 @@ def monitor(watch, belief, measured, conclusion, bank, bound, dt, t):
     if watch.past == 0:
         follow_rates(watch, bank.innovation, bound.eta_bar, dt)
     redundancy.check(step, signal, watch.engine)
+    if N_TESTS > N_COMPUTED:
+        redundancy.compare_equals(step, signal, measured.fresh)
+        note_agreement(watch, measured.fresh)
     since_start.follow(step, watch.since, signal)
     accelerometers.note_stillness(watch, signal)
     if watch.past == 0:
@@ -270,6 +278,9 @@ def suspect(watch):
     """Fill suspect (N_SENSORS,) with the instruments that can have brought the tests here."""
     who, lead, fired = watch.suspect, watch.lead, watch.fired
     who[:] = 0
+    if lead >= N_COMPUTED:
+        suspect_unequal(watch, lead - N_COMPUTED)
+        return
     if lead < SPEED:
         suspect_attitude(watch)
     if lead == SPEED:
@@ -287,6 +298,31 @@ def suspect(watch):
     for i in range(STARTERS):
         if not frozen and since_start.explains(watch.since, i, lead):
             who[(ALPHA, BETA, AIRSPEED, PHI, THETA)[i]] = 1
+
+
+@kernel
+def note_agreement(watch, fresh):
+    """Note which sensors have equalled the reading that they should, before any alarm."""
+    for k in range(EQUAL_SENSOR.size):
+        equal = watch.step.test[N_COMPUTED + k].share <= 1.0
+        if fresh[EQUAL_SENSOR[k] - N_IN_EQUATIONS] and equal and not watch.alarmed:
+            watch.agreed[k] = 1
+
+
+@kernel
+def suspect_unequal(watch, k):
+    """Of a sensor and the reading that it no longer equals: the reading if its own test shows an error, the
+    sensor if an error of the reading of this size would have shown there, both where neither is certain.
+
+    No test shows an error that a reading has had from the first look on, nor one that is frozen.
+    """
+    step, reading, shows = watch.step, EQUAL_READING[k], EQUAL_SHOWS[k]
+    own, test = step.test[shows], step.test[N_COMPUTED + k]
+    least = abs(test.residual) - test.bound[0]  # of the error, if it is the reading's
+    hidden = least <= 2.0 * max(own.bound[0], step.error[reading])
+    frozen = accelerometers.stands_still(watch, reading)
+    watch.suspect[EQUAL_SENSOR[k]] = not watch.fired[shows]
+    watch.suspect[reading] = watch.fired[shows] == 1 or hidden or frozen or not watch.agreed[k]
 
 
 @kernel

@@ -6,10 +6,25 @@ import numpy as np
 
 from beaver_ftc.compiled import record
 from beaver_ftc.plant.instruments import N_SENSORS, PHI, SENSORS, SIGNALS
-from beaver_ftc.scenario.sensors import sensor_words
+from beaver_ftc.scenario.sensors import ROWS, sensor_words
 
 TURN, ANGLE, SPEED, ALPHA_FLOW, BETA_FLOW, DENSITY, CLIMB, RPM, PRESSURE = 0, 3, 6, 7, 8, 9, 10, 11, 12
-N_TESTS = 13
+N_COMPUTED = 13  # tests with an equation; then those of sensors that should equal another reading
+EQUAL = tuple((SENSORS.index(row.name), row.equal) for row in ROWS if row.equal is not None)
+N_TESTS = N_COMPUTED + len(EQUAL)
+# The test in which a jump of a reading appears at once, as the rows of the sensors name it.
+TESTS = {
+    "roll": TURN, "pitch": TURN + 1, "yaw": TURN + 2,
+    "bank angle": ANGLE, "pitch angle": ANGLE + 1, "heading": ANGLE + 2,
+    "speed": SPEED, "incidence": ALPHA_FLOW, "sideslip": BETA_FLOW, "density": DENSITY, "climb": CLIMB,
+    "engine speed": RPM, "manifold pressure": PRESSURE,
+}  # fmt: skip
+# Of each sensor that should equal another reading: its place, that of the reading, the test in which the
+# reading's own errors appear, and by how much the quantities may differ, SI.
+EQUAL_SENSOR = np.array([i for i, _ in EQUAL], np.int64)
+EQUAL_READING = np.array([SENSORS.index(to.reading) for _, to in EQUAL], np.int64)
+EQUAL_SHOWS = np.array([TESTS[ROWS[SENSORS.index(to.reading)].test] for _, to in EQUAL], np.int64)
+EQUAL_WITHIN = np.array([to.within for _, to in EQUAL], float)
 POLES_PER_S = (1e6, 10.0, 1.0)
 N_POLES = len(POLES_PER_S)
 NOBODY = -1
@@ -69,6 +84,7 @@ WATCH = record(
     gyro_error=3, gyro_error_then=3,  # as each frame began, rad/s
     spike=3, spike_then=3, spike_before=3, damping=(3, 3), W=3, W_bound=3, W_then=3, before=3,
     # no gyro can be what the rates show: what attitude and W make of that, and how far one gyro goes
+    agreed=(int, max(len(EQUAL), 1)),  # whether a sensor has equalled the reading that it should
     blurred=int, no_gyro=int, apart=(3, N_POLES), apart_bound=(3, N_POLES),
     rates_say=(int, 3), taken_over=(int, 3),
     # accelerometers.py: looks with the very same reading, and how many say that it is frozen; readings of

@@ -1,0 +1,144 @@
+"""A sensor that is unlike those there is added to a copy of the package: by its row, and its presets.
+
+A radio altimeter measures in feet, five times a second. Nothing else of the copy is touched: scenarios,
+schema, log and the sensor monitor follow from the row.
+"""
+
+import filecmp
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import beaver_ftc
+from beaver_ftc.documents.paths import data_root
+
+ERRORS = '''@_reads("ft", "ft", 1000, 0.3048)
+class RadioAltimeter(_Sensor):
+    """Height above the ground."""
+
+
+class Equal(NamedTuple):'''
+ROW = """    Row("az", Accelerometer, 100.0),
+    Row(
+        "radio_altitude", RadioAltimeter, 500.0, truth=("position/h-agl-ft", 0.3048),
+        column="radio_altitude_measured_m", rate_hz=5.0, equal=Equal("altitude", 0.5),
+    ),
+)
+"""
+PRESET = "consumer-grade:\n  radio_altitude: {noise_std_ft: 0.5, bias_ft: 1.0, quantum_ft: 0.1}\n"
+FLIGHT = """
+import json, sys
+import beaver_ftc as bf
+sensors = {"altitude": {"noise_std_m": 0.2}, "radio_altitude": {"noise_std_ft": 0.3, "bias_ft": 1.0}}
+said = {
+    "name": "radio", "duration_s": 5, "rate_hz": 20, "seed": 3, "sensors": sensors,
+    "reference": {"q": [{"step": {"amplitude_deg_s": 6, "start_s": 0.5}}]},
+    "fdi": {"bounds": {"sensors": sensors}, "sensor_monitor": "always"},
+}
+told = {}
+for name, more in json.loads(sys.argv[1]).items():
+    flight = bf.fly(said | more)
+    columns = ("t_s", "altitude_m", "radio_altitude_measured_m")
+    told[name] = {column: flight.log[column].tolist() for column in columns}
+    told[name] |= {what: flight.metrics[what] for what in ("isolation", "detection")}
+print(json.dumps(told))
+"""
+
+
+@pytest.fixture(scope="module")
+def copied(tmp_path_factory):
+    """A copy of the package with the sensor in it."""
+    root = tmp_path_factory.mktemp("copied")
+    package = root / "beaver_ftc"
+    shutil.copytree(beaver_ftc.__path__[0], package, ignore=shutil.ignore_patterns("__pycache__"))
+    for folder in ("aircraft", "scenarios"):
+        shutil.copytree(data_root() / folder, package / "data" / folder, dirs_exist_ok=True)
+    rows = package / "scenario" / "sensors.py"
+    text = rows.read_text().replace("class Equal(NamedTuple):", ERRORS)
+    rows.write_text(text.replace('    Row("az", Accelerometer, 100.0),\n)\n', ROW))
+    presets = rows.with_name("presets.yaml")
+    presets.write_text(presets.read_text().replace("consumer-grade:\n", PRESET))
+    return root
+
+
+def in_copy(copied, program, *asked):
+    """What a program prints with the copy."""
+    done = subprocess.run(
+        [sys.executable, "-c", program, *asked], capture_output=True, text=True, check=False,
+        env={**os.environ, "PYTHONPATH": str(copied), "NUMBA_DISABLE_JIT": "1"},
+    )  # fmt: skip
+    assert done.returncode in (0, 2), done.stderr
+    return done.stdout or done.stderr
+
+
+def fault(kind, sensor="radio_altitude", **more):
+    return {"faults": [{"sensor": sensor, "type": kind, "at_s": 3.0, **more}]}
+
+
+BROKEN = {  # what happens, who is named, and how soon the alarm comes, s
+    "bias": (fault("bias", magnitude=60.0), "radio_altitude", 0.2),
+    "scale": (fault("scale", magnitude=0.05), "radio_altitude", 0.2),
+    "lost": (fault("lost"), "radio_altitude", 0.05),
+    "freeze": (fault("freeze"), "radio_altitude", 2.0),
+    "altimeter": (fault("bias", sensor="altitude", magnitude=-18.0), "altitude", 0.2),
+}
+
+
+@pytest.fixture(scope="module")
+def flown(copied):
+    """By name what became of the flight of each fault, and of one without."""
+    asked = {"healthy": {}} | {name: more for name, (more, _, _) in BROKEN.items()}
+    return json.loads(in_copy(copied, FLIGHT, json.dumps(asked)))
+
+
+def test_two_files_are_touched(copied):
+    ours, package = Path(beaver_ftc.__path__[0]), copied / "beaver_ftc"
+    touched = [
+        path.relative_to(package).as_posix()
+        for path in package.rglob("*")
+        if path.is_file() and "data" not in path.parts and "__pycache__" not in path.parts
+        and not filecmp.cmp(path, ours / path.relative_to(package), shallow=False)
+    ]  # fmt: skip
+    assert sorted(touched) == ["scenario/presets.yaml", "scenario/sensors.py"]
+
+
+def test_it_is_read_at_its_own_rate_and_logged_in_metres(flown):
+    found = flown["healthy"]
+    assert found["detection"]["time_s"] is None
+    readings, truth = found["radio_altitude_measured_m"], found["altitude_m"]
+    changes = [k for k in range(1, len(readings)) if readings[k] != readings[k - 1]]
+    assert changes == list(range(4, len(readings), 4))  # of 20 frames a second
+    for k in (0, *changes):
+        assert abs(readings[k] - truth[k] - 0.3048) <= 4 * 0.3 * 0.3048
+    stale = [abs(readings[k] - truth[k] - 0.3048) for k in range(len(readings) - 4, len(readings))]
+    assert max(stale) > 0.3  # the aircraft has climbed since the last sample
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_the_monitor_names_the_one_that_is_broken(flown, name):
+    _, broken, soon_s = BROKEN[name]
+    found = flown[name]
+    assert found["isolation"]["fault"] == f"sensor {broken}"
+    assert 3.0 <= found["detection"]["time_s"] <= 3.0 + soon_s
+
+
+def test_scenarios_and_schema_know_it(copied):
+    schema = in_copy(copied, "from beaver_ftc.cli.main import main; main()", "schema")
+    assert re.search(r'"noise_std_ft": \{[^}]*"unit": "ft"', schema) or '"noise_std_ft"' in schema
+    program = (
+        "import beaver_ftc as bf\n"
+        "known = bf.load({'name': 'x', 'sensors': 'consumer-grade'}).sensors.radio_altitude\n"
+        "print(known.noise_std_ft, known.noise_bias_quantum)\n"
+        "try: bf.load({'name': 'x', 'faults': [{'sensor': 'radio_altitude', 'type': 'bias', 'magnitude': 501,"
+        " 'at_s': 1}]})\n"
+        "except bf.BadInput as error: print(error)\n"
+    )
+    first, second = in_copy(copied, program).splitlines()
+    assert first == f"0.5 ({0.5 * 0.3048}, {0.3048}, {0.1 * 0.3048})"
+    assert second.endswith("501 is out of range, allowed: at most 500 ft for radio_altitude")

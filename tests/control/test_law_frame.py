@@ -78,7 +78,7 @@ def test_the_rejecting_law_has_no_integral_and_begins_with_what_is_measured():
 def believed(frame, surface, theta=-0.6, detected=1):
     """The isolated loss of a surface, by its estimator."""
     fdi = frame["fdi"]
-    estimators = fdi["isolation"]["estimator"][: int(fdi["isolation"]["n"])]
+    estimators = fdi["isolation"]["estimator"][: int(fdi["isolation"]["config"]["n"])]
     place = estimators["surface"].tolist().index(surface)
     fdi["verdict"]["detected"], fdi["verdict"]["isolated"] = detected, place
     fdi["isolation"]["estimator"][place]["theta"] = theta
@@ -158,9 +158,9 @@ def alarmed(known=0, speaks=0, score=2.0):
     fdi = frame["fdi"]
     fdi["verdict"]["detected"], fdi["config"]["authority"] = known, WORST_CASE
     fdi["watch"]["enabled"] = fdi["watch"]["alarmed"] = speaks
-    fdi["bank"]["threshold"] = 0.1
-    fdi["bank"]["residual"][0, 1] = 0.1 * score
-    fdi["fdae"]["network"]["weights"], fdi["fdae"]["network"]["output"] = 1.0, 0.0
+    fdi["bank"]["output"]["threshold"] = 0.1
+    fdi["bank"]["output"]["residual"][0, 1] = 0.1 * score
+    fdi["fdae"]["network"]["memory"]["weights"], fdi["fdae"]["network"]["output"] = 1.0, 0.0
     fdi["isolation"]["estimator"]["xhat"] = 9.0
     whole.conclude(fdi, frame["measured"], frame["belief"]["u"], 5.0)
     return fdi
@@ -168,7 +168,7 @@ def alarmed(known=0, speaks=0, score=2.0):
 
 def test_the_alarm_starts_the_estimators_once_and_the_network_answers():
     fdi = alarmed()
-    first = int(fdi["isolation"]["n"])
+    first = int(fdi["isolation"]["config"]["n"])
     assert fdi["verdict"]["detected"] == 1
     assert fdi["isolation"]["estimator"]["xhat"][:first] == pytest.approx(np.tile(X, (first, 1)))
     assert fdi["fdae"]["network"]["output"].all()

@@ -162,7 +162,7 @@ def _bang_bang(plant, bound, phi):
 
 def _push(plant, bound, phi):
     """Everything in the direction in which the residual already leans."""
-    return bound * np.where(plant.fdi["bank"]["residual"][0] >= 0, 1.0, -1.0)
+    return bound * np.where(plant.fdi["bank"]["output"]["residual"][0] >= 0, 1.0, -1.0)
 
 
 def _hide(plant, bound, phi):

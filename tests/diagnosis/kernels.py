@@ -12,10 +12,26 @@ DT, POLES = 0.02, np.array([1e6, 4.0, 0.5])
 
 def new_fdi():
     fdi = np.zeros(1, diagnosis_dtype(4)).view(np.recarray)[0]
-    fdi["config"]["dt"], fdi["bank"]["n"], fdi["bank"]["decay"][:3] = DT, 3, np.exp(-POLES * DT)
+    fdi["config"]["dt"], fdi["bank"]["config"]["n"], fdi["bank"]["config"]["decay"][:3] = (
+        DT,
+        3,
+        np.exp(-POLES * DT),
+    )
     fdi["types"]["config"]["dt"] = DT
-    fdi["isolation"]["forgetting"], fdi["isolation"]["decay"] = 0.98, np.exp(-np.array([3.0, 4.0, 5.0]) * DT)
+    fdi["isolation"]["config"]["forgetting"], fdi["isolation"]["config"]["decay"] = (
+        0.98,
+        np.exp(-np.array([3.0, 4.0, 5.0]) * DT),
+    )
     return fdi
+
+
+def fill(record, **values):
+    """Fill fields of a stage's record: of its own, its config, memory or output. Returns the record."""
+    sections = [record[part] for part in ("config", "memory", "output") if part in record.dtype.names]
+    for name, value in values.items():
+        holder = next(part for part in (record, *sections) if name in (part.dtype.names or ()))
+        holder[name] = value
+    return record
 
 
 WHERE = {
@@ -31,7 +47,7 @@ def put(fdi, **values):
         if name in fdi["types"]["config"].dtype.names:
             fdi["types"]["config"][name] = value
         if name in WHERE:
-            fdi[WHERE[name]][name] = value
+            fill(fdi[WHERE[name]], **{name: value})
 
 
 def of_stages(fdi, kernel):
@@ -42,10 +58,10 @@ def of_stages(fdi, kernel):
         "config": types["config"] if whole else fdi["config"], "types": types, "surfaces": types["surface"],
         "pair": types["pair"], "conclusion": fdi["verdict"], "layout": fdi["layout"],
         "isolation": fdi["isolation"], "estimators": fdi["isolation"]["estimator"], "bound": fdi["bound"],
-        "shared": fdi["isolation"]["shared"], "abrupt": fdi["config"]["abrupt"],
+        "shared": fdi["isolation"]["config"]["shared"], "abrupt": fdi["config"]["abrupt"],
         "every_type": fdi["config"]["every_type"],
         "instants": fdi["config"]["instants"], "bank": fdi["bank"], "fdae": fdi["fdae"],
-        "innovation": fdi["bank"]["innovation"], "detected": fdi["verdict"]["detected"],
+        "innovation": fdi["bank"]["output"]["innovation"], "detected": fdi["verdict"]["detected"],
         "frame_bound": fdi["bound"]["frame"], "noise": fdi["bound"]["noise"], "dt": fdi["config"]["dt"],
         "statistical_alarm": fdi["statistical"]["alarm"],
         **({"k": types["frame"] if later else types["frame"] - 1} if whole else {}),
@@ -68,7 +84,7 @@ def on(kernel, fdi, *given):
 
 
 def estimator(fdi, kind=LOSS, surface=0, low=-1.0, high=0.0):
-    fdi["isolation"]["n"] = max(int(fdi["isolation"]["n"]), 1)
+    fdi["isolation"]["config"]["n"] = max(int(fdi["isolation"]["config"]["n"]), 1)
     fie = fdi["isolation"]["estimator"][0]
     fie["kind"], fie["surface"], fie["low"], fie["high"] = kind, surface, low, high
     fie["theta_low"], fie["theta_high"] = low, high

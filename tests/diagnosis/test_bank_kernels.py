@@ -21,23 +21,23 @@ def test_a_filter_and_its_bound_are_convolutions_of_what_went_in():
         fdi["bound"]["noise"] = noise[k + 1]
         on(bank.innovate, fdi, x[k + 1], x[k], believed[k])
     innovation = np.diff(x, axis=0) / DT - believed
-    assert fdi["bank"]["innovation"] == pytest.approx(innovation[-1])
+    assert fdi["bank"]["output"]["innovation"] == pytest.approx(innovation[-1])
     assert fdi["bound"]["frame"] == pytest.approx(eta[-1] + (noise[-1] + noise[-2]) / DT)
     for m, decay in enumerate(np.exp(-POLES * DT)):
         w = weights(decay, frames)
-        assert fdi["bank"]["residual"][m] == pytest.approx(DT * w @ innovation)
-        assert fdi["bank"]["eta"][m] == pytest.approx(DT * w @ eta)
-        assert fdi["bank"]["noise"][m] == pytest.approx((1.0 - decay) * w @ noise[:-1])
+        assert fdi["bank"]["output"]["residual"][m] == pytest.approx(DT * w @ innovation)
+        assert fdi["bank"]["memory"]["eta"][m] == pytest.approx(DT * w @ eta)
+        assert fdi["bank"]["memory"]["noise"][m] == pytest.approx((1.0 - decay) * w @ noise[:-1])
         whole = DT * w @ eta + (1.0 - decay) * w @ noise[:-1] + noise[-1]
-        assert fdi["bank"]["threshold"][m] == pytest.approx(whole)
+        assert fdi["bank"]["output"]["threshold"][m] == pytest.approx(whole)
 
 
 def with_shares(*shares):
     """A bank whose filters (m, 3) reach these shares of their bounds."""
     fdi = new_fdi()
     shares = np.array(shares)
-    fdi["bank"]["threshold"][:3] = [[0.1, 0.2, 0.3], [0.4, 0.5, 0.6], [0.7, 0.8, 0.9]]
-    fdi["bank"]["residual"][:3] = shares * fdi["bank"]["threshold"][:3]
+    fdi["bank"]["output"]["threshold"][:3] = [[0.1, 0.2, 0.3], [0.4, 0.5, 0.6], [0.7, 0.8, 0.9]]
+    fdi["bank"]["output"]["residual"][:3] = shares * fdi["bank"]["output"]["threshold"][:3]
     return fdi
 
 
@@ -55,20 +55,20 @@ def test_the_alarm_is_of_the_first_axis_on_which_a_filter_leaves_its_bound():
 def test_the_closest_approach_of_every_filter_is_kept():
     fdi = with_shares(*LEAVES)
     alarm = fdi["statistical"]["alarm"]
-    fdi["bank"]["closest"][:3], alarm["score"] = (0.6, 0.0, 0.0), 0.4
+    fdi["bank"]["output"]["closest"][:3], alarm["score"] = (0.6, 0.0, 0.0), 0.4
     bank.note_closest_approach(fdi["bank"])
     statistical.note_closest_approach(alarm)
-    assert fdi["bank"]["closest"][:3] == pytest.approx([0.6, 1.5, 1.2])
+    assert fdi["bank"]["output"]["closest"][:3] == pytest.approx([0.6, 1.5, 1.2])
     assert alarm["closest"] == 0.4
     silent = new_fdi()
     bank.note_closest_approach(silent["bank"])
-    assert not silent["bank"]["closest"].any()
+    assert not silent["bank"]["output"]["closest"].any()
     assert on(bank.largest_share, silent) == 0.0
 
 
 def test_the_direction_across_a_fault_is_of_unit_length_and_sees_nothing_of_it():
     fdi = new_fdi()
-    fdi["isolation"]["n"] = 2
+    fdi["isolation"]["config"]["n"] = 2
     fdi["isolation"]["estimator"]["surface"][:2] = 2, 1
     G = np.array([[0, 0, 3.0, 0], [0, 5.0, 0, 0], [0, 0, -4.0, 0]])
     on(bank.align, fdi, G)
@@ -108,10 +108,10 @@ def test_what_a_fault_can_have_done_is_the_filtered_extreme_of_what_it_does(seed
 def test_a_fault_explains_what_is_within_its_reach_and_the_bound(m, axis, side):
     def explained(beyond, unasked=False):
         fdi, fie = reach_of(0.0, 0.0, 0.0, across=(0.0, 0.0, 0.0))
-        fie["reach_low"], fie["reach_high"], fdi["bank"]["threshold"] = -0.3, 0.5, 0.1
+        fie["reach_low"], fie["reach_high"], fdi["bank"]["output"]["threshold"] = -0.3, 0.5, 0.1
         fie["unasked"][axis] = unasked
         limit = -0.4 if side < 0 else 0.6
-        fdi["bank"]["residual"][m, axis] = limit + side * beyond
+        fdi["bank"]["output"]["residual"][m, axis] = limit + side * beyond
         return bool(on(bank.explains, fdi, fie, True))
 
     assert explained(-1e-9)
@@ -124,10 +124,10 @@ def test_across_its_direction_a_shared_parameter_confines_it_too(side):
     fdi, fie = reach_of(0.0, 0.0, 0.0)
     fie["reach_low"][:, :3], fie["reach_high"][:, :3] = -9.0, 9.0
     fie["reach_low"][:, 3], fie["reach_high"][:, 3] = -0.2, 0.3
-    fdi["bank"]["threshold"][:3] = 0.1
+    fdi["bank"]["output"]["threshold"][:3] = 0.1
     limit = (0.3 if side > 0 else -0.2) + side * (0.6 + 0.8) * 0.1
     for beyond, within in ((-1e-9, True), (1e-9, False)):
-        fdi["bank"]["residual"][1] = (limit + side * beyond) * fie["across"]  # a unit vector
+        fdi["bank"]["output"]["residual"][1] = (limit + side * beyond) * fie["across"]  # a unit vector
         assert bool(on(bank.explains, fdi, fie, True)) == within
         assert on(bank.explains, fdi, fie, False)
 
@@ -135,12 +135,12 @@ def test_across_its_direction_a_shared_parameter_confines_it_too(side):
 def test_a_filter_without_a_bound_has_no_share_of_it():
     """Nothing is declared: it may alarm, but is nearer to its bound than no other."""
     fdi = with_shares(*LEAVES)
-    fdi["bank"]["threshold"][0] = 0.0
+    fdi["bank"]["output"]["threshold"][0] = 0.0
     with np.errstate(divide="ignore"):
         assert on(bank.largest_share, fdi) == pytest.approx(1.5)
         assert [bank.nearest(fdi["bank"], i) for i in range(3)] == [2, 1, 2]
         bank.note_closest_approach(fdi["bank"])
-    assert fdi["bank"]["closest"][:3] == pytest.approx([0.0, 1.5, 1.2])
+    assert fdi["bank"]["output"]["closest"][:3] == pytest.approx([0.0, 1.5, 1.2])
     assert on(bank.alarm, fdi) == 0
 
 
@@ -170,13 +170,13 @@ def test_poles_are_those_asked_for_and_those_that_noise_asks_for(noisy, several)
     asked |= {"sharpen": {"pole_bank": several}}
     scenario, fdi = Scenario.model_validate({"name": "x", "fdi": asked}), new_fdi()
     config = scenario.fdi
-    fdi["bank"]["decay"] = 0.0
+    fdi["bank"]["config"]["decay"] = 0.0
     bank.configure(fdi["bank"], config, Declared.of(scenario), DT)
     bound = max(config.bounds.constant_rad_s2.as_tuple())
     for_noise = poles_for_noise(SensorErrors(config.bounds.sensors), bound)
     assert bool(for_noise) is noisy
     poles = [2.5, *([11.0, 0.7, *for_noise] if several else [])]
     apart(poles=poles)
-    assert fdi["bank"]["n"] == len(poles)
-    assert fdi["bank"]["decay"][: len(poles)] == pytest.approx(np.exp(-DT * np.array(poles)))
-    assert not fdi["bank"]["decay"][len(poles) :].any()
+    assert fdi["bank"]["config"]["n"] == len(poles)
+    assert fdi["bank"]["config"]["decay"][: len(poles)] == pytest.approx(np.exp(-DT * np.array(poles)))
+    assert not fdi["bank"]["config"]["decay"][len(poles) :].any()

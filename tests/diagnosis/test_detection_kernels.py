@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from kernels import DT, new_fdi, on
+from kernels import DT, fill, new_fdi, on
 
 from beaver_ftc.diagnosis import conclusion
 from beaver_ftc.diagnosis.belief import expectation as beliefs
-from beaver_ftc.diagnosis.detection import fdae
+from beaver_ftc.diagnosis.detection import bank, fdae
 from beaver_ftc.diagnosis.detection.fdae import ALPHA_CENTRES, BETA_CENTRES, N_BASIS, NETWORK
 from beaver_ftc.diagnosis.state import (
     EITHER,
@@ -17,10 +17,7 @@ from beaver_ftc.scenario.schema import Scenario
 
 
 def new_network(**fields):
-    record = np.zeros(1, NETWORK).view(np.recarray)[0]
-    for name, value in fields.items():
-        record[name] = value
-    return record
+    return fill(np.zeros(1, NETWORK).view(np.recarray)[0], **fields)
 
 
 @pytest.mark.parametrize("alpha", [-0.3, -0.1, 0.0, 0.13, 0.5, 0.9])
@@ -47,7 +44,7 @@ def test_the_output_is_the_weights_on_the_basis():
     rng = np.random.default_rng(1)
     record = new_network(weights=rng.normal(size=(3, N_BASIS)))
     fdae.evaluate(record, 0.1, -0.05)
-    assert record["output"] == pytest.approx(record["weights"] @ record["basis"])
+    assert record["output"] == pytest.approx(record["memory"]["weights"] @ record["memory"]["basis"])
 
 
 @pytest.mark.parametrize("leaking", [False, True])
@@ -59,21 +56,22 @@ def test_weights_learn_what_exceeds_the_threshold_and_leak(leaking):
     )
     fdae.learn(record, np.array([0.5, -0.4, 0.1]), np.full(3, 0.2), leaking, DT)
     kept = np.exp(-2.0 * DT) if leaking else 1.0
-    learnt = DT * 30.0 * np.outer([0.3, -0.2, 0.0], record["basis"])
-    assert record["weights"] == pytest.approx(kept * before + learnt)
-    record["weight_limit"] = 0.05
+    learnt = DT * 30.0 * np.outer([0.3, -0.2, 0.0], record["memory"]["basis"])
+    assert record["memory"]["weights"] == pytest.approx(kept * before + learnt)
+    record["config"]["weight_limit"] = 0.05
     fdae.learn(record, np.array([0.5, -0.4, 0.1]), np.full(3, 0.2), leaking, DT)
-    assert np.abs(record["weights"]).max() == 0.05
-    assert record["weights"].min() == -0.05
+    assert np.abs(record["memory"]["weights"]).max() == 0.05
+    assert record["memory"]["weights"].min() == -0.05
 
 
 def test_a_diagnosis_begins_with_no_residual_and_the_gyros_error_to_come():
     fdi = new_fdi()
     fdi["bound"]["noise"] = 0.1, 0.2, 0.3
     on(fdae.begin, fdi, np.array([1.0, 2.0, 3.0]))
-    assert fdi["fdae"]["xhat"] == pytest.approx([1.0, 2.0, 3.0])
-    assert fdi["fdae"]["threshold_noise"] == pytest.approx([0.1, 0.2, 0.3])
-    assert fdi["bank"]["noise"][:3] == pytest.approx(np.tile([0.1, 0.2, 0.3], (3, 1)))
+    assert fdi["fdae"]["memory"]["xhat"] == pytest.approx([1.0, 2.0, 3.0])
+    assert fdi["fdae"]["memory"]["threshold_noise"] == pytest.approx([0.1, 0.2, 0.3])
+    on(bank.begin, fdi)
+    assert fdi["bank"]["memory"]["noise"][:3] == pytest.approx(np.tile([0.1, 0.2, 0.3], (3, 1)))
 
 
 @pytest.mark.parametrize(
@@ -87,14 +85,18 @@ def test_a_diagnosis_begins_with_no_residual_and_the_gyros_error_to_come():
 def test_who_is_in_authority_raises_the_alarm(authority, filters, score, axis):
     fdi = new_fdi()
     fdi["config"]["authority"] = authority
-    fdi["bank"]["threshold"][:3], fdi["bank"]["residual"][1, 2] = 0.1, 0.1 * filters
-    fdi["statistical"]["alarm"]["score"], fdi["statistical"]["alarm"]["axis"], fdi["fdae"]["xhat"] = (
+    fdi["bank"]["output"]["threshold"][:3], fdi["bank"]["output"]["residual"][1, 2] = 0.1, 0.1 * filters
+    (
+        fdi["statistical"]["alarm"]["score"],
+        fdi["statistical"]["alarm"]["axis"],
+        fdi["fdae"]["memory"]["xhat"],
+    ) = (
         score,
         0,
         (1.0, 1.0, 1.0),
     )
     fdae.form_residual(fdi["fdae"], np.array([1.5, 0.5, 1.0]))
-    assert fdi["fdae"]["residual"] == pytest.approx([0.5, -0.5, 0.0])
+    assert fdi["fdae"]["output"]["residual"] == pytest.approx([0.5, -0.5, 0.0])
     assert on(fdae.detect, fdi, authority) == (-1 if axis is None else axis)
 
 
@@ -111,30 +113,35 @@ def test_the_detection_estimator_and_its_threshold_are_convolutions(detected):
     rng, frames, fdi = np.random.default_rng(3), 15, new_fdi()
     decay = np.exp(-np.array([2.0, 3.0, 4.0]) * DT)
     record = fdi["fdae"]
-    record["decay"], fdi["verdict"]["detected"] = decay, detected
+    record["config"]["decay"], fdi["verdict"]["detected"] = decay, detected
     record["network"]["output"] = output = np.array([0.1, -0.2, 0.3])
-    record["network"]["gain"], record["network"]["basis"], record["network"]["weight_limit"] = 1.0, 1.0, 100.0
+    (
+        record["network"]["config"]["gain"],
+        record["network"]["memory"]["basis"],
+        record["network"]["config"]["weight_limit"],
+    ) = 1.0, 1.0, 100.0
     x, believed = rng.normal(size=(frames, 3)), rng.normal(size=(frames, 3))
     eta, noise = rng.uniform(0.1, 0.3, (frames, 3)), rng.uniform(0.1, 0.3, (frames + 1, 3))
     for k in range(frames):
         fdi["bound"]["eta_bar"], fdi["bound"]["noise_then"] = eta[k], noise[k]
-        fdi["bound"]["noise"], record["residual"] = noise[k + 1], 99.0
+        fdi["bound"]["noise"], record["output"]["residual"] = noise[k + 1], 99.0
         on(fdae.predict, fdi, x[k], believed[k], False)
     w = decay ** np.arange(frames)[::-1, None]
     shares = w * ((1.0 - decay) * x + DT * (believed + output))
-    assert record["xhat"] == pytest.approx(shares.sum(axis=0))
+    assert record["memory"]["xhat"] == pytest.approx(shares.sum(axis=0))
     sums = DT * (w * eta).sum(axis=0), ((1.0 - decay) * w * noise[:-1]).sum(axis=0)
-    assert record["threshold_eta"] == pytest.approx(sums[0])
-    assert record["threshold_noise"] == pytest.approx(sums[1])
-    assert record["threshold"] == pytest.approx(sums[0] + sums[1] + noise[-1])
-    assert record["network"]["weights"].any() == detected
+    assert record["memory"]["threshold_eta"] == pytest.approx(sums[0])
+    assert record["memory"]["threshold_noise"] == pytest.approx(sums[1])
+    assert record["output"]["threshold"] == pytest.approx(sums[0] + sums[1] + noise[-1])
+    assert record["network"]["memory"]["weights"].any() == detected
 
 
 def test_beyond_the_model_is_what_was_learnt_and_the_residual_beyond_noise():
     fdi, out = new_fdi(), np.zeros(3)
     record = fdi["fdae"]
-    record["network"]["output"], record["pole"], record["residual"] = 0.1, (2.0, 3.0, 4.0), (0.5, -0.5, 0.05)
-    record["threshold_noise"], fdi["bound"]["noise"] = 0.1, 0.2
+    record["network"]["output"], record["config"]["pole"] = 0.1, (2.0, 3.0, 4.0)
+    record["output"]["residual"] = 0.5, -0.5, 0.05
+    record["memory"]["threshold_noise"], fdi["bound"]["noise"] = 0.1, 0.2
     on(fdae.unknown_acceleration, fdi, out)
     assert out == pytest.approx([0.1 + 2.0 * 0.2, 0.1 - 3.0 * 0.2, 0.1])
 
@@ -212,8 +219,8 @@ def test_an_estimator_forgets_by_the_frame_however_many_instants_it_has(substeps
     asked = {"fdi": {"detection_pole_per_s": 2.2}, "control": control, "rate_hz": 40, "substeps": substeps}
     record = new_fdi()["fdae"]
     fdae.configure(record, Scenario.model_validate({"name": "x", **asked}))
-    assert np.unique(record["pole"]).tolist() == [2.2]
-    assert np.unique(record["decay"]) == pytest.approx([np.exp(-2.2 / 40.0)])
+    assert np.unique(record["config"]["pole"]).tolist() == [2.2]
+    assert np.unique(record["config"]["decay"]) == pytest.approx([np.exp(-2.2 / 40.0)])
     network = record["network"]
     names = "gain", "leak_per_s", "weight_limit"
-    assert [float(network[name]) for name in names] == [91.0, 0.7, 3.3]
+    assert [float(network["config"][name]) for name in names] == [91.0, 0.7, 3.3]

@@ -29,20 +29,20 @@ def summed(pole_keeps, inputs):
 @pytest.mark.parametrize("kind", ["random", "push"])
 def test_until_an_alarm_all_is_sums_of_what_the_model_does_not_explain(kind):
     flown = plant().fly(30, UNCERTAINTIES[kind])
-    fdi, n = flown.fdi, int(flown.fdi["bank"]["n"])
+    fdi, n = flown.fdi, int(flown.fdi["bank"]["config"]["n"])
     missed, bounds = np.array(flown.innovations[:-1]), np.array(flown.bounds[:-1]) + ROUNDING_RAD_S2
     assert not fdi["verdict"]["detected"]
-    assert fdi["bank"]["innovation"] == pytest.approx(missed[-1])
-    keeps = fdi["bank"]["decay"][:n]
-    assert fdi["bank"]["residual"][:n] == pytest.approx(summed(keeps, missed))
-    assert fdi["bank"]["threshold"][:n] == pytest.approx(summed(keeps, bounds))
+    assert fdi["bank"]["output"]["innovation"] == pytest.approx(missed[-1])
+    keeps = fdi["bank"]["config"]["decay"][:n]
+    assert fdi["bank"]["output"]["residual"][:n] == pytest.approx(summed(keeps, missed))
+    assert fdi["bank"]["output"]["threshold"][:n] == pytest.approx(summed(keeps, bounds))
     for i in range(3):
-        keep = fdi["fdae"]["decay"][i]
-        assert fdi["fdae"]["residual"][i] == pytest.approx(summed(keep, missed[:, [i]])[0])
-        assert fdi["fdae"]["threshold"][i] == pytest.approx(summed(keep, bounds[:, [i]])[0])
+        keep = fdi["fdae"]["config"]["decay"][i]
+        assert fdi["fdae"]["output"]["residual"][i] == pytest.approx(summed(keep, missed[:, [i]])[0])
+        assert fdi["fdae"]["output"]["threshold"][i] == pytest.approx(summed(keep, bounds[:, [i]])[0])
     assert not fdi["fdae"]["network"]["weights"].any()
     assert not fdi["isolation"]["estimator"]["xhat"].any()
-    assert ((fdi["bank"]["closest"][:n] > 0.0) & (fdi["bank"]["closest"][:n] < 1.0)).all()
+    assert ((fdi["bank"]["output"]["closest"][:n] > 0.0) & (fdi["bank"]["output"]["closest"][:n] < 1.0)).all()
 
 
 @pytest.mark.parametrize("surface", [AILERON, ELEVATOR, RUDDER])
@@ -52,8 +52,8 @@ def test_an_alarm_is_of_the_frame_in_which_a_residual_leaves_its_bound(surface):
     for _ in range(40):
         flown.fly(1, exactly)
         bank = flown.fdi["bank"]
-        n = int(bank["n"])
-        seen.append((np.abs(bank["residual"][:n]) > bank["threshold"][:n]).any(axis=0))
+        n = int(bank["config"]["n"])
+        seen.append((np.abs(bank["output"]["residual"][:n]) > bank["output"]["threshold"][:n]).any(axis=0))
         if flown.fdi["verdict"]["detected"]:
             break
     first = int(np.flatnonzero(np.any(seen, axis=1))[0])
@@ -92,7 +92,7 @@ def test_the_estimator_of_the_true_loss_stays_and_is_named_once_it_is_alone(surf
     flown = loss_flown(surface, exactly if kind == "none" else UNCERTAINTIES[kind])
     verdict, fies = (
         flown.fdi["verdict"],
-        flown.fdi["isolation"]["estimator"][: int(flown.fdi["isolation"]["n"])],
+        flown.fdi["isolation"]["estimator"][: int(flown.fdi["isolation"]["config"]["n"])],
     )
     left = np.flatnonzero(fies["excluded"] == 0)
     assert surface in left
@@ -112,7 +112,7 @@ def test_an_estimator_filters_what_its_fault_does_not_explain():
         if verdict["detected"]:
             alarm = round(float(verdict["detected_at_s"]) * RATE_HZ)
             moments = np.array(flown.innovations[alarm:k]).reshape(-1, 3) / THETA
-            omega = summed(flown.fdi["isolation"]["decay"][ELEVATOR], moments)
+            omega = summed(flown.fdi["isolation"]["config"]["decay"][ELEVATOR], moments)
             assert fie["omega"] == pytest.approx(omega, abs=1e-15)
             assert fie["residual"] == pytest.approx(omega * (THETA - fie["theta"]), abs=1e-12)
             steps.append(np.abs(fie["residual"]).max())

@@ -27,7 +27,7 @@ def run_estimator(shared, theta, kind=LOSS, frames=25, eta_share=1.0, seed=0):
     """An estimator beside a plant with this fault: (fdi, fie, what was fed in)."""
     rng, fdi = np.random.default_rng(seed), new_fdi()
     fie = estimator(fdi, kind, low=-1.0, high=0.6)
-    fdi["isolation"]["shared"], x = shared, rng.normal(size=3)
+    fdi["isolation"]["config"]["shared"], x = shared, rng.normal(size=3)
     fdi["bound"]["noise"] = 0.004, 0.005, 0.006
     on(estimators.start, fdi, x)
     fed = {name: [] for name in ("Z", "eta", "eta_bar", "noise_then", "spread")}
@@ -38,12 +38,12 @@ def run_estimator(shared, theta, kind=LOSS, frames=25, eta_share=1.0, seed=0):
         offset = rng.normal(size=3)
         fie["effect"]["Z"], fie["effect"]["offset"], fie["effect"]["spread"] = Z, offset, spread
         fdi["bound"]["eta_bar"], fdi["bound"]["noise_then"] = eta_bar, noise_then
-        estimators.within_limits(fie, fdi["isolation"]["thresholds"], x)
+        estimators.within_limits(fie, fdi["isolation"]["config"]["thresholds"], x)
         on(estimators.predict_all, fdi, x, believed)
         x = x + DT * (believed + offset + theta * Z + eta)
         for name, value in zip(fed, (Z, eta, eta_bar, noise_then, spread), strict=True):
             fed[name].append(value)
-    within = estimators.within_limits(fie, fdi["isolation"]["thresholds"], x)
+    within = estimators.within_limits(fie, fdi["isolation"]["config"]["thresholds"], x)
     return fdi, fie, {name: np.array(value) for name, value in fed.items()}, within
 
 
@@ -52,7 +52,7 @@ def test_the_residual_is_omega_times_the_error_and_the_filtered_uncertainty(shar
     """Whatever the estimate does [Zhang2005, sec. IV]; and every filter is the convolution it stands for."""
     theta, frames = -0.45, 25
     fdi, fie, fed, within = run_estimator(shared, theta, frames=frames)
-    w = fdi["isolation"]["decay"] ** np.arange(frames)[::-1, None]
+    w = fdi["isolation"]["config"]["decay"] ** np.arange(frames)[::-1, None]
     omega = DT * (w * fed["Z"]).sum(axis=0)
     uncertainty = DT * (w * fed["eta"]).sum(axis=0)
     assert fie["omega"] == pytest.approx(omega)
@@ -60,8 +60,8 @@ def test_the_residual_is_omega_times_the_error_and_the_filtered_uncertainty(shar
     assert fie["rise"] == pytest.approx(DT * (w * np.maximum(fed["Z"], 0)).sum(axis=0))
     assert fie["fall"] == pytest.approx(DT * (w * np.minimum(fed["Z"], 0)).sum(axis=0))
     eta = DT * (w * (fed["eta_bar"] + fed["spread"])).sum(axis=0)
-    left = fdi["isolation"]["decay"] ** frames * np.array([0.004, 0.005, 0.006])
-    noise = left + ((1.0 - fdi["isolation"]["decay"]) * w * fed["noise_then"]).sum(axis=0)
+    left = fdi["isolation"]["config"]["decay"] ** frames * np.array([0.004, 0.005, 0.006])
+    noise = left + ((1.0 - fdi["isolation"]["config"]["decay"]) * w * fed["noise_then"]).sum(axis=0)
     assert fie["bound_eta"] == pytest.approx(eta)
     assert fie["bound_noise"] == pytest.approx(noise)
     assert fie["bound"] == pytest.approx(eta + noise + [0.004, 0.005, 0.006])
@@ -130,7 +130,7 @@ def test_a_residual_at_its_limit_is_within_and_beyond_it_is_not(thresholds, axis
     def within(beyond, unasked=False):
         fdi = new_fdi()
         fie = estimator(fdi, low=-0.9, high=0.2)
-        fdi["isolation"]["thresholds"] = thresholds
+        fdi["isolation"]["config"]["thresholds"] = thresholds
         fie["rise"], fie["fall"], fie["bound"], fie["theta"] = 0.5, -0.2, 0.03, -0.3
         fie["omega"], fie["unasked"][axis] = 0.3, unasked
         lower, upper = -0.9 * 0.5 - 0.2 * 0.2, 0.2 * 0.5 + 0.9 * 0.2
@@ -139,7 +139,7 @@ def test_a_residual_at_its_limit_is_within_and_beyond_it_is_not(thresholds, axis
             limits = (-0.6 * 0.3 - 0.03, 0.6 * 0.3 + 0.03)
         x = np.zeros(3)
         x[axis] = limits[side > 0] + side * beyond
-        return bool(estimators.within_limits(fie, fdi["isolation"]["thresholds"], x))
+        return bool(estimators.within_limits(fie, fdi["isolation"]["config"]["thresholds"], x))
 
     assert within(-1e-12)
     assert not within(1e-9)
@@ -169,7 +169,7 @@ def test_who_rules_a_fault_out(every_type, authority, within, ruled_out):
 )  # fmt: skip
 def test_the_one_left_is_the_fault(excluded, isolated):
     fdi = new_fdi()
-    fdi["isolation"]["n"], fdi["isolation"]["estimator"]["excluded"][:3] = 3, excluded
+    fdi["isolation"]["config"]["n"], fdi["isolation"]["estimator"]["excluded"][:3] = 3, excluded
     fdi["verdict"]["isolated"], fdi["verdict"]["isolated_at_s"] = NOT_ISOLATED, -1.0
     assert on(estimators.decide, fdi, 4.0) == isolated
     for t in (4.0, 5.0):
@@ -181,7 +181,7 @@ def test_the_one_left_is_the_fault(excluded, isolated):
 @pytest.mark.parametrize(("doubted", "shown", "named"), [(1, 0, False), (1, 1, True), (0, 0, True)])
 def test_one_that_is_left_for_an_end_that_nobody_saw_begin_is_not_named(doubted, shown, named):
     fdi = new_fdi()
-    fdi["isolation"]["n"], fdi["isolation"]["estimator"]["excluded"][:3] = 3, (1, 0, 1)
+    fdi["isolation"]["config"]["n"], fdi["isolation"]["estimator"]["excluded"][:3] = 3, (1, 0, 1)
     fdi["isolation"]["estimator"]["doubted"][1], fdi["isolation"]["estimator"]["shown"][1] = doubted, shown
     assert on(estimators.decide, fdi, 4.0) == (1 if named else NOT_ISOLATED)
     fdi["isolation"]["estimator"]["excluded"][1] = 1
@@ -203,7 +203,7 @@ def test_what_is_supposed_of_a_frame(memory):
     rng, fdi = np.random.default_rng(4), new_fdi()
     estimator(fdi, surface=2)
     G, Gu, spread = rng.normal(size=(3, 3, 4))
-    fdi["isolation"]["memory"], fdi["verdict"]["detected"] = memory, 0
+    fdi["isolation"]["config"]["memory"], fdi["verdict"]["detected"] = memory, 0
     on(estimators.suppose_all, fdi, G, Gu, np.abs(spread))
     fie = fdi["isolation"]["estimator"][0]
     assert fie["reach_low"][:3, :3].any() == memory
@@ -226,7 +226,7 @@ def told(fdi, loss, step):
         hypotheses = block["hypothesis"][:2]
         hypotheses["kind"], hypotheses["surface"] = (LOSS, STEP), (0, -1)
         hypotheses["at_least"] = hypotheses["at_most"] = loss, step
-    fdi["isolation"]["n"], record["tests"]["share"] = 1, 1.0
+    fdi["isolation"]["config"]["n"], record["tests"]["share"] = 1, 1.0
     return estimator(fdi)
 
 
@@ -266,8 +266,8 @@ def doubtful(kind=LOSS, **switches):
     fdi = new_fdi()
     fie = estimator(fdi, kind)
     fie["bound"], fie["effect"]["Z"] = 1.0, (1.0, 0.0, 0.0)
-    fdi["bank"]["innovation"], fdi["bound"]["frame"] = (9.0, 0.0, 0.0), 1.0
-    fdi["bank"]["residual"], fdi["bank"]["threshold"] = 9.0, 1.0
+    fdi["bank"]["output"]["innovation"], fdi["bound"]["frame"] = (9.0, 0.0, 0.0), 1.0
+    fdi["bank"]["output"]["residual"], fdi["bank"]["output"]["threshold"] = 9.0, 1.0
     put(fdi, **switches)
     return fdi, fie
 
@@ -289,15 +289,15 @@ def test_each_test_that_is_switched_on_can_exclude(kind, switches, started, poss
 
 def test_a_position_is_asked_in_the_first_frame_where_the_past_is_kept():
     fdi, fie = doubtful(POSITION, memory=1)
-    fdi["bank"]["residual"] = 0.0
+    fdi["bank"]["output"]["residual"] = 0.0
     assert not on(estimators.possible, fdi, fie, np.zeros(3), False)
-    fdi["bank"]["innovation"] = 0.0
+    fdi["bank"]["output"]["innovation"] = 0.0
     assert on(estimators.possible, fdi, fie, np.zeros(3), False)
 
 
 def test_what_is_learned_of_a_constant_loss_is_kept_of_no_position():
     fdi, fie = doubtful(POSITION, membership=1, abrupt=1)
-    fdi["bank"]["innovation"] = 0.0
+    fdi["bank"]["output"]["innovation"] = 0.0
     on(estimators.possible, fdi, fie, np.zeros(3), True)
     assert fie["theta_low"].tolist() == [-1.0] * 3
 
@@ -331,14 +331,14 @@ def test_a_frame_is_shown_to_every_type_alone_or_in_its_block(length, started, m
     fdi = new_fdi()
     (
         fdi["config"]["every_type"],
-        fdi["isolation"]["memory"],
+        fdi["isolation"]["config"]["memory"],
         fdi["types"]["config"]["length"],
         fdi["types"]["config"]["span_s"],
     ) = 1, memory, length, 0.1
     fdi["layout"]["position_of"], fdi["layout"]["loss_of"] = range(4), range(4)
     fdi["layout"]["dominant_axis"], fdi["config"]["authority"] = (0, 1, 2, 1), WORST_CASE
     (
-        fdi["isolation"]["n"],
+        fdi["isolation"]["config"]["n"],
         fdi["types"]["config"]["patience"],
         fdi["config"]["instants"],
         fdi["types"]["config"]["whole"],

@@ -71,7 +71,7 @@ def test_no_healthy_flight_alarms(uncertainty):
     for seed in range(5):
         plant = Mapped(seed=seed).fly(FRAMES, UNCERTAINTIES[uncertainty])
         assert plant.detected_at_s == np.inf
-        assert plant.fdi["bank"]["closest"].max() > 0.9
+        assert plant.fdi["bank"]["output"]["closest"].max() > 0.9
 
 
 @pytest.mark.parametrize("course", POSITIONS)
@@ -116,7 +116,7 @@ def test_the_room_of_a_position_is_that_of_where_it_can_have_been():
         SHARE,
     )
     bound["error_map"]["travel_low"], bound["error_map"]["travel_high"] = -0.5, 0.5
-    bound["beyond"][:3], bound["frame"], fdi["bank"]["innovation"] = ERROR, 0.1, (0.0, 1.0, 0.0)
+    bound["beyond"][:3], bound["frame"], fdi["bank"]["output"]["innovation"] = ERROR, 0.1, (0.0, 1.0, 0.0)
     fie["effect"]["Z"], fdi["config"]["instants"] = (0.0, 20.0, 0.0), 1
     # 1.0 +- 0.1 +- 3.0 over 20: within 0.205 of 0.5 rad, the second level; then 1.4 / 20, the first
     on(membership.allow_for_own_errors, fdi, fie)

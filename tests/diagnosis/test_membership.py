@@ -27,7 +27,7 @@ def test_without_an_effect_every_parameter_agrees_or_none():
 def agreeing(innovation, **fields):
     fdi = new_fdi()
     fie = estimator(fdi, low=-1.0, high=0.0)
-    fdi["bank"]["innovation"], fdi["bound"]["frame"] = innovation, 0.1
+    fdi["bank"]["output"]["innovation"], fdi["bound"]["frame"] = innovation, 0.1
     fie["effect"]["Z"], fie["effect"]["offset"], fie["effect"]["spread"] = (1.0, 2.0, -1.0), 0.3, 0.05
     for name, value in fields.items():
         fie[name] = value
@@ -50,7 +50,7 @@ def test_one_theta_has_to_explain_all_axes():
 def test_of_a_constant_theta_every_frame_leaves_what_it_agrees_with(shared):
     exact = 0.3 - 0.5 * np.array([1.0, 2.0, -1.0])
     fdi, fie = agreeing(exact)
-    fdi["isolation"]["shared"] = shared
+    fdi["isolation"]["config"]["shared"] = shared
     fie["omega"], fie["theta"], fie["bound"] = (0.5, 0.0, 1.0), -0.2, 0.05
     fie["residual"] = fie["omega"] * (-0.5 + 0.2)
     assert on(membership.narrow, fdi, fie)
@@ -73,7 +73,7 @@ def test_how_far_a_surface_can_have_been_is_narrowed_round_by_round(instants):
     """A position whose terms' errors grow with it: the room is a fixed point of where it can have been."""
     fdi = new_fdi()
     fie = estimator(fdi, POSITION, surface=1, low=-0.6, high=0.5)
-    fdi["config"]["instants"], fdi["bank"]["innovation"], fdi["bound"]["frame"] = (
+    fdi["config"]["instants"], fdi["bank"]["output"]["innovation"], fdi["bound"]["frame"] = (
         instants,
         (0.0, 0.9, 0.0),
         0.05,
@@ -95,7 +95,11 @@ def test_how_far_a_surface_can_have_been_is_narrowed_round_by_round(instants):
 def test_where_no_position_agrees_the_whole_travel_stays_possible():
     fdi = new_fdi()
     fie = estimator(fdi, POSITION, surface=1, low=-0.6, high=0.5)
-    fdi["config"]["instants"], fdi["bank"]["innovation"], fdi["bound"]["frame"] = 1, (0.0, 9.0, 0.0), 0.05
+    fdi["config"]["instants"], fdi["bank"]["output"]["innovation"], fdi["bound"]["frame"] = (
+        1,
+        (0.0, 9.0, 0.0),
+        0.05,
+    )
     fdi["bound"]["own_per_rad"][:, 1] = 0.1
     fie["effect"]["Z"] = 0.1, 5.0, 1.0
     on(membership.allow_for_own_errors, fdi, fie)

@@ -106,12 +106,12 @@ def test_ailerons_and_rudder_were_where_two_equations_put_them(off_a, off_r, siz
         effect["Z"][[0, 2]], effect["spread"][[0, 2]] = Z[:, column], spread[:, column]
         fdi["types"]["surface"][s]["command"] = 0.02
     fdi["bound"]["frame"][[0, 2]] = frame
-    fdi["bank"]["innovation"][[0, 2]] = Z @ [off_a, off_r]
+    fdi["bank"]["output"]["innovation"][[0, 2]] = Z @ [off_a, off_r]
     solve_roll_and_yaw(
         fdi["types"],
         fdi["layout"],
         fdi["isolation"]["estimator"],
-        fdi["bank"]["innovation"],
+        fdi["bank"]["output"]["innovation"],
         fdi["bound"]["frame"],
     )
     e = frame + spread.sum(axis=1)

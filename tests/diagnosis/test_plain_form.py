@@ -21,8 +21,9 @@ for seed, surface, profile in ((1, 0, "any"), (2, 1, "abrupt"), (3, 2, "any")):
     fdi = plant.fdi
     verdict = fdi["verdict"]
     numbers += [float(verdict["detected_at_s"]), float(verdict["isolated_at_s"])]
-    numbers += map(float, fdi["fdae"]["residual"])
-    numbers += [*map(float, fdi["bank"]["residual"].ravel()), *map(float, fdi["bank"]["threshold"].ravel())]
+    numbers += map(float, fdi["fdae"]["output"]["residual"])
+    of_bank = fdi["bank"]["output"]
+    numbers += [*map(float, of_bank["residual"].ravel()), *map(float, of_bank["threshold"].ravel())]
     for fie in fdi["isolation"]["estimator"][:3]:
         for name in ("residual", "lower", "upper", "theta", "reach_low", "theta_low", "theta_high"):
             numbers += map(float, fie[name].ravel())

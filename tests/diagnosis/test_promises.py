@@ -65,7 +65,9 @@ def test_no_admissible_uncertainty_raises_an_alarm(flight, uncertainty, threshol
     plant = DesignPlant(thresholds=thresholds, **flight).fly(FRAMES, uncertainty)
     assert not plant.fdi["verdict"]["detected"]
     assert not any(plant.excluded(s) for s in range(3))
-    assert max(plant.fdi["bank"]["closest"]) <= 1.0  # of every filter, however near the uncertainty drives it
+    assert (
+        max(plant.fdi["bank"]["output"]["closest"]) <= 1.0
+    )  # of every filter, however near the uncertainty drives it
 
 
 @settings(max_examples=samples(150), deadline=None)
@@ -131,7 +133,7 @@ def test_an_uncertainty_that_hides_the_fault_delays_detection_to_the_guaranteed_
 
 def test_bounds_are_attained_so_no_smaller_ones_would_do():
     plant = DesignPlant(seed=1, pole_bank_per_s=[2.0, 50.0, 1e6]).fly(400, lambda p, bound, phi: bound)
-    assert plant.fdi["bank"]["closest"][:4] == pytest.approx(1.0, abs=1e-6)
+    assert plant.fdi["bank"]["output"]["closest"][:4] == pytest.approx(1.0, abs=1e-6)
 
 
 def test_filters_and_bounds_are_the_convolutions_they_stand_for():
@@ -141,8 +143,8 @@ def test_filters_and_bounds_are_the_convolutions_they_stand_for():
     weight = plant.dt * np.exp(-lam * plant.dt * np.arange(198, -1, -1))
     residual = weight @ np.array(plant.innovations[:199])
     bound = weight @ np.array(plant.bounds[:199])
-    assert plant.fdi["bank"]["residual"][0] == pytest.approx(residual, abs=1e-12)
-    assert plant.fdi["bank"]["threshold"][0] == pytest.approx(bound, abs=1e-10)
+    assert plant.fdi["bank"]["output"]["residual"][0] == pytest.approx(residual, abs=1e-12)
+    assert plant.fdi["bank"]["output"]["threshold"][0] == pytest.approx(bound, abs=1e-10)
 
 
 @settings(max_examples=samples(60), deadline=None)

@@ -395,7 +395,7 @@ def test_the_built_in_statistic(enabled, authority, score, share, statistic):
         authority,
         score,
     )
-    fdi["bank"]["threshold"][0], fdi["bank"]["residual"][0, 1] = 0.5, 0.5 * share
+    fdi["bank"]["output"]["threshold"][0], fdi["bank"]["output"]["residual"][0, 1] = 0.5, 0.5 * share
     likely = assessment.likelihood_counts(fdi["statistical"]["tests"], authority)
     alarm = fdi["statistical"]["alarm"]
     found = scheme.built_in_statistic(fdi["bank"], alarm, authority, likely)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from kernels import new_fdi, on, put
 
+from beaver_ftc.diagnosis import conclusion
 from beaver_ftc.diagnosis.belief.expectation import means_dtype
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, UNANTICIPATED, YAW
 from beaver_ftc.diagnosis.types import examine, pairs, verdict
@@ -43,7 +44,7 @@ def new_case(**left):
         fdi["config"]["every_type"],
         fdi["types"]["config"]["instants"],
     ) = PATIENCE, 1, 1, 1
-    fdi["isolation"]["n"] = 8
+    fdi["isolation"]["config"]["n"] = 8
     fdi["types"]["config"]["length"], fdi["types"]["config"]["span_s"] = 1, DT
     layout = fdi["layout"]
     layout["loss_of"], layout["position_of"] = range(4), range(4, 8)
@@ -284,21 +285,31 @@ def test_of_elevator_and_flap_the_one_a_constant_explains(flap, evidence, own_er
     assert bool(on(verdict.others_refuted, fdi, ELEVATOR)) == (evidence >= PATIENCE)
 
 
+def conclude(fdi, kernel, *given, lead=()):
+    """Hand a finding of the types to the conclusion."""
+    conclusion.note_type(fdi["verdict"], (*on(kernel, fdi, *given), *lead))
+
+
+def take_lead(fdi, kernel, *given):
+    """Keep a lead where the conclusion has it."""
+    fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"] = on(kernel, fdi, *given)
+
+
 def test_a_decision_notes_when_surface_and_type_became_certain():
     fdi = new_case(rudder=(STUCK,), **NOBODY_ELSE)
     fdi["verdict"]["isolated"], fdi["verdict"]["type"] = NOT_ISOLATED, -1
-    on(verdict.decide, fdi, 3.0)
+    conclude(fdi, verdict.decide, 3.0)
     assert fdi["verdict"]["isolated"] == 4 + RUDDER  # its estimator of a position
     assert fdi["verdict"]["type"] == STUCK
     assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_at_s"]) == (3.0, 3.0)
     leave(fdi["types"]["surface"][RUDDER], VARYING_LOSS)
-    on(verdict.decide, fdi, 4.0)
+    conclude(fdi, verdict.decide, 4.0)
     assert fdi["verdict"]["isolated"] == RUDDER  # its estimator of a loss
     assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_at_s"]) == (3.0, 4.0)
-    on(verdict.decide, fdi, 5.0)
+    conclude(fdi, verdict.decide, 5.0)
     assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_at_s"]) == (3.0, 4.0)
     fdi["types"]["surface"]["refuted"][RUDDER] = 1
-    on(verdict.decide, fdi, 6.0)
+    conclude(fdi, verdict.decide, 6.0)
     assert fdi["verdict"]["isolated"] == UNANTICIPATED
     assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_at_s"]) == (6.0, 6.0)
     assert fdi["verdict"]["type"] == -1
@@ -308,12 +319,12 @@ def test_a_decision_notes_when_surface_and_type_became_certain():
 def test_the_law_acts_on_the_likeliest_before_all_doubt_is_gone():
     fdi = new_case(**NOBODY_ELSE)
     fdi["verdict"]["isolated"] = NOT_ISOLATED
-    assert on(verdict.presumed, fdi) == RUDDER
-    assert on(verdict.presumed, _open(new_case())) == ELEVATOR
-    assert on(verdict.presumed, _open(new_case(elevator=None))) == FLAP
-    assert on(verdict.presumed, _open(new_case(elevator=None, flap=None))) == NO_SURFACE
+    assert on(verdict.presumed, fdi, fdi["verdict"]["isolated"]) == RUDDER
+    assert on(verdict.presumed, _open(new_case()), NOT_ISOLATED) == ELEVATOR
+    assert on(verdict.presumed, _open(new_case(elevator=None)), NOT_ISOLATED) == FLAP
+    assert on(verdict.presumed, _open(new_case(elevator=None, flap=None)), NOT_ISOLATED) == NO_SURFACE
     fdi["verdict"]["isolated"] = 4 + FLAP
-    assert on(verdict.presumed, fdi) == FLAP
+    assert on(verdict.presumed, fdi, fdi["verdict"]["isolated"]) == FLAP
 
 
 def _open(fdi):
@@ -327,19 +338,19 @@ def test_the_lead_is_taken_on_one_surface_while_its_fault_shows():
     surface["set_low"][STUCK], surface["set_high"][STUCK], surface["command"] = 0.1, 0.2, 0.3
     surface["low"], surface["high"] = 0.1, 0.2
     fdi["types"]["surface"]["measure"] = 3
-    on(verdict.take_the_lead, fdi)
+    take_lead(fdi, verdict.take_the_lead, fdi["verdict"]["isolated"])
     assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (RUDDER, FIXED)
     assert fdi["types"]["surface"]["measure"].tolist() == [-1, -1, FIXED, -1]
     surface["low"], surface["high"] = 0.25, 0.35  # it follows its command again
     fdi["types"]["config"]["dt"] = 0.01
     for _ in range(19):
-        on(verdict.take_the_lead, fdi)
+        take_lead(fdi, verdict.take_the_lead, fdi["verdict"]["isolated"])
     assert fdi["verdict"]["lead"] == RUDDER
-    on(verdict.take_the_lead, fdi)
+    take_lead(fdi, verdict.take_the_lead, fdi["verdict"]["isolated"])
     assert fdi["verdict"]["lead"] == NO_SURFACE
     assert surface["measure"] == -1
     surface["low"] = 0.1
-    on(verdict.take_the_lead, fdi)
+    take_lead(fdi, verdict.take_the_lead, fdi["verdict"]["isolated"])
     assert (surface["absent"], fdi["verdict"]["lead"]) == (0, RUDDER)
     assert on(verdict.still_there, fdi, surface, LOSES, True)
 
@@ -553,7 +564,7 @@ def test_a_block_is_the_mean_of_its_frames_with_the_noise_of_its_ends():
     spread = rng.uniform(0, 0.1, (length, 8, 3))
     Z[:, :, YAW] += 5.0
     for k in range(length):
-        fdi["bank"]["innovation"], fdi["bound"]["eta_bar"] = innovation[k], eta[k]
+        fdi["bank"]["output"]["innovation"], fdi["bound"]["eta_bar"] = innovation[k], eta[k]
         fdi["bound"]["noise_then"], fdi["bound"]["noise"] = noise[k], noise[k + 1]
         fdi["isolation"]["estimator"]["effect"]["Z"][:8] = Z[k]
         fdi["isolation"]["estimator"]["effect"]["offset"][:8] = offset[k]
@@ -576,7 +587,7 @@ def test_a_block_is_the_mean_of_its_frames_with_the_noise_of_its_ends():
 def test_alarms_are_noted_by_plane():
     for axis, planes in ((ROLL, [0, 1]), (PITCH, [1, 0]), (YAW, [0, 1])):
         fdi = new_case()
-        fdi["bank"]["threshold"], fdi["bank"]["residual"][2, axis] = 0.1, -0.11
+        fdi["bank"]["output"]["threshold"], fdi["bank"]["output"]["residual"][2, axis] = 0.1, -0.11
         on(pairs.note_alarms, fdi)
         assert fdi["types"]["pair"]["alarmed"].tolist() == planes
 
@@ -684,14 +695,18 @@ def test_beside_the_first_pitch_fault_the_second_is_where_the_rest_puts_it():
     )
     fdi["isolation"]["estimator"]["effect"]["spread"][4 + ELEVATOR, PITCH] = 0.01
     fdi["isolation"]["estimator"]["effect"]["spread"][4 + FLAP, PITCH] = 0.02
-    fdi["bound"]["frame"][PITCH], fdi["bank"]["innovation"][PITCH], flap["command"] = 0.03, -1.2 + 0.4, 0.05
+    fdi["bound"]["frame"][PITCH], fdi["bank"]["output"]["innovation"][PITCH], flap["command"] = (
+        0.03,
+        -1.2 + 0.4,
+        0.05,
+    )
     on(pairs.solve_pitch, fdi)
     # the elevator's share is -10 * 0.12 give or take 0.2, the rest 0.4 give or take 0.26, over 2
     assert (flap["low"], flap["high"]) == pytest.approx((0.05 + 0.2 - 0.13, 0.05 + 0.2 + 0.13))
     assert flap["wrong"] == 1
     assert elevator["wrong"] == 0
     assert (elevator["low"], elevator["high"]) == (0.1, 0.14)
-    fdi["bank"]["innovation"][PITCH] = 9.0
+    fdi["bank"]["output"]["innovation"][PITCH] = 9.0
     on(pairs.solve_pitch, fdi)
     assert flap["standing"] == RULED_OUT
 
@@ -699,7 +714,7 @@ def test_beside_the_first_pitch_fault_the_second_is_where_the_rest_puts_it():
 @pytest.mark.parametrize(("innovation", "wrong"), [(0.03, 0), (0.031, 1), (-0.031, 1)])
 def test_before_that_pitch_shows_a_fault_or_not(innovation, wrong):
     fdi = new_case()
-    fdi["types"]["pair"]["first"], fdi["bound"]["frame"], fdi["bank"]["innovation"] = (
+    fdi["types"]["pair"]["first"], fdi["bound"]["frame"], fdi["bank"]["output"]["innovation"] = (
         NO_SURFACE,
         0.03,
         innovation,
@@ -789,7 +804,7 @@ def decided(alarmed=(1, 0), **left):
 
 def test_one_fault_in_pitch_is_named_and_acted_upon():
     fdi = decided(elevator=(CONSTANT_LOSS,), flap=None)
-    on(pairs.decide, fdi, 3.0)
+    conclude(fdi, pairs.decide, 3.0)
     assert fdi["types"]["surface"]["named"].tolist() == [
         0,
         0,
@@ -797,7 +812,7 @@ def test_one_fault_in_pitch_is_named_and_acted_upon():
         0,
     ]  # ailerons and rudder might be it as well
     fdi = decided(elevator=(CONSTANT_LOSS,), flap=None, aileron=None, rudder=None)
-    on(pairs.decide, fdi, 3.0)
+    conclude(fdi, pairs.decide, 3.0)
     assert fdi["types"]["surface"]["named"].tolist() == [0, 1, 0, 0]
     assert fdi["verdict"]["isolated"] == ELEVATOR
     assert (fdi["verdict"]["type"], fdi["verdict"]["isolated_at_s"]) == (CONSTANT_LOSS, 3.0)
@@ -808,7 +823,7 @@ def test_one_fault_in_pitch_is_named_and_acted_upon():
 
 def test_without_an_alarm_in_pitch_nobody_is_named_there():
     fdi = decided(alarmed=(0, 1), elevator=(CONSTANT_LOSS,), flap=None, aileron=None, rudder=None)
-    on(pairs.decide, fdi, 3.0)
+    conclude(fdi, pairs.decide, 3.0)
     assert not fdi["types"]["surface"]["named"][ELEVATOR]
     assert not on(pairs.acted_upon, fdi, ELEVATOR)
 
@@ -828,15 +843,15 @@ def test_the_verdict_is_that_of_the_first_named():
     fdi = decided(aileron=None, rudder=None)
     fdi["types"]["surface"]["type"][RUDDER] = STUCK
     fdi["types"]["surface"]["type_at_s"][RUDDER], fdi["types"]["surface"]["named_at_s"][RUDDER] = 2.0, 1.5
-    on(pairs.summarise, fdi, RUDDER, False, 3.0)
+    conclude(fdi, pairs.summarise, RUDDER, False, 3.0, lead=(NO_SURFACE, -1))
     found = fdi["verdict"]
     assert (found["isolated"], found["type"], found["type_at_s"]) == (4 + RUDDER, STUCK, 2.0)
     assert found["isolated_at_s"] == 1.5
-    on(pairs.summarise, fdi, NO_SURFACE, True, 4.0)
+    conclude(fdi, pairs.summarise, NO_SURFACE, True, 4.0, lead=(NO_SURFACE, -1))
     assert (found["isolated"], found["type"], found["isolated_at_s"]) == (UNANTICIPATED, -1, 4.0)
-    on(pairs.summarise, fdi, NO_SURFACE, True, 5.0)
+    conclude(fdi, pairs.summarise, NO_SURFACE, True, 5.0, lead=(NO_SURFACE, -1))
     assert found["isolated_at_s"] == 4.0
-    on(pairs.summarise, fdi, NO_SURFACE, False, 6.0)
+    conclude(fdi, pairs.summarise, NO_SURFACE, False, 6.0, lead=(NO_SURFACE, -1))
     assert (found["isolated"], found["isolated_at_s"]) == (NOT_ISOLATED, 6.0)
 
 
@@ -851,7 +866,7 @@ def acted(**left):
 def test_the_law_acts_on_all_that_are_named_and_the_lead_is_the_first():
     fdi = acted(alarmed=(0, 1), aileron=(CONSTANT_LOSS,), rudder=(BIAS,), elevator=None, flap=None)
     fdi["types"]["surface"]["named"] = 1, 0, 1, 0
-    on(pairs.act, fdi)
+    take_lead(fdi, pairs.act)
     assert fdi["types"]["surface"]["measure"].tolist() == [LOSES, -1, SHIFTED, -1]
     assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (AILERON, LOSES)
 
@@ -863,7 +878,7 @@ def test_the_law_acts_on_all_that_are_named_and_the_lead_is_the_first():
 def test_an_elevator_that_is_replaced_comes_first(kinds, measure, lead):
     fdi = acted(aileron=(CONSTANT_LOSS,), elevator=kinds, rudder=None, flap=None)
     fdi["types"]["surface"]["named"] = 1, 1, 0, 0
-    on(pairs.act, fdi)
+    take_lead(fdi, pairs.act)
     assert fdi["types"]["surface"]["measure"].tolist() == [LOSES, measure, -1, -1]
     assert fdi["verdict"]["lead"] == lead
 
@@ -871,24 +886,24 @@ def test_an_elevator_that_is_replaced_comes_first(kinds, measure, lead):
 def test_a_rudder_that_is_fixed_does_not_come_before_the_first():
     fdi = acted(aileron=(BIAS,), rudder=(STUCK,), elevator=None, flap=None)
     fdi["types"]["surface"]["named"] = 1, 0, 1, 0
-    on(pairs.act, fdi)
+    take_lead(fdi, pairs.act)
     assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (AILERON, SHIFTED)
 
 
 def test_a_surface_acted_upon_that_cannot_be_at_fault_is_shifted_as_it_shows():
     fdi = acted(elevator=None, flap=None, aileron=None, rudder=None)
     leave(fdi["types"]["surface"][ELEVATOR], STUCK)
-    on(pairs.act, fdi)
+    take_lead(fdi, pairs.act)
     assert fdi["types"]["surface"]["measure"].tolist() == [-1, SHIFTED, -1, -1]
     fdi["types"]["surface"]["named"][ELEVATOR] = 1
-    on(pairs.act, fdi)
+    take_lead(fdi, pairs.act)
     assert fdi["types"]["surface"]["measure"].tolist() == [-1, FIXED, -1, -1]
     fdi["types"]["surface"]["low"], fdi["types"]["surface"]["high"], fdi["types"]["surface"]["absent"] = (
         0.3,
         0.4,
         99,
     )
-    on(pairs.act, fdi)
+    take_lead(fdi, pairs.act)
     assert fdi["types"]["surface"]["measure"].tolist() == [-1, -1, -1, -1]
     assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (NO_SURFACE, -1)
 
@@ -904,7 +919,7 @@ def test_two_equations_say_where_ailerons_and_rudder_were(seed):
         effect = fdi["isolation"]["estimator"][4 + s]["effect"]
         effect["Z"][[ROLL, YAW]], effect["spread"][[ROLL, YAW]] = Z[:, k], spread[:, k]
         fdi["types"]["surface"][s]["command"] = command[k]
-    fdi["bank"]["innovation"][[ROLL, YAW]], fdi["bound"]["frame"][[ROLL, YAW]] = Z @ off, room
+    fdi["bank"]["output"]["innovation"][[ROLL, YAW]], fdi["bound"]["frame"][[ROLL, YAW]] = Z @ off, room
     on(pairs.solve_roll_and_yaw, fdi)
     slack = room + spread.sum(axis=1)
     corners = [np.linalg.solve(Z, Z @ off + slack * (a, b)) for a in (-1, 1) for b in (-1, 1)]
@@ -913,7 +928,7 @@ def test_two_equations_say_where_ailerons_and_rudder_were(seed):
         surface = fdi["types"]["surface"][s]
         assert (surface["low"], surface["high"]) == pytest.approx((least[k], greatest[k]))
     assert not fdi["types"]["pair"]["no_lateral_pair"]
-    fdi["bank"]["innovation"][YAW] = 9.0
+    fdi["bank"]["output"]["innovation"][YAW] = 9.0
     on(pairs.solve_roll_and_yaw, fdi)
     assert fdi["types"]["pair"]["no_lateral_pair"]
 
@@ -941,7 +956,7 @@ def test_the_first_named_is_the_one_the_verdict_is_about():
         (1, 0, 1, 0),
         (2.0, 0.0, 1.0, 0.0),
     )
-    on(pairs.decide, fdi, 3.0)
+    conclude(fdi, pairs.decide, 3.0)
     assert fdi["verdict"]["isolated_at_s"] == 1.0
     assert fdi["isolation"]["estimator"]["surface"][fdi["verdict"]["isolated"]] == RUDDER
 
@@ -950,7 +965,7 @@ def test_the_first_surface_and_its_first_estimator_are_not_nobody():
     fdi = new_case(elevator=None, rudder=None, flap=None, aileron=(CONSTANT_LOSS,))
     fdi["verdict"]["isolated"], fdi["verdict"]["type"] = NOT_ISOLATED, -1
     for t in (3.0, 4.0):
-        on(verdict.decide, fdi, t)
+        conclude(fdi, verdict.decide, t)
         found = fdi["verdict"]
         assert (found["isolated"], found["type"], found["lead"]) == (AILERON, CONSTANT_LOSS, AILERON)
         assert (found["isolated_at_s"], found["type_at_s"], found["lead_kind"]) == (3.0, 3.0, LOSES)
@@ -959,16 +974,16 @@ def test_the_first_surface_and_its_first_estimator_are_not_nobody():
 def test_the_one_named_is_acted_upon_though_others_are_possible():
     fdi = new_case()
     fdi["verdict"]["isolated"] = 0  # the estimator of the aileron's loss
-    assert on(verdict.presumed, fdi) == AILERON
+    assert on(verdict.presumed, fdi, fdi["verdict"]["isolated"]) == AILERON
     fdi["verdict"]["isolated"] = NOT_ISOLATED
-    assert on(verdict.presumed, fdi) == ELEVATOR
+    assert on(verdict.presumed, fdi, fdi["verdict"]["isolated"]) == ELEVATOR
 
 
 def test_without_anybody_to_act_upon_there_is_no_lead():
     fdi = new_case(aileron=None, elevator=None, rudder=None, flap=None)
     fdi["verdict"]["isolated"] = UNANTICIPATED
     fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"] = 2, 2
-    on(verdict.take_the_lead, fdi)
+    take_lead(fdi, verdict.take_the_lead, fdi["verdict"]["isolated"])
     assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (NO_SURFACE, -1)
     assert (fdi["types"]["surface"]["measure"] == -1).all()
 
@@ -985,7 +1000,7 @@ def test_of_two_faults_the_verdict_is_on_the_first_named(s, outside):
     fdi["verdict"]["isolated"], fdi["verdict"]["type"] = NOT_ISOLATED, -1
     surface = fdi["types"]["surface"][s]
     surface["type"], surface["type_at_s"], surface["named_at_s"] = STUCK, 4.0, 3.0
-    on(pairs.summarise, fdi, s, outside, 5.0)
+    conclude(fdi, pairs.summarise, s, outside, 5.0, lead=(NO_SURFACE, -1))
     found = fdi["verdict"]
     if s < 0:
         assert (found["isolated"], found["type"]) == (UNANTICIPATED if outside else NOT_ISOLATED, -1)

@@ -227,7 +227,7 @@ def detected_fdi(at_s=-1.0, isolated=NOT_ISOLATED):
     verdict["detected"], verdict["detected_at_s"], verdict["isolated"] = at_s >= 0.0, at_s, isolated
     verdict["isolated_at_s"], verdict["type"], verdict["lead"], verdict["lead_kind"] = at_s, 2, 1, 1
     fdi["types"]["surface"]["measure"] = 1
-    fdi["fdae"]["network"]["weights"] = fdi["fdae"]["network"]["output"] = 0.3
+    fdi["fdae"]["network"]["memory"]["weights"] = fdi["fdae"]["network"]["output"] = 0.3
     return fdi
 
 
@@ -245,7 +245,7 @@ def test_an_alarm_voids_what_a_moment_ago_was_made_of_it(isolated):
     assert [verdict[name] for name in ("detected_at_s", "isolated_at_s")] == [-1.0, -1.0]
     assert [verdict[name] for name in ("lead", "lead_kind")] == [-1, -1]
     assert (fdi["types"]["surface"]["measure"] == -1).all()
-    assert not fdi["fdae"]["network"]["weights"].any()
+    assert not fdi["fdae"]["network"]["memory"]["weights"].any()
     assert not fdi["fdae"]["network"]["output"].any()
     on(watching.raise_alarm, detected_fdi(9.6, 1), watch, 11.0)
     assert watch["alarmed_at_s"] == 9.6
@@ -301,8 +301,8 @@ def asked(
 ):
     """What the rates say by axis; by default the bound of a frame is 1 rad/s2."""
     watch, fdi = new_watch(gyro_error=error, gyro_error_then=then, spike_before=spike, **fields), new_fdi()
-    fdi["bank"]["innovation"], fdi["bound"]["frame"] = innovation, 1.0
-    fdi["bank"]["threshold"][:3] = 1.0
+    fdi["bank"]["output"]["innovation"], fdi["bound"]["frame"] = innovation, 1.0
+    fdi["bank"]["output"]["threshold"][:3] = 1.0
     watch["step"]["test"]["noise"] = noise
     on(watching.ask_rates, fdi, watch)
     return watch["rates_say"].tolist()
@@ -373,7 +373,7 @@ def test_a_first_error_of_a_gyro_need_not_be_in_the_filter(first, say):
 @pytest.mark.parametrize(("begun", "asked"), [(1, False), (2, False), (3, True)])
 def test_the_first_whole_frame_shows_no_jump(begun, asked):
     watch, fdi = with_shares({TURN: 2.0, ANGLE: 1.5}, past=0, gyro_error=(0, 0.3, 0), begun=begun), new_fdi()
-    fdi["bank"]["threshold"], fdi["bound"]["frame"] = 1.0, 1.0
+    fdi["bank"]["output"]["threshold"], fdi["bound"]["frame"] = 1.0, 1.0
     on(watching.decide, fdi, watch, seen(), 5.0)
     assert (watch["rates_say"][1] == NO) == asked
 
@@ -397,8 +397,10 @@ def test_the_filter_of_a_gyros_error_follows_it_exactly():
     growing[np.diag_indices(3)] = -np.diag(D)
     fdi["bound"]["eta_bar"] = eta_bar
     for k in range(frames):
-        fdi["bank"]["innovation"] = (error[k + 1] - error[k]) / DT + D @ error[k]
-        watching.follow_rates(watch, fdi["bank"]["innovation"], fdi["bound"]["eta_bar"], fdi["config"]["dt"])
+        fdi["bank"]["output"]["innovation"] = (error[k + 1] - error[k]) / DT + D @ error[k]
+        watching.follow_rates(
+            watch, fdi["bank"]["output"]["innovation"], fdi["bound"]["eta_bar"], fdi["config"]["dt"]
+        )
         bound = bound + DT * (eta_bar + growing @ bound)
     assert watch["W"] == pytest.approx(error[-1])
     assert watch["W_bound"] == pytest.approx(bound)
@@ -508,10 +510,10 @@ def looked(watch, fdi, **signal):
 
 def test_looks_of_a_frame_follow_one_another():
     watch, fdi = new_watch(past=3), new_fdi()
-    fdi["bank"]["threshold"], fdi["bound"]["frame"] = 1.0, 1.0
+    fdi["bank"]["output"]["threshold"], fdi["bound"]["frame"] = 1.0, 1.0
     watch["step"]["gravity"] = watch["step"]["offset"] = 0.0
     watch["step"]["offset"][:] = 1.0
-    fdi["bank"]["innovation"] = 0.5, 0.0, 0.0
+    fdi["bank"]["output"]["innovation"] = 0.5, 0.0, 0.0
     looked(watch, fdi)
     assert (watch["begun"], watch["past"]) == (1, 0)
     for k in range(4):
@@ -532,7 +534,7 @@ def test_looks_of_a_frame_follow_one_another():
 
 def test_a_broken_altimeter_is_named_and_replaced_from_then_on():
     watch, fdi = new_watch(), new_fdi()
-    fdi["bound"]["frame"], fdi["bank"]["threshold"] = 1.0, 1.0
+    fdi["bound"]["frame"], fdi["bank"]["output"]["threshold"] = 1.0, 1.0
     looked(watch, fdi)
     looked(watch, fdi)
     assert not watch["alarmed"]
@@ -548,7 +550,7 @@ def test_the_rates_are_asked_once_a_frame(past, asked):
         with_shares({TURN: 2.0, ANGLE: 1.5}, past=past, gyro_error=(0, 0.3, 0), begun=watching.ASKED),
         new_fdi(),
     )
-    fdi["bank"]["threshold"], fdi["bound"]["frame"] = 1.0, 1.0
+    fdi["bank"]["output"]["threshold"], fdi["bound"]["frame"] = 1.0, 1.0
     on(watching.decide, fdi, watch, seen(), 5.0)
     assert (watch["rates_say"][1] == NO) == asked
 
@@ -629,8 +631,12 @@ def test_suspicions_of_the_frame_before_are_gone():
 def test_an_alarm_on_roll_counts_as_one():
     """The first axis of the bank has number 0, and no axis is -1."""
     watch, fdi = new_watch(gyro_error=(0.0, 0.3, 0.0), W_bound=(9.0, 9.0, 9.0)), new_fdi()
-    fdi["bound"]["frame"], fdi["bank"]["threshold"][:3], watch["gyro_error_then"] = 1.0, 1.0, (0.0, 0.3, 0.0)
-    fdi["bank"]["residual"][0, 0] = 2.0
+    fdi["bound"]["frame"], fdi["bank"]["output"]["threshold"][:3], watch["gyro_error_then"] = (
+        1.0,
+        1.0,
+        (0.0, 0.3, 0.0),
+    )
+    fdi["bank"]["output"]["residual"][0, 0] = 2.0
     on(watching.ask_rates, fdi, watch)
     assert watch["rates_say"].tolist() == [YES] * 3
 
@@ -647,7 +653,7 @@ def test_what_is_named_is_replaced_and_flags_are_one():
 def test_where_the_attitude_is_blurred_a_look_asks_whether_any_gyro_can_be_it():
     for blurred in (0, 1):
         watch, fdi = new_watch(blurred=blurred, begun=1, past=1), new_fdi()
-        watch["W"], fdi["bank"]["threshold"] = (0.5, 0.0, 0.0), 1.0
+        watch["W"], fdi["bank"]["output"]["threshold"] = (0.5, 0.0, 0.0), 1.0
         watch["step"]["offset"][:] = 1.0
         looked(watch, fdi)
         assert bool(watch["apart"].any()) == bool(blurred)

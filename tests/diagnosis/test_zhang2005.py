@@ -46,20 +46,20 @@ def test_the_basis_is_a_product_of_gaussians_of_x_and_u(alpha, beta, rate, defle
         shares = np.linspace(TRAVEL[0, i], TRAVEL[1, i], 3)
         along = gaussians(np.linspace(-0.3, 0.3, 3), sign * rate), gaussians(shares, sign * deflection)
         expected = np.einsum("a,b,c->abc", gaussians(centres, angle), *along).ravel()
-        np.testing.assert_allclose(new.basis[i], expected, atol=1e-12)
-        assert np.linalg.norm(new.basis[i]) == pytest.approx(1.0)
+        np.testing.assert_allclose(new.memory.basis[i], expected, atol=1e-12)
+        assert np.linalg.norm(new.memory.basis[i]) == pytest.approx(1.0)
 
 
 @given(st.lists(st.floats(-5, 5), min_size=3, max_size=3), st.floats(0.1, 3.0))
 def test_the_network_learns_along_its_basis_within_its_limit(signal, limit):
     new = at(network(gain=50.0, limit=limit), alpha=0.2)
-    weights = np.linspace(-limit, limit, new.weights.size).reshape(new.weights.shape)
-    new.weights[:] = weights
+    weights = np.linspace(-limit, limit, new.memory.weights.size).reshape(new.memory.weights.shape)
+    new.memory.weights[:] = weights
     zhang2005.learn(new, np.array(signal), 0.02)
-    expected = weights + 0.02 * 50.0 * new.basis * np.array(signal)[:, None]
-    np.testing.assert_allclose(new.weights, np.clip(expected, -limit, limit))
+    expected = weights + 0.02 * 50.0 * new.memory.basis * np.array(signal)[:, None]
+    np.testing.assert_allclose(new.memory.weights, np.clip(expected, -limit, limit))
     at(new, alpha=0.2)
-    np.testing.assert_allclose(new.output, (new.weights * new.basis).sum(axis=1), atol=1e-12)
+    np.testing.assert_allclose(new.output, (new.memory.weights * new.memory.basis).sum(axis=1), atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -70,14 +70,16 @@ def test_the_network_learns_what_exceeds_the_threshold_once_there_is_an_alarm(
     dead_zone, detected, residual, learns
 ):
     published = np.zeros(1, zhang2005.PUBLISHED).view(np.recarray)[0]
-    published.dead_zone = dead_zone
+    published.config.dead_zone = dead_zone
     zhang2005.configure_network(published.network, 60.0, 20.0, TRAVEL)
     at(published.network)
     fdae = np.zeros(1, zhang2005_fdae()).view(np.recarray)[0]
-    fdae.residual[:], fdae.threshold[:] = (0.0, residual, -0.001), 0.01
+    fdae.output.residual[:], fdae.output.threshold[:] = (0.0, residual, -0.001), 0.01
     zhang2005.approximate(published, fdae, detected, DT)
-    expected = DT * 60.0 * published.network.basis * fdae.residual[:, None] if learns else 0.0
-    np.testing.assert_allclose(published.network.weights, np.broadcast_to(expected, (3, zhang2005.N_NODES)))
+    expected = DT * 60.0 * published.network.memory.basis * fdae.output.residual[:, None] if learns else 0.0
+    np.testing.assert_allclose(
+        published.network.memory.weights, np.broadcast_to(expected, (3, zhang2005.N_NODES))
+    )
 
 
 def zhang2005_fdae():
@@ -91,7 +93,7 @@ def zhang2005_fdae():
 )
 def test_the_alarm_is_of_the_first_axis_beyond_its_threshold(residual, axis):
     fdae = np.zeros(1, zhang2005_fdae()).view(np.recarray)[0]
-    fdae.residual[:], fdae.threshold[:] = residual, 0.01
+    fdae.output.residual[:], fdae.output.threshold[:] = residual, 0.01
     assert zhang2005.detect(fdae) == (-1 if axis is None else axis)
 
 
@@ -104,7 +106,11 @@ def test_the_alarm_is_of_the_first_axis_beyond_its_threshold(residual, axis):
 def test_the_residual_of_the_true_estimator_is_omega_times_what_the_estimate_misses(theta, gain, Z, projects):
     """However it adapts: the term Om ths' of the estimator sees to that."""
     records = np.zeros(1, isolation_dtype(4)).view(np.recarray)[0]
-    records.decay[:], records.by_gradient, records.gradient = zhang2005.euler(POLE, DT), 1, gain
+    records.config.decay[:], records.config.by_gradient, records.config.gradient = (
+        zhang2005.euler(POLE, DT),
+        1,
+        gain,
+    )
     fie = records.estimator[0]
     fie.low, fie.high, fie.theta_low[:], fie.theta_high[:] = -1.0, 0.0, -np.inf, np.inf
     if projects:

@@ -81,10 +81,11 @@ def at(record, path):
 EXPECTED = {
     "dt": DT, "belief.share": 0.5, "belief.u": TRIM, "belief.commanded": TRIM, "control.layout.trim": TRIM,
     "control.allocation.output.command": TRIM,
-    "fdi.config.enabled": 1, "fdi.config.dt": DT, "fdi.isolation.forgetting": exp(-DT / 2.0),
-    "fdi.isolation.decay": exp(-2.5 * DT),
-    "fdi.fdae.pole": 1.5, "fdi.fdae.decay": exp(-1.5 * DT), "fdi.isolation.n": 8,
-    "fdi.fdae.network.gain": 45.0, "fdi.fdae.network.leak_per_s": 0.8, "fdi.fdae.network.weight_limit": 15.0,
+    "fdi.config.enabled": 1, "fdi.config.dt": DT, "fdi.isolation.config.forgetting": exp(-DT / 2.0),
+    "fdi.isolation.config.decay": exp(-2.5 * DT),
+    "fdi.fdae.config.pole": 1.5, "fdi.fdae.config.decay": exp(-1.5 * DT), "fdi.isolation.config.n": 8,
+    "fdi.fdae.network.config.gain": 45.0, "fdi.fdae.network.config.leak_per_s": 0.8,
+    "fdi.fdae.network.config.weight_limit": 15.0,
     "fdi.bound.inertia": (0.1, 0.2, 0.3), "fdi.bound.constant": (0.01, 0.02, 0.03),
     "fdi.bound.earth_rate": 7.292115e-5,  # rad/s [WGS84]
     "fdi.verdict.detected_at_s": -1.0, "fdi.verdict.isolated_at_s": -1.0, "fdi.verdict.type": -1,
@@ -102,7 +103,7 @@ EXPECTED = {
     "fdi.types.surface.1.approach": 1.0 - exp(-25.0 * DT / 2), "fdi.types.surface.1.step": pi / 2 * DT / 2,
     "fdi.types.surface.1.least_runaway_rate": pi / 4,
     "fdi.types.surface.1.slowest_step": radians(3.0) * DT / 2,
-    "fdi.bank.n": 3, "fdi.isolation.memory": 0, "fdi.isolation.membership": 1,
+    "fdi.bank.config.n": 3, "fdi.isolation.config.memory": 0, "fdi.isolation.config.membership": 1,
     "control.reference.config.dt": DT,
     "control.surfaces.output.effectiveness": 1.0,
     "control.surfaces.config.effectiveness_step": 2.5 * DT, "control.reference.memory.scale": 1.0,
@@ -143,7 +144,9 @@ def test_a_number_of_the_record(path, frame):
 
 
 def test_poles_are_that_of_detection_and_the_bank(frame):
-    assert frame["fdi"]["bank"]["decay"][:3] == pytest.approx(np.exp(-DT * np.array([1.5, 0.5, 4.0])))
+    assert frame["fdi"]["bank"]["config"]["decay"][:3] == pytest.approx(
+        np.exp(-DT * np.array([1.5, 0.5, 4.0]))
+    )
 
 
 def test_the_slipstream_per_manifold_pressure_is_that_of_the_engine(frame):
@@ -205,7 +208,7 @@ def test_a_plug_in_that_diagnoses_has_the_record_to_itself():
     fdi = frames["fdi"][0]
     off = (
         fdi["config"]["enabled"],
-        fdi["isolation"]["n"],
+        fdi["isolation"]["config"]["n"],
         fdi["config"]["every_type"],
         fdi["watch"]["enabled"],
     )

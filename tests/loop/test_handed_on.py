@@ -27,7 +27,7 @@ GOES_ON = {
         *(f"control.{name}" for name in REFERENCE_AND_COMMAND),
         *(f"control.power.{name}" for name in ENGINE),
     },
-    "scheme": {"fdi.bank.closest", "fdi.statistical.alarm.closest"},
+    "scheme": {"fdi.bank.output.closest", "fdi.statistical.alarm.closest"},
     "sensors": {
         f"instruments.{name}"
         for name in ("random", "counter", "lagged", "line", "reading", "broken", "fault")

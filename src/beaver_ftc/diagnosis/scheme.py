@@ -86,8 +86,8 @@ def isolate_type(types, conclusion, layout, isolation, bank, bound, t, started):
         pairs.examine(types, layout, estimators, bank, bound.frame)
         conclusions.note_type(conclusion, pairs.decide(types, conclusion, layout, t))
         return
-    if started or isolation.memory:
-        examine.examine(types, layout, estimators, bank.innovation, bound)
+    if started or isolation.config.memory:
+        examine.examine(types, layout, estimators, bank.output.innovation, bound)
     conclusions.note_type(conclusion, verdict.decide(types, conclusion, layout, estimators, t))
 
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.model import ALPHA, BETA
-from beaver_ftc.diagnosis.detection.fdae import gaussians
+from beaver_ftc.diagnosis.detection.fdae import gaussians, take_output
 from beaver_ftc.diagnosis.state import CONSTANT, PITCH
 from beaver_ftc.plugins import DETECTORS, settings
 from beaver_ftc.scenario.schema import Scenario
@@ -32,22 +32,28 @@ PLACES = (len(ALPHA_CENTRES), len(RATE_CENTRES), len(SHARES))
 N_NODES = PLACES[0] * PLACES[1] * PLACES[2]
 
 # first, step: of the centres, by axis and input. limit: of a weight, projection P; infinite without one.
+# output: fhat, rad/s2.
 NETWORK = record(
-    gain=float, limit=float, first=(3, 3), step=(3, 3), along=(3, PLACES[0]), weights=(3, N_NODES),
-    basis=(3, N_NODES), output=3,
-)  # fmt: skip
+    config=record(gain=float, limit=float, first=(3, 3), step=(3, 3)),
+    memory=record(along=(3, PLACES[0]), weights=(3, N_NODES), basis=(3, N_NODES)),
+    output=3,
+)
 
 # in_use: whether this scheme diagnoses; constant: rad/s, in the place of all adaptive thresholds, or 0.
-PUBLISHED = record(in_use=int, dead_zone=int, constant=float, network=NETWORK)
+CONFIG = record(in_use=int, dead_zone=int, constant=float)
+PUBLISHED = record(config=CONFIG, network=NETWORK)
 
 
 def configure_network(network: np.void, gain: float, limit: float, travel: np.ndarray) -> None:
     """Fill the record (dtype NETWORK); travel (2, 3) rad: of the surfaces that lead roll, pitch and yaw."""
-    network["gain"], network["limit"] = gain, limit
+    network["config"]["gain"], network["config"]["limit"] = gain, limit
     for i in range(3):
         reach = travel[0, i] + SHARES * (travel[1, i] - travel[0, i])
         for j, centres in enumerate((ALPHA_CENTRES if i == PITCH else BETA_CENTRES, RATE_CENTRES, reach)):
-            network["first"][i, j], network["step"][i, j] = centres[0], centres[1] - centres[0]
+            network["config"]["first"][i, j], network["config"]["step"][i, j] = (
+                centres[0],
+                centres[1] - centres[0],
+            )
 
 
 def configure(fdi: np.void, scenario: Scenario, travel: np.ndarray) -> None:
@@ -55,15 +61,20 @@ def configure(fdi: np.void, scenario: Scenario, travel: np.ndarray) -> None:
     rad: the stops."""
     config, dt, isolation = scenario.fdi, 1.0 / scenario.rate_hz, fdi["isolation"]
     option, published = settings(DETECTORS, config.scheme, config.options), fdi["published"]
-    published["in_use"], published["dead_zone"] = 1, option["dead_zone"]
+    published["config"]["in_use"], published["config"]["dead_zone"] = 1, option["dead_zone"]
     limit = option["network_limit_rad_s2"] if option["projection"] else np.inf
     configure_network(published["network"], option["network_gain"], limit, travel[:, fdi["layout"]["main"]])
-    fdi["fdae"]["decay"] = fdi["bank"]["decay"][0] = euler(config.detection_pole_per_s, dt)
-    isolation["decay"] = euler(config.isolation_pole_per_s, dt)
-    isolation["by_gradient"], isolation["gradient"] = 1, option["adaptation_gain"]
-    isolation["unprojected"] = not option["projection"]
+    fdi["fdae"]["config"]["decay"] = fdi["bank"]["config"]["decay"][0] = euler(
+        config.detection_pole_per_s, dt
+    )
+    isolation["config"]["decay"] = euler(config.isolation_pole_per_s, dt)
+    isolation["config"]["by_gradient"], isolation["config"]["gradient"] = 1, option["adaptation_gain"]
+    isolation["config"]["unprojected"] = not option["projection"]
     if not option["adaptive_threshold"]:
-        published["constant"], isolation["thresholds"] = option["constant_threshold_rad_s"], CONSTANT
+        published["config"]["constant"], isolation["config"]["thresholds"] = (
+            option["constant_threshold_rad_s"],
+            CONSTANT,
+        )
     if option["leave_out"]:
         isolation["estimator"]["excluded"][int(option["leave_out"]) - 1] = 1
 
@@ -75,16 +86,16 @@ def euler(pole_per_s: float, dt_s: float) -> float:
 
 @kernel
 def place(network, i, j, count, value):
-    """Fill network.along[j] with the Gaussians of input j of axis i at `value`; their squares add up to 1."""
-    at = min(max((value - network.first[i, j]) / network.step[i, j], 0.0), count - 1.0)
-    norm = np.sqrt(gaussians(at, count, 0, network.along[j]))
+    """Fill along[j] with the Gaussians of input j of axis i at `value`; their squares add up to 1."""
+    at = min(max((value - network.config.first[i, j]) / network.config.step[i, j], 0.0), count - 1.0)
+    norm = np.sqrt(gaussians(at, count, 0, network.memory.along[j]))
     for k in range(count):
-        network.along[j, k] /= norm
+        network.memory.along[j, k] /= norm
 
 
 @kernel
 def evaluate(network, main, x, y, u):
-    """Fill network.basis, of unit length on each axis, and network.output (3,) rad/s2 at (x, u).
+    """Fill basis, of unit length on each axis, and network.output (3,) rad/s2 at (x, u).
 
     x (3,) rad/s; y: measured signals; u (n,) rad; main (3,): the surface that leads each axis.
     """
@@ -96,9 +107,9 @@ def evaluate(network, main, x, y, u):
         for a in range(PLACES[0]):
             for b in range(PLACES[1]):
                 for c in range(PLACES[2]):
-                    phi = network.along[0, a] * network.along[1, b] * network.along[2, c]
-                    network.basis[i, node] = phi
-                    total += network.weights[i, node] * phi
+                    phi = network.memory.along[0, a] * network.memory.along[1, b] * network.memory.along[2, c]
+                    network.memory.basis[i, node] = phi
+                    total += network.memory.weights[i, node] * phi
                     node += 1
         network.output[i] = total
 
@@ -108,8 +119,11 @@ def learn(network, signal, dt):
     """th' = P{Gamma Z^T signal}, by a step of dt s; signal (3,), Z: the basis as it was evaluated."""
     for i in range(3):
         for j in range(N_NODES):
-            weight = network.weights[i, j] + dt * network.gain * network.basis[i, j] * signal[i]
-            network.weights[i, j] = min(max(weight, -network.limit), network.limit)
+            weight = (
+                network.memory.weights[i, j]
+                + dt * network.config.gain * network.memory.basis[i, j] * signal[i]
+            )
+            network.memory.weights[i, j] = min(max(weight, -network.config.limit), network.config.limit)
 
 
 @kernel
@@ -120,31 +134,22 @@ def approximate(published, fdae, detected, dt):
     """
     outside = False
     for i in range(3):
-        outside = outside or abs(fdae.residual[i]) > fdae.threshold[i]
-    if not published.dead_zone or (detected and outside):
-        learn(published.network, fdae.residual, dt)
+        outside = outside or abs(fdae.output.residual[i]) > fdae.output.threshold[i]
+    if not published.config.dead_zone or (detected and outside):
+        learn(published.network, fdae.output.residual, dt)
 
 
 @kernel
 def respond(published, fdae, main, x, y, u):
     """Bring fhat to this frame, where the FDAE and the log read it; arguments as of `evaluate`."""
     evaluate(published.network, main, x, y, u)
-    fdae.network.output[:] = published.network.output
+    take_output(fdae.network, published.network.output)
 
 
 @kernel
 def detect(fdae):
     """The first axis on which the residual of the FDAE exceeds its threshold, or -1."""
     for i in range(3):
-        if abs(fdae.residual[i]) > fdae.threshold[i]:
+        if abs(fdae.output.residual[i]) > fdae.output.threshold[i]:
             return i
     return -1
-
-
-@kernel
-def hold_thresholds(constant, bank, fdae, estimators):
-    """Put one constant threshold (rad/s) in the place of all adaptive ones."""
-    fdae.threshold[:] = constant
-    bank.threshold[0] = constant
-    for fie in estimators:
-        fie.bound[:] = constant

@@ -103,10 +103,10 @@ def follow_guarantee(guarantee, bank, dt, share, k, t):
         return
     for i in range(3):
         mean = share * guarantee.phi_sum[i]
-        for m in range(bank.n):
-            effect = bank.decay[m] * guarantee.effect[m, i] + dt * mean
+        for m in range(bank.config.n):
+            effect = bank.config.decay[m] * guarantee.effect[m, i] + dt * mean
             guarantee.effect[m, i] = effect
-            certain = abs(effect) > 2.0 * bank.threshold[m, i] > 0.0
+            certain = abs(effect) > 2.0 * bank.output.threshold[m, i] > 0.0
             if certain and guarantee.certain_after_s < 0.0:
                 guarantee.certain_after_s = t
         guarantee.phi_sum[i] = guarantee.phi[i]

@@ -98,7 +98,7 @@ def lay_out(frame: np.void, scenario: Scenario, diagnoses_itself: bool) -> tuple
     fdi, logged, profile = frame["fdi"], frame["logged"], bool(frame["autopilot"]["enabled"])
     aircraft, tests = scenario.airframe, fdi["statistical"]["tests"]
     estimators = estimator_names(scenario.fdi.fault_class, aircraft) if diagnoses_itself else ()
-    logged["estimators"] = fdi["isolation"]["n"] if diagnoses_itself else 0
+    logged["estimators"] = fdi["isolation"]["config"]["n"] if diagnoses_itself else 0
     watched = logged["watch"] = instrument_records.columns_of_the_watch(scenario)
     sampled = instrument_records.reads_further(scenario)
     logged["sampled"] = N_SAMPLED if sampled else 0

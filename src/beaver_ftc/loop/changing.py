@@ -146,8 +146,8 @@ def take_diagnosis(frame: np.void, new: np.void, k: int) -> None:
     """Begin the diagnosis anew with frame k; what healthy flight has shown of its margins is kept."""
     fdi, other = frame["fdi"], new["fdi"]
     other["watch"]["past"] = 0  # its first look begins a frame
-    if fdi["bank"]["n"] == other["bank"]["n"]:
-        other["bank"]["closest"] = fdi["bank"]["closest"]
+    if fdi["bank"]["config"]["n"] == other["bank"]["config"]["n"]:
+        other["bank"]["output"]["closest"] = fdi["bank"]["output"]["closest"]
     for air in ("air", "inertial_air"):
         other["statistical"][air]["in_flight"] = k > 0
     other["statistical"]["alarm"]["closest"] = fdi["statistical"]["alarm"]["closest"]

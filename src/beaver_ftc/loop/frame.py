@@ -91,11 +91,18 @@ def begin(frame):
 
 
 @kernel
+def begin_filters(fdi, x):
+    """Begin the detection filters at the first measurement x (3,) rad/s."""
+    fdae.begin(fdi.fdae, fdi.bound.noise, x)
+    bank.begin(fdi.bank, fdi.bound.noise)
+
+
+@kernel
 def diagnose(frame):
     """The built-in diagnosis, from prediction to verdict; with scheme `none`, nothing is concluded."""
     fdi, k = frame.fdi, frame.k - frame.since
     if k == 0:
-        fdae.begin(fdi.fdae, fdi.bank, fdi.bound.noise, frame.measured.x)
+        begin_filters(fdi, frame.measured.x)
     if fdi.config.enabled:
         if k > 0:
             predict(frame, k)
@@ -113,7 +120,7 @@ def take_verdict(frame):
     that serves the laws is brought up to date."""
     fdi, measured, k = frame.fdi, frame.measured, frame.k - frame.since
     if k == 0:
-        fdae.begin(fdi.fdae, fdi.bank, fdi.bound.noise, measured.x)
+        begin_filters(fdi, measured.x)
     else:
         predict(frame, k)
     fdae.form_residual(fdi.fdae, measured.x)
@@ -146,7 +153,7 @@ def predict(frame, k):
     if chances.tests.enabled:
         form_innovation(belief, x, dt)
         statistical.follow_rest(chances.block, chances.air, belief.innovation_after_known_faults, dt)
-    if fdi.published.in_use:
+    if fdi.published.config.in_use:
         predict_as_published(fdi, x_then, mean.acceleration)
         return
     leaking = found.isolated >= 0 or found.lead >= 0
@@ -160,9 +167,16 @@ def predict_as_published(fdi, x_then, acceleration):
     published, dt = fdi.published, fdi.config.dt
     zhang2005.approximate(published, fdi.fdae, fdi.verdict.detected, dt)
     fdae.predict(fdi.fdae, fdi.bound, x_then, acceleration, False, False, dt)
-    if published.constant > 0.0:
-        estimators = fdi.isolation.estimator[: fdi.isolation.n]
-        zhang2005.hold_thresholds(published.constant, fdi.bank, fdi.fdae, estimators)
+    if published.config.constant > 0.0:
+        hold_thresholds(fdi, published.config.constant)
+
+
+@kernel
+def hold_thresholds(fdi, constant):
+    """Replace all adaptive thresholds by a constant, rad/s."""
+    fdae.hold_threshold(fdi.fdae, constant)
+    bank.hold_threshold(fdi.bank, constant)
+    estimators.hold_thresholds(fdi.isolation, constant)
 
 
 @apart
@@ -171,7 +185,7 @@ def compare_likelihoods(frame, k):
     fdi, belief, chances, y = frame.fdi, frame.belief, frame.fdi.statistical, frame.measured.y
     tests, noise, blocks, felt = chances.tests, chances.noise, chances.block, chances.forces
     seen, inertial, views = chances.air, chances.inertial_air, chances.views[: chances.n_views]
-    mean, innovation, dt = belief.means, fdi.bank.innovation, fdi.config.dt
+    mean, innovation, dt = belief.means, fdi.bank.output.innovation, fdi.config.dt
     air.elapse(seen, belief.share)
     if inertial.moving:
         air.elapse(inertial, belief.share)
@@ -197,7 +211,7 @@ def conclude(fdi, measured, u, t):
         return
     known, every_type = fdi.verdict.detected, fdi.config.every_type
     fdae.form_residual(fdi.fdae, measured.x)
-    if fdi.published.in_use:
+    if fdi.published.config.in_use:
         axis = zhang2005.detect(fdi.fdae)
         zhang2005.respond(fdi.published, fdi.fdae, fdi.layout.main, measured.x, measured.y, u)
     else:
@@ -211,7 +225,7 @@ def conclude(fdi, measured, u, t):
     sound = not sensor_monitor.shown_from_the_start(fdi.watch, fdi.verdict.detected_at_s)
     if sound and sensor_monitor.clears_surfaces(fdi.watch, known) and not fdi.engines.output.failed:
         isolate(fdi, measured.x, t, known)
-    if not fdi.published.in_use:
+    if not fdi.published.config.in_use:
         fdae.evaluate(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
 
 
@@ -230,7 +244,7 @@ def detect(fdi, y, t):
 def isolate(fdi, x, t, started):
     """Test every estimator against the measured x (3,) rad/s, and decide; started: a frame or more ago."""
     config, records, bound = fdi.config, fdi.isolation, fdi.bound
-    for s in range(records.n):
+    for s in range(records.config.n):
         fie = records.estimator[s]
         can_be = estimators.possible(records, fie, fdi.bank, bound.frame, config.abrupt, x, started)
         if rules_out(fdi, fie, can_be):
@@ -414,13 +428,13 @@ def record(frame, commanded, row):
     column = put(row, column, control.reference.output.model_rate)
     column = log_row.record_surfaces(frame.truth, belief.commanded, saturated, row, column)
     column = log_row.record_alarm(fdi.bank, row, column)
-    column = put(row, column, fdi.fdae.residual)
-    column = put(row, column, fdi.fdae.threshold)
+    column = put(row, column, fdi.fdae.output.residual)
+    column = put(row, column, fdi.fdae.output.threshold)
     column = put(row, column, fdi.bound.eta_bar)
     column = put(row, column, fdi.fdae.network.output)
     column = put(row, column, belief.means.acceleration)
     for e in range(logged.estimators):
-        if e < fdi.isolation.n:  # else another diagnosis has taken their place
+        if e < fdi.isolation.config.n:  # else another diagnosis has taken their place
             log_row.record_estimator(fdi.isolation.estimator[e], fdi.verdict.detected, row, column)
         column += log_row.PER_ESTIMATOR
     column = put(row, column, frame.assessment.effectiveness)

@@ -65,7 +65,7 @@ def record_alarm(bank, row, column):
     """Residual and threshold of what raises the alarm: on each axis the filter nearest to its bound."""
     for i in range(3):
         m = nearest(bank, i)
-        row[column + i], row[column + 3 + i] = bank.residual[m, i], bank.threshold[m, i]
+        row[column + i], row[column + 3 + i] = bank.output.residual[m, i], bank.output.threshold[m, i]
     return column + 6
 
 

@@ -137,10 +137,12 @@ def _isolation(fdi: np.void, surfaces: Sequence[str]) -> dict[str, Any]:
     if isolated == UNANTICIPATED:
         said |= {"isolated": "unanticipated", "isolation_type": "unanticipated"}
     else:
-        estimators = fdi["isolation"]["estimator"][: int(fdi["isolation"]["n"])]
+        estimators = fdi["isolation"]["estimator"][: int(fdi["isolation"]["config"]["n"])]
         left = [surfaces[int(fie["surface"])] for fie in estimators if not fie["excluded"]]
         if isolated == NOT_ISOLATED:  # a loss that is excluded is no damage excluded
-            left += [s for s, taken in zip(surfaces, fdi["isolation"]["taken"], strict=True) if taken]
+            left += [
+                s for s, taken in zip(surfaces, fdi["isolation"]["config"]["taken"], strict=True) if taken
+            ]
         said["candidates"] = tuple(dict.fromkeys(left))
     if isolated >= 0:
         surface = int(fdi["isolation"]["estimator"][isolated]["surface"])
@@ -370,7 +372,9 @@ def landing_of(
     surfaces, departed = scenario.airframe.surfaces, int(frame["departed"])
     known = slice(int(supervisor["n_modes"]))  # as many as there is room for
     modes = zip(supervisor["mode_at_s"][known], supervisor["mode_is"][known], strict=True)
-    closest = tuple(float(share) for share in fdi["bank"]["closest"][: max(int(fdi["bank"]["n"]), 1)])
+    closest = tuple(
+        float(share) for share in fdi["bank"]["output"]["closest"][: max(int(fdi["bank"]["config"]["n"]), 1)]
+    )
     return Landing(
         scenario=scenario,
         frames=int(frame["k"]),

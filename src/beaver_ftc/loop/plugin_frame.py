@@ -258,8 +258,10 @@ def plugged(
         return None
     if detector is not None:  # no built-in isolation; instead, one estimator a surface for its verdict
         fdi = frames["fdi"][0]
-        fdi["config"]["enabled"] = fdi["config"]["every_type"] = fdi["isolation"]["n"] = 0
-        fdi["statistical"]["tests"]["enabled"] = fdi["watch"]["enabled"] = fdi["published"]["in_use"] = 0
+        fdi["config"]["enabled"] = fdi["config"]["every_type"] = fdi["isolation"]["config"]["n"] = 0
+        fdi["statistical"]["tests"]["enabled"] = fdi["watch"]["enabled"] = fdi["published"]["config"][
+            "in_use"
+        ] = 0
         n = fdi["types"]["surface"].size
         fdi["isolation"]["estimator"]["surface"][:n] = range(n)
     control = frames["control"][0]

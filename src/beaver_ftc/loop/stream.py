@@ -147,7 +147,7 @@ class Diagnosis:
     def surprise(self) -> tuple[Vector, Vector, Vector]:
         """What no healthy surface explains of the frame that ended with the last sample: the innovation (3,),
         its declared bound (3,), and what each surface was expected to give (3, surfaces), rad/s2."""
-        innovation, bound = self._fdi["bank"]["innovation"], self._fdi["bound"]["frame"]
+        innovation, bound = self._fdi["bank"]["output"]["innovation"], self._fdi["bound"]["frame"]
         return innovation.copy(), bound.copy(), self._frame["belief"]["means"]["Gu"].copy()
 
     def model(self) -> tuple[Vector, Vector]:

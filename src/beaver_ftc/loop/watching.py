@@ -71,7 +71,7 @@ def news(frames, known):
         return changed
     changed |= replace(known, 1, fdi.verdict.detected_axis) | replace(known, 2, fdi.verdict.isolated)
     excluded = 0
-    for i in range(fdi.isolation.n):
+    for i in range(fdi.isolation.config.n):
         excluded = 2 * excluded + fdi.isolation.estimator[i].excluded
     changed |= replace(known, 3, excluded) | replace(known, 4, fdi.verdict.type)
     if fdi.config.every_type:

@@ -282,7 +282,11 @@ def statements(
     alarm, fdi = events["detected"], tape.alarm["fdi"]
     about: Document = {"what": None, "column": "detected", "frame": alarm}
     watch = instruments_say.of_alarm(fdi["watch"]) if fdi["watch"]["alarmed"] else None
-    if not fdi["isolation"]["n"] or not fdi["config"]["enabled"] or fdi["published"]["in_use"]:
+    if (
+        not fdi["isolation"]["config"]["n"]
+        or not fdi["config"]["enabled"]
+        or fdi["published"]["config"]["in_use"]
+    ):
         yield about | (watch or {"because": "another scheme was in charge"})
         return
     said = _stated(_of_alarm(scenario, tape, history, alarm), history, chance.NOT_STATED, **about)

@@ -50,7 +50,7 @@ def _log(frames: np.ndarray, flown: Iterable[int], scenario: Scenario, recorder:
     """What the diagnosis makes of each frame, in the columns that a certificate takes."""
     frame, log, surfaces = frames[0], MemoryLog(), scenario.airframe.surfaces
     fdi = frame["fdi"]
-    estimators = fdi["isolation"]["estimator"][: int(fdi["isolation"]["n"])]
+    estimators = fdi["isolation"]["estimator"][: int(fdi["isolation"]["config"]["n"])]
     names = estimator_names(scenario.fdi.fault_class, scenario.airframe)
     columns = ["t_s", *(f"{axis}_{what}" for what in MEASURED_MODEL_BOUND for axis in AXES), "detected"]
     columns += [f"fie_{name}_excluded" for name in names]

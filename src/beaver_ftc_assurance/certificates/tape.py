@@ -92,7 +92,11 @@ class Recorder:
         """Begin to keep frames of the record `frames`, the first of them number 0."""
         numbers = take_memory((1,), frames.dtype)
         _words_of(numbers)[:] = np.arange(frames.nbytes // 8)
-        n, config, fdi = int(frames["fdi"]["isolation"]["n"][0]), self._scenario.fdi, numbers[0]["fdi"]
+        n, config, fdi = (
+            int(frames["fdi"]["isolation"]["config"]["n"][0]),
+            self._scenario.fdi,
+            numbers[0]["fdi"],
+        )
         self._always = _Places(_always(numbers[0], n, config.fault_class == "all"))
         self._early = _Places(_early(fdi, n, config.statistical is not None))
         self._state = np.array([0, -1, 0, fdi["verdict"]["detected"], fdi["watch"]["alarmed"]])

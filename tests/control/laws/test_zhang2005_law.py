@@ -69,10 +69,10 @@ def test_effectiveness_follows_the_gradient_and_stays_in_its_set():
 def test_what_a_saturated_surface_misses_teaches_nothing():
     control = law()
     control.allocation.output.saturated[1] = 1
-    control.zhang2005.network.basis[:] = 0.1
+    control.zhang2005.network.memory.basis[:] = 0.1
     adapt(control, (0.0, 0.3, 0.0))
     assert (control.surfaces.output.effectiveness == 1.0).all()
-    assert not control.zhang2005.network.weights.any()
+    assert not control.zhang2005.network.memory.weights.any()
 
 
 @settings(max_examples=samples(15))
@@ -81,20 +81,23 @@ def test_the_lyapunov_function_falls(unknown, e0):
     """e' = -Kp e - Ki int e + fhat - phi, phi constant, in small steps: V with the weights in it."""
     control, dt = law(network_gain=60.0, rate_weight=20.0), 1e-3
     q, Gamma, network = 20.0, 60.0, control.zhang2005.network
-    network.basis[:, 0] = 1.0
+    network.memory.basis[:, 0] = 1.0
     A = np.array([[0.0, 1.0], [-1.0, -2.0]])
     P = solve_continuous_lyapunov(A.T, -np.diag([1.0, q]))
     e, integral, before = e0, 0.0, np.inf
     for k in range(3000):
         control.zhang2005.feedback.memory.integral[1] = integral
-        missed = network.weights[1, 0] - unknown
+        missed = network.memory.weights[1, 0] - unknown
         z = np.array([integral, e])
         V = z @ P @ z / P[1, 1] + missed**2 / Gamma
         if k % 100 == 0:
             assert before + 1e-12 >= V * (1.0 - 2e-3)
             before = V
         adapt(control, (0.0, e, 0.0), u=np.zeros(4), dt=dt)
-        e, integral = e + dt * (-2.0 * e - integral + network.weights[1, 0] - unknown), integral + dt * e
+        e, integral = (
+            e + dt * (-2.0 * e - integral + network.memory.weights[1, 0] - unknown),
+            integral + dt * e,
+        )
     assert abs(e) < 0.05 * (1.0 + abs(unknown) + abs(e0))
 
 

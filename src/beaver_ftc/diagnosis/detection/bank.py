@@ -20,12 +20,13 @@ from beaver_ftc.diagnosis.detection.thresholds import bound_step, noise_step
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import MAX_POLES, FdiConfig
 
-# The bank of detection filters; filter 0 is the published one.
-BANK = record(
-    n=int, decay=MAX_POLES, innovation=3, residual=(MAX_POLES, 3), threshold=(MAX_POLES, 3),
-    eta=(MAX_POLES, 3), noise=(MAX_POLES, 3),
-    closest=MAX_POLES,  # largest share of its bound each filter reached in healthy flight
-)  # fmt: skip
+# The bank of detection filters; filter 0 is the published one. decay: a_m; eta, noise rad/s: parts of the
+# threshold; innovation rad/s2; residual, threshold rad/s; closest: largest share of its bound that each
+# filter has reached in healthy flight.
+CONFIG = record(n=int, decay=MAX_POLES)
+MEMORY = record(eta=(MAX_POLES, 3), noise=(MAX_POLES, 3))
+OUTPUT = record(innovation=3, residual=(MAX_POLES, 3), threshold=(MAX_POLES, 3), closest=MAX_POLES)
+BANK = record(config=CONFIG, memory=MEMORY, output=OUTPUT)
 
 
 def poles_of(config: FdiConfig, declared: Declared) -> tuple[float, ...]:
@@ -38,8 +39,20 @@ def poles_of(config: FdiConfig, declared: Declared) -> tuple[float, ...]:
 def configure(bank: np.void, config: FdiConfig, declared: Declared, dt: float) -> None:
     """Fill in the filters' poles: those of the scenario, and those that noise asks for."""
     poles = poles_of(config, declared)
-    bank["n"] = len(poles)
-    bank["decay"][: len(poles)] = [exp(-pole * dt) for pole in poles]
+    bank["config"]["n"] = len(poles)
+    bank["config"]["decay"][: len(poles)] = [exp(-pole * dt) for pole in poles]
+
+
+@kernel
+def begin(bank, noise):
+    """Begin with all of the gyros' errors still to come: noise (3,) rad/s, by how much they may change."""
+    bank.memory.noise[: bank.config.n] = noise
+
+
+@kernel
+def hold_threshold(bank, constant):
+    """Replace the threshold of the published filter by a constant, rad/s."""
+    bank.output.threshold[0] = constant
 
 
 @kernel
@@ -50,7 +63,7 @@ def align(isolation, G):
     The bound is exact for any fixed direction; this one has power while G keeps its direction, which
     depends on alpha alone, and weakly.
     """
-    for fie in isolation.estimator[: isolation.n]:
+    for fie in isolation.estimator[: isolation.config.n]:
         p, r = G[0, fie.surface], G[2, fie.surface]
         length = np.hypot(p, r)
         if length > 0.0:
@@ -65,21 +78,21 @@ def innovate(bank, bound, x, x_then, believed, dt):
     aircraft, mean over the frame. bound: of `bound_dtype`; dt s.
     """
     for i in range(3):
-        bank.innovation[i] = (x[i] - x_then[i]) / dt - believed[i]
+        bank.output.innovation[i] = (x[i] - x_then[i]) / dt - believed[i]
         bound.frame[i] = bound.eta_bar[i] + (bound.noise[i] + bound.noise_then[i]) / dt
-        for m, a in enumerate(bank.decay[: bank.n]):
-            bank.residual[m, i] = a * bank.residual[m, i] + dt * bank.innovation[i]
-            bank.eta[m, i] = bound_step(bank.eta[m, i], bound.eta_bar[i], a, dt)
-            bank.noise[m, i] = noise_step(bank.noise[m, i], bound.noise_then[i], a)
-            bank.threshold[m, i] = bank.eta[m, i] + bank.noise[m, i] + bound.noise[i]
+        for m, a in enumerate(bank.config.decay[: bank.config.n]):
+            bank.output.residual[m, i] = a * bank.output.residual[m, i] + dt * bank.output.innovation[i]
+            bank.memory.eta[m, i] = bound_step(bank.memory.eta[m, i], bound.eta_bar[i], a, dt)
+            bank.memory.noise[m, i] = noise_step(bank.memory.noise[m, i], bound.noise_then[i], a)
+            bank.output.threshold[m, i] = bank.memory.eta[m, i] + bank.memory.noise[m, i] + bound.noise[i]
 
 
 @kernel
 def alarm(bank):
     """The first axis on which a filter of the bank leaves its bound, or -1."""
     for i in range(3):
-        for m in range(bank.n):
-            if abs(bank.residual[m, i]) > bank.threshold[m, i]:
+        for m in range(bank.config.n):
+            if abs(bank.output.residual[m, i]) > bank.output.threshold[m, i]:
                 return i
     return -1
 
@@ -87,15 +100,15 @@ def alarm(bank):
 @kernel
 def share_of(bank, m, i):
     """The share of its bound that filter m reaches on axis i."""
-    bound = bank.threshold[m, i]
-    return abs(bank.residual[m, i]) / bound if bound > 0.0 else 0.0
+    bound = bank.output.threshold[m, i]
+    return abs(bank.output.residual[m, i]) / bound if bound > 0.0 else 0.0
 
 
 @kernel
 def nearest(bank, i):
     """The filter that is nearest to its bound on axis i: the one the alarm comes from, if there is one."""
     m_nearest, largest = 0, 0.0
-    for m in range(bank.n):
+    for m in range(bank.config.n):
         share = share_of(bank, m, i)
         if share > largest:
             m_nearest, largest = m, share
@@ -106,7 +119,7 @@ def nearest(bank, i):
 def largest_share(bank):
     """The largest share of its bound that a filter of the bank reaches."""
     largest = 0.0
-    for m in range(bank.n):
+    for m in range(bank.config.n):
         for i in range(3):
             largest = max(largest, share_of(bank, m, i))
     return largest
@@ -115,9 +128,9 @@ def largest_share(bank):
 @kernel
 def note_closest_approach(bank):
     """Keep the largest share of its bound that each filter has reached."""
-    for m in range(bank.n):
+    for m in range(bank.config.n):
         for i in range(3):
-            bank.closest[m] = max(bank.closest[m], share_of(bank, m, i))
+            bank.output.closest[m] = max(bank.output.closest[m], share_of(bank, m, i))
 
 
 @kernel
@@ -145,7 +158,7 @@ def remember(bank, fie, dt):
     """Advance what the fault can have done to each filter since the flight began; channel 3 is `across`."""
     for channel in range(4):
         low, high = extremes(fie, channel) if channel < 3 else aligned_extremes(fie)
-        for m, a in enumerate(bank.decay[: bank.n]):
+        for m, a in enumerate(bank.config.decay[: bank.config.n]):
             fie.reach_low[m, channel] = a * fie.reach_low[m, channel] + dt * low
             fie.reach_high[m, channel] = a * fie.reach_high[m, channel] + dt * high
 
@@ -156,10 +169,10 @@ def explains(bank, fie, shared):
 
     `shared`: also across its direction, which only a parameter shared by the axes confines.
     """
-    for m in range(bank.n):
+    for m in range(bank.config.n):
         residual, bound = 0.0, 0.0
         for i in range(3):
-            r, b = bank.residual[m, i], bank.threshold[m, i]
+            r, b = bank.output.residual[m, i], bank.output.threshold[m, i]
             if not fie.reach_low[m, i] - b <= r <= fie.reach_high[m, i] + b and not fie.unasked[i]:
                 return False
             residual += fie.across[i] * r

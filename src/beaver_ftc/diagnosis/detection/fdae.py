@@ -24,17 +24,23 @@ from beaver_ftc.diagnosis.detection.thresholds import bound_step, noise_step
 from beaver_ftc.diagnosis.state import STATISTICS, WORST_CASE
 from beaver_ftc.scenario.schema import Scenario
 
-# Centres of the network's basis functions, rad; and its memory.
+# Centres of the network's basis functions, rad; and its record. gain 1/s2, weight_limit rad/s2; output: fhat,
+# rad/s2.
 ALPHA_CENTRES = np.linspace(-0.1, 0.5, 9)
 BETA_CENTRES = np.linspace(-0.3, 0.3, 5)
 N_BASIS = len(ALPHA_CENTRES) + len(BETA_CENTRES)
 NETWORK = record(
-    gain=float, leak_per_s=float, weight_limit=float, weights=(3, N_BASIS), basis=N_BASIS, output=3,
-)  # fmt: skip
+    config=record(gain=float, leak_per_s=float, weight_limit=float),
+    memory=record(weights=(3, N_BASIS), basis=N_BASIS),
+    output=3,
+)
 
-FDAE = record(
-    pole=3, decay=3, xhat=3, residual=3, threshold=3, threshold_eta=3, threshold_noise=3, network=NETWORK,
-)  # fmt: skip
+# pole 1/s; decay: a. xhat: the estimate of the rates, rad/s; threshold_eta, threshold_noise rad/s: parts of
+# the threshold. residual, threshold rad/s.
+CONFIG = record(pole=3, decay=3)
+MEMORY = record(xhat=3, threshold_eta=3, threshold_noise=3)
+OUTPUT = record(residual=3, threshold=3)
+FDAE = record(config=CONFIG, memory=MEMORY, output=OUTPUT, network=NETWORK)
 
 _PER_STEP = np.exp(-1.0)
 _N_ALPHA, _N_BETA = len(ALPHA_CENTRES), len(BETA_CENTRES)
@@ -45,10 +51,13 @@ _BETA_FIRST, _BETA_STEP = BETA_CENTRES[0], BETA_CENTRES[1] - BETA_CENTRES[0]
 def configure(fdae: np.void, scenario: Scenario) -> None:
     """Fill in the estimator's pole, and how its network learns."""
     config, network = scenario.control, fdae["network"]
-    fdae["pole"] = scenario.fdi.detection_pole_per_s
-    fdae["decay"] = exp(-scenario.fdi.detection_pole_per_s * (1.0 / scenario.rate_hz))
-    network["gain"], network["leak_per_s"] = config.network_gain_per_s2, config.network_leak_per_s
-    network["weight_limit"] = config.network_weight_limit_rad_s2
+    fdae["config"]["pole"] = scenario.fdi.detection_pole_per_s
+    fdae["config"]["decay"] = exp(-scenario.fdi.detection_pole_per_s * (1.0 / scenario.rate_hz))
+    network["config"]["gain"], network["config"]["leak_per_s"] = (
+        config.network_gain_per_s2,
+        config.network_leak_per_s,
+    )
+    network["config"]["weight_limit"] = config.network_weight_limit_rad_s2
 
 
 @kernel
@@ -93,11 +102,11 @@ def dead_zone(residual, threshold):
 @kernel
 def evaluate(network, alpha, beta):
     """Fill network.output (3,) rad/s2 for the present alpha and beta."""
-    basis(alpha, beta, network.basis)
+    basis(alpha, beta, network.memory.basis)
     for i in range(3):
         total = 0.0
         for j in range(N_BASIS):
-            total += network.weights[i, j] * network.basis[j]
+            total += network.memory.weights[i, j] * network.memory.basis[j]
         network.output[i] = total
 
 
@@ -107,36 +116,47 @@ def learn(network, residual, threshold, leaking, dt):
 
     `leaking` lets go of what was learnt once another estimate explains the fault.
     """
-    keep = np.exp(-network.leak_per_s * dt) if leaking else 1.0
-    limit = network.weight_limit
+    keep = np.exp(-network.config.leak_per_s * dt) if leaking else 1.0
+    limit = network.config.weight_limit
     for i in range(3):
-        drive = dt * network.gain * dead_zone(residual[i], threshold[i])
+        drive = dt * network.config.gain * dead_zone(residual[i], threshold[i])
         for j in range(N_BASIS):
-            weight = keep * network.weights[i, j] + drive * network.basis[j]
-            network.weights[i, j] = min(max(weight, -limit), limit)
+            weight = keep * network.memory.weights[i, j] + drive * network.memory.basis[j]
+            network.memory.weights[i, j] = min(max(weight, -limit), limit)
 
 
 @kernel
-def begin(fdae, bank, noise, x):
+def begin(fdae, noise, x):
     """Start at the first measurement x (3,) rad/s: no residual, and all of the gyro's error still to come.
 
     noise (3,) rad/s: by how much the gyros' errors may change.
     """
-    fdae.xhat[:], fdae.threshold_noise[:] = x, noise
-    bank.noise[: bank.n] = noise
+    fdae.memory.xhat[:], fdae.memory.threshold_noise[:] = x, noise
+
+
+@kernel
+def hold_threshold(fdae, constant):
+    """Replace the threshold by a constant, rad/s."""
+    fdae.output.threshold[:] = constant
+
+
+@kernel
+def take_output(network, fhat):
+    """Replace the output of the network by that of another, fhat (3,) rad/s2."""
+    network.output[:] = fhat
 
 
 @kernel
 def reset_network(network):
     """Discard what the network has learnt."""
-    network.weights[:], network.output[:] = 0.0, 0.0
+    network.memory.weights[:], network.output[:] = 0.0, 0.0
 
 
 @kernel
 def form_residual(fdae, x):
     """Fill the residual for the measured x (3,) rad/s."""
     for i in range(3):
-        fdae.residual[i] = x[i] - fdae.xhat[i]
+        fdae.output.residual[i] = x[i] - fdae.memory.xhat[i]
 
 
 @kernel
@@ -159,13 +179,17 @@ def predict(fdae, bound, x, believed, detected, leaking, dt):
     x (3,) rad/s; `believed` (3,) rad/s2 is f + G u, with the isolated fault once there is one.
     """
     if detected:
-        learn(fdae.network, fdae.residual, fdae.threshold, leaking, dt)
+        learn(fdae.network, fdae.output.residual, fdae.output.threshold, leaking, dt)
     for i in range(3):
-        rate, decay = believed[i] + fdae.network.output[i], fdae.decay[i]
-        fdae.xhat[i] = x[i] + dt * rate + decay * (fdae.xhat[i] - x[i])
-        fdae.threshold_eta[i] = bound_step(fdae.threshold_eta[i], bound.eta_bar[i], decay, dt)
-        fdae.threshold_noise[i] = noise_step(fdae.threshold_noise[i], bound.noise_then[i], decay)
-        fdae.threshold[i] = fdae.threshold_eta[i] + fdae.threshold_noise[i] + bound.noise[i]
+        rate, decay = believed[i] + fdae.network.output[i], fdae.config.decay[i]
+        fdae.memory.xhat[i] = x[i] + dt * rate + decay * (fdae.memory.xhat[i] - x[i])
+        fdae.memory.threshold_eta[i] = bound_step(fdae.memory.threshold_eta[i], bound.eta_bar[i], decay, dt)
+        fdae.memory.threshold_noise[i] = noise_step(
+            fdae.memory.threshold_noise[i], bound.noise_then[i], decay
+        )
+        fdae.output.threshold[i] = (
+            fdae.memory.threshold_eta[i] + fdae.memory.threshold_noise[i] + bound.noise[i]
+        )
 
 
 @kernel
@@ -177,5 +201,5 @@ def unknown_acceleration(fdae, noise, out):
     it, and off the surfaces.
     """
     for i in range(3):
-        explained = fdae.threshold_noise[i] + noise[i]
-        out[i] = fdae.network.output[i] + fdae.pole[i] * dead_zone(fdae.residual[i], explained)
+        explained = fdae.memory.threshold_noise[i] + noise[i]
+        out[i] = fdae.network.output[i] + fdae.config.pole[i] * dead_zone(fdae.output.residual[i], explained)

@@ -26,5 +26,5 @@ def weigh(fie, tests, blocks, isolation, loss_of, abrupt, hidden):
     fie.improbable = statistical.excludes(tests, blocks, others, loss_of, s, True, abrupt)
     fie.doubted = max(fie.doubted, 1)
     if fie.improbable and hidden:
-        for other in others[: isolation.n]:
+        for other in others[: isolation.config.n]:
             other.doubted = max(other.doubted, 1)

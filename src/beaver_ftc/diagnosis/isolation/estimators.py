@@ -65,11 +65,11 @@ def isolation_dtype(surfaces: int) -> np.dtype:
     them is sharpened. by_gradient: how they adapt, else by least squares; unprojected: their estimates may
     leave the known set. patience_s: for so long the one left is not named yet; taken: surfaces that damage
     may take, besides."""
-    return record(
+    config = record(
         n=int, thresholds=int, forgetting=float, decay=3, memory=int, shared=int, membership=int,
         by_gradient=int, gradient=float, unprojected=int, patience_s=float, taken=(int, surfaces),
-        estimator=(ESTIMATOR, 2 * surfaces),
     )  # fmt: skip
+    return record(config=config, estimator=(ESTIMATOR, 2 * surfaces))
 
 
 PATIENCE_S = 4.0  # in still air what damage left over was excluded within 3.2 s, in 210 flights
@@ -104,11 +104,14 @@ def configure(
     """Fill in the estimators and how the decision among them is sharpened; travel (2, n) rad."""
     config, aircraft, dt = scenario.fdi, scenario.airframe, 1.0 / scenario.rate_hz
     sharpen = config.sharpen
-    isolation["thresholds"] = _THRESHOLDS[config.thresholds]
-    isolation["forgetting"] = exp(-dt / config.forgetting_time_s)
-    isolation["decay"] = exp(-config.isolation_pole_per_s * dt)
-    isolation["memory"], isolation["shared"] = sharpen.memory, sharpen.shared_effectiveness
-    isolation["membership"], isolation["n"] = sharpen.set_membership, len(members)
+    isolation["config"]["thresholds"] = _THRESHOLDS[config.thresholds]
+    isolation["config"]["forgetting"] = exp(-dt / config.forgetting_time_s)
+    isolation["config"]["decay"] = exp(-config.isolation_pole_per_s * dt)
+    isolation["config"]["memory"], isolation["config"]["shared"] = (
+        sharpen.memory,
+        sharpen.shared_effectiveness,
+    )
+    isolation["config"]["membership"], isolation["config"]["n"] = sharpen.set_membership, len(members)
     reach = np.array([np.minimum(travel[0], 0.0), np.maximum(travel[1], 0.0)])  # a share of it can be left
     for fie, (_, kind, surface) in zip(isolation["estimator"], members, strict=False):
         fie["kind"], fie["surface"] = kind, surface
@@ -119,9 +122,9 @@ def configure(
     # fault.
     doubted = BESIDE_DAMAGE if config.weighs_chance and aircraft.damage else 0
     isolation["estimator"]["doubted"] = doubted
-    isolation["patience_s"] = PATIENCE_S if aircraft.damage else 0.0
+    isolation["config"]["patience_s"] = PATIENCE_S if aircraft.damage else 0.0
     lost = {surface for case in aircraft.damage.values() for surface in case.takes}
-    isolation["taken"] = [surface in lost for surface in aircraft.surfaces]
+    isolation["config"]["taken"] = [surface in lost for surface in aircraft.surfaces]
 
 
 @kernel
@@ -149,16 +152,16 @@ def suppose(isolation, fie, bank, bound, config, G, Gu, spread):
     for i in range(3):
         effect.spread[i] = spread[i, fie.surface]
     if (bound.own_errors or bound.error_map.anywhere) and fie.kind == POSITION:
-        membership.allow_for_own_errors(fie, bound, bank.innovation, config.instants)
-    if isolation.memory:
+        membership.allow_for_own_errors(fie, bound, bank.output.innovation, config.instants)
+    if isolation.config.memory:
         remember(bank, fie, config.dt)
 
 
 @kernel
 def suppose_all(isolation, bank, bound, config, detected, G, Gu, spread):
     """`suppose` for every estimator, where something will ask for it."""
-    if isolation.memory or config.every_type or detected:
-        for fie in isolation.estimator[: isolation.n]:
+    if isolation.config.memory or config.every_type or detected:
+        for fie in isolation.estimator[: isolation.config.n]:
             suppose(isolation, fie, bank, bound, config, G, Gu, spread)
 
 
@@ -168,10 +171,10 @@ def start(isolation, noise, x):
 
     noise (3,) rad/s: by how much the gyros' errors may change.
     """
-    for fie in isolation.estimator[: isolation.n]:
+    for fie in isolation.estimator[: isolation.config.n]:
         fie.xhat[:], fie.bound_noise[:] = x, noise
         fie.covariance[:] = (fie.high - fie.low) ** 2 / 12.0  # of a uniform distribution
-        membership.start(fie, isolation.unprojected)
+        membership.start(fie, isolation.config.unprojected)
 
 
 @kernel
@@ -198,14 +201,23 @@ def possible(isolation, fie, bank, frame_bound, abrupt, x, started):
 
     frame_bound (3,): on the innovation of a healthy frame; abrupt: whether a fault stays as it is.
     """
-    can_be = within_limits(fie, isolation.thresholds, x)
-    if isolation.memory:
-        can_be = can_be and explains(bank, fie, isolation.shared)
-    if (isolation.shared or fie.kind == POSITION) and (started or isolation.memory):
-        can_be = can_be and membership.agree(fie, bank.innovation, frame_bound)
-    if isolation.membership and abrupt and started and fie.kind == LOSS:
-        can_be = can_be and membership.narrow(fie, bank.innovation, frame_bound, isolation.shared)
+    can_be = within_limits(fie, isolation.config.thresholds, x)
+    if isolation.config.memory:
+        can_be = can_be and explains(bank, fie, isolation.config.shared)
+    if (isolation.config.shared or fie.kind == POSITION) and (started or isolation.config.memory):
+        can_be = can_be and membership.agree(fie, bank.output.innovation, frame_bound)
+    if isolation.config.membership and abrupt and started and fie.kind == LOSS:
+        can_be = can_be and membership.narrow(
+            fie, bank.output.innovation, frame_bound, isolation.config.shared
+        )
     return can_be
+
+
+@kernel
+def hold_thresholds(isolation, constant):
+    """Replace the adaptive thresholds by a constant, rad/s."""
+    for fie in isolation.estimator[: isolation.config.n]:
+        fie.bound[:] = constant
 
 
 @kernel
@@ -224,13 +236,13 @@ def decide(isolation, t):
     damage, one that has not yet been the only one left for `patience_s`.
     """
     left, last, since_s = 0, NOT_ISOLATED, -np.inf
-    for s, fie in enumerate(isolation.estimator[: isolation.n]):
+    for s, fie in enumerate(isolation.estimator[: isolation.config.n]):
         if fie.excluded:
             since_s = max(since_s, fie.excluded_at_s)
         else:
             left += 1
             last = NOT_ISOLATED if fie.doubted and not fie.shown else s
-    if t - since_s < isolation.patience_s:
+    if t - since_s < isolation.config.patience_s:
         last = NOT_ISOLATED
     return NOT_ISOLATED if left > 1 else (last if left == 1 else UNANTICIPATED)
 
@@ -293,11 +305,11 @@ def predict(isolation, fie, bound, x, believed, dt):
     already this frame's.
     """
     for i in range(3):
-        base, Z, theta, a = fie.effect.offset[i], fie.effect.Z[i], fie.theta[i], isolation.decay[i]
+        base, Z, theta, a = fie.effect.offset[i], fie.effect.Z[i], fie.theta[i], isolation.config.decay[i]
         fie.xhat[i] = x[i] + dt * (believed[i] + base + Z * theta) + a * (fie.xhat[i] - x[i])
     adapt(isolation, fie, dt)
     for i in range(3):
-        Z, a = fie.effect.Z[i], isolation.decay[i]
+        Z, a = fie.effect.Z[i], isolation.config.decay[i]
         fie.rise[i] = a * fie.rise[i] + dt * max(Z, 0.0)
         fie.fall[i] = a * fie.fall[i] + dt * min(Z, 0.0)
         fie.bound_eta[i] = bound_step(fie.bound_eta[i], bound.eta_bar[i] + fie.effect.spread[i], a, dt)
@@ -308,20 +320,22 @@ def predict(isolation, fie, bound, x, believed, dt):
 @kernel
 def adapt(isolation, fie, dt):
     """Move the estimate by the residual the frame began with, and the prediction along Omega[k+1]."""
-    joint = adapt_jointly(fie, isolation.forgetting) if isolation.shared else 0.0
+    joint = adapt_jointly(fie, isolation.config.forgetting) if isolation.config.shared else 0.0
     for i in range(3):
-        if isolation.by_gradient:
-            step = descend(fie, i, isolation.gradient, dt)
-        elif isolation.shared:
+        if isolation.config.by_gradient:
+            step = descend(fie, i, isolation.config.gradient, dt)
+        elif isolation.config.shared:
             step = joint
         else:
-            step = correct(fie, i, fie.residual[i], isolation.forgetting, fie.theta_low[i], fie.theta_high[i])
-        fie.omega[i] = isolation.decay[i] * fie.omega[i] + dt * fie.effect.Z[i]
+            step = correct(
+                fie, i, fie.residual[i], isolation.config.forgetting, fie.theta_low[i], fie.theta_high[i]
+            )
+        fie.omega[i] = isolation.config.decay[i] * fie.omega[i] + dt * fie.effect.Z[i]
         fie.xhat[i] += fie.omega[i] * step
 
 
 @kernel
 def predict_all(isolation, bound, x, believed, dt):
     """Advance the estimators by a frame; arguments as in `predict`."""
-    for fie in isolation.estimator[: isolation.n]:
+    for fie in isolation.estimator[: isolation.config.n]:
         predict(isolation, fie, bound, x, believed, dt)

@@ -78,7 +78,7 @@ def monitor(watch, belief, measured, conclusion, bank, bound, dt, t):
         begin(watch, measured, t)
         return
     if watch.past == 0:
-        follow_rates(watch, bank.innovation, bound.eta_bar, dt)
+        follow_rates(watch, bank.output.innovation, bound.eta_bar, dt)
     redundancy.check(step, signal, watch.engine)
     if N_TESTS > N_COMPUTED:
         redundancy.compare_equals(step, signal, measured.fresh)
@@ -230,7 +230,7 @@ def ask_rates(watch, bank, bound, dt):
     What has shown inside a frame and is gone for all of the next is no gyro's: its error would have come to
     stay, and one that varies is not as small at every look.
     """
-    alarmed, innovation = alarm(bank), bank.innovation
+    alarmed, innovation = alarm(bank), bank.output.innovation
     for i in range(3):
         if watch.rates_say[i] != UNKNOWN:
             continue

@@ -31,8 +31,8 @@ def note_alarms(pair, bank):
     """In which plane a filter of the bank has left its bound."""
     for i in range(3):
         plane = IN_PITCH if i == PITCH else IN_ROLL_AND_YAW
-        for m in range(bank.n):
-            if abs(bank.residual[m, i]) > bank.threshold[m, i]:
+        for m in range(bank.config.n):
+            if abs(bank.output.residual[m, i]) > bank.output.threshold[m, i]:
                 pair.alarmed[plane] = 1
 
 
@@ -112,9 +112,9 @@ def solve_beside_the_first(types, layout, estimators, innovation, frame_bound):
 def examine(types, layout, estimators, bank, frame_bound):
     """Take in the elapsed frame, plane by plane, and judge the one before; frame_bound (3,): of its own."""
     note_alarms(types.pair, bank)
-    frames.take_in(types, layout, estimators, bank.innovation, frame_bound)
-    solve_roll_and_yaw(types, layout, estimators, bank.innovation, frame_bound)
-    solve_pitch(types, layout, estimators, bank.innovation, frame_bound)
+    frames.take_in(types, layout, estimators, bank.output.innovation, frame_bound)
+    solve_roll_and_yaw(types, layout, estimators, bank.output.innovation, frame_bound)
+    solve_pitch(types, layout, estimators, bank.output.innovation, frame_bound)
     frames.judge_all(types)
 
 
@@ -240,14 +240,22 @@ def decide(types, conclusion, layout, t):
     for s, surface in enumerate(types.surface):
         if surface.named and (earliest < 0 or surface.named_at_s < types.surface[earliest].named_at_s):
             earliest = s
+    isolated, isolated_at_s, kind, type_at_s = summarise(types, conclusion, layout, earliest, outside, t)
     lead, lead_kind = act(types, layout)
-    if earliest >= 0:
-        first = types.surface[earliest]
-        isolated = verdict.estimator_for(layout, earliest, first.type)
-        return isolated, first.named_at_s, first.type, first.type_at_s, lead, lead_kind
+    return isolated, isolated_at_s, kind, type_at_s, lead, lead_kind
+
+
+@kernel
+def summarise(types, conclusion, layout, s, outside, t):
+    """The finding on surface s, the first named, as that of a single fault: estimator, its instant, type, its
+    instant. NO_SURFACE: none is named, and the fault of roll and yaw may be `outside` the class."""
+    if s >= 0:
+        surface = types.surface[s]
+        isolated = verdict.estimator_for(layout, s, surface.type)
+        return isolated, surface.named_at_s, surface.type, surface.type_at_s
     isolated = state.UNANTICIPATED if outside else state.NOT_ISOLATED
     isolated_at_s = t if isolated != conclusion.isolated else conclusion.isolated_at_s
-    return isolated, isolated_at_s, -1, conclusion.type_at_s, lead, lead_kind
+    return isolated, isolated_at_s, -1, conclusion.type_at_s
 
 
 @kernel

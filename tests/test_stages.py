@@ -19,11 +19,8 @@ import beaver_ftc
 ROOT = Path(beaver_ftc.__file__).parent
 COMPILED = {"kernel", "apart", "lazy_kernel"}
 
-SEVERAL_FILES = {
-    "demand", "hedging", "hold", "k", "t", "target", "usual_speed", "wrong", "wrong_before",
-    "wrong_then", "x",
-}  # fmt: skip
-OTHER_FOLDER = {"effective", "fhat", "hedging", "present", "x"}
+SEVERAL_FILES = {"demand", "hold", "k", "t", "wrong", "wrong_before", "wrong_then", "x"}
+OTHER_FOLDER = {"x"}
 
 
 @cache

@@ -29,7 +29,7 @@ LONGEST = (
     "cli/test_command_line.py", "live/page/test_session.py", "aircraft/derive/test_derive.py",
     "diagnosis/test_short_flights.py", "live/challenge/test_cheats.py",
     "studies/mismatch/test_command.py", "control/outer/test_thrust_of_others.py", "tools/test_mutants.py",
-    "studies/bench/test_cache.py", "tools/test_site.py", "studies/compare/test_compare.py",
+    "compiled/test_cache.py", "tools/test_site.py", "studies/compare/test_compare.py",
     "control/test_engines.py", "diagnosis/test_frames_kernels.py", "diagnosis/test_redundancy_kernels.py",
 )  # fmt: skip
 

@@ -36,7 +36,7 @@ BESIDE = {
 FLOORS = (
     {"public"},
     {"documents"},
-    {"choice", "commands", "compiled", "extensions", "numba_inside", "numba_sized", "plugins"},
+    {"choice", "commands", "compiled", "extensions", "plugins"},
     {"aircraft"},
     {"design"},
     {"scenario"},

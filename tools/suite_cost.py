@@ -85,16 +85,16 @@ class Cost:
     @pytest.hookimpl(tryfirst=True)
     def pytest_sessionstart(self) -> None:
         self._write("start", "start", _BORN)
-        from beaver_ftc import numba_inside
+        from beaver_ftc.compiled import target
 
-        compiled = numba_inside.Kernel._compiled
+        compiled = target.Kernel._compiled
 
         def measured(kernel: Any, types: Any) -> Any:
             name = f"{kernel.py_func.__module__}.{kernel.py_func.__qualname__}"
             with self._measured("compilation", name):
                 return compiled(kernel, types)
 
-        numba_inside.Kernel._compiled = measured
+        target.Kernel._compiled = measured
 
     def pytest_unconfigure(self) -> None:
         self._write("rest", "rest", _now() - _BORN - self._inner[0])

@@ -96,7 +96,7 @@ def test_what_fills_the_records_of_kernels_is_glue_and_what_lays_them_out_is_not
 
 def test_what_is_left_out_has_a_reason_and_what_is_listed_exists():
     assert sum(int(line.split()[0]) for line in scope.left_out()) < 30
-    assert scope.kind(scope.CORE / "compiled.py") == "compile"
+    assert scope.kind(scope.CORE / "compiled" / "target.py") == "compile"
     assert scope.kind(scope.CORE / "loop" / "frame.py") == "fly"
     assert scope.stale() == []
 

@@ -33,7 +33,7 @@ SLOW_S = {
 WAITS_S = 20.0  # nor is what waits so long, for other processes
 HANGS_S = 900.0  # of processor for the tests of one file, far more than the limits allow
 EXAMPLES = 4
-APART = ("beaver_ftc.compiled", "beaver_ftc.numba_inside", "beaver_ftc.numba_sized")
+APART = ("beaver_ftc.compiled",)
 SHARED = ("conftest.py", "kept.py")
 KEPT = ROOT / ".mutants"
 
@@ -235,7 +235,7 @@ def forget() -> None:
     the first of a process would be known to execute it.
     """
     for name, module in list(sys.modules.items()):
-        if name.startswith("beaver_ftc") and name not in APART:
+        if name.startswith("beaver_ftc") and not name.startswith(APART):
             for value in list(vars(module).values()):
                 if isinstance(value, functools._lru_cache_wrapper) and value.__module__ == name:
                     value.cache_clear()

@@ -27,10 +27,7 @@ MODES = {KERNELS: (PLAIN,), GLUE: (PLAIN, COMPILED)}
 
 # Compiled modules that plain Python reaches in a second.
 QUICK = ("design", "diagnosis", "control")
-APART = {
-    "beaver_ftc/compiled.py": "compile", "beaver_ftc/numba_inside.py": "compile",
-    "beaver_ftc/numba_sized.py": "compile", "beaver_ftc/results/style.py": "looks",
-}  # fmt: skip
+APART = {"beaver_ftc/compiled": "compile", "beaver_ftc/results/style.py": "looks"}
 LEFT_OUT = {
     "looks": "how lines look: only the eye can judge it",
     "compile": "what compiles and keeps code: a mistake in it would be kept",
@@ -40,8 +37,9 @@ LEFT_OUT = {
 
 def kind(file: Path) -> str:
     """KERNELS, GLUE, or why no mutants are made of a module (a key of LEFT_OUT)."""
-    if reason := APART.get(file.relative_to(SOURCES).as_posix()):
-        return reason
+    for place, reason in APART.items():
+        if file.is_relative_to(SOURCES / place):
+            return reason
     if file not in _compiled(SOURCES):
         return GLUE
     return KERNELS if _is_quick(file) else "fly"

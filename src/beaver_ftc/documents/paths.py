@@ -93,9 +93,25 @@ def _not_ours(folder: Path, base: bool) -> str:
         return "it is a link"
     if base and status.st_mode & stat.S_ISVTX and status.st_uid in trusted:
         return ""  # as /tmp: what we make in it nobody else can replace
+    return _other_writer(status)
+
+
+def _other_writer(status: os.stat_result) -> str:
+    """Who else can write a file or a folder, in words; nothing if nobody."""
     if status.st_uid != _user():
         return f"it belongs to user {status.st_uid}"
     return f"its mode is {status.st_mode & 0o7777:04o}" if status.st_mode & _OTHERS_WRITE else ""
+
+
+def read_own(path: Path) -> tuple[bytes, str]:
+    """The content of a file of compiled code, and why it must not be run: who else can write it, in words.
+
+    Of a file that is refused nothing is read. Raises OSError.
+    """
+    flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
+    with open(path, "rb", opener=lambda name, _: os.open(name, flags)) as file:
+        why = _other_writer(os.fstat(file.fileno())) if os.name == "posix" else ""
+        return (b"" if why else file.read()), why
 
 
 def _say_refused(folder: Path, why: str) -> None:

@@ -2,7 +2,7 @@
 
 What has the same size in each comes first in such a record, always in the same places. Behind it is what has
 not: where each part begins and how long it is follows from the record's NumPy type. Compiled code asks for
-these numbers (`places`) when Python calls it, and is the same for all sizes: numba_sized.py.
+these numbers (`places`) when Python calls it, and is the same for all sizes: compiled/sized_types.py.
 """
 
 import functools

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import beaver_ftc
-from beaver_ftc import compiled, numba_inside
+from beaver_ftc import compiled
+from beaver_ftc.compiled import target
 from beaver_ftc.documents import sized, sources
 from beaver_ftc.documents.sources import digest_of
 
@@ -155,7 +156,7 @@ def test_all_that_kernels_of_the_package_name_is_followed(monkeypatch):
     monkeypatch.setattr(sources, "_value", noted)
     for module in walk_packages(beaver_ftc.__path__, "beaver_ftc."):
         for made in vars(import_module(module.name)).values():
-            if isinstance(made, numba_inside.Kernel) and made.py_func.__module__ == module.name:
+            if isinstance(made, target.Kernel) and made.py_func.__module__ == module.name:
                 kernels += 1
                 digest_of(made.py_func)
     assert kernels > 300
@@ -170,10 +171,10 @@ ALLOWED = {"type SimpleNamespace"}
 
 def test_how_code_is_compiled_names_the_folder(monkeypatch, tmp_path):
     package = Path(beaver_ftc.__file__).parent
-    (tmp_path / "documents").mkdir()
-    files = (
-        "compiled.py", "numba_inside.py", "numba_sized.py", "documents/sized.py", "documents/sources.py"
-    )  # fmt: skip
+    files = [f"compiled/{path.name}" for path in sorted((package / "compiled").glob("*.py"))]
+    files += ["documents/sized.py", "documents/sources.py"]
+    for folder in ("compiled", "documents"):
+        (tmp_path / folder).mkdir()
     for file in files:
         (tmp_path / file).write_bytes((package / file).read_bytes())
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))

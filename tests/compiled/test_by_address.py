@@ -7,7 +7,8 @@ import sys
 import numpy as np
 import pytest
 
-from beaver_ftc import compiled, numba_inside
+from beaver_ftc import compiled
+from beaver_ftc.compiled import target
 
 MODULE = """
 from pathlib import Path
@@ -94,7 +95,7 @@ def test_what_happens_while_it_is_compiled_reaches_the_caller_who_may_call_again
         raise error
 
     with monkeypatch.context() as patched:
-        patched.setattr(numba_inside.Kernel, "result", fail)
+        patched.setattr(target.Kernel, "result", fail)
         with pytest.raises(error):
             made.often(made.records(1), 1.5)
     assert made.often(made.records(1), 1.5) == 2.5
@@ -116,13 +117,13 @@ def test_python_calls_it_like_any_kernel_and_has_its_plain_form(made):
 
 
 FLIGHTS = """
-from beaver_ftc import numba_inside
+from beaver_ftc.compiled import by_address
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.schema import Scenario
 for fault_class in ("published", "all"):
     loss = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.4, "at_s": 0.5}
     fly(Scenario(name="short", duration_s=1, faults=[loss], fdi={"fault_class": fault_class}))
-    print(*sorted(name[1] for name, _ in numba_inside._found))
+    print(*sorted(name[1] for name, _ in by_address._found))
 """
 
 

@@ -7,14 +7,11 @@ Compiled code is kept in the user's cache, each kernel under what its code follo
 again what it changes. It also works where the package is read-only. Nobody else may write there: what is kept
 is run.
 
-Of the versions of Numba in `KNOWN` much is borrowed that Numba does not promise (numba_inside.py). With any
-other, Numba compiles by its own means: flights are the same, the first of them takes minutes.
+target.py says how much is borrowed of which version of Numba. Flights are the same with any.
 """
 
 # mypy: disable-error-code="attr-defined,method-assign,assignment"
 import functools
-import hashlib
-import os
 from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
@@ -31,11 +28,9 @@ from beaver_ftc.documents.sources import BY_ADDRESS, digest_of_files
 
 __all__ = ["apart", "direct", "kernel", "plain", "record", "row_of", "sized"]
 
-KNOWN = ("0.68",)  # versions whose inside numba_inside.py fits
-VARIABLE = "BEAVER_FTC_COMPILER"  # `numba`: borrow nothing
-PLAINLY = "numba {} is not known from inside: the first flight compiles for some minutes, allowed: numba {}"
+ALONE = "numba {} has other parts than are known: each start compiles for minutes, allowed: numba 0.68.*"
 
-_PACKAGE = Path(__file__).parent
+_PACKAGE = Path(__file__).parents[1]
 
 
 @lru_cache(maxsize=1)
@@ -44,8 +39,8 @@ def cache_folder() -> Path | None:
 
     It is named after how code is compiled; which code is in a file, the file's name says.
     """
-    how = ("compiled.py", "numba_inside.py", "numba_sized.py", "documents/sized.py", "documents/sources.py")
-    return cache_of_version(digest_of_files(*(_PACKAGE / file for file in how)))
+    beside = (_PACKAGE / "documents" / "sized.py", _PACKAGE / "documents" / "sources.py")
+    return cache_of_version(digest_of_files(*sorted((_PACKAGE / "compiled").glob("*.py")), *beside))
 
 
 def kernel(function):
@@ -58,11 +53,13 @@ def apart(function):
 
     Give it records and numbers: shapes and strides of arrays are no longer constants beyond such a call.
     """
-    called, inside = kernel(function), _inside()
-    if inside is None or numba.config.DISABLE_JIT:
+    called = kernel(function)
+    if numba.config.DISABLE_JIT or not borrows():
         return called
+    from beaver_ftc.compiled.by_address import stub
+
     tag = called.folder.name if called.folder else ""
-    caller = inside.stub((function.__module__, function.__qualname__, tag), called)
+    caller = stub((function.__module__, function.__qualname__, tag), called)
     compiled = compile_into(called.folder, caller)
     compiled.py_func = function
     setattr(compiled, BY_ADDRESS, f"{function.__module__}.{function.__qualname__}")
@@ -84,46 +81,25 @@ def compile_into(folder: Path | None, function):
     """
     if numba.config.DISABLE_JIT:
         return _interpreted(function)
-    numba.types.Record.mangling_args = property(_by_contents)
-    inside = _inside()
-    return inside.Kernel(folder, function) if inside else _by_numba_alone(folder, function)
+    target = _own_target()
+    return target.Kernel(folder, function) if target else numba.njit(error_model="numpy")(function)
 
 
 @lru_cache(maxsize=1)
-def _inside() -> ModuleType | None:
-    """What is borrowed from inside this version of Numba, if it is known."""
-    if os.environ.get(VARIABLE) == "numba" or not numba.__version__.startswith(tuple(f"{v}." for v in KNOWN)):
-        return None
-    from beaver_ftc import numba_inside
-
-    return numba_inside
-
-
-def _by_numba_alone(folder: Path | None, function):
-    """A kernel of Numba's own; what has no file it cannot keep."""
-    if folder is None or not any(folder.glob("*")):
-        say_once(PLAINLY.format(numba.__version__, " or ".join(f"{version}.*" for version in KNOWN)))
-    usual, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder or "")
+def _own_target() -> ModuleType | None:
+    """Our own target of the compiler; None if this version of Numba has no room for it."""
     try:
-        return numba.njit(error_model="numpy", cache=folder is not None)(function)
-    except RuntimeError:
-        return numba.njit(error_model="numpy")(function)
-    finally:
-        numba.config.CACHE_DIR = usual
+        from beaver_ftc.compiled import target
+    except (ImportError, AttributeError, TypeError):
+        say_once(ALONE.format(numba.__version__))
+        return None
+    return target
 
 
-@functools.cache
-def _digest_of(record) -> str:
-    return hashlib.sha256(repr(record).encode()).hexdigest()[:16]
-
-
-def _by_contents(record):
-    """In place of numba's: what a record's type is called in the names of compiled functions.
-
-    Numba counts a process's types. Code that two processes have kept would then have the same names for
-    records of two aircraft, and a third process that loads both would run the one for the other.
-    """
-    return type(record).__name__, (_digest_of(record),)
+def borrows() -> bool:
+    """Whether kernels are compiled by parts that Numba does not promise: see target.py."""
+    target = _own_target()
+    return target is not None and target.borrows()
 
 
 def direct(function: Any, *arguments: np.ndarray) -> Any:
@@ -146,7 +122,7 @@ def _entry_point(function, kinds):
 @lru_cache(maxsize=64)
 def _code(function, types):
     """The same for types of numba's: 9 ms to find, so kept."""
-    found = function.stored(types) if _inside() else None
+    found = function.stored(types) if _own_target() else None
     if found is None:
         function.compile(types)
         found = function.overloads[types]
@@ -155,9 +131,10 @@ def _code(function, types):
 
 def _array_of(dtype, dimensions):
     """The type of a C-ordered array; of records that have a size, theirs."""
-    inside = _inside()
-    sizeless = inside and inside.kind_of(dtype, dimensions)
-    return sizeless or numba.types.Array(numba.from_dtype(dtype), dimensions, "C")
+    target = _own_target()
+    if target is None:
+        return numba.types.Array(numba.from_dtype(dtype), dimensions, "C")
+    return target.array_type(dtype, dimensions)
 
 
 def row_of(array, i):
@@ -172,10 +149,9 @@ def row_of(array, i):
 
 @overload(row_of)
 def _row_of(array, i):
-    inside = _inside()
-    if inside is None:
+    if not borrows():
         return lambda array, i: array[i]
-    borrowed_row = inside.borrowed_row
+    from beaver_ftc.compiled.target import borrowed_row
 
     def row(array, i):
         return borrowed_row(array, i)

@@ -12,7 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from beaver_ftc import compiled, numba_inside
+import beaver_ftc
+from beaver_ftc import compiled
+from beaver_ftc.compiled import cache
 from beaver_ftc.documents import paths
 from beaver_ftc.documents.errors import say_once
 from beaver_ftc.documents.paths import data_root
@@ -141,13 +143,13 @@ def test_what_old_versions_left_goes_but_for_the_latest(nowhere, tmp_path):
 
 
 def test_what_was_not_used_for_longest_goes_where_much_is_kept(tmp_path, monkeypatch):
-    monkeypatch.setattr(numba_inside, "MOST_BYTES", 250)
+    monkeypatch.setattr(cache, "MOST_BYTES", 250)
     for i, name in enumerate(["a-1", "b-2", "c-3", "d-4", "lock"]):
         (tmp_path / name).write_bytes(b"x" * 100)
         os.utime(tmp_path / name, (i, i))
     os.utime(tmp_path / "a-1", (9, 0))  # the oldest was read last
     (tmp_path / "parts-3").mkdir()
-    numba_inside.discard_unused(tmp_path)
+    cache.discard_unused(tmp_path)
     assert {path.name for path in tmp_path.iterdir()} == {"a-1", "d-4", "lock", "parts-3"}
 
 
@@ -204,7 +206,7 @@ def test_the_second_run_compiles_nothing_wherever_it_is_started(tmp_path):
 def test_an_installation_nobody_can_write_to_compiles_once_into_the_temporary_folder(tmp_path):
     package, temporary = tmp_path / "site" / "beaver_ftc", tmp_path / "temporary"
     shutil.copytree(
-        Path(compiled.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__", "data")
+        Path(beaver_ftc.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__", "data")
     )
     for name in ("aircraft", "scenarios"):
         shutil.copytree(REPOSITORY / name, package / "data" / name)
@@ -324,7 +326,7 @@ def test_an_inner_kernel_can_be_called_by_itself_before_and_after(tmp_path):
 
 
 def test_what_takes_long_is_said(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(numba_inside, "PATIENCE_S", 0.0)
+    monkeypatch.setattr(cache, "PATIENCE_S", 0.0)
     kernels = [
         lambda x: x + 1,
         lambda x: x - 2,
@@ -332,12 +334,12 @@ def test_what_takes_long_is_said(tmp_path, monkeypatch, capsys):
         lambda x: x * x,
     ]
     for said, folder, new in (
-        (numba_inside.COMPILING, None, kernels[:2]),  # two kernels, one word
-        (numba_inside.COMPILING, tmp_path, kernels[:2]),
-        (numba_inside.MORE, tmp_path, kernels[2:]),
+        (cache.COMPILING, None, kernels[:2]),  # two kernels, one word
+        (cache.COMPILING, tmp_path, kernels[:2]),
+        (cache.MORE, tmp_path, kernels[2:]),
     ):
         say_once.cache_clear()
-        numba_inside._say_compiling.cache_clear()
+        cache._say_compiling.cache_clear()
         for kernel in new:
             assert compiled.compile_into(folder, kernel)(0.0) == kernel(0.0)
         assert capsys.readouterr().err == f"beaver-ftc: {said}\n"
@@ -347,7 +349,7 @@ def test_a_full_disk_for_the_cache_is_said_and_does_not_matter(tmp_path, monkeyp
     def full(*_):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(numba_inside._Store, "_write", full)
+    monkeypatch.setattr(cache.CodeCache, "_write", full)
     twice = compiled.compile_into(tmp_path, lambda x: 2 * x)
     assert twice(3) == 6
     assert "compiled code cannot be kept in" in capsys.readouterr().err

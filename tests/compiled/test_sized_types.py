@@ -17,13 +17,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from beaver_ftc import compiled
-from beaver_ftc.compiled import direct, kernel, plain, record, sized
+from beaver_ftc.compiled import direct, kernel, plain, record, sized, sized_types
 from beaver_ftc.diagnosis.detection.parity import USUAL, Rooms, Size
 from beaver_ftc.documents.sized import Room, shape_of
 from beaver_ftc.loop.assembly import frame_dtype
 
 of_known = pytest.mark.skipif(
-    compiled._inside() is None or numba.config.DISABLE_JIT, reason="records have sizes to this compiler"
+    numba.config.DISABLE_JIT or not compiled.borrows(), reason="records have sizes to this compiler"
 )
 
 TEST = record(score=float, fired=(int, 2))
@@ -228,7 +228,7 @@ def test_records_that_change_in_size_stand_in_a_row():
 @of_known
 def test_flights_of_all_sizes_have_one_type():
     """Surfaces, terms of the model, boxes of its error map, delays: none makes another."""
-    kind_of = compiled._inside().kind_of
+    kind_of = sized_types.kind_of
     large = Size(Rooms(105, 62), Rooms(108, 21), 47, 20)
     sizes = [(n, size, line) for n in (3, 4, 17, 20) for size in (USUAL, large) for line in (512, 9000)]
     assert {kind_of(frame_dtype(*of), 1) for of in sizes} == {kind_of(frame_dtype(4), 1)}
@@ -238,20 +238,20 @@ ASKED = """
 import json, sys, tempfile
 from pathlib import Path
 import yaml
-from beaver_ftc import numba_inside
+from beaver_ftc.compiled.cache import CodeCache
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.loader import load_text
 sys.path.insert(0, sys.argv[1])
 import seventeen
 
 asked = []
-stored = numba_inside._Store.load
+stored = CodeCache.load
 
 def load(store, types, context):
     asked.append(store._name)
     return stored(store, types, context)
 
-numba_inside._Store.load = load
+CodeCache.load = load
 noisy = {name: {"noise_std_deg_s": 0.02} for name in ("p", "q", "r")}
 late = {name: {"delay_s": 1.0} for name in ("p", "q", "r", "alpha")}
 KINDS = [
@@ -280,7 +280,7 @@ with tempfile.TemporaryDirectory() as made:
 def test_a_second_aircraft_compiles_nothing():
     """Three and four surfaces after seventeen: no code is asked for that those flights have not had, but for
     the entry of flights that nothing of Python interrupts."""
-    root = Path(__file__).parents[1]
+    root = Path(__file__).parents[2]
     done = subprocess.run(
         [sys.executable, "-c", ASKED, str(root / "tests")],
         env={**os.environ, "PYTHONPATH": os.pathsep.join([*sys.path, str(root)])},

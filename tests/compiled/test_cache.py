@@ -262,8 +262,42 @@ def test_damaged_code_is_compiled_anew_and_it_is_said_once(tmp_path, damage):
     how, said = small(tmp_path)
     assert how == "compiled"
     assert said.count("\n") == 1
-    assert "is damaged; it is compiled anew" in said
+    assert "is not run: it is damaged; it is compiled anew" in said
     assert small(tmp_path) == ("loaded", "")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="files have no mode here")
+def test_code_in_a_file_that_others_may_write_is_not_run(tmp_path):
+    assert small(tmp_path) == ("compiled", "")
+    (file,) = (tmp_path / "cache").glob("outer-*")
+    file.chmod(0o666)
+    how, said = small(tmp_path)
+    assert how == "compiled"
+    assert said.count("\n") == 1
+    assert "is not run: its mode is 0666; it is compiled anew" in said
+    assert file.stat().st_mode & 0o022 == 0
+    assert small(tmp_path) == ("loaded", "")
+
+
+def doubled(x):
+    return 2 * x
+
+
+@pytest.mark.skipif(os.name != "posix", reason="files have no owner here")
+@pytest.mark.parametrize("what", ["belongs to another", "is a link"])
+def test_content_of_a_file_that_is_not_ours_is_not_even_unpickled(tmp_path, monkeypatch, what):
+    folder = tmp_path / "cache"
+    assert compiled.compile_into(folder, doubled)(3) == 6
+    (file,) = folder.glob("*-*")
+    if what == "is a link":
+        file.rename(tmp_path / "elsewhere")
+        file.symlink_to(tmp_path / "elsewhere")
+    else:
+        monkeypatch.setattr(paths, "_user", lambda: os.getuid() + 1)
+    monkeypatch.setattr(cache.pickle, "loads", None)
+    again = compiled.compile_into(folder, doubled)
+    assert again(3) == 6
+    assert not again.stats.cache_hits
 
 
 def test_several_processes_compile_once(tmp_path):

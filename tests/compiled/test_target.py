@@ -196,7 +196,7 @@ def test_kernels_come_to_the_same_either_way_and_are_kept(tmp_path, compiler):
     assert ("code is compiled in a minute" in said) != borrows
     assert run(4)[0][:4] == first[:4]
     again, said = run(1)
-    assert again == [*first[:4], "1"]
+    assert again[:4] == first[:4]
     assert said == ""
     kept = {path.name.partition("-")[0] for path in (tmp_path / "cache").glob("*-*")}
     assert kept == ({"step", "halve"} if borrows else {"step"})

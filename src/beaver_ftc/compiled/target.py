@@ -4,17 +4,17 @@ Numba knows its targets by registries [numba.core.target_extension]: a class of 
 functions, and the contexts in which they are typed and translated. Ours inherit from those of Numba's CPU
 target. Nothing of Numba is replaced: a function that somebody else compiles never comes here.
 
-Of a version of Numba in `KNOWN` more is borrowed (library.py), and records have a size (sized_types.py). With
-any other, Numba makes the machine code: kernels that others call without optimising them, which is done once,
-in the outermost one.
+Of a version of Numba in `KNOWN` more is borrowed: records have a size (sized_types.py), and what only some
+flights want is called by its address (by_address.py). With any other version each aircraft has code of its
+own, all of it, which takes longer. library.py serves other versions too, if it passes a trial in a process of
+its own (trial.py).
 """
 
 # mypy: disable-error-code="attr-defined,misc"
-import contextlib
 import functools
 import hashlib
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -35,15 +35,17 @@ from numba.core.types import unliteral
 from numba.core.utils import threadsafe_cached_property
 from numba.extending import intrinsic, overload
 
+from beaver_ftc.compiled import trial
 from beaver_ftc.compiled.cache import CodeCache, announced, locked
 from beaver_ftc.compiled.library import Codegen, Inner, compiling
 from beaver_ftc.compiled.sized_types import kind_of, type_of
 from beaver_ftc.documents.errors import say_once
 
 NAME = "beaver_ftc"  # of the target
-KNOWN = ("0.68",)  # versions of Numba that library.py and sized_types.py fit
-VARIABLE = "BEAVER_FTC_COMPILER"  # `numba`: as with a version that is not known
+KNOWN = ("0.68",)  # versions of Numba whose inside is as we have found it
+VARIABLE = "BEAVER_FTC_COMPILER"  # `numba`: as with a version that is not known; `trial`: without a trial
 SLOWER = "numba {} is not known from inside: code is compiled in a minute, not in 20 s; known: numba {}"
+SLOWEST = "numba {} has other parts than are known: code is compiled in minutes, not in 20 s; known: numba {}"
 
 
 class Target(CPU):
@@ -54,7 +56,13 @@ class Target(CPU):
 def borrows() -> bool:
     """Whether this version of Numba is known from inside."""
     known = numba.__version__.startswith(tuple(f"{version}." for version in KNOWN))
-    return known and os.environ.get(VARIABLE) != "numba"
+    return known and not os.environ.get(VARIABLE)
+
+
+@functools.cache
+def optimises_once() -> bool:
+    """Whether library.py makes the machine code: where this version is known, or has passed a trial."""
+    return borrows() or os.environ.get(VARIABLE) == "trial" or trial.passes()
 
 
 class _Context(CPUContext):
@@ -62,7 +70,7 @@ class _Context(CPUContext):
 
     def init(self) -> None:
         super().init()
-        if borrows():
+        if optimises_once():
             self._internal_codegen = Codegen(NAME)
 
     def load_additional_registries(self) -> None:
@@ -82,7 +90,7 @@ class _Context(CPUContext):
     def get_executable(self, library: Any, fndesc: Any, env: Any) -> Any:
         """What Python calls; of an inner function what stands for it."""
         library._ensure_finalized()
-        is_inner = len(compiling) > 1 and borrows()
+        is_inner = len(compiling) > 1 and optimises_once()
         return Inner() if is_inner else super().get_executable(library, fndesc, env)
 
 
@@ -194,8 +202,7 @@ class Kernel(Dispatcher):
         return self._offered(args, result)
 
     def _compiled_as_part(self, args: tuple[Any, ...]) -> Any:
-        with contextlib.nullcontext() if borrows() else _not_optimised():
-            result = self._translated(args, {"no_cfunc_wrapper": True, "no_cpython_wrapper": True})
+        result = self._translated(args, {"no_cfunc_wrapper": True, "no_cpython_wrapper": True})
         self._inner.add(args)
         self.overloads[args] = result
         return result.entry_point
@@ -217,20 +224,10 @@ class Kernel(Dispatcher):
         return result.entry_point
 
 
-@contextlib.contextmanager
-def _not_optimised() -> Iterator[None]:
-    """Numba's own setting: what is compiled is not optimised. Under Numba's lock."""
-    usual = numba.config.OPT
-    numba.config.OPT = type(usual)(0)
-    try:
-        yield
-    finally:
-        numba.config.OPT = usual
-
-
 def _say_slower() -> None:
-    if not borrows():
-        say_once(SLOWER.format(numba.__version__, ", ".join(f"{version}.*" for version in KNOWN)))
+    if os.environ.get(VARIABLE) != "trial" and not borrows():
+        says = SLOWER if optimises_once() else SLOWEST
+        say_once(says.format(numba.__version__, ", ".join(f"{version}.*" for version in KNOWN)))
 
 
 def _jit(**options: Any) -> Callable[..., Dispatcher]:

@@ -1,66 +1,27 @@
 """A trial of library.py with a version of Numba that is not known, in a process of its own.
 
-What is borrowed from inside another version may end a process instead of raising. So kernels are compiled and
-called in a child; the answer is kept beside the compiled code.
+What is borrowed from inside another version may end a process instead of raising.
 """
 
-import contextlib
-import os
-import subprocess
 import sys
-from pathlib import Path
 
 import llvmlite
 import numba
 
-from beaver_ftc.documents.paths import cache_base, read_own
+from beaver_ftc.documents.trials import passes as passes_in_a_child
 
 VARIABLE = "BEAVER_FTC_COMPILER"
-PASSED, FAILED = b"passed", b"failed"
-PATIENCE_S = 120.0
-CODE = "import beaver_ftc.compiled.trial as trial; trial.run()"
+CODE = "import beaver_ftc.compiled.trial as trial; raise SystemExit(not trial.compiles_rightly())"
 
 
 def passes() -> bool:
     """Whether kernels compiled so are right, as found now or by an earlier process."""
-    base = cache_base()
-    if base is None:
-        return _passes_now()
-    file = base / f"trial-{numba.__version__}-{llvmlite.__version__}-{sys.implementation.cache_tag}"
-    answer = _answer_in(file)
-    if answer is None:
-        answer = PASSED if _passes_now() else FAILED
-        with contextlib.suppress(OSError):
-            file.unlink(missing_ok=True)  # of another user, or a link
-            file.write_bytes(answer)
-    return answer == PASSED
+    build = f"{numba.__version__} {llvmlite.__version__} {sys.implementation.cache_tag}"
+    return passes_in_a_child("numba", build, CODE, {VARIABLE: "trial"})
 
 
-def _answer_in(file: Path) -> bytes | None:
-    try:
-        content, why_refused = read_own(file)
-    except OSError:
-        return None
-    return content if not why_refused and content in (PASSED, FAILED) else None
-
-
-def _passes_now() -> bool:
-    environment = {**os.environ, VARIABLE: "trial"}
-    try:
-        done = subprocess.run(
-            [sys.executable, "-c", CODE],
-            env=environment,
-            capture_output=True,
-            timeout=PATIENCE_S,
-            check=False,
-        )
-    except (OSError, subprocess.TimeoutExpired):
-        return False
-    return done.returncode == 0 and done.stdout.split() == [PASSED]
-
-
-def run() -> None:
-    """Compile kernels that call one another, and compare them with their plain form."""
+def compiles_rightly() -> bool:
+    """Whether kernels that call one another come to the same as their plain form."""
     import numpy as np
 
     from beaver_ftc.compiled import compile_into
@@ -98,5 +59,7 @@ def run() -> None:
     try:
         refused(np.array([1.0, 1.0]))
     except ValueError as error:
-        if str(error) == "greater than zero" and np.array_equal([*first, *x[0]], [*second, *again[0]], True):
-            print(PASSED.decode())
+        return str(error) == "greater than zero" and np.array_equal(
+            [*first, *x[0]], [*second, *again[0]], True
+        )
+    return False

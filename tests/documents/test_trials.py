@@ -31,7 +31,7 @@ def passes(tmp_path, monkeypatch):
     [
         ("pass", True),
         ("import ctypes; ctypes.string_at(0)", False),
-        ("raise SystemExit(1)", False),
+        ("raise SystemExit(3)", False),
         ("import os; os.abort()", False),
     ],
 )
@@ -52,6 +52,11 @@ def test_a_child_that_cannot_be_started_or_does_not_end_is_no_answer_for_others(
     monkeypatch.undo()
 
 
+@pytest.mark.parametrize("code", ["raise MemoryError", "import nothing_of_this_name"])
+def test_one_that_could_not_find_out_is_asked_again(passes, code):
+    assert [passes(code), passes(code)] == [(False, 1), (False, 2)]
+
+
 def test_one_that_does_not_end_is_asked_again(passes, monkeypatch):
     monkeypatch.setattr(trials, "PATIENCE_S", 0.5)
     assert passes("import time; time.sleep(60)") == (False, 1)
@@ -60,11 +65,11 @@ def test_one_that_does_not_end_is_asked_again(passes, monkeypatch):
 
 @pytest.mark.skipif(os.name != "posix", reason="files have no mode here")
 def test_an_answer_that_another_user_can_write_does_not_count(passes, tmp_path):
-    assert passes("raise SystemExit(1)") == (False, 1)
+    assert passes("raise SystemExit(3)") == (False, 1)
     (file,) = tmp_path.glob("trial-*")
     file.write_bytes(trials.PASSED)
     file.chmod(0o666)
-    assert passes("raise SystemExit(1)") == (False, 2)
+    assert passes("raise SystemExit(3)") == (False, 2)
     assert file.stat().st_mode & 0o022 == 0
 
 

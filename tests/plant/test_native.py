@@ -1,9 +1,13 @@
 """Compiled property access gives what Python gives, to the bit."""
 
+import subprocess
+import sys
+
 import numba
 import numpy as np
 import pytest
 
+from beaver_ftc.documents import trials
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plant import addresses, native
 from beaver_ftc.plant.adapter import Plant
@@ -79,14 +83,55 @@ def test_a_bank_keeps_its_aircraft_alive(trim_point):
     assert out[0] * 0.3048 == pytest.approx(45)
 
 
-@pytest.mark.parametrize(
-    "change", [{"_NODE_SIZE": 40}, {"GETTER": "_ZNK9NoSuchName"}, {"_POINTER_OFFSET": 16}]
-)
-def test_another_layout_is_recognised(monkeypatch, change):
-    """A node of another size, a missing symbol, a word that is not the node's address."""
-    for name, value in change.items():
-        monkeypatch.setattr(addresses, name, value)
-    assert not addresses._layout_is_known.__wrapped__()
+WRONG = {
+    "a node of another size": {"node_size": 40},
+    "an executive of another size": {"executive_size": 48},
+    "a node's method table": {"node_pointer": 16},
+    "a word between two": {"node_pointer": 20},
+    "beyond the object": {"node_pointer": 32},
+    "a dictionary": {"executive_base": 32, "executive_pointer": 32},
+    "a type": {"node_pointer": 8, "executive_base": 8, "executive_pointer": 8},
+}
+
+
+@needs_native
+@pytest.mark.parametrize("wrong", WRONG.values(), ids=list(WRONG))
+def test_another_layout_is_recognised_without_a_crash(monkeypatch, tmp_path, wrong):
+    monkeypatch.setattr(trials, "cache_base", lambda: tmp_path)
+    assert not addresses.is_proved.__wrapped__(addresses.LAYOUT._replace(**wrong))
+
+
+@needs_native
+def test_a_missing_function_is_recognised(monkeypatch):
+    monkeypatch.setattr(addresses, "GETTER", "_ZNK9NoSuchName")
+    assert not addresses._sizes_fit(addresses.LAYOUT)
+
+
+FLIGHT = """
+import hashlib, sys
+from beaver_ftc.plant import addresses
+addresses.LAYOUT = addresses.LAYOUT._replace(**LAYOUT)
+from beaver_ftc.loop.loop import Loop
+from beaver_ftc.scenario.loader import load
+loop = Loop(load({"name": "run", "duration_s": 2.0, "substeps": 2, "sensors": "consumer-grade"}))
+rows = hashlib.sha256()
+for chunk in loop.chunks():
+    rows.update(chunk.tobytes())
+print(loop.cockpit.native, rows.hexdigest())
+"""
+
+
+@needs_native
+def test_with_a_wrong_layout_the_flight_is_the_same_by_the_slow_road_and_a_line_is_said():
+    found = {}
+    for name, layout in (("right", {}), ("wrong", {"node_pointer": 16})):
+        program = FLIGHT.replace("**LAYOUT", f"**{layout}")
+        done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+        found[name] = *done.stdout.split()[-2:], done.stderr.count("has a layout that is not known")
+    (right, logged, _), (wrong, slowly, said) = found.values()
+    assert (right, wrong) == ("True", "False")
+    assert logged == slowly
+    assert said == 1
 
 
 ROUGH = {"environment": {"turbulence": "dryden", "severity": "moderate"}, "sensors": "consumer-grade"}
@@ -106,10 +151,9 @@ def test_jsbsim_run_by_compiled_code_is_the_same_flight(air, substeps):
     np.testing.assert_array_equal(*logs)
 
 
+@needs_native
 def test_an_executive_that_is_not_where_it_is_expected_is_run_through_python(monkeypatch):
     plant = Plant(rate_hz=100)
-    monkeypatch.setattr(addresses, "_EXECUTIVE_SIZE", 48)
-    assert addresses.executive_address(plant.fdm) == 0
-    monkeypatch.undo()
-    monkeypatch.setattr(addresses, "_BASE_OFFSET", 32)  # where the dictionary is
+    monkeypatch.setattr(addresses, "is_proved", lambda layout: True)
+    monkeypatch.setattr(addresses, "LAYOUT", addresses.LAYOUT._replace(executive_base=32))  # a dictionary
     assert addresses.executive_address(plant.fdm) == 0

@@ -15,11 +15,16 @@ from pathlib import Path
 from beaver_ftc.documents.paths import PACKAGE, cache_base, read_own
 
 PASSED, FAILED = b"passed", b"failed"
+NO = 3  # the status of a child that has found out that it does not
 PATIENCE_S = 120.0  # on the clock: a busy machine may need that long to begin
 
 
 def passes(name: str, build: str, code: str, environment: Mapping[str, str] | None = None) -> bool:
-    """Whether a child that runs this code ends well. build: the versions and files that the answer is of."""
+    """Whether a child that runs this code ends well: with status 0, and not with NO or by a signal.
+
+    build: the versions and files that the answer is of. A child that ends otherwise found no answer: where it
+    is started again another may.
+    """
     base = cache_base()
     if base is None:
         return bool(_passes_now(code, environment or {}))
@@ -64,4 +69,4 @@ def _passes_now(code: str, environment: Mapping[str, str]) -> bool | None:
         )
     except (OSError, ValueError, subprocess.TimeoutExpired):
         return None
-    return done.returncode == 0
+    return done.returncode == 0 if done.returncode in (0, NO) or done.returncode < 0 else None

@@ -1,5 +1,8 @@
 """Where JSBSim keeps what compiled code reads, writes and runs: addresses in this build of its binding.
 
+A wrong guess of a build's layout would end the process. So the layout is proved once a build, in a child that
+may crash (documents/trials.py); where it is another, properties are read and written through the binding.
+
 Nothing here is compiled: what only trims an aircraft has no need of a compiler. See native.py.
 """
 
@@ -8,28 +11,47 @@ import os
 import sys
 from functools import lru_cache
 from importlib import import_module
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from beaver_ftc.documents.errors import say_once
+from beaver_ftc.documents.sources import digest_of_files
+from beaver_ftc.documents.trials import passes
 
 if TYPE_CHECKING:
     import jsbsim
 
 GETTER = "_ZNK14SGPropertyNode14getDoubleValueEv"  # double SGPropertyNode::getDoubleValue() const
 SETTER = "_ZN14SGPropertyNode14setDoubleValueEd"  # bool SGPropertyNode::setDoubleValue(double)
-
-# The Python node: reference count, type, C++ method table, then the counted pointer to the C++ node.
-_NODE_SIZE = 32
-_POINTER_OFFSET = 24
-
 RUN = "_ZN6JSBSim9FGFDMExec3RunEv"  # bool JSBSim::FGFDMExec::Run()
 
-# The Python executive: reference count, type, the C++ executive twice (as its base, as itself), a dictionary.
-_EXECUTIVE_SIZE = 40
-_BASE_OFFSET, _EXECUTIVE_OFFSET = 16, 24
+UNKNOWN = "JSBSim {} has a layout that is not known: properties go through Python, a flight takes longer"
+
+
+class Layout(NamedTuple):
+    """The binding's objects, in bytes.
+
+    The Python node: reference count, type, C++ method table, then the counted pointer to the C++ node. The
+    Python executive: reference count, type, the C++ executive twice (as its base, as itself), a dictionary.
+    """
+
+    node_size: int = 32
+    node_pointer: int = 24
+    executive_size: int = 40
+    executive_base: int = 16
+    executive_pointer: int = 24
+
+
+LAYOUT = Layout()
 
 
 @lru_cache(maxsize=1)
 def _library() -> ctypes.CDLL:
-    return ctypes.CDLL(import_module("jsbsim._jsbsim").__file__)
+    return ctypes.CDLL(_library_file())
+
+
+def _library_file() -> str:
+    return str(import_module("jsbsim._jsbsim").__file__)
 
 
 def address(symbol: str) -> int:
@@ -43,23 +65,24 @@ def address(symbol: str) -> int:
 
 def pointer(node: "jsbsim.FGPropertyNode") -> int:
     """The address of a node."""
-    return ctypes.c_int64.from_address(id(node) + _POINTER_OFFSET).value
+    return _word(node, LAYOUT.node_pointer)
+
+
+def _word(thing: object, offset: int) -> int:
+    """A word of a Python object's own memory: not beyond its size, see `_sizes_fit`."""
+    return ctypes.c_int64.from_address(id(thing) + offset).value
 
 
 def executive_address(fdm: "jsbsim.FGFDMExec") -> int:
     """The C++ executive for `advance`, 0 if it is not where it is expected. The aircraft flies one frame."""
-    if not (available() and _runs_by_address()):
+    if not available():
         return 0
-    base, executive = (
-        ctypes.c_int64.from_address(id(fdm) + at).value for at in (_BASE_OFFSET, _EXECUTIVE_OFFSET)
-    )
-    return executive if base == executive > 0 and executive % 8 == 0 and _flies(fdm, executive) else 0
+    executive = _word(fdm, LAYOUT.executive_pointer)
+    return executive if _is_executive(fdm, executive) and _flies(fdm, executive) else 0
 
 
-def _runs_by_address() -> bool:
-    import jsbsim
-
-    return jsbsim.FGFDMExec.__basicsize__ == _EXECUTIVE_SIZE and address(RUN) > 0
+def _is_executive(fdm: "jsbsim.FGFDMExec", executive: int) -> bool:
+    return executive == _word(fdm, LAYOUT.executive_base) and executive > 0 and executive % 8 == 0
 
 
 def _flies(fdm: "jsbsim.FGFDMExec", executive: int) -> bool:
@@ -73,18 +96,58 @@ def available() -> bool:
     """Whether nodes can be read and written by address here: by compiled code, unless BEAVER_FTC_NATIVE=0."""
     wanted = os.environ.get("BEAVER_FTC_NATIVE", "1") != "0"
     compiled = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
-    return wanted and compiled and _layout_is_known()
+    return wanted and compiled and is_proved(LAYOUT)
 
 
-@lru_cache(maxsize=1)
-def _layout_is_known() -> bool:
-    """Check this build of the binding, safest evidence first: nothing unknown is dereferenced."""
+@lru_cache
+def is_proved(layout: Layout) -> bool:
+    """Whether this build of the binding has this layout; a line is said where it has another."""
+    proved = _sizes_fit(layout) and _is_proved_in_a_child(layout)
+    if not proved:
+        say_once(UNKNOWN.format(import_module("jsbsim").__version__))
+    return proved
+
+
+def _sizes_fit(layout: Layout) -> bool:
+    """What can be seen without following an address: objects are as large, and functions have their names."""
     import jsbsim
 
-    cpython = sys.implementation.name == "cpython" and ctypes.sizeof(ctypes.c_void_p) == 8
-    if not (cpython and jsbsim.FGPropertyNode.__basicsize__ == _NODE_SIZE):
-        return False
-    return bool(address(GETTER) and address(SETTER)) and _pointers_are_nodes() and _values_agree()
+    words = sys.implementation.name == "cpython" and ctypes.sizeof(ctypes.c_void_p) == 8
+    sizes = jsbsim.FGPropertyNode.__basicsize__, jsbsim.FGFDMExec.__basicsize__
+    within = layout.node_pointer <= sizes[0] - 8 and layout[3:] <= (sizes[1] - 8,) * 2
+    return (
+        words
+        and sizes == (layout.node_size, layout.executive_size)
+        and within
+        and all(map(address, (GETTER, SETTER, RUN)))
+    )
+
+
+def _is_proved_in_a_child(layout: Layout) -> bool:
+    library = Path(_library_file())
+    status = library.stat()
+    build = f"{sys.implementation.cache_tag} {library} {status.st_size} {status.st_mtime_ns} "
+    build += digest_of_files(Path(__file__))
+    code = (
+        f"from beaver_ftc.plant import addresses; addresses.LAYOUT = addresses.{layout}; "
+        "raise SystemExit(0 if addresses.holds() else 3)"
+    )
+    return passes("jsbsim", build, code, {"BEAVER_FTC_NATIVE": "0"})
+
+
+def holds() -> bool:
+    """Whether nodes and an executive are where LAYOUT has them. It may end the process."""
+    return _pointers_are_nodes() and _values_agree() and _executive_runs()
+
+
+def _executive_runs() -> bool:
+    """Whether the built-in aircraft is run by its executive's address."""
+    from beaver_ftc.aircraft import load
+    from beaver_ftc.plant.adapter import bare
+
+    fdm = bare(load().jsbsim)
+    executive = _word(fdm, LAYOUT.executive_pointer)
+    return _is_executive(fdm, executive) and _flies(fdm, executive)
 
 
 def _trial_nodes(names: str) -> "list[jsbsim.FGPropertyNode]":

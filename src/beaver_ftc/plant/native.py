@@ -2,9 +2,9 @@
 
 A property read through JSBSim's Python binding costs about 0.1 us; a frame reads and writes some forty. The
 binding exports the C++ accessors of a property node, so a compiled kernel can call them on the node's own
-address: 0.01 us each. That rests on how one build of the binding is laid out, so addresses.py checks it
-before it is used, and the environment variable BEAVER_FTC_NATIVE=0 turns it off; the caller then reads and
-writes through Python.
+address: 0.01 us each. That rests on how one build of the binding is laid out, so addresses.py has it proved
+in a child process before it is used. The environment variable BEAVER_FTC_NATIVE=0 turns it off; the caller
+reads and writes through Python then.
 
 Likewise the executive's `Run`, which `advance` calls: a flight then leaves compiled code only when something
 changes. An error that JSBSim raises could not be caught there. Its models of an aircraft without engines

@@ -45,11 +45,6 @@ def layout_dtype(n: int) -> np.dtype:
     )
 
 
-# Output of a law that demands accelerations, rad/s2: what is demanded, what of it only holds the rates, and
-# the disturbance that the law's observer finds, zero of a law without one.
-DEMAND = record(demand=3, hold=3, disturbance=3)
-
-
 @sized
 def axes_dtype(n: int) -> np.dtype:
     """Output of the allocation, by axis. G (3, n) rad/s2 per rad: with the effectiveness of each surface in
@@ -137,12 +132,12 @@ def divide(moment, effectiveness):
 
 
 @kernel
-def form_demand(axes, law, offset, G, subtracts_offsets):
-    """Fill axes.demand and axes.hold (3,) rad/s2 with what a law demands; law: its Output, of type DEMAND. If
-    subtracts_offsets, the moments of the surfaces' offsets are subtracted: G (3, n) rad/s2 per rad times the
-    offsets (n,) rad."""
+def form_demand(axes, demand, hold, disturbance, offset, G, subtracts_offsets):
+    """Fill axes.demand, hold and disturbance, each (3,) rad/s2, with what a law demands, what of it only
+    holds the rates, and the disturbance that its observer finds. If subtracts_offsets, the moments of the
+    surfaces' offsets are subtracted: G (3, n) rad/s2 per rad times the offsets (n,) rad."""
     for i in range(3):
-        axes.demand[i], axes.hold[i], axes.disturbance[i] = law.demand[i], law.hold[i], law.disturbance[i]
+        axes.demand[i], axes.hold[i], axes.disturbance[i] = demand[i], hold[i], disturbance[i]
         if subtracts_offsets:
             for s in range(G.shape[1]):
                 axes.demand[i] -= G[i, s] * offset[s]

@@ -33,15 +33,16 @@ def is_governed(control):
 
 
 @apart
-def command_surfaces(control, law_output, assessment, faults, belief, by_observer):
-    """From the law's demand (`law_output`, of type allocation.DEMAND) to the command of each surface.
+def command_surfaces(control, demand, hold, disturbance, assessment, faults, belief, by_observer):
+    """From the law's demand to the command of each surface; demand, hold, disturbance (3,) rad/s2: see
+    `allocation.form_demand`.
 
     by_observer: whether the law's observer finds what a surface does not do; the stand-in then carries what
     the main surface has lost, and the flap takes what an elevator at its stop leaves.
     """
     axes, layout, surfaces, out = control.axes, control.layout, control.surfaces, control.allocation.output
     uses_verdict, effectiveness = control.config.uses_verdict, surfaces.output.effectiveness
-    allocation.form_demand(axes, law_output, surfaces.output.offset, belief.G, uses_verdict)
+    allocation.form_demand(axes, demand, hold, disturbance, surfaces.output.offset, belief.G, uses_verdict)
     share = out.transfer_share if by_observer else allocation.smooth(out.hand_over)
     probe = control.probe.memory.deflection
     if layout.general:

@@ -81,9 +81,21 @@ def sense(frame):
 
 
 @kernel
+def start_clock(frame):
+    """Set the time of the frame, s since the start."""
+    frame.t = frame.k * frame.dt
+
+
+@kernel
+def advance_clock(frame):
+    """Count the frame: it is over."""
+    frame.k += 1
+
+
+@kernel
 def begin(frame):
     """Measure, and see what the design model makes of the elapsed frame. Returns the flight's status."""
-    frame.t = frame.k * frame.dt
+    start_clock(frame)
     status = sense(frame)
     if status != NOT_FINITE:
         look_back(frame.belief, frame.fdi.bound, frame.measured, frame.k, frame.dt)
@@ -466,5 +478,5 @@ def finish(frame, commanded, row):
     reference.govern(control.reference, commanded, control.axes.shortfall, authority_lost)
     follow_command(belief, control.allocation.output.command)
     hand_over(frame.truth, belief.commanded, control.power.output)
-    frame.k += 1
+    advance_clock(frame)
     frame.row += 1

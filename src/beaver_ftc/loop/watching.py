@@ -8,7 +8,8 @@ import numpy as np
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.belief.expectation import follow_command, look_back, respond
 from beaver_ftc.diagnosis.conclusion import isolated_surface
-from beaver_ftc.loop.frame import accommodate, isolated_theta
+from beaver_ftc.loop.frame import accommodate, advance_clock, isolated_theta, start_clock
+from beaver_ftc.plant.instruments import take_sample
 
 MEMORY = 8 + 5 * 8  # of the verdict's words: `news`
 
@@ -24,12 +25,10 @@ def take(frames, x, y, command, attitude):
         return False
     frame = frames[0]
     belief, measured = frame.belief, frame.measured
-    frame.t = frame.k * frame.dt
+    start_clock(frame)
     if frame.k > 0:
         follow_command(belief, command)
-    measured.x[:], measured.attitude[:] = x, attitude
-    for i in range(y.size):
-        measured.y[i] = y[i]
+    take_sample(measured, x, y, attitude)
     respond(belief, measured)
     look_back(belief, frame.fdi.bound, measured, frame.k, frame.dt)
     return True
@@ -49,7 +48,7 @@ def believe(frames):
     """What the diagnosis knows of the surfaces goes into its own next prediction."""
     frame = frames[0]
     accommodate(frame)
-    frame.k += 1
+    advance_clock(frame)
 
 
 @kernel

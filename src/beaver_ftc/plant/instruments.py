@@ -212,6 +212,15 @@ def break_all(instruments, signals, missing):
 
 
 @kernel
+def take_sample(measured, x, y, attitude):
+    """Take a sample from outside in the place of the instruments': x (3,) rad/s, y signals, attitude (3,)
+    rad."""
+    measured.x[:], measured.attitude[:] = x, attitude
+    for i in range(y.size):
+        measured.y[i] = y[i]
+
+
+@kernel
 def share_out(measured):
     """From the readings to x, y, attitude, force and altitude."""
     signal, y = measured.signal, measured.y

@@ -10,13 +10,13 @@ import numpy as np
 
 from beaver_ftc.compiled import apart, kernel, record, sized
 from beaver_ftc.control import inversion
-from beaver_ftc.control.allocation import DEMAND
 from beaver_ftc.control.base import CompiledLaw
 from beaver_ftc.scenario.schema import Scenario
 
 CONFIG = record(Kp=float, Ki=float)  # gains 1/s, 1/s2
 MEMORY = record(integral=3)  # of the error, rad
-FEEDBACK = record(config=CONFIG, memory=MEMORY, output=DEMAND)
+OUTPUT = record(demand=3, hold=3, disturbance=3)  # rad/s2: see allocation.form_demand; it finds none
+FEEDBACK = record(config=CONFIG, memory=MEMORY, output=OUTPUT)
 
 
 @sized
@@ -35,9 +35,12 @@ def configure(law: np.void, control: np.void, scenario: Scenario, travel: np.nda
 def command(control, assessment, faults, belief, measured, mode, t):
     """From what is measured to the command of each surface (base.CompiledLaw)."""
     law, reference, unknown = control.published, control.reference, control.surfaces.output.unknown
+    out = law.output
     inversion.prepare(control, assessment, belief, mode, t)
     demand(law, reference.output, measured.x, belief.f, unknown)
-    inversion.command_surfaces(control, law.output, assessment, faults, belief, False)
+    inversion.command_surfaces(
+        control, out.demand, out.hold, out.disturbance, assessment, faults, belief, False
+    )
     integrate(law, control.axes, reference, control.allocation.output.command, measured.x)
     inversion.complete(control, assessment, faults, measured, t)
 

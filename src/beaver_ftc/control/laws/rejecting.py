@@ -25,7 +25,6 @@ import numpy as np
 from beaver_ftc.compiled import apart, kernel, record, sized
 from beaver_ftc.control import accommodation, allocation, inversion
 from beaver_ftc.control.accommodation import approach, begin_frame, reported, start_of
-from beaver_ftc.control.allocation import DEMAND
 from beaver_ftc.control.base import CompiledLaw
 from beaver_ftc.control.laws import effectiveness_estimator as estimator
 from beaver_ftc.control.laws.effectiveness_estimator import (
@@ -49,6 +48,7 @@ NOTHING_LEFT = 0.05  # half of what the law divides by
 OBSERVER = record(begun=int, rate=3, disturbance=3)
 # Sums of the least squares, of the main surface of each axis; named: whether the diagnosis has named it.
 SUMS = record(product=3, square=3, innovation=3, frames=3, named=(int, 3))
+OUTPUT = record(demand=3, hold=3, disturbance=3)  # rad/s2: see allocation.form_demand
 
 
 @sized
@@ -78,7 +78,7 @@ def memory_dtype(n: int) -> np.dtype:
 @sized
 def rejecting_dtype(n: int) -> np.dtype:
     """The law's records for n surfaces."""
-    return record(config=config_dtype(n), observer=OBSERVER, memory=memory_dtype(n), output=DEMAND)
+    return record(config=config_dtype(n), observer=OBSERVER, memory=memory_dtype(n), output=OUTPUT)
 
 
 @apart
@@ -112,7 +112,10 @@ def command(control, assessment, faults, belief, measured, mode, t):
     inversion.prepare(control, assessment, belief, mode, t)
     main, share = control.layout.main, out.transfer_share
     demand(law, control.reference, surfaces, main, share, belief, measured)
-    inversion.command_surfaces(control, law.output, assessment, faults, belief, True)
+    found = law.output
+    inversion.command_surfaces(
+        control, found.demand, found.hold, found.disturbance, assessment, faults, belief, True
+    )
     inversion.complete(control, assessment, faults, measured, t)
     allocation.lead_compensate(out, control.layout, law.config.lead, belief.u)
 

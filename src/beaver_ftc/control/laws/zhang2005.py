@@ -94,10 +94,12 @@ def adapt(law, surfaces, main, saturated, error, G, u, dt):
 @apart
 def command(control, assessment, faults, belief, measured, mode, t):
     """From what is measured to the command of each surface (base.CompiledLaw)."""
-    law, reference = control.zhang2005, control.reference
+    law, reference, out = control.zhang2005, control.reference, control.zhang2005.feedback.output
     inversion.prepare(control, assessment, belief, mode, t)
     published.demand(law.feedback, reference.output, measured.x, belief.f, law.network.output)
-    inversion.command_surfaces(control, law.feedback.output, assessment, faults, belief, False)
+    inversion.command_surfaces(
+        control, out.demand, out.hold, out.disturbance, assessment, faults, belief, False
+    )
     u = control.allocation.output.command
     published.integrate(law.feedback, control.axes, reference, u, measured.x)
     inversion.complete(control, assessment, faults, measured, t)

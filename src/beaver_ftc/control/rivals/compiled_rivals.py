@@ -6,7 +6,7 @@ The surfaces that lead roll, pitch and yaw move; the others stay in trim.
 import numpy as np
 
 from beaver_ftc.compiled import apart, kernel, record, sized
-from beaver_ftc.control.allocation import DEMAND, form_demand, take_command
+from beaver_ftc.control.allocation import form_demand, take_command
 from beaver_ftc.control.base import CompiledLaw
 from beaver_ftc.control.rivals.tracking import DELAY_FRAMES
 
@@ -26,9 +26,9 @@ MEMORY = record(
 
 @sized
 def rival_dtype(n: int) -> np.dtype:
-    """The rivals' records for n surfaces; command (n,) rad before it is limited, axes: of incremental
-    inversion, what it demands."""
-    return record(config=CONFIG, memory=MEMORY, output=record(command=n, axes=DEMAND))
+    """The rivals' records for n surfaces; command (n,) rad before it is limited; demand (3,) rad/s2, of
+    incremental inversion; zero (3,): no rates are held, no disturbance is found."""
+    return record(config=CONFIG, memory=MEMORY, output=record(command=n, demand=3, zero=3))
 
 
 @apart
@@ -39,7 +39,7 @@ def command(control, assessment, faults, belief, measured, mode, t):
     out.command[:] = layout.trim
     if law.config.incremental:
         increment(law, reference, layout.main, belief.G, x)
-        form_demand(control.axes, out.axes, control.surfaces.output.offset, belief.G, False)
+        form_demand(control.axes, out.demand, out.zero, out.zero, out.zero, belief.G, False)
     else:
         regulate(law, reference, layout.main, x)
     take_command(allocated, layout, out.command)
@@ -76,8 +76,8 @@ def regulate(law, reference, main, x):
 
 @kernel
 def increment(law, reference, main, G, x):
-    """u0 + G^-1 (nu - xdot0), into the output's command; nu - xdot0 into its axes' demand (3,) rad/s2."""
-    config, memory, demand, out = law.config, law.memory, law.output.axes.demand, law.output.command
+    """u0 + G^-1 (nu - xdot0), into the output's command; nu - xdot0 into its demand (3,) rad/s2."""
+    config, memory, demand, out = law.config, law.memory, law.output.demand, law.output.command
     if not memory.begun:
         memory.begun, memory.x_before[:] = 1, x
     for i in range(3):

@@ -31,6 +31,7 @@ _SURE = (0.05, 0.95)
 SHOWN = 3.0
 """-ln 0.05: with no alarm in so many of the hours asked for one, the rate is shown without a tail."""
 _HIGHEST = 1e4
+_ROUNDING = 1e-9  # of a sum of probabilities: a quantile between two rates must not hang on its last digits
 
 Part = tuple[Floats, float]
 """Peaks of what is left out in one, and its hours."""
@@ -92,7 +93,7 @@ def expected(tail: Tail, threshold: float) -> Expected:
     shape, scale, weight = _posterior(tail)
     rates = (_above(threshold - tail.level, shape, scale)[:, None] * _rates(tail)[None, :]).ravel()
     order, mass = np.argsort(rates), np.repeat(weight, len(_RATES)) / len(_RATES)
-    within = np.searchsorted(np.cumsum(mass[order]), _SURE)
+    within = np.searchsorted(np.cumsum(mass[order]), np.array(_SURE) - _ROUNDING)
     low, high = rates[order][np.minimum(within, len(rates) - 1)]
     return Expected(float(rates @ mass), float(low), float(high))
 
@@ -137,11 +138,12 @@ def _rates(tail: Tail) -> Floats:
 
 def _posterior(tail: Tail) -> tuple[Floats, Floats, Floats]:
     """Shape, scale and the weight of both, each over the whole grid."""
+    from scipy.stats import genpareto
+
     excess = np.array(tail.excess)
     scales = max(float(excess.mean()), TINY) * _SCALES
     shape, scale = (part.ravel() for part in np.meshgrid(_SHAPES, scales, indexing="ij"))
-    logs = np.array([_log_survival(one, shape, scale) for one in excess])
-    log = ((1.0 + shape) * logs - np.log(scale)).sum(axis=0) / tail.dispersion
+    log = genpareto.logpdf(excess[:, None], shape, scale=scale).sum(axis=0) / tail.dispersion
     log -= 0.5 * (shape / _SHAPE_SD) ** 2
     weight = np.exp(log - log.max())
     return shape, scale, weight / weight.sum()
@@ -149,14 +151,6 @@ def _posterior(tail: Tail) -> tuple[Floats, Floats, Floats]:
 
 def _above(excess: float, shape: Floats, scale: Floats) -> Floats:
     """Probability that a peak over the level exceeds it by more."""
-    return np.exp(_log_survival(max(excess, 0.0), shape, scale))
+    from scipy.stats import genpareto
 
-
-def _log_survival(excess: float, shape: Floats, scale: Floats) -> Floats:
-    """Logarithm of the share of peaks that exceed more; -inf beyond the end of a bounded tail."""
-    ratio, curved = excess / scale, np.abs(shape) > 1e-9
-    bend = np.where(curved, shape, 1.0)
-    with np.errstate(divide="ignore"):
-        bent = -np.log(np.maximum(1.0 + bend * ratio, 0.0)) / bend
-    bent = np.where(1.0 + bend * ratio > 0.0, bent, -np.inf)
-    return np.asarray(np.where(curved, bent, -ratio))
+    return np.asarray(genpareto.sf(excess, shape, scale=scale))

@@ -15,6 +15,21 @@ from beaver_ftc.studies.linear_systems import (
 )
 
 
+def test_python_control_gives_the_same():
+    control = pytest.importorskip("control")
+    rng = np.random.default_rng(4)
+    A, b = rng.normal(size=(6, 6)) - 3.0 * np.eye(6), rng.normal(size=6)
+    system, omega = control.ss(A, b[:, None], np.eye(6)[[2]], 0), np.geomspace(0.1, 30.0, 7)
+    assert response(A, b, 2, omega) == pytest.approx(system(1j * omega), rel=1e-9)
+    held = control.sample_system(system, 0.05, "zoh")
+    for ours, theirs in zip(held_over_frame(A, b[:, None], 0.05), (held.A, held.B), strict=True):
+        assert ours == pytest.approx(theirs, rel=1e-9, abs=1e-12)
+    assert np.sort_complex(zeros(A, b, 2)) == pytest.approx(np.sort_complex(control.zeros(system)), rel=1e-6)
+    t_s = 0.05 * np.arange(40)
+    stepped = control.forced_response(held, t_s, (t_s < 0.475).astype(float)).outputs
+    assert pulse_response(A, b, 2, t_s, 0.5) == pytest.approx(np.array(stepped), rel=1e-9, abs=1e-12)
+
+
 def pair(real, imaginary):
     return np.array([[real, imaginary], [-imaginary, real]])
 

@@ -5,6 +5,9 @@ over it.
 
 Processes are forked from a clean one that has everything imported. Importing takes that process half a
 second; started early, it does so while this one still reads its input. Nothing heavy is imported here.
+
+Each worker is a pool of its own. In one pool of several, Python's or loky's, one that is killed takes the
+tasks of all the others with it (loky: TerminatedWorkerError in each), so nothing tells which case kills.
 """
 
 import contextlib

@@ -113,7 +113,10 @@ def _generator(seed: int, index: int, purpose: int) -> np.random.Generator:
 
 
 def _latin_hypercube(file: SweepFile, dimensions: int) -> np.ndarray:
-    """One flight in each of `flights` equal slices of every key [McKay, Beckman, Conover 1979]."""
+    """One flight in each of `flights` equal slices of every key [McKay, Beckman, Conover 1979].
+
+    Not scipy's `qmc.LatinHypercube`: it draws other numbers, and a seed gives the same flights for good.
+    """
     generator = _generator(file.seed, 0, _OF_DESIGN)
     columns = [
         (generator.permutation(file.flights) + generator.random(file.flights)) / file.flights

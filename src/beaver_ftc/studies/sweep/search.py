@@ -2,7 +2,8 @@
 
 Differential evolution [Storn and Price 1997], current-to-best/1/bin, on the unit cube of the varied keys, a
 generation a batch. Each generation follows from the seed and from the outcomes before it alone: a search that
-is interrupted goes on exactly as it would have, and any number of workers finds the same flight.
+is interrupted goes on exactly as it would have, and any number of workers finds the same flight. Scipy's
+`differential_evolution` calls the objective itself and keeps no state: it cannot go on.
 """
 
 import math

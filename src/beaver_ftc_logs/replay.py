@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.documents import BadInput
-from beaver_ftc.results import TIME_TOLERANCE_S
+from beaver_ftc.scenario import TIME_TOLERANCE_S
 from beaver_ftc_logs.readers.table import check_time, read_numbers
 from beaver_ftc_logs.recording import Floats
 

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from beaver_ftc.results.metrics import faults_of, hints
+from beaver_ftc.results.model import Metrics
 from beaver_ftc.results.verdict import facts, mood, title
 from beaver_ftc.scenario.schema import Scenario
 
@@ -19,7 +20,7 @@ ALL, PAIRS = {"fault_class": "all"}, {"fault_class": "all", "pairs": True}
 def _hints(*faults, detected=True, guaranteed=0.1, end=(45.0, 1828.8), why=None, used=(0.11, 0.5), **keys):
     scenario = Scenario.model_validate({"name": "x", "faults": list(faults), **keys})
     document = {"detection": {"detected": detected, "guaranteed_delay_s": guaranteed, "inconclusive": why}}
-    return hints(SimpleNamespace(scenario=scenario, end=end, closest_approach=used), document)
+    return hints(SimpleNamespace(scenario=scenario, end=end, closest_approach=used), Metrics.of(document))
 
 
 @pytest.mark.parametrize(

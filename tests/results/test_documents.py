@@ -17,6 +17,7 @@ from beaver_ftc.results.flight import Flight as Opened
 from beaver_ftc.results.junit import write_junit
 from beaver_ftc.results.log import ParquetLog, unit_of, units
 from beaver_ftc.results.metrics import as_json, fault_free_s, hints, metrics
+from beaver_ftc.results.model import Metrics
 from beaver_ftc.results.report import register_section, render
 from beaver_ftc.results.style import MODE_COLOURS
 from kept import in_short
@@ -44,13 +45,19 @@ FLIGHTS = {
         end=(39.0, 1500.0), isolation_type="stuck", estimate=0.1, estimate_interval=(0.05, math.nan),
         frequency_rad_s=5.0, type_time_s=12.5, probing_s=(14.0, 18.5),
         engine_power={"from_s": 13.2, "in_charge_s": 0.9, "lowest_inhg": 20.04, "highest_inhg": 22.26},
-        profile={"altitude_m": 3.0, "airspeed_mps": 1.5, "heading_deg": 0.1, "bank_deg": 0.2},
-        arrival={"altitude_m": -2.0, "heading_deg": 0.05},
+        profile={
+            "altitude_m": 3.0, "airspeed_mps": 1.5, "heading_deg": 0.1, "bank_deg": 0.2,
+            "airspeed_limited_mps": 1.25,
+        },
+        arrival={"altitude_m": -2.0, "airspeed_mps": None, "heading_deg": 0.05, "bank_deg": None},
         limits=({
             "limits": "bank_deg", "side": "at most", "value": 30.0, "in_force": True, "time_s": 20.0,
             "because": "stuck",
         },),
-        authority={"p": {"beyond_s": 0.2}, "q": {"beyond_s": 0.05}},
+        authority={
+            axis: {"given_share": 0.75, "beyond_s": beyond_s}
+            for axis, beyond_s in zip("pqr", (0.2, 0.05, 0.0), strict=True)
+        },
         saturation_s={"elevator": 1.25, "flap": 0.0},
         statistical={"time_s": 12.2, "alarm_level": 6.5, "closest_approach": 0.81},
         changes=({
@@ -106,7 +113,9 @@ def test_a_fault_free_time_ends_with_the_first_alarm_or_fault():
 )
 def test_a_flight_has_drifted_beyond_5_mps_or_300_m(end, said):
     initial = SimpleNamespace(airspeed_mps=45.0, altitude_m=1800.0)
-    found = hints(Flight(scenario=Scenario(initial=initial), end=end), {"detection": {"detected": True}})
+    found = hints(
+        Flight(scenario=Scenario(initial=initial), end=end), Metrics.of({"detection": {"detected": True}})
+    )
     assert "".join(found) == (said and f"the flight drifted in {said}: only the body rates are controlled")
 
 

@@ -3,6 +3,7 @@
 import pytest
 
 from beaver_ftc.results.expectations import evaluate, margin
+from beaver_ftc.results.model import Expectation, Metrics
 from beaver_ftc.scenario.schema import Expect
 
 METRICS = {
@@ -13,9 +14,9 @@ METRICS = {
 
 
 def _found(name, expected, metrics):
-    (found,) = evaluate(Expect.model_validate({name: expected}), metrics)
-    assert (found["name"], found["expected"]) == (name, expected)
-    return found["actual"], found["passed"]
+    (found,) = evaluate(Expect.model_validate({name: expected}), Metrics.of(metrics))
+    assert (found.name, found.expected) == (name, expected)
+    return found.actual, found.passed
 
 
 @pytest.mark.parametrize(
@@ -57,9 +58,9 @@ def test_a_rule(name, expected, actual, met):
 def test_where_a_flight_has_come_to(part, expected, actual, met):
     arrival = {"altitude_m": -12.0, "airspeed_mps": None, "heading_deg": 4.0, "in_envelope": False}
     expect = Expect.model_validate({"arrives": {part: expected}})
-    found = {"name": f"arrives.{part}", "passed": met, "expected": expected, "actual": actual}
-    assert evaluate(expect, {"arrival": arrival}) == [found]
-    assert not evaluate(expect, {"arrival": None})[0]["passed"]
+    found = Expectation(f"arrives.{part}", met, expected, actual)
+    assert evaluate(expect, Metrics.of({"arrival": arrival})) == [found]
+    assert not evaluate(expect, Metrics.of({"arrival": None}))[0].passed
 
 
 def test_what_was_never_flown_or_never_left():
@@ -94,8 +95,8 @@ GONE += [{"fault": "rudder", "from_s": 4.0, "to_s": 4.5}]
     ],
 )
 def test_why_the_diagnosis_does_not_do_what_was_expected(name, expected, metrics, met, reason):
-    (found,) = evaluate(Expect.model_validate({name: expected}), metrics)
-    assert (found["passed"], found.get("reason")) == (met, reason)
+    (found,) = evaluate(Expect.model_validate({name: expected}), Metrics.of(metrics))
+    assert (found.passed, found.reason) == (met, reason)
 
 
 @pytest.mark.parametrize(
@@ -103,4 +104,4 @@ def test_why_the_diagnosis_does_not_do_what_was_expected(name, expected, metrics
     [(5, -3.0, 2.0), (0.5, 0.75, -0.25), (0.5, 0.5, 0.0), (5.0, None, None), (True, 1, None), ("a", 1, None)],
 )
 def test_a_margin_is_what_is_left_to_the_limit(expected, actual, inside):
-    assert margin({"expected": expected, "actual": actual}) == inside
+    assert margin(Expectation("", False, expected, actual)) == inside

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 import beaver_ftc as bf
-from beaver_ftc.results import typed
+from beaver_ftc.results import model
 from beaver_ftc.results.writer import run
 from flying import loss, scenario
 
@@ -44,11 +44,7 @@ class TestFlown:
 
     def test_typed_is_what_the_document_says(self, flight):
         for part in ("fault", "detection", "isolation"):
-            said = vars(getattr(flight, part))
-            document = {**flight.metrics[part]}
-            assert {k: list(v) if isinstance(v, tuple) else v for k, v in said.items()} == {
-                key: document[key] for key in said
-            }
+            assert getattr(flight, part).document() == flight.metrics[part]
         assert (
             flight.tracking.post_fault_rms_deg_s.q == flight.metrics["tracking"]["post_fault_rms_deg_s"]["q"]
         )
@@ -137,6 +133,24 @@ def files(folder: Path):
 
 
 def test_lists_within_lists_are_frozen_and_numbers_by_axis_have_names():
-    found = typed._frozen([[1.0, [2.0]], {"p": 0.1, "q": 0.2, "r": 0.3}, "word"])
-    assert found == ((1.0, (2.0,)), typed.Rates(p=0.1, q=0.2, r=0.3), "word")
-    assert hash(found)
+    rates, exit = {"p": 0.1, "q": 0.2, "r": 0.3}, {"start_s": 1.0, "end_s": 2.0}
+    found = model.Metrics.of({"tracking": {"pre_fault_rms_deg_s": rates}, "envelope_exits": [exit]})
+    assert found.tracking.pre_fault_rms_deg_s == model.Rates(p=0.1, q=0.2, r=0.3)
+    assert found.envelope_exits == (model.Exit(1.0, 2.0),)
+    assert found.tracking.post_fault_rms_deg_s is None
+    assert found.supervisor == ()
+
+
+def test_the_document_of_a_flight_is_its_records_and_back(flight):
+    """Also of the keys that are there only where there is something to say."""
+    again = model.Metrics.of(flight.metrics)
+    assert again.document() == flight.metrics
+    assert list(again.document()) == list(flight.metrics)
+    changed = {"time_s": 1.0, "law": None, "scheme": None, "sensors": True}
+    ended = {**changed, "detection_time_s": None, "isolated": None}
+    alarmed = {**changed, "detection_time_s": 0.5, "isolated": None, "false_alarm": True}
+    for document in (changed, ended, alarmed):
+        assert model.Change.of(document).document() == document
+    sensor = {"actuator": None, "sensor": "q", "type": "bias", "at_s": 1.0}
+    assert model.Fault.of(sensor).document() == sensor
+    assert list(model.Fault.of(sensor).document()) == list(sensor)

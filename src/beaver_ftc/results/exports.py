@@ -20,7 +20,7 @@ from beaver_ftc.aircraft import Aircraft, load
 from beaver_ftc.aircraft.units import EARTH_RADIUS_M
 from beaver_ftc.plant.state import START_LATITUDE_DEG
 from beaver_ftc.results import log
-from beaver_ftc.results.metrics import Document
+from beaver_ftc.results.model import Document
 from beaver_ftc.results.style import marks
 
 ACMI_RATE_HZ = 25.0  # smooth to look at; a viewer interpolates

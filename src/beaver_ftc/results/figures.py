@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from beaver_ftc.results import log
-from beaver_ftc.results.metrics import Document
+from beaver_ftc.results.model import Document
 from beaver_ftc.results.style import GREY, LOOKS, YELLOW, Mark, closeup_window, marks
 from beaver_ftc.results.views import WHOLE, Panel, Series, Trace, View, read_series, views
 

@@ -13,9 +13,10 @@ import numpy as np
 
 from beaver_ftc.documents.errors import BadInput, SimulationFailed, suggestion
 from beaver_ftc.extensions import required
-from beaver_ftc.results import typed, verdict
+from beaver_ftc.results import model, verdict
 from beaver_ftc.results.log import Log, MemoryLog, StoredLog
-from beaver_ftc.results.metrics import Document, metrics
+from beaver_ftc.results.metrics import metrics
+from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.loader import ScenarioLike, load
 from beaver_ftc.scenario.schema import Scenario
 
@@ -68,52 +69,54 @@ class Flight:
         """The scenario's name, and that of the result folder."""
         return self.scenario.name
 
+    @cached_property
+    def _typed(self) -> model.Metrics:
+        return model.Metrics.of(self.metrics)
+
     @property
-    def fault(self) -> typed.Fault | None:
+    def fault(self) -> model.Fault | None:
         """The first fault declared."""
-        declared = self.metrics["fault"]
-        return declared and typed.Fault.of(declared)
+        return self._typed.fault
 
     @property
-    def detection(self) -> typed.Detection:
+    def detection(self) -> model.Detection:
         """The alarm."""
-        return typed.Detection.of(self.metrics["detection"])
+        return self._typed.detection
 
     @property
-    def isolation(self) -> typed.Isolation:
+    def isolation(self) -> model.Isolation:
         """What was named."""
-        return typed.Isolation.of(self.metrics["isolation"])
+        return self._typed.isolation
 
     @property
-    def tracking(self) -> typed.Tracking:
+    def tracking(self) -> model.Tracking:
         """How well the rates were followed."""
-        return typed.Tracking.of(self.metrics["tracking"])
+        return self._typed.tracking
 
     @property
-    def supervisor(self) -> tuple[typed.ModeChange, ...]:
+    def supervisor(self) -> tuple[model.ModeChange, ...]:
         """Who was in charge, change by change."""
-        return typed.every(typed.ModeChange, self.metrics["supervisor"])
+        return self._typed.supervisor
 
     @property
-    def departure(self) -> typed.Departure | None:
+    def departure(self) -> model.Departure | None:
         """When and in which signal the aircraft was lost; None if it was kept."""
-        departure = self.metrics["departure"]
-        return departure and typed.Departure.of(departure)
+        return self._typed.departure
 
     @property
-    def expectations(self) -> tuple[typed.Expectation, ...]:
+    def expectations(self) -> tuple[model.Expectation, ...]:
         """What the scenario expects, and what came out."""
-        return typed.every(typed.Expectation, self.metrics["expectations"])
+        return self._typed.expectations
 
     @property
     def false_alarm(self) -> bool:
         """Whether there was an alarm before any fault."""
-        return bool(self.metrics["false_alarm"])
+        return self._typed.false_alarm
 
     @property
     def passed(self) -> bool:
         """Whether every expectation was met."""
-        return bool(self.metrics["passed"])
+        return self._typed.passed
 
     def views(self) -> tuple[str, ...]:
         """What `plot` can show of this flight."""

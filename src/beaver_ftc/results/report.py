@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from beaver_ftc.results import log, verdict
-from beaver_ftc.results.metrics import Document
+from beaver_ftc.results.model import Document
 from beaver_ftc.results.style import LOOKS, MODE_COLOURS, closeup_window, marks
 from beaver_ftc.results.views import MAX_POINTS, Panel, View, kinds, read_series, surfaces, views
 

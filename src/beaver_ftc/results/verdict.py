@@ -7,7 +7,7 @@ import io
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from beaver_ftc.results.metrics import Document
+from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.measured import in_words
 
 if TYPE_CHECKING:

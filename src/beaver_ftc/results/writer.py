@@ -20,7 +20,8 @@ from beaver_ftc.commands import files_of_commands
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.extensions import required
 from beaver_ftc.results.log import ParquetLog
-from beaver_ftc.results.metrics import Document, as_json, metrics
+from beaver_ftc.results.metrics import as_json, metrics
+from beaver_ftc.results.model import Document
 
 if TYPE_CHECKING:
     from beaver_ftc.plant.adapter import Plant

@@ -28,5 +28,6 @@ if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import NAME_PATTERN, Expect, Scenario
     from beaver_ftc.scenario.sensors import sensor_words, sensors_there
     from beaver_ftc.scenario.sweeps import Sweep, SweepExpect, is_sweep, load_sweep, validate_sweep
+    from beaver_ftc.scenario.timing import TIME_TOLERANCE_S
 else:
     __getattr__, __dir__ = lazily(__name__)

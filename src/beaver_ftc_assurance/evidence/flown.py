@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.documents import BadInput, BeaverFtcError
-from beaver_ftc.results import Formula, faults_of
+from beaver_ftc.results import Formula, Metrics, faults_of, measure
 from beaver_ftc.results import evaluate_expectations as evaluate
 from beaver_ftc.results import margin_of_expectation as margin
-from beaver_ftc.results import metrics_of as metrics
 from beaver_ftc.scenario import Scenario, to_yaml
 from beaver_ftc.studies.present import finite
 from beaver_ftc.studies.sweep import BAD_INPUT, CRASHED, DEPARTED, FAILED, FLOWN, row_of, row_of_failure
@@ -96,11 +95,11 @@ def _flown(plan: EvidencePlan, name: str, run: int) -> Row:
     scenario = source.scenario(run)
     log = Watched(sorted({c for each in plan.of(name) for c in _columns(plan, each)}))
     flight = fly(scenario, log)
-    document = metrics(flight)
-    found = {each.id: _judged(plan, each, scenario, document, log) for each in plan.of(name)}
-    assigned, lost = source.assignment(run), document["departure"]
-    why = f"lost: {lost['signal']} at {lost['time_s']:g} s" if lost else ""
-    of_sweep = assigned and row_of(assigned, document, flight)
+    amounts = measure(flight)
+    found = {each.id: _judged(plan, each, scenario, amounts, log) for each in plan.of(name)}
+    assigned, lost = source.assignment(run), amounts.departure
+    why = f"lost: {lost.signal} at {lost.time_s:g} s" if lost else ""
+    of_sweep = assigned and row_of(assigned, amounts, flight)
     return {
         **_row(plan, (name, run), DEPARTED if lost else FLOWN, why, found, of_sweep),
         "scenario": hashlib.sha256(to_yaml(scenario).encode()).hexdigest(),
@@ -134,15 +133,15 @@ def part(
 
 
 def _judged(
-    plan: EvidencePlan, requirement: Requirement, scenario: Scenario, document: Row, log: Watched
+    plan: EvidencePlan, requirement: Requirement, scenario: Scenario, found: Metrics, log: Watched
 ) -> list[Row]:
     """What a flight says of a requirement, part by part; of a sweep's statistics nothing."""
     bar, formula = requirement.bar, plan.formulas.get(requirement.id)
     if formula is not None:
-        return [_of_formula(requirement.formula or "", formula, scenario.rate_hz, document, log)]
+        return [_of_formula(requirement.formula or "", formula, scenario.rate_hz, found, log)]
     try:
         if isinstance(bar, OfHandling):
-            return _of_handling(bar, scenario, document, log)
+            return _of_handling(bar, scenario, found, log)
         if isinstance(bar, OfMargins):
             return _of_margins(bar, scenario)
     except BeaverFtcError as error:  # the study has nothing to say of it, such as of another law
@@ -150,41 +149,41 @@ def _judged(
     if requirement.expect is None:
         return []
     return [
-        part(one["name"], one["expected"], one["actual"], MET if one["passed"] else NOT_MET, margin(one))
-        for one in evaluate(plan.expect[requirement.id], document)
+        part(one.name, one.expected, one.actual, MET if one.passed else NOT_MET, margin(one))
+        for one in evaluate(plan.expect[requirement.id], found)
     ]
 
 
-def _of_formula(text: str, formula: Formula, rate_hz: float, document: Row, log: Watched) -> Row:
+def _of_formula(text: str, formula: Formula, rate_hz: float, found: Metrics, log: Watched) -> Row:
     r = formula.robustness(log.columns, rate_hz)
-    lost = document["departure"]
+    lost = found.departure
     if not math.isfinite(r):
         nan, far = "a column is not a number where it asks", "it looks beyond the log, or at what is infinite"
         why = nan if math.isnan(r) else far
         return part("robustness", text, None, NOT_SHOWN, says=why)
-    if r >= 0.0 and lost and formula.looks_ahead_s > lost["time_s"]:
-        return part("robustness", text, r, NOT_SHOWN, says=f"the aircraft was lost at {lost['time_s']:g} s")
+    if r >= 0.0 and lost and formula.looks_ahead_s > lost.time_s:
+        return part("robustness", text, r, NOT_SHOWN, says=f"the aircraft was lost at {lost.time_s:g} s")
     return part("robustness", text, r, MET if r >= 0.0 else NOT_MET, r)
 
 
-def _of_handling(bar: OfHandling, scenario: Scenario, document: Row, log: Watched) -> list[Row]:
+def _of_handling(bar: OfHandling, scenario: Scenario, found: Metrics, log: Watched) -> list[Row]:
     from beaver_ftc.studies import HANDLING_LIMITS as LIMITS
     from beaver_ftc.studies import where_ended, where_trimmed
 
-    if document["departure"]:
+    if found.departure:
         return [part("handling qualities", bar.level, None, NOT_SHOWN, says="the aircraft was lost")]
     qualities = where_ended(scenario, log.end) if scenario.faults else where_trimmed(scenario)
-    found = []
+    parts = []
     for limit, each in zip(LIMITS, qualities, strict=True):
         least, most = (None if math.isinf(end) else end for end in limit.levels[bar.level - 1])
         asked = {"at_least": least, "at_most": most, "level": bar.level}
         inside = limit.margin(each.value, bar.level)
-        found.append(part(
+        parts.append(part(
             f"{limit.mode} {limit.quantity}", {key: v for key, v in asked.items() if v is not None},
             finite(each.value), MET if each.level <= bar.level else NOT_MET,
             finite(inside), f"level {each.level}" if each.level <= 3 else "no level",
         ))  # fmt: skip
-    return found
+    return parts
 
 
 def _of_margins(bar: OfMargins, scenario: Scenario) -> list[Row]:

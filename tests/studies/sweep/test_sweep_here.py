@@ -10,6 +10,7 @@ import pytest
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
+from beaver_ftc.results.model import Metrics
 from beaver_ftc.scenario.sweeps import Variation
 from beaver_ftc.studies.engine.workers import ThisProcess
 from beaver_ftc.studies.sweep import campaign, one_flight, store
@@ -269,16 +270,16 @@ def test_the_row_of_a_made_flight(changed):
     }  # fmt: skip
     modes = [("nominal", 0.0), ("adaptive", 12.1), ("reallocated", 12.5), ("adaptive", 13.0)]
     document["supervisor"] = [{"mode": mode, "time_s": at_s} for mode, at_s in modes]
-    document["envelope"] = {"exits": 3, "outside_s": 1.5}
+    document |= {"envelope": {"exits": 3, "outside_s": 1.5}, "envelope_exits": []}
     document["expectations"] = [{"name": n, "passed": n == "b"} for n in "abc"]
     flight = SimpleNamespace(
         frames=250, worst_residual_ratio=0.875,
         scenario=SimpleNamespace(rate_hz=50.0, airframe=SimpleNamespace(surfaces=load().surfaces)),
     )  # fmt: skip
-    assert not changed(row_of(Assignment(5, {"a": 1.5}), document, flight))
+    assert not changed(row_of(Assignment(5, {"a": 1.5}), Metrics.of(document), flight))
     document |= {"departure": None, "supervisor": modes and [{"mode": "nominal", "time_s": 0.0}]}
     document["isolation"] |= {"estimate_interval": None, "probing_s": None, "candidates": [], "faults": []}
-    plain = row_of(Assignment(5, {}), document, flight)
+    plain = row_of(Assignment(5, {}), Metrics.of(document), flight)
     assert (plain["status"], plain["reason"], plain["isolation.faults"]) == ("flown", None, "")
     assert plain["supervisor.adaptive_at_s"] is plain["isolation.probing_s.from"] is None
 

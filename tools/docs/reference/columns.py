@@ -18,7 +18,8 @@ from beaver_ftc.studies.mismatch import split, study
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.power.shown import rows_as_parquet
 from beaver_ftc.studies.present.tables import markdown_table
-from beaver_ftc.studies.sweep.one_flight import FIXED, columns_of
+from beaver_ftc.studies.sweep.columns import columns_of
+from beaver_ftc.studies.sweep.one_flight import FIXED
 from beaver_ftc_logs import pages
 
 TEXTS = Path(__file__).with_name("columns.yaml")

@@ -14,7 +14,7 @@ HEAD = """# Python names
 Which names does `import beaver_ftc as bf` give, and what does each take and return? Shapes, units and sources
 stand in the text of each."""
 
-RECORDS = "results.typed"
+RECORDS = "results.model"
 _MODULES = re.compile(r"\b(?:[a-z_]+\.)+(?=\w)")  # before a name in a signature
 
 # Headings, the names below each as after `beaver_ftc.`, and the members that are shown where not all are.

@@ -16,7 +16,7 @@ import typer
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.plant import addresses, conditions
 from beaver_ftc.results.log import ParquetLog
-from beaver_ftc.results.metrics import metrics
+from beaver_ftc.results.metrics import measure
 from beaver_ftc.scenario.loader import load_scenario
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sweeps import Sweep, load_sweep
@@ -205,7 +205,7 @@ def _flown(sweep: Sweep, changes: dict[str, Any], run: int) -> Taken:
         pass
     marks.append(time.process_time())
     flight = loop.land()
-    row_of(assignment, metrics(flight), flight)
+    row_of(assignment, measure(flight), flight)
     marks.append(time.process_time())
     alone, runs = loop.plant.run, flight.frames * scenario.substeps
     began = time.process_time()

@@ -9,7 +9,8 @@ from typing import Any
 
 from beaver_ftc.diagnosis.bounds.clairvoyant import chance
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.results.metrics import Document, versions
+from beaver_ftc.results.metrics import versions
+from beaver_ftc.results.model import Document
 from beaver_ftc.studies.compare.replay import Trace, alarms_at
 from beaver_ftc.studies.engine.statistics import Estimate, binomial, poisson, share_within, sign_test
 from beaver_ftc.studies.power.survey import BOTH, BUILT_IN, WATCHED_S, WITHIN_S, Grid, Watched

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from beaver_ftc.results.metrics import Document, as_json
+from beaver_ftc.results.metrics import as_json
+from beaver_ftc.results.model import Document
 from beaver_ftc.studies.engine.command import (
     AirspeedOption,
     AltitudeOption,

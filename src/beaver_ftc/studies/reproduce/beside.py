@@ -6,7 +6,7 @@ What is flown, declared and asked for is the same; only who diagnoses and who co
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from beaver_ftc.results.metrics import Document
+from beaver_ftc.results.model import Document
 from beaver_ftc.studies.present.tables import number
 from beaver_ftc.studies.reproduce.cases import CASES, CORNERS, OURS, Changed, Flown, fly_case
 from beaver_ftc.studies.reproduce.measures import AXIS

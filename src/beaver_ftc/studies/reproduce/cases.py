@@ -16,7 +16,8 @@ from beaver_ftc.aircraft import AXES
 from beaver_ftc.documents.document import parse
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
-from beaver_ftc.results.metrics import Document, metrics
+from beaver_ftc.results.metrics import metrics
+from beaver_ftc.results.model import Document
 from beaver_ftc.studies.reproduce.choices import FAULT_AT_S, GIVEN, gains, scenario
 
 ESTIMATORS = ("aileron", "elevator", "rudder")

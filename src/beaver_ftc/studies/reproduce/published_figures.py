@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from beaver_ftc.results.figures import draw
-from beaver_ftc.results.metrics import Document
+from beaver_ftc.results.model import Document
 from beaver_ftc.results.style import BLUE, GREY, VERMILION, marks
 from beaver_ftc.results.views import (
     AXES,

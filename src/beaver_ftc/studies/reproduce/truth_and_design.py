@@ -5,7 +5,7 @@ from typing import Any
 
 from beaver_ftc.aircraft import AXES, load
 from beaver_ftc.aircraft.aircraft import MOMENTS
-from beaver_ftc.results.metrics import Document
+from beaver_ftc.results.model import Document
 from beaver_ftc.studies.present.tables import number, seconds
 from beaver_ftc.studies.reproduce.cases import CASES, Changed, Flown, fly_case
 

@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFailed
-from beaver_ftc.results.metrics import Document, as_json, versions
+from beaver_ftc.results.metrics import as_json, versions
+from beaver_ftc.results.model import Document
 from beaver_ftc.results.writer import clear_disk_errors
 from beaver_ftc.scenario.sweeps import Sweep
 from beaver_ftc.studies.engine.store import batches_of, write_whole

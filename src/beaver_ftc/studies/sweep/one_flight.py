@@ -7,9 +7,8 @@ bytes.
 import contextlib
 import json
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cache
 from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,8 +18,10 @@ from pydantic import ValidationError
 from beaver_ftc.documents import document as source
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.documents.problems import key_path, problems_of
+from beaver_ftc.results.model import Metrics
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sweeps import Sweep, Variation
+from beaver_ftc.studies.sweep.columns import columns_of, value_of
 from beaver_ftc.studies.sweep.sampling import Assignment, flight_seed
 
 if TYPE_CHECKING:
@@ -30,84 +31,11 @@ if TYPE_CHECKING:
 
 
 Row = dict[str, Any]
-Document = dict[str, Any]
-Getter = Callable[[Document, "Landing"], Any]
 
 FLOWN, DEPARTED, BAD_INPUT, FAILED, CRASHED = "flown", "departed", "bad_input", "failed", "crashed"
 RESULTS = (FLOWN, DEPARTED)  # the statuses of a flight that has metrics
 # Columns of every sweep, and their types: what varies stands behind the first.
 FIXED = {"run": "int", "seed": "int", "status": "text", "reason": "text"}
-
-
-def _faults(document: Document, flight: "Landing") -> str:
-    """surface:type of each fault that was named, of several at once."""
-    named = (found for found in document["isolation"]["faults"] if found["fault"])
-    return " ".join(f"{found['fault']}:{found['type'] or 'open'}" for found in named)
-
-
-def _missed_expectations(document: Document, flight: "Landing") -> str:
-    return " ".join(found["name"] for found in document["expectations"] if not found["passed"])
-
-
-def _first_entry(mode: str) -> Getter:
-    def get(document: Document, flight: "Landing") -> Any:
-        return next((change["time_s"] for change in document["supervisor"] if change["mode"] == mode), None)
-
-    return get
-
-
-def _end_of_pair(name: str, end: int) -> Getter:
-    def get(document: Document, flight: "Landing") -> Any:
-        pair = document["isolation"][name]
-        return pair[end] if pair else None
-
-    return get
-
-
-# Columns that are not at the path of their name in the metrics document.
-_ELSEWHERE: dict[str, Getter] = {
-    "flown_s": lambda document, flight: flight.frames / flight.scenario.rate_hz,
-    "worst_residual_ratio": lambda document, flight: flight.worst_residual_ratio,
-    "isolation.estimate_interval.low": _end_of_pair("estimate_interval", 0),
-    "isolation.estimate_interval.high": _end_of_pair("estimate_interval", 1),
-    "isolation.probing_s.from": _end_of_pair("probing_s", 0),
-    "isolation.probing_s.to": _end_of_pair("probing_s", 1),
-    "isolation.candidates": lambda document, flight: " ".join(document["isolation"]["candidates"]),
-    "isolation.faults": _faults,
-    "isolation.withdrawn": lambda document, flight: " ".join(
-        gone["fault"] for gone in document["isolation"]["withdrawn"]
-    ),
-    "supervisor.mode": lambda document, flight: document["supervisor"][-1]["mode"],
-    "supervisor.adaptive_at_s": _first_entry("adaptive"),
-    "supervisor.reallocated_at_s": _first_entry("reallocated"),
-    "supervisor.unanticipated_at_s": _first_entry("unanticipated"),
-    "envelope_exits.count": lambda document, flight: document["envelope"]["exits"],
-    "envelope_exits.total_s": lambda document, flight: document["envelope"]["outside_s"],
-    "expectations.missed": _missed_expectations,
-}
-
-
-@cache
-def columns_of(surfaces: tuple[str, ...]) -> dict[str, str]:
-    """Name and type of what came of each flight of an aircraft with these surfaces: columns.json, where a
-    name's `*` is each surface.
-    """
-    listed = json.loads((Path(__file__).parent / "columns.json").read_text(encoding="utf-8"))
-    return {
-        name: kind
-        for pattern, kind in listed.items()
-        for name in ([pattern.replace("*", one) for one in surfaces] if "*" in pattern else [pattern])
-    }
-
-
-def _value(name: str, document: Document, flight: "Landing") -> Any:
-    """What a column says of a flight; None where a section on the way to it is null."""
-    if name in _ELSEWHERE:
-        return _ELSEWHERE[name](document, flight)
-    here: Any = document
-    for part in name.split("."):
-        here = None if here is None else here.get(part)
-    return here
 
 
 def kind_of(how: Variation) -> str:
@@ -127,14 +55,14 @@ def as_cell(value: Any, kind: str) -> Any:
     return value if kind == "flag" or isinstance(value, str) else json.dumps(value)
 
 
-def row_of(assignment: Assignment, document: Document, flight: "Landing") -> Row:
+def row_of(assignment: Assignment, found: Metrics, flight: "Landing") -> Row:
     """The row of a flight that has metrics."""
-    departure = document["departure"]
+    departure = found.departure
     status = DEPARTED if departure else FLOWN
-    reason = f"{departure['signal']} at {departure['time_s']:g} s" if departure else None
+    reason = f"{departure.signal} at {departure.time_s:g} s" if departure else None
     columns = columns_of(flight.scenario.airframe.surfaces)
-    metrics = {name: _value(name, document, flight) for name in columns}
-    return _row(assignment, document["seed"], status, reason, metrics)
+    metrics = {name: value_of(name, found, flight) for name in columns}
+    return _row(assignment, found.seed, status, reason, metrics)
 
 
 def row_of_failure(sweep: Sweep, assignment: Assignment, status: str, reason: str) -> Row:
@@ -225,11 +153,11 @@ def scenario_of(sweep: Sweep, assignment: Assignment) -> Scenario:
 def fly_one(sweep: Sweep, assignment: Assignment, keep: Keep | None = None) -> Row:
     """Fly one flight; whatever goes wrong with it is in its row."""
     from beaver_ftc.loop.loop import fly
-    from beaver_ftc.results.metrics import metrics
+    from beaver_ftc.results.metrics import measure
 
     try:
         flight = fly(scenario_of(sweep, assignment))
-        row = row_of(assignment, metrics(flight), flight)
+        row = row_of(assignment, measure(flight), flight)
     except BadInput as error:
         row = row_of_failure(sweep, assignment, BAD_INPUT, str(error))
     except BeaverFtcError as error:

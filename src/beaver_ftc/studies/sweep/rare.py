@@ -19,9 +19,8 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFailed, say_once, suggestion
-from beaver_ftc.results.expectations import evaluate
 from beaver_ftc.results.log import Columns
-from beaver_ftc.results.metrics import as_json, metrics, versions
+from beaver_ftc.results.metrics import as_json, measure, versions
 from beaver_ftc.results.writer import result_folder
 from beaver_ftc.scenario.dump import to_yaml
 from beaver_ftc.scenario.schema import Scenario
@@ -183,18 +182,18 @@ def score_of(scenario: Scenario, expectation: str) -> float:
 
     log = Columns(*DEPARTURE_LIMITS) if expectation == "no_departure" else None
     flight = fly(scenario, log)
-    document = metrics(flight)
-    found = next(one for one in evaluate(scenario.expect, document) if one["name"] == expectation)
+    amounts = measure(flight)
+    found = next(one for one in amounts.expectations if one.name == expectation)
     if log is not None:
         shares = (np.abs(log[name]).max() / limit for name, limit in DEPARTURE_LIMITS.items())
         score = float(max(shares)) - 1.0
     elif expectation == "no_false_alarm":
         score = flight.worst_residual_ratio - 1.0
-    elif found["actual"] is not None:
-        score = abs(found["actual"]) / found["expected"] - 1.0 if found["expected"] else abs(found["actual"])
+    elif found.actual is not None:
+        score = abs(found.actual) / found.expected - 1.0 if found.expected else abs(found.actual)
     else:  # it never came: the later it could have, the worse
-        score = max(0.0, flight.frames / scenario.rate_hz - (document["fault"] or {"at_s": 0.0})["at_s"])
-    return min(score, _BEFORE) if found["passed"] else max(score, 0.0)
+        score = max(0.0, flight.frames / scenario.rate_hz - (amounts.fault.at_s if amounts.fault else 0.0))
+    return min(score, _BEFORE) if found.passed else max(score, 0.0)
 
 
 def values_at(sweep: Sweep, point: Sequence[float]) -> dict[str, Any]:

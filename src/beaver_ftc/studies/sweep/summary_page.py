@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.results.metrics import ON_THE_BOUND
+from beaver_ftc.results.model import Document
 from beaver_ftc.studies.present.page import picture_data
 from beaver_ftc.studies.present.tables import number, printed
-from beaver_ftc.studies.sweep.one_flight import Document
 from beaver_ftc.studies.sweep.pictures import FIGURES
 from beaver_ftc.studies.sweep.summary import OUTCOMES
 

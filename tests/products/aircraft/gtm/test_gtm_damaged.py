@@ -13,8 +13,8 @@ from beaver_ftc.aircraft.schema import AircraftFile, DamageSection
 from beaver_ftc.diagnosis.detection.noise_model import SLOW_RAD_S, swing_of
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.trim import trim
-from beaver_ftc.results.metrics import _type_correct
 from beaver_ftc.scenario.diagnosis import Statistical
+from beaver_ftc.scenario.judgement import DeclaredFault
 from beaver_ftc_aircraft.derive import sample as sampling
 from beaver_ftc_aircraft.gtm import folder
 from beaver_ftc_aircraft.gtm.steady import FT_S_PER_KNOT
@@ -107,10 +107,10 @@ def test_only_where_damage_takes_surfaces_is_the_drift_that_of_a_slow_swing():
 
 
 def test_unanticipated_is_no_wrong_type_of_damage():
-    damage = {"type": "damage", "actuator": None}
-    assert _type_correct("unanticipated", damage) is None
-    assert _type_correct("loss_of_effectiveness", damage) is True
-    assert _type_correct("stuck", damage) is False
+    damage = DeclaredFault(None, "damage", 1.0)
+    assert damage.is_of_type("unanticipated") is None
+    assert damage.is_of_type("loss_of_effectiveness") is True
+    assert damage.is_of_type("stuck") is False
 
 
 @pytest.mark.parametrize("case", [0, 2, 4])

@@ -1,0 +1,386 @@
+"""What a flight amounts to, typed: `metrics.json`, the columns of a sweep and the attributes of a flight.
+
+A record's fields are the keys of its section of the document, in their order. Times are s since the start of
+the flight, delays s since the first frame with the fault, rates deg/s; None is what there is not.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from functools import cache
+from types import UnionType
+from typing import Any, Self, Union, get_args, get_origin, get_type_hints
+
+Document = dict[str, Any]  # a section as JSON has it
+Span = tuple[float, float]
+
+
+def _if_known() -> Any:
+    """A key that the document has only where its value is known."""
+    return field(default=None, metadata={"left_out": True}, kw_only=True)
+
+
+@dataclass(frozen=True)
+class Part:
+    """A section of the document."""
+
+    @classmethod
+    def of(cls, document: Mapping[str, Any]) -> Self:
+        """From a section as JSON has it; a key that is not there is None, or an empty list."""
+        return cls(**{name: _read(hint, document.get(name)) for name, hint in _hints(cls).items()})
+
+    def document(self) -> Document:
+        """The section, key by key."""
+        values = {one.name: getattr(self, one.name) for one in fields(self)}
+        left_out = {one.name for one in fields(self) if "left_out" in one.metadata}
+        return {
+            key: _plain(value) for key, value in values.items() if not (value is None and key in left_out)
+        }
+
+
+@cache
+def _hints(part: type[Part]) -> dict[str, Any]:
+    return get_type_hints(part)
+
+
+def without_none(hint: Any) -> Any:
+    """The type of a field that may be None, without that."""
+    if get_origin(hint) not in (Union, UnionType):
+        return hint
+    return next(one for one in get_args(hint) if one is not type(None))
+
+
+def _read(hint: Any, value: Any) -> Any:
+    """A value of JSON as a field of this type has it."""
+    may_be_none, hint = without_none(hint) is not hint, without_none(hint)
+    inner = get_args(hint)
+    if value is None and (may_be_none or get_origin(hint) not in (tuple, dict)):
+        return None
+    if get_origin(hint) is tuple:
+        return tuple(_read(inner[0], entry) for entry in value or ())
+    if get_origin(hint) is dict:
+        return {key: _read(inner[1], entry) for key, entry in (value or {}).items()}
+    if isinstance(hint, type) and issubclass(hint, Part):
+        return hint.of(value)
+    return tuple(value) if isinstance(value, list) else value
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Part):
+        return value.document()
+    if isinstance(value, Mapping):
+        return {key: _plain(entry) for key, entry in value.items()}
+    return [_plain(entry) for entry in value] if isinstance(value, tuple | list) else value
+
+
+@dataclass(frozen=True)
+class Condition(Part):
+    """The flight condition, and who diagnosed and controlled."""
+
+    airspeed_mps: float
+    altitude_m: float
+    rate_hz: float
+    flown_s: float
+    scheme: str
+    fault_class: str
+    law: str
+
+
+@dataclass(frozen=True)
+class Fault(Part):
+    """The first fault declared; actuator is None for an unanticipated one, and for that of an instrument,
+    which has a sensor."""
+
+    actuator: str | None
+    sensor: str | None = _if_known()
+    type: str
+    at_s: float
+
+
+@dataclass(frozen=True)
+class DeclaredFault(Fault):
+    """A fault declared. size: what else its type has."""
+
+    end_s: float | None
+    profile: str
+    size: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Statistical(Part):
+    """The statistical detector: when it would have raised the alarm; its level, in standard deviations; the
+    largest share of it reached in healthy flight."""
+
+    time_s: float | None
+    alarm_level: float
+    closest_approach: float
+
+
+@dataclass(frozen=True)
+class Inconclusive(Part):
+    """The frames in which the built-in diagnosis can conclude nothing: their share, when the first was, and
+    why."""
+
+    share: float
+    from_s: float
+    reasons: tuple[Document, ...]
+
+
+@dataclass(frozen=True)
+class Detection(Part):
+    """The alarm. guaranteed_delay_s: from the fault to the instant from which it was certain."""
+
+    detected: bool
+    time_s: float | None
+    delay_s: float | None
+    axis: str | None
+    guaranteed_delay_s: float | None
+    statistical: Statistical | None
+    inconclusive: Inconclusive | None
+
+
+@dataclass(frozen=True)
+class Named(Part):
+    """A fault that is named; `fault` is None where a question is open between the candidates. estimate: theta
+    in [-1, 0] for a loss of effectiveness, else rad; candidates: the fault types (or surfaces) still
+    possible. so_far: a surface named by exclusion, which data may yet exclude. premature: named before the
+    fault began."""
+
+    fault: str | None
+    type: str | None
+    time_s: float | None
+    delay_s: float | None
+    correct: bool | None
+    candidates: tuple[str, ...]
+    type_correct: bool | None
+    type_delay_s: float | None
+    estimate: float | None
+    estimate_deg: float | None
+    estimate_interval: Span | None
+    frequency_rad_s: float | None
+    so_far: bool | None
+    premature: bool | None
+
+
+@dataclass(frozen=True)
+class Withdrawn(Part):
+    """A surface that was named, from when to when."""
+
+    fault: str
+    from_s: float
+    to_s: float
+
+
+@dataclass(frozen=True)
+class Isolation(Part):
+    """What was named: as in `Named`. names: all names given, in the order of the faults."""
+
+    isolated: bool
+    fault: str | None
+    type: str | None
+    time_s: float | None
+    delay_s: float | None
+    correct: bool | None
+    estimate: float | None
+    candidates: tuple[str, ...]
+    type_correct: bool | None
+    type_delay_s: float | None
+    estimate_deg: float | None
+    estimate_interval: Span | None
+    frequency_rad_s: float | None
+    so_far: bool | None
+    premature: bool | None
+    withdrawn: tuple[Withdrawn, ...]
+    names: tuple[str, ...]
+    probing_s: Span | None
+    faults: tuple[Named, ...]
+
+
+@dataclass(frozen=True)
+class Rates(Part):
+    """One number an axis, deg/s."""
+
+    p: float | None
+    q: float | None
+    r: float | None
+
+
+@dataclass(frozen=True)
+class Tracking(Part):
+    """RMS tracking errors, deg/s; None where there was no such time. Path and energy by surface."""
+
+    pre_fault_rms_deg_s: Rates | None
+    post_fault_rms_deg_s: Rates | None
+    surface_travel_deg: dict[str, float]
+    surface_energy_deg2_s: dict[str, float]
+
+
+@dataclass(frozen=True)
+class ModeChange(Part):
+    """Who is in charge from when on."""
+
+    time_s: float
+    mode: str
+
+
+@dataclass(frozen=True)
+class Change(Part):
+    """What was changed in flight; of a diagnosis that ended with it its alarm and the name it gave."""
+
+    time_s: float
+    law: str | None
+    scheme: str | None
+    sensors: bool
+    detection_time_s: float | None
+    isolated: str | None
+    false_alarm: bool | None = _if_known()
+    renewed: bool = True
+
+    def document(self) -> Document:
+        """Of a diagnosis that went on there is nothing to say."""
+        found = super().document()
+        of_it = () if found.pop("renewed") else ("detection_time_s", "isolated")
+        return {key: value for key, value in found.items() if key not in of_it}
+
+    @classmethod
+    def of(cls, document: Mapping[str, Any]) -> Self:
+        """From a section as JSON has it."""
+        return super().of({**document, "renewed": "detection_time_s" in document})
+
+
+@dataclass(frozen=True)
+class Exit(Part):
+    """A spell outside the validated envelope."""
+
+    start_s: float
+    end_s: float
+
+
+@dataclass(frozen=True)
+class Envelope(Part):
+    """All spells outside together; exits_left_out: how many are not listed."""
+
+    exits: int
+    outside_s: float
+    exits_left_out: int
+
+
+@dataclass(frozen=True)
+class Departure(Part):
+    """When the aircraft was lost, and which signal left its limits."""
+
+    time_s: float
+    signal: str
+
+
+@dataclass(frozen=True)
+class AxisAuthority(Part):
+    """Of one axis after the fault: share of the demanded acceleration given, and for how long holding the
+    rates was beyond the surfaces. What they give at the end, rad/s2, believed and healthy; the engines'."""
+
+    given_share: float
+    beyond_s: float
+    least_rad_s2: float | None = _if_known()
+    greatest_rad_s2: float | None = _if_known()
+    healthy_least_rad_s2: float | None = _if_known()
+    healthy_greatest_rad_s2: float | None = _if_known()
+    engines_least_rad_s2: float | None = _if_known()
+    engines_greatest_rad_s2: float | None = _if_known()
+
+
+@dataclass(frozen=True)
+class Authority(Part):
+    """By axis."""
+
+    p: AxisAuthority
+    q: AxisAuthority
+    r: AxisAuthority
+
+
+@dataclass(frozen=True)
+class EnginePower(Part):
+    """Since when and for how long pitch was left to the engine, and the manifold pressures, inHg."""
+
+    from_s: float
+    in_charge_s: float
+    lowest_inhg: float
+    highest_inhg: float
+
+
+@dataclass(frozen=True)
+class Profile(Part):
+    """Largest deviation from the commanded profile, by channel; None where it is not flown. limited: from
+    the commanded airspeed as far as it can be held."""
+
+    altitude_m: float | None
+    airspeed_mps: float | None
+    heading_deg: float | None
+    bank_deg: float | None
+    airspeed_limited_mps: float | None
+
+
+@dataclass(frozen=True)
+class Arrival(Part):
+    """The mean deviation at the end, with its sign; and whether the flight ends in the envelope."""
+
+    altitude_m: float | None
+    airspeed_mps: float | None
+    heading_deg: float | None
+    bank_deg: float | None
+    in_envelope: bool
+
+
+@dataclass(frozen=True)
+class Limit(Part):
+    """A limit that envelope protection has put on the command."""
+
+    time_s: float
+    limits: str
+    side: str
+    value: float
+    because: str
+    in_force: bool
+
+
+@dataclass(frozen=True)
+class Expectation(Part):
+    """One of the scenario's expectations, and what came out; the reason of one that is not met, if it is
+    known."""
+
+    name: str
+    passed: bool
+    expected: Any
+    actual: Any
+    reason: str | None = _if_known()
+
+
+@dataclass(frozen=True)
+class Metrics(Part):
+    """The document metrics.json."""
+
+    scenario: str
+    seed: int
+    frames: int
+    flight: Condition
+    fault: Fault | None
+    faults: tuple[DeclaredFault, ...]
+    detection: Detection
+    isolation: Isolation
+    false_alarm: bool
+    fault_free_s: float
+    tracking: Tracking
+    supervisor: tuple[ModeChange, ...]
+    changes: tuple[Change, ...]
+    mode_changes_left_out: int
+    envelope_exits: tuple[Exit, ...]
+    envelope: Envelope
+    departure: Departure | None
+    authority: Authority | None
+    engine_power: EnginePower | None
+    profile: Profile | None
+    arrival: Arrival | None
+    limits: tuple[Limit, ...]
+    saturation_s: dict[str, float]
+    hints: tuple[str, ...]
+    expectations: tuple[Expectation, ...]
+    passed: bool
+    versions: dict[str, str]

@@ -1,0 +1,117 @@
+"""The columns of a sweep's table that say what came of a flight: of its metrics, by path, and a few more.
+
+A path's type follows from the metrics model; `*` is each surface.
+"""
+
+from collections.abc import Callable
+from functools import cache
+from typing import TYPE_CHECKING, Any, get_args, get_origin, get_type_hints
+
+from beaver_ftc.results.model import Metrics, without_none
+
+if TYPE_CHECKING:
+    from beaver_ftc.loop.outcome import Landing
+
+Getter = Callable[[Metrics, "Landing"], Any]
+
+NAMES = (
+    "frames", "flown_s", "fault_free_s", "fault.actuator", "fault.type", "fault.at_s", "detection.detected",
+    "detection.time_s", "detection.delay_s", "detection.guaranteed_delay_s", "detection.axis",
+    "detection.inconclusive.share", "detection.statistical.time_s", "detection.statistical.alarm_level",
+    "detection.statistical.closest_approach", "isolation.isolated", "isolation.correct", "isolation.fault",
+    "isolation.type", "isolation.time_s", "isolation.delay_s", "isolation.estimate",
+    "isolation.type_correct", "isolation.type_delay_s", "isolation.estimate_deg",
+    "isolation.frequency_rad_s", "isolation.estimate_interval.low", "isolation.estimate_interval.high",
+    "isolation.probing_s.from", "isolation.probing_s.to", "isolation.so_far", "isolation.premature",
+    "isolation.withdrawn", "isolation.candidates", "isolation.faults", "false_alarm",
+    "worst_residual_ratio", "tracking.pre_fault_rms_deg_s.p", "tracking.pre_fault_rms_deg_s.q",
+    "tracking.pre_fault_rms_deg_s.r", "tracking.post_fault_rms_deg_s.p", "tracking.post_fault_rms_deg_s.q",
+    "tracking.post_fault_rms_deg_s.r", "tracking.surface_travel_deg.*", "tracking.surface_energy_deg2_s.*",
+    "supervisor.mode", "supervisor.adaptive_at_s", "supervisor.reallocated_at_s",
+    "supervisor.unanticipated_at_s", "envelope_exits.count", "envelope_exits.total_s", "departure.time_s",
+    "departure.signal", "authority.p.given_share", "authority.p.beyond_s", "authority.q.given_share",
+    "authority.q.beyond_s", "authority.r.given_share", "authority.r.beyond_s", "profile.altitude_m",
+    "profile.airspeed_mps", "profile.airspeed_limited_mps", "profile.heading_deg", "profile.bank_deg",
+    "arrival.altitude_m", "arrival.airspeed_mps", "arrival.heading_deg", "arrival.bank_deg",
+    "arrival.in_envelope", "engine_power.from_s", "engine_power.in_charge_s", "engine_power.lowest_inhg",
+    "engine_power.highest_inhg", "saturation_s.*", "expectations.missed", "passed",
+)  # fmt: skip
+_KINDS = {float: "float", int: "int", bool: "flag", str: "text"}
+
+
+def _faults(found: Metrics, flight: "Landing") -> str:
+    """surface:type of each fault that was named, of several at once."""
+    named = (one for one in found.isolation.faults if one.fault)
+    return " ".join(f"{one.fault}:{one.type or 'open'}" for one in named)
+
+
+def _first_entry(mode: str) -> Getter:
+    def get(found: Metrics, flight: "Landing") -> Any:
+        return next((change.time_s for change in found.supervisor if change.mode == mode), None)
+
+    return get
+
+
+def _end_of_pair(name: str, end: int) -> Getter:
+    def get(found: Metrics, flight: "Landing") -> Any:
+        pair = getattr(found.isolation, name)
+        return pair[end] if pair else None
+
+    return get
+
+
+# Columns that are not at the path of their name in the metrics: type, and where they come from.
+_ELSEWHERE: dict[str, tuple[str, Getter]] = {
+    "flown_s": ("float", lambda found, flight: flight.frames / flight.scenario.rate_hz),
+    "worst_residual_ratio": ("float", lambda found, flight: flight.worst_residual_ratio),
+    "isolation.estimate_interval.low": ("float", _end_of_pair("estimate_interval", 0)),
+    "isolation.estimate_interval.high": ("float", _end_of_pair("estimate_interval", 1)),
+    "isolation.probing_s.from": ("float", _end_of_pair("probing_s", 0)),
+    "isolation.probing_s.to": ("float", _end_of_pair("probing_s", 1)),
+    "isolation.candidates": ("text", lambda found, flight: " ".join(found.isolation.candidates)),
+    "isolation.faults": ("text", _faults),
+    "isolation.withdrawn": (
+        "text", lambda found, flight: " ".join(gone.fault for gone in found.isolation.withdrawn),
+    ),
+    "supervisor.mode": ("text", lambda found, flight: found.supervisor[-1].mode),
+    "supervisor.adaptive_at_s": ("float", _first_entry("adaptive")),
+    "supervisor.reallocated_at_s": ("float", _first_entry("reallocated")),
+    "supervisor.unanticipated_at_s": ("float", _first_entry("unanticipated")),
+    "envelope_exits.count": ("int", lambda found, flight: found.envelope.exits),
+    "envelope_exits.total_s": ("float", lambda found, flight: found.envelope.outside_s),
+    "expectations.missed": (
+        "text", lambda found, flight: " ".join(one.name for one in found.expectations if not one.passed),
+    ),
+}  # fmt: skip
+
+
+@cache
+def columns_of(surfaces: tuple[str, ...]) -> dict[str, str]:
+    """Name and type of each column, for an aircraft with these surfaces."""
+    return {
+        name: _kind(pattern)
+        for pattern in NAMES
+        for name in ([pattern.replace("*", one) for one in surfaces] if "*" in pattern else [pattern])
+    }
+
+
+def _kind(path: str) -> str:
+    """The type of the column at a path of the metrics."""
+    if path in _ELSEWHERE:
+        return _ELSEWHERE[path][0]
+    hint: Any = Metrics
+    for part in path.split("."):
+        hint = get_args(hint)[1] if get_origin(hint) is dict else get_type_hints(hint)[part]
+        hint = without_none(hint)
+    return _KINDS[hint]
+
+
+def value_of(name: str, found: Metrics, flight: "Landing") -> Any:
+    """What a column says of a flight; None where a section on the way to it is."""
+    if name in _ELSEWHERE:
+        return _ELSEWHERE[name][1](found, flight)
+    here: Any = found
+    for part in name.split("."):
+        if here is not None:
+            here = here.get(part) if isinstance(here, dict) else getattr(here, part)
+    return here

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
-from math import ceil, exp
+from math import ceil
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -24,7 +24,9 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.loop.outcome import Landing
 from beaver_ftc.results.metrics import fault_free_s
 from beaver_ftc.scenario.faults import LossOfEffectiveness
+from beaver_ftc.scenario.judgement import Truth, is_late
 from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.timing import grown_share
 from beaver_ftc.studies.engine.command import Reporter, StudyCommand, WorkersOption
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial_upper, poisson_bound, share_within
 from beaver_ftc.studies.engine.store import UNREADABLE, Parts, RowsAsJson, fingerprint, set_aside, write_whole
@@ -137,7 +139,6 @@ STEPS: dict[str, dict[str, Any]] = {
     "constant": {"fault_profile": "abrupt"},
 }
 _CONSTANT_ONLY = "constant"  # for faults that are: one that grows is outside what this step declares
-_LATE_S = 1e-9  # rounding of frame times
 
 Row = dict[str, Any]
 Schemes = dict[str, dict[str, Any]]
@@ -176,23 +177,20 @@ def _faulty(draw: Draw, schemes: Schemes) -> Row:
 
 def judge(flight: Landing) -> Row:
     """What became of the promises in a flight with one fault; delays in s from the first frame with it."""
-    scenario = flight.scenario
-    fault, frame_s = scenario.faults[0], 1.0 / scenario.rate_hz
-    actuator = getattr(fault, "actuator", "unanticipated")
-    struck_s = ceil((fault.at_s - _LATE_S) * scenario.rate_hz) * frame_s
-    delay_s = None if flight.detection_time_s is None else flight.detection_time_s - struck_s
-    earliest_s = frame_s if scenario.substeps == 1 else 0.0  # of one JSBSim frame a fault shows in the next
-    guaranteed_s = flight.guaranteed_delay_s
-    late = guaranteed_s is not None and (delay_s is None or delay_s > guaranteed_s + frame_s + _LATE_S)
+    truth, guaranteed_s = Truth.of(flight.scenario), flight.guaranteed_delay_s
+    alarm_s, delay_s = flight.detection_time_s, truth.onset.delay_s(flight.detection_time_s)
+    left = (*flight.candidates, flight.isolated)
+    meant = truth.meant_by(flight.isolated, flight.isolation_time_s)
     return {
         "delay_s": delay_s,
-        "false_alarm": delay_s is not None and delay_s < earliest_s - _LATE_S,
+        "false_alarm": alarm_s is not None and truth.onset.is_false(alarm_s),
         "guaranteed_s": guaranteed_s,
-        "late": late,
-        "isolation_s": flight.isolation_time_s - struck_s if flight.isolation_time_s is not None else None,
-        "excluded": delay_s is not None and actuator not in (*flight.candidates, flight.isolated),
-        "wrong": flight.isolated not in (None, actuator),
-        "estimate_error": _estimate_error(flight) if flight.isolated == actuator else None,
+        "late": guaranteed_s is not None
+        and (delay_s is None or is_late(delay_s, guaranteed_s, 1.0 / flight.scenario.rate_hz)),
+        "isolation_s": truth.onset.delay_s(flight.isolation_time_s),
+        "excluded": alarm_s is not None and not any(truth.faults[0].is_named_by(name) for name in left),
+        "wrong": flight.isolated is not None and not meant,
+        "estimate_error": _estimate_error(flight) if meant else None,
     }
 
 
@@ -201,8 +199,7 @@ def _estimate_error(flight: Landing) -> float | None:
     fault = flight.scenario.faults[0]
     if flight.estimate is None or not isinstance(fault, LossOfEffectiveness):
         return None
-    age_s = flight.frames / flight.scenario.rate_hz - fault.at_s
-    grown = 1.0 if fault.kappa_per_s is None else 1.0 - exp(-fault.kappa_per_s * age_s)
+    grown = grown_share(fault, flight.frames / flight.scenario.rate_hz)
     return abs(flight.estimate + fault.magnitude * grown)
 
 

@@ -6,6 +6,7 @@ from typing import Any
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.loop.loop import fly
+from beaver_ftc.scenario.judgement import Truth
 from beaver_ftc.scenario.loader import load_scenario
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.mismatch.split import Tally, tally_of_flight
@@ -45,16 +46,15 @@ def rounded_up(value: float, digits: int = 2) -> float:
 def guarantee_with(constant_rad_s2: PerAxis, like: Scenario) -> dict[str, Any]:
     """The published elevator case, flown with this bound and the design model of `like`.
 
-    Delays are in s from the fault, None for never.
+    Delays are in s from the fault's first frame, None for never.
     """
     flight = fly(published_case(constant_rad_s2, like))
-    fault_s, at_s = flight.scenario.faults[0].at_s, flight.detection_time_s
-    early = at_s is not None and at_s < fault_s
+    onset, alarm_s = Truth.of(flight.scenario).onset, flight.detection_time_s
     return {
         "constant_rad_s2": constant_rad_s2,
         "guaranteed_delay_s": flight.guaranteed_delay_s,
-        "detection_delay_s": None if at_s is None or early else round(at_s - fault_s, 9),
-        "false_alarm": early,
+        "detection_delay_s": onset.delay_s(alarm_s),
+        "false_alarm": alarm_s is not None and onset.is_false(alarm_s),
     }
 
 

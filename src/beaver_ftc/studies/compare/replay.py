@@ -8,7 +8,7 @@ the fault, and each value after it that was larger than all before.
 from collections.abc import Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
-from math import inf, isfinite, isnan
+from math import inf, isnan
 from time import process_time
 
 import numpy as np
@@ -19,6 +19,7 @@ from beaver_ftc.diagnosis.bounds import clairvoyant
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.loop.stepping import built_in_statistic
 from beaver_ftc.plugins import DETECTORS, made
+from beaver_ftc.scenario.judgement import Onset, Truth
 from beaver_ftc.scenario.schema import Scenario
 
 
@@ -87,11 +88,16 @@ class Recording:
     context: Context
     seen: list[tuple[Measured, np.ndarray]]
     built_in: np.ndarray
-    fault_at_s: float
+    onset: Onset
     known: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
     error: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     air: np.ndarray | None = None
     air_noise: np.ndarray | None = None
+
+    @property
+    def fault_at_s(self) -> float:
+        """When the fault begins, as declared; infinite where nothing breaks."""
+        return inf if self.onset.at_s is None else self.onset.at_s
 
 
 def record(scenario: Scenario) -> Recording:
@@ -116,8 +122,7 @@ def record(scenario: Scenario) -> Recording:
     loop.fly_frame = fly_and_note
     for _ in loop.chunks():
         pass
-    fault_at_s = min((fault.at_s for fault in scenario.faults), default=inf)
-    by_frame = np.array(built_in), fault_at_s, np.array(known), np.array(error)
+    by_frame = np.array(built_in), Truth.of(scenario).onset, np.array(known), np.array(error)
     recording = Recording(recorder.context, recorder.seen, *by_frame)
     if scenario.fdi.statistical is not None and statistical["air"]["seen"]:
         recording.air, recording.air_noise = np.array(air), np.sqrt(statistical["noise"]["jitter"][0])
@@ -171,7 +176,7 @@ def replay_together(recordings: Sequence[Recording], scheme: str) -> list[Trace]
 def _frames_in_common(recordings: Sequence[Recording]) -> int:
     """Frames before any fault in which all flights were measured alike, to the bit; zero if they differ."""
     count = min(
-        sum(measured.t_s < recording.fault_at_s - 1e-9 for measured, _ in recording.seen)
+        sum(recording.onset.is_false(measured.t_s) for measured, _ in recording.seen)
         for recording in recordings
     )
     last = [np.concatenate((r.seen[count - 1][0].x, r.seen[count - 1][0].y)) for r in recordings if count]
@@ -188,11 +193,12 @@ def _statistic(verdict: Verdict) -> float:
 def trace(recording: Recording, statistic: np.ndarray, us: float = 0.0) -> Trace:
     """Boil a statistic (frames,) down to what decides about alarms at any level."""
     t = np.array([measured.t_s for measured, _ in recording.seen])
-    healthy = t < recording.fault_at_s - 1e-9
+    healthy = recording.onset.is_false(t)
     early = statistic[healthy]
     rises = _records(t[healthy], early)
-    records = _records(t[~healthy] - recording.fault_at_s, statistic[~healthy])
-    faulted = isfinite(recording.fault_at_s) and not healthy.all()
+    since = np.array([recording.onset.delay_s(one) for one in t[~healthy]])
+    records = _records(since, statistic[~healthy])
+    faulted = not healthy.all()
     healthy_s = float(healthy.sum()) * recording.context.dt_s
     return Trace(float(early.max(initial=0.0)), records, faulted, healthy_s, us, rises)
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from beaver_ftc.scenario.judgement import Onset
 from beaver_ftc_logs.diagnose import Rows
 from beaver_ftc_logs.recording import Event, Floats
 from beaver_ftc_logs.samples import Samples
@@ -64,18 +65,19 @@ def nearest(estimate: Floats, settings: Floats) -> np.ndarray:
 def by_event(rows: Rows, events: tuple[Event, ...], groups: list[list[str]]) -> Document:
     """Against the first failure the log tells of: alarms before it are false, those after it are late by."""
     begins = min((event.t_s for event in events), default=np.inf)
+    onset = Onset(None if np.isinf(begins) else float(begins))
     surfaces = sorted({event.surface for event in events if event.t_s < begins + _SETTLED_S})
-    before = rows.t_s < begins
+    before = onset.is_false(rows.t_s)
     after = np.flatnonzero(~before & (rows.faulty == 1))
     detected = bool(after.size)
     named = _named(rows, after)
     return {
         "failure": "+".join(surfaces) or None,
-        "failure_s": None if np.isinf(begins) else float(begins),
+        "failure_s": onset.at_s,
         "healthy_s": float(rows.t_s[before][-1] - rows.t_s[0]) if before.any() else 0.0,
         "false_alarms": int(np.sum(np.diff(rows.faulty[before], prepend=0) == 1)),
         "detected": detected,
-        "delay_s": float(rows.t_s[after[0]] - begins) if detected else None,
+        "delay_s": onset.delay_s(float(rows.t_s[after[0]])) if detected else None,
         "named": named,
         "right_group": _right_group(named, surfaces, groups),
     }

@@ -7,6 +7,7 @@ import numpy as np
 
 from beaver_ftc.documents import BadInput, suggestion
 from beaver_ftc.scenario.faults import TYPES
+from beaver_ftc.scenario.judgement import Onset
 from beaver_ftc_live.page.messages import Message
 
 EARLIEST_S, LATEST_S = 4.0, 20.0  # of the hidden fault, after the start of the round
@@ -85,10 +86,9 @@ class Game:
 
     def _delay_s(self, said: tuple[str, float] | None) -> float | None:
         """From the fault to the right answer, s; None if it was wrong or too early."""
-        place = self.fault.get("actuator")
-        if said is None or self.broken_s is None or said[0] != place or said[1] < self.broken_s:
+        if said is None or said[0] != self.fault.get("actuator"):
             return None
-        return said[1] - self.broken_s
+        return Onset(self.broken_s).delay_s(said[1])
 
     def stop(self) -> None:
         """Give the round up."""

@@ -13,11 +13,12 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.results.metrics import ON_THE_BOUND
+from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.faults import UNANTICIPATED
+from beaver_ftc.scenario.judgement import is_late
 from beaver_ftc.scenario.sweeps import AxisLevels, Level, QuantileLevel, Sweep, SweepExpect
 from beaver_ftc.studies.engine import statistics
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, Estimate, quantile, wilson
-from beaver_ftc.studies.sweep.one_flight import Document
 from beaver_ftc.studies.sweep.outcomes import NO_FAULT, Flights, Ranking, rank
 
 QUANTILES = {"median": 0.5, "p90": 0.9, "p95": 0.95, "p99": 0.99, "max": 1.0}
@@ -133,14 +134,10 @@ def _false_alarms(flights: Flights) -> Document:
 
 
 def _guarantee(flights: Flights) -> Document:
-    """Whether every fault was detected by the instant from which theory says detection is certain.
-
-    A fault begins with the first frame at or after its time, from which the promise counts: up to a frame
-    later.
-    """
+    """Whether every fault was detected by the instant from which theory says detection is certain."""
     promised = flights.faulted & np.isfinite(flights["detection.guaranteed_delay_s"])
     frame_s = flights["flown_s"] / flights["frames"]
-    late = flights.detection_delay_s >= flights["detection.guaranteed_delay_s"] + frame_s - 1e-9
+    late = is_late(flights.detection_delay_s, flights["detection.guaranteed_delay_s"], frame_s)
     return {"promised": int(promised.sum()), "broken": int((promised & late).sum())}
 
 

@@ -10,6 +10,7 @@ from reportlab.pdfgen.canvas import Canvas
 
 import beaver_ftc as bf
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.results.model import Metrics
 from beaver_ftc.studies.margins import Margin
 from beaver_ftc.studies.present.page import Heading, contents
 from beaver_ftc.studies.sweep import one_flight
@@ -130,8 +131,8 @@ def test_a_formula_is_met_from_zero_on_where_the_flight_lasted_as_far_as_it_look
     robustness, lost_at_s, verdict
 ):
     formula = SimpleNamespace(robustness=lambda columns, rate_hz: robustness, looks_ahead_s=3.0)
-    document = {"departure": lost_at_s and {"time_s": lost_at_s}}
-    found = flown._of_formula("text", formula, 100.0, document, SimpleNamespace(columns={}))
+    amounts = Metrics.of({"departure": lost_at_s and {"time_s": lost_at_s}})
+    found = flown._of_formula("text", formula, 100.0, amounts, SimpleNamespace(columns={}))
     assert found["verdict"] == verdict
 
 

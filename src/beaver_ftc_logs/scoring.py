@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.scenario.judgement import Onset
+from beaver_ftc.scenario import Onset
 from beaver_ftc_logs.diagnose import Rows
 from beaver_ftc_logs.recording import Event, Floats
 from beaver_ftc_logs.samples import Samples

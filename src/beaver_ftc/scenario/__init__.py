@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from beaver_ftc.scenario.diagnosis import Bounds
     from beaver_ftc.scenario.dump import to_yaml
     from beaver_ftc.scenario.initial import initial_of
+    from beaver_ftc.scenario.judgement import Onset
     from beaver_ftc.scenario.loader import (
         ScenarioLike,
         builtin_names,

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.documents import BadInput, suggestion
+from beaver_ftc.scenario import Onset
 from beaver_ftc.scenario.faults import TYPES
-from beaver_ftc.scenario.judgement import Onset
 from beaver_ftc_live.page.messages import Message
 
 EARLIEST_S, LATEST_S = 4.0, 20.0  # of the hidden fault, after the start of the round

@@ -191,7 +191,7 @@ def _gone(one: Candidate, fdi: np.void) -> bool:
     if not fdi["config"]["every_type"]:
         return bool(estimators[int(layout["loss_of"][one.surface])]["excluded"])
     whole = bool(estimators[int(layout["position_of"][one.surface])]["excluded"])
-    return whole or bool(fdi["types"]["surface"][one.surface]["type_excluded"][one.kind])
+    return whole or bool(fdi["types"]["surface"][one.surface]["feasible"]["excluded"][one.kind])
 
 
 def write(document: Document, scenario: Scenario, out: Path) -> Path:
@@ -275,7 +275,7 @@ def _left(tape: Tape) -> Iterator[tuple[int, int]]:
             if e >= 0 and not estimators[e]["excluded"]:
                 yield s, CONSTANT_LOSS
         elif not estimators[int(layout["position_of"][s])]["excluded"]:
-            yield from ((s, kind) for kind in CONSTANT if not surface["type_excluded"][kind])
+            yield from ((s, kind) for kind in CONSTANT if not surface["feasible"]["excluded"][kind])
 
 
 def open_courses(tape: Tape, names: Sequence[str]) -> list[str]:
@@ -285,7 +285,7 @@ def open_courses(tape: Tape, names: Sequence[str]) -> list[str]:
         return []
     for s, surface in enumerate(fdi["types"]["surface"]):
         if not fdi["isolation"]["estimator"][int(fdi["layout"]["position_of"][s])]["excluded"]:
-            kinds = np.flatnonzero(surface["type_excluded"] == 0)
+            kinds = np.flatnonzero(surface["feasible"]["excluded"] == 0)
             found += [f"{names[s]} {NAMES[k]}" for k in kinds if k not in CONSTANT]
     return sorted(set(found))
 

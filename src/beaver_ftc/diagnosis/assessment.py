@@ -11,6 +11,7 @@ from beaver_ftc.diagnosis.detection import fdae, statistical
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, WORST_CASE
 from beaver_ftc.diagnosis.types import verdict
 from beaver_ftc.diagnosis.types.contract import FIXED, LAGS, LOSES, SHIFTED
+from beaver_ftc.diagnosis.types.observation import middle_error
 
 SURE = 400.0  # one over the variance of an effectiveness known to 0.05, which need not be eased in
 
@@ -35,7 +36,7 @@ def assess(assessment, config, conclusion, types, layout, estimators, statistics
     assessment.detected, assessment.every_type = conclusion.detected, every_type
     assessment.named, assessment.hedge, assessment.unknown = named, 0, is_unknown(conclusion)
     for s in range(assessment.measure.size):
-        assessment.measure[s] = types.surface[s].measure if every_type else -1
+        assessment.measure[s] = types.surface[s].accommodation.mode if every_type else -1
         assessment.effectiveness[s], assessment.at_once[s] = 1.0, 0
         assessment.offset[s], assessment.lag[s] = 0.0, 0.0
         if conclusion.estimates and conclusion.detected:
@@ -53,16 +54,16 @@ def assess(assessment, config, conclusion, types, layout, estimators, statistics
 def assess_type(assessment, types, layout, estimators, s):
     """Fill the assessment of surface s, at fault by the diagnosis of every type."""
     surface = types.surface[s]
-    at_fault = verdict.possible(surface)
-    if surface.measure == LOSES:
+    at_fault, mode = verdict.possible(surface), surface.accommodation.mode
+    if mode == LOSES:
         assessment.effectiveness[s] = verdict.effectiveness_left(types, layout, estimators, s)
-    elif surface.measure == FIXED:
+    elif mode == FIXED:
         assessment.effectiveness[s], assessment.at_once[s] = 0.0, 1
-        assessment.offset[s] = surface.command + verdict.deflection_error(surface, at_fault)
-    elif surface.measure == SHIFTED:
+        assessment.offset[s] = surface.elapsed.command + verdict.deflection_error(surface, at_fault)
+    elif mode == SHIFTED:
         assessment.offset[s] = verdict.deflection_error(surface, at_fault)
-    elif surface.measure == LAGS:
-        assessment.lag[s] = 0.5 * (surface.low + surface.high) - surface.command
+    elif mode == LAGS:
+        assessment.lag[s] = middle_error(surface)
         assessment.hedge = 1
 
 
@@ -94,5 +95,5 @@ def assess_unknown(assessment, config, conclusion, types, layout, statistics, de
     elif conclusion.detected and not lags:
         fdae.unknown_acceleration(detector, bound.noise, unknown)
     is_open = every_type and conclusion.detected and conclusion.isolated == NOT_ISOLATED
-    long = types.surface[layout.main[PITCH]].evidence >= types.config.patience
+    long = types.surface[layout.main[PITCH]].evidence.frames >= types.config.patience
     assessment.pitch_is_open = is_open and long

@@ -62,7 +62,7 @@ def watch_instruments(frame):
 def reset_surface_diagnosis(fdi):
     """Discard what the diagnosis of the surfaces made of a broken sensor."""
     conclusion.void(fdi.verdict)
-    verdict.clear_measures(fdi.types.surface)
+    verdict.clear_modes(fdi.types.surface)
     fdae.reset_network(fdi.fdae.network)
 
 
@@ -319,7 +319,7 @@ def note_names(fdi, t):
     pairs, void = fdi.config.every_type and fdi.types.pair.enabled, sensor_monitor.speaks(fdi.watch)
     only = conclusion.isolated_surface(fdi.verdict, fdi.isolation.estimator)
     for s in range(fdi.types.surface.size):
-        named = fdi.types.surface[s].named if pairs else s == only
+        named = fdi.types.surface[s].status.named if pairs else s == only
         conclusion.note_name(fdi.verdict, s, named and not (void and not fdi.watch.beside), t)
 
 

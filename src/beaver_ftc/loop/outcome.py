@@ -320,7 +320,8 @@ def verdict_of(frame: np.void, surfaces: Sequence[str]) -> Verdict:
 def estimate_now(fdi: np.void, said: Verdict, surfaces: Sequence[str]) -> float | None:
     """The estimate of a verdict that otherwise still stands, of a diagnosis for every type."""
     surface, types = surfaces.index(str(said.isolated)), fdi["types"]
-    named = types["surface"][surface] if types["pair"]["enabled"] else fdi["verdict"]
+    pairs = types["pair"]["enabled"]
+    named = types["surface"][surface]["status"] if pairs else fdi["verdict"]
     return estimate_of(fdi, surface, int(named["type"]))
 
 

@@ -85,11 +85,11 @@ def news(frames, known):
 def news_of(surface, patience, known):
     """The same of one surface, where every type is asked for; known (5 and more,): its own."""
     bits = 0
-    for kind in range(surface.type_excluded.size):
-        bits = 2 * bits + surface.type_excluded[kind]
-    early = surface.evidence - surface.quiet < patience
-    changed = replace(known, 0, surface.named) | replace(known, 1, surface.standing)
-    changed |= replace(known, 2, surface.type) | replace(known, 3, bits)
+    for kind in range(surface.feasible.excluded.size):
+        bits = 2 * bits + surface.feasible.excluded[kind]
+    early = surface.evidence.frames - surface.evidence.quiet < patience
+    changed = replace(known, 0, surface.status.named) | replace(known, 1, surface.status.source)
+    changed |= replace(known, 2, surface.status.type) | replace(known, 3, bits)
     return changed | replace(known, 4, 1 if early else 0)
 
 

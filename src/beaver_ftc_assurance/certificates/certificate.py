@@ -219,9 +219,9 @@ def evidence(scenario: Scenario, tape: Tape, said: list[Document]) -> Evidence:
         for end in ("low", "high"):
             found[f"fie_{name}_theta_{end}"] = Part.constant(float(fdi["isolation"]["estimator"][e][end]))
     for surface in dict.fromkeys(of_types):
-        place = fdi["types"]["surface"][surfaces.index(surface)]
+        actuator = fdi["types"]["surface"][surfaces.index(surface)]["actuator"]
         for end in ("low", "high"):
-            found[f"{surface}_travel_{end}_rad"] = Part.constant(float(place[f"travel_{end}"]))
+            found[f"{surface}_travel_{end}_rad"] = Part.constant(float(actuator[f"travel_{end}"]))
     for s, kind, _ in kinds.excluded_types(tape):
         if surfaces[s] in of_types:
             flags = (tape.types[:, s, kind] > 0).astype(float)

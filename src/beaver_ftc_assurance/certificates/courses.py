@@ -115,7 +115,7 @@ def _offsets(seen: Seen, i: int, j: int) -> Iterator[Found]:
 
 def _runaway(seen: Seen, surface: Surface, config: np.void) -> Iterator[Found]:
     """Less far than its least rate takes it; of several instants, by the frame before."""
-    pace, stop = float(surface["least_runaway_rate"]), seen.stops[1]
+    pace, stop = float(surface["actuator"]["least_runaway_rate"]), seen.stops[1]
     step, late = pace * float(config["span_s"]), int(not config["whole"])
     began = np.where(seen.wrong, seen.low - step * np.arange(len(seen.low)), -np.inf)
     for j in np.flatnonzero(seen.wrong & (seen.high < stop - _LEAST)).tolist():
@@ -143,8 +143,8 @@ def _swing(seen: Seen, surface: Surface, config: np.void) -> Iterator[Found]:
 def _slow(seen: Seen, surface: Surface, config: np.void) -> Iterator[Found]:
     """Further away from all that it was ordered to than one can be that comes nearer at its least pace, until
     its lag makes the steps smaller."""
-    step = float(surface["slowest_step"])
-    least, close = int(config["instants"] * config["length"]) * step, step / float(surface["approach"])
+    step, approach = float(surface["actuator"]["slowest_step"]), float(surface["actuator"]["approach"])
+    least, close = int(config["instants"] * config["length"]) * step, step / approach
     for axis, low in enumerate(seen.least.T):
         beyond = seen.wrong & (low > seen.ordered + _LEAST)
         begins, comes = seen.since(beyond), seen.high + least * np.arange(len(low))
@@ -205,7 +205,7 @@ def _seen(
     reach = np.column_stack([tape.least[here, s, 0], tape.greatest[here, s, 0]])[:, ::sign] * sign
     room = np.maximum(0.0, (command[:, None] - reach) * (1.0, -1.0)) * (not whole)
     surface = tape.last["fdi"]["types"]["surface"][s]
-    stops = np.sort(sign * np.array([surface["travel_low"], surface["travel_high"]]))
+    stops = np.sort(sign * np.array([surface["actuator"]["travel_low"], surface["actuator"]["travel_high"]]))
     judged = slice(here.start + 1, here.stop + 1)
     ordered = np.maximum(told[judged, s, 2], told[judged, s, 2 if whole else 1])
     shows = wrong(history, frames)

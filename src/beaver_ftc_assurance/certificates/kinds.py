@@ -69,12 +69,13 @@ def row_of(tape: Tape, s: int, kind: int) -> int:
 def hypothesis(tape: Tape, s: int, kind: int) -> Hypothesis:
     """What a fault of this type on surface s adds to the innovation."""
     fdi = tape.alarm["fdi"]
-    e, surface = int(fdi["layout"]["position_of"][s]), fdi["types"]["surface"][s]
+    e = int(fdi["layout"]["position_of"][s])
     Gu, G, spread = -tape.offset[:, e], tape.slope[:, e], tape.spread[:, e]
     asked = tuple(i for i in range(3) if not fdi["isolation"]["estimator"][e]["unasked"][i])
     if fdi["types"]["config"]["length"] > 1:  # blocks: the axis on which no effect changes its sign
         asked = (int(fdi["layout"]["dominant_axis"][s]),)
-    low, high = float(surface["travel_low"]), float(surface["travel_high"])
+    actuator = fdi["types"]["surface"][s]["actuator"]
+    low, high = float(actuator["travel_low"]), float(actuator["travel_high"])
     if kind == STUCK:
         return Hypothesis(tape.first, -Gu, G, spread, low, high, True, True, asked)
     if kind == FLOAT:

@@ -189,7 +189,7 @@ def _always(record: np.void, n: int, every_type: bool) -> dict[str, np.ndarray]:
         "eta_bar": fdi["bound"]["eta_bar"], "noise": fdi["bound"]["noise"],
         "offset": estimators["effect"]["offset"], "slope": estimators["effect"]["Z"],
         "spread": estimators["effect"]["spread"], "excluded": estimators["excluded"],
-        "types": fdi["types"]["surface"]["type_excluded"],
+        "types": fdi["types"]["surface"]["feasible"]["excluded"],
     }  # fmt: skip
     if every_type:  # what the surfaces were told, and where healthy ones were
         orders = fdi["types"]["surface"]["orders"]

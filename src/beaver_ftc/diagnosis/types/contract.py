@@ -29,7 +29,7 @@ NOTHING_SAID, EXCLUDED, UNSEEN, STANDS = range(4)
 @kernel
 def anywhere(config, surface, kind, k):
     """Anywhere within reach."""
-    return surface.reach_low, surface.reach_high
+    return surface.actuator.reach_low, surface.actuator.reach_high
 
 
 def _nothing(fdi: np.void, s: int, kind: int) -> None:
@@ -133,19 +133,19 @@ class FaultType:
 @kernel
 def within_travel(surface, deflection):
     """A deflection (rad), cut off by the stops."""
-    return min(max(deflection, surface.travel_low), surface.travel_high)
+    return min(max(deflection, surface.actuator.travel_low), surface.actuator.travel_high)
 
 
 @kernel
 def middle(surface, kind):
     """The middle of a type's set."""
-    return 0.5 * (surface.set_low[kind] + surface.set_high[kind])
+    return 0.5 * (surface.feasible.low[kind] + surface.feasible.high[kind])
 
 
 def set_of(fdi: np.void, s: int, kind: int) -> tuple[float, float]:
     """The set of a type's parameter on surface s."""
     surface = fdi["types"]["surface"][s]
-    return float(surface["set_low"][kind]), float(surface["set_high"][kind])
+    return float(surface["feasible"]["low"][kind]), float(surface["feasible"]["high"][kind])
 
 
 def middle_of(fdi: np.void, s: int, kind: int) -> float:

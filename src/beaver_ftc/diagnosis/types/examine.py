@@ -20,7 +20,7 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.isolation import membership
-from beaver_ftc.diagnosis.types import sets
+from beaver_ftc.diagnosis.types import observation, sets
 from beaver_ftc.diagnosis.types.contract import EXCLUDED, FIXED, STANDS
 from beaver_ftc.diagnosis.types.registry import (
     AT_REST,
@@ -49,9 +49,9 @@ def begin(surface):
     """Nothing is known of this surface yet."""
     sets.begin(surface)
     fill_each(surface)
-    surface.low, surface.high = surface.reach_low, surface.reach_high
-    surface.started_at = -1
-    surface.evidence = surface.quiet = surface.unhidden = 0
+    observation.begin(surface)
+    surface.evidence.started_at = -1
+    surface.evidence.frames = surface.evidence.quiet = surface.evidence.unhidden = 0
     begin_each(surface)
 
 
@@ -70,52 +70,14 @@ def note_orders(types, commanded, means):
             orders.low[0], orders.high[0] = np.inf, -np.inf
             orders.least[1], orders.greatest[1] = orders.least[0], orders.greatest[0]
             orders.least[0], orders.greatest[0] = np.inf, -np.inf
-            surface.G_least, surface.G_most = np.inf, -np.inf
-        order = min(max(commanded[s], surface.travel_low), surface.travel_high)
+            orders.G_least, orders.G_most = np.inf, -np.inf
+        order = min(max(commanded[s], surface.actuator.travel_low), surface.actuator.travel_high)
         orders.given[0, types.block.filled] = order
         orders.low[0], orders.high[0] = min(orders.low[0], order), max(orders.high[0], order)
         orders.least[0] = min(orders.least[0], means.u_least[s])
         orders.greatest[0] = max(orders.greatest[0], means.u_most[s])
-        surface.G_least = min(surface.G_least, means.G_least[s])
-        surface.G_most = max(surface.G_most, means.G_most[s])
-
-
-@kernel
-def locate(config, surface, fie, axis, innovation, bound, effect):
-    """Find where a surface can have been (rad): what agrees with the innovation (3,) within its bound (3,).
-
-    fie: its estimator of a position; axis: on which it has most effect; effect: what that supposes of the
-    same frame or block, dtype EFFECT.
-    """
-    surface.low_before, surface.high_before = surface.low_then, surface.high_then
-    surface.low_then, surface.high_then, surface.command_then = surface.low, surface.high, surface.command
-    surface.command = -effect.offset[axis] / effect.Z[axis]
-    surface.uneven_then = surface.uneven
-    surface.uneven = 0.25 * (surface.G_most - surface.G_least) / abs(effect.Z[axis])
-    surface.low, surface.high = fie.low, fie.high
-    for i in range(3):
-        if config.length > 1 and i != axis and effect.Z[i] != 0.0:
-            continue  # over a block the axes weigh what varies differently
-        low, high = membership.agreeing(innovation, bound, fie, effect, i)
-        surface.low, surface.high = max(surface.low, low), min(surface.high, high)
-    surface.hides_then[:] = surface.hides
-    note_stops(surface, 2.0 * (bound[axis] + effect.spread[axis]) / abs(effect.Z[axis]))
-
-
-@kernel
-def note_stops(surface, width):
-    """Which stops can cut a deflection off unseen: those nearer to a healthy surface than `width` (rad), that
-    of the interval which holds the true deflection."""
-    surface.hides[0] = surface.orders.least[0] - surface.travel_low < width
-    surface.hides[1] = surface.travel_high - surface.orders.greatest[0] < width
-
-
-@kernel
-def note_wrong(surfaces, innovation, bound):
-    """Keep for every surface whether more than the admitted uncertainty was at work."""
-    wrong = not membership.healthy(innovation, bound)
-    for surface in surfaces:
-        surface.wrong_before, surface.wrong_then, surface.wrong = surface.wrong_then, surface.wrong, wrong
+        orders.G_least = min(orders.G_least, means.G_least[s])
+        orders.G_most = max(orders.G_most, means.G_most[s])
 
 
 @kernel
@@ -124,27 +86,30 @@ def take_in(types, layout, estimators, innovation, bound):
 
     bound (3,): on its innovation (3,) without a fault, rad/s2.
     """
-    note_wrong(types.surface, innovation, bound)
+    wrong = not membership.healthy(innovation, bound)
     for s, surface in enumerate(types.surface):
+        observation.shift(surface)
+        observation.note_wrong(surface, wrong)
         fie, axis = estimators[layout.position_of[s]], layout.dominant_axis[s]
         effect = fie.block_effect if types.config.length > 1 else fie.effect
-        locate(types.config, surface, fie, axis, innovation, bound, effect)
+        observation.locate(types.config, surface, fie, axis, innovation, bound, effect)
 
 
 @kernel
 def note_evidence(surface):
     """Count a frame as evidence; see `judge_all` for that which no stop can have hidden."""
-    surface.evidence += 1
-    surface.unhidden += 1
+    surface.evidence.frames += 1
+    surface.evidence.unhidden += 1
 
 
 @kernel
 def judge(config, surface, k):
     """Hold every type of one surface against the frame before the elapsed one: something was wrong in it."""
-    if surface.low_then > surface.high_then:
+    evidence, seen = surface.evidence, surface.judged
+    if seen.low > seen.high:
         return
-    if surface.started_at < 0:
-        surface.started_at, surface.start_low, surface.start_high = k, surface.low_then, surface.high_then
+    if evidence.started_at < 0:
+        evidence.started_at, evidence.start_low, evidence.start_high = k, seen.low, seen.high
     judge_each(config, surface, k)
 
 
@@ -156,9 +121,9 @@ def judge_all(types):
         on_frame_each(config, surface)
         if config.returns and types.frame > 0:
             on_release_each(config, surface, k)
-        if config.abrupt and surface.measure == FIXED and not surface.wrong_then:
+        if config.abrupt and surface.accommodation.mode == FIXED and not surface.judged.wrong:
             note_quiet(types, s)
-        elif surface.wrong_then and (config.whole or (surface.wrong_before and surface.wrong)):
+        elif surface.judged.wrong and (config.whole or (surface.earlier.wrong and surface.elapsed.wrong)):
             note_evidence(surface)
             judge(config, surface, k)
         else:
@@ -166,8 +131,8 @@ def judge_all(types):
         if config.returns and types.frame > 0:
             restore_each(surface)
             propagate_release_each(config, surface)
-        if surface.hides_then[0] or surface.hides_then[1]:
-            surface.unhidden = 0
+        if surface.judged.hides[0] or surface.judged.hides[1]:
+            surface.evidence.unhidden = 0
     types.frame += 1
 
 
@@ -235,10 +200,10 @@ def note_quiet(types, s):
     if not may_stand(surface):
         return
     for i, other in enumerate(types.surface):
-        if i == s or (surface.in_question and other.in_question):
+        if i == s or (surface.status.is_candidate and other.status.is_candidate):
             note_evidence(other)
-    surface.quiet += 1
-    if surface.quiet > types.config.patience and not types.config.own_errors:
+    surface.evidence.quiet += 1
+    if surface.evidence.quiet > types.config.patience and not types.config.own_errors:
         for kind in range(N_TYPES):
             if AT_REST[kind] == EXCLUDED:
                 sets.exclude(surface, kind)
@@ -248,7 +213,8 @@ def note_quiet(types, s):
 def may_stand(surface):
     """Whether the judged frame agrees with where the surface is known to stand."""
     for kind in range(N_TYPES):
-        apart = surface.low_then > surface.set_high[kind] or surface.high_then < surface.set_low[kind]
+        low, high = surface.feasible.low[kind], surface.feasible.high[kind]
+        apart = surface.judged.low > high or surface.judged.high < low
         if AT_REST[kind] == STANDS and apart:
             return False
     return True

@@ -36,10 +36,9 @@ def found(fdi: np.void, surfaces: Sequence[str]) -> Found:
 
 def _found_of_several(fdi: np.void, names: Sequence[str]) -> Found:
     """The fault named first as if it were alone, and all of them; what is open in a plane where none is."""
-    surfaces = fdi["types"]["surface"]
-    named = np.flatnonzero(surfaces["named"]).tolist()
-    at_fault = sorted(named, key=lambda s: surfaces["named_at_s"][s])
-    faults = [_found_on(fdi, s, int(surfaces["type"][s]), names) for s in at_fault]
+    status = fdi["types"]["surface"]["status"]
+    at_fault = sorted(np.flatnonzero(status["named"]).tolist(), key=lambda s: status["named_at_s"][s])
+    faults = [_found_on(fdi, s, int(status["type"][s]), names) for s in at_fault]
     planes = fdi["types"]["pair"]["alarmed"]
     surfaces_of = [np.flatnonzero(fdi["layout"]["group"] == g).tolist() for g in range(len(planes))]
     if not planes.any() and not faults and int(fdi["verdict"]["isolated"]) == NOT_ISOLATED:
@@ -77,9 +76,9 @@ def _found_on(fdi: np.void, s: int, kind: int, names: Sequence[str]) -> Found:
     surface = fdi["types"]["surface"][s]
     return {
         "isolated": names[s],
-        "isolation_time_s": float(surface["named_at_s"]),
+        "isolation_time_s": float(surface["status"]["named_at_s"]),
         "isolation_type": registry.NAMES[kind] if kind >= 0 else None,
-        "type_time_s": float(surface["type_at_s"]) if kind >= 0 else None,
+        "type_time_s": float(surface["status"]["type_at_s"]) if kind >= 0 else None,
         "candidates": (registry.NAMES[kind],) if kind >= 0 else tuple(_types_left(fdi, s)),
         "estimate": estimate_of(fdi, s, kind),
         "estimate_interval": _of_type(kind, "interval", fdi, s, kind),
@@ -100,9 +99,9 @@ def _of_type(kind: int, what: str, *arguments: Any) -> Any:
 
 def _possible(fdi: np.void, s: int) -> bool:
     surface = fdi["types"]["surface"][s]
-    if surface["named"] or surface["standing"] == BY_DEDUCTION:
+    if surface["status"]["named"] or surface["status"]["source"] == BY_DEDUCTION:
         return True
-    return not (surface["standing"] == RULED_OUT or surface["refuted"])
+    return not (surface["status"]["source"] == RULED_OUT or surface["refuted"])
 
 
 def _types_left(fdi: np.void, s: int) -> list[str]:
@@ -112,10 +111,11 @@ def _types_left(fdi: np.void, s: int) -> list[str]:
     constant has been seen for long enough, or until those types are excluded that it can look like.
     """
     surface = fdi["types"]["surface"][s]
-    left = [kind for kind, out in enumerate(surface["type_excluded"]) if _possible(fdi, s) and not out]
+    left = [kind for kind, out in enumerate(surface["feasible"]["excluded"]) if _possible(fdi, s) and not out]
     constant = [kind for kind in left if kind < registry.N_CONSTANT]
     if constant and not fdi["types"]["config"]["own_errors"]:
-        early = surface["evidence"] - surface["quiet"] < fdi["types"]["config"]["patience"]
+        evidence, patience = surface["evidence"], fdi["types"]["config"]["patience"]
+        early = evidence["frames"] - evidence["quiet"] < patience
         left = [kind for kind in left if kind in constant or early or _is_open(kind, constant)]
     beside_another = fdi["types"]["pair"]["enabled"] and fdi["layout"]["group"][s] == IN_PITCH
     if beside_another and any(registry.ACCOMMODATION[kind] == FIXED for kind in constant):

@@ -20,7 +20,7 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis import state
 from beaver_ftc.diagnosis.state import IN_PITCH, IN_ROLL_AND_YAW, PITCH, ROLL, YAW
 from beaver_ftc.diagnosis.types import examine as frames
-from beaver_ftc.diagnosis.types import sets, verdict
+from beaver_ftc.diagnosis.types import observation, sets, verdict
 from beaver_ftc.diagnosis.types.contract import FIXED, LOSES, SHIFTED
 from beaver_ftc.diagnosis.types.registry import ACCOMMODATION, N_CONSTANT, deflection
 from beaver_ftc.diagnosis.types.verdict import NO_SURFACE, any_constant, left, possible
@@ -37,16 +37,6 @@ def note_alarms(pair, bank):
 
 
 @kernel
-def place(surface, middle, slack):
-    """A surface was off its command by middle +- slack (rad). False: nowhere within its reach."""
-    surface.low = max(surface.reach_low, surface.command + middle - slack)
-    surface.high = min(surface.reach_high, surface.command + middle + slack)
-    surface.wrong = abs(middle) > slack
-    frames.note_stops(surface, 2.0 * slack)
-    return surface.low <= surface.high
-
-
-@kernel
 def solve_roll_and_yaw(types, layout, estimators, innovation, frame_bound):
     """Where ailerons and rudder were in the elapsed frame: nu = G (p - u) + eta solved for p; nu: innovation
     (3,), |eta| <= frame_bound (3,) rad/s2."""
@@ -59,9 +49,9 @@ def solve_roll_and_yaw(types, layout, estimators, innovation, frame_bound):
     determinant = a_p * r_r - a_r * r_p
     size = abs(determinant)
     off, slack = (p * r_r - r * r_p) / determinant, (slack_p * abs(r_r) + slack_r * abs(r_p)) / size
-    fits = place(types.surface[a], off, slack)
+    fits = observation.place(types.surface[a], off, slack)
     off, slack = (r * a_p - p * a_r) / determinant, (slack_r * abs(a_p) + slack_p * abs(a_r)) / size
-    if not (place(types.surface[b], off, slack) and fits):
+    if not (observation.place(types.surface[b], off, slack) and fits):
         types.pair.no_lateral_pair = 1
 
 
@@ -74,7 +64,7 @@ def whereabouts(config, surface, k):
         if left(surface, kind):
             low, high = deflection(config, surface, kind, k)
             least, greatest = min(least, low), max(greatest, high)
-    low, high = surface.reach_low, surface.reach_high
+    low, high = surface.actuator.reach_low, surface.actuator.reach_high
     return min(max(least, low), high), min(max(greatest, low), high)
 
 
@@ -82,12 +72,12 @@ def whereabouts(config, surface, k):
 def solve_pitch(types, layout, estimators, innovation, frame_bound):
     """Whether pitch shows a fault; once a second one has begun beside one that was named, where it was."""
     first = types.pair.first
-    if first != NO_SURFACE and not types.surface[first].in_question:
+    if first != NO_SURFACE and not types.surface[first].status.is_candidate:
         solve_beside_the_first(types, layout, estimators, innovation, frame_bound)
         return
     for s, surface in enumerate(types.surface):
         if layout.group[s] == IN_PITCH:
-            surface.wrong = abs(innovation[PITCH]) > frame_bound[PITCH]
+            observation.note_wrong(surface, abs(innovation[PITCH]) > frame_bound[PITCH])
 
 
 @kernel
@@ -98,14 +88,14 @@ def solve_beside_the_first(types, layout, estimators, innovation, frame_bound):
     known = estimators[layout.position_of[first]].effect
     other = estimators[layout.position_of[second]].effect
     surface = types.surface[first]
-    surface.low, surface.high = whereabouts(types.config, surface, types.frame)
-    surface.wrong = 0
+    low, high = whereabouts(types.config, surface, types.frame)
+    observation.place_known(surface, low, high)
     Z, Z_known = other.Z[PITCH], known.Z[PITCH]
-    share = Z_known * (0.5 * (surface.low + surface.high) - surface.command)
-    slack = abs(Z_known) * 0.5 * (surface.high - surface.low)
+    share = Z_known * observation.middle_error(surface)
+    slack = abs(Z_known) * 0.5 * (high - low)
     slack += frame_bound[PITCH] + known.spread[PITCH] + other.spread[PITCH]
-    if not place(types.surface[second], (innovation[PITCH] - share) / Z, slack / abs(Z)):
-        types.surface[second].standing = verdict.RULED_OUT
+    if not observation.place(types.surface[second], (innovation[PITCH] - share) / Z, slack / abs(Z)):
+        types.surface[second].status.source = verdict.RULED_OUT
 
 
 @kernel
@@ -122,11 +112,12 @@ def examine(types, layout, estimators, bank, frame_bound):
 def name(surface, named, kind, t):
     """Name a surface and the type of its fault (-1 if open), or take the name back; t s."""
     kind = kind if named else -1
-    if named and not surface.named:
-        surface.named_at_s = t
-    if kind != surface.type:
-        surface.type_at_s = t
-    surface.named, surface.type = named, kind
+    status = surface.status
+    if named and not status.named:
+        status.named_at_s = t
+    if kind != status.type:
+        status.type_at_s = t
+    status.named, status.type = named, kind
 
 
 @kernel
@@ -154,13 +145,13 @@ def note_first(types, s):
     pair, surface, changed = types.pair, types.surface[s], False
     known = surface.known
     for kind in range(N_CONSTANT):
-        changed = changed or surface.type_excluded[kind] != known.excluded[kind]
+        changed = changed or surface.feasible.excluded[kind] != known.excluded[kind]
     pair.unsettled = pair.unsettled + 1 if changed else 0
     if pair.first != s or pair.unsettled >= types.config.patience:
         pair.first, pair.unsettled = s, 0
-        known.low[:], known.high[:] = surface.set_low, surface.set_high
+        known.low[:], known.high[:] = surface.feasible.low, surface.feasible.high
         known.excluded[:] = 1
-        known.excluded[:N_CONSTANT] = surface.type_excluded[:N_CONSTANT]
+        known.excluded[:N_CONSTANT] = surface.feasible.excluded[:N_CONSTANT]
 
 
 @kernel
@@ -170,8 +161,8 @@ def begin_second(types, layout):
     sets.recall(first)
     frames.begin(second)
     for surface in (first, second):
-        surface.in_question, surface.standing = 0, verdict.BY_DEDUCTION
-        surface.wrong = surface.wrong_then = surface.wrong_before = 0
+        surface.status.is_candidate, surface.status.source = 0, verdict.BY_DEDUCTION
+        observation.forget_wrong(surface)
 
 
 @kernel
@@ -179,7 +170,8 @@ def patient(config, surface):
     """Whether a slow oscillation, a slow surface or a growing bias would have shown by now."""
     growing = verdict.may_be_mistaken(surface, verdict.one_constant(surface), False)
     open_yet = growing or verdict.may_be_unseen(config, surface)
-    return surface.evidence >= config.patience and verdict.would_have_shown(config, surface) and not open_yet
+    long = surface.evidence.frames >= config.patience
+    return long and verdict.would_have_shown(config, surface) and not open_yet
 
 
 @kernel
@@ -188,9 +180,9 @@ def two_in_pitch(types, layout):
     if types.pair.first == NO_SURFACE or layout.partner[types.pair.first] < 0:
         return False
     surface = types.surface[types.pair.first]
-    if surface.in_question and not (possible(surface) and any_constant(surface)):
+    if surface.status.is_candidate and not (possible(surface) and any_constant(surface)):
         begin_second(types, layout)
-    return not surface.in_question
+    return not surface.status.is_candidate
 
 
 @kernel
@@ -209,8 +201,8 @@ def decide_pitch(types, layout, t):
     if two_in_pitch(types, layout):
         first, s = types.surface[types.pair.first], layout.partner[types.pair.first]
         second = types.surface[s]
-        name(first, 1, first.type, t)
-        shows = second.evidence > 0 and possible(second) and verdict.explained(second)
+        name(first, 1, first.status.type, t)
+        shows = second.evidence.frames > 0 and possible(second) and verdict.explained(second)
         name(second, shows, verdict.type_at_fault(types.config, second), t)
         return
     s = one_in_pitch(types, layout)
@@ -238,7 +230,8 @@ def decide(types, conclusion, layout, t):
     decide_pitch(types, layout, t)
     earliest = NO_SURFACE
     for s, surface in enumerate(types.surface):
-        if surface.named and (earliest < 0 or surface.named_at_s < types.surface[earliest].named_at_s):
+        status, first = surface.status, types.surface[max(earliest, 0)].status
+        if status.named and (earliest < 0 or status.named_at_s < first.named_at_s):
             earliest = s
     isolated, isolated_at_s, kind, type_at_s = summarise(types, conclusion, layout, earliest, outside, t)
     lead, lead_kind = act(types, layout)
@@ -250,9 +243,9 @@ def summarise(types, conclusion, layout, s, outside, t):
     """The finding on surface s, the first named, as that of a single fault: estimator, its instant, type, its
     instant. NO_SURFACE: none is named, and the fault of roll and yaw may be `outside` the class."""
     if s >= 0:
-        surface = types.surface[s]
-        isolated = verdict.estimator_for(layout, s, surface.type)
-        return isolated, surface.named_at_s, surface.type, surface.type_at_s
+        status = types.surface[s].status
+        isolated = verdict.estimator_for(layout, s, status.type)
+        return isolated, status.named_at_s, status.type, status.type_at_s
     isolated = state.UNANTICIPATED if outside else state.NOT_ISOLATED
     isolated_at_s = t if isolated != conclusion.isolated else conclusion.isolated_at_s
     return isolated, isolated_at_s, -1, conclusion.type_at_s
@@ -262,7 +255,7 @@ def summarise(types, conclusion, layout, s, outside, t):
 def named_in_pitch(types, layout):
     """Whether a surface of pitch is named."""
     for s, surface in enumerate(types.surface):
-        if layout.group[s] == IN_PITCH and surface.named:
+        if layout.group[s] == IN_PITCH and surface.status.named:
             return True
     return False
 
@@ -270,7 +263,7 @@ def named_in_pitch(types, layout):
 @kernel
 def acted_upon(types, layout, s):
     """Whether the law acts on surface s: it is named, or the likeliest in pitch."""
-    if types.surface[s].named:
+    if types.surface[s].status.named:
         return True
     if layout.group[s] != IN_PITCH or named_in_pitch(types, layout) or not types.pair.alarmed[IN_PITCH]:
         return False
@@ -284,13 +277,13 @@ def act(types, layout):
     is done about it: a replaced elevator leads before all others."""
     lead, lead_kind = NO_SURFACE, -1
     for s, surface in enumerate(types.surface):
-        surface.measure = -1
+        verdict.set_mode(surface, -1)
         if acted_upon(types, layout, s):
-            at_fault = surface.named == 1 or possible(surface)
-            measure = verdict.mode_for(surface) if at_fault else SHIFTED
-            if verdict.still_there(types.config, surface, measure, at_fault):
-                surface.measure = measure
-                replaced = s == layout.main[PITCH] and measure in (LOSES, FIXED)
+            at_fault = surface.status.named == 1 or possible(surface)
+            mode = verdict.mode_for(surface) if at_fault else SHIFTED
+            if verdict.still_there(types.config, surface, mode, at_fault):
+                verdict.set_mode(surface, mode)
+                replaced = s == layout.main[PITCH] and mode in (LOSES, FIXED)
                 if lead == NO_SURFACE or replaced:
-                    lead, lead_kind = s, measure
+                    lead, lead_kind = s, mode
     return lead, lead_kind

@@ -15,6 +15,7 @@ from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.diagnosis.state import IN_PITCH
 from beaver_ftc.diagnosis.types import sets, table
 from beaver_ftc.diagnosis.types.contract import NOTHING, FaultType, Kernel
+from beaver_ftc.diagnosis.types.observation import OBSERVATION
 from beaver_ftc.scenario.schema import Scenario
 
 BLOCK_S = 0.2  # to be examined at once where gyros are noisy: short beside the slowest half-cycle, 3.1 s
@@ -124,11 +125,33 @@ expected_error = _of_one("expected_error", "surface, kind", np.nan)
 MAX_BLOCK = 256  # frames of a block: examine.py
 HISTORY = 3  # frames, or blocks, of which the orders are kept: the elapsed one and two before it
 
-# What the surface was ordered to do, rad; [0] belongs to the elapsed frame or block, [1] to the one before.
+# Orders to one surface, rad; [0] belongs to the elapsed frame or block, [1] to the one before: examine.py.
 ORDERS = record(
     given=(HISTORY, MAX_BLOCK), low=HISTORY, high=HISTORY,
     least=2, greatest=2,  # where a healthy surface was within it
+    G_least=float, G_most=float,  # its effectiveness within the elapsed frame or block
 )  # fmt: skip
+
+# Configuration: the actuator of one surface, rad. It acts where it can reach: a part of its travel is nearer
+# to zero.
+ACTUATOR = record(
+    travel_low=float, travel_high=float, reach_low=float, reach_high=float, least_runaway_rate=float,
+    approach=float, step=float, slowest_step=float,
+)  # fmt: skip
+
+# The set of each type's parameter: sets.py.
+FEASIBLE = record(low=N_TYPES, high=N_TYPES, excluded=(int, N_TYPES))
+
+# Frames in which something was wrong, and of them those in which a surface that was given up was quiet, and
+# those since a stop could last hide something; the first, and where the surface was in it: examine.py.
+EVIDENCE = record(frames=int, quiet=int, unhidden=int, started_at=int, start_low=float, start_high=float)
+
+# Whether the surface may be the one at fault by itself, and what decides whether it can be (verdict.py);
+# whether it is named, of which type, -1 if open, and since when, s: pairs.py.
+STATUS = record(is_candidate=int, source=int, named=int, named_at_s=float, type=int, type_at_s=float)
+
+# The mode of accommodation, -1 for none; frames since the fault last showed: verdict.py.
+ACCOMMODATED = record(mode=int, absent=int)
 
 # Where a surface that a type has held and let go can be, rad: release.py.
 RELEASE = record(
@@ -156,28 +179,13 @@ FRAME_BLOCK = record(filled=int, innovation=3, bound=3, noise=3)
 
 @lru_cache
 def surface_dtype() -> np.dtype:
-    """One surface's record; positions in rad. `then`: a frame before the elapsed one, `before`: two."""
+    """One surface's records: configuration, observations (observation.py), the memories of the types, and
+    what is concluded. refuted: its estimator is excluded (verdict.py)."""
     own = {row.record: row.memory for row in TYPES if row.memory}
     return record(
-        # its actuator
-        travel_low=float, travel_high=float, least_runaway_rate=float,
-        reach_low=float, reach_high=float,  # where it can act: a part of its travel is nearer to zero
-        approach=float, step=float, slowest_step=float, orders=ORDERS,
-        # where it was if it alone is at fault, and whether something was wrong
-        command=float, low=float, high=float, wrong=int, command_then=float, low_then=float, high_then=float,
-        wrong_then=int, low_before=float, high_before=float, wrong_before=int,
-        # its effectiveness within the frame or block, and a quarter of what that varies by, in means
-        G_least=float, G_most=float, uneven=float, uneven_then=float,
-        # what the types make of it
-        set_low=N_TYPES, set_high=N_TYPES, type_excluded=(int, N_TYPES), start_low=float, start_high=float,
-        started_at=int,
-        hides=(int, 2), hides_then=(int, 2),  # lower and upper stop: examine.note_stops
-        evidence=int, quiet=int, absent=int,  # frames
-        unhidden=int,  # of the evidence, what has come since a stop could last hide something
-        release=RELEASE, **own,
-        # what is concluded; refuted: its estimator is excluded
-        in_question=int, refuted=int, standing=int, measure=int, named=int, named_at_s=float, type=int,
-        type_at_s=float, known=KNOWN,
+        actuator=ACTUATOR, orders=ORDERS, elapsed=OBSERVATION, judged=OBSERVATION, earlier=OBSERVATION,
+        evidence=EVIDENCE, feasible=FEASIBLE, release=RELEASE, **own,
+        refuted=int, status=STATUS, accommodation=ACCOMMODATED, known=KNOWN,
     )  # fmt: skip
 
 
@@ -200,11 +208,11 @@ def configure(
     types["pair"]["first"], types["pair"]["enabled"] = -1, config.pairs
     surfaces, instant_s = scenario.airframe.surfaces, dt / scenario.substeps
     for s, (name, place, low, high) in enumerate(zip(surfaces, types["surface"], *travel, strict=True)):
-        place["travel_low"], place["travel_high"] = low, high
-        place["reach_low"], place["reach_high"] = min(low, 0.0), max(high, 0.0)
-        place["in_question"] = not config.pairs or layout["group"][s] == IN_PITCH
-        place["measure"], place["type"] = -1, -1
-        place["approach"], place["step"] = actuators["approach"][s], actuators["step"][s]
-        rate_deg_s = getattr(scenario.actuators, name).rate_limit_deg_s
-        place["least_runaway_rate"] = 0.5 * (radians(rate_deg_s) or RUNAWAY_RATE_RAD_S)
-        place["slowest_step"] = min(radians(config.slowest_rate_deg_s) * instant_s, place["step"])
+        rate_deg_s, actuator = getattr(scenario.actuators, name).rate_limit_deg_s, place["actuator"]
+        actuator["travel_low"], actuator["travel_high"] = low, high
+        actuator["reach_low"], actuator["reach_high"] = min(low, 0.0), max(high, 0.0)
+        actuator["approach"], actuator["step"] = actuators["approach"][s], actuators["step"][s]
+        actuator["least_runaway_rate"] = 0.5 * (radians(rate_deg_s) or RUNAWAY_RATE_RAD_S)
+        actuator["slowest_step"] = min(radians(config.slowest_rate_deg_s) * instant_s, actuator["step"])
+        place["status"]["is_candidate"] = not config.pairs or layout["group"][s] == IN_PITCH
+        place["accommodation"]["mode"] = place["status"]["type"] = -1

@@ -49,8 +49,8 @@ def any_release(surface, which, kind):
 def start(surface, kind):
     """It may have been let go before the alarm, anywhere."""
     forget(surface, EARLIER, kind)
-    surface.release.low[LATER, kind] = surface.travel_low
-    surface.release.high[LATER, kind] = surface.travel_high
+    surface.release.low[LATER, kind] = surface.actuator.travel_low
+    surface.release.high[LATER, kind] = surface.actuator.travel_high
     not_held(surface, kind)
 
 
@@ -75,10 +75,10 @@ def carried(config, surface, held, side=0):
             total += a
             count += 1
             least, greatest = min(least, a), max(greatest, a)
-            a = nearer(a, order, surface.approach, surface.step)
+            a = nearer(a, order, surface.actuator.approach, surface.actuator.step)
             if side != 0:
                 a = min(a, held) if side < 0 else max(a, held)
-    return total / count, a, surface.uneven_then * (greatest - least)
+    return total / count, a, surface.judged.uneven * (greatest - least)
 
 
 @kernel
@@ -89,7 +89,7 @@ def released_within(config, surface, kind):
         return False
     low, _, low_room = carried(config, surface, held_low, -1)
     high, _, high_room = carried(config, surface, held_high, 1)
-    return low - low_room <= surface.high_then and high + high_room >= surface.low_then
+    return low - low_room <= surface.judged.high and high + high_room >= surface.judged.low
 
 
 @kernel
@@ -116,13 +116,13 @@ def agrees(config, surface, which, kind):
     held = surface.release
     low, _, low_room = carried(config, surface, held.low[which, kind])
     high, _, high_room = carried(config, surface, held.high[which, kind])
-    room, command = max(low_room, high_room), surface.command_then
+    room, command = max(low_room, high_room), surface.judged.command
     if max(abs(low - room - command), abs(high + room - command)) <= NOT_BACK_RAD:
         return False
-    if low - room > surface.high_then or high + room < surface.low_then:
+    if low - room > surface.judged.high or high + room < surface.judged.low:
         return False
-    least = held.low[which, kind] + max(surface.low_then - low - room, 0.0)
-    greatest = held.high[which, kind] - max(high - room - surface.high_then, 0.0)
+    least = held.low[which, kind] + max(surface.judged.low - low - room, 0.0)
+    greatest = held.high[which, kind] - max(high - room - surface.judged.high, 0.0)
     keep(held, which, kind, least, greatest)
     return True
 
@@ -147,7 +147,7 @@ def status(config, surface, kind, least, greatest):
     released it, and the actuator may be bringing it back: RETURNING; or neither explains it: REFUTED."""
     returning = config.returns and possible(config, surface, kind)
     released = surface.release.released
-    if least <= surface.high_then and greatest >= surface.low_then and not released[kind]:
+    if least <= surface.judged.high and greatest >= surface.judged.low and not released[kind]:
         return HELD
     if not returning:
         return REFUTED
@@ -169,8 +169,8 @@ def beginning(config, surface, k):
     With several JSBSim frames in one of ours it may have been let go within it: the frame before is used.
     """
     if config.whole:
-        return surface.low_then, surface.high_then, k
-    return surface.low_before, surface.high_before, k - 1
+        return surface.judged.low, surface.judged.high, k
+    return surface.earlier.low, surface.earlier.high, k - 1
 
 
 @kernel
@@ -188,7 +188,7 @@ def note_release(surface, kind, low, high):
 def propagate(config, surface, kind):
     """Carry what has been let go to the next frame; a surface that looks healthy may be held again."""
     held = surface.release
-    if not surface.wrong_then:
+    if not surface.judged.wrong:
         held.released[kind] = 0
     for which in (EARLIER, LATER):
         if any_release(surface, which, kind):

@@ -12,14 +12,14 @@ from beaver_ftc.compiled import kernel
 @kernel
 def begin(surface):
     """Allow every type with any parameter."""
-    surface.set_low[:], surface.set_high[:] = -np.inf, np.inf
-    surface.type_excluded[:] = 0
+    surface.feasible.low[:], surface.feasible.high[:] = -np.inf, np.inf
+    surface.feasible.excluded[:] = 0
 
 
 @kernel
 def replace(surface, kind, interval):
     """Put an interval in place of the set of a type."""
-    surface.set_low[kind], surface.set_high[kind] = interval
+    surface.feasible.low[kind], surface.feasible.high[kind] = interval
 
 
 @kernel
@@ -27,22 +27,22 @@ def intersect(surface, kind, interval):
     """Keep of the set of a type what is also in an interval; exclude the type when nothing is left."""
     low, high = interval
     if low > high:
-        surface.type_excluded[kind] = 1
+        surface.feasible.excluded[kind] = 1
         return
-    surface.set_low[kind] = max(surface.set_low[kind], low)
-    surface.set_high[kind] = min(surface.set_high[kind], high)
-    if surface.set_low[kind] > surface.set_high[kind]:
-        surface.type_excluded[kind] = 1
+    surface.feasible.low[kind] = max(surface.feasible.low[kind], low)
+    surface.feasible.high[kind] = min(surface.feasible.high[kind], high)
+    if surface.feasible.low[kind] > surface.feasible.high[kind]:
+        surface.feasible.excluded[kind] = 1
 
 
 @kernel
 def exclude(surface, kind):
     """Exclude a type."""
-    surface.type_excluded[kind] = 1
+    surface.feasible.excluded[kind] = 1
 
 
 @kernel
 def recall(surface):
     """Return to the sets that were kept when the surface was named (pairs.py)."""
-    surface.set_low[:], surface.set_high[:] = surface.known.low, surface.known.high
-    surface.type_excluded[:] = surface.known.excluded
+    surface.feasible.low[:], surface.feasible.high[:] = surface.known.low, surface.known.high
+    surface.feasible.excluded[:] = surface.known.excluded

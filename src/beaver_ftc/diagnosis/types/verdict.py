@@ -10,6 +10,7 @@ import numpy as np
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, UNANTICIPATED
 from beaver_ftc.diagnosis.types.contract import FIXED, LAGS, LOSES, SHIFTED, UNSEEN, middle
+from beaver_ftc.diagnosis.types.observation import middle_error
 from beaver_ftc.diagnosis.types.registry import (
     ACCOMMODATION,
     AT_REST,
@@ -48,27 +49,27 @@ def note_refuted(surfaces, layout, estimators):
 @kernel
 def possible(surface):
     """Whether anything on a surface can be the fault."""
-    if surface.standing != BY_ESTIMATOR:
-        return surface.standing == BY_DEDUCTION
+    if surface.status.source != BY_ESTIMATOR:
+        return surface.status.source == BY_DEDUCTION
     return not surface.refuted
 
 
 @kernel
 def left(surface, kind):
     """Whether a type is not excluded."""
-    return not surface.type_excluded[kind]
+    return not surface.feasible.excluded[kind]
 
 
 @kernel
 def any_constant(surface):
     """Whether a type with a constant parameter is left."""
-    return not np.all(surface.type_excluded[:N_CONSTANT])
+    return not np.all(surface.feasible.excluded[:N_CONSTANT])
 
 
 @kernel
 def anything_left(surface):
     """Whether any type is left."""
-    return not np.all(surface.type_excluded)
+    return not np.all(surface.feasible.excluded)
 
 
 @kernel
@@ -84,7 +85,7 @@ def explained(surface):
 def would_have_shown(config, surface):
     """Whether each type that must show itself is excluded, or has had the time to, hidden by no stop."""
     for kind in range(N_TYPES):
-        if left(surface, kind) and surface.unhidden < SHOWS_WITHIN[kind] * config.patience:
+        if left(surface, kind) and surface.evidence.unhidden < SHOWS_WITHIN[kind] * config.patience:
             return False
     return True
 
@@ -118,7 +119,7 @@ def sole_type(surface):
 def may_be_unseen(config, surface):
     """Whether what a constant explains may be a type that does not show in a surface at rest, such as a slow
     surface that has come to where it is commanded: it has not stood off its command for long."""
-    if not any_constant(surface) or surface.evidence - surface.quiet >= config.patience:
+    if not any_constant(surface) or surface.evidence.frames - surface.evidence.quiet >= config.patience:
         return False
     for kind in range(N_TYPES):
         if AT_REST[kind] == UNSEEN and left(surface, kind):
@@ -154,7 +155,7 @@ def sole(surfaces, constant):
     """The one possible surface, with a type of constant parameter left if so asked; NO_SURFACE or SEVERAL."""
     found = NO_SURFACE
     for s, surface in enumerate(surfaces):
-        if surface.in_question and possible(surface) and (any_constant(surface) or not constant):
+        if surface.status.is_candidate and possible(surface) and (any_constant(surface) or not constant):
             found = s if found == NO_SURFACE else SEVERAL
     return found
 
@@ -185,7 +186,7 @@ def others_refuted(types, chosen):
     """
     config, half_cycles = types.config, 1
     for s, surface in enumerate(types.surface):
-        if s != chosen and surface.in_question and possible(surface):
+        if s != chosen and surface.status.is_candidate and possible(surface):
             if config.own_errors and anything_left(surface):
                 return False
             if not would_have_shown(config, surface):
@@ -195,14 +196,14 @@ def others_refuted(types, chosen):
                     if not FOLLOWS_COMMAND[kind]:
                         return False
                     half_cycles = max(half_cycles, HALF_CYCLES[kind])
-    return types.surface[chosen].evidence >= half_cycles * config.patience
+    return types.surface[chosen].evidence.frames >= half_cycles * config.patience
 
 
 @kernel
 def type_at_fault(config, surface):
     """The type of the fault on a surface, taken to be at fault; OPEN while more than one fits or one may yet
     show itself."""
-    if surface.evidence < config.patience or may_be_unseen(config, surface):
+    if surface.evidence.frames < config.patience or may_be_unseen(config, surface):
         return OPEN
     if config.own_errors:
         return sole_type(surface)
@@ -323,34 +324,41 @@ def presumed(types, isolated, layout, estimators):
 
 
 @kernel
-def clear_measures(surfaces):
+def set_mode(surface, mode):
+    """Replace the mode of accommodation of a surface, -1 for none."""
+    surface.accommodation.mode = mode
+
+
+@kernel
+def clear_modes(surfaces):
     """Let the law act upon no surface."""
     for surface in surfaces:
-        surface.measure = -1
+        set_mode(surface, -1)
 
 
 @kernel
 def take_the_lead(types, isolated, layout, estimators):
     """The surface on which the law acts, or NO_SURFACE, and how; isolated: an estimator, if any."""
     s = presumed(types, isolated, layout, estimators)
-    clear_measures(types.surface)
+    clear_modes(types.surface)
     if s < 0:
         return NO_SURFACE, -1
     surface = types.surface[s]
-    measure = mode_for(surface)
-    if still_there(types.config, surface, measure, True):
-        surface.measure = measure
-        return s, measure
-    return NO_SURFACE, measure
+    mode = mode_for(surface)
+    if still_there(types.config, surface, mode, True):
+        set_mode(surface, mode)
+        return s, mode
+    return NO_SURFACE, mode
 
 
 @kernel
-def still_there(config, surface, measure, at_fault):
-    """Whether the fault of a surface shows, or did a moment ago; one that has gone is let go."""
-    deflection = deflection_error(surface, at_fault) + surface.command
-    there = surface.low <= deflection <= surface.high or measure == LOSES
-    surface.absent = 0 if there else surface.absent + 1
-    return surface.absent * config.dt < ABSENT_S - _ROUNDING
+def still_there(config, surface, mode, at_fault):
+    """Whether the fault of a surface shows, or did a moment ago."""
+    seen, accommodation = surface.elapsed, surface.accommodation
+    deflection = deflection_error(surface, at_fault) + seen.command
+    there = seen.low <= deflection <= seen.high or mode == LOSES
+    accommodation.absent = 0 if there else accommodation.absent + 1
+    return accommodation.absent * config.dt < ABSENT_S - _ROUNDING
 
 
 @kernel
@@ -364,7 +372,7 @@ def deflection_error(surface, at_fault):
                 if np.isfinite(error):
                     return error
                 break
-    return 0.5 * (surface.low + surface.high) - surface.command
+    return middle_error(surface)
 
 
 @kernel

@@ -18,6 +18,7 @@ from beaver_ftc.diagnosis.types.contract import (
     set_of,
     within_travel,
 )
+from beaver_ftc.diagnosis.types.observation import middle_error_of
 
 AS_FAST = 1.8  # times the least pace of a runaway, half of the rate limit at which it runs
 
@@ -29,12 +30,12 @@ def offset(surface):
     A surface at its stop may be off by more than it shows; so may one that was there at an instant of it.
     Nothing but a loss takes it beyond.
     """
-    low, high, u, orders = surface.low_then, surface.high_then, surface.command_then, surface.orders
-    if high < surface.travel_low or low > surface.travel_high:
+    low, high, u, orders = surface.judged.low, surface.judged.high, surface.judged.command, surface.orders
+    if high < surface.actuator.travel_low or low > surface.actuator.travel_high:
         return membership.NOTHING
     least, greatest = low - max(u - orders.least[1], 0.0), high + max(orders.greatest[1] - u, 0.0)
-    off_low = low - u if least > surface.travel_low else -np.inf
-    return off_low, high - u if greatest < surface.travel_high else np.inf
+    off_low = low - u if least > surface.actuator.travel_low else -np.inf
+    return off_low, high - u if greatest < surface.actuator.travel_high else np.inf
 
 
 @kernel
@@ -46,22 +47,22 @@ def judge(config, surface, kind, k):
 @kernel
 def error(surface, kind):
     """Off its command, rad, by the middle of its set; unlimited while an end of that is open."""
-    low, high = surface.set_low[kind], surface.set_high[kind]
+    low, high = surface.feasible.low[kind], surface.feasible.high[kind]
     return middle(surface, kind) if high - low < np.inf else np.inf
 
 
 @kernel
 def deflection(config, surface, kind, k):
     """The command and the offset, cut off by the stops."""
-    low = cut_off(surface, surface.set_low[kind], surface.orders.least[0])
-    return low, cut_off(surface, surface.set_high[kind], surface.orders.greatest[0])
+    low = cut_off(surface, surface.feasible.low[kind], surface.orders.least[0])
+    return low, cut_off(surface, surface.feasible.high[kind], surface.orders.greatest[0])
 
 
 @kernel
 def cut_off(surface, off, extreme):
     """Where an offset (rad) takes a surface in the mean; if a stop is met at an instant, at the `extreme`."""
-    orders, mean = surface.orders, surface.command + off
-    met = orders.least[0] + off < surface.travel_low or orders.greatest[0] + off > surface.travel_high
+    orders, actuator, mean = surface.orders, surface.actuator, surface.elapsed.command + off
+    met = orders.least[0] + off < actuator.travel_low or orders.greatest[0] + off > actuator.travel_high
     return within_travel(surface, extreme + off) if met else mean
 
 
@@ -89,7 +90,7 @@ def forget_pace(grown):
 @kernel
 def pace(config, surface):
     """How far one that is slower than a runaway moves from one judged frame to the next, rad at most."""
-    return AS_FAST * surface.least_runaway_rate * config.span_s
+    return AS_FAST * surface.actuator.least_runaway_rate * config.span_s
 
 
 @kernel
@@ -144,8 +145,7 @@ def ran(surface, direction):
 
 def last_offset(fdi: np.void, s: int, kind: int) -> float | None:
     """Offset in the last frame, rad."""
-    surface = fdi["types"]["surface"][s]
-    return float(0.5 * (surface["low"] + surface["high"]) - surface["command"])
+    return middle_error_of(fdi["types"]["surface"][s])
 
 
 CONSTANT = FaultType(

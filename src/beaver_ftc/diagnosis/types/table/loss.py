@@ -10,8 +10,8 @@ from beaver_ftc.diagnosis.types.contract import ANYTHING, LOSES, NOTHING, FaultT
 @kernel
 def effectiveness(surface):
     """The interval of 1 + theta in [0, 1] that agrees with the judged frame; low > high if none."""
-    low, high = surface.low_then, surface.high_then
-    return membership.solve(0.5 * (low + high), 0.5 * (high - low), surface.command_then, 0.0, 1.0)
+    low, high = surface.judged.low, surface.judged.high
+    return membership.solve(0.5 * (low + high), 0.5 * (high - low), surface.judged.command, 0.0, 1.0)
 
 
 @kernel
@@ -29,7 +29,7 @@ def judge(config, surface, kind, k):
 @kernel
 def deflection(config, surface, kind, k):
     """The command times what can be left."""
-    low, high, u = surface.set_low[kind], surface.set_high[kind], surface.command
+    low, high, u = surface.feasible.low[kind], surface.feasible.high[kind], surface.elapsed.command
     return min(low * u, high * u), max(low * u, high * u)
 
 

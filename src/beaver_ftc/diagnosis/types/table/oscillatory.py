@@ -23,7 +23,7 @@ def begin(surface, kind):
 @kernel
 def add_square(config, surface, kind):
     """Sum the squares of the deflection error."""
-    error = 0.5 * (surface.low_then + surface.high_then) - surface.command_then
+    error = 0.5 * (surface.judged.low + surface.judged.high) - surface.judged.command
     surface.oscillatory.square += error**2
 
 
@@ -35,9 +35,9 @@ def judge(config, surface, kind, k):
     keeps its sign.
     """
     swing = surface.oscillatory
-    low, high = surface.low_then - surface.command_then, surface.high_then - surface.command_then
+    low, high = surface.judged.low - surface.judged.command, surface.judged.high - surface.judged.command
     sign = 1 if low > 0.0 else (-1 if high < 0.0 else 0)
-    if sign == 0 or (not config.whole and surface.hides_then[0 if sign > 0 else 1]):
+    if sign == 0 or (not config.whole and surface.judged.hides[0 if sign > 0 else 1]):
         swing.steady_since = k + 1
         return ANYTHING
     if sign != swing.sign:

@@ -19,7 +19,7 @@ def judge(config, surface, kind, k):
 
     Of several JSBSim frames in one of ours the first is the old command's.
     """
-    low, high, run = surface.low_then, surface.high_then, surface.rate_limit
+    low, high, run = surface.judged.low, surface.judged.high, surface.rate_limit
     sign, retreats = side(config, surface), False
     if sign == 0 or sign != run.sign or k != run.at + 1:
         run.low, run.high = low, high
@@ -35,8 +35,8 @@ def judge(config, surface, kind, k):
 def come_nearer(config, surface, run, sign):
     """Take off what the slowest one comes nearer by within the judged frame: a least step an instant, until
     its lag makes the steps smaller. Where it was at an instant bounds where it is a frame later."""
-    least = config.instants * config.length * surface.slowest_step
-    close = surface.slowest_step / surface.approach
+    least = config.instants * config.length * surface.actuator.slowest_step
+    close = surface.actuator.slowest_step / surface.actuator.approach
     lowest, highest = ordered(config, surface)
     if sign > 0:
         run.high = min(run.high, max(run.high - least, highest + close))
@@ -56,7 +56,7 @@ def ordered(config, surface):
 def side(config, surface):
     """1 for a surface certainly above all it was ordered to, -1 below, 0 otherwise."""
     lowest, highest = ordered(config, surface)
-    return 1 if surface.low_then > highest else (-1 if surface.high_then < lowest else 0)
+    return 1 if surface.judged.low > highest else (-1 if surface.judged.high < lowest else 0)
 
 
 RATE_LIMIT = FaultType(

@@ -27,7 +27,7 @@ from beaver_ftc.diagnosis.types.release import EARLIER, HELD, LATER, REFUTED
 @kernel
 def travel(surface):
     """It may be anywhere in its travel, rad."""
-    return surface.travel_low, surface.travel_high
+    return surface.actuator.travel_low, surface.actuator.travel_high
 
 
 @kernel
@@ -40,9 +40,9 @@ def begin(surface, kind):
 @kernel
 def judge(config, surface, kind, k):
     """It stays where it is."""
-    status = release.status(config, surface, kind, surface.set_low[kind], surface.set_high[kind])
+    status = release.status(config, surface, kind, surface.feasible.low[kind], surface.feasible.high[kind])
     if status == HELD:
-        return surface.low_then, surface.high_then
+        return surface.judged.low, surface.judged.high
     return NOTHING if status == REFUTED else ANYTHING
 
 
@@ -51,7 +51,9 @@ def on_release(config, surface, kind, k):
     """It may be let go where it is jammed."""
     renew(surface, kind)
     low, high, _ = release.beginning(config, surface, k)
-    release.note_release(surface, kind, max(low, surface.set_low[kind]), min(high, surface.set_high[kind]))
+    release.note_release(
+        surface, kind, max(low, surface.feasible.low[kind]), min(high, surface.feasible.high[kind])
+    )
 
 
 @kernel
@@ -60,7 +62,7 @@ def renew(surface, kind):
     jam = surface.stuck
     if not release.any_release(surface, EARLIER, kind):
         jam.kept_low[EARLIER], jam.kept_high[EARLIER] = jam.kept_low[LATER], jam.kept_high[LATER]
-        jam.kept_low[LATER], jam.kept_high[LATER] = surface.set_low[kind], surface.set_high[kind]
+        jam.kept_low[LATER], jam.kept_high[LATER] = surface.feasible.low[kind], surface.feasible.high[kind]
         release.renew(surface, kind)
 
 
@@ -68,17 +70,17 @@ def renew(surface, kind):
 def restored(surface, kind):
     """Where the surface looks healthy the jam may take hold again: its set as it was before the earliest
     release still possible."""
-    if not surface.wrong_then:
+    if not surface.judged.wrong:
         for which in (EARLIER, LATER):
             if release.any_release(surface, which, kind):
                 return surface.stuck.kept_low[which], surface.stuck.kept_high[which]
-    return surface.set_low[kind], surface.set_high[kind]
+    return surface.feasible.low[kind], surface.feasible.high[kind]
 
 
 @kernel
 def deflection(config, surface, kind, k):
     """Where it is jammed."""
-    return surface.set_low[kind], surface.set_high[kind]
+    return surface.feasible.low[kind], surface.feasible.high[kind]
 
 
 @kernel
@@ -106,19 +108,19 @@ def deflection_float(config, surface, kind, k):
 def neutral_of(fdi: np.void, s: int, kind: int) -> float | None:
     """Deflection, rad."""
     surface = fdi["types"]["surface"][s]
-    return float(min(max(0.0, surface["travel_low"]), surface["travel_high"]))
+    return float(min(max(0.0, surface["actuator"]["travel_low"]), surface["actuator"]["travel_high"]))
 
 
 @kernel
 def error(surface, kind):
     """Off its command, rad, by the middle of where it can be jammed."""
-    return middle(surface, kind) - surface.command
+    return middle(surface, kind) - surface.elapsed.command
 
 
 @kernel
 def error_of_float(surface, kind):
     """Off its command, rad: at neutral."""
-    return within_travel(surface, 0.0) - surface.command
+    return within_travel(surface, 0.0) - surface.elapsed.command
 
 
 STUCK = FaultType(

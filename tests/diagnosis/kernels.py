@@ -50,6 +50,36 @@ def put(fdi, **values):
             fill(fdi[WHERE[name]], **{name: value})
 
 
+# Fields of a surface's records by one name each, for cases that say a few of them.
+_ACTUATOR = (
+    "travel_low", "travel_high", "reach_low", "reach_high", "least_runaway_rate", "approach", "step",
+    "slowest_step",
+)  # fmt: skip
+OF_SURFACE = {
+    **{name: ("actuator", name) for name in _ACTUATOR},
+    **{name: ("elapsed", name) for name in ("command", "low", "high", "wrong", "uneven", "hides")},
+    **{f"{name}_then": ("judged", name) for name in ("command", "low", "high", "wrong", "uneven", "hides")},
+    **{f"{name}_before": ("earlier", name) for name in ("low", "high", "wrong")},
+    "evidence": ("evidence", "frames"),
+    **{name: ("evidence", name) for name in ("quiet", "unhidden", "started_at", "start_low", "start_high")},
+    "absent": ("accommodation", "absent"),
+    "in_question": ("status", "is_candidate"), "standing": ("status", "source"),
+    **{name: ("status", name) for name in ("named", "named_at_s", "type", "type_at_s")},
+}  # fmt: skip
+
+
+def put_on(surface, **values):
+    """Fill fields of a surface's records, by their names in OF_SURFACE."""
+    for name, value in values.items():
+        part, field = OF_SURFACE[name]
+        surface[part][field] = value
+
+
+def of(surface, *names):
+    """Fields of a surface's records, by the same names."""
+    return tuple(surface[part][field] for part, field in map(OF_SURFACE.__getitem__, names))
+
+
 def of_stages(fdi, kernel):
     """What the arguments of kernels are called, of the stages of one diagnosis."""
     types, whole = fdi["types"], kernel.__module__.startswith("beaver_ftc.diagnosis.types")

@@ -20,8 +20,9 @@ A frame that eta alone explains gives no information: so a fault may be intermit
 constant while it is there, is never excluded, and so never misnamed. What cannot be told apart stays a
 candidate.
 
-One file a type under table/ (contract.py says what is in it); registry.py reads them; examine.py shows them
-each frame; verdict.py and pairs.py conclude; findings.py says it in words.
+One file a type under table/ (contract.py says what is in it); registry.py reads them into arrays and records.
+Each frame observation.py finds where a surface was, examine.py holds the types against it, sets.py keeps what
+is left of them; verdict.py and pairs.py conclude; findings.py puts the conclusion in words.
 """
 
 from typing import TYPE_CHECKING

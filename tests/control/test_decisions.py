@@ -42,7 +42,7 @@ def new_frame(faults=None, **fields):
     """A frame whose law has these fields; of the diagnosis and the truth, nothing but whole surfaces."""
     frame = record(frame_dtype(4))
     frame["control"], frame["faults"] = new_control(**fields), new_faults(**(faults or {}))
-    frame["fdi"]["types"]["surface"]["measure"] = -1
+    frame["fdi"]["types"]["surface"]["accommodation"]["mode"] = -1
     return frame
 
 
@@ -180,7 +180,7 @@ def test_a_surface_given_up_goes_to_its_trim(which):
     surfaces = control["surfaces"]["output"]
     out["command"], out["saturated"], fdi["config"]["every_type"] = 0.1, 1, 1
     if "jam" in which:
-        fdi["types"]["surface"]["measure"][RUDDER] = FIXED
+        fdi["types"]["surface"]["accommodation"]["mode"][RUDDER] = FIXED
         surfaces["effectiveness"][RUDDER] = 0.0 if which == "jammed" else 0.5
     surfaces["given_up"][RUDDER] = which == "abandoned"
     given_up(frame)
@@ -308,7 +308,10 @@ def test_only_what_may_still_act_is_taken_for_what_the_observer_sees(law, fixed,
     fdi, control = frame["fdi"], frame["control"]
     fdi["verdict"]["detected"], fdi["verdict"]["isolated"] = 1, 0
     fdi["isolation"]["estimator"]["surface"][:4], fdi["isolation"]["estimator"]["theta"][0] = range(4), -0.9
-    fdi["types"]["surface"]["measure"][AILERON], fdi["config"]["every_type"] = FIXED if fixed else -1, fixed
+    fdi["types"]["surface"]["accommodation"]["mode"][AILERON], fdi["config"]["every_type"] = (
+        FIXED if fixed else -1,
+        fixed,
+    )
     found = control["rejecting"]["memory"]["sums"]
     found["named"], found["frames"], found["square"], found["product"] = 1, 1.0, 2.0, -1.0
     frame["belief"]["design"], frame["measured"]["y"][:4] = design_record()[0], (0.2, 0.0, 45.0, 1000.0)

@@ -114,10 +114,10 @@ def test_what_is_done_about_each_kind_of_fault(measure):
     fdi = frame["fdi"]
     surface = fdi["types"]["surface"][RUDDER]
     kind = {LOSES: CONSTANT_LOSS, FIXED: STUCK, SHIFTED: BIAS, LAGS: BIAS}[measure]
-    fdi["types"]["surface"]["measure"], surface["measure"] = -1, measure
-    surface["type_excluded"] = [other != kind for other in range(N_TYPES)]
-    surface["set_low"][kind], surface["set_high"][kind] = 0.1, 0.2
-    surface["command"], surface["low"], surface["high"] = 0.05, 0.3, 0.34
+    fdi["types"]["surface"]["accommodation"]["mode"], surface["accommodation"]["mode"] = -1, measure
+    surface["feasible"]["excluded"] = [other != kind for other in range(N_TYPES)]
+    surface["feasible"]["low"][kind], surface["feasible"]["high"][kind] = 0.1, 0.2
+    surface["elapsed"]["command"], surface["elapsed"]["low"], surface["elapsed"]["high"] = 0.05, 0.3, 0.34
     loss = fdi["layout"]["loss_of"][RUDDER]
     fdi["isolation"]["estimator"][int(loss)]["theta"] = -0.3
     surfaces = accommodated(frame)
@@ -145,8 +145,8 @@ def test_when_it_has_long_been_open_whether_elevator_or_flap(
     frame = new_frame(name)
     fdi = frame["fdi"]
     types, fdi["config"]["every_type"] = fdi["types"], every_type
-    types["config"]["patience"], types["surface"]["evidence"] = 4, 0
-    types["surface"]["evidence"][ELEVATOR] = evidence
+    types["config"]["patience"], types["surface"]["evidence"]["frames"] = 4, 0
+    types["surface"]["evidence"]["frames"][ELEVATOR] = evidence
     fdi["verdict"]["detected"], fdi["verdict"]["isolated"] = detected, isolated
     frame["control"]["probe"]["config"]["frames"], frame["control"]["probe"]["memory"]["from_s"] = 8, -1.0
     commanded(frame)

@@ -69,7 +69,7 @@ def test_the_true_type_is_neither_excluded_nor_named_wrongly(noisy, seed, kind, 
     plant = fly(seed, noisy, kind, surface, at, share, 700)
     code = TYPES[kind][1]
     assert not plant.position_excluded(surface)
-    assert not plant.fdi["types"]["surface"][surface]["type_excluded"][code]
+    assert not plant.fdi["types"]["surface"][surface]["feasible"]["excluded"][code]
     said = found(plant.fdi, SURFACES)
     assert said["isolated"] in (SURFACES[surface], None)
     assert said["isolation_type"] in (types.NAMES[code], None)
@@ -80,8 +80,12 @@ def test_an_estimate_is_certain_to_lie_in_its_interval(noisy):
     """An aileron stuck a quarter up its travel."""
     plant = fly(4, noisy, "stuck", 0, 30, 0.25, 900)
     known = plant.fdi["types"]["surface"][0]
-    assert known["set_low"][fault_kinds.STUCK] <= -0.26 <= known["set_high"][fault_kinds.STUCK]
-    assert known["set_high"][fault_kinds.STUCK] - known["set_low"][fault_kinds.STUCK] < np.deg2rad(4)
+    assert (
+        known["feasible"]["low"][fault_kinds.STUCK] <= -0.26 <= known["feasible"]["high"][fault_kinds.STUCK]
+    )
+    assert known["feasible"]["high"][fault_kinds.STUCK] - known["feasible"]["low"][
+        fault_kinds.STUCK
+    ] < np.deg2rad(4)
     assert found(plant.fdi, SURFACES)["isolated"] == "aileron"
 
 
@@ -93,7 +97,7 @@ def test_blocks_see_what_frames_do_not():
         plant.fdi["isolation"]["estimator"][plant.fdi["layout"]["position_of"][2]],
     )
     of_a_frame = 2 * plant.fdi["bound"]["frame"][2] / abs(estimator["effect"]["Z"][2])
-    assert known["high"] - known["low"] < 0.5 * of_a_frame
+    assert known["elapsed"]["high"] - known["elapsed"]["low"] < 0.5 * of_a_frame
 
 
 def test_pairs_are_refused_with_noisy_gyros_in_one_line():
@@ -117,4 +121,4 @@ def test_a_release_anywhere_inside_a_block_excludes_neither_surface_nor_type(
     fault.plant = plant
     plant.fly(at + lasting + 100, None)
     assert not plant.position_excluded(surface)
-    assert not plant.fdi["types"]["surface"][surface]["type_excluded"][fault.code]
+    assert not plant.fdi["types"]["surface"][surface]["feasible"]["excluded"][fault.code]

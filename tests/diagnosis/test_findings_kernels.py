@@ -26,11 +26,11 @@ def new(left=None, detected=1, pairs=0, verdict=NOT_ISOLATED, **fields):
     fdi["layout"]["position_of"], fdi["isolation"]["estimator"]["surface"][4:8] = POSITION_OF, range(4)
     fdi["layout"]["group"] = 1 - IN_PITCH
     fdi["layout"]["group"][[ELEVATOR, FLAP]] = IN_PITCH
-    fdi["types"]["surface"]["refuted"], fdi["types"]["surface"]["type_excluded"] = 1, 1
-    fdi["types"]["surface"]["type"], fdi["types"]["surface"]["type_at_s"] = -1, -1.0
+    fdi["types"]["surface"]["refuted"], fdi["types"]["surface"]["feasible"]["excluded"] = 1, 1
+    fdi["types"]["surface"]["status"]["type"], fdi["types"]["surface"]["status"]["type_at_s"] = -1, -1.0
     for s, kinds in (left or {}).items():
         fdi["types"]["surface"]["refuted"][s] = 0
-        fdi["types"]["surface"]["type_excluded"][s][list(kinds)] = 0
+        fdi["types"]["surface"]["feasible"]["excluded"][s][list(kinds)] = 0
     put(fdi, **fields)
     return fdi
 
@@ -67,7 +67,10 @@ def test_a_surface_of_which_no_type_fits_is_named_bare_and_the_fault_may_be_unan
 )  # fmt: skip
 def test_a_surface_is_possible_until_it_is_excluded_or_ruled_out(named, standing, excluded, possible):
     fdi = new({RUDDER: [STUCK]})
-    fdi["types"]["surface"]["named"][RUDDER], fdi["types"]["surface"]["standing"][RUDDER] = named, standing
+    (
+        fdi["types"]["surface"]["status"]["named"][RUDDER],
+        fdi["types"]["surface"]["status"]["source"][RUDDER],
+    ) = named, standing
     fdi["types"]["surface"]["refuted"][RUDDER] = excluded
     assert (f"rudder:{NAMES[STUCK]}" in findings.found(fdi, SURFACES)["candidates"]) == possible
 
@@ -87,7 +90,10 @@ def test_what_any_course_explains_counts_only_until_a_constant_has_been_seen_for
     """But where a surface stands still, a slow one may stand until it is excluded."""
     constants = set() if constant is None else {constant}
     fdi = new({RUDDER: {VARYING_LOSS, SLOW} | constants}, patience=40)
-    fdi["types"]["surface"]["evidence"][RUDDER], fdi["types"]["surface"]["quiet"][RUDDER] = evidence, 10
+    (
+        fdi["types"]["surface"]["evidence"]["frames"][RUDDER],
+        fdi["types"]["surface"]["evidence"]["quiet"][RUDDER],
+    ) = evidence, 10
     fdi["types"]["config"]["own_errors"] = own_errors
     types = findings._types_left(fdi, RUDDER)
     assert set(types) == set(said(*constants, *kept))
@@ -122,7 +128,10 @@ def test_a_fault_outside_the_class_is_unanticipated():
 def several(named=(), alarmed=(0, 0), left=None):
     fdi = new(left, pairs=1)
     for s, at_s in named:
-        fdi["types"]["surface"]["named"][s], fdi["types"]["surface"]["named_at_s"][s] = 1, at_s
+        fdi["types"]["surface"]["status"]["named"][s], fdi["types"]["surface"]["status"]["named_at_s"][s] = (
+            1,
+            at_s,
+        )
     fdi["types"]["pair"]["alarmed"] = alarmed
     return findings.found(fdi, SURFACES)
 
@@ -139,8 +148,8 @@ def test_each_of_several_faults_has_instants_of_its_own():
     fdi = new(pairs=1)
     surface = fdi["types"]["surface"]
     for s, kind, named_at_s, type_at_s in ((RUDDER, STUCK, 9.0, 11.5), (ELEVATOR, -1, 7.0, -1.0)):
-        surface["named"][s], surface["named_at_s"][s] = 1, named_at_s
-        surface["type"][s], surface["type_at_s"][s] = kind, type_at_s
+        surface["status"]["named"][s], surface["status"]["named_at_s"][s] = 1, named_at_s
+        surface["status"]["type"][s], surface["status"]["type_at_s"][s] = kind, type_at_s
     apart(instants=[9.0, 11.5, 7.0])
     elevator, rudder = findings.found(fdi, SURFACES)["faults"]
     keys = "isolated", "isolation_time_s", "isolation_type", "type_time_s"
@@ -184,9 +193,9 @@ def test_a_parameter_is_said_of_its_own_surface_and_type(s):
     sets = fdi["types"]["surface"]
     for surface in range(4):
         fill(sets[surface], seed=surface + 1)
-    apart(low=sets["set_low"], high=sets["set_high"])
+    apart(low=sets["feasible"]["low"], high=sets["feasible"]["high"])
     for kind, off in ((STUCK, 0.0), (BIAS, 0.0), (CONSTANT_LOSS, 1.0)):
-        low, high = sets["set_low"][s, kind] - off, sets["set_high"][s, kind] - off
+        low, high = sets["feasible"]["low"][s, kind] - off, sets["feasible"]["high"][s, kind] - off
         assert TYPES[kind].interval(fdi, s, kind) == pytest.approx((low, high))
-    middle = 0.5 * (sets["set_low"][s, STUCK] + sets["set_high"][s, STUCK])
+    middle = 0.5 * (sets["feasible"]["low"][s, STUCK] + sets["feasible"]["high"][s, STUCK])
     assert TYPES[STUCK].estimate(fdi, s, STUCK) == pytest.approx(middle)

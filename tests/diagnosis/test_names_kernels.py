@@ -65,7 +65,7 @@ def test_every_spell_of_a_name_is_kept_and_of_too_many_the_latest(frames):
 def test_which_surfaces_are_named(every_type, pair, alarmed, beside, named):
     """The one isolated, those of a pair, and none where an instrument has been found instead."""
     fdi = nameless()
-    fdi["verdict"]["isolated"], fdi["types"]["surface"]["named"][[AILERON, RUDDER]] = ELEVATOR, 1
+    fdi["verdict"]["isolated"], fdi["types"]["surface"]["status"]["named"][[AILERON, RUDDER]] = ELEVATOR, 1
     fdi["config"]["every_type"], fdi["types"]["pair"]["enabled"] = every_type, pair
     fdi["watch"]["enabled"], fdi["watch"]["alarmed"], fdi["watch"]["beside"] = 1, alarmed, beside
     note_names(fdi, 2.5)

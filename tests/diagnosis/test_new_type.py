@@ -32,13 +32,14 @@ from beaver_ftc.diagnosis.types.contract import ANYTHING, NOTHING, FaultType
 @kernel
 def judge(config, surface, kind, k):
     """Whether the mirrored command explains this frame."""
-    return ANYTHING if surface.low_then <= -surface.command_then <= surface.high_then else NOTHING
+    seen = surface.judged
+    return ANYTHING if seen.low <= -seen.command <= seen.high else NOTHING
 
 
 @kernel
 def deflection(config, surface, kind, k):
     """The mirrored command."""
-    return -surface.command, -surface.command
+    return -surface.elapsed.command, -surface.elapsed.command
 
 
 def estimate(fdi, s, kind):
@@ -99,9 +100,9 @@ def begin(surface, kind):
 @kernel
 def judge(config, surface, kind, k):
     """A factor explains this frame that is no smaller than one that was needed before."""
-    low, high, worn = surface.low_then, surface.high_then, surface.overdrive
+    low, high, worn = surface.judged.low, surface.judged.high, surface.overdrive
     middle, slack = 0.5 * (low + high), 0.5 * (high - low)
-    low, high = membership.solve(middle, slack, surface.command_then, worn.least, MOST)
+    low, high = membership.solve(middle, slack, surface.judged.command, worn.least, MOST)
     if low > high:
         return NOTHING
     worn.least = max(worn.least, low)
@@ -182,8 +183,9 @@ def flown(name, sign):
     plant, excluded, judged = DesignPlant(4, 50.0, surface=0, position=worn(sign), fault_class="all"), 0, 0
     for _ in range(130):
         plant.fly(1, UNCERTAINTIES[name])
-        excluded += plant.fdi["types"]["surface"]["type_excluded"][0][KIND] or plant.position_excluded(0)
-        judged = int(plant.fdi["types"]["surface"]["evidence"][0])
+        surface = plant.fdi["types"]["surface"][0]
+        excluded += surface["feasible"]["excluded"][KIND] or plant.position_excluded(0)
+        judged = int(surface["evidence"]["frames"])
     return int(excluded), judged
 
 print(json.dumps(dict(worn=[flown(name, 1.0) for name in UNCERTAINTIES], heals=flown("random", -1.0))))

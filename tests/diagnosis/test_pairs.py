@@ -55,7 +55,7 @@ def test_ailerons_and_rudder(seed, uncertainty, kind, other, at, later, share, o
     plant = fly(seed, uncertainty, faults)
     check(plant, faults)
     for surface, one, _, _ in faults:
-        assert not plant.fdi["types"]["surface"][surface]["type_excluded"][TYPES[one][1]]
+        assert not plant.fdi["types"]["surface"][surface]["feasible"]["excluded"][TYPES[one][1]]
     assert not plant.fdi["types"]["pair"]["no_lateral_pair"]
 
 
@@ -104,7 +104,7 @@ def test_ailerons_and_rudder_were_where_two_equations_put_them(off_a, off_r, siz
     for column, s in enumerate((AILERON, RUDDER)):
         effect = fdi["isolation"]["estimator"][fdi["layout"]["position_of"][s]]["effect"]
         effect["Z"][[0, 2]], effect["spread"][[0, 2]] = Z[:, column], spread[:, column]
-        fdi["types"]["surface"][s]["command"] = 0.02
+        fdi["types"]["surface"][s]["elapsed"]["command"] = 0.02
     fdi["bound"]["frame"][[0, 2]] = frame
     fdi["bank"]["output"]["innovation"][[0, 2]] = Z @ [off_a, off_r]
     solve_roll_and_yaw(
@@ -119,9 +119,13 @@ def test_ailerons_and_rudder_were_where_two_equations_put_them(off_a, off_r, siz
     corners = np.array([np.linalg.solve(Z, Z @ [off_a, off_r] + e * sign) for sign in signs])
     for column, s in enumerate((AILERON, RUDDER)):
         surface, ends = fdi["types"]["surface"][s], corners[:, column]
-        assert surface["low"] == pytest.approx(max(surface["travel_low"], 0.02 + ends.min()), abs=1e-9)
-        assert surface["high"] == pytest.approx(min(surface["travel_high"], 0.02 + ends.max()), abs=1e-9)
-        assert surface["wrong"] == (ends.min() > 0 or ends.max() < 0)
+        assert surface["elapsed"]["low"] == pytest.approx(
+            max(surface["actuator"]["travel_low"], 0.02 + ends.min()), abs=1e-9
+        )
+        assert surface["elapsed"]["high"] == pytest.approx(
+            min(surface["actuator"]["travel_high"], 0.02 + ends.max()), abs=1e-9
+        )
+        assert surface["elapsed"]["wrong"] == (ends.min() > 0 or ends.max() < 0)
 
 
 @pytest.mark.parametrize("thresholds", ["published", "interval"])

@@ -57,7 +57,7 @@ def test_a_return_excludes_neither_surface_nor_type(kind, case, surface, at, las
     fault = Repaired(kind, surface, at, at + lasting, share, 1 / case["rate_hz"])
     plant = fly(case, surface, fault, uncertainty)
     assert not plant.position_excluded(surface)
-    assert not plant.fdi["types"]["surface"][surface]["type_excluded"][fault.code]
+    assert not plant.fdi["types"]["surface"][surface]["feasible"]["excluded"][fault.code]
 
 
 @settings(max_examples=samples(60), deadline=None)
@@ -68,12 +68,12 @@ def test_a_return_does_not_move_the_jam(case, surface, at, lasting, share, uncer
     plant = fly(case, surface, fault, uncertainty, frames=at + lasting + int(3 * case["rate_hz"]))
     low, high = TRAVEL_RAD[:, surface]
     known = plant.fdi["types"]["surface"][surface]
-    healthy = not (known["wrong"] or known["wrong_then"])
+    healthy = not (known["elapsed"]["wrong"] or known["judged"]["wrong"])
     if healthy:
         assert (
-            known["set_low"][fault_kinds.STUCK]
+            known["feasible"]["low"][fault_kinds.STUCK]
             <= low + share * (high - low)
-            <= known["set_high"][fault_kinds.STUCK]
+            <= known["feasible"]["high"][fault_kinds.STUCK]
         )
 
 
@@ -85,7 +85,7 @@ def test_a_surface_that_comes_back_otherwise_than_its_actuator_could_was_not_hel
     for back, excluded in ((None, False), (crawling, True)):
         fault = Repaired(kind, 1, 30, 80, 0.1, 0.01, back)
         plant = fly(case, 1, fault, UNCERTAINTIES["random"], frames=300)
-        assert bool(plant.fdi["types"]["surface"][1]["type_excluded"][fault.code]) == excluded
+        assert bool(plant.fdi["types"]["surface"][1]["feasible"]["excluded"][fault.code]) == excluded
 
 
 def test_a_servo_does_not_keep_a_bias_from_being_told_from_a_jam():
@@ -98,7 +98,7 @@ def test_a_servo_does_not_keep_a_bias_from_being_told_from_a_jam():
         actuators="servo",
         **case,
     ).fly(100, UNCERTAINTIES["random"])
-    excluded = plant.fdi["types"]["surface"][0]["type_excluded"]
+    excluded = plant.fdi["types"]["surface"][0]["feasible"]["excluded"]
     assert excluded[fault_kinds.STUCK]
     assert excluded[fault_kinds.FLOAT]
     assert not excluded[fault_kinds.BIAS]
@@ -112,7 +112,7 @@ def test_later_releases_become_the_earlier_ones_when_of_those_none_is_left(earli
     held["low"][:, kind] = 0.1 if earlier else np.inf, 0.2
     held["high"][:, kind] = 0.15 if earlier else -np.inf, 0.3
     jam["kept_low"], jam["kept_high"] = (0.01, 0.02), (0.05, 0.06)
-    surface["set_low"][kind], surface["set_high"][kind] = -0.4, 0.4
+    surface["feasible"]["low"][kind], surface["feasible"]["high"][kind] = -0.4, 0.4
     stuck.renew(surface, kind)
     low, high = list(held["low"][:, kind]), list(held["high"][:, kind])
     if earlier:
@@ -147,6 +147,6 @@ def test_health_after_a_swing_that_looked_like_a_jam_is_no_quiet_of_a_jam(surfac
     plant.wanted = lambda k: c - swing(k)
     plant.fly(1000, UNCERTAINTIES["random"])
     known = plant.fdi["types"]["surface"][surface]
-    assert not known["type_excluded"][fault_kinds.STUCK]
-    assert bool(known["type_excluded"][fault_kinds.OSCILLATORY]) == excluded
+    assert not known["feasible"]["excluded"][fault_kinds.STUCK]
+    assert bool(known["feasible"]["excluded"][fault_kinds.OSCILLATORY]) == excluded
     assert excluded or plant.fdi["verdict"]["type"] != fault_kinds.STUCK

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from kernels import new_fdi, on, put
+from kernels import new_fdi, on, put, put_on
 
-from beaver_ftc.diagnosis.types import contract, examine, release, sets
+from beaver_ftc.diagnosis.types import contract, examine, observation, release, sets
 from beaver_ftc.diagnosis.types.registry import N_TYPES, TYPES
 from beaver_ftc.diagnosis.types.table import bias, hardover, loss, oscillatory, rate_limit, stuck
 from fault_kinds import (
@@ -32,14 +32,18 @@ def new_surface(left=ALL, low=-0.01, high=0.01, command=0.0, **fields):
     put(fdi, whole=1, patience=20, instants=1)
     fdi["types"]["config"]["length"], fdi["types"]["config"]["span_s"], fdi["types"]["frame"] = 1, DT, 10
     surface = fdi["types"]["surface"][0]
-    surface["travel_low"], surface["travel_high"], surface["approach"], surface["step"] = LOW, HIGH, 0.5, 0.1
-    surface["reach_low"], surface["reach_high"] = min(LOW, 0.0), max(HIGH, 0.0)
+    (
+        surface["actuator"]["travel_low"],
+        surface["actuator"]["travel_high"],
+        surface["actuator"]["approach"],
+        surface["actuator"]["step"],
+    ) = LOW, HIGH, 0.5, 0.1
+    surface["actuator"]["reach_low"], surface["actuator"]["reach_high"] = min(LOW, 0.0), max(HIGH, 0.0)
     examine.begin(surface)
-    surface["set_low"][BIAS], surface["set_high"][BIAS] = -np.inf, np.inf
-    surface["low_then"], surface["high_then"], surface["command_then"] = low, high, command
-    surface["type_excluded"] = [kind not in left for kind in range(N_TYPES)]
-    for name, value in fields.items():
-        surface[name] = value
+    surface["feasible"]["low"][BIAS], surface["feasible"]["high"][BIAS] = -np.inf, np.inf
+    surface["judged"]["low"], surface["judged"]["high"], surface["judged"]["command"] = low, high, command
+    surface["feasible"]["excluded"] = [kind not in left for kind in range(N_TYPES)]
+    put_on(surface, **fields)
     return fdi, surface
 
 
@@ -55,15 +59,22 @@ def restored(surface):
 
 def test_what_is_known_of_a_surface_as_it_begins():
     _, surface = new_surface(left=())
-    surface["evidence"], surface["quiet"], surface["started_at"] = 3, 4, 5
-    surface["low"], surface["high"] = 0.1, 0.2
+    surface["evidence"]["frames"], surface["evidence"]["quiet"], surface["evidence"]["started_at"] = 3, 4, 5
+    surface["elapsed"]["low"], surface["elapsed"]["high"] = 0.1, 0.2
     examine.begin(surface)
-    assert not surface["type_excluded"].any()
-    assert (surface["evidence"], surface["quiet"], surface["started_at"]) == (0, 0, -1)
-    assert (surface["low"], surface["high"]) == (LOW, HIGH)
-    assert (surface["set_low"][STUCK], surface["set_high"][STUCK]) == (LOW, HIGH)
-    assert (surface["set_low"][CONSTANT_LOSS], surface["set_high"][CONSTANT_LOSS]) == (0.0, 1.0)
-    assert (surface["set_low"][BIAS], surface["set_high"][BIAS]) == (-np.inf, np.inf)
+    assert not surface["feasible"]["excluded"].any()
+    assert (
+        surface["evidence"]["frames"],
+        surface["evidence"]["quiet"],
+        surface["evidence"]["started_at"],
+    ) == (0, 0, -1)
+    assert (surface["elapsed"]["low"], surface["elapsed"]["high"]) == (LOW, HIGH)
+    assert (surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK]) == (LOW, HIGH)
+    assert (surface["feasible"]["low"][CONSTANT_LOSS], surface["feasible"]["high"][CONSTANT_LOSS]) == (
+        0.0,
+        1.0,
+    )
+    assert (surface["feasible"]["low"][BIAS], surface["feasible"]["high"][BIAS]) == (-np.inf, np.inf)
     assert surface["rate_limit"]["at"] == -2
     assert surface["oscillatory"]["half_cycles"] == 0
 
@@ -80,14 +91,15 @@ def test_a_constant_loss_keeps_the_shares_that_explain_the_frame(low, high, comm
     judged(loss.judge, fdi, surface, CONSTANT_LOSS, 5)
     judged(loss.judge_varying, fdi, surface, VARYING_LOSS, 5)
     assert (
-        surface["type_excluded"][CONSTANT_LOSS]
-        == surface["type_excluded"][VARYING_LOSS]
+        surface["feasible"]["excluded"][CONSTANT_LOSS]
+        == surface["feasible"]["excluded"][VARYING_LOSS]
         == (expected is None)
     )
     if expected:
-        assert (surface["set_low"][CONSTANT_LOSS], surface["set_high"][CONSTANT_LOSS]) == pytest.approx(
-            expected
-        )
+        assert (
+            surface["feasible"]["low"][CONSTANT_LOSS],
+            surface["feasible"]["high"][CONSTANT_LOSS],
+        ) == pytest.approx(expected)
 
 
 def test_over_a_block_in_which_the_command_swings_any_mean_may_be_a_varying_loss():
@@ -96,28 +108,28 @@ def test_over_a_block_in_which_the_command_swings_any_mean_may_be_a_varying_loss
         fdi["types"]["config"]["length"], surface["orders"]["least"][1] = 5, least
         surface["orders"]["greatest"][1] = greatest
         judged(loss.judge_varying, fdi, surface, VARYING_LOSS, 5)
-        assert surface["type_excluded"][VARYING_LOSS] == excluded
+        assert surface["feasible"]["excluded"][VARYING_LOSS] == excluded
 
 
 def test_sets_shrink_to_what_is_left_and_end_when_nothing_is():
     _, surface = new_surface()
     sets.intersect(surface, STUCK, (-0.1, 0.2))
     sets.intersect(surface, STUCK, (0.0, 0.9))
-    assert (surface["set_low"][STUCK], surface["set_high"][STUCK]) == (0.0, 0.2)
+    assert (surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK]) == (0.0, 0.2)
     assert contract.middle(surface, STUCK) == 0.1
-    assert not surface["type_excluded"][STUCK]
+    assert not surface["feasible"]["excluded"][STUCK]
     sets.intersect(surface, STUCK, (0.2, 0.9))  # one point is not nothing
-    assert not surface["type_excluded"][STUCK]
+    assert not surface["feasible"]["excluded"][STUCK]
     sets.intersect(surface, STUCK, (0.21, 0.9))
-    assert surface["type_excluded"][STUCK]
+    assert surface["feasible"]["excluded"][STUCK]
 
 
 def test_an_offset_is_unlimited_at_a_stop():
     _, surface = new_surface(low=0.1, high=0.15, command=0.3)
     assert bias.offset(surface) == pytest.approx((-0.2, -0.15))
-    surface["high_then"] = HIGH
+    surface["judged"]["high"] = HIGH
     assert bias.offset(surface) == (pytest.approx(-0.2), np.inf)
-    surface["low_then"] = LOW
+    surface["judged"]["low"] = LOW
     assert bias.offset(surface)[0] == -np.inf
 
 
@@ -127,7 +139,7 @@ def test_no_offset_takes_a_surface_beyond_its_stops(low, high):
     fdi, surface = new_surface(low=low, high=high, command=0.2, travel_low=0.1)
     for kind, judge in ((BIAS, bias.judge), (GROWING_BIAS, bias.judge_growing)):
         judged(judge, fdi, surface, kind, 5)
-        assert surface["type_excluded"][kind]
+        assert surface["feasible"]["excluded"][kind]
 
 
 @pytest.mark.parametrize("length", [1, 5])  # frames; one may have several instants
@@ -146,18 +158,20 @@ def test_within_what_is_seen_at_once_a_stop_may_have_been_met_at_its_furthest_or
 def test_a_bias_keeps_the_offsets_that_explain_every_frame():
     fdi, surface = new_surface(low=0.1, high=0.15, command=0.3)
     judged(bias.judge, fdi, surface, BIAS, 5)
-    surface["low_then"], surface["high_then"], surface["command_then"] = 0.23, 0.4, 0.4
+    surface["judged"]["low"], surface["judged"]["high"], surface["judged"]["command"] = 0.23, 0.4, 0.4
     judged(bias.judge, fdi, surface, BIAS, 6)
-    assert (surface["set_low"][BIAS], surface["set_high"][BIAS]) == pytest.approx((-0.17, -0.15))
-    surface["command"] = 0.05
+    assert (surface["feasible"]["low"][BIAS], surface["feasible"]["high"][BIAS]) == pytest.approx(
+        (-0.17, -0.15)
+    )
+    surface["elapsed"]["command"] = 0.05
     assert on(bias.deflection, fdi, surface, BIAS) == pytest.approx((-0.12, -0.1))
-    orders, surface["command"] = surface["orders"], -0.2
+    orders, surface["elapsed"]["command"] = surface["orders"], -0.2
     orders["least"][0], orders["greatest"][0] = -0.24, -0.1  # where it was meanwhile: to -0.41 and to -0.25
     assert on(bias.deflection, fdi, surface, BIAS) == pytest.approx((LOW, -0.35))
     orders["least"][0] = orders["greatest"][0] = 0.0
     assert bias.interval(fdi, 0, BIAS) == pytest.approx((-0.17, -0.15))
     assert contract.middle_of(fdi, 0, BIAS) == pytest.approx(-0.16)
-    surface["set_high"][BIAS] = np.inf
+    surface["feasible"]["high"][BIAS] = np.inf
     assert bias.interval(fdi, 0, BIAS) is None
 
 
@@ -172,9 +186,9 @@ def test_a_growing_bias_keeps_its_sign_and_never_shrinks(offsets, excluded):
     """Each known to within 0.01."""
     fdi, surface = new_surface()
     for offset in offsets:
-        surface["low_then"], surface["high_then"] = offset - 0.01, offset + 0.01
+        surface["judged"]["low"], surface["judged"]["high"] = offset - 0.01, offset + 0.01
         judged(bias.judge_growing, fdi, surface, GROWING_BIAS, 5)
-    assert surface["type_excluded"][GROWING_BIAS] == excluded
+    assert surface["feasible"]["excluded"][GROWING_BIAS] == excluded
 
 
 def test_at_a_stop_a_growing_bias_says_nothing():
@@ -200,7 +214,7 @@ def test_a_growing_bias_is_as_fast_as_a_runaway_only_where_that_is_certain(place
         if place == "well":
             on(bias.skip_growing, fdi, surface, GROWING_BIAS)
         elif place is not None:
-            surface["low_then"], surface["high_then"] = place - 0.01, min(place + 0.01, HIGH)
+            surface["judged"]["low"], surface["judged"]["high"] = place - 0.01, min(place + 0.01, HIGH)
             judged(bias.judge_growing, fdi, surface, GROWING_BIAS, 5)
     assert surface["growing_bias"]["ran"].tolist() == ran
 
@@ -210,7 +224,7 @@ def test_of_several_instants_a_mean_may_be_that_of_the_last():
     fdi["types"]["config"]["whole"] = 0
     for place, ran in ((0.0, 0), (0.19, 0), (0.31, 1)):  # beyond 0.01 + 3 * 0.09 after two frames
         on(bias.widen_growing, fdi, surface, GROWING_BIAS)
-        surface["low_then"], surface["high_then"] = place - 0.01, place + 0.01
+        surface["judged"]["low"], surface["judged"]["high"] = place - 0.01, place + 0.01
         judged(bias.judge_growing, fdi, surface, GROWING_BIAS, 5)
         assert surface["growing_bias"]["ran"][1] == ran
 
@@ -220,9 +234,9 @@ def slow_run(places, orders=(0.0, 0.0), whole=1, frames=None, slowest_step=0.0):
     fdi["types"]["config"]["whole"] = whole
     surface["orders"]["low"], surface["orders"]["high"] = orders[0], orders[1]
     for k, place in enumerate(places):
-        surface["low_then"], surface["high_then"] = place - 0.01, place + 0.01
+        surface["judged"]["low"], surface["judged"]["high"] = place - 0.01, place + 0.01
         judged(rate_limit.judge, fdi, surface, SLOW, (frames or range(99))[k])
-    return surface["type_excluded"][SLOW]
+    return surface["feasible"]["excluded"][SLOW]
 
 
 def test_a_slow_surface_never_moves_away_from_its_command():
@@ -269,7 +283,7 @@ def swung(signs, patience=20):
     fdi["types"]["config"]["patience"] = patience
     for frame, sign in enumerate(signs):
         fdi["types"]["frame"] = frame + 1
-        surface["low_then"], surface["high_then"] = 0.1 * sign - 0.02, 0.1 * sign + 0.02
+        surface["judged"]["low"], surface["judged"]["high"] = 0.1 * sign - 0.02, 0.1 * sign + 0.02
         on(oscillatory.add_square, fdi, surface, OSCILLATORY)
         judged(oscillatory.judge, fdi, surface, OSCILLATORY, frame)
     return fdi, surface
@@ -294,10 +308,10 @@ def test_the_amplitude_is_that_of_the_mean_square():
 
 
 def test_a_sign_that_stays_for_longer_than_the_slowest_half_cycle_is_none():
-    assert not swung([1] * 21)[1]["type_excluded"][OSCILLATORY]
-    assert swung([1] * 22)[1]["type_excluded"][OSCILLATORY]
-    assert swung([-1] * 22)[1]["type_excluded"][OSCILLATORY]
-    assert not swung([1] * 15 + [0] + [1] * 15)[1]["type_excluded"][OSCILLATORY]
+    assert not swung([1] * 21)[1]["feasible"]["excluded"][OSCILLATORY]
+    assert swung([1] * 22)[1]["feasible"]["excluded"][OSCILLATORY]
+    assert swung([-1] * 22)[1]["feasible"]["excluded"][OSCILLATORY]
+    assert not swung([1] * 15 + [0] + [1] * 15)[1]["feasible"]["excluded"][OSCILLATORY]
     fdi, surface = swung([1] * 20)
     on(oscillatory.skip, fdi, surface, OSCILLATORY)
     assert surface["oscillatory"]["steady_since"] == 20
@@ -313,7 +327,7 @@ def test_a_runaway_has_gone_at_least_its_way(length, ways):
         assert on(hardover.downwards, fdi, surface, frame) == pytest.approx(0.2 - way)
     assert on(hardover.upwards, fdi, surface, 99) == HIGH
     assert on(hardover.downwards, fdi, surface, 99) == LOW
-    surface["started_at"] = -1
+    surface["evidence"]["started_at"] = -1
     assert (on(hardover.upwards, fdi, surface, 9), on(hardover.downwards, fdi, surface, 9)) == (LOW, HIGH)
 
 
@@ -327,10 +341,10 @@ def test_a_runaway_has_gone_at_least_its_way(length, ways):
 def test_what_holds_a_surface_is_excluded_where_it_is_not(kind, inside, outside):
     for (low, high), excluded in ((inside, 0), (outside, 1)):
         fdi, surface = new_surface(low=low, high=high, started_at=3, start_low=0.1, start_high=0.2)
-        surface["least_runaway_rate"] = 1.0
-        surface["set_low"][STUCK], surface["set_high"][STUCK] = 0.05, 0.3
+        surface["actuator"]["least_runaway_rate"] = 1.0
+        surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK] = 0.05, 0.3
         judged(TYPES[kind].judge, fdi, surface, kind, 5)
-        assert surface["type_excluded"][kind] == excluded
+        assert surface["feasible"]["excluded"][kind] == excluded
     if kind == STUCK:
         assert TYPES[kind].estimate(fdi, 0, kind) == pytest.approx(0.175)
 
@@ -341,10 +355,10 @@ def test_what_holds_a_surface_is_excluded_where_it_is_not(kind, inside, outside)
 )
 def test_at_a_stop_the_mean_of_a_quick_swing_keeps_its_sign(whole, hides, excluded):
     fdi, surface = new_surface(low=-0.2, high=-0.1, command=0.1)  # below its command all the time
-    fdi["types"]["config"]["whole"], surface["hides_then"] = whole, hides
+    fdi["types"]["config"]["whole"], surface["judged"]["hides"] = whole, hides
     for frame in range(30):
         judged(oscillatory.judge, fdi, surface, OSCILLATORY, frame)
-    assert surface["type_excluded"][OSCILLATORY] == excluded
+    assert surface["feasible"]["excluded"][OSCILLATORY] == excluded
 
 
 @pytest.mark.parametrize(("least", "greatest", "hides"), [
@@ -353,8 +367,8 @@ def test_at_a_stop_the_mean_of_a_quick_swing_keeps_its_sign(whole, hides, exclud
 def test_a_stop_hides_what_is_no_wider_than_the_interval_of_a_deflection(least, greatest, hides):
     _, surface = new_surface()
     surface["orders"]["least"][0], surface["orders"]["greatest"][0] = least, greatest
-    examine.note_stops(surface, 0.0999)
-    assert surface["hides"].tolist() == hides
+    observation.note_stops(surface, 0.0999)
+    assert surface["elapsed"]["hides"].tolist() == hides
 
 
 def test_a_jam_narrows_to_where_it_is_seen():
@@ -368,14 +382,14 @@ def test_where_types_have_a_surface():
     fdi, surface = new_surface(
         started_at=3, start_low=0.1, start_high=0.2, least_runaway_rate=1.0, command=0.2
     )
-    surface["command"], surface["set_low"][CONSTANT_LOSS] = -0.2, 0.25
+    surface["elapsed"]["command"], surface["feasible"]["low"][CONSTANT_LOSS] = -0.2, 0.25
     fdi["types"]["frame"] = 5
     assert on(loss.deflection, fdi, surface, CONSTANT_LOSS) == pytest.approx((-0.2, -0.05))
     assert on(stuck.deflection_float, fdi, surface, FLOAT) == (0.0, 0.0)
-    surface["travel_low"] = 0.1  # the lower stop is as near to neutral as it comes
+    surface["actuator"]["travel_low"] = 0.1  # the lower stop is as near to neutral as it comes
     assert on(stuck.deflection_float, fdi, surface, FLOAT) == (0.1, 0.1)
     assert stuck.neutral_of(fdi, 0, FLOAT) == 0.1
-    surface["travel_low"] = LOW
+    surface["actuator"]["travel_low"] = LOW
     assert on(hardover.deflection_up, fdi, surface, UP) == pytest.approx((0.14, HIGH))
     assert on(hardover.deflection_down, fdi, surface, DOWN) == pytest.approx((LOW, 0.16))
     assert [TYPES[kind].estimate(fdi, 0, kind) for kind in (FLOAT, UP, DOWN)] == [
@@ -417,10 +431,14 @@ def test_what_a_frame_shows_of_a_return_is_weighted_by_the_effectiveness_then(G,
     for _ in range(G.size - 1):
         path.append(path[-1] + np.clip(0.5 * (order - path[-1]), -0.1, 0.1))
     shown = np.sum(G * path) / np.sum(G)
-    surface["uneven_then"] = 0.25 * (G.max() - G.min()) / G.mean()
+    surface["judged"]["uneven"] = 0.25 * (G.max() - G.min()) / G.mean()
     mean, _, room = on(release.carried, fdi, surface, held)
     assert abs(shown - mean) <= room + 1e-15
-    surface["command_then"], surface["low_then"], surface["high_then"] = 9.0, shown - 1e-12, shown + 1e-12
+    surface["judged"]["command"], surface["judged"]["low"], surface["judged"]["high"] = (
+        9.0,
+        shown - 1e-12,
+        shown + 1e-12,
+    )
     assert on(release.possible, fdi, surface, STUCK)
 
 
@@ -445,8 +463,12 @@ def test_a_return_has_the_room_that_an_uneven_effectiveness_gives_it(length, ins
     for beyond, there in ((0.9, True), (1.1, False), (-0.9, True), (-1.1, False)):
         shown = 0.25 + beyond * 0.2 * 0.1
         fdi, surface = released(low=0.2, high=0.2, order=0.9, judged=(shown, shown), instants=instants)
-        fdi["types"]["config"]["length"], surface["approach"], surface["step"] = length, 1.0, 0.05
-        surface["uneven_then"] = 0.2
+        fdi["types"]["config"]["length"], surface["actuator"]["approach"], surface["actuator"]["step"] = (
+            length,
+            1.0,
+            0.05,
+        )
+        surface["judged"]["uneven"] = 0.2
         assert on(release.possible, fdi, surface, STUCK) == there
 
 
@@ -460,11 +482,11 @@ def test_what_is_let_go_joins_the_later_releases_and_is_carried_on():
     held["released"][STUCK] = 1
     release.note_release(surface, STUCK, -0.4, 0.5)
     assert (held["low"][1, STUCK], held["high"][1, STUCK]) == (0.1, 0.3)
-    surface["wrong_then"] = 1
+    surface["judged"]["wrong"] = 1
     on(release.propagate, fdi, surface, STUCK)
     assert (held["low"][1, STUCK], held["high"][1, STUCK]) == pytest.approx((0.05, 0.2))
     assert held["released"][STUCK] == 1
-    surface["wrong_then"] = 0
+    surface["judged"]["wrong"] = 0
     on(release.propagate, fdi, surface, STUCK)
     assert held["released"][STUCK] == 0
 
@@ -475,7 +497,7 @@ def test_a_type_that_no_longer_holds_is_excluded_unless_a_return_explains_it(ret
     fdi["types"]["config"]["returns"] = returns
     elsewhere = release.RETURNING if returns else release.REFUTED
     judged(release.explains, fdi, surface, STUCK, -0.1, 0.1)
-    assert surface["type_excluded"][STUCK] == (not returns)
+    assert surface["feasible"]["excluded"][STUCK] == (not returns)
     assert surface["release"]["released"][STUCK] == returns
     fdi, surface = released(judged=(0.2, 0.3))
     fdi["types"]["config"]["returns"] = returns
@@ -495,8 +517,8 @@ def test_where_a_surface_was_as_the_judged_frame_began():
 @pytest.mark.parametrize("kind", [STUCK, FLOAT, UP, DOWN])
 def test_from_where_each_type_lets_go(kind):
     fdi, surface = released(low=np.inf, high=-np.inf, judged=(-0.1, 0.2), started_at=7, start_low=0.0)
-    surface["least_runaway_rate"], surface["start_high"] = 1.0, 0.1
-    surface["set_low"][STUCK], surface["set_high"][STUCK] = 0.05, 0.3
+    surface["actuator"]["least_runaway_rate"], surface["evidence"]["start_high"] = 1.0, 0.1
+    surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK] = 0.05, 0.3
     for which in (0, 1):
         release.forget(surface, which, kind)
     if kind == STUCK:
@@ -513,7 +535,7 @@ def test_from_where_each_type_lets_go(kind):
 @pytest.mark.parametrize(("kind", "expected"), [(UP, (0.02, HIGH)), (DOWN, (LOW, 0.08))])
 def test_within_a_frame_of_several_instants_a_runaway_may_be_let_go_further_on(kind, expected):
     fdi, surface = released(started_at=7, start_low=0.0, start_high=0.1, least_runaway_rate=1.0)
-    surface["low_before"], surface["high_before"], fdi["types"]["config"]["whole"] = -0.1, 0.2, 0
+    surface["earlier"]["low"], surface["earlier"]["high"], fdi["types"]["config"]["whole"] = -0.1, 0.2, 0
     for which in (0, 1):
         release.forget(surface, which, kind)
     on(TYPES[kind].on_release, fdi, surface, kind)
@@ -524,9 +546,9 @@ def test_within_a_frame_of_several_instants_a_runaway_may_be_let_go_further_on(k
 def test_a_jam_that_may_have_let_go_returns_to_what_was_known_before():
     _, surface = released(low=0.2, high=0.3, wrong_then=0)
     surface["stuck"]["kept_low"], surface["stuck"]["kept_high"] = (0.0, 0.1), (0.2, 0.4)
-    surface["set_low"][STUCK], surface["set_high"][STUCK] = 0.25, 0.26
+    surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK] = 0.25, 0.26
     restored(surface)
-    assert (surface["set_low"][STUCK], surface["set_high"][STUCK]) == (0.1, 0.4)
+    assert (surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK]) == (0.1, 0.4)
     stuck.renew(surface, STUCK)  # no earlier release: the later are the earlier ones now
     held = surface["release"]
     assert (held["low"][0, STUCK], held["high"][0, STUCK]) == (0.2, 0.3)
@@ -536,10 +558,10 @@ def test_a_jam_that_may_have_let_go_returns_to_what_was_known_before():
         [0.4, 0.4],
     )
     restored(surface)
-    assert (surface["set_low"][STUCK], surface["set_high"][STUCK]) == (0.1, 0.4)
-    surface["wrong_then"], surface["set_low"][STUCK] = 1, 0.3
+    assert (surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK]) == (0.1, 0.4)
+    surface["judged"]["wrong"], surface["feasible"]["low"][STUCK] = 1, 0.3
     restored(surface)
-    assert surface["set_low"][STUCK] == 0.3
+    assert surface["feasible"]["low"][STUCK] == 0.3
 
 
 def within_block(orders, held=(0.2, 0.3), judged=(-1.0, 1.0)):
@@ -548,7 +570,7 @@ def within_block(orders, held=(0.2, 0.3), judged=(-1.0, 1.0)):
     fdi["types"]["config"]["length"] = len(orders)
     surface["orders"]["given"][1, : len(orders)] = orders
     surface["release"]["held_low"][STUCK], surface["release"]["held_high"][STUCK] = held
-    surface["uneven_then"] = UNEVEN
+    surface["judged"]["uneven"] = UNEVEN
     return fdi, surface
 
 
@@ -587,7 +609,7 @@ def test_a_release_within_the_block_explains_what_lies_between_with_some_room(en
     assert room > 1e-3
     edge = mean + side * room
     beyond = edge - side * 1e-6 if inside else edge + side * 1e-6
-    surface["low_then"], surface["high_then"] = (-1.0, beyond) if end == "low" else (beyond, 1.0)
+    surface["judged"]["low"], surface["judged"]["high"] = (-1.0, beyond) if end == "low" else (beyond, 1.0)
     assert on(release.released_within, fdi, surface, STUCK) == inside
     assert on(release.possible, fdi, surface, STUCK) == inside
     held = surface["release"]["held_low"][STUCK] <= surface["release"]["held_high"][STUCK]
@@ -624,7 +646,7 @@ def test_where_the_effectiveness_changes_a_return_has_a_share_of_its_way_as_room
     fdi, surface = released(low=0.2, high=0.3, command=-0.2)
     fdi["types"]["config"]["length"], surface["orders"]["given"][1, :4] = 4, ORDERS
     held, start = surface["release"], 0.2 if side == "low" else 0.3
-    surface["uneven_then"], path = UNEVEN, way(start, ORDERS)
+    surface["judged"]["uneven"], path = UNEVEN, way(start, ORDERS)
     mean = path[:-1].mean()
     assert on(release.carried, fdi, surface, start) == pytest.approx(
         (mean, path[-1], UNEVEN * np.ptp(path[:-1]))
@@ -632,7 +654,7 @@ def test_where_the_effectiveness_changes_a_return_has_a_share_of_its_way_as_room
     room = max(UNEVEN * np.ptp(way(other, ORDERS)[:-1]) for other in (0.2, 0.3))
     sign = -1.0 if side == "low" else 1.0
     beyond = mean + sign * (room + (-1e-6 if inside else 1e-6))
-    surface["low_then"], surface["high_then"] = (-1.0, beyond) if side == "low" else (beyond, 1.0)
+    surface["judged"]["low"], surface["judged"]["high"] = (-1.0, beyond) if side == "low" else (beyond, 1.0)
     assert on(release.agrees, fdi, surface, release.LATER, STUCK) == inside
     if inside:  # nearly all that could have been let go is left out; but the ends may not pass
         assert held["low"][1, STUCK] <= held["high"][1, STUCK]
@@ -642,7 +664,7 @@ def test_where_the_effectiveness_changes_a_return_has_a_share_of_its_way_as_room
 
 def test_a_jam_let_go_without_an_earlier_release_is_the_earlier_one_then():
     fdi, surface = released(low=0.1, high=0.3, judged=(0.0, 0.25))
-    surface["set_low"][STUCK], surface["set_high"][STUCK] = 0.15, 0.22
+    surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK] = 0.15, 0.22
     on(stuck.on_release, fdi, surface, STUCK)
     held = surface["release"]
     assert (held["low"][0, STUCK], held["high"][0, STUCK]) == (0.1, 0.3)
@@ -653,12 +675,12 @@ def test_a_jam_let_go_without_an_earlier_release_is_the_earlier_one_then():
 def test_a_jam_that_looks_healthy_is_what_it_was_before():
     _, surface = released(low=0.2, high=0.3, wrong_then=0)
     surface["stuck"]["kept_low"], surface["stuck"]["kept_high"] = (0.0, 0.1), (0.2, 0.4)
-    surface["set_low"][STUCK], surface["set_high"][STUCK] = 0.25, 0.26
+    surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK] = 0.25, 0.26
     restored(surface)
-    assert (surface["set_low"][STUCK], surface["set_high"][STUCK]) == (0.1, 0.4)
+    assert (surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK]) == (0.1, 0.4)
     surface["release"]["low"][0, STUCK], surface["release"]["high"][0, STUCK] = 0.1, 0.2
     restored(surface)
-    assert (surface["set_low"][STUCK], surface["set_high"][STUCK]) == (0.0, 0.2)
+    assert (surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK]) == (0.0, 0.2)
 
 
 def test_a_frame_that_may_be_on_either_side_ends_no_half_cycle_and_begins_the_count_anew():
@@ -667,6 +689,6 @@ def test_a_frame_that_may_be_on_either_side_ends_no_half_cycle_and_begins_the_co
     swing = surface["oscillatory"]
     assert (swing["sign"], swing["half_cycles"], swing["steady_since"]) == (0, 0, 11)
     for low, high in ((0.0, 0.3), (-0.3, 0.0)):
-        surface["low_then"], surface["high_then"] = low, high
+        surface["judged"]["low"], surface["judged"]["high"] = low, high
         judged(oscillatory.judge, fdi, surface, OSCILLATORY, 10)
         assert swing["sign"] == 0, "on its command it is on no side of it"

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from kernels import new_fdi, on, put
+from kernels import new_fdi, on, put, put_on
 
 from beaver_ftc.diagnosis import conclusion
 from beaver_ftc.diagnosis.belief.expectation import means_dtype
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, UNANTICIPATED, YAW
-from beaver_ftc.diagnosis.types import examine, pairs, verdict
+from beaver_ftc.diagnosis.types import examine, observation, pairs, verdict
 from beaver_ftc.diagnosis.types.contract import FIXED, LAGS, LOSES, SHIFTED
 from beaver_ftc.diagnosis.types.registry import N_TYPES
 from beaver_ftc.diagnosis.types.verdict import BY_DEDUCTION, NO_SURFACE, RULED_OUT, SEVERAL
@@ -32,7 +32,7 @@ COURSES = (VARYING_LOSS, OSCILLATORY, SLOW, GROWING_BIAS)
 
 def leave(surface, *kinds):
     """Only these types are left of a surface."""
-    surface["type_excluded"] = [kind not in kinds for kind in range(N_TYPES)]
+    surface["feasible"]["excluded"] = [kind not in kinds for kind in range(N_TYPES)]
 
 
 def new_case(**left):
@@ -55,12 +55,18 @@ def new_case(**left):
         (0,) * 4 + (1,) * 4,
     )
     (
-        fdi["types"]["surface"]["in_question"],
-        fdi["types"]["surface"]["evidence"],
-        fdi["types"]["surface"]["unhidden"],
+        fdi["types"]["surface"]["status"]["is_candidate"],
+        fdi["types"]["surface"]["evidence"]["frames"],
+        fdi["types"]["surface"]["evidence"]["unhidden"],
     ) = 1, 99, 99
-    fdi["types"]["surface"]["travel_low"], fdi["types"]["surface"]["travel_high"] = -0.4, 0.5
-    fdi["types"]["surface"]["reach_low"], fdi["types"]["surface"]["reach_high"] = -0.4, 0.5
+    fdi["types"]["surface"]["actuator"]["travel_low"], fdi["types"]["surface"]["actuator"]["travel_high"] = (
+        -0.4,
+        0.5,
+    )
+    fdi["types"]["surface"]["actuator"]["reach_low"], fdi["types"]["surface"]["actuator"]["reach_high"] = (
+        -0.4,
+        0.5,
+    )
     fdi["isolation"]["estimator"]["low"][4:8], fdi["isolation"]["estimator"]["high"][4:8] = -0.4, 0.5
     for s, name in enumerate(("aileron", "elevator", "rudder", "flap")):
         kinds = left.get(name, ALL)
@@ -72,18 +78,18 @@ def new_case(**left):
 
 
 def locate(fdi, s, innovation, bound, effect):
-    """`examine.locate` for surface s, with its estimator and its axis."""
+    """`observation.locate` for surface s, with its estimator and its axis."""
     fie = fdi["isolation"]["estimator"][fdi["layout"]["position_of"][s]]
     axis = fdi["layout"]["dominant_axis"][s]
     config, surface = fdi["types"]["config"], fdi["types"]["surface"][s]
-    examine.locate(config, surface, fie, axis, innovation, bound, effect)
+    observation.shift(surface)
+    observation.locate(config, surface, fie, axis, innovation, bound, effect)
 
 
 def one(*kinds, **fields):
     fdi = new_case(rudder=kinds)
     surface = fdi["types"]["surface"][RUDDER]
-    for name, value in fields.items():
-        surface[name] = value
+    put_on(surface, **fields)
     return fdi, surface
 
 
@@ -144,7 +150,7 @@ def test_what_kind_of_fault_it_may_be(kinds, fixed, one_type, sole_type):
 def test_a_surface_is_possible_by_its_estimator_or_by_deduction():
     fdi = new_case(rudder=None)
     assert [bool(verdict.possible(fdi["types"]["surface"][s])) for s in range(4)] == [True, True, False, True]
-    fdi["types"]["surface"]["standing"] = RULED_OUT, BY_DEDUCTION, BY_DEDUCTION, 0
+    fdi["types"]["surface"]["status"]["source"] = RULED_OUT, BY_DEDUCTION, BY_DEDUCTION, 0
     assert [bool(verdict.possible(fdi["types"]["surface"][s])) for s in range(4)] == [False, True, True, True]
 
 
@@ -155,7 +161,7 @@ def test_the_sole_surface_that_is_possible():
     only = new_case(aileron=COURSES, elevator=COURSES, flap=COURSES, rudder=(STUCK,))
     assert on(verdict.sole, only, True) == RUDDER
     assert on(verdict.sole, only, False) == SEVERAL
-    only["types"]["surface"]["in_question"] = 0, 0, 0, 1
+    only["types"]["surface"]["status"]["is_candidate"] = 0, 0, 0, 1
     assert on(verdict.sole, only, False) == FLAP
     assert on(verdict.sole, only, True) == NO_SURFACE
 
@@ -276,12 +282,15 @@ def test_the_surface_at_fault():
 )  # fmt: skip
 def test_of_elevator_and_flap_the_one_a_constant_explains(flap, evidence, own_errors, refuted):
     fdi = new_case(elevator=(STUCK,), aileron=None, rudder=None, flap=flap)
-    fdi["types"]["surface"]["evidence"][ELEVATOR], fdi["types"]["config"]["own_errors"] = evidence, own_errors
-    fdi["types"]["surface"]["unhidden"][FLAP] = evidence
+    fdi["types"]["surface"]["evidence"]["frames"][ELEVATOR], fdi["types"]["config"]["own_errors"] = (
+        evidence,
+        own_errors,
+    )
+    fdi["types"]["surface"]["evidence"]["unhidden"][FLAP] = evidence
     assert bool(on(verdict.others_refuted, fdi, ELEVATOR)) == refuted
     if flap is not None:
         assert on(verdict.surface_at_fault, fdi) == (ELEVATOR if refuted else NOT_ISOLATED)
-    fdi["types"]["surface"]["in_question"][FLAP] = 0
+    fdi["types"]["surface"]["status"]["is_candidate"][FLAP] = 0
     assert bool(on(verdict.others_refuted, fdi, ELEVATOR)) == (evidence >= PATIENCE)
 
 
@@ -335,23 +344,27 @@ def _open(fdi):
 def test_the_lead_is_taken_on_one_surface_while_its_fault_shows():
     fdi = _open(new_case(rudder=(STUCK,), **NOBODY_ELSE))
     surface = fdi["types"]["surface"][RUDDER]
-    surface["set_low"][STUCK], surface["set_high"][STUCK], surface["command"] = 0.1, 0.2, 0.3
-    surface["low"], surface["high"] = 0.1, 0.2
-    fdi["types"]["surface"]["measure"] = 3
+    surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK], surface["elapsed"]["command"] = (
+        0.1,
+        0.2,
+        0.3,
+    )
+    surface["elapsed"]["low"], surface["elapsed"]["high"] = 0.1, 0.2
+    fdi["types"]["surface"]["accommodation"]["mode"] = 3
     take_lead(fdi, verdict.take_the_lead, fdi["verdict"]["isolated"])
     assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (RUDDER, FIXED)
-    assert fdi["types"]["surface"]["measure"].tolist() == [-1, -1, FIXED, -1]
-    surface["low"], surface["high"] = 0.25, 0.35  # it follows its command again
+    assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [-1, -1, FIXED, -1]
+    surface["elapsed"]["low"], surface["elapsed"]["high"] = 0.25, 0.35  # it follows its command again
     fdi["types"]["config"]["dt"] = 0.01
     for _ in range(19):
         take_lead(fdi, verdict.take_the_lead, fdi["verdict"]["isolated"])
     assert fdi["verdict"]["lead"] == RUDDER
     take_lead(fdi, verdict.take_the_lead, fdi["verdict"]["isolated"])
     assert fdi["verdict"]["lead"] == NO_SURFACE
-    assert surface["measure"] == -1
-    surface["low"] = 0.1
+    assert surface["accommodation"]["mode"] == -1
+    surface["elapsed"]["low"] = 0.1
     take_lead(fdi, verdict.take_the_lead, fdi["verdict"]["isolated"])
-    assert (surface["absent"], fdi["verdict"]["lead"]) == (0, RUDDER)
+    assert (surface["accommodation"]["absent"], fdi["verdict"]["lead"]) == (0, RUDDER)
     assert on(verdict.still_there, fdi, surface, LOSES, True)
 
 
@@ -359,7 +372,7 @@ def test_the_lead_is_taken_on_one_surface_while_its_fault_shows():
 def test_a_fault_that_has_gone_is_let_go_after_a_fifth_of_a_second_at_any_rate(dt):
     fdi, surface = one(STUCK, command=0.3, low=0.29, high=0.31, absent=0)
     fdi["types"]["config"]["dt"] = dt
-    surface["set_low"][STUCK], surface["set_high"][STUCK] = 0.1, 0.2
+    surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK] = 0.1, 0.2
     there = [bool(on(verdict.still_there, fdi, surface, FIXED, True)) for _ in range(round(0.3 / dt))]
     assert there.index(False) + 1 == round(0.2 / dt)
     assert not any(there[there.index(False) :])
@@ -374,18 +387,18 @@ def test_a_fault_that_has_gone_is_let_go_after_a_fifth_of_a_second_at_any_rate(d
 )  # fmt: skip
 def test_how_far_a_surface_is_off(kinds, at_fault, off):
     _, surface = one(*kinds, command=0.3, low=0.2, high=0.24)
-    surface["set_low"][STUCK], surface["set_high"][STUCK] = 0.1, 0.2
-    surface["set_low"][BIAS], surface["set_high"][BIAS] = -0.1, 0.0
+    surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK] = 0.1, 0.2
+    surface["feasible"]["low"][BIAS], surface["feasible"]["high"][BIAS] = -0.1, 0.0
     assert verdict.deflection_error(surface, at_fault) == pytest.approx(off)
     if kinds == (BIAS,):
-        surface["set_low"][BIAS] = -np.inf
+        surface["feasible"]["low"][BIAS] = -np.inf
         assert verdict.deflection_error(surface, at_fault) == pytest.approx(0.22 - 0.3)
 
 
 def test_what_a_surface_has_left():
     fdi, surface = one(CONSTANT_LOSS)
     fdi["isolation"]["estimator"]["theta"][RUDDER] = -0.1, -0.2, -0.3
-    surface["set_low"][CONSTANT_LOSS], surface["set_high"][CONSTANT_LOSS] = 0.5, 0.6
+    surface["feasible"]["low"][CONSTANT_LOSS], surface["feasible"]["high"][CONSTANT_LOSS] = 0.5, 0.6
     assert on(verdict.effectiveness_left, fdi, RUDDER) == pytest.approx(0.7)  # by its own axis, yaw
     fdi["types"]["pair"]["enabled"] = 1
     assert on(verdict.effectiveness_left, fdi, RUDDER) == pytest.approx(0.55)
@@ -410,7 +423,10 @@ def test_orders_are_kept_for_the_frames_before():
     )  # within the travel
     assert orders["low"] == pytest.approx([0.0, -0.1, 0.1])
     assert orders["high"] == pytest.approx([0.5, 0.3, 0.2])
-    assert (fdi["types"]["surface"][0]["G_least"], fdi["types"]["surface"][0]["G_most"]) == (
+    assert (
+        fdi["types"]["surface"][0]["orders"]["G_least"],
+        fdi["types"]["surface"][0]["orders"]["G_most"],
+    ) == (
         -1.9,
         2.0,
     )  # of the last block
@@ -421,36 +437,46 @@ def test_orders_are_kept_for_the_frames_before():
 def test_what_the_effectiveness_varies_by_is_a_share_of_its_mean():
     fdi = new_case()
     effect, surface = fdi["isolation"]["estimator"][4 + RUDDER]["effect"], fdi["types"]["surface"][RUDDER]
-    effect["Z"], surface["uneven"] = (0.5, 0.0, -2.0), 0.07
-    surface["G_least"], surface["G_most"] = -2.1, -1.8
+    effect["Z"], surface["elapsed"]["uneven"] = (0.5, 0.0, -2.0), 0.07
+    surface["orders"]["G_least"], surface["orders"]["G_most"] = -2.1, -1.8
     locate(fdi, RUDDER, np.zeros(3), np.zeros(3), effect)
-    assert (surface["uneven"], surface["uneven_then"]) == pytest.approx((0.25 * 0.3 / 2.0, 0.07))
+    assert (surface["elapsed"]["uneven"], surface["judged"]["uneven"]) == pytest.approx(
+        (0.25 * 0.3 / 2.0, 0.07)
+    )
 
 
 def test_a_surface_is_where_the_innovation_puts_it():
     fdi = new_case()
     effect, surface = fdi["isolation"]["estimator"][4 + RUDDER]["effect"], fdi["types"]["surface"][RUDDER]
     effect["Z"], effect["offset"] = (0.5, 0.0, -2.0), (-0.05, 0.0, 0.2)  # commanded to 0.1
-    surface["low"], surface["high"], surface["command"] = 0.2, 0.3, 0.15
-    surface["low_then"], surface["high_then"] = 0.4, 0.45
+    surface["elapsed"]["low"], surface["elapsed"]["high"], surface["elapsed"]["command"] = 0.2, 0.3, 0.15
+    surface["judged"]["low"], surface["judged"]["high"] = 0.4, 0.45
     # off by 0.2: 0.1 on roll, -0.4 on yaw, give or take
     locate(fdi, RUDDER, np.array([0.1, 0.0, -0.4]), np.array([0.005, 1.0, 0.1]), effect)
-    assert surface["command"] == pytest.approx(0.1)
-    assert (surface["low"], surface["high"]) == pytest.approx((0.29, 0.31))  # roll says it to 0.005 / 0.5
-    assert (surface["low_then"], surface["high_then"], surface["command_then"]) == (0.2, 0.3, 0.15)
-    assert (surface["low_before"], surface["high_before"]) == (0.4, 0.45)
+    assert surface["elapsed"]["command"] == pytest.approx(0.1)
+    assert (surface["elapsed"]["low"], surface["elapsed"]["high"]) == pytest.approx(
+        (0.29, 0.31)
+    )  # roll says it to 0.005 / 0.5
+    assert (surface["judged"]["low"], surface["judged"]["high"], surface["judged"]["command"]) == (
+        0.2,
+        0.3,
+        0.15,
+    )
+    assert (surface["earlier"]["low"], surface["earlier"]["high"]) == (0.4, 0.45)
     fdi["types"]["config"]["length"] = 4
     locate(fdi, RUDDER, np.array([0.1, 0.0, -0.4]), np.array([0.005, 1.0, 0.1]), effect)
-    assert (surface["low"], surface["high"]) == pytest.approx((0.25, 0.35))  # its own axis alone
+    assert (surface["elapsed"]["low"], surface["elapsed"]["high"]) == pytest.approx(
+        (0.25, 0.35)
+    )  # its own axis alone
 
 
 def test_wrong_frames_are_remembered_for_two_more():
     fdi, bound = new_case(), np.full(3, 0.1)
     for innovation in (0.2, 0.05, 0.2):
-        on(examine.note_wrong, fdi, np.array([0.0, innovation, 0.0]), bound)
-    assert fdi["types"]["surface"]["wrong"].tolist() == [1] * 4
-    assert fdi["types"]["surface"]["wrong_then"].tolist() == [0] * 4
-    assert fdi["types"]["surface"]["wrong_before"].tolist() == [1] * 4
+        on(examine.take_in, fdi, np.array([0.0, innovation, 0.0]), bound)
+    assert fdi["types"]["surface"]["elapsed"]["wrong"].tolist() == [1] * 4
+    assert fdi["types"]["surface"]["judged"]["wrong"].tolist() == [0] * 4
+    assert fdi["types"]["surface"]["earlier"]["wrong"].tolist() == [1] * 4
 
 
 @pytest.mark.parametrize(
@@ -465,13 +491,15 @@ def test_a_frame_next_to_a_healthy_one_is_judged_only_if_faults_begin_between_fr
     fdi["types"]["config"]["whole"], fdi["types"]["frame"] = whole, 7
     surface = fdi["types"]["surface"][RUDDER]
     examine.begin(surface)
-    surface["evidence"], surface["measure"] = 5, -1
-    surface["wrong_before"], surface["wrong_then"], surface["wrong"] = wrong
-    surface["low_then"], surface["high_then"] = 0.1, 0.2
+    surface["evidence"]["frames"], surface["accommodation"]["mode"] = 5, -1
+    surface["earlier"]["wrong"], surface["judged"]["wrong"], surface["elapsed"]["wrong"] = wrong
+    surface["judged"]["low"], surface["judged"]["high"] = 0.1, 0.2
     on(examine.judge_all, fdi)
-    assert surface["evidence"] == (6 if judged else 5)
-    assert surface["started_at"] == (6 if judged else -1)
-    assert (surface["start_low"], surface["start_high"]) == ((0.1, 0.2) if judged else (0.0, 0.0))
+    assert surface["evidence"]["frames"] == (6 if judged else 5)
+    assert surface["evidence"]["started_at"] == (6 if judged else -1)
+    assert (surface["evidence"]["start_low"], surface["evidence"]["start_high"]) == (
+        (0.1, 0.2) if judged else (0.0, 0.0)
+    )
     assert fdi["types"]["frame"] == 8
     assert surface["oscillatory"]["steady_since"] == (6 if judged else 7)
 
@@ -482,12 +510,12 @@ def test_evidence_counts_for_a_swing_since_a_stop_could_last_hide_one():
     examine.begin(surface)
     counted = []
     for hides in ((0, 0), (0, 0), (0, 1), (0, 0), (1, 0), (0, 0), (0, 0), (0, 0)):
-        surface["wrong_then"], surface["hides_then"] = 1, hides
-        surface["low_then"], surface["high_then"] = 0.1, 0.2
+        surface["judged"]["wrong"], surface["judged"]["hides"] = 1, hides
+        surface["judged"]["low"], surface["judged"]["high"] = 0.1, 0.2
         on(examine.judge_all, fdi)
-        counted.append(int(surface["unhidden"]))
+        counted.append(int(surface["evidence"]["unhidden"]))
     assert counted == [1, 2, 0, 1, 0, 1, 2, 3]
-    assert surface["evidence"] == 8
+    assert surface["evidence"]["frames"] == 8
 
 
 def test_where_a_stop_is_follows_the_surface_by_a_frame():
@@ -495,27 +523,27 @@ def test_where_a_stop_is_follows_the_surface_by_a_frame():
     surface, effect = fdi["types"]["surface"][RUDDER], fdi["isolation"]["estimator"][4 + RUDDER]["effect"]
     effect["Z"], effect["spread"], bound = (0.5, 0.0, -2.0), (9.0, 9.0, 0.02), np.array([9.0, 9.0, 0.08])
     for at, now in ((0.41, 1), (0.39, 0)):  # 2 (0.08 + 0.02) / 2 is 0.1 rad, the stop at 0.5
-        surface["orders"]["greatest"][0], then = at, surface["hides"].copy()
+        surface["orders"]["greatest"][0], then = at, surface["elapsed"]["hides"].copy()
         locate(fdi, RUDDER, np.zeros(3), bound, effect)
-        assert surface["hides"].tolist() == [0, now]
-        assert surface["hides_then"].tolist() == then.tolist()
+        assert surface["elapsed"]["hides"].tolist() == [0, now]
+        assert surface["judged"]["hides"].tolist() == then.tolist()
 
 
 def test_a_frame_that_puts_a_surface_nowhere_judges_nothing():
     fdi = new_case()
     surface = fdi["types"]["surface"][RUDDER]
     examine.begin(surface)
-    surface["low_then"], surface["high_then"] = 0.2, 0.1
+    surface["judged"]["low"], surface["judged"]["high"] = 0.2, 0.1
     on(examine.judge, fdi, surface, 6)
-    assert surface["started_at"] == -1
+    assert surface["evidence"]["started_at"] == -1
 
 
 def quiet(low=0.1, high=0.2, frames=1, **fields):
     fdi = new_case()
     surface = fdi["types"]["surface"][RUDDER]
-    surface["set_low"][STUCK], surface["set_high"][STUCK] = 0.15, 0.3
-    surface["low_then"], surface["high_then"] = low, high
-    fdi["types"]["surface"]["evidence"] = 0
+    surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK] = 0.15, 0.3
+    surface["judged"]["low"], surface["judged"]["high"] = low, high
+    fdi["types"]["surface"]["evidence"]["frames"] = 0
     put(fdi, **fields)
     for _ in range(frames):
         on(examine.note_quiet, fdi, RUDDER)
@@ -524,34 +552,39 @@ def quiet(low=0.1, high=0.2, frames=1, **fields):
 
 def test_a_quiet_surface_given_up_does_not_swing():
     fdi, surface = quiet()
-    assert fdi["types"]["surface"]["evidence"].tolist() == [1] * 4
-    assert surface["quiet"] == 1
-    assert quiet(low=0.31, high=0.4)[1]["quiet"] == 0
-    assert quiet(low=0.0, high=0.14)[1]["quiet"] == 0
-    assert not quiet(frames=PATIENCE)[1]["type_excluded"][OSCILLATORY]
-    assert quiet(frames=PATIENCE + 1)[1]["type_excluded"][OSCILLATORY]
-    assert not quiet(frames=PATIENCE + 1, own_errors=1)[1]["type_excluded"][OSCILLATORY]
+    assert fdi["types"]["surface"]["evidence"]["frames"].tolist() == [1] * 4
+    assert surface["evidence"]["quiet"] == 1
+    assert quiet(low=0.31, high=0.4)[1]["evidence"]["quiet"] == 0
+    assert quiet(low=0.0, high=0.14)[1]["evidence"]["quiet"] == 0
+    assert not quiet(frames=PATIENCE)[1]["feasible"]["excluded"][OSCILLATORY]
+    assert quiet(frames=PATIENCE + 1)[1]["feasible"]["excluded"][OSCILLATORY]
+    assert not quiet(frames=PATIENCE + 1, own_errors=1)[1]["feasible"]["excluded"][OSCILLATORY]
     fdi, surface = quiet()
-    fdi["types"]["surface"]["in_question"] = 1, 1, 0, 1
+    fdi["types"]["surface"]["status"]["is_candidate"] = 1, 1, 0, 1
     on(examine.note_quiet, fdi, RUDDER)
-    assert fdi["types"]["surface"]["evidence"].tolist() == [1, 1, 2, 1]  # of another one it says nothing then
+    assert fdi["types"]["surface"]["evidence"]["frames"].tolist() == [
+        1,
+        1,
+        2,
+        1,
+    ]  # of another one it says nothing then
 
 
 @pytest.mark.parametrize("abrupt", [0, 1])
 def test_a_surface_given_up_is_quiet_where_nothing_is_wrong_and_a_fault_stays(abrupt):
     fdi = new_case()
     (
-        fdi["types"]["surface"]["measure"],
-        fdi["types"]["surface"]["set_high"],
+        fdi["types"]["surface"]["accommodation"]["mode"],
+        fdi["types"]["surface"]["feasible"]["high"],
         fdi["types"]["config"]["abrupt"],
     ) = (
         -1,
         1.0,
         abrupt,
     )
-    fdi["types"]["surface"][RUDDER]["measure"] = FIXED
+    fdi["types"]["surface"][RUDDER]["accommodation"]["mode"] = FIXED
     on(examine.judge_all, fdi)
-    assert fdi["types"]["surface"]["quiet"].tolist() == [0, 0, abrupt, 0]
+    assert fdi["types"]["surface"]["evidence"]["quiet"].tolist() == [0, 0, abrupt, 0]
 
 
 def test_a_block_is_the_mean_of_its_frames_with_the_noise_of_its_ends():
@@ -604,8 +637,8 @@ def lateral(one_left=True, other_left=True, alarmed=1, **pair):
         fdi["types"]["pair"][name] = value
     outside = on(pairs.decide_roll_and_yaw, fdi, 3.0)
     return [
-        bool(fdi["types"]["surface"]["named"][AILERON]),
-        bool(fdi["types"]["surface"]["named"][RUDDER]),
+        bool(fdi["types"]["surface"]["status"]["named"][AILERON]),
+        bool(fdi["types"]["surface"]["status"]["named"][RUDDER]),
         bool(outside),
     ]
 
@@ -629,63 +662,76 @@ def test_where_nothing_explains_both_the_fault_is_outside_the_class():
         assert on(pairs.decide_roll_and_yaw, fdi, 3.0)
         leave(fdi["types"]["surface"][s], OSCILLATORY)  # it may swing yet
         assert not on(pairs.decide_roll_and_yaw, fdi, 3.0)
-        assert not fdi["types"]["surface"]["named"].any()
+        assert not fdi["types"]["surface"]["status"]["named"].any()
 
 
 def test_a_name_notes_when_it_was_given_and_when_its_type():
     surface = new_case()["types"]["surface"][RUDDER]
-    surface["type"] = -1
+    surface["status"]["type"] = -1
     pairs.name(surface, 1, STUCK, 3.0)
-    assert (surface["named"], surface["type"], surface["named_at_s"], surface["type_at_s"]) == (
+    assert (
+        surface["status"]["named"],
+        surface["status"]["type"],
+        surface["status"]["named_at_s"],
+        surface["status"]["type_at_s"],
+    ) == (
         1,
         STUCK,
         3.0,
         3.0,
     )
     pairs.name(surface, 1, BIAS, 4.0)
-    assert (surface["named_at_s"], surface["type_at_s"]) == (3.0, 4.0)
+    assert (surface["status"]["named_at_s"], surface["status"]["type_at_s"]) == (3.0, 4.0)
     pairs.name(surface, 1, BIAS, 5.0)
-    assert surface["type_at_s"] == 4.0
+    assert surface["status"]["type_at_s"] == 4.0
     pairs.name(surface, 0, BIAS, 6.0)
-    assert (surface["named"], surface["type"], surface["type_at_s"]) == (0, -1, 6.0)
+    assert (surface["status"]["named"], surface["status"]["type"], surface["status"]["type_at_s"]) == (
+        0,
+        -1,
+        6.0,
+    )
 
 
 def test_a_surface_off_its_command_is_within_its_travel():
     surface = new_case()["types"]["surface"][RUDDER]
-    surface["command"] = 0.1
-    assert pairs.place(surface, 0.2, 0.05)
-    assert (surface["low"], surface["high"], surface["wrong"]) == (
+    surface["elapsed"]["command"] = 0.1
+    assert observation.place(surface, 0.2, 0.05)
+    assert (surface["elapsed"]["low"], surface["elapsed"]["high"], surface["elapsed"]["wrong"]) == (
         pytest.approx(0.25),
         pytest.approx(0.35),
         1,
     )
-    assert pairs.place(surface, 0.4, 0.05)
-    assert surface["high"] == 0.5
-    assert not pairs.place(surface, 0.5, 0.05)
-    assert pairs.place(surface, -0.49, 0.05)
-    assert surface["low"] == -0.4
-    pairs.place(surface, 0.04, 0.05)
-    assert surface["wrong"] == 0
-    pairs.place(surface, 0.05, 0.05)
-    assert surface["wrong"] == 0
+    assert observation.place(surface, 0.4, 0.05)
+    assert surface["elapsed"]["high"] == 0.5
+    assert not observation.place(surface, 0.5, 0.05)
+    assert observation.place(surface, -0.49, 0.05)
+    assert surface["elapsed"]["low"] == -0.4
+    observation.place(surface, 0.04, 0.05)
+    assert surface["elapsed"]["wrong"] == 0
+    observation.place(surface, 0.05, 0.05)
+    assert surface["elapsed"]["wrong"] == 0
 
 
 def test_whereabouts_cover_every_constant_type_left():
     fdi, surface = one(STUCK, FLOAT, SLOW)
-    surface["set_low"][STUCK], surface["set_high"][STUCK] = 0.1, 0.2
+    surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK] = 0.1, 0.2
     assert on(pairs.whereabouts, fdi, surface) == (0.0, 0.2)
     leave(surface, BIAS)
-    surface["set_low"][BIAS], surface["set_high"][BIAS] = -np.inf, 0.0
+    surface["feasible"]["low"][BIAS], surface["feasible"]["high"][BIAS] = -np.inf, 0.0
     assert on(pairs.whereabouts, fdi, surface) == (-0.4, 0.0)
-    surface["set_low"][BIAS], surface["set_high"][BIAS] = 0.1, np.inf
+    surface["feasible"]["low"][BIAS], surface["feasible"]["high"][BIAS] = 0.1, np.inf
     assert on(pairs.whereabouts, fdi, surface) == (0.1, 0.5)
 
 
 def test_beside_the_first_pitch_fault_the_second_is_where_the_rest_puts_it():
     fdi = new_case(elevator=(STUCK,))
     elevator, flap = fdi["types"]["surface"][ELEVATOR], fdi["types"]["surface"][FLAP]
-    fdi["types"]["pair"]["first"], elevator["in_question"] = ELEVATOR, 0
-    elevator["set_low"][STUCK], elevator["set_high"][STUCK], elevator["command"] = 0.1, 0.14, 0.0
+    fdi["types"]["pair"]["first"], elevator["status"]["is_candidate"] = ELEVATOR, 0
+    (
+        elevator["feasible"]["low"][STUCK],
+        elevator["feasible"]["high"][STUCK],
+        elevator["elapsed"]["command"],
+    ) = 0.1, 0.14, 0.0
     (
         fdi["isolation"]["estimator"]["effect"]["Z"][4 + ELEVATOR, PITCH],
         fdi["isolation"]["estimator"]["effect"]["Z"][4 + FLAP, PITCH],
@@ -695,20 +741,22 @@ def test_beside_the_first_pitch_fault_the_second_is_where_the_rest_puts_it():
     )
     fdi["isolation"]["estimator"]["effect"]["spread"][4 + ELEVATOR, PITCH] = 0.01
     fdi["isolation"]["estimator"]["effect"]["spread"][4 + FLAP, PITCH] = 0.02
-    fdi["bound"]["frame"][PITCH], fdi["bank"]["output"]["innovation"][PITCH], flap["command"] = (
+    fdi["bound"]["frame"][PITCH], fdi["bank"]["output"]["innovation"][PITCH], flap["elapsed"]["command"] = (
         0.03,
         -1.2 + 0.4,
         0.05,
     )
     on(pairs.solve_pitch, fdi)
     # the elevator's share is -10 * 0.12 give or take 0.2, the rest 0.4 give or take 0.26, over 2
-    assert (flap["low"], flap["high"]) == pytest.approx((0.05 + 0.2 - 0.13, 0.05 + 0.2 + 0.13))
-    assert flap["wrong"] == 1
-    assert elevator["wrong"] == 0
-    assert (elevator["low"], elevator["high"]) == (0.1, 0.14)
+    assert (flap["elapsed"]["low"], flap["elapsed"]["high"]) == pytest.approx(
+        (0.05 + 0.2 - 0.13, 0.05 + 0.2 + 0.13)
+    )
+    assert flap["elapsed"]["wrong"] == 1
+    assert elevator["elapsed"]["wrong"] == 0
+    assert (elevator["elapsed"]["low"], elevator["elapsed"]["high"]) == (0.1, 0.14)
     fdi["bank"]["output"]["innovation"][PITCH] = 9.0
     on(pairs.solve_pitch, fdi)
-    assert flap["standing"] == RULED_OUT
+    assert flap["status"]["source"] == RULED_OUT
 
 
 @pytest.mark.parametrize(("innovation", "wrong"), [(0.03, 0), (0.031, 1), (-0.031, 1)])
@@ -720,20 +768,20 @@ def test_before_that_pitch_shows_a_fault_or_not(innovation, wrong):
         innovation,
     )
     on(pairs.solve_pitch, fdi)
-    assert fdi["types"]["surface"]["wrong"].tolist() == [0, wrong, 0, wrong]
+    assert fdi["types"]["surface"]["elapsed"]["wrong"].tolist() == [0, wrong, 0, wrong]
 
 
 def test_what_is_known_of_the_first_is_kept_once_it_has_settled():
     fdi = new_case(elevator=(STUCK,))
     elevator = fdi["types"]["surface"][ELEVATOR]
     fdi["types"]["pair"]["first"] = NO_SURFACE
-    elevator["set_low"][STUCK], elevator["set_high"][STUCK] = 0.1, 0.14
+    elevator["feasible"]["low"][STUCK], elevator["feasible"]["high"][STUCK] = 0.1, 0.14
     on(pairs.note_first, fdi, ELEVATOR)
     known = elevator["known"]
     assert fdi["types"]["pair"]["first"] == ELEVATOR
     assert (known["low"][STUCK], known["high"][STUCK]) == (0.1, 0.14)
     assert known["excluded"].tolist() == [kind != STUCK for kind in range(N_TYPES)]
-    elevator["type_excluded"][STUCK], elevator["set_low"][STUCK] = 1, 0.12
+    elevator["feasible"]["excluded"][STUCK], elevator["feasible"]["low"][STUCK] = 1, 0.12
     for k in range(PATIENCE - 1):
         on(pairs.note_first, fdi, ELEVATOR)
         assert (known["low"][STUCK], fdi["types"]["pair"]["unsettled"]) == (0.1, k + 1)
@@ -746,17 +794,20 @@ def test_a_second_begins_with_what_was_known_of_the_first():
     elevator, flap = fdi["types"]["surface"][ELEVATOR], fdi["types"]["surface"][FLAP]
     fdi["types"]["pair"]["first"], elevator["known"]["low"], elevator["known"]["high"] = ELEVATOR, 0.1, 0.14
     elevator["known"]["excluded"] = [kind != STUCK for kind in range(N_TYPES)]
-    fdi["types"]["surface"]["wrong"] = fdi["types"]["surface"]["wrong_then"] = fdi["types"]["surface"][
-        "wrong_before"
-    ] = 1
+    for frame in ("elapsed", "judged", "earlier"):
+        fdi["types"]["surface"][frame]["wrong"] = 1
     assert on(pairs.two_in_pitch, fdi)
     assert verdict.one_constant(elevator) == STUCK
-    assert (elevator["set_low"][STUCK], elevator["set_high"][STUCK]) == (0.1, 0.14)
-    assert not flap["type_excluded"].any()
+    assert (elevator["feasible"]["low"][STUCK], elevator["feasible"]["high"][STUCK]) == (0.1, 0.14)
+    assert not flap["feasible"]["excluded"].any()
     for surface in (elevator, flap):
-        assert (surface["in_question"], surface["standing"]) == (0, BY_DEDUCTION)
-        assert (surface["wrong"], surface["wrong_then"], surface["wrong_before"]) == (0, 0, 0)
-    assert fdi["types"]["surface"]["in_question"][[AILERON, RUDDER]].tolist() == [1, 1]
+        assert (surface["status"]["is_candidate"], surface["status"]["source"]) == (0, BY_DEDUCTION)
+        assert (surface["elapsed"]["wrong"], surface["judged"]["wrong"], surface["earlier"]["wrong"]) == (
+            0,
+            0,
+            0,
+        )
+    assert fdi["types"]["surface"]["status"]["is_candidate"][[AILERON, RUDDER]].tolist() == [1, 1]
     assert not on(pairs.two_in_pitch, _first(new_case(elevator=(STUCK,)), ELEVATOR))
     assert not on(pairs.two_in_pitch, _first(new_case(elevator=()), NO_SURFACE))
 
@@ -797,15 +848,15 @@ def decided(alarmed=(1, 0), **left):
         alarmed,
     )
     fdi["verdict"]["isolated"] = NOT_ISOLATED
-    fdi["types"]["surface"]["type"] = -1
-    fdi["types"]["surface"]["low"], fdi["types"]["surface"]["high"] = -0.4, 0.5
+    fdi["types"]["surface"]["status"]["type"] = -1
+    fdi["types"]["surface"]["elapsed"]["low"], fdi["types"]["surface"]["elapsed"]["high"] = -0.4, 0.5
     return fdi
 
 
 def test_one_fault_in_pitch_is_named_and_acted_upon():
     fdi = decided(elevator=(CONSTANT_LOSS,), flap=None)
     conclude(fdi, pairs.decide, 3.0)
-    assert fdi["types"]["surface"]["named"].tolist() == [
+    assert fdi["types"]["surface"]["status"]["named"].tolist() == [
         0,
         0,
         0,
@@ -813,18 +864,18 @@ def test_one_fault_in_pitch_is_named_and_acted_upon():
     ]  # ailerons and rudder might be it as well
     fdi = decided(elevator=(CONSTANT_LOSS,), flap=None, aileron=None, rudder=None)
     conclude(fdi, pairs.decide, 3.0)
-    assert fdi["types"]["surface"]["named"].tolist() == [0, 1, 0, 0]
+    assert fdi["types"]["surface"]["status"]["named"].tolist() == [0, 1, 0, 0]
     assert fdi["verdict"]["isolated"] == ELEVATOR
     assert (fdi["verdict"]["type"], fdi["verdict"]["isolated_at_s"]) == (CONSTANT_LOSS, 3.0)
     assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (ELEVATOR, LOSES)
-    assert fdi["types"]["surface"]["measure"].tolist() == [-1, LOSES, -1, -1]
+    assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [-1, LOSES, -1, -1]
     assert fdi["types"]["pair"]["first"] == ELEVATOR
 
 
 def test_without_an_alarm_in_pitch_nobody_is_named_there():
     fdi = decided(alarmed=(0, 1), elevator=(CONSTANT_LOSS,), flap=None, aileron=None, rudder=None)
     conclude(fdi, pairs.decide, 3.0)
-    assert not fdi["types"]["surface"]["named"][ELEVATOR]
+    assert not fdi["types"]["surface"]["status"]["named"][ELEVATOR]
     assert not on(pairs.acted_upon, fdi, ELEVATOR)
 
 
@@ -834,15 +885,18 @@ def test_the_likeliest_in_pitch_is_acted_upon_until_one_is_named():
     only_flap = decided(aileron=None, rudder=None, elevator=COURSES)
     assert [bool(on(pairs.acted_upon, only_flap, s)) for s in range(4)] == [False, False, False, True]
     assert not on(pairs.named_in_pitch, fdi)
-    fdi["types"]["surface"]["named"] = 1, 0, 0, 1
+    fdi["types"]["surface"]["status"]["named"] = 1, 0, 0, 1
     assert on(pairs.named_in_pitch, fdi)
     assert [bool(on(pairs.acted_upon, fdi, s)) for s in range(4)] == [True, False, False, True]
 
 
 def test_the_verdict_is_that_of_the_first_named():
     fdi = decided(aileron=None, rudder=None)
-    fdi["types"]["surface"]["type"][RUDDER] = STUCK
-    fdi["types"]["surface"]["type_at_s"][RUDDER], fdi["types"]["surface"]["named_at_s"][RUDDER] = 2.0, 1.5
+    fdi["types"]["surface"]["status"]["type"][RUDDER] = STUCK
+    (
+        fdi["types"]["surface"]["status"]["type_at_s"][RUDDER],
+        fdi["types"]["surface"]["status"]["named_at_s"][RUDDER],
+    ) = 2.0, 1.5
     conclude(fdi, pairs.summarise, RUDDER, False, 3.0, lead=(NO_SURFACE, -1))
     found = fdi["verdict"]
     assert (found["isolated"], found["type"], found["type_at_s"]) == (4 + RUDDER, STUCK, 2.0)
@@ -859,15 +913,15 @@ def acted(**left):
     """What the law does about each surface; each was seen where its type has it."""
     fdi = decided(**left)
     for surface in fdi["types"]["surface"]:
-        surface["set_low"], surface["set_high"] = -0.1, 0.1
+        surface["feasible"]["low"], surface["feasible"]["high"] = -0.1, 0.1
     return fdi
 
 
 def test_the_law_acts_on_all_that_are_named_and_the_lead_is_the_first():
     fdi = acted(alarmed=(0, 1), aileron=(CONSTANT_LOSS,), rudder=(BIAS,), elevator=None, flap=None)
-    fdi["types"]["surface"]["named"] = 1, 0, 1, 0
+    fdi["types"]["surface"]["status"]["named"] = 1, 0, 1, 0
     take_lead(fdi, pairs.act)
-    assert fdi["types"]["surface"]["measure"].tolist() == [LOSES, -1, SHIFTED, -1]
+    assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [LOSES, -1, SHIFTED, -1]
     assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (AILERON, LOSES)
 
 
@@ -877,15 +931,15 @@ def test_the_law_acts_on_all_that_are_named_and_the_lead_is_the_first():
 )
 def test_an_elevator_that_is_replaced_comes_first(kinds, measure, lead):
     fdi = acted(aileron=(CONSTANT_LOSS,), elevator=kinds, rudder=None, flap=None)
-    fdi["types"]["surface"]["named"] = 1, 1, 0, 0
+    fdi["types"]["surface"]["status"]["named"] = 1, 1, 0, 0
     take_lead(fdi, pairs.act)
-    assert fdi["types"]["surface"]["measure"].tolist() == [LOSES, measure, -1, -1]
+    assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [LOSES, measure, -1, -1]
     assert fdi["verdict"]["lead"] == lead
 
 
 def test_a_rudder_that_is_fixed_does_not_come_before_the_first():
     fdi = acted(aileron=(BIAS,), rudder=(STUCK,), elevator=None, flap=None)
-    fdi["types"]["surface"]["named"] = 1, 0, 1, 0
+    fdi["types"]["surface"]["status"]["named"] = 1, 0, 1, 0
     take_lead(fdi, pairs.act)
     assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (AILERON, SHIFTED)
 
@@ -894,17 +948,21 @@ def test_a_surface_acted_upon_that_cannot_be_at_fault_is_shifted_as_it_shows():
     fdi = acted(elevator=None, flap=None, aileron=None, rudder=None)
     leave(fdi["types"]["surface"][ELEVATOR], STUCK)
     take_lead(fdi, pairs.act)
-    assert fdi["types"]["surface"]["measure"].tolist() == [-1, SHIFTED, -1, -1]
-    fdi["types"]["surface"]["named"][ELEVATOR] = 1
+    assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [-1, SHIFTED, -1, -1]
+    fdi["types"]["surface"]["status"]["named"][ELEVATOR] = 1
     take_lead(fdi, pairs.act)
-    assert fdi["types"]["surface"]["measure"].tolist() == [-1, FIXED, -1, -1]
-    fdi["types"]["surface"]["low"], fdi["types"]["surface"]["high"], fdi["types"]["surface"]["absent"] = (
+    assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [-1, FIXED, -1, -1]
+    (
+        fdi["types"]["surface"]["elapsed"]["low"],
+        fdi["types"]["surface"]["elapsed"]["high"],
+        fdi["types"]["surface"]["accommodation"]["absent"],
+    ) = (
         0.3,
         0.4,
         99,
     )
     take_lead(fdi, pairs.act)
-    assert fdi["types"]["surface"]["measure"].tolist() == [-1, -1, -1, -1]
+    assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [-1, -1, -1, -1]
     assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (NO_SURFACE, -1)
 
 
@@ -918,7 +976,7 @@ def test_two_equations_say_where_ailerons_and_rudder_were(seed):
     for k, s in enumerate((AILERON, RUDDER)):
         effect = fdi["isolation"]["estimator"][4 + s]["effect"]
         effect["Z"][[ROLL, YAW]], effect["spread"][[ROLL, YAW]] = Z[:, k], spread[:, k]
-        fdi["types"]["surface"][s]["command"] = command[k]
+        fdi["types"]["surface"][s]["elapsed"]["command"] = command[k]
     fdi["bank"]["output"]["innovation"][[ROLL, YAW]], fdi["bound"]["frame"][[ROLL, YAW]] = Z @ off, room
     on(pairs.solve_roll_and_yaw, fdi)
     slack = room + spread.sum(axis=1)
@@ -926,7 +984,9 @@ def test_two_equations_say_where_ailerons_and_rudder_were(seed):
     least, greatest = np.min(corners, axis=0) + command, np.max(corners, axis=0) + command
     for k, s in enumerate((AILERON, RUDDER)):
         surface = fdi["types"]["surface"][s]
-        assert (surface["low"], surface["high"]) == pytest.approx((least[k], greatest[k]))
+        assert (surface["elapsed"]["low"], surface["elapsed"]["high"]) == pytest.approx(
+            (least[k], greatest[k])
+        )
     assert not fdi["types"]["pair"]["no_lateral_pair"]
     fdi["bank"]["output"]["innovation"][YAW] = 9.0
     on(pairs.solve_roll_and_yaw, fdi)
@@ -935,24 +995,27 @@ def test_two_equations_say_where_ailerons_and_rudder_were(seed):
 
 def test_a_second_pitch_fault_is_named_once_it_shows():
     fdi = decided(elevator=(BIAS,), flap=(STUCK,), aileron=None, rudder=None)
-    fdi["types"]["pair"]["first"], fdi["types"]["surface"]["in_question"] = ELEVATOR, (1, 0, 1, 0)
-    fdi["types"]["surface"]["standing"] = 0, BY_DEDUCTION, 0, BY_DEDUCTION
-    fdi["types"]["surface"]["type"][ELEVATOR], fdi["types"]["surface"]["evidence"][FLAP] = BIAS, 0
+    fdi["types"]["pair"]["first"], fdi["types"]["surface"]["status"]["is_candidate"] = ELEVATOR, (1, 0, 1, 0)
+    fdi["types"]["surface"]["status"]["source"] = 0, BY_DEDUCTION, 0, BY_DEDUCTION
+    (
+        fdi["types"]["surface"]["status"]["type"][ELEVATOR],
+        fdi["types"]["surface"]["evidence"]["frames"][FLAP],
+    ) = BIAS, 0
     on(pairs.decide_pitch, fdi, 4.0)
-    assert fdi["types"]["surface"]["named"].tolist() == [0, 1, 0, 0]
-    fdi["types"]["surface"]["evidence"][FLAP] = 99
+    assert fdi["types"]["surface"]["status"]["named"].tolist() == [0, 1, 0, 0]
+    fdi["types"]["surface"]["evidence"]["frames"][FLAP] = 99
     on(pairs.decide_pitch, fdi, 5.0)
-    assert fdi["types"]["surface"]["named"].tolist() == [0, 1, 0, 1]
-    assert fdi["types"]["surface"]["type"].tolist()[1::2] == [BIAS, STUCK]
-    fdi["types"]["surface"]["standing"][FLAP] = RULED_OUT
+    assert fdi["types"]["surface"]["status"]["named"].tolist() == [0, 1, 0, 1]
+    assert fdi["types"]["surface"]["status"]["type"].tolist()[1::2] == [BIAS, STUCK]
+    fdi["types"]["surface"]["status"]["source"][FLAP] = RULED_OUT
     on(pairs.decide_pitch, fdi, 6.0)
-    assert fdi["types"]["surface"]["named"].tolist() == [0, 1, 0, 0]
+    assert fdi["types"]["surface"]["status"]["named"].tolist() == [0, 1, 0, 0]
 
 
 def test_the_first_named_is_the_one_the_verdict_is_about():
     fdi = decided(alarmed=(0, 1), aileron=(BIAS,), rudder=(BIAS,), elevator=None, flap=None)
     fdi["types"]["surface"]["refuted"][[AILERON, RUDDER]] = 1
-    fdi["types"]["surface"]["named"], fdi["types"]["surface"]["named_at_s"] = (
+    fdi["types"]["surface"]["status"]["named"], fdi["types"]["surface"]["status"]["named_at_s"] = (
         (1, 0, 1, 0),
         (2.0, 0.0, 1.0, 0.0),
     )
@@ -985,7 +1048,7 @@ def test_without_anybody_to_act_upon_there_is_no_lead():
     fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"] = 2, 2
     take_lead(fdi, verdict.take_the_lead, fdi["verdict"]["isolated"])
     assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (NO_SURFACE, -1)
-    assert (fdi["types"]["surface"]["measure"] == -1).all()
+    assert (fdi["types"]["surface"]["accommodation"]["mode"] == -1).all()
 
 
 def test_the_first_surface_is_named_where_a_constant_explains_it_alone():
@@ -999,7 +1062,11 @@ def test_of_two_faults_the_verdict_is_on_the_first_named(s, outside):
     fdi = new_case()
     fdi["verdict"]["isolated"], fdi["verdict"]["type"] = NOT_ISOLATED, -1
     surface = fdi["types"]["surface"][s]
-    surface["type"], surface["type_at_s"], surface["named_at_s"] = STUCK, 4.0, 3.0
+    surface["status"]["type"], surface["status"]["type_at_s"], surface["status"]["named_at_s"] = (
+        STUCK,
+        4.0,
+        3.0,
+    )
     conclude(fdi, pairs.summarise, s, outside, 5.0, lead=(NO_SURFACE, -1))
     found = fdi["verdict"]
     if s < 0:

@@ -226,7 +226,7 @@ def detected_fdi(at_s=-1.0, isolated=NOT_ISOLATED):
     verdict = fdi["verdict"]
     verdict["detected"], verdict["detected_at_s"], verdict["isolated"] = at_s >= 0.0, at_s, isolated
     verdict["isolated_at_s"], verdict["type"], verdict["lead"], verdict["lead_kind"] = at_s, 2, 1, 1
-    fdi["types"]["surface"]["measure"] = 1
+    fdi["types"]["surface"]["accommodation"]["mode"] = 1
     fdi["fdae"]["network"]["memory"]["weights"] = fdi["fdae"]["network"]["output"] = 0.3
     return fdi
 
@@ -244,7 +244,7 @@ def test_an_alarm_voids_what_a_moment_ago_was_made_of_it(isolated):
     assert [verdict[name] for name in ("detected", "isolated", "type")] == [0, NOT_ISOLATED, -1]
     assert [verdict[name] for name in ("detected_at_s", "isolated_at_s")] == [-1.0, -1.0]
     assert [verdict[name] for name in ("lead", "lead_kind")] == [-1, -1]
-    assert (fdi["types"]["surface"]["measure"] == -1).all()
+    assert (fdi["types"]["surface"]["accommodation"]["mode"] == -1).all()
     assert not fdi["fdae"]["network"]["memory"]["weights"].any()
     assert not fdi["fdae"]["network"]["output"].any()
     on(watching.raise_alarm, detected_fdi(9.6, 1), watch, 11.0)

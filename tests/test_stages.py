@@ -19,7 +19,7 @@ import beaver_ftc
 ROOT = Path(beaver_ftc.__file__).parent
 COMPILED = {"kernel", "apart", "lazy_kernel"}
 
-SEVERAL_FILES = {"demand", "hold", "k", "t", "wrong", "wrong_before", "wrong_then", "x"}
+SEVERAL_FILES = {"demand", "hold", "k", "t", "x"}
 OTHER_FOLDER = {"x"}
 
 

@@ -14,10 +14,15 @@ from tools.promises import is_at_night, is_spared
 import kept
 import warm
 from samples import samples
+from tools import suite_cost
 
 # No deadline: a first call compiles. Derandomised: a red build can be repeated.
 settings.register_profile("repeatable", deadline=None, derandomize=True, max_examples=samples(100))
 settings.load_profile("repeatable")
+
+
+def pytest_configure(config):
+    suite_cost.pytest_configure(config)
 
 
 def pytest_addoption(parser):

@@ -1,8 +1,8 @@
 """`python -m tools.suite_cost`: seconds of processor that the test suite takes, by test, fixture and kernel.
 
-It runs what `make test` runs with this module as a plug-in, and prints tables; `--read` prints those of an
-earlier run anew. Seconds are those of the process and of the commands it has started and waited for: what
-else the machine does meanwhile does not count.
+It runs what `make test` runs with this module as a plug-in (tests/conftest.py), and prints tables; `--read`
+prints those of an earlier run anew. Seconds are those of the process and of the commands it has started and
+waited for: what else the machine does meanwhile does not count.
 """
 
 import argparse
@@ -101,6 +101,7 @@ class Cost:
 
 
 def pytest_configure(config: Any) -> None:
+    """Measure, if this run is to be measured."""
     if FOLDER in os.environ:
         config.pluginmanager.register(Cost(Path(os.environ[FOLDER])), "suite-cost")
 
@@ -146,10 +147,9 @@ def main() -> int:
     status = 0
     if not options.read:
         folder.mkdir(parents=True, exist_ok=True)
-        more = f"{os.environ.get('PYTEST_ADDOPTS', '')} -p tools.suite_cost"
         begin = time.monotonic()
         status = subprocess.run(
-            options.command, env=os.environ | {FOLDER: str(folder), "PYTEST_ADDOPTS": more}, check=False
+            options.command, env=os.environ | {FOLDER: str(folder.resolve())}, check=False
         ).returncode
         took, clock = _now() - _BORN, time.monotonic() - begin
         print(f"{shlex.join(options.command)}: {took:.0f} s of processor, {clock:.0f} s by the clock")

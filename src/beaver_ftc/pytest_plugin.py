@@ -26,7 +26,6 @@ _OF_A_RESULT = (
     ("sweep.json", "results.parquet"),
 )
 _COMPLETES = "completes"
-_NO_MAPPING = ("is empty", "is not a mapping")  # a YAML file of another tool
 _NEAR = 0.8
 
 
@@ -100,7 +99,7 @@ def _kind_by_its_keys(path: Path, named: bool, all_of_them: bool) -> "type[Flown
     try:
         keys = list(parse_document(read_file(path, str(path)), str(path)).data)
     except ScenarioError as error:
-        none = all(problem.says.startswith(_NO_MAPPING) for problem in error.problems)
+        none = all(problem.no_mapping for problem in error.problems)  # a YAML file of another tool
         return ScenarioFile if all_of_them and not none else None
     if not {"base", "vary"}.isdisjoint(keys):
         return SweepFile if named and not {"vary", "runs", "set"}.isdisjoint(keys) else None

@@ -6,10 +6,11 @@ from typing import Annotated, Any, Literal
 import pytest
 from pydantic import Discriminator, Field, Tag
 
-from beaver_ftc.documents import validation
+from beaver_ftc.documents import problems, validation
 from beaver_ftc.documents.base import Flag, Number, Section, Whole, entry, number, order_conflicts
 from beaver_ftc.documents.document import MAX_PROBLEMS, Document, Problem
 from beaver_ftc.documents.errors import nearest, suggestion
+from beaver_ftc.documents.files import AbsentFileError
 from beaver_ftc.documents.problems import ScenarioError, key_path, one_line
 from beaver_ftc.documents.validation import parse_document, validate
 
@@ -281,3 +282,40 @@ def test_a_value_with_a_unit_and_no_description():
 )
 def test_three_letters_are_a_beginning_and_two_are_none(given, meant):
     assert nearest(given, ["rudder", "filtered_elevator"]) == meant
+
+
+MISTAKES = """
+closd: 2.0
+names: {}
+animal: {type: bea, legz: 3, sting: 1}
+choice: thrid
+"""
+
+
+def _repairs(text):
+    with pytest.raises(ScenarioError) as caught:
+        validate(Zoo, parse_document(text, "zoo.yaml"), "zoo.yaml")
+    return [(one.line, one.location, one.unknown_key, one.meant) for one in caught.value.problems]
+
+
+def test_nothing_follows_from_the_words_of_a_mistake(monkeypatch):
+    """What a mistyped key or type hides is found, however a message is put."""
+    before = _repairs(MISTAKES)
+    assert (4, ("animal", "legz"), True, "legs") in before
+    assert (4, ("animal", "type"), False, "bee") in before
+    said = problems._Said
+
+    def reworded(text, *rest, **named):
+        return said(f"({text.upper().replace(' ', '_')})", *rest, **named)
+
+    monkeypatch.setattr(problems, "_Said", reworded)
+    assert _repairs(MISTAKES) == before
+
+
+def test_of_a_file_that_is_not_there_no_words_are_read(tmp_path, monkeypatch):
+    def absent(*_):
+        raise AbsentFileError("gone")
+
+    monkeypatch.setattr(validation, "read_text", absent)
+    with pytest.raises(ScenarioError, match="in its place"):
+        validation.text_of(tmp_path / "x", 10, if_absent=lambda: "in its place")

@@ -154,7 +154,7 @@ def _row_of(array, i):
     from beaver_ftc.compiled.target import borrowed_row
 
     def row(array, i):
-        return borrowed_row(array, i)
+        return borrowed_row(array, i)  # type: ignore[call-arg]
 
     return row
 

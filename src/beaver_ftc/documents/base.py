@@ -59,6 +59,12 @@ def refuse(conflicts: Iterable[Conflict]) -> None:
         raise PydanticCustomError("conflict", "contradictory values", {"conflicts": found})
 
 
+def refuse_unknown(keys: Iterable[Any], known: Iterable[str]) -> None:
+    """Raise if there are keys of a mapping that are none of those known."""
+    if unknown := list(keys):
+        raise PydanticCustomError("unknown_keys", "unknown keys", {"unknown": unknown, "known": list(known)})
+
+
 def deny(says: str, *at: int | str) -> NoReturn:
     """Raise what is wrong with a value, or with what is below it at these keys."""
     raise PydanticCustomError("conflict", "contradictory values", {"conflicts": [(at, says)]})

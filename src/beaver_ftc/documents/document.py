@@ -1,8 +1,8 @@
 """YAML text to plain data that remembers its lines.
 
 The tree is built from libyaml's event stream, so nothing but mappings, lists, texts, numbers, truth values
-and null can come out, and a hostile file is stopped while it is read: nesting (which a composer that recurses
-freely crashes on), size and alias expansion are bounded.
+and null can come out, and a hostile file is stopped while it is read: nesting, size and alias expansion are
+bounded. No library does that: PyYAML's composer, whose nodes have lines too, ends the process by recursion.
 
 Anchors and aliases are read, because repeating a value by name is what YAML users do, but what they expand to
 counts towards the bound: an alias bomb ends at MAX_NODES. Merge keys (`<<`) and tags are not read.
@@ -44,6 +44,9 @@ class Problem:
     line: int
     location: Location
     says: str
+    unknown_key: bool = field(default=False, compare=False)  # the last key of the location is no key there
+    meant: str | None = field(default=None, compare=False)  # the key or value that was meant, if one is near
+    no_mapping: bool = field(default=False, compare=False)  # the whole document is nothing with keys
 
 
 class MalformedDocumentError(Exception):

@@ -30,9 +30,13 @@ class SimulationFailed(BeaverFtcError):
 def suggestion(given: str, known: Iterable[str], cutoff: float = 0.6) -> str:
     """`, did you mean x?` if something known is near to what was given, and what is allowed."""
     names = list(known)
-    near = nearest(given, names, cutoff)
-    hint = f", did you mean {near}?" if near else ","
-    return f"{hint} allowed: {', '.join(names)}"
+    return hint(nearest(given, names, cutoff), names)
+
+
+def hint(near: str | None, known: Iterable[str]) -> str:
+    """The same of a name that is known to be near, if there is one."""
+    meant = f", did you mean {near}?" if near else ","
+    return f"{meant} allowed: {', '.join(known)}"
 
 
 def nearest(given: str, names: Iterable[str], cutoff: float = 0.6) -> str | None:

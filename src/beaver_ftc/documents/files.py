@@ -14,6 +14,10 @@ class UnreadableError(Exception):
         self.line = line
 
 
+class AbsentFileError(UnreadableError):
+    """There is no such file."""
+
+
 def read_text(path: Path | str, max_bytes: int) -> str:
     """The whole of a regular UTF-8 file.
 
@@ -38,7 +42,7 @@ def read_bytes(path: Path | str, max_bytes: int) -> bytes:
             _check_kind_and_size(os.fstat(file.fileno()), max_bytes)
             data = file.read(max_bytes + 1)
     except FileNotFoundError:
-        raise UnreadableError("no such file, allowed: the path of a text file") from None
+        raise AbsentFileError("no such file, allowed: the path of a text file") from None
     except IsADirectoryError:
         raise UnreadableError("is a folder, allowed: a text file") from None
     except (OSError, ValueError) as error:

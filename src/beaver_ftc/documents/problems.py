@@ -6,13 +6,13 @@ What is allowed is read from the JSON Schema, the same text an editor shows, so 
 import re
 from collections.abc import Iterator, Sequence
 from difflib import get_close_matches
-from typing import Any
+from typing import Any, NamedTuple
 
 from pydantic import ValidationError
 
 from beaver_ftc.documents.base import Location
 from beaver_ftc.documents.document import MAX_PROBLEMS, Document, Problem, has
-from beaver_ftc.documents.errors import BadInput, nearest, suggestion
+from beaver_ftc.documents.errors import BadInput, hint, nearest
 
 WHOLE_FILE = "(file)"
 _SHOWN = 48
@@ -75,18 +75,39 @@ def problems_of(error: ValidationError, document: Document, schema: dict[str, An
     details = error.errors(include_url=False)
     places = [_in_document(of["loc"], document.data, of["type"] == "missing") for of in details]
     for detail, at in _of_branches_meant(list(zip(details, places, strict=True))):
-        if detail["type"] == "conflict":
-            found = [
-                (_in_document((*at, *below), document.data), says)
-                for below, says in detail["ctx"]["conflicts"]
-            ]
-        elif detail["type"] == "union_tag_not_found" and (near := _near_miss_of_type(detail["input"])):
-            found = [((*at, near), f"unknown key{suggestion(near, ['type'], cutoff=0.5)}")]
-        else:
-            where = (*at, "type") if detail["type"].startswith("union_tag") else at
-            found = [(where, _says(detail, at, document.data, schema))]
-        for where, says in found:
-            yield Problem(document.line(where), where, says)
+        for where, said in _said_of(detail, at, document.data, schema):
+            unknown_key, meant = said.unknown_key, said.meant
+            yield Problem(document.line(where), where, said.text, unknown_key=unknown_key, meant=meant)
+
+
+class _Said(NamedTuple):
+    """What is said of a mistake, and what follows from it: nothing follows from the words."""
+
+    text: str
+    unknown_key: bool = False
+    meant: str | None = None  # what was meant, if something known is near
+
+
+def _said_of(
+    detail: Any, at: Location, data: Any, schema: dict[str, Any]
+) -> Iterator[tuple[Location, _Said]]:
+    """What is said of one of pydantic's errors, and where."""
+    context, kind = detail.get("ctx", {}), detail["type"]
+    if kind == "conflict":
+        for below, says in context["conflicts"]:
+            yield _in_document((*at, *below), data), _Said(says)
+    elif kind == "unknown_keys":
+        for key in context["unknown"]:
+            yield _in_document((*at, key), data), _unknown_key(str(key), context["known"])
+    elif kind == "union_tag_not_found" and (near := _near_miss_of_type(detail["input"])):
+        yield (*at, near), _unknown_key(near, ["type"])
+    else:
+        yield (*at, "type") if kind.startswith("union_tag") else at, _says(detail, at, data, schema)
+
+
+def _unknown_key(key: str, known: Sequence[str]) -> _Said:
+    near = nearest(key, known, cutoff=0.5)
+    return _Said(f"unknown key{hint(near, known)}", True, near)
 
 
 def _of_branches_meant(located: list[tuple[Any, Location]]) -> Iterator[tuple[Any, Location]]:
@@ -118,38 +139,37 @@ def _in_document(loc: Location, data: Any, is_missing: bool = True) -> Location:
     return tuple(location)
 
 
-def _says(detail: Any, location: Location, data: Any, schema: dict[str, Any]) -> str:
+def _says(detail: Any, location: Location, data: Any, schema: dict[str, Any]) -> _Said:
     kind, given = detail["type"], detail["input"]
     if kind == "extra_forbidden":
-        known = _keys(_at(schema, location[:-1], data))
-        return f"unknown key{suggestion(str(location[-1]), known, cutoff=0.5)}"
+        return _unknown_key(str(location[-1]), _keys(_at(schema, location[:-1], data)))
     here = _at(schema, location, data)
     if kind == "missing" and isinstance(detail["loc"][-1], int):
-        return f"too few items, allowed: {_allowed(here)}"
+        return _Said(f"too few items, allowed: {_allowed(here)}")
     if kind in ("missing", "union_tag_not_found"):
         types = [tag for node in here for tag in _types(node)] if kind != "missing" else []
-        return f"required key is missing, allowed: {', '.join(types) or _allowed(here)}"
+        return _Said(f"required key is missing, allowed: {', '.join(types) or _allowed(here)}")
     if kind in ("literal_error", "enum", "union_tag_invalid"):
         return _not_one_of(detail, given, here)
     near = nearest(given, map(str, _choices(here))) if isinstance(given, str) else None
     if near:
-        return f"{_shown(given)} is not known, did you mean {near}? allowed: {_allowed(here)}"
+        return _Said(f"{_shown(given)} is not known{hint(near, [_allowed(here)])}", meant=near)
     items = ", each begun with `- `" if kind in _NO_LIST and isinstance(given, dict) else ""
-    return f"{_wrong(detail, given)}, allowed: {_allowed(here)}{items}"
+    return _Said(f"{_wrong(detail, given)}, allowed: {_allowed(here)}{items}")
 
 
 _NO_LIST = ("list_type", "tuple_type")
 
 
-def _not_one_of(detail: Any, given: Any, here: list[dict[str, Any]]) -> str:
+def _not_one_of(detail: Any, given: Any, here: list[dict[str, Any]]) -> _Said:
     if detail["type"] == "union_tag_invalid":
         given, allowed = detail["ctx"]["tag"], detail["ctx"]["expected_tags"].replace("'", "").split(", ")
-        return f"{_shown(given)} is not known{suggestion(str(given), allowed)}"
-    allowed = list(map(str, _choices(here)))
-    if not allowed:
-        return f"{_shown(given)} is not known, allowed: {detail['ctx']['expected']}"
-    hint = suggestion(given, allowed) if isinstance(given, str) else f", allowed: {', '.join(allowed)}"
-    return f"{_shown(given)} is not known{hint}"
+        near = nearest(str(given), allowed)
+    else:
+        choices = list(map(str, _choices(here)))
+        allowed = choices or [detail["ctx"]["expected"]]
+        near = nearest(given, choices) if isinstance(given, str) else None
+    return _Said(f"{_shown(given)} is not known{hint(near, allowed)}", meant=near)
 
 
 _WRONG_TYPE = ("_type", "_parsing")

@@ -1,6 +1,5 @@
 """From a text to a model: every mistake at once, one line each, at its line in the file."""
 
-import re
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import lru_cache
@@ -20,10 +19,9 @@ from beaver_ftc.documents.document import (
     has,
     parse,
 )
-from beaver_ftc.documents.files import UnreadableError, read_text
+from beaver_ftc.documents.files import AbsentFileError, UnreadableError, read_text
 from beaver_ftc.documents.problems import ScenarioError, problems_of
 
-_MEANT = re.compile(r"did you mean ([^?\s]+)\?")
 _Model = TypeVar("_Model", bound=BaseModel)
 
 
@@ -40,7 +38,7 @@ def parse_document(text: str, source: str, keys: str = "the keys of `beaver-ftc 
         raise ScenarioError(source, [error.problem]) from None
     if not isinstance(document.data, dict):
         says = "is empty" if document.data is None else "is not a mapping"
-        problem = Problem(document.line(()), (), f"{says}, allowed: a mapping with {keys}")
+        problem = Problem(document.line(()), (), f"{says}, allowed: a mapping with {keys}", no_mapping=True)
         raise ScenarioError(source, [*document.problems, problem])
     return document
 
@@ -50,9 +48,7 @@ def text_of(path: Path | str, most_bytes: int, if_absent: Callable[[], str] | No
     try:
         return read_text(path, most_bytes)
     except UnreadableError as error:
-        says = str(error)
-        if if_absent is not None and says.startswith("no such file"):
-            says = if_absent()
+        says = if_absent() if if_absent and isinstance(error, AbsentFileError) else str(error)
         raise ScenarioError(str(path), [Problem(error.line, (), says)]) from None
 
 
@@ -95,19 +91,18 @@ def _repaired(document: Document, problems: Iterable[Problem], known: set[Locati
     data, lines, changed = copied(document.data), dict(document.lines), False
     for problem in problems:
         section, key = _place(data, problem.location)
-        meant = _MEANT.search(problem.says)
         if section is None:
             continue
-        if problem.says.startswith("unknown key"):
+        if problem.unknown_key:
             value = section.pop(key)
-            if meant and meant[1] not in section:
-                section[meant[1]] = value
-                renamed = (*problem.location[:-1], meant[1])
+            if problem.meant and problem.meant not in section:
+                section[problem.meant] = value
+                renamed = (*problem.location[:-1], problem.meant)
                 known.add(renamed)
                 lines |= _moved(lines, problem.location, renamed)
             changed = True
-        elif meant and key == "type":
-            section[key], changed = meant[1], True
+        elif problem.meant and key == "type":
+            section[key], changed = problem.meant, True
     return replace(document, data=data, lines=lines) if changed else None
 
 

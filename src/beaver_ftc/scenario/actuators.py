@@ -7,8 +7,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.documents.base import Number, Section, deny, number, refuse
-from beaver_ftc.documents.errors import suggestion
+from beaver_ftc.documents.base import Number, Section, deny, number, refuse_unknown
 from beaver_ftc.scenario.airframe import checked_aircraft
 
 
@@ -78,6 +77,6 @@ def _by_surface(given: dict[str, Any]) -> dict[str, Any]:
     rest = {key: value for key, value in given.items() if key not in for_all}
     known = (*ActuatorDynamics.model_fields, *surfaces)
     wrong = [key for key in rest if key not in surfaces]
-    refuse([((key,), f"unknown key{suggestion(str(key), known, cutoff=0.5)}") for key in wrong])
+    refuse_unknown(wrong, known)
     own = {surface: rest.get(surface, {}) for surface in surfaces}
     return {surface: {**for_all, **it} if isinstance(it, dict) else it for surface, it in own.items()}

@@ -8,7 +8,7 @@ import pytest
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant import instrumented, model_file
 from beaver_ftc.plant.instrumented import instrument
-from beaver_ftc.plant.model_file import copy_of, files_of, refuse_deeds, with_systems
+from beaver_ftc.plant.model_file import check_model_has_no_side_effects, copy_of, files_of, with_systems
 from kept import page
 
 FILES = {
@@ -82,7 +82,7 @@ def test_the_package_s_files_are_taken_where_there_are_no_own_folders(jet, tmp_p
         "jsbsim/systems/gain.xml": "Systems/gain.xml", "jet/deep/other.xml": "deep/other.xml",
         "jsbsim/engine/direct.xml": "Engines/direct.xml",
     }  # fmt: skip
-    refuse_deeds(jet)  # what the package's own files do is not looked at
+    check_model_has_no_side_effects(jet)  # what the package's own files do is not looked at
     copied = copy_of(jet, tmp_path / "copy")
     assert sorted(str(path.relative_to(tmp_path / "copy")) for path in copied.parent.rglob("*.xml")) == [
         "Engines/direct.xml", "Systems/gain.xml", "deep/other.xml", "jet.xml",
@@ -114,7 +114,7 @@ def test_what_is_wrong_with_a_file(tmp_path, changed):
     for case, text in WRONG.items():
         put(tmp_path / "m" / "m.xml", text)
         try:
-            refuse_deeds(tmp_path / "m" / "m.xml")
+            check_model_has_no_side_effects(tmp_path / "m" / "m.xml")
             found[case] = []
         except BadInput as error:
             found[case] = [line.partition("m.xml:")[2].partition(" (")[0] for line in str(error).splitlines()]
@@ -125,25 +125,25 @@ def test_what_is_beside_an_aircraft_s_file_is_looked_at(jet):
     script = jet.parent / "scripts" / "fly.xml"
     put(script, '<runscript><output name="x"/></runscript>')
     put(jet.parent / "notes.xml", '<notes><output name="x"/></notes>')
-    refuse_deeds(jet)
+    check_model_has_no_side_effects(jet)
     put(jet.parent / "aircraft.yaml", "")
     with pytest.raises(BadInput) as caught:
-        refuse_deeds(jet)
+        check_model_has_no_side_effects(jet)
     (line,) = str(caught.value).splitlines()
     assert line.startswith(f"{script}:1: <output name=")
     script.unlink()
     (jet.parent / "link.xml").symlink_to(jet.parent.parent / "jsbsim" / "engine" / "direct.xml")
     with pytest.raises(BadInput, match=r"link.xml:1: is a link out of the folder"):
-        refuse_deeds(jet)
+        check_model_has_no_side_effects(jet)
 
 
 def test_a_file_that_changed_is_read_again_and_one_that_is_gone_is_said(jet):
-    refuse_deeds(jet)
+    check_model_has_no_side_effects(jet)
     (jet.parent / "Systems" / "more.xml").write_text('<system><input port="3"/></system>')
     with pytest.raises(BadInput, match=r"more.xml:1: <input port="):
-        refuse_deeds(jet)
+        check_model_has_no_side_effects(jet)
     with pytest.raises(BadInput, match=r"none.xml:1: cannot be read, allowed: an XML file"):
-        refuse_deeds(jet.parent / "none.xml")
+        check_model_has_no_side_effects(jet.parent / "none.xml")
 
 
 def test_systems_are_read_in_and_comments_that_come_first_are_descriptions(jet):

@@ -11,7 +11,7 @@ import beaver_ftc as bf
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.paths import data_root
 from beaver_ftc.plant import adapter, model_file, trial
-from beaver_ftc.plant.model_file import refuse_deeds
+from beaver_ftc.plant.model_file import check_model_has_no_side_effects
 
 ROOT = '<fdm_config name="m" version="2.0" release="BETA">{}</fdm_config>'
 
@@ -26,10 +26,10 @@ def model(tmp_path, inside):
 def test_elements_in_elements_are_bounded(tmp_path):
     """The root is one of them."""
     path = model(tmp_path, "<a>" * 99 + "</a>" * 99)
-    refuse_deeds(path)
+    check_model_has_no_side_effects(path)
     path.write_text(ROOT.format("<a>" * 100_000 + "</a>" * 100_000))
     with pytest.raises(BadInput) as caught:
-        refuse_deeds(path)
+        check_model_has_no_side_effects(path)
     (line,) = str(caught.value).splitlines()
     assert line == f"{path}:1: <a> is in more than 100 elements, allowed: up to 100"
 
@@ -38,7 +38,7 @@ def test_elements_in_elements_are_bounded(tmp_path):
 def test_a_model_does_not_start_jsbsim_anew_from_within_a_frame(tmp_path, name):
     path = model(tmp_path, f"<system><output> {name} </output></system>")
     with pytest.raises(BadInput, match=f"m.xml:1: {name} controls JSBSim itself, allowed: other properties"):
-        refuse_deeds(path)
+        check_model_has_no_side_effects(path)
 
 
 def test_files_of_a_folder_are_bounded_in_number_and_size(tmp_path, monkeypatch):
@@ -46,13 +46,13 @@ def test_files_of_a_folder_are_bounded_in_number_and_size(tmp_path, monkeypatch)
     (path.parent / "aircraft.yaml").write_text("")
     for i in range(3):
         (path.parent / f"f{i}.xml").write_text("<a/>")
-    refuse_deeds(path)
+    check_model_has_no_side_effects(path)
     monkeypatch.setattr(model_file, "_MAX_BYTES_OF_A_FOLDER", 20)
     with pytest.raises(BadInput, match=r"m:1: has \S+ MB of XML, allowed: up to 2e-05 MB"):
-        refuse_deeds(path)
+        check_model_has_no_side_effects(path)
     monkeypatch.setattr(model_file, "_MOST_IN_A_FOLDER", 3)
     with pytest.raises(BadInput, match="m:1: has 4 XML files, allowed: up to 3"):
-        refuse_deeds(path)
+        check_model_has_no_side_effects(path)
 
 
 def beaver_with(tmp_path, component):

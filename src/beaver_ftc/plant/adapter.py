@@ -19,7 +19,7 @@ from beaver_ftc.aircraft.units import M_PER_FT, N_PER_LBF
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.documents.paths import data_root
 from beaver_ftc.plant.addresses import available
-from beaver_ftc.plant.model_file import package, refuse_deeds, shared
+from beaver_ftc.plant.model_file import check_model_has_no_side_effects, package, shared
 from beaver_ftc.plant.state import START_LATITUDE_DEG, FlightState
 
 FT_PER_M = 1.0 / M_PER_FT
@@ -86,7 +86,7 @@ def _load(errors: _Errors, model: Path) -> jsbsim.FGFDMExec:
     Raises BadInput for a model that would act on the machine, SimulationFailed with what JSBSim says of one
     it cannot load.
     """
-    refuse_deeds(model)
+    check_model_has_no_side_effects(model)
     jsbsim.set_logger(errors)
     _LISTENING[threading.get_ident()] = errors
     fdm = jsbsim.FGFDMExec(str(data_root()))

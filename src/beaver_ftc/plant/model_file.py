@@ -61,18 +61,18 @@ class _File:
     wrong: list[tuple[int, str]] = field(default_factory=list)
 
 
-def refuse_deeds(model: Path) -> None:
+def check_model_has_no_side_effects(model: Path) -> None:
     """Raise BadInput where a model, a file it is made of or a script beside it would act on the machine.
 
     A line for each: FILE:LINE: what it says, what is allowed. Engines and systems that the jsbsim package
     shares among aircraft are not looked at.
     """
-    lines = list(islice(_deeds(model.resolve()), MAX_PROBLEMS))
+    lines = list(islice(_side_effects(model.resolve()), MAX_PROBLEMS))
     if lines:
         raise BadInput("\n".join(lines))
 
 
-def _deeds(model: Path) -> Iterator[str]:
+def _side_effects(model: Path) -> Iterator[str]:
     folder = model.parent
     used = dict.fromkeys((model, *files_of(model)))
     for path in used:

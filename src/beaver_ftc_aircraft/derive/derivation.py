@@ -38,11 +38,11 @@ from beaver_ftc.plant import (
     SIGNAL_PROPERTIES,
     Plant,
     TrimPoint,
+    check_model_has_no_side_effects,
     copy_of,
     failure_of_trial,
     instrument_model,
     is_known_to_jsbsim,
-    refuse_deeds,
     seen_by_aerodynamics,
     source_of_jsbsim,
     surfaces_of,
@@ -124,7 +124,7 @@ def source_of(reference: str) -> Source:
     if path.is_dir() and (path / f"{path.resolve().name}.xml").is_file():
         path = path / f"{path.resolve().name}.xml"
     if path.suffix == ".xml" and path.is_file():
-        refuse_deeds(path)
+        check_model_has_no_side_effects(path)
         return Source(path.stem, path.resolve())
     raise BadInput(f"{reference[:80]!r} cannot be derived, allowed: {_ALLOWED}")
 

@@ -28,7 +28,7 @@ from beaver_ftc.documents import (
     cache_base,
     parse_document,
 )
-from beaver_ftc.plant import Plant, failure_of_trial, refuse_deeds, translated
+from beaver_ftc.plant import Plant, check_model_has_no_side_effects, failure_of_trial, translated
 from beaver_ftc.plant import trim_plant as trim
 from beaver_ftc.scenario import Bounds
 from beaver_ftc.studies.engine import write_whole
@@ -63,10 +63,10 @@ def _say(line: str) -> None:
 def kept_or_compared(aircraft: Aircraft) -> list[str]:
     """A line for each axis on which the model exceeds what the file declares, found now or earlier.
 
-    Raises BadInput as `refuse_deeds`, and as `compared`; ScenarioError, too, where JSBSim does not survive
-    the model: that is tried in a process of its own.
+    Raises BadInput as `check_model_has_no_side_effects`, and as `compared`; ScenarioError, too, where JSBSim
+    does not survive the model: that is tried in a process of its own.
     """
-    refuse_deeds(aircraft.jsbsim)
+    check_model_has_no_side_effects(aircraft.jsbsim)
     base = cache_base()
     if base is None:
         return _tried_and_compared(aircraft)

@@ -15,7 +15,9 @@ from typer.testing import CliRunner
 from beaver_ftc import __version__, plugins
 from beaver_ftc.cli import main as command_line
 from beaver_ftc.cli.inputs import as_typer_reads, complete_names
+from beaver_ftc.commands import files_of_commands
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.results.writer import FILES_OF_A_RUN
 
 
 @pytest.fixture
@@ -78,6 +80,11 @@ def test_which_commands_fly(changed):
         name: ["plugin" in [each.name for each in command.params], *(command.epilog or "").splitlines()[2:]]
         for name, command in command_line.every_command().items()
     })  # fmt: skip
+
+
+def test_what_a_result_folder_may_hold(changed):
+    """All names that commands declare: a folder that holds another is not replaced."""
+    assert not changed(sorted({*files_of_commands()} | FILES_OF_A_RUN))
 
 
 @dataclass(frozen=True)

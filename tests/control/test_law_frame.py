@@ -162,7 +162,7 @@ def alarmed(known=0, speaks=0, score=2.0):
     fdi["bank"]["output"]["residual"][0, 1] = 0.1 * score
     fdi["fdae"]["network"]["memory"]["weights"], fdi["fdae"]["network"]["output"] = 1.0, 0.0
     fdi["isolation"]["estimator"]["xhat"] = 9.0
-    whole.conclude(fdi, frame["measured"], frame["belief"]["u"], 5.0)
+    whole.conclude(fdi, frame["belief"], frame["measured"], 5.0)
     return fdi
 
 

@@ -12,16 +12,18 @@ GRADE = {"sensors": {"q": {"bias_deg_s": 0.2, "delay_s": 0.1, "bandwidth_rad_s":
 # Beside the change itself: the engine's instruments, chance, and a fault that somebody has found by then.
 GIVEN = {"duration_s": 4.0, "faults": [loss(at_s=0.5, magnitude=0.6)], "seed": 5, "fdi": {"statistical": {}}}
 REFERENCE_AND_COMMAND = {
-    *(f"reference.{name}" for name in ("commanded_rate", "model_rate", "model_acceleration")),
-    *(f"reference.{name}" for name in ("governed_rate", "governed_acceleration")),
-    *(f"surfaces.{name}" for name in ("effectiveness", "offset", "lag")),
-    *(f"allocation.{name}" for name in ("command", "saturated", "hand_over")),
-    *(f"probe.{name}" for name in ("deflection", "probed", "from_s", "to_s")),
+    *(f"reference.output.{name}" for name in ("commanded_rate", "model_rate", "model_acceleration")),
+    *(f"reference.output.{name}" for name in ("governed_rate", "governed_acceleration")),
+    *(f"surfaces.output.{name}" for name in ("target", "effectiveness", "offset", "lag", "given_up")),
+    *(f"surfaces.output.{name}" for name in ("parked", "authority_lost", "unknown")),
+    *(f"allocation.output.{name}" for name in ("command", "saturated", "hand_over")),
+    *(f"allocation.output.{name}" for name in ("lost_share", "transfer_share")),
+    *(f"probe.memory.{name}" for name in ("deflection", "probed", "from_s", "to_s")),
 }
 ENGINE = {
-    "lost", "engaged", "in_use", "moved", "speed", "usual_speed", "attitude", "command", "from_s", "frames",
-    "least", "greatest",
-}  # fmt: skip
+    *(f"memory.{name}" for name in ("lost", "engaged", "moved", "speed", "usual_speed", "attitude")),
+    *(f"output.{name}" for name in ("command", "in_use", "from_s", "frames", "least", "greatest")),
+}
 GOES_ON = {
     "law": {
         *(f"control.{name}" for name in REFERENCE_AND_COMMAND),
@@ -33,7 +35,7 @@ GOES_ON = {
         for name in ("random", "counter", "lagged", "line", "reading", "broken", "fault")
     },
 }  # fmt: skip
-GOES_ON["observer"] = GOES_ON["law"] | {f"control.rejection.{name}" for name in ("begun", "rate", "part")}
+GOES_ON["observer"] = GOES_ON["law"] | {f"control.rejecting.observer.{name}" for name in ("begun", "rate")}
 BEGINS = {
     "law": ("control",),
     "observer": ("control",),
@@ -41,7 +43,7 @@ BEGINS = {
     "sensors": ("instruments",),
 }
 # What the change itself works out, tested below or elsewhere.
-OF_A_LAW = {"control.feedback.integral", "control.rejection.disturbance"}
+OF_A_LAW = {"control.published.memory.integral", "control.rejecting.observer.disturbance"}
 OWN = {
     "law": OF_A_LAW,
     "observer": OF_A_LAW,

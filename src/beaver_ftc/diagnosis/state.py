@@ -6,6 +6,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import record, sized
+from beaver_ftc.diagnosis.schemes.rows import place_of
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.schema import Scenario
 
@@ -35,15 +36,17 @@ def layout_dtype(n: int) -> np.dtype:
     )  # fmt: skip
 
 
-# What several stages go by. authority: whose alarms count; every_type: faults of every type; abrupt: a fault
-# is declared to stay as it is; instants: of JSBSim, in a frame; dt s.
-CONFIG = record(enabled=int, authority=int, every_type=int, abrupt=int, instants=int, dt=float)
+# What several stages go by. scheme: place of its kernels (schemes/rows.py); authority: whose alarms count;
+# every_type: faults of every type; abrupt: a fault is declared to stay as it is; instants: of JSBSim, in a
+# frame; dt s.
+CONFIG = record(enabled=int, scheme=int, authority=int, every_type=int, abrupt=int, instants=int, dt=float)
 
 
 def configure(shared: np.void, scenario: Scenario) -> None:
     """Fill what several stages go by (dtype CONFIG)."""
     config = scenario.fdi
     shared["enabled"], shared["dt"] = config.diagnoses, 1.0 / scenario.rate_hz
+    shared["scheme"] = place_of(config.scheme)
     shared["authority"], shared["every_type"] = _AUTHORITIES[config.authority], config.fault_class == "all"
     shared["abrupt"], shared["instants"] = config.fault_profile == "abrupt", scenario.substeps
 

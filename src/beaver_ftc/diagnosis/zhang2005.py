@@ -39,8 +39,9 @@ NETWORK = record(
     output=3,
 )
 
-# in_use: whether this scheme diagnoses; constant: rad/s, in the place of all adaptive thresholds, or 0.
-CONFIG = record(in_use=int, dead_zone=int, constant=float)
+# dead_zone: whether the network waits for a residual outside the threshold; constant: rad/s, in the place of
+# all adaptive thresholds, or 0.
+CONFIG = record(dead_zone=int, constant=float)
 PUBLISHED = record(config=CONFIG, network=NETWORK)
 
 
@@ -61,7 +62,7 @@ def configure(fdi: np.void, scenario: Scenario, travel: np.ndarray) -> None:
     rad: the stops."""
     config, dt, isolation = scenario.fdi, 1.0 / scenario.rate_hz, fdi["isolation"]
     option, published = settings(DETECTORS, config.scheme, config.options), fdi["published"]
-    published["config"]["in_use"], published["config"]["dead_zone"] = 1, option["dead_zone"]
+    published["config"]["dead_zone"] = option["dead_zone"]
     limit = option["network_limit_rad_s2"] if option["projection"] else np.inf
     configure_network(published["network"], option["network_gain"], limit, travel[:, fdi["layout"]["main"]])
     fdi["fdae"]["config"]["decay"] = fdi["bank"]["config"]["decay"][0] = euler(

@@ -20,7 +20,7 @@ from beaver_ftc.control.laws import table
 from beaver_ftc.control.outer.autopilot import judge, steer
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, unanticipated_pitch
 from beaver_ftc.diagnosis import assessment as assessed
-from beaver_ftc.diagnosis import conclusion, scheme, zhang2005
+from beaver_ftc.diagnosis import conclusion, scheme
 from beaver_ftc.diagnosis.assessment import assess, assess_unknown
 from beaver_ftc.diagnosis.belief import air
 from beaver_ftc.diagnosis.belief.expectation import (
@@ -37,7 +37,8 @@ from beaver_ftc.diagnosis.detection import bank, fdae, parity, statistical
 from beaver_ftc.diagnosis.detection.signatures import sign_blocks
 from beaver_ftc.diagnosis.isolation import by_chance, estimators
 from beaver_ftc.diagnosis.monitors import engine_symmetry, sensor_monitor
-from beaver_ftc.diagnosis.state import PITCH, STATISTICS, UNANTICIPATED, WORST_CASE, YAW
+from beaver_ftc.diagnosis.schemes import table as schemes
+from beaver_ftc.diagnosis.state import PITCH, STATISTICS, WORST_CASE
 from beaver_ftc.diagnosis.types import examine, verdict
 from beaver_ftc.loop import accounts, log_row
 from beaver_ftc.loop.log_row import put
@@ -122,7 +123,7 @@ def diagnose(frame):
             bank.align(fdi.isolation, frame.belief.G)
         differences = frame.control.power.output.command[1:]
         engine_symmetry.disable_if_differential_thrust(fdi.engines, differences)
-        conclude(fdi, frame.measured, frame.belief.u, frame.t)
+        conclude(fdi, frame.belief, frame.measured, frame.t)
     make_ready(frame, k)
 
 
@@ -165,30 +166,7 @@ def predict(frame, k):
     if chances.tests.enabled:
         form_innovation(belief, x, dt)
         statistical.follow_rest(chances.block, chances.air, belief.innovation_after_known_faults, dt)
-    if fdi.published.config.in_use:
-        predict_as_published(fdi, x_then, mean.acceleration)
-        return
-    leaking = found.isolated >= 0 or found.lead >= 0
-    fdae.predict(fdi.fdae, bound, x_then, belief.expected, known, leaking, dt)
-
-
-@apart
-def predict_as_published(fdi, x_then, acceleration):
-    """Bring the FDAE and its network to this frame, as published: x_then (3,) rad/s as the elapsed one began,
-    acceleration (3,) rad/s2 in it."""
-    published, dt = fdi.published, fdi.config.dt
-    zhang2005.approximate(published, fdi.fdae, fdi.verdict.detected, dt)
-    fdae.predict(fdi.fdae, fdi.bound, x_then, acceleration, False, False, dt)
-    if published.config.constant > 0.0:
-        hold_thresholds(fdi, published.config.constant)
-
-
-@kernel
-def hold_thresholds(fdi, constant):
-    """Replace all adaptive thresholds by a constant, rad/s."""
-    fdae.hold_threshold(fdi.fdae, constant)
-    bank.hold_threshold(fdi.bank, constant)
-    estimators.hold_thresholds(fdi.isolation, constant)
+    schemes.predict(config.scheme, fdi, belief)
 
 
 @apart
@@ -213,8 +191,8 @@ def compare_likelihoods(frame, k):
 
 
 @kernel
-def conclude(fdi, measured, u, t):
-    """From residuals to alarm, and from then on to a verdict. u (n,) rad: where healthy surfaces are.
+def conclude(fdi, belief, measured, t):
+    """From residuals to alarm, and from then on to a verdict.
 
     Where instruments are watched, a surface waits a frame after the alarm: that much later the attitude shows
     what a gyro did; a blurred one, later. Once it or an engine is found broken, no surface is named.
@@ -223,13 +201,7 @@ def conclude(fdi, measured, u, t):
         return
     known, every_type = fdi.verdict.detected, fdi.config.every_type
     fdae.form_residual(fdi.fdae, measured.x)
-    if fdi.published.config.in_use:
-        axis = zhang2005.detect(fdi.fdae)
-        zhang2005.respond(fdi.published, fdi.fdae, fdi.layout.main, measured.x, measured.y, u)
-    else:
-        axis = detect(fdi, measured.y, t)
-    if axis >= 0:
-        conclusion.latch_alarm(fdi.verdict, axis, t)
+    schemes.detect(fdi.config.scheme, fdi, belief, measured, t)
     if not fdi.verdict.detected:
         return
     if not known:
@@ -237,19 +209,7 @@ def conclude(fdi, measured, u, t):
     sound = not sensor_monitor.shown_from_the_start(fdi.watch, fdi.verdict.detected_at_s)
     if sound and sensor_monitor.clears_surfaces(fdi.watch, known) and not fdi.engines.output.failed:
         isolate(fdi, measured.x, t, known)
-    if not fdi.published.config.in_use:
-        fdae.evaluate(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
-
-
-@kernel
-def detect(fdi, y, t):
-    """The axis on which a detector raises the alarm, or -1. An engine that has failed is outside the class:
-    no surface is isolated then. y: measured signals."""
-    apart, found = fdi.bound.error_map.apart_now, fdi.verdict
-    if not found.detected and engine_symmetry.detect(fdi.engines, apart, y):
-        conclusion.note_isolated(found, UNANTICIPATED, t)
-        return YAW
-    return fdae.detect(fdi.bank, fdi.config.authority, fdi.statistical.alarm)
+    schemes.evaluate(fdi.config.scheme, fdi, measured)
 
 
 @kernel

@@ -17,6 +17,7 @@ from beaver_ftc.control.laws.rows import has_kernels, row_of
 from beaver_ftc.design.context import Context, DesignFunctions
 from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
 from beaver_ftc.diagnosis.bounds.variances import variances_of
+from beaver_ftc.diagnosis.schemes.rows import PLUGGED
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.documents.errors import BeaverFtcError, SimulationFailed
 from beaver_ftc.loop import stepping as stages
@@ -259,9 +260,8 @@ def plugged(
     if detector is not None:  # no built-in isolation; instead, one estimator a surface for its verdict
         fdi = frames["fdi"][0]
         fdi["config"]["enabled"] = fdi["config"]["every_type"] = fdi["isolation"]["config"]["n"] = 0
-        fdi["statistical"]["tests"]["enabled"] = fdi["watch"]["enabled"] = fdi["published"]["config"][
-            "in_use"
-        ] = 0
+        fdi["statistical"]["tests"]["enabled"] = fdi["watch"]["enabled"] = 0
+        fdi["config"]["scheme"] = PLUGGED
         n = fdi["types"]["surface"].size
         fdi["isolation"]["estimator"]["surface"][:n] = range(n)
     control = frames["control"][0]

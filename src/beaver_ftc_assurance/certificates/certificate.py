@@ -17,6 +17,7 @@ import numpy as np
 from beaver_ftc.design import AXES
 from beaver_ftc.diagnosis import LOSS
 from beaver_ftc.diagnosis.detection import poles_of
+from beaver_ftc.diagnosis.schemes import place_of
 from beaver_ftc.diagnosis.types import TYPE_WORDS as WORDS
 from beaver_ftc.documents import BadInput
 from beaver_ftc.loop import LogSink
@@ -282,11 +283,8 @@ def statements(
     alarm, fdi = events["detected"], tape.alarm["fdi"]
     about: Document = {"what": None, "column": "detected", "frame": alarm}
     watch = instruments_say.of_alarm(fdi["watch"]) if fdi["watch"]["alarmed"] else None
-    if (
-        not fdi["isolation"]["config"]["n"]
-        or not fdi["config"]["enabled"]
-        or fdi["published"]["config"]["in_use"]
-    ):
+    config, ours = fdi["config"], place_of("adaptive-estimators")
+    if not fdi["isolation"]["config"]["n"] or not config["enabled"] or config["scheme"] != ours:
         yield about | (watch or {"because": "another scheme was in charge"})
         return
     said = _stated(_of_alarm(scenario, tape, history, alarm), history, chance.NOT_STATED, **about)

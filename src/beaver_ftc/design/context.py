@@ -39,7 +39,7 @@ _ZEROS = {shape: partial(np.zeros, shape) for shape in (0, 3, 4, 7, (3, 3))}
 
 @dataclass(frozen=True)
 class DeclaredErrors:
-    """Errors that a plug-in reckons with beside the published bounds; all zero where nothing is declared.
+    """Declared errors beside the published bounds, as a plug-in is given them; zero where none is declared.
 
     noise, bias, resolution, slope (7,): of the instruments, in the order of SIGNALS, SI; noise is the
     standard deviation of a sample. gust_rad_s, gust_time_s (3,): rotation of the air about each axis,

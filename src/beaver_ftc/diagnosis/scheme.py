@@ -65,7 +65,7 @@ def configure(fdi: np.void, belief: np.void, scenario: Scenario, travel: np.ndar
 
 def _check_pairs(scenario: Scenario) -> None:
     """Raises BadInput where a change in flight declares errors with which pairs are not available."""
-    if why := pairs_refused(scenario.fdi.bounds.sensors, scenario.airframe):
+    if why := pairs_refused(Declared.of(scenario).sensors.declared, scenario.airframe):
         raise BadInput(f"{scenario.name}: fdi.pairs: {why}, allowed: false")
 
 

@@ -125,7 +125,9 @@ def _declared(fault: DeclaredFault) -> model.DeclaredFault:
 def _first(truth: Truth) -> model.Fault | None:
     """The earliest declared fault."""
     first = truth.first
-    return first and model.Fault(first.actuator, first.type, first.at_s, sensor=first.sensor)
+    if first is None:
+        return None
+    return model.Fault(first.actuator, first.type, first.at_s, sensor=first.sensor)
 
 
 def _detection(flight: "Landing", truth: Truth) -> model.Detection:

@@ -14,9 +14,7 @@ Document = dict[str, Any]  # a section as JSON has it
 Span = tuple[float, float]
 
 
-def _if_known() -> Any:
-    """A key that the document has only where its value is known."""
-    return field(default=None, metadata={"left_out": True}, kw_only=True)
+_IF_KNOWN = {"left_out": True}  # a key that the document has only where its value is known
 
 
 @dataclass(frozen=True)
@@ -26,7 +24,8 @@ class Part:
     @classmethod
     def of(cls, document: Mapping[str, Any]) -> Self:
         """From a section as JSON has it; a key that is not there is None, or an empty list."""
-        return cls(**{name: _read(hint, document.get(name)) for name, hint in _hints(cls).items()})
+        part: Any = cls
+        return cls(**{name: _read(hint, document.get(name)) for name, hint in _hints(part).items()})
 
     def document(self) -> Document:
         """The section, key by key."""
@@ -38,7 +37,7 @@ class Part:
 
 
 @cache
-def _hints(part: type[Part]) -> dict[str, Any]:
+def _hints(part: Any) -> dict[str, Any]:
     return get_type_hints(part)
 
 
@@ -91,7 +90,7 @@ class Fault(Part):
     which has a sensor."""
 
     actuator: str | None
-    sensor: str | None = _if_known()
+    sensor: str | None = field(default=None, metadata=_IF_KNOWN, kw_only=True)
     type: str
     at_s: float
 
@@ -232,7 +231,7 @@ class Change(Part):
     sensors: bool
     detection_time_s: float | None
     isolated: str | None
-    false_alarm: bool | None = _if_known()
+    false_alarm: bool | None = field(default=None, metadata=_IF_KNOWN, kw_only=True)
     renewed: bool = True
 
     def document(self) -> Document:
@@ -279,12 +278,12 @@ class AxisAuthority(Part):
 
     given_share: float
     beyond_s: float
-    least_rad_s2: float | None = _if_known()
-    greatest_rad_s2: float | None = _if_known()
-    healthy_least_rad_s2: float | None = _if_known()
-    healthy_greatest_rad_s2: float | None = _if_known()
-    engines_least_rad_s2: float | None = _if_known()
-    engines_greatest_rad_s2: float | None = _if_known()
+    least_rad_s2: float | None = field(default=None, metadata=_IF_KNOWN, kw_only=True)
+    greatest_rad_s2: float | None = field(default=None, metadata=_IF_KNOWN, kw_only=True)
+    healthy_least_rad_s2: float | None = field(default=None, metadata=_IF_KNOWN, kw_only=True)
+    healthy_greatest_rad_s2: float | None = field(default=None, metadata=_IF_KNOWN, kw_only=True)
+    engines_least_rad_s2: float | None = field(default=None, metadata=_IF_KNOWN, kw_only=True)
+    engines_greatest_rad_s2: float | None = field(default=None, metadata=_IF_KNOWN, kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -350,7 +349,7 @@ class Expectation(Part):
     passed: bool
     expected: Any
     actual: Any
-    reason: str | None = _if_known()
+    reason: str | None = field(default=None, metadata=_IF_KNOWN, kw_only=True)
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from beaver_ftc.diagnosis.state import IN_PITCH
 from beaver_ftc.diagnosis.types import sets, table
 from beaver_ftc.diagnosis.types.contract import NOTHING, FaultType, Kernel
 from beaver_ftc.diagnosis.types.observation import OBSERVATION
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 
 BLOCK_S = 0.2  # to be examined at once where gyros are noisy: short beside the slowest half-cycle, 3.1 s
@@ -200,7 +201,7 @@ def configure(
 ) -> None:
     """Fill in what the types go by, and what they know of each surface's actuator; travel (2, n) rad."""
     config, shared, dt = scenario.fdi, types["config"], 1.0 / scenario.rate_hz
-    shared["length"] = block = ceil(BLOCK_S / dt) if config.bounds.sensors.gyros_vary else 1
+    shared["length"] = block = ceil(BLOCK_S / dt) if Declared.of(scenario).sensors.declared.gyros_vary else 1
     shared["whole"], shared["span_s"] = scenario.substeps == 1 and block == 1, block * dt
     shared["patience"] = ceil(pi / config.slowest_oscillation_rad_s / (block * dt))
     shared["instants"], shared["returns"], shared["dt"] = scenario.substeps, actuators["real"], dt

@@ -1,19 +1,20 @@
-"""Show the elapsed frame, or block of frames, to every type: where was each surface, and was anything wrong?
+"""Hold every type against the elapsed frame, or block of frames: where was each surface, was anything wrong?
 
-A frame is judged when the next one is there: with several JSBSim frames in one of ours a fault may begin or
-end within a frame, which then shows a part of it; such a frame, next to a healthy one, is passed over.
+A frame is judged one frame later: with several JSBSim frames in one of ours a fault may begin or end within a
+frame, which then shows a part of it; such a frame, next to a healthy one, is skipped.
 
-Where a gyro's noise makes a single frame say little, frames are examined in blocks. Summed over a block the
-innovation holds the noise of its two ends alone, n[k+N] - n[k]. So the mean over N frames has the bound
+Where the noise of a gyro makes single frames uninformative, frames are examined in blocks. Summed over a
+block the innovation holds the noise of its two ends alone, n[k+N] - n[k]. So the mean over N frames has the
+bound
 
     mean eta_bar + (nbar[k] + nbar[k+N]) / (N dt)
 
-and with it says where the surface was in the mean, weighted by its effectiveness G, whose sign stays. Of a
-constant position, offset or effectiveness the weighted mean is exact; of what varies it lies between the
-extremes. A block is then to the types what a frame is that consists of several JSBSim frames: one next to a
-healthy one is passed over.
+which gives the mean position of the surface, weighted by its effectiveness G, whose sign stays. The weighted
+mean of a constant position, offset or effectiveness is exact; that of a varying one lies between its
+extremes. To the types a block is like a frame that consists of several JSBSim frames: a block next to a
+healthy one is skipped.
 
-types: of `types_dtype`. estimators: those of the isolation; layout: whose is which. bound: of `bound_dtype`.
+types: of `types_dtype`. estimators: those of the isolation, by the layout. bound: of `bound_dtype`.
 """
 
 import numpy as np
@@ -57,8 +58,8 @@ def begin(surface):
 
 @kernel
 def note_orders(types, commanded, means):
-    """What the surfaces have been ordered to do, commanded (n,) rad, since the elapsed frame began; where
-    healthy ones were, and their least and greatest effectiveness, within it: means of a `belief.means_dtype`.
+    """Add a frame to the orders of the surfaces: commanded (n,) rad; positions of healthy surfaces and their
+    least and greatest effectiveness within it: means of a `belief.means_dtype`.
     """
     length = types.config.length
     for s, surface in enumerate(types.surface):
@@ -97,7 +98,7 @@ def take_in(types, layout, estimators, innovation, bound):
 
 @kernel
 def note_evidence(surface):
-    """Count a frame as evidence; see `judge_all` for that which no stop can have hidden."""
+    """Count a frame as evidence, and as evidence since a stop could last hide a swing (`judge_all`)."""
     surface.evidence.frames += 1
     surface.evidence.unhidden += 1
 

@@ -1,21 +1,21 @@
-"""A surface that has been let go: between the fault and health it is where its actuator brings it.
+"""The return of a surface after a repair: between the fault and health its actuator moves it.
 
-A jammed, trailing or runaway surface that is repaired comes back from where it was held, by lag and rate
-limit: for a while it is neither at fault nor where a healthy one would be. The actuator's step a' = f(a) is
-known and rises with a, so the set of positions a that a release within the past can have led to is an
+A jammed, trailing or runaway surface that is repaired (released) returns from where it was held, by lag and
+rate limit: for a while it is neither at fault nor where a healthy one would be. The actuator's step
+a' = f(a) is known and rises with a, so the set of positions a that a past release can have led to is an
 interval, carried along exactly by its ends. A type that no longer holds the surface is excluded only when no
 such return explains the frame either.
 
-There are two such intervals, of earlier and of later releases: see stuck.py for what the second is for.
-Nothing is seen before the alarm, so any release may have gone before it; each frame in which something is
-wrong says where it cannot have led.
+There are two such intervals, of earlier and of later releases: stuck.py says why. Nothing is observed before
+the alarm, so a release may have happened before it; each frame in which something is wrong excludes some
+releases.
 
-Once let go, a type does not take hold again before the surface has been seen healthy.
+After a release a type does not hold the surface again until the surface has been observed healthy.
 
-In a block of frames the release may lie at any instant inside: at each, the surface is where it is held, or
-where the actuator brings it from there.
+In a block of frames the release may happen at any instant of the block: at each instant the surface is where
+it was held, or where the actuator has moved it from there.
 
-What a frame shows of a position a that moves within it is the mean weighted by the effectiveness G then. It
+A frame shows the mean of a moving position a, weighted by the effectiveness G at each instant. This mean
 differs from the plain mean by the covariance of G and a, over the mean of G, so by no more than
 
     (G_max - G_min) / (4 |mean G|)  (a_max - a_min)                                        [Gruess1935]
@@ -29,7 +29,7 @@ from beaver_ftc.diagnosis.types.contract import ANYTHING, NOTHING
 
 EARLIER, LATER = 0, 1
 HELD, RETURNING, REFUTED = range(3)
-# What is nearer to a healthy surface acts as one: it must do less than the bound allows for rounding.
+# A surface nearer than this to a healthy one counts as healthy: its effect is below the rounding bound.
 NOT_BACK_RAD = 1e-14
 
 
@@ -47,7 +47,7 @@ def any_release(surface, which, kind):
 
 @kernel
 def start(surface, kind):
-    """It may have been let go before the alarm, anywhere."""
+    """Allow a release before the alarm, from anywhere in the travel."""
     forget(surface, EARLIER, kind)
     surface.release.low[LATER, kind] = surface.actuator.travel_low
     surface.release.high[LATER, kind] = surface.actuator.travel_high
@@ -62,11 +62,11 @@ def not_held(surface, kind):
 
 @kernel
 def carried(config, surface, held, side=0):
-    """Mean position over the judged frame of a surface that is at `held` (rad) as it begins; and as it ends;
-    and by how much the mean may be off, where the effectiveness changes meanwhile.
+    """Mean position over the judged frame of a surface released at `held` (rad), its position at the end of
+    the frame, and the possible error of the mean where the effectiveness changes meanwhile.
 
-    It is let go as the frame begins; or, with a side, at any instant inside: the least if side < 0, or the
-    greatest.
+    The release is at the beginning of the frame; with a side, at any instant of it: the least mean if
+    side < 0, else the greatest.
     """
     total, count, a, least, greatest = 0.0, 0, held, held, held
     for k in range(config.length):
@@ -83,7 +83,7 @@ def carried(config, surface, held, side=0):
 
 @kernel
 def released_within(config, surface, kind):
-    """Whether a release inside the judged block explains it."""
+    """Whether a release at an instant of the judged block explains the block."""
     held_low, held_high = surface.release.held_low[kind], surface.release.held_high[kind]
     if config.length == 1 or held_low > held_high:
         return False
@@ -94,7 +94,7 @@ def released_within(config, surface, kind):
 
 @kernel
 def possible(config, surface, kind):
-    """Whether a return from this type explains the judged frame; forget those releases that do not."""
+    """Whether a return after this type explains the judged frame; forget the releases that do not."""
     left = released_within(config, surface, kind)
     if not left:
         not_held(surface, kind)
@@ -137,7 +137,7 @@ def renew(surface, kind):
 
 @kernel
 def keep(held, which, kind, low, high):
-    """Take [low, high] for where a return can be; ends that meet may have passed by rounding."""
+    """Replace the interval of a return by [low, high]; rounding may have swapped ends that meet."""
     held.low[which, kind], held.high[which, kind] = min(low, high), max(low, high)
 
 
@@ -166,7 +166,7 @@ def explains(config, surface, kind, least, greatest):
 def beginning(config, surface, k):
     """Where the surface can have been as the judged frame began, (low, high) rad, and which frame shows it.
 
-    With several JSBSim frames in one of ours it may have been let go within it: the frame before is used.
+    With several JSBSim frames in one of ours the release may have been within it: the frame before is used.
     """
     if config.whole:
         return surface.judged.low, surface.judged.high, k
@@ -175,7 +175,7 @@ def beginning(config, surface, k):
 
 @kernel
 def note_release(surface, kind, low, high):
-    """A type that holds the surface between low and high (rad) may let go of it there; none if low > high."""
+    """Add a release from between low and high (rad), where a type may hold the surface, if low <= high."""
     held = surface.release
     not_held(surface, kind)
     if low <= high and not held.released[kind]:
@@ -186,7 +186,7 @@ def note_release(surface, kind, low, high):
 
 @kernel
 def propagate(config, surface, kind):
-    """Carry what has been let go to the next frame; a surface that looks healthy may be held again."""
+    """Carry the intervals of returns to the next frame; a surface that looks healthy may be held again."""
     held = surface.release
     if not surface.judged.wrong:
         held.released[kind] = 0

@@ -22,7 +22,7 @@ def seen(low, high, wrong=None, ordered=0.1, command=0.0):
     )  # fmt: skip
 
 
-SURFACE = {"slowest_step": 0.025, "approach": 0.5, "least_runaway_rate": 2.0}
+SURFACE = {"actuator": {"slowest_step": 0.025, "approach": 0.5, "least_runaway_rate": 2.0}}
 CONFIG = {"instants": 2.0, "length": 1.0, "span_s": 0.05, "whole": True, "patience": 2, "dt": 0.5}
 RULES = {
     # What comes nearer by 0.05 rad a frame at least, and more slowly within 0.05 rad of what was ordered.

@@ -1,7 +1,7 @@
 """An offset, p = u + b, cut off by the stops: constant, or of one sign and never smaller than it was.
 
-At a stop one that grows shows nothing that a runaway does not. How fast they came there tells them apart:
-what runs almost as fast as a runaway counts as one.
+At a stop an offset that grows looks like a runaway. The speed on the way to the stop distinguishes them: an
+offset that grows almost as fast as a runaway counts as one.
 """
 
 import numpy as np
@@ -83,7 +83,7 @@ def begin_growing(surface, kind):
 
 @kernel
 def forget_pace(grown):
-    """Where it is is not known."""
+    """Its offset is not known."""
     grown.least, grown.greatest = -np.inf, np.inf
 
 
@@ -95,7 +95,7 @@ def pace(config, surface):
 
 @kernel
 def widen_growing(config, surface, kind):
-    """A slower one has moved on."""
+    """Widen the interval of the offset by what one that is slower than a runaway moves in a frame."""
     way = pace(config, surface)
     surface.growing_bias.least -= way
     surface.growing_bias.greatest += way
@@ -103,7 +103,7 @@ def widen_growing(config, surface, kind):
 
 @kernel
 def skip_growing(config, surface, kind, k):
-    """It may have gone, and begin anew."""
+    """The fault may have gone, and begin again with any offset."""
     forget_pace(surface.growing_bias)
 
 

@@ -46,7 +46,7 @@ def judge_down(config, surface, kind, k):
 
 @kernel
 def on_release_up(config, surface, kind, k):
-    """It may be let go on its way; within a frame of several instants, further on."""
+    """It may be released on its way; within a frame of several instants, further on."""
     low, high, shown = release.beginning(config, surface, k)
     low = max(low, upwards(config, surface, shown))
     if not config.whole and low <= high:

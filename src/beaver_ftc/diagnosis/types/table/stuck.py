@@ -1,7 +1,7 @@
 """A surface that stays where it is: a jam, p = c anywhere in the travel, or one that trails freely, p = 0.
 
-What was concluded of c while a return from it may already have been on its way is not certain. So the set as
-it was before the earliest return still possible is kept, and comes back when health does.
+Conclusions about c are not certain if the surface may already have been returning after a repair. So the set
+before the earliest return still possible is kept, and is restored when the surface looks healthy.
 """
 
 import numpy as np
@@ -48,7 +48,7 @@ def judge(config, surface, kind, k):
 
 @kernel
 def on_release(config, surface, kind, k):
-    """It may be let go where it is jammed."""
+    """It may be released where it is jammed."""
     renew(surface, kind)
     low, high, _ = release.beginning(config, surface, k)
     release.note_release(
@@ -92,7 +92,7 @@ def judge_float(config, surface, kind, k):
 
 @kernel
 def on_release_float(config, surface, kind, k):
-    """It may be let go at neutral."""
+    """It may be released at neutral."""
     low, high, _ = release.beginning(config, surface, k)
     neutral = within_travel(surface, 0.0)
     release.note_release(surface, kind, max(low, neutral), min(high, neutral))

@@ -57,12 +57,12 @@ TABLE = (
     Exempt(
         r"(beaver-ftc live(?: (?!--open)\S+)*)( --open)?",
         "flies until it is ended, which the page's test does (tests/products/live/page): its address",
-        r"timeout --signal=INT 20 \1 | grep live:.http",
+        r"timeout --signal=INT 10 \1 | grep live:.http",
     ),
     Exempt(
         r"(beaver-ftc sitl \S+ --as ardupilot)",
         "waits for an autopilot, which tests/products/links/sitl has: its address",
-        r"timeout --signal=INT 20 \1 --port 0 --no-report 2>&1 | grep 127.0.0.1",
+        r"timeout --signal=INT 10 \1 --port 0 --no-report 2>&1 | grep 127.0.0.1",
     ),
     Exempt(
         r"beaver-ftc sitl .*",

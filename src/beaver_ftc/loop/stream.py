@@ -80,7 +80,7 @@ class Diagnosis:
         self._frames = assemble(self._scenario, np.zeros(travel.shape[1]), travel)
         self._frame = self._frames[0]
         self._fdi = self._frame["fdi"]
-        self._fdi["balance"]["n"] = 0  # nobody says where levers are
+        self._fdi["engines"]["config"]["n"] = 0  # nobody says where levers are
         self._x, self._command, self._attitude = np.zeros(3), np.zeros(travel.shape[1]), np.zeros(3)
         self._altitude = np.array([self._scenario.initial.altitude_m])
         self._y = np.zeros_like(self._frame["measured"]["y"])  # beyond the aircraft's own signals always zero

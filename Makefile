@@ -18,13 +18,14 @@ PLAIN := tests/design $(wildcard tests/*/test_*_kernels.py tests/*/*/test_*_kern
   $(addprefix tests/control/test_,decisions.py law_frame.py laws.py supervisor.py compiled_rivals.py) \
   tests/control/laws/test_gains.py tests/diagnosis/rivals/test_filters.py
 
-.PHONY: demo check test nightly promises plain acceptance cost test-fast coverage mutants drawn lint docs docs-check site clean help
+.PHONY: demo check test core-test nightly promises plain acceptance cost test-fast coverage mutants drawn lint docs docs-check site clean help
 
 help:
 	@echo "make demo       set up, fly the published elevator case, print the verdict and where the report lies"
 	@echo "make check      the tests that execute the lines you changed: a minute at most"
 	@echo "make test       set up and run every test of every day"
 	@echo "make nightly    all tests with all that they draw, browsers, notebooks, drawn scenarios, mutants"
+	@echo "make core-test  the core's tests, in a copy without the products"
 	@echo "make promises   what is promised, and which tests hold each promise"
 	@echo "make acceptance the installed command from outside: every scenario, page and mistake"
 	@echo "make cost       what a flight costs beside bare JSBSim: no more than a tenth above the recorded revision?"
@@ -69,8 +70,13 @@ nightly: $(VENV)/.dev
 	BEAVER_FTC_NIGHT=1 NUMBA_DISABLE_JIT=1 $(PYTEST) $(PLAIN)
 	BEAVER_FTC_NIGHT=1 $(PYTEST) -m "not acceptance" $(addprefix --ignore=,$(PLAIN))
 	BEAVER_FTC_NIGHT=1 $(MAKE) acceptance
+	$(MAKE) core-test
 	$(BIN)/python -m tools.drawn
 	$(BIN)/python -m tools.mutants --seed $(SEED)
+
+# The core knows none of the products beside it: its tests pass in a copy that has them not.
+core-test: $(VENV)/.dev
+	$(BIN)/python -m tools.core_alone -n $(WORKERS) --dist loadfile -m "not nightly"
 
 check: $(VENV)/.dev
 	$(BIN)/python -m tools.check

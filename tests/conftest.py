@@ -35,7 +35,7 @@ LONGEST = (
     "diagnosis/test_short_flights.py", "live/challenge/test_cheats.py",
     "studies/mismatch/test_command.py", "control/outer/test_thrust_of_others.py", "tools/test_mutants.py",
     "compiled/test_cache.py", "tools/test_site.py", "studies/compare/test_compare.py",
-    "control/test_engines.py", "diagnosis/test_frames_kernels.py", "diagnosis/test_redundancy_kernels.py",
+    "aircraft/test_engines.py", "diagnosis/test_frames_kernels.py", "diagnosis/test_redundancy_kernels.py",
 )  # fmt: skip
 
 

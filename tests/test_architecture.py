@@ -203,7 +203,7 @@ def test_every_public_name_exists_is_used_by_a_product_and_has_a_docstring(folde
     package = import_module(f"{PACKAGE}.{folder}")
     for name in published_by(folder):
         found = getattr(package, name)
-        assert f"{PACKAGE}.{folder}.{name}" in used, name
+        assert f"{PACKAGE}.{folder}.{name}" in used or not PRODUCTS, name
         assert found.__doc__ or not isinstance(found, type | FunctionType), name
         assert name in dir(package)
     with pytest.raises(AttributeError, match=f"module 'beaver_ftc.{folder}' has no attribute 'nothing'"):

@@ -56,10 +56,20 @@ def groups() -> dict[str, str]:
 def summary(target: str) -> str:
     """The first line of its docstring, read from the source."""
     module, _, name = target.partition(":")
-    spec = find_spec(module)
-    source = Path(str(spec.origin)).read_text(encoding="utf-8") if spec else ""
+    file = _source(module)
+    source = file.read_text(encoding="utf-8") if file.is_file() else ""
     found = re.search(rf'^(?:class|def) {name}\b.*?"""(.*?)(?:"""|$)', source, re.DOTALL | re.MULTILINE)
     return found[1] if found else ""
+
+
+def _source(module: str) -> Path:
+    """The file of a module; imports none of the packages that it is in."""
+    package, *below = module.split(".")
+    spec = find_spec(package)
+    if not below or spec is None or not spec.submodule_search_locations:
+        return Path(str(spec.origin if spec else module))
+    place = Path(spec.submodule_search_locations[0], *below)
+    return place / "__init__.py" if place.is_dir() else place.with_suffix(".py")
 
 
 def declare(*files: str, plugins: bool = True) -> Callable[[Any], Any]:

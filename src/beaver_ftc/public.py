@@ -37,7 +37,11 @@ def lazily(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]
 def published(package: str) -> dict[str, tuple[str, str]]:
     """{public name: (module, name there)} of the imports that a package lists under TYPE_CHECKING."""
     tree = ast.parse(Path(str(sys.modules[package].__file__)).read_text(encoding="utf-8"))
-    blocks = (node.body for node in tree.body if isinstance(node, ast.If))
+    blocks = (
+        node.body
+        for node in tree.body
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+    )
     imports = (node for block in blocks for node in block if isinstance(node, ast.ImportFrom))
     return {
         alias.asname or alias.name: (str(node.module), alias.name) for node in imports for alias in node.names

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+import needs
 from beaver_ftc.cli import inputs, output, progress, run, sweep
 from beaver_ftc.cli.output import Format
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFailed
@@ -190,6 +191,7 @@ def test_scenarios_are_told_all_their_mistakes_at_once(tmp_path):
     assert [scenario.name for scenario in inputs.load_all([files[0], "fault-free"])] == ["x", "fault-free"]
 
 
+@needs.service("flightgear")
 @pytest.mark.parametrize(("given", "port"), [
     ("localhost:1", 1), ("localhost:65535", 65535), ("::1:0", None), ("localhost:65536", None),
     ("x:-1", None), (":80", None), ("localhost", None), ("localhost:8 0", None),

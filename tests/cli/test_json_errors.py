@@ -6,19 +6,21 @@ from pathlib import Path
 
 import pytest
 
+import needs
 from commands import beaver
 
 BEAVER = str(Path(sys.executable).parent / "beaver-ftc")
+IDENTIFY = ["identify", "nope.csv", "--vehicle", "nope", "--out", "model.json"]
 
 
 @pytest.mark.parametrize(
     "asked",
     [
         ["compare", "nope"],
-        ["derive", "nope"],
+        pytest.param(["derive", "nope"], marks=needs.command("derive")),
         ["trim", "nope"],
-        ["identify", "nope.csv", "--vehicle", "nope", "--out", "model.json"],
-        ["diagnose", "nope.csv", "--model", "nope.json"],
+        pytest.param(IDENTIFY, marks=needs.command("identify")),
+        pytest.param(["diagnose", "nope.csv", "--model", "nope.json"], marks=needs.command("diagnose")),
         ["run", "nope"],
     ],
     ids=lambda asked: asked[0],

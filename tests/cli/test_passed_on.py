@@ -5,6 +5,7 @@ import re
 from copy import deepcopy
 from dataclasses import fields, is_dataclass
 from importlib import import_module
+from importlib.util import find_spec
 from inspect import signature
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,6 +14,7 @@ from typing import get_args
 import pytest
 
 import commands
+import needs
 from beaver_ftc.cli import catalogue
 from beaver_ftc.cli.main import Row
 from beaver_ftc.commands import registered
@@ -20,12 +22,14 @@ from beaver_ftc.documents.errors import BadInput
 
 
 def test_options_of_all_commands(changed):
-    """Defaults, names, ranges and helps of every option."""
+    """Defaults, names, ranges and helps of every option; of each package by itself."""
     found = {}
     for name, target in registered().items():
         parameters = signature(Row(name, target).read()).parameters.values()
-        found[name] = {each.name: _option(each) for each in parameters}
-    assert not changed(found)
+        options = {each.name: _option(each) for each in parameters}
+        found.setdefault(target.partition(".")[0], {})[name] = options
+    for package, commands_of_it in found.items():
+        assert not changed(commands_of_it, part=package)
 
 
 def _option(parameter):
@@ -316,6 +320,15 @@ ASKED = [
 ]  # fmt: skip
 
 
+def _is_there(asked, instead):
+    """Whether the packages of a command, and of what is put in place, are installed."""
+    packages = {path.partition("__")[0] for path in instead if path.startswith("beaver_ftc_")}
+    words = asked.split()
+    known = {name.partition(" ")[0] for name in registered()}
+    return words[0] in known and all(find_spec(package) for package in packages)
+
+
+ASKED = [(asked, instead) for asked, instead in ASKED if _is_there(asked, instead)]
 KINDS = dict.fromkeys(asked.split()[0] for asked, _ in ASKED)
 
 
@@ -331,6 +344,7 @@ def test_what_is_handed_on_and_answered(beaver, kind, changed):
     )
 
 
+@needs.service("compare_recorded")
 def test_the_picture_beside_a_page_is_renewed(beaver, tmp_path):
     (tmp_path / "images").mkdir()
     beaver("compare --flights recorded --leaderboard page.md", **COMPARE)

@@ -8,6 +8,7 @@ import pytest
 
 import beaver_ftc as bf
 import commands
+import needs
 from beaver_ftc.scenario.loader import load_text
 
 ROOT = Path(__file__).parents[2]
@@ -142,6 +143,7 @@ def test_an_airspeed_that_nothing_can_hold_is_said_at_its_key_by_validate(beaver
     )
 
 
+@needs.service("derive")
 def test_an_aircraft_of_the_package_is_suggested_by_its_name_and_nothing_is_promised(beaver):
     status, _, said = _validated(beaver, "name: x\naircraft: jsbsim:c172\n")
     assert status == 2
@@ -188,6 +190,7 @@ def test_why_a_surface_that_is_named_is_kept_in_use_is_said(beaver):
     assert not any("handed over" in hint for hint in at_once.metrics["hints"])
 
 
+@needs.command("identify")
 def test_a_table_with_a_column_twice_is_bad_input(beaver):
     Path("twice.csv").write_text("t_s,p_rad_s,p_rad_s\n0,0,0\n1,0,0\n")
     vehicle = ROOT / "examples/recorded-flights/flying-wing.yaml"

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+import needs
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plant import conditions, reuse
@@ -225,6 +226,7 @@ def test_what_cannot_be_trimmed_leaves_the_aircraft_to_others():
     assert reuse.borrowed(100.0, 1, plant.aircraft) is plant
 
 
+@needs.service("derive")
 def test_an_aircraft_with_engines_flies_alike_whether_its_trim_is_known_or_searched_for(monkeypatch):
     flight = load({"name": "again", "aircraft": "jsbsim:c172p", "duration_s": 1.5})
     searched_for = flown_in_a_fresh_one(flight, monkeypatch)

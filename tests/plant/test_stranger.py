@@ -13,6 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 import beaver_ftc as bf
+import needs
 from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.adapter import bare
@@ -121,6 +122,7 @@ DEEDS = [
 ]  # fmt: skip
 
 
+@needs.service("compare")
 @pytest.mark.parametrize(("file", "text", "says"), DEEDS)
 def test_what_acts_on_the_machine_is_refused_by_name(machine, file, text, says):
     machine.put(file, text)
@@ -140,6 +142,7 @@ NESTED = {
 }
 
 
+@needs.service("compare")
 def test_a_file_named_by_a_file_that_is_named_is_looked_at(machine):
     for file, text in NESTED.items():
         machine.put(file, text)
@@ -155,9 +158,9 @@ def test_a_file_named_by_a_file_that_is_named_is_looked_at(machine):
         ["linearise", "{scenario}"],
         ["mismatch", "{scenario}"],
         ["matrix", "--aircraft", "{folder}", "--out", "{out}"],
-        ["derive", "{folder}", "--out", "{out}"],
-        ["derive", "{folder}/trainer.xml", "--out", "{out}"],
-        ["live", "{scenario}"],
+        pytest.param(["derive", "{folder}", "--out", "{out}"], marks=needs.command("derive")),
+        pytest.param(["derive", "{folder}/trainer.xml", "--out", "{out}"], marks=needs.command("derive")),
+        pytest.param(["live", "{scenario}"], marks=needs.command("live")),
     ],
     ids=lambda asked: " ".join(asked[:2]),
 )
@@ -172,6 +175,7 @@ def test_no_command_lets_it_act(machine, asked, monkeypatch):
     assert '<output name="' in said
 
 
+@needs.service("compare")
 def test_no_public_function_lets_it_act(machine):
     machine.put("trainer.xml", '<input port="{free}"/>')
     for call in (bf.trim, bf.fly, bf.linearise, bf.load):
@@ -191,6 +195,7 @@ def test_entities_are_not_expanded(machine):
     assert line.endswith("<!DOCTYPE fdm_config> may define entities, allowed: XML without a DOCTYPE")
 
 
+@needs.service("compare")
 def test_a_link_out_of_the_aircrafts_folder_is_refused(machine):
     """Also one that stays below the scenario's own folder."""
     rudder = machine.folder / "Systems" / "rudder.xml"

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 import beaver_ftc as bf
+import needs
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.paths import data_root
 from beaver_ftc.plant import adapter, model_file, trial
@@ -66,6 +67,7 @@ def beaver_with(tmp_path, component):
     return path, scenario
 
 
+@needs.service("compare")
 def test_a_model_that_takes_all_memory_is_refused_and_this_process_goes_on(tmp_path):
     path, scenario = beaver_with(
         tmp_path,

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-TEMPLATE = Path(__file__).parents[3] / "examples" / "my-detector"
+TEMPLATE = Path(__file__).parents[2] / "examples" / "my-detector"
 BEAVER = Path(sys.executable).with_name("beaver-ftc")
 SWEEP = """
 base:

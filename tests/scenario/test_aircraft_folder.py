@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+import needs
 from beaver_ftc.aircraft.loading import load as load_aircraft
 from beaver_ftc.aircraft.loading import read
 from beaver_ftc.documents.errors import BadInput
@@ -47,6 +48,7 @@ PROPERTY = "text of letters, digits, -, ., /, [, ] and _ of at most 200 characte
 STOP = "is out of range, allowed: a number from -3.2 to 3.2"
 
 
+@needs.service("compare")
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
@@ -75,6 +77,7 @@ def test_a_mistake_is_said_at_its_line(folder, old, new, says):
     assert sorted(changed(folder, old, new)) == says
 
 
+@needs.service("compare")
 def test_a_model_that_needs_a_file_that_is_not_there_is_bad_input(folder):
     model = folder / "trainer" / "trainer.xml"
     model.write_text(model.read_text().replace("<aerodynamics>", '<system file="none"/>\n<aerodynamics>', 1))

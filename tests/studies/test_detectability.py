@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
+import needs
 from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
@@ -208,6 +209,7 @@ def test_what_a_line_promises_holds_in_flight(flight):
         assert flown.detection_time_s - struck_s <= 0.5 + 1e-9
 
 
+@needs.service("derive")
 def test_another_aircraft_has_its_own_errors():
     """One of plain JSBSim has no property for the errors of the Beaver's truth."""
     coupled = scenario(duration_s=2.5).with_({"uncertainty.inertia_coupling.p": 0.2})

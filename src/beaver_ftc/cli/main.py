@@ -15,7 +15,6 @@ from typer.core import TyperCommand, TyperGroup
 from beaver_ftc import __version__, commands
 from beaver_ftc.cli.inputs import as_typer_reads
 from beaver_ftc.cli.output import failure_of, report_last, status_of_stop
-from beaver_ftc.cli.study import command_of
 from beaver_ftc.extensions import loaded
 
 
@@ -33,8 +32,11 @@ class Row(TyperCommand):
     def read(self) -> Callable[..., None]:
         """What the row names, as typer reads it."""
         found = loaded(self.target)
-        command = command_of(found) if isinstance(found, type) else found
-        return as_typer_reads(command, getattr(found, "PLUGINS", True))
+        if isinstance(found, type):
+            from beaver_ftc.cli.study import command_of
+
+            return as_typer_reads(command_of(found), getattr(found, "PLUGINS", True))
+        return as_typer_reads(found, getattr(found, "PLUGINS", True))
 
     def whole(self) -> Any:
         """The command with its options and its help; the examples at its end on lines of their own."""

@@ -68,7 +68,6 @@ def run(
     file could not be written.
     """
     from beaver_ftc.loop.loop import fly
-    from beaver_ftc.results import exports as exporting
 
     certificate = required("certificate", "certified")(scenario) if certified else None
     watch = certificate.watch if certificate else None
@@ -89,15 +88,21 @@ def run(
             with _kept_whatever(folder, "report.html", failed):
                 write_report_files(folder, document)
         if "csv" in exports:
+            from beaver_ftc.results.exports import write_csv
+
             with _kept_whatever(folder, "log.csv", failed):
-                exporting.write_csv(log_path, folder / "log.csv")
+                write_csv(log_path, folder / "log.csv")
         if "acmi" in exports and document:
+            from beaver_ftc.results.exports import write_acmi
+
             with _kept_whatever(folder, "flight.acmi", failed):
-                exporting.write_acmi(log_path, document, folder / "flight.acmi", aircraft)
+                write_acmi(log_path, document, folder / "flight.acmi", aircraft)
         if recording is not None:
+            from beaver_ftc.results.exports import write_recording
+
             stops_rad = {s: max(abs(to.min_rad), abs(to.max_rad)) for s, to in aircraft.travel.items()}
             with _kept_whatever(folder, f"the recording ({recording})", failed):
-                exporting.write_recording(log_path, stops_rad, recording, folder, tuple(aircraft.signals))
+                write_recording(log_path, stops_rad, recording, folder, tuple(aircraft.signals))
     if failed:
         why = "; ".join(" ".join(str(error).split()) for error in failed)
         raise NotAllWritten(f"{out / scenario.name}: the flight and its log are kept, but {why}") from failed[

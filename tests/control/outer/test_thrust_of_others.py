@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 
 import beaver_ftc as bf
+import needs
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.schema import Scenario
 from flying import Memory
 
 EXAMPLES = Path(__file__).parents[3] / "examples" / "outer-loops"
+
+pytestmark = needs.service("derive")
 
 
 def flown(autopilot, duration_s=90.0, aircraft="jsbsim:c172p", **keys):

@@ -18,7 +18,6 @@ from beaver_ftc.studies.sweep.campaign import Options, SweepStopped, assignment_
 from beaver_ftc.studies.sweep.one_flight import Keep, as_cell, kind_of, row_of
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan, value_at
 from beaver_ftc.studies.sweep.search import Evolution, members, score
-from beaver_ftc_assurance.certificates.check_certificate import failures
 
 from .conftest import SHORT, sweep_of
 
@@ -69,18 +68,6 @@ def test_a_sweep_and_the_worst_of_it(hired, tmp_path, changed, monkeypatch):
     assert not (folder / "report.html").exists()
     table = pq.read_table(folder / "results.parquet").to_pylist()
     assert not changed({key: value for key, value in table[3].items() if value is not None}, "row")
-
-
-def test_the_flights_kept_have_their_certificates_if_asked(hired, tmp_path):
-    sweep = sweep_of(BRIEF, **{"48": "4"})
-    kept = Keep("selected", frozenset({1}), certified=True)
-    run_sweep(sweep, Options(out=tmp_path, keep=kept, source="brief.yaml", report=False))
-    (folder,) = (tmp_path / "short" / "flights").iterdir()
-    certificate = json.loads((folder / "certificate.json").read_text())
-    table = pq.read_table(folder / "log.parquet")
-    log = {name: table[name].to_numpy() for name in table.column_names}
-    assert [*failures(certificate, log, (folder / "scenario.yaml").read_text())] == []
-    assert bool(certificate["statements"]) == bool(log["detected"].any())
 
 
 def test_a_search_goes_on_from_generation_to_generation(hired, tmp_path, changed):

@@ -1,0 +1,51 @@
+"""What a plain `beaver-ftc run --no-report` imports of our packages: what it flies and keeps, no more."""
+
+import subprocess
+import sys
+
+import pytest
+
+SCENARIO = "name: plain\nduration_s: 0.5\nreference: {q: [{sine: {amplitude_deg_s: 3, frequency_hz: 0.2}}]}\n"
+RUN = """
+import sys
+sys.argv = ["beaver-ftc", "run", "plain.yaml", "--no-report"]
+from beaver_ftc.cli.main import main
+try:
+    main()
+except SystemExit as ended:
+    assert not ended.code
+for name in sorted(sys.modules):
+    if name.partition(".")[0].startswith("beaver_ftc"):
+        print(name, file=sys.stderr)
+"""
+BAR = 90
+# Of the core: other commands, other views of a result, the reports of many flights.
+NOT_FOR_A_RUN = (
+    "beaver_ftc.cli.catalogue", "beaver_ftc.cli.scenarios", "beaver_ftc.cli.study", "beaver_ftc.cli.sweep",
+    "beaver_ftc.diagnosis.rivals.", "beaver_ftc.plant.trial", "beaver_ftc.pytest_plugin",
+    "beaver_ftc.results.exports", "beaver_ftc.results.figures", "beaver_ftc.results.flight",
+    "beaver_ftc.results.report", "beaver_ftc.results.views", "beaver_ftc.studies.",
+)  # fmt: skip
+ALLOWED = ("beaver_ftc.studies.engine", "beaver_ftc.studies.engine.command")  # the options of commands
+
+
+@pytest.fixture(scope="module")
+def imported(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("plain")
+    (folder / "plain.yaml").write_text(SCENARIO)
+    done = subprocess.run([sys.executable, "-c", RUN], cwd=folder, capture_output=True, text=True, check=True)
+    return [line for line in done.stderr.splitlines() if line.startswith("beaver_ftc")]
+
+
+def test_a_run_imports_no_product(imported):
+    assert "beaver_ftc.loop.loop" in imported
+    assert [name for name in imported if name.startswith("beaver_ftc_")] == []
+
+
+def test_a_run_imports_nothing_of_other_commands_and_views(imported):
+    assert [name for name in imported if name.startswith(NOT_FOR_A_RUN) and name not in ALLOWED] == []
+
+
+@pytest.mark.xfail(strict=True, reason="a flight imports the stages of every scheme and law")
+def test_a_run_imports_at_most_as_many_modules_as_it_needs(imported):
+    assert len(imported) <= BAR

@@ -160,9 +160,10 @@ def is_public(target: str) -> bool:
     place, _, name = target.rpartition(".")
     if name.startswith("_") or (place and place not in modules()):
         return False
-    if modules()[place].name != "__init__.py" or not place:
-        return name in getattr(import_module(f"{PACKAGE}.{place}".rstrip(".")), "__all__", ())
-    return name in {*published_by(place), *defined_in(place)}
+    listed = getattr(import_module(f"{PACKAGE}.{place}".rstrip(".")), "__all__", None)
+    if listed is None and modules()[place].name == "__init__.py":
+        return name in {*published_by(place), *defined_in(place)}
+    return name in (listed or ())
 
 
 def published_by(folder: str) -> dict[str, tuple[str, str]]:

@@ -335,6 +335,8 @@ def _package(path):
 
 
 ASKED = [*_are_there(ASKED)]
+
+
 def _kind(asked):
     """The command; of recorded flights by itself."""
     return asked.split()[0] + (" recorded" if "--flights recorded" in asked else "")
@@ -350,9 +352,7 @@ def test_no_command_is_left_out():
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_is_handed_on_and_answered(beaver, kind, changed):
-    assert not changed(
-        {asked: beaver(asked, **instead) for asked, instead in ASKED if _kind(asked) == kind}
-    )
+    assert not changed({asked: beaver(asked, **instead) for asked, instead in ASKED if _kind(asked) == kind})
 
 
 @needs.service("compare_recorded")

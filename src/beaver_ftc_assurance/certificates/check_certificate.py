@@ -329,7 +329,10 @@ class Frames:
         self.x = self.last(self.columns("{}_measured_rad_s"))
         self.F, self.eta_bar = (self.mean(self.columns(f"{{}}_{of}_rad_s2")) for of in ("design", "eta_bar"))
         said, earth = about["declared"], about.get("omega_E", 0.0)
-        c, b, g, o, B, m = (np.array([said[name].get(axis, 0.0) for axis in AXES]) for name in "cbgoBm")
+        c, b, g, o, B, m = (
+            np.array([said[name].get(axis, 0.0) for axis in AXES])  # by axis; what each is: see DECLARED
+            for name in ("c", "b", "g", "o", "B", "m")
+        )
         x = self.columns("{}_measured_rad_s")
         rates = np.abs(x) + (o + m * np.abs(x)) / (1 - m)  # as large as the true rates can be
         self.n = self.last(o - B + m * rates)
@@ -487,7 +490,8 @@ def filtered(term, said, frames, effect, declared):
 
     E[k] = sum of a^(k-j) dt nu[j].d    over j = since + 1 ... k
     """
-    k, first, dt, d = term["frame"], term["first"], frames.dt, np.array(term["d"])
+    k, first = term["frame"], term["first"]
+    dt, d = frames.dt, np.array(term["d"])
     decay = exp(-term["pole_per_s"] * dt) if "pole_per_s" in term else 0.0
     since = term["since"] if "pole_per_s" in term else k - 1
     begun = declared.from_row if frames.length == 1 else 0
@@ -624,49 +628,75 @@ def deflection(bound, place, k, frames, effect):
 
 
 def likelihood(said, frames, declared):
-    """Evidence N against its limit; and the log's share of the level against N's.
+    """Evidence against its limit; and the log's share of the level against the ratio of the two.
 
-    The Kalman filter with the stated variances whitens innovation, signature and constants (columns of Y);
-    w = S^-1 g_s; N = sum w.g, D = sum w.g_s; limit: max(z sqrt D, room + z/2 sqrt D).
+    N = sum w.g and D = sum w.g_s, see `whitened`; limit: max(z sqrt D, room + z/2 sqrt D).
     """
-    k, dt, axes, z = said["first"], frames.dt, said["axes"], said["level"]
-    statistical, n = declared.scenario["fdi"].get("statistical"), len(said["axes"])
+    check_level(said, declared)
+    (N, D, *of_constants, foreseen), room = whitened(said, frames)
+    require(D >= 0, "the evidence has a negative variance")
+    evidence = -N - max(0.0, -foreseen) if said["sense"] == "less" else abs(N)
+    if of_constants:
+        evidence -= said["tolerance"] @ np.abs(of_constants)
+    z = said["level"]
+    limit = max(z * D**0.5, room + z / 2 * D**0.5)
+    require(said["likelihood"] in frames.log, f"the log has no column {said['likelihood']}")
+    logged = float(frames.log[said["likelihood"]][said["frame"]]) * (1 + 1e-5)
+    return [(evidence, limit), (logged, evidence / limit)]
+
+
+def check_level(said, declared):
+    """The scenario has this detector; its rate of false alarms allows the level; no frame is missing."""
+    statistical = declared.scenario["fdi"].get("statistical")
     require(statistical and said["what"] is None, "the scenario declares no statistical detector")
     one_test = statistical["false_alarms_per_h"] / (3600 / declared.dt)
-    require(
-        z >= -NormalDist().inv_cdf(one_test) * (1 - 1e-9), "level: the declared rate allows no smaller one"
-    )
-    require(said["first"] + len(said["frames"]) - 1 == said["frame"] >= said["first"], "frames are missing")
+    least = -NormalDist().inv_cdf(one_test)
+    require(said["level"] >= least * (1 - 1e-9), "level: the declared rate allows no smaller one")
+    last = said["first"] + len(said["frames"]) - 1
+    require(last == said["frame"] >= said["first"], "frames are missing")
     require(said["likelihood"].endswith("_likelihood_share"), "likelihood: this is no share of the level")
-    Y, P = (np.array([[value or 0.0 for value in line] for line in said[name]]) for name in "YP")
-    R = np.array([value or 0.0 for value in said["R"]])
-    eye = np.eye(2 * n, n)
-    sums, swung, paced, stayed, w, last = 0.0, 0.0, 0.0, 0.0, np.zeros(n), 0.0
+
+
+def whitened(said, frames):
+    """Sums over the frames of w.g for each column g, and the room that a bounded drift needs.
+
+    A Kalman filter with the stated variances whitens the columns of Y: innovation, signature g_s, constants.
+    It has two states for each axis, a value and its drift. w = S^-1 g_s, S: covariance of the innovation.
+    """
+    dt, axes, n = frames.dt, said["axes"], len(said["axes"])
+    Y, P, R = (with_zeros(said[name]) for name in ("Y", "P", "R"))
+    values, drifts = slice(None, n), slice(n, None)
+    sums, stayed, swung, paced = 0.0, 0.0, 0.0, 0.0
+    w, last_swing = np.zeros(n), 0.0
     for k, its in enumerate(said["frames"], said["first"]):
-        inputs = np.stack(
-            [frames.nu[k, axes] - its.get("air", 0), its["signature"], *its.get("known", [])], 1
-        )
-        Q = np.pad(np.diag(its["jitter"]), (0, n)) + np.pad(its["drift"], (n, 0))
-        forgets, bounded = 1 - its.get("keep", 1), np.array(its.get("bounded", [0] * n))
-        step = np.kron([[1, dt], [0, 1 - forgets]], eye[:n])
-        Y, P = step @ Y + dt * eye @ inputs, step @ (P + Q) @ step.T
-        inverse = np.linalg.inv(P[:n, :n] + np.diag(R))
-        K, before, w = P[:, :n] @ inverse, w, inverse @ Y[:n, 1]
-        sums = sums + w @ np.column_stack([Y[:n], its.get("foreseen", np.zeros(n))])
-        swing = 1.2 * np.abs(np.linalg.pinv(K[n:])) @ bounded
-        swung, last = swung + swing @ np.abs(w - before), swing @ np.abs(w)
-        paced += its.get("pace", 1e9) * last
-        stays = forgets * bounded / (np.diag(K) * forgets / dt + np.diag(K[n:]))
-        stayed += stays @ np.abs(w)
-        Y, P = Y - K @ Y[:n], P - K @ P[:n]
-    N, D, *R_of_constants, foreseen = np.asarray(sums)
-    evidence = -N - max(0.0, -foreseen) if said["sense"] == "less" else abs(N)
-    evidence -= said["tolerance"] @ np.abs(R_of_constants) if R_of_constants else 0.0
-    require(D >= 0, "the evidence has a negative variance")
-    limit = max(z * D**0.5, stayed + min(swung + last, paced) + z / 2 * D**0.5)
-    require(said["likelihood"] in frames.log, f"the log has no column {said['likelihood']}")
-    logged = float(frames.log[said["likelihood"]][k]) * (1 + 1e-5)
-    return [(evidence, limit), (logged, evidence / limit)]
+        # Prediction: the frame's inputs come in, and the drift forgets a part of itself.
+        innovation = frames.nu[k, axes] - its.get("air", 0)
+        inputs = np.stack([innovation, its["signature"], *its.get("known", [])], 1)
+        forgets = 1 - its.get("keep", 1)
+        step = np.kron([[1, dt], [0, 1 - forgets]], np.eye(n))
+        noise = np.pad(np.diag(its["jitter"]), (0, n)) + np.pad(its["drift"], (n, 0))
+        Y = step @ Y + dt * np.eye(2 * n, n) @ inputs
+        P = step @ (P + noise) @ step.T
+        # Weights of this frame's innovation.
+        inverse = np.linalg.inv(P[values, values] + np.diag(R))
+        K = P[:, values] @ inverse
+        before, w = w, inverse @ Y[values, 1]
+        sums = sums + w @ np.column_stack([Y[values], its.get("foreseen", np.zeros(n))])
+        # Room: a drift that stays at its bound, and one that swings from one end to the other.
+        bounded = np.array(its.get("bounded", [0] * n))
+        swing = 1.2 * np.abs(np.linalg.pinv(K[drifts])) @ bounded
+        swung += swing @ np.abs(w - before)
+        last_swing = swing @ np.abs(w)
+        paced += its.get("pace", 1e9) * last_swing
+        stayed += forgets * bounded / (np.diag(K) * forgets / dt + np.diag(K[drifts])) @ np.abs(w)
+        # Correction.
+        Y, P = Y - K @ Y[values], P - K @ P[values]
+    return np.asarray(sums), stayed + min(swung + last_swing, paced)
+
+
+def with_zeros(values):
+    """An array of a list, or of a list of lists, null as 0."""
+    return np.array([with_zeros(one) if isinstance(one, list) else one or 0.0 for one in values])
 
 
 def like_the_alarm(said, about, frames):

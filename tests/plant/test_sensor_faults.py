@@ -6,7 +6,7 @@ import pytest
 from beaver_ftc.plant.faults import NEVER, SensorFaultSchedule
 from beaver_ftc.plant.instruments import N_SENSORS, SENSORS, break_all, instruments_dtype
 from beaver_ftc.scenario.loader import load
-from beaver_ftc.scenario.sensors import QUANTITIES, Sensors
+from beaver_ftc.scenario.sensors import N_IN_EQUATIONS, QUANTITIES, ROWS, Sensors
 
 
 def schedule_of(*faults, rate_hz=100.0):
@@ -84,4 +84,6 @@ def test_an_accelerometer_s_fault_is_in_metres_a_second_squared():
 
 def test_instruments_are_those_of_the_contract_in_its_order():
     assert tuple(Sensors.model_fields) == SENSORS
+    assert SENSORS[:N_IN_EQUATIONS][-3:] == ("ax", "ay", "az")
+    assert all(row.truth[0] and row.column and row.equal for row in ROWS[N_IN_EQUATIONS:])
     assert set(QUANTITIES) == set(SENSORS)

@@ -171,8 +171,9 @@ class Row(NamedTuple):
     equal: Equal | None = None
 
 
-# Equations of the diagnosis use the first sixteen by their places: flow and rates, attitude and altitude,
-# engine, accelerometers. Sensors that only the monitor compares stand below them.
+# Equations of the diagnosis use the first sixteen by their places: rates and flow, attitude and altitude,
+# engine, accelerometers. Sensors that only the monitor compares stand below them, with the property they
+# measure.
 ROWS = (
     Row("p", RateGyro, 200.0, "roll"),
     Row("q", RateGyro, 200.0, "pitch"),
@@ -191,7 +192,7 @@ ROWS = (
     Row("ay", Accelerometer, 100.0),
     Row("az", Accelerometer, 100.0),
 )
-N_IN_EQUATIONS = 16  # of these rows, from the first on
+N_IN_EQUATIONS = sum(not row.truth[0] for row in ROWS)  # of these rows, from the first on
 
 
 class Quantity(NamedTuple):

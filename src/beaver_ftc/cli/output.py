@@ -14,8 +14,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 from beaver_ftc.documents.errors import BeaverFtcError, SimulationFailed
-
-Document = dict[str, Any]
+from beaver_ftc.results.model import Document
 
 
 class Format(StrEnum):

@@ -6,13 +6,12 @@ the cases add up to the suite and the suites to what the command took.
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.documents.problems import one_line
+from beaver_ftc.results.model import Document
 
-Document = dict[str, Any]
 _LONGEST = 10_000  # characters of one line
 
 

@@ -34,6 +34,7 @@ from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.plant.instrumented import ENGINE_SIGNALS
 from beaver_ftc.results.log import Columns
+from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc.scenario.loader import load_scenario
 from beaver_ftc.scenario.schema import Scenario
@@ -67,7 +68,6 @@ PARTS = ("points", "pairs")  # of the document: a row a fault, and a row a fault
 PAIRS = (*PLACE, "fault", "other", *isolability.SHOWN, *isolability.DOUBLET)
 SUMMARY = ("fault", "excit.", "certain at", "from", "half the time at", "from")
 CERTAIN = "certain: detected and isolated in time, from some magnitude on; of so many grid points"
-Document = dict[str, Any]
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.extensions import offered
+from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.engine.statistics import quantile
 from beaver_ftc.studies.present.figures import heat_map, label_edges, panels
@@ -30,7 +31,6 @@ SAYS = (
 )
 PER_CELL = 1.55, 0.65  # inches
 ACROSS = 3  # panels
-Document = dict[str, Any]
 
 
 def shown(excluded: np.ndarray, frames: int, dt: float) -> Document:

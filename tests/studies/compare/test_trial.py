@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from beaver_ftc.results.model import Metrics
 from beaver_ftc.studies.compare import trial
 
 FLIGHT = SimpleNamespace(frames=2000, scenario=SimpleNamespace(rate_hz=100.0))
@@ -25,7 +26,7 @@ LOST = {"departure": {"time_s": 14.0, "signal": "alpha"}}
 def result(**changes):
     document = {**DOCUMENT, **changes}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(trial, "metrics", lambda flight: document)
+        patch.setattr(trial, "measure", lambda flight: Metrics.of(document))
         return trial.result_of(FLIGHT, trial.Entry("ours", "nominal"), us=7.0)
 
 

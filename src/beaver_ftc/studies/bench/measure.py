@@ -17,6 +17,7 @@ from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.plant import addresses, conditions
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import measure
+from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.loader import load_scenario
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sweeps import Sweep, load_sweep
@@ -43,7 +44,6 @@ FRAMES = 1000  # a block: 6 ms, short against changes of its pace, long against 
 LONG_FLIGHT_S = 330.0  # two row groups of the log file
 
 Say = Callable[[str], None]
-Document = dict[str, Any]
 
 
 def bench(rounds: int = 60, with_parts: bool = True, say: Say = lambda text: None) -> Document:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.problems import one_line
+from beaver_ftc.results.model import Document
 from beaver_ftc.results.style import BLACK
 from beaver_ftc.studies.present.figures import panels
 from beaver_ftc.studies.present.page import save
@@ -16,7 +17,6 @@ from beaver_ftc.studies.present.tables import aligned, number
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Document = dict[str, Any]
 
 NOTHING = "-"
 STAR = "* differs between the runs"

@@ -6,15 +6,13 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from math import inf
 from operator import itemgetter
 from statistics import median
-from typing import Any
 
 from beaver_ftc.results.metrics import versions
+from beaver_ftc.results.model import Document
 from beaver_ftc.studies.compare.replay import Trace, alarms_at
 from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, Entry, Result, Trial
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, poisson_bound, share_within, wilson_bound
 from beaver_ftc.studies.present.tables import finite
-
-Document = dict[str, Any]
 
 
 def line_of(entry: Entry, results: Sequence[Result], oracle: Sequence[Result]) -> Document:

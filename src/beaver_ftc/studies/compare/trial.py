@@ -11,7 +11,8 @@ from beaver_ftc.documents.paths import data_root
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.loop.outcome import Landing
 from beaver_ftc.plugins import DETECTORS, is_compiled
-from beaver_ftc.results.metrics import metrics
+from beaver_ftc.results.metrics import measure
+from beaver_ftc.results.model import Rates
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.compare.replay import Trace, record, replay, trace
 
@@ -166,26 +167,26 @@ def _fly(scenario: Scenario, entry: Entry) -> Result:
 
 def result_of(flight: Landing, entry: Entry, us: float) -> Result:
     """Boil a flight down."""
-    document = metrics(flight)
-    fault, isolation, tracking = document["fault"], document["isolation"], document["tracking"]
-    end_s, departed = flight.frames / flight.scenario.rate_hz, document["departure"] is not None
-    correct = bool(isolation["correct"]) and not document["false_alarm"]
-    before, after = (_size(tracking[f"{part}_fault_rms_deg_s"]) for part in ("pre", "post"))
-    whole = before if tracking["post_fault_rms_deg_s"] is None else after
+    found = measure(flight)
+    fault, isolation, tracking = found.fault, found.isolation, found.tracking
+    end_s, departed = flight.frames / flight.scenario.rate_hz, found.departure is not None
+    correct = bool(isolation.correct) and not found.false_alarm
+    before, after = _size(tracking.pre_fault_rms_deg_s), _size(tracking.post_fault_rms_deg_s)
+    whole = before if tracking.post_fault_rms_deg_s is None else after
     return Result(
         entry=entry,
-        false_alarm=document["false_alarm"],
-        fault_free_s=document["fault_free_s"],
-        faulted=fault is not None and end_s > fault["at_s"],
-        delay_s=_or_never(document["detection"]["delay_s"]),
-        isolated=isolation["fault"],
+        false_alarm=found.false_alarm,
+        fault_free_s=found.fault_free_s,
+        faulted=fault is not None and end_s > fault.at_s,
+        delay_s=_or_never(found.detection.delay_s),
+        isolated=isolation.fault,
         correct=correct,
-        isolation_delay_s=_or_never(isolation["delay_s"]) if correct else inf,
+        isolation_delay_s=_or_never(isolation.delay_s) if correct else inf,
         rms_deg_s=inf if departed else whole,
         before_deg_s=inf if departed and fault is None else before,
         after_deg_s=inf if departed else after,
-        travel_deg_s=sum(tracking["surface_travel_deg"].values()) / end_s,
-        energy_deg2_s2=sum(tracking["surface_energy_deg2_s"].values()) / end_s,
+        travel_deg_s=sum(tracking.surface_travel_deg.values()) / end_s,
+        energy_deg2_s2=sum(tracking.surface_energy_deg2_s.values()) / end_s,
         departed=departed,
         us=us,
     )
@@ -195,6 +196,6 @@ def _or_never(value: float | None) -> float:
     return inf if value is None else value
 
 
-def _size(rms: dict[str, float] | None) -> float:
+def _size(rms: Rates | None) -> float:
     """Over all axes; infinite of a part of the flight there is not."""
-    return inf if rms is None else hypot(*rms.values())
+    return inf if rms is None else hypot(*vars(rms).values())

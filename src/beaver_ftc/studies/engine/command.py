@@ -27,11 +27,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 import typer
 
-Document = dict[str, Any]
+from beaver_ftc.results.model import Document
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,8 @@ from beaver_ftc.documents.errors import BadInput, SimulationFailed, say_once
 from beaver_ftc.documents.paths import data_root
 from beaver_ftc.extensions import SERVICES, folders
 from beaver_ftc.results.metrics import versions
+from beaver_ftc.results.model import Document
 from beaver_ftc.results.writer import clear_disk_errors, sync
-
-Document = dict[str, Any]
 
 LOCK = ".lock"
 DAMAGED = ".damaged"  # at the end of the name of what was set aside

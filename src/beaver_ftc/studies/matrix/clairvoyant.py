@@ -5,7 +5,7 @@ one would have been under the same commands. Coefficients are unknown constants,
 """
 
 from math import sqrt
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,11 +19,11 @@ from beaver_ftc.diagnosis.bounds.clairvoyant import (
     healthy,
 )
 from beaver_ftc.results.log import Columns
+from beaver_ftc.results.model import Document
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
 
-Document = dict[str, Any]
 COLUMNS = (
     "t_s", "p_rad_s", "q_rad_s", "r_rad_s", "alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa",
 )  # fmt: skip

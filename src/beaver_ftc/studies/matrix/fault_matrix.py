@@ -18,6 +18,7 @@ from beaver_ftc.loop.outcome import Landing
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.trim import trim
 from beaver_ftc.results.metrics import as_json, metrics
+from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc.scenario.environment import air_of
 from beaver_ftc.scenario.faults import TYPES
@@ -33,7 +34,6 @@ from beaver_ftc.studies.reproduce.choices import SETTING
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Document = dict[str, Any]
 NAME, DECLARED = "fault-matrix", "fault-matrix-declared"
 TOLERANCE, SENSORS = 0.05, "tactical-grade"
 AIRSPEEDS_MPS = (38.0, 45.0, 52.0)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from functools import partial
 from math import degrees
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from beaver_ftc.plant.linear import LinearModel, differences, engine_slope
 from beaver_ftc.plant.trim import trim
 from beaver_ftc.results.log import Columns
 from beaver_ftc.results.metrics import as_json, metrics
+from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.control import EnginePower
 from beaver_ftc.scenario.schema import Initial, Scenario
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
@@ -25,7 +26,6 @@ from beaver_ftc.studies.linear_systems import zeros
 from beaver_ftc.studies.matrix.fault_matrix import AIRSPEEDS_MPS, AT_S, REFERENCE, UNCERTAINTY, trimmed_deg
 from beaver_ftc.studies.present.page import Makers
 
-Document = dict[str, Any]
 NAME = "pitch-lost"
 DURATION_S = 100.0
 COLUMNS = ("t_s", "q_rad_s", "theta_rad", "phi_rad", "airspeed_mps", "envelope_valid")

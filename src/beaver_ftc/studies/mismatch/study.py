@@ -22,6 +22,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import as_json, metrics
+from beaver_ftc.results.model import Document
 from beaver_ftc.results.writer import result_folder, write_documents, write_report_files
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
@@ -42,7 +43,6 @@ from beaver_ftc.studies.mismatch.tables import show_in_reports
 from beaver_ftc.studies.present.page import Files, write_files
 from beaver_ftc.studies.present.tables import as_csv, finite
 
-Document = dict[str, Any]
 COMPARISON, MAP = "mismatch-comparison", "mismatch-map"
 AIRSPEEDS_MPS = (30.0, 35.0, 40.0, 45.0, 50.0, 55.0)  # the validated envelope
 ALTITUDES_M = (0.0, 1000.0, 2000.0, 3000.0, 4000.0)

@@ -3,14 +3,13 @@
 import json
 from html import escape
 from pathlib import Path
-from typing import Any
 
 from beaver_ftc.aircraft import AXES
+from beaver_ftc.results.model import Document
 from beaver_ftc.results.report import register_section
 from beaver_ftc.studies.present.page import picture_data
 from beaver_ftc.studies.present.tables import html_table, number, plain, printed, seconds
 
-Document = dict[str, Any]
 WIDTH = 150
 
 PICTURES = {

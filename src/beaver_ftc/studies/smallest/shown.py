@@ -2,14 +2,13 @@
 
 import json
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 from beaver_ftc.results.metrics import ON_THE_BOUND
+from beaver_ftc.results.model import Document
 from beaver_ftc.studies.present.page import Makers, Part, Table, as_html
 from beaver_ftc.studies.present.tables import aligned, as_csv
 
 HEAD = ("", "found in 90 %", "95 % interval", "flights", "certain")
-Document = dict[str, Any]
 
 
 def as_text(document: Document) -> str:

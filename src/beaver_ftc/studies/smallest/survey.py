@@ -20,11 +20,13 @@ import typer
 
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.loop.loop import fly
-from beaver_ftc.results.metrics import metrics, versions
+from beaver_ftc.results.metrics import measure, versions
+from beaver_ftc.results.model import Document
 from beaver_ftc.results.writer import result_folder
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.loader import load_scenario
 from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.timing import TIME_TOLERANCE_S
 from beaver_ftc.studies.detectability import SETTLED_S
 from beaver_ftc.studies.engine.command import Reporter, ScenarioArgument, StudyCommand, WorkersOption
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial
@@ -39,7 +41,6 @@ AS_IT_IS = "as it is"
 NOTHING = {"p": 0.0, "q": 0.0, "r": 0.0}
 ADDED_DEG_S, ADDED_HZ = 3.0, 0.25  # of a sine, where an axis has no reference
 FIRST = STAGES[:1]  # flights of a comparison, and of the size that is certain
-Document = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -128,17 +129,17 @@ def fly_one(variants: dict[str, Scenario], asked: Asked, flight: Flight) -> Docu
     ends_s = min(at_s + asked.within_s + 2.0 / scenario.rate_hz, scenario.duration_s)
     try:
         landing = fly(flown.model_copy(update={"duration_s": ends_s}))
-        document = metrics(landing)
+        found = measure(landing)
     except BeaverFtcError:
         return _row(failed=True)
-    detection, within_s = document["detection"], asked.within_s + 1e-9
-    delay_s, certain_s = detection["delay_s"], detection["guaranteed_delay_s"]
-    inconclusive = detection["inconclusive"]
+    within_s = asked.within_s + TIME_TOLERANCE_S
+    delay_s, certain_s = found.detection.delay_s, found.detection.guaranteed_delay_s
+    inconclusive = found.detection.inconclusive
     return _row(
         found=delay_s is not None and delay_s <= within_s,
         certain=certain_s is not None and certain_s <= within_s,
-        false_alarm=document["false_alarm"],
-        inconclusive=inconclusive["reasons"][0]["says"] if inconclusive else None,
+        false_alarm=found.false_alarm,
+        inconclusive=inconclusive.reasons[0]["says"] if inconclusive else None,
         bound_used=max(landing.closest_approach, default=0.0),
     )
 

@@ -7,10 +7,11 @@ import re
 from collections.abc import Callable, Iterator
 from itertools import cycle
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from beaver_ftc.results.model import Document
 from beaver_ftc.results.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION
 from beaver_ftc.studies.engine.statistics import wilson
 from beaver_ftc.studies.present.figures import GRID, heat_map, new_figure
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-Document = dict[str, Any]
 Drawer = Callable[[Flights, Document], "Figure | None"]
 
 BINS = 16

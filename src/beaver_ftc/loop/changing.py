@@ -15,15 +15,11 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.loop.plugin_frame import PluginFrame, named_detector, named_law, plugged
 from beaver_ftc.plant.faults import NEVER
+from beaver_ftc.plant.instruments import take_configuration
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.interventions import stages
 from beaver_ftc.scenario.schema import Change, Scenario
 from beaver_ftc.scenario.timing import frame_of
-
-OF_INSTRUMENTS = (
-    "real", "gain", "bias", "noise", "quantum", "dropout", "drift", "keep", "delay", "first", "length",
-    "engine",
-)  # fmt: skip
 
 
 class Stage(NamedTuple):
@@ -91,9 +87,7 @@ class Changing:
                 loop.enable_watch(new["fdi"])
             take_diagnosis(frame, new, stage.frame)
         if change.sensors is not None:
-            for name in OF_INSTRUMENTS:  # the random numbers go on, lags and delays begin with what is there
-                frame["instruments"][name] = new["instruments"][name]
-            frame["instruments"]["taken"] = 0
+            take_configuration(frame["instruments"], new["instruments"])
         statistical = frame["fdi"]["statistical"]
         forces = statistical["forces"]["known"] or statistical["air"]["read"]
         if frame["fdi"]["watch"]["enabled"] or frame["instruments"]["engine"] or forces:

@@ -9,6 +9,7 @@ alone: nothing in it knows the truth.
 """
 
 from math import pi
+from typing import Any
 
 import numpy as np
 
@@ -40,22 +41,32 @@ SENSOR_FAULT = record(
 )  # fmt: skip
 
 
+# What instruments are configured with; a change of sensors in flight replaces all of it. drift: per sample;
+# keep: exp(-bandwidth dt), 0 without lag; delay: JSBSim frames, length: samples of the line that are the
+# signal's, first: the first of them; every: JSBSim frames from one reading to the next; engine: whether dpt
+# is worked out from readings.
+CONFIGURED: dict[str, Any] = {
+    "real": int, "engine": int, "gain": N_SENSORS, "bias": N_SENSORS, "noise": N_SENSORS,
+    "quantum": N_SENSORS, "dropout": N_SENSORS, "drift": N_SENSORS, "keep": N_SENSORS, "delay": N_SENSORS,
+    "length": (int, N_SENSORS), "first": (int, N_SENSORS), "every": (int, N_SENSORS),
+}  # fmt: skip
+
+
 @sized
 def instruments_dtype(line: int = USUAL_LINE) -> np.dtype:
-    """The instruments of a flight whose delay lines keep so many samples."""
+    """The instruments of a flight whose delay lines keep so many samples: what they are configured with, and
+    their memory. counter: which of the random numbers counts now; taken: samples."""
     return record(
-        real=int, random=("u8", N_COUNTERS), counter=int,  # and which one counts now
-        gain=N_SENSORS, bias=N_SENSORS, noise=N_SENSORS, quantum=N_SENSORS, dropout=N_SENSORS,
-        drift=N_SENSORS,  # per sample
-        keep=N_SENSORS,  # exp(-bandwidth dt), 0 without lag
-        # JSBSim frames; samples of the line that are the signal's, and the first of them
-        delay=N_SENSORS, length=(int, N_SENSORS), first=(int, N_SENSORS),
-        lagged=N_SENSORS, line=line,
-        taken=(int, N_SENSORS), every=(int, N_SENSORS),  # samples; JSBSim frames from one reading to the next
-        reading=N_SENSORS,
-        engine=int,  # dpt is worked out from readings
-        broken=int, fault=(SENSOR_FAULT, N_SENSORS),
+        **CONFIGURED, random=("u8", N_COUNTERS), counter=int, lagged=N_SENSORS, line=line,
+        taken=(int, N_SENSORS), reading=N_SENSORS, broken=int, fault=(SENSOR_FAULT, N_SENSORS),
     )  # fmt: skip
+
+
+def take_configuration(instruments: np.void, new: np.void) -> None:
+    """Go on with other sensors: random numbers go on, lags and delays begin with what is there."""
+    for name in CONFIGURED:
+        instruments[name] = new[name]
+    instruments["taken"] = 0
 
 
 # What is known of an instant: every sensor's reading, and sorted by use. attitude: phi, theta, psi, rad;

@@ -2,6 +2,9 @@
 
 `broken` looks at the metrics alone; `told_alike` at log and verdict; `saved_alike` at a result folder and its
 page; `flown_again` at the numbers of the same scenario read back from its text.
+
+`broken` is an oracle: it works out false alarms, delays and names by a second road, with a tolerance of its
+own, and does not ask `beaver_ftc.scenario.judgement`, so that an error there shows here.
 """
 
 import json

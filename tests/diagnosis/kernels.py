@@ -25,12 +25,16 @@ def new_fdi():
     return fdi
 
 
-def fill(record, **values):
-    """Fill fields of a stage's record: of its own, its config, memory or output. Returns the record."""
+def holder(record, name):
+    """Where a stage's record has this field: the record itself, its config, memory or output."""
     sections = [record[part] for part in ("config", "memory", "output") if part in record.dtype.names]
+    return next(part for part in (record, *sections) if name in (part.dtype.names or ()))
+
+
+def fill(record, **values):
+    """Fill fields of a stage's record, wherever it has them. Returns the record."""
     for name, value in values.items():
-        holder = next(part for part in (record, *sections) if name in (part.dtype.names or ()))
-        holder[name] = value
+        holder(record, name)[name] = value
     return record
 
 

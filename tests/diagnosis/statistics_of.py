@@ -3,7 +3,7 @@
 import numpy as np
 
 from beaver_ftc.diagnosis.detection import parity, statistical
-from beaver_ftc.diagnosis.detection.signatures import sign_blocks
+from beaver_ftc.diagnosis.detection.signatures import sign_blocks, sign_view
 from beaver_ftc.plant.instruments import MEASURED
 
 
@@ -108,7 +108,7 @@ class Across:
 
     @staticmethod
     def sign(fdi, view, Gu):
-        parity.sign(view, fdi["statistical"]["forces"], Gu)
+        sign_view(view, fdi["statistical"]["forces"], Gu)
 
     @staticmethod
     def observe(fdi, innovation, G, Gu, y, frame, latched):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from kernels import holder
 
 from beaver_ftc.diagnosis.monitors import accelerometers, redundancy
 from beaver_ftc.diagnosis.monitors.sensor_records import (
@@ -36,26 +37,31 @@ def level(alpha=INCIDENCE, beta=0.02):
 
 def new_watch(lead=ALPHA_FLOW, bound=1e-3):
     watch = np.zeros(1, WATCH).view(np.recarray)[0]
-    watch["named"], watch["lead"], watch["alarmed"], watch["longest_still"] = NOBODY, lead, 1, 3
+    (
+        watch["output"]["named"],
+        watch["output"]["lead"],
+        watch["output"]["alarmed"],
+        watch["config"]["longest_still"],
+    ) = NOBODY, lead, 1, 3
     step = watch["step"]
-    step["h"], step["decay"] = H, (0.0, 0.9, 0.99)
+    step["config"]["h"], step["config"]["decay"] = H, (0.0, 0.9, 0.99)
     step["test"]["bound"] = bound
-    step["then"] = watch["earlier"] = level()
+    step["memory"]["then"] = watch["memory"]["earlier"] = level()
     return watch
 
 
 def looks(watch, readings, residuals):
     """Each look's readings, and the residual of the test that leads."""
     for signal, residual in zip(readings, residuals, strict=True):
-        watch["step"]["test"]["residual"][watch["lead"]] = residual
+        watch["step"]["test"]["residual"][watch["output"]["lead"]] = residual
         accelerometers.note_stillness(watch, signal)
         accelerometers.weigh(watch, signal)
-        watch["earlier"] = watch["step"]["then"]
-        watch["step"]["then"] = signal
+        watch["memory"]["earlier"] = watch["step"]["memory"]["then"]
+        watch["step"]["memory"]["then"] = signal
 
 
 def cleared(watch):
-    return set(np.flatnonzero(watch["cleared"]).tolist())
+    return set(np.flatnonzero(watch["memory"]["cleared"]).tolist())
 
 
 def course(of, values):
@@ -76,13 +82,13 @@ def test_a_reading_that_is_the_same_is_counted_until_it_is_not():
     watch, signal = new_watch(), level()
     for expected in (1, 2, 3):
         accelerometers.note_stillness(watch, signal)
-        assert watch["still"][ALPHA] == expected
+        assert watch["memory"]["still"][ALPHA] == expected
     assert accelerometers.stands_still(watch, ALPHA)
-    watch["longest_still"][ALPHA] = 4
+    watch["config"]["longest_still"][ALPHA] = 4
     assert not accelerometers.stands_still(watch, ALPHA)
     signal[ALPHA] += 1e-15
     accelerometers.note_stillness(watch, signal)
-    assert watch["still"][[ALPHA, BETA]].tolist() == [0, 4]
+    assert watch["memory"]["still"][[ALPHA, BETA]].tolist() == [0, 4]
 
 
 @pytest.mark.parametrize("lead", OF)
@@ -107,12 +113,12 @@ def test_where_an_accelerometer_has_leapt_the_reading_s_own_says_nothing(sensor)
     for ago in (0, 40):
         for share, leaps in ((0.99, True), (1.01, False)):
             watch = new_watch(bound=1.0)
-            watch["step"]["then"][sensor] += share * 0.5 * jump / (1.5 * H / V) / 0.995**ago
+            watch["step"]["memory"]["then"][sensor] += share * 0.5 * jump / (1.5 * H / V) / 0.995**ago
             looks(watch, course(ALPHA, np.zeros(ago) + 1e-9 * np.arange(ago)), np.zeros(ago))
             watch["step"]["test"]["bound"] = 1e-3
             (signal,) = course(ALPHA, [jump])
             signal[list(FORCES)] = (
-                watch["step"]["then"][list(FORCES)] if ago else level()[list(FORCES)] + 1e-9
+                watch["step"]["memory"]["then"][list(FORCES)] if ago else level()[list(FORCES)] + 1e-9
             )
             looks(watch, [signal], [jump])
             assert (AZ in cleared(watch)) == leaps
@@ -121,10 +127,10 @@ def test_where_an_accelerometer_has_leapt_the_reading_s_own_says_nothing(sensor)
 def test_what_accelerometers_have_leapt_is_forgotten_in_two_seconds_at_any_rate():
     for h in (0.002, 0.01, 0.02):
         watch = new_watch()
-        watch["step"]["h"], watch["restless"] = h, 3.0
+        watch["step"]["config"]["h"], watch["memory"]["restless"] = h, 3.0
         for _ in range(round(2.0 / h)):
-            accelerometers.note_stillness(watch, watch["step"]["then"].copy())
-        assert watch["restless"] == pytest.approx(3.0 * np.exp(-1.0), rel=0.02)
+            accelerometers.note_stillness(watch, watch["step"]["memory"]["then"].copy())
+        assert watch["memory"]["restless"] == pytest.approx(3.0 * np.exp(-1.0), rel=0.02)
 
 
 def test_long_after_the_alarm_a_leap_says_nothing():
@@ -133,8 +139,8 @@ def test_long_after_the_alarm_a_leap_says_nothing():
         (0.01, 99, set(FORCES)), (0.01, 100, set()), (0.002, 499, set(FORCES)), (0.002, 500, set()),
     ):  # fmt: skip
         watch = new_watch()
-        watch["step"]["h"], watch["gathering"] = h, gathering
-        watch["least"], watch["most"] = -1.0, 99.0
+        watch["step"]["config"]["h"], watch["memory"]["gathering"] = h, gathering
+        watch["memory"]["least"], watch["memory"]["most"] = -1.0, 99.0
         watch["step"]["test"]["bound"][CLIMB] = 99.0
         looks(watch, course(ALPHA, [0.05]), [0.05])
         assert cleared(watch) == clear
@@ -143,7 +149,7 @@ def test_long_after_the_alarm_a_leap_says_nothing():
 def test_a_straight_course_is_no_leap():
     """Second differences: a steady change of the reading is none, however fast."""
     watch, rate = new_watch(), 0.1
-    watch["earlier"][ALPHA] -= rate
+    watch["memory"]["earlier"][ALPHA] -= rate
     looks(watch, course(ALPHA, [rate]), [rate])
     assert cleared(watch) == set()
 
@@ -176,7 +182,7 @@ def test_the_look_of_the_alarm_counts_for_a_jump_only():
     watch = new_watch()
     looks(watch, course(ALPHA, jump + 1e-7 * np.sin(np.arange(300.0))), [jump, *np.zeros(299)])
     assert cleared(watch) == set()
-    assert watch["gathered"][1] == 0.0
+    assert watch["memory"]["gathered"][1] == 0.0
 
 
 def test_scatter_of_a_vane_does_not_go_on():
@@ -194,13 +200,13 @@ def test_who_stands_still_is_frozen(lead):
         looks(watch, course(frozen, np.zeros(6)), np.full(6, 1e-5))
         assert cleared(watch) == clear
         accelerometers.suspect_accelerometers(watch, False)
-        who = np.flatnonzero(watch["suspect"]).tolist()
+        who = np.flatnonzero(watch["output"]["suspect"]).tolist()
         assert who == ([] if clear == set(FORCES) else [AY])
 
 
 def test_an_airspeed_s_error_is_in_the_density_too():
     seen = new_watch(SPEED, bound=1.0)
-    seen["fired"][DENSITY] = 1
+    seen["memory"]["fired"][DENSITY] = 1
     looks(seen, course(AIRSPEED, [1e-5]), [0.5])
     assert cleared(seen) == set(FORCES)
     for size, clear in ((0.99, set()), (1.01, {AIRSPEED})):
@@ -225,26 +231,30 @@ def test_an_incidence_s_error_is_in_the_climb_too():
         watch["step"]["test"]["bound"][CLIMB] = 9.0, 9.0, bound * fallen / accelerometers.CLEARLY
         looks(watch, readings, np.full(100, each))
         assert cleared(watch) == clear
-        assert watch["fallen"][2] == pytest.approx(fallen)
+        assert watch["memory"]["fallen"][2] == pytest.approx(fallen)
 
 
 def test_a_climb_that_shows_clears_nobody():
     watch = new_watch(bound=1.0)
-    watch["step"]["test"]["bound"][CLIMB], watch["fired"][CLIMB], watch["fallen"] = 1e-9, 1, 1.0
+    watch["step"]["test"]["bound"][CLIMB], watch["memory"]["fired"][CLIMB], watch["memory"]["fallen"] = (
+        1e-9,
+        1,
+        1.0,
+    )
     assert not accelerometers.would_show_elsewhere(watch, level())
-    watch["fired"][CLIMB] = 0
+    watch["memory"]["fired"][CLIMB] = 0
     assert accelerometers.would_show_elsewhere(watch, level())
-    watch["lead"] = BETA_FLOW
+    watch["output"]["lead"] = BETA_FLOW
     assert not accelerometers.would_show_elsewhere(watch, level())
 
 
 def test_other_alarms_are_none_of_theirs():
     for lead in (P, DENSITY, CLIMB):
         watch = new_watch(lead)
-        watch["still"] = 9
+        watch["memory"]["still"] = 9
         looks(watch, course(ALPHA, [0.1]), [0.1])
         assert cleared(watch) == set()
-        assert not watch["gathering"]
+        assert not watch["memory"]["gathering"]
 
 
 @pytest.mark.parametrize("i", range(3))
@@ -253,25 +263,25 @@ def test_the_axis_of_the_velocity_made_up_is_that_of_the_accelerometer(i, flow):
     """By turning a step along a body axis into speed, incidence and sideslip."""
     alpha, beta = flow
     watch = new_watch()
-    watch["step"]["then"] = level(alpha, beta)
+    watch["step"]["memory"]["then"] = level(alpha, beta)
     v = V * np.array([np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)])
     moved = v + 1e-4 * np.eye(3)[i]
     speed = np.linalg.norm(moved)
-    watch["gathered"] = (
+    watch["memory"]["gathered"] = (
         speed - V, np.arctan2(moved[2], moved[0]) - alpha, np.arcsin(moved[1] / speed) - beta
     )  # fmt: skip
     accelerometers.suspect_accelerometers(watch, False)
-    assert watch["made_up"] == pytest.approx(1e-4 * np.eye(3)[i], abs=1e-8)
-    assert np.flatnonzero(watch["suspect"]).tolist() == [AX + i]
+    assert watch["memory"]["made_up"] == pytest.approx(1e-4 * np.eye(3)[i], abs=1e-8)
+    assert np.flatnonzero(watch["output"]["suspect"]).tolist() == [AX + i]
     for doubt, all_of_them in ((0.49e-4, False), (0.51e-4, True)):
-        watch["sound"] = doubt, 0.0, 0.0
+        watch["memory"]["sound"] = doubt, 0.0, 0.0
         accelerometers.suspect_accelerometers(watch, False)
-        assert bool(watch["suspect"][AX:].all()) == all_of_them
+        assert bool(watch["output"]["suspect"][AX:].all()) == all_of_them
     accelerometers.suspect_accelerometers(watch, True)
-    assert not watch["suspect"].any(), "a gyro explains it"
+    assert not watch["output"]["suspect"].any(), "a gyro explains it"
     accelerometers.clear_accelerometers(watch)
     accelerometers.suspect_accelerometers(watch, False)
-    assert not watch["suspect"].any()
+    assert not watch["output"]["suspect"].any()
 
 
 @pytest.mark.parametrize(
@@ -282,7 +292,7 @@ def test_none_is_used_once_one_may_be_broken(fields, used):
     watch, measured = new_watch(), np.zeros(1, MEASURED).view(np.recarray)[0]
     measured["inertial"] = 1
     for name, i in fields.items():
-        watch[name][i] = 1
+        holder(watch, name)[name][i] = 1
     accelerometers.discard(watch, measured)
     assert measured["inertial"] == used
 
@@ -291,7 +301,7 @@ def test_none_is_used_once_one_may_be_broken(fields, used):
 def test_what_a_reading_may_be_off_covers_two_steps(steady, changing):
     """1.5 a - 0.5 a_then, at its worst: a bias, and noise that changes sides."""
     step = new_watch()["step"]
-    step["steady"][AX], step["error_then"][AX], step["error_before"][AX] = (
+    step["config"]["steady"][AX], step["memory"]["error_then"][AX], step["memory"]["error_before"][AX] = (
         steady,
         steady + changing,
         steady + changing,

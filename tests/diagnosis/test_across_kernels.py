@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from innovations import by_onset
-from kernels import DT, new_fdi
+from kernels import DT, holder, new_fdi
 from statistics_of import Across
 
 from beaver_ftc.aircraft import load
@@ -39,10 +39,14 @@ def fdi(rng):
     set_up_views(statistical, load())
     tones.set_up_listening(statistical["listening"], 1e-8, V, 15.0, DT)
     air = statistical["air"]
-    air["moving"], air["rolling"], air["per_metre"] = 1, 34.0, rng.uniform(1e-5, 1e-4, 3)
+    air["output"]["moving"], air["config"]["rolling"], air["memory"]["per_metre"] = (
+        1,
+        34.0,
+        rng.uniform(1e-5, 1e-4, 3),
+    )
     for name in ("damping", "axes", "swing", "leap"):
-        air[name] = rng.normal(size=(3, 3))
-    air["leap"] = air["leap"] @ air["leap"].T
+        holder(air, name)[name] = rng.normal(size=(3, 3))
+    air["output"]["leap"] = air["output"]["leap"] @ air["output"]["leap"].T
     fdi["bound"]["own_per_rad"], fdi["bound"]["own_errors"] = rng.uniform(0.1, 0.4, (3, 4)), 1
     return fdi
 
@@ -73,17 +77,17 @@ def declared_along(statistical, m):
     air, pitch, lateral = statistical["air"], *statistical["block"][:2]
     noise = np.array([lateral["noise"][0], pitch["noise"][0], lateral["noise"][1]])
     bound = np.abs(m) @ statistical["noise"]["bounded"]
-    gusts = air["damping"] @ air["axes"]
-    walk = gusts @ np.diag(air["per_metre"]) @ gusts.T
-    if air["swings"]:
-        turned = air["damping"] @ air["swing"]
-        longest_s = air["rolling"] / V
-        walk += 0.5 * longest_s**2 * turned @ np.diag(air["per_metre"]) @ turned.T
-    moves = float(air["moving"])
+    gusts = air["output"]["damping"] @ air["output"]["axes"]
+    walk = gusts @ np.diag(air["memory"]["per_metre"]) @ gusts.T
+    if air["memory"]["swings"]:
+        turned = air["output"]["damping"] @ air["memory"]["swing"]
+        longest_s = air["config"]["rolling"] / V
+        walk += 0.5 * longest_s**2 * turned @ np.diag(air["memory"]["per_metre"]) @ turned.T
+    moves = float(air["output"]["moving"])
     size = max(bound, LEAST_UNCERTAINTY_RAD_S2)
     drift = statistical["noise"]["rapidity"] * size**2 + moves * V * m @ walk @ m
     jitter = (np.abs(m) @ np.sqrt(statistical["noise"]["jitter"])) ** 2
-    return m**2 @ noise, jitter, bound, drift, moves * m @ air["leap"] @ m
+    return m**2 @ noise, jitter, bound, drift, moves * m @ air["output"]["leap"] @ m
 
 
 @pytest.mark.parametrize(
@@ -93,9 +97,9 @@ def declared_along(statistical, m):
 @pytest.mark.parametrize("mix", [(0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (-0.6, 0.0, 0.8)])
 def test_what_is_declared_of_the_axes_is_seen_along_a_direction(fdi, mix, changes, swings):
     statistical, view = fdi["statistical"], fdi["statistical"]["views"][PAST_AILERON]
-    view["mix"][:3], statistical["air"]["swings"], view["block"]["P_dd"][0, 0] = mix, swings, 0.7
+    view["mix"][:3], statistical["air"]["memory"]["swings"], view["block"]["P_dd"][0, 0] = mix, swings, 0.7
     for name, value in changes.items():
-        statistical["air"][name] = value
+        holder(statistical["air"], name)[name] = value
     Across.blur(view, statistical, V)
     noise, jitter, bound, drift, leap = declared_along(statistical, np.array(mix))
     block = view["block"]
@@ -108,7 +112,7 @@ def test_what_is_declared_of_the_axes_is_seen_along_a_direction(fdi, mix, change
 
 def test_where_no_uncertainty_is_declared_the_least_is_reckoned_with(fdi):
     statistical, view = fdi["statistical"], fdi["statistical"]["views"][ROLL_AXIS]
-    statistical["noise"]["bounded"], statistical["air"]["moving"] = 0.0, 0
+    statistical["noise"]["bounded"], statistical["air"]["output"]["moving"] = 0.0, 0
     Across.blur(view, statistical, V)
     assert view["bounded"][0] == 0.0
     assert view["block"]["drift"][0, 0] == pytest.approx(2.0 * LEAST_UNCERTAINTY_RAD_S2**2)

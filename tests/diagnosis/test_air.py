@@ -152,15 +152,15 @@ def test_where_no_model_has_the_forces_only_accelerometers_tell_a_gust(tmp_path,
         )
     )
     statistical = loop.frames["fdi"]["statistical"][0]
-    assert statistical["air"]["read"] == 1
+    assert statistical["air"]["output"]["read"] == 1
     if forces != "felt":
         air.no_longer_read(statistical["air"])
     if forces == "claimed":
-        statistical["air"]["seen"], statistical["air"]["unseen"] = 1, air.UNSEEN
+        statistical["air"]["output"]["seen"], statistical["air"]["memory"]["unseen"] = 1, air.UNSEEN
     for _ in loop.chunks():
         pass
     assert bool(statistical["alarm"]["closest"] > 0.2) is (forces == "claimed")
-    seen = float(np.abs(statistical["air"]["acceleration"]).max())
+    seen = float(np.abs(statistical["air"]["output"]["acceleration"]).max())
     assert (seen == 0.0) is (forces == "nobody's")
     assert (seen > 0.05) is (forces == "claimed")
 

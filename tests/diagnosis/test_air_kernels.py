@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from kernels import fill, holder
 from scipy.spatial.transform import Rotation
 
 from beaver_ftc.aircraft import load
@@ -24,11 +25,14 @@ Y = np.array([0.1, 0.03, 45.0, 1036.0, 0.3, 0.0, 0.0, 0.0])
 
 def new_air(**fields):
     record = np.zeros(1, AIR).view(np.recarray)[0]
-    record["span"], record["gravity"], record["moving"], record["seen"] = SPAN, GRAVITY, 1, 1
-    record["scale"], record["rolling"] = SCALE, ROLLING
-    for name, value in fields.items():
-        record[name] = value
-    return record
+    (
+        record["config"]["span"],
+        record["config"]["gravity"],
+        record["output"]["moving"],
+        record["output"]["seen"],
+    ) = SPAN, GRAVITY, 1, 1
+    record["config"]["scale"], record["config"]["rolling"] = SCALE, ROLLING
+    return fill(record, **fields)
 
 
 def to_earth(attitude):
@@ -77,20 +81,20 @@ def test_the_gust_followed_is_the_airs_own_change(seed):
     air.begin(record, *flight.reading())
     pitching = yawing = 0.0
     for _ in range(6):
-        wind, axes_then = flight.wind, record["axes"].copy()
+        wind, axes_then = flight.wind, record["output"]["axes"].copy()
         psi_then = flight.attitude[2]
-        record["force"] = flight.step()
+        record["memory"]["force"] = flight.step()
         y, attitude = flight.reading()
         air.observe(record, y, attitude, DT)
         change = Rotation.from_euler("z", -flight.attitude[2]).apply(flight.wind - wind)
         tau_q, tau_r = 4.0 * SPAN / (np.pi * y[2]), 3.0 * SPAN / (np.pi * y[2])
         pitching = np.exp(-DT / tau_q) * pitching + change[2] / (y[2] * tau_q)
         yawing = np.exp(-DT / tau_r) * yawing + change[1] / (y[2] * tau_r)
-        assert record["gust"] == pytest.approx([0.0, pitching, yawing])
+        assert record["memory"]["gust"] == pytest.approx([0.0, pitching, yawing])
         # The axes of the gusts: level, along the heading of the instant before.
         axes = (to_earth(flight.attitude).inv() * Rotation.from_euler("z", psi_then)).as_matrix()
-        assert record["axes"] == pytest.approx(axes)
-        assert record["swing"] == pytest.approx((axes - axes_then) / DT)
+        assert record["output"]["axes"] == pytest.approx(axes)
+        assert record["memory"]["swing"] == pytest.approx((axes - axes_then) / DT)
 
 
 @pytest.mark.parametrize(("turn_rad", "swings"), [(1e-3, False), (0.1, True)])
@@ -99,26 +103,26 @@ def test_axes_swing_where_a_gust_that_keeps_its_size_would_be_seen_to_change(tur
     air.begin(record, *flight.reading())
     flight.attitude[1] = 0.0
     for _ in range(3):
-        record["force"] = flight.step()
+        record["memory"]["force"] = flight.step()
         flight.attitude[1] += turn_rad
         y, attitude = flight.reading()
         air.observe(record, y, attitude, DT)
     fastest = turn_rad / DT  # nearly: a little less where the axis is not square to what turns it
     walk = 0.5 * (fastest * ROLLING / y[2]) ** 2
     assert not 0.8 * air.LEAST_SWING < walk < 1.3 * air.LEAST_SWING
-    assert bool(record["swings"]) == swings == (walk > air.LEAST_SWING)
+    assert bool(record["memory"]["swings"]) == swings == (walk > air.LEAST_SWING)
 
 
 @pytest.mark.parametrize("share", [0.98, 1.02])
 def test_the_fastest_swing_decides(share):
     record = new_air(axes=np.eye(3))
     most = np.sqrt(2.0 * air.LEAST_SWING) * 45.0 / ROLLING
-    record["swing"] = np.eye(3)
-    record["swing"][1, 2] = share * most * DT
-    record["swing"][0, 0] += 0.5 * most * DT
+    record["memory"]["swing"] = np.eye(3)
+    record["memory"]["swing"][1, 2] = share * most * DT
+    record["memory"]["swing"][0, 0] += 0.5 * most * DT
     air.note_swing(record, DT, 45.0)
-    assert record["swing"][1, 2] == pytest.approx(-share * most)
-    assert record["swings"] == (share > 1.0)
+    assert record["memory"]["swing"][1, 2] == pytest.approx(-share * most)
+    assert record["memory"]["swings"] == (share > 1.0)
 
 
 def test_a_yawing_gust_that_turning_hides_fades_and_its_loss_fades_with_it():
@@ -126,7 +130,7 @@ def test_a_yawing_gust_that_turning_hides_fades_and_its_loss_fades_with_it():
     record, y = new_air(), np.array([0.0, 0.0, 45.0, 1000.0, 0, 0, 0, 0])
     level = np.zeros(3)
     air.begin(record, y, level)
-    record["force"], record["gust"] = (0.0, 0.0, -GRAVITY), (0.0, 0.0, 0.05)
+    record["memory"]["force"], record["memory"]["gust"] = (0.0, 0.0, -GRAVITY), (0.0, 0.0, 0.05)
     tau_r, lag = 3.0 * SPAN / (np.pi * 45.0), np.exp(-DT / (3.0 * SPAN / (np.pi * 45.0)))
     enough = np.sqrt(np.pi * 45.0**2 / (SPAN * SCALE))  # rad/s at which all of it is lost
     turn = 1.1 * enough * DT
@@ -137,15 +141,15 @@ def test_a_yawing_gust_that_turning_hides_fades_and_its_loss_fades_with_it():
         ((0, 0, turn), 0.05 * lag**4, lag**2),
     ):
         air.observe(record, y, np.array(attitude), DT)
-        assert record["gust"][2] == pytest.approx(gust)
-        assert record["turning"] == pytest.approx(turning)
-        record["force"] = 0.0, 0.0, -GRAVITY
+        assert record["memory"]["gust"][2] == pytest.approx(gust)
+        assert record["memory"]["turning"] == pytest.approx(turning)
+        record["memory"]["force"] = 0.0, 0.0, -GRAVITY
     part = 0.5 * enough * DT
     air.observe(record, y, np.array([0, 0, turn + part]), DT)
-    assert record["lost"] == pytest.approx(0.25)
-    assert record["turning"] == pytest.approx(max(lag**3, 0.25))
+    assert record["memory"]["lost"] == pytest.approx(0.25)
+    assert record["memory"]["turning"] == pytest.approx(max(lag**3, 0.25))
     aside = 45.0 * np.sin(part)  # of the old course, from the left: a gust from the right has come up
-    assert record["gust"][2] == pytest.approx(0.05 * lag**5 - aside / (45.0 * tau_r))
+    assert record["memory"]["gust"][2] == pytest.approx(0.05 * lag**5 - aside / (45.0 * tau_r))
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -162,11 +166,15 @@ def test_a_diagnosis_that_begins_in_flight_has_seen_no_gust():
     flight = Flight(3)
     record = new_air(started=1, lost=0.4, turning=0.3, gust=(0.1, 0.2, 0.3))
     air.begin(record, *flight.reading())
-    assert (record["started"], record["lost"], record["turning"]) == (0, 0.0, 0.0)
-    assert not record["gust"].any()
-    assert record["axes"] == pytest.approx(record["turn"])
+    assert (record["memory"]["started"], record["memory"]["lost"], record["memory"]["turning"]) == (
+        0,
+        0.0,
+        0.0,
+    )
+    assert not record["memory"]["gust"].any()
+    assert record["output"]["axes"] == pytest.approx(record["memory"]["turn"])
     through = Rotation.from_euler("z", -flight.attitude[2]).apply(flight.velocity - flight.wind)
-    assert record["velocity"] == pytest.approx(through)
+    assert record["memory"]["velocity"] == pytest.approx(through)
 
 
 def without_inertia(design):
@@ -181,12 +189,12 @@ def test_what_a_gust_does_is_what_the_opposite_rates_would():
     """By differences of the design model's own response, whose inertia terms the air knows nothing of."""
     design = design_record().view(np.recarray)
     record = new_air(area_per_mass=0.01)
-    fill_table(record["forces"], AIRCRAFT, AIRCRAFT.measurable_forces, FORCES)
+    fill_table(record["memory"]["forces"], AIRCRAFT, AIRCRAFT.measurable_forces, FORCES)
     air.begin(record, Y, np.array([0.3, 0.2, 1.0]))
-    record["gust"] = 0.0, 0.02, -0.03
+    record["memory"]["gust"] = 0.0, 0.02, -0.03
     air.effect(record, design[0], X, Y, U)
     rotation = to_earth((0.3, 0.2, 0.0)).inv().apply([0.0, 0.02, -0.03])
-    assert record["rotation"] == pytest.approx(rotation)
+    assert record["memory"]["rotation"] == pytest.approx(rotation)
 
     def acceleration(x):
         f, G = np.zeros(3), np.zeros((3, 4))
@@ -195,18 +203,18 @@ def test_what_a_gust_does_is_what_the_opposite_rates_would():
 
     step = 1e-6
     expected = (acceleration(X - step * rotation) - acceleration(X + step * rotation)) / (2.0 * step)
-    assert record["acceleration"] == pytest.approx(expected, rel=1e-6)
+    assert record["output"]["acceleration"] == pytest.approx(expected, rel=1e-6)
     air.effect(record, design[0], X, Y, U)
     air.begin_frame(record, 45.0, 0.01)
-    record["acceleration"] = 0.0
-    assert record["total"] == pytest.approx(expected, rel=1e-6)
+    record["output"]["acceleration"] = 0.0
+    assert record["memory"]["total"] == pytest.approx(expected, rel=1e-6)
 
 
 def test_what_an_earlier_diagnosis_kept_is_gone_when_one_begins():
     kept = dict.fromkeys(("gust", "started", "lost", "turning", "leaping", "leapt", "leap", "leaps"), 1)
     record = new_air(**kept)
     air.begin(record, Y, np.array([0.3, 0.2, 1.0]))
-    assert {name for name in kept if np.any(record[name])} == set()
+    assert {name for name in kept if np.any(holder(record, name)[name])} == set()
 
 
 @pytest.mark.parametrize(("angle", "axis"), [("phi", None), ("theta", 1), ("psi", 2)])
@@ -220,11 +228,11 @@ def test_the_noise_of_an_attitude_is_in_the_gust_that_is_followed(angle, axis):
     record, seen = new_air(), []
     air.begin(record, y, level)
     for _ in range(4000):
-        record["force"] = -GRAVITY * np.array([-np.sin(alpha), 0.0, np.cos(alpha)])
+        record["memory"]["force"] = -GRAVITY * np.array([-np.sin(alpha), 0.0, np.cos(alpha)])
         blurred = level.copy()
         blurred[place] += np.radians(std_deg) * rng.normal()
         air.observe(record, y, blurred, DT)
-        seen.append(record["gust"].copy())
+        seen.append(record["memory"]["gust"].copy())
     lags = np.array([4.0, 3.0]) * SPAN / (np.pi * 45.0)
     counted, reckoned = np.std(seen, axis=0)[1:] * lags, variances.flow_noise(SensorErrors(sensors), 45.0)
     assert (counted <= 1.02 * reckoned).all()

@@ -48,9 +48,13 @@ def test_the_drift_of_the_detectors_blocks(moving):
     for before in (0.0, 9.0):
         fdi = new_fdi()
         record = fdi["statistical"]
-        record["air"]["moving"], record["noise"]["deflection"] = moving, 0.01
-        record["air"]["damping"], record["air"]["per_metre"], record["air"]["unseen"] = np.eye(3), 1e-3, 0.5
-        record["air"]["axes"] = np.arange(9.0).reshape(3, 3)
+        record["air"]["output"]["moving"], record["noise"]["deflection"] = moving, 0.01
+        (
+            record["air"]["output"]["damping"],
+            record["air"]["memory"]["per_metre"],
+            record["air"]["memory"]["unseen"],
+        ) = np.eye(3), 1e-3, 0.5
+        record["air"]["output"]["axes"] = np.arange(9.0).reshape(3, 3)
         for block, axes in zip(record["block"], ((1,), (0, 2)), strict=False):
             block["n"], block["axis"][: len(axes)], block["stronger"] = len(axes), axes, 1.0
         record["noise"]["bounded"] = record["block"]["drift"] = record["block"]["jitter"] = before

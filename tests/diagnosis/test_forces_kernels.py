@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from kernels import new_fdi
+from kernels import holder, new_fdi
 from statistics_of import Across
 
 from beaver_ftc.aircraft import load
@@ -44,10 +44,13 @@ def felt(bounds=None, **admitted):
         fdi["bound"]["admitted"][name] = value
     statistical = fdi["statistical"]
     air = statistical["air"]
-    fill_table(air["forces"], AIRCRAFT, AIRCRAFT.measurable_forces, FORCES)
-    air["area_per_mass"], air["gravity"] = AIRCRAFT.geometry.wing_area_m2 / AIRCRAFT.mass.mass_kg, GRAVITY
-    air["scale"], statistical["forces"]["known"] = 533.4, 1
-    air["read"] = 1
+    fill_table(air["memory"]["forces"], AIRCRAFT, AIRCRAFT.measurable_forces, FORCES)
+    air["config"]["area_per_mass"], air["config"]["gravity"] = (
+        AIRCRAFT.geometry.wing_area_m2 / AIRCRAFT.mass.mass_kg,
+        GRAVITY,
+    )
+    air["config"]["scale"], statistical["forces"]["known"] = 533.4, 1
+    air["output"]["read"] = 1
     set_up_forces(fdi, declared_in(bounds or Bounds(), AIRCRAFT), (X, Y, U), ALONG_Y, DT)
     return fdi
 
@@ -219,12 +222,12 @@ def test_bias_and_slope_of_accelerometers_are_tolerated():
 
 def test_without_accelerometers_no_force_is_weighed(viewed):
     statistical, G = viewed["statistical"], np.ones((3, 4))
-    statistical["inertial_air"]["moving"] = 1
+    statistical["inertial_air"]["output"]["moving"] = 1
     views = statistical["views"]
     views["held"], views["block"]["hypothesis"]["score"][:, 0] = 50.0, 50.0
     forces.do_without(*(statistical[name] for name in ("forces", "air", "inertial_air")))
-    assert not statistical["air"]["read"]
-    assert not statistical["inertial_air"]["moving"]
+    assert not statistical["air"]["output"]["read"]
+    assert not statistical["inertial_air"]["output"]["moving"]
     for v in (ELEVATOR_VIEW, ALPHA_VIEW, UP_VIEW, SIDE_VIEW):
         assert Across.shown(statistical, views[v]) == 0.0
     assert Across.shown(statistical, views[0]) == 50.0
@@ -238,13 +241,13 @@ def test_accelerometers_that_may_break_raise_no_alarm_and_tell_no_gust(viewed):
     """Their forces still count, and ask for the vane to be cleared, once the rates alone have alarmed."""
     statistical = viewed["statistical"]
     air, views = statistical["air"], statistical["views"]
-    air["moving"] = 1
+    air["output"]["moving"] = 1
     set_up_views(statistical, AIRCRAFT)
     views["mix"][ELEVATOR_VIEW], views["held"][ELEVATOR_VIEW] = (0.0, 0.3, 0.0, 0.0, -0.95), 9.0
-    air["mean"] = 0.1, 0.2, 0.3
+    air["output"]["mean"] = 0.1, 0.2, 0.3
     views["block"]["hypothesis"]["score"][0, 0] = 7.0
     for read in (1, 0):
-        air["read"] = read
+        air["output"]["read"] = read
         views["held"][UP_VIEW] = 50.0
         assert Across.alarm(statistical, views[ELEVATOR_VIEW]) == 9.0 * read
         views["held"][UP_VIEW] = 0.0
@@ -263,14 +266,19 @@ def test_a_gust_that_nobody_tells_moves_rate_and_force_in_full(viewed):
         statistical["views"][RUDDER_VIEW],
         statistical["forces"]["component"],
     )
-    air["moving"], air["damping"], air["axes"], air["read"] = 1, rng.normal(size=(3, 3)), np.eye(3), 0
-    air["per_metre"], air["unseen"] = (1e-5, 2e-5, 3e-5), 0.0
+    air["output"]["moving"], air["output"]["damping"], air["output"]["axes"], air["output"]["read"] = (
+        1,
+        rng.normal(size=(3, 3)),
+        np.eye(3),
+        0,
+    )
+    air["memory"]["per_metre"], air["memory"]["unseen"] = (1e-5, 2e-5, 3e-5), 0.0
     Across.turn(viewed, view, rng.normal(size=(3, 4)))
     Across.blur(view, statistical, 45.0)
     m = view["mix"]
-    by_both = np.abs(m[:3] @ air["damping"]) + np.abs(m[3:] @ component["damping"])
+    by_both = np.abs(m[:3] @ air["output"]["damping"]) + np.abs(m[3:] @ component["damping"])
     still = float(view["block"]["drift"][0, 0])
-    air["per_metre"] = 0.0
+    air["memory"]["per_metre"] = 0.0
     Across.blur(view, statistical, 45.0)
     gusts = still - float(view["block"]["drift"][0, 0])
     assert gusts == pytest.approx(45.0 * np.sum(by_both**2 * np.array([1e-5, 2e-5, 3e-5])))
@@ -423,9 +431,10 @@ def test_the_side_vane_is_cleared_across_the_rolling_gust_as_well(viewed):
     """Of roll, yaw and side force: neither the vane's error nor a rolling gust moves what is looked at, and
     what errors of the vane's column let show is the most that its corners do."""
     statistical, rng = viewed["statistical"], np.random.default_rng(3)
-    statistical["air"]["moving"] = 1
+    statistical["air"]["output"]["moving"] = 1
     set_up_views(statistical, AIRCRAFT)
     view, moving = statistical["views"][BETA_VIEW], statistical["air"]
+    moving = moving["output"]
     moving["damping"], moving["axes"] = rng.normal(size=(3, 3)), np.linalg.qr(rng.normal(size=(3, 3)))[0]
     force = statistical["forces"]["component"][ASIDE]
     column = np.array([force["vane_roll"], *force["vane"]])
@@ -451,11 +460,11 @@ def test_the_side_vane_is_cleared_across_the_rolling_gust_as_well(viewed):
 
 def test_where_no_vane_and_no_gust_moves_anything_the_direction_stays(viewed):
     statistical = viewed["statistical"]
-    statistical["air"]["moving"] = 1
+    statistical["air"]["output"]["moving"] = 1
     set_up_views(statistical, AIRCRAFT)
     view = statistical["views"][BETA_VIEW]
     view["mix"] = 0.6, 0.0, 0.8, 0.0, 0.0
-    statistical["air"]["damping"] = 0.0
+    statistical["air"]["output"]["damping"] = 0.0
     assert Across.turn(viewed, view, np.zeros((3, 4))) == 0.0
     assert view["mix"].tolist() == [0.6, 0.0, 0.8, 0.0, 0.0]
 
@@ -580,19 +589,26 @@ def test_what_is_declared_of_rate_and_force_is_seen_along_a_direction(viewed, v)
         2.0,
     )
     air, view, component = statistical["air"], statistical["views"][v], statistical["forces"]["component"]
-    air["moving"], air["damping"], air["axes"] = 1, rng.normal(size=(3, 3)), np.eye(3)
-    air["per_metre"] = 1e-5, 2e-5, 3e-5
+    air["output"]["moving"], air["output"]["damping"], air["output"]["axes"] = (
+        1,
+        rng.normal(size=(3, 3)),
+        np.eye(3),
+    )
+    air["memory"]["per_metre"] = 1e-5, 2e-5, 3e-5
     component["jitter"], component["deflection"] = ((2e-6, 1e-7), (3e-5, 2e-5)), (0.001, 0.002)
     component["wander"], statistical["forces"]["strength"] = (1e-4, 2e-4), 1.2
     for name in ("moving", "damping", "axes", "per_metre"):
-        statistical["inertial_air"][name] = air[name]
-    air["unseen"], statistical["inertial_air"]["unseen"] = (1.0, 0.25, 0.09), (1.0, 0.36, 0.16)
-    seen = statistical["inertial_air" if view["clears"] else "air"]["unseen"]
+        holder(statistical["inertial_air"], name)[name] = holder(air, name)[name]
+    air["memory"]["unseen"], statistical["inertial_air"]["memory"]["unseen"] = (
+        (1.0, 0.25, 0.09),
+        (1.0, 0.36, 0.16),
+    )
+    seen = statistical["inertial_air" if view["clears"] else "air"]["memory"]["unseen"]
     Across.turn(viewed, view, rng.normal(size=(3, 4)))
     Across.blur(view, statistical, 45.0)
     m, block = view["mix"], view["block"]
-    by_rates, by_forces = np.abs(m[:3] @ air["damping"]), 1.2 * np.abs(m[3:] @ component["damping"])
-    gusts = 45.0 * np.sum((np.sqrt(seen) * by_rates + by_forces) ** 2 * air["per_metre"])
+    by_rates, by_forces = np.abs(m[:3] @ air["output"]["damping"]), 1.2 * np.abs(m[3:] @ component["damping"])
+    gusts = 45.0 * np.sum((np.sqrt(seen) * by_rates + by_forces) ** 2 * air["memory"]["per_metre"])
     sizes = np.sqrt([*statistical["noise"]["jitter"], *component["jitter"][:, int(view["inertial"])]])
     assert block["jitter"][0] == pytest.approx((np.abs(m) @ sizes) ** 2)
     bound = np.abs(m) @ [0.02, 0.02, 0.02, 0.0012, 0.0024]
@@ -638,7 +654,10 @@ def test_without_vanes_the_flow_is_what_the_forces_say():
 def test_a_view_takes_off_the_gust_as_it_may_know_it(viewed, v):
     """Of surfaces by the vanes; of what clears a vane without them."""
     statistical = viewed["statistical"]
-    statistical["air"]["mean"], statistical["inertial_air"]["mean"] = (0.1, 0.2, 0.3), (0.4, 0.5, 0.6)
+    statistical["air"]["output"]["mean"], statistical["inertial_air"]["output"]["mean"] = (
+        (0.1, 0.2, 0.3),
+        (0.4, 0.5, 0.6),
+    )
     seen = 0.5 if v == ALPHA_VIEW else 0.2
     view = statistical["views"][v]
     assert Across.part(viewed, view, np.ones(3), PITCH) == pytest.approx(1.0 - seen)
@@ -649,7 +668,7 @@ def test_a_view_takes_off_the_gust_as_it_may_know_it(viewed, v):
 
 def test_in_moving_air_the_vanes_are_asked_but_for_the_rolling_gust(viewed):
     for moving in (0, 1):
-        viewed["statistical"]["air"]["moving"] = moving
+        viewed["statistical"]["air"]["output"]["moving"] = moving
         set_up_views(viewed["statistical"], AIRCRAFT)
         cleared_by = viewed["statistical"]["views"]["cleared_by"][:5].tolist()
         assert cleared_by == [moving * NORMAL, 0, moving * SIDE, moving * SIDE, 0]
@@ -681,7 +700,7 @@ def test_an_aircraft_told_apart_in_one_plane_only_has_the_views_of_that_plane(ai
     """And no vane is asked in moving air: none looks at both planes."""
     fdi = felt()
     statistical = fdi["statistical"]
-    statistical["air"]["moving"] = 1
+    statistical["air"]["output"]["moving"] = 1
     set_up_views(statistical, aircraft)
     views = statistical["views"][: statistical["n_views"]]
     found = [(int(view["surface"]), tuple(view["plane"].tolist())) for view in views[5:]]

@@ -495,7 +495,7 @@ def test_what_the_beliefs_leave_unexplained_is_followed_by_the_drift(b):
     _, record = detector()
     rng = np.random.default_rng(b)
     surprise, mean = rng.normal(size=3), rng.normal(size=3)
-    record["air"]["mean"], record["air"]["acceleration"] = mean, (0.1, 0.2, 0.3)
+    record["air"]["output"]["mean"], record["air"]["output"]["acceleration"] = mean, (0.1, 0.2, 0.3)
     gains = rng.normal(size=(2, 2))
     record["block"]["K_d"], record["block"]["keep"] = gains, 1.0
     Statistical.follow_rest(record, surprise, DT)

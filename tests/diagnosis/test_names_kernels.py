@@ -67,7 +67,11 @@ def test_which_surfaces_are_named(every_type, pair, alarmed, beside, named):
     fdi = nameless()
     fdi["verdict"]["isolated"], fdi["types"]["surface"]["status"]["named"][[AILERON, RUDDER]] = ELEVATOR, 1
     fdi["config"]["every_type"], fdi["types"]["pair"]["enabled"] = every_type, pair
-    fdi["watch"]["enabled"], fdi["watch"]["alarmed"], fdi["watch"]["beside"] = 1, alarmed, beside
+    fdi["watch"]["config"]["enabled"], fdi["watch"]["output"]["alarmed"], fdi["watch"]["output"]["beside"] = (
+        1,
+        alarmed,
+        beside,
+    )
     note_names(fdi, 2.5)
     since = np.full(4, -1.0)
     since[named] = 2.5

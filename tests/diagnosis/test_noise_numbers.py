@@ -175,16 +175,16 @@ def test_a_loss_declared_constant_neither_grows_nor_ends():
 def test_the_second_view_returns_with_a_gust_as_strong_where_it_is_slow(alone):
     air, last = alone.detector["air"], alone.blocks[-1]
     rolling = sqrt(0.3048 * 1750.0 * SPAN_M) / 2.6
-    assert air["rolling"] == pytest.approx(rolling)
+    assert air["config"]["rolling"] == pytest.approx(rolling)
     assert last["lag"] == pytest.approx(noise_model.returning_length(alone.detector, V, 50.0, rolling))
     assert last["stronger"] == pytest.approx((rolling / last["lag"]) ** 2)
     assert [float(block["stronger"]) for block in alone.blocks[:-1]] == [1.0, 1.0]
-    assert air["moving"] == 1
-    assert air["area_per_mass"] == pytest.approx(AIRCRAFT.geometry.wing_area_m2 / MASS.mass_kg)
-    assert air["unseen"] == pytest.approx([1.0, 0.003, 0.03])
-    assert air["span"] == SPAN_M
-    assert air["gravity"] == pytest.approx(9.80665)
-    assert Detector(50.0).detector["air"]["moving"] == 0
+    assert air["output"]["moving"] == 1
+    assert air["config"]["area_per_mass"] == pytest.approx(AIRCRAFT.geometry.wing_area_m2 / MASS.mass_kg)
+    assert air["memory"]["unseen"] == pytest.approx([1.0, 0.003, 0.03])
+    assert air["config"]["span"] == SPAN_M
+    assert air["config"]["gravity"] == pytest.approx(9.80665)
+    assert Detector(50.0).detector["air"]["output"]["moving"] == 0
 
 
 def test_where_nothing_diagnoses_nothing_is_enabled():
@@ -350,7 +350,7 @@ def test_a_sense_is_kept_for_every_onset(alone):
 
 
 def test_forces_are_those_the_file_has_a_sensor_for(alone):
-    table = alone.detector["air"]["forces"]
+    table = alone.detector["air"]["memory"]["forces"]
     values = table["value"][: len(AIRCRAFT.measurable_forces)]
     assert sorted(values) == sorted(term.value for term in AIRCRAFT.measurable_forces)
 
@@ -363,7 +363,7 @@ def test_where_forces_are_weighed_their_noise_is_in_the_gust_that_follows_from_t
     )
     statistical, design, dt = np.zeros(1, statistical_dtype())[0], design_record()[0], 0.02
     forces = statistical["forces"]
-    statistical["air"]["span"] = SPAN_M
+    statistical["air"]["config"]["span"] = SPAN_M
     forces["known"], forces["component"]["felt"] = known, (0.3**2, 0.2**2)
     forces["component"]["vane"][:, 1] = -6.0, 50.0
     air.set_up_jitter(statistical, SensorErrors(sensors.sensors), design, *LEVEL_FLIGHT[1:], dt)

@@ -56,16 +56,16 @@ def flown(attitude, alpha, beta, V, altitude, rates):
 def test_a_ball_thrown_into_the_air_is_predicted():
     """No force, no rotation: velocity falls, altitude and flow follow from mechanics in closed form."""
     step = np.zeros(1, STEP)[0]
-    step["h"], step["gravity"] = 0.01, 9.8
+    step["config"]["h"], step["config"]["gravity"] = 0.01, 9.8
     attitude, alpha, beta, V = np.array([0.3, 0.2, 1.0]), 0.1, 0.05, 45.0
     rotation = as_rotation(attitude)
     v = V * np.array([np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)])
     redundancy.look(step, flown(attitude, alpha, beta, V, 1000.0, np.zeros(3)), np.zeros(3))
-    step["acceleration_then"] = step["acceleration"]
+    step["memory"]["acceleration_then"] = step["memory"]["acceleration"]
     redundancy.predict(step)
     down = rotation.apply(v)[2]
     after = rotation.inv().apply(rotation.apply(v) + np.array([0.0, 0.0, 9.8 * 0.01]))
-    predicted = step["predicted"]
+    predicted = step["memory"]["predicted"]
     assert predicted[3] == pytest.approx(np.arctan2(after[2], after[0]), abs=1e-14)
     assert predicted[4] == pytest.approx(np.arcsin(after[1] / np.linalg.norm(after)), abs=1e-14)
     assert predicted[5] == pytest.approx(np.linalg.norm(after), abs=1e-12)
@@ -76,7 +76,7 @@ def test_a_ball_thrown_into_the_air_is_predicted():
 def test_a_bound_covers_the_worst_course_of_what_it_is_told():
     """Extreme inputs, one by one: a residual is never beyond its bound, and can come near it."""
     test, step = np.zeros(1, TEST)[0], np.zeros(1, STEP)[0]
-    step["h"], step["decay"] = 0.01, [np.exp(-pole * 0.01) for pole in (1e6, 10.0, 1.0)]
+    step["config"]["h"], step["config"]["decay"] = 0.01, [np.exp(-pole * 0.01) for pole in (1e6, 10.0, 1.0)]
     test["noise_then"] = 0.02
     test["bound_noise"] = 0.02
     reading, largest = 0.02, 0.0

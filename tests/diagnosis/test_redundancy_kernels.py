@@ -45,7 +45,13 @@ def reading(
 
 def new_step():
     step = np.zeros(1, STEP)[0]
-    step["h"], step["gravity"], step["drift"], step["gust"], step["swift"] = H, GRAVITY, DRIFT, GUST, 80.0
+    (
+        step["config"]["h"],
+        step["config"]["gravity"],
+        step["config"]["drift"],
+        step["config"]["gust"],
+        step["config"]["swift"],
+    ) = H, GRAVITY, DRIFT, GUST, 80.0
     return step
 
 
@@ -63,17 +69,17 @@ def test_a_look_keeps_attitude_velocity_and_acceleration(seed):
         attitude=rng.uniform(-1.2, 1.2, 3), alpha=rng.uniform(-0.3, 0.3), beta=rng.uniform(-0.3, 0.3)
     )
     step, force = new_step(), rng.normal(size=3)
-    step["error"], step["error_then"] = 0.2, 0.1
+    step["memory"]["error"], step["memory"]["error_then"] = 0.2, 0.1
     redundancy.look(step, signal, force)
     rotation = as_rotation(signal[PHI : PHI + 3])
-    kept = Rotation.from_quat([*step["turned"][1:], step["turned"][0]])
+    kept = Rotation.from_quat([*step["memory"]["turned"][1:], step["memory"]["turned"][0]])
     acceleration = force + rotation.inv().apply([0, 0, GRAVITY])
     assert (kept.inv() * rotation).magnitude() < 1e-14
-    assert step["then"] == pytest.approx(signal)
-    assert step["velocity"] == pytest.approx(velocity_of(signal), rel=1e-12)
-    assert step["acceleration"] == pytest.approx(acceleration, rel=1e-12)
-    assert (step["error_then"] == 0.2).all()
-    assert (step["error_before"] == 0.1).all()
+    assert step["memory"]["then"] == pytest.approx(signal)
+    assert step["memory"]["velocity"] == pytest.approx(velocity_of(signal), rel=1e-12)
+    assert step["memory"]["acceleration"] == pytest.approx(acceleration, rel=1e-12)
+    assert (step["memory"]["error_then"] == 0.2).all()
+    assert (step["memory"]["error_before"] == 0.1).all()
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -83,20 +89,20 @@ def test_a_prediction_turns_attitude_and_velocity_by_the_rates(seed):
     signal = reading(attitude=rng.uniform(-1.0, 1.0, 3), rates=rng.uniform(-0.5, 0.5, 3))
     step, before = new_step(), rng.normal(size=3)
     redundancy.look(step, signal, rng.normal(size=3))
-    step["acceleration_then"], now = before, step["acceleration"].copy()
-    step["pull"], step["pulled"] = 3.0, (2.0, 1.0)
+    step["memory"]["acceleration_then"], now = before, step["memory"]["acceleration"].copy()
+    step["memory"]["pull"], step["memory"]["pulled"] = 3.0, (2.0, 1.0)
     redundancy.predict(step)
-    assert step["pull"] == pytest.approx(np.linalg.norm(1.5 * now - 0.5 * before))
-    assert step["pulled"].tolist() == [3.0, 2.0]
-    assert step["felt_then"] == pytest.approx(np.linalg.norm(before))
+    assert step["memory"]["pull"] == pytest.approx(np.linalg.norm(1.5 * now - 0.5 * before))
+    assert step["memory"]["pulled"].tolist() == [3.0, 2.0]
+    assert step["memory"]["felt_then"] == pytest.approx(np.linalg.norm(before))
     size = np.linalg.norm(signal[:3])
     by = Rotation.from_rotvec(signal[:3] / size * 2.0 * np.arctan(0.5 * H * size))
     attitude = (as_rotation(signal[PHI : PHI + 3]) * by).as_euler("ZYX")[::-1]
     v = by.inv().apply(velocity_of(signal) + H * (1.5 * now - 0.5 * before))
-    predicted = step["predicted"]
+    predicted = step["memory"]["predicted"]
     assert predicted[PHI : PHI + 3] == pytest.approx(attitude, abs=1e-13)
-    assert step["velocity"] == pytest.approx(v, rel=1e-12)
-    assert step["acceleration_then"] == pytest.approx(by.inv().apply(now), rel=1e-12)
+    assert step["memory"]["velocity"] == pytest.approx(v, rel=1e-12)
+    assert step["memory"]["acceleration_then"] == pytest.approx(by.inv().apply(now), rel=1e-12)
     assert predicted[AIRSPEED] == pytest.approx(np.linalg.norm(v))
     assert predicted[ALPHA] == pytest.approx(np.arctan(v[2] / v[0]))
     assert predicted[BETA] == pytest.approx(np.arcsin(v[1] / np.linalg.norm(v)))
@@ -108,7 +114,7 @@ def test_a_prediction_turns_attitude_and_velocity_by_the_rates(seed):
 def test_what_each_angle_turns_the_axes_by(i):
     """By a small step of the angle, as a rotation vector in body axes."""
     step, angles, small = new_step(), np.array([0.4, -0.3, 2.0]), 1e-6
-    step["then"][PHI : PHI + 3] = angles
+    step["memory"]["then"][PHI : PHI + 3] = angles
     moved = angles + small * (np.arange(3) == i)
     one, other = (Rotation.from_euler("ZYX", of[::-1]) for of in (angles, moved))
     turned = (one.inv() * other).as_rotvec() / small
@@ -123,8 +129,8 @@ def test_axes_that_do_not_turn_leave_a_vector_as_it_is():
 
 def compared(now, signal, predicted, then):
     step = new_step()
-    redundancy.quaternion(*now, step["now"])
-    step["predicted"], step["then"] = predicted, then
+    redundancy.quaternion(*now, step["memory"]["now"])
+    step["memory"]["predicted"], step["memory"]["then"] = predicted, then
     redundancy.compare(step, signal)
     return step["test"]["residual"].copy()
 
@@ -198,9 +204,9 @@ def three_looks(seed):
 def residuals(looks):
     """The record after three looks, and the residuals (RPM,) of the last."""
     step = new_step()
-    step["drift"] = step["gust"] = 0.0
+    step["config"]["drift"] = step["config"]["gust"] = 0.0
     redundancy.look(step, looks[0], looks[0, AX:])
-    step["acceleration_then"] = step["acceleration"]
+    step["memory"]["acceleration_then"] = step["memory"]["acceleration"]
     redundancy.predict(step)
     redundancy.look(step, looks[1], looks[1, AX:])
     redundancy.predict(step)
@@ -210,11 +216,11 @@ def residuals(looks):
 
 def allowed(step, signal, sensor, steady, changing):
     """(rate, noise) (RPM,) where these errors of one sensor are declared."""
-    step["steady"], step["changing"] = 0.0, 0.0
+    step["config"]["steady"], step["memory"]["changing"] = 0.0, 0.0
     for name in ("error", "error_then", "error_before"):
-        step[name] = 0.0
-        step[name][sensor] = steady + changing
-    step["steady"][sensor], step["changing"][sensor] = steady, changing
+        step["memory"][name] = 0.0
+        step["memory"][name][sensor] = steady + changing
+    step["config"]["steady"][sensor], step["memory"]["changing"][sensor] = steady, changing
     redundancy.allow(step, signal)
     return step["test"]["rate"][:RPM].copy(), step["test"]["noise"][:RPM].copy()
 
@@ -262,18 +268,18 @@ def test_a_declared_error_is_of_the_reading_and_what_is_steady_does_not_change()
     """|reading - truth| <= offset + slope |truth|, and |truth| <= (|reading| + offset) / (1 - slope)."""
     step, signal = new_step(), np.full(N_SENSORS, -3.0)
     signal[PHI + 2] += 2.0 * np.pi  # a heading is off by its slope of the angle from north
-    step["offset"], step["slope"], step["steady"] = 0.3, 0.1, 0.25
+    step["config"]["offset"], step["config"]["slope"], step["config"]["steady"] = 0.3, 0.1, 0.25
     redundancy.note_declared(step, signal)
     truth = (3.0 + 0.3) / 0.9
-    assert step["error"] == pytest.approx(truth - 3.0)
-    assert step["changing"] == pytest.approx(truth - 3.0 - 0.25 + 3e-10, rel=1e-9)
+    assert step["memory"]["error"] == pytest.approx(truth - 3.0)
+    assert step["memory"]["changing"] == pytest.approx(truth - 3.0 - 0.25 + 3e-10, rel=1e-9)
 
 
 def test_filters_sum_what_was_with_what_each_pole_keeps():
     rng, frames = np.random.default_rng(2), 30
     test, step = np.zeros(1, TEST)[0], new_step()
-    step["decay"] = keep = np.array([0.0, 0.8, 0.97])
-    step["gusts"], test["air"] = [0.1, 0.2, 0.3], 0.5
+    step["config"]["decay"] = keep = np.array([0.0, 0.8, 0.97])
+    step["config"]["gusts"], test["air"] = [0.1, 0.2, 0.3], 0.5
     residual, rate, noise = rng.normal(size=frames), rng.uniform(1, 2, frames), rng.uniform(1, 2, frames)
     for k in range(frames):
         test["residual"], test["rate"], test["noise"] = residual[k], rate[k], noise[k]
@@ -291,8 +297,12 @@ def test_filters_sum_what_was_with_what_each_pole_keeps():
 @pytest.mark.parametrize("engine", [False, True])
 def test_a_whole_look_finds_sound_instruments_sound_and_a_wrong_one_wrong(engine):
     step, signal = new_step(), reading(rates=np.zeros(3), attitude=(0, 0.1, 0))
-    step["decay"] = [0.0, 0.8, 0.97]
-    step["command"], step["offset"][ENGINE_SPEED], step["offset"][MANIFOLD] = (1700.0, 20.5), 10.0, 0.25
+    step["config"]["decay"] = [0.0, 0.8, 0.97]
+    step["memory"]["command"], step["config"]["offset"][ENGINE_SPEED], step["config"]["offset"][MANIFOLD] = (
+        (1700.0, 20.5),
+        10.0,
+        0.25,
+    )
     redundancy.look(step, signal, np.array([GRAVITY * np.sin(0.1), 0.0, -GRAVITY * np.cos(0.1)]))
     step["test"]["bound_noise"] = 1e-6
     redundancy.check(step, signal, engine)
@@ -365,9 +375,17 @@ def test_sound_instruments_stay_within_every_bound(seed, h):
         3e-3 * side[2] * (np.abs(np.arange(N_SENSORS) - 8) <= 1),
     )
     noise = rng.choice([0.0, 0.2, 1.0], N_SENSORS) * UNITS
-    step["h"], step["decay"], step["gust"] = h, np.exp(-h * np.array([1e6, 10.0, 1.0])), 0.0
-    step["offset"], step["steady"], step["slope"] = np.abs(bias) + noise, np.abs(bias), np.abs(slope)
-    step["drift"], step["command"] = np.abs(drift).max(), (1800.0, 20.0)
+    step["config"]["h"], step["config"]["decay"], step["config"]["gust"] = (
+        h,
+        np.exp(-h * np.array([1e6, 10.0, 1.0])),
+        0.0,
+    )
+    step["config"]["offset"], step["config"]["steady"], step["config"]["slope"] = (
+        np.abs(bias) + noise,
+        np.abs(bias),
+        np.abs(slope),
+    )
+    step["config"]["drift"], step["memory"]["command"] = np.abs(drift).max(), (1800.0, 20.0)
     nearest = np.zeros(13)
     for k in range(looks):
         reading = (1.0 + slope) * true[k] + bias + h * k * drift + noise * rng.choice([-1.0, 1.0], N_SENSORS)
@@ -383,7 +401,7 @@ def test_sound_instruments_stay_within_every_bound(seed, h):
 
 def test_near_the_vertical_attitude_is_not_compared_and_its_tests_begin_anew():
     step, signal = new_step(), reading(rates=np.zeros(3), attitude=(0.1, 1.25, 0.2))
-    step["decay"] = 0.0, 0.8, 0.97
+    step["config"]["decay"] = 0.0, 0.8, 0.97
     redundancy.begin(step, signal, signal[AX:])
     shares = []
     for pitch in (1.28, 1.31, 1.28, 1.25):
@@ -402,7 +420,7 @@ def test_the_bound_of_a_climb_knows_the_hardest_of_three_pulls_whichever_it_was(
     def rate(*pulled):
         step, signal = new_step(), reading()
         redundancy.look(step, signal, np.array([0.0, 0.0, -GRAVITY]))
-        step["pull"], step["pulled"] = 1.0, pulled
+        step["memory"]["pull"], step["memory"]["pulled"] = 1.0, pulled
         redundancy.allow(step, signal)
         return step["test"]["rate"][CLIMB]
 
@@ -416,7 +434,7 @@ def test_a_wrong_airspeed_turns_the_flow_at_most_by_what_it_makes_of_the_pull():
     for off in (0.0, 2.0):
         step = new_step()
         redundancy.look(step, signal, np.array([0.0, 0.0, -GRAVITY]))
-        step["pull"] = pull
+        step["memory"]["pull"] = pull
         rates.append(allowed(step, signal, AIRSPEED, off, 0.0)[0][list(FLOWS)])
     V = signal[AIRSPEED]
     turned = pull * (1.0 / (V - 2.0) - 1.0 / V)
@@ -428,8 +446,8 @@ def test_a_wrong_airspeed_turns_the_flow_at_most_by_what_it_makes_of_the_pull():
 def test_momentary_errors_of_the_attitude_stay_within_bounds_that_remember_long(seed):
     """A heading that leaps back and forth turns each time about the axis that a blurred bank has by then."""
     rng, step, signal = np.random.default_rng(seed), new_step(), reading(rates=np.zeros(3))
-    step["decay"], step["drift"] = (0.0, 0.99, 0.9999), 0.0
-    step["offset"][PHI : PHI + 3] = sizes = np.array([1e-3, 1e-3, 0.06])
+    step["config"]["decay"], step["config"]["drift"] = (0.0, 0.99, 0.9999), 0.0
+    step["config"]["offset"][PHI : PHI + 3] = sizes = np.array([1e-3, 1e-3, 0.06])
     true = signal[PHI : PHI + 3] * (0.0, 1.0, 1.0)
     for k in range(400):
         signal[PHI : PHI + 3] = true + sizes * rng.choice([-1.0, 0.0, 1.0], 3)

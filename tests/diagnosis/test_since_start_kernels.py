@@ -78,11 +78,19 @@ def course(kind, size, true, h):
 def new_watch(h):
     watch = np.zeros(1, WATCH).view(np.recarray)[0]
     step = watch["step"]
-    step["h"], step["decay"], step["gravity"] = h, np.exp([-1e6 * h, -10.0 * h, -h]), GRAVITY
-    step["rising"], step["swift"] = 1.0, 80.0
-    step["offset"][:3], step["steady"][:3] = 2e-4, 1e-4
-    step["offset"][[ALPHA, BETA, PHI, THETA]] = 5e-4
-    step["offset"][AIRSPEED], step["offset"][QDYN], step["offset"][ALTITUDE] = 0.05, 2.0, 0.5
+    step["config"]["h"], step["config"]["decay"], step["config"]["gravity"] = (
+        h,
+        np.exp([-1e6 * h, -10.0 * h, -h]),
+        GRAVITY,
+    )
+    step["config"]["rising"], step["config"]["swift"] = 1.0, 80.0
+    step["config"]["offset"][:3], step["config"]["steady"][:3] = 2e-4, 1e-4
+    step["config"]["offset"][[ALPHA, BETA, PHI, THETA]] = 5e-4
+    step["config"]["offset"][AIRSPEED], step["config"]["offset"][QDYN], step["config"]["offset"][ALTITUDE] = (
+        0.05,
+        2.0,
+        0.5,
+    )
     return watch
 
 

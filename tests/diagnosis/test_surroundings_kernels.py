@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from kernels import DT, new_fdi, on
+from kernels import DT, fill, new_fdi, on
 from scipy.spatial.transform import Rotation
 from statistics_of import Statistical, put
 
@@ -35,10 +35,8 @@ EITHER = 0
 
 def new_air(**fields):
     record = np.zeros(1, AIR).view(np.recarray)[0]
-    record["span"], record["gravity"], record["moving"], record["seen"] = SPAN, 9.8, 1, 1
-    for name, value in fields.items():
-        record[name] = value
-    return record
+    fill(record, span=SPAN, gravity=9.8, moving=1, seen=1)
+    return fill(record, **fields)
 
 
 def through_air(y, attitude, heading=None):
@@ -57,25 +55,27 @@ def test_a_gust_is_what_forces_and_gravity_do_not_explain(seed):
     y_then[:2], y_now[:2] = rng.uniform(-0.1, 0.2, (2, 2))
     y_now[2] = 47.0
     air.begin(record, y_then, then)
-    assert record["velocity"] == pytest.approx(through_air(y_then, then))
-    assert record["heading"] == then[2]
-    assert not record["gust"].any()
-    record["gust"], record["force"] = (0.0, 0.02, -0.03), rng.normal(size=3)
+    assert record["memory"]["velocity"] == pytest.approx(through_air(y_then, then))
+    assert record["memory"]["heading"] == then[2]
+    assert not record["memory"]["gust"].any()
+    record["memory"]["gust"], record["memory"]["force"] = (0.0, 0.02, -0.03), rng.normal(size=3)
     level = Rotation.from_euler("ZYX", [0.0, then[1], then[0]])
-    expected = through_air(y_then, then) + dt * (level.apply(record["force"]) + np.array([0.0, 0.0, 9.8]))
+    expected = through_air(y_then, then) + dt * (
+        level.apply(record["memory"]["force"]) + np.array([0.0, 0.0, 9.8])
+    )
     expected = Rotation.from_euler("z", then[2] - now[2]).apply(expected)
     air.observe(record, y_now, now, dt)
     change = expected - through_air(y_now, now)
     tau_q, tau_r = 4.0 * SPAN / (np.pi * 47.0), 3.0 * SPAN / (np.pi * 47.0)
     pitching = 0.02 * np.exp(-dt / tau_q) + change[2] / (47.0 * tau_q)
     yawing = -0.03 * np.exp(-dt / tau_r) + change[1] / (47.0 * tau_r)
-    assert record["gust"] == pytest.approx([0.0, pitching, yawing])
-    assert record["velocity"] == pytest.approx(through_air(y_now, now))
+    assert record["memory"]["gust"] == pytest.approx([0.0, pitching, yawing])
+    assert record["memory"]["velocity"] == pytest.approx(through_air(y_now, now))
 
 
 def test_the_specific_force_is_that_of_the_terms():
     record, out = new_air(area_per_mass=0.01), np.zeros(3)
-    fill_table(record["forces"], AIRCRAFT, AIRCRAFT.measurable_forces, FORCES)
+    fill_table(record["memory"]["forces"], AIRCRAFT, AIRCRAFT.measurable_forces, FORCES)
     air.specific_force(record, X, Y, U, out)
     of = {
         "alpha": Y[0], "beta": Y[1], "ph": X[0] * SPAN / (2 * V), "rh": X[2] * SPAN / (2 * V), "dpt": Y[4],
@@ -91,13 +91,13 @@ def test_the_specific_force_is_that_of_the_terms():
 def test_the_gusts_of_a_frame_are_summed_over_its_instants():
     record, design = new_air(area_per_mass=0.01), design_record().view(np.recarray)[0]
     air.begin(record, Y, np.zeros(3))
-    record["gust"] = 0.0, 0.02, -0.03
+    record["memory"]["gust"] = 0.0, 0.02, -0.03
     air.effect(record, design, X, Y, U)
-    first = record["acceleration"].copy()
+    first = record["output"]["acceleration"].copy()
     air.begin_frame(record, V, 0.01)
     air.look(record, design, X, Y, U, np.zeros(3), 0.01)
-    assert record["total"] == pytest.approx(first + record["acceleration"])
-    assert np.abs(record["acceleration"] - first).max() > 1e-5
+    assert record["memory"]["total"] == pytest.approx(first + record["output"]["acceleration"])
+    assert np.abs(record["output"]["acceleration"] - first).max() > 1e-5
 
 
 @pytest.mark.parametrize("swings", [0, 1])
@@ -108,9 +108,14 @@ def test_axes_that_turn_move_what_is_not_seen_besides(swings):
     """
     rng = np.random.default_rng(7)
     record = new_air(swings=swings, turning=0.4, rolling=30.0)
-    record["damping"], record["axes"], record["swing"] = rng.normal(size=(3, 3, 3))
-    record["unseen"], record["per_metre"] = (1.0, 0.2, 0.7), (1e-3, 2e-3, 3e-3)
-    axes, swing = record["damping"] @ record["axes"], record["damping"] @ record["swing"]
+    record["output"]["damping"], record["output"]["axes"], record["memory"]["swing"] = rng.normal(
+        size=(3, 3, 3)
+    )
+    record["memory"]["unseen"], record["memory"]["per_metre"] = (1.0, 0.2, 0.7), (1e-3, 2e-3, 3e-3)
+    axes, swing = (
+        record["output"]["damping"] @ record["output"]["axes"],
+        record["output"]["damping"] @ record["memory"]["swing"],
+    )
     expected = axes @ np.diag([1e-3, 4e-4, 3e-3]) @ axes.T  # of the yawing one no more than all of it
     lags = 30.0 / V, 0.0, 3.0 * SPAN / (np.pi * V)
     turned = 0.5 * np.square(lags) * [1e-3, 0.0, 0.4 * 3e-3]
@@ -121,7 +126,7 @@ def test_axes_that_turn_move_what_is_not_seen_besides(swings):
         for _ in range(instants):
             air.note_leap(record, V, DT)
         air.elapse(record, 1.0)
-        assert record["leap"] == pytest.approx(leap * once, rel=1e-12)
+        assert record["output"]["leap"] == pytest.approx(leap * once, rel=1e-12)
 
 
 def test_a_turning_heading_hides_a_yawing_gust():
@@ -194,9 +199,7 @@ def new_map(**fields):
     record["share"][:3], record["until_s"][:2] = (0.25, 0.5, 1.0), (10.0, 60.0)
     record["travel_low"], record["travel_high"] = (-0.4, -0.4, -0.2, -0.1), (0.2, 0.4, 0.4, 1.0)
     record["error"] = np.arange(record["error"].size).reshape(record["error"].shape) / 1000.0
-    for name, value in fields.items():
-        record[name] = value
-    return record
+    return fill(record, **fields)
 
 
 @pytest.mark.parametrize(
@@ -269,17 +272,24 @@ def new_detector(**fields):
 def test_the_drift_is_of_what_is_bounded_and_of_the_air_not_seen(moving):
     fdi, record, design = new_detector()
     rng = np.random.default_rng(1)
-    record["air"]["moving"] = moving
-    record["air"]["damping"], record["air"]["axes"] = rng.normal(size=(2, 3, 3))
-    record["air"]["unseen"], record["air"]["per_metre"] = (1.0, 0.2, 0.3), (1e-3, 2e-3, 3e-3)
-    record["air"]["glimpsed"], record["air"]["rolling"], record["air"]["span"] = moving, 20.0, 5.0 * np.pi
+    record["air"]["output"]["moving"] = moving
+    record["air"]["output"]["damping"], record["air"]["output"]["axes"] = rng.normal(size=(2, 3, 3))
+    record["air"]["memory"]["unseen"], record["air"]["memory"]["per_metre"] = (
+        (1.0, 0.2, 0.3),
+        (1e-3, 2e-3, 3e-3),
+    )
+    (
+        record["air"]["config"]["glimpsed"],
+        record["air"]["config"]["rolling"],
+        record["air"]["config"]["span"],
+    ) = moving, 20.0, 5.0 * np.pi
     fdi["bound"]["constant"], fdi["bound"]["inertia"] = (0.02, 0.0, 0.04), 0.1
     Statistical.drifts(record, fdi, design, X, Y)
     bounded = np.zeros(3)
     worst_case.uncertainty_bound(X, design, np.full(3, 0.1), np.array([0.02, 0.0, 0.04]), 0.0, bounded)
     bounded += [0.01, 0.02, 0.03]
     assert record["noise"]["bounded"] == pytest.approx(bounded)
-    turned = record["air"]["damping"] @ record["air"]["axes"]
+    turned = record["air"]["output"]["damping"] @ record["air"]["output"]["axes"]
     usual, slow = (1e-3, 4e-4, 9e-4), (4e-3, 16e-4, 36e-4 * 0.75**2)  # stronger; 20, 20 and 15 m
     for block, intensity in zip(record["block"], (usual, usual, slow), strict=True):
         axes = block["axis"][: block["n"]]
@@ -438,14 +448,14 @@ def test_the_estimate_is_that_of_whoever_counts():
 def test_the_gusts_mean_is_a_share_of_what_was_summed(share):
     record = new_air(total=(0.4, -0.8, 1.2))
     air.elapse(record, share)
-    assert record["mean"] == pytest.approx(share * np.array([0.4, -0.8, 1.2]))
+    assert record["output"]["mean"] == pytest.approx(share * np.array([0.4, -0.8, 1.2]))
 
 
 def test_a_leap_of_the_air_widens_what_a_drift_may_be():
     """By the axes of the block, so much stronger as the gusts are taken to be."""
     block = np.zeros(1, block_dtype(USUAL.rates)).view(np.recarray)[0]
     record, rng = new_air(), np.random.default_rng(2)
-    record["leap"], block["stronger"], block["P_dd"] = rng.normal(size=(3, 3)), 1.7, 0.3
+    record["output"]["leap"], block["stronger"], block["P_dd"] = rng.normal(size=(3, 3)), 1.7, 0.3
     block["n"], block["axis"] = 2, (0, 2)
     statistical.leap(record, block)
-    assert block["P_dd"] == pytest.approx(0.3 + 1.7 * record["leap"][np.ix_((0, 2), (0, 2))])
+    assert block["P_dd"] == pytest.approx(0.3 + 1.7 * record["output"]["leap"][np.ix_((0, 2), (0, 2))])

@@ -263,7 +263,7 @@ def test_what_raises_the_alarm_beside_the_blocks(surface, plane, mix, inertial, 
         12.5,
         2,
     )
-    statistical["air"]["read"] = statistical["forces"]["known"] = 1
+    statistical["air"]["output"]["read"] = statistical["forces"]["known"] = 1
     view, clearing = statistical["views"][:2]
     clearing["clears"], clearing["plane"], clearing["held"] = 1, (YAW, SIDE), 50.0
     view["cleared_by"], view["held"] = SIDE, 9.0

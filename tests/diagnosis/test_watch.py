@@ -17,9 +17,9 @@ def watch():
 
 
 def test_nothing_is_said_without_an_alarm_or_beside_a_surfaces(watch):
-    watch["beside"] = 1
+    watch["output"]["beside"] = 1
     assert instrument_found(watch, 4.5) is None
-    watch["beside"] = watch["alarmed"] = 0
+    watch["output"]["beside"] = watch["output"]["alarmed"] = 0
     assert instrument_found(watch, 4.5) is None
 
 
@@ -39,7 +39,7 @@ def test_what_cannot_be_named_by_then_is_unanticipated(watch):
 
 @pytest.mark.parametrize("named", [0, 1])
 def test_the_instrument_that_is_named_is_said_with_its_instant(watch, named):
-    watch["named"], watch["named_at_s"] = named, 4.25
+    watch["output"]["named"], watch["output"]["named_at_s"] = named, 4.25
     said = instrument_found(watch, 9.0)
     assert (said["isolated"], said["isolation_time_s"]) == (sensor_words(SENSORS[named]), 4.25)
     assert said["isolation_type"] is None

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from kernels import DT, new_fdi, on
+from kernels import DT, fill, new_fdi, on
 
 from beaver_ftc.design.engine import measured_slipstream
 from beaver_ftc.design.model import DPT
@@ -51,12 +51,23 @@ GYROS, FORCES = (0, 1, 2), (AX, AX + 1, AX + 2)
 
 def new_watch(**fields):
     watch = np.zeros(1, WATCH).view(np.recarray)[0]
-    watch["enabled"], watch["instants"], watch["named"], watch["follows"] = 1, 4, NOBODY, 1.0
-    watch["step"]["h"], watch["step"]["decay"], watch["alarmed_at_s"] = H, (0.0, 0.9, 0.99), -1.0
-    watch["step"]["test"]["bound"], watch["longest_still"], watch["step"]["swift"] = 1.0, 3, 80.0
-    for name, value in fields.items():
-        watch[name] = value
-    return watch
+    (
+        watch["config"]["enabled"],
+        watch["config"]["instants"],
+        watch["output"]["named"],
+        watch["config"]["follows"],
+    ) = 1, 4, NOBODY, 1.0
+    watch["step"]["config"]["h"], watch["step"]["config"]["decay"], watch["output"]["alarmed_at_s"] = (
+        H,
+        (0.0, 0.9, 0.99),
+        -1.0,
+    )
+    watch["step"]["test"]["bound"], watch["config"]["longest_still"], watch["step"]["config"]["swift"] = (
+        1.0,
+        3,
+        80.0,
+    )
+    return fill(watch, **fields)
 
 
 def seen(*missing):
@@ -82,16 +93,16 @@ def with_shares(shares, **fields):
 def test_of_the_looks_of_a_frame_the_test_furthest_towards_its_bound_is_kept(shares, past, furthest):
     watch = with_shares(shares, furthest=5, share=0.7, past=past)
     watching.note_furthest(watch)
-    assert (watch["furthest"], watch["share"]) == furthest
+    assert (watch["output"]["furthest"], watch["output"]["share"]) == furthest
 
 
 def suspects(shares, lead=None, **fields):
     """Who can have brought the tests here."""
     watch = with_shares(shares, **fields)
-    watch["lead"] = max(shares, key=shares.get) if lead is None else lead
+    watch["output"]["lead"] = max(shares, key=shares.get) if lead is None else lead
     watching.note_fired(watch)
     watching.suspect(watch)
-    return set(np.flatnonzero(watch["suspect"]).tolist())
+    return set(np.flatnonzero(watch["output"]["suspect"]).tolist())
 
 
 @pytest.mark.parametrize(
@@ -148,14 +159,14 @@ def test_an_airspeed_as_wrong_as_the_density_has_it_would_show_in_its_own_test(a
     """0.5 V ln(density ratio) against twice the bound of the airspeed's test, 2."""
     watch = with_shares({DENSITY: 0.2})
     watch["step"]["test"]["share"][DENSITY] = 2.0
-    watch["step"]["then"][AIRSPEED], watch["lead"] = airspeed, DENSITY
+    watch["step"]["memory"]["then"][AIRSPEED], watch["output"]["lead"] = airspeed, DENSITY
     watch["since"]["refuted"] = 1
     assert watching.would_show(watch) == (who == {QDYN})
     watching.suspect(watch)
-    assert set(np.flatnonzero(watch["suspect"]).tolist()) == who
-    watch["still"][AIRSPEED] = 1
+    assert set(np.flatnonzero(watch["output"]["suspect"]).tolist()) == who
+    watch["memory"]["still"][AIRSPEED] = 1
     watching.suspect(watch)
-    assert watch["suspect"][AIRSPEED], "one that stands still may be frozen"
+    assert watch["output"]["suspect"][AIRSPEED], "one that stands still may be frozen"
 
 
 @pytest.mark.parametrize(("say", "who"), [(UNKNOWN, {1, THETA}), (YES, {1}), (NO, {THETA})])
@@ -196,7 +207,7 @@ def test_an_alarm_of_the_first_second_may_be_an_instruments_first_error(detected
 def test_how_much_of_the_flow_a_gyro_may_move_unseen(flow, gyro, share, less):
     """Twice what its own test leaves, by the kinematics of a flow at 0.2 rad and -0.3 rad."""
     watch = new_watch()
-    watch["step"]["then"][[ALPHA, BETA]] = 0.2, -0.3
+    watch["step"]["memory"]["then"][[ALPHA, BETA]] = 0.2, -0.3
     watch["step"]["test"]["bound"][TURN + gyro] = 40.0
     own = (flow, gyro) in ((ALPHA_FLOW, 1), (BETA_FLOW, 2))
     watch["step"]["test"]["filtered"][flow] = -less * (80.0 * share + (2.0 if own else 1.0))
@@ -208,11 +219,11 @@ def test_no_surface_is_named_while_a_reading_of_the_flow_stands_still(name):
     """Whatever moves the aircraft moves it; but a sideslip of zero may stay one."""
     i = SENSORS.index(name)
     watch = new_watch(blurred=0)
-    watch["longest_still"], watch["step"]["then"] = 3, 0.1
+    watch["config"]["longest_still"], watch["step"]["memory"]["then"] = 3, 0.1
     for still, value, clear in ((2, 0.1, True), (3, 0.1, False), (3, 0.0, True)):
-        watch["still"][i], watch["step"]["then"][i] = still, value
+        watch["memory"]["still"][i], watch["step"]["memory"]["then"][i] = still, value
         assert bool(watching.clears_surfaces(watch, 1)) == clear
-    watch["step"]["then"], watch["still"], watch["still"][0] = 0.1, 0, 9
+    watch["step"]["memory"]["then"], watch["memory"]["still"], watch["memory"]["still"][0] = 0.1, 0, 9
     assert watching.clears_surfaces(watch, 1), "a gyro is held against the attitude"
 
 
@@ -235,10 +246,10 @@ def detected_fdi(at_s=-1.0, isolated=NOT_ISOLATED):
 def test_an_alarm_voids_what_a_moment_ago_was_made_of_it(isolated):
     watch, fdi = new_watch(), detected_fdi(9.6, isolated)
     on(watching.raise_alarm, fdi, watch, 10.0)
-    assert watch["alarmed"]
-    assert watch["alarmed_at_s"] == 9.6  # the same fault, seen first in the rates
-    assert watch["misnamed"] == (isolated >= 0)
-    assert not watch["beside"]
+    assert watch["output"]["alarmed"]
+    assert watch["output"]["alarmed_at_s"] == 9.6  # the same fault, seen first in the rates
+    assert watch["output"]["misnamed"] == (isolated >= 0)
+    assert not watch["output"]["beside"]
     frame.reset_surface_diagnosis(fdi)
     verdict = fdi["verdict"]
     assert [verdict[name] for name in ("detected", "isolated", "type")] == [0, NOT_ISOLATED, -1]
@@ -248,52 +259,60 @@ def test_an_alarm_voids_what_a_moment_ago_was_made_of_it(isolated):
     assert not fdi["fdae"]["network"]["memory"]["weights"].any()
     assert not fdi["fdae"]["network"]["output"].any()
     on(watching.raise_alarm, detected_fdi(9.6, 1), watch, 11.0)
-    assert watch["alarmed_at_s"] == 9.6
+    assert watch["output"]["alarmed_at_s"] == 9.6
 
 
 def test_a_surface_found_long_before_stays_found():
     watch, fdi = new_watch(), detected_fdi(9.4, 1)
     on(watching.raise_alarm, fdi, watch, 10.0)
-    assert watch["beside"]
-    assert watch["alarmed_at_s"] == 10.0
+    assert watch["output"]["beside"]
+    assert watch["output"]["alarmed_at_s"] == 10.0
     assert fdi["verdict"]["isolated"] == 1
     watch, fdi = new_watch(), detected_fdi(9.5, 1)
     on(watching.raise_alarm, fdi, watch, 10.0)  # half a second is no long time
-    assert not watch["beside"]
+    assert not watch["output"]["beside"]
 
 
 def test_with_nothing_found_before_the_alarm_is_of_now():
     watch, fdi = new_watch(), detected_fdi()
     on(watching.raise_alarm, fdi, watch, 10.0)
-    assert watch["alarmed_at_s"] == 10.0
-    assert not watch["beside"]
-    assert not watch["misnamed"]
+    assert watch["output"]["alarmed_at_s"] == 10.0
+    assert not watch["output"]["beside"]
+    assert not watch["output"]["misnamed"]
 
 
 def test_an_instrument_without_a_reading_is_named_at_once():
     watch = new_watch()
     on(watching.decide, new_fdi(), watch, seen(BETA, PSI), 5.0)
-    assert watch["alarmed"]
-    assert watch["named"] == BETA
-    assert watch["named_at_s"] == 5.0
-    assert np.flatnonzero(watch["replaced"]).tolist() == [BETA]
+    assert watch["output"]["alarmed"]
+    assert watch["output"]["named"] == BETA
+    assert watch["output"]["named_at_s"] == 5.0
+    assert np.flatnonzero(watch["output"]["replaced"]).tolist() == [BETA]
     on(watching.decide, new_fdi(), watch, seen(PSI), 6.0)
-    assert watch["named"] == BETA
+    assert watch["output"]["named"] == BETA
 
 
 def test_the_one_suspect_left_is_named_and_two_are_not():
     watch = with_shares({CLIMB: 2.0})
     on(watching.decide, new_fdi(), watch, seen(), 5.0)
-    assert (watch["alarmed"], watch["lead"], watch["named"]) == (1, CLIMB, ALTITUDE)
+    assert (watch["output"]["alarmed"], watch["output"]["lead"], watch["output"]["named"]) == (
+        1,
+        CLIMB,
+        ALTITUDE,
+    )
     watch = with_shares({ALPHA_FLOW: 2.0})
     on(watching.decide, new_fdi(), watch, seen(), 5.0)
-    assert (watch["alarmed"], watch["lead"], watch["named"]) == (1, ALPHA_FLOW, NOBODY)
+    assert (watch["output"]["alarmed"], watch["output"]["lead"], watch["output"]["named"]) == (
+        1,
+        ALPHA_FLOW,
+        NOBODY,
+    )
     watch["step"]["test"]["share"][SPEED] = 9.0
     on(watching.decide, new_fdi(), watch, seen(), 6.0)
-    assert watch["lead"] == ALPHA_FLOW  # the first alarm leads
+    assert watch["output"]["lead"] == ALPHA_FLOW  # the first alarm leads
     quiet = new_watch()
     on(watching.decide, new_fdi(), quiet, seen(), 5.0)
-    assert not quiet["alarmed"]
+    assert not quiet["output"]["alarmed"]
 
 
 def asked(
@@ -305,7 +324,7 @@ def asked(
     fdi["bank"]["output"]["threshold"][:3] = 1.0
     watch["step"]["test"]["noise"] = noise
     on(watching.ask_rates, fdi, watch)
-    return watch["rates_say"].tolist()
+    return watch["memory"]["rates_say"].tolist()
 
 
 def test_a_jump_of_a_gyro_is_an_acceleration_and_one_of_the_attitude_is_none():
@@ -362,12 +381,14 @@ def test_a_first_error_of_a_gyro_need_not_be_in_the_filter(first, say):
     """An error there from the first look on, which brought no innovation: 0.7 of it is within the bound."""
     watch = new_watch(begun=1, past=0, gyro_error=(first, -first, 2.0 * first))
     for past in (0, 1, 2, 3):
-        watch["past"] = past
+        watch["memory"]["past"] = past
         watching.note_first_errors(watch)
-    assert watch["begun"] == 2
-    assert watch["W_bound"].tolist() == [first, first, 2.0 * first], "once, at the first look of the frame"
+    assert watch["memory"]["begun"] == 2
+    assert watch["memory"]["W_bound"].tolist() == [first, first, 2.0 * first], (
+        "once, at the first look of the frame"
+    )
     error = (0.7, -0.7, 1.4)
-    assert asked(error=error, then=error, W_bound=watch["W_bound"])[0] == say
+    assert asked(error=error, then=error, W_bound=watch["memory"]["W_bound"])[0] == say
 
 
 @pytest.mark.parametrize(("begun", "asked"), [(1, False), (2, False), (3, True)])
@@ -375,7 +396,7 @@ def test_the_first_whole_frame_shows_no_jump(begun, asked):
     watch, fdi = with_shares({TURN: 2.0, ANGLE: 1.5}, past=0, gyro_error=(0, 0.3, 0), begun=begun), new_fdi()
     fdi["bank"]["output"]["threshold"], fdi["bound"]["frame"] = 1.0, 1.0
     on(watching.decide, fdi, watch, seen(), 5.0)
-    assert (watch["rates_say"][1] == NO) == asked
+    assert (watch["memory"]["rates_say"][1] == NO) == asked
 
 
 @pytest.mark.parametrize("quiet", ["error", "then", "spike_then"])
@@ -402,14 +423,14 @@ def test_the_filter_of_a_gyros_error_follows_it_exactly():
             watch, fdi["bank"]["output"]["innovation"], fdi["bound"]["eta_bar"], fdi["config"]["dt"]
         )
         bound = bound + DT * (eta_bar + growing @ bound)
-    assert watch["W"] == pytest.approx(error[-1])
-    assert watch["W_bound"] == pytest.approx(bound)
+    assert watch["memory"]["W"] == pytest.approx(error[-1])
+    assert watch["memory"]["W_bound"] == pytest.approx(bound)
 
 
 def test_a_bound_of_that_filter_is_never_below_zero():
     watch = new_watch(damping=np.diag([200.0, 1.0, 1.0]), W_bound=(1.0, 1.0, 1.0))
     watching.follow_rates(watch, np.zeros(3), np.zeros(3), DT)
-    assert watch["W_bound"] == pytest.approx([0.0, 1 - DT, 1 - DT])
+    assert watch["memory"]["W_bound"] == pytest.approx([0.0, 1 - DT, 1 - DT])
 
 
 @pytest.mark.parametrize(("size", "clear"), [(0.999, 0), (1.001, 1)])
@@ -421,26 +442,28 @@ def test_what_no_gyro_can_be_is_further_from_w_than_all_bounds(size, clear):
     limit = 0.02 + H * (0.3 + watching.SLACK * 0.5)
     test["residual"][TURN + 1] = size * limit + H * 0.5
     watching.clear_gyros(watch)
-    assert watch["no_gyro"] == clear
-    assert watch["apart"][1] == pytest.approx([size * limit] * 3)
+    assert watch["memory"]["no_gyro"] == clear
+    assert watch["memory"]["apart"][1] == pytest.approx([size * limit] * 3)
     watching.clear_gyros(watch)
-    assert watch["apart"][1] == pytest.approx(size * limit * (1.0 + np.array([0.0, 0.9, 0.99])))
-    assert watch["apart_bound"][1] == pytest.approx(H * 0.4 * (1.0 + np.array([0.0, 0.9, 0.99])))
+    assert watch["memory"]["apart"][1] == pytest.approx(size * limit * (1.0 + np.array([0.0, 0.9, 0.99])))
+    assert watch["memory"]["apart_bound"][1] == pytest.approx(H * 0.4 * (1.0 + np.array([0.0, 0.9, 0.99])))
 
 
 def test_a_watch_begins_with_its_first_look():
     watch = new_watch(past=3)
     measured = np.zeros(1, [("signal", "f8", (N_SENSORS,)), ("force", "f8", (3,))]).view(np.recarray)[0]
     measured["signal"][AIRSPEED], measured["signal"][QDYN], measured["force"] = 45.0, 1000.0, (1.0, 2.0, -9.0)
-    watch["step"]["gravity"], watch["step"]["offset"][ALTITUDE] = 9.8, 0.7
-    watch["step"]["drift"], watch["step"]["swift"] = 2e-3, 80.0
+    watch["step"]["config"]["gravity"], watch["step"]["config"]["offset"][ALTITUDE] = 9.8, 0.7
+    watch["step"]["config"]["drift"], watch["step"]["config"]["swift"] = 2e-3, 80.0
     watching.begin(watch, measured, 5.0)
     step = watch["step"]
-    assert (watch["begun"], watch["past"]) == (1, 0)
-    assert step["error_then"][[PHI, ALTITUDE]] == pytest.approx([0.01, 0.7])  # drifted since the flight began
-    assert (step["error_before"] == step["error_then"]).all()
-    assert step["then"][AIRSPEED] == 45.0
-    assert step["acceleration_then"] == pytest.approx([1.0, 2.0, 0.8])
+    assert (watch["memory"]["begun"], watch["memory"]["past"]) == (1, 0)
+    assert step["memory"]["error_then"][[PHI, ALTITUDE]] == pytest.approx(
+        [0.01, 0.7]
+    )  # drifted since the flight began
+    assert (step["memory"]["error_before"] == step["memory"]["error_then"]).all()
+    assert step["memory"]["then"][AIRSPEED] == 45.0
+    assert step["memory"]["acceleration_then"] == pytest.approx([1.0, 2.0, 0.8])
     assert step["test"]["noise_then"][CLIMB] == pytest.approx(0.7)
     assert step["test"]["bound_noise"][CLIMB] == pytest.approx([0.7] * 3)
     assert step["test"]["noise_then"].shape == (N_TESTS,)
@@ -450,9 +473,9 @@ def stood_in(i, signal=(), **fields):
     watch = new_watch(**fields)
     belief = np.zeros(1, belief_dtype(4)).view(np.recarray)[0]
     step = watch["step"]
-    step["predicted"], step["command"] = np.arange(N_SENSORS) / 10.0, (1800.0, 20.0)
-    step["then"][[QDYN, AIRSPEED]] = 1000.0, 40.0
-    step["then"][:3], watch["trim"] = (0.1, 0.2, 0.3), 7.0
+    step["memory"]["predicted"], step["memory"]["command"] = np.arange(N_SENSORS) / 10.0, (1800.0, 20.0)
+    step["memory"]["then"][[QDYN, AIRSPEED]] = 1000.0, 40.0
+    step["memory"]["then"][:3], watch["config"]["trim"] = (0.1, 0.2, 0.3), 7.0
     values = np.zeros(N_SENSORS)
     for sensor, value in dict(signal).items():
         values[sensor] = value
@@ -487,7 +510,7 @@ def test_a_rate_is_what_the_attitude_shows_and_the_models_change_since(gyro, pas
     u_sum = 0.7 if past == 0 else 0.3
     acceleration = (1, 2, 3)[gyro] + 0.5 * u_sum
     assert value == pytest.approx((0.1, 0.2, 0.3)[gyro] + (0.01, 0.02, 0.03)[gyro] / H + H * acceleration)
-    assert watch["taken_over"][gyro]
+    assert watch["memory"]["taken_over"][gyro]
 
 
 def test_where_the_attitude_is_noisy_a_rate_follows_it_slowly_after_one_step():
@@ -511,25 +534,25 @@ def looked(watch, fdi, **signal):
 def test_looks_of_a_frame_follow_one_another():
     watch, fdi = new_watch(past=3), new_fdi()
     fdi["bank"]["output"]["threshold"], fdi["bound"]["frame"] = 1.0, 1.0
-    watch["step"]["gravity"] = watch["step"]["offset"] = 0.0
-    watch["step"]["offset"][:] = 1.0
+    watch["step"]["config"]["gravity"] = watch["step"]["config"]["offset"] = 0.0
+    watch["step"]["config"]["offset"][:] = 1.0
     fdi["bank"]["output"]["innovation"] = 0.5, 0.0, 0.0
     looked(watch, fdi)
-    assert (watch["begun"], watch["past"]) == (1, 0)
+    assert (watch["memory"]["begun"], watch["memory"]["past"]) == (1, 0)
     for k in range(4):
         looked(watch, fdi, phi=1e-3 * (k % 2))
-        assert watch["past"] == (k + 1) % 4
-    assert watch["W"][0] == pytest.approx(0.5 * DT)  # once a frame
+        assert watch["memory"]["past"] == (k + 1) % 4
+    assert watch["memory"]["W"][0] == pytest.approx(0.5 * DT)  # once a frame
     # the gyro's error as the frame began, and the largest inside it: the attitude moved, the rates did not
-    assert watch["gyro_error"] == pytest.approx(np.zeros(3), abs=1e-12)
-    assert watch["spike"][0] == pytest.approx(1e-3 / H, rel=1e-3)
-    before = watch["spike"].copy()
+    assert watch["memory"]["gyro_error"] == pytest.approx(np.zeros(3), abs=1e-12)
+    assert watch["memory"]["spike"][0] == pytest.approx(1e-3 / H, rel=1e-3)
+    before = watch["memory"]["spike"].copy()
     looked(watch, fdi, phi=2e-3)
-    assert watch["gyro_error"][0] == pytest.approx(-1e-3 / H, rel=1e-2)
-    assert watch["spike_then"] == pytest.approx(before)
-    assert not watch["spike"].any()
-    assert watch["gyro_error_then"] == pytest.approx(np.zeros(3), abs=1e-12)
-    assert watch["W"][0] == pytest.approx(2 * 0.5 * DT)
+    assert watch["memory"]["gyro_error"][0] == pytest.approx(-1e-3 / H, rel=1e-2)
+    assert watch["memory"]["spike_then"] == pytest.approx(before)
+    assert not watch["memory"]["spike"].any()
+    assert watch["memory"]["gyro_error_then"] == pytest.approx(np.zeros(3), abs=1e-12)
+    assert watch["memory"]["W"][0] == pytest.approx(2 * 0.5 * DT)
 
 
 def test_a_broken_altimeter_is_named_and_replaced_from_then_on():
@@ -537,9 +560,9 @@ def test_a_broken_altimeter_is_named_and_replaced_from_then_on():
     fdi["bound"]["frame"], fdi["bank"]["output"]["threshold"] = 1.0, 1.0
     looked(watch, fdi)
     looked(watch, fdi)
-    assert not watch["alarmed"]
+    assert not watch["output"]["alarmed"]
     measured = looked(watch, fdi, altitude=50.0)
-    assert watch["named"] == ALTITUDE
+    assert watch["output"]["named"] == ALTITUDE
     assert abs(measured["signal"][ALTITUDE]) < 0.1
     assert abs(measured["altitude"]) < 0.1
 
@@ -552,7 +575,7 @@ def test_the_rates_are_asked_once_a_frame(past, asked):
     )
     fdi["bank"]["output"]["threshold"], fdi["bound"]["frame"] = 1.0, 1.0
     on(watching.decide, fdi, watch, seen(), 5.0)
-    assert (watch["rates_say"][1] == NO) == asked
+    assert (watch["memory"]["rates_say"][1] == NO) == asked
 
 
 @pytest.mark.parametrize(
@@ -570,18 +593,18 @@ def test_what_is_replaced_is_shared_out_and_the_slipstream_is_that_of_what_it_is
 ):
     watch, measured = new_watch(engine=engine), np.zeros(1, MEASURED).view(np.recarray)[0]
     belief = np.zeros(1, belief_dtype(4)).view(np.recarray)[0]
-    watch["step"]["predicted"], watch["step"]["command"] = 0.1, (1800.0, 20.0)
-    watch["step"]["then"][[QDYN, AIRSPEED]] = 1000.0, 44.0
+    watch["step"]["memory"]["predicted"], watch["step"]["memory"]["command"] = 0.1, (1800.0, 20.0)
+    watch["step"]["memory"]["then"][[QDYN, AIRSPEED]] = 1000.0, 44.0
     measured["signal"], measured["y"], measured["attitude"] = 0.3, 9.0, 9.0
     measured["signal"][[AIRSPEED, QDYN, ENGINE_SPEED, MANIFOLD]] = 45.0, 1036.0, 1900.0, 21.0
     for i in broken:
         if missing:
             measured["missing"][i] = 1
         else:
-            watch["replaced"][i] = 1
+            watch["output"]["replaced"][i] = 1
     before = measured["signal"].copy()
     watching.replace(watch, belief, measured)
-    assert np.flatnonzero(watch["replaced"]).tolist() == sorted(broken)
+    assert np.flatnonzero(watch["output"]["replaced"]).tolist() == sorted(broken)
     assert set(np.flatnonzero(measured["signal"] != before)) == set(broken)
     assert (measured["attitude"][1] != 9.0) == shared
     assert (measured["y"][DPT] != 9.0) == slipstream
@@ -622,38 +645,38 @@ def test_angles_are_held_against_angles_and_rates_against_rates():
 
 def test_suspicions_of_the_frame_before_are_gone():
     watch = with_shares({CLIMB: 2.0}, lead=CLIMB)
-    watch["suspect"] = 1
+    watch["output"]["suspect"] = 1
     watching.note_fired(watch)
     watching.suspect(watch)
-    assert np.flatnonzero(watch["suspect"]).tolist() == [ALTITUDE]
+    assert np.flatnonzero(watch["output"]["suspect"]).tolist() == [ALTITUDE]
 
 
 def test_an_alarm_on_roll_counts_as_one():
     """The first axis of the bank has number 0, and no axis is -1."""
     watch, fdi = new_watch(gyro_error=(0.0, 0.3, 0.0), W_bound=(9.0, 9.0, 9.0)), new_fdi()
-    fdi["bound"]["frame"], fdi["bank"]["output"]["threshold"][:3], watch["gyro_error_then"] = (
+    fdi["bound"]["frame"], fdi["bank"]["output"]["threshold"][:3], watch["memory"]["gyro_error_then"] = (
         1.0,
         1.0,
         (0.0, 0.3, 0.0),
     )
     fdi["bank"]["output"]["residual"][0, 0] = 2.0
     on(watching.ask_rates, fdi, watch)
-    assert watch["rates_say"].tolist() == [YES] * 3
+    assert watch["memory"]["rates_say"].tolist() == [YES] * 3
 
 
 def test_what_is_named_is_replaced_and_flags_are_one():
     watch = new_watch()
     watching.name(watch, CLIMB, 3.0)
-    assert watch["replaced"][CLIMB] == 1
+    assert watch["output"]["replaced"][CLIMB] == 1
     watch = new_watch()
     on(watching.raise_alarm, detected_fdi(9.4, 1), watch, 10.0)
-    assert (watch["beside"], watch["alarmed"]) == (1, 1)
+    assert (watch["output"]["beside"], watch["output"]["alarmed"]) == (1, 1)
 
 
 def test_where_the_attitude_is_blurred_a_look_asks_whether_any_gyro_can_be_it():
     for blurred in (0, 1):
         watch, fdi = new_watch(blurred=blurred, begun=1, past=1), new_fdi()
-        watch["W"], fdi["bank"]["output"]["threshold"] = (0.5, 0.0, 0.0), 1.0
-        watch["step"]["offset"][:] = 1.0
+        watch["memory"]["W"], fdi["bank"]["output"]["threshold"] = (0.5, 0.0, 0.0), 1.0
+        watch["step"]["config"]["offset"][:] = 1.0
         looked(watch, fdi)
-        assert bool(watch["apart"].any()) == bool(blurred)
+        assert bool(watch["memory"]["apart"].any()) == bool(blurred)

@@ -35,7 +35,7 @@ def names(scenario):
     while not sim.done:
         sim.step()
         named.add(sim.verdict.isolated)
-    assert not sim._loop.frames[0]["fdi"]["watch"]["misnamed"]
+    assert not sim._loop.frames[0]["fdi"]["watch"]["output"]["misnamed"]
     assert not sim.departed
     return named - {None}
 
@@ -101,8 +101,8 @@ def test_sound_accelerometers_with_the_declared_errors_are_never_suspected(
         for _ in loop.chunks():
             pass
         watch = loop.frames[0]["fdi"]["watch"]
-        assert watch["begun"]
-        assert not watch["alarmed"]
+        assert watch["memory"]["begun"]
+        assert not watch["output"]["alarmed"]
 
 
 def test_beyond_what_is_declared_they_are():
@@ -112,7 +112,7 @@ def test_beyond_what_is_declared_they_are():
         loop = Loop(flight(sensors={"az": {"bias_mps2": off}}, fdi=fdi))
         for _ in loop.chunks():
             pass
-        assert bool(loop.frames[0]["fdi"]["watch"]["alarmed"]) == seen
+        assert bool(loop.frames[0]["fdi"]["watch"]["output"]["alarmed"]) == seen
 
 
 @pytest.mark.parametrize(
@@ -155,7 +155,7 @@ def test_where_one_breaks_forces_are_weighed_no_more():
     loop = Loop(flight(fault("az", "lost"), fdi=WEIGHED))
     statistical = loop.frames[0]["fdi"]["statistical"]
     assert statistical["forces"]["known"]
-    assert not statistical["air"]["read"], "watched: not taken at their word"
+    assert not statistical["air"]["output"]["read"], "watched: not taken at their word"
     for _ in loop.chunks():
         pass
     assert not statistical["forces"]["known"]

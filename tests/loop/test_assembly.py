@@ -202,7 +202,11 @@ def test_a_plug_in_that_diagnoses_has_the_record_to_itself():
     scenario = Scenario.model_validate(given)
     frames = assemble(scenario, TRIM, TRAVEL)
     before = frames["fdi"][0]
-    switches = before["config"]["enabled"], before["watch"]["enabled"], before["config"]["every_type"]
+    switches = (
+        before["config"]["enabled"],
+        before["watch"]["config"]["enabled"],
+        before["config"]["every_type"],
+    )
     assert switches == (1, 1, 1)
     plugin_frame.plugged(frames, scenario, np.ones(40), RlsMonitor(), None)
     fdi = frames["fdi"][0]
@@ -210,7 +214,7 @@ def test_a_plug_in_that_diagnoses_has_the_record_to_itself():
         fdi["config"]["enabled"],
         fdi["isolation"]["config"]["n"],
         fdi["config"]["every_type"],
-        fdi["watch"]["enabled"],
+        fdi["watch"]["config"]["enabled"],
     )
     power = frames["control"]["power"]["config"]
     assert (*off, fdi["statistical"]["tests"]["enabled"], power["enabled"][0]) == (0,) * 6

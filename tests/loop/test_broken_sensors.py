@@ -82,8 +82,8 @@ def test_sound_instruments_are_never_suspected(more):
     for _ in loop.chunks():
         pass
     watch = loop.frames[0]["fdi"]["watch"]
-    assert watch["begun"]
-    assert not watch["alarmed"]
+    assert watch["memory"]["begun"]
+    assert not watch["output"]["alarmed"]
 
 
 def test_a_surface_fault_is_no_instruments_fault_and_named_a_frame_later_at_most():

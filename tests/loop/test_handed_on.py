@@ -47,7 +47,11 @@ OF_A_LAW = {"control.published.memory.integral", "control.rejecting.observer.dis
 OWN = {
     "law": OF_A_LAW,
     "observer": OF_A_LAW,
-    "scheme": {"since", "fdi.statistical.air.in_flight", "fdi.statistical.inertial_air.in_flight"},
+    "scheme": {
+        "since",
+        "fdi.statistical.air.config.in_flight",
+        "fdi.statistical.inertial_air.config.in_flight",
+    },
     "sensors": {"instruments.taken"},
 }
 

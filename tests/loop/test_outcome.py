@@ -86,8 +86,8 @@ CASES = {
     }),
     "no-limits": ({}, {"autopilot.holding.from_s": [5.0, 3.0, 0.0]}),
     "instrument": ({"fdi": {"sensor_monitor": "always"}}, ALARM | {
-        "t": 5.0, "fdi.watch.alarmed": 1, "fdi.watch.alarmed_at_s": 1.5,
-        "fdi.watch.named": 1, "fdi.watch.named_at_s": 1.75,
+        "t": 5.0, "fdi.watch.output.alarmed": 1, "fdi.watch.output.alarmed_at_s": 1.5,
+        "fdi.watch.output.named": 1, "fdi.watch.output.named_at_s": 1.75,
     }),
 }  # fmt: skip
 
@@ -182,7 +182,7 @@ NOISY = {"q": {"noise_std_deg_s": 1.0}}
         ({}, ALARM | {"fdi.verdict.detected_at_s": 1.99}, False, False),
         ({}, {"fdi.verdict.detected_at_s": 1.99}, False, True),
         ({}, {"fdi.config.authority": STATISTICS}, False, False),
-        ({}, {"fdi.watch.alarmed": 1}, False, False),
+        ({}, {"fdi.watch.output.alarmed": 1}, False, False),
         ({"faults": [FAULT, BROKEN | {"at_s": 2.5}]}, {}, False, False),
         ({"faults": [FAULT, BROKEN | {"at_s": 2.51}]}, {}, False, True),
         (WRONG, {}, False, False), ({"sensors": NOISY}, {}, False, False),

@@ -94,13 +94,13 @@ def isolate_type(types, conclusion, layout, isolation, bank, bound, t, started):
 @kernel
 def see_air(seen, inertial, felt, belief, measured, k, dt):
     """Take in the air as the vanes see it, and what the accelerometers say of it (forces.py)."""
-    if seen.moving:
+    if seen.output.moving:
         air.reach_height(seen, measured.altitude)
         air.follow(seen, measured.y, measured.attitude, belief.share * dt, k)
-    if (felt.known or seen.read) and not measured.inertial:
+    if (felt.known or seen.output.read) and not measured.inertial:
         forces.do_without(felt, seen, inertial)
-    if felt.known or seen.read:
-        seen.felt[:] = measured.force
+    if felt.known or seen.output.read:
+        air.take_force(seen, measured.force)
     if felt.known:
         weigh_forces(seen, inertial, felt, belief, measured, k, dt)
 
@@ -109,9 +109,9 @@ def see_air(seen, inertial, felt, belief, measured, k, dt):
 def weigh_forces(seen, inertial, felt, belief, measured, k, dt):
     """Take in what the accelerometers say, and the air as it follows from them without the vanes."""
     forces.look(felt, seen, measured, belief.u, dt)
-    if inertial.moving:
-        forces.without_vanes(felt, inertial.rotation, measured.y)
-        inertial.felt[:] = measured.force
+    if inertial.output.moving:
+        forces.without_vanes(felt, inertial.memory.rotation, measured.y)
+        air.take_force(inertial, measured.force)
         air.reach_height(inertial, measured.altitude)
         air.follow(inertial, felt.y, measured.attitude, dt, k)
         air.effect(inertial, belief.design, measured.x, felt.y, belief.u)

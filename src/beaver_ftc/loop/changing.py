@@ -89,8 +89,8 @@ class Changing:
         if change.sensors is not None:
             take_configuration(frame["instruments"], new["instruments"])
         statistical = frame["fdi"]["statistical"]
-        forces = statistical["forces"]["known"] or statistical["air"]["read"]
-        if frame["fdi"]["watch"]["enabled"] or frame["instruments"]["engine"] or forces:
+        forces = statistical["forces"]["known"] or statistical["air"]["output"]["read"]
+        if frame["fdi"]["watch"]["config"]["enabled"] or frame["instruments"]["engine"] or forces:
             loop.read_more()
         frame["control"]["power"]["config"]["enabled"] = new["control"]["power"]["config"]["enabled"]
         before = loop.plugin_frame
@@ -139,7 +139,7 @@ def take_law(frame: np.void, new: np.void) -> None:
 def take_diagnosis(frame: np.void, new: np.void, k: int) -> None:
     """Begin the diagnosis anew with frame k; what healthy flight has shown of its margins is kept."""
     fdi, other = frame["fdi"], new["fdi"]
-    other["watch"]["past"] = 0  # its first look begins a frame
+    other["watch"]["memory"]["past"] = 0  # its first look begins a frame
     if fdi["bank"]["config"]["n"] == other["bank"]["config"]["n"]:
         other["bank"]["output"]["closest"] = fdi["bank"]["output"]["closest"]
     for air in ("air", "inertial_air"):

@@ -51,11 +51,11 @@ def watch_instruments(frame):
     """Hold the instruments against one another; what is known to be broken is replaced. What an instant
     inside a frame shows is known with that frame."""
     fdi, watch, engine = frame.fdi, frame.fdi.watch, frame.control.power.output
-    before, t = watch.alarmed, frame.k * frame.dt
+    before, t = watch.output.alarmed, frame.k * frame.dt
     if engine.in_use:
-        watch.step.command[1] = engine.command[0]
+        sensor_monitor.note_command(watch, engine.command[0])
     sensor_monitor.monitor(watch, frame.belief, frame.measured, fdi.verdict, fdi.bank, fdi.bound, frame.dt, t)
-    if watch.alarmed and not (before or watch.beside):
+    if watch.output.alarmed and not (before or watch.output.beside):
         reset_surface_diagnosis(fdi)
 
 
@@ -72,7 +72,7 @@ def sense(frame):
     """Measure, and see what the design model makes of this instant. Returns the flight's status."""
     truth, belief, measured = frame.truth, frame.belief, frame.measured
     measure(truth, frame.instruments, measured)
-    if frame.fdi.watch.enabled:
+    if frame.fdi.watch.config.enabled:
         watch_instruments(frame)
     status = flight_status(truth.value, truth.ground_m, truth.slow_mps)
     if status != NOT_FINITE:
@@ -177,7 +177,7 @@ def compare_likelihoods(frame, k):
     seen, inertial, views = chances.air, chances.inertial_air, chances.views[: chances.n_views]
     mean, innovation, dt = belief.means, fdi.bank.output.innovation, fdi.config.dt
     air.elapse(seen, belief.share)
-    if inertial.moving:
+    if inertial.output.moving:
         air.elapse(inertial, belief.share)
     foresee(mean)
     sign_blocks(blocks, mean.Gu_foreseen, unanticipated_pitch(belief.design, y, 1.0))
@@ -246,7 +246,7 @@ def rules_out(fdi, fie, within):
         return True
     if not tests.enabled or chances.alarm.detected_at_s < 0.0:
         return False
-    hidden = fdi.watch.enabled and chances.air.moving
+    hidden = fdi.watch.config.enabled and chances.air.output.moving
     by_chance.weigh(fie, tests, chances.block, fdi.isolation, layout.loss_of, config.abrupt, hidden)
     return fie.improbable == 1
 
@@ -280,7 +280,7 @@ def note_names(fdi, t):
     only = conclusion.isolated_surface(fdi.verdict, fdi.isolation.estimator)
     for s in range(fdi.types.surface.size):
         named = fdi.types.surface[s].status.named if pairs else s == only
-        conclusion.note_name(fdi.verdict, s, named and not (void and not fdi.watch.beside), t)
+        conclusion.note_name(fdi.verdict, s, named and not (void and not fdi.watch.output.beside), t)
 
 
 @apart
@@ -411,7 +411,7 @@ def record(frame, commanded, row):
         column += log_row.PER_ESTIMATOR
     column = put(row, column, frame.assessment.effectiveness)
     column = log_row.record_used(effectiveness, control.config.uses_verdict, row, column)
-    row[column], row[column + 1] = frame.supervisor.mode, fdi.verdict.detected or fdi.watch.alarmed
+    row[column], row[column + 1] = frame.supervisor.mode, fdi.verdict.detected or fdi.watch.output.alarmed
     column += 2
     if logged.watch:
         column = log_row.record_watch(fdi.watch, frame.measured.missing, row, column, logged.watch)

@@ -73,7 +73,7 @@ def configure(frame: np.void, scenario: Scenario, dt: float) -> None:
     instruments["engine"] = has_real_engine(scenario)
     declared, statistical = Declared.of(scenario), frame["fdi"]["statistical"]
     statistical["forces"]["known"] = declared.uses_accelerometers
-    statistical["air"]["read"] = declared.follows_gusts_by_accelerometers
+    statistical["air"]["output"]["read"] = declared.follows_gusts_by_accelerometers
     for i, name in enumerate(SENSORS):
         sensor = getattr(scenario.sensors, name)
         instruments["noise"][i], instruments["bias"][i], instruments["quantum"][i] = sensor.noise_bias_quantum
@@ -119,25 +119,41 @@ def seed(instruments: np.void, number: int) -> None:
 def configure_watch(watch: np.void, scenario: Scenario, h: float) -> None:
     """Fill the watch's record; h: seconds between two looks, which is a JSBSim frame."""
     declared = Declared.of(scenario)
-    watch["enabled"], watch["instants"] = declared.monitors_sensors, scenario.substeps
-    watch["past"] = scenario.substeps - 1  # the first look ends a frame
-    watch["named"], watch["alarmed_at_s"], watch["named_at_s"] = NOBODY, -1.0, -1.0
-    watch["engine"] = scenario.airframe.has_engine_instruments
+    watch["config"]["enabled"], watch["config"]["instants"] = declared.monitors_sensors, scenario.substeps
+    watch["memory"]["past"] = scenario.substeps - 1  # the first look ends a frame
+    watch["output"]["named"], watch["output"]["alarmed_at_s"], watch["output"]["named_at_s"] = (
+        NOBODY,
+        -1.0,
+        -1.0,
+    )
+    watch["config"]["engine"] = scenario.airframe.has_engine_instruments
     step, errors, initial = watch["step"], declared.sensors, scenario.initial
-    step["h"], step["decay"] = h, [exp(-pole * h) for pole in POLES_PER_S]
-    step["gravity"] = GRAVITY_MPS2 * (1.0 + initial.altitude_m / EARTH_RADIUS_M) ** -2
-    step["gust"], step["gusts"] = gusts_seen(declared.air, initial.airspeed_mps, h)
-    step["swift"] = FASTER * initial.airspeed_mps
-    step["low"], step["rising"] = declared.air.low_m, declared.vertical_wind_mps
-    if watch["engine"]:  # whose keys the aircraft names
-        step["command"] = [getattr(initial, name) for name in ("engine_rpm", "manifold_pressure_inhg")]
+    step["config"]["h"], step["config"]["decay"] = h, [exp(-pole * h) for pole in POLES_PER_S]
+    step["config"]["gravity"] = GRAVITY_MPS2 * (1.0 + initial.altitude_m / EARTH_RADIUS_M) ** -2
+    step["config"]["gust"], step["config"]["gusts"] = gusts_seen(declared.air, initial.airspeed_mps, h)
+    step["config"]["swift"] = FASTER * initial.airspeed_mps
+    step["config"]["low"], step["config"]["rising"] = declared.air.low_m, declared.vertical_wind_mps
+    if watch["config"]["engine"]:  # whose keys the aircraft names
+        step["memory"]["command"] = [
+            getattr(initial, name) for name in ("engine_rpm", "manifold_pressure_inhg")
+        ]
     for i, name in enumerate(SENSORS):
         error = errors[name]
-        step["offset"][i], step["slope"][i], step["steady"][i] = error.worst, error.slope, error.steady
-        watch["longest_still"][i] = longest_still(error.noise, error.resolution) * _frames_apart(i, h)
-        step["drift"] = max(step["drift"], abs(getattr(getattr(errors.declared, name), "drift_rad_s", 0.0)))
-    blurred = watch["blurred"] = np.any(step["offset"][PHI : PHI + 3] > step["steady"][PHI : PHI + 3])
-    watch["follows"] = min(1.0, h * TAKEN_OVER_PER_S) if blurred else 1.0
+        step["config"]["offset"][i], step["config"]["slope"][i], step["config"]["steady"][i] = (
+            error.worst,
+            error.slope,
+            error.steady,
+        )
+        watch["config"]["longest_still"][i] = longest_still(error.noise, error.resolution) * _frames_apart(
+            i, h
+        )
+        step["config"]["drift"] = max(
+            step["config"]["drift"], abs(getattr(getattr(errors.declared, name), "drift_rad_s", 0.0))
+        )
+    blurred = watch["config"]["blurred"] = np.any(
+        step["config"]["offset"][PHI : PHI + 3] > step["config"]["steady"][PHI : PHI + 3]
+    )
+    watch["config"]["follows"] = min(1.0, h * TAKEN_OVER_PER_S) if blurred else 1.0
 
 
 def longest_still(noise: float, quantum: float) -> int:
@@ -160,5 +176,5 @@ def gusts_seen(air: Dryden, airspeed_mps: float, h: float) -> tuple[float, np.nd
 
 def anchor_watch(watch: np.void, design: np.ndarray, y: np.ndarray) -> None:
     """Show the watch the trim: y, and how the rates are damped there; design: the designer's record, (1,)."""
-    watch["trim"][3:7] = y[:4]
-    watch["damping"] = gust_effect(DesignFunctions(design.copy()), y)
+    watch["config"]["trim"][3:7] = y[:4]
+    watch["config"]["damping"] = gust_effect(DesignFunctions(design.copy()), y)

@@ -82,8 +82,8 @@ def record_used(effectiveness, used, row, column):
 def record_watch(watch, missing, row, column, columns):
     """How near a test between the instruments came to its bound in this frame, and which; of three `columns`
     the first instrument that gives no reading, missing (N_SENSORS,). Returns the next column."""
-    if watch.enabled and watch.begun:
-        row[column], row[column + 1] = watch.share, watch.furthest
+    if watch.config.enabled and watch.memory.begun:
+        row[column], row[column + 1] = watch.output.share, watch.output.furthest
     if columns > 2:
         for i in range(missing.size - 1, -1, -1):
             if missing[i]:

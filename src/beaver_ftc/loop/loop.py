@@ -123,7 +123,9 @@ class Loop:
         anchor(design, *trim)
         state.anchor(frame["control"], frame["belief"], scenario, y)
         set_up_autopilot(frame["autopilot"], frame["control"], scenario)
-        if fdi["watch"]["enabled"]:  # compiled code called from here: a quarter of a second, the first time
+        if fdi["watch"]["config"][
+            "enabled"
+        ]:  # compiled code called from here: a quarter of a second, the first time
             anchor_watch(fdi["watch"], np.array([design]), y)
         mass = mass_of(scenario.design_model, self.aircraft)
         noise_model.set_up(fdi, scenario.fdi, Declared.of(scenario), design, mass, trim, scenario.rate_hz)
@@ -239,11 +241,11 @@ class Loop:
         """Have a watch, if one may be and was not wanted before the flight; the trim is shown to it now.
         Accelerometers are no longer taken at their word. Returns whether it has just been enabled."""
         wanted = self.scenario.fdi.sensor_monitor != "never" and fdi["config"]["enabled"]
-        if not wanted or fdi["watch"]["enabled"]:
+        if not wanted or fdi["watch"]["config"]["enabled"]:
             return False
-        fdi["watch"]["enabled"] = 1
+        fdi["watch"]["config"]["enabled"] = 1
         no_longer_read(fdi["statistical"]["air"])
-        fdi["statistical"]["inertial_air"]["moving"] = 0
+        fdi["statistical"]["inertial_air"]["output"]["moving"] = 0
         anchor_watch(fdi["watch"], np.array([self.frames[0]["belief"]["design"]]), self._trimmed[1])
         return True
 

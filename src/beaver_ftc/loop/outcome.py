@@ -304,7 +304,7 @@ def _withdrawn(fdi: np.void, surfaces: Sequence[str]) -> tuple[dict[str, Any], .
 def verdict_of(frame: np.void, surfaces: Sequence[str]) -> Verdict:
     """What the built-in diagnosis makes of the flight so far, as a plug-in law is given it."""
     fdi = frame["fdi"]
-    if not (fdi["verdict"]["detected"] or fdi["watch"]["alarmed"]):
+    if not (fdi["verdict"]["detected"] or fdi["watch"]["output"]["alarmed"]):
         return Verdict()
     said = _findings(frame, surfaces)
     return Verdict(
@@ -346,7 +346,7 @@ def guaranteed_delay_s(frame: np.void, scenario: Scenario, plugged: bool) -> flo
         return None
     fault_s, verdict = float(truth["fault_at_s"]), fdi["verdict"]
     early = verdict["detected"] and verdict["detected_at_s"] < fault_s - TIME_TOLERANCE_S
-    if early or fdi["config"]["authority"] == STATISTICS or fdi["watch"]["alarmed"]:
+    if early or fdi["config"]["authority"] == STATISTICS or fdi["watch"]["output"]["alarmed"]:
         return None
     return None if _is_off(scenario, certain_s) else certain_s - fault_s
 

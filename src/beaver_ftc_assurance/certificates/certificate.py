@@ -282,7 +282,7 @@ def statements(
     """What can be said of each event; one without a `value` says why it cannot be certified."""
     alarm, fdi = events["detected"], tape.alarm["fdi"]
     about: Document = {"what": None, "column": "detected", "frame": alarm}
-    watch = instruments_say.of_alarm(fdi["watch"]) if fdi["watch"]["alarmed"] else None
+    watch = instruments_say.of_alarm(fdi["watch"]) if fdi["watch"]["output"]["alarmed"] else None
     config, ours = fdi["config"], place_of("adaptive-estimators")
     if not fdi["isolation"]["config"]["n"] or not config["enabled"] or config["scheme"] != ours:
         yield about | (watch or {"because": "another scheme was in charge"})

@@ -180,7 +180,7 @@ def _written(tape: Tape, history: History, test: tuple[int, int, int], rows: ran
         its["keep"] = then["keep"]
     if known:
         its["known"] = (response - before[..., :n]) / dt + before[..., n:]  # that gave this response
-    if chances["air"]["moving"]:
+    if chances["air"]["output"]["moving"]:
         its["air"] = tape.chances["air"][here][1:][:, axes]
         drift += block["stronger"] * tape.chances["leap"][here][1:][np.ix_(range(len(rows)), axes, axes)]
     lane, at = block["lane"], h * N_SLOTS + slot

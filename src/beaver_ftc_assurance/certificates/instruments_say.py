@@ -25,18 +25,18 @@ def of_alarm(watch: np.void) -> Document:
 
     watch: of the flight's record at the alarm, of `WATCH`.
     """
-    number = int(watch["furthest"])
-    if watch["share"] > 1.0 and number >= N_COMPUTED:
+    number = int(watch["output"]["furthest"])
+    if watch["output"]["share"] > 1.0 and number >= N_COMPUTED:
         return {"because": NOT_COMPUTED}
-    if watch["share"] > 1.0:
+    if watch["output"]["share"] > 1.0:
         looks = [look for look in _looks(watch["step"], number) if any(look)]
         value, limit = sum(z - then for z, then, _ in looks), sum(most for *_, most in looks)
         if value < 0.0:  # the other way round
             looks, value = [[then, z, most] for z, then, most in looks], -value
         if value > limit:
             return {"test": TESTS[number], "looks": looks, "sides": [value, limit]}
-    named = int(watch["named"])
-    if named >= 0 and watch["replaced"][named] and not watch["share"] > 1.0:
+    named = int(watch["output"]["named"])
+    if named >= 0 and watch["output"]["replaced"][named] and not watch["output"]["share"] > 1.0:
         because = f"there was no reading of {sensor_words(SENSORS[named])}, and no column that says so"
         return {"missing": [named], "because": because}
     return {"because": NOT_STATED}
@@ -55,13 +55,13 @@ def _looks(step: np.void, number: int) -> Iterator[list[float]]:
     test = step["test"][number]
     residual = float(test["residual"])
     if number >= RPM:
-        told = float(step["command"][number - RPM])
-        yield [told + residual, told, float(step["error"][ENGINE_SPEED + number - RPM]) + 1e-6]
+        told = float(step["memory"]["command"][number - RPM])
+        yield [told + residual, told, float(step["memory"]["error"][ENGINE_SPEED + number - RPM]) + 1e-6]
         return
     reads = TESTS[number]
-    foretold = float(step["predicted"][SENSORS.index(reads)]) if reads in SENSORS else 0.0
+    foretold = float(step["memory"]["predicted"][SENSORS.index(reads)]) if reads in SENSORS else 0.0
     m = int(np.argmax(np.abs(test["filtered"]) / test["bound"]))
-    now = float(step["h"] * test["rate"] + test["noise"] + test["air"] * step["gusts"][m])
+    now = float(step["config"]["h"] * test["rate"] + test["noise"] + test["air"] * step["config"]["gusts"][m])
     yield [foretold + residual, foretold, now]
     kept = np.array([test["filtered"][m] - residual, test["bound"][m] - now])
     kept[np.abs(kept) <= _LEAST * np.array([abs(test["filtered"][m]), test["bound"][m]])] = 0.0

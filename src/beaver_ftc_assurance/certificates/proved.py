@@ -61,9 +61,9 @@ def _log(frames: np.ndarray, flown: Iterable[int], scenario: Scenario, recorder:
         of_frame = frame["measured"]["x"], frame["belief"]["means"]["acceleration"], fdi["bound"]["eta_bar"]
         if scenario.fdi.statistical:
             shares = chance.shares(fdi["statistical"], surfaces)
-        if watch["enabled"]:
-            shares |= {"watch_share": watch["share"], "watch_test": watch["furthest"]}
-        alarm = fdi["verdict"]["detected"] or watch["alarmed"]  # as in a log of ours
+        if watch["config"]["enabled"]:
+            shares |= {"watch_share": watch["output"]["share"], "watch_test": watch["output"]["furthest"]}
+        alarm = fdi["verdict"]["detected"] or watch["output"]["alarmed"]  # as in a log of ours
         values = [alarm, *estimators["excluded"], *shares.values()]
         rows.append(np.concatenate([[k / scenario.rate_hz], *of_frame, values]))
     log.open([*columns, *shares])

@@ -99,7 +99,7 @@ class Recorder:
         )
         self._always = _Places(_always(numbers[0], n, config.fault_class == "all"))
         self._early = _Places(_early(fdi, n, config.statistical is not None))
-        self._state = np.array([0, -1, 0, fdi["verdict"]["detected"], fdi["watch"]["alarmed"]])
+        self._state = np.array([0, -1, 0, fdi["verdict"]["detected"], fdi["watch"]["output"]["alarmed"]])
         give_back_memory(numbers)
         ring = 1 + (BEFORE if config.statistical is None else BEFORE_CHANCE)
         self._ring = np.empty((ring, len(self._early.words)), np.int64)
@@ -206,7 +206,7 @@ def _early(fdi: np.void, n: int, chance: bool) -> dict[str, np.ndarray]:
         blocks = chances["block"]
         views |= {name: blocks[name] for name in OF_BLOCK}
         views |= {"signature": blocks["hypothesis"]["signature"], "bounded": chances["noise"]["bounded"]}
-        views |= {"air": chances["air"]["mean"], "leap": chances["air"]["leap"]}
+        views |= {"air": chances["air"]["output"]["mean"], "leap": chances["air"]["output"]["leap"]}
     return views
 
 

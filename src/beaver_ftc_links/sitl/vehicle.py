@@ -157,7 +157,7 @@ class Flown(Simulation):
 
     def _stop_listening(self) -> None:
         fdi = self._frame["fdi"]
-        self._listens = fdi["config"]["enabled"] = fdi["watch"]["enabled"] = False
+        self._listens = fdi["config"]["enabled"] = fdi["watch"]["config"]["enabled"] = False
 
     def _heed_the_ground(self) -> None:
         """End the diagnosis near the ground, begin it anew in flight unless it has found something."""
@@ -196,7 +196,10 @@ class Flown(Simulation):
     def alarmed(self) -> bool:
         """Whether there is an alarm."""
         verdict, watch = self._seen
-        return bool(verdict["detected"][0] or watch["alarmed"][0]) or self._loop.plugin_frame is not None
+        return (
+            bool(verdict["detected"][0] or watch["output"]["alarmed"][0])
+            or self._loop.plugin_frame is not None
+        )
 
     def pilot(self, runs: int, deflections: Vector | None, power: float | None) -> None:
         """Fly so many of JSBSim's frames, or to the end, with these deflections (n,) rad and this setting of

@@ -53,39 +53,57 @@ SLOPE_RAD = 0.3  # of the path, along which gravity acts
 DRAG = 0.3  # of the weight, at most: what errors of the coefficients are a share of
 LEAST_SWING = 0.01  # of a gust's own intensity: less is not reckoned with
 
-AIR = record(
-    moving=int, started=int,  # whether there is turbulence; whether `pull` is known
-    modelled=int, seen=int,  # whether the design model has forces; whether the vanes tell a gust
-    glimpsed=int, shown=3,  # whether they do but roughly; what a gust so shown does, rad/s2
-    read=int, felt=3,  # whether accelerometers are read; what they say, m/s2
-    forces=TABLE, scratch=MAX_MONOMIALS,  # force coefficients
-    area_per_mass=float, gravity=float, span=float, velocity=3, force=3, turn=(3, 3), heading=float,
-    axes=(3, 3),  # from the gusts' axes to body axes
-    pull=3,  # forces and gravity an instant before, m/s2 in the level axes of this one
-    gust=3, rotation=3, damping=(3, 3),
-    acceleration=3,  # at this instant
-    total=3, mean=3,  # over the instants of a frame; over the elapsed one
-    per_metre=3,  # intensity of the rotation's drift over airspeed, rad2/s3 per m/s, at this height
-    aloft=3, low=3,  # the same above 2000 ft; at a height of 1 m
+CONFIG = record(
+    modelled=int,  # whether the design model has forces
+    glimpsed=int,  # whether the vanes show a gust but roughly
+    area_per_mass=float, gravity=float, span=float,
+    aloft=3, low=3,  # intensity of the rotation's drift over airspeed above 2000 ft; at a height of 1 m
     altitude_off=float, altitude_slope=float,  # how far the altimeter's reading can be off, m; as a share
-    # The gust's velocity since the start, m/s ahead, right, down; its largest component; how fast it is
-    # forgotten, 1/s; speed through the mean air, m/s.
-    blown=3, strongest=float, forgets=float, speed=float,
-    # Variance, (m/s)2, that the speed is off by; that of a gust there was at the start, and which share of it
-    # is still unknown; share of a gust's intensity per square of the relative error.
-    spread=float, gusty=float, fresh=float, doubt=float,
-    unseen=3,  # share of it that the vanes do not show
+    # Largest component of a gust, m/s; how fast its sum is forgotten, 1/s.
+    strongest=float, forgets=float,
+    # Variance, (m/s)2, that the speed is off by; that of a gust there was at the start; share of a gust's
+    # intensity per square of the relative error.
+    spread=float, gusty=float, doubt=float,
     rolling=float,  # lag of the rolling gust times airspeed, m
-    # Scale of the gusts, m; share of a yawing one that turning loses at this instant, and that is lost.
-    scale=float, lost=float, turning=float,
-    # Whether the diagnosis begins in air that is moving by then; share of a pitching gust unseen for that.
-    in_flight=int, late=float,
+    scale=float,  # of the gusts, m
+    in_flight=int,  # whether the diagnosis begins in air that is moving by then
+)  # fmt: skip
+
+MEMORY = record(
+    started=int,  # whether `pull` is known
+    felt=3,  # what accelerometers say, m/s2
+    forces=TABLE, scratch=MAX_MONOMIALS,  # force coefficients, evaluated at this instant
+    velocity=3, force=3, turn=(3, 3), heading=float,
+    pull=3,  # forces and gravity an instant before, m/s2 in the level axes of this one
+    gust=3, rotation=3,
+    total=3,  # over the instants of a frame
+    per_metre=3,  # intensity of the rotation's drift over airspeed, rad2/s3 per m/s, at this height
+    unseen=3,  # share of it that the vanes do not show
+    # The gust's velocity since the start, m/s ahead, right, down; which share of the variance of a gust there
+    # was at the start is still unknown.
+    blown=3, fresh=float,
+    # Share of a yawing gust that turning loses at this instant, and that is lost; share of a pitching gust
+    # unseen because the diagnosis begins in flight.
+    lost=float, turning=float, late=float,
     # How fast the axes of the gusts turn in the body, 1/s, and whether that matters.
     swing=(3, 3), swings=int,
     # Variance of what that moves the accelerations by, (rad/s2)2: in the frame that goes on, in the one
-    # before it, and in both; for how many frames there is any.
-    leaping=(3, 3), leapt=(3, 3), leap=(3, 3), leaps=int,
+    # before it; for how many frames there is any.
+    leaping=(3, 3), leapt=(3, 3), leaps=int,
 )  # fmt: skip
+
+OUTPUT = record(
+    # Whether there is turbulence; whether accelerometers are read, and whether the vanes tell a gust. These
+    # are filled by configure, and end with the accelerometers.
+    moving=int, read=int, seen=int,
+    acceleration=3, mean=3,  # rad/s2: of the gust that is seen, at this instant; mean over the elapsed frame
+    shown=3,  # the same of a gust that the vanes show but roughly
+    leap=(3, 3),  # (rad/s2)2: `leaping` and `leapt` together
+    speed=float,  # through the mean air, m/s
+    damping=(3, 3), axes=(3, 3),  # 1/s; from the gusts' axes to body axes
+)  # fmt: skip
+
+AIR = record(config=CONFIG, memory=MEMORY, output=OUTPUT)
 
 
 @kernel
@@ -93,10 +111,10 @@ def specific_force(air, x, y, u, out):
     """Fill out (3,) m/s2: aerodynamic and propulsive force over mass, body axes; x (3,) rad/s, y (4 +
     declared,), u (surfaces,) rad. The term in the rate of sideslip is left out: it is below a hundredth of
     the side force."""
-    table = air.forces
+    table = air.memory.forces
     evaluate(table, x, y)
     for i in range(3):
-        out[i] = y[QDYN] * air.area_per_mass * whole_sum(table, i, table.power, u)
+        out[i] = y[QDYN] * air.config.area_per_mass * whole_sum(table, i, table.power, u)
 
 
 @kernel
@@ -121,11 +139,13 @@ def advance_axes(air, y, attitude):
     y (5,) and attitude (3,) rad as measured.
     """
     alpha, beta, V = y[ALPHA], y[BETA], y[AIRSPEED]
-    level_axes(attitude[0], attitude[1], air.turn)
-    air.heading = attitude[2]
+    level_axes(attitude[0], attitude[1], air.memory.turn)
+    air.memory.heading = attitude[2]
     u, v, w = V * np.cos(alpha) * np.cos(beta), V * np.sin(beta), V * np.sin(alpha) * np.cos(beta)
     for i in range(3):
-        air.velocity[i] = air.turn[0, i] * u + air.turn[1, i] * v + air.turn[2, i] * w
+        air.memory.velocity[i] = (
+            air.memory.turn[0, i] * u + air.memory.turn[1, i] * v + air.memory.turn[2, i] * w
+        )
 
 
 @kernel
@@ -134,11 +154,11 @@ def begin(air, y, attitude):
     diagnosis that begins in flight, fades unseen."""
     advance_axes(air, y, attitude)
     turn_gusts(air, 0.0, 1.0)
-    air.gust[:] = 0.0
-    air.started, air.lost = 0, 0.0
-    air.turning = air.late = air.fresh = float(air.in_flight)
-    air.blown[:], air.speed = 0.0, y[AIRSPEED]
-    air.leaping[:], air.leapt[:], air.leap[:], air.leaps = 0.0, 0.0, 0.0, 0
+    air.memory.gust[:] = 0.0
+    air.memory.started, air.memory.lost = 0, 0.0
+    air.memory.turning = air.memory.late = air.memory.fresh = float(air.config.in_flight)
+    air.memory.blown[:], air.output.speed = 0.0, y[AIRSPEED]
+    air.memory.leaping[:], air.memory.leapt[:], air.output.leap[:], air.memory.leaps = 0.0, 0.0, 0.0, 0
 
 
 @kernel
@@ -147,11 +167,11 @@ def turn_gusts(air, sin, cos):
 
     sin, cos: of what the heading has turned. JSBSim's gusts point along the heading of the step before.
     """
-    air.swing[:] = air.axes
+    air.memory.swing[:] = air.output.axes
     for i in range(3):
-        ahead, right = air.turn[i, 0], air.turn[i, 1]
-        air.axes[i, 0], air.axes[i, 1] = ahead * cos - right * sin, ahead * sin + right * cos
-        air.axes[i, 2] = air.turn[i, 2]
+        ahead, right = air.memory.turn[i, 0], air.memory.turn[i, 1]
+        air.output.axes[i, 0], air.output.axes[i, 1] = ahead * cos - right * sin, ahead * sin + right * cos
+        air.output.axes[i, 2] = air.memory.turn[i, 2]
 
 
 @kernel
@@ -164,9 +184,9 @@ def note_swing(air, dt, V):
     most = 0.0
     for i in range(3):
         for g in range(3):
-            air.swing[i, g] = (air.axes[i, g] - air.swing[i, g]) / dt
-            most = max(most, abs(air.swing[i, g]))
-    air.swings = 0.5 * (most * air.rolling / V) ** 2 > LEAST_SWING
+            air.memory.swing[i, g] = (air.output.axes[i, g] - air.memory.swing[i, g]) / dt
+            most = max(most, abs(air.memory.swing[i, g]))
+    air.memory.swings = 0.5 * (most * air.config.rolling / V) ** 2 > LEAST_SWING
 
 
 @kernel
@@ -177,7 +197,7 @@ def lost_by_turning(air, V, rate):
     that is a change by rate sigma, besides a walk of intensity 3 sigma^2 V / scale. Over the lag of the
     yawing gust, 3 span / pi V, the square of the one over that of the other.
     """
-    return rate * rate * air.span * air.scale / (pi * V * V)
+    return rate * rate * air.config.span * air.config.scale / (pi * V * V)
 
 
 @kernel
@@ -188,68 +208,73 @@ def observe(air, y, attitude, dt):
     fast that what the vanes show is mostly that, as it does when the nose passes the vertical, a yawing gust
     is let fade, unseen; an instant longer, since JSBSim's gusts turn a step after the heading.
     """
-    pulled = air.scratch
+    pulled = air.memory.scratch
     for i in range(3):
-        pulled[i] = to_level(air.turn, air.force, i)
-    pulled[2] += air.gravity
-    if not air.started:
-        air.pull[:] = pulled[:3]
-        air.started = 1
+        pulled[i] = to_level(air.memory.turn, air.memory.force, i)
+    pulled[2] += air.config.gravity
+    if not air.memory.started:
+        air.memory.pull[:] = pulled[:3]
+        air.memory.started = 1
     for i in range(3):
-        air.velocity[i] += dt * (1.5 * pulled[i] - 0.5 * air.pull[i])
-    turned = wrapped(attitude[2] - air.heading)
+        air.memory.velocity[i] += dt * (1.5 * pulled[i] - 0.5 * air.memory.pull[i])
+    turned = wrapped(attitude[2] - air.memory.heading)
     sin, cos = np.sin(turned), np.cos(turned)
     ahead, right = (
-        air.velocity[0] * cos + air.velocity[1] * sin,
-        air.velocity[1] * cos - air.velocity[0] * sin,
+        air.memory.velocity[0] * cos + air.memory.velocity[1] * sin,
+        air.memory.velocity[1] * cos - air.memory.velocity[0] * sin,
     )
-    down = air.velocity[2]
-    air.pull[0], air.pull[1] = pulled[0] * cos + pulled[1] * sin, pulled[1] * cos - pulled[0] * sin
-    air.pull[2] = pulled[2]
+    down = air.memory.velocity[2]
+    air.memory.pull[0], air.memory.pull[1] = (
+        pulled[0] * cos + pulled[1] * sin,
+        pulled[1] * cos - pulled[0] * sin,
+    )
+    air.memory.pull[2] = pulled[2]
     advance_axes(air, y, attitude)
     pass_through(air, ahead, right, down, y[AIRSPEED], dt)
-    V = air.speed
+    V = air.output.speed
     turn_gusts(air, sin, cos)
     note_swing(air, dt, V)
-    pitching, yawing = 4.0 * air.span / (pi * V), 3.0 * air.span / (pi * V)  # lags, s
-    before, air.lost = air.lost, lost_by_turning(air, V, turned / dt)
-    lost = max(before, air.lost)
-    air.turning = min(max(np.exp(-dt / yawing) * air.turning, lost), 1.0)
-    air.late *= np.exp(-dt / pitching)
-    air.gust[1] = np.exp(-dt / pitching) * air.gust[1] + (down - air.velocity[2]) / (V * pitching)
-    air.gust[2] = np.exp(-dt / yawing) * air.gust[2]
+    pitching, yawing = 4.0 * air.config.span / (pi * V), 3.0 * air.config.span / (pi * V)  # lags, s
+    before, air.memory.lost = air.memory.lost, lost_by_turning(air, V, turned / dt)
+    lost = max(before, air.memory.lost)
+    air.memory.turning = min(max(np.exp(-dt / yawing) * air.memory.turning, lost), 1.0)
+    air.memory.late *= np.exp(-dt / pitching)
+    air.memory.gust[1] = np.exp(-dt / pitching) * air.memory.gust[1] + (down - air.memory.velocity[2]) / (
+        V * pitching
+    )
+    air.memory.gust[2] = np.exp(-dt / yawing) * air.memory.gust[2]
     if lost < 1.0:
-        air.gust[2] += (right - air.velocity[1]) / (V * yawing)
+        air.memory.gust[2] += (right - air.memory.velocity[1]) / (V * yawing)
     else:
-        air.blown[:], air.fresh = 0.0, 1.0
+        air.memory.blown[:], air.memory.fresh = 0.0, 1.0
 
 
 @kernel
 def pass_through(air, ahead, right, down, V, dt):
     """Bring `blown` and `speed` to this instant, dt s after the one before: ahead, right, down, m/s, is the
     velocity through air whose gust had not changed. V m/s: airspeed, which serves where no gust is seen."""
-    air.speed = V
-    if not air.seen:
+    air.output.speed = V
+    if not air.output.seen:
         return
-    kept = np.exp(-air.forgets * dt)
-    air.fresh *= kept * kept
-    air.blown[0] = kept * air.blown[0] + ahead - air.velocity[0]
-    air.blown[1] = kept * air.blown[1] + right - air.velocity[1]
-    air.blown[2] = kept * air.blown[2] + down - air.velocity[2]
+    kept = np.exp(-air.config.forgets * dt)
+    air.memory.fresh *= kept * kept
+    air.memory.blown[0] = kept * air.memory.blown[0] + ahead - air.memory.velocity[0]
+    air.memory.blown[1] = kept * air.memory.blown[1] + right - air.memory.velocity[1]
+    air.memory.blown[2] = kept * air.memory.blown[2] + down - air.memory.velocity[2]
     squared = 0.0
     for i in range(3):
-        air.blown[i] = min(max(air.blown[i], -air.strongest), air.strongest)
-        squared += (air.velocity[i] + air.blown[i]) ** 2
-    air.speed = max(np.sqrt(squared), 0.5 * V)
+        air.memory.blown[i] = min(max(air.memory.blown[i], -air.config.strongest), air.config.strongest)
+        squared += (air.memory.velocity[i] + air.memory.blown[i]) ** 2
+    air.output.speed = max(np.sqrt(squared), 0.5 * V)
 
 
 @kernel
 def reach_height(air, altitude):
     """Bring the strength of the turbulence to this altitude, m as measured."""
-    height = least_height(altitude, air.altitude_off, air.altitude_slope)
-    air.per_metre[0] = max(air.aloft[0], air.low[0] / height**1.5)
+    height = least_height(altitude, air.config.altitude_off, air.config.altitude_slope)
+    air.memory.per_metre[0] = max(air.config.aloft[0], air.config.low[0] / height**1.5)
     for g in range(1, 3):
-        air.per_metre[g] = max(air.aloft[g], air.low[g] / height)
+        air.memory.per_metre[g] = max(air.config.aloft[g], air.config.low[g] / height)
 
 
 @kernel
@@ -267,28 +292,28 @@ def effect(air, design, x, y, u):
 
     x (3,) rad/s, y (5,), u (4,) rad: measured, and the surfaces in effect.
     """
-    if air.read:
-        air.force[:] = air.felt
-    elif air.glimpsed:  # lift holds the weight, and turns as far as the bank goes
-        air.force[0] = air.force[1] = 0.0
-        air.force[2] = -air.gravity / max(air.turn[2, 2], STEEP)
+    if air.output.read:
+        air.memory.force[:] = air.memory.felt
+    elif air.config.glimpsed:  # lift holds the weight, and turns as far as the bank goes
+        air.memory.force[0] = air.memory.force[1] = 0.0
+        air.memory.force[2] = -air.config.gravity / max(air.memory.turn[2, 2], STEEP)
     else:
-        specific_force(air, x, y, u, air.force)
-    rate_damping(design, x, y, u, air.scratch, air.damping)
+        specific_force(air, x, y, u, air.memory.force)
+    rate_damping(design, x, y, u, air.memory.scratch, air.output.damping)
     for i in range(3):
-        known = air.axes[i, 1] * air.gust[1] + air.axes[i, 2] * air.gust[2]
-        air.rotation[i] = known if air.seen or air.glimpsed else 0.0
+        known = air.output.axes[i, 1] * air.memory.gust[1] + air.output.axes[i, 2] * air.memory.gust[2]
+        air.memory.rotation[i] = known if air.output.seen or air.config.glimpsed else 0.0
     for i in range(3):
         moved = 0.0
         for j in range(3):
-            moved -= air.damping[i, j] * air.rotation[j]
-        air.acceleration[i], air.shown[i] = (moved, 0.0) if air.seen else (0.0, moved)
+            moved -= air.output.damping[i, j] * air.memory.rotation[j]
+        air.output.acceleration[i], air.output.shown[i] = (moved, 0.0) if air.output.seen else (0.0, moved)
 
 
 @kernel
 def begin_frame(air, V, dt):
     """Begin the sums over the next frame's instants, dt s apart, with this one; V m/s."""
-    air.total[:] = air.acceleration
+    air.memory.total[:] = air.output.acceleration
     note_leap(air, V, dt)
 
 
@@ -298,45 +323,67 @@ def look(air, design, x, y, u, attitude, dt):
     observe(air, y, attitude, dt)
     effect(air, design, x, y, u)
     for i in range(3):
-        air.total[i] += air.acceleration[i]
+        air.memory.total[i] += air.output.acceleration[i]
     note_leap(air, y[AIRSPEED], dt)
+
+
+@kernel
+def take_force(air, force):
+    """Take in what the accelerometers say, force (3,) m/s2."""
+    air.memory.felt[:] = force
+
+
+@kernel
+def stop(air):
+    """Follow no gust from now on."""
+    air.output.moving = 0
 
 
 @kernel
 def no_longer_read(air):
     """Do without the accelerometers from now on. A gust that they alone showed is there, unseen: its whole
     variance counts."""
-    air.read = 0
-    if air.seen and not air.modelled:
-        air.seen, air.unseen[:] = 0, 1.0
+    air.output.read = 0
+    if air.output.seen and not air.config.modelled:
+        air.output.seen, air.memory.unseen[:] = 0, 1.0
         pitching, yawing = 0.5 * length(air, 1), 0.5 * length(air, 2)
         for i in range(3):
             for j in range(3):
-                air.leaping[i, j] += pitching * air.per_metre[1] * together(air, air.axes, i, j, 1)
-                air.leaping[i, j] += yawing * air.per_metre[2] * together(air, air.axes, i, j, 2)
-        air.leaps = 3
+                air.memory.leaping[i, j] += (
+                    pitching * air.memory.per_metre[1] * together(air, air.output.axes, i, j, 1)
+                )
+                air.memory.leaping[i, j] += (
+                    yawing * air.memory.per_metre[2] * together(air, air.output.axes, i, j, 2)
+                )
+        air.memory.leaps = 3
 
 
 @kernel
 def hidden(air, g):
     """Share of the gust about axis g that the vanes do not show in this frame."""
     if g == 0:
-        return min(air.unseen[g], 1.0)
-    off = air.doubt * (air.spread + air.fresh * air.gusty) / max(air.speed, 1.0) ** 2 if air.seen else 0.0
-    return min(air.unseen[g] + off + (air.late if g == 1 else air.turning), 1.0)
+        return min(air.memory.unseen[g], 1.0)
+    off = (
+        air.config.doubt
+        * (air.config.spread + air.memory.fresh * air.config.gusty)
+        / max(air.output.speed, 1.0) ** 2
+        if air.output.seen
+        else 0.0
+    )
+    return min(air.memory.unseen[g] + off + (air.memory.late if g == 1 else air.memory.turning), 1.0)
 
 
 @kernel
 def sooner(air, g):
     """How much less of the gust about axis g is slow than if it returned as late as the rolling one. What
     vanes leave of a gust that they tell returns as it likes."""
-    return (length(air, g) / air.rolling) ** 2 if air.glimpsed else 1.0
+    return (length(air, g) / air.config.rolling) ** 2 if air.config.glimpsed else 1.0
 
 
 @kernel
 def length(air, g):
     """Way flown within which the gust about axis g returns, m, as `design.dryden.rotation_lengths`."""
-    return air.rolling if g == 0 else (4.0 if g == 1 else 3.0) * air.span / pi
+    return air.config.rolling if g == 0 else (4.0 if g == 1 else 3.0) * air.config.span / pi
 
 
 @kernel
@@ -346,22 +393,22 @@ def unseen_drift(air, V, i, j, slow=False):
     total = 0.0
     for g in range(3):
         share = sooner(air, g) if slow else 1.0
-        total += together(air, air.axes, i, j, g) * hidden(air, g) * air.per_metre[g] * share
-    return total * max(V, air.speed)
+        total += together(air, air.output.axes, i, j, g) * hidden(air, g) * air.memory.per_metre[g] * share
+    return total * max(V, air.output.speed)
 
 
 @kernel
 def note_leap(air, V, dt):
     """Add what the swing of the gusts' axes, dt s long, does to the accelerations, while V m/s is flown."""
-    if not air.swings:
+    if not air.memory.swings:
         return
-    rolling = 0.5 * (air.rolling / V) ** 2 * air.per_metre[0]
-    yawing = 0.5 * (3.0 * air.span / (pi * V)) ** 2 * air.per_metre[2] * air.turning
+    rolling = 0.5 * (air.config.rolling / V) ** 2 * air.memory.per_metre[0]
+    yawing = 0.5 * (3.0 * air.config.span / (pi * V)) ** 2 * air.memory.per_metre[2] * air.memory.turning
     for i in range(3):
         for j in range(3):
-            roll, yaw = together(air, air.swing, i, j, 0), together(air, air.swing, i, j, 2)
-            air.leaping[i, j] += dt * V * (rolling * roll + yawing * yaw)
-    air.leaps = 3
+            roll, yaw = together(air, air.memory.swing, i, j, 0), together(air, air.memory.swing, i, j, 2)
+            air.memory.leaping[i, j] += dt * V * (rolling * roll + yawing * yaw)
+    air.memory.leaps = 3
 
 
 @kernel
@@ -372,26 +419,28 @@ def elapse(air, share):
     one the rest. So unlike a drift, which goes on from where the frame ends, the leap is there in both.
     """
     for i in range(3):
-        air.mean[i] = share * air.total[i]
-    if air.leaps > 0:
-        air.leaps -= 1
+        air.output.mean[i] = share * air.memory.total[i]
+    if air.memory.leaps > 0:
+        air.memory.leaps -= 1
         for i in range(3):
             for j in range(3):
-                air.leap[i, j] = air.leapt[i, j] + air.leaping[i, j]
-                air.leapt[i, j], air.leaping[i, j] = air.leaping[i, j], 0.0
+                air.output.leap[i, j] = air.memory.leapt[i, j] + air.memory.leaping[i, j]
+                air.memory.leapt[i, j], air.memory.leaping[i, j] = air.memory.leaping[i, j], 0.0
 
 
 @kernel
 def whole_drift(air, V, felt, by_forces):
     """Intensity, (rad/s2)2/s, of all of the air's rotation where rates feel it, `felt` (3,) 1/s about the
     body axes, and forces do: of one who does not ask the vanes."""
-    total, longest_s = 0.0, air.rolling / V
+    total, longest_s = 0.0, air.config.rolling / V
     for g in range(3):
-        by_both = abs(along(felt, air.axes, g)) + abs(along(by_forces, air.axes, g))
-        total += by_both**2 * air.per_metre[g]
-        if air.swings:
-            total += 0.5 * longest_s * longest_s * air.per_metre[g] * along(felt, air.swing, g) ** 2
-    return total * max(V, air.speed)
+        by_both = abs(along(felt, air.output.axes, g)) + abs(along(by_forces, air.output.axes, g))
+        total += by_both**2 * air.memory.per_metre[g]
+        if air.memory.swings:
+            total += (
+                0.5 * longest_s * longest_s * air.memory.per_metre[g] * along(felt, air.memory.swing, g) ** 2
+            )
+    return total * max(V, air.output.speed)
 
 
 @kernel
@@ -400,9 +449,9 @@ def drift_beside(air, V, by_rates, by_forces):
     do: (3,) 1/s each, about the body axes."""
     total = 0.0
     for g in range(3):
-        of_rates = np.sqrt(hidden(air, g)) * abs(along(by_rates, air.axes, g))
-        total += (of_rates + abs(along(by_forces, air.axes, g))) ** 2 * air.per_metre[g]
-    return total * max(V, air.speed)
+        of_rates = np.sqrt(hidden(air, g)) * abs(along(by_rates, air.output.axes, g))
+        total += (of_rates + abs(along(by_forces, air.output.axes, g))) ** 2 * air.memory.per_metre[g]
+    return total * max(V, air.output.speed)
 
 
 @kernel
@@ -417,8 +466,8 @@ def together(air, axes, i, j, g):
     1/s4 of their `swing`."""
     on_i, on_j = 0.0, 0.0
     for k in range(3):
-        on_i += air.damping[i, k] * axes[k, g]
-        on_j += air.damping[j, k] * axes[k, g]
+        on_i += air.output.damping[i, k] * axes[k, g]
+        on_j += air.output.damping[j, k] * axes[k, g]
     return on_i * on_j
 
 
@@ -426,18 +475,27 @@ def set_up_air(air: np.void, declared: Declared, mass: MassProperties) -> None:
     """Fill the record with the declared turbulence, for an aircraft of so much mass."""
     turbulence, errors, aircraft = declared.air, declared.sensors, declared.aircraft
     span_m = aircraft.geometry.span_m
-    air["moving"], air["modelled"] = turbulence.moves, bool(aircraft.measurable_forces)
-    air["seen"] = air["modelled"] or air["read"]  # only where forces are known
-    air["glimpsed"] = air["moving"] and not air["seen"]
-    fill_table(air["forces"], aircraft, aircraft.measurable_forces, FORCES)
-    air["area_per_mass"] = aircraft.geometry.wing_area_m2 / mass.mass_kg
-    air["gravity"] = GRAVITY_MPS2  # standard; what is constant has no part in a change of the gust
-    air["span"] = span_m
-    air["aloft"], air["low"] = turbulence.rotation_walk(span_m), turbulence.rotation_walk_at_1_m(span_m)
-    air["per_metre"], air["unseen"] = air["aloft"], UNSEEN if air["seen"] else 1.0
-    air["altitude_off"], air["altitude_slope"] = errors["altitude"].worst, errors["altitude"].slope
-    air["scale"] = SCALE_M
-    air["rolling"] = rotation_lengths(span_m)[0]
+    air["output"]["moving"], air["config"]["modelled"] = turbulence.moves, bool(aircraft.measurable_forces)
+    air["output"]["seen"] = air["config"]["modelled"] or air["output"]["read"]  # only where forces are known
+    air["config"]["glimpsed"] = air["output"]["moving"] and not air["output"]["seen"]
+    fill_table(air["memory"]["forces"], aircraft, aircraft.measurable_forces, FORCES)
+    air["config"]["area_per_mass"] = aircraft.geometry.wing_area_m2 / mass.mass_kg
+    air["config"]["gravity"] = GRAVITY_MPS2  # standard; what is constant has no part in a change of the gust
+    air["config"]["span"] = span_m
+    air["config"]["aloft"], air["config"]["low"] = (
+        turbulence.rotation_walk(span_m),
+        turbulence.rotation_walk_at_1_m(span_m),
+    )
+    air["memory"]["per_metre"], air["memory"]["unseen"] = (
+        air["config"]["aloft"],
+        UNSEEN if air["output"]["seen"] else 1.0,
+    )
+    air["config"]["altitude_off"], air["config"]["altitude_slope"] = (
+        errors["altitude"].worst,
+        errors["altitude"].slope,
+    )
+    air["config"]["scale"] = SCALE_M
+    air["config"]["rolling"] = rotation_lengths(span_m)[0]
 
 
 def set_up_jitter(
@@ -445,8 +503,8 @@ def set_up_jitter(
 ) -> None:
     """What noise adds to the gust that is followed: that of the vanes, and of the force that moves the air's
     velocity on from frame to frame; where the flow follows from the forces, that of the forces too."""
-    flow, span_m = flow_noise(errors, y[AIRSPEED]), float(statistical["air"]["span"])
-    if statistical["forces"]["known"] or statistical["air"]["read"]:
+    flow, span_m = flow_noise(errors, y[AIRSPEED]), float(statistical["air"]["config"]["span"])
+    if statistical["forces"]["known"] or statistical["air"]["output"]["read"]:
         flow += TWO_STEPS * errors.each("random", ("az", "ay")) * dt_s / y[AIRSPEED]
     if statistical["forces"]["known"]:
         forces = statistical["forces"]["component"][::-1]  # normal to the body, and across
@@ -465,20 +523,24 @@ def set_up_passing(air: np.void, declared: Declared, level: float, airspeed_mps:
     together are least near a^3 = 2 b^2 V / (L sigma^2).
     """
     sigma, errors = declared.air.sigma_mps, declared.sensors
-    if not (air["moving"] and air["seen"]):
+    if not (air["output"]["moving"] and air["output"]["seen"]):
         return
     returns, V = airspeed_mps / SCALE_M, errors["V"]
     drift = 2.0 * EARTH_RATE_RAD_S * airspeed_mps + SLOPE_RAD * FALLING_M_S2  # Coriolis; gravity with place
     drift += GRAVITY_MPS2 * (errors["phi"].steady + errors["theta"].steady)
-    if air["read"]:
+    if air["output"]["read"]:
         drift += errors["ax"].steady + GRAVITY_MPS2 * DRAG * errors["ax"].slope
     else:
         drift += GRAVITY_MPS2 * DRAG * (declared.coefficients.largest + MASS_TOLERANCE)
     forgets = (2.0 * drift**2 * returns / sigma**2) ** (1.0 / 3.0)
-    air["gusty"], air["strongest"], air["forgets"] = sigma**2, STRONGEST * sigma, forgets
-    air["spread"] = sigma**2 * forgets / (forgets + returns) + (drift / forgets) ** 2 + V.random**2
-    air["spread"] += (V.steady + V.slope * airspeed_mps) ** 2
-    air["doubt"] = passing_doubt(level)
+    air["config"]["gusty"], air["config"]["strongest"], air["config"]["forgets"] = (
+        sigma**2,
+        STRONGEST * sigma,
+        forgets,
+    )
+    air["config"]["spread"] = sigma**2 * forgets / (forgets + returns) + (drift / forgets) ** 2 + V.random**2
+    air["config"]["spread"] += (V.steady + V.slope * airspeed_mps) ** 2
+    air["config"]["doubt"] = passing_doubt(level)
 
 
 def passing_doubt(level: float) -> float:

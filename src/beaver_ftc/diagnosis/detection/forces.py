@@ -23,7 +23,7 @@ from beaver_ftc.aircraft.units import EARTH_RATE_RAD_S
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.engine import slipstream_slopes
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, DPT, N_Y, QDYN, evaluate
-from beaver_ftc.diagnosis.belief.air import no_longer_read
+from beaver_ftc.diagnosis.belief.air import no_longer_read, stop
 from beaver_ftc.diagnosis.monitors.redundancy import FALLING_M_S2
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
 from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
@@ -75,7 +75,7 @@ def look(forces, air, measured, u, dt):
     """
     if forces.begun == 0:
         flow_rates(forces, measured)
-    evaluate(air.forces, measured.x, measured.y)
+    evaluate(air.memory.forces, measured.x, measured.y)
     forces.strength = measured.y[QDYN] / forces.pressure
     for f in range(2):
         before = forces.component[f].whole
@@ -108,7 +108,8 @@ def without_vanes(forces, rotation, y):
 def do_without(forces, air, inertial_air):
     """Weigh no force from now on, and follow the gust without accelerometers."""
     no_longer_read(air)
-    forces.known = inertial_air.moving = 0
+    stop(inertial_air)
+    forces.known = 0
 
 
 @kernel
@@ -123,9 +124,9 @@ def follow(forces, force, f, y, dt):
 @kernel
 def look_along(forces, air, f, measured, u):
     """The same along one direction: e, what surfaces do to it, and what the errors multiply."""
-    table, force = air.forces, forces.component[f]
+    table, force = air.memory.forces, forces.component[f]
     first, last = table.free_from[CY + f], table.surface_to[CY + f]
-    scale, whole = measured.y[QDYN] * air.area_per_mass * forces.per_m, 0.0
+    scale, whole = measured.y[QDYN] * air.config.area_per_mass * forces.per_m, 0.0
     force.foreseen[:] = force.column
     force.column[:], force.own[:] = 0.0, 0.0
     for k in range(first, last):
@@ -182,11 +183,11 @@ def set_up_forces(fdi: np.void, declared: Declared, trim: Trim, along_y: np.ndar
     """
     y, statistical, aircraft, sensors = trim[1], fdi["statistical"], declared.aircraft, declared.sensors
     forces, air, size = statistical["forces"], statistical["air"], aircraft.geometry
-    forces["per_m"], forces["gravity"] = 1.0 / size.chord_m, air["gravity"]
+    forces["per_m"], forces["gravity"] = 1.0 / size.chord_m, air["config"]["gravity"]
     forces["pressure"], forces["pressure_noise"] = y[QDYN], sensors["qdyn"].random
     rates = [t.value for t in aircraft.forces if t.coefficient == "CY" and t.of == ((SIDESLIP_RATE, 1),)]
     forces["span"], forces["of_rate"] = size.span_m, sum(rates)
-    scale = y[QDYN] * air["area_per_mass"] * forces["per_m"]
+    scale = y[QDYN] * air["config"]["area_per_mass"] * forces["per_m"]
     errors = sensors.each("random", ("alpha", "beta", "V", *AXES))
     by_airspeed, by_others = _slipstream_noise(y, fdi["bound"]["admitted"], sensors)
     for f, (vane, axis) in enumerate(((BETA, 2), (ALPHA, 1))):
@@ -205,7 +206,7 @@ def set_up_forces(fdi: np.void, declared: Declared, trim: Trim, along_y: np.ndar
         _set_up_tolerances(force, declared, terms, y, slopes[vane] / scale, f, forces["per_m"])
         turned = scale * sum(abs(term.value) for term in terms if term.surface)
         force["deflection"] = turned * declared.actuators.deflection_rad
-        force["drift"] = _drift(sensors, air["gravity"], y[AIRSPEED], f)
+        force["drift"] = _drift(sensors, air["config"]["gravity"], y[AIRSPEED], f)
         wander = (CHANGES * force["drift"]) ** 2 + dt_s * (noise / y[AIRSPEED]) ** 2
         force["wander"] = slopes[vane] ** 2 * (wander + declared.air.angle_walk(y[AIRSPEED]))
 

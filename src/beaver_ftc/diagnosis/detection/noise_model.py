@@ -145,22 +145,22 @@ def set_up(
         if forces:
             along_y = jacobian(design, *start)[3]
             set_up_forces(fdi, declared, start, along_y, dt_s)
-            air["read"] = not fdi["watch"]["enabled"]  # which may find them broken
+            air["output"]["read"] = not fdi["watch"]["config"]["enabled"]  # which may find them broken
             statistical["inertial_air"] = air
-            statistical["inertial_air"]["moving"] *= air["read"]
-            statistical["inertial_air"]["unseen"] = np.minimum(np.add(UNSEEN, BY_FORCE), 1.0)
+            statistical["inertial_air"]["output"]["moving"] *= air["output"]["read"]
+            statistical["inertial_air"]["memory"]["unseen"] = np.minimum(np.add(UNSEEN, BY_FORCE), 1.0)
         set_up_views(statistical, aircraft)
     last, pitch = statistical["block"][-1], statistical["block"][likelihood.PITCH_BLOCK]
-    rolling = float(air["rolling"]) if air["moving"] else 0.0
-    gusts_m = rotation_lengths(air["span"]) if air["glimpsed"] else [rolling]
+    rolling = float(air["config"]["rolling"]) if air["output"]["moving"] else 0.0
+    gusts_m = rotation_lengths(air["config"]["span"]) if air["config"]["glimpsed"] else [rolling]
     last["lag"] = returning_length(statistical, airspeed_mps, rate_hz, float(min(gusts_m)))
-    if air["moving"]:
+    if air["output"]["moving"]:
         # the filters that reckon with no gust: as the others begin, and with a drift that goes anywhere
         for name in ("n", "keep", "noise", "P_xx", "P_dd"):
             statistical["block"]["calm"][name] = statistical["block"][name]
         last["stronger"] = (rolling / last["lag"]) ** 2
-        if not air["seen"]:
-            pitching = float(rotation_lengths(air["span"])[1])
+        if not air["output"]["seen"]:
+            pitching = float(rotation_lengths(air["config"]["span"])[1])
             pitch["lag"] = returning_length(statistical, airspeed_mps, rate_hz, pitching)
             pitch["stronger"] = (pitching / pitch["lag"]) ** 2
         set_up_jitter(statistical, errors, design, *start[1:], dt_s)

@@ -96,7 +96,9 @@ def view_dtype(rooms: Rooms) -> np.dtype:
 def part(view, forces, air, inertial_air, innovation, i):
     """Component i of what is looked at, rad/s2: of the rates' innovation (3,), or of a force's."""
     if i < SIDE:
-        return innovation[i] - (gust_of(view, air, inertial_air).mean[i] if knows_gust(view, air) else 0.0)
+        return innovation[i] - (
+            gust_of(view, air, inertial_air).output.mean[i] if knows_gust(view, air) else 0.0
+        )
     force = forces.component[i - SIDE]
     return force.inertial if view.inertial else force.innovation
 
@@ -139,7 +141,10 @@ def turn_past_gust(view, forces, air):
     gust does to the rates: the vector product of the two."""
     force = forces.component[0]
     roll, yaw, side = force.vane_roll, force.vane[0], force.vane[1]
-    roll_gust, yaw_gust = along(air.damping[ROLL], air.axes, 0), along(air.damping[YAW], air.axes, 0)
+    roll_gust, yaw_gust = (
+        along(air.output.damping[ROLL], air.output.axes, 0),
+        along(air.output.damping[YAW], air.output.axes, 0),
+    )
     by_roll, by_yaw, by_side = -side * yaw_gust, side * roll_gust, roll * yaw_gust - yaw * roll_gust
     length = np.sqrt(by_roll * by_roll + by_yaw * by_yaw + by_side * by_side)
     if length == 0.0:
@@ -154,7 +159,7 @@ def turn_past_gust(view, forces, air):
 @kernel
 def knows_gust(view, air):
     """Whether a view is told the gust: only one that the measured force clears of broken surfaces."""
-    return view.cleared_by > 0 and air.read == 1
+    return view.cleared_by > 0 and air.output.read == 1
 
 
 @kernel
@@ -198,15 +203,15 @@ def blur(view, noise, blocks, forces, air, inertial_air, V):
         if view.inertial:
             drift += (m[SIDE + f] * forces.strength) ** 2 * force.wander
         bound += abs(m[SIDE + f]) * (force.deflection * forces.strength + force.unsettled)
-    if air.moving:
-        feel_gust(view, forces, air.damping)
+    if air.output.moving:
+        feel_gust(view, forces, air.output.damping)
         if knows_gust(view, air):
             drift += drift_beside(gust_of(view, air, inertial_air), V, view.by_rates, view.by_forces)
         else:
             drift += whole_drift(air, V, view.by_rates, view.by_forces)
         for i in range(3):
             for j in range(3):
-                block.P_dd[0, 0] += m[i] * m[j] * air.leap[i, j]
+                block.P_dd[0, 0] += m[i] * m[j] * air.output.leap[i, j]
     size = max(bound, likelihood.LEAST_UNCERTAINTY_RAD_S2)
     block.noise[0], block.jitter[0], view.bounded[0] = variance, jitter * jitter, bound
     block.drift[0, 0] = drift + noise.rapidity * size * size
@@ -328,7 +333,7 @@ def alarm(view, views, tests, forces, air):
     if view.surface == AN_AXIS and not view.inertial:
         return view.tones.score
     mostly = view.plane[1] >= SIDE and abs(view.mix[view.plane[1]]) > MOSTLY
-    if view.surface >= 0 and mostly and air.read == 1:
+    if view.surface >= 0 and mostly and air.output.read == 1:
         return shown(view, views, tests, forces, air)
     return 0.0
 
@@ -400,7 +405,7 @@ def set_up_views(statistical: np.void, aircraft: Aircraft) -> None:
     """Fill the views of a statistical record whose blocks, and normal force, are set up."""
     forces = statistical["forces"]
     separated = [aircraft.separated_by_force(COMPONENTS[f]) for f in (ASIDE, UP)]
-    with_air = forces["known"] and statistical["air"]["moving"] and all(separated)
+    with_air = forces["known"] and statistical["air"]["output"]["moving"] and all(separated)
     views = list(views_of(aircraft, bool(forces["known"])))[: len(statistical["views"])]
     statistical["n_views"] = len(views)
     for view, (surface, mix, plane, movers, inertial, asks) in zip(statistical["views"], views, strict=False):
@@ -409,7 +414,7 @@ def set_up_views(statistical: np.void, aircraft: Aircraft) -> None:
         axes = statistical["block"][PITCH_BLOCK if plane == IN_PITCH else LATERAL]
         # A law answers a gust by the vanes before the gyros feel it pitch, and the vanes are not asked here:
         # what an elevator does in moving air goes along with the noise, and no test of its loss is fair.
-        answered = statistical["air"]["moving"] and mix[PITCH]
+        answered = statistical["air"]["output"]["moving"] and mix[PITCH]
         tried = [] if answered else movers[: len(block["hypothesis"]) - 1]
         kinds, n = [STEP, *(LOSS for _ in tried)], int(axes["n_regressors"])
         block["n"], block["n_hypotheses"], block["keep"] = 1, len(kinds), 1.0
@@ -430,7 +435,7 @@ def set_up_views(statistical: np.void, aircraft: Aircraft) -> None:
         block["tolerance"][n] = float(surface != AN_AXIS)  # of how far errors turn the column, in flight
         hypotheses = block["hypothesis"][: len(kinds)]
         hypotheses["kind"], hypotheses["surface"] = kinds, [-1, *tried]
-        view["past_gust"] = surface == THE_VANE and plane == IN_YAW and statistical["air"]["moving"]
+        view["past_gust"] = surface == THE_VANE and plane == IN_YAW and statistical["air"]["output"]["moving"]
         view["inertial"], view["clears"] = inertial, inertial or surface == THE_VANE
         sense = block["lane"]["sense"].reshape(-1, likelihood.N_SLOTS)
         sense[:] = 0.0

@@ -80,12 +80,12 @@ def observe(tests, bounded, blocks, air, innovation, dt, k, latched, ends=False)
         if not latched:
             likelihood.start(block, slot)
         for i, axis in enumerate(block.axis[: block.n]):
-            block.scratch[i] = innovation[axis] - air.mean[axis]
-        block.glimpsed = air.glimpsed
-        if air.glimpsed:
+            block.scratch[i] = innovation[axis] - air.output.mean[axis]
+        block.glimpsed = air.config.glimpsed
+        if air.config.glimpsed:
             for i, axis in enumerate(block.axis[: block.n]):
-                block.shown[i] = air.shown[axis]
-        if air.moving:
+                block.shown[i] = air.output.shown[axis]
+        if air.output.moving:
             leap(air, block)
             if b < likelihood.RETURNING:
                 likelihood.follow_calm(block, dt)
@@ -100,7 +100,7 @@ def leap(air, block):
     """Let the drift be elsewhere where the axes of the gusts have swung round."""
     for i in range(block.n):
         for j in range(block.n):
-            block.P_dd[i, j] += block.stronger * air.leap[block.axis[i], block.axis[j]]
+            block.P_dd[i, j] += block.stronger * air.output.leap[block.axis[i], block.axis[j]]
 
 
 @kernel
@@ -108,7 +108,7 @@ def follow_rest(blocks, air, surprise, dt):
     """Filter what the law's beliefs leave unexplained: surprise (3,) rad/s2, known faults taken off."""
     for block in blocks[: likelihood.RETURNING]:
         for i, axis in enumerate(block.axis[: block.n]):
-            block.scratch[i] = surprise[axis] - air.mean[axis]
+            block.scratch[i] = surprise[axis] - air.output.mean[axis]
         likelihood.whiten(block, block.rest, block.scratch, dt, block.scratch)
 
 
@@ -118,7 +118,7 @@ def unknown_acceleration(blocks, air, out):
     best, and the gust the vanes see."""
     for block in blocks[: likelihood.RETURNING]:
         for i, axis in enumerate(block.axis[: block.n]):
-            out[axis] = block.rest[2 + i] + air.acceleration[axis]
+            out[axis] = block.rest[2 + i] + air.output.acceleration[axis]
 
 
 @kernel
@@ -265,7 +265,7 @@ def prepare(tests, noise, blocks, air, bound, design, measured, u, dt):
     bound: what is declared; u (surfaces,) rad: in effect.
     """
     x, y = measured.x, measured.y
-    if air.moving:
+    if air.output.moving:
         gusts.effect(air, design, x, y, u)
     if tests.tolerated:
         for block in blocks:
@@ -274,7 +274,7 @@ def prepare(tests, noise, blocks, air, bound, design, measured, u, dt):
     drifts(noise, blocks, air, bound, design, measured, dt)
     if bound.error_map.n_boxes > 0:
         follow_surfaces(noise, blocks, bound.error_map, u)
-    if air.moving:
+    if air.output.moving:
         gusts.begin_frame(air, y[AIRSPEED], tests.share * dt)
 
 
@@ -293,7 +293,7 @@ def follow_surfaces(noise, blocks, error_map, u):
 @kernel
 def look(tests, noise, blocks, air, bound, design, measured, u, dt):
     """Take in an instant inside a frame, dt s after the one before."""
-    if air.moving:
+    if air.output.moving:
         gusts.look(air, design, measured.x, measured.y, u, measured.attitude, dt)
     if tests.tolerated:
         constants(tests.share, noise, blocks, bound.admitted, design, measured, u)
@@ -326,7 +326,7 @@ def drifts(noise, blocks, air, bound, design, measured, dt):
         for i, axis in enumerate(block.axis[: block.n]):
             for j in range(block.n):
                 block.drift[i, j] = 0.0
-                if air.moving:
+                if air.output.moving:
                     moved = gusts.unseen_drift(air, V, axis, block.axis[j], b == likelihood.RETURNING)
                     block.drift[i, j] = block.stronger * moved
             size = max(bounded[axis], likelihood.LEAST_UNCERTAINTY_RAD_S2)

@@ -68,51 +68,51 @@ def of_the_flow(test):
 def note_stillness(watch, signal):
     """Count the looks for which each reading (N_SENSORS,) has been the very same; and how far accelerometers
     have leapt in a look of late, m/s2."""
-    watch.restless *= 1.0 - watch.step.h / CALMED_S
+    watch.memory.restless *= 1.0 - watch.step.config.h / CALMED_S
     for i in range(N_SENSORS):
-        watch.still[i] = watch.still[i] + 1 if signal[i] == watch.step.then[i] else 0
+        watch.memory.still[i] = watch.memory.still[i] + 1 if signal[i] == watch.step.memory.then[i] else 0
         if AX <= i < N_IN_EQUATIONS:
-            watch.restless = max(watch.restless, abs(signal[i] - watch.step.then[i]))
+            watch.memory.restless = max(watch.memory.restless, abs(signal[i] - watch.step.memory.then[i]))
 
 
 @kernel
 def stands_still(watch, i):
     """Whether instrument i is frozen: no sound one gives the same reading for so long."""
-    return watch.still[i] >= watch.longest_still[i]
+    return watch.memory.still[i] >= watch.config.longest_still[i]
 
 
 @kernel
 def weigh(watch, signal):
     """Clear instruments of the flow, or accelerometers, by this look, that of the alarm or a later one."""
-    if not of_the_flow(watch.lead):
+    if not of_the_flow(watch.output.lead):
         return
-    if watch.gathering * watch.step.h < SOON_S - _ROUNDING_S and leapt(watch, signal):
+    if watch.memory.gathering * watch.step.config.h < SOON_S - _ROUNDING_S and leapt(watch, signal):
         clear_accelerometers(watch)
     gather(watch, signal)
-    flow = instrument_of(watch.lead)
-    if stands_still(watch, flow) or (watch.lead == SPEED and watch.fired[DENSITY]):
+    flow = instrument_of(watch.output.lead)
+    if stands_still(watch, flow) or (watch.output.lead == SPEED and watch.memory.fired[DENSITY]):
         clear_accelerometers(watch)
     frozen = False
     for i in range(AX, N_IN_EQUATIONS):
         frozen = frozen or stands_still(watch, i)
     if frozen or goes_on(watch) or would_show_elsewhere(watch, signal):
-        watch.cleared[flow] = 1
+        watch.memory.cleared[flow] = 1
 
 
 @kernel
 def clear_accelerometers(watch):
     """None of them is it."""
-    watch.cleared[AX:] = 1
+    watch.memory.cleared[AX:] = 1
 
 
 @kernel
 def leapt(watch, signal):
     """Whether the residual is more than accelerometers make in a look, and in the reading, not in theirs."""
-    i, step = instrument_of(watch.lead), watch.step
-    per_m_s = 1.0 if watch.lead == SPEED else 1.0 / max(step.then[AIRSPEED], 1.0)
-    test, per_m_s2 = step.test[watch.lead], step.h * per_m_s
-    second = signal[i] - 2.0 * step.then[i] + watch.earlier[i]
-    half, theirs = 0.5 * abs(test.residual), 1.5 * watch.restless * per_m_s2
+    i, step = instrument_of(watch.output.lead), watch.step
+    per_m_s = 1.0 if watch.output.lead == SPEED else 1.0 / max(step.memory.then[AIRSPEED], 1.0)
+    test, per_m_s2 = step.test[watch.output.lead], step.config.h * per_m_s
+    second = signal[i] - 2.0 * step.memory.then[i] + watch.memory.earlier[i]
+    half, theirs = 0.5 * abs(test.residual), 1.5 * watch.memory.restless * per_m_s2
     return 2.0 * half > test.bound[0] + LEAP_M_S2 * per_m_s2 and abs(second) >= half > theirs
 
 
@@ -123,29 +123,34 @@ def gather(watch, signal):
     step = watch.step
     for j in range(3):
         i, test = instrument_of(SPEED + j), step.test[SPEED + j]
-        if watch.gathering == 0:
-            watch.least[j] = watch.most[j] = signal[i]
-            watch.sound[j] = 2.0 * test.noise + test.air * step.gust
+        if watch.memory.gathering == 0:
+            watch.memory.least[j] = watch.memory.most[j] = signal[i]
+            watch.memory.sound[j] = 2.0 * test.noise + test.air * step.config.gust
             continue
-        watch.gathered[j] += test.residual
+        watch.memory.gathered[j] += test.residual
         of = hypothesis_of(SPEED + j)
-        watch.sound[j] += step.h * test.rate
-        watch.first[j] += watch.since.held[of] * watch.since.reach[of, SPEED + j]
-        watch.least[j], watch.most[j] = min(watch.least[j], signal[i]), max(watch.most[j], signal[i])
-    excess = np.sign(watch.gathered[1]) * max(abs(watch.gathered[1]) - watch.sound[1] - watch.first[1], 0.0)
-    fallen = step.h * signal[AIRSPEED] * excess * np.cos(signal[PHI]) * np.cos(signal[PHI + 1])
-    for m in range(step.decay.size):
-        watch.fallen[m] = step.decay[m] * watch.fallen[m] + fallen
-    watch.gathering += 1
+        watch.memory.sound[j] += step.config.h * test.rate
+        watch.memory.first[j] += watch.since.held[of] * watch.since.reach[of, SPEED + j]
+        watch.memory.least[j], watch.memory.most[j] = (
+            min(watch.memory.least[j], signal[i]),
+            max(watch.memory.most[j], signal[i]),
+        )
+    excess = np.sign(watch.memory.gathered[1]) * max(
+        abs(watch.memory.gathered[1]) - watch.memory.sound[1] - watch.memory.first[1], 0.0
+    )
+    fallen = step.config.h * signal[AIRSPEED] * excess * np.cos(signal[PHI]) * np.cos(signal[PHI + 1])
+    for m in range(step.config.decay.size):
+        watch.memory.fallen[m] = step.config.decay[m] * watch.memory.fallen[m] + fallen
+    watch.memory.gathering += 1
 
 
 @kernel
 def goes_on(watch):
     """Whether the residuals add up to what no error of a reading is, that has moved by so much."""
-    j = watch.lead - SPEED
-    moved = watch.most[j] - watch.least[j]
-    sound = watch.sound[j] + watch.first[j]
-    return moved > 0.0 and abs(watch.gathered[j]) > GOES_ON * moved + CLEARLY * sound
+    j = watch.output.lead - SPEED
+    moved = watch.memory.most[j] - watch.memory.least[j]
+    sound = watch.memory.sound[j] + watch.memory.first[j]
+    return moved > 0.0 and abs(watch.memory.gathered[j]) > GOES_ON * moved + CLEARLY * sound
 
 
 @kernel
@@ -153,13 +158,13 @@ def would_show_elsewhere(watch, signal):
     """Whether an airspeed as wrong as that would show in the density, or an incidence in the climb; neither
     does."""
     step = watch.step
-    elsewhere = DENSITY if watch.lead == SPEED else CLIMB
-    if watch.lead == BETA_FLOW or watch.fired[elsewhere]:
+    elsewhere = DENSITY if watch.output.lead == SPEED else CLIMB
+    if watch.output.lead == BETA_FLOW or watch.memory.fired[elsewhere]:
         return False
-    of = hypothesis_of(watch.lead)
-    for m in range(step.decay.size):
-        error, speed = abs(watch.fallen[m]), step.test[SPEED]
-        if watch.lead == SPEED:
+    of = hypothesis_of(watch.output.lead)
+    for m in range(step.config.decay.size):
+        error, speed = abs(watch.memory.fallen[m]), step.test[SPEED]
+        if watch.output.lead == SPEED:
             error = 2.0 * (abs(speed.filtered[m]) - speed.bound[m]) / max(signal[AIRSPEED], 1.0)
             error *= 1.0 - min(watch.since.held[of], 1.0)
         if error > CLEARLY * (step.test[elsewhere].bound[m] + hidden(watch.since, of, elsewhere, m)):
@@ -171,26 +176,30 @@ def would_show_elsewhere(watch, signal):
 def suspect_accelerometers(watch, shown):
     """Fill in which of them can be it: along whose axis there is most of the velocity made up; shown: a gyro
     explains it."""
-    step, who = watch.step, watch.suspect
-    alpha, beta, V = step.then[ALPHA], step.then[BETA], max(step.then[AIRSPEED], 1.0)
-    faster, down, aside = watch.gathered[0], V * np.cos(beta) * watch.gathered[1], V * watch.gathered[2]
-    made_up, size = watch.made_up, 0.0
+    step, who = watch.step, watch.output.suspect
+    alpha, beta, V = step.memory.then[ALPHA], step.memory.then[BETA], max(step.memory.then[AIRSPEED], 1.0)
+    faster, down, aside = (
+        watch.memory.gathered[0],
+        V * np.cos(beta) * watch.memory.gathered[1],
+        V * watch.memory.gathered[2],
+    )
+    made_up, size = watch.memory.made_up, 0.0
     made_up[0] = np.cos(alpha) * (np.cos(beta) * faster - np.sin(beta) * aside) - np.sin(alpha) * down
     made_up[1] = np.sin(beta) * faster + np.cos(beta) * aside
     made_up[2] = np.sin(alpha) * (np.cos(beta) * faster - np.sin(beta) * aside) + np.cos(alpha) * down
-    doubt = watch.sound[0] + V * (watch.sound[1] + watch.sound[2])
+    doubt = watch.memory.sound[0] + V * (watch.memory.sound[1] + watch.memory.sound[2])
     frozen = -1
     for i in range(3):
         size = max(size, abs(made_up[i]))
         frozen = AX + i if stands_still(watch, AX + i) else frozen
     for i in range(AX, N_IN_EQUATIONS):
         along = frozen == i or (frozen < 0 and abs(made_up[i - AX]) + doubt >= 0.5 * size)
-        who[i] = along and not shown and not watch.cleared[i]
+        who[i] = along and not shown and not watch.memory.cleared[i]
 
 
 @kernel
 def discard(watch, measured):
     """Have no accelerometer used once one may be broken."""
     for i in range(AX, N_IN_EQUATIONS):
-        if watch.replaced[i] or (watch.alarmed and watch.suspect[i]):
+        if watch.output.replaced[i] or (watch.output.alarmed and watch.output.suspect[i]):
             measured.inertial = 0

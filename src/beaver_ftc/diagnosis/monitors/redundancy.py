@@ -86,7 +86,7 @@ def angle_between(one, other, axis):
 @kernel
 def turned_by(step, axis, i):
     """By how much a body axis turns for what angle i changes by."""
-    bank, tilt = step.then[PHI], step.then[THETA]
+    bank, tilt = step.memory.then[PHI], step.memory.then[THETA]
     if axis == 0:
         return (1.0, 0.0, -np.sin(tilt))[i]
     if axis == 1:
@@ -113,26 +113,26 @@ def note_declared(step, signal):
     """Fill error and changing (N_SENSORS,): how far each reading can be off, and by how much that changes."""
     for i in range(N_SENSORS):
         size = abs(wrapped(signal[i])) if i == PSI else abs(signal[i])
-        whole = (step.offset[i] + step.slope[i] * size) / (1.0 - step.slope[i])
-        step.error[i] = whole
-        step.changing[i] = whole - step.steady[i] + 1e-10 * abs(signal[i])
+        whole = (step.config.offset[i] + step.config.slope[i] * size) / (1.0 - step.config.slope[i])
+        step.memory.error[i] = whole
+        step.memory.changing[i] = whole - step.config.steady[i] + 1e-10 * abs(signal[i])
     for i in range(PHI, PHI + 3):
-        step.error[i] += step.drifted
+        step.memory.error[i] += step.memory.drifted
 
 
 @kernel
 def look(step, signal, force):
     """Keep this instant for the next look; signal (N_SENSORS,) SI, force (3,) m/s2."""
-    step.then[:], step.error_before[:] = signal, step.error_then
-    step.error_then[:] = step.error
-    quaternion(signal[PHI], signal[THETA], signal[PSI], step.turned)
+    step.memory.then[:], step.memory.error_before[:] = signal, step.memory.error_then
+    step.memory.error_then[:] = step.memory.error
+    quaternion(signal[PHI], signal[THETA], signal[PSI], step.memory.turned)
     alpha, beta, V = signal[ALPHA], signal[BETA], signal[AIRSPEED]
-    step.velocity[0] = V * np.cos(alpha) * np.cos(beta)
-    step.velocity[1], step.velocity[2] = V * np.sin(beta), V * np.sin(alpha) * np.cos(beta)
+    step.memory.velocity[0] = V * np.cos(alpha) * np.cos(beta)
+    step.memory.velocity[1], step.memory.velocity[2] = V * np.sin(beta), V * np.sin(alpha) * np.cos(beta)
     tilt, bank = signal[THETA], signal[PHI]
-    step.acceleration[0] = force[0] - step.gravity * np.sin(tilt)
-    step.acceleration[1] = force[1] + step.gravity * np.cos(tilt) * np.sin(bank)
-    step.acceleration[2] = force[2] + step.gravity * np.cos(tilt) * np.cos(bank)
+    step.memory.acceleration[0] = force[0] - step.config.gravity * np.sin(tilt)
+    step.memory.acceleration[1] = force[1] + step.config.gravity * np.cos(tilt) * np.sin(bank)
+    step.memory.acceleration[2] = force[2] + step.config.gravity * np.cos(tilt) * np.cos(bank)
 
 
 @kernel
@@ -144,24 +144,24 @@ def length(vector):
 @kernel
 def predict(step):
     """Fill predicted (N_SENSORS,): what the look before says of attitude, flow and altitude now."""
-    rates, h, out, moved = step.then[:3], step.h, step.predicted, step.scratch[:3]
-    turn(step.turned, rates, h, step.now)
-    a, b, c, d = step.now[0], step.now[1], step.now[2], step.now[3]
+    rates, h, out, moved = step.memory.then[:3], step.config.h, step.memory.predicted, step.memory.scratch[:3]
+    turn(step.memory.turned, rates, h, step.memory.now)
+    a, b, c, d = step.memory.now[0], step.memory.now[1], step.memory.now[2], step.memory.now[3]
     out[PHI] = np.arctan2(2.0 * (a * b + c * d), 1.0 - 2.0 * (b * b + c * c))
     out[THETA] = np.arcsin(min(max(2.0 * (a * c - b * d), -1.0), 1.0))
     out[PSI] = np.arctan2(2.0 * (a * d + b * c), 1.0 - 2.0 * (c * c + d * d))
-    tilt, bank, v = step.then[THETA], step.then[PHI], step.velocity
+    tilt, bank, v = step.memory.then[THETA], step.memory.then[PHI], step.memory.velocity
     up = v[0] * np.sin(tilt) - v[1] * np.sin(bank) * np.cos(tilt) - v[2] * np.cos(bank) * np.cos(tilt)
-    out[ALTITUDE] = step.then[ALTITUDE] + h * up
-    step.pulled[1], step.pulled[0] = step.pulled[0], step.pull
-    step.felt_then = length(step.acceleration_then)
+    out[ALTITUDE] = step.memory.then[ALTITUDE] + h * up
+    step.memory.pulled[1], step.memory.pulled[0] = step.memory.pulled[0], step.memory.pull
+    step.memory.felt_then = length(step.memory.acceleration_then)
     for i in range(3):
-        moved[i] = 1.5 * step.acceleration[i] - 0.5 * step.acceleration_then[i]
-    step.pull = length(moved)
+        moved[i] = 1.5 * step.memory.acceleration[i] - 0.5 * step.memory.acceleration_then[i]
+    step.memory.pull = length(moved)
     for i in range(3):
         moved[i] = v[i] + h * moved[i]
     turn_back(rates, h, moved, v)
-    turn_back(rates, h, step.acceleration, step.acceleration_then)
+    turn_back(rates, h, step.memory.acceleration, step.memory.acceleration_then)
     speed = length(v)
     out[AIRSPEED] = speed
     out[ALPHA], out[BETA] = np.arctan2(v[2], v[0]), np.arcsin(v[1] / max(speed, 1e-3))
@@ -170,15 +170,18 @@ def predict(step):
 @kernel
 def compare(step, signal):
     """Fill the residual of each test with what the readings (N_SENSORS,) are beyond what was predicted."""
-    test, predicted = step.test, step.predicted
-    quaternion(signal[PHI], signal[THETA], signal[PSI], step.scratch)
+    test, predicted = step.test, step.memory.predicted
+    quaternion(signal[PHI], signal[THETA], signal[PSI], step.memory.scratch)
     for i in range(3):
-        test[TURN + i].residual = angle_between(step.now, step.scratch, i + 1)
+        test[TURN + i].residual = angle_between(step.memory.now, step.memory.scratch, i + 1)
         test[ANGLE + i].residual = wrapped(signal[PHI + i] - predicted[PHI + i])
     test[SPEED].residual = signal[AIRSPEED] - predicted[AIRSPEED]
     test[ALPHA_FLOW].residual = signal[ALPHA] - predicted[ALPHA]
     test[BETA_FLOW].residual = signal[BETA] - predicted[BETA]
-    dense, dense_then = signal[QDYN] / signal[AIRSPEED] ** 2, step.then[QDYN] / step.then[AIRSPEED] ** 2
+    dense, dense_then = (
+        signal[QDYN] / signal[AIRSPEED] ** 2,
+        step.memory.then[QDYN] / step.memory.then[AIRSPEED] ** 2,
+    )
     test[DENSITY].residual = np.log(max(dense, 1e-9) / max(dense_then, 1e-9))
     test[CLIMB].residual = signal[ALTITUDE] - predicted[ALTITUDE]
 
@@ -186,27 +189,30 @@ def compare(step, signal):
 @kernel
 def steepest(step, signal):
     """How far from level the nose can have been since the look before, rad."""
-    return max(abs(signal[THETA]) + step.error[THETA], abs(step.then[THETA]) + step.error_then[THETA])
+    return max(
+        abs(signal[THETA]) + step.memory.error[THETA],
+        abs(step.memory.then[THETA]) + step.memory.error_then[THETA],
+    )
 
 
 @kernel
 def stepped(step, i):
     """How far off 3/2 a - 1/2 a_then can be by what reading i is off at the two instants: a constant counts
     once."""
-    return 1.5 * step.error_then[i] + 0.5 * step.error_before[i] - step.steady[i]
+    return 1.5 * step.memory.error_then[i] + 0.5 * step.memory.error_before[i] - step.config.steady[i]
 
 
 @kernel
 def misjudged(step, turning, rates):
     """How far off the acceleration of the elapsed step can be, m/s2: by accelerometers, by gravity sought
     where the attitude has it, by turning the one before back. turning; rates: of gyros, errors; rad/s."""
-    tilt, g = stepped(step, PHI) + stepped(step, THETA), step.gravity
-    felt, steady = 0.0, g * (step.steady[PHI] + step.steady[THETA])
+    tilt, g = stepped(step, PHI) + stepped(step, THETA), step.config.gravity
+    felt, steady = 0.0, g * (step.config.steady[PHI] + step.config.steady[THETA])
     for i in range(AX, AX + 3):
         felt += stepped(step, i) ** 2
-        steady += step.steady[i]
-    back = step.h * (turning * steady + 0.5 * rates * step.felt_then)
-    return FALLING_M_S2 + step.unknown + g * tilt + np.sqrt(felt) + back
+        steady += step.config.steady[i]
+    back = step.config.h * (turning * steady + 0.5 * rates * step.memory.felt_then)
+    return FALLING_M_S2 + step.memory.unknown + g * tilt + np.sqrt(felt) + back
 
 
 @kernel
@@ -214,17 +220,19 @@ def allow_turning(step, signal, turning, rates):
     """The same as `allow`, of attitude. That a constant error of it turns with the aircraft: of the rates
     J(phi, theta) (phi', theta', psi') it changes J. An error of a moment turns an axis when it comes and back
     when it goes, and J has changed between."""
-    test, E, n = step.test, step.error_then, step.changing
+    test, E, n = step.test, step.memory.error_then, step.memory.changing
     level = 1.0 / np.cos(min(steepest(step, signal), STEEPEST_RAD))
-    tilt, around = E[PHI] + E[THETA] + E[PSI], step.h * turning
-    tipped = abs(signal[PHI] - step.then[PHI]) + abs(signal[THETA] - step.then[THETA])
-    momentary = E[THETA] - step.steady[THETA] + E[PSI] - step.steady[PSI] + n[THETA] + n[PSI]
+    tilt, around = E[PHI] + E[THETA] + E[PSI], step.config.h * turning
+    tipped = abs(signal[PHI] - step.memory.then[PHI]) + abs(signal[THETA] - step.memory.then[THETA])
+    momentary = E[THETA] - step.config.steady[THETA] + E[PSI] - step.config.steady[PSI] + n[THETA] + n[PSI]
     for i in range(3):
-        by_attitude = turning * (tilt + level * E[THETA]) + tipped * momentary / step.h
-        test[TURN + i].rate = TURNING_RAD_S + 2.0 * step.drift + E[P + i] + around * rates + by_attitude
+        by_attitude = turning * (tilt + level * E[THETA]) + tipped * momentary / step.config.h
+        test[TURN + i].rate = (
+            TURNING_RAD_S + 2.0 * step.config.drift + E[P + i] + around * rates + by_attitude
+        )
         by_attitude = 2.0 * level * turning * (E[PHI] + E[THETA])
         off = TURNING_RAD_S + (1.0 + level * around) * rates + by_attitude
-        test[ANGLE + i].rate, test[ANGLE + i].noise = level * off + step.drift, n[PHI + i]
+        test[ANGLE + i].rate, test[ANGLE + i].noise = level * off + step.config.drift, n[PHI + i]
     tilted, banked = abs(np.sin(signal[THETA])) + n[THETA], abs(np.sin(signal[PHI])) + n[PHI]
     test[TURN].noise = n[PHI] + tilted * n[PSI]
     test[TURN + 1].noise = n[THETA] + banked * n[PSI]
@@ -234,46 +242,53 @@ def allow_turning(step, signal, turning, rates):
 @kernel
 def lowest(step, signal):
     """The least height of the two looks, m, that the altimeter leaves."""
-    now, then = signal[ALTITUDE] - step.error[ALTITUDE], step.then[ALTITUDE] - step.error_then[ALTITUDE]
+    now, then = (
+        signal[ALTITUDE] - step.memory.error[ALTITUDE],
+        step.memory.then[ALTITUDE] - step.memory.error_then[ALTITUDE],
+    )
     return max(min(now, then), LEAST_HEIGHT_M)
 
 
 @kernel
 def allow_flow(step, signal, turning, rates):
     """The same, of flow and climb: slopes of their kinematics with each reading, where they are greatest."""
-    test, e, E, n = step.test, step.error, step.error_then, step.changing
-    slow = max(min(signal[AIRSPEED] - e[AIRSPEED], step.then[AIRSPEED] - E[AIRSPEED]), 1.0)
-    slip = max(abs(signal[BETA]) + e[BETA], abs(step.then[BETA]) + E[BETA])
+    test, e, E, n = step.test, step.memory.error, step.memory.error_then, step.memory.changing
+    slow = max(min(signal[AIRSPEED] - e[AIRSPEED], step.memory.then[AIRSPEED] - E[AIRSPEED]), 1.0)
+    slip = max(abs(signal[BETA]) + e[BETA], abs(step.memory.then[BETA]) + E[BETA])
     aslant, vanes = 1.0 / np.cos(min(slip, STEEPEST_RAD)), E[ALPHA] + E[BETA]
     off = misjudged(step, turning, rates)
-    pull, coarse = step.pull + off, 1.0 + step.h * (2.0 * step.pull / slow + turning)
-    gusty = np.sqrt(max(signal[AIRSPEED] / step.swift, 1.0) * max(step.low / lowest(step, signal), 1.0))
+    pull, coarse = step.memory.pull + off, 1.0 + step.config.h * (2.0 * step.memory.pull / slow + turning)
+    gusty = np.sqrt(
+        max(signal[AIRSPEED] / step.config.swift, 1.0) * max(step.config.low / lowest(step, signal), 1.0)
+    )
     flow = aslant**2 * ((off + pull * (vanes + E[AIRSPEED] / slow)) / slow + turning * vanes) + aslant * rates
     test[SPEED].air, test[SPEED].noise = gusty, n[AIRSPEED]
-    test[SPEED].rate = off + coarse * pull * vanes + step.h * (pull / slow) ** 2 * E[AIRSPEED]
+    test[SPEED].rate = off + coarse * pull * vanes + step.config.h * (pull / slow) ** 2 * E[AIRSPEED]
     for c, vane in ((ALPHA_FLOW, ALPHA), (BETA_FLOW, BETA)):
         test[c].air, test[c].noise, test[c].rate = gusty * aslant / slow, n[vane], coarse * flow
-    tilt, hardest = E[PHI] + E[THETA], max(pull, step.pulled[0], step.pulled[1])
-    climb = (step.then[AIRSPEED] + E[AIRSPEED]) * (tilt + vanes) + E[AIRSPEED]
-    test[CLIMB].rate = step.rising + step.gust + climb + 4.0 / 3.0 * step.h * hardest
+    tilt, hardest = E[PHI] + E[THETA], max(pull, step.memory.pulled[0], step.memory.pulled[1])
+    climb = (step.memory.then[AIRSPEED] + E[AIRSPEED]) * (tilt + vanes) + E[AIRSPEED]
+    test[CLIMB].rate = step.config.rising + step.config.gust + climb + 4.0 / 3.0 * step.config.h * hardest
     test[CLIMB].noise = n[ALTITUDE]
 
 
 @kernel
 def reciprocal_moved(step, signal, i):
     """How far the logarithm of a quantity can seem to move, the reading of which is off by a constant."""
-    least = max(min(signal[i], step.then[i]), 1.0)
-    moved = step.steady[i] * abs(1.0 / max(signal[i], 1.0) - 1.0 / max(step.then[i], 1.0))
-    return moved / max(1.0 - step.steady[i] / least, 0.01)
+    least = max(min(signal[i], step.memory.then[i]), 1.0)
+    moved = step.config.steady[i] * abs(1.0 / max(signal[i], 1.0) - 1.0 / max(step.memory.then[i], 1.0))
+    return moved / max(1.0 - step.config.steady[i] / least, 0.01)
 
 
 @kernel
 def allow_density(step, signal):
     """The same, of the logarithm of the density."""
-    test, e, n = step.test[DENSITY], step.error, step.changing
-    fastest = step.then[AIRSPEED] + step.error_then[AIRSPEED] + step.rising + step.gust
+    test, e, n = step.test[DENSITY], step.memory.error, step.memory.changing
+    fastest = (
+        step.memory.then[AIRSPEED] + step.memory.error_then[AIRSPEED] + step.config.rising + step.config.gust
+    )
     seems = reciprocal_moved(step, signal, QDYN) + 2.0 * reciprocal_moved(step, signal, AIRSPEED)
-    test.rate = fastest / DENSITY_HEIGHT_M + seems / step.h
+    test.rate = fastest / DENSITY_HEIGHT_M + seems / step.config.h
     test.noise = n[QDYN] / max(signal[QDYN] - e[QDYN], 1.0)
     test.noise += 2.0 * n[AIRSPEED] / max(signal[AIRSPEED] - e[AIRSPEED], 1.0)
 
@@ -285,9 +300,9 @@ def allow(step, signal):
     What was predicted is off by the errors of the readings it was predicted from (E, of the look before),
     what it is held against by those of now.
     """
-    E = step.error_then
+    E = step.memory.error_then
     rates = E[P] + E[Q] + E[R]
-    turning = abs(step.then[P]) + abs(step.then[Q]) + abs(step.then[R]) + rates
+    turning = abs(step.memory.then[P]) + abs(step.memory.then[Q]) + abs(step.memory.then[R]) + rates
     allow_turning(step, signal, turning, rates)
     allow_flow(step, signal, turning, rates)
     allow_density(step, signal)
@@ -297,12 +312,12 @@ def allow(step, signal):
 def follow(step, test):
     """Pass one residual through its filters; note the largest share of a bound."""
     test.share = 0.0
-    for m, a in enumerate(step.decay):
+    for m, a in enumerate(step.config.decay):
         test.filtered[m] = a * test.filtered[m] + test.residual
-        test.bound_rate[m] = bound_step(test.bound_rate[m], test.rate, a, step.h)
+        test.bound_rate[m] = bound_step(test.bound_rate[m], test.rate, a, step.config.h)
         test.bound_noise[m] = noise_step(test.bound_noise[m], test.noise_then, a)
         noise = test.bound_noise[m] + test.noise
-        test.bound[m] = test.bound_rate[m] + noise + test.air * step.gusts[m]
+        test.bound[m] = test.bound_rate[m] + noise + test.air * step.config.gusts[m]
         test.share = max(test.share, abs(test.filtered[m]) / test.bound[m])
     test.noise_then = test.noise
 
@@ -318,10 +333,10 @@ def start(test):
 @kernel
 def follow_engine(step, signal):
     """The engine's instruments against what was commanded: no filter, an error is there or not."""
-    step.test[RPM].residual = signal[ENGINE_SPEED] - step.command[0]
-    step.test[RPM + 1].residual = signal[MANIFOLD] - step.command[1]
+    step.test[RPM].residual = signal[ENGINE_SPEED] - step.memory.command[0]
+    step.test[RPM + 1].residual = signal[MANIFOLD] - step.memory.command[1]
     for which in range(2):
-        size = step.error[ENGINE_SPEED + which] + 1e-6
+        size = step.memory.error[ENGINE_SPEED + which] + 1e-6
         step.test[RPM + which].share = abs(step.test[RPM + which].residual) / size
 
 
@@ -336,7 +351,7 @@ def compare_equals(step, signal, fresh):
             test.residual = signal[i] - signal[reading]
             if PHI <= reading <= PSI:
                 test.residual = wrapped(test.residual)
-            test.bound[0] = EQUAL_WITHIN[k] + step.error[i] + step.error[reading] + 1e-6
+            test.bound[0] = EQUAL_WITHIN[k] + step.memory.error[i] + step.memory.error[reading] + 1e-6
             test.share = abs(test.residual) / test.bound[0]
 
 
@@ -345,9 +360,12 @@ def begin(step, signal, force):
     """The first look: what was before it is not known."""
     note_declared(step, signal)
     look(step, signal, force)
-    step.error_before[:], step.acceleration_then[:] = step.error_then, step.acceleration
-    step.pull = step.pulled[0] = length(step.acceleration) + LEAP_M_S2
-    step.unknown = 0.5 * LEAP_M_S2
+    step.memory.error_before[:], step.memory.acceleration_then[:] = (
+        step.memory.error_then,
+        step.memory.acceleration,
+    )
+    step.memory.pull = step.memory.pulled[0] = length(step.memory.acceleration) + LEAP_M_S2
+    step.memory.unknown = 0.5 * LEAP_M_S2
     allow(step, signal)
     for c in range(RPM):
         start(step.test[c])
@@ -356,12 +374,12 @@ def begin(step, signal, force):
 @kernel
 def check(step, signal, engine):
     """Hold this instant's readings (N_SENSORS,) against the look before; engine: it has instruments."""
-    step.drifted += step.h * step.drift
+    step.memory.drifted += step.config.h * step.config.drift
     note_declared(step, signal)
     predict(step)
     compare(step, signal)
     allow(step, signal)
-    step.unknown = 0.0
+    step.memory.unknown = 0.0
     steep = steepest(step, signal) > STEEPEST_RAD
     for c in range(RPM):
         if steep and c < SPEED:

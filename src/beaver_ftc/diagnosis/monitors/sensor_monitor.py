@@ -74,75 +74,84 @@ def monitor(watch, belief, measured, conclusion, bank, bound, dt, t):
     bank, bound: of the innovation of the elapsed frame, of dt s. conclusion: about the surfaces, so far.
     """
     step, signal = watch.step, measured.signal
-    if not watch.begun:
+    if not watch.memory.begun:
         begin(watch, measured, t)
         return
-    if watch.past == 0:
+    if watch.memory.past == 0:
         follow_rates(watch, bank.output.innovation, bound.eta_bar, dt)
-    redundancy.check(step, signal, watch.engine)
+    redundancy.check(step, signal, watch.config.engine)
     if N_TESTS > N_COMPUTED:
         redundancy.compare_equals(step, signal, measured.fresh)
         note_agreement(watch, measured.fresh)
     since_start.follow(step, watch.since, signal)
     accelerometers.note_stillness(watch, signal)
-    if watch.past == 0:
-        watch.gyro_error_then[:], watch.spike_before[:] = watch.gyro_error, watch.spike_then
-        watch.spike_then[:] = watch.spike
-        watch.spike[:] = 0.0
+    if watch.memory.past == 0:
+        watch.memory.gyro_error_then[:], watch.memory.spike_before[:] = (
+            watch.memory.gyro_error,
+            watch.memory.spike_then,
+        )
+        watch.memory.spike_then[:] = watch.memory.spike
+        watch.memory.spike[:] = 0.0
     for i in range(3):
-        error = -step.test[TURN + i].residual / step.h
-        if watch.past == 0:
-            watch.gyro_error[i] = error
+        error = -step.test[TURN + i].residual / step.config.h
+        if watch.memory.past == 0:
+            watch.memory.gyro_error[i] = error
         else:
-            watch.spike[i] = max(watch.spike[i], abs(error))
-    if watch.begun < ASKED:
+            watch.memory.spike[i] = max(watch.memory.spike[i], abs(error))
+    if watch.memory.begun < ASKED:
         note_first_errors(watch)
-    if watch.blurred:
+    if watch.config.blurred:
         clear_gyros(watch)
     decide(watch, measured, conclusion, bank, bound, dt, t)
     replace(watch, belief, measured)
     accelerometers.discard(watch, measured)
-    watch.earlier[:] = step.then
+    watch.memory.earlier[:] = step.memory.then
     redundancy.look(step, signal, measured.force)
-    watch.past = (watch.past + 1) % watch.instants
+    watch.memory.past = (watch.memory.past + 1) % watch.config.instants
+
+
+@kernel
+def note_command(watch, manifold_pressure_inhg):
+    """Expect of the engine's sensors what a law in charge of the engine commands."""
+    watch.step.memory.command[1] = manifold_pressure_inhg
 
 
 @kernel
 def begin(watch, measured, t):
     """The first look, at t s: nothing to compare with."""
-    watch.begun, watch.begun_at_s = 1, t
-    watch.step.drifted = watch.step.drift * t
+    watch.memory.begun, watch.memory.begun_at_s = 1, t
+    watch.step.memory.drifted = watch.step.config.drift * t
     redundancy.begin(watch.step, measured.signal, measured.force)
     since_start.begin(watch.since, measured.signal)
-    watch.earlier[:] = watch.step.then
-    watch.past = (watch.past + 1) % watch.instants
+    watch.memory.earlier[:] = watch.step.memory.then
+    watch.memory.past = (watch.memory.past + 1) % watch.config.instants
 
 
 @kernel
 def note_first_errors(watch):
     """A gyro's error e of the first look has brought no innovation: W is e less exp(-D t) times the first e,
     which its bound therefore begins with. The first frame shows no change of an error."""
-    if watch.past == 0:
-        watch.begun += 1
-    if watch.begun == ASKED - 1 and watch.past == 0:
+    if watch.memory.past == 0:
+        watch.memory.begun += 1
+    if watch.memory.begun == ASKED - 1 and watch.memory.past == 0:
         for i in range(3):
-            watch.W_bound[i] += abs(watch.gyro_error[i])
+            watch.memory.W_bound[i] += abs(watch.memory.gyro_error[i])
 
 
 @kernel
 def follow_rates(watch, innovation, eta_bar, dt):
     """Bring W (3,) rad/s and its bound to the frame whose innovation is there."""
-    W, bound, D = watch.W, watch.W_bound, watch.damping
-    watch.W_then[:] = bound
-    before = watch.before
+    W, bound, D = watch.memory.W, watch.memory.W_bound, watch.config.damping
+    watch.memory.W_then[:] = bound
+    before = watch.memory.before
     before[:] = W
     for i in range(3):
         lost, spread = 0.0, 0.0
         for j in range(3):
             lost += D[i, j] * before[j]
-            spread += (-D[i, j] if i == j else abs(D[i, j])) * watch.W_then[j]
+            spread += (-D[i, j] if i == j else abs(D[i, j])) * watch.memory.W_then[j]
         W[i] += dt * (innovation[i] - lost)
-        bound[i] = max(watch.W_then[i] + dt * (eta_bar[i] + spread), 0.0)
+        bound[i] = max(watch.memory.W_then[i] + dt * (eta_bar[i] + spread), 0.0)
 
 
 @kernel
@@ -153,39 +162,43 @@ def clear_gyros(watch):
     """
     step = watch.step
     for i in range(3):
-        test, rate = step.test[TURN + i], watch.W_bound[i] + SLACK * abs(watch.W[i])
-        for m, a in enumerate(step.decay):
-            watch.apart[i, m] = a * watch.apart[i, m] + test.residual + step.h * watch.W[i]
-            watch.apart_bound[i, m] = bound_step(watch.apart_bound[i, m], rate, a, step.h)
-            if abs(watch.apart[i, m]) > watch.apart_bound[i, m] + test.bound[m]:
-                watch.no_gyro = 1
+        test, rate = step.test[TURN + i], watch.memory.W_bound[i] + SLACK * abs(watch.memory.W[i])
+        for m, a in enumerate(step.config.decay):
+            watch.memory.apart[i, m] = (
+                a * watch.memory.apart[i, m] + test.residual + step.config.h * watch.memory.W[i]
+            )
+            watch.memory.apart_bound[i, m] = bound_step(
+                watch.memory.apart_bound[i, m], rate, a, step.config.h
+            )
+            if abs(watch.memory.apart[i, m]) > watch.memory.apart_bound[i, m] + test.bound[m]:
+                watch.memory.no_gyro = 1
 
 
 @kernel
 def decide(watch, measured, conclusion, bank, bound, dt, t):
     """Raise the alarm, and name the instrument once there is but one it can be."""
     note_furthest(watch)
-    if watch.named != NOBODY:
+    if watch.output.named != NOBODY:
         return
     for i in range(N_SENSORS):
-        if measured.missing[i] and watch.named == NOBODY:
+        if measured.missing[i] and watch.output.named == NOBODY:
             raise_alarm(watch, conclusion, t)
             name(watch, i, t)
-    if watch.named != NOBODY:
+    if watch.output.named != NOBODY:
         return
-    if watch.share > 1.0 and not watch.alarmed:
+    if watch.output.share > 1.0 and not watch.output.alarmed:
         raise_alarm(watch, conclusion, t)
-        watch.lead = watch.furthest
+        watch.output.lead = watch.output.furthest
         since_start.hold(watch.since)
-    if watch.alarmed:
-        if watch.past == 0 and watch.begun == ASKED:
+    if watch.output.alarmed:
+        if watch.memory.past == 0 and watch.memory.begun == ASKED:
             ask_rates(watch, bank, bound, dt)
         note_fired(watch)
         accelerometers.weigh(watch, measured.signal)
         suspect(watch)
         left, last = 0, NOBODY
         for i in range(N_SENSORS):
-            if watch.suspect[i]:
+            if watch.output.suspect[i]:
                 left, last = left + 1, i
         if left == 1:
             name(watch, last, t)
@@ -194,33 +207,33 @@ def decide(watch, measured, conclusion, bank, bound, dt, t):
 @kernel
 def note_furthest(watch):
     """Keep the test furthest towards its bound, or beyond it, of the looks of this frame."""
-    if watch.past == 0:
-        watch.furthest, watch.share = 0, 0.0
+    if watch.memory.past == 0:
+        watch.output.furthest, watch.output.share = 0, 0.0
     for c in range(N_TESTS):
-        if watch.step.test[c].share > watch.share:
-            watch.furthest, watch.share = c, watch.step.test[c].share
+        if watch.step.test[c].share > watch.output.share:
+            watch.output.furthest, watch.output.share = c, watch.step.test[c].share
 
 
 @kernel
 def raise_alarm(watch, conclusion, t):
     """Raise the alarm of the sensors at t s. A surface detected long before was detected with sound sensors:
     then the alarm is `beside` it. Otherwise the conclusion about surfaces is void."""
-    if watch.alarmed:
+    if watch.output.alarmed:
         return
-    watch.alarmed, watch.alarmed_at_s = 1, t
+    watch.output.alarmed, watch.output.alarmed_at_s = 1, t
     if conclusion.detected and conclusion.detected_at_s < t - BESIDE_S:
-        watch.beside = 1
+        watch.output.beside = 1
         return
     if conclusion.detected:
-        watch.alarmed_at_s = conclusion.detected_at_s  # the same fault, seen first in the rates
-    watch.misnamed = conclusion.isolated >= 0
+        watch.output.alarmed_at_s = conclusion.detected_at_s  # the same fault, seen first in the rates
+    watch.output.misnamed = conclusion.isolated >= 0
 
 
 @kernel
 def name(watch, i, t):
     """Instrument i is the one."""
-    watch.named, watch.named_at_s = i, t
-    watch.replaced[i] = 1
+    watch.output.named, watch.output.named_at_s = i, t
+    watch.output.replaced[i] = 1
 
 
 @kernel
@@ -232,24 +245,33 @@ def ask_rates(watch, bank, bound, dt):
     """
     alarmed, innovation = alarm(bank), bank.output.innovation
     for i in range(3):
-        if watch.rates_say[i] != UNKNOWN:
+        if watch.memory.rates_say[i] != UNKNOWN:
             continue
-        error, jump = watch.gyro_error[i], (watch.gyro_error[i] - watch.gyro_error_then[i]) / dt
-        own = CROSS_DAMPING_PER_S * max(abs(error), abs(watch.gyro_error_then[i])) + 0.1 * abs(jump)
-        blur = 4.0 * watch.step.test[TURN + i].noise / watch.step.h  # of `error`, by the attitude's noise
+        error, jump = (
+            watch.memory.gyro_error[i],
+            (watch.memory.gyro_error[i] - watch.memory.gyro_error_then[i]) / dt,
+        )
+        own = CROSS_DAMPING_PER_S * max(abs(error), abs(watch.memory.gyro_error_then[i])) + 0.1 * abs(jump)
+        blur = (
+            4.0 * watch.step.test[TURN + i].noise / watch.step.config.h
+        )  # of `error`, by the attitude's noise
         most = bound.frame[i] + 1e-6
-        seen = abs(innovation[i]) > most or alarmed >= 0 or abs(watch.W[i]) > watch.W_bound[i] + 1e-6
+        seen = (
+            abs(innovation[i]) > most
+            or alarmed >= 0
+            or abs(watch.memory.W[i]) > watch.memory.W_bound[i] + 1e-6
+        )
         spike, left = (
-            watch.spike_before[i],
-            max(abs(watch.gyro_error_then[i]), watch.spike_then[i], abs(error)),
+            watch.memory.spike_before[i],
+            max(abs(watch.memory.gyro_error_then[i]), watch.memory.spike_then[i], abs(error)),
         )
         sudden = left < GONE * spike and spike > 2.0 * blur
         explained = abs(innovation[i] - jump) <= most + own + blur / dt
-        slow = 0.7 * abs(error) <= watch.W_bound[i] + abs(watch.W[i]) + blur
+        slow = 0.7 * abs(error) <= watch.memory.W_bound[i] + abs(watch.memory.W[i]) + blur
         if not explained or (not seen and (sudden or not slow)):
-            watch.rates_say[i] = NO
+            watch.memory.rates_say[i] = NO
         elif seen:
-            watch.rates_say[i] = YES
+            watch.memory.rates_say[i] = YES
 
 
 @kernel
@@ -269,14 +291,14 @@ def note_fired(watch):
         triple = TURN if c < ANGLE else ANGLE
         beyond = involved(watch, c, triple) if c < SPEED else watch.step.test[c].share > 1.0
         if beyond:
-            watch.fired[c] = 1
-    since_start.note_refuted(watch.step, watch.since, watch.fired)
+            watch.memory.fired[c] = 1
+    since_start.note_refuted(watch.step, watch.since, watch.memory.fired)
 
 
 @kernel
 def suspect(watch):
     """Fill suspect (N_SENSORS,) with the instruments that can have brought the tests here."""
-    who, lead, fired = watch.suspect, watch.lead, watch.fired
+    who, lead, fired = watch.output.suspect, watch.output.lead, watch.memory.fired
     who[:] = 0
     if lead >= N_COMPUTED:
         suspect_unequal(watch, lead - N_COMPUTED)
@@ -285,9 +307,9 @@ def suspect(watch):
         suspect_attitude(watch)
     if lead == SPEED:
         accelerometers.suspect_accelerometers(watch, False)
-        who[AIRSPEED] = not watch.cleared[AIRSPEED]
+        who[AIRSPEED] = not watch.memory.cleared[AIRSPEED]
     elif lead == DENSITY:
-        may_be_frozen = watch.still[AIRSPEED] > 0  # then it need not show how it is wrong
+        may_be_frozen = watch.memory.still[AIRSPEED] > 0  # then it need not show how it is wrong
         who[AIRSPEED] = fired[SPEED] == 1 or not would_show(watch) or may_be_frozen
     who[QDYN] = lead == DENSITY and shown_alone(watch, DENSITY)
     suspect_vane(watch, ALPHA, ALPHA_FLOW, 1)
@@ -305,8 +327,8 @@ def note_agreement(watch, fresh):
     """Note which sensors have equalled the reading that they should, before any alarm."""
     for k in range(EQUAL_SENSOR.size):
         equal = watch.step.test[N_COMPUTED + k].share <= 1.0
-        if fresh[EQUAL_SENSOR[k] - N_IN_EQUATIONS] and equal and not watch.alarmed:
-            watch.agreed[k] = 1
+        if fresh[EQUAL_SENSOR[k] - N_IN_EQUATIONS] and equal and not watch.output.alarmed:
+            watch.memory.agreed[k] = 1
 
 
 @kernel
@@ -319,17 +341,19 @@ def suspect_unequal(watch, k):
     step, reading, shows = watch.step, EQUAL_READING[k], EQUAL_SHOWS[k]
     own, test = step.test[shows], step.test[N_COMPUTED + k]
     least = abs(test.residual) - test.bound[0]  # of the error, if it is the reading's
-    hidden = least <= 2.0 * max(own.bound[0], step.error[reading])
+    hidden = least <= 2.0 * max(own.bound[0], step.memory.error[reading])
     frozen = accelerometers.stands_still(watch, reading)
-    watch.suspect[EQUAL_SENSOR[k]] = not watch.fired[shows]
-    watch.suspect[reading] = watch.fired[shows] == 1 or hidden or frozen or not watch.agreed[k]
+    watch.output.suspect[EQUAL_SENSOR[k]] = not watch.memory.fired[shows]
+    watch.output.suspect[reading] = (
+        watch.memory.fired[shows] == 1 or hidden or frozen or not watch.memory.agreed[k]
+    )
 
 
 @kernel
 def shown_alone(watch, test):
     """Whether no test but this one has shown anything: its instrument is in none of the others."""
     for c in range(RPM):
-        if c != test and watch.fired[c]:
+        if c != test and watch.memory.fired[c]:
             return False
     return True
 
@@ -338,7 +362,11 @@ def shown_alone(watch, test):
 def one_is_frozen(watch):
     """Whether a suspect stands still: no first error of another explains that. A sound one may read zero."""
     for i in range(N_SENSORS):
-        if watch.suspect[i] and watch.step.then[i] != 0.0 and accelerometers.stands_still(watch, i):
+        if (
+            watch.output.suspect[i]
+            and watch.step.memory.then[i] != 0.0
+            and accelerometers.stands_still(watch, i)
+        ):
             return True
     return False
 
@@ -347,23 +375,23 @@ def one_is_frozen(watch):
 def suspect_vane(watch, vane, flow, gyro):
     """A vane, an accelerometer, or the gyro that moves the flow as well, if its error need not show in the
     attitude yet. No instrument of the flow moves the attitude's tests."""
-    if watch.lead != flow:
+    if watch.output.lead != flow:
         return
-    turns = watch.fired[TURN] + watch.fired[TURN + 1] + watch.fired[TURN + 2]
+    turns = watch.memory.fired[TURN] + watch.memory.fired[TURN + 1] + watch.memory.fired[TURN + 2]
     accelerometers.suspect_accelerometers(watch, turns > 0)
-    watch.suspect[vane] = not (turns > 0 or watch.cleared[vane])
+    watch.output.suspect[vane] = not (turns > 0 or watch.memory.cleared[vane])
     for i in range(3):
-        shown = turns == 1 and watch.fired[TURN + i] == 1
-        watch.suspect[i] = shown or (turns == 0 and may_hide(watch, flow, i, i == gyro))
+        shown = turns == 1 and watch.memory.fired[TURN + i] == 1
+        watch.output.suspect[i] = shown or (turns == 0 and may_hide(watch, flow, i, i == gyro))
 
 
 @kernel
 def may_hide(watch, flow, i, own):
     """Whether gyro i may do what the test of the flow shows, and not show in that of its axis; own: it is the
     one that turns the flow with all of its error. Of the others it takes the share by kinematics."""
-    step, alpha = watch.step, watch.step.then[ALPHA]
+    step, alpha = watch.step, watch.step.memory.then[ALPHA]
     along = np.cos(alpha) if i == 0 else np.sin(alpha)
-    share = abs(np.tan(step.then[BETA]) * along) if flow == ALPHA_FLOW else abs(np.sin(alpha))
+    share = abs(np.tan(step.memory.then[BETA]) * along) if flow == ALPHA_FLOW else abs(np.sin(alpha))
     test, turn = step.test[flow], step.test[TURN + i]
     for m in range(test.filtered.size):
         room = 2.0 * test.bound[m] if own else test.bound[m]
@@ -379,7 +407,7 @@ def would_show(watch):
     most = 1.0 + watch.since.held[OF_SPEED]
     for m in range(density.filtered.size):
         shown = abs(density.filtered[m]) - since_start.hidden(watch.since, OF_SPEED, DENSITY, m)
-        if 0.5 * watch.step.then[AIRSPEED] * shown > 2.0 * most * speed.bound[m]:
+        if 0.5 * watch.step.memory.then[AIRSPEED] * shown > 2.0 * most * speed.bound[m]:
             return True
     return False
 
@@ -389,18 +417,18 @@ def suspect_attitude(watch):
     """The same of gyros and attitude: one axis alone, or one angle alone. An angle by itself may be the first
     to show what a gyro does; one that is frozen is no gyro's doing, and until that is seen it may be.
     Nor is it a gyro's as long as an angle's own test leaves room for all that has shown."""
-    fired, who = watch.fired, watch.suspect
+    fired, who = watch.memory.fired, watch.output.suspect
     turns, frozen = 0, False
     for i in range(3):
         turns += fired[TURN + i]
         frozen = frozen or accelerometers.stands_still(watch, PHI + i)
     for i in range(3):
         alone = turns == 0 or (fired[TURN + i] == 1 and turns == 1)
-        who[i] = alone and watch.rates_say[i] != NO and not frozen
+        who[i] = alone and watch.memory.rates_say[i] != NO and not frozen
         fits = explains(watch, i)
         mine = no_other_angle(watch, i) and (fired[ANGLE + i] == 1 or fits)
-        moved = mine and watch.rates_say[axis_of(watch, i)] != YES
-        still, longest = watch.still[PHI + i], watch.longest_still[PHI + i]
+        moved = mine and watch.memory.rates_say[axis_of(watch, i)] != YES
+        still, longest = watch.memory.still[PHI + i], watch.config.longest_still[PHI + i]
         may_be_frozen = 0 < still < longest < accelerometers.NEVER_STILL  # too early to say
         who[PHI + i] = moved or (fits and may_be_frozen)
 
@@ -409,7 +437,7 @@ def suspect_attitude(watch):
 def no_other_angle(watch, i):
     """Whether no test of another angle has shown what a first error of angle i leaves unexplained."""
     for j in range(3):
-        shown = watch.fired[ANGLE + j] if i == 2 else watch.since.refuted[OF_PHI + i, ANGLE + j]
+        shown = watch.memory.fired[ANGLE + j] if i == 2 else watch.since.refuted[OF_PHI + i, ANGLE + j]
         if j != i and shown:
             return False
     return True
@@ -419,13 +447,16 @@ def no_other_angle(watch, i):
 def explains(watch, i):
     """Whether what shows about the axes can be what angle i is off by, as far as its own test can hide it."""
     step, angle = watch.step, watch.step.test[ANGLE + i]
-    unsure = step.error[PHI] + step.error[PHI + 1]
+    unsure = step.memory.error[PHI] + step.memory.error[PHI + 1]
     for j in range(3):
         turn, per_angle = step.test[TURN + j], abs(redundancy.turned_by(step, j, i)) + unsure
-        for m in range(step.decay.size):
+        for m in range(step.config.decay.size):
             most = abs(angle.filtered[m]) + angle.bound[m]
             hidden = since_start.hidden(watch.since, OF_PHI + i, TURN + j, m) if i < 2 else 0.0
-            if watch.fired[TURN + j] and abs(turn.filtered[m]) > per_angle * most + turn.bound[m] + hidden:
+            if (
+                watch.memory.fired[TURN + j]
+                and abs(turn.filtered[m]) > per_angle * most + turn.bound[m] + hidden
+            ):
                 return False
     return True
 
@@ -443,16 +474,20 @@ def axis_of(watch, i):
 @kernel
 def clears_surfaces(watch, known):
     """Whether a surface may be named, a frame or more (`known`) after the alarm."""
-    if not watch.enabled:
+    if not watch.config.enabled:
         return True
-    return known == 1 and (watch.no_gyro == 1 or not watch.blurred) and not flow_stands_still(watch)
+    return (
+        known == 1
+        and (watch.memory.no_gyro == 1 or not watch.config.blurred)
+        and not flow_stands_still(watch)
+    )
 
 
 @kernel
 def shown_from_the_start(watch, detected_at_s):
     """Whether the alarm of the surfaces came so early that a reading of the flow may have brought it by its
     first error, which in the model moves the aircraft from the first frame on. Then no surface is named."""
-    return watch.enabled and detected_at_s < watch.begun_at_s + SETTLED_S
+    return watch.config.enabled and detected_at_s < watch.memory.begun_at_s + SETTLED_S
 
 
 @kernel
@@ -460,7 +495,7 @@ def flow_stands_still(watch):
     """Whether a reading of the flow does: a surface that moves the aircraft moves it. In symmetric flight a
     sideslip of zero stays one."""
     for i in (ALPHA, BETA, AIRSPEED, QDYN):
-        if watch.step.then[i] != 0.0 and accelerometers.stands_still(watch, i):
+        if watch.step.memory.then[i] != 0.0 and accelerometers.stands_still(watch, i):
             return True
     return False
 
@@ -468,7 +503,7 @@ def flow_stands_still(watch):
 @kernel
 def speaks(watch):
     """Whether the watch has the word: no surface is to be named."""
-    return watch.enabled and watch.alarmed
+    return watch.config.enabled and watch.output.alarmed
 
 
 @kernel
@@ -478,13 +513,13 @@ def replace(watch, belief, measured):
     signal, changed = measured.signal, 0
     for i in range(N_SENSORS):
         if measured.missing[i]:
-            watch.replaced[i] = 1
-        if watch.replaced[i] and i < AX:
+            watch.output.replaced[i] = 1
+        if watch.output.replaced[i] and i < AX:
             signal[i] = stand_in(watch, belief, signal, i)
             changed = 2 if i in (AIRSPEED, QDYN, ENGINE_SPEED, MANIFOLD) else max(changed, 1)
     if changed > 0:
         share_out(measured)
-    if changed > 1 and watch.engine:
+    if changed > 1 and watch.config.engine:
         note_slipstream(measured)
 
 
@@ -495,15 +530,17 @@ def stand_in(watch, belief, signal, i):
     if i < 3:
         return rate_from_attitude(watch, belief, i)
     if i in (ALPHA, BETA):
-        return step.predicted[i] + step.h / FORGETTING_S * (watch.trim[i] - step.predicted[i])
-    density = 2.0 * step.then[QDYN] / step.then[AIRSPEED] ** 2
+        return step.memory.predicted[i] + step.config.h / FORGETTING_S * (
+            watch.config.trim[i] - step.memory.predicted[i]
+        )
+    density = 2.0 * step.memory.then[QDYN] / step.memory.then[AIRSPEED] ** 2
     if i == AIRSPEED:
         return np.sqrt(max(2.0 * signal[QDYN] / density, 1.0))
     if i == QDYN:
         return 0.5 * density * signal[AIRSPEED] ** 2
     if i >= ENGINE_SPEED:
-        return step.command[i - ENGINE_SPEED]
-    return step.predicted[i]
+        return step.memory.command[i - ENGINE_SPEED]
+    return step.memory.predicted[i]
 
 
 @kernel
@@ -513,13 +550,13 @@ def rate_from_attitude(watch, belief, i):
     The rate itself is used for the next look: its own error shows there.
     """
     step = watch.step
-    u = belief.u_then if watch.past == 0 else belief.u
+    u = belief.u_then if watch.memory.past == 0 else belief.u
     acceleration = belief.f[i]
     for s in range(u.size):
         acceleration += belief.G[i, s] * u[s]
-    shown = watch.follows * step.test[TURN + i].residual
-    if not watch.taken_over[i] and watch.follows < 1.0:
-        shown = step.h * QUICK_PER_S * step.test[TURN + i].filtered[1]
-    watch.taken_over[i] = 1
-    known = step.then[i] + shown / step.h
-    return known + step.h * acceleration
+    shown = watch.config.follows * step.test[TURN + i].residual
+    if not watch.memory.taken_over[i] and watch.config.follows < 1.0:
+        shown = step.config.h * QUICK_PER_S * step.test[TURN + i].filtered[1]
+    watch.memory.taken_over[i] = 1
+    known = step.memory.then[i] + shown / step.config.h
+    return known + step.config.h * acceleration

@@ -45,23 +45,28 @@ TEST = record(
 )  # fmt: skip
 
 STEP = record(
-    h=float, decay=N_POLES, gravity=float,
-    # of the declared turbulence: its speed at most, m/s, and what passes each filter of a gust's changes
-    # up to an airspeed m/s
-    gust=float, gusts=N_POLES, swift=float,
-    low=float,  # height below which a gust changes faster than those of 2000 ft, m
-    rising=float,  # vertical wind at most, m/s
-    # declared: the whole error of a reading, and what of it changes; drift of the attitude
-    offset=N_SENSORS, slope=N_SENSORS, steady=N_SENSORS, drift=float, error=N_SENSORS, changing=N_SENSORS,
-    # drift so far, rad; the errors of the look before, and of the one before that
-    drifted=float, error_then=N_SENSORS, error_before=N_SENSORS,
-    # the look before: readings, attitude as a quaternion, velocity, acceleration there and before that
-    then=N_SENSORS, turned=4, velocity=3, acceleration=3, acceleration_then=3,
-    # m/s2: size of the acceleration of the elapsed step, and of those before it; of acceleration_then
-    pull=float, pulled=2, felt_then=float,
-    unknown=float,  # of the acceleration of the first step, for want of the instant before
-    predicted=N_SENSORS, scratch=4, now=4,
-    command=2,  # engine speed rpm, manifold pressure inHg
+    config=record(
+        h=float, decay=N_POLES, gravity=float,
+        # of the declared turbulence: its speed at most, m/s, and what passes each filter of a gust's changes
+        # up to an airspeed m/s
+        gust=float, gusts=N_POLES, swift=float,
+        low=float,  # height below which a gust changes faster than those of 2000 ft, m
+        rising=float,  # vertical wind at most, m/s
+        # declared: the whole error of a reading, and what of it changes; drift of the attitude
+        offset=N_SENSORS, slope=N_SENSORS, steady=N_SENSORS, drift=float,
+    ),
+    memory=record(
+        error=N_SENSORS, changing=N_SENSORS,  # how far a reading can be off, and by how much that changes
+        # drift so far, rad; the errors of the look before, and of the one before that
+        drifted=float, error_then=N_SENSORS, error_before=N_SENSORS,
+        # the look before: readings, attitude as a quaternion, velocity, acceleration there and before that
+        then=N_SENSORS, turned=4, velocity=3, acceleration=3, acceleration_then=3,
+        # m/s2: size of the acceleration of the elapsed step, and of those before it; of acceleration_then
+        pull=float, pulled=2, felt_then=float,
+        unknown=float,  # of the acceleration of the first step, for want of the instant before
+        predicted=N_SENSORS, scratch=4, now=4,
+        command=2,  # engine speed rpm, manifold pressure inHg
+    ),
     test=(TEST, N_TESTS),
 )  # fmt: skip
 
@@ -73,44 +78,55 @@ SINCE = record(
     refuted=(int, STARTERS, N_TESTS),  # since the alarm, and by which test
 )  # fmt: skip
 
-WATCH = record(
-    enabled=int, begun=int, begun_at_s=float, instants=int, past=int, engine=int, alarmed=int,
-    alarmed_at_s=float, beside=int, lead=int,
-    misnamed=int,  # a surface had been named in the moment before the alarm
-    furthest=int, share=float,  # of this frame: the test nearest its bound, and how near
-    fired=(int, N_TESTS), suspect=(int, N_SENSORS), named=int, named_at_s=float, replaced=(int, N_SENSORS),
-    trim=N_SENSORS, follows=float,  # share of its error a replaced rate makes up a look
+WATCH_CONFIG = record(
+    enabled=int, instants=int, engine=int, trim=N_SENSORS,
+    follows=float,  # share of its error a replaced rate makes up a look
+    blurred=int,  # the attitude is noisy: a surface is named only once no gyro can be the cause
+    longest_still=(int, N_SENSORS),  # how many looks with the very same reading say that it is frozen
+    damping=(3, 3),
+)  # fmt: skip
+
+WATCH_MEMORY = record(
+    begun=int, begun_at_s=float, past=int, fired=(int, N_TESTS),
     # what tells a gyro from the attitude, by axis
     gyro_error=3, gyro_error_then=3,  # as each frame began, rad/s
-    spike=3, spike_then=3, spike_before=3, damping=(3, 3), W=3, W_bound=3, W_then=3, before=3,
+    spike=3, spike_then=3, spike_before=3, W=3, W_bound=3, W_then=3, before=3,
     # no gyro can be what the rates show: what attitude and W make of that, and how far one gyro goes
     agreed=(int, max(len(EQUAL), 1)),  # whether a sensor has equalled the reading that it should
-    blurred=int, no_gyro=int, apart=(3, N_POLES), apart_bound=(3, N_POLES),
-    rates_say=(int, 3), taken_over=(int, 3),
-    # accelerometers.py: looks with the very same reading, and how many say that it is frozen; readings of
-    # two looks ago; who is cleared
-    still=(int, N_SENSORS), longest_still=(int, N_SENSORS), earlier=N_SENSORS, cleared=(int, N_SENSORS),
+    no_gyro=int, apart=(3, N_POLES), apart_bound=(3, N_POLES), rates_say=(int, 3), taken_over=(int, 3),
+    # accelerometers.py: looks with the very same reading; readings of two looks ago; who is cleared
+    still=(int, N_SENSORS), earlier=N_SENSORS, cleared=(int, N_SENSORS),
     # how far accelerometers have leapt of late. Since the alarm: looks, residuals of speed, incidence and
     # sideslip, how much of them is sound, how much is of a first error; least and most of the readings; the
     # climb that such an incidence makes up; the velocity made up, body axes
     restless=float, gathering=int, gathered=3, sound=3, first=3, least=3, most=3, fallen=N_POLES, made_up=3,
-    step=STEP, since=SINCE,
 )  # fmt: skip
+
+WATCH_OUTPUT = record(
+    alarmed=int, alarmed_at_s=float,
+    beside=int,  # a surface was found long before, with sound sensors: it stays found
+    misnamed=int,  # a surface had been named in the moment before the alarm
+    lead=int,  # the test that has raised the alarm
+    furthest=int, share=float,  # of this frame: the test nearest its bound, and how near
+    suspect=(int, N_SENSORS), named=int, named_at_s=float, replaced=(int, N_SENSORS),
+)  # fmt: skip
+
+WATCH = record(config=WATCH_CONFIG, memory=WATCH_MEMORY, output=WATCH_OUTPUT, step=STEP, since=SINCE)
 
 
 def instrument_found(watch: np.void, t_s: float) -> dict[str, Any] | None:
     """The verdict's parts as of t_s, where an instrument is found broken; None where none is."""
-    if not watch["alarmed"] or watch["beside"]:
+    if not watch["output"]["alarmed"] or watch["output"]["beside"]:
         return None
     said: dict[str, Any] = {"isolated": None, "isolation_type": None, "estimate": None, "candidates": ()}
-    said["detection_time_s"], said["isolation_time_s"] = float(watch["alarmed_at_s"]), None
-    if watch["named"] >= 0:
-        said["isolated"] = sensor_words(SENSORS[int(watch["named"])])
-        said["isolation_time_s"] = float(watch["named_at_s"])
+    said["detection_time_s"], said["isolation_time_s"] = float(watch["output"]["alarmed_at_s"]), None
+    if watch["output"]["named"] >= 0:
+        said["isolated"] = sensor_words(SENSORS[int(watch["output"]["named"])])
+        said["isolation_time_s"] = float(watch["output"]["named_at_s"])
     elif t_s > said["detection_time_s"] + WAIT_S:
         said["isolated"] = said["isolation_type"] = "unanticipated"
         said["isolation_time_s"] = said["detection_time_s"] + WAIT_S
     else:
-        left = zip(SENSORS, watch["suspect"], strict=True)
+        left = zip(SENSORS, watch["output"]["suspect"], strict=True)
         said["candidates"] = tuple(sensor_words(name) for name, possible in left if possible)
     return said

@@ -113,9 +113,9 @@ def note_changes(step, since):
     for i in range(STARTERS):
         changed = most(step, own_test(i), SLOW) + since.off[i] * since.reached[i, own_test(i), SLOW]
         if i == OF_SPEED:
-            changed *= (1.0 + since.off[i]) / max(step.then[AIRSPEED], 1.0)
+            changed *= (1.0 + since.off[i]) / max(step.memory.then[AIRSPEED], 1.0)
         since.changed[i] = min(changed, since.first[i])
-        grown = since.off[i] + (1.0 - step.decay[SLOW]) * since.changed[i]
+        grown = since.off[i] + (1.0 - step.config.decay[SLOW]) * since.changed[i]
         since.off[i] = min(grown, since.first[i])
 
 
@@ -123,7 +123,7 @@ def note_changes(step, since):
 def reach(step, since, signal):
     """Fill reach (STARTERS, RPM): what a unit of each error adds to a residual in this look, at most; and
     `coupling`: what it adds, with its sign. Of the look before, from which this one was predicted."""
-    then, h = step.then, step.h
+    then, h = step.memory.then, step.config.h
     p, q, r = then[0], then[1], then[2]
     V, phi, theta = max(then[AIRSPEED], 1.0), then[PHI], then[THETA]
     to, c = since.reach, since.coupling
@@ -147,17 +147,17 @@ def reach(step, since, signal):
 @kernel
 def reach_flow(step, since, V, p, q, r):
     """The same of flow and climb, at V m/s and rates p, q, r rad/s."""
-    then, h, s, g = step.then, step.h, step.acceleration, step.gravity
+    then, h, s, g = step.memory.then, step.config.h, step.memory.acceleration, step.config.gravity
     to, c = since.reach, since.coupling
     sa, ca, sb, cb = np.sin(then[ALPHA]), np.cos(then[ALPHA]), np.sin(then[BETA]), np.cos(then[BETA])
     sp, cp, st, ct = np.sin(then[PHI]), np.cos(then[PHI]), np.sin(then[THETA]), np.cos(then[THETA])
     slip, wide = abs(then[BETA]), abs(then[BETA]) + angle_of(since.off[OF_BETA])
     aslant, aslant_true = 1.0 / np.cos(min(slip, STEEPEST_RAD)), 1.0 / np.cos(min(wide, STEEPEST_RAD))
-    normal, pull = s[2] * ca - s[0] * sa, max(step.pull, np.sqrt(s[0] ** 2 + s[1] ** 2 + s[2] ** 2))
+    normal, pull = s[2] * ca - s[0] * sa, max(step.memory.pull, np.sqrt(s[0] ** 2 + s[1] ** 2 + s[2] ** 2))
     aside = s[1] * cb - (s[0] * ca + s[2] * sa) * sb
     roll, yaw = p * ca + r * sa, p * sa - r * ca
     coarse = h * (1.0 + h * (pull / V + abs(p) + abs(q) + abs(r)))
-    rates, climbed = np.hypot(p, r), step.predicted[ALTITUDE] - then[ALTITUDE]
+    rates, climbed = np.hypot(p, r), step.memory.predicted[ALTITUDE] - then[ALTITUDE]
     to[OF_ALPHA, SPEED] = to[OF_BETA, SPEED] = coarse * pull
     to[OF_ALPHA, ALPHA_FLOW] = coarse * aslant * (pull / V + rates * abs(sb))
     to[OF_ALPHA, BETA_FLOW] = coarse * (rates + pull * abs(sb) / V)
@@ -190,11 +190,11 @@ def accumulate(step, since):
     """Pass reach and coupling through the filters."""
     for i in range(STARTERS):
         for t in range(RPM):
-            for m in range(step.decay.size):
-                since.reached[i, t, m] = step.decay[m] * since.reached[i, t, m] + since.reach[i, t]
+            for m in range(step.config.decay.size):
+                since.reached[i, t, m] = step.config.decay[m] * since.reached[i, t, m] + since.reach[i, t]
     for j in range(since.coupling.size):
-        for m in range(step.decay.size):
-            since.coupled[j, m] = step.decay[m] * since.coupled[j, m] + since.coupling[j]
+        for m in range(step.config.decay.size):
+            since.coupled[j, m] = step.config.decay[m] * since.coupled[j, m] + since.coupling[j]
 
 
 @kernel
@@ -220,7 +220,7 @@ def narrow_by(since, i, shown, coupling):
 @kernel
 def pulled(step, since, i, m):
     """The same of the velocity, m/s, whatever its direction."""
-    V = max(step.then[AIRSPEED], 1.0)
+    V = max(step.memory.then[AIRSPEED], 1.0)
     flow = np.hypot(shown(step, since, i, ALPHA_FLOW, m), shown(step, since, i, BETA_FLOW, m))
     return np.hypot(shown(step, since, i, SPEED, m), V * flow)
 
@@ -234,7 +234,7 @@ def turned(step, since, i, m):
 @kernel
 def narrow(step, since):
     """Bring down how far each may be off."""
-    for m in range(step.decay.size):
+    for m in range(step.config.decay.size):
         c = since.coupled[:, m]
         narrow_by(since, OF_PHI, turned(step, since, OF_PHI, m), np.hypot(c[Q_TURNS], c[R_TURNS]))
         narrow_by(since, OF_PHI, pulled(step, since, OF_PHI, m), np.hypot(c[G_DOWN], c[G_ASIDE]))
@@ -263,7 +263,7 @@ def narrow_speed(step, since, m):
     c, slower = since.coupled[:, m], 1.0 + since.off[OF_SPEED]
     narrow_by(since, OF_SPEED, slower * shown(step, since, OF_SPEED, ALPHA_FLOW, m), abs(c[PULLS]))
     narrow_by(since, OF_SPEED, slower * shown(step, since, OF_SPEED, BETA_FLOW, m), abs(c[PUSHES]))
-    changes = 2.0 * slower * most(step, SPEED, m) / max(step.then[AIRSPEED], 1.0)
+    changes = 2.0 * slower * most(step, SPEED, m) / max(step.memory.then[AIRSPEED], 1.0)
     narrow_by(since, OF_SPEED, shown(step, since, OF_SPEED, DENSITY, m) + changes, abs(c[FASTER]))
 
 
@@ -286,7 +286,7 @@ def beyond(step, since, i, t):
     if t >= RPM:
         return test.share > 1.0
     room = 1.0 + (off if i == OF_SPEED and t >= SPEED else 0.0)
-    for m in range(step.decay.size):
+    for m in range(step.config.decay.size):
         if abs(test.filtered[m]) > room * test.bound[m] + off * since.reached[i, t, m]:
             return True
     return False

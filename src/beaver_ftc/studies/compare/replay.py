@@ -112,7 +112,7 @@ def record(scenario: Scenario) -> Recording:
     assert fly_frame is not None
 
     def fly_and_note(frames: np.ndarray, references: np.ndarray, log: np.ndarray) -> int:
-        air.append(statistical["air"]["acceleration"][0].copy())
+        air.append(statistical["air"]["output"]["acceleration"][0].copy())
         status = fly_frame(frames, references, log)
         built_in.append(built_in_statistic(frames))
         known.append(not error_map["outside"][0])
@@ -124,7 +124,7 @@ def record(scenario: Scenario) -> Recording:
         pass
     by_frame = np.array(built_in), Truth.of(scenario).onset, np.array(known), np.array(error)
     recording = Recording(recorder.context, recorder.seen, *by_frame)
-    if scenario.fdi.statistical is not None and statistical["air"]["seen"]:
+    if scenario.fdi.statistical is not None and statistical["air"]["output"]["seen"]:
         recording.air, recording.air_noise = np.array(air), np.sqrt(statistical["noise"]["jitter"][0])
     return recording
 

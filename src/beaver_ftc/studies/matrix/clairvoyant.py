@@ -63,7 +63,7 @@ def _declared(scenario: "Scenario") -> tuple[Context, np.ndarray]:
     exact = scenario.with_({"fdi.bounds.coefficients": 0.0})
     coefficients = context_of(loop.frames, scenario, loop.start, {}).declared.coefficients
     context, statistical = context_of(loop.frames, exact, loop.start, {}), loop.frames["fdi"]["statistical"]
-    if statistical["air"]["seen"][0]:
+    if statistical["air"]["output"]["seen"][0]:
         context = aware_of_the_air(context, np.sqrt(statistical["noise"]["jitter"][0]))
     loop.release()
     return context, coefficients

@@ -621,19 +621,21 @@ def test_an_alarm_of_instruments_adds_up_to_its_test_whatever_is_declared(turned
     """Of a watch every number of which is another, gusts among them: the last look by its own limit, and what
     the filter nearest to its bound keeps of those before."""
     watch = fill(np.zeros(1, WATCH)[0], seed=2, size=0.3)
-    watch["furthest"], watch["share"] = TESTS.index("alpha"), 1.2
-    step = watch["step"]
+    watch["output"]["furthest"], watch["output"]["share"] = TESTS.index("alpha"), 1.2
+    step, config = watch["step"], watch["step"]["config"]
     test = step["test"][TESTS.index("alpha")]
     test["filtered"], test["bound"] = turned * np.array([3.0, 8.0, 5.5]), (2.9, 4.7, 5.1)
     test["residual"] = turned * 0.9
-    apart(looked=[step["h"], test["rate"], test["noise"], test["air"], *step["gusts"]])
+    apart(looked=[config["h"], test["rate"], test["noise"], test["air"], *config["gusts"]])
     said = instruments_say.of_alarm(watch)
     (now, then, most), (before, nothing, most_before) = said["looks"]
-    foretold = float(step["predicted"][SENSORS.index("alpha")])
+    foretold = float(step["memory"]["predicted"][SENSORS.index("alpha")])
     assert said["test"] == "alpha"
     assert sorted([now, then]) == pytest.approx(sorted([foretold + turned * 0.9, foretold]))
     assert now - then == pytest.approx(0.9)
-    assert most == pytest.approx(step["h"] * test["rate"] + test["noise"] + test["air"] * step["gusts"][1])
+    assert most == pytest.approx(
+        config["h"] * test["rate"] + test["noise"] + test["air"] * config["gusts"][1]
+    )
     assert before - nothing == pytest.approx(8.0 - 0.9)
     assert most_before == pytest.approx(4.7 - most)
     assert said["sides"] == pytest.approx([8.0, 4.7])

@@ -4,7 +4,9 @@ What is borrowed from inside another version may end a process instead of raisin
 """
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import llvmlite
 import numba
@@ -13,7 +15,10 @@ from beaver_ftc.documents.sources import digest_of_files
 from beaver_ftc.documents.trials import passes as passes_in_a_child
 
 VARIABLE = "BEAVER_FTC_COMPILER"
-CODE = "import beaver_ftc.compiled.trial as trial; raise SystemExit(0 if trial.is_right() else 3)"
+CODE = (
+    "from beaver_ftc.compiled import compile_into; from beaver_ftc.compiled.trial import is_right; "
+    "raise SystemExit(0 if is_right(compile_into) else 3)"
+)
 
 
 def passes() -> bool:
@@ -23,18 +28,19 @@ def passes() -> bool:
     return passes_in_a_child("numba", str(versions), CODE, {VARIABLE: "trial"})
 
 
-def is_right() -> bool:
-    """Whether kernels that call one another can be compiled, and come to the same as their plain form."""
+def is_right(compile_into: Callable[[None, Callable[..., Any]], Callable[..., Any]]) -> bool:
+    """Whether kernels that call one another can be compiled, and return the same as their plain form.
+
+    compile_into: as in `beaver_ftc.compiled`, which imports this module by way of target.py.
+    """
     try:
-        return _comes_to_the_same()
+        return _returns_the_same(compile_into)
     except Exception:  # whatever a part does that is not as we have found it
         return False
 
 
-def _comes_to_the_same() -> bool:
+def _returns_the_same(compile_into) -> bool:
     import numpy as np
-
-    from beaver_ftc.compiled import compile_into
 
     def scale(x, by):
         x[:] = x / by

@@ -129,23 +129,23 @@ def _is_proved_in_a_child(layout: Layout) -> bool:
     build = f"{sys.implementation.cache_tag} {library} {status.st_size} {status.st_mtime_ns} "
     build += digest_of_files(Path(__file__))
     code = (
-        f"from beaver_ftc.plant import addresses; addresses.LAYOUT = addresses.{layout}; "
-        "raise SystemExit(0 if addresses.holds() else 3)"
+        "from beaver_ftc.aircraft import load; from beaver_ftc.plant import addresses, adapter; "
+        f"addresses.LAYOUT = addresses.{layout}; "
+        "raise SystemExit(0 if addresses.holds(adapter.bare(load().jsbsim)) else 3)"
     )
     return passes("jsbsim", build, code, {"BEAVER_FTC_NATIVE": "0"})
 
 
-def holds() -> bool:
-    """Whether nodes and an executive are where LAYOUT has them. It may end the process."""
-    return _pointers_are_nodes() and _values_agree() and _executive_runs()
+def holds(fdm: "jsbsim.FGFDMExec") -> bool:
+    """Whether nodes and the executive of a loaded aircraft are where LAYOUT has them.
+
+    A wrong layout may end the process.
+    """
+    return _pointers_are_nodes() and _values_agree() and _executive_runs(fdm)
 
 
-def _executive_runs() -> bool:
-    """Whether the built-in aircraft is run by its executive's address."""
-    from beaver_ftc.aircraft import load
-    from beaver_ftc.plant.adapter import bare
-
-    fdm = bare(load().jsbsim)
+def _executive_runs(fdm: "jsbsim.FGFDMExec") -> bool:
+    """Whether the aircraft is run by its executive's address."""
     executive = _word(fdm, LAYOUT.executive_pointer)
     return _is_executive(fdm, executive) and _flies(fdm, executive)
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from kernels import new_fdi
+from kernels import fill, holder, new_fdi
 from statistics_of import Statistical
 
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS
@@ -66,14 +66,13 @@ def test_the_drift_of_the_detectors_blocks(moving):
 
 
 def test_the_gusts_effect():
-    found = []
+    found, filled = [], ("force", "rotation", "acceleration", "shown", "damping")
     for before in (0.0, 9.0):
         record = np.zeros(1, AIR).view(np.recarray)[0]
-        record["span"], record["axes"], record["gust"] = 14.0, np.eye(3), (0.0, 0.02, -0.03)
-        for name in ("force", "rotation", "acceleration", "damping", "scratch"):
-            record[name] = before
+        fill(record, span=14.0, axes=np.eye(3), gust=(0.0, 0.02, -0.03))
+        fill(record, **dict.fromkeys((*filled, "scratch"), before))
         air.effect(record, design(), X, Y, U)
-        found.append([record[name].tolist() for name in ("force", "rotation", "acceleration", "damping")])
+        found.append([holder(record, name)[name].tolist() for name in filled])
     assert found[0] == found[1]
 
 

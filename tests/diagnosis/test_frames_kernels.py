@@ -40,7 +40,7 @@ def test_until_an_alarm_all_is_sums_of_what_the_model_does_not_explain(kind):
         keep = fdi["fdae"]["config"]["decay"][i]
         assert fdi["fdae"]["output"]["residual"][i] == pytest.approx(summed(keep, missed[:, [i]])[0])
         assert fdi["fdae"]["output"]["threshold"][i] == pytest.approx(summed(keep, bounds[:, [i]])[0])
-    assert not fdi["fdae"]["network"]["weights"].any()
+    assert not fdi["fdae"]["network"]["memory"]["weights"].any()
     assert not fdi["isolation"]["estimator"]["xhat"].any()
     assert ((fdi["bank"]["output"]["closest"][:n] > 0.0) & (fdi["bank"]["output"]["closest"][:n] < 1.0)).all()
 

@@ -318,9 +318,9 @@ def test_errors_of_a_surfaces_own_terms_widen_the_room_of_its_position(kind, err
 def test_every_type_starts_with_no_knowledge_of_any_surface():
     for every_type in (0, 1):
         fdi = new_fdi()
-        fdi["config"]["every_type"], fdi["types"]["surface"]["evidence"] = every_type, 7
+        fdi["config"]["every_type"], fdi["types"]["surface"]["evidence"]["frames"] = every_type, 7
         on(scheme.begin_isolation, fdi, np.zeros(3))
-        assert fdi["types"]["surface"]["evidence"].tolist() == [0 if every_type else 7] * 4
+        assert fdi["types"]["surface"]["evidence"]["frames"].tolist() == [0 if every_type else 7] * 4
 
 
 @pytest.mark.parametrize(

@@ -24,6 +24,7 @@ from beaver_ftc.diagnosis.detection.likelihood import block_dtype
 from beaver_ftc.diagnosis.detection.parity import USUAL
 from beaver_ftc.diagnosis.isolation import estimators
 from beaver_ftc.diagnosis.state import LOSS, NOT_ISOLATED, STATISTICS, WORST_CASE, verdict_dtype
+from beaver_ftc.diagnosis.types.contract import LAGS
 from beaver_ftc.loop import frame
 
 AIRCRAFT = load()
@@ -413,6 +414,14 @@ def test_the_built_in_statistic(enabled, authority, score, share, statistic):
     assert bool(likely) == (enabled == 1 and authority != WORST_CASE)
 
 
+def unknown_acceleration(fdi):
+    """What the assessment explains by no known fault, rad/s2."""
+    assessed = np.zeros(1, assessment.assessment_dtype(4)).view(np.recarray)[0]
+    stages = (fdi[name] for name in ("config", "verdict", "types", "layout", "statistical", "fdae", "bound"))
+    assessment.assess_unknown(assessed, *stages)
+    return assessed["unknown_acceleration"].tolist()
+
+
 def test_the_estimate_is_that_of_whoever_counts():
     fdi = new_fdi()
     (
@@ -432,14 +441,15 @@ def test_the_estimate_is_that_of_whoever_counts():
     )
     assert on(conclusion.isolated_surface, fdi) == 2
     assert frame.isolated_theta(fdi, 2) == -0.2
-    out = np.zeros(3)
     fdi["fdae"]["network"]["output"], block["rest"] = 0.3, (0, 0, 0.7, 0)
-    frame.unknown_acceleration(fdi, out)
-    assert out == pytest.approx([0.3] * 3)
+    assert unknown_acceleration(fdi) == [0.0] * 3
+    fdi["verdict"]["detected"] = 1
+    assert unknown_acceleration(fdi) == pytest.approx([0.3] * 3)
     fdi["statistical"]["tests"]["enabled"] = 1
     assert frame.isolated_theta(fdi, 2) == -0.6
-    frame.unknown_acceleration(fdi, out)
-    assert out[1] == 0.7
+    assert unknown_acceleration(fdi)[1] == 0.7
+    fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"] = 2, LAGS
+    assert unknown_acceleration(fdi) == [0.0] * 3
     fdi["verdict"]["isolated"] = NOT_ISOLATED
     assert on(conclusion.isolated_surface, fdi) == -1
 

@@ -143,6 +143,6 @@ def take_diagnosis(frame: np.void, new: np.void, k: int) -> None:
     if fdi["bank"]["config"]["n"] == other["bank"]["config"]["n"]:
         other["bank"]["output"]["closest"] = fdi["bank"]["output"]["closest"]
     for air in ("air", "inertial_air"):
-        other["statistical"][air]["in_flight"] = k > 0
+        other["statistical"][air]["config"]["in_flight"] = k > 0
     other["statistical"]["alarm"]["closest"] = fdi["statistical"]["alarm"]["closest"]
     frame["fdi"], frame["verdict"], frame["since"] = other, new["verdict"], k

@@ -302,7 +302,8 @@ class TestVerdict:
 
     def test_a_slow_surface_is_left_to_its_pace(self, frame):
         surface, frame["fdi"]["config"]["every_type"] = frame["fdi"]["types"]["surface"][RUDDER], 1
-        surface["measure"], surface["command"], surface["low"], surface["high"] = LAGS, 0.1, 0.02, 0.06
+        surface["accommodation"]["mode"], elapsed = LAGS, surface["elapsed"]
+        elapsed["command"], elapsed["low"], elapsed["high"] = 0.1, 0.02, 0.06
         assert self.taken(frame)["lag"] == pytest.approx([0, 0, 0.04 - 0.1, 0])
         assert frame["control"]["surfaces"]["output"]["authority_lost"] == 1
 

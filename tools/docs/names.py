@@ -65,7 +65,7 @@ class Names:
         program, *words = text.split()
         command = ""
         if program == "beaver-ftc":
-            command = next((word for word in words if not word.startswith("-")), "")
+            command = _command(words, self.known)
             if command and command not in self.known.commands and not _FILLED.fullmatch(command):
                 yield command
         elif program == "pip":
@@ -84,7 +84,7 @@ class Names:
 
     def _of_options(self, words: Iterable[str], command: str = "") -> Iterator[str]:
         of = self.known.commands
-        allowed = of[command] | of[""] if of.get(command) else frozenset().union(*of.values())
+        allowed = of[command] | of[""] if command and command in of else frozenset().union(*of.values())
         for word in words:
             option = word.partition("=")[0].rstrip(",]")
             if option.startswith("--") and option not in allowed and option not in self.shown:
@@ -92,8 +92,8 @@ class Names:
 
     def _of_short_command(self, text: str) -> Iterator[str]:
         """A command without the program, `sweep FILE --resume`, or an option with its value."""
-        first, *words = text.split()
-        yield from self._of_options([first, *words], first)
+        words = text.split()
+        yield from self._of_options(words, _command(words, self.known))
 
     def _of_file(self, text: str) -> Iterator[str]:
         if not self._is_file(text):
@@ -240,7 +240,8 @@ class Names:
     _KINDS: tuple[tuple[Callable[[str], object], Callable[["Names", str], Iterator[str]]], ...] = (
         (_PROGRAM.match, _of_command),
         (lambda text: text.startswith("--"), _of_short_command),
-        (lambda text: text.split()[0] in known().commands and " --" in text, _of_short_command),
+        (lambda text: _command(text.split(), known()) in known().commands and " --" in text,
+         _of_short_command),
         (_FILE.fullmatch, _of_file),
         (_ITEM.fullmatch, _of_item),
         (_CALL.fullmatch, _of_call),
@@ -250,6 +251,13 @@ class Names:
         (re.compile(rf"[\w<>*{{}}.,-]*(?:{_FILLED.pattern})[\w<>*{{}}.,-]*").fullmatch,
          _of_filled),
     )  # fmt: skip
+
+
+def _command(words: Sequence[str], of: Known) -> str:
+    """The command that a line begins with, of one word or two (`challenge new`); else the first word."""
+    said = [word for word in words if not word.startswith("-")]
+    pair = " ".join(said[:2])
+    return pair if pair in of.commands else "".join(said[:1])
 
 
 def spans(text: str) -> Iterator[tuple[int, str]]:

@@ -124,6 +124,21 @@ def test_sets_shrink_to_what_is_left_and_end_when_nothing_is():
     assert surface["feasible"]["excluded"][STUCK]
 
 
+@pytest.mark.parametrize(
+    ("interval", "stands"),
+    [((0.15, 0.05), False), ((0.4, 0.5), False), (contract.NOTHING, True)],
+    ids=["axes disagree", "elsewhere", "refuted otherwise"],
+)
+def test_a_surface_stands_nowhere_once_where_it_was_contradicts_itself(interval, stands):
+    _, surface = new_surface()
+    sets.replace(surface, STUCK, (0.0, 0.2))
+    sets.intersect(surface, STUCK, interval)
+    assert surface["feasible"]["excluded"][STUCK]
+    for place in (-0.1, 0.02, 0.15, 0.19, 0.45):
+        surface["judged"]["low"], surface["judged"]["high"] = place - 1e-3, place + 1e-3
+        assert examine.may_stand(surface) == (stands and 0.0 <= place <= 0.2), place
+
+
 def test_an_offset_is_unlimited_at_a_stop():
     _, surface = new_surface(low=0.1, high=0.15, command=0.3)
     assert bias.offset(surface) == pytest.approx((-0.2, -0.15))

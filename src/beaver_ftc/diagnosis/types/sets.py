@@ -24,9 +24,11 @@ def replace(surface, kind, interval):
 
 @kernel
 def intersect(surface, kind, interval):
-    """Keep of the set of a type what is also in an interval; exclude the type when nothing is left."""
+    """Keep of the set of a type what is also in an interval; exclude the type when nothing is left. The set
+    then holds the two bounds that contradict each other. NOTHING of contract.py has no such bounds: a type
+    that it excludes keeps its set."""
     low, high = interval
-    if low > high:
+    if low == np.inf:
         surface.feasible.excluded[kind] = 1
         return
     surface.feasible.low[kind] = max(surface.feasible.low[kind], low)

@@ -1,6 +1,6 @@
 """What a scenario declares in `fdi.bounds`, and which parts of the diagnosis use it: one object, made once.
 
-Detectors, warnings, studies and integrations ask `Declared`; none reads `fdi.bounds` for itself.
+Detectors, warnings, studies and products ask `Declared`; none reads `fdi.bounds` for itself.
 """
 
 from collections.abc import Iterable, Mapping, Sequence

@@ -97,12 +97,13 @@ EXPECTED = {
     "fdi.types.config.whole": 0, "fdi.config.instants": 2,
     "fdi.types.config.returns": 1, "fdi.types.config.patience": 131,  # half a cycle at 1.2 rad/s is 2.618 s
     "fdi.types.pair.enabled": 0, "fdi.types.pair.first": -1,
-    "fdi.types.surface.0.travel_low": -0.5, "fdi.types.surface.3.travel_high": 1.0,
-    "fdi.types.surface.1.measure": -1,
-    "fdi.types.surface.1.type": -1, "fdi.types.surface.0.in_question": 1,
-    "fdi.types.surface.1.approach": 1.0 - exp(-25.0 * DT / 2), "fdi.types.surface.1.step": pi / 2 * DT / 2,
-    "fdi.types.surface.1.least_runaway_rate": pi / 4,
-    "fdi.types.surface.1.slowest_step": radians(3.0) * DT / 2,
+    "fdi.types.surface.0.actuator.travel_low": -0.5, "fdi.types.surface.3.actuator.travel_high": 1.0,
+    "fdi.types.surface.1.accommodation.mode": -1,
+    "fdi.types.surface.1.status.type": -1, "fdi.types.surface.0.status.is_candidate": 1,
+    "fdi.types.surface.1.actuator.approach": 1.0 - exp(-25.0 * DT / 2),
+    "fdi.types.surface.1.actuator.step": pi / 2 * DT / 2,
+    "fdi.types.surface.1.actuator.least_runaway_rate": pi / 4,
+    "fdi.types.surface.1.actuator.slowest_step": radians(3.0) * DT / 2,
     "fdi.bank.config.n": 3, "fdi.isolation.config.memory": 0, "fdi.isolation.config.membership": 1,
     "control.reference.config.dt": DT,
     "control.surfaces.output.effectiveness": 1.0,
@@ -184,7 +185,7 @@ def test_losses_of_the_leading_surfaces_come_first_then_the_others_and_every_pos
 
 def test_in_pairs_each_plane_is_asked_for_itself():
     fdi = assembled(substeps=1, fdi={**GIVEN["fdi"], "pairs": True, "authority": "worst-case"})["fdi"]
-    assert fdi["types"]["surface"]["in_question"].tolist() == [0, 1, 0, 1]
+    assert fdi["types"]["surface"]["status"]["is_candidate"].tolist() == [0, 1, 0, 1]
     pitch, others = [1, 0, 1], [0, 1, 0]
     assert fdi["isolation"]["estimator"]["unasked"][:4].tolist() == [others, pitch, others, pitch]
 

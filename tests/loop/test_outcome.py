@@ -28,7 +28,8 @@ CASES = {
         "accounts.tracking.frames_since": 4,
         "accounts.authority.demanded": [0.8, 0.0, 8.0], "accounts.authority.lacking": [0.2, 0.0, 6.0],
         "accounts.authority.beyond_frames": [5, 0, 7], "accounts.saturated_frames": [1, 2, 3, 4],
-        "accounts.travelled": [0.1, 0.2, 0.3, 0.4], "accounts.hurried": [1.0, 2.0, 3.0, 4.0],
+        "accounts.actuator_travel": [0.1, 0.2, 0.3, 0.4],
+        "accounts.actuator_energy": [1.0, 2.0, 3.0, 4.0],
         "truth.value.5": 50.0, "truth.value.12": 1500.0,
     }),
     "modes-and-exits": ({}, {
@@ -56,18 +57,19 @@ CASES = {
         "fdi.statistical.tests.alarm_level": 6.5,
     }),
     "engine": ({}, {
-        "control.power.enabled": 1, "control.power.from_s": 0.0, "control.power.frames": 250,
-        "control.power.least": 11.5, "control.power.greatest": 30.25,
+        "control.power.config.enabled": 1, "control.power.output.from_s": 0.0,
+        "control.power.output.frames": 250, "control.power.output.least": 11.5,
+        "control.power.output.greatest": 30.25,
     }),
-    "engine-not-used": ({}, {"control.power.enabled": 1, "control.power.from_s": -1.0}),
-    "no-engine": ({}, {"control.power.from_s": 1.0}),
+    "engine-not-used": ({}, {"control.power.config.enabled": 1, "control.power.output.from_s": -1.0}),
+    "no-engine": ({}, {"control.power.output.from_s": 1.0}),
     "probed": ({"fdi": {"fault_class": "all", "probing": {}}}, {
-        "t": 9.0, "control.probe.from_s": 0.0, "control.probe.to_s": 4.5,
+        "t": 9.0, "control.probe.memory.from_s": 0.0, "control.probe.memory.to_s": 4.5,
     }),
     "still-probing": ({"fdi": {"fault_class": "all", "probing": {}}}, {
-        "t": 9.0, "control.probe.from_s": 2.0,
+        "t": 9.0, "control.probe.memory.from_s": 2.0,
     }),
-    "probed-for-nothing": ({}, {"t": 9.0, "control.probe.from_s": 2.0}),
+    "probed-for-nothing": ({}, {"t": 9.0, "control.probe.memory.from_s": 2.0}),
     "profile": ({}, PILOT | {
         "autopilot.worst": [5.0, 2.5, 0.4, 0.2], "autopilot.held_worst": 1.25,
         "autopilot.mean_off": [-1.0, 0.5, 0.1, -0.1],
@@ -78,11 +80,11 @@ CASES = {
     "limits": ({}, PILOT | {
         "autopilot.holding.from_s": [5.0, 3.0, 0.0], "autopilot.holding.value": [55.0, 38.5, radians(25.0)],
         "autopilot.holding.in_force": [1, 0, 1], "autopilot.holding.acting": radians(-4.25),
-        "control.surfaces.effectiveness": [0.8, 0.1, 0.35, 0.0],
+        "control.surfaces.output.effectiveness": [0.8, 0.1, 0.35, 0.0],
     }),
     "limits-of-roll": ({}, PILOT | {
         "autopilot.holding.from_s": [-1.0, -1.0, 2.0], "autopilot.holding.value": [55.0, 38.5, radians(25.0)],
-        "control.surfaces.effectiveness": [0.8, 0.1, 0.9, 0.0],
+        "control.surfaces.output.effectiveness": [0.8, 0.1, 0.9, 0.0],
     }),
     "no-limits": ({}, {"autopilot.holding.from_s": [5.0, 3.0, 0.0]}),
     "instrument": ({"fdi": {"sensor_monitor": "always"}}, ALARM | {

@@ -185,7 +185,7 @@ def test_random_numbers_begin_with_the_seed_each_counter_apart():
     for number, record in enumerate(records):
         instrument_records.seed(record, number)
     first, second = (record["random"].tolist() for record in records)
-    assert first == [0, 0xD1B54A32D192ED03, 0x8CB92BA72F3D8DD7, 0xA0761D6478BD642F]
+    assert first == [0, 0xD1B54A32D192ED03, 0x8CB92BA72F3D8DD7, 0xA0761D6478BD642F, 0xE7037ED1A0B428DB]
     assert second == [number ^ 1 for number in first]
 
 

@@ -31,7 +31,7 @@ from flying import SINES
 from samples import samples
 from telling import apart, fill
 
-CHECKER = Path(__file__).parents[3] / "tools/check_certificate.py"
+CHECKER = Path(__file__).parents[4] / "tools/check_certificate.py"
 GYRO = {"noise_std_deg_s": 0.02, "bias_deg_s": 0.05, "scale_error": 1e-3}
 GYROS = {"p": GYRO, "q": GYRO, "r": GYRO}
 COARSE = dict.fromkeys("pqr", GYRO | {"quantum_deg_s": 0.02})

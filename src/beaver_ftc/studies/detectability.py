@@ -245,7 +245,7 @@ def engine_failures(scenario: Scenario) -> list[Document]:
     short = scenario.model_copy(update={"duration_s": SETTLED_S + 1.0, "faults": ()})
     configure_engines(engines, short)
     power = aircraft.file.power_setting
-    if thrust is None or power is None or not engines["n"]:
+    if thrust is None or power is None or not engines["config"]["n"]:
         return []
     loop, bound = Loop(short), excitation(short).bound[0]
     setting = loop.trim.settings[power[0]]
@@ -258,7 +258,7 @@ def engine_failures(scenario: Scenario) -> list[Document]:
     mapped = aircraft.file.model_error_map
     held = known and mapped is not None and mapped.knows_engines
     for e, name in enumerate(aircraft.effectors):
-        turns = np.abs(engines["B"][:, e]) * gained
+        turns = np.abs(engines["config"]["B"][:, e]) * gained
         shows = 1.0 / float(detection_magnitude(turns[None], bound[None])[0])
         turned = turns.tolist()
         found.append({"engine": name, "turns_rad_s2": turned, "shows": shows, "known": known, "held": held})

@@ -55,11 +55,12 @@ class Flown:
         loop.fly_frames(1, 0)
         for _ in range(loop.n_frames - 1):
             loop.fly_frames(1, given.substeps)
-            turn = np.array(record["turn"])
+            turn = np.array(record["memory"]["turn"])
             true = turn.T @ [node.get_double_value() for node in nodes]
             felt = [FT * node.get_double_value() for node in accelerations]
             V = loop.frames["measured"]["y"][0][2]
-            rows.append([*record["gust"], *true, V, heading.get_double_value(), *record["force"], *felt])
+            seen, force = record["memory"]["gust"], record["memory"]["force"]
+            rows.append([*seen, *true, V, heading.get_double_value(), *force, *felt])
         rows = np.array(rows)
         self.seen, self.true = rows[:, 0:3], rows[:, 3:6]
         self.airspeed, self.heading = rows[:, 6].mean(), np.unwrap(rows[:, 7])
@@ -182,7 +183,7 @@ def test_where_no_gust_is_seen_each_returns_as_late_as_it_does(without_forces):
     fdi = {"statistical": {}, "bounds": {"turbulence": "light"}}
     statistical = Loop(load_given({"aircraft": "./trainer", "fdi": fdi})).frames["fdi"]["statistical"][0]
     long, record = statistical["block"][2], statistical["air"]
-    lengths = rotation_lengths(float(record["span"]))
+    lengths = rotation_lengths(float(record["config"]["span"]))
     omega = np.geomspace(1e-4, 1e2, 50)  # rad/m
     for g in range(3):
         true = 1.0 / (1.0 / lengths[g] ** 2 + omega**2)
@@ -203,7 +204,7 @@ def test_where_no_model_has_the_forces_the_vanes_show_a_gust_roughly_for_a_law_t
     for axis in (0, 1):
         assert np.corrcoef(seen[:, axis], true[:, axis])[0, 1] > 0.95
     record = flown.record
-    assert np.abs(record["shown"]).max() > 0.0 == np.abs(record["acceleration"]).max()
+    assert np.abs(record["output"]["shown"]).max() > 0.0 == np.abs(record["output"]["acceleration"]).max()
 
 
 def test_nor_does_it_when_the_force_jumps_between_coarse_frames():
@@ -222,20 +223,21 @@ def test_a_heading_that_turns_round_as_the_nose_passes_the_vertical_is_no_gust(l
     """The turbulence turns with the heading: air from ahead, and a little from aside, turns round at once."""
     record, dt = air_of(), 0.01
     still, gust = np.array([45.0, 0.0, 0.0]), np.array([3.0, 1.0, 0.0])  # m/s; straight down, and level axes
-    record["turn"], record["gust"][2] = _turn(0.0, -1.56), 0.05
-    air.begin(record, readings(still - record["turn"] @ gust), np.array([0.0, -1.56, 0.3]))
-    record["gust"][2] = 0.05
+    record["memory"]["turn"], record["memory"]["gust"][2] = _turn(0.0, -1.56), 0.05
+    air.begin(record, readings(still - record["memory"]["turn"] @ gust), np.array([0.0, -1.56, 0.3]))
+    record["memory"]["gust"][2] = 0.05
     over = np.array([np.pi, -1.56, 0.3 + np.pi])
-    record["force"] = record["turn"] @ [0.0, 0.0, -record["gravity"]]  # nothing accelerates
+    held = [0.0, 0.0, -record["config"]["gravity"]]  # nothing accelerates
+    record["memory"]["force"] = record["memory"]["turn"] @ held
     if late:  # the wind turns a step after the heading
         air.observe(record, readings(still - _turn(np.pi, -1.56) @ (gust * [-1, -1, 1])), over, dt)
-        record["force"] = _turn(np.pi, -1.56) @ [0.0, 0.0, -record["gravity"]]
+        record["memory"]["force"] = _turn(np.pi, -1.56) @ held
     air.observe(record, readings(still - _turn(np.pi, -1.56) @ gust), over, dt)
-    assert abs(record["gust"][2]) <= 0.05
-    unseen, record["unseen"] = np.array(record["unseen"]), np.ones(3)
-    record["damping"] = np.diag([0.0, 0.0, 5.0]) @ record["axes"].T
+    assert abs(record["memory"]["gust"][2]) <= 0.05
+    unseen, record["memory"]["unseen"] = np.array(record["memory"]["unseen"]), np.ones(3)
+    record["output"]["damping"] = np.diag([0.0, 0.0, 5.0]) @ record["output"]["axes"].T
     everything = air.unseen_drift(record, 45.0, 2, 2)
-    record["unseen"] = unseen
+    record["memory"]["unseen"] = unseen
     assert air.unseen_drift(record, 45.0, 2, 2) == pytest.approx(everything)
 
 
@@ -243,16 +245,16 @@ def test_a_gust_that_was_seen_acts_as_before_in_the_step_in_which_the_heading_tu
     """JSBSim's gusts point along the heading of the step before, in body axes as they are now."""
     record, y = air_of(), readings(np.array([45.0, 0.0, 2.0]))
     air.begin(record, y, np.array([0.0, -1.56, 0.3]))
-    record["gust"][1] = 0.04
+    record["memory"]["gust"][1] = 0.04
     over = np.array([np.pi, -1.56, 0.3 + np.pi])
     air.observe(record, y, over, 1e-4)
-    now = record["gust"][1]
+    now = record["memory"]["gust"][1]
     air.effect(record, design_record()[0], np.zeros(3), y, np.zeros(4))
-    assert record["rotation"][1] == pytest.approx(now)
+    assert record["memory"]["rotation"][1] == pytest.approx(now)
     air.observe(record, y, over, 1e-4)
-    now = record["gust"][1]
+    now = record["memory"]["gust"][1]
     air.effect(record, design_record()[0], np.zeros(3), y, np.zeros(4))
-    assert record["rotation"][1] == pytest.approx(-now)
+    assert record["memory"]["rotation"][1] == pytest.approx(-now)
 
 
 def readings(velocity):
@@ -311,21 +313,21 @@ def test_a_gust_acts_through_the_damping_in_body_axes():
     """The air pitches up: against it the aircraft pitches down, and is damped as if it did."""
     record, design = air_of(), design_record()[0]
     y = np.array([0.1, 0.02, 45.0, 1036.0, 0.3])
-    record["axes"] = _turn(0.6, 0.1)
-    record["gust"] = [0.0, 0.02, -0.03]
+    record["output"]["axes"] = _turn(0.6, 0.1)
+    record["memory"]["gust"] = [0.0, 0.02, -0.03]
     air.effect(record, design.view(), np.zeros(3), y, np.zeros(4))
     _, _, slope, _ = jacobian(design, np.zeros(3), y, np.zeros(4))
-    body = _turn(0.6, 0.1) @ record["gust"]
-    assert record["acceleration"] == pytest.approx(-slope @ body)
+    body = _turn(0.6, 0.1) @ record["memory"]["gust"]
+    assert record["output"]["acceleration"] == pytest.approx(-slope @ body)
 
 
 def test_what_is_not_seen_drifts_in_body_axes_as_a_covariance_turns():
     record, design = air_of(), design_record()[0]
     y = np.array([0.1, 0.02, 45.0, 1036.0, 0.3])
-    record["axes"] = turn = _turn(0.6, 0.1)
+    record["output"]["axes"] = turn = _turn(0.6, 0.1)
     air.effect(record, design, np.zeros(3), y, np.zeros(4))
     spread = turn @ np.diag(45.0 * Dryden("light").rotation_walk(14.63) * air.UNSEEN) @ turn.T
-    expected = record["damping"] @ spread @ record["damping"].T
+    expected = record["output"]["damping"] @ spread @ record["output"]["damping"].T
     found = [[air.unseen_drift(record, 45.0, i, j) for j in range(3)] for i in range(3)]
     assert np.array(found) == pytest.approx(expected, rel=1e-12)
 
@@ -336,14 +338,14 @@ def test_a_gust_unseen_drifts_besides_as_its_axis_turns_in_the_body():
     before, after = np.array([0.5, -1.45, 0.2]), np.array([0.53, -1.47, 0.2])
     air.begin(record, y, before)
     air.observe(record, y, after, dt)
-    record["damping"] = D = np.diag([5.0, 3.0, 1.0])
+    record["output"]["damping"] = D = np.diag([5.0, 3.0, 1.0])
     air.begin_frame(record, 45.0, dt)
     air.elapse(record, 1.0)
     turned = (_turn(*after[:2]) - _turn(*before[:2]))[:, 0] / dt
     lag_s = np.sqrt(0.3048 * 1750 * 14.63) / 2.6 / 45
     variance = 45 * Dryden("light").rotation_walk(14.63)[0] * lag_s / 2  # of a first-order process
     expected = np.outer(D @ turned, D @ turned) * variance * lag_s
-    assert record["leap"] / dt == pytest.approx(expected, rel=1e-9)
+    assert record["output"]["leap"] / dt == pytest.approx(expected, rel=1e-9)
 
 
 TURN = {  # to 30 deg of bank, and round

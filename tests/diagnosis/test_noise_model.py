@@ -58,7 +58,7 @@ def test_false_alarms_are_no_more_than_declared_and_not_absurdly_fewer(setting, 
     scores = alone.watch(alone.innovations(frames, rng), *surfaces_at_work(frames, rate_hz, rng), renew=True)
     seen = poisson(int(np.sum(scores > 1.0)), hours, 0.999)
     assert seen.high <= per_h
-    assert seen.config.low > 0.02 * per_h
+    assert seen.low > 0.02 * per_h
 
 
 def _share(rate_hz, omega, eta_bar, declared=None, seconds=20, **bounds):

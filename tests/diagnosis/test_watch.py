@@ -11,8 +11,9 @@ from beaver_ftc.scenario.sensors import sensor_words
 @pytest.fixture
 def watch():
     record = np.zeros(1, WATCH)[0]
-    record["alarmed"], record["alarmed_at_s"], record["named"] = 1, 4.0, -1
-    record["suspect"][[0, 2]] = 1
+    said = record["output"]
+    said["alarmed"], said["alarmed_at_s"], said["named"] = 1, 4.0, -1
+    said["suspect"][[0, 2]] = 1
     return record
 
 

@@ -108,7 +108,7 @@ def test_a_flight_is_taken_apart_at_its_marks(monkeypatch):
     )
     monkeypatch.setattr(measure.time, "process_time", lambda: float(next(clock)))
     monkeypatch.setattr(measure, "Loop", lambda case: loop)
-    monkeypatch.setattr(measure, "metrics", lambda flight: {})
+    monkeypatch.setattr(measure, "measure", lambda flight: {})
     monkeypatch.setattr(measure, "row_of", lambda assignment, found, flight: None)
     monkeypatch.setattr(measure, "scenario_of", lambda sweep, assignment: scenario(substeps=3))
     measure.conditions._trims["old"] = None

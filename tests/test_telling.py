@@ -34,8 +34,13 @@ def test_numbers_tell_apart(shape):
 
 def test_a_filled_record_has_no_number_twice():
     record = fill(np.zeros(1, control_dtype(4))[0], seed=3)
-    apart(power=[float(record["power"][name]) for name in ("least", "greatest", "trim", "low")])
-    apart(whole=[int(record["power"]["frames"]), int(record["probe"]["probed"]), int(record["law"])])
-    apart(G=record["allocation"]["G"])
+    power = record["power"]
+    set_points = [power["output"]["least"], power["output"]["greatest"]]
+    apart(power=[float(number) for number in (*set_points, power["config"]["trim"], power["config"]["low"])])
+    numbers_of = power["output"]["frames"], record["probe"]["memory"]["probed"], record["config"]["law"]
+    apart(whole=[int(number) for number in numbers_of])
+    apart(G=record["axes"]["G"])
     other = fill(np.zeros(1, control_dtype(4))[0], seed=4)
-    assert not np.isin(record["reference"]["model_rate"], other["reference"]["model_rate"]).any()
+    assert not np.isin(
+        record["reference"]["output"]["model_rate"], other["reference"]["output"]["model_rate"]
+    ).any()

@@ -1,1 +1,1 @@
-"""The former place of the pytest plug-in."""
+"""Former places of the pytest plug-in and of the Gymnasium environments."""

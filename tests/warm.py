@@ -23,10 +23,14 @@ def main():
     from beaver_ftc.control.rivals.indi import IncrementalInversion
     from beaver_ftc.diagnosis.rivals.rls import RlsMonitor
     from beaver_ftc.loop.loop import fly
+    from beaver_ftc.scenario.loader import load_scenario
     from flying import scenario
 
     for plugged in ({}, {"detector": RlsMonitor()}, {"law": IncrementalInversion()}):
         fly(scenario(duration_s=0.2, substeps=2, fdi={"statistical": {}}), **plugged)
+    published = load_scenario("elevator-partial-loss")  # after an alarm other kernels are used
+    for fault_class in ("published", "all"):
+        fly(published.with_({"fdi.fault_class": fault_class}))
     done.touch()
 
 

@@ -15,6 +15,7 @@ import multiprocessing
 import os
 import signal
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -25,7 +26,9 @@ from typing import Any, NamedTuple, Protocol
 from beaver_ftc.documents.errors import SimulationFailed
 
 LEAVES_S = 5.0  # a pool's thread, once its workers have ended: milliseconds
-MOST_STARTS = 3  # of a worker, should what it is forked from be killed meanwhile
+# Starts of a worker, each later, should the process that it is forked from be killed meanwhile: one that is
+# killed closes its pipe before the system says that it has ended, so what comes at once finds it still there.
+STARTS_AFTER_S = (0.0, 0.1, 1.0)
 MOST_STILLBORN = 8  # in a row, should workers be killed before they have begun
 
 Row = Any
@@ -109,7 +112,8 @@ class _Worker:
 
     def __init__(self, work: Work) -> None:
         self.pid: Future[int] = Future()
-        for _ in range(MOST_STARTS):
+        for pause_s in STARTS_AFTER_S:
+            time.sleep(pause_s)
             self._pool = ProcessPoolExecutor(1, mp_context=context(), initializer=_begin, initargs=(work,))
             with contextlib.suppress(EOFError, ConnectionError):  # what it is forked from was killed: anew
                 self.pid = self._started()

@@ -5,8 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from beaver_ftc.scenario.loader import load_scenario
+from beaver_ftc.studies.mismatch import bound
 from beaver_ftc.studies.mismatch.bound import (
+    PUBLISHED_CASE,
     guarantee_with,
+    published_case,
     recommend,
     recommended_for,
     rounded_up,
@@ -208,3 +212,24 @@ def test_an_alarm_without_an_excess_widens_the_bound_until_there_is_none(monkeyp
 )  # fmt: skip
 def test_two_digits_that_are_not_below(value, digits, up):
     assert rounded_up(value, digits) == pytest.approx(up, rel=1e-12)
+
+
+def test_the_published_case_flies_with_the_declared_bound_and_design_of_the_flights(monkeypatch):
+    """Settled with are the flights and the published case, both under what the first flight declares."""
+    declared = {"p": 0.011, "q": 0.023, "r": 0.037}
+    like = scenario(design_model={"mass": 1.07}, fdi={"bounds": {"constant_rad_s2": declared}}, duration_s=3)
+    found = []
+    monkeypatch.setattr(bound, "tally_of_flight", lambda case: (f"tally of {case.name}", {}))
+    monkeypatch.setattr(
+        bound, "settle", lambda cases, kept: (found.append((cases, kept)), ({"p": 0.05}, 7))[1]
+    )
+    monkeypatch.setattr(bound, "guarantee_with", lambda constant, of: (constant, of))
+    said = recommended_for([like, scenario()], ["one", "two"])
+    (cases, kept), published = found[0], load_scenario(PUBLISHED_CASE)
+    assert kept == ["one", "two", f"tally of {PUBLISHED_CASE}"]
+    assert (cases[0], cases[2].faults, cases[2].duration_s) == (like, published.faults, published.duration_s)
+    assert cases[2] == published_case(declared, like)
+    assert cases[2].fdi.bounds.constant_rad_s2.model_dump() == declared
+    assert cases[2].design_model == like.design_model
+    assert said["guarantee"] == {"declared": (declared, like), "recommended": ({"p": 0.05}, like)}
+    assert said["recommended"] == {"constant_rad_s2": {"p": 0.05}, "runs": 2, "coverage": 2 / 3, "settled": 7}

@@ -160,3 +160,9 @@ class TestHealthyActuators:
         pieces = HealthyActuators(scenario(actuators="servo"))
         joined = np.concatenate([pieces.follow(commands[a : a + 37]) for a in range(0, 300, 37)])
         assert np.array_equal(whole, joined)
+
+    def test_a_declared_travel_stops_them_at_either_end(self):
+        travel = {"rudder": {"travel_deg": [-7.0, 11.0]}, "flap": {"travel_deg": [3.0, 17.0]}}
+        commands = np.array([[0.0, 0.0, -0.5, 0.01], [0.0, 0.0, 0.5, 0.5]])
+        followed = HealthyActuators(scenario(actuators=travel)).follow(commands)
+        assert np.degrees(followed[:, 2:]) == pytest.approx(np.array([[-7.0, 3.0], [11.0, 17.0]]))

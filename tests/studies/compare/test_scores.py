@@ -146,7 +146,7 @@ def test_without_flights_a_level_costs_nothing():
 
 
 def test_flights_without_a_number_on_either_side_give_no_ratio():
-    """Ratios of mine to the oracle's: 12 / 4 alone; an oracle that departed, stood still or failed has none."""
+    """Only 12 / 4 is a ratio: an oracle that departed, stood still or failed has none."""
     mine = [_result(rms_deg_s=rms) for rms in (12.0, 5.0, 7.0, 9.0)] + [_result(error="no")] * 2
     oracle = [_result(rms_deg_s=rms) for rms in (4.0, inf, 0.0)]
     line = line_of(ENTRY, mine, [*oracle, _result(error="lost", rms_deg_s=2.0), *oracle[:2]])

@@ -129,7 +129,7 @@ for fault_class in ("published", "all"):
 
 # One law's kernels, one scheme's, and what they share: no other law or scheme is compiled.
 OF_A_FLIGHT = {"stepping.fly_one"}
-OF_A_FLIGHT |= {f"adaptive_estimators.{step}" for step in ("predict", "detect", "evaluate")}
+OF_A_FLIGHT |= {f"adaptive_estimators.{step}" for step in ("begin", "predict", "conclude", "prepare")}
 OF_A_FLIGHT |= {"rejecting.accommodate", "rejecting.command"}
 OF_A_FLIGHT |= {f"inversion.{step}" for step in ("prepare", "command_surfaces", "complete")}
 
@@ -137,5 +137,9 @@ OF_A_FLIGHT |= {f"inversion.{step}" for step in ("prepare", "command_surfaces", 
 def test_a_flight_asks_for_what_it_uses_and_for_nothing_else():
     done = subprocess.run([sys.executable, "-c", FLIGHTS], capture_output=True, text=True, check=True)
     published, every_type = (set(line.split()) for line in done.stdout.splitlines()[-2:])
-    assert published == OF_A_FLIGHT
-    assert every_type == OF_A_FLIGHT | {"scheme.isolate_type"}
+    of_class = [
+        {f"fault_classes.{step}" for step in (f"begin_{what}", f"observe_{what}", f"isolate_{what}")}
+        for what in ("loss", "type")
+    ]
+    assert published == OF_A_FLIGHT | of_class[0]
+    assert every_type == OF_A_FLIGHT | of_class[0] | of_class[1]

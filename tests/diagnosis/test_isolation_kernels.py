@@ -4,21 +4,21 @@ import numpy as np
 import pytest
 from kernels import DT, estimator, new_fdi, on, put
 
-from beaver_ftc.diagnosis import conclusion, scheme
+from beaver_ftc.diagnosis import conclusion
 from beaver_ftc.diagnosis.detection.likelihood import STEP
 from beaver_ftc.diagnosis.isolation import estimators
 from beaver_ftc.diagnosis.isolation.estimators import hypothesis
+from beaver_ftc.diagnosis.schemes import fault_classes
 from beaver_ftc.diagnosis.state import (
     INTERVAL,
     LOSS,
     NOT_ISOLATED,
     POSITION,
     PUBLISHED,
-    STATISTICS,
     UNANTICIPATED,
-    WORST_CASE,
 )
-from beaver_ftc.loop import frame as whole
+from beaver_ftc.plant.instruments import MEASURED
+from beaver_ftc.scenario.diagnosis import FdiConfig
 
 EITHER = 0
 
@@ -146,18 +146,28 @@ def test_a_residual_at_its_limit_is_within_and_beyond_it_is_not(thresholds, axis
     assert within(1e-9, unasked=True)
 
 
+def excludes(fdi, row, x=0.0):
+    """Whether a row of the fault classes excludes the first fault of a diagnosis, at rates of x rad/s."""
+    measured = np.zeros(1, MEASURED).view(np.recarray)[0]
+    measured["x"], estimator(fdi)["excluded"] = x, 0
+    fault_classes.ROWS[row].isolate(fdi, measured, 1.0, False)
+    return bool(estimator(fdi)["excluded"])
+
+
 @pytest.mark.parametrize(
-    ("every_type", "authority", "within", "ruled_out"),
+    ("row", "x", "excluded"),
     [
-        (0, WORST_CASE, True, False), (0, WORST_CASE, False, True), (1, STATISTICS, False, True),
-        (1, STATISTICS, True, False), (0, EITHER, False, True), (0, EITHER, True, False),
-        (0, STATISTICS, False, False),
+        (("published", "worst-case"), 0.0, False), (("published", "worst-case"), 1.0, True),
+        (("all", "either"), 1.0, True), (("all", "either"), 0.0, False), (("all", "worst-case"), 1.0, True),
+        (("published", "either"), 1.0, True), (("published", "either"), 0.0, False),
+        (("published", "statistical"), 1.0, False),
     ],
 )  # fmt: skip
-def test_who_rules_a_fault_out(every_type, authority, within, ruled_out):
+def test_who_excludes_a_fault_beyond_its_worst_case(row, x, excluded):
     fdi = new_fdi()
-    fdi["config"]["every_type"], fdi["config"]["authority"] = every_type, authority
-    assert bool(whole.rules_out(fdi, estimator(fdi), within)) == ruled_out
+    fdi["isolation"]["config"]["n"], fdi["statistical"]["alarm"]["detected_at_s"] = 1, -1.0
+    fdi["layout"]["position_of"], fdi["layout"]["loss_of"] = range(4), range(4)
+    assert excludes(fdi, row, x) == excluded
 
 
 @pytest.mark.parametrize(
@@ -230,35 +240,36 @@ def told(fdi, loss, step):
     return estimator(fdi)
 
 
-@pytest.mark.parametrize("authority", [EITHER, STATISTICS])
-@pytest.mark.parametrize(("step", "ruled_out"), [(NAMING + 0.1, True), (NAMING - 0.1, False)])
-def test_statistics_rule_out_what_something_else_explains_better(authority, step, ruled_out):
-    fdi = new_fdi()
-    fie, fdi["config"]["authority"] = told(fdi, 0.0, step), authority
-    assert whole.rules_out(fdi, fie, True) == ruled_out
-    fdi["statistical"]["tests"]["enabled"] = 0
-    assert not whole.rules_out(fdi, fie, True)
-    fdi["statistical"]["tests"]["enabled"], fdi["config"]["authority"] = 1, WORST_CASE
-    assert not whole.rules_out(fdi, fie, True)
+EITHER_OR_STATISTICS = (("published", "either"), ("published", "statistical"))
 
 
-@pytest.mark.parametrize(("detected_at_s", "ruled_out"), [(-1.0, False), (0.0, True), (2.5, True)])
-def test_statistics_that_have_raised_no_alarm_rule_out_nothing(detected_at_s, ruled_out):
+@pytest.mark.parametrize("row", EITHER_OR_STATISTICS)
+@pytest.mark.parametrize(("step", "excluded"), [(NAMING + 0.1, True), (NAMING - 0.1, False)])
+def test_statistics_exclude_what_something_else_explains_better(row, step, excluded):
     fdi = new_fdi()
-    fie, fdi["config"]["authority"] = told(fdi, 0.0, NAMING + 0.1), EITHER
+    told(fdi, 0.0, step)
+    assert excludes(fdi, row) == excluded
+    assert not excludes(fdi, ("published", "worst-case"))
+
+
+@pytest.mark.parametrize(("detected_at_s", "excluded"), [(-1.0, False), (0.0, True), (2.5, True)])
+@pytest.mark.parametrize("row", EITHER_OR_STATISTICS)
+def test_statistics_that_have_raised_no_alarm_exclude_nothing(row, detected_at_s, excluded):
+    fdi = new_fdi()
+    told(fdi, 0.0, NAMING + 0.1)
     fdi["statistical"]["alarm"]["detected_at_s"] = detected_at_s
-    assert whole.rules_out(fdi, fie, True) == ruled_out
+    assert excludes(fdi, row) == excluded
 
 
 @pytest.mark.parametrize("abrupt", [0, 1])
-def test_a_loss_that_has_shown_is_not_ruled_out_by_what_comes_later(abrupt):
+def test_a_loss_that_has_shown_is_not_excluded_by_what_comes_later(abrupt):
     """That may be its end; one that is declared to stay has none."""
     fdi = new_fdi()
     fie, fdi["config"]["abrupt"] = told(fdi, 20.0, 0.0), abrupt
-    assert not whole.rules_out(fdi, fie, True)
+    assert not excludes(fdi, ("published", "either"))
     assert fie["shown"] == (not abrupt)
     told(fdi, 0.0, 90.0)
-    assert whole.rules_out(fdi, fie, True) == bool(abrupt)
+    assert excludes(fdi, ("published", "either")) == bool(abrupt)
 
 
 def doubtful(kind=LOSS, **switches):
@@ -316,11 +327,28 @@ def test_errors_of_a_surfaces_own_terms_widen_the_room_of_its_position(kind, err
 
 
 def test_every_type_starts_with_no_knowledge_of_any_surface():
-    for every_type in (0, 1):
+    for (fault_class, _), row in fault_classes.ROWS.items():
         fdi = new_fdi()
-        fdi["config"]["every_type"], fdi["types"]["surface"]["evidence"]["frames"] = every_type, 7
-        on(scheme.begin_isolation, fdi, np.zeros(3))
-        assert fdi["types"]["surface"]["evidence"]["frames"].tolist() == [0 if every_type else 7] * 4
+        fdi["types"]["surface"]["evidence"]["frames"] = 7
+        row.begin(fdi)
+        assert fdi["types"]["surface"]["evidence"]["frames"].tolist() == [7 * (fault_class != "all")] * 4
+
+
+def test_the_row_of_a_fault_class_follows_from_the_detectors_in_authority():
+    """Without the statistical detector the worst case alone excludes; of types it always does."""
+    rows = list(fault_classes.ROWS)
+    for of, statistical, authority, row in (
+        ("published", None, "either", ("published", "worst-case")),
+        ("published", {}, "either", ("published", "either")),
+        ("published", {}, "worst-case", ("published", "worst-case")),
+        ("published", {}, "statistical", ("published", "statistical")),
+        ("all", None, "either", ("all", "worst-case")),
+        ("all", {}, "statistical", ("all", "either")),
+        ("all", {}, "worst-case", ("all", "worst-case")),
+    ):
+        config = FdiConfig(fault_class=of, statistical=statistical, authority=authority)
+        assert rows[fault_classes.place_of(config)] == row
+    assert rows[fault_classes.PUBLISHED] == ("published", "worst-case")
 
 
 @pytest.mark.parametrize(
@@ -329,14 +357,10 @@ def test_every_type_starts_with_no_knowledge_of_any_surface():
 )
 def test_a_frame_is_shown_to_every_type_alone_or_in_its_block(length, started, memory, frame, filled):
     fdi = new_fdi()
-    (
-        fdi["config"]["every_type"],
-        fdi["isolation"]["config"]["memory"],
-        fdi["types"]["config"]["length"],
-        fdi["types"]["config"]["span_s"],
-    ) = 1, memory, length, 0.1
+    fdi["isolation"]["config"]["memory"] = memory
+    fdi["types"]["config"]["length"], fdi["types"]["config"]["span_s"] = length, 0.1
     fdi["layout"]["position_of"], fdi["layout"]["loss_of"] = range(4), range(4)
-    fdi["layout"]["dominant_axis"], fdi["config"]["authority"] = (0, 1, 2, 1), WORST_CASE
+    fdi["layout"]["dominant_axis"] = (0, 1, 2, 1)
     (
         fdi["isolation"]["config"]["n"],
         fdi["types"]["config"]["patience"],
@@ -346,7 +370,8 @@ def test_a_frame_is_shown_to_every_type_alone_or_in_its_block(length, started, m
     for s, fie in enumerate(fdi["isolation"]["estimator"][:4]):
         fie["kind"], fie["surface"], fie["low"], fie["high"] = POSITION, s, -1.0, 1.0
         fie["effect"]["Z"] = np.eye(3)[(0, 1, 2, 1)[s]]
-    whole.isolate(fdi, np.zeros(3), 1.0, started)
+    measured = np.zeros(1, MEASURED).view(np.recarray)[0]
+    fault_classes.ROWS["all", "worst-case"].isolate(fdi, measured, 1.0, started)
     assert (fdi["types"]["frame"], fdi["types"]["block"]["filled"]) == (frame, filled)
 
 

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from kernels import new_fdi
 
 from beaver_ftc.diagnosis.conclusion import MAX_WITHDRAWN, note_name
+from beaver_ftc.diagnosis.scheme import note_named_surfaces
 from beaver_ftc.diagnosis.state import NOT_ISOLATED
-from beaver_ftc.loop.frame import note_names
 
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)
 
@@ -52,27 +52,20 @@ def test_every_spell_of_a_name_is_kept_and_of_too_many_the_latest(frames):
 
 
 @pytest.mark.parametrize(
-    ("every_type", "pair", "alarmed", "beside", "named"),
-    [
-        (0, 0, 0, 0, [ELEVATOR]),
-        (1, 0, 0, 0, [ELEVATOR]),
-        (1, 1, 0, 0, [AILERON, RUDDER]),
-        (0, 1, 0, 0, [ELEVATOR]),
-        (1, 1, 1, 0, []),
-        (1, 1, 1, 1, [AILERON, RUDDER]),
-    ],
+    ("pair", "alarmed", "beside", "named"),
+    [(0, 0, 0, [ELEVATOR]), (1, 0, 0, [AILERON, RUDDER]), (1, 1, 0, []), (1, 1, 1, [AILERON, RUDDER])],
 )
-def test_which_surfaces_are_named(every_type, pair, alarmed, beside, named):
+def test_which_surfaces_are_named(pair, alarmed, beside, named):
     """The one isolated, those of a pair, and none where an instrument has been found instead."""
     fdi = nameless()
     fdi["verdict"]["isolated"], fdi["types"]["surface"]["status"]["named"][[AILERON, RUDDER]] = ELEVATOR, 1
-    fdi["config"]["every_type"], fdi["types"]["pair"]["enabled"] = every_type, pair
+    fdi["types"]["pair"]["enabled"] = pair
     fdi["watch"]["config"]["enabled"], fdi["watch"]["output"]["alarmed"], fdi["watch"]["output"]["beside"] = (
         1,
         alarmed,
         beside,
     )
-    note_names(fdi, 2.5)
+    note_named_surfaces(fdi, 2.5)
     since = np.full(4, -1.0)
     since[named] = 2.5
     assert fdi["verdict"]["named_from_s"].tolist() == since.tolist()

@@ -36,7 +36,7 @@ def frame():
     """A frame with a detector and a law, of a flight that has a scheme and a law of those names."""
     keys = {"fdi": {"scheme": "augmented-ekf"}, "control": {"law": "nominal", "options": {}}}
     loop = Loop(_scenario(**keys), Answers(Verdict()), Answers(np.zeros(4)))
-    return loop.plugin_frame, loop.frames[0]["verdict"]
+    return loop.plugin_frame, loop.frames[0]["fdi"]["plugin_verdict"]
 
 
 @pytest.mark.parametrize(
@@ -188,7 +188,7 @@ def test_who_fails_in_flight_is_blamed_and_when(detector, law, blamed):
 def test_every_stage_is_called_as_machine_code():
     """A dispatcher would look up the type of the record at each call: thirty times a frame's time."""
     for detector, law, called in (
-        (Answers(Verdict()), None, {"begin", "take_verdict", "decide", "command", "finish"}),
+        (Answers(Verdict()), None, {"begin", "diagnose", "decide", "command", "finish"}),
         (None, Answers(np.zeros(4)), {"begin", "diagnose", "decide", "take_command", "finish"}),
     ):
         loop = Loop(_scenario(duration_s=0.1), detector, law)

@@ -1,29 +1,24 @@
 """What joins stages of the diagnosis, a few of them at a time; the frame (loop/frame.py) joins them all.
 
-conclusion: of `conclusion_dtype`; estimators: those of the isolation; bank, types, layout: records of their
-stages. k: number of the diagnosis' frame; t s.
+fdi: of `diagnosis_dtype`; t s.
 """
 
 import numpy as np
 
-from beaver_ftc.compiled import apart, kernel, record, sized
-from beaver_ftc.design.model import AIRSPEED
+from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.diagnosis import conclusion as conclusions
 from beaver_ftc.diagnosis import state, zhang2005
-from beaver_ftc.diagnosis.belief import air
 from beaver_ftc.diagnosis.bounds import admitted
 from beaver_ftc.diagnosis.bounds.worst_case import bound_dtype
-from beaver_ftc.diagnosis.detection import bank, fdae, forces, statistical
+from beaver_ftc.diagnosis.detection import bank, fdae, statistical
 from beaver_ftc.diagnosis.detection.bank import largest_share
 from beaver_ftc.diagnosis.detection.parity import USUAL, Size
 from beaver_ftc.diagnosis.isolation import estimators
-from beaver_ftc.diagnosis.isolation.estimators import start
-from beaver_ftc.diagnosis.monitors import engine_symmetry
+from beaver_ftc.diagnosis.monitors import engine_symmetry, sensor_monitor
 from beaver_ftc.diagnosis.monitors.sensor_records import WATCH
-from beaver_ftc.diagnosis.state import (
-    STATISTICS,
-)
-from beaver_ftc.diagnosis.types import examine, pairs, registry, verdict
+from beaver_ftc.diagnosis.schemes import fault_classes
+from beaver_ftc.diagnosis.state import STATISTICS
+from beaver_ftc.diagnosis.types import registry
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.pairs import pairs_refused
@@ -39,6 +34,7 @@ def diagnosis_dtype(n: int, size: Size = USUAL) -> np.dtype:
         isolation=estimators.isolation_dtype(n),
         types=registry.types_dtype(n), statistical=statistical.statistical_dtype(size), watch=WATCH,
         published=zhang2005.PUBLISHED, engines=engine_symmetry.ENGINES,
+        plugin_verdict=state.verdict_dtype(n),
     )  # fmt: skip
 
 
@@ -47,6 +43,7 @@ def configure(fdi: np.void, belief: np.void, scenario: Scenario, travel: np.ndar
     config, aircraft, dt = scenario.fdi, scenario.airframe, 1.0 / scenario.rate_hz
     members = estimators.members_of(config.fault_class, aircraft)
     state.configure(fdi["config"], scenario)
+    fdi["config"]["fault_class"] = fault_classes.place_of(config)
     state.configure_layout(fdi["layout"], members, aircraft)
     estimators.configure(fdi["isolation"], scenario, members, travel)
     if config.pairs:
@@ -70,52 +67,32 @@ def _check_pairs(scenario: Scenario) -> None:
 
 
 @kernel
-def begin_isolation(isolation, types, every_type, noise, x):
-    """Begin, at the measured x (3,) rad/s, with no knowledge of any fault; noise as in `isolation.start`."""
-    start(isolation, noise, x)
-    if every_type:
-        examine.start(types)
-
-
-@apart
-def isolate_type(types, conclusion, layout, isolation, bank, bound, t, started):
-    """Of faults of every type, alone or two at a time, decide which it is."""
-    estimators = isolation.estimator
-    verdict.note_refuted(types.surface, layout, estimators)
-    if types.pair.enabled:
-        pairs.examine(types, layout, estimators, bank, bound.frame)
-        conclusions.note_type(conclusion, pairs.decide(types, conclusion, layout, t))
-        return
-    if started or isolation.config.memory:
-        examine.examine(types, layout, estimators, bank.output.innovation, bound)
-    conclusions.note_type(conclusion, verdict.decide(types, conclusion, layout, estimators, t))
+def begin_filters(fdi, x):
+    """Begin the detection filters at the first measurement x (3,) rad/s."""
+    fdae.begin(fdi.fdae, fdi.bound.noise, x)
+    bank.begin(fdi.bank, fdi.bound.noise)
 
 
 @kernel
-def see_air(seen, inertial, felt, belief, measured, k, dt):
-    """Take in the air as the vanes see it, and what the accelerometers say of it (forces.py)."""
-    if seen.output.moving:
-        air.reach_height(seen, measured.altitude)
-        air.follow(seen, measured.y, measured.attitude, belief.share * dt, k)
-    if (felt.known or seen.output.read) and not measured.inertial:
-        forces.do_without(felt, seen, inertial)
-    if felt.known or seen.output.read:
-        air.take_force(seen, measured.force)
-    if felt.known:
-        weigh_forces(seen, inertial, felt, belief, measured, k, dt)
+def predict_estimators(fdi, belief):
+    """Bring the isolation estimators from the frame before to this one, once the bank has its innovation."""
+    config, bound, records, mean = fdi.config, fdi.bound, fdi.isolation, belief.means
+    known = fdi.verdict.detected
+    estimators.suppose_all(records, fdi.bank, bound, config, known, mean.G, mean.Gu, mean.Gu_spread)
+    if known:
+        estimators.predict_all(records, bound, belief.x_then, mean.acceleration, config.dt)
 
 
 @kernel
-def weigh_forces(seen, inertial, felt, belief, measured, k, dt):
-    """Take in what the accelerometers say, and the air as it follows from them without the vanes."""
-    forces.look(felt, seen, measured, belief.u, dt)
-    if inertial.output.moving:
-        forces.without_vanes(felt, inertial.memory.rotation, measured.y)
-        air.take_force(inertial, measured.force)
-        air.reach_height(inertial, measured.altitude)
-        air.follow(inertial, felt.y, measured.attitude, dt, k)
-        air.effect(inertial, belief.design, measured.x, felt.y, belief.u)
-        air.begin_frame(inertial, felt.y[AIRSPEED], dt)
+def note_named_surfaces(fdi, t):
+    """Record at t s which surfaces are named: those of a pair, or the isolated one; none once a sensor is
+    found broken."""
+    found, watch = fdi.verdict, fdi.watch
+    void = sensor_monitor.speaks(watch) and not watch.output.beside
+    only = conclusions.isolated_surface(found, fdi.isolation.estimator)
+    for s in range(fdi.types.surface.size):
+        named = fdi.types.surface[s].status.named if fdi.types.pair.enabled else s == only
+        conclusions.note_name(found, s, named and not void, t)
 
 
 @kernel

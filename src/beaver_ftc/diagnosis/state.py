@@ -36,10 +36,14 @@ def layout_dtype(n: int) -> np.dtype:
     )  # fmt: skip
 
 
-# What several stages go by. scheme: place of its kernels (schemes/rows.py); authority: whose alarms count;
-# every_type: faults of every type; abrupt: a fault is declared to stay as it is; instants: of JSBSim, in a
-# frame; dt s.
-CONFIG = record(enabled=int, scheme=int, authority=int, every_type=int, abrupt=int, instants=int, dt=float)
+# What several stages go by. enabled: a compiled scheme diagnoses; scheme: place of its kernels
+# (schemes/rows.py); fault_class: place of the class's (schemes/fault_classes.py); authority: whose alarms
+# count; every_type: faults of every type; abrupt: a fault is declared to stay as it is; instants: of JSBSim,
+# in a frame; dt s.
+CONFIG = record(
+    enabled=int, scheme=int, fault_class=int, authority=int, every_type=int, abrupt=int, instants=int,
+    dt=float,
+)  # fmt: skip
 
 
 def configure(shared: np.void, scenario: Scenario) -> None:

@@ -11,7 +11,6 @@ from beaver_ftc.diagnosis.assessment import assessment_dtype
 from beaver_ftc.diagnosis.belief import expectation
 from beaver_ftc.diagnosis.detection.parity import USUAL, Size, size_for
 from beaver_ftc.diagnosis.isolation.estimators import estimator_names
-from beaver_ftc.diagnosis.state import verdict_dtype
 from beaver_ftc.loop import instrument_records, memory
 from beaver_ftc.loop.accounts import accounts_dtype, true_faults_dtype
 from beaver_ftc.plant import channels as ch
@@ -35,7 +34,7 @@ def frame_dtype(n: int, size: Size = USUAL, line: int = USUAL_LINE) -> np.dtype:
         running=RUNNING,
         since=int, logged=LOGGED,  # the frame with which this diagnosis has begun
         truth=truth_dtype(n), instruments=instruments_dtype(line), measured=MEASURED,
-        belief=expectation.belief_dtype(n), fdi=scheme.diagnosis_dtype(n, size), verdict=verdict_dtype(n),
+        belief=expectation.belief_dtype(n), fdi=scheme.diagnosis_dtype(n, size),
         assessment=assessment_dtype(n), faults=true_faults_dtype(n), supervisor=SUPERVISOR,
         control=control.control_dtype(n), autopilot=AUTOPILOT,
         held=int, held_rad=n,  # whether another than the law commands, and what

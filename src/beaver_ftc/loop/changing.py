@@ -145,4 +145,4 @@ def take_diagnosis(frame: np.void, new: np.void, k: int) -> None:
     for air in ("air", "inertial_air"):
         other["statistical"][air]["config"]["in_flight"] = k > 0
     other["statistical"]["alarm"]["closest"] = fdi["statistical"]["alarm"]["closest"]
-    frame["fdi"], frame["verdict"], frame["since"] = other, new["verdict"], k
+    frame["fdi"], frame["since"] = other, k

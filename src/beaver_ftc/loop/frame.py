@@ -18,28 +18,23 @@ from beaver_ftc.compiled import apart, kernel
 from beaver_ftc.control import allocation, power, reference, supervisor
 from beaver_ftc.control.laws import table
 from beaver_ftc.control.outer.autopilot import judge, steer
-from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, unanticipated_pitch
 from beaver_ftc.diagnosis import assessment as assessed
-from beaver_ftc.diagnosis import conclusion, scheme
+from beaver_ftc.diagnosis import conclusion
 from beaver_ftc.diagnosis.assessment import assess, assess_unknown
-from beaver_ftc.diagnosis.belief import air
 from beaver_ftc.diagnosis.belief.expectation import (
     begin_frame,
     expect,
     follow_command,
-    foresee,
-    form_innovation,
     look,
     look_back,
     respond,
 )
-from beaver_ftc.diagnosis.detection import bank, fdae, parity, statistical
-from beaver_ftc.diagnosis.detection.signatures import sign_blocks
-from beaver_ftc.diagnosis.isolation import by_chance, estimators
+from beaver_ftc.diagnosis.detection import bank, fdae, statistical
 from beaver_ftc.diagnosis.monitors import engine_symmetry, sensor_monitor
+from beaver_ftc.diagnosis.scheme import note_named_surfaces
 from beaver_ftc.diagnosis.schemes import table as schemes
-from beaver_ftc.diagnosis.state import PITCH, STATISTICS, WORST_CASE
-from beaver_ftc.diagnosis.types import examine, verdict
+from beaver_ftc.diagnosis.state import PITCH
+from beaver_ftc.diagnosis.types import verdict
 from beaver_ftc.loop import accounts, log_row
 from beaver_ftc.loop.log_row import put
 from beaver_ftc.plant import channels as ch
@@ -104,163 +99,25 @@ def begin(frame):
 
 
 @kernel
-def begin_filters(fdi, x):
-    """Begin the detection filters at the first measurement x (3,) rad/s."""
-    fdae.begin(fdi.fdae, fdi.bound.noise, x)
-    bank.begin(fdi.bank, fdi.bound.noise)
-
-
-@kernel
 def diagnose(frame):
-    """The built-in diagnosis, from prediction to verdict; with scheme `none`, nothing is concluded."""
-    fdi, k = frame.fdi, frame.k - frame.since
+    """The diagnosis, from prediction to verdict, by the kernels of the scheme in charge.
+
+    The faults that the law already takes into account are expected: they are no innovation.
+    """
+    fdi, belief, measured, k = frame.fdi, frame.belief, frame.measured, frame.k - frame.since
+    scheme, every_type, applied = fdi.config.scheme, fdi.config.every_type, frame.control.surfaces.output
+    engine_symmetry.disable_if_differential_thrust(fdi.engines, frame.control.power.output.command[1:])
     if k == 0:
-        begin_filters(fdi, frame.measured.x)
-    if fdi.config.enabled:
-        if k > 0:
-            predict(frame, k)
-        else:
-            bank.align(fdi.isolation, frame.belief.G)
-        differences = frame.control.power.output.command[1:]
-        engine_symmetry.disable_if_differential_thrust(fdi.engines, differences)
-        conclude(fdi, frame.belief, frame.measured, frame.t)
-    make_ready(frame, k)
-
-
-@kernel
-def take_verdict(frame):
-    """Take a plug-in's verdict, which is in frame.verdict, in place of the built-in diagnosis; the estimator
-    that serves the laws is brought up to date."""
-    fdi, measured, k = frame.fdi, frame.measured, frame.k - frame.since
-    if k == 0:
-        begin_filters(fdi, measured.x)
+        schemes.begin(scheme, fdi, belief, measured)
     else:
-        predict(frame, k)
-    fdae.form_residual(fdi.fdae, measured.x)
-    conclusion.note_plugin(fdi.verdict, frame.verdict, frame.t)
-    estimators.take_estimate(fdi.isolation, fdi.verdict.isolated, frame.verdict.theta)
-    if fdi.verdict.detected:
-        fdae.evaluate(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
-    make_ready(frame, k)
-
-
-@kernel
-def predict(frame, k):
-    """Bring the estimators from the frame before to this one; k: number of the diagnosis' frame.
-
-    What the law takes each surface for is expected: what is known of a fault is no surprise.
-    """
-    fdi, belief, chances, surfaces = frame.fdi, frame.belief, frame.fdi.statistical, frame.control.surfaces
-    config, bound, found, dt = fdi.config, fdi.bound, fdi.verdict, fdi.config.dt
-    x, x_then, mean = frame.measured.x, belief.x_then, belief.means
-    bank.innovate(fdi.bank, bound, x, x_then, mean.acceleration, dt)
-    if chances.tests.enabled:
-        compare_likelihoods(frame, k)
-    known, spread = found.detected, mean.Gu_spread
-    estimators.suppose_all(fdi.isolation, fdi.bank, bound, config, known, mean.G, mean.Gu, spread)
-    if config.every_type:
-        examine.note_orders(fdi.types, belief.commanded, mean)
-    if known:
-        estimators.predict_all(fdi.isolation, bound, x_then, mean.acceleration, dt)
-    expect(belief, known, surfaces.output.effectiveness, surfaces.output.offset, config.every_type)
-    if chances.tests.enabled:
-        form_innovation(belief, x, dt)
-        statistical.follow_rest(chances.block, chances.air, belief.innovation_after_known_faults, dt)
-    schemes.predict(config.scheme, fdi, belief)
-
-
-@apart
-def compare_likelihoods(frame, k):
-    """Show the statistical detector the elapsed frame."""
-    fdi, belief, chances, y = frame.fdi, frame.belief, frame.fdi.statistical, frame.measured.y
-    tests, noise, blocks, felt = chances.tests, chances.noise, chances.block, chances.forces
-    seen, inertial, views = chances.air, chances.inertial_air, chances.views[: chances.n_views]
-    mean, innovation, dt = belief.means, fdi.bank.output.innovation, fdi.config.dt
-    air.elapse(seen, belief.share)
-    if inertial.output.moving:
-        air.elapse(inertial, belief.share)
-    foresee(mean)
-    sign_blocks(blocks, mean.Gu_foreseen, unanticipated_pitch(belief.design, y, 1.0))
-    latched, ends = chances.alarm.detected_at_s >= 0.0, not fdi.config.abrupt
-    statistical.observe(tests, noise.bounded, blocks, seen, innovation, dt, k, latched, ends)
-    parity.face(views, felt, seen, fdi.bound, mean.G_foreseen, mean.Gu_foreseen)
-    parity.compose(views, tests.tolerated, noise, blocks, felt, seen, inertial, innovation, y[AIRSPEED])
-    parity.observe(views, tests, chances.listening, y, dt, k, latched)
-    known = fdi.bound.error_map.outside == 0
-    statistical.score(chances.alarm, tests, blocks, views, felt, seen, frame.t, known)
-
-
-@kernel
-def conclude(fdi, belief, measured, t):
-    """From residuals to alarm, and from then on to a verdict.
-
-    Where instruments are watched, a surface waits a frame after the alarm: that much later the attitude shows
-    what a gyro did; a blurred one, later. Once it or an engine is found broken, no surface is named.
-    """
-    if sensor_monitor.speaks(fdi.watch):
-        return
-    known, every_type = fdi.verdict.detected, fdi.config.every_type
-    fdae.form_residual(fdi.fdae, measured.x)
-    schemes.detect(fdi.config.scheme, fdi, belief, measured, t)
-    if not fdi.verdict.detected:
-        return
-    if not known:
-        scheme.begin_isolation(fdi.isolation, fdi.types, every_type, fdi.bound.noise, measured.x)
-    sound = not sensor_monitor.shown_from_the_start(fdi.watch, fdi.verdict.detected_at_s)
-    if sound and sensor_monitor.clears_surfaces(fdi.watch, known) and not fdi.engines.output.failed:
-        isolate(fdi, measured.x, t, known)
-    schemes.evaluate(fdi.config.scheme, fdi, measured)
-
-
-@kernel
-def isolate(fdi, x, t, started):
-    """Test every estimator against the measured x (3,) rad/s, and decide; started: a frame or more ago."""
-    config, records, bound = fdi.config, fdi.isolation, fdi.bound
-    for s in range(records.config.n):
-        fie = records.estimator[s]
-        can_be = estimators.possible(records, fie, fdi.bank, bound.frame, config.abrupt, x, started)
-        if rules_out(fdi, fie, can_be):
-            estimators.exclude(fie, t)
-    if config.every_type:
-        scheme.isolate_type(fdi.types, fdi.verdict, fdi.layout, records, fdi.bank, bound, t, started)
-    else:
-        conclusion.note_isolated(fdi.verdict, estimators.decide(records, t), t)
-
-
-@kernel
-def rules_out(fdi, fie, within):
-    """Whether a fault is excluded by those in authority; `within`: it is possible in the worst case.
-
-    Of faults of every type the sets know the course; chance, which axes are moved. Within the class, chance
-    that has raised no alarm has nothing to say about the alarm of the sets.
-    """
-    config, chances, layout, estimators = fdi.config, fdi.statistical, fdi.layout, fdi.isolation.estimator
-    tests = chances.tests
-    if config.authority == WORST_CASE or (config.every_type and not within):
-        return not within
-    if config.every_type:
-        column, views = estimators[layout.position_of[fie.surface]].effect.Z, chances.views[: chances.n_views]
-        felt, seen = chances.forces, chances.air
-        return tests.enabled and parity.excludes(views, tests, felt, seen, fie.surface, column)
-    if config.authority != STATISTICS and not within:
-        return True
-    if not tests.enabled or chances.alarm.detected_at_s < 0.0:
-        return False
-    hidden = fdi.watch.config.enabled and chances.air.output.moving
-    by_chance.weigh(fie, tests, chances.block, fdi.isolation, layout.loss_of, config.abrupt, hidden)
-    return fie.improbable == 1
-
-
-@kernel
-def make_ready(frame, k):
-    """Make ready for the frame to come: begin its sums, and put where the law reads it what is concluded."""
-    fdi, belief = frame.fdi, frame.belief
-    if fdi.statistical.tests.enabled:
-        look_ahead(frame, k)
-    begin_frame(belief, fdi.bound, fdi.layout, fdi.config.every_type, frame.measured)
+        expect(belief, fdi.verdict.detected, applied.effectiveness, applied.offset, every_type)
+        schemes.predict(scheme, fdi, belief, measured, k, frame.t)
+    schemes.conclude(scheme, fdi, belief, measured, frame.t)
+    note_named_surfaces(fdi, frame.t)
+    schemes.prepare(scheme, fdi, belief, measured, k)
+    begin_frame(belief, fdi.bound, fdi.layout, every_type, measured)
     accounts.follow_guarantee(frame.accounts.guarantee, fdi.bank, fdi.config.dt, belief.share, k, frame.t)
     assess_faults(frame)
-    note_names(fdi, frame.t)
 
 
 @kernel
@@ -273,39 +130,10 @@ def assess_faults(frame):
 
 
 @kernel
-def note_names(fdi, t):
-    """Note which surfaces are named: those of a pair, or the one isolated; none once an instrument is found
-    broken."""
-    pairs, void = fdi.config.every_type and fdi.types.pair.enabled, sensor_monitor.speaks(fdi.watch)
-    only = conclusion.isolated_surface(fdi.verdict, fdi.isolation.estimator)
-    for s in range(fdi.types.surface.size):
-        named = fdi.types.surface[s].status.named if pairs else s == only
-        conclusion.note_name(fdi.verdict, s, named and not (void and not fdi.watch.output.beside), t)
-
-
-@apart
-def look_ahead(frame, k):
-    """Ready the statistical detector for the next frame: the air as it is seen, noise, coefficients."""
-    fdi, belief, measured, chances = frame.fdi, frame.belief, frame.measured, frame.fdi.statistical
-    tests, noise, seen, dt = chances.tests, chances.noise, chances.air, fdi.config.dt
-    scheme.see_air(seen, chances.inertial_air, chances.forces, belief, measured, k, dt)
-    statistical.prepare(tests, noise, chances.block, seen, fdi.bound, belief.design, measured, belief.u, dt)
-
-
-@apart
-def look_at_air(frame):
-    """Take in the gust that the vanes see by now, and what it does."""
-    fdi, belief, measured, chances = frame.fdi, frame.belief, frame.measured, frame.fdi.statistical
-    tests, noise, seen, dt = chances.tests, chances.noise, chances.air, belief.share * fdi.config.dt
-    statistical.look(tests, noise, chances.block, seen, fdi.bound, belief.design, measured, belief.u, dt)
-
-
-@kernel
 def look_on(frame):
     """Take in an instant inside a frame: what is believed of it, and the gust that the vanes see by then."""
     fdi = frame.fdi
-    if fdi.statistical.tests.enabled:
-        look_at_air(frame)
+    schemes.accumulate(fdi.config.scheme, fdi, frame.belief, frame.measured)
     look(frame.belief, fdi.bound, fdi.layout, fdi.config.every_type, frame.measured)
 
 

@@ -1,8 +1,9 @@
 """A frame in which a plug-in diagnoses or commands: its answers are checked, and errors name it.
 
-    begin -> diagnose | take_verdict -> decide -> command | take_command -> finish
+    begin -> diagnose -> decide -> command | take_command -> finish
 
-are the stages of frame.py; left of a bar: built in, right of it: a plug-in's answer.
+are the stages of frame.py; left of the bar: built in, right of it: a plug-in's answer. A plug-in's verdict is
+taken by `diagnose` (diagnosis/schemes/plugged.py).
 """
 
 from collections.abc import Callable, Mapping
@@ -17,6 +18,7 @@ from beaver_ftc.control.laws.rows import has_kernels, row_of
 from beaver_ftc.design.context import Context, DesignFunctions
 from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
 from beaver_ftc.diagnosis.bounds.variances import variances_of
+from beaver_ftc.diagnosis.schemes.fault_classes import PUBLISHED
 from beaver_ftc.diagnosis.schemes.rows import PLUGGED
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.documents.errors import BeaverFtcError, SimulationFailed
@@ -115,12 +117,10 @@ class PluginFrame:
 
     def _diagnose(self, frames: np.ndarray, measured: Measured) -> None:
         frame = frames[0]
-        if self.detector is None:
-            self._stage(stages.diagnose, frames)
-            return
-        answer = self._ask(self._names[0], self.detector.step, measured, frame["belief"]["u"].copy())
-        self.verdict = self._checked(answer, frame["verdict"])
-        self._stage(stages.take_verdict, frames)
+        if self.detector is not None:
+            answer = self._ask(self._names[0], self.detector.step, measured, frame["belief"]["u"].copy())
+            self.verdict = self._checked(answer, frame["fdi"]["plugin_verdict"])
+        self._stage(stages.diagnose, frames)
 
     def _command(self, frames: np.ndarray, commanded: np.ndarray, measured: Measured) -> None:
         frame = frames[0]
@@ -261,7 +261,8 @@ def plugged(
         fdi = frames["fdi"][0]
         fdi["config"]["enabled"] = fdi["config"]["every_type"] = fdi["isolation"]["config"]["n"] = 0
         fdi["statistical"]["tests"]["enabled"] = fdi["watch"]["config"]["enabled"] = 0
-        fdi["config"]["scheme"] = PLUGGED
+        fdi["config"]["scheme"], fdi["config"]["fault_class"] = PLUGGED, PUBLISHED
+        fdi["types"]["pair"]["enabled"] = 0
         n = fdi["types"]["surface"].size
         fdi["isolation"]["estimator"]["surface"][:n] = range(n)
     control = frames["control"][0]

@@ -35,14 +35,8 @@ def begin(frames):
 
 @kernel
 def diagnose(frames):
-    """The built-in diagnosis alone."""
+    """The diagnosis alone."""
     whole.diagnose(frames[0])
-
-
-@kernel
-def take_verdict(frames):
-    """In its place a plug-in's."""
-    whole.take_verdict(frames[0])
 
 
 @kernel

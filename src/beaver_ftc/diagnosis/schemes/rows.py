@@ -3,8 +3,9 @@
 from beaver_ftc.plugins import DETECTORS, compiled_rows
 
 _ROWS = compiled_rows(DETECTORS)
-MODULES = tuple(dict.fromkeys(row["kernels"] for row in _ROWS.values()))  # in the order of their places
-PLUGGED = 0  # the place of the kernels that serve the laws while a plug-in diagnoses
+_PLUGGED = f"{__package__}.plugged"  # of all schemes that are Python plug-ins
+MODULES = (*dict.fromkeys(row["kernels"] for row in _ROWS.values()), _PLUGGED)  # in the order of their places
+PLUGGED = MODULES.index(_PLUGGED)
 
 
 def place_of(name: str) -> int:

@@ -8,6 +8,8 @@ from beaver_ftc.diagnosis.schemes.rows import MODULES
 
 SCHEMES: tuple[CompiledScheme, ...] = tuple(import_module(module).SCHEME for module in MODULES)
 
+begin = one_of([scheme.begin for scheme in SCHEMES])
 predict = one_of([scheme.predict for scheme in SCHEMES])
-detect = one_of([scheme.detect for scheme in SCHEMES])
-evaluate = one_of([scheme.evaluate for scheme in SCHEMES])
+conclude = one_of([scheme.conclude for scheme in SCHEMES])
+prepare = one_of([scheme.prepare for scheme in SCHEMES])
+accumulate = one_of([scheme.accumulate for scheme in SCHEMES])

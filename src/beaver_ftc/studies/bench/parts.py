@@ -53,7 +53,8 @@ PARTS: dict[str, dict[str, Kernel]] = {
     "fies": {
         "diagnosis.isolation.estimators.suppose_all": nothing,
         "diagnosis.isolation.estimators.predict_all": nothing,
-        "diagnosis.isolation.estimators.start": nothing, "loop.frame.isolate": nothing,
+        "diagnosis.isolation.estimators.start": nothing,
+        "diagnosis.schemes.fault_classes.isolate_fault": nothing,
     },
     # the bound on the uncertainty, and every threshold that follows from it
     "thresholds": {

@@ -35,15 +35,16 @@ class Cost:
 
     def __init__(self, folder: Path) -> None:
         self._file = (folder / f"{os.getpid()}.jsonl").open("a", encoding="utf-8")
-        self._inner = [0.0]  # what the parts inside the present one took, at each depth
+        self._inner = [(0.0, 0.0)]  # processor and clock of the parts inside the present one, at each depth
         self._started = 0
         sys.addaudithook(self._count)
 
     def _count(self, event: str, _: Any) -> None:
         self._started += event == "subprocess.Popen"
 
-    def _write(self, kind: str, name: str, seconds: float, started: int = 0) -> None:
-        row = {"kind": kind, "name": name, "seconds": round(seconds, 3), "started": started}
+    def _write(self, kind: str, name: str, seconds: float, clock: float = 0.0, started: int = 0) -> None:
+        row = {"kind": kind, "name": name, "seconds": round(seconds, 3), "clock": round(clock, 3)}
+        row |= {"started": started, "end": round(time.time(), 3)}
         self._file.write(json.dumps(row) + "\n")
         self._file.flush()
 
@@ -72,15 +73,16 @@ class Cost:
     @contextmanager
     def _measured(self, kind: str, name: str) -> Iterator[None]:
         """Write down what is done within this, without the measured parts inside it."""
-        start, started = _now(), self._started
-        self._inner.append(0.0)
+        start, begin, started = _now(), time.monotonic(), self._started
+        self._inner.append((0.0, 0.0))
         try:
             yield
         finally:
-            whole = _now() - start
-            own = whole - self._inner.pop()
-            self._inner[-1] += whole
-            self._write(kind, name, own, self._started - started)
+            whole, clock = _now() - start, time.monotonic() - begin
+            inner, inner_clock = self._inner.pop()
+            outer, outer_clock = self._inner[-1]
+            self._inner[-1] = outer + whole, outer_clock + clock
+            self._write(kind, name, whole - inner, clock - inner_clock, self._started - started)
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_sessionstart(self) -> None:
@@ -97,7 +99,7 @@ class Cost:
         target.Kernel._compiled = measured
 
     def pytest_unconfigure(self) -> None:
-        self._write("rest", "rest", _now() - _BORN - self._inner[0])
+        self._write("rest", "rest", _now() - _BORN - self._inner[0][0])
 
 
 def pytest_configure(config: Any) -> None:
@@ -119,6 +121,15 @@ def tables(found: list[dict[str, Any]], longest: int) -> Iterator[str]:
         yield from _table(kind, [(row["name"], row) for row in found if row["kind"] == kind], longest)
     tests = [row for row in found if row["kind"] in ("test", "fixture")]
     yield from _table("file", [(row["name"].partition("::")[0], row) for row in tests], longest)
+    yield from _waits(found, longest)
+
+
+def _waits(found: list[dict[str, Any]], longest: int) -> Iterator[str]:
+    """Parts that take longer by the clock than of the processor: they wait, or the machine does something else."""
+    waits = sorted(found, key=lambda row: row["seconds"] - row["clock"])
+    yield f"\nwaiting: {sum(max(row['clock'] - row['seconds'], 0.0) for row in found):.0f} s"
+    for row in waits[:longest]:
+        yield f"{row['clock'] - row['seconds']:8.1f} s  {row['kind']}  {row['name']}"
 
 
 def _table(title: str, named: list[tuple[str, dict[str, Any]]], longest: int) -> Iterator[str]:

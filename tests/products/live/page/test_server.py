@@ -46,7 +46,7 @@ def opened(cockpit, cookie, origin=None, host=None):
     place = cockpit.home.split(str(cockpit.port))[1]
     return connect(
         f"{address}{place}socket", origin=origin or f"http://127.0.0.1:{cockpit.port}",
-        additional_headers=headers, max_size=None,
+        additional_headers=headers, max_size=None, max_queue=None,
     )  # fmt: skip
 
 

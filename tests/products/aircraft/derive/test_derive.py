@@ -386,7 +386,7 @@ SAME = ["elevator-partial-loss", "aileron-stuck", "rudder-stuck", "unanticipated
 
 
 @pytest.mark.parametrize("name", SAME)
-def test_the_built_in_aircraft_as_derived_has_the_same_verdicts(name, tmp_path_factory):
+def test_the_built_in_aircraft_as_derived_has_the_same_verdicts(name, tmp_path_factory, quick):
     """Its table written by hand, and the one found from its model: the same flights are judged the same."""
     folder = tmp_path_factory.getbasetemp() / "same-verdicts"
     if not folder.is_dir():

@@ -10,7 +10,7 @@ from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.detectors import detector_names
 from beaver_ftc_logs.recorded import benchmark, other_days
-from beaver_ftc_logs.recorded.benchmark import OURS, data_sets, run_benchmark
+from beaver_ftc_logs.recorded.benchmark import OURS, data_sets
 from products.logs import synthetic
 
 
@@ -28,8 +28,18 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def document(folder):
-    return run_benchmark(folder)
+def compared(folder, tmp_path_factory):
+    """(what the command says, the folder it writes to)."""
+    out = tmp_path_factory.mktemp("compared")
+    arguments = ["compare", "--flights", str(folder), "--out", str(out), "--format", "json"]
+    done = CliRunner().invoke(app, arguments)
+    assert done.exit_code == 0, done.output
+    return json.loads(done.stdout), out / "recorded-flights"
+
+
+@pytest.fixture(scope="module")
+def document(compared):
+    return compared[0]
 
 
 def test_every_method_has_a_row_and_ours_is_right(document):
@@ -92,14 +102,10 @@ def test_a_folder_without_flights_is_refused(tmp_path):
         data_sets(tmp_path / "none")
 
 
-def test_the_command_writes_both_files(folder, tmp_path):
-    done = CliRunner().invoke(
-        app, ["compare", "--flights", str(folder), "--out", str(tmp_path), "--format", "json"]
-    )
-    assert done.exit_code == 0, done.output
-    assert json.loads(done.stdout)["sets"][0]["set"] == "wing"
-    names = {path.name for path in (tmp_path / "recorded-flights").iterdir()}
-    assert names == {"flights.json", "flights.md", "flights.png"}
+def test_the_command_writes_both_files(compared):
+    document, out = compared
+    assert document["sets"][0]["set"] == "wing"
+    assert {path.name for path in out.iterdir()} == {"flights.json", "flights.md", "flights.png"}
 
 
 def _flight(failure, false_alarms=0, delay=None, right=True):

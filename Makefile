@@ -63,12 +63,12 @@ demo: $(VENV)/.demo
 # What most flights use is compiled while plain kernels are tried; the second run compiles what is missing.
 test: $(VENV)/.dev
 	$(BIN)/python tests/warm.py >/dev/null 2>&1 & NUMBA_DISABLE_JIT=1 $(PYTEST) -m "not nightly" $(PLAIN)
-	$(PYTEST) -m "not acceptance and not nightly" $(addprefix --ignore=,$(PLAIN))
+	$(PYTEST) -m "not nightly" $(addprefix --ignore=,tests/acceptance $(PLAIN))
 
 # Every test with all that it draws, what tests/nightly.yaml lists too; then drawn scenarios, mutants.
 nightly: $(VENV)/.dev
 	BEAVER_FTC_NIGHT=1 NUMBA_DISABLE_JIT=1 $(PYTEST) $(PLAIN)
-	BEAVER_FTC_NIGHT=1 $(PYTEST) -m "not acceptance" $(addprefix --ignore=,$(PLAIN))
+	BEAVER_FTC_NIGHT=1 $(PYTEST) $(addprefix --ignore=,tests/acceptance $(PLAIN))
 	BEAVER_FTC_NIGHT=1 $(MAKE) acceptance
 	$(MAKE) core-test
 	$(BIN)/python -m tools.drawn
@@ -95,7 +95,7 @@ cost: $(VENV)/.dev
 	$(BIN)/python benchmarks/flight_cost.py --rounds 8 --check benchmarks/ratios.json
 
 test-fast: $(VENV)/.dev
-	$(PYTEST) -m "not acceptance and not nightly" $(FAST)
+	$(PYTEST) -m "not nightly" $(FAST)
 
 # Compiled kernels and commands that tests start as processes are not seen: what is counted is Python in the tests.
 coverage: $(VENV)/.dev

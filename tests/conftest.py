@@ -23,6 +23,17 @@ settings.load_profile("repeatable")
 
 def pytest_configure(config):
     suite_cost.pytest_configure(config)
+    worker = getattr(config, "workerinput", {"workerid": "gw0"})["workerid"]
+    if config.args == ["tests"] and int(worker[2:]) % 2:
+        config.args = _from_the_other_end(config.getoption("ignore") or ())
+
+
+def _from_the_other_end(ignored):
+    """Every second worker collects backwards: each file's assertions are rewritten once, by whoever comes first."""
+    here = Path(__file__).parent
+    children = {each for each in here.iterdir() if each.is_dir() or each.match("test_*.py")}
+    children -= {Path(each).resolve() for each in ignored}
+    return [str(each) for each in sorted(children, reverse=True)]
 
 
 def pytest_addoption(parser):
@@ -39,9 +50,12 @@ LONGEST = (
 )  # fmt: skip
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
     """The longest files come first; what tests/nightly.yaml keeps for the night has the mark `nightly`."""
-    items.sort(key=lambda item: not item.nodeid.partition("::")[0].endswith(LONGEST))
+    files = [item.nodeid.partition("::")[0] for item in items]
+    ranks = {file: (not file.endswith(LONGEST), file) for file in files}
+    items.sort(key=lambda item: ranks[item.nodeid.partition("::")[0]])
     seen = set()
     for item in items:
         of = item.nodeid.partition("[")[0]

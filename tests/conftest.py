@@ -29,7 +29,7 @@ def pytest_configure(config):
 
 
 def _from_the_other_end(ignored):
-    """Every second worker collects backwards: each file's assertions are rewritten once, by whoever comes first."""
+    """Every second worker collects backwards: whoever comes first to a file rewrites its assertions."""
     here = Path(__file__).parent
     children = {each for each in here.iterdir() if each.is_dir() or each.match("test_*.py")}
     children -= {Path(each).resolve() for each in ignored}

@@ -125,7 +125,7 @@ def tables(found: list[dict[str, Any]], longest: int) -> Iterator[str]:
 
 
 def _waits(found: list[dict[str, Any]], longest: int) -> Iterator[str]:
-    """Parts that take longer by the clock than of the processor: they wait, or the machine does something else."""
+    """Parts that take longer by the clock than of the processor: they wait, or the machine is busy."""
     waits = sorted(found, key=lambda row: row["seconds"] - row["clock"])
     yield f"\nwaiting: {sum(max(row['clock'] - row['seconds'], 0.0) for row in found):.0f} s"
     for row in waits[:longest]:

@@ -31,7 +31,8 @@ class Seat:
         origin = self.home.rpartition("/")[0].rpartition("/")[0]
         headers = {"Cookie": self.cookie}
         place = self.home.replace("http", "ws", 1) + "socket"
-        return connect(place, origin=more.pop("origin", origin), additional_headers=headers, max_queue=None, **more)
+        more = {"origin": origin, "max_queue": None} | more
+        return connect(place, additional_headers=headers, **more)
 
 
 @pytest.fixture(scope="module")

@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from beaver_ftc.diagnosis.detection.parity import AN_AXIS, weighs
+from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, uses_force
 from beaver_ftc.diagnosis.state import LOSS
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.loop.loop import Loop
@@ -120,13 +120,13 @@ class Watched:
             losses = tried["kind"] == LOSS
             for test, of_it in (("loss", tried["score"][losses]), ("step", tried["score"][~losses])):
                 self._note(test, of_it.max(initial=0.0))
-        own = (self._views["surface"] == AN_AXIS) & (self._views["inertial"] == 0)
+        own = (self._views["surface"] == AXIS_VIEW) & (self._views["inertial"] == 0)
         self._note("tone of an axis", self._views["tones"]["score"][own].max(initial=0.0))
         self._note("force", self._forces())
 
     def _forces(self) -> float:
         """What the views that may raise an alarm by a force show, whatever clears them of a vane's error."""
-        held = [view["held"] for view in self._views if view["surface"] >= 0 and weighs(view)]
+        held = [view["peak_score"] for view in self._views if view["surface"] >= 0 and uses_force(view)]
         return float(max(held, default=0.0))
 
     def _note(self, test: str, score: float) -> None:

@@ -15,8 +15,8 @@ from beaver_ftc.design.engine import DPT_0, KW_TO_DPT, SEA_LEVEL_DENSITY_KG_M3
 from beaver_ftc.design.fdc import MASS
 from beaver_ftc.diagnosis.bounds import variances
 from beaver_ftc.diagnosis.detection import likelihood, noise_model, statistical
-from beaver_ftc.diagnosis.detection.likelihood import MAX_HYPOTHESES, N_SLOTS, SENSE, Rooms, block_dtype
-from beaver_ftc.diagnosis.detection.signatures import sign_blocks
+from beaver_ftc.diagnosis.detection.likelihood import MAX_HYPOTHESES, N_SLOTS, SENSE, Capacity, block_dtype
+from beaver_ftc.diagnosis.detection.signatures import fill_block_signatures
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.scenario.declared import Declared, SensorErrors
 from beaver_ftc.scenario.schema import Scenario
@@ -39,7 +39,7 @@ def misread(y, place, error, thin_air_kw=0.0):
 def block_of(drift, noise, jitter=0.0, prior=1.0, keep=1.0):
     """A block as a record, with as many axes as `drift` (n, n) has. Standard deviations noise and jitter."""
     n = len(drift)
-    block = np.zeros(1, block_dtype(Rooms(105, MAX_HYPOTHESES))).view(np.recarray)[0]
+    block = np.zeros(1, block_dtype(Capacity(105, MAX_HYPOTHESES))).view(np.recarray)[0]
     block["n"], block["axis"][:n], block["keep"] = n, range(n), keep
     block["drift"][:n, :n] = drift
     block["noise"][:n], block["jitter"][:n] = np.square(noise), np.square(jitter)
@@ -198,7 +198,7 @@ def watch_all(detector, innovations, Gu, cubic, first, renew, dt, scores):
     """The frames of a flight without one: innovations (k, 3), Gu (k, 3, 4) rad/s2, cubic (k,)."""
     for k in range(len(innovations)):
         blocks, alarm, tests = detector.block, detector.alarm, detector.tests
-        sign_blocks(blocks, Gu[k], cubic[k])
+        fill_block_signatures(blocks, Gu[k], cubic[k])
         bounded, still = detector.noise.bounded, detector.air
         statistical.observe(tests, bounded, blocks, still, innovations[k], dt, first + k, 0)
         views = detector.views[: detector.n_views]

@@ -3,7 +3,7 @@
 import numpy as np
 
 from beaver_ftc.diagnosis.detection import parity, statistical
-from beaver_ftc.diagnosis.detection.signatures import sign_blocks, sign_view
+from beaver_ftc.diagnosis.detection.signatures import fill_block_signatures, fill_view_signatures
 from beaver_ftc.plant.instruments import MEASURED
 
 
@@ -24,7 +24,7 @@ class Statistical:
 
     @staticmethod
     def signatures(record, Gu, cubic):
-        sign_blocks(record["block"], Gu, cubic)
+        fill_block_signatures(record["block"], Gu, cubic)
 
     @staticmethod
     def score(record, t, known=True):
@@ -79,57 +79,59 @@ class Statistical:
 
 
 class Across:
-    """Of `across.py`."""
+    """Calls the kernels of `parity.py`."""
 
     @staticmethod
     def part(fdi, view, innovation, i):
         parts = (fdi["statistical"][name] for name in ("forces", "air", "inertial_air"))
-        return parity.part(view, *parts, innovation, i)
+        return parity.innovation_component(view, *parts, innovation, i)
 
     @staticmethod
     def turn(fdi, view, G):
         record = fdi["statistical"]
-        return parity.turn(view, record["forces"], record["air"], fdi["bound"], G)
+        return parity.set_direction(view, record["forces"], record["air"], fdi["bound"], G)
 
     @staticmethod
-    def knows_gust(record, view):
-        return parity.knows_gust(view, record["air"])
+    def uses_gust_estimate(record, view):
+        return parity.uses_gust_estimate(view, record["air"])
 
     @staticmethod
     def blur(view, record, V):
         parts = (record[name] for name in ("noise", "block", "forces", "air", "inertial_air"))
-        parity.blur(view, *parts, V)
+        parity.set_noise(view, *parts, V)
 
     @staticmethod
     def regress(fdi, view, innovation, share):
-        view["shows_across"] = share
+        view["column_leak"] = share
         parts = (fdi["statistical"][name] for name in ("block", "forces", "air", "inertial_air"))
-        parity.regress(view, *parts, innovation)
+        parity.fill_regressors(view, *parts, innovation)
 
     @staticmethod
     def sign(fdi, view, Gu):
-        sign_view(view, fdi["statistical"]["forces"], Gu)
+        fill_view_signatures(view, fdi["statistical"]["forces"], Gu)
 
     @staticmethod
     def observe(fdi, innovation, G, Gu, y, frame, latched):
         record, bound = fdi["statistical"], fdi["bound"]
         views, tests = views_of(record), record["tests"]
-        parity.face(views, record["forces"], record["air"], bound, G, Gu)
+        parity.update_directions(views, record["forces"], record["air"], bound, G, Gu)
         parts = (record[name] for name in ("noise", "block", "forces", "air", "inertial_air"))
-        parity.compose(views, int(tests["tolerated"]), *parts, innovation, y[2])
-        parity.observe(views, tests, record["listening"], y, fdi["config"]["dt"], frame, latched)
+        parity.project_innovation(views, int(tests["tolerated"]), *parts, innovation, y[2])
+        parity.update_views(views, tests, record["tone_config"], y, fdi["config"]["dt"], frame, latched)
 
     @staticmethod
-    def feels(fdi, view, s, column):
-        return parity.feels(view, fdi["statistical"]["forces"], s, column)
+    def is_sensitive_to(fdi, view, s, column):
+        return parity.is_sensitive_to(view, fdi["statistical"]["forces"], s, column)
 
     @staticmethod
     def shown(record, view):
-        return parity.shown(view, views_of(record), record["tests"], record["forces"], record["air"])
+        return parity.confirmed_score(
+            view, views_of(record), record["tests"], record["forces"], record["air"]
+        )
 
     @staticmethod
     def alarm(record, view):
-        return parity.alarm(view, views_of(record), record["tests"], record["forces"], record["air"])
+        return parity.alarm_score(view, views_of(record), record["tests"], record["forces"], record["air"])
 
     @staticmethod
     def excludes(fdi, s):

@@ -9,7 +9,7 @@ from beaver_ftc.aircraft import load
 from beaver_ftc.diagnosis.belief import air
 from beaver_ftc.diagnosis.detection.likelihood import STEP
 from beaver_ftc.diagnosis.detection.parity import set_up_views
-from beaver_ftc.diagnosis.detection.tones import set_up_listening
+from beaver_ftc.diagnosis.detection.tones import set_up_tones
 from beaver_ftc.diagnosis.state import LOSS, POSITION
 from beaver_ftc.loop import frame
 from beaver_ftc.loop.loop import Loop, fly
@@ -37,7 +37,7 @@ def watching(turns=0.0):
     for block, n in zip(statistical["block"], (1, 2, 2), strict=True):
         block["noise"][:n] = 1e-8
     set_up_views(statistical, AIRCRAFT)
-    set_up_listening(statistical["listening"], 1e-8, 45.0, 15.0, DT)
+    set_up_tones(statistical["tone_config"], 1e-8, 45.0, 15.0, DT)
     statistical["tests"]["tolerated"] = fdi["bound"]["own_errors"] = turns > 0.0
     fdi["bound"]["own_per_rad"] = turns * np.abs(G)
     fdi["layout"]["position_of"] = range(4)
@@ -65,7 +65,7 @@ def test_a_fault_of_any_course_shows_nothing_where_its_surface_moves_nothing(sur
     views = shown(fdi, lambda k: course[k] * G[:, surface])
     for v, view in enumerate(views[:5]):
         evidence = np.abs(view["block"]["lane"]["correlation"]).max()
-        felt = Across.feels(fdi, view, surface, G[:, surface])
+        felt = Across.is_sensitive_to(fdi, view, surface, G[:, surface])
         assert felt == (v not in blind)
         assert (evidence > 1.0) == felt
 
@@ -87,8 +87,8 @@ def test_errors_that_turn_the_column_are_tolerated(signs):
 def test_only_what_a_surface_does_not_move_excludes_it():
     for v in range(5):
         fdi = watching()
-        fdi["statistical"]["views"]["mix"][PAST_AILERON, :3] = (0.4 / 9.0, 0.0, -1.0)
-        fdi["statistical"]["views"]["mix"][PAST_RUDDER, :3] = (3.0 / 1.2, 0.0, 1.0)
+        fdi["statistical"]["views"]["direction"][PAST_AILERON, :3] = (0.4 / 9.0, 0.0, -1.0)
+        fdi["statistical"]["views"]["direction"][PAST_RUDDER, :3] = (3.0 / 1.2, 0.0, 1.0)
         fdi["statistical"]["views"][v]["block"]["hypothesis"]["score"][0] = 5.1
         found = [Across.excludes(fdi, s) for s in range(4)]
         excluded = {

@@ -9,7 +9,7 @@ from statistics_of import Across
 from beaver_ftc.aircraft import load
 from beaver_ftc.diagnosis.detection import likelihood, parity, tones
 from beaver_ftc.diagnosis.detection.likelihood import LEAST_UNCERTAINTY_RAD_S2, STEP
-from beaver_ftc.diagnosis.detection.parity import AN_AXIS, USUAL, set_up_views
+from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, USUAL_SIZE, set_up_views
 from beaver_ftc.diagnosis.state import LOSS, POSITION
 
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)
@@ -37,7 +37,7 @@ def fdi(rng):
         block["regressor"] = rng.normal(size=block["regressor"].shape)
         block["tolerance"][:regressors] = rng.uniform(0.1, 0.2, regressors)
     set_up_views(statistical, load())
-    tones.set_up_listening(statistical["listening"], 1e-8, V, 15.0, DT)
+    tones.set_up_tones(statistical["tone_config"], 1e-8, V, 15.0, DT)
     air = statistical["air"]
     air["output"]["moving"], air["config"]["rolling"], air["memory"]["per_metre"] = (
         1,
@@ -60,16 +60,16 @@ def test_across_a_column_is_square_to_it_of_length_one_and_to_the_left(fdi, rng)
     view = fdi["statistical"]["views"][PAST_AILERON]
     G, of_it = column(rng)
     Across.turn(fdi, view, G)
-    assert view["mix"][:3] @ of_it == pytest.approx(0.0, abs=1e-12)
-    assert np.linalg.norm(view["mix"]) == pytest.approx(1.0)
-    assert np.cross(of_it, view["mix"][:3])[1] < 0.0  # from roll over yaw, as (-g_r, g_p)
+    assert view["direction"][:3] @ of_it == pytest.approx(0.0, abs=1e-12)
+    assert np.linalg.norm(view["direction"]) == pytest.approx(1.0)
+    assert np.cross(of_it, view["direction"][:3])[1] < 0.0  # from roll over yaw, as (-g_r, g_p)
 
 
 def test_a_surface_that_moves_neither_leaves_the_direction_as_it_was(fdi):
     view = fdi["statistical"]["views"][PAST_RUDDER]
-    view["mix"][:3] = 0.6, 0.0, 0.8
+    view["direction"][:3] = 0.6, 0.0, 0.8
     assert Across.turn(fdi, view, np.zeros((3, 4))) == 0.0
-    assert view["mix"].tolist() == [0.6, 0.0, 0.8, 0.0, 0.0]
+    assert view["direction"].tolist() == [0.6, 0.0, 0.8, 0.0, 0.0]
 
 
 def declared_along(statistical, m):
@@ -97,7 +97,11 @@ def declared_along(statistical, m):
 @pytest.mark.parametrize("mix", [(0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (-0.6, 0.0, 0.8)])
 def test_what_is_declared_of_the_axes_is_seen_along_a_direction(fdi, mix, changes, swings):
     statistical, view = fdi["statistical"], fdi["statistical"]["views"][PAST_AILERON]
-    view["mix"][:3], statistical["air"]["memory"]["swings"], view["block"]["P_dd"][0, 0] = mix, swings, 0.7
+    view["direction"][:3], statistical["air"]["memory"]["swings"], view["block"]["P_dd"][0, 0] = (
+        mix,
+        swings,
+        0.7,
+    )
     for name, value in changes.items():
         holder(statistical["air"], name)[name] = value
     Across.blur(view, statistical, V)
@@ -130,7 +134,7 @@ def test_what_constants_multiply_is_that_of_the_axes_along_the_direction(fdi):
     ):
         views[v]["block"]["regressor"][:], views[v]["block"]["n_regressors"] = 9.0, 0
         if v == PAST_AILERON:
-            views[v]["mix"][:3], views[v]["surface"] = (-0.6, 0.0, 0.8), AN_AXIS
+            views[v]["direction"][:3], views[v]["surface"] = (-0.6, 0.0, 0.8), AXIS_VIEW
         Across.regress(fdi, views[v], np.ones(3), 0.0)
         found = views[v]["block"]["regressor"][:, 0]
         assert found[: len(expected)] == pytest.approx(expected)
@@ -146,12 +150,12 @@ def test_of_what_goes_along_a_column_that_may_be_turned_a_share_shows_across(fdi
     G, innovation = np.zeros((3, 4)), np.array([0.7, 5.0, -0.4])
     G[0, AILERON], G[2, AILERON], fdi["bound"]["own_errors"] = 0.8 * size, 0.6 * size, own_errors
     Across.regress(fdi, view, innovation, Across.turn(fdi, view, G))
-    m = view["mix"][[0, 2]]
+    m = view["direction"][[0, 2]]
     along = np.array([m[1], -m[0]])
     e = fdi["bound"]["own_per_rad"][[0, 2], AILERON]
     corners = [e * (s, t) for s in (-1, 1) for t in (-1, 1)]
     most = max(abs(m @ c) for c in corners)
-    least = max(size - max(abs(along @ c) for c in corners), parity.LEAST_LENGTH * size)
+    least = max(size - max(abs(along @ c) for c in corners), parity.MIN_COLUMN_LENGTH * size)
     shown = own_errors * most / least * (along @ innovation[[0, 2]])
     n = int(fdi["statistical"]["block"][1]["n_regressors"])
     assert view["block"]["regressor"][n, 0] == pytest.approx(shown)
@@ -159,12 +163,12 @@ def test_of_what_goes_along_a_column_that_may_be_turned_a_share_shows_across(fdi
 
 def test_a_step_signs_as_one_and_a_loss_as_what_its_surface_gives_along_the_direction(fdi, rng):
     view, Gu = fdi["statistical"]["views"][PAST_RUDDER], rng.normal(size=(3, 4))
-    view["mix"][:3] = 0.5, 0.3, -0.7
+    view["direction"][:3] = 0.5, 0.3, -0.7
     hypotheses = view["block"]["hypothesis"]
     view["block"]["n_hypotheses"], hypotheses["signature"] = 3, 9.0
     hypotheses["kind"][:3], hypotheses["surface"][:3] = (LOSS, STEP, LOSS), (FLAP, -1, AILERON)
     Across.sign(fdi, view, Gu)
-    m = view["mix"][:3]
+    m = view["direction"][:3]
     assert hypotheses["signature"][:3, 0] == pytest.approx([m @ Gu[:, FLAP], 1.0, m @ Gu[:, AILERON]])
     assert (hypotheses["signature"][:, 1] == 9.0).all()
     assert (hypotheses["signature"][3:] == 9.0).all()
@@ -174,10 +178,10 @@ def test_a_step_signs_as_one_and_a_loss_as_what_its_surface_gives_along_the_dire
 def test_a_fault_shows_along_every_axis_that_its_column_moves(fdi, axis):
     view = fdi["statistical"]["views"][PAST_RUDDER]
     moved = np.eye(3)[axis]
-    view["mix"][:3] = moved
-    assert Across.feels(fdi, view, AILERON, 1e-6 * moved)
-    assert not Across.feels(fdi, view, AILERON, 1.0 - moved)
-    assert not Across.feels(fdi, view, RUDDER, moved), "across its own column it shows nothing"
+    view["direction"][:3] = moved
+    assert Across.is_sensitive_to(fdi, view, AILERON, 1e-6 * moved)
+    assert not Across.is_sensitive_to(fdi, view, AILERON, 1.0 - moved)
+    assert not Across.is_sensitive_to(fdi, view, RUDDER, moved), "across its own column it shows nothing"
 
 
 @pytest.mark.parametrize(("latched", "tolerated", "frame"), [(False, 1, 6), (True, 1, 6), (False, 0, 7)])
@@ -201,7 +205,7 @@ def test_a_frame_is_seen_along_every_direction(fdi, rng, latched, tolerated, fra
         if tolerated:
             Across.regress(fdi, own, innovation, share)
         Across.sign(fdi, own, Gu)
-        block["scratch"][0] = own["mix"][:3] @ innovation
+        block["scratch"][0] = own["direction"][:3] @ innovation
         if not latched:
             likelihood.start(block, likelihood.slot_to_start(frame))
         likelihood.take_in(block, own["bounded"], tolerated, DT, 0.9 if latched else 1.0)
@@ -217,7 +221,7 @@ def test_views_that_are_not_there_are_not_asked(fdi, rng):
     Across.observe(fdi, rng.normal(size=3), np.ones((3, 4)), np.ones((3, 4)), FLOW, 3, False)
     after = fdi["statistical"]["views"]
     changed = [now.tobytes() != then.tobytes() for now, then in zip(after, before, strict=True)]
-    assert changed == [True] + [False] * (USUAL.views - 1)
+    assert changed == [True] + [False] * (USUAL_SIZE.views - 1)
 
 
 def test_any_hypothesis_beyond_the_level_excludes_whom_it_is_not_felt_of(fdi):
@@ -262,4 +266,4 @@ def test_a_view_has_levels_and_tolerances_of_the_axes_it_looks_at(fdi):
 
 def losses(tried):
     """1 for each loss that is tried, of which a correlation of the other sign speaks for nothing."""
-    return np.pad(tried["kind"] == LOSS, (0, USUAL.view.hypotheses - len(tried))).astype(float)
+    return np.pad(tried["kind"] == LOSS, (0, USUAL_SIZE.view.hypotheses - len(tried))).astype(float)

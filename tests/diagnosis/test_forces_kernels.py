@@ -12,8 +12,8 @@ from beaver_ftc.design.engine import slipstream_slopes
 from beaver_ftc.design.terms import fill_table
 from beaver_ftc.diagnosis.detection import forces, parity, statistical
 from beaver_ftc.diagnosis.detection.forces import ASIDE, UP, look, set_up_forces
-from beaver_ftc.diagnosis.detection.parity import AN_AXIS, THE_VANE, set_up_views
-from beaver_ftc.diagnosis.detection.tones import set_up_listening
+from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, VANE_VIEW, set_up_views
+from beaver_ftc.diagnosis.detection.tones import set_up_tones
 from beaver_ftc.diagnosis.state import NORMAL, PITCH, ROLL, SIDE, YAW
 from beaver_ftc.plant.instruments import MEASURED
 from beaver_ftc.scenario.diagnosis import Bounds
@@ -224,7 +224,7 @@ def test_without_accelerometers_no_force_is_weighed(viewed):
     statistical, G = viewed["statistical"], np.ones((3, 4))
     statistical["inertial_air"]["output"]["moving"] = 1
     views = statistical["views"]
-    views["held"], views["block"]["hypothesis"]["score"][:, 0] = 50.0, 50.0
+    views["peak_score"], views["block"]["hypothesis"]["score"][:, 0] = 50.0, 50.0
     forces.do_without(*(statistical[name] for name in ("forces", "air", "inertial_air")))
     assert not statistical["air"]["output"]["read"]
     assert not statistical["inertial_air"]["output"]["moving"]
@@ -234,7 +234,7 @@ def test_without_accelerometers_no_force_is_weighed(viewed):
     for block in statistical["block"]:
         block["noise"] = 1e-8
     Across.observe(viewed, np.zeros(3), G, 0.0 * G, Y, 1, False)
-    assert not views["held"][ELEVATOR_VIEW : SIDE_VIEW + 1].any()
+    assert not views["peak_score"][ELEVATOR_VIEW : SIDE_VIEW + 1].any()
 
 
 def test_accelerometers_that_may_break_raise_no_alarm_and_tell_no_gust(viewed):
@@ -243,19 +243,19 @@ def test_accelerometers_that_may_break_raise_no_alarm_and_tell_no_gust(viewed):
     air, views = statistical["air"], statistical["views"]
     air["output"]["moving"] = 1
     set_up_views(statistical, AIRCRAFT)
-    views["mix"][ELEVATOR_VIEW], views["held"][ELEVATOR_VIEW] = (0.0, 0.3, 0.0, 0.0, -0.95), 9.0
+    views["direction"][ELEVATOR_VIEW], views["peak_score"][ELEVATOR_VIEW] = (0.0, 0.3, 0.0, 0.0, -0.95), 9.0
     air["output"]["mean"] = 0.1, 0.2, 0.3
     views["block"]["hypothesis"]["score"][0, 0] = 7.0
     for read in (1, 0):
         air["output"]["read"] = read
-        views["held"][UP_VIEW] = 50.0
+        views["peak_score"][UP_VIEW] = 50.0
         assert Across.alarm(statistical, views[ELEVATOR_VIEW]) == 9.0 * read
-        views["held"][UP_VIEW] = 0.0
-        assert Across.knows_gust(statistical, views[0]) == bool(read)
+        views["peak_score"][UP_VIEW] = 0.0
+        assert Across.uses_gust_estimate(statistical, views[0]) == bool(read)
         assert Across.part(viewed, views[0], np.ones(3), PITCH) == pytest.approx(1.0 - 0.2 * read)
         assert Across.shown(statistical, views[0]) == (0.0 if read else 7.0), "nothing is to be cleared"
         assert Across.shown(statistical, views[ELEVATOR_VIEW]) == 0.0
-    views["held"][UP_VIEW] = 50.0
+    views["peak_score"][UP_VIEW] = 50.0
     assert Across.shown(statistical, views[ELEVATOR_VIEW]) == 9.0
 
 
@@ -275,7 +275,7 @@ def test_a_gust_that_nobody_tells_moves_rate_and_force_in_full(viewed):
     air["memory"]["per_metre"], air["memory"]["unseen"] = (1e-5, 2e-5, 3e-5), 0.0
     Across.turn(viewed, view, rng.normal(size=(3, 4)))
     Across.blur(view, statistical, 45.0)
-    m = view["mix"]
+    m = view["direction"]
     by_both = np.abs(m[:3] @ air["output"]["damping"]) + np.abs(m[3:] @ component["damping"])
     still = float(view["block"]["drift"][0, 0])
     air["memory"]["per_metre"] = 0.0
@@ -289,7 +289,7 @@ def test_noise_of_the_gust_that_forces_tell_blurs_what_clears_a_vane(viewed):
     statistical["forces"]["blurred"] = 0.1, 0.2, 0.3
     for v, blurred in ((ALPHA_VIEW, True), (ELEVATOR_VIEW, False)):
         view = statistical["views"][v]
-        view["mix"] = 0.0, -0.6, 0.0, 0.0, 0.8
+        view["direction"] = 0.0, -0.6, 0.0, 0.0, 0.8
         Across.blur(view, statistical, 45.0)
         own = 0.8 * np.sqrt(statistical["forces"]["component"][UP]["jitter"][0])
         assert view["block"]["jitter"][0] == pytest.approx((own + 0.6 * 0.2 * blurred) ** 2)
@@ -362,7 +362,7 @@ def viewed():
         statistical["tests"]["keep"],
     ) = 6.0, 0.5 * 5.0**2, 0.99
     set_up_views(statistical, AIRCRAFT)
-    set_up_listening(statistical["listening"], 1e-8, 45.0, 15.0, DT)
+    set_up_tones(statistical["tone_config"], 1e-8, 45.0, 15.0, DT)
     for _ in range(2):
         look(statistical["forces"], statistical["air"], measured(), U, DT)
     fdi["layout"]["position_of"] = range(4)
@@ -379,7 +379,7 @@ def test_a_force_is_off_by_what_it_changes_in_two_milliseconds(before, begun, ex
 
 def test_what_a_force_is_off_widens_what_is_merely_bounded(viewed):
     statistical, view = viewed["statistical"], viewed["statistical"]["views"][ELEVATOR_VIEW]
-    view["mix"] = 0.0, 0.6, 0.0, 0.0, -0.8
+    view["direction"] = 0.0, 0.6, 0.0, 0.0, -0.8
     Across.blur(view, statistical, 45.0)
     before = float(view["bounded"][0])
     statistical["forces"]["component"]["unsettled"][UP] = 0.5
@@ -400,13 +400,13 @@ def test_how_fast_a_force_changes_is_told_from_one_instant_to_the_next(viewed):
 
 def test_each_surface_is_looked_past_in_the_axis_it_leads_and_its_force(viewed):
     seen = [
-        (int(v["surface"]), *v["plane"], v["inertial"], v["clears"])
+        (int(v["surface"]), *v["plane"], v["inertial"], v["immune_to_vane"])
         for v in viewed["statistical"]["views"][5:13]
     ]
     assert seen == [
-        (1, PITCH, NORMAL, 0, 0), (3, PITCH, NORMAL, 0, 0), (THE_VANE, PITCH, NORMAL, 0, 1),
-        (AN_AXIS, PITCH, NORMAL, 1, 1), (0, ROLL, SIDE, 0, 0), (2, YAW, SIDE, 0, 0),
-        (THE_VANE, YAW, SIDE, 0, 1), (AN_AXIS, YAW, SIDE, 1, 1),
+        (1, PITCH, NORMAL, 0, 0), (3, PITCH, NORMAL, 0, 0), (VANE_VIEW, PITCH, NORMAL, 0, 1),
+        (AXIS_VIEW, PITCH, NORMAL, 1, 1), (0, ROLL, SIDE, 0, 0), (2, YAW, SIDE, 0, 0),
+        (VANE_VIEW, YAW, SIDE, 0, 1), (AXIS_VIEW, YAW, SIDE, 1, 1),
     ]  # fmt: skip
 
 
@@ -418,13 +418,15 @@ def test_what_goes_along_a_column_of_rate_and_force_is_not_seen_past_it(viewed, 
     first, second = view["plane"]
     force = viewed["statistical"]["forces"]["component"][second - SIDE]
     s = int(view["surface"])
-    of_it = force["vane"] if s == THE_VANE else (G[first, s], force["column"][s])
-    assert view["mix"][[first, second]] @ of_it == pytest.approx(0.0, abs=1e-12)
-    assert np.linalg.norm(view["mix"]) == pytest.approx(1.0)
-    assert np.count_nonzero(view["mix"]) == 2
-    if s != THE_VANE:
-        assert Across.feels(viewed, view, s, G[:, s]) == 0
-        assert Across.feels(viewed, view, FLAP if s == ELEVATOR else ELEVATOR, G[:, 1]) == (second == NORMAL)
+    of_it = force["vane"] if s == VANE_VIEW else (G[first, s], force["column"][s])
+    assert view["direction"][[first, second]] @ of_it == pytest.approx(0.0, abs=1e-12)
+    assert np.linalg.norm(view["direction"]) == pytest.approx(1.0)
+    assert np.count_nonzero(view["direction"]) == 2
+    if s != VANE_VIEW:
+        assert Across.is_sensitive_to(viewed, view, s, G[:, s]) == 0
+        assert Across.is_sensitive_to(viewed, view, FLAP if s == ELEVATOR else ELEVATOR, G[:, 1]) == (
+            second == NORMAL
+        )
 
 
 def test_the_side_vane_is_cleared_across_the_rolling_gust_as_well(viewed):
@@ -439,18 +441,18 @@ def test_the_side_vane_is_cleared_across_the_rolling_gust_as_well(viewed):
     force = statistical["forces"]["component"][ASIDE]
     column = np.array([force["vane_roll"], *force["vane"]])
     share = Across.turn(viewed, view, np.zeros((3, 4)))
-    mix = view["mix"][[ROLL, YAW, SIDE]]
-    assert np.linalg.norm(view["mix"]) == pytest.approx(1.0)
+    mix = view["direction"][[ROLL, YAW, SIDE]]
+    assert np.linalg.norm(view["direction"]) == pytest.approx(1.0)
     assert mix @ column == pytest.approx(0.0, abs=1e-12)
     gust = (moving["damping"] @ moving["axes"])[:, 0]
-    assert view["mix"][:3] @ gust == pytest.approx(0.0, abs=1e-12)
-    assert view["mix"][PITCH] == view["mix"][NORMAL] == 0.0
+    assert view["direction"][:3] @ gust == pytest.approx(0.0, abs=1e-12)
+    assert view["direction"][PITCH] == view["direction"][NORMAL] == 0.0
     assert view["column"][[ROLL, YAW, SIDE]] == pytest.approx(column / np.linalg.norm(column))
     corners = np.stack(np.meshgrid(*[(-0.1, 0.1)] * 3)).reshape(3, -1).T * column
     assert share == pytest.approx(np.max(np.abs(corners @ mix)) / (0.9 * np.linalg.norm(column)))
     n = int(view["block"]["n_regressors"])
     Across.regress(viewed, view, np.zeros(3), share)
-    view["cleared_by"] = 0
+    view["confirmed_by"] = 0
     Across.regress(viewed, view, np.array([0.4, 7.0, -0.3]), share)
     seen = np.array([0.4, -0.3, force["innovation"]])
     assert view["block"]["regressor"][n - 1, 0] == pytest.approx(
@@ -463,29 +465,29 @@ def test_where_no_vane_and_no_gust_moves_anything_the_direction_stays(viewed):
     statistical["air"]["output"]["moving"] = 1
     set_up_views(statistical, AIRCRAFT)
     view = statistical["views"][BETA_VIEW]
-    view["mix"] = 0.6, 0.0, 0.8, 0.0, 0.0
+    view["direction"] = 0.6, 0.0, 0.8, 0.0, 0.0
     statistical["air"]["output"]["damping"] = 0.0
     assert Across.turn(viewed, view, np.zeros((3, 4))) == 0.0
-    assert view["mix"].tolist() == [0.6, 0.0, 0.8, 0.0, 0.0]
+    assert view["direction"].tolist() == [0.6, 0.0, 0.8, 0.0, 0.0]
 
 
 def test_in_still_air_there_is_no_gust_to_look_past(viewed):
-    assert not viewed["statistical"]["views"]["past_gust"].any()
+    assert not viewed["statistical"]["views"]["across_gust"].any()
 
 
 def test_a_force_counts_once_the_vane_is_cleared(viewed):
     """At the alarm level, of what clears the vane at the naming level; rates need no clearing."""
     statistical = viewed["statistical"]
     views = statistical["views"]
-    views["held"][ELEVATOR_VIEW], views["mix"][ELEVATOR_VIEW] = 9.0, (0.0, 0.3, 0.0, 0.0, -0.95)
+    views["peak_score"][ELEVATOR_VIEW], views["direction"][ELEVATOR_VIEW] = 9.0, (0.0, 0.3, 0.0, 0.0, -0.95)
     assert Across.shown(statistical, views[ELEVATOR_VIEW]) == 0.0
     for clearing in (ALPHA_VIEW, UP_VIEW):
-        views["held"][[ALPHA_VIEW, UP_VIEW]] = 0.0
-        views["held"][clearing] = 5.0
+        views["peak_score"][[ALPHA_VIEW, UP_VIEW]] = 0.0
+        views["peak_score"][clearing] = 5.0
         assert Across.shown(statistical, views[ELEVATOR_VIEW]) == pytest.approx(6.0)
-    views["held"][UP_VIEW] = 50.0
+    views["peak_score"][UP_VIEW] = 50.0
     assert Across.shown(statistical, views[ELEVATOR_VIEW]) == 9.0
-    views["held"][[ALPHA_VIEW, UP_VIEW]], views["held"][[BETA_VIEW, SIDE_VIEW]] = 0.0, 50.0
+    views["peak_score"][[ALPHA_VIEW, UP_VIEW]], views["peak_score"][[BETA_VIEW, SIDE_VIEW]] = 0.0, 50.0
     assert Across.shown(statistical, views[ELEVATOR_VIEW]) == 0.0, "another vane"
     views["block"]["hypothesis"]["score"][0, 0] = 7.0
     assert Across.shown(statistical, views[0]) == 7.0
@@ -499,7 +501,7 @@ def test_only_what_is_mostly_a_force_raises_the_alarm(viewed):
         (AILERON_VIEW, (0.03, 0.0, 0.0, 1.0, 0.0), True), (ALPHA_VIEW, (0.0, 0.1, 0.0, 0.0, 0.99), False),
         (SIDE_VIEW, (0.0, 0.0, 0.0, 1.0, 0.0), False),
     ):  # fmt: skip
-        views["mix"][v], views["held"][:] = mix, 9.0
+        views["direction"][v], views["peak_score"][:] = mix, 9.0
         assert (Across.alarm(viewed["statistical"], views[v]) > 0.0) == alarms
 
 
@@ -510,8 +512,8 @@ def test_the_alarm_of_a_force_is_the_scores_and_the_logs_and_has_its_time(viewed
     """Held at 9 where 6 raise it: one and a half, of the axis that its surface leads."""
     chances, row = viewed["statistical"], np.full(5, 7.0)
     views, tests, alarm = chances["views"][: chances["n_views"]], chances["tests"], chances["alarm"]
-    views["mix"] = 0.0
-    views["mix"][v], views["held"], tests["naming_level"] = mix, 9.0, 18.0
+    views["direction"] = 0.0
+    views["direction"][v], views["peak_score"], tests["naming_level"] = mix, 9.0, 18.0
     alarm["detected_at_s"], tests["n_columns"] = -1.0, 4
     statistical.score(alarm, tests, chances["block"], views, chances["forces"], chances["air"], 2.5)
     assert (alarm["score"], alarm["axis"], alarm["detected_at_s"]) == (1.5, axis, 2.5)
@@ -523,7 +525,7 @@ def test_what_clears_a_vane_excludes_nobody(viewed):
     statistical = viewed["statistical"]
     views = statistical["views"]
     for v in (ALPHA_VIEW, UP_VIEW):
-        views["held"][v], views["block"]["hypothesis"]["score"][v, 0] = 50.0, 50.0
+        views["peak_score"][v], views["block"]["hypothesis"]["score"][v, 0] = 50.0, 50.0
     assert not any(Across.excludes(viewed, s) for s in range(4))
 
 
@@ -533,23 +535,25 @@ def test_a_force_is_weighed_once_the_rate_of_sideslip_of_the_run_before_is_known
     statistical, swinging = fdi["statistical"], measured()
     statistical["tests"]["alarm_level"], statistical["tests"]["keep"] = 6.0, 0.99
     set_up_views(statistical, AIRCRAFT)
-    set_up_listening(statistical["listening"], 1e-8, 45.0, 15.0, DT)
+    set_up_tones(statistical["tone_config"], 1e-8, 45.0, 15.0, DT)
     swinging["force"][1] += 20.0
     for looks in (1, 2):
         look(statistical["forces"], statistical["air"], swinging, U, DT)
         assert statistical["forces"]["begun"] == looks
         Across.observe(fdi, np.zeros(3), np.ones((3, 4)), np.zeros((3, 4)), Y, looks, False)
-        weighed = [v for v in statistical["views"] if parity.weighs(v) and parity.best(v) > 0.0]
-        assert bool(weighed) == (looks == 2)
+        active = [v for v in statistical["views"] if parity.uses_force(v) and parity.largest_score(v) > 0.0]
+        assert bool(active) == (looks == 2)
 
 
 def test_old_evidence_of_a_force_is_forgotten_slowly(viewed):
     statistical, G = viewed["statistical"], np.ones((3, 4))
-    statistical["views"]["held"][UP_VIEW] = 8.0
+    statistical["views"]["peak_score"][UP_VIEW] = 8.0
     for block in statistical["block"]:
         block["noise"] = 1e-8
     Across.observe(viewed, np.zeros(3), G, 0.0 * G, Y, 1, False)
-    assert statistical["views"]["held"][UP_VIEW] == pytest.approx(8.0 * (1.0 - 0.01 / parity.HOLDS))
+    assert statistical["views"]["peak_score"][UP_VIEW] == pytest.approx(
+        8.0 * (1.0 - 0.01 / parity.PEAK_MEMORY)
+    )
 
 
 def test_what_errors_multiply_along_a_direction_is_that_of_rate_and_force(viewed):
@@ -558,7 +562,7 @@ def test_what_errors_multiply_along_a_direction_is_that_of_rate_and_force(viewed
     pitch, force = statistical["block"][0], statistical["forces"]["component"][UP]
     pitch["n_regressors"], pitch["regressor"][:3, 0] = 3, rng.normal(size=3)
     view, n = statistical["views"][ELEVATOR_VIEW], int(force["n"])
-    view["mix"], view["column"] = (0.0, 0.6, 0.0, 0.0, -0.8), (0.0, -0.8, 0.0, 0.0, -0.6)
+    view["direction"], view["column"] = (0.0, 0.6, 0.0, 0.0, -0.8), (0.0, -0.8, 0.0, 0.0, -0.6)
     Across.regress(viewed, view, np.array([0.0, 2.0, 0.0]), 0.1)
     found = view["block"]["regressor"][: 4 + n, 0]
     along = 0.1 * (-0.8 * 2.0 - 0.6 * force["innovation"])
@@ -572,7 +576,7 @@ def test_what_errors_multiply_along_a_direction_is_that_of_rate_and_force(viewed
 
 def test_a_loss_signs_with_the_force_it_takes(viewed):
     view, Gu = viewed["statistical"]["views"][FLAP_VIEW], np.random.default_rng(1).normal(size=(3, 4))
-    view["mix"] = 0.0, 0.9, 0.0, 0.0, 0.4
+    view["direction"] = 0.0, 0.9, 0.0, 0.0, 0.4
     Across.sign(viewed, view, Gu)
     moment = viewed["statistical"]["forces"]["component"][UP]["moment"][ELEVATOR]
     assert view["block"]["hypothesis"]["signature"][:2, 0] == pytest.approx(
@@ -603,12 +607,15 @@ def test_what_is_declared_of_rate_and_force_is_seen_along_a_direction(viewed, v)
         (1.0, 0.25, 0.09),
         (1.0, 0.36, 0.16),
     )
-    seen = statistical["inertial_air" if view["clears"] else "air"]["memory"]["unseen"]
+    seen = statistical["inertial_air" if view["immune_to_vane"] else "air"]["memory"]["unseen"]
     Across.turn(viewed, view, rng.normal(size=(3, 4)))
     Across.blur(view, statistical, 45.0)
-    m, block = view["mix"], view["block"]
-    by_rates, by_forces = np.abs(m[:3] @ air["output"]["damping"]), 1.2 * np.abs(m[3:] @ component["damping"])
-    gusts = 45.0 * np.sum((np.sqrt(seen) * by_rates + by_forces) ** 2 * air["memory"]["per_metre"])
+    m, block = view["direction"], view["block"]
+    gust_on_rates, gust_on_forces = (
+        np.abs(m[:3] @ air["output"]["damping"]),
+        1.2 * np.abs(m[3:] @ component["damping"]),
+    )
+    gusts = 45.0 * np.sum((np.sqrt(seen) * gust_on_rates + gust_on_forces) ** 2 * air["memory"]["per_metre"])
     sizes = np.sqrt([*statistical["noise"]["jitter"], *component["jitter"][:, int(view["inertial"])]])
     assert block["jitter"][0] == pytest.approx((np.abs(m) @ sizes) ** 2)
     bound = np.abs(m) @ [0.02, 0.02, 0.02, 0.0012, 0.0024]
@@ -670,8 +677,8 @@ def test_in_moving_air_the_vanes_are_asked_but_for_the_rolling_gust(viewed):
     for moving in (0, 1):
         viewed["statistical"]["air"]["output"]["moving"] = moving
         set_up_views(viewed["statistical"], AIRCRAFT)
-        cleared_by = viewed["statistical"]["views"]["cleared_by"][:5].tolist()
-        assert cleared_by == [moving * NORMAL, 0, moving * SIDE, moving * SIDE, 0]
+        confirmed_by = viewed["statistical"]["views"]["confirmed_by"][:5].tolist()
+        assert confirmed_by == [moving * NORMAL, 0, moving * SIDE, moving * SIDE, 0]
 
 
 def without_force(coefficient, surface):
@@ -683,9 +690,9 @@ def without_force(coefficient, surface):
     return Aircraft(AIRCRAFT.file.model_copy(update={"forces": changed}), AIRCRAFT.folder)
 
 
-UP_VIEWS = [(ELEVATOR, (PITCH, NORMAL)), (FLAP, (PITCH, NORMAL)), (THE_VANE, (PITCH, NORMAL)),
-            (AN_AXIS, (PITCH, NORMAL))]  # fmt: skip
-SIDE_VIEWS = [(0, (ROLL, SIDE)), (2, (YAW, SIDE)), (THE_VANE, (YAW, SIDE)), (AN_AXIS, (YAW, SIDE))]
+UP_VIEWS = [(ELEVATOR, (PITCH, NORMAL)), (FLAP, (PITCH, NORMAL)), (VANE_VIEW, (PITCH, NORMAL)),
+            (AXIS_VIEW, (PITCH, NORMAL))]  # fmt: skip
+SIDE_VIEWS = [(0, (ROLL, SIDE)), (2, (YAW, SIDE)), (VANE_VIEW, (YAW, SIDE)), (AXIS_VIEW, (YAW, SIDE))]
 
 
 @pytest.mark.parametrize(
@@ -706,7 +713,7 @@ def test_an_aircraft_told_apart_in_one_plane_only_has_the_views_of_that_plane(ai
     found = [(int(view["surface"]), tuple(view["plane"].tolist())) for view in views[5:]]
     assert found == expected
     asking = [asked and view in (0, 2, 3) for view in range(5)]  # pitch, yaw, and past the aileron
-    assert [bool(view["cleared_by"]) for view in views[:5]] == asking
+    assert [bool(view["confirmed_by"]) for view in views[:5]] == asking
     assert aircraft.forces_separate_surfaces
 
 

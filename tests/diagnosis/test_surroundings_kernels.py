@@ -21,7 +21,7 @@ from beaver_ftc.diagnosis.bounds import worst_case
 from beaver_ftc.diagnosis.bounds.worst_case import error_map_dtype
 from beaver_ftc.diagnosis.detection import statistical, thresholds
 from beaver_ftc.diagnosis.detection.likelihood import block_dtype
-from beaver_ftc.diagnosis.detection.parity import USUAL
+from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE
 from beaver_ftc.diagnosis.isolation import estimators
 from beaver_ftc.diagnosis.state import LOSS, NOT_ISOLATED, STATISTICS, WORST_CASE, verdict_dtype
 from beaver_ftc.diagnosis.types.contract import LAGS
@@ -463,7 +463,7 @@ def test_the_gusts_mean_is_a_share_of_what_was_summed(share):
 
 def test_a_leap_of_the_air_widens_what_a_drift_may_be():
     """By the axes of the block, so much stronger as the gusts are taken to be."""
-    block = np.zeros(1, block_dtype(USUAL.rates)).view(np.recarray)[0]
+    block = np.zeros(1, block_dtype(USUAL_SIZE.rates)).view(np.recarray)[0]
     record, rng = new_air(), np.random.default_rng(2)
     record["output"]["leap"], block["stronger"], block["P_dd"] = rng.normal(size=(3, 3)), 1.7, 0.3
     block["n"], block["axis"] = 2, (0, 2)

@@ -11,7 +11,7 @@ from statistics_of import Across
 
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA
 from beaver_ftc.diagnosis.detection import likelihood, parity, tones
-from beaver_ftc.diagnosis.detection.parity import AN_AXIS, THE_VANE
+from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, VANE_VIEW
 from beaver_ftc.diagnosis.detection.tones import FREQUENCIES_RAD_S, MEMORY_S, N_TONES
 from beaver_ftc.diagnosis.state import PITCH, SIDE, YAW
 
@@ -36,18 +36,18 @@ def view(rng):
 
 
 @pytest.fixture
-def listening():
-    listening = new_fdi()["statistical"]["listening"]
-    tones.set_up_listening(listening, CHANCE, V, PACE, DT)
-    return listening
+def tone_config():
+    tone_config = new_fdi()["statistical"]["tone_config"]
+    tones.set_up_tones(tone_config, CHANCE, V, PACE, DT)
+    return tone_config
 
 
-def listen(view, listening, samples, regressors=None, heard=True, tolerated=False, alarm_level=6.0):
+def listen(view, tone_config, samples, regressors=None, heard=True, tolerated=False, alarm_level=6.0):
     for k, sample in enumerate(samples):
         view["block"]["innovation"][0] = sample
         if regressors is not None:
             view["block"]["regressor_response"][:3, 0] = regressors[k]
-        tones.listen(view, listening, alarm_level, heard, tolerated, DT)
+        tones.update(view, tone_config, alarm_level, heard, tolerated, DT)
 
 
 def resonance(samples):
@@ -61,9 +61,9 @@ def as_complex(pair):
     return pair[0] + 1j * pair[1]
 
 
-def test_what_is_heard_is_a_sum_that_fades_over_the_whitened_frames(view, listening, rng):
+def test_what_is_heard_is_a_sum_that_fades_over_the_whitened_frames(view, tone_config, rng):
     samples, regressors = rng.normal(size=60), rng.normal(size=(60, 3))
-    listen(view, listening, samples, regressors, tolerated=True)
+    listen(view, tone_config, samples, regressors, tolerated=True)
     found = view["tones"]
     assert as_complex(found["tone"]) == pytest.approx(resonance(2.0 * samples))
     for j in range(3):
@@ -73,19 +73,19 @@ def test_what_is_heard_is_a_sum_that_fades_over_the_whitened_frames(view, listen
     assert not found["overlap"][3:].any()
 
 
-def test_a_sum_is_judged_when_it_is_full_and_not_before(view, listening):
-    listen(view, listening, [50.0])
+def test_a_sum_is_judged_when_it_is_full_and_not_before(view, tone_config):
+    listen(view, tone_config, [50.0])
     assert (view["tones"]["score"], view["tones"]["information"]) == (0.0, 0.0)
-    listen(view, listening, [50.0])
+    listen(view, tone_config, [50.0])
     assert view["tones"]["score"] > 0.0
     assert (view["tones"]["count"], view["tones"]["sum"]) == (0, 0.0)
 
 
-def test_what_is_not_heard_lets_the_rest_fade(view, listening, rng):
+def test_what_is_not_heard_lets_the_rest_fade(view, tone_config, rng):
     samples = rng.normal(size=20)
-    listen(view, listening, samples)
+    listen(view, tone_config, samples)
     then = np.abs(as_complex(view["tones"]["tone"]))
-    listen(view, listening, np.full(10, 1e6), heard=False)
+    listen(view, tone_config, np.full(10, 1e6), heard=False)
     assert np.abs(as_complex(view["tones"]["tone"])) == pytest.approx(then * exp(-10 * DT / MEMORY_S))
 
 
@@ -104,22 +104,22 @@ def test_the_filter_lets_pass_of_a_tone_what_it_does_when_run(view, K_x, K_d, ke
     )
     amplitude = np.hypot(*shares)
     angle = frequency_rad_s * DT
-    found = tones.passes(K_x, K_d, keep, np.cos(angle), np.sin(angle), DT)
+    found = tones.whitening_gain(K_x, K_d, keep, np.cos(angle), np.sin(angle), DT)
     assert found == pytest.approx(amplitude, rel=1e-9)
 
 
-def test_room_is_what_a_bounded_uncertainty_adds_summed_as_the_tone_is(view, listening):
+def test_room_is_what_a_bounded_uncertainty_adds_summed_as_the_tone_is(view, tone_config):
     bounds = [0.05, 0.02, 0.0, 0.09] * 8
     for bound in bounds:
         view["bounded"] = bound
-        listen(view, listening, np.zeros(EVERY))
+        listen(view, tone_config, np.zeros(EVERY))
     angle = FREQUENCIES_RAD_S * DT
-    passed = np.array([tones.passes(0.3, 0.8, 1.0, np.cos(a), np.sin(a), DT) for a in angle])
+    passed = np.array([tones.whitening_gain(0.3, 0.8, 1.0, np.cos(a), np.sin(a), DT) for a in angle])
     age_s = EVERY * DT * np.arange(len(bounds))[::-1]
     faded = EVERY * np.exp(-age_s / MEMORY_S) * bounds
     beat = np.abs(np.exp(np.multiply.outer(2j * FREQUENCIES_RAD_S, age_s)) @ faded)
-    mean = tones.heard_of_bounded(FREQUENCIES_RAD_S, PACE)
-    assert view["tones"]["room"] == pytest.approx(2.0 * passed * mean * (faded.sum() + beat))
+    mean = tones.bounded_gain_at(FREQUENCIES_RAD_S, PACE)
+    assert view["tones"]["uncertainty_part"] == pytest.approx(2.0 * passed * mean * (faded.sum() + beat))
 
 
 @given(st.lists(st.floats(0.0, 1.0), min_size=4, max_size=40), st.floats(0.1, 3.0))
@@ -142,7 +142,7 @@ def test_of_a_bounded_uncertainty_no_more_is_heard_than_of_the_steepest_wave(x, 
     triangle = np.arcsin(np.cos(phase))  # of slope one
     wave = np.clip(triangle / x, -1.0, 1.0) if steep else triangle / x
     assert np.mean(np.cos(phase) * wave) == pytest.approx(
-        tones.heard_of_bounded(np.array([x]), 1.0)[0], rel=1e-6
+        tones.bounded_gain_at(np.array([x]), 1.0)[0], rel=1e-6
     )
 
 
@@ -156,7 +156,7 @@ def test_no_periodic_uncertainty_of_that_pace_is_heard_louder(steps, x):
     )  # slopes within 1 / x, whatever the mean was
     wave -= 0.5 * (wave.max() + wave.min())
     wave /= max(1.0, np.abs(wave).max())
-    most = tones.heard_of_bounded(np.array([x]), 1.0)[0]
+    most = tones.bounded_gain_at(np.array([x]), 1.0)[0]
     assert abs(np.mean(np.exp(1j * phase) * wave)) <= most * (1.0 + 1e-3)
 
 
@@ -164,62 +164,62 @@ def test_no_periodic_uncertainty_of_that_pace_is_heard_louder(steps, x):
 def test_the_slack_of_one_coefficient_is_its_magnitude_and_at_most_a_twelfth_more(parts):
     record = new_fdi()["statistical"]["views"][0]["tones"]
     record["overlap"][0, :, 4], size = parts, np.hypot(*parts)
-    tones.tolerate(record, np.array([0.3]), 1)
-    assert 0.3 * size * (1.0 - 1e-12) <= record["slack"][4] <= 0.3 * 1.0825 * size + 1e-300
-    assert record["slack"][5] == 0.0
+    tones.fill_coefficient_part(record, np.array([0.3]), 1)
+    assert 0.3 * size * (1.0 - 1e-12) <= record["coefficient_part"][4] <= 0.3 * 1.0825 * size + 1e-300
+    assert record["coefficient_part"][5] == 0.0
 
 
 def test_slacks_of_several_coefficients_add_up_and_only_of_those_there_are(view, rng):
     record = view["tones"]
     record["overlap"][:] = 9.0
-    record["overlap"][:2, 0], record["overlap"][:2, 1], record["slack"] = -3.0, 0.0, 7.0
-    tones.tolerate(record, np.array([0.1, 0.2, 0.4]), 2)
-    assert record["slack"] == pytest.approx(np.full(N_TONES, 0.9))
+    record["overlap"][:2, 0], record["overlap"][:2, 1], record["coefficient_part"] = -3.0, 0.0, 7.0
+    tones.fill_coefficient_part(record, np.array([0.1, 0.2, 0.4]), 2)
+    assert record["coefficient_part"] == pytest.approx(np.full(N_TONES, 0.9))
 
 
-def test_noise_as_declared_is_no_louder_than_a_chance_of_exp_of_minus_half_its_square(listening, rng):
+def test_noise_as_declared_is_no_louder_than_a_chance_of_exp_of_minus_half_its_square(tone_config, rng):
     """Of the largest of all frequencies, however far apart their parts are: each alone is within that."""
     noise = rng.normal(size=(4000, 300))
     loud = np.array([np.abs(resonance(row)) for row in noise.reshape(4000, -1)])
     age_s = EVERY * DT * np.arange(150)
-    root = np.sqrt(listening["width"] * EVERY * np.exp(-2.0 * age_s / MEMORY_S).sum())
+    root = np.sqrt(tone_config["noise_variance"] * EVERY * np.exp(-2.0 * age_s / MEMORY_S).sum())
     for x in (1.0, 2.0, 3.0):
         share = np.mean(loud / root > x, axis=0)
         assert (share < exp(-0.5 * x * x) + 3.0 * sqrt(exp(-0.5 * x * x) / 4000)).all()
     assert (np.mean(loud / root > 1.0, axis=0) > 0.4).all(), "and not much quieter"
 
 
-def test_the_score_is_that_of_the_loudest_beyond_what_is_explained(view, listening):
+def test_the_score_is_that_of_the_loudest_beyond_what_is_explained(view, tone_config):
     record = view["tones"]
     record["information"], record["tone"][0, 3], record["tone"][1, 3] = 100.0, 60.0, 80.0
-    record["slack"][3], record["tone"][0, 7], listening["width"][:] = 10.0, 12.0, 0.6
-    tones.judge(record, listening, 6.0)
-    root = sqrt(100.0 * listening["width"][3])
+    record["coefficient_part"][3], record["tone"][0, 7], tone_config["noise_variance"][:] = 10.0, 12.0, 0.6
+    tones.fill_score(record, tone_config, 6.0)
+    root = sqrt(100.0 * tone_config["noise_variance"][3])
     assert record["score"] == pytest.approx(90.0 / root * 6.0 / LEVEL)
-    record["room"][3] = 200.0
-    tones.judge(record, listening, 6.0)
+    record["uncertainty_part"][3] = 200.0
+    tones.fill_score(record, tone_config, 6.0)
     assert record["score"] == pytest.approx(90.0 / (200.0 / LEVEL + 0.5 * root) * 6.0 / LEVEL)
     record["tone"][:] = 0.0
-    tones.judge(record, listening, 6.0)
+    tones.fill_score(record, tone_config, 6.0)
     assert record["score"] == 0.0
 
 
 @pytest.mark.parametrize("frequency_rad_s", [1.0, 3.9, 9.6, 13.0])
-def test_a_tone_is_heard_on_the_grid_and_between(view, listening, frequency_rad_s):
+def test_a_tone_is_heard_on_the_grid_and_between(view, tone_config, frequency_rad_s):
     view["bounded"] = 0.0
     samples = 0.5 * 0.8 * np.cos(frequency_rad_s * DT * np.arange(1000) + 1.0)  # 0.8 standard deviations
-    listen(view, listening, samples, alarm_level=LEVEL)
+    listen(view, tone_config, samples, alarm_level=LEVEL)
     whole = 0.8 / 2.0 * MEMORY_S / DT / sqrt(0.5 * 0.5 * MEMORY_S / DT)  # amplitude over its deviation
     assert 0.6 * whole < view["tones"]["score"] < 1.1 * whole
 
 
-def test_an_aircraft_that_has_all_but_stopped_or_tumbles_is_not_listened_to(listening):
+def test_an_aircraft_that_has_all_but_stopped_or_tumbles_is_not_listened_to(tone_config):
     def flow(**changed):
         y = np.zeros(5)
         y[AIRSPEED] = V
         for place, value in changed.items():
             y[{"V": AIRSPEED, "alpha": ALPHA, "beta": BETA}[place]] = value
-        return tones.usual(listening, y)
+        return tones.is_within_envelope(tone_config, y)
 
     assert flow()
     assert flow(V=23.0)
@@ -240,20 +240,20 @@ def test_an_aircraft_that_has_all_but_stopped_or_tumbles_is_not_listened_to(list
 def test_the_loudest_tone_counts_as_the_best_test_of_a_view(view):
     view["block"]["n_hypotheses"], view["block"]["hypothesis"]["score"] = 2, 3.0
     view["tones"]["score"] = 2.0
-    assert parity.best(view) == 3.0
+    assert parity.largest_score(view) == 3.0
     view["tones"]["score"] = 4.0
-    assert parity.best(view) == 4.0
+    assert parity.largest_score(view) == 4.0
 
 
 @pytest.mark.parametrize(
     ("surface", "plane", "mix", "inertial", "expected"),
     [
-        (AN_AXIS, (0, YAW), {YAW: 1.0}, 0, 4.0),  # the tone alone: blocks of the rates look for all else
-        (AN_AXIS, (YAW, SIDE), {SIDE: 1.0}, 1, 0.0),
+        (AXIS_VIEW, (0, YAW), {YAW: 1.0}, 0, 4.0),  # the tone alone: blocks of the rates look for all else
+        (AXIS_VIEW, (YAW, SIDE), {SIDE: 1.0}, 1, 0.0),
         (0, (0, SIDE), {SIDE: -0.95, 0: 0.3}, 0, 9.0),
         (0, (0, SIDE), {SIDE: 0.85, 0: 0.5}, 0, 0.0),
         (0, (0, YAW), {YAW: 1.0}, 0, 0.0),
-        (THE_VANE, (PITCH, SIDE), {SIDE: 1.0}, 0, 0.0),
+        (VANE_VIEW, (PITCH, SIDE), {SIDE: 1.0}, 0, 0.0),
     ],
 )
 def test_what_raises_the_alarm_beside_the_blocks(surface, plane, mix, inertial, expected):
@@ -265,10 +265,10 @@ def test_what_raises_the_alarm_beside_the_blocks(surface, plane, mix, inertial, 
     )
     statistical["air"]["output"]["read"] = statistical["forces"]["known"] = 1
     view, clearing = statistical["views"][:2]
-    clearing["clears"], clearing["plane"], clearing["held"] = 1, (YAW, SIDE), 50.0
-    view["cleared_by"], view["held"] = SIDE, 9.0
+    clearing["immune_to_vane"], clearing["plane"], clearing["peak_score"] = 1, (YAW, SIDE), 50.0
+    view["confirmed_by"], view["peak_score"] = SIDE, 9.0
     view["surface"], view["plane"], view["inertial"], view["tones"]["score"] = surface, plane, inertial, 4.0
     view["block"]["n_hypotheses"], view["block"]["hypothesis"]["score"] = 1, 9.0
     for i, share in mix.items():
-        view["mix"][i] = share
+        view["direction"][i] = share
     assert Across.alarm(statistical, view) == expected

@@ -12,7 +12,7 @@ from beaver_ftc.diagnosis.bounds import admitted
 from beaver_ftc.diagnosis.bounds.worst_case import bound_dtype
 from beaver_ftc.diagnosis.detection import bank, fdae, statistical
 from beaver_ftc.diagnosis.detection.bank import largest_share
-from beaver_ftc.diagnosis.detection.parity import USUAL, Size
+from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE, Size
 from beaver_ftc.diagnosis.isolation import estimators
 from beaver_ftc.diagnosis.monitors import engine_symmetry, sensor_monitor
 from beaver_ftc.diagnosis.monitors.sensor_records import WATCH
@@ -26,7 +26,7 @@ from beaver_ftc.scenario.schema import Scenario
 
 
 @sized
-def diagnosis_dtype(n: int, size: Size = USUAL) -> np.dtype:
+def diagnosis_dtype(n: int, size: Size = USUAL_SIZE) -> np.dtype:
     """The stages of the diagnosis of an aircraft with n surfaces; size: rooms of its record."""
     return record(
         config=state.CONFIG, bound=bound_dtype(n, size.boxes), bank=bank.BANK, fdae=fdae.FDAE,

@@ -9,7 +9,7 @@ from beaver_ftc.control.supervisor import SUPERVISOR
 from beaver_ftc.diagnosis import scheme
 from beaver_ftc.diagnosis.assessment import assessment_dtype
 from beaver_ftc.diagnosis.belief import expectation
-from beaver_ftc.diagnosis.detection.parity import USUAL, Size, size_for
+from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE, Size, size_for
 from beaver_ftc.diagnosis.isolation.estimators import estimator_names
 from beaver_ftc.loop import instrument_records, memory
 from beaver_ftc.loop.accounts import accounts_dtype, true_faults_dtype
@@ -26,7 +26,7 @@ LOGGED = record(estimators=int, watch=int, sampled=int, power=int, tests=int)
 
 
 @sized
-def frame_dtype(n: int, size: Size = USUAL, line: int = USUAL_LINE) -> np.dtype:
+def frame_dtype(n: int, size: Size = USUAL_SIZE, line: int = USUAL_LINE) -> np.dtype:
     """All that a flight of an aircraft with n surfaces remembers between frames; size: of its statistics;
     line: of its delay lines."""
     return record(

@@ -14,7 +14,7 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.detection import (
     CHANCE,
     N_SLOTS,
-    Rooms,
+    Capacity,
     advance_block,
     block_dtype,
     reach_of_block,
@@ -265,7 +265,7 @@ def _frames(said: Document, history: History) -> _Frames:
 def _followed(said: Document, frames: _Frames, P: np.ndarray, R: np.ndarray) -> _Sums:
     """Run the filter; P, R: variances before the first frame, and of gyros."""
     n, m = len(R), 2 + len(said["tolerance"])
-    block, states = np.zeros(1, block_dtype(Rooms(1, 1))), np.zeros((m + 2 * n, 4))
+    block, states = np.zeros(1, block_dtype(Capacity(1, 1))), np.zeros((m + 2 * n, 4))
     filters = block[0]
     filters["n"], filters["axis"] = n, (0, 1)
     of = [slice(0, n), slice(n, 2 * n)]

@@ -429,12 +429,12 @@ def elapse(air, share):
 
 
 @kernel
-def whole_drift(air, V, felt, by_forces):
+def whole_drift(air, V, felt, gust_on_forces):
     """Intensity, (rad/s2)2/s, of all of the air's rotation where rates feel it, `felt` (3,) 1/s about the
     body axes, and forces do: of one who does not ask the vanes."""
     total, longest_s = 0.0, air.config.rolling / V
     for g in range(3):
-        by_both = abs(along(felt, air.output.axes, g)) + abs(along(by_forces, air.output.axes, g))
+        by_both = abs(along(felt, air.output.axes, g)) + abs(along(gust_on_forces, air.output.axes, g))
         total += by_both**2 * air.memory.per_metre[g]
         if air.memory.swings:
             total += (
@@ -444,13 +444,13 @@ def whole_drift(air, V, felt, by_forces):
 
 
 @kernel
-def drift_beside(air, V, by_rates, by_forces):
+def drift_beside(air, V, gust_on_rates, gust_on_forces):
     """Intensity of what the vanes leave of the rotation where rates feel it, and of all of it where forces
     do: (3,) 1/s each, about the body axes."""
     total = 0.0
     for g in range(3):
-        of_rates = np.sqrt(hidden(air, g)) * abs(along(by_rates, air.output.axes, g))
-        total += (of_rates + abs(along(by_forces, air.output.axes, g))) ** 2 * air.memory.per_metre[g]
+        of_rates = np.sqrt(hidden(air, g)) * abs(along(gust_on_rates, air.output.axes, g))
+        total += (of_rates + abs(along(gust_on_forces, air.output.axes, g))) ** 2 * air.memory.per_metre[g]
     return total * max(V, air.output.speed)
 
 

@@ -89,7 +89,7 @@ HYPOTHESIS = record(
 )  # fmt: skip
 
 
-class Rooms(NamedTuple):
+class Capacity(NamedTuple):
     """How many regressors and hypotheses a block has room for."""
 
     regressors: int
@@ -97,13 +97,13 @@ class Rooms(NamedTuple):
 
 
 @sized
-def lane_dtype(rooms: Rooms) -> np.dtype:
+def lane_dtype(capacity: Capacity) -> np.dtype:
     """What the lanes of a block keep, side by side."""
-    lanes = N_SLOTS * rooms.hypotheses
+    lanes = N_SLOTS * capacity.hypotheses
     return record(
         sense=lanes, shaped=(2, lanes), response=(4, lanes),
         weight=(2, lanes),  # S^-1 g_s of the frame
-        correlation=lanes, information=lanes, overlap=(rooms.regressors, lanes), slack=lanes,
+        correlation=lanes, information=lanes, overlap=(capacity.regressors, lanes), slack=lanes,
         missing=lanes,  # of a loss that grows, what is yet to come
         held=(2, lanes),  # of a loss that ends, its signature as it did
         # what a bounded uncertainty can add to the correlation: as it stays, as it swings, at its pace
@@ -123,7 +123,7 @@ FILTER = record(**_FILTER)
 
 
 @sized
-def block_dtype(rooms: Rooms) -> np.dtype:
+def block_dtype(capacity: Capacity) -> np.dtype:
     """A block: its filter, and what its hypotheses come to."""
     return record(
         axis=(int, 2),  # first: a record that begins as another does is taken for one
@@ -134,9 +134,9 @@ def block_dtype(rooms: Rooms) -> np.dtype:
         glimpsed=int, shown=2, shown_state=4,  # whether vanes show a gust roughly; what it does, whitened
         # alarm level; share of it that chance is given beside what is bounded; omega dt of the latter
         level=float, chance=float, pace=float, stay=2, swing=2,
-        n_regressors=int, tolerance=rooms.regressors, regressor=(rooms.regressors, 2),
-        regressor_state=(rooms.regressors, 4), regressor_response=(rooms.regressors, 2),
-        n_hypotheses=int, hypothesis=(HYPOTHESIS, rooms.hypotheses), lane=lane_dtype(rooms),
+        n_regressors=int, tolerance=capacity.regressors, regressor=(capacity.regressors, 2),
+        regressor_state=(capacity.regressors, 4), regressor_response=(capacity.regressors, 2),
+        n_hypotheses=int, hypothesis=(HYPOTHESIS, capacity.hypotheses), lane=lane_dtype(capacity),
     )  # fmt: skip
 
 

@@ -32,8 +32,8 @@ from beaver_ftc.diagnosis.detection.likelihood import (
     N_SLOTS,
     STEP,
 )
-from beaver_ftc.diagnosis.detection.parity import AN_AXIS, Direction, set_up_views, views_of
-from beaver_ftc.diagnosis.detection.tones import N_TONES, set_up_listening
+from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, Direction, set_up_views, views_of
+from beaver_ftc.diagnosis.detection.tones import N_TONES, set_up_tones
 from beaver_ftc.diagnosis.state import LOSS, SIDE
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
 from beaver_ftc.scenario.declared import Declared, SensorErrors
@@ -86,10 +86,10 @@ def tests_a_frame(aircraft: Aircraft, *views: Direction) -> int:
     kinds = [kind for _, members in blocks_of(aircraft) for kind, _, _, alarms in members if alarms]
     tones = 0
     for view in views:
-        if view.across >= 0 and any(view.mix[SIDE:]):
-            kinds += [STEP, *(LOSS for _ in view.tries)]
+        if view.column_of >= 0 and any(view.direction[SIDE:]):
+            kinds += [STEP, *(LOSS for _ in view.losses)]
             tones += N_TONES
-        elif view.across == AN_AXIS and not view.inertial:
+        elif view.column_of == AXIS_VIEW and not view.inertial:
             tones += N_TONES
     return N_SLOTS * sum(SIDES[kind] for kind in kinds) + tones
 
@@ -141,7 +141,7 @@ def set_up(
     set_up_readings(statistical, errors, fdi["bound"]["admitted"])
     if across:
         chance = given.false_alarms_per_h / (3600.0 * rate_hz * n_tests)
-        set_up_listening(statistical["listening"], chance, airspeed_mps, pace * rate_hz, dt_s)
+        set_up_tones(statistical["tone_config"], chance, airspeed_mps, pace * rate_hz, dt_s)
         if forces:
             along_y = jacobian(design, *start)[3]
             set_up_forces(fdi, declared, start, along_y, dt_s)

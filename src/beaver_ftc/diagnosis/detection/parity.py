@@ -1,32 +1,36 @@
-"""What a surface cannot have done, whatever the type and the course of its fault.
+"""Parity tests: they exclude a surface, whatever the type and the time history of its fault.
 
-A fault of surface s moves the rates along its column g_s of G and nowhere else. So they are looked at along
-directions m that it does not move,
+A fault of surface s accelerates the aircraft along the column g_s of G only, rad/s2 per rad. A projection of
+the innovation nu, rad/s2, on a parity direction m that is orthogonal to that column,
 
-    m . x,     m . g_s = 0
+    m . nu        with  m . g_s = 0,  |m| = 1
 
-each by a filter and tests of its own (likelihood.py): a step, and losses of other surfaces.
-What is found there is another surface's doing. Directions are the axes, for the surfaces that do not move
-them at all, and in a plane that several surfaces move, across the column of each: m = (-g_2, g_1) / |g|. The
-planes are roll with yaw, and where accelerometers are read (forces.py) pitch with the normal force and yaw
-with the side force.
+does not depend on a fault of s. If a test finds a signal in this projection, s is not the (only) cause. Each
+direction is a view: it has a whitening filter of its own and tests for a step, for a loss of another surface
+(likelihood.py) and for an oscillation (tones.py). The directions are
 
-Where declared errors may turn that column, a share of what goes along it shows across: at most
-(|m_1| e_1 + |m_2| e_2) / (|g| - |m_2| e_1 - |m_1| e_2), e the error of the surface's own terms per rad. That
-much is tolerated as an error of a coefficient is. What a test must reach is the level of the alarm: chance
-and bounded uncertainty exclude no oftener than they alarm.
+* each axis, for the surfaces that do not move it;
+* in a plane that several surfaces move, the direction across the column g of each: m = (-g_2, g_1) / |g|. The
+  planes are roll and yaw; if accelerometers are used (forces.py), also pitch and normal force, yaw and side
+  force.
 
-The gust that the vanes show is taken off the rates only where the forces are measured: else a surface that is
-off its command has forces that would be taken for one, and every gust is reckoned with in full. So is the
-rolling one, which no vane shows.
+Declared errors may turn the column. Then a share of the innovation along the column leaks into the
+projection, at most (|m_1| e_1 + |m_2| e_2) / (|g| - |m_2| e_1 - |m_1| e_2), where e_1 and e_2 bound the
+errors of the surface's own terms, rad/s2 per rad. This share is tolerated like an error of a coefficient. A
+test excludes at the alarm level, so noise and bounded uncertainty exclude as rarely as they raise an alarm.
 
-An error of a vane moves a rate and its force as well, and so do gusts that it makes up. So where vanes are
-asked a surface is excluded only once something shows that is no vane's doing: across the vane's column, the
-gust being that which the forces say, or in the force at the angle of inertial motion.
+The gust estimated from the vanes is subtracted from the rates only if the forces are measured. Without that
+measurement a surface that does not follow its command produces a force that looks like a gust; then the
+whole declared gust counts as noise. The rolling gust always does: no vane measures it.
 
-A broken accelerometer moves a force and no rate. Where accelerometers may break (air.read: they are taken at
-their word) a force raises no alarm, so that it counts once the rates alone have raised it, and no gust is
-known by them. Known to be broken, or suspected of it, they count no more.
+An error of a vane changes a rate and its force, and so does the false gust estimate that it causes. If a view
+uses a vane, it excludes a surface only after a view that is insensitive to the vane confirms it. That is a
+view across the column of the vane, with the gust estimated from the forces, or a view of the force at the
+flow angle that integrated inertial motion gives.
+
+A broken accelerometer changes a force and no rate. If accelerometers may break (air.output.read is 0), a
+force raises no alarm and gives no gust estimate; it only counts after an alarm of the rates. Forces that are
+known or suspected to be wrong are not used.
 """
 
 from collections.abc import Iterator
@@ -48,66 +52,75 @@ from beaver_ftc.diagnosis.detection.likelihood import (
     PITCH_BLOCK,
     SENSE,
     STEP,
-    Rooms,
+    Capacity,
 )
-from beaver_ftc.diagnosis.detection.signatures import sign_view
+from beaver_ftc.diagnosis.detection.signatures import fill_view_signatures
 from beaver_ftc.diagnosis.detection.tones import tones_dtype
 from beaver_ftc.diagnosis.state import LOSS, NORMAL, PITCH, ROLL, SIDE, YAW
 
-VANE_TOLERANCE = 0.1  # of what a vane's error does: its column is that of the trim
-HOLDS = 5.0  # times as long as old evidence elsewhere a force is remembered
-MOSTLY = 0.9  # of a direction of length one
-LEAST_LENGTH = 0.1  # of a column: errors larger than that are not reckoned with
-IN_PITCH, LATERALLY, IN_YAW = (PITCH, NORMAL), (ROLL, YAW), (YAW, SIDE)  # planes that several surfaces move
+VANE_TOLERANCE = 0.1  # relative error of the effect of a vane's error: its column is that of the trim
+PEAK_MEMORY = 5.0  # time constant of `peak_score` over the one with which evidence is forgotten
+MIN_FORCE_SHARE = 0.9  # component of a direction of length 1, above which a view counts as one of the force
+MIN_COLUMN_LENGTH = 0.1  # least length that the errors leave of a column, as a share of its length
+PITCH_PLANE, LATERAL_PLANE, YAW_PLANE = (PITCH, NORMAL), (ROLL, YAW), (YAW, SIDE)
 
-# The rates along a direction, `mix`, in a block of one axis. surface: whose column it is across,
-# AN_AXIS of none, THE_VANE of an error of the incidence. plane: of the column; tolerated: anything at all;
-# inertial: the force by an angle that no vane gave; clears: what it shows is no vane's doing; cleared_by: the
-# force of the views that clear its vane, 0 where it asks none. held: its largest score, slowly forgotten.
-# axis: that an alarm of it is said to be about. past_gust: across the rolling gust too. column: of length 1.
-# Of the frame: whether it is weighed; which share of what goes along its column may show across.
-AN_AXIS, THE_VANE = -1, -2
+# Values of `surface` in a view without one: a view of an axis; one across the column of an error of a vane.
+AXIS_VIEW, VANE_VIEW = -1, -2
 
 
 class Size(NamedTuple):
-    """What a record has room for: of a block of the rates, of a view, and views; boxes of the error map."""
+    """Capacities of a record: of a block of the rates, of a view; numbers of views and of error-map boxes."""
 
-    rates: Rooms
-    view: Rooms
+    rates: Capacity
+    view: Capacity
     views: int
     boxes: int
 
 
-USUAL = Size(Rooms(23, MAX_HYPOTHESES), Rooms(36, 3), 13, 6)  # of most aircraft: `size_for` says whose
+USUAL_SIZE = Size(
+    Capacity(23, MAX_HYPOTHESES), Capacity(36, 3), 13, 6
+)  # enough for most aircraft: see `size_for`
 
 
 @sized
-def view_dtype(rooms: Rooms) -> np.dtype:
-    """A view whose block has these rooms."""
+def view_dtype(capacity: Capacity) -> np.dtype:
+    """A view whose block has these capacities."""
     return record(
-        surface=int, axis=int, mix=5, plane=(int, 2), past_gust=int, column=5, tolerated=int,
-        inertial=int, clears=int, cleared_by=int, weighed=int, shows_across=float,
-        bounded=1, by_rates=3, by_forces=3, held=float,
-        block=likelihood.block_dtype(rooms), tones=tones_dtype(rooms.regressors),
+        surface=int,  # whose column the direction is orthogonal to, or AXIS_VIEW, or VANE_VIEW
+        axis=int,  # reported with an alarm of this view
+        direction=5, column=5,  # m and g / |g|: roll, pitch, yaw, side force, normal force
+        plane=(int, 2),  # the two components that the column has
+        across_gust=int,  # whether m is orthogonal to the rolling gust as well
+        has_tolerance=int,  # whether regressors count in this view whatever the detector's other blocks do
+        inertial=int,  # whether the force is that at the flow angle from inertial motion
+        immune_to_vane=int,  # whether an error of a vane does not appear in this view
+        confirmed_by=int,  # force of the views that confirm this one; 0 if no vane is used
+        # of this frame: whether the view is used; which share of nu along the column leaks into it
+        active=int, column_leak=float,
+        bounded=1,  # bound on the uncertainty along m, rad/s2
+        gust_on_rates=3, gust_on_forces=3,  # effect of the air's rotation about the body axes, 1/s
+        peak_score=float,  # largest score, decaying slowly
+        block=likelihood.block_dtype(capacity), tones=tones_dtype(capacity.regressors),
     )  # fmt: skip
 
 
 @kernel
-def part(view, forces, air, inertial_air, innovation, i):
-    """Component i of what is looked at, rad/s2: of the rates' innovation (3,), or of a force's."""
+def innovation_component(view, forces, air, inertial_air, innovation, i):
+    """Component i of the innovation that a view projects, rad/s2: of the rates (3,), or of a force."""
     if i < SIDE:
-        return innovation[i] - (
-            gust_of(view, air, inertial_air).output.mean[i] if knows_gust(view, air) else 0.0
-        )
+        gust = 0.0
+        if uses_gust_estimate(view, air):
+            gust = gust_estimate_for(view, air, inertial_air).output.mean[i]
+        return innovation[i] - gust
     force = forces.component[i - SIDE]
     return force.inertial if view.inertial else force.innovation
 
 
 @kernel
-def column_of(view, forces, bound, G, j):
-    """The j-th of the two components of the column a view looks across, and how far off it can be."""
+def column_component(view, forces, bound, G, j):
+    """Entry j, 0 or 1, of the column in a view's plane and the bound on its error, rad/s2 per rad."""
     i, s = view.plane[j], view.surface
-    if s == THE_VANE:
+    if s == VANE_VIEW:
         size = forces.component[view.plane[1] - SIDE].vane[j]
         return size, VANE_TOLERANCE * abs(size)
     if i >= SIDE:
@@ -117,28 +130,32 @@ def column_of(view, forces, bound, G, j):
 
 
 @kernel
-def turn(view, forces, air, bound, G):
-    """Fill `mix` and `column` (5,), for a view across a column, G (3, n); returns which share of what goes
-    along it the errors of the column let show across."""
-    if view.past_gust:
-        return turn_past_gust(view, forces, air)
+def set_direction(view, forces, air, bound, G):
+    """Fill `direction` and `column` (5,) of a view across a column of G (3, n) rad/s2 per rad.
+
+    Returns the share of the innovation along the column that errors of the column let leak into the view.
+    """
+    if view.across_gust:
+        return set_direction_past_gust(view, forces, air)
     first, second = view.plane[0], view.plane[1]
-    one, one_off = column_of(view, forces, bound, G, 0)
-    other, other_off = column_of(view, forces, bound, G, 1)
-    size = np.sqrt(one * one + other * other)
+    first_entry, first_error = column_component(view, forces, bound, G, 0)
+    second_entry, second_error = column_component(view, forces, bound, G, 1)
+    size = np.sqrt(first_entry * first_entry + second_entry * second_entry)
     if size == 0.0:
         return 0.0
-    view.mix[first], view.mix[second] = -other / size, one / size
-    view.column[first], view.column[second] = one / size, other / size
-    across_it = abs(view.mix[first]) * one_off + abs(view.mix[second]) * other_off
-    shorter = abs(view.mix[second]) * one_off + abs(view.mix[first]) * other_off
-    return across_it / max(size - shorter, LEAST_LENGTH * size)
+    view.direction[first], view.direction[second] = -second_entry / size, first_entry / size
+    view.column[first], view.column[second] = first_entry / size, second_entry / size
+    leak = abs(view.direction[first]) * first_error + abs(view.direction[second]) * second_error
+    shorter = abs(view.direction[second]) * first_error + abs(view.direction[first]) * second_error
+    return leak / max(size - shorter, MIN_COLUMN_LENGTH * size)
 
 
 @kernel
-def turn_past_gust(view, forces, air):
-    """The same across the column of the side vane in roll, yaw and side force, and across what the rolling
-    gust does to the rates: the vector product of the two."""
+def set_direction_past_gust(view, forces, air):
+    """The same for the direction across two vectors: their vector product in (roll, yaw, side force).
+
+    The vectors are the column of an error of the side vane and the effect of the rolling gust on the rates.
+    """
     force = forces.component[0]
     roll, yaw, side = force.vane_roll, force.vane[0], force.vane[1]
     roll_gust, yaw_gust = (
@@ -149,53 +166,56 @@ def turn_past_gust(view, forces, air):
     length = np.sqrt(by_roll * by_roll + by_yaw * by_yaw + by_side * by_side)
     if length == 0.0:
         return 0.0
-    size, shows = np.sqrt(roll * roll + yaw * yaw + side * side), 0.0
+    size, leak = np.sqrt(roll * roll + yaw * yaw + side * side), 0.0
     for i, of_vane, by in ((ROLL, roll, by_roll), (YAW, yaw, by_yaw), (SIDE, side, by_side)):
-        view.mix[i], view.column[i] = by / length, of_vane / size
-        shows += VANE_TOLERANCE * abs(view.mix[i] * of_vane)
-    return shows / ((1.0 - VANE_TOLERANCE) * size)
+        view.direction[i], view.column[i] = by / length, of_vane / size
+        leak += VANE_TOLERANCE * abs(view.direction[i] * of_vane)
+    return leak / ((1.0 - VANE_TOLERANCE) * size)
 
 
 @kernel
-def knows_gust(view, air):
-    """Whether a view is told the gust: only one that the measured force clears of broken surfaces."""
-    return view.cleared_by > 0 and air.output.read == 1
+def uses_gust_estimate(view, air):
+    """True if the gust estimate is subtracted from a view: the measured force separates it from faults."""
+    return view.confirmed_by > 0 and air.output.read == 1
 
 
 @kernel
-def weighs(view):
-    """Whether there is a force in a view."""
-    return view.mix[SIDE] != 0.0 or view.mix[SIDE + 1] != 0.0
+def uses_force(view):
+    """True if a view's direction has a component along a force."""
+    return view.direction[SIDE] != 0.0 or view.direction[SIDE + 1] != 0.0
 
 
 @kernel
-def gust_of(view, air, inertial_air):
-    """The air by which a view knows the gust: that the vanes show, or that follows without them."""
-    return inertial_air if view.clears else air
+def gust_estimate_for(view, air, inertial_air):
+    """The gust estimate that a view uses: from the vanes, or from inertial motion if it must not use them."""
+    return inertial_air if view.immune_to_vane else air
 
 
 @kernel
-def feel_gust(view, forces, damping):
-    """Fill `by_rates` and `by_forces` (3,), 1/s: what the air's rotation about body axes does in a view;
-    damping (3, 3) 1/s: to the rates."""
-    m = view.mix
+def fill_gust_sensitivity(view, forces, damping):
+    """Fill `gust_on_rates` and `gust_on_forces` (3,), 1/s: the gust sensitivity of a view.
+
+    It is the projected acceleration per rad/s of rotation of the air about each body axis. damping (3, 3)
+    1/s: that of the rates.
+    """
+    m = view.direction
     for k in range(3):
         roll, pitch, yaw = m[ROLL] * damping[ROLL, k], m[PITCH] * damping[PITCH, k], m[YAW] * damping[YAW, k]
-        view.by_rates[k] = roll + pitch + yaw
-        view.by_forces[k] = 0.0
+        view.gust_on_rates[k] = roll + pitch + yaw
+        view.gust_on_forces[k] = 0.0
         for f in range(2):
-            view.by_forces[k] += m[SIDE + f] * forces.component[f].damping[k] * forces.strength
+            view.gust_on_forces[k] += m[SIDE + f] * forces.component[f].damping[k] * forces.strength
 
 
 @kernel
-def blur(view, noise, blocks, forces, air, inertial_air, V):
-    """Fill noise, jitter, drift and bound of a view's block from what is declared; V m/s."""
-    block, m = view.block, view.mix
+def set_noise(view, noise, blocks, forces, air, inertial_air, V):
+    """Fill measurement noise, jitter, drift intensity and bound of a view from the declared ones; V m/s."""
+    block, m = view.block, view.direction
     variance, jitter, bound, drift = 0.0, 0.0, 0.0, 0.0
     for i in range(3):
         variance += m[i] * m[i] * blocks[PITCH_BLOCK if i == PITCH else LATERAL].noise[i // 2]
         jitter += abs(m[i]) * np.sqrt(noise.jitter[i])
-        if view.clears:
+        if view.immune_to_vane:
             jitter += abs(m[i]) * forces.blurred[i]
         bound += abs(m[i]) * (noise.bounded[i] + noise.beyond[i])
     for f, force in enumerate(forces.component):
@@ -204,11 +224,13 @@ def blur(view, noise, blocks, forces, air, inertial_air, V):
             drift += (m[SIDE + f] * forces.strength) ** 2 * force.wander
         bound += abs(m[SIDE + f]) * (force.deflection * forces.strength + force.unsettled)
     if air.output.moving:
-        feel_gust(view, forces, air.output.damping)
-        if knows_gust(view, air):
-            drift += drift_beside(gust_of(view, air, inertial_air), V, view.by_rates, view.by_forces)
+        fill_gust_sensitivity(view, forces, air.output.damping)
+        if uses_gust_estimate(view, air):
+            drift += drift_beside(
+                gust_estimate_for(view, air, inertial_air), V, view.gust_on_rates, view.gust_on_forces
+            )
         else:
-            drift += whole_drift(air, V, view.by_rates, view.by_forces)
+            drift += whole_drift(air, V, view.gust_on_rates, view.gust_on_forces)
         for i in range(3):
             for j in range(3):
                 block.P_dd[0, 0] += m[i] * m[j] * air.output.leap[i, j]
@@ -218,17 +240,22 @@ def blur(view, noise, blocks, forces, air, inertial_air, V):
 
 
 @kernel
-def regress(view, blocks, forces, air, inertial_air, innovation):
-    """Fill what constants multiply in a view; innovation (3,) rad/s2."""
-    block, m = view.block, view.mix
+def fill_regressors(view, blocks, forces, air, inertial_air, innovation):
+    """Fill the regressors of a view: projections of those of the rates' block, of the force, of the leak.
+
+    innovation (3,) rad/s2.
+    """
+    block, m = view.block, view.direction
     first, second = view.plane[0], view.plane[1]
-    rates = blocks[PITCH_BLOCK if first == PITCH else LATERAL]
-    for j in range(rates.n_regressors):
+    block_of_rates = blocks[PITCH_BLOCK if first == PITCH else LATERAL]
+    for j in range(block_of_rates.n_regressors):
         if first == PITCH:
-            block.regressor[j, 0] = m[PITCH] * rates.regressor[j, 0]
+            block.regressor[j, 0] = m[PITCH] * block_of_rates.regressor[j, 0]
         else:
-            block.regressor[j, 0] = m[ROLL] * rates.regressor[j, 0] + m[YAW] * rates.regressor[j, 1]
-    n = rates.n_regressors
+            block.regressor[j, 0] = (
+                m[ROLL] * block_of_rates.regressor[j, 0] + m[YAW] * block_of_rates.regressor[j, 1]
+            )
+    n = block_of_rates.n_regressors
     if second >= SIDE and m[second] != 0.0:
         force = forces.component[second - SIDE]
         for j in range(force.n):
@@ -236,151 +263,171 @@ def regress(view, blocks, forces, air, inertial_air, innovation):
         n += force.n
         if view.inertial:
             block.regressor[n, 0], n = m[second] * force.drifted, n + 1
-    if view.surface != AN_AXIS:
+    if view.surface != AXIS_VIEW:
         block.regressor[n, 0] = 0.0
         for i in range(m.size):
             if view.column[i] != 0.0:
-                one = part(view, forces, air, inertial_air, innovation, i)
-                block.regressor[n, 0] += view.shows_across * view.column[i] * one
+                component = innovation_component(view, forces, air, inertial_air, innovation, i)
+                block.regressor[n, 0] += view.column_leak * view.column[i] * component
 
 
 @kernel
-def face(views, forces, air, bound, G, Gu):
-    """Turn each view to where it looks in this frame, with its signatures; G, Gu (3, n): of it."""
+def update_directions(views, forces, air, bound, G, Gu):
+    """Bring the direction and the signatures of each view to this frame.
+
+    G (3, n) rad/s2 per rad, Gu (3, n) rad/s2: control effectiveness and effect of each surface in the frame.
+    """
     for view in views:
-        view.weighed = not weighs(view) or (forces.known and forces.begun == SETTLED)
-        if view.weighed:
-            view.shows_across = turn(view, forces, air, bound, G) if view.surface != AN_AXIS else 0.0
-            sign_view(view, forces, Gu)
+        view.active = not uses_force(view) or (forces.known and forces.begun == SETTLED)
+        if view.active:
+            view.column_leak = (
+                set_direction(view, forces, air, bound, G) if view.surface != AXIS_VIEW else 0.0
+            )
+            fill_view_signatures(view, forces, Gu)
 
 
 @kernel
-def compose(views, tolerated, noise, blocks, forces, air, inertial_air, innovation, V):
-    """Put together what each view sees of the frame, and what it may owe to noise and to constants that are
-    `tolerated`; V m/s."""
+def project_innovation(views, tolerated, noise, blocks, forces, air, inertial_air, innovation, V):
+    """Project the innovation (3,) rad/s2 on the direction of each view, into `scratch` of its block.
+
+    Noise follows, and if constant errors are `tolerated`, their regressors; V m/s.
+    """
     for view in views:
-        if not view.weighed:
+        if not view.active:
             continue
-        blur(view, noise, blocks, forces, air, inertial_air, V)
-        m, seen = view.mix, view.block.scratch
-        seen[0] = 0.0
+        set_noise(view, noise, blocks, forces, air, inertial_air, V)
+        m, projected = view.direction, view.block.scratch
+        projected[0] = 0.0
         for i in range(m.size):
             if m[i] != 0.0:
-                seen[0] += m[i] * part(view, forces, air, inertial_air, innovation, i)
-        if tolerated or view.tolerated:
-            regress(view, blocks, forces, air, inertial_air, innovation)
+                projected[0] += m[i] * innovation_component(view, forces, air, inertial_air, innovation, i)
+        if tolerated or view.has_tolerance:
+            fill_regressors(view, blocks, forces, air, inertial_air, innovation)
 
 
 @kernel
-def observe(views, tests, listening, y, dt, k, latched):
-    """Take in frame k of what the views see, as `statistical.observe`; y as measured."""
-    heard = tones.usual(listening, y)
+def update_views(views, tests, tone_config, y, dt, k, latched):
+    """Update filters and tests of every view with frame k, as `statistical.update`; y (5,) as measured."""
+    within_envelope = tones.is_within_envelope(tone_config, y)
     keep, slot = tests.keep if latched else 1.0, likelihood.slot_to_start(k)
     for view in views:
-        if not view.weighed:
-            view.held = 0.0
+        if not view.active:
+            view.peak_score = 0.0
             continue
         if not latched:
             likelihood.start(view.block, slot)
-        tolerated = tests.tolerated or view.tolerated
+        tolerated = tests.tolerated or view.has_tolerance
         likelihood.take_in(view.block, view.bounded, tolerated, dt, keep)
-        if not view.inertial:  # the angle followed is off by what integration is, which swings as the flight
-            tones.listen(view, listening, tests.alarm_level, heard, tolerated, dt)
-        view.held = max((1.0 - (1.0 - tests.keep) / HOLDS) * view.held, best(view))
+        if not view.inertial:  # the error of the integrated angle oscillates with the aircraft's own modes
+            tones.update(view, tone_config, tests.alarm_level, within_envelope, tolerated, dt)
+        view.peak_score = max((1.0 - (1.0 - tests.keep) / PEAK_MEMORY) * view.peak_score, largest_score(view))
 
 
 @kernel
-def feels(view, forces, s, column):
-    """Whether a fault of surface s, of this column of G (3,), shows in a view."""
+def is_sensitive_to(view, forces, s, column):
+    """True if a fault of surface s, with this column (3,) of G, changes the projection of a view."""
     if view.surface == s:
         return False
-    m, shows = view.mix, 0.0
+    m, sensitivity = view.direction, 0.0
     for i in range(3):
-        shows += m[i] * column[i]
+        sensitivity += m[i] * column[i]
     for f in range(2):
-        shows += m[SIDE + f] * forces.component[f].column[s]
-    return shows != 0.0
+        sensitivity += m[SIDE + f] * forces.component[f].column[s]
+    return sensitivity != 0.0
 
 
 @kernel
-def best(view):
-    """The largest score in a view."""
-    found = view.tones.score
+def largest_score(view):
+    """The largest score of the tests of a view."""
+    largest = view.tones.score
     for h in range(view.block.n_hypotheses):
-        found = max(found, view.block.hypothesis[h].score)
-    return found
+        largest = max(largest, view.block.hypothesis[h].score)
+    return largest
 
 
 @kernel
-def shown(view, views, tests, forces, air):
-    """The score of what goes on in a view and is no vane's doing: no vane moves the rates alone. What a force
-    shows, and what clears the vane, may come a moment apart. The latter asks for the naming level."""
-    if weighs(view) and not forces.known:
+def confirmed_score(view, views, tests, forces, air):
+    """The score of a view, limited by the views that confirm that it is not an error of a vane.
+
+    A view of the rates alone needs no confirmation: no error of a vane changes the rates alone. Peak scores
+    are compared because the view and its confirmation may reach their levels at different times. The
+    confirming view must reach the naming level.
+    """
+    if uses_force(view) and not forces.known:
         return 0.0
-    if view.clears or not (weighs(view) or knows_gust(view, air)):
-        return best(view)
-    cleared = 0.0
+    if view.immune_to_vane or not (uses_force(view) or uses_gust_estimate(view, air)):
+        return largest_score(view)
+    confirming = 0.0
     for other in views:
-        if other.clears and other.plane[1] == view.cleared_by:
-            cleared = max(cleared, other.held)
-    return min(view.held, cleared * tests.alarm_level / np.sqrt(2.0 * tests.naming_level))
+        if other.immune_to_vane and other.plane[1] == view.confirmed_by:
+            confirming = max(confirming, other.peak_score)
+    return min(view.peak_score, confirming * tests.alarm_level / np.sqrt(2.0 * tests.naming_level))
 
 
 @kernel
-def alarm(view, views, tests, forces, air):
-    """The score with which a view raises the alarm, for what no block of the rates looks at: a tone about an
-    axis, or a view of little but a force, of accelerometers that do not break."""
-    if view.surface == AN_AXIS and not view.inertial:
+def alarm_score(view, views, tests, forces, air):
+    """The score with which a view raises the alarm, 0 if it raises none.
+
+    Views raise it only where no block of the rates tests: for an oscillation about an axis, and for a force,
+    if accelerometers cannot break.
+    """
+    if view.surface == AXIS_VIEW and not view.inertial:
         return view.tones.score
-    mostly = view.plane[1] >= SIDE and abs(view.mix[view.plane[1]]) > MOSTLY
-    if view.surface >= 0 and mostly and air.output.read == 1:
-        return shown(view, views, tests, forces, air)
+    is_mostly_force = view.plane[1] >= SIDE and abs(view.direction[view.plane[1]]) > MIN_FORCE_SHARE
+    if view.surface >= 0 and is_mostly_force and air.output.read == 1:
+        return confirmed_score(view, views, tests, forces, air)
     return 0.0
 
 
 @kernel
 def excludes(views, tests, forces, air, s, column):
-    """Whether something is going on that no fault of surface s does, of this column of G (3,)."""
+    """True if a view detects a signal that no fault of surface s, with this column (3,) of G, can cause."""
     for view in views:
-        blind = not view.clears and not feels(view, forces, s, column)
-        if blind and shown(view, views, tests, forces, air) > tests.alarm_level:
+        tests_surface = not view.immune_to_vane and not is_sensitive_to(view, forces, s, column)
+        if tests_surface and confirmed_score(view, views, tests, forces, air) > tests.alarm_level:
             return True
     return False
 
 
 class Direction(NamedTuple):
-    """What a view looks along. across: a surface, THE_VANE or AN_AXIS; tries: whose losses."""
+    """A parity direction as it is set up.
 
-    across: int
-    mix: tuple[float, ...]
+    column_of: the surface to whose column it is orthogonal, or VANE_VIEW, or AXIS_VIEW; direction: at the
+    start; losses: surfaces whose losses are tested; inertial: at the flow angle from inertial motion.
+    """
+
+    column_of: int
+    direction: tuple[float, ...]
     plane: tuple[int, int]
-    tries: list[int]
+    losses: list[int]
     inertial: bool = False
-    asks: bool = False  # the vanes, in moving air: they do not see it roll
+    uses_vane: bool = False  # for the gust estimate in moving air, which has no rolling component
 
 
 def views_of(aircraft: Aircraft, with_force: bool = False) -> Iterator[Direction]:
-    """The axes for themselves; in roll and yaw across the column of each surface that turns about
-    one of them. With accelerometers, in a rate and its force across those of what moves both, and that of
-    the vane."""
+    """The parity directions of an aircraft: each axis, and in roll and yaw across each surface's column.
+
+    With accelerometers also, in the plane of a rate and its force, across the column of each surface that
+    moves both and across that of the vane; and the force at the flow angle from inertial motion.
+    """
     in_pitch = [s for s, axis in enumerate(aircraft.dominant_axis) if axis == PITCH]
     lateral = [s for s, axis in enumerate(aircraft.dominant_axis) if axis != PITCH]
-    yield Direction(AN_AXIS, _along((PITCH,)), IN_PITCH, in_pitch, asks=True)
-    yield Direction(AN_AXIS, _along((ROLL,)), LATERALLY, lateral)
-    yield Direction(AN_AXIS, _along((YAW,)), LATERALLY, lateral, asks=True)
+    yield Direction(AXIS_VIEW, _along((PITCH,)), PITCH_PLANE, in_pitch, uses_vane=True)
+    yield Direction(AXIS_VIEW, _along((ROLL,)), LATERAL_PLANE, lateral)
+    yield Direction(AXIS_VIEW, _along((YAW,)), LATERAL_PLANE, lateral, uses_vane=True)
     for s in lateral:
         past_roll, others = aircraft.dominant_axis[s] == ROLL, [other for other in lateral if other != s]
-        yield Direction(s, _along((ROLL,)), LATERALLY, others, asks=past_roll)
+        yield Direction(s, _along((ROLL,)), LATERAL_PLANE, others, uses_vane=past_roll)
     if not with_force:
         return
-    for f, plane, movers in ((UP, IN_PITCH, in_pitch), (ASIDE, IN_YAW, lateral)):
+    for f, plane, movers in ((UP, PITCH_PLANE, in_pitch), (ASIDE, YAW_PLANE, lateral)):
         found = aircraft.separated_by_force(COMPONENTS[f])
         for s in found:
             own = aircraft.dominant_axis[s], plane[1]
             yield Direction(s, _along(own), own, [other for other in movers if other != s])
         if found:
-            yield Direction(THE_VANE, _along(plane), plane, movers)
-            yield Direction(AN_AXIS, _along(plane[1:]), plane, movers, inertial=True)
+            yield Direction(VANE_VIEW, _along(plane), plane, movers)
+            yield Direction(AXIS_VIEW, _along(plane[1:]), plane, movers, inertial=True)
 
 
 def _along(components: tuple[int, ...]) -> tuple[float, ...]:
@@ -388,33 +435,35 @@ def _along(components: tuple[int, ...]) -> tuple[float, ...]:
 
 
 def size_for(aircraft: Aircraft) -> Size:
-    """What an aircraft needs room for."""
+    """The capacities that the records of an aircraft need."""
     axes = [axis_of(term) for term in aircraft.moments]
     views = list(views_of(aircraft, aircraft.forces_separate_surfaces))
     rates = N_READINGS + max(axes.count(PITCH), axes.count(ROLL) + axes.count(YAW))
     errors = max(len(terms_of(aircraft, f)) for f in (ASIDE, UP)) + forces.MAX_ERRORS - MAX_TERMS_OF_ONE
     turns = [aircraft.dominant_axis[aircraft.surfaces.index(s)] for s in aircraft.class_of_losses]
     losses = max(turns.count(PITCH), turns.count(ROLL) + turns.count(YAW))
-    tried = max(len(view.tries) for view in views)
+    tried = max(len(view.losses) for view in views)
     error_map = aircraft.file.model_error_map
     boxes = len(error_map.boxes) if error_map else 0
-    return Size(Rooms(rates, 3 * losses + 2), Rooms(rates + errors + 2, tried + 1), len(views), boxes)
+    return Size(Capacity(rates, 3 * losses + 2), Capacity(rates + errors + 2, tried + 1), len(views), boxes)
 
 
 def set_up_views(statistical: np.void, aircraft: Aircraft) -> None:
-    """Fill the views of a statistical record whose blocks, and normal force, are set up."""
+    """Fill the views of a statistical record whose blocks and forces are already set up."""
     forces = statistical["forces"]
     separated = [aircraft.separated_by_force(COMPONENTS[f]) for f in (ASIDE, UP)]
     with_air = forces["known"] and statistical["air"]["output"]["moving"] and all(separated)
     views = list(views_of(aircraft, bool(forces["known"])))[: len(statistical["views"])]
     statistical["n_views"] = len(views)
-    for view, (surface, mix, plane, movers, inertial, asks) in zip(statistical["views"], views, strict=False):
-        view["surface"], view["mix"], view["plane"], block = surface, mix, plane, view["block"]
-        view["axis"] = mix.index(1.0) if surface == AN_AXIS and not inertial else plane[0]
-        axes = statistical["block"][PITCH_BLOCK if plane == IN_PITCH else LATERAL]
-        # A law answers a gust by the vanes before the gyros feel it pitch, and the vanes are not asked here:
-        # what an elevator does in moving air goes along with the noise, and no test of its loss is fair.
-        answered = statistical["air"]["output"]["moving"] and mix[PITCH]
+    for view, (surface, direction, plane, movers, inertial, uses_vane) in zip(
+        statistical["views"], views, strict=False
+    ):
+        view["surface"], view["direction"], view["plane"], block = surface, direction, plane, view["block"]
+        view["axis"] = direction.index(1.0) if surface == AXIS_VIEW and not inertial else plane[0]
+        axes = statistical["block"][PITCH_BLOCK if plane == PITCH_PLANE else LATERAL]
+        # A law that uses the vanes reacts to a gust before the gyros measure its pitching effect, and these
+        # views do not use the vanes. The elevator's effect then correlates with the noise: no loss is tested.
+        answered = statistical["air"]["output"]["moving"] and direction[PITCH]
         tried = [] if answered else movers[: len(block["hypothesis"]) - 1]
         kinds, n = [STEP, *(LOSS for _ in tried)], int(axes["n_regressors"])
         block["n"], block["n_hypotheses"], block["keep"] = 1, len(kinds), 1.0
@@ -422,21 +471,23 @@ def set_up_views(statistical: np.void, aircraft: Aircraft) -> None:
         for name in ("level", "chance", "pace"):
             block[name] = axes[name]
         block["tolerance"][:n] = axes["tolerance"][:n]
-        if asks and with_air:  # the vanes for the gust
-            view["cleared_by"] = NORMAL if plane == IN_PITCH else SIDE
-        if any(mix[SIDE:]):
-            force, view["cleared_by"] = forces["component"][plane[1] - SIDE], plane[1]
-            view["tolerated"], of_force = 1, int(force["n"])
+        if uses_vane and with_air:
+            view["confirmed_by"] = NORMAL if plane == PITCH_PLANE else SIDE
+        if any(direction[SIDE:]):
+            force, view["confirmed_by"] = forces["component"][plane[1] - SIDE], plane[1]
+            view["has_tolerance"], of_force = 1, int(force["n"])
             block["tolerance"][n : n + of_force] = force["tolerance"][:of_force]
             n += of_force
             if inertial:
                 block["tolerance"][n], n = force["drift"], n + 1
-        block["n_regressors"] = n + (surface != AN_AXIS)
-        block["tolerance"][n] = float(surface != AN_AXIS)  # of how far errors turn the column, in flight
+        block["n_regressors"] = n + (surface != AXIS_VIEW)
+        block["tolerance"][n] = float(surface != AXIS_VIEW)  # of the leak, which is worked out in flight
         hypotheses = block["hypothesis"][: len(kinds)]
         hypotheses["kind"], hypotheses["surface"] = kinds, [-1, *tried]
-        view["past_gust"] = surface == THE_VANE and plane == IN_YAW and statistical["air"]["output"]["moving"]
-        view["inertial"], view["clears"] = inertial, inertial or surface == THE_VANE
+        view["across_gust"] = (
+            surface == VANE_VIEW and plane == YAW_PLANE and statistical["air"]["output"]["moving"]
+        )
+        view["inertial"], view["immune_to_vane"] = inertial, inertial or surface == VANE_VIEW
         sense = block["lane"]["sense"].reshape(-1, likelihood.N_SLOTS)
         sense[:] = 0.0
         sense[: len(kinds)] = [[SENSE[kind]] for kind in kinds]

@@ -1,9 +1,9 @@
-"""Signatures: the acceleration that each hypothesis would have caused in the elapsed frame, per unit of
-theta.
+"""Signatures: the acceleration, rad/s2, of each hypothesis in the elapsed frame per unit of its theta.
 
-loss of surface s     G_s u_s              theta in [-1, 0]
-step on an axis       1 rad/s2             theta any
-pitching moment       that of one unit of the coefficient on alpha^3
+hypothesis            signature                             theta
+loss of surface s     G_s u_s, predicted                    in [-1, 0]
+step on an axis       1 rad/s2                              any
+pitching moment       that of a coefficient 1 of alpha^3    any
 """
 
 from beaver_ftc.compiled import kernel
@@ -12,11 +12,11 @@ from beaver_ftc.diagnosis.state import SIDE
 
 
 @kernel
-def sign_blocks(blocks, Gu, cubic):
+def fill_block_signatures(blocks, Gu, cubic):
     """Fill the signatures of the blocks of the rates, rad/s2.
 
-    Gu (3, surfaces) rad/s2: what each surface gave, mean over the frame; cubic rad/s2: a pitching moment on
-    alpha^3.
+    Gu (3, n) rad/s2: effect of each surface, mean over the frame; cubic rad/s2: pitch acceleration of a
+    coefficient 1 of alpha^3.
     """
     for block in blocks:
         for hypothesis in block.hypothesis[: block.n_hypotheses]:
@@ -30,9 +30,12 @@ def sign_blocks(blocks, Gu, cubic):
 
 
 @kernel
-def sign_view(view, forces, Gu):
-    """Fill the signatures along the direction of a view, rad/s2: a step, and losses; Gu (3, n) rad/s2."""
-    block, m = view.block, view.mix
+def fill_view_signatures(view, forces, Gu):
+    """Fill the projections of the signatures on the direction of a view: of a step, and of losses.
+
+    Gu (3, n) rad/s2: effect of each surface, mean over the frame.
+    """
+    block, m = view.block, view.direction
     for hypothesis in block.hypothesis[: block.n_hypotheses]:
         s = hypothesis.surface
         hypothesis.signature[0] = 1.0

@@ -25,8 +25,8 @@ from beaver_ftc.diagnosis.detection.likelihood import (
     N_READINGS,
     block_dtype,
 )
-from beaver_ftc.diagnosis.detection.parity import USUAL, Size, view_dtype
-from beaver_ftc.diagnosis.detection.tones import LISTENING
+from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE, Size, view_dtype
+from beaver_ftc.diagnosis.detection.tones import TONE_CONFIG
 from beaver_ftc.diagnosis.state import BESIDE_DAMAGE, LOSS
 
 # Of what the best explanation explains, the part that a constant theta leaves to a loss that grows is larger
@@ -62,11 +62,11 @@ ALARM = record(score=float, axis=int, closest=float, detected_at_s=float)
 
 
 @sized
-def statistical_dtype(size: Size = USUAL) -> np.dtype:
+def statistical_dtype(size: Size = USUAL_SIZE) -> np.dtype:
     """What the detector keeps of an aircraft of this size."""
     return record(
         tests=TESTS, noise=NOISE, alarm=ALARM, block=(block_dtype(size.rates), N_BLOCKS),
-        n_views=int, views=(view_dtype(size.view), size.views), listening=LISTENING,
+        n_views=int, views=(view_dtype(size.view), size.views), tone_config=TONE_CONFIG,
         forces=FORCES_FELT, air=AIR, inertial_air=AIR,
     )  # fmt: skip
 
@@ -133,7 +133,7 @@ def score(alarm, tests, blocks, views, forces, air, t, known=True):
             if hypothesis.alarms:
                 note(alarm, tests.alarm_level, hypothesis.score, hypothesis.axis)
     for view in views:
-        note(alarm, tests.alarm_level, parity.alarm(view, views, tests, forces, air), view.axis)
+        note(alarm, tests.alarm_level, parity.alarm_score(view, views, tests, forces, air), view.axis)
     if alarm.score > 1.0 and alarm.detected_at_s < 0.0:
         alarm.detected_at_s = t
 
@@ -165,7 +165,7 @@ def write_shares(tests, blocks, views, forces, air, row):
                 row[place] = max(row[place], hypothesis.score / tests.alarm_level)
     for view in views:
         place = row.size - 3 + view.axis
-        row[place] = max(row[place], parity.alarm(view, views, tests, forces, air) / tests.alarm_level)
+        row[place] = max(row[place], parity.alarm_score(view, views, tests, forces, air) / tests.alarm_level)
 
 
 @kernel

@@ -5,7 +5,7 @@ from beaver_ftc.design.model import AIRSPEED, unanticipated_pitch
 from beaver_ftc.diagnosis.belief import air
 from beaver_ftc.diagnosis.belief.expectation import foresee, form_innovation
 from beaver_ftc.diagnosis.detection import forces, parity, statistical
-from beaver_ftc.diagnosis.detection.signatures import sign_blocks
+from beaver_ftc.diagnosis.detection.signatures import fill_block_signatures
 
 
 @apart
@@ -19,14 +19,14 @@ def compare_likelihoods(fdi, belief, measured, k, t):
     if inertial.output.moving:
         air.elapse(inertial, belief.share)
     foresee(mean)
-    sign_blocks(blocks, mean.Gu_foreseen, unanticipated_pitch(belief.design, y, 1.0))
+    fill_block_signatures(blocks, mean.Gu_foreseen, unanticipated_pitch(belief.design, y, 1.0))
     latched, ends = chances.alarm.detected_at_s >= 0.0, not fdi.config.abrupt
     statistical.observe(tests, bounded, blocks, seen, innovation, dt, k, latched, ends)
-    parity.face(views, felt, seen, fdi.bound, mean.G_foreseen, mean.Gu_foreseen)
-    parity.compose(
+    parity.update_directions(views, felt, seen, fdi.bound, mean.G_foreseen, mean.Gu_foreseen)
+    parity.project_innovation(
         views, tests.tolerated, chances.noise, blocks, felt, seen, inertial, innovation, y[AIRSPEED]
     )
-    parity.observe(views, tests, chances.listening, y, dt, k, latched)
+    parity.update_views(views, tests, chances.tone_config, y, dt, k, latched)
     known = fdi.bound.error_map.outside == 0
     statistical.score(chances.alarm, tests, blocks, views, felt, seen, t, known)
     form_innovation(belief, measured.x, dt)

@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.diagnosis import UNANTICIPATED
+from beaver_ftc.diagnosis import UNANTICIPATED, DiagnosisReadout
 from beaver_ftc.diagnosis.types import TYPE_NAMES as NAMES
 from beaver_ftc.documents import BadInput
 from beaver_ftc.loop import Stepping, fly
@@ -146,10 +146,10 @@ def _flown(scenario: Scenario, pair: Document, candidates: Sequence[Candidate]) 
         before = 0
         for k in _with_doublet(flight, scenario, pair):
             if k == round(scenario.duration_s * scenario.rate_hz) - 1:
-                before = int(flight.record["accounts"]["envelope"]["n_exits"])
-        fdi, both = flight.record["fdi"], zip(candidates, pair["candidates"], strict=True)
-        exits = int(flight.record["accounts"]["envelope"]["n_exits"]) - before
-        return {"left": [words for one, words in both if not _gone(one, fdi)], "envelope_exits": exits}
+                before = flight.readout.envelope_exits
+        at_end, both = flight.readout, zip(candidates, pair["candidates"], strict=True)
+        left = [words for one, words in both if not _is_excluded(one, at_end.diagnosis)]
+        return {"left": left, "envelope_exits": at_end.envelope_exits - before}
     finally:
         flight.release()
 
@@ -167,7 +167,7 @@ def _with_doublet(flight: Stepping, scenario: Scenario, pair: Document) -> Itera
     for k in range(1, frames):
         flight.step()
         yield k
-    rest = flight.record["belief"]["u"].copy()
+    rest = flight.readout.expected_u_rad
     for k in range(round(pair["time_s"] * scenario.rate_hz) + 1):
         command = rest.copy()
         for name, course in pair["commands_rad"].items():
@@ -185,13 +185,13 @@ def certified(scenario: Scenario, pair: Document) -> tuple[MemoryLog, Document]:
         flight.release()
 
 
-def _gone(one: Candidate, fdi: np.void) -> bool:
+def _is_excluded(one: Candidate, diagnosis: DiagnosisReadout) -> bool:
     """Whether a candidate is excluded."""
-    estimators, layout = fdi["isolation"]["estimator"], fdi["layout"]
-    if not fdi["config"]["every_type"]:
-        return bool(estimators[int(layout["loss_of"][one.surface])]["excluded"])
-    whole = bool(estimators[int(layout["position_of"][one.surface])]["excluded"])
-    return whole or bool(fdi["types"]["surface"][one.surface]["feasible"]["excluded"][one.kind])
+    estimators, layout = diagnosis.estimators, diagnosis.layout
+    if not diagnosis.every_type:
+        return estimators[layout.loss_of[one.surface]].excluded
+    surface = estimators[layout.position_of[one.surface]].excluded
+    return surface or bool(diagnosis.surfaces[one.surface].excluded[one.kind])
 
 
 def write(document: Document, scenario: Scenario, out: Path) -> Path:
@@ -220,22 +220,16 @@ def _seen(scenario: Scenario, log: MemoryLog, recorder: Recorder) -> tuple[Tape,
 
 def situation_of(tape: Tape, scenario: Scenario, rate: float) -> Situation:
     """What is known of the aircraft as the flight ends; rate: rad/s at most."""
-    frame, aircraft = tape.last, scenario.airframe
-    belief, bound, declared, dt = (
-        frame["belief"],
-        frame["fdi"]["bound"],
-        declared_of(frame),
-        1.0 / scenario.rate_hz,
-    )
+    frame, aircraft, dt = tape.last, scenario.airframe, 1.0 / scenario.rate_hz
+    bound, declared, actuators = frame.diagnosis.bound, declared_of(frame), frame.actuators
     coupled = np.array(declared["inertia_coupling"]) * np.abs(declared["coupling"]) * rate**2
-    actuators = belief["actuators"]
     return Situation(
-        G=belief["means"]["G"].copy(), u=belief["u"].copy(), x=frame["measured"]["x"].copy(), rate=rate,
-        bound=MARGIN * (bound["eta_bar"] + coupled + 2.0 * bound["noise"] / dt),
-        stops=np.array([actuators["low"], actuators["high"]]), approach=actuators["approach"].copy(),
-        step=actuators["step"].copy(), instants=scenario.substeps,
-        in_blocks=int(frame["fdi"]["types"]["config"]["length"]) > 1, dt=dt,
-        alpha=float(frame["measured"]["y"][0]), alpha_range=_radians(aircraft.envelope.alpha_deg),
+        G=frame.mean_G, u=frame.expected_u_rad, x=frame.rates_rad_s, rate=rate,
+        bound=MARGIN * (bound.eta_bar_rad_s2 + coupled + 2.0 * bound.noise_rad_s / dt),
+        stops=np.array([actuators.low_rad, actuators.high_rad]), approach=actuators.approach,
+        step=actuators.step_rad, instants=scenario.substeps,
+        in_blocks=frame.diagnosis.types_config.block_frames > 1, dt=dt,
+        alpha=frame.alpha_rad, alpha_range=_radians(aircraft.envelope.alpha_deg),
     )  # fmt: skip
 
 
@@ -246,9 +240,9 @@ def _radians(ends: Sequence[float]) -> tuple[float, float]:
 
 def candidates(tape: Tape, history: History) -> Iterator[Candidate]:
     """Every fault that is left and stays as it is, with what is known of its parameter."""
-    fdi, frames = tape.last["fdi"], np.arange(_alarm(tape), tape.end)
+    frames = np.arange(_alarm(tape), tape.end)
     shown = frames[wrong(history, frames)]
-    if int(fdi["verdict"]["isolated"]) == UNANTICIPATED or not len(shown):
+    if tape.last.diagnosis.isolated == UNANTICIPATED or not len(shown):
         return
     for s, kind in _left(tape):
         of = hypothesis(tape, s, kind)
@@ -262,30 +256,30 @@ def candidates(tape: Tape, history: History) -> Iterator[Candidate]:
 
 def _alarm(tape: Tape) -> int:
     """The frame of the alarm."""
-    return round(float(tape.last["fdi"]["verdict"]["detected_at_s"]) / float(tape.last["dt"]))
+    return round(tape.last.diagnosis.detected_at_s / tape.last.dt_s)
 
 
 def _left(tape: Tape) -> Iterator[tuple[int, int]]:
     """Surface and type of what is not excluded and stays as it is."""
-    fdi = tape.last["fdi"]
-    estimators, layout = fdi["isolation"]["estimator"], fdi["layout"]
-    for s, surface in enumerate(fdi["types"]["surface"]):
-        if not fdi["config"]["every_type"]:
-            e = int(layout["loss_of"][s])
-            if e >= 0 and not estimators[e]["excluded"]:
+    diagnosis = tape.last.diagnosis
+    estimators, layout = diagnosis.estimators, diagnosis.layout
+    for s, surface in enumerate(diagnosis.surfaces):
+        if not diagnosis.every_type:
+            e = layout.loss_of[s]
+            if e >= 0 and not estimators[e].excluded:
                 yield s, CONSTANT_LOSS
-        elif not estimators[int(layout["position_of"][s])]["excluded"]:
-            yield from ((s, kind) for kind in CONSTANT if not surface["feasible"]["excluded"][kind])
+        elif not estimators[layout.position_of[s]].excluded:
+            yield from ((s, kind) for kind in CONSTANT if not surface.excluded[kind])
 
 
 def open_courses(tape: Tape, names: Sequence[str]) -> list[str]:
     """What is left whose course over many frames tells, not a frame."""
-    fdi, found = tape.last["fdi"], []
-    if not fdi["config"]["every_type"]:
+    diagnosis, found = tape.last.diagnosis, []
+    if not diagnosis.every_type:
         return []
-    for s, surface in enumerate(fdi["types"]["surface"]):
-        if not fdi["isolation"]["estimator"][int(fdi["layout"]["position_of"][s])]["excluded"]:
-            kinds = np.flatnonzero(surface["feasible"]["excluded"] == 0)
+    for s, surface in enumerate(diagnosis.surfaces):
+        if not diagnosis.estimators[diagnosis.layout.position_of[s]].excluded:
+            kinds = np.flatnonzero(~surface.excluded)
             found += [f"{names[s]} {NAMES[k]}" for k in kinds if k not in CONSTANT]
     return sorted(set(found))
 

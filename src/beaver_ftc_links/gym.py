@@ -39,9 +39,10 @@ from beaver_ftc.compiled import direct
 from beaver_ftc.documents import BadInput, SimulationFailed
 from beaver_ftc.loop import LARGEST_OBSERVATION as LARGEST
 from beaver_ftc.loop import OBSERVED_BESIDE_SURFACES as BESIDE_SURFACES
-from beaver_ftc.loop import OBSERVED_COLUMNS as LOOK
 from beaver_ftc.loop import act_as_agent as act
 from beaver_ftc.loop import cost_of_agent as cost
+from beaver_ftc.loop import look_of_agent as look_of
+from beaver_ftc.loop import note_trim_of_agent as note_trim
 from beaver_ftc.loop import observe_as_agent as observe
 from beaver_ftc.results import Simulation
 from beaver_ftc.scenario import ScenarioLike, load
@@ -67,18 +68,14 @@ class Episode(Simulation):
         super()._make_ready()
         self._cost = 0.0
         frames, log = self._loop.frames, self._loop.log
-        self._look = np.zeros(1, LOOK)
-        self._look["measured"], self._look["model"] = (
-            self.columns.index(f"p_{what}_rad_s") for what in ("measured", "model")
-        )
-        self._size = int(frames["held_rad"].size)
+        self._look = look_of(self.columns)
+        self._size = self.trim_rad.size
         seen = np.empty(0)
         self._acts = direct(act, frames, seen)
         self._costs = direct(cost, frames, log, self._look)
         self._observes = direct(observe, frames, log, self._look, seen)
         self._begin()
-        for name, value in zip(("alpha", "beta", "airspeed"), self.measured.y, strict=False):
-            self._look[name] = value
+        note_trim(self._look, self.measured.y)
 
     def act(self, action: ArrayLike, frames: int) -> float:
         """Fly so many frames, or to the end, with an action (surfaces,) held; returns what they cost."""

@@ -5,6 +5,7 @@ from dataclasses import asdict
 import numpy as np
 import pytest
 
+from beaver_ftc.control.readout import Schedule
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.assembly import y_places
 from beaver_ftc.loop.loop import Loop
@@ -141,15 +142,10 @@ def test_commands_do_what_is_demanded():
 
 
 def test_the_schedule_between_its_points_and_handed_over():
-    kind = np.dtype(
-        [("qdyn", float, 2), *((name, float, (4, 2)) for name in ("Kp_at", "L_rate_at", "L_disturbance_at"))]
-    )
-    rejection = np.zeros((), kind)
-    rejection["qdyn"] = 500.0, 1500.0
-    for i, name in enumerate(("Kp_at", "L_rate_at", "L_disturbance_at")):
-        rejection[name] = [[axis + 10 * i, axis + 10 * i + 1.0] for axis in (1, 2, 3, 6)]
-    np.testing.assert_allclose(interpolated(rejection, 750.0, 0.0)[1], [11.25, 12.25, 13.25])
-    np.testing.assert_allclose(interpolated(rejection, 750.0, 0.5), [[x + 10 * i for x in (1.25, 4.25, 3.25)]
+    gains = ([[axis + 10 * i, axis + 10 * i + 1.0] for axis in (1, 2, 3, 6)] for i in range(3))
+    schedule = Schedule(np.array([500.0, 1500.0]), *map(np.array, gains))
+    np.testing.assert_allclose(interpolated(schedule, 750.0, 0.0)[1], [11.25, 12.25, 13.25])
+    np.testing.assert_allclose(interpolated(schedule, 750.0, 0.5), [[x + 10 * i for x in (1.25, 4.25, 3.25)]
                                                                      for i in range(3)])  # fmt: skip
 
 

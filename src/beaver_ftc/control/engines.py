@@ -71,6 +71,13 @@ def configure(engines: np.void, scenario: Scenario) -> None:
         engines["memory"]["problem"]["weight"][e] = 1.0
 
 
+def effects_of(scenario: Scenario) -> np.ndarray:
+    """B (3, engines): rad/s2 about each axis per m/s2 of each engine that is an effector; of none (3, 0)."""
+    engines = np.zeros(1, ENGINES)[0]
+    configure(engines, scenario)
+    return np.array(engines["config"]["B"][:, : engines["config"]["n"]])
+
+
 @kernel
 def reaches(layout, saturated, surfaces, i):
     """Whether the surface that leads axis i is neither given up nor at its stop; saturated (n,)."""

@@ -45,6 +45,11 @@ def inertia_coefficients(mass: MassProperties) -> InertiaCoefficients:
     )  # fmt: skip
 
 
+def inertia_of(design: np.void) -> InertiaCoefficients:
+    """Those of a design model's record (dtype `design_dtype`)."""
+    return InertiaCoefficients(*(float(design[name]) for name in InertiaCoefficients._fields))
+
+
 def inertial(inertia: InertiaCoefficients, x: np.ndarray) -> np.ndarray:
     """The angular acceleration (n, 3) rad/s2 of turning with no moment, from the rate products [FDC]."""
     p, q, r = x.T

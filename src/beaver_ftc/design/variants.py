@@ -10,7 +10,7 @@ d(G u0)/dy, and f0 + G0 u0 is the acceleration in trim.
 
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -56,6 +56,29 @@ def anchor(design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndarray) -> None
         f_y[:, ALPHA] = 0.0
     design["x0"], design["y0"][: y.size] = x, y
     design["f0"], design["G0"], design["f_x"], design["f_y"][:, : y.size] = f, G, f_x, f_y
+
+
+class Anchored(NamedTuple):
+    """How a design model is tied to a trim: linearised about it, or with its angle of attack frozen there.
+
+    x0 (3,) rad/s, y0: the trim. f0 (3,) rad/s2, G0 (3, surfaces) rad/s2 per rad, f_x (3, 3), f_y: the model
+    and its derivatives there; zero where it is not tied.
+    """
+
+    linearised: bool
+    frozen_alpha: bool
+    x0: np.ndarray
+    y0: np.ndarray
+    f0: np.ndarray
+    G0: np.ndarray
+    f_x: np.ndarray
+    f_y: np.ndarray
+
+
+def anchored(design: np.void) -> Anchored:
+    """How this design model is tied to a trim; of a record of `design_dtype`."""
+    arrays = {name: design[name].copy() for name in Anchored._fields[2:]}
+    return Anchored(bool(design["linearised"]), bool(design["frozen_alpha"]), **arrays)
 
 
 def jacobian(

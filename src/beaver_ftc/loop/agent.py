@@ -3,6 +3,8 @@
 Between both, `stepping.fly_on` flies: a step of an agent is three compiled calls, however many frames it has.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from beaver_ftc.compiled import kernel, record
@@ -17,6 +19,19 @@ BESIDE_SURFACES = 12
 
 # Where a row of the log has the measured p and the reference model's, which q and r follow; trim, in SI.
 LOOK = record(measured=int, model=int, alpha=float, beta=float, airspeed=float)
+
+
+def look_of(columns: Sequence[str]) -> np.ndarray:
+    """What an agent of a log with these columns looks at, (1,) of LOOK; still without the trim."""
+    look = np.zeros(1, LOOK)
+    look["measured"], look["model"] = (columns.index(f"p_{what}_rad_s") for what in ("measured", "model"))
+    return look
+
+
+def note_trim(look: np.ndarray, y: np.ndarray) -> None:
+    """Note the trim, y: alpha rad, beta rad, airspeed m/s."""
+    for name, value in zip(("alpha", "beta", "airspeed"), y, strict=False):
+        look[name] = value
 
 
 @kernel

@@ -16,6 +16,7 @@ from beaver_ftc.loop.inconclusive import inconclusive_now
 from beaver_ftc.loop.loop import CHUNK_ROWS, FLYING, ONE_FLIES, LogSink, Loop
 from beaver_ftc.loop.outcome import Landing, verdict_of
 from beaver_ftc.loop.plugin_frame import measured_of
+from beaver_ftc.loop.readout import FrameReadout
 from beaver_ftc.plant.adapter import Plant, UnknownProperty
 from beaver_ftc.plant.configure import GustSchedule
 from beaver_ftc.plant.faults import is_there
@@ -153,14 +154,14 @@ class Stepping:
         return MODES[int(self._frame["supervisor"]["mode"])]
 
     @property
-    def record(self) -> np.void:
-        """The flight's record, of `frame_dtype`; the flight goes on in it."""
+    def readout(self) -> FrameReadout:
+        """The flight at the frame just flown."""
         self._begin()
-        return self._frame
+        return FrameReadout(self._frame)
 
     @property
     def records(self) -> np.ndarray:
-        """The same as an array (1,)."""
+        """The flight's record as an array (1,), of `frame_dtype`; the flight goes on in it."""
         self._begin()
         return self._loop.frames
 

@@ -26,8 +26,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.control.engines import ENGINES
-from beaver_ftc.control.engines import configure as configure_engines
+from beaver_ftc.control.engines import effects_of as effects_of_engines
 from beaver_ftc.design.model import AXES, N_Y, both_responses
 from beaver_ftc.design.variants import design_of
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
@@ -241,11 +240,10 @@ def engine_failures(scenario: Scenario) -> list[Document]:
     is certain to show in a frame; whether its moment is a signal, so that the design model knows it, and
     whether that is held against the thrust of all."""
     aircraft = scenario.airframe
-    engines, thrust = np.zeros(1, ENGINES)[0], aircraft.engine.thrust
+    thrust, power = aircraft.engine.thrust, aircraft.file.power_setting
     short = scenario.model_copy(update={"duration_s": SETTLED_S + 1.0, "faults": ()})
-    configure_engines(engines, short)
-    power = aircraft.file.power_setting
-    if thrust is None or power is None or not engines["config"]["n"]:
+    effects = effects_of_engines(short)
+    if thrust is None or power is None or not effects.size:
         return []
     loop, bound = Loop(short), excitation(short).bound[0]
     setting = loop.trim.settings[power[0]]
@@ -258,7 +256,7 @@ def engine_failures(scenario: Scenario) -> list[Document]:
     mapped = aircraft.file.model_error_map
     held = known and mapped is not None and mapped.knows_engines
     for e, name in enumerate(aircraft.effectors):
-        turns = np.abs(engines["config"]["B"][:, e]) * gained
+        turns = np.abs(effects[:, e]) * gained
         shows = 1.0 / float(detection_magnitude(turns[None], bound[None])[0])
         turned = turns.tolist()
         found.append({"engine": name, "turns_rad_s2": turned, "shows": shows, "known": known, "held": held})

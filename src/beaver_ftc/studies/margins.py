@@ -22,12 +22,13 @@ from beaver_ftc.aircraft import AXES
 from beaver_ftc.control.laws.gains import margins
 from beaver_ftc.control.laws.rejecting import STAND_IN
 from beaver_ftc.control.laws.rows import flown_by
+from beaver_ftc.control.readout import Schedule
 from beaver_ftc.design.model import QDYN
 from beaver_ftc.design.variants import jacobian
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.loop.assembly import y_places
 from beaver_ftc.loop.loop import Loop
+from beaver_ftc.loop.readout import FrameReadout
 from beaver_ftc.plant.conditions import trimmed
 from beaver_ftc.plant.linear import LinearModel, differences
 from beaver_ftc.scenario.schema import Scenario
@@ -71,11 +72,11 @@ class OpenLoop:
     dt_s: float
 
 
-def interpolated(law: np.void, qdyn: float, lost: float) -> np.ndarray:
+def interpolated(law: Schedule, qdyn: float, lost: float) -> np.ndarray:
     """Kp, L_rate and L_disturbance, (3, 3) over the axes, of the law's schedule at a dynamic pressure (Pa), a
     share `lost` of pitch handed over."""
-    schedules = (law[name] for name in ("Kp_at", "L_rate_at", "L_disturbance_at"))
-    found = np.array([[np.interp(qdyn, law["qdyn"], row) for row in rows] for rows in schedules])
+    schedules = law.Kp, law.L_rate, law.L_disturbance
+    found = np.array([[np.interp(qdyn, law.qdyn_pa, row) for row in rows] for rows in schedules])
     found[:, PITCH] += lost * (found[:, STAND_IN] - found[:, PITCH])
     return found[:, :3]
 
@@ -195,11 +196,10 @@ def at(scenario: Scenario) -> Iterator[Margin]:
     """The margins at a scenario's flight condition."""
     plant, point = trimmed(scenario)
     linear = differences(plant, point)
-    frame = Loop(scenario).frames[0]
-    truth = frame["truth"]["value"] * frame["truth"]["factor"]
-    y = truth[y_places(frame)]
+    frame = FrameReadout(Loop(scenario).frames[0])
+    y = frame.true_signals
     omega = frequencies(1.0 / scenario.rate_hz)
-    for fault, effectiveness in cases(frame["control"]["layout"]["main"], scenario.airframe.surfaces):
+    for fault, effectiveness in cases(frame.control.main, scenario.airframe.surfaces):
         loop, law = open_loop(scenario, frame, linear, y, effectiveness)
         L = loops(loop, law, omega)
         for s, surface in enumerate(scenario.airframe.surfaces):
@@ -217,23 +217,22 @@ def cases(main: np.ndarray, surfaces: tuple[str, ...]) -> Iterator[tuple[str, np
 
 
 def open_loop(
-    scenario: Scenario, frame: np.void, linear: LinearModel, y: np.ndarray, effectiveness: np.ndarray
+    scenario: Scenario, frame: FrameReadout, linear: LinearModel, y: np.ndarray, effectiveness: np.ndarray
 ) -> tuple[OpenLoop, LawGains]:
     """The loop with this effectiveness (n,), the law knowing it; y: the measured signals in trim."""
-    control, belief, dt = frame["control"], frame["belief"], 1.0 / scenario.rate_hz
-    law, layout = control["rejecting"]["config"], control["layout"]
-    _, G, f_x, f_y = jacobian(belief["design"], np.zeros(3), y, layout["trim"])
-    lost = 1.0 - effectiveness[layout["main"][PITCH]] if layout["stand_in"] >= 0 else 0.0
-    whole = 1.0 - (1.0 - belief["actuators"]["approach"]) ** scenario.substeps
+    law, dt = frame.control, 1.0 / scenario.rate_hz
+    _, G, f_x, f_y = jacobian(frame.design, np.zeros(3), y, law.trim_rad)
+    lost = 1.0 - effectiveness[law.main[PITCH]] if law.stand_in >= 0 else 0.0
+    whole = 1.0 - (1.0 - frame.actuators.approach) ** scenario.substeps
     C = outputs(linear.states, y)
     delay_s, keep = sensors(scenario, len(C), dt)
     loop = OpenLoop(
         linear.A, linear.B, C, np.hstack((f_x, f_y[:, : len(C) - 3])), G * effectiveness, effectiveness,
         whole, delay_s, keep, dt,
     )  # fmt: skip
-    demand = allocation(G * effectiveness, layout["main"], layout["stand_in"], lost)
-    Kp, L_rate, L_disturbance = interpolated(law, y[QDYN], lost)
-    return loop, LawGains(Kp, L_rate, L_disturbance, demand, np.array(law["lead"]), float(law["share"]))
+    demand = allocation(G * effectiveness, law.main, law.stand_in, lost)
+    Kp, L_rate, L_disturbance = interpolated(law.schedule, y[QDYN], lost)
+    return loop, LawGains(Kp, L_rate, L_disturbance, demand, law.lead, law.share)
 
 
 def outputs(states: tuple[str, ...], y: np.ndarray) -> np.ndarray:

@@ -56,9 +56,9 @@ def by_blocks(history: History, length: int, begin: int) -> Blocks:
 
 def in_blocks(tape: Tape, history: History, alarm: int) -> tuple[Tape, Blocks, int]:
     """Tape, history and alarm by the blocks that the types were held against."""
-    types = tape.alarm["fdi"]["types"]
-    length = int(types["config"]["length"])
-    begin = (alarm + 1 - int(types["block"]["filled"])) % length
+    diagnosis = tape.alarm.diagnosis
+    length = diagnosis.types_config.block_frames
+    begin = (alarm + 1 - diagnosis.frames_in_block) % length
     of, first = by_blocks(history, length, begin), ceil((tape.first - begin) / length)
     since = begin + first * length - tape.first
     kept = {

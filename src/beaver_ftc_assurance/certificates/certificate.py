@@ -208,7 +208,7 @@ def evidence(scenario: Scenario, tape: Tape, said: list[Document]) -> Evidence:
     offset, slope and spread of its fault's effect and the range of its parameter; for each fault type on a
     surface whether it is excluded. The effects are known in the frames of the tape only."""
     found: Evidence = {}
-    surfaces, fdi = scenario.airframe.surfaces, tape.alarm["fdi"]
+    surfaces, diagnosis = scenario.airframe.surfaces, tape.alarm.diagnosis
     of_types = [one["what"].partition(" ")[0] for one in said if one["what"] and " " in one["what"]]
     wanted = {one["what"] for one in said} | {f"{surface}_position" for surface in of_types}
     for e, name in enumerate(tape.names):
@@ -217,12 +217,13 @@ def evidence(scenario: Scenario, tape: Tape, said: list[Document]) -> Evidence:
         for quantity, unit in (("offset", "_rad_s2"), ("slope", ""), ("spread", "_rad_s2")):
             for axis, values in zip(AXES, getattr(tape, quantity)[:, e].T, strict=True):
                 found[f"fie_{name}_{axis}_{quantity}{unit}"] = Part(tape.first, values)
-        for end in ("low", "high"):
-            found[f"fie_{name}_theta_{end}"] = Part.constant(float(fdi["isolation"]["estimator"][e][end]))
+        estimator = diagnosis.estimators[e]
+        for end, theta in (("low", estimator.low), ("high", estimator.high)):
+            found[f"fie_{name}_theta_{end}"] = Part.constant(theta)
     for surface in dict.fromkeys(of_types):
-        actuator = fdi["types"]["surface"][surfaces.index(surface)]["actuator"]
-        for end in ("low", "high"):
-            found[f"{surface}_travel_{end}_rad"] = Part.constant(float(actuator[f"travel_{end}"]))
+        actuator = diagnosis.surfaces[surfaces.index(surface)].actuator
+        for end, stop_rad in (("low", actuator.travel_low_rad), ("high", actuator.travel_high_rad)):
+            found[f"{surface}_travel_{end}_rad"] = Part.constant(stop_rad)
     for s, kind, _ in kinds.excluded_types(tape):
         if surfaces[s] in of_types:
             flags = (tape.types[:, s, kind] > 0).astype(float)
@@ -280,11 +281,11 @@ def statements(
     scenario: Scenario, tape: Tape, history: History, events: dict[str, int]
 ) -> Iterator[Document]:
     """What can be said of each event; one without a `value` says why it cannot be certified."""
-    alarm, fdi = events["detected"], tape.alarm["fdi"]
+    alarm, diagnosis = events["detected"], tape.alarm.diagnosis
     about: Document = {"what": None, "column": "detected", "frame": alarm}
-    watch = instruments_say.of_alarm(fdi["watch"]) if fdi["watch"]["output"]["alarmed"] else None
-    config, ours = fdi["config"], place_of("adaptive-estimators")
-    if not fdi["isolation"]["config"]["n"] or not config["enabled"] or config["scheme"] != ours:
+    monitor, ours = diagnosis.sensor_monitor, place_of("adaptive-estimators")
+    watch = instruments_say.of_alarm(monitor) if monitor.alarmed else None
+    if not diagnosis.estimators or not diagnosis.enabled or diagnosis.scheme != ours:
         yield about | (watch or {"because": "another scheme was in charge"})
         return
     said = _stated(_of_alarm(scenario, tape, history, alarm), history, chance.NOT_STATED, **about)
@@ -312,7 +313,7 @@ def statements(
 def _of_types(scenario: Scenario, tape: Tape, history: History, alarm: int) -> Iterator[Document]:
     """Of each type excluded, surface by surface; the log has a column for it only with a certificate."""
     frames = tape, history
-    if tape.alarm["fdi"]["types"]["config"]["length"] > 1:
+    if tape.alarm.diagnosis.types_config.block_frames > 1:
         tape, history, alarm = in_blocks(tape, history, alarm)
     any_block = len(tape.types) > 0
     for s, kind, k in kinds.excluded_types(tape if any_block else frames[0]):
@@ -376,20 +377,20 @@ def _first_violated(candidates: Iterable[list[Term]], of: Hypothesis, history: H
 
 def _of_exclusion(scenario: Scenario, tape: Tape, history: History, e: int, alarm: int, k: int) -> Found:
     """The test that the fault of estimator e failed at frame k."""
-    fie, config = tape.alarm["fdi"]["isolation"]["estimator"][e], scenario.fdi
-    asked = tuple(i for i in range(3) if not fie["unasked"][i])
+    estimator, config = tape.alarm.diagnosis.estimators[e], scenario.fdi
+    asked = estimator.axes
     of = Hypothesis(
-        tape.first, tape.offset[:, e], tape.slope[:, e], tape.spread[:, e], float(fie["low"]),
-        float(fie["high"]), asked=asked,
+        tape.first, tape.offset[:, e], tape.slope[:, e], tape.spread[:, e], estimator.low, estimator.high,
+        asked=asked,
     )  # fmt: skip
     since_alarm = ([Term(d, config.isolation_pole_per_s, alarm, k)] for d in directions(asked) if k > alarm)
-    filtered = _filtered(scenario, tape, e, fie["across"], asked, k)
+    filtered = _filtered(scenario, tape, e, estimator.across, asked, k)
     found = _first_violated(chain(of_one_frame(k, of), filtered, since_alarm), of, history, tape)
     if found is not None:
         return found
     lasting = replace(of, constant=True)
     candidates: list[list[Term]] = []
-    if fie["kind"] == LOSS and config.fault_profile == "abrupt":
+    if estimator.kind == LOSS and config.fault_profile == "abrupt":
         candidates.append(constant_pair(lasting, history, np.arange(alarm, k + 1)))
     elif config.thresholds == "published" and k > alarm:
         candidates += [[Term(d, config.isolation_pole_per_s, alarm, k)] for d in directions(asked)]

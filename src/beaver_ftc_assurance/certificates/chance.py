@@ -11,19 +11,18 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.compiled import kernel
+from beaver_ftc.diagnosis import OF_BLOCK, DiagnosisReadout, StatisticalBlock, StatisticalHypothesis
 from beaver_ftc.diagnosis.detection import (
     CHANCE,
-    N_SLOTS,
-    Capacity,
     advance_block,
-    block_dtype,
+    filter_block,
     reach_of_block,
     slot_to_start,
     whiten_frame,
 )
 from beaver_ftc.diagnosis.detection import STEP_HYPOTHESIS as STEP
 from beaver_ftc_assurance.certificates.inequality import Document, History
-from beaver_ftc_assurance.certificates.tape import OF_BLOCK, Tape
+from beaver_ftc_assurance.certificates.tape import Tape
 
 _AS_LOGGED = 1e-5  # of the alarm's score: more than all that is left out makes
 _FORGOTTEN = 1e-7  # of the limit
@@ -37,13 +36,13 @@ NOT_STATED = "chance raised it: an onset long before, a tone, or a force"
 
 def of_alarm(tape: Tape, history: History, surfaces: Sequence[str], k: int) -> Document | None:
     """The statement that chance raised the alarm at row k; None where it is not one onset's, or too old."""
-    chances = tape.alarm["fdi"]["statistical"]
-    b, h, slot = _loudest(chances)
+    diagnosis = tape.alarm.diagnosis
+    b, h, slot = _loudest(diagnosis.blocks)
     first = next((r for r in range(k, tape.first, -1) if slot_to_start(r - tape.since) == slot), None)
     if first is None or k - first > _LONGEST:
         return None
-    hypothesis = chances["block"][b]["hypothesis"][h]
-    score = float(hypothesis["score"] / chances["tests"]["alarm_level"])
+    hypothesis = diagnosis.blocks[b].hypotheses[h]
+    score = hypothesis.score / diagnosis.alarm_level
     said = _written(tape, history, (b, h, slot), range(first, k + 1))
     if score > 1.0 + _AS_LOGGED:
         _leave_out(said, history)
@@ -68,24 +67,18 @@ def with_share(said: Document, logged: float) -> Document:
     return said | {"sides": [[value, logged * (1.0 + _AS_LOGGED)], [limit, value / limit]]}
 
 
-def shares(chances: np.void, surfaces: Sequence[str]) -> dict[str, float]:
-    """Column, and largest share of the level, of each hypothesis that raises alarms."""
+def shares(diagnosis: DiagnosisReadout, surfaces: Sequence[str]) -> dict[str, float]:
+    """Column, and largest share of the alarm level, of each hypothesis that raises alarms."""
     found: dict[str, float] = {}
-    for block in chances["block"]:
-        for hypothesis in block["hypothesis"][: block["n_hypotheses"]]:
-            if hypothesis["alarms"]:
-                column, share = (
-                    _column(hypothesis, surfaces),
-                    hypothesis["score"] / chances["tests"]["alarm_level"],
-                )
-                found[column] = max(found.get(column, 0.0), float(share))
+    for hypothesis in (each for block in diagnosis.blocks for each in block.hypotheses if each.alarms):
+        column, share = _column(hypothesis, surfaces), hypothesis.score / diagnosis.alarm_level
+        found[column] = max(found.get(column, 0.0), share)
     return found
 
 
-def _column(hypothesis: np.void, surfaces: Sequence[str]) -> str:
-    step = hypothesis["kind"] == STEP
-    of = f"{AXES[hypothesis['axis']]}_step" if step else f"{surfaces[hypothesis['surface']]}_loss"
-    return f"{of}_likelihood_share"
+def _column(of: StatisticalHypothesis, surfaces: Sequence[str]) -> str:
+    name = f"{AXES[of.axis]}_step" if of.kind == STEP else f"{surfaces[of.surface]}_loss"
+    return f"{name}_likelihood_share"
 
 
 def _leave_out(said: Document, history: History) -> None:
@@ -144,27 +137,26 @@ def _leave_out_variances(said: Document, history: History) -> None:
             said["R"][i] = None
 
 
-def _loudest(chances: np.void) -> tuple[int, int, int]:
+def _loudest(blocks: Sequence[StatisticalBlock]) -> tuple[int, int, int]:
     """Block, hypothesis and slot of the largest score that raises alarms."""
     best, found = -1.0, (0, 0, 0)
-    for b, block in enumerate(chances["block"]):
-        for h, hypothesis in enumerate(block["hypothesis"][: block["n_hypotheses"]]):
-            if hypothesis["alarms"] and hypothesis["score"] > best:
-                lanes = block["lane"]["score"][h * N_SLOTS : (h + 1) * N_SLOTS]
-                best, found = float(hypothesis["score"]), (b, h, int(np.argmax(lanes)))
+    for b, block in enumerate(blocks):
+        for h, hypothesis in enumerate(block.hypotheses):
+            if hypothesis.alarms and hypothesis.score > best:
+                best, found = hypothesis.score, (b, h, int(np.argmax(block.lanes.score[h])))
     return found
 
 
 def _written(tape: Tape, history: History, test: tuple[int, int, int], rows: range) -> Document:
     """The statement of a test, block, hypothesis and onset's slot, with these frames."""
-    (b, h, slot), dt, chances = test, history.dt, tape.alarm["fdi"]["statistical"]
-    block, here = chances["block"][b], slice(rows[0] - 1 - tape.first, rows[-1] + 1 - tape.first)
+    (b, h, slot), dt, diagnosis = test, history.dt, tape.alarm.diagnosis
+    block, here = diagnosis.blocks[b], slice(rows[0] - 1 - tape.first, rows[-1] + 1 - tape.first)
     of = {name: tape.chances[name][here, b] for name in (*OF_BLOCK, "signature")}
     then, now = ({name: values[part] for name, values in of.items()} for part in (np.s_[:-1], np.s_[1:]))
-    felt = _felt(of, now["signature"][:, h], int(block["n"]))
-    n, states, axes = len(felt), [*felt, *(2 + i for i in felt)], [int(block["axis"][i]) for i in felt]
+    felt = _felt(of, now["signature"][:, h], len(block.axes))
+    n, states, axes = len(felt), [*felt, *(2 + i for i in felt)], [block.axes[i] for i in felt]
     square = np.ix_(range(len(rows)), felt, felt)
-    known = [j for j in np.flatnonzero(block["tolerance"][: block["n_regressors"]] > 0.0).tolist()
+    known = [j for j in np.flatnonzero(block.tolerance > 0.0).tolist()
              if now["regressor_response"][:, j][:, felt].any()]  # fmt: skip
     drift = dt * then["drift"][square]  # which is felt a frame later
     drift[1:], drift[0] = drift[:-1].copy(), 0.0
@@ -176,16 +168,16 @@ def _written(tape: Tape, history: History, test: tuple[int, int, int], rows: ran
         "signature": now["signature"][:, h][:, felt], "jitter": dt * dt * then["jitter"][:, felt],
         "drift": drift, "bounded": tape.chances["bounded"][here][:-1][:, axes], "pace": then["pace"],
     }  # fmt: skip
-    if block["lag"] > 0.0:
+    if block.lag > 0.0:
         its["keep"] = then["keep"]
     if known:
         its["known"] = (response - before[..., :n]) / dt + before[..., n:]  # that gave this response
-    if chances["air"]["output"]["moving"]:
+    if diagnosis.air.moving:
         its["air"] = tape.chances["air"][here][1:][:, axes]
-        drift += block["stronger"] * tape.chances["leap"][here][1:][np.ix_(range(len(rows)), axes, axes)]
-    lane, at = block["lane"], h * N_SLOTS + slot
-    loss = bool(lane["sense"][at])
-    taken = [name for name in ("foreseen", "shown") if lane["sense"][at] * lane[name][at] > 0.0]
+        drift += block.stronger * tape.chances["leap"][here][1:][np.ix_(range(len(rows)), axes, axes)]
+    lanes = block.lanes
+    sense, explained = lanes.sense[h, slot], {"foreseen": lanes.foreseen, "shown": lanes.shown}
+    taken = [name for name, values in explained.items() if sense * values[h, slot] > 0.0]
     if taken:  # each of them where it speaks for the loss
         its["foreseen"] = np.sum([now[name] for name in taken], axis=0)[:, felt]
     state = then["state"][0, states]
@@ -195,8 +187,8 @@ def _written(tape: Tape, history: History, test: tuple[int, int, int], rows: ran
     lists = zip(*(values.tolist() for values in its.values()), strict=True)
     frames = [dict(zip(its, row, strict=True)) for row in lists]
     return {
-        "level": float(chances["tests"]["alarm_level"]), "axes": axes, "sense": "less" if loss else "either",
-        "tolerance": [float(block["tolerance"][j]) for j in known],
+        "level": diagnosis.alarm_level, "axes": axes, "sense": "less" if sense else "either",
+        "tolerance": [float(block.tolerance[j]) for j in known],
         "R": of["noise"][0, felt].tolist(), "Y": Y.tolist(),
         "P": (0.5 * (P + P.T)).tolist(),  # else rounding sets both sides apart
         "first": rows[0], "frames": frames,
@@ -265,13 +257,7 @@ def _frames(said: Document, history: History) -> _Frames:
 def _followed(said: Document, frames: _Frames, P: np.ndarray, R: np.ndarray) -> _Sums:
     """Run the filter; P, R: variances before the first frame, and of gyros."""
     n, m = len(R), 2 + len(said["tolerance"])
-    block, states = np.zeros(1, block_dtype(Capacity(1, 1))), np.zeros((m + 2 * n, 4))
-    filters = block[0]
-    filters["n"], filters["axis"] = n, (0, 1)
-    of = [slice(0, n), slice(n, 2 * n)]
-    for name, rows, columns in (("P_xx", 0, 0), ("P_xd", 0, 1), ("P_dd", 1, 1)):
-        filters[name][:n, :n] = P[of[rows], of[columns]]
-    filters["noise"][:n] = R
+    block, states = filter_block(P, R), np.zeros((m + 2 * n, 4))
     Y = np.column_stack([np.nan_to_num(np.array(said["Y"], float)), np.eye(2 * n)]).T
     states[:, :n], states[:, 2 : 2 + n] = Y[:, :n], -Y[:, n:]
     sums, room = np.zeros(m + 2 * n), np.zeros(5)

@@ -11,6 +11,7 @@ from math import pi
 
 import numpy as np
 
+from beaver_ftc.diagnosis import Actuator, TypesConfig
 from beaver_ftc.diagnosis.types import TYPE_ROWS as TYPES
 from beaver_ftc.diagnosis.types import TYPE_WORDS as WORDS
 from beaver_ftc.scenario import Scenario
@@ -79,10 +80,7 @@ class Found:
     axis: int | None = None  # None: the one that says most
 
 
-Surface = np.void  # a record of `surface_dtype`
-
-
-def _bias(seen: Seen, surface: Surface, config: np.void) -> Iterator[Found]:
+def _bias(seen: Seen, actuator: Actuator, config: TypesConfig) -> Iterator[Found]:
     """One offset: at least what one frame says, and less by another."""
     low, high = seen.off_command()
     i, j = int(np.argmax(low)), int(np.argmin(high))
@@ -90,7 +88,7 @@ def _bias(seen: Seen, surface: Surface, config: np.void) -> Iterator[Found]:
         yield from _offsets(seen, i, j)
 
 
-def _growing(seen: Seen, surface: Surface, config: np.void) -> Iterator[Found]:
+def _growing(seen: Seen, actuator: Actuator, config: TypesConfig) -> Iterator[Found]:
     """Of one sign, and smaller than it was."""
     low, high = seen.off_command()
     for j in np.flatnonzero(high < np.inf).tolist():
@@ -113,10 +111,10 @@ def _offsets(seen: Seen, i: int, j: int) -> Iterator[Found]:
         yield Found(range(i, i + 1), j, pairs, {"stops": [float(low), float(high)]})
 
 
-def _runaway(seen: Seen, surface: Surface, config: np.void) -> Iterator[Found]:
+def _runaway(seen: Seen, actuator: Actuator, config: TypesConfig) -> Iterator[Found]:
     """Less far than its least rate takes it; of several instants, by the frame before."""
-    pace, stop = float(surface["actuator"]["least_runaway_rate"]), seen.stops[1]
-    step, late = pace * float(config["span_s"]), int(not config["whole"])
+    pace, stop = actuator.least_runaway_rad_s, seen.stops[1]
+    step, late = pace * config.block_s, int(not config.single_instant)
     began = np.where(seen.wrong, seen.low - step * np.arange(len(seen.low)), -np.inf)
     for j in np.flatnonzero(seen.wrong & (seen.high < stop - _LEAST)).tolist():
         if j <= late:
@@ -129,22 +127,22 @@ def _runaway(seen: Seen, surface: Surface, config: np.void) -> Iterator[Found]:
             return
 
 
-def _swing(seen: Seen, surface: Surface, config: np.void) -> Iterator[Found]:
+def _swing(seen: Seen, actuator: Actuator, config: TypesConfig) -> Iterator[Found]:
     """On one side for longer than half of the slowest oscillation."""
     for axis, low in enumerate(seen.least.T):
         begins = seen.since(seen.wrong & (low > seen.command + _LEAST))
-        for k in np.flatnonzero(np.arange(len(begins)) - begins > config["patience"])[:1].tolist():
+        for k in np.flatnonzero(np.arange(len(begins)) - begins > config.patience)[:1].tolist():
             run = range(int(begins[k]), k + 1)
-            slowest = pi / seen.slowest_rad_s / float(config["dt"])
+            slowest = pi / seen.slowest_rad_s / config.dt_s
             pairs = [(k - run[0], slowest), *_beyond(low - seen.command, run)]
             yield Found(run, None, pairs, {"slowest_rad_s": seen.slowest_rad_s}, axis)
 
 
-def _slow(seen: Seen, surface: Surface, config: np.void) -> Iterator[Found]:
+def _slow(seen: Seen, actuator: Actuator, config: TypesConfig) -> Iterator[Found]:
     """Further away from all that it was ordered to than one can be that comes nearer at its least pace, until
     its lag makes the steps smaller."""
-    step, approach = float(surface["actuator"]["slowest_step"]), float(surface["actuator"]["approach"])
-    least, close = int(config["instants"] * config["length"]) * step, step / approach
+    step = actuator.slowest_step_rad
+    least, close = config.instants * config.block_frames * step, step / actuator.approach
     for axis, low in enumerate(seen.least.T):
         beyond = seen.wrong & (low > seen.ordered + _LEAST)
         begins, comes = seen.since(beyond), seen.high + least * np.arange(len(low))
@@ -167,7 +165,7 @@ def _beyond(ahead: np.ndarray, run: range) -> list[Pair]:
 
 
 # By the type in words; a type without a rule is not certified by its course.
-RULES: dict[str, Callable[[Seen, Surface, np.void], Iterator[Found]]] = {
+RULES: dict[str, Callable[[Seen, Actuator, TypesConfig], Iterator[Found]]] = {
     "hardover up": _runaway, "hardover down": _runaway, "bias": _bias, "bias that grows": _growing,
     "oscillatory": _swing, "rate_limit": _slow,
 }  # fmt: skip
@@ -180,11 +178,11 @@ def excludes(
 
     of: that the surface is held somewhere, theta.
     """
-    fdi = tape.last["fdi"]["types"]
+    diagnosis = tape.last.diagnosis
     direction = TYPES[kind].direction
     for sign in (direction,) if direction else (1, -1):
         seen = _seen(tape, history, of, s, alarm, sign, scenario.fdi.slowest_oscillation_rad_s)
-        for found in RULES[WORDS[kind]](seen, fdi["surface"][s], fdi["config"]):
+        for found in RULES[WORDS[kind]](seen, diagnosis.surfaces[s].actuator, diagnosis.types_config):
             return _written(found, seen, of)
     return None
 
@@ -204,8 +202,8 @@ def _seen(
     told = tape.told_most if sign > 0 else -tape.told_least
     reach = np.column_stack([tape.least[here, s, 0], tape.greatest[here, s, 0]])[:, ::sign] * sign
     room = np.maximum(0.0, (command[:, None] - reach) * (1.0, -1.0)) * (not whole)
-    surface = tape.last["fdi"]["types"]["surface"][s]
-    stops = np.sort(sign * np.array([surface["actuator"]["travel_low"], surface["actuator"]["travel_high"]]))
+    actuator = tape.last.diagnosis.surfaces[s].actuator
+    stops = np.sort(sign * np.array([actuator.travel_low_rad, actuator.travel_high_rad]))
     judged = slice(here.start + 1, here.stop + 1)
     ordered = np.maximum(told[judged, s, 2], told[judged, s, 2 if whole else 1])
     shows = wrong(history, frames)

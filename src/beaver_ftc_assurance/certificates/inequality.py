@@ -17,6 +17,7 @@ import numpy as np
 
 from beaver_ftc.design import AXES
 from beaver_ftc.diagnosis.bounds import ROUNDING_RAD_S2
+from beaver_ftc.loop import FrameReadout
 
 WINDOW = 16  # frames that are written out; what was before them is the filter's state
 _LEAST = 1e-9  # of a margin, as a share of the limit: more than another order of summation makes
@@ -95,28 +96,27 @@ def _before(values: np.ndarray) -> np.ndarray:
     return np.concatenate([np.full_like(values[:1], nan), values[:-1]])
 
 
-def declared_of(frame: np.void) -> Document:
+def declared_of(frame: FrameReadout) -> Document:
     """What a flight's record says of bounds declared, and of the coefficients in them."""
-    bound, design = frame["fdi"]["bound"], frame["belief"]["design"]
-    admitted = bound["admitted"]
-    there = bool(admitted["any"])
-
-    def of(values: np.ndarray) -> list[float]:
-        return [float(value) if there else 0.0 for value in values[:3]]
-
-    d = {name: abs(float(design[name])) for name in ("Ppq", "Pqr", "Rpq", "Rqr", "Qpr", "Qpp", "Qrr")}
-    shares = d["Ppq"] + d["Pqr"], d["Qpr"] + 2.0 * max(d["Qpp"], d["Qrr"]), d["Rpq"] + d["Rqr"]
+    bound, of = frame.diagnosis.bound, frame.inertia
+    most = {name: abs(value) for name, value in of._asdict().items()}
+    shares = (
+        most["Ppq"] + most["Pqr"],
+        most["Qpr"] + 2.0 * max(most["Qpp"], most["Qrr"]),
+        most["Rpq"] + most["Rqr"],
+    )
     return {
-        "inertia_coupling": bound["inertia"].tolist(),
-        "constant_rad_s2": bound["constant"].tolist(),
-        "coupling": [float(design[name]) for name in ("Pqr", "Qpr", "Rpq")],
-        "earth_rad_s": float(bound["earth_rate"]),
+        "inertia_coupling": bound.inertia.tolist(),
+        "constant_rad_s2": bound.constant_rad_s2.tolist(),
+        "coupling": [of.Pqr, of.Qpr, of.Rpq],
+        "earth_rad_s": bound.earth_rate_rad_s,
         "earth_share": [max(share, 1.0) for share in shares],
         "gyro": {
-            "offset_rad_s": of(admitted["offset"]), "steady_rad_s": of(admitted["steady"]),
-            "slope": of(admitted["slope"]),
+            "offset_rad_s": bound.gyro_offset_rad_s.tolist(),
+            "steady_rad_s": bound.gyro_steady_rad_s.tolist(),
+            "slope": bound.gyro_slope.tolist(),
         },
-    }  # fmt: skip
+    }
 
 
 def declaration(history: History, frames: list[np.ndarray], asked: np.ndarray) -> Document:

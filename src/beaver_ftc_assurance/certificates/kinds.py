@@ -34,9 +34,9 @@ BY_FRAMES = (CONSTANT_LOSS, VARYING_LOSS, STUCK, FLOAT)  # what single frames ca
 
 def excluded_types(tape: Tape) -> Iterator[tuple[int, int, int]]:
     """(surface, type, frame) of each type excluded on a surface that can be at fault."""
-    layout = tape.alarm["fdi"]["layout"]
+    layout = tape.alarm.diagnosis.layout
     for s, kinds in enumerate(tape.types[-1]):
-        if tape.excluded[-1][layout["position_of"][s]]:
+        if tape.excluded[-1][layout.position_of[s]]:
             continue
         for kind in np.flatnonzero(kinds):
             yield s, int(kind), tape.first + int(np.argmax(tape.types[:, s, kind] > 0))
@@ -44,10 +44,10 @@ def excluded_types(tape: Tape) -> Iterator[tuple[int, int, int]]:
 
 def why_not(tape: Tape, kind: int) -> str | None:
     """Why an exclusion of this type cannot be certified, None if it can."""
-    config = tape.alarm["fdi"]["types"]["config"]
-    if TYPES[kind].has_shown is not None and not config["whole"]:
+    config = tape.alarm.diagnosis.types_config
+    if TYPES[kind].has_shown is not None and not config.single_instant:
         return SWING
-    return RETURN if config["returns"] and TYPES[kind].on_release is not None else None
+    return RETURN if config.returns and TYPES[kind].on_release is not None else None
 
 
 def name_of(surface: str, kind: int) -> str:
@@ -68,14 +68,14 @@ def row_of(tape: Tape, s: int, kind: int) -> int:
 
 def hypothesis(tape: Tape, s: int, kind: int) -> Hypothesis:
     """What a fault of this type on surface s adds to the innovation."""
-    fdi = tape.alarm["fdi"]
-    e = int(fdi["layout"]["position_of"][s])
+    diagnosis = tape.alarm.diagnosis
+    e = diagnosis.layout.position_of[s]
     Gu, G, spread = -tape.offset[:, e], tape.slope[:, e], tape.spread[:, e]
-    asked = tuple(i for i in range(3) if not fdi["isolation"]["estimator"][e]["unasked"][i])
-    if fdi["types"]["config"]["length"] > 1:  # blocks: the axis on which no effect changes its sign
-        asked = (int(fdi["layout"]["dominant_axis"][s]),)
-    actuator = fdi["types"]["surface"][s]["actuator"]
-    low, high = float(actuator["travel_low"]), float(actuator["travel_high"])
+    asked = diagnosis.estimators[e].axes
+    if diagnosis.types_config.block_frames > 1:  # blocks: the axis on which no effect changes its sign
+        asked = (diagnosis.layout.dominant_axis[s],)
+    actuator = diagnosis.surfaces[s].actuator
+    low, high = actuator.travel_low_rad, actuator.travel_high_rad
     if kind == STUCK:
         return Hypothesis(tape.first, -Gu, G, spread, low, high, True, True, asked)
     if kind == FLOAT:

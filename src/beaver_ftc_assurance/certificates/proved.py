@@ -7,6 +7,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.diagnosis.isolation import estimator_names
+from beaver_ftc.loop import FrameReadout
 from beaver_ftc.results import Columns, Log, MemoryLog, Proof
 from beaver_ftc.scenario import Scenario, to_yaml
 from beaver_ftc_assurance.certificates import certificate, chance
@@ -48,23 +49,23 @@ def write(scenario: Scenario, log: MemoryLog, document: Document, folder: Path) 
 
 def _log(frames: np.ndarray, flown: Iterable[int], scenario: Scenario, recorder: Recorder) -> MemoryLog:
     """What the diagnosis makes of each frame, in the columns that a certificate takes."""
-    frame, log, surfaces = frames[0], MemoryLog(), scenario.airframe.surfaces
-    fdi = frame["fdi"]
-    estimators = fdi["isolation"]["estimator"][: int(fdi["isolation"]["config"]["n"])]
+    log, surfaces = MemoryLog(), scenario.airframe.surfaces
     names = estimator_names(scenario.fdi.fault_class, scenario.airframe)
     columns = ["t_s", *(f"{axis}_{what}" for what in MEASURED_MODEL_BOUND for axis in AXES), "detected"]
     columns += [f"fie_{name}_excluded" for name in names]
     shares: dict[str, float] = {}
-    watch, rows = fdi["watch"], []
+    rows = []
     for k in flown:
         recorder.keep()
-        of_frame = frame["measured"]["x"], frame["belief"]["means"]["acceleration"], fdi["bound"]["eta_bar"]
+        frame = FrameReadout(frames[0])
+        diagnosis = frame.diagnosis
+        of_frame = frame.rates_rad_s, frame.model_rad_s2, diagnosis.bound.eta_bar_rad_s2
         if scenario.fdi.statistical:
-            shares = chance.shares(fdi["statistical"], surfaces)
-        if watch["config"]["enabled"]:
-            shares |= {"watch_share": watch["output"]["share"], "watch_test": watch["output"]["furthest"]}
-        alarm = fdi["verdict"]["detected"] or watch["output"]["alarmed"]  # as in a log of ours
-        values = [alarm, *estimators["excluded"], *shares.values()]
+            shares = chance.shares(diagnosis, surfaces)
+        if diagnosis.sensor_monitor.enabled:
+            monitor = diagnosis.sensor_monitor
+            shares |= {"watch_share": monitor.share, "watch_test": monitor.furthest}
+        values = [frame.alarmed, *diagnosis.excluded, *shares.values()]  # as in a log of ours
         rows.append(np.concatenate([[k / scenario.rate_hz], *of_frame, values]))
     log.open([*columns, *shares])
     log.write(np.array(rows))

@@ -10,7 +10,17 @@ import numpy as np
 from beaver_ftc.compiled import direct, kernel
 from beaver_ftc.diagnosis.detection import N_SLOTS
 from beaver_ftc.diagnosis.isolation import estimator_names
-from beaver_ftc.loop import Loop, copy_memory, fly, give_back_memory, take_memory
+from beaver_ftc.loop import (
+    FrameReadout,
+    Loop,
+    alarm_flags,
+    copy_memory,
+    fly,
+    give_back_memory,
+    recorded_always,
+    recorded_until_alarm,
+    take_memory,
+)
 from beaver_ftc.scenario import Scenario
 
 BEFORE = 40  # frames kept before the alarm: what was before them is in the filters
@@ -18,17 +28,13 @@ BEFORE_CHANCE = 2**N_SLOTS + 2  # with the statistical detector: its oldest onse
 AFTER_S = 10.0  # after the last event, where types are excluded one by one
 MOST_AFTER = 1 << 16  # frames kept after the alarm
 _AT_ONCE = 1 << 10  # so many at first
-OF_BLOCK = (
-    "keep", "pace", "state", "P_xx", "P_xd", "P_dd", "drift", "jitter", "noise", "foreseen",
-    "shown", "regressor_state", "regressor_response",
-)  # fmt: skip
 
 
 @dataclass
 class Tape:
     """Frames `first` to `first + frames - 1` of the flight, rows of its log.
 
-    alarm, last: the flight's record as it was at the alarm and at the end, of `frame_dtype`. since: the frame
+    alarm, last: the flight as it was at the alarm and at the end. since: the frame
     with which the diagnosis began. Of each frame x (3,) rad/s, model and eta_bar (3,) rad/s2, what a gyro's
     error changes by noise (3,) rad/s, and of each estimator offset, slope and spread (estimators, 3): rad/s2,
     and per unit of its parameter. chances: of each up to the alarm what the statistics reckon with.
@@ -38,8 +44,8 @@ class Tape:
     first: int
     frames: int
     since: int
-    alarm: np.void
-    last: np.void
+    alarm: FrameReadout
+    last: FrameReadout
     names: tuple[str, ...]
     reach_low: np.ndarray
     reach_high: np.ndarray
@@ -92,14 +98,10 @@ class Recorder:
         """Begin to keep frames of the record `frames`, the first of them number 0."""
         numbers = take_memory((1,), frames.dtype)
         _words_of(numbers)[:] = np.arange(frames.nbytes // 8)
-        n, config, fdi = (
-            int(frames["fdi"]["isolation"]["config"]["n"][0]),
-            self._scenario.fdi,
-            numbers[0]["fdi"],
-        )
-        self._always = _Places(_always(numbers[0], n, config.fault_class == "all"))
-        self._early = _Places(_early(fdi, n, config.statistical is not None))
-        self._state = np.array([0, -1, 0, fdi["verdict"]["detected"], fdi["watch"]["output"]["alarmed"]])
+        config, n = self._scenario.fdi, len(FrameReadout(frames[0]).diagnosis.estimators)
+        self._always = _Places(recorded_always(numbers[0], n, config.fault_class == "all"))
+        self._early = _Places(recorded_until_alarm(numbers[0], n, config.statistical is not None))
+        self._state = np.array([0, -1, 0, *alarm_flags(numbers[0])])
         give_back_memory(numbers)
         ring = 1 + (BEFORE if config.statistical is None else BEFORE_CHANCE)
         self._ring = np.empty((ring, len(self._early.words)), np.int64)
@@ -125,11 +127,11 @@ class Recorder:
 
     def tape(self, events: Sequence[int], rows: int) -> Tape:
         """The frames around these, of so many rows; the first of them is the alarm's, if one was raised."""
-        last, config = self._last[0], self._scenario.fdi
+        last, config = FrameReadout(self._last[0]), self._scenario.fdi
         seen, alarm, clear = self._state[:3].tolist()
         ring, raised = len(self._ring), alarm >= 0
-        alarm, at_alarm = (alarm, self._alarm[0]) if raised else (seen - 1, last)
-        since, anew = int(at_alarm["since"]), int(last["since"])
+        alarm, at_alarm = (alarm, FrameReadout(self._alarm[0])) if raised else (seen - 1, last)
+        since, anew = at_alarm.since, last.since
         after = round(AFTER_S * self._scenario.rate_hz) if config.fault_class == "all" else 1
         first = max(min(events) - ring + 1, alarm - ring + 1, since, clear, 0)
         end = min(max(events) + after, rows, alarm + 1 + len(self._kept) - ring)
@@ -178,36 +180,6 @@ def _words_of(frames: np.ndarray) -> np.ndarray:
     """The words of a record that `memory` gave."""
     assert frames.base is not None
     return frames.base[: frames.nbytes].view(np.int64)
-
-
-def _always(record: np.void, n: int, every_type: bool) -> dict[str, np.ndarray]:
-    """What is kept of every frame, of n estimators."""
-    fdi = record["fdi"]
-    estimators = fdi["isolation"]["estimator"][:n]
-    views = {
-        "x": record["measured"]["x"], "model": record["belief"]["means"]["acceleration"],
-        "eta_bar": fdi["bound"]["eta_bar"], "noise": fdi["bound"]["noise"],
-        "offset": estimators["effect"]["offset"], "slope": estimators["effect"]["Z"],
-        "spread": estimators["effect"]["spread"], "excluded": estimators["excluded"],
-        "types": fdi["types"]["surface"]["feasible"]["excluded"],
-    }  # fmt: skip
-    if every_type:  # what the surfaces were told, and where healthy ones were
-        orders = fdi["types"]["surface"]["orders"]
-        views |= {"told_least": orders["low"], "told_most": orders["high"]}
-        views |= {name: orders[name] for name in ("least", "greatest")}
-    return views
-
-
-def _early(fdi: np.void, n: int, chance: bool) -> dict[str, np.ndarray]:
-    """What is kept of frames up to the alarm besides."""
-    views = {name: fdi["isolation"]["estimator"][name][:n] for name in ("reach_low", "reach_high")}
-    if chance:
-        chances = fdi["statistical"]
-        blocks = chances["block"]
-        views |= {name: blocks[name] for name in OF_BLOCK}
-        views |= {"signature": blocks["hypothesis"]["signature"], "bounded": chances["noise"]["bounded"]}
-        views |= {"air": chances["air"]["output"]["mean"], "leap": chances["air"]["output"]["leap"]}
-    return views
 
 
 def recorded(scenario: Scenario, events: Sequence[int], rows: int) -> Tape:

@@ -9,8 +9,19 @@ import numpy as np
 
 from beaver_ftc.aircraft import M_PER_FT, MOST_CHANNELS, Aircraft
 from beaver_ftc.documents import BadInput
-from beaver_ftc.loop import Loop, take_diagnosis
-from beaver_ftc.plant import AIRSPEED, ALTITUDE, AX, SENSORS, lay_ground, stand_on_ground
+from beaver_ftc.loop import (
+    FrameReadout,
+    Instruments,
+    Loop,
+    command_power,
+    diagnosis_record,
+    end_outer_loops,
+    hold_from_start,
+    set_ground,
+    stop_diagnosis,
+    take_diagnosis,
+)
+from beaver_ftc.plant import AX, SENSORS, lay_ground, stand_on_ground
 from beaver_ftc.results import Simulation, SpooledLog
 from beaver_ftc.scenario import Declared, Scenario
 from beaver_ftc_links.sitl.outputs import Outputs, power_range
@@ -110,27 +121,21 @@ class Flown(Simulation):
         super()._make_ready()
         self._runs, self._engaged = 0, False  # JSBSim frames flown of the coming frame
         self.listens_from_s: float | None = 0.0
-        self._listens = True
+        self._diagnoses = True
         self._fresh: Vector | None = None  # the record as assembled: what a diagnosis begins with
         self._slowest_mps = self.airframe.envelope.airspeed_mps[0]
         if self.airframe.file.ground is not None:
             self._lay_ground()
         self._begin()
-        frames, plant = self._loop.frames, self._loop.plant
-        measured, truth = frames["measured"][0], frames["truth"][0]
-        self._signal, self._measured = measured["signal"], measured
-        self._nodes = [(plant.node(name).get_double_value, factor) for name, factor in _NODES]
-        self._origin = float(truth["latitude_0"]), float(truth["longitude_0"])
-        self._radii = float(truth["radius_m"]), float(truth["parallel_radius_m"])
-        self._power = frames["control"]["power"]["output"]
-        self._autopilot = frames["autopilot"]
-        self._seen = frames["fdi"]["verdict"], frames["fdi"]["watch"]
+        node = self._loop.plant.node
+        self._nodes = [(node(name).get_double_value, factor) for name, factor in _NODES]
+        self._instruments, self._origin = Instruments(self._frame), FrameReadout(self._frame).origin
 
     def _lay_ground(self) -> None:
         loop, frame, file = self._loop, self._frame, self.airframe.file
         assert file.ground is not None
         loop._may_fly_again = False  # with a ground to it
-        frame["truth"]["ground_m"], frame["truth"]["slow_mps"] = self.ground_m, SLOW_MPS
+        set_ground(frame, self.ground_m, SLOW_MPS)
         self._standing_m = self.ground_m + file.ground.height_m
         self._lowest_m = GUSTY_M if Declared.of(self._scenario).air.moves else DOWN_M
         self._fresh = loop.frames.copy()
@@ -150,42 +155,42 @@ class Flown(Simulation):
             for name, setting in self.airframe.engine.settings.items()
         }
         stand_on_ground(loop.plant, replace(loop.trim, settings=settings), self.ground_m)
-        frame["held"], frame["held_rad"] = 1, self.trim_rad
+        hold_from_start(frame, self.trim_rad)
         self._by_hand = True
-        self._stop_listening()
+        self._stop_diagnosis()
         self.listens_from_s = None
 
-    def _stop_listening(self) -> None:
-        fdi = self._frame["fdi"]
-        self._listens = fdi["config"]["enabled"] = fdi["watch"]["config"]["enabled"] = False
+    def _stop_diagnosis(self) -> None:
+        stop_diagnosis(self._frame)
+        self._diagnoses = False
 
-    def _heed_the_ground(self) -> None:
+    def _start_or_stop_diagnosis(self) -> None:
         """End the diagnosis near the ground, begin it anew in flight unless it has found something."""
-        value = self._frame["truth"]["value"]
-        height_m, airspeed_mps = value[ALTITUDE] - self._standing_m, value[AIRSPEED]
-        if self._listens:
+        now = FrameReadout(self._frame)
+        height_m = now.height_m - self._standing_m
+        if self._diagnoses:
             if height_m < self._lowest_m:
-                self._stop_listening()
+                self._stop_diagnosis()
         elif (
             height_m > self._lowest_m + UP_M - DOWN_M
-            and airspeed_mps > self._slowest_mps
+            and now.airspeed_mps > self._slowest_mps
             and not self.alarmed
         ):
-            self._listen()
+            self._begin_diagnosis()
 
-    def _listen(self) -> None:
+    def _begin_diagnosis(self) -> None:
         loop, fresh = self._loop, self._fresh[0]  # type: ignore[index]
         if loop.sensor_schedule.any:  # broken meanwhile
-            loop.enable_watch(fresh["fdi"])
+            loop.enable_watch(diagnosis_record(fresh))
         take_diagnosis(self._frame, fresh, self._next)
-        self._listens = True
+        self._diagnoses = True
         if self.listens_from_s is None:
             self.listens_from_s = self._now_s
 
     @property
     def G(self) -> Vector:
         """What each surface does about each axis now, (3, n) rad/s2 per rad, by the design model."""
-        return np.array(self._frame["belief"]["G"])
+        return FrameReadout(self._frame).G
 
     @property
     def airframe(self) -> Aircraft:
@@ -195,11 +200,7 @@ class Flown(Simulation):
     @property
     def alarmed(self) -> bool:
         """Whether there is an alarm."""
-        verdict, watch = self._seen
-        return (
-            bool(verdict["detected"][0] or watch["output"]["alarmed"][0])
-            or self._loop.plugin_frame is not None
-        )
+        return FrameReadout(self._frame).alarmed or self._loop.plugin_frame is not None
 
     def pilot(self, runs: int, deflections: Vector | None, power: float | None) -> None:
         """Fly so many of JSBSim's frames, or to the end, with these deflections (n,) rad and this setting of
@@ -215,7 +216,7 @@ class Flown(Simulation):
             self._runs = 0
             self._last.clear()
             if self._fresh is not None:
-                self._heed_the_ground()
+                self._start_or_stop_diagnosis()
             self._fly_to(self._next + 1)
 
     def _take(self, deflections: Vector | None, power: float | None) -> None:
@@ -224,10 +225,10 @@ class Flown(Simulation):
             return
         self._by_hand = True
         if not self._engaged:
-            self._engaged, self._autopilot["enabled"] = True, 0  # outer loops of ours are over
+            self._engaged = True
+            end_outer_loops(self._frame)
         if power is not None:
-            self._power["in_use"] = 1
-            self._power["command"][0][0] = power
+            command_power(self._frame, power)
             self._loop.plant.write(self._loop.aircraft.trim.throttle, power)
 
     def _inside(self, runs: int) -> None:
@@ -238,12 +239,12 @@ class Flown(Simulation):
 
     def instant(self) -> Instant:
         """What is known of the JSBSim frame just flown."""
-        signal = self._signal.tolist()
+        signal = self._instruments.readings()
         true = [read() * factor for read, factor in self._nodes]
-        north = (true[9] - self._origin[0]) * self._radii[0]
-        east = (true[10] - self._origin[1]) * self._radii[1]
+        north = (true[9] - self._origin.latitude_rad) * self._origin.radius_m
+        east = (true[10] - self._origin.longitude_rad) * self._origin.parallel_radius_m
         force = tuple(signal[AX : AX + 3])
-        if not self._measured["inertial"]:
+        if not self._instruments.has_accelerometers:
             force = true[11] / true[14], true[12] / true[14], true[13] / true[14]
         t_s = self._next_instant_s
         return Instant(

@@ -140,6 +140,18 @@ def block_dtype(capacity: Capacity) -> np.dtype:
     )  # fmt: skip
 
 
+def filter_block(P: np.ndarray, R: np.ndarray) -> np.ndarray:
+    """A block (1,) that filters n rates and tests nothing.
+
+    P (2 n, 2 n): covariance of rates and their drift; R (n,): variance of a reading's noise."""
+    blocks, n = np.zeros(1, block_dtype(Capacity(1, 1))), len(R)
+    block, rates, drifts = blocks[0], slice(0, n), slice(n, 2 * n)
+    block["n"], block["axis"], block["noise"][:n] = n, (0, 1), R
+    for name, rows, columns in (("P_xx", rates, rates), ("P_xd", rates, drifts), ("P_dd", drifts, drifts)):
+        block[name][:n, :n] = P[rows, columns]
+    return blocks
+
+
 @kernel
 def invert(n, S):
     """Replace the leading n x n part of a symmetric S (2, 2), n at most 2, by its inverse."""

@@ -17,6 +17,7 @@ from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
 from beaver_ftc.diagnosis.bounds import clairvoyant
 from beaver_ftc.loop.loop import Loop
+from beaver_ftc.loop.readout import FrameReadout, run_statistical_tests
 from beaver_ftc.loop.stepping import built_in_statistic
 from beaver_ftc.plugins import DETECTORS, made
 from beaver_ftc.scenario.judgement import Onset, Truth
@@ -106,17 +107,17 @@ def record(scenario: Scenario) -> Recording:
     recorder, built_in = Recorder(), list[float]()
     air, known, error = list[np.ndarray](), list[bool](), list[np.ndarray]()
     loop = Loop(scenario.model_copy(update={"control": nominal}), recorder)
-    statistical, fly_frame = loop.frames["fdi"]["statistical"], loop.plugin_frame
-    error_map = loop.frames["fdi"]["bound"]["error_map"]
-    statistical["tests"]["enabled"] = scenario.fdi.statistical is not None
+    fly_frame = loop.plugin_frame
+    run_statistical_tests(loop.frames[0], scenario.fdi.statistical is not None)
     assert fly_frame is not None
 
     def fly_and_note(frames: np.ndarray, references: np.ndarray, log: np.ndarray) -> int:
-        air.append(statistical["air"]["output"]["acceleration"][0].copy())
+        air.append(FrameReadout(frames[0]).diagnosis.air.acceleration_rad_s2)
         status = fly_frame(frames, references, log)
         built_in.append(built_in_statistic(frames))
-        known.append(not error_map["outside"][0])
-        error.append(error_map["now"][0].copy())
+        mapped = FrameReadout(frames[0]).diagnosis.mapped_error
+        known.append(mapped.known)
+        error.append(mapped.bound_rad_s2)
         return status
 
     loop.fly_frame = fly_and_note
@@ -124,8 +125,9 @@ def record(scenario: Scenario) -> Recording:
         pass
     by_frame = np.array(built_in), Truth.of(scenario).onset, np.array(known), np.array(error)
     recording = Recording(recorder.context, recorder.seen, *by_frame)
-    if scenario.fdi.statistical is not None and statistical["air"]["output"]["seen"]:
-        recording.air, recording.air_noise = np.array(air), np.sqrt(statistical["noise"]["jitter"][0])
+    diagnosis = FrameReadout(loop.frames[0]).diagnosis
+    if scenario.fdi.statistical is not None and diagnosis.air.seen:
+        recording.air, recording.air_noise = np.array(air), np.sqrt(diagnosis.model_noise)
     return recording
 
 

@@ -58,12 +58,14 @@ def _declared(scenario: "Scenario") -> tuple[Context, np.ndarray]:
     do; and their tolerances, absolute."""
     from beaver_ftc.loop.loop import Loop
     from beaver_ftc.loop.plugin_frame import context_of
+    from beaver_ftc.loop.readout import FrameReadout
 
     loop = Loop(scenario)
     exact = scenario.with_({"fdi.bounds.coefficients": 0.0})
     coefficients = context_of(loop.frames, scenario, loop.start, {}).declared.coefficients
-    context, statistical = context_of(loop.frames, exact, loop.start, {}), loop.frames["fdi"]["statistical"]
-    if statistical["air"]["output"]["seen"][0]:
-        context = aware_of_the_air(context, np.sqrt(statistical["noise"]["jitter"][0]))
+    context = context_of(loop.frames, exact, loop.start, {})
+    diagnosis = FrameReadout(loop.frames[0]).diagnosis
+    if diagnosis.air.seen:
+        context = aware_of_the_air(context, np.sqrt(diagnosis.model_noise))
     loop.release()
     return context, coefficients

@@ -99,7 +99,7 @@ def designed_derivatives(scenario: Scenario, point: FlightState) -> tuple[np.nda
     design = design_of(scenario.design_model)[0]
     y = np.array([point.alpha_rad, point.beta_rad, *air_data(point)])
     _, G, f_x, f_y = jacobian(design, np.zeros(3), y, in_fdc(point)[1])
-    if design["frozen_alpha"]:
+    if scenario.design_model.frozen_alpha:
         f_y[:, ALPHA] = 0.0
     return f_x, f_y, G
 

@@ -14,7 +14,7 @@ from beaver_ftc.aircraft import AXES, Term
 from beaver_ftc.aircraft.aircraft import MOMENTS
 from beaver_ftc.design.fdc import GEOMETRY, MASS, SURFACES, TERMS
 from beaver_ftc.design.model import ALPHA, InertiaCoefficients, inertia_coefficients, inertial
-from beaver_ftc.design.variants import anchor, design_of, mass_of
+from beaver_ftc.design.variants import Anchored, anchor, anchored, design_of, mass_of
 from beaver_ftc.scenario.schema import Scenario
 
 MOMENT_TERMS: dict[str, Term] = {name: term for name, term in TERMS.items() if term.coefficient in MOMENTS}
@@ -162,17 +162,17 @@ class Belief:
     """The design model in use: nonlinear, frozen or linearised at the trim of the first frame."""
 
     moments: MomentModel
-    design: np.void
+    design: Anchored
 
     def acceleration(self, x: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
         """f + G u (n, 3) rad/s2."""
         d, m = self.design, y.shape[1]
-        if d["linearised"]:
-            away = (x - d["x0"]) @ d["f_x"].T + (y - d["y0"][:m]) @ d["f_y"][:, :m].T
-            return d["f0"] + away + u @ d["G0"].T
-        if d["frozen_alpha"]:
+        if d.linearised:
+            away = (x - d.x0) @ d.f_x.T + (y - d.y0[:m]) @ d.f_y[:, :m].T
+            return d.f0 + away + u @ d.G0.T
+        if d.frozen_alpha:
             y = y.copy()
-            y[:, ALPHA] = d["y0"][ALPHA]
+            y[:, ALPHA] = d.y0[ALPHA]
         return self.moments.acceleration(x, y, u)
 
     def effectiveness(self, y: np.ndarray) -> np.ndarray:
@@ -187,4 +187,4 @@ def belief_of(scenario: Scenario, trim: States) -> Belief:
     """The scenario's design model; `trim` is the flight's first frame, where it was linearised."""
     design = design_of(scenario.design_model)[0]
     anchor(design, trim.x[0], trim.y[0], trim.u[0])
-    return Belief(designed_moments(scenario), design)
+    return Belief(designed_moments(scenario), anchored(design))

@@ -20,6 +20,7 @@ from tools.drawn.reader import doubts
 import beaver_ftc as bf
 from beaver_ftc.cli.main import main
 from beaver_ftc.diagnosis.monitors.sensor_records import WATCH
+from beaver_ftc.diagnosis.readout import read_sensor_monitor
 from beaver_ftc.plant.instruments import SENSORS
 from beaver_ftc.results import writer
 from beaver_ftc_assurance.certificates import certificate as certificate_module
@@ -627,7 +628,7 @@ def test_an_alarm_of_instruments_adds_up_to_its_test_whatever_is_declared(turned
     test["filtered"], test["bound"] = turned * np.array([3.0, 8.0, 5.5]), (2.9, 4.7, 5.1)
     test["residual"] = turned * 0.9
     apart(looked=[config["h"], test["rate"], test["noise"], test["air"], *config["gusts"]])
-    said = instruments_say.of_alarm(watch)
+    said = instruments_say.of_alarm(read_sensor_monitor(watch))
     (now, then, most), (before, nothing, most_before) = said["looks"]
     foretold = float(step["memory"]["predicted"][SENSORS.index("alpha")])
     assert said["test"] == "alpha"

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from beaver_ftc.diagnosis.readout import Actuator, TypesConfig
 from beaver_ftc_assurance.certificates import courses
 from beaver_ftc_assurance.certificates.courses import Found, Seen
 
@@ -22,8 +23,10 @@ def seen(low, high, wrong=None, ordered=0.1, command=0.0):
     )  # fmt: skip
 
 
-SURFACE = {"actuator": {"slowest_step": 0.025, "approach": 0.5, "least_runaway_rate": 2.0}}
-CONFIG = {"instants": 2.0, "length": 1.0, "span_s": 0.05, "whole": True, "patience": 2, "dt": 0.5}
+ACTUATOR = Actuator(-1.0, 1.0, least_runaway_rad_s=2.0, slowest_step_rad=0.025, approach=0.5)
+CONFIG = TypesConfig(
+    single_instant=True, instants=2, returns=False, patience=2, block_frames=1, block_s=0.05, dt_s=0.5
+)
 RULES = {
     # What comes nearer by 0.05 rad a frame at least, and more slowly within 0.05 rad of what was ordered.
     "not nearer at once": (courses._slow, [0.2, 0.5], [0.3, 9.0], Found(
@@ -57,7 +60,7 @@ RULES = {
 @pytest.mark.parametrize("name", RULES)
 def test_a_rule_finds_the_frames_and_says_what_it_compares(name):
     rule, low, high, expected = RULES[name]
-    found = [*rule(seen(low, high), SURFACE, CONFIG)]
+    found = [*rule(seen(low, high), ACTUATOR, CONFIG)]
     if expected is None:
         assert found == []
         return
@@ -71,13 +74,13 @@ def test_a_rule_finds_the_frames_and_says_what_it_compares(name):
 
 @pytest.mark.parametrize("rule", courses.RULES.values())
 def test_what_nothing_shows_excludes_nothing(rule):
-    assert [*rule(seen([NOTHING] * 6, [-NOTHING] * 6), SURFACE, CONFIG)] == []
+    assert [*rule(seen([NOTHING] * 6, [-NOTHING] * 6), ACTUATOR, CONFIG)] == []
     hidden = seen([0.2, 0.5, 0.9, 0.5], [0.3, 0.6, 0.9, 0.2], wrong=[0] * 4)  # and health explains it all
-    assert [*rule(hidden, SURFACE, CONFIG)] == []
+    assert [*rule(hidden, ACTUATOR, CONFIG)] == []
 
 
 def test_of_several_instants_a_runaway_is_held_against_the_frame_before():
-    several = CONFIG | {"whole": False}
-    assert [*courses._runaway(seen([0.2] * 3, [9.0, 9.0, 0.35]), SURFACE, several)] == []
-    (found,) = courses._runaway(seen([0.2] * 3, [9.0, 9.0, 0.25]), SURFACE, several)
+    several = CONFIG._replace(single_instant=False)
+    assert [*courses._runaway(seen([0.2] * 3, [9.0, 9.0, 0.35]), ACTUATOR, several)] == []
+    (found,) = courses._runaway(seen([0.2] * 3, [9.0, 9.0, 0.25]), ACTUATOR, several)
     np.testing.assert_allclose(found.compared[-1], (0.3, 0.25))

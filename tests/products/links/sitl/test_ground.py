@@ -137,7 +137,7 @@ def test_the_small_autopilot_takes_off_climbs_turns_and_lands(over):
     document = sim.land().metrics
     assert (document["false_alarm"], document["isolation"]["fault"]) == (False, "elevator")
     assert document["detection"]["delay_s"] < 0.1
-    assert not sim._listens
+    assert not sim._diagnoses
 
 
 def test_what_breaks_on_the_ground_is_found_in_the_air():
@@ -159,8 +159,8 @@ def test_in_declared_turbulence_the_diagnosis_begins_above_2000_ft():
     heights = {300.0: False, 900.0: False, 920.0: True, 905.0: False, 911.0: False}
     for height_m, listens in heights.items():
         sim._frame["truth"]["value"][[5, 12]] = 40.0, height_m
-        sim._heed_the_ground()
-        assert sim._listens == listens, height_m
+        sim._start_or_stop_diagnosis()
+        assert sim._diagnoses == listens, height_m
 
 
 def test_what_cannot_begin_on_the_ground():

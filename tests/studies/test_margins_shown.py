@@ -9,6 +9,7 @@ from beaver_ftc.control.readout import Schedule
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.assembly import y_places
 from beaver_ftc.loop.loop import Loop
+from beaver_ftc.loop.readout import FrameReadout
 from beaver_ftc.plant.conditions import trimmed
 from beaver_ftc.plant.linear import differences
 from beaver_ftc.studies import margins
@@ -43,7 +44,7 @@ def test_the_loop_of_a_scenario(given, changed):
     linear = differences(*trimmed(flown))
     y = (frame["truth"]["value"] * frame["truth"]["factor"])[y_places(frame)]
     for fault, effectiveness in ("none", np.ones(4)), ("lost", np.array([1.0, 0.1, 1.0, 1.0])):
-        loop, law = open_loop(flown, frame, linear, y, effectiveness)
+        loop, law = open_loop(flown, FrameReadout(frame), linear, y, effectiveness)
         assert not changed({"loop": asdict(loop), "law": asdict(law)}, fault)
         found = loops(loop, law, np.array([0.3, 3.0, 30.0]))
         assert not changed([found.real, found.imag], f"{fault}-response")

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from beaver_ftc.diagnosis.detection.likelihood import N_SLOTS
+from beaver_ftc.diagnosis.schemes.rows import place_of
 
 
 class Estimator(NamedTuple):
@@ -319,8 +320,9 @@ def run_statistical_tests(fdi: np.void, enabled: bool) -> None:
 
 
 def disable(fdi: np.void) -> None:
-    """Stop the diagnosis of surfaces and sensors from the next frame on."""
+    """Stop the diagnosis of surfaces and sensors from the next frame on: scheme `none` is in charge then."""
     fdi["config"]["enabled"] = fdi["watch"]["config"]["enabled"] = False
+    fdi["config"]["scheme"] = place_of("none")
 
 
 def recorded_always(fdi: np.void, n: int, every_type: bool) -> dict[str, np.ndarray]:

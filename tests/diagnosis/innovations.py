@@ -15,7 +15,14 @@ from beaver_ftc.design.engine import DPT_0, KW_TO_DPT, SEA_LEVEL_DENSITY_KG_M3
 from beaver_ftc.design.fdc import MASS
 from beaver_ftc.diagnosis.bounds import variances
 from beaver_ftc.diagnosis.detection import likelihood, noise_model, statistical
-from beaver_ftc.diagnosis.detection.likelihood import MAX_HYPOTHESES, N_SLOTS, SENSE, Capacity, block_dtype
+from beaver_ftc.diagnosis.detection.likelihood import (
+    MAX_HYPOTHESES,
+    N_LANES,
+    N_SLOTS,
+    SENSE,
+    Capacity,
+    block_dtype,
+)
 from beaver_ftc.diagnosis.detection.signatures import fill_block_signatures
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.scenario.declared import Declared, SensorErrors
@@ -54,13 +61,19 @@ def with_hypotheses(block, *kinds, tolerance=()):
     block["tolerance"][: len(tolerance)] = tolerance
     for h, kind in enumerate(kinds):
         block["hypothesis"][h]["kind"] = kind
-        by_onset(block, "sense")[:, h] = SENSE[kind]
+        group, lane = divmod(h * N_SLOTS, N_LANES)
+        block["lanes"]["sense"][group, lane : lane + N_SLOTS] = SENSE[kind]
     return block
 
 
+def lanes_of(block, name):
+    """What the lanes keep under a name, a copy, (..., lanes)."""
+    return np.concatenate(list(block["overlap"] if name == "overlap" else block["lanes"][name]), axis=-1)
+
+
 def by_onset(block, name):
-    """What the lanes keep under a name, (..., slots, hypotheses)."""
-    kept = block["lane"][name]
+    """What the lanes keep under a name, a copy, (..., slots, hypotheses)."""
+    kept = lanes_of(block, name)
     return kept.reshape(*kept.shape[:-1], -1, N_SLOTS).swapaxes(-1, -2)
 
 

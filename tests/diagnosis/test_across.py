@@ -64,7 +64,7 @@ def test_a_fault_of_any_course_shows_nothing_where_its_surface_moves_nothing(sur
     fdi = watching()
     views = shown(fdi, lambda k: course[k] * G[:, surface])
     for v, view in enumerate(views[:5]):
-        evidence = np.abs(view["block"]["lane"]["correlation"]).max()
+        evidence = np.abs(view["block"]["lanes"]["correlation"]).max()
         felt = Across.is_sensitive_to(fdi, view, surface, G[:, surface])
         assert felt == (v not in blind)
         assert (evidence > 1.0) == felt
@@ -76,12 +76,12 @@ def test_errors_that_turn_the_column_are_tolerated(signs):
     course = np.cumsum(np.random.default_rng(8).normal(size=70))
     turned = G[:, RUDDER] * (1.0 + 0.05 * np.array([signs[0], 0.0, signs[1]]))
     view = shown(watching(turns=0.05), lambda k: course[k] * turned)[PAST_RUDDER]
-    lane = view["block"]["lane"]
-    known = lane["information"] > 0.0
+    lanes = view["block"]["lanes"]
+    known = lanes["information"] > 0.0
     assert known.any()
-    assert (np.abs(lane["correlation"]) <= 1.0001 * lane["slack"] + 1e-9)[known].all()
+    assert (np.abs(lanes["correlation"]) <= 1.0001 * lanes["slack"] + 1e-9)[known].all()
     if signs[0] != signs[1]:
-        assert np.abs(lane["correlation"]).max() > 1.0
+        assert np.abs(lanes["correlation"]).max() > 1.0
 
 
 def test_only_what_a_surface_does_not_move_excludes_it():

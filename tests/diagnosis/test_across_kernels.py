@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from innovations import by_onset
+from innovations import by_onset, lanes_of
 from kernels import DT, holder, new_fdi
 from statistics_of import Across
 
@@ -193,9 +193,10 @@ def test_a_frame_is_seen_along_every_direction(fdi, rng, latched, tolerated, fra
     alone, statistical["n_views"] = [], 2  # enough: the first, and one across a column
     statistical["views"][1] = statistical["views"][PAST_AILERON].copy()
     for view in statistical["views"][:2]:
-        lane = view["block"]["lane"]
-        for name in ("correlation", "information", "overlap", "response"):
-            lane[name] = rng.uniform(1.0, 2.0, lane[name].shape)
+        lanes, overlap = view["block"]["lanes"], view["block"]["overlap"]
+        for name in ("correlation", "information", "response"):
+            lanes[name] = rng.uniform(1.0, 2.0, lanes[name].shape)
+        overlap[:] = rng.uniform(1.0, 2.0, overlap.shape)
         alone.append(view.copy().view(np.recarray))
     Across.observe(fdi, innovation, G, Gu, FLOW, frame, latched)
     for view, own in zip(statistical["views"], alone, strict=False):
@@ -212,7 +213,7 @@ def test_a_frame_is_seen_along_every_direction(fdi, rng, latched, tolerated, fra
         for name in NAMES:
             assert view["block"][name] == pytest.approx(block[name], rel=1e-12), name
         for name in ("correlation", "information", "overlap", "slack", "score"):
-            assert view["block"]["lane"][name] == pytest.approx(block["lane"][name], rel=1e-12), name
+            assert lanes_of(view["block"], name) == pytest.approx(lanes_of(block, name), rel=1e-12), name
 
 
 def test_views_that_are_not_there_are_not_asked(fdi, rng):
@@ -261,9 +262,5 @@ def test_a_view_has_levels_and_tolerances_of_the_axes_it_looks_at(fdi):
         tried = block["hypothesis"][: block["n_hypotheses"]]
         assert tried["kind"].tolist() == [STEP] + [LOSS] * (len(tried) - 1)
         sense = by_onset(block, "sense")
-        assert (sense == -losses(tried)).all()
-
-
-def losses(tried):
-    """1 for each loss that is tried, of which a correlation of the other sign speaks for nothing."""
-    return np.pad(tried["kind"] == LOSS, (0, USUAL_SIZE.view.hypotheses - len(tried))).astype(float)
+        assert (sense[:, : len(tried)] == -1.0 * (tried["kind"] == LOSS)).all()
+        assert (sense[:, len(tried) :] == 0.0).all()

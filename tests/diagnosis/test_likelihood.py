@@ -172,7 +172,7 @@ def test_a_bounded_uncertainty_adds_no_more_than_is_allowed_for(case, seed, cour
 
 def _allowed(block):
     """What a bounded uncertainty may add to the correlation of the first hypothesis, (slots,)."""
-    return np.array([likelihood.allowance(block["lane"], k, *block["swing"]) for k in range(N_SLOTS)])
+    return np.array([likelihood.allowance(block["lanes"][0], k, *block["swing"]) for k in range(N_SLOTS)])
 
 
 def test_the_allowance_is_not_absurdly_wide():

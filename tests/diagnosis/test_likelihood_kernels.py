@@ -2,12 +2,20 @@
 
 import numpy as np
 import pytest
-from innovations import block_of, by_onset, with_hypotheses
+from innovations import block_of, by_onset, lanes_of, with_hypotheses
 from kernels import new_fdi
 from statistics_of import Statistical, put
 
 from beaver_ftc.diagnosis.detection import likelihood, statistical
-from beaver_ftc.diagnosis.detection.likelihood import ALPHA3, ENDING, GROWING, MAX_HYPOTHESES, N_SLOTS, STEP
+from beaver_ftc.diagnosis.detection.likelihood import (
+    ALPHA3,
+    ENDING,
+    GROWING,
+    MAX_HYPOTHESES,
+    N_LANES,
+    N_SLOTS,
+    STEP,
+)
 from beaver_ftc.diagnosis.state import LOSS
 
 DT = 0.02
@@ -53,8 +61,9 @@ def test_an_onset_that_starts_knows_nothing_and_the_others_stay():
         "weight",
         "overlap",
     )
-    for name in names:
-        block["lane"][name] = 3.0
+    for name in names[:-1]:
+        block["lanes"][name] = 3.0
+    block["overlap"] = 3.0
     likelihood.start(block, 4)
     for name in names:
         kept = by_onset(block, name)
@@ -90,22 +99,22 @@ def test_the_room_of_a_bounded_uncertainty_is_summed_up_by_parts():
     block["stay"], block["swing"], block["pace"] = (0.1, 0.2), (0.3, 0.4), 0.05
     w = rng.normal(size=(frames, 2))
     block["K_x"] = block["S_inverse"] = np.eye(2)  # a filter that forgets at once: g_s is the signature
-    lane = 2
+    lanes, lane = block["lanes"][0], 2
     for each in w:
-        block["lane"]["shaped"][:, lane] = each
-        likelihood.respond(block, 1.0, keep)
+        lanes["shaped"][:, lane] = each
+        likelihood.respond(block, lanes, N_SLOTS, 1.0, keep)
     old = keep ** np.arange(frames)[::-1]
     changes = np.abs(np.diff(np.vstack([np.zeros(2), w]), axis=0))
     stays, swings = old @ np.abs(w) @ [0.1, 0.2], old @ changes @ [0.3, 0.4]
     drifts = old @ np.abs(w) @ [0.3, 0.4] * 0.05
-    assert block["lane"]["stays"][lane] == pytest.approx(stays)
-    assert block["lane"]["swings"][lane] == pytest.approx(swings)
-    assert block["lane"]["drifts"][lane] == pytest.approx(drifts)
+    assert lanes["stays"][lane] == pytest.approx(stays)
+    assert lanes["swings"][lane] == pytest.approx(swings)
+    assert lanes["drifts"][lane] == pytest.approx(drifts)
     last = np.abs(w[-1]) @ [0.3, 0.4]
-    allowed = likelihood.allowance(block["lane"], lane, *block["swing"])
+    allowed = likelihood.allowance(lanes, lane, *block["swing"])
     assert allowed == pytest.approx(stays + min(swings + last, drifts))
-    block["lane"]["drifts"][lane] = 99.0
-    allowed = likelihood.allowance(block["lane"], lane, *block["swing"])
+    lanes["drifts"][lane] = 99.0
+    allowed = likelihood.allowance(lanes, lane, *block["swing"])
     assert allowed == pytest.approx(stays + swings + last)
 
 
@@ -118,14 +127,15 @@ def test_a_frame_is_whitened_weighed_and_summed_as_matrices_say():
     block["K_x"], block["K_d"], block["S_inverse"], block["keep"] = K_x, K_d, S, kept
     seen, regressors = rng.normal(size=2), rng.normal(size=(2, 2))
     block["innovation"], block["regressor_response"][:2] = seen, regressors
-    lane = block["lane"]
-    for name in ("shaped", "response", "correlation", "information", "overlap", "slack"):
-        lane[name] = rng.normal(size=lane[name].shape)
-    before = {
-        name: lane[name].copy() for name in ("shaped", "response", "correlation", "information", "overlap")
-    }
-    likelihood.respond(block, dt, keep)
-    likelihood.overlap(block, keep)
+    for name in ("shaped", "response", "correlation", "information", "slack"):
+        block["lanes"][name] = rng.normal(size=block["lanes"][name].shape)
+    block["overlap"] = rng.normal(size=block["overlap"].shape)
+    kept_by_name = ("shaped", "response", "correlation", "information", "overlap")
+    before = {name: lanes_of(block, name) for name in kept_by_name}
+    for lanes, overlap in zip(block["lanes"], block["overlap"], strict=True):
+        likelihood.respond(block, lanes, N_LANES, dt, keep)
+        likelihood.accumulate_overlap(block, lanes, overlap, N_LANES, keep)
+    lane = {name: lanes_of(block, name) for name in (*kept_by_name, "weight", "slack")}
     x, d = before["response"][:2], before["response"][2:]
     r = x + dt * (before["shaped"] - d)
     w = S @ r
@@ -181,7 +191,7 @@ def test_what_calm_air_foretells_is_taken_off_where_it_speaks_for_the_fault(kind
                 "information": 4.0,
                 "foreseen": it,
             }.items():
-                by_onset(block, name)[:, 0] = value
+                block["lanes"][name][0, :N_SLOTS] = value
             likelihood.judge(block)
             scores.append(block["hypothesis"][0]["score"])
         assert scores[0] == pytest.approx(4.0)
@@ -192,35 +202,37 @@ def test_of_hypotheses_that_a_block_does_not_have_nothing_is_reckoned():
     rng = np.random.default_rng(9)
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), LOSS, STEP, tolerance=(0.1, 0.2))
     block["level"], block["regressor"][:2] = 4.0, rng.normal(size=(2, 2))
-    lane = block["lane"]
-    for name in lane.dtype.names:
-        lane[name] = rng.uniform(1.0, 2.0, lane[name].shape)
-    before = lane.copy()
+    names = (*block["lanes"].dtype.names, "overlap")
+    for name in names[:-1]:
+        block["lanes"][name] = rng.uniform(1.0, 2.0, block["lanes"][name].shape)
+    block["overlap"] = rng.uniform(1.0, 2.0, block["overlap"].shape)
+    before = {name: lanes_of(block, name) for name in names}
     block["hypothesis"]["signature"], block["scratch"] = rng.normal(size=2), rng.normal(size=2)
     likelihood.start(block, 3)
     likelihood.take_in(block, np.full(3, 0.1), True, DT, 0.9)
-    for name in lane.dtype.names:
-        assert (lane[name][..., 2 * N_SLOTS :] == before[name][..., 2 * N_SLOTS :]).all(), name
+    for name in names:
+        assert (lanes_of(block, name) == before[name])[..., 2 * N_SLOTS :].all(), name
 
 
 def test_a_lane_without_information_comes_to_nothing():
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), *MAX_HYPOTHESES * (LOSS,))
-    block["lane"]["sense"], block["lane"]["correlation"], block["level"] = -1.0, -5.0, 4.0
-    block["lane"]["information"][::2] = 2.0
+    block["lanes"]["sense"], block["lanes"]["correlation"], block["level"] = -1.0, -5.0, 4.0
+    block["lanes"]["information"][:, ::2] = 2.0
     with np.errstate(divide="ignore", invalid="ignore"):
-        likelihood.judge_lanes(block, True, False)
+        for lanes in block["lanes"]:
+            likelihood.judge_lanes(block, lanes, N_LANES, True, False)
     for name, nothing in (("score", 0.0), ("at_least", 0.0), ("at_most", 0.0), ("likelihood", -1.0)):
-        assert (block["lane"][name][1::2] == nothing).all()
-        assert (block["lane"][name][::2] > 0.0).all()
+        assert (lanes_of(block, name)[1::2] == nothing).all()
+        assert (lanes_of(block, name)[::2] > 0.0).all()
 
 
 def shapes(kind, frames=5):
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), kind)
-    block["hypothesis"]["growth_keep"], block["lane"]["missing"] = 0.8, 1.0
+    block["hypothesis"]["growth_keep"], block["lanes"]["missing"] = 0.8, 1.0
     found = []
     for k in range(frames):
         block["hypothesis"]["signature"][0] = 1.0 + k, -2.0 * k
-        likelihood.shape(block, 0)
+        likelihood.shape(block["hypothesis"][0], block["lanes"][0], 0)
         found.append(by_onset(block, "shaped")[:, 3, 0].copy())
     return np.array(found)
 
@@ -249,23 +261,24 @@ def test_a_loss_takes_away_and_its_end_gives_back(kind, sided, score):
     assert bool(likelihood.one_sided(kind)) == sided
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), kind)
     for sign in (1.0, -1.0):
-        block["lane"]["correlation"][0], block["lane"]["information"][0] = 3.0 * sign, 9.0
-        likelihood.judge_lanes(block, True, False)
-        assert block["lane"]["score"][0] == pytest.approx(score * sign if sided else 1.0)
+        lanes = block["lanes"][0]
+        lanes["correlation"][0], lanes["information"][0] = 3.0 * sign, 9.0
+        likelihood.judge_lanes(block, lanes, N_SLOTS, True, False)
+        assert lanes["score"][0] == pytest.approx(score * sign if sided else 1.0)
 
 
 @pytest.mark.parametrize(("kind", "certain"), [(LOSS, 24.5), (ALPHA3, 0.5), (STEP, 0.5)])
 def test_a_mapped_error_is_doubt_of_all_but_a_loss(kind, certain):
     """Evidence of 7 standard deviations, of which what is bounded may be 6: logarithms 7^2 / 2, 1 / 2."""
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), kind)
-    lane = block["lane"]
+    lane = block["lanes"][0]
     lane["sense"], lane["correlation"], lane["information"] = likelihood.SENSE[kind], -7.0 * 9.0, 81.0
     lane["stays"] = 6.0 * 9.0
-    likelihood.judge_lanes(block, True, True)
+    likelihood.judge_lanes(block, lane, N_SLOTS, True, True)
     assert lane["at_least"][0] == pytest.approx(certain)
-    likelihood.judge_lanes(block, True, False)
+    likelihood.judge_lanes(block, lane, N_SLOTS, True, False)
     assert lane["at_least"][0] == pytest.approx(24.5)
-    likelihood.judge_lanes(block, False, True)
+    likelihood.judge_lanes(block, lane, N_SLOTS, False, True)
     assert lane["at_least"][0] == pytest.approx(0.5)
 
 
@@ -298,15 +311,14 @@ def test_a_share_is_in_standard_deviations_or_of_what_uncertainty_and_chance_all
 def judged(kind=LOSS, tolerated=False, memory=0.0, rooms=(0.0, 0.0), at_most=0.0):
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), kind, tolerance=(0.1, 0.2))
     block["level"], block["chance"] = 1.0, 0.5
-    onsets, names = [1, 5], ("correlation", "information", "overlap", "stays")
-    correlation, information, overlap, stays = (by_onset(block, name) for name in names)
-    correlation[onsets, 0], information[onsets, 0] = (-3.0, -5.0), (4.0, 16.0)
-    correlation[7, 0] = -99.0  # nothing is known of that onset
-    overlap[:2, 1, 0], overlap[:2, 5, 0], stays[onsets, 0] = (1.0, -2.0), (-3.0, 4.0), rooms
+    onsets, lanes, overlap = [1, 5], block["lanes"][0], block["overlap"][0]
+    lanes["correlation"][onsets], lanes["information"][onsets] = (-3.0, -5.0), (4.0, 16.0)
+    lanes["correlation"][7] = -99.0  # nothing is known of that onset
+    overlap[:2, 1], overlap[:2, 5], lanes["stays"][onsets] = (1.0, -2.0), (-3.0, 4.0), rooms
     hypothesis = block["hypothesis"][0]
     hypothesis["score"], hypothesis["at_least"], hypothesis["at_most"] = 99.0, 99.0, at_most
     if tolerated:
-        likelihood.overlap(block, 1.0)
+        likelihood.accumulate_overlap(block, lanes, overlap, N_SLOTS, 1.0)
     likelihood.judge(block, memory)
     return hypothesis
 

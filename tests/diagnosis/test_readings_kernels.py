@@ -100,7 +100,7 @@ def test_what_the_vanes_show_of_the_gust_is_taken_off_the_innovation():
         alone = Detector(100.0, bounds={"turbulence": "light"})
         alone.detector["air"]["output"]["mean"] = mean
         alone.watch(innovations + mean, Gu, np.ones(2))
-        kept.append([block["lane"] for block in alone.blocks])
+        kept.append([block["lanes"] for block in alone.blocks])
     still, moving = kept
     assert any(np.abs(lane["held"]).max() > 0.01 for lane in still)
     for one, other in zip(still, moving, strict=True):

@@ -390,8 +390,8 @@ def _surface(surface: np.void) -> SurfaceTypes:
 
 def _block(block: np.void) -> Block:
     hypotheses = tuple(map(_hypothesis, block["hypothesis"][: block["n_hypotheses"]]))
-    there = len(hypotheses) * N_SLOTS
-    lanes = (block["lane"][name][:there].reshape(-1, N_SLOTS).copy() for name in Lanes._fields)
+    n = len(hypotheses)
+    lanes = (block["lanes"][name].reshape(-1, N_SLOTS)[:n].copy() for name in Lanes._fields)
     return Block(
         tuple(block["axis"][: block["n"]].tolist()), float(block["lag"]), float(block["stronger"]),
         block["tolerance"][: block["n_regressors"]].copy(), hypotheses, Lanes(*lanes),

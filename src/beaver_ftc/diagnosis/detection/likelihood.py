@@ -52,6 +52,7 @@ Onsets: slot j starts anew every 2^(j+1) frames, so that there is always one of 
 alarm on they stay, and old evidence is forgotten slowly.
 """
 
+from collections.abc import Sequence
 from math import sqrt
 from typing import NamedTuple
 
@@ -61,9 +62,7 @@ from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.diagnosis.state import LOSS
 
 # A block is the axes whose noise goes together: pitch, and roll with yaw, the latter twice. States of a
-# filter: what is left of the rate, then the drift. Every hypothesis is tried from every onset: that is a lane
-# of a block, and what lanes keep lies side by side for vector instructions, lane hypothesis * N_SLOTS + slot:
-# those of the hypotheses that a block has come first, and no other is reckoned.
+# filter: what is left of the rate, then the drift.
 PITCH_BLOCK, LATERAL, RETURNING = 0, 1, 2  # the last is the second view of roll and yaw
 N_BLOCKS = 3
 N_SLOTS = 10
@@ -96,23 +95,25 @@ class Capacity(NamedTuple):
     hypotheses: int
 
 
-@sized
-def lane_dtype(capacity: Capacity) -> np.dtype:
-    """What the lanes of a block keep, side by side."""
-    lanes = N_SLOTS * capacity.hypotheses
-    return record(
-        sense=lanes, shaped=(2, lanes), response=(4, lanes),
-        weight=(2, lanes),  # S^-1 g_s of the frame
-        correlation=lanes, information=lanes, overlap=(capacity.regressors, lanes), slack=lanes,
-        missing=lanes,  # of a loss that grows, what is yet to come
-        held=(2, lanes),  # of a loss that ends, its signature as it did
-        # what a bounded uncertainty can add to the correlation: as it stays, as it swings, at its pace
-        stays=lanes, swings=lanes, drifts=lanes,
-        foreseen=lanes,  # of the correlation, what calm air gives a law that answers noise
-        shown=lanes,  # and a gust that the vanes show a law which answers them
-        # what it comes to, the last three as log likelihood ratios
-        score=lanes, at_least=lanes, at_most=lanes, likelihood=lanes,
-    )  # fmt: skip
+# A hypothesis tried from one onset is a lane. The lanes of a few hypotheses lie side by side for vector
+# instructions, lane (h % PER_GROUP) * N_SLOTS + slot in group h // PER_GROUP. A group is as large in every
+# record, so that compiled code knows that none of its arrays overlaps another: to find that out in each frame
+# took a tenth of the detector's time.
+PER_GROUP = 4
+N_LANES = PER_GROUP * N_SLOTS
+LANES = record(
+    sense=N_LANES, shaped=(2, N_LANES), response=(4, N_LANES),
+    weight=(2, N_LANES),  # S^-1 g_s of the frame
+    correlation=N_LANES, information=N_LANES, slack=N_LANES,
+    missing=N_LANES,  # of a loss that grows, what is yet to come
+    held=(2, N_LANES),  # of a loss that ends, its signature as it did
+    # what a bounded uncertainty can add to the correlation: as it stays, as it swings, at its pace
+    stays=N_LANES, swings=N_LANES, drifts=N_LANES,
+    foreseen=N_LANES,  # of the correlation, what calm air gives a law that answers noise
+    shown=N_LANES,  # and a gust that the vanes show a law which answers them
+    # what it comes to, the last three as log likelihood ratios
+    score=N_LANES, at_least=N_LANES, at_most=N_LANES, likelihood=N_LANES,
+)  # fmt: skip
 
 
 _FILTER = {
@@ -120,6 +121,19 @@ _FILTER = {
     "drift": (2, 2), "jitter": 2, "noise": 2, "S_inverse": (2, 2), "K_x": (2, 2), "K_d": (2, 2),
 }  # fmt: skip
 FILTER = record(**_FILTER)
+
+
+def set_senses(block: np.void, kinds: Sequence[int]) -> None:
+    """Say of the lanes of each hypothesis which sign of a correlation speaks for it."""
+    block["lanes"]["sense"] = 0.0
+    for h, kind in enumerate(kinds):
+        first = (h % PER_GROUP) * N_SLOTS
+        block["lanes"]["sense"][h // PER_GROUP, first : first + N_SLOTS] = SENSE[kind]
+
+
+def groups(capacity: Capacity) -> int:
+    """How many groups of lanes the hypotheses of a block need."""
+    return (capacity.hypotheses + PER_GROUP - 1) // PER_GROUP
 
 
 @sized
@@ -136,7 +150,9 @@ def block_dtype(capacity: Capacity) -> np.dtype:
         level=float, chance=float, pace=float, stay=2, swing=2,
         n_regressors=int, tolerance=capacity.regressors, regressor=(capacity.regressors, 2),
         regressor_state=(capacity.regressors, 4), regressor_response=(capacity.regressors, 2),
-        n_hypotheses=int, hypothesis=(HYPOTHESIS, capacity.hypotheses), lane=lane_dtype(capacity),
+        n_hypotheses=int, hypothesis=(HYPOTHESIS, capacity.hypotheses),
+        lanes=(LANES, groups(capacity)),
+        overlap=(groups(capacity), capacity.regressors, N_LANES),  # R_j of each lane
     )  # fmt: skip
 
 
@@ -233,6 +249,22 @@ def whiten(block, state, acceleration, dt, out):
 
 
 @kernel
+def whiten_regressors(block, dt):
+    """Whiten the regressors as `whiten` does, all at once; of a block of one axis, the second's are zero."""
+    K_x, K_d, kept = block.K_x, block.K_d, block.keep
+    x00, x01, x10, x11 = K_x[0, 0], K_x[0, 1], K_x[1, 0], K_x[1, 1]
+    d00, d01, d10, d11 = K_d[0, 0], K_d[0, 1], K_d[1, 0], K_d[1, 1]
+    given, state, response = block.regressor, block.regressor_state, block.regressor_response
+    for j in range(block.n_regressors):
+        r0 = state[j, 0] + dt * (given[j, 0] - state[j, 2])
+        r1 = state[j, 1] + dt * (given[j, 1] - state[j, 3])
+        response[j, 0], response[j, 1] = r0, r1
+        state[j, 0], state[j, 1] = r0 - x00 * r0 - x01 * r1, r1 - x10 * r0 - x11 * r1
+        state[j, 2] = kept * state[j, 2] + (d00 * r0 + d01 * r1)
+        state[j, 3] = kept * state[j, 3] + (d10 * r0 + d11 * r1)
+
+
+@kernel
 def follow_calm(block, dt):
     """Whiten the frame, `scratch`, by the filter that reckons with no gust."""
     advance(block.calm, dt)
@@ -270,24 +302,31 @@ def slot_to_start(k):
 
 
 @kernel
-def lanes(block):
-    """How many lanes there are: the first of each of its arrays."""
-    return block.n_hypotheses * N_SLOTS
+def lanes_in(block, g):
+    """How many lanes of group g there are: the first of each of its arrays."""
+    return min(block.n_hypotheses - g * PER_GROUP, PER_GROUP) * N_SLOTS
+
+
+@kernel
+def n_groups(block):
+    """How many groups of lanes there are."""
+    return (block.n_hypotheses + PER_GROUP - 1) // PER_GROUP
 
 
 @kernel
 def start(block, slot):
     """Forget everything about an onset."""
-    lane = block.lane
-    for k in range(slot, lanes(block), N_SLOTS):
-        lane.correlation[k] = lane.information[k] = 0.0
-        lane.weight[0, k] = lane.weight[1, k] = 0.0
-        lane.stays[k] = lane.swings[k] = lane.drifts[k] = lane.foreseen[k] = lane.shown[k] = 0.0
-        lane.missing[k] = 1.0
-        for i in range(4):
-            lane.response[i, k] = 0.0
-        for j in range(block.n_regressors):
-            lane.overlap[j, k] = 0.0
+    for g in range(n_groups(block)):
+        lanes = block.lanes[g]
+        for k in range(slot, lanes_in(block, g), N_SLOTS):
+            lanes.correlation[k] = lanes.information[k] = 0.0
+            lanes.weight[0, k] = lanes.weight[1, k] = 0.0
+            lanes.stays[k] = lanes.swings[k] = lanes.drifts[k] = lanes.foreseen[k] = lanes.shown[k] = 0.0
+            lanes.missing[k] = 1.0
+            for i in range(4):
+                lanes.response[i, k] = 0.0
+            for j in range(block.n_regressors):
+                block.overlap[g, j, k] = 0.0
 
 
 @kernel
@@ -306,93 +345,95 @@ def reach(block, bounded, dt):
 
 
 @kernel
-def shape(block, h):
-    """Fill `shaped` with the signature of hypothesis h since each onset: of growth a part, of an end what it
-    was then."""
-    lane, hypothesis = block.lane, block.hypothesis[h]
+def shape(hypothesis, lanes, first):
+    """Fill `shaped` with the signature of a hypothesis since each onset, from lane `first` on: of growth a
+    part, of an end what it was then."""
     s0, s1 = hypothesis.signature[0], hypothesis.signature[1]
-    for k in range(h * N_SLOTS, (h + 1) * N_SLOTS):
+    for k in range(first, first + N_SLOTS):
         if hypothesis.kind == ENDING:
-            if lane.missing[k] > 0.0:
-                lane.held[0, k], lane.held[1, k], lane.missing[k] = s0, s1, 0.0
-            lane.shaped[0, k], lane.shaped[1, k] = lane.held[0, k], lane.held[1, k]
+            if lanes.missing[k] > 0.0:
+                lanes.held[0, k], lanes.held[1, k], lanes.missing[k] = s0, s1, 0.0
+            lanes.shaped[0, k], lanes.shaped[1, k] = lanes.held[0, k], lanes.held[1, k]
         elif hypothesis.kind == GROWING:
-            lane.missing[k] *= hypothesis.growth_keep
-            grown = 1.0 - lane.missing[k]
-            lane.shaped[0, k], lane.shaped[1, k] = grown * s0, grown * s1
+            lanes.missing[k] *= hypothesis.growth_keep
+            grown = 1.0 - lanes.missing[k]
+            lanes.shaped[0, k], lanes.shaped[1, k] = grown * s0, grown * s1
         else:
-            lane.shaped[0, k], lane.shaped[1, k] = s0, s1
+            lanes.shaped[0, k], lanes.shaped[1, k] = s0, s1
 
 
 @kernel
-def respond(block, dt, keep):
-    """Whiten the shaped signatures, as `whiten` does, and bring N and D to this frame.
+def respond(block, lanes, n, dt, keep):
+    """Whiten the shaped signatures of n lanes, as `whiten` does, and bring N and D to this frame.
 
     Of a block of one axis, what belongs to a second one is zero.
     """
-    K_x, K_d, S, lane = block.K_x, block.K_d, block.S_inverse, block.lane
+    K_x, K_d, S = block.K_x, block.K_d, block.S_inverse
     x00, x01, x10, x11 = K_x[0, 0], K_x[0, 1], K_x[1, 0], K_x[1, 1]
     d00, d01, d10, d11 = K_d[0, 0], K_d[0, 1], K_d[1, 0], K_d[1, 1]
     s00, s01, s10, s11 = S[0, 0], S[0, 1], S[1, 0], S[1, 1]
     kept, g0, g1 = block.keep, block.innovation[0], block.innovation[1]
     p0, p1 = block.foreseen[0], block.foreseen[1]
     swing0, swing1, stay0, stay1 = block.swing[0], block.swing[1], block.stay[0], block.stay[1]
-    state, shaped, weight, pace = lane.response, lane.shaped, lane.weight, block.pace
-    for k in range(lanes(block)):
+    state, shaped, weight, pace = lanes.response, lanes.shaped, lanes.weight, block.pace
+    for k in range(n):
         r0 = state[0, k] + dt * (shaped[0, k] - state[2, k])
         r1 = state[1, k] + dt * (shaped[1, k] - state[3, k])
         state[0, k], state[1, k] = r0 - x00 * r0 - x01 * r1, r1 - x10 * r0 - x11 * r1
         state[2, k] = kept * state[2, k] + (d00 * r0 + d01 * r1)
         state[3, k] = kept * state[3, k] + (d10 * r0 + d11 * r1)
         w0, w1 = s00 * r0 + s01 * r1, s10 * r0 + s11 * r1
-        lane.correlation[k] = keep * lane.correlation[k] + (w0 * g0 + w1 * g1)
-        lane.information[k] = keep * lane.information[k] + w0 * r0 + w1 * r1
-        lane.foreseen[k] = keep * lane.foreseen[k] + (w0 * p0 + w1 * p1)
+        lanes.correlation[k] = keep * lanes.correlation[k] + (w0 * g0 + w1 * g1)
+        lanes.information[k] = keep * lanes.information[k] + w0 * r0 + w1 * r1
+        lanes.foreseen[k] = keep * lanes.foreseen[k] + (w0 * p0 + w1 * p1)
         change = swing0 * abs(w0 - weight[0, k]) + swing1 * abs(w1 - weight[1, k])
-        lane.stays[k] = keep * lane.stays[k] + (stay0 * abs(w0) + stay1 * abs(w1))
-        lane.swings[k] = keep * lane.swings[k] + change
-        lane.drifts[k] = keep * lane.drifts[k] + pace * (swing0 * abs(w0) + swing1 * abs(w1))
+        lanes.stays[k] = keep * lanes.stays[k] + (stay0 * abs(w0) + stay1 * abs(w1))
+        lanes.swings[k] = keep * lanes.swings[k] + change
+        lanes.drifts[k] = keep * lanes.drifts[k] + pace * (swing0 * abs(w0) + swing1 * abs(w1))
         weight[0, k], weight[1, k] = w0, w1
 
 
 @kernel
-def overlap(block, keep):
-    """Bring R_j to this frame, and `slack`: how much of N the declared errors of the coefficients explain."""
-    weight, slack, n = block.lane.weight, block.lane.slack, lanes(block)
+def accumulate_overlap(block, lanes, overlap, n, keep):
+    """Bring R_j of n lanes to this frame, `overlap` (regressors, lanes), and `slack`: how much of N the
+    declared errors of the coefficients explain."""
+    weight, slack = lanes.weight, lanes.slack
     slack[:n] = 0.0
     for j in range(block.n_regressors):
         r0, r1 = block.regressor_response[j, 0], block.regressor_response[j, 1]
-        total, tolerance = block.lane.overlap[j], block.tolerance[j]
+        total, tolerance = overlap[j], block.tolerance[j]
         for k in range(n):
             total[k] = keep * total[k] + (weight[0, k] * r0 + weight[1, k] * r1)
             slack[k] += tolerance * abs(total[k])
 
 
 @kernel
-def glimpse(block, keep):
+def glimpse(block, lanes, n, keep):
     """Bring to this frame what a gust that the vanes show adds to N; `respond` has left the weights."""
-    lane, p0, p1 = block.lane, block.shown[0], block.shown[1]
-    for k in range(lanes(block)):
-        lane.shown[k] = keep * lane.shown[k] + (lane.weight[0, k] * p0 + lane.weight[1, k] * p1)
+    p0, p1 = block.shown[0], block.shown[1]
+    for k in range(n):
+        lanes.shown[k] = keep * lanes.shown[k] + (lanes.weight[0, k] * p0 + lanes.weight[1, k] * p1)
 
 
 @kernel
 def weigh(block, tolerated, dt, keep):
     """Add the frame just whitened to every hypothesis and onset; `keep` is the share of what was there."""
     for h in range(block.n_hypotheses):
-        shape(block, h)
-    respond(block, dt, keep)
-    if block.glimpsed:
-        glimpse(block, keep)
-    if tolerated:
-        overlap(block, keep)
+        shape(block.hypothesis[h], block.lanes[h // PER_GROUP], (h % PER_GROUP) * N_SLOTS)
+    for g in range(n_groups(block)):
+        lanes, n = block.lanes[g], lanes_in(block, g)
+        respond(block, lanes, n, dt, keep)
+        if block.glimpsed:
+            glimpse(block, lanes, n, keep)
+        if tolerated:
+            accumulate_overlap(block, lanes, block.overlap[g], n, keep)
 
 
 @kernel
-def allowance(lane, k, swing0, swing1):
+def allowance(lanes, k, swing0, swing1):
     """How much of N, in lane k, a bounded uncertainty can explain; swing0, swing1: a block's `swing`."""
-    last = swing0 * abs(lane.weight[0, k]) + swing1 * abs(lane.weight[1, k])
-    return lane.stays[k] + min(lane.swings[k] + last, lane.drifts[k])
+    last = swing0 * abs(lanes.weight[0, k]) + swing1 * abs(lanes.weight[1, k])
+    return lanes.stays[k] + min(lanes.swings[k] + last, lanes.drifts[k])
 
 
 @kernel
@@ -422,29 +463,29 @@ def share(level, chance, evidence, room, D):
 
 
 @kernel
-def judge_lanes(block, certain, mapped):
-    """Find what every lane comes to; certain: what a bounded uncertainty may hide is no doubt.
+def judge_lanes(block, lanes, n, certain, mapped):
+    """Find what each of n lanes comes to; certain: what a bounded uncertainty may hide is no doubt.
 
     A lane without information comes to nothing. A model whose error is `mapped` has more of it than what is
     published, and the same for long: what is no loss is then doubted.
     """
-    lane, sense, swing0, swing1 = block.lane, block.lane.sense, block.swing[0], block.swing[1]
+    sense, swing0, swing1 = lanes.sense, block.swing[0], block.swing[1]
     level, chance, doubted = block.level, block.chance, 0.0 if certain else 1.0
-    for k in range(lanes(block)):
-        N, D = lane.correlation[k], lane.information[k]
-        slack = lane.slack[k] + max(sense[k] * lane.foreseen[k], 0.0) + max(sense[k] * lane.shown[k], 0.0)
+    for k in range(n):
+        N, D = lanes.correlation[k], lanes.information[k]
+        slack = lanes.slack[k] + max(sense[k] * lanes.foreseen[k], 0.0) + max(sense[k] * lanes.shown[k], 0.0)
         is_loss, known = sense[k] != 0.0, D > 0.0
         evidence = sense[k] * N if is_loss else abs(N)
-        room = allowance(lane, k, swing0, swing1)
+        room = allowance(lanes, k, swing0, swing1)
         doubt = slack + (room if mapped and not is_loss else doubted * room)
         score = share(level, chance, evidence - slack, room, D)
         likelihood = log_likelihood(is_loss, evidence, D)
         at_least = log_likelihood(is_loss, evidence - doubt, D)
         at_most = log_likelihood(is_loss, evidence + doubt, D)
-        lane.score[k] = score if known else 0.0
-        lane.at_least[k] = at_least if known else 0.0
-        lane.at_most[k] = at_most if known else 0.0
-        lane.likelihood[k] = likelihood if known else -1.0
+        lanes.score[k] = score if known else 0.0
+        lanes.at_least[k] = at_least if known else 0.0
+        lanes.at_most[k] = at_most if known else 0.0
+        lanes.likelihood[k] = likelihood if known else -1.0
 
 
 @kernel
@@ -454,18 +495,19 @@ def judge(block, memory=0.0, mapped=False):
     memory: where a loss may end, what a frame leaves of what one explained before; 0 where a loss stays.
     mapped: as of `judge_lanes`.
     """
-    lane = block.lane
-    judge_lanes(block, memory > 0.0, mapped)
+    for g in range(n_groups(block)):
+        judge_lanes(block, block.lanes[g], lanes_in(block, g), memory > 0.0, mapped)
     for h, hypothesis in enumerate(block.hypothesis[: block.n_hypotheses]):
+        lanes, first = block.lanes[h // PER_GROUP], (h % PER_GROUP) * N_SLOTS
         score, at_least, at_most, best, likeliest = 0.0, 0.0, memory * hypothesis.at_most, -1.0, -1
-        for k in range(h * N_SLOTS, (h + 1) * N_SLOTS):
-            score = max(score, lane.score[k])
-            at_least, at_most = max(at_least, lane.at_least[k]), max(at_most, lane.at_most[k])
-            if lane.likelihood[k] > best:
-                best, likeliest = lane.likelihood[k], k
+        for k in range(first, first + N_SLOTS):
+            score = max(score, lanes.score[k])
+            at_least, at_most = max(at_least, lanes.at_least[k]), max(at_most, lanes.at_most[k])
+            if lanes.likelihood[k] > best:
+                best, likeliest = lanes.likelihood[k], k
         hypothesis.score, hypothesis.at_least, hypothesis.at_most = score, at_least, at_most
         if likeliest >= 0:
-            N, D = lane.correlation[likeliest], lane.information[likeliest]
+            N, D = lanes.correlation[likeliest], lanes.information[likeliest]
             hypothesis.theta, hypothesis.certainty = estimate(hypothesis.kind, N, D), D
 
 
@@ -485,9 +527,7 @@ def take_in(block, bounded, tolerated, dt, keep, memory=0.0, mapped=False):
     if block.glimpsed:
         whiten(block, block.shown_state, block.shown, dt, block.shown)
     if tolerated:
-        for j in range(block.n_regressors):
-            state, response = block.regressor_state[j], block.regressor_response[j]
-            whiten(block, state, block.regressor[j], dt, response)
+        whiten_regressors(block, dt)
     weigh(block, tolerated, dt, keep)
     judge(block, memory, mapped)
 

@@ -179,8 +179,7 @@ def _set_up_blocks(statistical: np.void, errors: SensorErrors, aircraft: Aircraf
             variance = max(errors[AXES[axis]].random, LEAST_NOISE_RAD_S) ** 2
             block["noise"][i] = block["P_xx"][i, i] = variance
             block["P_dd"][i, i] = likelihood.PRIOR_DRIFT_RAD_S2**2
-        sense = block["lane"]["sense"].reshape(-1, N_SLOTS)
-        sense[: len(members)] = [[likelihood.SENSE[kind]] for kind, *_ in members]
+        likelihood.set_senses(block, [kind for kind, *_ in members])
         for hypothesis, (kind, surface, axis, alarms) in zip(block["hypothesis"], members, strict=False):
             hypothesis["kind"], hypothesis["surface"] = kind, surface
             hypothesis["axis"], hypothesis["alarms"] = axis, alarms

@@ -50,7 +50,6 @@ from beaver_ftc.diagnosis.detection.likelihood import (
     MAX_HYPOTHESES,
     N_READINGS,
     PITCH_BLOCK,
-    SENSE,
     STEP,
     Capacity,
 )
@@ -488,6 +487,4 @@ def set_up_views(statistical: np.void, aircraft: Aircraft) -> None:
             surface == VANE_VIEW and plane == YAW_PLANE and statistical["air"]["output"]["moving"]
         )
         view["inertial"], view["immune_to_vane"] = inertial, inertial or surface == VANE_VIEW
-        sense = block["lane"]["sense"].reshape(-1, likelihood.N_SLOTS)
-        sense[:] = 0.0
-        sense[: len(kinds)] = [[SENSE[kind]] for kind in kinds]
+        likelihood.set_senses(block, kinds)

@@ -33,6 +33,9 @@ def box(**keys):
     }
 
 
+THRUST = {"airspeed_mps": [40, 60], "setting": [0, 900, 3000], "force_n": [[-9, 7, 80], [-30, 5, 60]]}
+SHARE = {"throttle": "a/b", "share": 0.5, "right_m": -4.9}
+EFFECTORS = {"left": SHARE, "right": SHARE | {"throttle": "a/c", "right_m": 4.8}}
 TAB = {"tab": {"travel_rad": [-0.1, 0.2]}}
 CANNOT = {
     "ends": {"envelope": {"airspeed_mps": [65, 65], "alpha_deg": [14, -4]}},
@@ -56,6 +59,25 @@ CANNOT = {
     "signals not in a box": {**box(), "signals": {"dpt": {"property": "aero/dpt"}}},
     "signals measured anyway": {"signals": {"alpha": {"property": "a/b"}, "betadoth": {"property": "a/b"}}},
     "signals nobody measures": {"signals": {"dpt": {"property": "aero/dpt", "sensed": False}}},
+    "together": {
+        "trim": {
+            "together": {
+                "aileron": {"rudder": 1, "tab": 1},
+                "elevator": {"rudder": 1, "aileron": 1},
+                "fin": {},
+            }
+        }
+    },
+    "damage of nothing": {"damage": {"off": {"property": "a/b", "takes": ["rudder", "fin"]}}},
+    "effectors alone": {"effectors": EFFECTORS},
+    "too much of a share": {
+        "engine": {"thrust": THRUST},
+        "effectors": {**EFFECTORS, "mid": SHARE | {"share": 0.1}},
+    },
+    "thrust by no setting": {"engine": {"thrust": THRUST}, "trim": {"throttle": "a/b"}},
+    "thrust below the setting": {"engine": {"thrust": THRUST | {"setting": [-1, 900, 2000]}}},
+    "thrust above the setting": {"engine": {"thrust": THRUST | {"setting": [0, 900, 3001]}}},
+    "thrust of no mass": {"engine": {"thrust": THRUST}, "mass": {"mass_kg": None}, "forces": None},
     "writing": {"trim": {"throttle": "simulation/do_linearization"}},
 }
 CAN = {
@@ -71,6 +93,7 @@ CAN = {
     "as many as there may be": {"moments": {"Cm": [term(f"Cm_{i}") for i in range(64)]}},
     "a rate and a surface in a force": {"forces": {"CZ": [term(of={"qh": 1}, surface="elevator")]}},
     "signals of a box": {**box(signals={"dpt": [0, 1]}), "signals": {"dpt": {"property": "aero/dpt"}}},
+    "thrust at both ends of its setting": {"engine": {"thrust": THRUST}, "effectors": EFFECTORS},
 }  # fmt: skip
 
 

@@ -99,20 +99,34 @@ def test_how_far_it_looks_and_at_what():
     assert formula.looks_ahead_s == 7.0
     assert formula.columns == {"a", "b", "c"}
     assert parse("always(eventually[0:1](a > 0))").looks_ahead_s == math.inf
+    assert parse("(a > 0) until[3:90] (b > 0)").looks_ahead_s == 90.0
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
+NO_FORMULA = [
         "", "a", "a + 1", "abs(a)", "a <=", "(a <= 1", "a <= 1)", "a <= 1 b", "a == 1", "always a <= 1",
         "always[0:5]", "always[5:0](a <= 1)", "always[-1:2](a <= 1)", "always[0](a <= 1)", "not a", "a and b",
         "(a <= 1) + 2 <= 3", "abs(a <= 1) >= 0", "__import__('os')", "a <= 1; b <= 1", "and <= 1",
         "a <= 1e9999999:", "a <= 1e999", "a <= " + "9" * 400,
         "always[0:1e9](a <= 1)", "(" * (MOST_DEPTH + 1) + "a <= 1", "a <= " + "1" * MOST_CHARACTERS,
-    ],
+]  # fmt: skip
+
+
+def test_what_is_no_formula_is_said(changed):
+    found = {}
+    for text in NO_FORMULA:
+        with pytest.raises(FormulaError) as error:
+            parse(text)
+        assert "\n" not in str(error.value)
+        assert len(str(error.value)) < 200
+        found[text[:40]] = str(error.value)
+    assert not changed(found)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["always[0:360000](a <= 1)", "once[2:2](a <= 1)",
+     "(" * (MOST_DEPTH - 2) + "a <= 1" + ")" * (MOST_DEPTH - 2),
+     f"a <= {'0' * (MOST_CHARACTERS - 6)}1", "(a > 0) until[3:90] (b > 0)"],
 )  # fmt: skip
-def test_what_is_no_formula_is_said(text):
-    with pytest.raises(FormulaError) as error:
-        parse(text)
-    assert "\n" not in str(error.value)
-    assert len(str(error.value)) < 200
+def test_a_formula_at_each_limit_is_one(text):
+    assert parse(text).columns <= {"a", "b"}

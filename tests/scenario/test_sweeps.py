@@ -9,6 +9,7 @@ HEAD = "base: elevator-partial-loss\nruns: 3\n"
 LONG = "n" * 120
 WRONG = {
     "two kinds": HEAD + "vary: {rate_hz: {uniform: [50, 100], choice: [50]}}",
+    "no kind": HEAD + "vary: {rate_hz: {within: [50, 100]}}",
     "equal ends": HEAD + "vary: {rate_hz: {uniform: [50, 50]}, duration_s: {loguniform: [40, 30]}}",
     "cut to nothing": HEAD + "vary: {rate_hz: {normal: [60, 1], within: [70, 60]}}",
     "cut without a normal": HEAD + "vary: {rate_hz: {choice: [60], within: [60, 70]}}",

@@ -110,6 +110,14 @@ def test_the_pictures(files, name, changed):
     assert not changed({**picture(figure), "looks": looks(figure)})
 
 
+def test_a_map_has_a_row_a_surface_and_a_column_a_condition(surveyed):
+    document, rows = surveyed
+    grid = document["grid"] | {"conditions": document["grid"]["conditions"][:1]}
+    here = [row for row in rows if row["sensors"] == "ideal" and row["scheme"] == BOTH]
+    figure = shown._maps(document | {"grid": grid}, BOTH, here)
+    assert figure.axes[0].get_subplotspec().get_geometry()[:2] == (2, 1)
+
+
 def test_a_flight_of_the_survey(changed):
     block = Block(GRID.conditions[1], 5.0, 1002)
     at_s = strikes_at_s(block)

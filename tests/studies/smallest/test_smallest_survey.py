@@ -120,9 +120,10 @@ def test_what_is_stopped_goes_on_and_flies_no_finished_round_again(few, tmp_path
     [
         ({}, Asked("elevater", 0.5), "--surface 'elevater': allowed: aileron, elevator, rudder, flap"),
         ({"fdi": {"scheme": "none"}}, ASKED, "scheme: none diagnoses nothing"),
-        ({"duration_s": 1.0}, ASKED, "too short for --within"),
+        ({"duration_s": 2.95}, ASKED, "sines: duration_s: too short for --within, allowed: 3 or more"),
     ],
 )
 def test_what_cannot_be_answered_is_a_line(changes, asked, says):
     with pytest.raises(BadInput, match=says):
         check(bf.load(SCENARIO | changes), asked)
+    check(bf.load(SCENARIO), ASKED)  # just long enough: 2 s to settle, twice 0.5 s

@@ -4,9 +4,10 @@ from math import degrees, radians
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_aircraft.gtm.steady import Bench, Condition, Steady
+from beaver_ftc_aircraft.gtm.steady import Bench, Condition, Steady, pitch_angle
 from beaver_ftc_aircraft.gtm.systems import THROTTLE
 from telling import apart
 
@@ -49,6 +50,19 @@ def test_each_surface_is_commanded_by_its_kind_and_side():
     assert {kind for kind in ("elevator", "aileron", "rudder") if any(kind in name for name in commands)} == {
         "elevator", "aileron", "rudder",
     }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "angles", [(0.11, -0.07, 0.23, 0.05), (-0.04, 0.13, -0.6, -0.09), (0.3, 0.2, 0.9, 0.17)]
+)
+def test_the_pitch_angle_gives_the_path_angle(angles):
+    """By turning the velocity from body axes to the Earth's: it climbs at gamma."""
+    alpha, beta, phi, gamma = angles
+    apart(angles=angles)
+    body = [np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)]
+    theta = pitch_angle(alpha, beta, phi, gamma)
+    down = Rotation.from_euler("ZYX", [0.4, theta, phi]).apply(body)[2]
+    assert np.arcsin(-down) == pytest.approx(gamma)
 
 
 @pytest.mark.parametrize(("left", "is_steady"), [(0.9e-6, True), (1.1e-6, False)])

@@ -88,6 +88,13 @@ MISTAKES = {
     "level": ("type: margins", "type: handling_qualities, level: 4", "10: requirements[2].bar.level: 4 is"),
     "own": ("duration_s: 2", "duration: 2", "3: flights.own.duration: unknown key, did you mean duration_s?"),
     "sweep": ("position_deg\"", "position\"", "6: flights.many.vary.faults[0].position: "),
+    "named-twice": (
+        "own", "also",
+        "7: requirements: deeper/also.yaml and also are both named also, allowed: each name once",
+    ),
+    "too-many": (
+        "2, 3]}}", "2, 99998]}}", "7: requirements: 100001 flights, allowed: at most 100000",
+    ),
     "unused": ("[own, many, elevator-stuck]", "[elevator-stuck]", "4: flights.many: no requirement is ove"),
 }  # fmt: skip
 

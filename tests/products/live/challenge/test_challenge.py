@@ -97,6 +97,10 @@ def test_hidden_flights_among_what_students_may_read_are_refused(challenge, monk
     ("make", "says"),
     [
         (lambda at: at.mkdir(), "0 Python files, allowed: one"),
+        (
+            lambda at: (at.mkdir(), [(at / f"{i}.py").touch() for i in range(2)]),
+            "2 Python files, allowed: one",
+        ),
         (lambda at: at.with_suffix(".txt").write_text(""), "is no Python file"),
         (lambda at: at.write_bytes(b"#" * 65_537), "larger than allowed: 64 KiB"),
         (lambda at: at.write_bytes(b"\xff\xfe"), "is not UTF-8 text"),
@@ -305,6 +309,20 @@ def test_a_challenge_that_is_none(tmp_path):
     (tmp_path / "mine.py").write_text("")
     with pytest.raises(BadInput, match="is no challenge"):
         folders.keep("", "ada", tmp_path)
+    (tmp_path / "submissions").mkdir()
+    with pytest.raises(BadInput, match="submissions: no submissions, allowed: files NAME-1"):
+        folders.submissions(tmp_path)
+
+
+def test_the_last_submission_counts_and_a_file_as_large_as_allowed_is_one(tmp_path):
+    """By its number, which is no word: 10 comes after 9."""
+    (tmp_path / "submissions").mkdir()
+    for name in ("ada-9", "ada-10", "ada-2", "bob-1", "bob", "bob-x"):
+        (tmp_path / "submissions" / f"{name}.py").write_bytes(b"#" * 65_536)
+    found = folders.submissions(tmp_path)
+    assert [(one.student, one.file.name) for one in found] == [("ada", "ada-10.py"), ("bob", "bob-1.py")]
+    assert len(folders.source_of(found[0].file)) == 65_536
+    assert folders.keep("text", "ada", tmp_path).name == "ada-11.py"
 
 
 @pytest.mark.parametrize(("student", "kind", "places"), [

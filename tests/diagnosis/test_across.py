@@ -10,8 +10,8 @@ from beaver_ftc.diagnosis.belief import air
 from beaver_ftc.diagnosis.detection.likelihood import STEP
 from beaver_ftc.diagnosis.detection.parity import set_up_views
 from beaver_ftc.diagnosis.detection.tones import set_up_tones
+from beaver_ftc.diagnosis.schemes import fault_classes
 from beaver_ftc.diagnosis.state import LOSS, POSITION
-from beaver_ftc.loop import frame
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.scenario.diagnosis import FdiConfig
 from beaver_ftc.studies.matrix.fault_matrix import declared
@@ -125,10 +125,11 @@ def test_what_a_surface_does_not_move_rules_its_faults_out():
     fdi = watching()
     fdi["statistical"]["tests"]["enabled"] = fdi["config"]["every_type"] = 1
     fdi["statistical"]["views"][PITCH_AXIS]["block"]["hypothesis"]["score"][0] = 5.1
-    assert frame.rules_out(fdi, fdi["isolation"]["estimator"][AILERON], True)
-    assert not frame.rules_out(fdi, fdi["isolation"]["estimator"][ELEVATOR], True)
+    estimator = fdi["isolation"]["estimator"]
+    assert fault_classes.is_off_the_column(fdi, estimator[AILERON])
+    assert not fault_classes.is_off_the_column(fdi, estimator[ELEVATOR])
     fdi["statistical"]["n_views"] = 0
-    assert not frame.rules_out(fdi, fdi["isolation"]["estimator"][AILERON], True)
+    assert not fault_classes.is_off_the_column(fdi, estimator[AILERON])
 
 
 def test_views_try_a_step_and_the_losses_of_those_that_move_the_axis():

@@ -7,11 +7,12 @@ from beaver_ftc.control.laws import published
 from beaver_ftc.control.laws.rows import row_of
 from beaver_ftc.control.rivals import compiled_rivals
 from beaver_ftc.control.supervisor import MODE_ADAPTIVE
+from beaver_ftc.diagnosis.schemes import adaptive_estimators
 from beaver_ftc.diagnosis.state import LOSS, NOT_ISOLATED, WORST_CASE
 from beaver_ftc.diagnosis.types.contract import FIXED, LAGS, LOSES, SHIFTED
 from beaver_ftc.diagnosis.types.registry import N_TYPES
 from beaver_ftc.loop import frame as whole
-from beaver_ftc.loop.assembly import assemble
+from beaver_ftc.loop.assembly import Trim, assemble
 from beaver_ftc.scenario.schema import Scenario
 from fault_kinds import BIAS, CONSTANT_LOSS, STUCK
 from law_records import fields, put
@@ -19,14 +20,13 @@ from law_records import fields, put
 TRAVEL_RAD = np.array([[-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]])
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)
 X = np.array([0.02, -0.01, 0.015])
+TRIM = Trim(np.zeros(3), np.array([0.1, 0.02, 45.0, 1036.0, 0.3]), np.zeros(4))
 G = np.array([[-9.0, 0.0, 0.6, 0.0], [0.0, -10.0, 0.0, 2.1], [-0.2, 0.0, -2.0, 0.0]])
 
 
 def new_frame(law_name="adaptive", **fdi):
     keys = {"rate_hz": 100, "control": {"law": law_name}, "fdi": fdi}
-    frame = assemble(Scenario.model_validate({"name": "x", **keys}), np.zeros(4), TRAVEL_RAD).view(
-        np.recarray
-    )[0]
+    frame = assemble(Scenario.model_validate({"name": "x", **keys}), TRIM, TRAVEL_RAD).view(np.recarray)[0]
     frame["measured"]["x"], frame["measured"]["y"][:5] = X, (0.1, 0.02, 45.0, 1036.0, 0.3)
     frame["belief"]["f"], frame["belief"]["G"], frame["control"]["layout"]["trim"] = (0.3, -0.2, 0.1), G, 0.01
     return frame
@@ -162,7 +162,7 @@ def alarmed(known=0, speaks=0, score=2.0):
     fdi["bank"]["output"]["residual"][0, 1] = 0.1 * score
     fdi["fdae"]["network"]["memory"]["weights"], fdi["fdae"]["network"]["output"] = 1.0, 0.0
     fdi["isolation"]["estimator"]["xhat"] = 9.0
-    whole.conclude(fdi, frame["belief"], frame["measured"], 5.0)
+    adaptive_estimators.conclude(fdi, frame["belief"], frame["measured"], 5.0)
     return fdi
 
 

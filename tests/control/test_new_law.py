@@ -40,7 +40,7 @@ def sliding_dtype(n):
     return record(config=CONFIG, memory=MEMORY, output=OUTPUT, travelled=n)
 
 
-def configure(law, control, scenario, travel):
+def configure(law, control, belief, scenario, y):
     law["config"] = scenario.control.proportional_per_s, 0.1, 0.05
 
 

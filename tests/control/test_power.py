@@ -15,7 +15,7 @@ from beaver_ftc.design import fdc
 from beaver_ftc.design.fdc import value
 from beaver_ftc.design.model import ELEVATOR, FLAP, RUDDER
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.loop.assembly import assemble
+from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.plant.trim import trim
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.results.verdict import facts
@@ -37,7 +37,7 @@ SPEEDS = (38.0, 45.0, 52.0)
 def control_record(**keys):
     """An oracle's control record, all well, as a flight begins with it."""
     given = scenario(control={"law": "oracle", "power": keys})
-    return assemble(given, np.zeros(4), TRAVEL)[0]["control"]
+    return configure_design(given, TRAVEL)[0]["control"]
 
 
 def lose_pitch(control):

@@ -5,7 +5,7 @@ import pytest
 
 from beaver_ftc.design.engine import engine_power_kw, measured_slipstream, power_error_kw, slipstream
 from beaver_ftc.diagnosis.bounds.worst_case import slipstream_error
-from beaver_ftc.loop.assembly import assemble
+from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.scenario.loader import load
 
 RNG = np.random.default_rng(5)
@@ -21,7 +21,7 @@ def test_readings_without_errors_give_the_truths_dpt():
 @pytest.mark.parametrize("grade", ["tactical-grade", "consumer-grade"])
 def test_no_admitted_error_of_the_readings_is_beyond_the_bound(grade):
     scenario = load({"name": "x", "fdi": {"bounds": {"sensors": grade}}})
-    admitted = assemble(scenario, np.zeros(4), TRAVEL_RAD)["fdi"]["bound"]["admitted"][0].view(np.recarray)
+    admitted = configure_design(scenario, TRAVEL_RAD)["fdi"]["bound"]["admitted"][0].view(np.recarray)
     at_most = [
         4.0 * noise + abs(bias) + quantum / 2
         for noise, bias, quantum in (

@@ -12,7 +12,7 @@ from beaver_ftc.design.model import N_Y
 from beaver_ftc.diagnosis.belief.expectation import look_back, respond
 from beaver_ftc.diagnosis.bounds.worst_case import ROUNDING_RAD_S2, bound_now
 from beaver_ftc.diagnosis.detection.bank import note_closest_approach
-from beaver_ftc.loop.assembly import assemble
+from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.loop.frame import diagnose
 from beaver_ftc.scenario.schema import Scenario
 
@@ -59,7 +59,7 @@ class DesignPlant:
         scenario = Scenario.model_validate({"name": "design-plant", **keys})
         scenario._airframe = aircraft
         self.servo = actuators == "servo"
-        self.frames = assemble(scenario, np.zeros(4), TRAVEL_RAD)
+        self.frames = configure_design(scenario, TRAVEL_RAD)
         self.frame, self.fdi = self.frames[0], self.frames[0]["fdi"]
         self.fdi["bound"]["earth_rate"] = 0.0  # this plant flies over a flat Earth at rest
         self.dt, self.airspeed_mps = 1.0 / rate_hz, airspeed_mps

@@ -24,7 +24,7 @@ from beaver_ftc.diagnosis.detection.likelihood import (
     block_dtype,
 )
 from beaver_ftc.diagnosis.detection.signatures import fill_block_signatures
-from beaver_ftc.loop.assembly import assemble
+from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.scenario.declared import Declared, SensorErrors
 from beaver_ftc.scenario.schema import Scenario
 
@@ -176,7 +176,7 @@ class Detector:
     def __init__(self, rate_hz=100.0, **fdi):
         keys = {"rate_hz": rate_hz, "fdi": {"statistical": {}, **fdi}}
         scenario = Scenario.model_validate({"name": "detector-alone", **keys})
-        self.frames = assemble(scenario, np.zeros(4), TRAVEL_RAD).view(np.recarray)
+        self.frames = configure_design(scenario, TRAVEL_RAD).view(np.recarray)
         frame = self.frames[0]
         self.fdi, self.dt = frame["fdi"], 1.0 / rate_hz
         design, declared = frame["belief"]["design"], Declared.of(scenario)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.belief.expectation import begin_frame, elapse, sum_up
 from beaver_ftc.diagnosis.detection.bank import aligned_extremes, extremes
-from beaver_ftc.loop.assembly import assemble
+from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.scenario.schema import Scenario
 
 
@@ -37,7 +37,7 @@ def limits(frames, surface):
 
 
 def record(substeps):
-    return assemble(Scenario(name="x", substeps=substeps), np.zeros(4), TRAVEL_RAD)
+    return configure_design(Scenario(name="x", substeps=substeps), TRAVEL_RAD)
 
 
 def fill(frame, rng):

@@ -14,7 +14,7 @@ from beaver_ftc.design.model import both_responses, design_record
 from beaver_ftc.diagnosis.types import registry as types
 from beaver_ftc.diagnosis.types.findings import found
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.loop.assembly import assemble
+from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sensors import Sensors
 from samples import samples
@@ -106,7 +106,7 @@ def test_pairs_are_refused_with_noisy_gyros_in_one_line():
     noisy = scenario.fdi.bounds.model_copy(update={"sensors": Sensors.model_validate("tactical-grade")})
     changed = scenario.model_copy(update={"fdi": scenario.fdi.model_copy(update={"bounds": noisy})})
     with pytest.raises(BadInput, match=r"x: fdi\.pairs: not available with errors .*, allowed: false$"):
-        assemble(changed, np.zeros(4), np.array([[-1.0] * 4, [1.0] * 4]))
+        configure_design(changed, np.array([[-1.0] * 4, [1.0] * 4]))
 
 
 @pytest.mark.parametrize("kind", HELD)

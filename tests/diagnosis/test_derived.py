@@ -9,7 +9,7 @@ from beaver_ftc.design.model import both_responses, design_record
 from beaver_ftc.diagnosis.bounds.admitted import inertia_slack, poles_for_noise
 from beaver_ftc.diagnosis.bounds.worst_case import derived_bound, slack_per_rad
 from beaver_ftc.diagnosis.detection.thresholds import noise_step
-from beaver_ftc.loop.assembly import assemble
+from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.scenario.declared import SensorErrors
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sensors import Sensors
@@ -40,7 +40,7 @@ def acceleration(x, y, u, **changes):
 
 def bound(x, y, u, **bounds):
     scenario = Scenario.model_validate({"name": "x", "fdi": {"bounds": bounds}})
-    frame = assemble(scenario, np.zeros(4), TRAVEL_RAD)[0]
+    frame = configure_design(scenario, TRAVEL_RAD)[0]
     out = np.zeros(3)
     derived_bound(frame["fdi"]["bound"]["admitted"], frame["belief"]["design"], x, y, u, out)
     return out
@@ -158,7 +158,7 @@ def test_a_surfaces_own_share_of_the_bound_is_its_slope(seed, surface):
     bounds = {"coefficients": 0.05, "inertia": 0.02, "sensors": SENSORS, "deflection_deg": 0.1}
     further = u.copy()
     further[surface] = np.sign(u[surface]) * (abs(u[surface]) + 1.0)
-    frame = assemble(Scenario.model_validate({"name": "x", "fdi": {"bounds": bounds}}), u, TRAVEL_RAD)[0]
+    frame = configure_design(Scenario.model_validate({"name": "x", "fdi": {"bounds": bounds}}), TRAVEL_RAD)[0]
     derived_bound(frame["fdi"]["bound"]["admitted"], frame["belief"]["design"], x, y, u, np.zeros(3))
     slack_per_rad(frame["fdi"]["bound"]["admitted"], frame["belief"]["design"], surface)
     rise = bound(x, y, further, **bounds) - bound(x, y, u, **bounds)

@@ -8,7 +8,7 @@ import pytest
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.engine import DPT_0, KW_TO_DPT, SEA_LEVEL_DENSITY_KG_M3
 from beaver_ftc.diagnosis.bounds import worst_case
-from beaver_ftc.loop.assembly import assemble
+from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.scenario.schema import Scenario
 
 AIRCRAFT = load()
@@ -25,7 +25,7 @@ LENGTHS = {
 def records(seed=0, gust=0.02, deflection=0.004):
     """(admitted, design) with every error declared, at random."""
     rng = np.random.default_rng(seed)
-    frame = assemble(Scenario.model_validate({"name": "x"}), np.zeros(4), TRAVEL_RAD).view(np.recarray)[0]
+    frame = configure_design(Scenario.model_validate({"name": "x"}), TRAVEL_RAD).view(np.recarray)[0]
     admitted, design = frame["fdi"]["bound"]["admitted"], frame["belief"]["design"]
     admitted["tolerance"][: len(AIRCRAFT.moments)] = rng.uniform(0.001, 0.05, len(AIRCRAFT.moments))
     admitted["inertia"] = rng.uniform(0.001, 0.1, 12)

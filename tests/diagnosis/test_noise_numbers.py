@@ -20,7 +20,7 @@ from beaver_ftc.diagnosis.detection import noise_model, statistical
 from beaver_ftc.diagnosis.detection.likelihood import ALPHA3, ENDING, GROWING, N_SLOTS, STEP
 from beaver_ftc.diagnosis.detection.statistical import statistical_dtype
 from beaver_ftc.diagnosis.state import LOSS
-from beaver_ftc.loop.assembly import assemble
+from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.scenario.declared import Declared, SensorErrors
 from beaver_ftc.scenario.diagnosis import Bounds, Statistical
 from beaver_ftc.scenario.schema import Scenario
@@ -145,7 +145,7 @@ def test_a_block_begins_with_the_gyros_noise_and_a_drift_that_may_be_anything():
             assert block["noise"][i] == pytest.approx(variance, rel=1e-9)
             assert block["P_xx"][i, i] == block["noise"][i]
             assert block["P_dd"][i, i] == 1.0
-    start = assemble(Scenario.model_validate(GIVEN), np.zeros(4), TRAVEL_RAD)[0]["fdi"]["statistical"]
+    start = configure_design(Scenario.model_validate(GIVEN), TRAVEL_RAD)[0]["fdi"]["statistical"]
     assert not start["block"]["n_hypotheses"].any(), "before a trim nothing of it is set up"
     ideal = Detector(50.0).blocks[1]
     assert ideal["noise"] == pytest.approx([1e-18, 1e-18])

@@ -13,11 +13,11 @@ from beaver_ftc.diagnosis.detection.statistical import statistical_dtype
 from beaver_ftc.diagnosis.isolation.estimators import estimator_names
 from beaver_ftc.diagnosis.rivals.rls import RlsMonitor
 from beaver_ftc.loop import plugin_frame
-from beaver_ftc.loop.assembly import assemble
+from beaver_ftc.loop.assembly import Trim, assemble
 from beaver_ftc.scenario.schema import Scenario
 
 TRAVEL = np.array([[-0.5, -0.4, -0.3, -0.1], [0.5, 0.45, 0.35, 1.0]])
-TRIM = np.array([0.01, -0.02, 0.03, 0.04])
+TRIM, Y = np.array([0.01, -0.02, 0.03, 0.04]), np.array([0.1, 0.02, 45.0, 1036.0, 0.3])
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)
 DT, SUBSTEPS = 0.02, 2
 GIVEN = {
@@ -46,7 +46,7 @@ GIVEN = {
 
 
 def assembled(**keys):
-    return assemble(Scenario.model_validate(GIVEN | keys), TRIM, TRAVEL)[0]
+    return assemble(Scenario.model_validate(GIVEN | keys), Trim(np.zeros(3), Y, TRIM), TRAVEL)[0]
 
 
 def test_a_flight_remembers_little_and_one_of_more_terms_or_delays_as_much_as_it_needs():
@@ -201,7 +201,7 @@ def test_a_plug_in_that_diagnoses_has_the_record_to_itself():
     """An estimator a surface for its verdicts; nothing built in diagnoses, watches, weighs chance or acts."""
     given = {**GIVEN, "fdi": {"fault_class": "all", "statistical": {}, "sensor_monitor": "always"}}
     scenario = Scenario.model_validate(given)
-    frames = assemble(scenario, TRIM, TRAVEL)
+    frames = assemble(scenario, Trim(np.zeros(3), Y, TRIM), TRAVEL)
     before = frames["fdi"][0]
     switches = (
         before["config"]["enabled"],

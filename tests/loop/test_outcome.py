@@ -8,13 +8,13 @@ import pytest
 
 from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.diagnosis.state import STATISTICS, UNANTICIPATED
-from beaver_ftc.loop.assembly import assemble
+from beaver_ftc.loop.assembly import Trim, assemble
 from beaver_ftc.loop.outcome import Landing, guaranteed_delay_s, landing_of, verdict_of
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.timing import TIME_TOLERANCE_S
 
 SURFACES = ("aileron", "elevator", "rudder", "flap")
-TRIM = np.array([0.01, -0.02, 0.03, 0.04])
+TRIM, Y = np.array([0.01, -0.02, 0.03, 0.04]), np.array([0.1, 0.02, 45.0, 1036.0, 0.3])
 TRAVEL = np.array([[-0.5, -0.4, -0.3, -0.1], [0.5, 0.45, 0.35, 1.0]])
 ALARM = {"fdi.verdict.detected": 1, "fdi.verdict.detected_at_s": 2.25, "fdi.verdict.detected_axis": 1}
 NAMED = ALARM | {"fdi.verdict.isolated": 1, "fdi.verdict.isolated_at_s": 2.5}
@@ -108,7 +108,7 @@ def _put(frame, values):
 
 def _record(keys, values):
     scenario = Scenario.model_validate({"name": "x", **keys})
-    frames = assemble(scenario, TRIM, TRAVEL)
+    frames = assemble(scenario, Trim(np.zeros(3), Y, TRIM), TRAVEL)
     frames["autopilot"]["holding"]["from_s"] = -1.0
     _put(frames[0], values)
     return scenario, frames[0]

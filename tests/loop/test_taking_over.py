@@ -9,7 +9,7 @@ import beaver_ftc as bf
 from beaver_ftc.control.laws.rows import row_of
 from beaver_ftc.design.model import N_Y
 from beaver_ftc.loop import stream
-from beaver_ftc.loop.assembly import assemble
+from beaver_ftc.loop.assembly import Trim, assemble
 from beaver_ftc.loop.changing import Changing, _check_delays, renews_diagnosis, take_diagnosis, take_law
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.declared import Declared
@@ -17,6 +17,7 @@ from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.matrix.fault_matrix import trimmed_deg
 from flying import loss, scenario
 
+TRIM = Trim(np.zeros(3), np.array([0.1, 0.02, 45.0, 1036.0, 0.3]), np.zeros(4))
 TRAVEL = np.array([[-0.5, -0.4, -0.3, -0.1], [0.5, 0.45, 0.35, 1.0]])
 LEARNT, FHAT, INTEGRAL = (np.array(x) for x in ([0.3, -0.1, 0.2], [0.5, 0.25, -0.5], [1.0, -2.0, 4.0]))
 DISTURBANCE = np.array([0.7, -0.6, 0.05])
@@ -24,7 +25,7 @@ DISTURBANCE = np.array([0.7, -0.6, 0.05])
 
 def _frame(law, **control):
     given = Scenario.model_validate({"name": "x", "control": {"law": law, **control}})
-    return assemble(given, np.zeros(4), TRAVEL)[0]
+    return assemble(given, TRIM, TRAVEL)[0]
 
 
 def _taken(before, after, detected=1, **control):
@@ -182,7 +183,7 @@ def test_a_plug_in_detectors_word_stands_while_another_law_takes_over():
 
 def test_an_instrument_broken_in_flight_is_watched_by_a_diagnosis_begun_anew(monkeypatch):
     sim, watched = bf.Simulation(scenario(duration_s=1.0)), []
-    monkeypatch.setattr(sim._loop, "enable_watch", watched.append)
+    monkeypatch.setattr(sim._loop, "enable_watch", lambda *given: watched.append(given))
     sim.change({"scheme": "adaptive-estimators"})
     sim.step(frames=10)
     assert watched == []
@@ -242,7 +243,7 @@ def test_a_law_in_its_own_place_goes_on_where_it_was(law):
     before, layout = frame["control"].copy(), frame["control"]["layout"]
     power = before["power"]["output"]
     assert power["least"] < before["power"]["setpoint"]["base"] < power["greatest"]
-    new = assemble(given, layout["trim"], np.array([layout["low"], layout["high"]]))[0]["control"]
+    new = assemble(given, sim._loop.trimmed, np.array([layout["low"], layout["high"]]))[0]["control"]
     fresh = new.copy()
     take_law(frame, new)
     parts = [f"{stage}.{part}" for stage in STAGES for part in before[stage].dtype.names]

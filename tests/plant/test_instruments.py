@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.loop.assembly import assemble
+from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.plant.instruments import (
     AX,
     N_SENSORS,
@@ -23,7 +23,7 @@ TRAVEL_RAD = np.array([[-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]])
 def samples(truth, seed=1, rate_hz=100, **sensors):
     """Readings (n, 7) of truth (n, 7)."""
     scenario = Scenario.model_validate({"name": "x", "seed": seed, "rate_hz": rate_hz, "sensors": sensors})
-    instruments = assemble(scenario, np.zeros(4), TRAVEL_RAD)["instruments"][0]
+    instruments = configure_design(scenario, TRAVEL_RAD)["instruments"][0]
     readings = truth.copy()
     for row in readings:
         read_all(instruments, row)
@@ -113,13 +113,13 @@ def test_the_first_sample_is_never_lost():
 def test_a_delay_longer_than_the_line_is_refused():
     given = {"name": "x", "rate_hz": 1000, "substeps": 2, "sensors": {"p": {"delay_s": 1.0}}}
     with pytest.raises(BadInput, match=r"sensors\.p\.delay_s"):
-        assemble(Scenario.model_validate(given), np.zeros(4), TRAVEL_RAD)
+        configure_design(Scenario.model_validate(given), TRAVEL_RAD)
 
 
 def forces_read(truth, seed=1, **sensors):
     """Readings of accelerometers (n, 3), and of the others beside them (n, 13), of truth (n, 16)."""
     scenario = Scenario.model_validate({"name": "x", "seed": seed, "rate_hz": 100, "sensors": sensors})
-    instruments = assemble(scenario, np.zeros(4), TRAVEL_RAD)["instruments"][0]
+    instruments = configure_design(scenario, TRAVEL_RAD)["instruments"][0]
     readings = truth.copy()
     for row in readings:
         read_all(instruments, row)
@@ -163,7 +163,7 @@ def test_accelerometers_draw_from_a_counter_of_their_own():
 def test_a_first_sample_is_the_first_whenever_it_is_taken():
     """Accelerometers that are read from some instant on do not lag behind what they never saw."""
     scenario = Scenario.model_validate({"name": "x", "sensors": {"az": {"bandwidth_rad_s": 5.0}}})
-    instruments = assemble(scenario, np.zeros(4), TRAVEL_RAD)["instruments"][0]
+    instruments = configure_design(scenario, TRAVEL_RAD)["instruments"][0]
     for row in in_flight(10):
         read_all(instruments, row)
     last = in_flight(1)[0]

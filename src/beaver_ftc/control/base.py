@@ -55,8 +55,8 @@ class CompiledLaw(NamedTuple):
 
     faults: the true faults, for laws whose row says `informed`. mode: the supervisor's; t s.
 
-    configure(law, control, scenario, travel): fill the law's configuration; travel (2, n) rad, the stops.
-    anchor(law, control, belief, scenario, y): derive what depends on the trim; y: the measured signals there.
+    configure(law, control, belief, scenario, y): fill the law's configuration, at the trim; y: the measured
+    signals there.
     unexplained(control): acceleration (3,) rad/s2 that the law in charge attributes to no model.
     begin(control, before, unexplained, learnt): take over in flight from the law whose records are `before`,
     without a bump; learnt (3,) rad/s2: what the diagnosis' network explains of `unexplained`.
@@ -66,6 +66,5 @@ class CompiledLaw(NamedTuple):
     command: Callable[..., None]
     accommodate: Callable[..., None] | None = None
     configure: Callable[..., None] | None = None
-    anchor: Callable[..., None] | None = None
     unexplained: Callable[[Any], np.ndarray] | None = None
     begin: Callable[..., None] | None = None

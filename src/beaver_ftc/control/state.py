@@ -37,7 +37,7 @@ def control_dtype(n: int) -> np.dtype:
 
 
 def configure(control: np.void, scenario: Scenario, travel: np.ndarray) -> None:
-    """Fill a law's record from a scenario; travel (2, n) rad: the stops. A plug-in: loop/plugin_frame.py."""
+    """Fill the records that all laws share; travel (2, n) rad: the stops. The law's own: `configure_law`."""
     config, dt, row = scenario.control, 1.0 / scenario.rate_hz, row_of(scenario.control.law)
     control["config"] = row.place, row.uses_verdict, row.reallocates, row.informed
     reference.configure(control["reference"], config, dt)
@@ -46,15 +46,14 @@ def configure(control: np.void, scenario: Scenario, travel: np.ndarray) -> None:
     allocation.configure_probe(control["probe"], scenario.fdi.probing, dt)
     power.configure(control["power"], control["layout"], scenario)
     engines.configure(control["engines"], scenario)
-    if (law := FILES[row.file]).configure is not None:
-        law.configure(control[row.file], control, scenario, travel)
 
 
-def anchor(control: np.void, belief: np.void, scenario: Scenario, y: np.ndarray) -> None:
-    """Show a law the trim, if it derives its gains there; y: the measured signals."""
+def configure_law(control: np.void, belief: np.void, scenario: Scenario, y: np.ndarray) -> None:
+    """Fill the record of the law in charge, which may derive its gains at the trim; y: the measured signals
+    there."""
     row = row_of(scenario.control.law)
-    if (law := FILES[row.file]).anchor is not None:
-        law.anchor(control[row.file], control, belief, scenario, y)
+    if (law := FILES[row.file]).configure is not None:
+        law.configure(control[row.file], control, belief, scenario, y)
 
 
 def take_over(new: np.void, before: np.void, learnt: np.ndarray) -> None:

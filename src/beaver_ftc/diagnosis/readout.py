@@ -320,9 +320,11 @@ def run_statistical_tests(fdi: np.void, enabled: bool) -> None:
 
 
 def disable(fdi: np.void) -> None:
-    """Stop the diagnosis of surfaces and sensors from the next frame on: scheme `none` is in charge then."""
+    """Stop the built-in diagnosis of surfaces and sensors from the next frame on: scheme `none` is in charge
+    then. A plug-in goes on."""
+    if fdi["config"]["enabled"]:
+        fdi["config"]["scheme"] = place_of("none")
     fdi["config"]["enabled"] = fdi["watch"]["config"]["enabled"] = False
-    fdi["config"]["scheme"] = place_of("none")
 
 
 def recorded_always(fdi: np.void, n: int, every_type: bool) -> dict[str, np.ndarray]:

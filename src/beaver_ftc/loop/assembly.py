@@ -1,22 +1,39 @@
-"""Turns a scenario into the frame record that the compiled loop works on."""
+"""Turns a scenario into the frame record that the compiled loop works on.
+
+A stage is configured at one of two instants, each of which is one function here:
+
+    configure_design   from the scenario alone: sensors, belief, thresholds, estimators, allocation,
+                       reference. Flights of one design share it: it is made once, and copied.
+    configure_at_trim  once the trim is known: what is linearised there, the law, the autopilot, the
+                       statistical detector, the sensor monitor.
+
+`assemble` does both. A change in flight assembles the record of its scenario from the same trim.
+"""
+
+from typing import NamedTuple
 
 import numpy as np
 
 from beaver_ftc.compiled import record, sized
 from beaver_ftc.control import state as control
+from beaver_ftc.control.outer.setup import set_up_autopilot
 from beaver_ftc.control.outer.state import AUTOPILOT, COLUMNS
 from beaver_ftc.control.supervisor import SUPERVISOR
+from beaver_ftc.design.variants import anchor, mass_of
 from beaver_ftc.diagnosis import scheme
 from beaver_ftc.diagnosis.assessment import assessment_dtype
 from beaver_ftc.diagnosis.belief import expectation
+from beaver_ftc.diagnosis.detection import noise_model
 from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE, Size, size_for
 from beaver_ftc.diagnosis.isolation.estimators import estimator_names
+from beaver_ftc.diagnosis.monitors import sensor_records
 from beaver_ftc.loop import instrument_records, memory
 from beaver_ftc.loop.accounts import accounts_dtype, true_faults_dtype
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.instruments import MEASURED, N_SAMPLED, USUAL_LINE, instruments_dtype
 from beaver_ftc.plant.native import RUNNING
 from beaver_ftc.plant.sensing import truth_dtype
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.dump import texts_of
 from beaver_ftc.scenario.schema import Scenario
 
@@ -47,12 +64,24 @@ _MOST_DESIGNS = 32
 _designs: dict[tuple[object, ...], np.ndarray] = {}
 
 
-def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.ndarray:
-    """The frame record, shape (1,), of a flight about to start.
+class Trim(NamedTuple):
+    """The state in trim. x (3,): rates, rad/s; y: the measured signals beside them; u (n,) rad: surfaces."""
 
-    trim (4,) rad: the surfaces in trim; travel (2, 4) rad: lower and upper stops. The truth's nodes are
-    attached by the loop. A copy of the record of its design, which is assembled once.
-    """
+    x: np.ndarray
+    y: np.ndarray
+    u: np.ndarray
+
+
+def assemble(scenario: Scenario, trim: Trim, travel: np.ndarray) -> np.ndarray:
+    """The frame record, shape (1,), of a flight about to start from this trim; travel (2, n) rad: lower and
+    upper stops. The truth's nodes are attached by the loop."""
+    frames = configure_design(scenario, travel)
+    configure_at_trim(frames[0], scenario, trim)
+    return frames
+
+
+def configure_design(scenario: Scenario, travel: np.ndarray) -> np.ndarray:
+    """A record in which every stage that needs no trim is configured: a copy of that of its design."""
     initial = tuple(scenario.initial.model_dump(exclude={"airspeed_mps"}).values())
     rates, failing = (scenario.rate_hz, scenario.substeps), instrument_records.breaks_instruments(scenario)
     line = instrument_records.line_for(scenario)
@@ -62,15 +91,32 @@ def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.nda
             _designs.clear()
         _designs[key] = _assemble_design(scenario, travel, line)
     frames = memory.copied(_designs[key])
-    frame = frames[0]
-    frame["belief"]["u"] = frame["belief"]["commanded"] = trim
-    frame["control"]["layout"]["trim"] = frame["control"]["allocation"]["output"]["command"] = trim
-    instrument_records.seed(frame["instruments"], scenario.seed)
+    instrument_records.seed(frames[0]["instruments"], scenario.seed)
     return frames
 
 
+def configure_at_trim(frame: np.void, scenario: Scenario, trim: Trim) -> None:
+    """Configure the stages that depend on the trim, in a record of `configure_design`."""
+    configure_diagnosis_at_trim(frame, scenario, trim)
+    stage = frame["control"]
+    stage["allocation"]["output"]["command"] = trim.u
+    control.configure_law(stage, frame["belief"], scenario, trim.y)
+    set_up_autopilot(frame["autopilot"], stage, scenario)
+
+
+def configure_diagnosis_at_trim(frame: np.void, scenario: Scenario, trim: Trim) -> None:
+    """The same of a diagnosis without a law: belief, sensor monitor, statistical detector."""
+    belief, fdi, declared = frame["belief"], frame["fdi"], Declared.of(scenario)
+    design = belief["design"]
+    belief["u"] = belief["commanded"] = frame["control"]["layout"]["trim"] = trim.u
+    anchor(design, *trim)
+    sensor_records.configure(fdi["watch"], scenario, design, trim.y, declared.monitors_sensors)
+    mass = mass_of(scenario.design_model, scenario.airframe)
+    noise_model.set_up(fdi, scenario.fdi, declared, design, mass, tuple(trim), scenario.rate_hz)
+
+
 def _assemble_design(scenario: Scenario, travel: np.ndarray, line: int) -> np.ndarray:
-    """What does not depend on the trim, the seed and the truth: each stage fills in its own record."""
+    """The record of a design, made anew."""
     aircraft, dt = scenario.airframe, 1.0 / scenario.rate_hz
     frames = memory.taken_empty((1,), frame_dtype(aircraft.n, size_for(aircraft), line))
     frame, instant_s = frames[0], dt / scenario.substeps
@@ -78,8 +124,7 @@ def _assemble_design(scenario: Scenario, travel: np.ndarray, line: int) -> np.nd
     truth, channels = frame["truth"], instrument_records.truth_read(scenario)
     truth["n"], truth["declared"] = len(channels), len(aircraft.signals)
     truth["factor"][: len(channels)] = [factor for _, _, factor in channels]
-    instrument_records.configure(frame, scenario, instant_s)
-    instrument_records.configure_watch(frame["fdi"]["watch"], scenario, instant_s)
+    instrument_records.configure(frame["instruments"], scenario, instant_s)
     expectation.configure(frame["belief"], scenario, travel)
     scheme.configure(frame["fdi"], frame["belief"], scenario, travel)
     control.configure(frame["control"], scenario, travel)

@@ -23,11 +23,12 @@ from beaver_ftc.scenario.timing import frame_of
 
 
 class Stage(NamedTuple):
-    """A change ready to be made: its frame, whether the diagnosis begins anew, the record to take it from,
-    the plug-ins from then on."""
+    """A change ready to be made: its frame, the scenario from then on, whether the diagnosis begins anew, the
+    record to take it from, the plug-ins from then on."""
 
     frame: int
     change: Change
+    scenario: Scenario
     renews: bool
     frames: np.ndarray
     plugins: PluginFrame | None
@@ -55,16 +56,16 @@ class Changing:
     def _stage(self, frame: int, change: Change, then: Scenario, before: PluginFrame | None) -> Stage:
         loop = self._loop
         layout = loop.frames["control"]["layout"][0]
-        frames = assemble(then, layout["trim"], np.array([layout["low"], layout["high"]]))
+        frames = assemble(then, loop.trimmed, np.array([layout["low"], layout["high"]]))
         _check_delays(frames, loop.frames)
-        loop.anchor(frames[0], then)
         renews = renews_diagnosis(change, then)
         detector, law = (before.detector, before.law) if before else (None, None)
         if renews:
             detector = named_detector(then)
         if change.law is not None:
             law = named_law(frames, then, loop.start)
-        return Stage(frame, change, renews, frames, plugged(frames, then, loop.start, detector, law, before))
+        plugins = plugged(frames, then, loop.start, detector, law, before)
+        return Stage(frame, change, then, renews, frames, plugins)
 
     def next_change(self, k: int) -> int:
         """The first frame after k at which `apply` has something to do."""
@@ -84,7 +85,7 @@ class Changing:
             take_law(frame, new["control"])
         if stage.renews:
             if loop.sensor_schedule.any:  # broken in flight, as the scenario had not said
-                loop.enable_watch(new["fdi"])
+                loop.enable_watch(new["fdi"], stage.scenario)
             take_diagnosis(frame, new, stage.frame)
         if change.sensors is not None:
             take_configuration(frame["instruments"], new["instruments"])

@@ -8,16 +8,12 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from beaver_ftc.compiled import direct
-from beaver_ftc.control import state
-from beaver_ftc.control.outer.setup import set_up_autopilot
-from beaver_ftc.design.variants import anchor, mass_of
 from beaver_ftc.diagnosis.belief.air import no_longer_read
-from beaver_ftc.diagnosis.detection import noise_model
+from beaver_ftc.diagnosis.monitors import sensor_records
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.loop import memory, stepping
-from beaver_ftc.loop.assembly import assemble, lay_out, y_places
+from beaver_ftc.loop.assembly import Trim, configure_at_trim, configure_design, lay_out, y_places
 from beaver_ftc.loop.cockpit import Cockpit, note_failures, set_origin, travel_rad
-from beaver_ftc.loop.instrument_records import anchor_watch
 from beaver_ftc.loop.outcome import Landing, landing_of
 from beaver_ftc.loop.stepping import fly_frame, fly_on, hold, look_inside
 from beaver_ftc.plant import channels as ch
@@ -29,7 +25,6 @@ from beaver_ftc.plant.instruments import AX, ENGINE_SPEED, N_SAMPLED
 from beaver_ftc.plant.reuse import give_back
 from beaver_ftc.plant.sensing import FLYING, NOT_FINITE
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled
-from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import sample_frames
 
@@ -86,14 +81,13 @@ class Loop:
             prepare(self.plant)
             self.plant.executive = 0  # whatever was done to its `run` is to be called
         take_off(self.plant, scenario, self.trim)
-        surfaces = np.array(list(self.trim.surfaces_rad.values()))
-        self.frames = assemble(scenario, surfaces, travel_rad(self.plant))
+        self.frames = configure_design(scenario, travel_rad(self.plant))
         self.cockpit = Cockpit(self.plant, self.frames)
         self.cockpit.read()
-        truth = self.frames["truth"]
+        truth, surfaces = self.frames["truth"], np.array(list(self.trim.surfaces_rad.values()))
         self.start: np.ndarray = truth["value"][0] * truth["factor"][0]
-        self._trimmed = self.start[:3], self.start[y_places(self.frames[0])], surfaces
-        self.anchor(self.frames[0], scenario)
+        self.trimmed = Trim(self.start[:3], self.start[y_places(self.frames[0])], surfaces)
+        configure_at_trim(self.frames[0], scenario, self.trimmed)
         self.schedule = FaultSchedule(scenario.faults, self.plant, scenario.rate_hz)
         instruments, has_engine = self.frames["instruments"][0], self.aircraft.has_engine_instruments
         self.sensor_schedule = SensorFaultSchedule(scenario.faults, instruments, scenario.rate_hz, has_engine)
@@ -114,21 +108,6 @@ class Loop:
         if scenario.changes:
             self.change(scenario, 0)
         set_origin(self.frames["truth"][0], self.plant, scenario.initial.altitude_m)
-
-    def anchor(self, frame: np.void, scenario: Scenario) -> None:
-        """Show a record the trim, which a linearised or frozen design model, the law and the statistics hold
-        on to."""
-        _, y, _ = trim = self._trimmed
-        fdi, design = frame["fdi"], frame["belief"]["design"]
-        anchor(design, *trim)
-        state.anchor(frame["control"], frame["belief"], scenario, y)
-        set_up_autopilot(frame["autopilot"], frame["control"], scenario)
-        if fdi["watch"]["config"][
-            "enabled"
-        ]:  # compiled code called from here: a quarter of a second, the first time
-            anchor_watch(fdi["watch"], np.array([design]), y)
-        mass = mass_of(scenario.design_model, self.aircraft)
-        noise_model.set_up(fdi, scenario.fdi, Declared.of(scenario), design, mass, trim, scenario.rate_hz)
 
     def change(self, scenario: Scenario, k: int) -> None:
         """Fly by a scenario that says what changes in flight, nothing of it before frame k, the next to fly.
@@ -232,21 +211,21 @@ class Loop:
             return
         frame = self.frames[0]
         self.read_more()
-        if self.enable_watch(frame["fdi"]) and frame["k"] > 0:
+        if self.enable_watch(frame["fdi"], self.scenario) and frame["k"] > 0:
             if not frame["measured"]["inertial"]:
                 self._read_further(frame["measured"])
             direct(stepping.begin_watch, self.frames)(self.frames)
 
-    def enable_watch(self, fdi: np.void) -> bool:
-        """Have a watch, if one may be and was not wanted before the flight; the trim is shown to it now.
-        Accelerometers are no longer taken at their word. Returns whether it has just been enabled."""
+    def enable_watch(self, fdi: np.void, scenario: Scenario) -> bool:
+        """Have the sensors monitored as `scenario` declares them, if that is allowed and was not so before.
+        Accelerometers no longer count as sound. Returns whether the monitor has just been enabled."""
         wanted = self.scenario.fdi.sensor_monitor != "never" and fdi["config"]["enabled"]
         if not wanted or fdi["watch"]["config"]["enabled"]:
             return False
-        fdi["watch"]["config"]["enabled"] = 1
+        design = self.frames[0]["belief"]["design"]
+        sensor_records.configure(fdi["watch"], scenario, design, self.trimmed.y, enabled=True)
         no_longer_read(fdi["statistical"]["air"])
         fdi["statistical"]["inertial_air"]["output"]["moving"] = 0
-        anchor_watch(fdi["watch"], np.array([self.frames[0]["belief"]["design"]]), self._trimmed[1])
         return True
 
     def read_more(self) -> None:

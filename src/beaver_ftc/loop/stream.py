@@ -9,12 +9,10 @@ from numpy.typing import ArrayLike, NDArray
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import direct
 from beaver_ftc.design.model import N_Y
-from beaver_ftc.design.variants import anchor, mass_of
 from beaver_ftc.diagnosis.base import Verdict
-from beaver_ftc.diagnosis.detection import noise_model
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop import stepping, watching
-from beaver_ftc.loop.assembly import assemble
+from beaver_ftc.loop.assembly import Trim, configure_design, configure_diagnosis_at_trim
 from beaver_ftc.loop.outcome import estimate_now, verdict_of
 from beaver_ftc.plugins import DETECTORS, is_compiled
 from beaver_ftc.scenario.airframe import checked_against
@@ -77,7 +75,7 @@ class Diagnosis:
         """Forget everything: the next sample is the first of a flight."""
         stops = [self._aircraft.travel[name] for name in self._aircraft.surfaces]
         travel = np.array([[stop.min_rad for stop in stops], [stop.max_rad for stop in stops]])
-        self._frames = assemble(self._scenario, np.zeros(travel.shape[1]), travel)
+        self._frames = configure_design(self._scenario, travel)
         self._frame = self._frames[0]
         self._fdi = self._frame["fdi"]
         self._fdi["engines"]["config"]["n"] = 0  # nobody says where levers are
@@ -166,18 +164,14 @@ class Diagnosis:
         return estimate_now(self._fdi, self._said, self._aircraft.surfaces)
 
     def _begin(self) -> None:
-        """Show the design model and the statistics the flight condition they hold on to."""
+        """Configure what holds on to the trim, once its first sample is there."""
         x, y, u = self._x.copy(), self._signals.copy(), self._command.copy()
         if self._start is not None:
             for what, place, given in zip(_START, (x, y, u), self._start, strict=True):
                 _put(what, np.asarray(given), place)
         if not all(np.isfinite(part).all() for part in (x, y, u)):
             return
-        scenario, belief = self._scenario, self._frame["belief"]
-        belief["u"] = belief["commanded"] = self._frame["control"]["layout"]["trim"] = u
-        design, mass = belief["design"], mass_of(scenario.design_model, self._aircraft)
-        anchor(design, x, y, u)
-        noise_model.set_up(self._fdi, scenario.fdi, self.declared, design, mass, (x, y, u), scenario.rate_hz)
+        configure_diagnosis_at_trim(self._frame, self._scenario, Trim(x, y, u))
         self._fresh = False
 
 

@@ -195,6 +195,11 @@ ROWS = (
 N_IN_EQUATIONS = sum(not row.truth[0] for row in ROWS)  # of these rows, from the first on
 
 
+def frames_apart(i: int, dt: float) -> int:
+    """JSBSim frames, of dt s each, from one sample of sensor i to the next."""
+    return max(round(1.0 / ROWS[i].rate_hz / dt), 1) if ROWS[i].rate_hz else 1
+
+
 class Quantity(NamedTuple):
     """The unit of a sensor's errors, that unit in SI, the largest offset or noise of a fault, its words."""
 

@@ -36,7 +36,7 @@ def asked(monkeypatch):
         belief = np.zeros(1, belief_dtype(4))[0]
         belief["design"] = design_record()[0]
         belief["actuators"]["approach"] = (0.2, 0.3, 0.4, 0.05)
-        state.anchor(control, belief, scenario, Y)
+        state.configure_law(control, belief, scenario, Y)
         return found
 
     return ask
@@ -108,6 +108,7 @@ def test_a_laws_record_is_what_its_scenario_says_frame_by_frame():
     scenario = given(control, substeps=3, fdi={"fault_class": "all", "probing": probing})
     record = np.zeros(1, state.control_dtype(4))[0]
     state.configure(record, scenario, travel)
+    state.configure_law(record, None, scenario, None)
     law, reach = fields(record["published"]), fields(record["layout"])
     assert (law["Kp"], law["Ki"]) == (3.1, 0.7)
     assert (reach["low"].tolist(), reach["high"].tolist()) == tuple(travel.tolist())

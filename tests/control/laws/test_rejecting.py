@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from beaver_ftc.loop.assembly import assemble
+from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.plant import channels as ch
 from flying import Memory, flown, loss, scenario
@@ -117,7 +117,7 @@ def test_the_schedule_does_not_depend_on_where_the_flight_starts():
 
 
 def test_other_laws_carry_no_schedule():
-    frames = assemble(scenario(control=OLD), np.zeros(4), np.array([[-0.5] * 4, [0.5] * 4]))
+    frames = configure_design(scenario(control=OLD), np.array([[-0.5] * 4, [0.5] * 4]))
     assert not frames[0]["control"]["rejecting"]["config"]["Kp_at"].any()
 
 

@@ -16,7 +16,7 @@ from beaver_ftc.control.supervisor import (
 from beaver_ftc.diagnosis.state import NOT_ISOLATED
 from beaver_ftc.diagnosis.types.contract import FIXED, LAGS, LOSES, SHIFTED
 from beaver_ftc.loop import frame as whole
-from beaver_ftc.loop.assembly import assemble
+from beaver_ftc.loop.assembly import configure_design
 from flying import scenario
 from law_records import fields, new_control, put
 
@@ -175,7 +175,7 @@ def test_the_observer_is_that_of_its_equations(seed):
 def test_the_demand_is_that_of_its_equation(seed):
     """demand = xm' + Kp (xm - x+) - f - d, xm and x+ when the command acts."""
     control, rng = record(seed)
-    frames = assemble(scenario(), np.zeros(4), TRAVEL).view(np.recarray)
+    frames = configure_design(scenario(), TRAVEL).view(np.recarray)
     belief, measured, law = frames[0]["belief"], frames[0]["measured"], control["rejecting"]
     f, G, u = rng.normal(0, 1, 3), rng.normal(0, 5, (3, 4)), rng.normal(0, 0.1, 4)
     belief["f"], belief["G"], belief["u"] = f, G, u
@@ -242,7 +242,7 @@ def test_handed_back_the_share_of_the_stand_in_leaps_by_no_more_than_its_step(gi
     ],
 )
 def test_pitch_is_handed_over_by_steps_and_back(mode, every_type, hedging, left, before, after):
-    frame = assemble(scenario(), np.zeros(4), TRAVEL).view(np.recarray)[0]
+    frame = configure_design(scenario(), TRAVEL).view(np.recarray)[0]
     control = put(frame["control"], hand_over=before, hand_over_step=0.1, hedging=hedging)
     control["surfaces"]["output"]["effectiveness"][ELEVATOR] = left
     control["allocation"]["output"]["lost_share"], assessment = 0.3, frame["assessment"]
@@ -270,7 +270,7 @@ class TestVerdict:
     @pytest.fixture
     def frame(self):
         given = scenario(control={"law": "fault-tolerant-published"})
-        frame = assemble(given, np.zeros(4), TRAVEL).view(np.recarray)[0]
+        frame = configure_design(given, TRAVEL).view(np.recarray)[0]
         frame["control"]["layout"]["trim"] = [0.01, -0.04, 0.02, 0.0]
         return frame
 

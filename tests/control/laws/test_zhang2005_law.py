@@ -26,7 +26,8 @@ def law(**options):
 def configured(control, **keys):
     """The law's record filled from a scenario with these keys of `control`."""
     scenario = Scenario.model_validate({"name": "x", "control": {"law": "zhang2005", **keys}})
-    zhang2005.configure(control["zhang2005"], control, scenario, TRAVEL)
+    control["layout"]["low"], control["layout"]["high"] = TRAVEL
+    zhang2005.configure(control["zhang2005"], control, None, scenario, None)
     return control
 
 

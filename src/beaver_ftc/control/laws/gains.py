@@ -204,7 +204,7 @@ def set_up(
             config["L_rate_at"][row, j], config["L_disturbance_at"][row, j] = corrections(RATIO * s, dt_s)
 
 
-def anchor(law: np.void, control: np.void, belief: np.void, scenario: Scenario, y: np.ndarray) -> None:
+def configure(law: np.void, control: np.void, belief: np.void, scenario: Scenario, y: np.ndarray) -> None:
     """Derive the gains of a scenario into the law's configuration (base.CompiledLaw); y: the measured signals
     in trim."""
     config, dt, layout = scenario.control, 1.0 / scenario.rate_hz, control["layout"]

@@ -25,7 +25,7 @@ def published_dtype(n: int) -> np.dtype:
     return FEEDBACK
 
 
-def configure(law: np.void, control: np.void, scenario: Scenario, travel: np.ndarray) -> None:
+def configure(law: np.void, control: np.void, belief: np.void, scenario: Scenario, y: np.ndarray) -> None:
     """Fill the gains (base.CompiledLaw)."""
     config = scenario.control
     law["config"]["Kp"], law["config"]["Ki"] = config.proportional_per_s, config.integral_per_s2

@@ -33,7 +33,7 @@ from beaver_ftc.control.laws.effectiveness_estimator import (
     estimator_dtype,
     observer_response,
 )
-from beaver_ftc.control.laws.gains import N_LOOPS, N_POINTS, anchor
+from beaver_ftc.control.laws.gains import N_LOOPS, N_POINTS, configure
 from beaver_ftc.control.reference import advance
 from beaver_ftc.design.model import QDYN
 from beaver_ftc.diagnosis.state import PITCH
@@ -332,4 +332,4 @@ def begin(control: np.void, before: np.void, unexplained: np.ndarray, learnt: np
     control["rejecting"]["observer"]["disturbance"] = unexplained
 
 
-LAW = CompiledLaw(rejecting_dtype, command, accommodate, anchor=anchor, unexplained=unexplained, begin=begin)
+LAW = CompiledLaw(rejecting_dtype, command, accommodate, configure, unexplained=unexplained, begin=begin)

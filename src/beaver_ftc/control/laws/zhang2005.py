@@ -38,11 +38,11 @@ def zhang2005_dtype(n: int) -> np.dtype:
     return record(config=CONFIG, memory=MEMORY, feedback=FEEDBACK, network=NETWORK)
 
 
-def configure(law: np.void, control: np.void, scenario: Scenario, travel: np.ndarray) -> None:
+def configure(law: np.void, control: np.void, belief: np.void, scenario: Scenario, y: np.ndarray) -> None:
     """Fill the law's configuration (base.CompiledLaw)."""
     settled, config = scenario.control, law["config"]
     option = settings(LAWS, settled.law, settled.options)
-    published.configure(law["feedback"], control, scenario, travel)
+    published.configure(law["feedback"], control, belief, scenario, y)
     if not option["hand_over"]:
         control["config"]["reallocates"] = 0
     config["adapts"], config["networks"] = option["adaptation"], option["network"]
@@ -50,8 +50,9 @@ def configure(law: np.void, control: np.void, scenario: Scenario, travel: np.nda
     Kp, Ki = settled.proportional_per_s, settled.integral_per_s2
     config["integral_weight"] = Kp / (option["rate_weight"] * Ki + 1.0)
     limit = option["network_limit_rad_s2"] if option["projection"] else np.inf
-    main = control["layout"]["main"]
-    configure_network(law["network"], option["network_gain"], limit, travel[:, main])
+    layout = control["layout"]
+    travel = np.array([layout["low"], layout["high"]])[:, layout["main"]]
+    configure_network(law["network"], option["network_gain"], limit, travel)
     config["least"], config["most"] = -np.inf, np.inf
     if option["projection"]:
         config["least"], config["most"] = settled.least_effectiveness, 1.0

@@ -124,8 +124,9 @@ def set_up(
     airspeed_mps, pace = float(start[1][AIRSPEED]), pace_of(given, aircraft, dt_s)
     tests["enabled"], tests["share"] = 1, 1.0 / max(instants, 1)
     tests["mapped"] = aircraft.file.model_error_map is not None and not aircraft.loses_surfaces
+    statistical["forces"]["known"] = forces = declared.uses_accelerometers
+    air["output"]["read"] = declared.follows_gusts_by_accelerometers
     set_up_air(air, declared, mass)
-    forces = bool(statistical["forces"]["known"])
     across = config.compares_across(instants)
     n_tests = tests_a_frame(aircraft, *(views_of(aircraft, forces) if across else ()))
     tests["alarm_level"] = alarm_level(given.false_alarms_per_h, rate_hz, n_tests)
@@ -145,7 +146,7 @@ def set_up(
         if forces:
             along_y = jacobian(design, *start)[3]
             set_up_forces(fdi, declared, start, along_y, dt_s)
-            air["output"]["read"] = not fdi["watch"]["config"]["enabled"]  # which may find them broken
+            air["output"]["read"] = not declared.monitors_sensors  # the monitor may find them broken
             statistical["inertial_air"] = air
             statistical["inertial_air"]["output"]["moving"] *= air["output"]["read"]
             statistical["inertial_air"]["memory"]["unseen"] = np.minimum(np.add(UNSEEN, BY_FORCE), 1.0)

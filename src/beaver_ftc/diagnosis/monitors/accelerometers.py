@@ -36,7 +36,6 @@ from beaver_ftc.scenario.sensors import N_IN_EQUATIONS
 
 SOON_S = 1.0  # after the alarm: later, chance has had too many tries
 CALMED_S = 2.0  # in which a leap of an accelerometer is forgotten
-NEVER_STILL = 1_000_000_000  # looks: of a reading that resolves less than it scatters
 GOES_ON = 30.0  # times what the reading has moved by: a scale error within 3 % of -1 would do that
 CLEARLY = 3.0  # beyond a bound, of what is not seen
 _ROUNDING_S = 1e-9

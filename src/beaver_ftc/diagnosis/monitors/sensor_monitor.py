@@ -30,6 +30,7 @@ from beaver_ftc.diagnosis.monitors.sensor_records import (
     EQUAL_SHOWS,
     N_COMPUTED,
     N_TESTS,
+    NEVER_STILL,
     NO,
     NOBODY,
     OF_PHI,
@@ -429,7 +430,7 @@ def suspect_attitude(watch):
         mine = no_other_angle(watch, i) and (fired[ANGLE + i] == 1 or fits)
         moved = mine and watch.memory.rates_say[axis_of(watch, i)] != YES
         still, longest = watch.memory.still[PHI + i], watch.config.longest_still[PHI + i]
-        may_be_frozen = 0 < still < longest < accelerometers.NEVER_STILL  # too early to say
+        may_be_frozen = 0 < still < longest < NEVER_STILL  # too early to say
         who[PHI + i] = moved or (fits and may_be_frozen)
 
 

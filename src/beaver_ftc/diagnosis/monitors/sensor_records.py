@@ -1,12 +1,20 @@
-"""What the watch over the instruments keeps (redundancy.py, instruments.py), and its verdict in words."""
+"""The records of the sensor monitor, how they are configured, and its verdict in words."""
 
+from math import exp
 from typing import Any
 
 import numpy as np
 
+from beaver_ftc.aircraft.units import EARTH_RADIUS_M, GRAVITY_MPS2
 from beaver_ftc.compiled import record
+from beaver_ftc.design.context import DesignFunctions
+from beaver_ftc.design.dryden import Dryden
+from beaver_ftc.diagnosis.bounds.admitted import GUST_LIMIT_SIGMA
+from beaver_ftc.diagnosis.bounds.variances import gust_effect
 from beaver_ftc.plant.instruments import N_SENSORS, PHI, SENSORS, SIGNALS
-from beaver_ftc.scenario.sensors import ROWS, sensor_words
+from beaver_ftc.scenario.declared import Declared
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.sensors import ROWS, frames_apart, sensor_words
 
 TURN, ANGLE, SPEED, ALPHA_FLOW, BETA_FLOW, DENSITY, CLIMB, RPM, PRESSURE = 0, 3, 6, 7, 8, 9, 10, 11, 12
 N_COMPUTED = 13  # tests with an equation; then those of sensors that should equal another reading
@@ -30,6 +38,9 @@ N_POLES = len(POLES_PER_S)
 NOBODY = -1
 LEAP_M_S2 = 8.0  # by which no specific force changes from one look to the next
 UNKNOWN, YES, NO = 0, 1, 2
+FASTER = 1.4  # than in trim a flight may become
+ATTITUDE_TAKES_OVER_PER_S = 3.0  # a rate that it replaces, where the attitude's own noise is declared
+NEVER_STILL = 1_000_000_000  # JSBSim frames: of a reading that resolves less than it scatters
 WAIT_S = 1.0  # for the instrument to be found; then the fault is outside what can be named
 P, Q, R, ALPHA, BETA, AIRSPEED, QDYN = range(len(SIGNALS))
 THETA, PSI = PHI + 1, PHI + 2
@@ -112,6 +123,69 @@ WATCH_OUTPUT = record(
 )  # fmt: skip
 
 WATCH = record(config=WATCH_CONFIG, memory=WATCH_MEMORY, output=WATCH_OUTPUT, step=STEP, since=SINCE)
+
+
+def configure(watch: np.void, scenario: Scenario, design: np.void, y: np.ndarray, enabled: bool) -> None:
+    """Fill the monitor's record at the trim: y, the measured signals there; design: the designer's record.
+
+    A monitor that is not `enabled` has found nothing, and its record holds no more than that.
+    """
+    output, config = watch["output"], watch["config"]
+    output["named"], output["alarmed_at_s"], output["named_at_s"] = NOBODY, -1.0, -1.0
+    config["enabled"] = enabled
+    if not enabled:
+        return
+    declared, initial = Declared.of(scenario), scenario.initial
+    config["instants"], config["engine"] = scenario.substeps, scenario.airframe.has_engine_instruments
+    config["trim"][3:7] = y[:4]
+    config["damping"] = gust_effect(DesignFunctions(np.array([design])), y)
+    watch["memory"]["past"] = scenario.substeps - 1  # the first JSBSim frame ends a frame of the loop
+    if config["engine"]:  # whose keys the aircraft names
+        watch["step"]["memory"]["command"] = initial.engine_rpm, initial.manifold_pressure_inhg
+    configure_step(watch["step"]["config"], declared, scenario)
+    configure_readings(watch, declared, watch["step"]["config"]["h"])
+
+
+def configure_step(step: np.void, declared: Declared, scenario: Scenario) -> None:
+    """Fill what the equations of motion and the gusts are stepped with, a JSBSim frame a step."""
+    initial, h = scenario.initial, 1.0 / scenario.rate_hz / scenario.substeps
+    step["h"], step["decay"] = h, [exp(-pole * h) for pole in POLES_PER_S]
+    step["gravity"] = GRAVITY_MPS2 * (1.0 + initial.altitude_m / EARTH_RADIUS_M) ** -2
+    step["gust"], step["gusts"] = gusts_seen(declared.air, initial.airspeed_mps, h)
+    step["swift"] = FASTER * initial.airspeed_mps
+    step["low"], step["rising"] = declared.air.low_m, declared.vertical_wind_mps
+
+
+def configure_readings(watch: np.void, declared: Declared, h: float) -> None:
+    """Fill the declared errors of the readings; h: seconds of a JSBSim frame."""
+    step, config, errors = watch["step"]["config"], watch["config"], declared.sensors
+    for i, name in enumerate(SENSORS):
+        error = errors[name]
+        step["offset"][i], step["slope"][i], step["steady"][i] = error.worst, error.slope, error.steady
+        config["longest_still"][i] = longest_still(error.noise, error.resolution) * frames_apart(i, h)
+        drift_rad_s = getattr(getattr(errors.declared, name), "drift_rad_s", 0.0)
+        step["drift"] = max(step["drift"], abs(drift_rad_s))
+    attitude = slice(PHI, PHI + 3)
+    config["blurred"] = np.any(step["offset"][attitude] > step["steady"][attitude])
+    config["follows"] = min(1.0, h * ATTITUDE_TAKES_OVER_PER_S) if config["blurred"] else 1.0
+
+
+def longest_still(noise: float, quantum: float) -> int:
+    """For how many samples no sound sensor, of this noise and resolution, gives the very same reading."""
+    if quantum == 0.0:
+        return 3
+    return 50 if noise > quantum / 4.0 else NEVER_STILL
+
+
+def gusts_seen(air: Dryden, airspeed_mps: float, h: float) -> tuple[float, np.ndarray]:
+    """Bounds on the speed of gusts, m/s, and on what passes each filter of their changes in h s.
+
+    The speed of a gust changes like a random walk (`Dryden.velocity_walk`); a filter with a pole of lam 1/s
+    keeps 1 / 2 lam of it.
+    """
+    sigma_mps, intensity = air.sigma_mps, air.velocity_walk(airspeed_mps, FASTER)
+    kept_s = [h / (1.0 - exp(-2.0 * pole * h)) for pole in POLES_PER_S]
+    return GUST_LIMIT_SIGMA * sigma_mps, GUST_LIMIT_SIGMA * np.sqrt(intensity * np.array(kept_s))
 
 
 def instrument_found(watch: np.void, t_s: float) -> dict[str, Any] | None:

@@ -31,14 +31,18 @@ from beaver_ftc import compiled
 calls, inside = {}, [0, 0]  # kernel -> what it was given; where the truth's record is in memory
 plain = compiled.kernel
 
+def address_of(given):
+    # Not by the array interface, which would describe all fields of a record.
+    return (given if isinstance(given, np.ndarray) else np.frombuffer(given, np.uint8)).ctypes.data
+
 def watched(function):
     call, name = plain(function), f"{function.__module__}.{function.__name__}"
     def spy(*arguments):
         for argument in arguments:
             if isinstance(argument, (np.ndarray, np.void)):
-                address = argument.__array_interface__["data"][0]
+                address = address_of(argument)
                 whose = "truth" if inside[0] <= address < inside[1] else "other"
-                kind = "record" if argument.dtype.names == truth_dtype(4).names else "plain"
+                kind = "record" if argument.dtype.names == RECORD else "plain"
                 given = calls.setdefault(name, [])
                 given += [[whose, kind]] * ([whose, kind] not in given)
         return call(*arguments)
@@ -50,6 +54,7 @@ from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plant.sensing import truth_dtype
 from beaver_ftc.scenario.schema import Scenario
 
+RECORD = truth_dtype(4).names
 for words in json.loads(sys.argv[1]):
     loop = Loop(Scenario.model_validate(words))
     truth = loop.frames["truth"]

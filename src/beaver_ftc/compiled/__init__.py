@@ -171,18 +171,49 @@ def _interpreted(function):
     return call
 
 
-class _Record(np.record):  # type: ignore[misc]
+_field, _fill = np.void.__getitem__, np.void.__setitem__
+
+
+class _Record(np.void):  # type: ignore[misc]
     """A record whose fields come before what every scalar of NumPy has, such as `real`."""
 
     def __getattribute__(self, name):
-        fields = np.void.__getattribute__(self, "dtype").fields
-        return _with_attributes(self[name]) if name in fields else super().__getattribute__(name)
+        try:
+            return _field(self, name)
+        except (ValueError, KeyError):  # no field
+            return super().__getattribute__(name)
+
+    __setattr__ = _fill
+
+
+@functools.cache
+def _attributed(dtype):
+    """The same type with records whose fields are attributes, at every depth."""
+    if dtype.subdtype:
+        of, shape = dtype.subdtype
+        return np.dtype((_attributed(of), shape))
+    if not dtype.names:
+        return dtype
+    fields = [dtype.fields[name] for name in dtype.names]
+    return np.dtype(
+        (
+            _Record,
+            np.dtype(
+                {
+                    "names": dtype.names,
+                    "formats": [_attributed(of) for of, *_ in fields],
+                    "offsets": [offset for _, offset, *_ in fields],
+                    "itemsize": dtype.itemsize,
+                }
+            ),
+        )
+    )
 
 
 def _with_attributes(argument):
     """A record, or an array of records, whose fields can be written `record.field`."""
-    if isinstance(argument, np.void) and not isinstance(argument, _Record):
-        return argument.view((_Record, argument.dtype))
-    if isinstance(argument, np.ndarray) and argument.dtype.type is np.void and argument.dtype.names:
-        return argument.view(np.dtype((_Record, argument.dtype)))
+    if isinstance(argument, (np.ndarray, np.void)):
+        of = argument.dtype
+        if of.names and of.type is not _Record:
+            return argument.view(_attributed(of))
     return argument

@@ -11,7 +11,7 @@ from synthetic import Expect, Fault, Flight, Scenario, rows
 
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import as_json, metrics
-from beaver_ftc.results.report import render, write_report
+from beaver_ftc.results.report import _words, render, write_report
 
 NASTY = "</script><script>throw 1</script> <b>&amp;"
 
@@ -32,6 +32,10 @@ def _folder(path, flight, description="A flight made by hand."):
 def folder(tmp_path_factory):
     expect = Expect(detected_within_s=0.5, isolated_within_s=0.1)
     return _folder(tmp_path_factory.mktemp("runs") / "a", Flight(scenario=Scenario(expect=expect)), NASTY)
+
+
+def test_a_scenario_without_a_description_has_none():
+    assert _words(metrics(Flight()), "name: a\n")["description"] == ""
 
 
 def test_report_needs_nothing_but_itself(folder):

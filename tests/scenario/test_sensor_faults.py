@@ -34,6 +34,7 @@ def faulty(**fault):
         ({"actuator": "elevator"}, "faults[0].actuator: unknown key"),
         ({"end_s": 1}, "faults[0].end_s: 1 is not after at_s, allowed: later than 2 s"),
         ({"at_s": 40}, "faults[0].at_s: 40 is after the end, allowed: earlier than duration_s, 30 s"),
+        ({"end_s": None, "until_s": 5}, "faults[0].until_s: says the same as end_s, allowed: one of the two"),
         ({"end_s": 4, "until_s": 5}, "faults[0].until_s: says the same as end_s, allowed: one of the two"),
         ({"magnitude": "much"}, "faults[0].magnitude: 'much' is text, allowed: a number"),
     ],

@@ -24,6 +24,8 @@ def test_the_alarm_of_a_replay_is_that_of_a_flight(recorded, scheme):
     assert seen.delay_s() == pytest.approx(flown.detection_time_s - 6.0)
     assert seen.faulted
     assert seen.healthy_s == pytest.approx(6.0)
+    assert recorded.known.all()  # the error of the Beaver's model, wherever it flies
+    assert recorded.error.shape == (900, 3)
 
 
 @pytest.mark.parametrize("scheme", ["augmented-ekf", "observer-constant", "multiple-models", "rls-monitor"])

@@ -1,6 +1,7 @@
 """A short flight with all that is declared at once: what each source adds, and the documents made of it."""
 
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,7 +14,7 @@ from beaver_ftc.studies.mismatch import split, study, tables
 from beaver_ftc.studies.mismatch.linear import analyse, linear_document
 from beaver_ftc.studies.mismatch.models import LOGGED, States, true_moments
 from beaver_ftc.studies.mismatch.sources import SOURCES, earth, earth_rotation, fault_effects, share
-from beaver_ftc.studies.mismatch.split import ETA_BAR, TOTAL, UNEXPLAINED, Tally
+from beaver_ftc.studies.mismatch.split import ETA_BAR, TOTAL, UNEXPLAINED, Figures, Tally
 from flying import Memory, fly, loss, scenario
 from kept import in_short
 
@@ -80,6 +81,13 @@ def test_what_each_source_adds(stretches, changed):
 def held(arrays):
     """In short, but for what rounding leaves."""
     return {name: in_short(of) for name, of in arrays.items() if UNEXPLAINED not in name}
+
+
+def test_the_closure_is_the_largest_unexplained_of_any_axis(case, tally, flown):
+    rest = Figures()
+    rest.add(np.array([[0.2, 0.7, 0.3]]), np.ones((1, 3)))
+    other = replace(tally, figures=tally.figures | {UNEXPLAINED: rest})
+    assert study.document(case, other, metrics(flown[0]))["closure"] == 0.7
 
 
 def without_rest(document):

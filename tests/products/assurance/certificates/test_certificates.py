@@ -416,8 +416,8 @@ def test_a_number_of_the_head_that_is_not_the_scenarios_is_refused_by_name(field
 
 
 COURSES = {
-    ("hardover up", "pace_rad_s"): (lambda pace: 1.01 * pace, "pace_rad_s is not half the rate limit"),
-    ("hardover up", "stops"): (lambda stops: [1.01 * stops[0]], "the stop is not that of the log"),
+    ("hardover up", "pace_rad_s"): (lambda pace: (1 + 1e-9) * pace, "pace_rad_s is not half the rate limit"),
+    ("hardover up", "stops"): (lambda stops: [stops[0] * (1 - 1e-9)], "the stop is not that of the log"),
     ("bias", "stops"): (lambda stops: [stops[0], 1.01 * stops[1]], "stops"),
     ("bias that grows", "stops"): (lambda stops: [1.01 * stops[0], stops[1]], "stops"),
     ("rate_limit", "ordered"): (lambda ordered: ordered[:-1], "ordered: frames are missing"),

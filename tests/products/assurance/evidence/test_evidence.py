@@ -1,6 +1,7 @@
 """A plan flown: what is violated is found, in the flight it is in; and the document is the same twice."""
 
 import json
+import re
 from math import inf, nan
 from types import SimpleNamespace
 
@@ -208,7 +209,10 @@ def test_a_lost_aircraft_shows_nothing_beyond_its_loss(tmp_path):
             {"id": "D", "over": ["hard"], "formula": "always[0:1](0 / (q_rad_s - q_rad_s) >= 0)"},
         ],
     )
-    found = {each["id"]: each for each in judged(plan)["requirements"]}
+    row = fly_flight(plan, plan.cases[0])
+    found = {each["id"]: each for each in document_of(plan, [row], "today")["requirements"]}
+    assert re.fullmatch(r"lost: \w+ at \d\.\d+ s", row["why"])
+    assert 0.5 < float(row["why"].split()[-2]) < 6.0
     assert {id: each["verdict"] for id, each in found.items()} == {
         "A": NOT_SHOWN,
         "B": MET,
@@ -218,6 +222,18 @@ def test_a_lost_aircraft_shows_nothing_beyond_its_loss(tmp_path):
     assert found["A"]["worst"]["says"].startswith("the aircraft was lost at ")
     assert found["C"]["worst"]["says"] == "the aircraft was lost"
     assert found["D"]["worst"]["says"] == "a column is not a number where it asks"
+
+
+@pytest.mark.parametrize(("changes", "words"), [
+    ({}, "detection rate: 0.25, asked 0 (in 3 of 12)"),
+    ({"expected": None, "says": ""}, "detection rate: 0.25"),
+    ({"name": "robustness"}, "robustness 0.25 in 3 of 12"),
+    ({"name": "robustness", "says": ""}, "robustness 0.25"),
+])  # fmt: skip
+def test_the_worst_of_a_requirement_in_words(changes, words):
+    """A bound of 0 is a bound."""
+    worst = {"name": "detection_rate", "actual": 0.25, "expected": 0.0, "says": "in 3 of 12"} | changes
+    assert shown._found(worst) == words
 
 
 def test_a_study_that_has_nothing_to_say_shows_nothing_and_the_flight_the_rest(tmp_path):

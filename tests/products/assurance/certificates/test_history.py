@@ -1,0 +1,62 @@
+"""What a log's rows bound, row by row and axis by axis, by scalars (docs/theory.md, sections 1 and 2)."""
+
+import numpy as np
+import pytest
+
+from beaver_ftc_assurance.certificates.inequality import ROUNDING_RAD_S2, History
+from telling import apart, numbers
+
+DT, SHARE = 0.02, 1 / 3
+GYRO = {"offset_rad_s": [0.03, 0.05, 0.07], "steady_rad_s": [0.01, 0.02, 0.04], "slope": [0.11, 0.13, 0.17]}
+DECLARED = {
+    "gyro": GYRO, "earth_rad_s": 0.9, "earth_share": [1.1, 1.3, 1.7], "inertia_coupling": [0.21, 0.23, 0.29],
+    "coupling": [-0.31, 0.37, -0.41], "constant_rad_s2": [0.43, 0.47, 0.53],
+}  # fmt: skip
+
+
+@pytest.fixture
+def history():
+    x, model, eta_bar = (numbers(4, 3, seed=seed) for seed in range(3))
+    apart(
+        x=x,
+        model=model,
+        eta_bar=eta_bar,
+        **{k: v for k, v in DECLARED.items() if k not in ("gyro", "earth_rad_s")},
+    )
+    return History(DT, SHARE, x, model, np.abs(eta_bar), DECLARED)
+
+
+@pytest.mark.parametrize("k", range(4))
+def test_a_row_says_what_its_numbers_and_the_row_before_say(history, k):
+    one = slice(k, k + 1)
+    found = [of(one)[0] for of in (history.innovation, history.frame_bound, history.rest)]
+    if k == 0:  # before which nothing is known
+        assert np.isnan(found).all()
+        return
+    g = np.array(DECLARED["earth_share"])
+    size = [[abs(history.x[j, i]) + off(history, j, i) for i in range(3)] for j in range(4)]
+    for i in range(3):
+        rate, before = history.x[k, i], history.x[k - 1, i]
+        assert history.off[k, i] == pytest.approx(off(history, k, i))
+        assert found[0][i] == pytest.approx((rate - before) / DT - history.model[k, i])
+        noise = [
+            GYRO["offset_rad_s"][i] - GYRO["steady_rad_s"][i] + GYRO["slope"][i] * size[j][i]
+            for j in (k, k - 1)
+        ]
+        assert found[1][i] == pytest.approx(history.eta_bar[k, i] + sum(noise) / DT)
+        one, other = (size[k - 1][j] for j in range(3) if j != i)
+        coupled = DECLARED["inertia_coupling"][i] * abs(DECLARED["coupling"][i]) * one * other
+        of_earth = 0.9 * ((1 + g[i]) * sum(size[k - 1]) + g[i] * 0.9) + ROUNDING_RAD_S2
+        known = coupled + DECLARED["constant_rad_s2"][i] + of_earth
+        assert found[2][i] == pytest.approx(history.eta_bar[k, i] - SHARE * known)
+
+
+def off(history, k, i):
+    """The largest |true - reading| with |true - reading| <= offset + slope |true|."""
+    return (GYRO["offset_rad_s"][i] + GYRO["slope"][i] * abs(history.x[k, i])) / (1 - GYRO["slope"][i])
+
+
+def test_what_is_always_off_counts_on_the_axes_that_are_looked_at(history):
+    asked = history.asking(np.array([0.0, 1.0, 0.0]))
+    assert asked.declared["gyro"]["steady_rad_s"] == [0.0, 0.02, 0.0]
+    np.testing.assert_allclose(asked.noise - history.noise, np.full((4, 3), [0.01, 0.0, 0.04]))

@@ -64,7 +64,7 @@ def command(options: Options) -> None:
     mavlink: A ground station: is told what the diagnosis finds, may inject failures.
     page: Show the flight on the live page at this port, 0 any: break it there, repair it.
     """
-    from beaver_ftc.results import verdict_text
+    from beaver_ftc.results import Metrics, verdict_text
     from beaver_ftc_links.sitl.serve import Options as Served
     from beaver_ftc_links.sitl.serve import serve
 
@@ -81,7 +81,7 @@ def command(options: Options) -> None:
     if options.format is Format.json:
         emit_json(document)
     else:
-        emit(verdict_text(document, str(folder), colour=sys.stdout.isatty()))
+        emit(verdict_text(Metrics.of(document), str(folder), colour=sys.stdout.isatty()))
     write_junit([document], options.junit)
     raise typer.Exit(0 if document["passed"] else 1)
 

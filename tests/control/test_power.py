@@ -17,7 +17,7 @@ from beaver_ftc.design.model import ELEVATOR, FLAP, RUDDER
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.plant.trim import trim
-from beaver_ftc.results.metrics import metrics
+from beaver_ftc.results.metrics import measure, metrics
 from beaver_ftc.results.verdict import facts
 from beaver_ftc.results.views import views
 from beaver_ftc.scenario.control import EnginePower
@@ -375,7 +375,7 @@ def test_it_is_reported():
     assert document["in_charge_s"] == pytest.approx(17.0, abs=0.05)
     assert document["lowest_inhg"] == pytest.approx(log["manifold_pressure_inhg"].min())
     assert document["highest_inhg"] == pytest.approx(log["manifold_pressure_inhg"].max())
-    assert "took over pitch at 12.99 s" in dict(facts(metrics(flight)))["engine power"]
+    assert "took over pitch at 12.99 s" in dict(facts(measure(flight)))["engine power"]
     names = [view.name for view in views(log.columns, power=True)]
     assert "engine" in names
     assert "engine" not in [view.name for view in views(log.columns)]

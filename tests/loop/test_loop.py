@@ -11,7 +11,7 @@ from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.loop import accounts, assembly, frame, loop, outcome
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant.channels import TRUTH
-from beaver_ftc.results.metrics import metrics
+from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.verdict import facts
 from beaver_ftc.scenario.faults import of_a_sensor
 from beaver_ftc.scenario.loader import builtin_scenarios, load_scenario
@@ -92,7 +92,7 @@ class TestEveryBuiltInScenario:
         first = min((fault.at_s for fault in flight.scenario.faults), default=0.0)
         after = log["t_s"] >= first
         fastest = max(np.abs(log[f"{axis}_rad_s"][after]).max() for axis in "pqr")
-        why = dict(facts(metrics(flight))).get("authority", "")
+        why = dict(facts(measure(flight))).get("authority", "")
         assert (flight.departure is None and fastest < np.deg2rad(15)) or "no deflection at all" in why
 
     def test_the_log_has_one_row_a_frame_on_the_frame_clock(self, built_in):

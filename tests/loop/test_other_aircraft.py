@@ -20,7 +20,7 @@ from beaver_ftc.plugins import DETECTORS, LAWS, registered
 from beaver_ftc.results.exports import write_acmi
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.log import column_names as log_columns
-from beaver_ftc.results.metrics import metrics
+from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.views import views
 from beaver_ftc.results.writer import result_folder
 from beaver_ftc.scenario.loader import load_scenario, load_text
@@ -174,7 +174,7 @@ def test_its_recording_and_views_have_its_surfaces(tmp_path):
     with result_folder(tmp_path, "kept") as folder:
         with ParquetLog(folder / "log.parquet") as log:
             flight = fly(load_scenario(FLIGHT), log)
-        write_acmi(folder / "log.parquet", metrics(flight), folder / "flight.acmi", flight.scenario.airframe)
+        write_acmi(folder / "log.parquet", measure(flight), folder / "flight.acmi", flight.scenario.airframe)
         shown = {view.name: view for view in views(log_columns(folder / "log.parquet"))}
     assert "Flaps" not in (tmp_path / "kept" / "flight.acmi").read_text()
     assert [panel.label for panel in shown["surfaces"].panels] == ["aileron", "elevator", "rudder"]

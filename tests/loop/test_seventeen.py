@@ -13,6 +13,7 @@ from beaver_ftc.diagnosis.isolation.estimators import members_of
 from beaver_ftc.loop.assembly import frame_dtype
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.trim import trim
+from beaver_ftc.results.model import Metrics
 from beaver_ftc.results.verdict import verdict_text
 from beaver_ftc.scenario.loader import load_text
 
@@ -112,7 +113,7 @@ def test_what_is_left_of_an_axis_is_computed_and_said():
     expected = 1.0 - spans["aileron_left"] / sum(spans.values())
     whole = of["healthy_greatest_rad_s2"] - of["healthy_least_rad_s2"]
     assert (of["greatest_rad_s2"] - of["least_rad_s2"]) / whole == pytest.approx(expected, abs=0.03)
-    assert "of what all surfaces together give" in verdict_text(flight.metrics, "here")
+    assert "of what all surfaces together give" in verdict_text(Metrics.of(flight.metrics), "here")
     assert flight.metrics["tracking"]["post_fault_rms_deg_s"]["p"] < 0.2
 
 

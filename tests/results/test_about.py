@@ -67,7 +67,7 @@ def test_every_type_of_fault_has_a_size_in_words():
         {"type": "float", "actuator": "rudder", "at_s": 5},
     ]  # fmt: skip
     document = _document(faults=faults_of(Scenario.model_validate({"name": "x", "faults": faults})))
-    said = [how for what, how in facts(document) if what in ("fault", "")]
+    said = [how for what, how in facts(Metrics.of(document)) if what in ("fault", "")]
     assert said == [
         "flap hardover (to the lower stop) at 1.00 s",
         "flap rate limit (10 % of its rate) at 2.00 s to 3.00 s",
@@ -91,6 +91,9 @@ def _document(**changes):
 
 def test_a_lost_aircraft_is_said_and_not_green():
     lost = _document(departure={"time_s": 3.0, "signal": "altitude"})
-    assert (title(lost), mood(lost)) == ("x: flown, the aircraft was LOST, nothing was expected", "lost")
-    assert mood(_document()) == "good"
-    assert mood(lost | {"passed": False}) == "bad"
+    assert (title(Metrics.of(lost)), mood(Metrics.of(lost))) == (
+        "x: flown, the aircraft was LOST, nothing was expected",
+        "lost",
+    )
+    assert mood(Metrics.of(_document())) == "good"
+    assert mood(Metrics.of(lost | {"passed": False})) == "bad"

@@ -16,7 +16,7 @@ from beaver_ftc.results.exports import RECORDINGS, write_acmi, write_recording
 from beaver_ftc.results.flight import Flight as Opened
 from beaver_ftc.results.junit import write_junit
 from beaver_ftc.results.log import ParquetLog, unit_of, units
-from beaver_ftc.results.metrics import as_json, fault_free_s, hints, metrics
+from beaver_ftc.results.metrics import as_json, fault_free_s, hints, measure, metrics
 from beaver_ftc.results.model import Metrics
 from beaver_ftc.results.report import register_section, render
 from beaver_ftc.results.style import MODE_COLOURS
@@ -92,8 +92,9 @@ def test_the_metrics_of_a_flight(name, changed):
 def test_the_words_of_a_flight(name, changed):
     opened = Opened(FLIGHTS[name].scenario, metrics(FLIGHTS[name]))
     assert not changed({
-        "terminal": verdict.verdict_text(opened.metrics, "runs/x").splitlines(),
-        "mood": verdict.mood(opened.metrics), "repr": repr(opened).splitlines(), "html": opened._repr_html_(),
+        "terminal": verdict.verdict_text(Metrics.of(opened.metrics), "runs/x").splitlines(),
+        "mood": verdict.mood(Metrics.of(opened.metrics)),
+        "repr": repr(opened).splitlines(), "html": opened._repr_html_(),
     })  # fmt: skip
 
 
@@ -178,7 +179,7 @@ def test_a_recording_and_its_vehicle_file(kind, tmp_path, changed):
 def test_a_tacview_recording(tmp_path, changed):
     flown = Flight(scenario=Scenario(name="a, b\\c\nd", faults=(Fault(at_s=0.04),)), frames=FRAMES,
                    detection_time_s=0.06, isolation_time_s=0.2)  # fmt: skip
-    write_acmi(_written(tmp_path / "log.parquet"), metrics(flown), tmp_path / "flight.acmi")
+    write_acmi(_written(tmp_path / "log.parquet"), measure(flown), tmp_path / "flight.acmi")
     assert not changed((tmp_path / "flight.acmi").read_text(encoding="utf-8").splitlines())
 
 
@@ -188,7 +189,7 @@ def test_a_tacview_recording(tmp_path, changed):
 )
 def test_a_tacview_recording_has_25_frames_a_second_at_most(tmp_path, hz, frames, every):
     path = _written(tmp_path / "log.parquet", frames, hz)
-    write_acmi(path, metrics(FLIGHTS["quiet"]), tmp_path / "flight.acmi")
+    write_acmi(path, measure(FLIGHTS["quiet"]), tmp_path / "flight.acmi")
     lines = (tmp_path / "flight.acmi").read_text().splitlines()
     shown = [line for line in lines if line.startswith("#")]
     assert shown == [f"#{i / hz:.3f}" for i in range(0, frames, every)]
@@ -202,7 +203,7 @@ def test_a_place_is_told_by_the_radius_at_the_start(tmp_path):
     with ParquetLog(tmp_path / "log.parquet") as log:
         log.open(LOGGED)
         log.write(rows)
-    write_acmi(tmp_path / "log.parquet", metrics(FLIGHTS["quiet"]), tmp_path / "flight.acmi")
+    write_acmi(tmp_path / "log.parquet", measure(FLIGHTS["quiet"]), tmp_path / "flight.acmi")
     text = (tmp_path / "flight.acmi").read_text()
     assert text.count("b1,T=0.00000000|46.00000000|") == 2
 

@@ -5,7 +5,8 @@ from synthetic import Flight, Scenario, rows
 
 from beaver_ftc.results.exports import ACMI_RATE_HZ, write_acmi, write_csv
 from beaver_ftc.results.log import ParquetLog
-from beaver_ftc.results.metrics import metrics
+from beaver_ftc.results.metrics import measure, metrics
+from beaver_ftc.results.model import Metrics
 
 EARTH_RADIUS_M = 6371000.0
 
@@ -38,7 +39,7 @@ def _parse(path):
 
 @pytest.fixture
 def recording(log_path, flight, tmp_path):
-    write_acmi(log_path, metrics(flight), tmp_path / "flight.acmi")
+    write_acmi(log_path, measure(flight), tmp_path / "flight.acmi")
     return _parse(tmp_path / "flight.acmi")
 
 
@@ -70,7 +71,7 @@ def test_events_are_bookmarks_in_the_first_frame_not_before_them(recording):
 def test_a_false_alarm_is_a_bookmark_before_the_faults(log_path, flight, tmp_path):
     alarmed = metrics(flight)
     alarmed["detection"]["time_s"] = 3.0
-    write_acmi(log_path, alarmed, tmp_path / "flight.acmi")
+    write_acmi(log_path, Metrics.of(alarmed), tmp_path / "flight.acmi")
     found = [(text, pytest.approx(time)) for time, text in _parse(tmp_path / "flight.acmi")[1]]
     assert found == [("detection 3.00 s", 3.0), ("fault 12.00 s", 12.0), ("isolation 12.12 s", 12.12)]
 
@@ -82,6 +83,6 @@ def test_frames_are_evenly_spaced_across_the_row_groups_of_a_log(tmp_path, rate_
     with ParquetLog(tmp_path / "log.parquet", rows_per_group=100) as log:
         log.open(flight.columns)
         log.write(rows(flight))
-    write_acmi(tmp_path / "log.parquet", metrics(flight), tmp_path / "flight.acmi")
+    write_acmi(tmp_path / "log.parquet", measure(flight), tmp_path / "flight.acmi")
     frames, _ = _parse(tmp_path / "flight.acmi")
     assert list(frames) == pytest.approx(np.arange(0, 1000, every) / rate_hz, abs=6e-4)

@@ -6,7 +6,7 @@ from synthetic import Flight, Scenario, rows
 
 from beaver_ftc.results.figures import draw, write_figures
 from beaver_ftc.results.log import ParquetLog
-from beaver_ftc.results.metrics import metrics
+from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.style import LOOKS, closeup_window, marks
 from beaver_ftc.results.views import Panel, Trace, View, read_series, views
 
@@ -14,7 +14,7 @@ EVERY = {"tracking", "surfaces", "detection", "isolation", "ratio", "effectivene
 
 
 def test_every_view_becomes_a_picture_with_something_on_it(log_path, flight, tmp_path):
-    files = write_figures(log_path, metrics(flight), tmp_path / "figures")
+    files = write_figures(log_path, measure(flight), tmp_path / "figures")
     assert {file.stem.removesuffix("-closeup") for file in files} == EVERY
     assert {file.stem for file in files if "closeup" in file.stem} == {
         "detection-closeup", "isolation-closeup",
@@ -26,7 +26,7 @@ def test_every_view_becomes_a_picture_with_something_on_it(log_path, flight, tmp
 
 def _panels(flight, series, name):
     view = next(view for view in views(flight.columns) if view.name == name)
-    return draw(view, series, marks(metrics(flight)), "x").axes
+    return draw(view, series, marks(measure(flight)), "x").axes
 
 
 def test_instants_are_marked_in_every_panel_of_every_view(flight, log_path):
@@ -68,7 +68,7 @@ def test_flight_without_alarm_says_that_the_isolation_never_ran(tmp_path):
     view = next(view for view in views(quiet.columns) if view.name == "isolation")
     series = read_series(tmp_path / "log.parquet", view.columns)
     assert all(axes.texts[0].get_text() == view.absent for axes in _panels(quiet, series, "isolation"))
-    assert closeup_window(marks(metrics(quiet))) is None
+    assert closeup_window(marks(measure(quiet))) is None
 
 
 def test_views_of_a_log_without_estimators_leave_those_out(flight):
@@ -78,7 +78,7 @@ def test_views_of_a_log_without_estimators_leave_those_out(flight):
 
 def test_fault_that_never_came_is_not_marked():
     lost = Flight(detection_time_s=None, isolation_time_s=None, isolated=None, departure=(5.0, "beta"))
-    assert [mark.name for mark in marks(metrics(lost))] == ["departure"]
+    assert [mark.name for mark in marks(measure(lost))] == ["departure"]
 
 
 def test_no_two_curves_of_one_figure_look_the_same():

@@ -6,6 +6,7 @@ from synthetic import Expect, Fault, Flight, Scenario
 import beaver_ftc as bf
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.metrics import metrics
+from beaver_ftc.results.model import Metrics
 from beaver_ftc.results.verdict import verdict_text
 from beaver_ftc.scenario.schema import Scenario as Given
 from trainer import FOLDER
@@ -134,7 +135,7 @@ def test_in_flight_a_name_before_the_fault_is_not_correct(early):
     assert said.time_s < 12.0
     missed = {one.name: one.reason for one in early.expectations if not one.passed}
     assert missed["isolated_as"].startswith("elevator was named at")
-    assert "PREMATURE at" in verdict_text(early.metrics, "", colour=False)
+    assert "PREMATURE at" in verdict_text(Metrics.of(early.metrics), "", colour=False)
 
 
 def test_a_sweep_has_the_column(early):

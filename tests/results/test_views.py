@@ -8,7 +8,8 @@ from synthetic import COLUMNS, Fault, Flight, Scenario
 
 from beaver_ftc.results import figures
 from beaver_ftc.results.figures import draw
-from beaver_ftc.results.metrics import metrics
+from beaver_ftc.results.metrics import measure, metrics
+from beaver_ftc.results.model import Metrics
 from beaver_ftc.results.style import closeup_window, marks
 from beaver_ftc.results.views import (
     Panel,
@@ -83,7 +84,7 @@ def test_many_panels_are_set_side_by_side(estimators, across):
 
 
 T_S = np.arange(0.0, 20.0, 0.5)
-INSTANTS = marks(metrics(Flight(departure=(18.0, "alpha"))))
+INSTANTS = marks(measure(Flight(departure=(18.0, "alpha"))))
 
 
 def _series(view):
@@ -296,7 +297,7 @@ def test_the_pictures_of_a_flight_whole_and_around_the_fault(tmp_path, monkeypat
     monkeypatch.setattr(figures, "read_series", lambda path, columns, span: span)
     for given in (document, document | {"engine_power": {"from_s": 1.0}}, metrics(QUIET)):
         shown.clear()
-        written = figures.write_figures(tmp_path / "log.parquet", given, tmp_path / "figures")
+        written = figures.write_figures(tmp_path / "log.parquet", Metrics.of(given), tmp_path / "figures")
         assert [path for path, *_ in shown] == written
         assert {folder for path in written for folder in path.parents[:1]} == {tmp_path / "figures"}
         spans = {path.name: span for path, span, *_ in shown}
@@ -322,7 +323,7 @@ class _Drawn:
 
 
 def test_a_window_without_a_fault():
-    lost = marks(metrics(Flight(
+    lost = marks(measure(Flight(
         scenario=Scenario(faults=(Fault(at_s=25.0),)), detection_time_s=None, isolation_time_s=None,
         departure=(14.5, "alpha_rad"),
     )))  # fmt: skip

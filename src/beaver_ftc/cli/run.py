@@ -103,6 +103,7 @@ def _shown(given: str | None) -> "Prepare | None":
 
 def _run_all(scenarios: list["Scenario"], options: Options) -> int:
     """Fly one after the other; one that fails does not stop the rest. Returns the worst exit status."""
+    from beaver_ftc.results.model import Metrics
     from beaver_ftc.results.verdict import verdict_text
 
     prepare = _shown(options.flightgear)
@@ -121,7 +122,7 @@ def _run_all(scenarios: list["Scenario"], options: Options) -> int:
         runs.append(document)
         status = max(status, 0 if document["passed"] else 1)
         if options.format is Format.text:
-            emit(verdict_text(document, document["folder"], colour=sys.stdout.isatty()))
+            emit(verdict_text(Metrics.of(document), document["folder"], colour=sys.stdout.isatty()))
     write_junit([run | {"took_s": each} for run, each in zip(runs, took_s, strict=True)], options.junit)
     if options.format is Format.json:
         first = runs[0] if len(runs) == 1 else {}

@@ -145,11 +145,13 @@ def _fly(sweep: "Sweep", options: "Options", format: Format) -> Document:
 
 
 def _replay(sweep: "Sweep", options: "Options", index: int, format: Format) -> Document:
+    from beaver_ftc.results.model import Metrics
     from beaver_ftc.results.verdict import verdict_text
     from beaver_ftc.studies.sweep.campaign import replay
 
     document: Document = replay(sweep, options, index)
-    answer(format, document, lambda: verdict_text(document, document["folder"], sys.stdout.isatty()))
+    folder, found = document["folder"], Metrics.of(document)
+    answer(format, document, lambda: verdict_text(found, folder, sys.stdout.isatty()))
     return document
 
 

@@ -20,7 +20,7 @@ from beaver_ftc.aircraft import Aircraft, load
 from beaver_ftc.aircraft.units import EARTH_RADIUS_M
 from beaver_ftc.plant.state import START_LATITUDE_DEG
 from beaver_ftc.results import log
-from beaver_ftc.results.model import Document
+from beaver_ftc.results.model import Metrics
 from beaver_ftc.results.style import marks
 
 ACMI_RATE_HZ = 25.0  # smooth to look at; a viewer interpolates
@@ -60,14 +60,14 @@ def write_csv(log_path: Path, path: Path) -> None:
                     writer.write_table(source.read_row_group(group))
 
 
-def write_acmi(log_path: Path, metrics: Document, path: Path, aircraft: Aircraft | None = None) -> None:
+def write_acmi(log_path: Path, metrics: Metrics, path: Path, aircraft: Aircraft | None = None) -> None:
     """The flight as a Tacview recording (ACMI 2.2): path, attitude, air data, flap, bookmarks for events."""
     aircraft = aircraft or load()
     title = aircraft.file.description.partition(",")[0] or aircraft.name
     with path.open("w", encoding="utf-8", newline="\n") as file:
         file.write("FileType=text/acmi/tacview\nFileVersion=2.2\n")
         file.write(f"0,ReferenceTime={_REFERENCE_TIME}\n0,DataSource=JSBSim\n0,DataRecorder=beaver-ftc\n")
-        file.write(f"0,Title={_escaped(metrics['scenario'])}\n")
+        file.write(f"0,Title={_escaped(metrics.scenario)}\n")
         file.write(f"{_AIRCRAFT},Type=Air+FixedWing,Name={_escaped(title)},Color=Blue\n")
         file.writelines(_frames(log_path, metrics, aircraft))
 
@@ -76,7 +76,7 @@ def _escaped(text: str) -> str:
     return text.replace("\\", "\\\\").replace(",", "\\,").replace("\n", " ")
 
 
-def _frames(log_path: Path, metrics: Document, aircraft: Aircraft) -> Iterator[str]:
+def _frames(log_path: Path, metrics: Metrics, aircraft: Aircraft) -> Iterator[str]:
     """A frame of the recording at ACMI_RATE_HZ at most, each event in the first frame not before it."""
     events = sorted(marks(metrics), key=lambda mark: mark.time_s)
     start_m = float(next(log.read_chunks(log_path, ["altitude_m"]))["altitude_m"][0])

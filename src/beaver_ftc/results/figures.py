@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from beaver_ftc.results import log
-from beaver_ftc.results.model import Document
+from beaver_ftc.results.model import Metrics
 from beaver_ftc.results.style import GREY, LOOKS, YELLOW, Mark, closeup_window, marks
 from beaver_ftc.results.views import WHOLE, Panel, Series, Trace, View, read_series, views
 
@@ -23,9 +23,10 @@ LEGEND_LINE = 0.17  # inches, of one more line of the legend
 LOWEST_RATIO = 1e-2  # of a logarithmic axis: what is smaller is nothing
 
 
-def write_figures(log_path: Path, metrics: Document, folder: Path) -> list[Path]:
+def write_figures(log_path: Path, metrics: Metrics, folder: Path) -> list[Path]:
     """Draw every view of the log as `<view>.png`, some also as `<view>-closeup.png`; return the files."""
-    shown, instants = views(log.column_names(log_path), bool(metrics.get("engine_power"))), marks(metrics)
+    shown = views(log.column_names(log_path), bool(metrics.engine_power))
+    instants = marks(metrics)
     window = closeup_window(instants)
     closeups = [view for view in shown if view.closeup] if window else []
     folder.mkdir(exist_ok=True)
@@ -34,7 +35,7 @@ def write_figures(log_path: Path, metrics: Document, folder: Path) -> list[Path]
         series = read_series(log_path, [name for view in drawn for name in view.columns], span)
         for view in drawn:
             written.append(folder / f"{view.name}{ending}.png")
-            figure = draw(view, series, instants, metrics["scenario"])
+            figure = draw(view, series, instants, metrics.scenario)
             figure.savefig(written[-1], metadata={"Software": "beaver-ftc"})
     return written
 

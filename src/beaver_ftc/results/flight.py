@@ -134,7 +134,7 @@ class Flight:
         known = self._views()
         if view not in known:
             raise BadInput(f"view: {view!r:.60} is not known{suggestion(str(view), known)}")
-        instants = marks(self.metrics)
+        instants = marks(model.Metrics.of(self.metrics))
         window = (closeup_window(instants) if closeup else None) or WHOLE
         series = series_of(self._kept(), known[view].columns, window)
         return draw(known[view], series, instants, self.name)
@@ -181,7 +181,7 @@ class Flight:
 
     def __repr__(self) -> str:
         lines = [f"{what:12} {how}" for what, how in self._facts()]
-        return "\n".join([verdict.title(self.metrics), *(f"  {line}" for line in lines)])
+        return "\n".join([verdict.title(model.Metrics.of(self.metrics)), *(f"  {line}" for line in lines)])
 
     def _repr_html_(self) -> str:
         cell = "style='text-align:left'"
@@ -189,19 +189,19 @@ class Flight:
             f"<tr><th {cell}>{escape(what)}</th><td {cell}>{escape(how)}</td></tr>"
             for what, how in self._facts()
         )
-        return f"<b>{escape(verdict.title(self.metrics))}</b><table>{rows}</table>"
+        return f"<b>{escape(verdict.title(model.Metrics.of(self.metrics)))}</b><table>{rows}</table>"
 
     def _facts(self) -> list[tuple[str, str]]:
         tracked = [
             ("tracking", f"p {p}  q {q}  r {r} deg/s RMS {when} the fault")
-            for when, p, q, r in verdict.tracking(self.metrics)
+            for when, p, q, r in verdict.tracking(model.Metrics.of(self.metrics))
         ]
         missed = [
             ("missed", f"{name} {expected}, got {actual}")
-            for name, expected, actual, passed in verdict.expectations(self.metrics)
+            for name, expected, actual, passed in verdict.expectations(model.Metrics.of(self.metrics))
             if not passed
         ]
-        return [*verdict.facts(self.metrics), *tracked, *missed]
+        return [*verdict.facts(model.Metrics.of(self.metrics)), *tracked, *missed]
 
 
 def fly(

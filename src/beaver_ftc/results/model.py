@@ -353,8 +353,55 @@ class Expectation(Part):
 
 
 @dataclass(frozen=True)
+class Certified(Part):
+    """Of a certificate: statements that it proves, and alarms or exclusions without a proof."""
+
+    statements: int
+    without: int
+
+
+@dataclass(frozen=True)
+class Latency(Part):
+    """From a packet to its answer, ms."""
+
+    median: float
+    p99: float
+    largest: float
+
+
+@dataclass(frozen=True)
+class Interval(Part):
+    """Between two packets, ms."""
+
+    mean: float
+    jitter_rms: float
+    largest: float
+
+
+@dataclass(frozen=True)
+class Link(Part):
+    """How an autopilot was served: rates, counts of packets (beaver_ftc_links/sitl/link.py), times."""
+
+    protocol: str
+    packets_hz: float
+    frames_hz: float
+    frames: int
+    repeated: int
+    late: int
+    missed: int
+    resets: int
+    malformed: int
+    strangers: int
+    off_rate: int
+    silences: int
+    latency_ms: Latency
+    interval_ms: Interval
+
+
+@dataclass(frozen=True)
 class Metrics(Part):
-    """The document metrics.json."""
+    """The document metrics.json. Under an autopilot: link, and interrupted_s of a flight ended before its
+    time. certificate: of a flight whose certificate was asked for."""
 
     scenario: str
     seed: int
@@ -383,3 +430,6 @@ class Metrics(Part):
     expectations: tuple[Expectation, ...]
     passed: bool
     versions: dict[str, str]
+    interrupted_s: float | None = field(default=None, metadata=_IF_KNOWN, kw_only=True)
+    link: Link | None = field(default=None, metadata=_IF_KNOWN, kw_only=True)
+    certificate: Certified | None = field(default=None, metadata=_IF_KNOWN, kw_only=True)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from beaver_ftc.results import log, verdict
-from beaver_ftc.results.model import Document
+from beaver_ftc.results.model import DeclaredFault, Document, Metrics
 from beaver_ftc.results.style import LOOKS, MODE_COLOURS, closeup_window, marks
 from beaver_ftc.results.views import MAX_POINTS, Panel, View, kinds, read_series, surfaces, views
 
@@ -49,7 +49,7 @@ def render(folders: Sequence[Path], names: Sequence[str] = ()) -> str:
         runs=[_words(document, text) for document, text in zip(documents, texts, strict=True)],
         names=names,
         modes=MODE_COLOURS,
-        marks={mark.name: mark for document in documents for mark in marks(document)}.values(),
+        marks={mark.name: mark for document in documents for mark in marks(Metrics.of(document))}.values(),
         **parts(folders, documents, names),
         # what studies have found in a folder, if they have been there
         sections=[Markup("".join(section(folder) for section in _SECTIONS)) for folder in folders],
@@ -65,14 +65,15 @@ def register_section(section: Section) -> None:
 def _words(metrics: Document, scenario: str) -> Document:
     import yaml
 
+    found = Metrics.of(metrics)
     return {
         "metrics": metrics,
-        "title": verdict.title(metrics),
-        "mood": verdict.mood(metrics),
+        "title": verdict.title(found),
+        "mood": verdict.mood(found),
         "description": yaml.safe_load(scenario).get("description", ""),
-        "facts": verdict.facts(metrics),
-        "tracking": verdict.tracking(metrics),
-        "expectations": verdict.expectations(metrics),
+        "facts": verdict.facts(found),
+        "tracking": verdict.tracking(found),
+        "expectations": verdict.expectations(found),
         "scenario": scenario,
     }
 
@@ -109,9 +110,10 @@ def _data(
     columns = tuple(dict.fromkeys([*_PATH, "mode", *(name for view in shown for name in view.columns)]))
     # fewer points of each curve the more runs there are: the page stays within a few megabytes
     points = MAX_POINTS if len(logs) <= 2 else max(600, 2 * MAX_POINTS // len(logs))
-    named = zip(logs, documents, names or [document["scenario"] for document in documents], strict=True)
+    found = [Metrics.of(document) for document in documents]
+    named = zip(logs, found, names or [each.scenario for each in found], strict=True)
     return {
-        "runs": [_run(path, document, columns, name, points) for path, document, name in named],
+        "runs": [_run(path, metrics, columns, name, points) for path, metrics, name in named],
         "views": [_view(view) for view in shown],
         "looks": {role: asdict(look) for role, look in LOOKS.items()},
         "modes": list(MODE_COLOURS.items()),
@@ -127,7 +129,7 @@ def _common_views(logs: Sequence[Path], documents: Sequence[Document]) -> tuple[
     return tuple(view for view in first if all(view in other for other in rest))
 
 
-def _run(path: Path, metrics: Document, columns: Sequence[str], name: str, points: int) -> Document:
+def _run(path: Path, metrics: Metrics, columns: Sequence[str], name: str, points: int) -> Document:
     instants = marks(metrics)
     window = closeup_window(instants)
     levels = [read_series(path, columns, max_points=points)]
@@ -137,19 +139,17 @@ def _run(path: Path, metrics: Document, columns: Sequence[str], name: str, point
     return {
         "name": name,
         "jet": not {"spoiler", "stabiliser"}.isdisjoint(kinds(surfaces(log.column_names(path)))),
-        "damage": [
-            {
-                "part": fault["size"]["case"].removesuffix("-off"),
-                "at_s": fault["at_s"],
-                "end_s": fault["end_s"],
-            }
-            for fault in metrics["faults"]
-            if fault["type"] == "damage"
-        ],
+        "damage": [_damage(fault) for fault in metrics.faults if fault.type == "damage"],
         "marks": [asdict(mark) for mark in instants],
         "window": window or ((float(t_s[0]), float(t_s[-1])) if t_s.size else (0.0, 0.0)),
         "levels": [{name: _packed(name, values) for name, values in level.items()} for level in levels],
     }
+
+
+def _damage(fault: DeclaredFault) -> Document:
+    """Which part is missing, and from when to when."""
+    part = fault.size["case"].removesuffix("-off")
+    return {"part": part, "at_s": fault.at_s, "end_s": fault.end_s}
 
 
 def _packed(name: str, values: np.ndarray) -> str:

@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from beaver_ftc.results.model import Document
+from beaver_ftc.results.model import Metrics
 
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PURPLE, GREY = (
     "#000000", "#e69f00", "#56b4e9", "#009e73", "#f0e442", "#0072b2", "#d55e00", "#cc79a7", "#8a8a8a",
@@ -69,16 +69,16 @@ class Mark:
         return f"{self.name} {self.time_s:.2f} s"
 
 
-def marks(metrics: Document) -> list[Mark]:
+def marks(metrics: Metrics) -> list[Mark]:
     """The instants of fault, detection, isolation and departure, as far as they came before the end."""
-    fault, departure = metrics["fault"], metrics["departure"]
+    fault, departure = metrics.fault, metrics.departure
     instants = (
-        ("fault", fault and fault["at_s"], VERMILION, (), "v", "F"),
-        ("detection", metrics["detection"]["time_s"], BLACK, (4, 2), "D", "D"),
-        ("isolation", metrics["isolation"]["time_s"], PLUM, (6, 2, 1, 2), "s", "I"),
-        ("departure", departure and departure["time_s"], CRIMSON, (1, 2), "X", "X"),
+        ("fault", fault.at_s if fault else None, VERMILION, (), "v", "F"),
+        ("detection", metrics.detection.time_s, BLACK, (4, 2), "D", "D"),
+        ("isolation", metrics.isolation.time_s, PLUM, (6, 2, 1, 2), "s", "I"),
+        ("departure", departure.time_s if departure else None, CRIMSON, (1, 2), "X", "X"),
     )
-    end_s = departure["time_s"] if departure else math.inf
+    end_s = departure.time_s if departure else math.inf
     return [Mark(name, time, *look) for name, time, *look in instants if time is not None and time <= end_s]
 
 

@@ -1,13 +1,26 @@
 """What a flight amounts to, in words: the verdict in the terminal and at the head of the report.
 
-Everything is said from the metrics document, so that the words and `metrics.json` cannot disagree.
+All words follow from the metrics, so that they cannot disagree with `metrics.json`.
 """
 
 import io
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from beaver_ftc.results.model import Document
+from beaver_ftc.results.model import (
+    AxisAuthority,
+    Certified,
+    Change,
+    DeclaredFault,
+    Detection,
+    Expectation,
+    Fault,
+    Isolation,
+    Limit,
+    Metrics,
+    Named,
+    Withdrawn,
+)
 from beaver_ftc.scenario.measured import in_words
 
 if TYPE_CHECKING:
@@ -16,24 +29,24 @@ if TYPE_CHECKING:
 LEAST_BEYOND_S = 0.1
 
 
-def title(metrics: Document) -> str:
+def title(metrics: Metrics) -> str:
     """The scenario's name, whether it did as expected, and whether the aircraft was lost."""
-    lost = ", the aircraft was LOST" if metrics["departure"] else ""
-    if "interrupted_s" in metrics:
-        return f"{metrics['scenario']}: INTERRUPTED at {metrics['interrupted_s']:.2f} s, not passed{lost}"
-    if not metrics["expectations"]:
-        return f"{metrics['scenario']}: flown{lost}, nothing was expected"
-    return f"{metrics['scenario']}: {'PASSED' if metrics['passed'] else 'FAILED'}{lost}"
+    lost = ", the aircraft was LOST" if metrics.departure else ""
+    if metrics.interrupted_s is not None:
+        return f"{metrics.scenario}: INTERRUPTED at {metrics.interrupted_s:.2f} s, not passed{lost}"
+    if not metrics.expectations:
+        return f"{metrics.scenario}: flown{lost}, nothing was expected"
+    return f"{metrics.scenario}: {'PASSED' if metrics.passed else 'FAILED'}{lost}"
 
 
-def mood(metrics: Document) -> str:
+def mood(metrics: Metrics) -> str:
     """`good`, `bad`, or `lost` for an aircraft lost in a flight that did as expected: never green."""
-    return "bad" if not metrics["passed"] else "lost" if metrics["departure"] else "good"
+    return "bad" if not metrics.passed else "lost" if metrics.departure else "good"
 
 
-def facts(metrics: Document) -> list[tuple[str, str]]:
+def facts(metrics: Metrics) -> list[tuple[str, str]]:
     """(what, how it went) for each thing worth knowing, in the order in which they happen."""
-    declared = metrics.get("faults") or [metrics["fault"]]
+    declared = metrics.faults or (metrics.fault,)
     said = (
         ("flight", _flight(metrics)),
         *(("" if i else "fault", _fault(fault)) for i, fault in enumerate(declared)),
@@ -44,28 +57,26 @@ def facts(metrics: Document) -> list[tuple[str, str]]:
         *(("", said) for said in _others(metrics)),
         ("probing", _probing(metrics)),
         ("supervisor", _supervisor(metrics)),
-        *(("changed", _changed(change)) for change in metrics.get("changes", ())),
+        *(("changed", _changed(change)) for change in metrics.changes),
         ("engine power", _engine_power(metrics)),
         ("profile", _profile(metrics)),
-        *(("limited", _limit(limit)) for limit in metrics.get("limits", ())),
+        *(("limited", _limit(limit)) for limit in metrics.limits),
         ("authority", _authority(metrics)),
         ("left", _left(metrics)),
         ("envelope", _envelope(metrics)),
         ("departure", _departure(metrics)),
         ("link", _link(metrics)),
         ("saturation", _saturation(metrics)),
-        *(("note", hint) for hint in metrics.get("hints", ())),
+        *(("note", hint) for hint in metrics.hints),
     )
     return [(what, how) for what, how in said if how]
 
 
-def _others(metrics: Document) -> list[str]:
+def _others(metrics: Metrics) -> list[str]:
     """What else is at fault, of several faults at once, and what is open."""
-    isolation = metrics["isolation"]
-    rest = isolation.get("faults", [])[1:] if isolation["isolated"] else []
-    return [
-        _one(fault, metrics) if fault["fault"] else _still_possible(fault["candidates"]) for fault in rest
-    ]
+    isolation = metrics.isolation
+    rest = isolation.faults[1:] if isolation.isolated else []
+    return [_one(fault, metrics) if fault.fault else _still_possible(fault.candidates) for fault in rest]
 
 
 MOST_LISTED = 4  # places, or types: more are counted
@@ -128,28 +139,27 @@ def _counted(n: int, what: str) -> str:
     return f"{n} {what}{'' if n == 1 else 's'}"
 
 
-def tracking(metrics: Document) -> list[tuple[str, str, str, str]]:
+def tracking(metrics: Metrics) -> list[tuple[str, str, str, str]]:
     """(when, p, q, r): the RMS tracking errors in deg/s, before and after the fault."""
-    rows = (("before", "pre_fault_rms_deg_s"), ("after", "post_fault_rms_deg_s"))
-    tracked = [(when, metrics["tracking"][key]) for when, key in rows]
-    return [(when, _value(rms["p"]), _value(rms["q"]), _value(rms["r"])) for when, rms in tracked if rms]
+    of = metrics.tracking
+    tracked = ("before", of.pre_fault_rms_deg_s), ("after", of.post_fault_rms_deg_s)
+    return [(when, _value(rms.p), _value(rms.q), _value(rms.r)) for when, rms in tracked if rms]
 
 
-def expectations(metrics: Document) -> list[tuple[str, str, str, bool]]:
+def expectations(metrics: Metrics) -> list[tuple[str, str, str, bool]]:
     """(name, expected, actual, passed) for each expectation."""
     return [
-        (found["name"], _bound(found["expected"]), _actual(found), found["passed"])
-        for found in metrics["expectations"]
+        (found.name, _bound(found.expected), _actual(found), found.passed) for found in metrics.expectations
     ]
 
 
-def _actual(found: Document) -> str:
+def _actual(found: Expectation) -> str:
     """What came out, and why if the reason is known."""
-    reason = found.get("reason")
-    return _value(found["actual"]) + (f"; {reason}" if reason else "")
+    reason = found.reason
+    return _value(found.actual) + (f"; {reason}" if reason else "")
 
 
-def verdict_text(metrics: Document, folder: str, colour: bool = False) -> str:
+def verdict_text(metrics: Metrics, folder: str, colour: bool = False) -> str:
     """The verdict of one flight as a table for the terminal."""
     from rich.console import Console
 
@@ -159,7 +169,7 @@ def verdict_text(metrics: Document, folder: str, colour: bool = False) -> str:
     return "\n".join(line.rstrip() for line in captured.get().splitlines()) + "\n"
 
 
-def _table(metrics: Document, folder: str) -> "Table":
+def _table(metrics: Metrics, folder: str) -> "Table":
     from rich.table import Table
     from rich.text import Text
 
@@ -175,49 +185,50 @@ def _table(metrics: Document, folder: str) -> "Table":
     for name, expected, actual, passed in expectations(metrics):
         mark = Text("met   " if passed else "MISSED", "green" if passed else "bold red")
         table.add_row("expected", Text.assemble(mark, f" {name} {expected}, got {actual}"))
-    if "certificate" in metrics:
-        table.add_row("certificate", _certificate(metrics["certificate"], folder))
+    if metrics.certificate is not None:
+        table.add_row("certificate", _certificate(metrics.certificate, folder))
     table.add_row("results", folder)
     return table
 
 
-def _certificate(written: Document, folder: str) -> str:
+def _certificate(written: Certified, folder: str) -> str:
     """How many alarms and exclusions are certified, and the command that checks them."""
-    if not written["statements"] and not written["without"]:
+    if not written.statements and not written.without:
         return "nothing to certify: no alarm"
-    without = f", {written['without']} not certified" if written["without"] else ""
-    return f"{_counted(written['statements'], 'statement')}{without}; check: beaver-ftc check {folder}"
+    without = f", {written.without} not certified" if written.without else ""
+    return f"{_counted(written.statements, 'statement')}{without}; check: beaver-ftc check {folder}"
 
 
-def _changed(change: Document) -> str:
+def _changed(change: Change) -> str:
     """What was changed in flight, and what a diagnosis that ended with it had found."""
-    to = [f"{key} {change[key]}" for key in ("law", "scheme") if change[key]]
-    said = f"{', '.join([*to, *(['sensors'] if change['sensors'] else [])]) or 'declared sensors'}"
-    if change.get("detection_time_s") is None:
-        return f"{said} at {_time(change['time_s'])}"
-    found = change["isolated"] or "nothing named"
-    alarm = "FALSE ALARM" if change["false_alarm"] else "alarm"
-    before = f"{alarm} at {_time(change['detection_time_s'])}, {found}"
-    return f"{said} at {_time(change['time_s'])}; the diagnosis before: {before}"
+    to = [f"{key} {name}" for key, name in (("law", change.law), ("scheme", change.scheme)) if name]
+    said = f"{', '.join([*to, *(['sensors'] if change.sensors else [])]) or 'declared sensors'}"
+    if change.detection_time_s is None:
+        return f"{said} at {_time(change.time_s)}"
+    found = change.isolated or "nothing named"
+    alarm = "FALSE ALARM" if change.false_alarm else "alarm"
+    before = f"{alarm} at {_time(change.detection_time_s)}, {found}"
+    return f"{said} at {_time(change.time_s)}; the diagnosis before: {before}"
 
 
-def _flight(metrics: Document) -> str:
-    flown = metrics.get("flight")
+def _flight(metrics: Metrics) -> str:
+    flown = metrics.flight
     if not flown:
         return ""
-    condition = f"{flown['airspeed_mps']:g} m/s at {flown['altitude_m']:g} m, {_time(flown['flown_s'])}"
-    kind = ", every fault type" if flown["fault_class"] == "all" else ""
-    return f"{condition}; diagnosis {flown['scheme']}{kind}; law {flown['law']}"
+    condition = f"{flown.airspeed_mps:g} m/s at {flown.altitude_m:g} m, {_time(flown.flown_s)}"
+    kind = ", every fault type" if flown.fault_class == "all" else ""
+    return f"{condition}; diagnosis {flown.scheme}{kind}; law {flown.law}"
 
 
-def _fault(fault: Document | None) -> str:
+def _fault(fault: Fault | None) -> str:
     if fault is None:
         return "none"
-    until = f" to {_time(fault['end_s'])}" if fault.get("end_s") else ""
-    place = f"sensor {fault['sensor']}" if "sensor" in fault else fault["actuator"] or ""
-    what = f"{place} {fault['type'].replace('_', ' ')}".strip()
+    end_s = fault.end_s if isinstance(fault, DeclaredFault) else None
+    until = f" to {_time(end_s)}" if end_s else ""
+    place = f"sensor {fault.sensor}" if fault.sensor else fault.actuator or ""
+    what = f"{place} {fault.type.replace('_', ' ')}".strip()
     size = ", ".join(_sizes(fault))
-    return f"{what}{' (' + size + ')' if size else ''} at {_time(fault['at_s'])}{until}"
+    return f"{what}{' (' + size + ')' if size else ''} at {_time(fault.at_s)}{until}"
 
 
 _CHANNELS = {
@@ -226,110 +237,111 @@ _CHANNELS = {
 }  # fmt: skip
 
 
-def _profile(metrics: Document) -> str:
+def _profile(metrics: Metrics) -> str:
     """Largest deviations from the commanded profile; nothing where none was flown."""
-    flown = [(name, worst) for name, worst in (metrics.get("profile") or {}).items() if worst is not None]
-    off = ", ".join(_CHANNELS[name].format(_value(worst)) for name, worst in flown if name in _CHANNELS)
+    worst = {name: getattr(metrics.profile, name, None) for name in _CHANNELS}
+    off = ", ".join(_CHANNELS[name].format(_value(by)) for name, by in worst.items() if by is not None)
     return f"at most off by: {off}" if off else ""
 
 
 _LIMITED = {"airspeed_mps": "airspeed to {} {:.1f} m/s", "bank_deg": "bank to {} {:.0f} deg"}
 
 
-def _limit(limit: Document) -> str:
+def _limit(limit: Limit) -> str:
     """What envelope protection has limited, since when and why."""
-    what = _LIMITED[limit["limits"]].format(limit["side"], limit["value"])
-    until = "" if limit["in_force"] else ", no longer at the end"
-    return f"{what} from {_time(limit['time_s'])}{until}: {limit['because']}"
+    what = _LIMITED[limit.limits].format(limit.side, limit.value)
+    until = "" if limit.in_force else ", no longer at the end"
+    return f"{what} from {_time(limit.time_s)}{until}: {limit.because}"
 
 
-def _sizes(fault: Document) -> list[str]:
+def _sizes(fault: Fault) -> list[str]:
     """How large a declared fault is, in words."""
-    if "sensor" in fault:
-        return _sensor_sizes(fault)
+    if not isinstance(fault, DeclaredFault):
+        return []
+    if fault.sensor:
+        return _sensor_sizes(fault, fault.sensor)
     from beaver_ftc.scenario.faults import TYPES
 
-    row = TYPES.get(fault["type"])
+    row = TYPES.get(fault.type)
     in_words = row.in_words if row else {}
-    return [in_words[key](value) for key, value in fault.get("size", {}).items() if key in in_words]
+    return [in_words[key](value) for key, value in fault.size.items() if key in in_words]
 
 
-def _sensor_sizes(fault: Document) -> list[str]:
+def _sensor_sizes(fault: DeclaredFault, sensor: str) -> list[str]:
     """The same of an instrument's fault, in the unit of the instrument."""
     from beaver_ftc.scenario.sensors import QUANTITIES
 
-    size = fault["size"].get("magnitude")
-    unit = QUANTITIES[fault["sensor"]].unit
+    size = fault.size.get("magnitude")
+    unit = QUANTITIES[sensor].unit
     words = {"bias": "{:+g} {}", "noise": "{:g} {}", "scale": "{:+.0%}"}
-    return [] if size is None else [words[fault["type"]].format(size, unit)]
+    return [] if size is None else [words[fault.type].format(size, unit)]
 
 
-def _true(isolation: Document, metrics: Document) -> str:
+def _true(isolation: Isolation | Named, metrics: Metrics) -> str:
     """What the estimate ought to be, where the fault named is one that was declared."""
     from beaver_ftc.scenario.faults import TYPES
 
-    if isolation["estimate"] is None:
+    if isolation.estimate is None:
         return ""
-    row = TYPES.get(isolation["type"])
+    row = TYPES.get(isolation.type or "")
     key, sign = (row and row.truth) or ("", 1.0)
     sizes = [
-        fault["size"][key]
-        for fault in metrics.get("faults", ())
-        if (fault["actuator"], fault["type"]) == (isolation["fault"], isolation["type"])
-        and key in fault["size"]
+        fault.size[key]
+        for fault in metrics.faults
+        if (fault.actuator, fault.type) == (isolation.fault, isolation.type) and key in fault.size
     ]
     return f" (true {_value(sign * sizes[0])})" if sizes else ""
 
 
-def _detection(metrics: Document) -> str:
-    detection = metrics["detection"]
-    if not detection["detected"]:
+def _detection(metrics: Metrics) -> str:
+    detection = metrics.detection
+    if not detection.detected:
         return "no alarm"
-    if metrics["false_alarm"] and detection["delay_s"] is None:
-        return f"FALSE ALARM at {_time(detection['time_s'])} {_seen(detection)}"
-    guaranteed = detection["guaranteed_delay_s"]
+    if metrics.false_alarm and detection.delay_s is None:
+        return f"FALSE ALARM at {_time(detection.time_s)} {_seen(detection)}"
+    guaranteed = detection.guaranteed_delay_s
     within = "" if guaranteed is None else f" (certain within {_time(guaranteed)})"
-    return f"after {_time(detection['delay_s'])} {_seen(detection)}{within}"
+    return f"after {_time(detection.delay_s)} {_seen(detection)}{within}"
 
 
-def _inconclusive(metrics: Document) -> str:
+def _inconclusive(metrics: Metrics) -> str:
     """Where the diagnosis could conclude nothing; nothing if it could all the time."""
-    found = metrics["detection"].get("inconclusive")
-    return in_words(found) if found else ""
+    found = metrics.detection.inconclusive
+    return in_words(found.document()) if found else ""
 
 
-def _seen(detection: Document) -> str:
+def _seen(detection: Detection) -> str:
     """Where an alarm showed: on an axis, or between the instruments."""
-    return f"on {detection['axis']}" if detection["axis"] else "between the instruments"
+    return f"on {detection.axis}" if detection.axis else "between the instruments"
 
 
-def _statistical(metrics: Document) -> str:
+def _statistical(metrics: Metrics) -> str:
     """What the statistical detector would have said by itself; nothing if there was none."""
-    said = metrics["detection"].get("statistical")
+    said = metrics.detection.statistical
     if said is None:
         return ""
-    when = "no alarm" if said["time_s"] is None else f"alarm at {_time(said['time_s'])}"
-    level = f"level {said['alarm_level']:.2f} standard deviations"
-    return f"{when}; {level}, in healthy flight at most {said['closest_approach']:.2f} of it"
+    when = "no alarm" if said.time_s is None else f"alarm at {_time(said.time_s)}"
+    level = f"level {said.alarm_level:.2f} standard deviations"
+    return f"{when}; {level}, in healthy flight at most {said.closest_approach:.2f} of it"
 
 
-def _isolation(metrics: Document) -> str:
-    isolation = metrics["isolation"]
-    return "; ".join([_found(isolation, metrics), *_withdrawn(isolation.get("withdrawn", ()))])
+def _isolation(metrics: Metrics) -> str:
+    isolation = metrics.isolation
+    return "; ".join([_found(isolation, metrics), *_withdrawn(isolation.withdrawn)])
 
 
-def _found(isolation: Document, metrics: Document) -> str:
-    if isolation["isolated"]:
+def _found(isolation: Isolation, metrics: Metrics) -> str:
+    if isolation.isolated:
         return _one(isolation, metrics)
-    left = isolation["candidates"]
-    return _still_possible(left) if metrics["detection"]["detected"] and left else "none"
+    left = isolation.candidates
+    return _still_possible(left) if metrics.detection.detected and left else "none"
 
 
-def _withdrawn(gone: Sequence[Document]) -> list[str]:
+def _withdrawn(gone: Sequence[Withdrawn]) -> list[str]:
     """What was named before, for how long, each surface once."""
     spans: dict[str, list[float]] = {}
     for one in gone:
-        spans.setdefault(one["fault"], []).append(one["to_s"] - one["from_s"])
+        spans.setdefault(one.fault, []).append(one.to_s - one.from_s)
     said = [
         f"{name} for {_time(times[0])}"
         if len(times) == 1
@@ -339,101 +351,102 @@ def _withdrawn(gone: Sequence[Document]) -> list[str]:
     return [f"named before: {', '.join(said)}"] if said else []
 
 
-def _one(isolation: Document, metrics: Document) -> str:
+def _one(isolation: Isolation | Named, metrics: Metrics) -> str:
     """One named fault: `so far` of a surface that data may yet exclude, as they have every other."""
-    far = " so far" if isolation.get("so_far") else ""
-    when = "" if isolation["delay_s"] is None else f"{',' if far else ''} after {_time(isolation['delay_s'])}"
-    right = "correct" if isolation["correct"] and isolation["type_correct"] is not False else "WRONG"
-    if isolation.get("premature"):
-        right = f"PREMATURE at {_time(isolation['time_s'])}"
+    far = " so far" if isolation.so_far else ""
+    when = "" if isolation.delay_s is None else f"{',' if far else ''} after {_time(isolation.delay_s)}"
+    right = "correct" if isolation.correct and isolation.type_correct is not False else "WRONG"
+    if isolation.premature:
+        right = f"PREMATURE at {_time(isolation.time_s)}"
     size = _estimate(isolation) + _true(isolation, metrics)
-    return f"{isolation['fault']}{far}{when}, {right}{_type(isolation)}{size}"
+    return f"{isolation.fault}{far}{when}, {right}{_type(isolation)}{size}"
 
 
-def _probing(metrics: Document) -> str:
-    instants = metrics["isolation"].get("probing_s")
+def _probing(metrics: Metrics) -> str:
+    instants = metrics.isolation.probing_s
     return f"flap and elevator moved from {_time(instants[0])} to {_time(instants[1])}" if instants else ""
 
 
-def _type(isolation: Document) -> str:
+def _type(isolation: Isolation | Named) -> str:
     """The type, or those still possible; nothing where the class knows no other."""
-    if str(isolation["fault"]).startswith("sensor "):
+    if str(isolation.fault).startswith("sensor "):
         return ""
-    if isolation["type"] is None:
-        left = isolation["candidates"]
+    if isolation.type is None:
+        left = isolation.candidates
         few = len(left) < MOST_LISTED
         return f", {' or '.join(map(_in_words, left)) or 'of no known type' if few else _open_types(left)}"
-    return "" if isolation["type"] == "unanticipated" else f", {isolation['type'].replace('_', ' ')}"
+    return "" if isolation.type == "unanticipated" else f", {isolation.type.replace('_', ' ')}"
 
 
-def _estimate(isolation: Document) -> str:
-    if isolation["estimate"] is None:
+def _estimate(isolation: Isolation | Named) -> str:
+    if isolation.estimate is None:
         return ""
-    if isolation["estimate_deg"] is None:
+    if isolation.estimate_deg is None:
         from beaver_ftc.scenario.faults import TYPES
 
-        said = f"{TYPES[isolation['type']].symbol} {_value(isolation['estimate'])}"
+        said = f"{TYPES[str(isolation.type)].symbol} {_value(isolation.estimate)}"
         return f", estimated {said.strip()}"
-    return f", estimated {_value(isolation['estimate_deg'])} deg"
+    return f", estimated {_value(isolation.estimate_deg)} deg"
 
 
-def _supervisor(metrics: Document) -> str:
-    changes = [f"{change['mode']} {_time(change['time_s'])}" for change in metrics["supervisor"]]
-    left_out = metrics.get("mode_changes_left_out", 0)
+def _supervisor(metrics: Metrics) -> str:
+    changes = [f"{change.mode} {_time(change.time_s)}" for change in metrics.supervisor]
+    left_out = metrics.mode_changes_left_out
     if left_out:
         changes.insert(-1, f"({left_out} more)")
     return " → ".join(changes)
 
 
-def _engine_power(metrics: Document) -> str:
-    power = metrics.get("engine_power")
+def _engine_power(metrics: Metrics) -> str:
+    power = metrics.engine_power
     if not power:
         return ""
-    span = f"{power['lowest_inhg']:.1f} to {power['highest_inhg']:.1f} inHg"
-    return f"took over pitch at {_time(power['from_s'])}, for {_time(power['in_charge_s'])} in all, {span}"
+    span = f"{power.lowest_inhg:.1f} to {power.highest_inhg:.1f} inHg"
+    return f"took over pitch at {_time(power.from_s)}, for {_time(power.in_charge_s)} in all, {span}"
 
 
 MUCH_LEFT = 0.995  # of an axis: nothing to be said
 
 
-def _authority(metrics: Document) -> str:
+def _authority(metrics: Metrics) -> str:
     """For how long no law could have held a rate, if long enough to matter."""
-    axes = metrics.get("authority") or {}
-    beyond_s = {
-        axis: given["beyond_s"] for axis, given in axes.items() if given["beyond_s"] >= LEAST_BEYOND_S
-    }
+    beyond_s = {axis: given.beyond_s for axis, given in _by_axis(metrics) if given.beyond_s >= LEAST_BEYOND_S}
     if not beyond_s:
         return ""
     said = ", ".join(f"{axis} for {_time(time)}" for axis, time in beyond_s.items())
     return f"no deflection at all could hold the rate: {said}"
 
 
-def _left(metrics: Document) -> str:
+def _by_axis(metrics: Metrics) -> list[tuple[str, AxisAuthority]]:
+    of = metrics.authority
+    return [("p", of.p), ("q", of.q), ("r", of.r)] if of else []
+
+
+def _left(metrics: Metrics) -> str:
     """What the surfaces can still do about each axis, where it is less than if all were healthy."""
     said = []
-    for axis, of in (metrics.get("authority") or {}).items():
-        if "least_rad_s2" in of:
-            whole = of["healthy_greatest_rad_s2"] - of["healthy_least_rad_s2"]
-            share = (of["greatest_rad_s2"] - of["least_rad_s2"]) / whole
-            most = of.get("engines_greatest_rad_s2", 0.0)
+    for axis, of in _by_axis(metrics):
+        ends = of.least_rad_s2, of.greatest_rad_s2, of.healthy_least_rad_s2, of.healthy_greatest_rad_s2
+        if None not in ends:
+            least, greatest, healthy_least, healthy_greatest = map(float, ends)  # type: ignore[arg-type]
+            share, most = (greatest - least) / (healthy_greatest - healthy_least), of.engines_greatest_rad_s2
             if share < MUCH_LEFT or most:
-                span = f"{of['least_rad_s2']:.2g} to {of['greatest_rad_s2']:.2g} rad/s2"
-                engines = f", and engines {of['engines_least_rad_s2']:.2g} to {most:.2g}" if most else ""
-                said.append(f"{axis} {share:.0%}, {span}{engines}")
+                engines = f", and engines {of.engines_least_rad_s2:.2g} to {most:.2g}" if most else ""
+                said.append(f"{axis} {share:.0%}, {least:.2g} to {greatest:.2g} rad/s2{engines}")
     return f"of what all surfaces together give: {'; '.join(said)}" if said else ""
 
 
-def _envelope(metrics: Document) -> str:
-    exits = metrics["envelope_exits"]
+def _envelope(metrics: Metrics) -> str:
+    exits = metrics.envelope_exits
     if not exits:
         return ""
-    count, total_s = metrics["envelope"]["exits"], metrics["envelope"]["outside_s"]
-    return f"left {count} time(s), {_time(total_s)} in all, first at {_time(exits[0]['start_s'])}"
+    count, total_s = metrics.envelope.exits, metrics.envelope.outside_s
+    return f"left {count} time(s), {_time(total_s)} in all, first at {_time(exits[0].start_s)}"
 
 
-def _departure(metrics: Document) -> str:
-    departure = metrics["departure"]
-    return f"LOST at {_time(departure['time_s'])}: {departure['signal']}" if departure else ""
+def _departure(metrics: Metrics) -> str:
+    departure = metrics.departure
+    return f"LOST at {_time(departure.time_s)}: {departure.signal}" if departure else ""
 
 
 # What of a link's counts is worth a word, if there was any.
@@ -443,22 +456,24 @@ _COUNTED = {
 }  # fmt: skip
 
 
-def _link(metrics: Document) -> str:
+def _link(metrics: Metrics) -> str:
     """How an autopilot was served; nothing where a law of ours flew."""
-    link = metrics.get("link")
+    link = metrics.link
     if not link:
         return ""
-    latency, interval = link["latency_ms"], link["interval_ms"]
-    odd = "".join(f", {link[name]} {words}" for name, words in _COUNTED.items() if link[name])
-    times = (
-        f"answered in {latency['median']:.2f} ms (99 %: {latency['p99']:.2f}), asked every "
-        f"{interval['mean']:.2f} ms, jitter {interval['jitter_rms']:.2f} ms RMS"
+    latency, interval = link.latency_ms, link.interval_ms
+    odd = "".join(
+        f", {getattr(link, name)} {words}" for name, words in _COUNTED.items() if getattr(link, name)
     )
-    return f"{link['protocol']}, {link['frames']} frames at {link['packets_hz']:g} Hz{odd}; {times}"
+    times = (
+        f"answered in {latency.median:.2f} ms (99 %: {latency.p99:.2f}), asked every "
+        f"{interval.mean:.2f} ms, jitter {interval.jitter_rms:.2f} ms RMS"
+    )
+    return f"{link.protocol}, {link.frames} frames at {link.packets_hz:g} Hz{odd}; {times}"
 
 
-def _saturation(metrics: Document) -> str:
-    return ", ".join(f"{surface} {_time(time)}" for surface, time in metrics["saturation_s"].items() if time)
+def _saturation(metrics: Metrics) -> str:
+    return ", ".join(f"{surface} {_time(time)}" for surface, time in metrics.saturation_s.items() if time)
 
 
 def _bound(expected: Any) -> str:
@@ -466,16 +481,18 @@ def _bound(expected: Any) -> str:
     return f"≤ {_value(expected)}" if at_most else _value(expected)
 
 
-def _time(seconds: float) -> str:
+def _time(seconds: float | None) -> str:
+    if seconds is None:
+        return "none"
     return f"{seconds:.2f} s" if seconds < 1000 else f"{seconds:.1f} s"
 
 
 def _value(value: Any) -> str:
     """A value of the metrics for people: what is expected, and what came out, of any key of `expect:`."""
-    if value is None or value == []:
+    if value is None or value == ():
         return "none"
     if isinstance(value, bool):
         return "yes" if value else "no"
-    if isinstance(value, list):
+    if isinstance(value, tuple):
         return ", ".join(_value(entry) for entry in value)
     return value if isinstance(value, str) else f"{value:.3g}"

@@ -21,7 +21,7 @@ from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.extensions import required
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import as_json, metrics
-from beaver_ftc.results.model import Document
+from beaver_ftc.results.model import Document, Metrics
 
 if TYPE_CHECKING:
     from beaver_ftc.plant.adapter import Plant
@@ -96,7 +96,7 @@ def run(
             from beaver_ftc.results.exports import write_acmi
 
             with _kept_whatever(folder, "flight.acmi", failed):
-                write_acmi(log_path, document, folder / "flight.acmi", aircraft)
+                write_acmi(log_path, Metrics.of(document), folder / "flight.acmi", aircraft)
         if recording is not None:
             from beaver_ftc.results.exports import write_recording
 
@@ -161,7 +161,7 @@ def write_report_files(folder: Path, document: Document, to: Path | None = None)
     from beaver_ftc.results.figures import write_figures
     from beaver_ftc.results.report import write_report
 
-    write_figures(folder / "log.parquet", document, (to or folder) / "figures")
+    write_figures(folder / "log.parquet", Metrics.of(document), (to or folder) / "figures")
     write_report((to or folder) / "report.html", [folder])
 
 

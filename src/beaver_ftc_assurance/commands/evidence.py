@@ -79,8 +79,8 @@ def _fly(plan: "EvidencePlan", arguments: Arguments) -> dict[str, Any]:
 
 def _replay(plan: "EvidencePlan", arguments: Arguments) -> dict[str, Any]:
     """Fly one flight into a result folder of its own; what JUnit XML says of it."""
+    from beaver_ftc.results import Metrics, verdict_text
     from beaver_ftc.results import run_scenario as run
-    from beaver_ftc.results import verdict_text
     from beaver_ftc_assurance.evidence.shown import of_flight
 
     scenario, requirements = of_flight(plan, str(arguments.replay))
@@ -91,7 +91,7 @@ def _replay(plan: "EvidencePlan", arguments: Arguments) -> dict[str, Any]:
     said = document | {"folder": folder, "requirements": lines, "passed": meets}
 
     def text() -> str:
-        return "\n".join([verdict_text(document, folder, sys.stdout.isatty()).rstrip(), *lines])
+        return "\n".join([verdict_text(Metrics.of(document), folder, sys.stdout.isatty()).rstrip(), *lines])
 
     answer(arguments.format, said, text)
     return {"scenario": scenario.name, "passed": meets, "expectations": requirements}

@@ -15,7 +15,7 @@ from beaver_ftc.aircraft import load
 from beaver_ftc.results.exports import RECORDINGS, write_acmi, write_csv, write_recording
 from beaver_ftc.results.junit import write_junit
 from beaver_ftc.results.log import ParquetLog
-from beaver_ftc.results.metrics import metrics
+from beaver_ftc.results.metrics import measure
 from beaver_ftc_logs.readers import read_flight
 from results.synthetic import Flight
 
@@ -70,7 +70,7 @@ _PLACED = ("longitude", "latitude", "altitude", "roll", "pitch", "yaw")
 
 
 def test_every_property_of_the_tacview_recording(path, columns, tmp_path):
-    write_acmi(path, metrics(Flight()), tmp_path / "flight.acmi")
+    write_acmi(path, measure(Flight()), tmp_path / "flight.acmi")
     found = {}
     for line in (tmp_path / "flight.acmi").read_text().splitlines():
         if line.startswith("b1,T="):

@@ -5,6 +5,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from beaver_ftc.results.log import ParquetLog
+from beaver_ftc.results.model import Metrics
 from beaver_ftc.results.style import marks
 from beaver_ftc.studies.mismatch import charts
 from beaver_ftc.studies.mismatch.linear import analyse, linear_document
@@ -67,7 +68,7 @@ def all_of(figure):
 
 
 def test_the_sources_over_the_bound(found, frames, changed):
-    assert not changed(all_of(charts.sources_figure(frames, found, marks(FLOWN))))
+    assert not changed(all_of(charts.sources_figure(frames, found, marks(Metrics.of(FLOWN)))))
 
 
 def test_only_sources_that_an_eye_can_tell_from_zero_are_drawn(found):

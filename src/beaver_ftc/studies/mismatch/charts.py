@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from beaver_ftc.aircraft import AXES
+from beaver_ftc.results.model import Metrics
 from beaver_ftc.results.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION, Mark, marks
 from beaver_ftc.results.views import read_series
 from beaver_ftc.studies.linear_systems import CHANNELS, pulse_response, response, zeros
@@ -51,7 +52,7 @@ def figures(folder: Path, found: Document, flown: Document, analysis: LinearAnal
     """Of the mismatch of a result folder that holds `mismatch.parquet`, by the name of their files."""
     name = found["scenario"]
     return {
-        "mismatch-sources.png": sources_figure(folder / "mismatch.parquet", found, marks(flown)),
+        "mismatch-sources.png": sources_figure(folder / "mismatch.parquet", found, marks(Metrics.of(flown))),
         "mismatch-bound.png": bound_figure(found),
         "mismatch-linear.png": linear_figure(analysis, name),
         "mismatch-zeros.png": zeros_figure(analysis, name),

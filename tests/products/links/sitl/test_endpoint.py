@@ -22,6 +22,7 @@ from tools.autopilots.small import Small
 import beaver_ftc as bf
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results import verdict
+from beaver_ftc.results.model import Metrics
 from beaver_ftc_links.commands import address
 from beaver_ftc_links.sitl import Protocol
 from beaver_ftc_links.sitl import serve as serving
@@ -279,7 +280,9 @@ def test_an_interrupted_flight_is_not_passed(protocol):
         False,
         pytest.approx(endpoint.vehicle.flight.t_s),
     )
-    assert verdict.title(document).endswith(f"INTERRUPTED at {document['interrupted_s']:.2f} s, not passed")
+    assert verdict.title(Metrics.of(document)).endswith(
+        f"INTERRUPTED at {document['interrupted_s']:.2f} s, not passed"
+    )
     assert any(line.startswith("interrupted at ") for line in said)
 
 

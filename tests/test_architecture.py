@@ -51,7 +51,7 @@ FLOORS = (
 )
 TOOLS = FLOORS[2]
 # Their rows name what is far above them, for those who ask; the same for other packages.
-REGISTRIES = {"plugins", "commands"}
+REGISTRIES = {"plugins", "commands", "extensions"}
 
 
 @cache

@@ -26,10 +26,13 @@ from typing import Any
 from beaver_ftc.documents.errors import BadInput
 
 __all__ = [
-    "SERVICES", "WHEN_IMPORTED", "entries", "folders", "loaded", "offered", "required", "watch_imports",
+    "OF_THE_CORE", "SERVICES", "WHEN_IMPORTED", "entries", "folders", "loaded", "offered", "required",
+    "watch_imports",
 ]  # fmt: skip
 
 SERVICES, WHEN_IMPORTED = "beaver_ftc.services", "beaver_ftc.when_imported"
+# Services of the core itself, for what stands on a lower floor; no package can replace them.
+OF_THE_CORE = {"admit": "beaver_ftc.plant.admission:admit"}
 _METADATA = (".dist-info", ".egg-info")
 
 
@@ -96,7 +99,7 @@ def loaded(target: str) -> Any:
 
 def offered(service: str) -> Callable[..., Any] | None:
     """The function of a service; None if no installed package offers it."""
-    target = entries(SERVICES).get(service)
+    target = OF_THE_CORE.get(service) or entries(SERVICES).get(service)
     return None if target is None else loaded(target)
 
 

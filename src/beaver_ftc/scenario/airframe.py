@@ -20,8 +20,9 @@ _CHECKED: ContextVar[tuple[Aircraft, str | None] | None] = ContextVar("aircraft"
 def find_aircraft(reference: str = DEFAULT, beside: Path | None = None) -> Aircraft:
     """The aircraft of a name, `jsbsim:NAME` or `./FOLDER`; `beside` is the folder to find that in.
 
-    One of the jsbsim package is derived at its first use, one of the user's own compared with its model then;
-    both say so on standard error. Raises as `beaver_ftc.aircraft.load`.
+    One of the jsbsim package is derived at its first use. One of the user's own is checked, and compared with
+    its model; the product that derives says so on standard error. Raises as `beaver_ftc.aircraft.load`, and
+    as `plant.admission.admit`.
     """
     try:
         aircraft = load(reference, beside)
@@ -31,8 +32,10 @@ def find_aircraft(reference: str = DEFAULT, beside: Path | None = None) -> Aircr
         except BeaverFtcError as error:
             raise UnknownAircraft(str(error)) from None
         aircraft = load(reference, beside)
-    if reference.startswith(BESIDE) and (compare := offered("compare")):
-        compare(aircraft)
+    if reference.startswith(BESIDE):
+        required("admit", reference)(aircraft)
+        if compare := offered("compare"):
+            compare(aircraft)
     return aircraft
 
 

@@ -1,34 +1,23 @@
 """An aircraft that a scenario names for the first time: derived, or its file compared with its JSBSim model.
 
-Compared are the angular accelerations of both. What was found is kept in the user's cache under the digest of
-the folder's files, so that it costs nothing until one of them changes.
+Compared are the angular accelerations of both, of an aircraft that the core has admitted. The differences are
+kept in the user's cache under the digest of the folder's files, so that they cost nothing until one changes.
 """
 
 import contextlib
-import hashlib
 import json
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from functools import lru_cache
-from importlib.metadata import version
 from math import degrees
-from pathlib import Path
 
 import numpy as np
 
 from beaver_ftc.aircraft import AIRCRAFT_FILE as FILE
-from beaver_ftc.aircraft import AXES, FROM_JSBSIM, Aircraft, AircraftFile, is_derived
+from beaver_ftc.aircraft import AXES, FROM_JSBSIM, Aircraft, is_derived
 from beaver_ftc.design import inertia_coefficients
-from beaver_ftc.documents import (
-    BeaverFtcError,
-    Location,
-    Problem,
-    ScenarioError,
-    SimulationFailed,
-    cache_base,
-    parse_document,
-)
-from beaver_ftc.plant import Plant, check_model_has_no_side_effects, failure_of_trial, translated
+from beaver_ftc.documents import BeaverFtcError, cache_base
+from beaver_ftc.plant import Plant, digest_of_aircraft, translated
 from beaver_ftc.plant import trim_plant as trim
 from beaver_ftc.scenario import Bounds
 from beaver_ftc.studies.engine import write_whole
@@ -38,7 +27,6 @@ from beaver_ftc_aircraft.derive.outline import usual_start
 from beaver_ftc_aircraft.derive.sample import FRESH, SIDESLIP_RAD, Envelope, Moves, Samples, sample, sorted_in
 
 STATES, STARTS, SEED = 800, 8, 11
-_FORMAT = 2  # of what is kept: files of another are compared anew
 
 
 def derive_if_needed(reference: str) -> None:
@@ -61,83 +49,30 @@ def _say(line: str) -> None:
 
 
 def kept_or_compared(aircraft: Aircraft) -> list[str]:
-    """A line for each axis on which the model exceeds what the file declares, found now or earlier.
-
-    Raises BadInput as `check_model_has_no_side_effects`, and as `compared`; ScenarioError, too, where JSBSim
-    does not survive the model: that is tried in a process of its own.
-    """
-    check_model_has_no_side_effects(aircraft.jsbsim)
+    """A line for each axis on which the model exceeds what the file declares, found now or earlier."""
     base = cache_base()
     if base is None:
-        return _tried_and_compared(aircraft)
-    file = base / "compared" / f"{_digest(aircraft.folder)}.json"
+        return compared(aircraft)
+    file = base / "compared" / f"{digest_of_aircraft(aircraft.folder)}.json"
     try:
         return list(json.loads(file.read_text(encoding="utf-8")))
     except (OSError, ValueError):
-        lines = _tried_and_compared(aircraft)
+        lines = compared(aircraft)
     with contextlib.suppress(OSError):  # nowhere to keep it, or another process was first
         file.parent.mkdir(parents=True, exist_ok=True)
         write_whole(file, json.dumps(lines).encode())
     return lines
 
 
-def _tried_and_compared(aircraft: Aircraft) -> list[str]:
-    if why := failure_of_trial(aircraft.jsbsim):
-        raise _bad(aircraft, {("jsbsim",): f"{why}, allowed: a model that JSBSim loads and flies"})
-    return compared(aircraft)
-
-
-def _digest(folder: Path) -> str:
-    digest = hashlib.sha256(f"{_FORMAT} {version('jsbsim')}".encode())
-    for path in sorted(p for p in folder.rglob("*") if p.suffix in (".xml", ".yaml") and p.is_file()):
-        digest.update(str(path.relative_to(folder)).encode() + path.read_bytes())
-    return digest.hexdigest()[:32]
-
-
 def compared(aircraft: Aircraft) -> list[str]:
-    """A line for each axis on which the model exceeds what the file declares; or why none is compared.
-
-    Raises ScenarioError where JSBSim cannot load the model, or the model lacks a property of the file.
-    """
-    plant = _loaded(aircraft)
+    """A line for each axis on which the model exceeds what the file declares; or why none is compared."""
+    plant = Plant(100, aircraft=aircraft)
     try:
         with translated(aircraft.jsbsim):
             samples = _samples(aircraft, plant)
     except BeaverFtcError as error:
         return [f"it is not compared with {aircraft.file.jsbsim}: {error}"]
     return list(_lines(aircraft, samples))
-
-
-def _loaded(aircraft: Aircraft) -> Plant:
-    try:
-        plant = Plant(100, aircraft=aircraft)
-    except SimulationFailed as error:
-        raise _bad(aircraft, {("jsbsim",): f"{error}, allowed: a model that JSBSim loads"}) from None
-    says = f"is no property of {aircraft.file.jsbsim}, allowed: one that it has"
-    wrong = {at: f"{name!r} {says}" for at, name in _properties(aircraft.file) if not plant.has(name)}
-    if wrong:
-        raise _bad(aircraft, wrong)
-    return plant
-
-
-def _properties(file: AircraftFile) -> Iterator[tuple[Location, str]]:
-    """Each property the file names, and where."""
-    for name, surface in file.surfaces.items():
-        for key in ("command", "position", "effective"):
-            yield ("surfaces", name, key), getattr(surface, key)
-    for name, signal in file.signals.items():
-        yield ("signals", name, "property"), signal.property
-    yield ("trim", "throttle"), file.trim.throttle
-    for kind in ("settings", "limits"):
-        for name, of in getattr(file.engine, kind).items():
-            yield ("engine", kind, name, "property"), of.property
-
-
-def _bad(aircraft: Aircraft, says: Mapping[Location, str]) -> ScenarioError:
-    """These mistakes, at their lines."""
-    path = aircraft.folder / FILE
-    lines = parse_document(path.read_text(encoding="utf-8"), str(path))
-    return ScenarioError(str(path), [Problem(lines.line(at), at, what) for at, what in says.items()])
 
 
 def _samples(aircraft: Aircraft, plant: Plant) -> Samples:

@@ -6,6 +6,7 @@ import pytest
 from beaver_ftc.aircraft.loading import read
 from beaver_ftc.design.model import inertia_coefficients
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.plant import Plant
 from beaver_ftc_aircraft.derive import first_use, fit
 from kept import in_short
 
@@ -59,7 +60,7 @@ def test_nothing_is_promised_of_what_is_no_aircraft(monkeypatch, tmp_path, capsy
 
 def test_states_are_drawn_over_the_envelope_from_engines_just_started(changed):
     trainer = read(TRAINER)
-    samples = first_use._samples(trainer, first_use._loaded(trainer))
+    samples = first_use._samples(trainer, Plant(100, aircraft=trainer))
     assert len(samples) == 800
     assert not samples.age.any()
     low, high = samples.y[:, 2].min(), samples.y[:, 2].max()

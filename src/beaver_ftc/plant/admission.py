@@ -1,0 +1,87 @@
+"""A user's own aircraft is checked as a scenario names it, before JSBSim loads its model in this process.
+
+Its files are read for what would act on the machine. A process of its own loads and flies the model
+(trial.py). Every property that the aircraft file names must be one of the model. The user's cache keeps the
+digest of a folder that has passed: the last two checks are not repeated until a file changes.
+"""
+
+import contextlib
+import hashlib
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+from importlib.metadata import version
+from pathlib import Path
+
+from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.aircraft.loading import FILE
+from beaver_ftc.aircraft.schema import AircraftFile
+from beaver_ftc.documents.document import Location, Problem
+from beaver_ftc.documents.errors import SimulationFailed
+from beaver_ftc.documents.paths import cache_base
+from beaver_ftc.documents.problems import ScenarioError
+from beaver_ftc.documents.validation import parse_document
+from beaver_ftc.plant.adapter import Plant
+from beaver_ftc.plant.model_file import check_model_has_no_side_effects
+from beaver_ftc.plant.trial import failure
+
+_FORMAT = 3  # of what is checked: aircraft admitted by another are checked anew
+
+
+@lru_cache(maxsize=32)
+def admit(aircraft: Aircraft) -> None:
+    """Check an aircraft, once a process.
+
+    Raises BadInput as `check_model_has_no_side_effects`, and ScenarioError at the line of the aircraft file
+    where JSBSim does not load or fly the model, or where the model lacks a property.
+    """
+    check_model_has_no_side_effects(aircraft.jsbsim)
+    base = cache_base()
+    kept = None if base is None else base / "admitted" / digest_of(aircraft.folder)
+    if kept is not None and kept.is_file():
+        return
+    if why := failure(aircraft.jsbsim):
+        raise _mistakes(aircraft, {("jsbsim",): f"{why}, allowed: a model that JSBSim loads and flies"})
+    _check_properties(aircraft)
+    if kept is not None:
+        with contextlib.suppress(OSError):  # nowhere to keep it: checked again the next time
+            kept.parent.mkdir(parents=True, exist_ok=True)
+            kept.touch()
+
+
+def digest_of(folder: Path) -> str:
+    """Of the files of an aircraft's folder, and of JSBSim's version."""
+    digest = hashlib.sha256(f"{_FORMAT} {version('jsbsim')}".encode())
+    for path in sorted(p for p in folder.rglob("*") if p.suffix in (".xml", ".yaml") and p.is_file()):
+        digest.update(str(path.relative_to(folder)).encode() + path.read_bytes())
+    return digest.hexdigest()[:32]
+
+
+def _check_properties(aircraft: Aircraft) -> None:
+    try:
+        plant = Plant(100, aircraft=aircraft)
+    except SimulationFailed as error:
+        raise _mistakes(aircraft, {("jsbsim",): f"{error}, allowed: a model that JSBSim loads"}) from None
+    says = f"is no property of {aircraft.file.jsbsim}, allowed: one that it has"
+    wrong = {at: f"{name!r} {says}" for at, name in _properties(aircraft.file) if not plant.has(name)}
+    if wrong:
+        raise _mistakes(aircraft, wrong)
+
+
+def _properties(file: AircraftFile) -> Iterator[tuple[Location, str]]:
+    """Each property the file names, and where."""
+    for name, surface in file.surfaces.items():
+        for key in ("command", "position", "effective"):
+            yield ("surfaces", name, key), getattr(surface, key)
+    for name, signal in file.signals.items():
+        yield ("signals", name, "property"), signal.property
+    yield ("trim", "throttle"), file.trim.throttle
+    for kind in ("settings", "limits"):
+        for name, of in getattr(file.engine, kind).items():
+            yield ("engine", kind, name, "property"), of.property
+
+
+def _mistakes(aircraft: Aircraft, says: Mapping[Location, str]) -> ScenarioError:
+    """These mistakes, at their lines."""
+    path = aircraft.folder / FILE
+    lines = parse_document(path.read_text(encoding="utf-8"), str(path))
+    return ScenarioError(str(path), [Problem(lines.line(at), at, what) for at, what in says.items()])

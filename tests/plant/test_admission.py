@@ -1,0 +1,64 @@
+"""A user's own aircraft: checked as a scenario names it, by the core alone, once for a state of its files."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from beaver_ftc.aircraft.loading import read
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents.problems import ScenarioError
+from beaver_ftc.plant import admission
+from beaver_ftc.scenario import airframe
+
+TRAINER = Path(__file__).parents[1] / "data" / "aircraft" / "trainer"
+
+
+@pytest.fixture
+def trainer(tmp_path, monkeypatch):
+    """A copy of the trainer to change, and a cache of its own; no product is installed."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setattr(airframe, "offered", lambda service: None)
+    shutil.copytree(TRAINER, tmp_path / "trainer")
+    return tmp_path / "trainer"
+
+
+def change(file, old, new):
+    text = file.read_text()
+    assert old in text
+    file.write_text(text.replace(old, new))
+
+
+def test_a_property_that_the_model_lacks_is_said_at_its_line(trainer):
+    file = trainer / "aircraft.yaml"
+    change(file, "fcs/elevator-pos-rad", "fcs/no-such-rad")
+    line = 1 + next(i for i, text in enumerate(file.read_text().splitlines()) if "no-such" in text)
+    with pytest.raises(ScenarioError, match=f"aircraft.yaml:{line}: .*'fcs/no-such-rad' is no property of"):
+        airframe.find_aircraft("./trainer", trainer.parent)
+
+
+def test_a_model_that_jsbsim_refuses_is_not_loaded_here(trainer, monkeypatch):
+    monkeypatch.setattr(admission, "failure", lambda model: "it ends JSBSim by signal 11")
+    monkeypatch.setattr(admission, "Plant", lambda *a, **k: pytest.fail("loaded in this process"))
+    with pytest.raises(ScenarioError, match="jsbsim: it ends JSBSim by signal 11, allowed: a model that"):
+        airframe.find_aircraft("./trainer", trainer.parent)
+
+
+def test_a_model_that_would_write_is_refused_each_time_whatever_the_cache_has(trainer):
+    admission.admit(read(trainer))
+    assert len(list(trainer.parent.rglob("admitted/*"))) == 1
+    change(trainer / "trainer.xml", "</fdm_config>", '<output name="/tmp/x.csv" type="CSV"/></fdm_config>')
+    (trainer / "aircraft.yaml").touch()
+    with pytest.raises(BadInput, match="output"):
+        admission.admit.__wrapped__(read(trainer))
+
+
+def test_it_is_tried_once_for_each_state_of_the_files(trainer, monkeypatch):
+    tried = []
+    monkeypatch.setattr(admission, "failure", tried.append)
+    for _ in range(2):
+        admission.admit.__wrapped__(read(trainer))
+    assert len(tried) == 1
+    change(trainer / "trainer.xml", "<fdm_config", "<!-- another state --><fdm_config")
+    admission.admit.__wrapped__(read(trainer))
+    assert len(tried) == 2

@@ -42,19 +42,26 @@ def pytest_addoption(parser):
 
 # Files that take a worker longest: begun last, they would keep it while the other has nothing to do.
 LONGEST = (
-    "cli/test_command_line.py", "live/page/test_session.py", "aircraft/derive/test_derive.py",
-    "diagnosis/test_short_flights.py", "live/challenge/test_cheats.py",
-    "studies/mismatch/test_command.py", "control/outer/test_thrust_of_others.py", "tools/test_mutants.py",
-    "compiled/test_cache.py", "tools/test_site.py", "studies/compare/test_compare.py",
-    "aircraft/test_engines.py", "diagnosis/test_frames_kernels.py", "diagnosis/test_redundancy_kernels.py",
+    "aircraft/derive/test_derive.py", "cli/test_command_line.py", "compiled/test_cache.py",
+    "plugins/test_pytest_plugin.py", "live/page/test_guests.py", "live/page/test_server.py",
+    "diagnosis/test_new_type.py", "live/challenge/test_cheats.py", "studies/sweep/test_ray.py",
+    "studies/matrix/test_matrix.py", "studies/mismatch/test_command.py", "logs/test_commands.py",
+    "compiled/test_strangers.py", "studies/sweep/test_campaign.py", "studies/power/test_survey.py",
+    "diagnosis/test_short_flights.py", "control/outer/test_thrust_of_others.py", "tools/test_mutants.py",
+    "studies/compare/test_compare.py", "aircraft/test_engines.py", "diagnosis/test_air_kernels.py",
 )  # fmt: skip
+
+
+def _rank(file):
+    """The place of a file among the longest, the longest first."""
+    return next((k for k, longest in enumerate(LONGEST) if file.endswith(longest)), len(LONGEST))
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
     """The longest files come first; what tests/nightly.yaml keeps for the night has the mark `nightly`."""
     files = [item.nodeid.partition("::")[0] for item in items]
-    ranks = {file: (not file.endswith(LONGEST), file) for file in files}
+    ranks = {file: (_rank(file), file) for file in files}
     items.sort(key=lambda item: ranks[item.nodeid.partition("::")[0]])
     seen = set()
     for item in items:

@@ -1,4 +1,4 @@
-"""A Ray cluster of several nodes on this machine: the same table as local processes, whatever nodes do."""
+"""A Ray cluster on this machine: the same table as local processes, whatever its nodes do."""
 
 import time
 
@@ -15,12 +15,11 @@ ray = pytest.importorskip("ray", reason="Ray is not installed: pip install 'beav
 def cluster():
     from ray.cluster_utils import Cluster
 
-    head = {"num_cpus": 1, "include_dashboard": False}
+    head = {"num_cpus": 2, "include_dashboard": False}
     try:
         nodes = Cluster(initialize_head=True, head_node_args=head)
     except Exception as error:
         pytest.skip(f"no Ray cluster can be started here: {error}")
-    nodes.add_node(num_cpus=1)
     ray.init(address=nodes.address, log_to_driver=False)
     yield nodes
     ray.shutdown()

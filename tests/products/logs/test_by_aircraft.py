@@ -209,6 +209,12 @@ def test_turbulence_wants_the_attitude(log, tmp_path):
         diagnose_as(recording, level, rough)
 
 
+def test_a_scenario_is_of_its_aircraft_by_name_whatever_it_calls_it(monkeypatch):
+    elsewhere = bf.load("fault-free").model_copy(update={"aircraft": "./elsewhere"})
+    monkeypatch.setattr("beaver_ftc.scenario.load_scenario", lambda given: elsewhere)
+    assert known("beaver", "any").aircraft.name == "beaver"
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [

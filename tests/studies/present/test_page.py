@@ -77,8 +77,9 @@ def test_whatever_a_page_shows_is_text_and_never_markup(tmp_path):
         text(1), Heading(text(2)), Table((text(3), "verdict"), [(text(4), text(5))], {text(5): True}),
         Bullets(text(6), [text(7)]), Pictures([(text(8), "one")]),
     ]  # fmt: skip
-    made = as_html(text(0), parts, {"one": picture})
+    made = as_html(text(0), [*parts, "fly `it` again"], {"one": picture})
     assert "<i>" not in made
+    assert "<p>fly it again</p>" in made
     assert re.findall("&lt;i&gt;(.)&lt;/i&gt; &amp; &quot;more&quot;", made.partition("</title>")[2]) == [
         str(n) for n in range(9)
     ]

@@ -206,6 +206,21 @@ def test_what_a_worker_answers():
     assert isinstance(asked[2], SimulationFailed)
 
 
+def test_a_reset_answers_nothing_and_what_goes_wrong_is_the_answer():
+    """Not what the step before it answered."""
+    begun = []
+    made = SimpleNamespace(
+        _answer=None, _step=lambda: {0: {"metrics": "a"}}, _begin=lambda *of: begun.append(of)
+    )
+    gym._Episodes.tell(made, gym._STEP)
+    assert made._answer == {0: {"metrics": "a"}}
+    gym._Episodes.tell(made, pickle.dumps([7, None]))
+    assert (made._answer, begun) == ({}, [(0, 7), (1, None)])
+    made._step = lambda: 1 / 0
+    gym._Episodes.tell(made, gym._STEP)
+    assert isinstance(made._answer, ZeroDivisionError)
+
+
 def test_answers_of_all_are_one_by_gymnasiums_rule():
     told = [{0: {"metrics": "a"}}, {}, {2: {"metrics": "b", "other": 1}}]
     workers = [SimpleNamespace(answer=lambda said=said: said) for said in told]

@@ -1,5 +1,7 @@
 """From the ground and back: at rest on the wheels, a circuit under the small autopilot, what is refused."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from tools.autopilots import peers
@@ -11,6 +13,7 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.ground import lay
 from beaver_ftc.plant.state import FlightState
+from beaver_ftc_links.sitl import vehicle as vehicle_module
 from beaver_ftc_links.sitl.ardupilot import Ardupilot
 from beaver_ftc_links.sitl.link import Link
 from beaver_ftc_links.sitl.mavlink import Mavlink
@@ -191,3 +194,23 @@ def test_an_aircraft_that_knows_no_ground_does_not_stand():
     (problem,) = error.value.errors()
     says = "trainer's file has no `ground` to stand on, allowed: false"
     assert problem["ctx"]["conflicts"] == [(("on_ground",), says)]
+
+
+@pytest.mark.parametrize("broken", [True, False])
+def test_a_diagnosis_that_begins_again_is_said_to_run_since_it_first_did(monkeypatch, broken):
+    """The sensor monitor is enabled where an instrument has been broken meanwhile."""
+    taken, watched = [], []
+    monkeypatch.setattr(
+        vehicle_module, "take_diagnosis", lambda frame, fresh, n: taken.append((frame, fresh, n))
+    )
+    monkeypatch.setattr(vehicle_module, "diagnosis_record", lambda fresh: f"record of {fresh}")
+    loop = SimpleNamespace(sensor_schedule=SimpleNamespace(any=broken), scenario="case")
+    loop.enable_watch = lambda record, of: watched.append((record, of))
+    flown = SimpleNamespace(
+        _loop=loop, _fresh=["fresh"], _frame="frame", _diagnoses=False, listens_from_s=None
+    )
+    for flown._now_s, flown._next in (3.0, 300), (9.0, 900):
+        Flown._begin_diagnosis(flown)
+    assert (flown.listens_from_s, flown._diagnoses) == (3.0, True)
+    assert taken == [("frame", "fresh", 300), ("frame", "fresh", 900)]
+    assert watched == [("record of fresh", "case")] * (2 * broken)

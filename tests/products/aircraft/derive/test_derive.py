@@ -1,6 +1,8 @@
 """Aircraft nobody wrote by hand: derived from JSBSim, flown with the measured error as the bound."""
 
 import hashlib
+import os
+import shutil
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +14,7 @@ from tools.autopilots.small import Small
 from typer.testing import CliRunner
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.aircraft.loading import first_line, read
+from beaver_ftc.aircraft.loading import derived_folder, first_line, read
 from beaver_ftc.cli.main import app
 from beaver_ftc.design.context import DesignFunctions
 from beaver_ftc.design.model import design_record
@@ -50,7 +52,18 @@ reference:
 @pytest.fixture(scope="module", params=["c172p", pytest.param("737", marks=pytest.mark.nightly)])
 def derived(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp("derived")
-    return derive(f"jsbsim:{request.param}", folder), folder, request.param
+    made = derive(f"jsbsim:{request.param}", folder)
+    keep(folder / request.param)
+    return made, folder, request.param
+
+
+def keep(made):
+    """Scenarios of other tests, if nothing is kept yet, find here what they would derive for seconds."""
+    kept = derived_folder(made.name)
+    part = kept.with_name(f"{made.name}-{os.getpid()}")
+    if not kept.exists():
+        shutil.copytree(made, part)
+        part.rename(kept)
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ from test_random_faults import drawn
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.loop.loop import fly
-from beaver_ftc.results.metrics import metrics
+from beaver_ftc.results.metrics import measure
 from beaver_ftc.studies.matrix.fault_matrix import declared, run_matrix, verdict
 from flying import scenario
 from samples import samples
@@ -58,7 +58,7 @@ def test_random_faults_are_not_named_wrongly():
     for _ in range(FLIGHTS):
         flight = fly(random_flight(rng, faulty=True))
         fault = flight.scenario.faults[0]
-        said = verdict(metrics(flight), fault.actuator, fault.type)
+        said = verdict(measure(flight), fault.actuator, fault.type)
         named += said in ("named", "surface")
         if said == "WRONG" or (said == "surface" and not flight.candidates):
             wrong.append((fault, flight.isolated, flight.isolation_type, flight.candidates))

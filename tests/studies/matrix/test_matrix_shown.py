@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from beaver_ftc.results.model import Metrics
 from beaver_ftc.studies.matrix import fault_matrix
 from beaver_ftc.studies.matrix.fault_matrix import (
     FAULTS,
@@ -214,4 +215,4 @@ def test_a_run_of_the_whole_matrix(monkeypatch, tmp_path):
 def test_a_verdict(isolation, said):
     nothing = {"fault": None, "type": None, "candidates": [], "type_correct": None}
     document = {"detection": {"detected": True}, "false_alarm": False, "isolation": nothing | isolation}
-    assert verdict(document, "elevator", "stuck") == said
+    assert verdict(Metrics.of(document), "elevator", "stuck") == said

@@ -3,7 +3,7 @@
 import numpy as np
 
 from beaver_ftc.loop.loop import fly
-from beaver_ftc.results.metrics import metrics
+from beaver_ftc.results.metrics import measure
 from beaver_ftc.studies.matrix.fault_matrix import verdict
 from flying import scenario
 from samples import samples
@@ -72,7 +72,7 @@ def flown(flights, **more):
     for _ in range(flights):
         flight = fly(flight_of(rng, **more))
         fault = flight.scenario.faults[0]
-        said = verdict(metrics(flight), fault.actuator, fault.type)
+        said = verdict(measure(flight), fault.actuator, fault.type)
         named += said in ("named", "surface")
         if said == "WRONG":
             wrong.append((fault, flight.isolated, flight.isolation_type, flight.candidates))

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from beaver_ftc.results.model import Metrics
 from beaver_ftc.scenario.loader import load_scenario
 from beaver_ftc.studies.mismatch import bound
 from beaver_ftc.studies.mismatch.bound import (
@@ -123,7 +124,7 @@ def test_the_smallest_constant_would_have_covered_the_run_and_less_would_not():
     needed = [b.smallest_constant_rad_s2 for b in tally_of_flight(with_constant(CONSTANT))[0].bounds]
     covered, flown = tally_of_flight(with_constant([1.000001 * c for c in needed]))
     assert all(bound.exceeded_frames == 0 for bound in covered.bounds)
-    assert not flown["false_alarm"]
+    assert not flown.false_alarm
     short, _ = tally_of_flight(with_constant([0.99 * c for c in needed]))
     assert all(bound.exceeded_frames > 0 for bound in short.bounds)
 
@@ -146,12 +147,12 @@ def test_the_recommended_bound_covers_the_flight_it_makes():
     """With the published bound a wrong mass alarms and another law flies on; without, it needs more."""
     case = scenario(design_model={"mass": 1.1}, faults=[loss(at_s=6)], duration_s=12)
     kept, flown = tally_of_flight(case)
-    assert flown["false_alarm"]
+    assert flown.false_alarm
     constant, settled = settle([case], [kept])
     assert settled
     again, flown_with_it = tally_of_flight(with_bound(case, constant))
     assert not again.exceeded
-    assert not flown_with_it["false_alarm"]
+    assert not flown_with_it.false_alarm
 
 
 def test_a_run_within_its_bound_is_recommended_what_it_used():
@@ -178,7 +179,7 @@ def test_no_bound_is_recommended_under_which_a_flight_then_raises_a_false_alarm(
     assert found["recommended"]["coverage"] == 1 / 2
     again, flown = tally_of_flight(with_bound(calm, found["recommended"]["constant_rad_s2"]))
     assert not again.exceeded
-    assert not flown["false_alarm"]
+    assert not flown.false_alarm
 
 
 def test_what_alarms_without_being_exceeded_is_given_a_wider_bound():
@@ -194,7 +195,7 @@ def test_an_alarm_without_an_excess_widens_the_bound_until_there_is_none(monkeyp
 
     def fly(case):
         flown.append(case.fdi.bounds.constant_rad_s2.q)
-        return Tally(CONSTANT, 0.1), {"false_alarm": len(flown) <= alarms}
+        return Tally(CONSTANT, 0.1), Metrics.of({"false_alarm": len(flown) <= alarms})
 
     monkeypatch.setattr("beaver_ftc.studies.mismatch.bound.tally_of_flight", fly)
     needs = Tally(CONSTANT, 0.1, bounds=tuple(AxisBound(smallest_constant_rad_s2=0.1) for _ in range(3)))

@@ -20,10 +20,10 @@ PEAKS = {
     "r": {"earth_rotation": 1e-6, "wind_turbulence": 0.003, "simplification": 0.002, "integration": 1e-4},
 }
 BOUND = 0.025
-FLOWN = {
+FLOWN = Metrics.of({
     "fault": {"at_s": 1.0}, "detection": {"time_s": 1.2}, "isolation": {"time_s": 1.5},
     "departure": {"time_s": 2.5},
-}  # fmt: skip
+})  # fmt: skip
 
 
 @pytest.fixture
@@ -68,7 +68,7 @@ def all_of(figure):
 
 
 def test_the_sources_over_the_bound(found, frames, changed):
-    assert not changed(all_of(charts.sources_figure(frames, found, marks(Metrics.of(FLOWN)))))
+    assert not changed(all_of(charts.sources_figure(frames, found, marks(FLOWN))))
 
 
 def test_only_sources_that_an_eye_can_tell_from_zero_are_drawn(found):

@@ -211,8 +211,8 @@ def test_neglecting_the_engine_is_the_dominant_source_of_the_published_case_and_
     shares = {name: kept.figures[name].bound_share[1] for name in SOURCES if name != "fault"}
     assert max(shares, key=shares.get) == "engine"
     assert shares["engine"] > 10.0
-    assert flown_as["false_alarm"]
-    assert not tally_of_flight(variant_of(case, "engine_terms=true"))[1]["false_alarm"]
+    assert flown_as.false_alarm
+    assert not tally_of_flight(variant_of(case, "engine_terms=true"))[1].false_alarm
 
 
 def test_the_published_uncertainty_is_split_as_declared():

@@ -9,7 +9,8 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.log import StoredLog, read
-from beaver_ftc.results.metrics import metrics
+from beaver_ftc.results.metrics import measure
+from beaver_ftc.results.model import Metrics
 from beaver_ftc.studies.mismatch import split, study, tables
 from beaver_ftc.studies.mismatch.linear import analyse, linear_document
 from beaver_ftc.studies.mismatch.models import LOGGED, States, true_moments
@@ -87,7 +88,7 @@ def test_the_closure_is_the_largest_unexplained_of_any_axis(case, tally, flown):
     rest = Figures()
     rest.add(np.array([[0.2, 0.7, 0.3]]), np.ones((1, 3)))
     other = replace(tally, figures=tally.figures | {UNEXPLAINED: rest})
-    assert study.document(case, other, metrics(flown[0]))["closure"] == 0.7
+    assert study.document(case, other, measure(flown[0]))["closure"] == 0.7
 
 
 def without_rest(document):
@@ -100,7 +101,7 @@ def without_rest(document):
 
 @pytest.fixture(scope="module")
 def document(case, flown, tally):
-    found = study.document(case, tally, metrics(flown[0]))
+    found = study.document(case, tally, measure(flown[0]))
     constant, later = {"p": 0.1, "q": 0.25, "r": 0.03}, {"detection_delay_s": 0.5, "guaranteed_delay_s": 0.7}
     declared = {"false_alarm": True, "detection_delay_s": None, "guaranteed_delay_s": None}
     return found | {
@@ -111,7 +112,7 @@ def document(case, flown, tally):
 
 
 def test_the_document(case, flown, tally, changed):
-    assert not changed(without_rest(study.document(case, tally, metrics(flown[0]))))
+    assert not changed(without_rest(study.document(case, tally, measure(flown[0]))))
 
 
 def test_the_table_the_text_and_the_line_among_others(document, changed):
@@ -221,7 +222,7 @@ def test_a_map_has_a_flight_for_each_place(monkeypatch, tmp_path, changed):
         for i, bound in enumerate(found.bounds):
             bound.worst_ratio, bound.smallest_constant_rad_s2 = 0.1 * i + case.initial.altitude_m, 0.01 * i
         isolation = {"fault": None, "delay_s": None, "correct": None}
-        return found, {"false_alarm": False, "detection": {}, "isolation": isolation}
+        return found, Metrics.of({"false_alarm": False, "detection": {}, "isolation": isolation})
 
     monkeypatch.setattr(study, "tally_of_flight", flies)
     monkeypatch.setattr(study, "AIRSPEEDS_MPS", study.AIRSPEEDS_MPS[:2])

@@ -134,9 +134,9 @@ def test_no_false_alarm_at_the_corners_and_edges_of_the_published_uncertainty(wh
 
 def test_the_unanticipated_fault_is_kept_at_48_mps_by_the_network_alone():
     alone = fly_case(CASES["unanticipated-network"], {"initial.airspeed_mps": 48.0})
-    assert alone.metrics["departure"] is None
-    assert alone.metrics["detection"]["delay_s"] <= 0.5
-    assert alone.metrics["isolation"]["fault"] == "unanticipated"
+    assert alone.metrics.departure is None
+    assert alone.metrics.detection.delay_s <= 0.5
+    assert alone.metrics.isolation.fault == "unanticipated"
     assert np.all(alone.log["q_rad_s"] < 0.5)
 
 

@@ -5,6 +5,7 @@ from dataclasses import asdict
 import numpy as np
 import pytest
 
+from beaver_ftc.results.model import Metrics
 from beaver_ftc.studies.reproduce import beside, measures, reproduction, truth_and_design, words
 from beaver_ftc.studies.reproduce.cases import BEYOND, OURS, PUBLISHED, VARIANTS, Changed, Flown
 from beaver_ftc.studies.reproduce.choices import CHOICES, scenario
@@ -60,7 +61,7 @@ def flown(name="elevator", fault="elevator", departure=None, detected_s=12.2, un
             "surface_energy_deg2_s": {"aileron": 100.0, "elevator": 200.0},
         },
     }  # fmt: skip
-    return Flown(document, log)
+    return Flown(Metrics.of(document), log)
 
 
 @pytest.fixture
@@ -94,6 +95,11 @@ def test_what_a_flight_says_of_itself(changed):
     assert found.between(0.1, 0.13).nonzero()[0].tolist() == [10, 11, 12]
 
 
+def but(found, **changes):
+    """The same flight, but for this in its metrics."""
+    return Flown(Metrics.of(found.metrics.document() | changes), found.log)
+
+
 def without_alarm():
     """A flight in which nothing is ever detected."""
     found = flown()
@@ -102,11 +108,11 @@ def without_alarm():
         for name, column in found.log.items()
         if name == "detected" or name.startswith("fie_") or name.endswith("_residual_rad_s")
     }
-    metrics = found.metrics | {
+    metrics = found.metrics.document() | {
         "detection": {"delay_s": None, "time_s": None}, "supervisor": [],
         "isolation": {"fault": None, "time_s": None},
     }  # fmt: skip
-    return Flown(metrics, found.log | silent)
+    return Flown(Metrics.of(metrics), found.log | silent)
 
 
 @pytest.mark.parametrize(
@@ -179,18 +185,20 @@ def document(flights):
         for case in beside.SHOWN
         for whose in beside.WHOSE
     }
-    both["rudder", "paper"].metrics["tracking"]["surface_travel_deg"]["aileron"] = 1.0
-    both["elevator", "ours"].metrics["detection"]["delay_s"] = None
+    both["rudder", "paper"].metrics.tracking.surface_travel_deg["aileron"] = 1.0
+    both["elevator", "ours"] = but(both["elevator", "ours"], detection={"delay_s": None, "time_s": 12.2})
     both["unanticipated", "paper"] = flown("lost", None, {"time_s": 20.0})
     designs = [(without_alarm(), flown()), (flown(), flown()), (without_alarm(), without_alarm())]
-    designs[1][1].metrics["false_alarm"] = True
+    designs[1] = flown(), but(flown(), false_alarm=True)
     every = reproduction.Flights(flights, both, designs)
     monkey = pytest.MonkeyPatch()
     ours = dict(zip(MEASURED, well, strict=True))
     monkey.setattr(type(MEASURED[0]), "number", lambda claim, _: ours[claim])
     found = reproduction.document_of(every, [*rows.values(), *alarms])
     monkey.undo()
-    assert [case["metrics"] for case in found["cases"]] == [flown.metrics for flown in flights.values()]
+    assert [case["metrics"] for case in found["cases"]] == [
+        flown.metrics.document() for flown in flights.values()
+    ]
     return found | {"versions": {"ours": "1"}}
 
 

@@ -89,6 +89,6 @@ def reproduction_probe() -> str:
     flights = fly_published()
     said = [f"{claim.statement} {claim.number(flights.published):.6g}" for claim in MEASURED]
     for (case, whose), flown in flights.beside.items():
-        travel = flown.metrics["tracking"]["surface_travel_deg"]
+        travel = flown.metrics.tracking.surface_travel_deg
         said.append(f"{case}, {whose}: {sum(travel.values()):.6g} deg")
     return "\n".join(said)

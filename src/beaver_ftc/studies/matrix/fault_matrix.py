@@ -17,8 +17,8 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.loop.outcome import Landing
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.trim import trim
-from beaver_ftc.results.metrics import as_json, metrics
-from beaver_ftc.results.model import Document
+from beaver_ftc.results.metrics import as_json, measure
+from beaver_ftc.results.model import Document, Metrics
 from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc.scenario.environment import air_of
 from beaver_ftc.scenario.faults import TYPES
@@ -158,35 +158,35 @@ def fly_case(case: FaultCase) -> Document:
 
 
 def _diagnosis(flight: Landing, case: FaultCase) -> Document:
-    document = metrics(flight)
-    isolation, true_type = document["isolation"], flight.scenario.faults[0].type
+    found = measure(flight)
+    detection, isolation, true_type = found.detection, found.isolation, flight.scenario.faults[0].type
     return {
-        "detected": document["detection"]["detected"],
-        "delay_s": document["detection"]["delay_s"],
-        "false_alarm": document["false_alarm"],
-        "isolated": isolation["fault"],
-        "isolation_delay_s": isolation["delay_s"],
-        "type": isolation["type"],
-        "candidates": isolation["candidates"],
-        "estimate": isolation["estimate"],
-        "verdict": verdict(document, case.surface, true_type),
+        "detected": detection.detected,
+        "delay_s": detection.delay_s,
+        "false_alarm": found.false_alarm,
+        "isolated": isolation.fault,
+        "isolation_delay_s": isolation.delay_s,
+        "type": isolation.type,
+        "candidates": list(isolation.candidates),
+        "estimate": isolation.estimate,
+        "verdict": verdict(found, case.surface, true_type),
     }
 
 
-def verdict(document: Document, surface: str, true_type: str) -> str:
+def verdict(found: Metrics, surface: str, true_type: str) -> str:
     """named (surface and type right), surface (right, type open), open (still possible), unseen or WRONG."""
-    isolation = document["isolation"]
-    if not document["detection"]["detected"]:
+    isolation = found.isolation
+    if not found.detection.detected:
         return "unseen"
-    if document["false_alarm"]:
+    if found.false_alarm:
         return "WRONG"
-    if isolation["fault"] is None:
-        left = isolation["candidates"]
+    if isolation.fault is None:
+        left = isolation.candidates
         return "open" if surface in left or f"{surface}:{true_type}" in left else "WRONG"
-    if isolation["fault"] != surface or isolation["type_correct"] is False:
+    if isolation.fault != surface or isolation.type_correct is False:
         return "WRONG"
-    if isolation["type"] is None:
-        return "surface" if true_type in isolation["candidates"] or not isolation["candidates"] else "WRONG"
+    if isolation.type is None:
+        return "surface" if true_type in isolation.candidates or not isolation.candidates else "WRONG"
     return "named"
 
 

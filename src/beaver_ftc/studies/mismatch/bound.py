@@ -103,7 +103,7 @@ def settle(scenarios: Sequence[Scenario], kept: Sequence[Tally]) -> tuple[PerAxi
     tallies, constant = list(kept), recommend(kept)
     for _ in range(MAX_ROUNDS):
         again = [tally_of_flight(with_bound(scenario, constant)) for scenario in scenarios]
-        short = [tally for tally, flown in again if tally.exceeded or flown["false_alarm"]]
+        short = [tally for tally, flown in again if tally.exceeded or flown.false_alarm]
         if not short:
             return constant, True
         tallies += short

@@ -48,11 +48,11 @@ MODEL_LOOKS: dict[str, dict[str, Any]] = {
 }  # fmt: skip
 
 
-def figures(folder: Path, found: Document, flown: Document, analysis: LinearAnalysis) -> Files:
+def figures(folder: Path, found: Document, flown: Metrics, analysis: LinearAnalysis) -> Files:
     """Of the mismatch of a result folder that holds `mismatch.parquet`, by the name of their files."""
     name = found["scenario"]
     return {
-        "mismatch-sources.png": sources_figure(folder / "mismatch.parquet", found, marks(Metrics.of(flown))),
+        "mismatch-sources.png": sources_figure(folder / "mismatch.parquet", found, marks(flown)),
         "mismatch-bound.png": bound_figure(found),
         "mismatch-linear.png": linear_figure(analysis, name),
         "mismatch-zeros.png": zeros_figure(analysis, name),

@@ -14,7 +14,8 @@ import numpy as np
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.results.log import ParquetLog, column_names, read_chunks
-from beaver_ftc.results.metrics import metrics
+from beaver_ftc.results.metrics import measure
+from beaver_ftc.results.model import Metrics
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.mismatch.models import LOGGED, Columns, States, states_of
@@ -239,12 +240,12 @@ def _written(stretches: Iterable[Stretch], path: Path) -> Iterator[Stretch]:
             yield stretch
 
 
-def tally_of_flight(scenario: Scenario) -> tuple[Tally, dict[str, Any]]:
+def tally_of_flight(scenario: Scenario) -> tuple[Tally, Metrics]:
     """Fly and split as it is flown, keeping no log: the tally and the flight's metrics."""
     loop = Loop(scenario)
     places = [(name, place) for place, name in enumerate(loop.columns) if name in LOGGED]
     try:
         chunks = ({name: rows[:, place] for name, place in places} for rows in loop.chunks())
-        return Tally.of(scenario, split(scenario, chunks)), metrics(loop.land())
+        return Tally.of(scenario, split(scenario, chunks)), measure(loop.land())
     finally:
         loop.release()

@@ -21,8 +21,8 @@ from beaver_ftc.aircraft import AXES, load
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import ParquetLog
-from beaver_ftc.results.metrics import as_json, metrics
-from beaver_ftc.results.model import Document
+from beaver_ftc.results.metrics import as_json, measure
+from beaver_ftc.results.model import Document, Metrics
 from beaver_ftc.results.writer import result_folder, write_documents, write_report_files
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
@@ -68,17 +68,17 @@ def run_mismatch(
     with result_folder(out, scenario.name) as folder:
         with ParquetLog(folder / "log.parquet") as log:
             flight = fly(scenario, log, progress)
-        flown = metrics(flight)
+        flown = measure(flight)
         kept = tally_of_log(scenario, folder / "log.parquet", folder / "mismatch.parquet")
         analysis = analyse(scenario)
         recommended = recommended_for([scenario], [kept])
         found = document(scenario, kept, flown) | recommended | {"linear": linear_document(analysis)}
-        write_documents(folder, scenario, flown)
+        write_documents(folder, scenario, flown.document())
         write_files(folder, _as_files(found, csv_rows(found)))
         if report:
             show_in_reports()
             write_files(folder / "figures", charts.figures(folder, found, flown, analysis))
-            write_report_files(folder, flown)
+            write_report_files(folder, flown.document())
     return found, kept
 
 
@@ -92,7 +92,7 @@ def refuse_other_aircraft(scenarios: Iterable[Scenario]) -> None:
             )
 
 
-def document(scenario: Scenario, tally: Tally, metrics: Document) -> Document:
+def document(scenario: Scenario, tally: Tally, metrics: Metrics) -> Document:
     """What the split of a flight amounts to."""
     return {
         "scenario": scenario.name,
@@ -103,9 +103,9 @@ def document(scenario: Scenario, tally: Tally, metrics: Document) -> Document:
         "dominant": dominant(tally),
         "bound": {axis: _bound(tally, i) for i, axis in enumerate(AXES)},
         "closure": float(tally.figures[UNEXPLAINED].largest.max()),
-        "false_alarm": metrics["false_alarm"],
-        "detection": metrics["detection"],
-        "isolation": {key: metrics["isolation"][key] for key in ("fault", "delay_s", "correct")},
+        "false_alarm": metrics.false_alarm,
+        "detection": metrics.detection.document(),
+        "isolation": {key: getattr(metrics.isolation, key) for key in ("fault", "delay_s", "correct")},
     }
 
 

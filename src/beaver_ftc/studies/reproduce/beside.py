@@ -6,7 +6,7 @@ What is flown, declared and asked for is the same; only who diagnoses and who co
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from beaver_ftc.results.model import Document
+from beaver_ftc.results.model import Document, Rates
 from beaver_ftc.studies.present.tables import number
 from beaver_ftc.studies.reproduce.cases import CASES, CORNERS, OURS, Changed, Flown, fly_case
 from beaver_ftc.studies.reproduce.measures import AXIS
@@ -54,7 +54,7 @@ def healthy_settings() -> list[tuple[str, Changed]]:
 
 def false_alarm_of(setting: Changed) -> float:
     """1 if a healthy flight in this setting raises an alarm."""
-    return float(fly_case(HEALTHY, setting.changes).metrics["false_alarm"])
+    return float(fly_case(HEALTHY, setting.changes).metrics.false_alarm)
 
 
 def document_of(flights: Mapping[tuple[str, str], Flown], alarms: Sequence[float]) -> Document:
@@ -72,23 +72,28 @@ def document_of(flights: Mapping[tuple[str, str], Flown], alarms: Sequence[float
 
 def _row(case: str, whose: str, flown: Flown) -> Document:
     found, axis = flown.metrics, AXIS.get(case, "q")
-    tracked, isolation = found["tracking"], found["isolation"] or {}
-    after = tracked["post_fault_rms_deg_s"]
+    tracked, isolation = found.tracking, found.isolation
+    rms_deg_s = tracked.pre_fault_rms_deg_s, tracked.post_fault_rms_deg_s
+    before, after = (_of_axis(rms, axis) for rms in rms_deg_s)
     return {
         "case": case,
         "flown_by": whose,
-        "scheme": found["flight"]["scheme"],
-        "law": found["flight"]["law"],
-        "detected_s": found["detection"]["delay_s"],
-        "named": isolation.get("fault"),
-        "isolated_s": isolation.get("delay_s"),
+        "scheme": found.flight.scheme,
+        "law": found.flight.law,
+        "detected_s": found.detection.delay_s,
+        "named": isolation.fault,
+        "isolated_s": isolation.delay_s,
         "axis": axis,
-        "before_deg_s": tracked["pre_fault_rms_deg_s"][axis],
-        "after_deg_s": after and after[axis],
-        "travel_deg": sum(tracked["surface_travel_deg"].values()),
-        "work_deg2_per_s": sum(tracked["surface_energy_deg2_s"].values()),
-        "departed": found["departure"] is not None,
+        "before_deg_s": before,
+        "after_deg_s": after,
+        "travel_deg": sum(tracked.surface_travel_deg.values()),
+        "work_deg2_per_s": sum(tracked.surface_energy_deg2_s.values()),
+        "departed": found.departure is not None,
     }
+
+
+def _of_axis(rms: Rates | None, axis: str) -> float | None:
+    return None if rms is None else getattr(rms, axis)
 
 
 def _better(rows: Sequence[Document]) -> list[Document]:

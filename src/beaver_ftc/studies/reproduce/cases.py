@@ -16,8 +16,8 @@ from beaver_ftc.aircraft import AXES
 from beaver_ftc.documents.document import parse
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
-from beaver_ftc.results.metrics import metrics
-from beaver_ftc.results.model import Document
+from beaver_ftc.results.metrics import measure
+from beaver_ftc.results.model import Metrics
 from beaver_ftc.studies.reproduce.choices import FAULT_AT_S, GIVEN, gains, scenario
 
 ESTIMATORS = ("aileron", "elevator", "rudder")
@@ -61,7 +61,7 @@ BEYOND = (
 class Flown:
     """A case flown: its metrics, and its log as name -> values, shape (frames,)."""
 
-    metrics: Document
+    metrics: Metrics
     log: dict[str, np.ndarray]
 
     @property
@@ -148,7 +148,7 @@ def fly_case(case: Changed, changes: Mapping[str, Any] | None = None) -> Flown:
     """Fly a case, with further changes to the choices."""
     log = Columns()
     flight = fly(scenario(case.name, _apt({**case.changes, **(changes or {})})), log)
-    return Flown(metrics(flight), log)
+    return Flown(measure(flight), log)
 
 
 def _apt(changes: Mapping[str, Any]) -> dict[str, Any]:

@@ -62,7 +62,7 @@ def _frames(flown: Flown, span_s: float) -> float:
 @_measure("detection", "s after the fault")
 def detection(flights: Flights, name: str) -> float:
     """From the fault to the alarm."""
-    delay = flights[name].metrics["detection"]["delay_s"]
+    delay = flights[name].metrics.detection.delay_s
     return np.inf if delay is None else delay
 
 
@@ -76,9 +76,9 @@ def detected(flights: Flights, *names: str) -> float:
 def isolation(flights: Flights, name: str) -> float:
     """From the alarm to the right name; infinite if anything else is named in the end."""
     found = flights[name].metrics
-    if found["isolation"]["fault"] != name:
+    if found.isolation.fault != name:
         return np.inf
-    return _after(found["detection"]["time_s"], found["isolation"]["time_s"])
+    return _after(found.detection.time_s, found.isolation.time_s)
 
 
 @_measure("faults isolated", at_least=True)
@@ -118,7 +118,7 @@ def alarm_lag(flights: Flights, name: str) -> float:
     flown = flights[name]
     over = np.flatnonzero(flown.shares().max(axis=0) > 1.0)
     first_s = flown.log["t_s"][over[0]] if over.size else None
-    return _frames(flown, _after(first_s, flown.metrics["detection"]["time_s"]))
+    return _frames(flown, _after(first_s, flown.metrics.detection.time_s))
 
 
 @_measure("between first crossing and exclusion", "frames")
@@ -137,7 +137,7 @@ def last_to_go(flights: Flights, name: str) -> float:
     """From the alarm to the exclusion of the last estimator that does not fit."""
     flown = flights[name]
     last_s = max(flown.excluded_at_s(other) for other in ESTIMATORS if other != name)
-    return _after(flown.metrics["detection"]["time_s"], last_s)
+    return _after(flown.metrics.detection.time_s, last_s)
 
 
 @_measure("between last exclusion and conclusion", "frames")
@@ -145,8 +145,8 @@ def conclusion_lag(flights: Flights, name: str) -> float:
     """From the exclusion of the last estimator that does not fit to the right name."""
     flown = flights[name]
     last_s = max(flown.excluded_at_s(other) for other in ESTIMATORS if other != name)
-    right = flown.metrics["isolation"]["fault"] == name
-    return _frames(flown, _after(last_s, flown.metrics["isolation"]["time_s"])) if right else np.inf
+    right = flown.metrics.isolation.fault == name
+    return _frames(flown, _after(last_s, flown.metrics.isolation.time_s)) if right else np.inf
 
 
 @_measure("estimators at work", at_least=True)
@@ -173,7 +173,7 @@ def activation(flights: Flights, name: str) -> float:
     flown = flights[name]
     begun = np.any([flown.residuals_of(other).any(axis=0) for other in ESTIMATORS], axis=0)
     first_s = flown.log["t_s"][np.argmax(begun)] if begun.any() else None
-    return _frames(flown, _after(flown.metrics["detection"]["time_s"], first_s))
+    return _frames(flown, _after(flown.metrics.detection.time_s, first_s))
 
 
 @_measure("pairs of fault and estimator that answer so", at_least=True)
@@ -213,7 +213,7 @@ def unapproximated(flights: Flights, name: str) -> float:
     """RMS of what the detection estimator's network leaves of the unexplained acceleration, over its RMS."""
     flown = flights[name]
     after = flown.between(FAULT_AT_S + SETTLED_S)
-    if flown.metrics["departure"] or not after.any():
+    if flown.metrics.departure or not after.any():
         return np.inf
     unexplained = flown.unexplained_rad_s2("q")[after]
     return float(
@@ -232,7 +232,7 @@ def _left_of_error(flown: Flown, axis: str) -> float:
         flown.rms_deg_s(axis, FAULT_AT_S, FAULT_AT_S + 5.0),
         flown.rms_deg_s(axis, FAULT_AT_S + 13.0),
     )
-    return np.inf if flown.metrics["departure"] else late / early
+    return np.inf if flown.metrics.departure else late / early
 
 
 @_measure("furthest outside")
@@ -261,7 +261,7 @@ def unbounded(flights: Flights, name: str) -> float:
 def tracking(flights: Flights, name: str, axis: str) -> float:
     """RMS error of an axis after the fault, once settled; infinite if the aircraft is lost."""
     flown = flights[name]
-    return np.inf if flown.metrics["departure"] else flown.after_deg_s(axis) / AMPLITUDE_DEG_S
+    return np.inf if flown.metrics.departure else flown.after_deg_s(axis) / AMPLITUDE_DEG_S
 
 
 @_measure("largest RMS error", "of the reference's amplitude", none=LOST)
@@ -276,7 +276,7 @@ def healthy_tracking(flights: Flights, name: str) -> float:
     flown = flights[name]
     return (
         np.inf
-        if flown.metrics["departure"]
+        if flown.metrics.departure
         else max(flown.rms_deg_s(axis, SETTLED_S) / AMPLITUDE_DEG_S for axis in AXES)
     )
 
@@ -291,7 +291,7 @@ def deterioration(flights: Flights, name: str) -> float:
 def beside_nominal(flights: Flights, *names: str) -> float:
     """RMS error after the fault over that of the nominal law, of the worst of several faults."""
     return max(
-        np.inf if flights[n].metrics["departure"]
+        np.inf if flights[n].metrics.departure
         else flights[n].rms_deg_s("q", FAULT_AT_S) / flights[f"{n}-nominal"].rms_deg_s("q", FAULT_AT_S)
         for n in names
     )  # fmt: skip
@@ -304,14 +304,14 @@ def flown_on(flights: Flights, name: str) -> float:
 
 
 def _mode_at_s(flown: Flown, mode: str) -> float | None:
-    return next((change["time_s"] for change in flown.metrics["supervisor"] if change["mode"] == mode), None)
+    return next((change.time_s for change in flown.metrics.supervisor if change.mode == mode), None)
 
 
 @_measure("in charge", "s after detection")
 def in_charge(flights: Flights, name: str) -> float:
     """From the alarm to the adaptive law."""
     flown = flights[name]
-    return _after(flown.metrics["detection"]["time_s"], _mode_at_s(flown, "adaptive"))
+    return _after(flown.metrics.detection.time_s, _mode_at_s(flown, "adaptive"))
 
 
 @_measure("from 10 s to the adaptive law", "s")
@@ -324,7 +324,7 @@ def activated_near_10(flights: Flights, name: str) -> float:
 def reallocation(flights: Flights, name: str) -> float:
     """From the name to the reallocation."""
     flown = flights[name]
-    return _after(flown.metrics["isolation"]["time_s"], _mode_at_s(flown, "reallocated"))
+    return _after(flown.metrics.isolation.time_s, _mode_at_s(flown, "reallocated"))
 
 
 @_measure("decisions taken", at_least=True)

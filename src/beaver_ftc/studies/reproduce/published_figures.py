@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from beaver_ftc.results.figures import draw
-from beaver_ftc.results.model import Document, Metrics
+from beaver_ftc.results.model import Document
 from beaver_ftc.results.style import BLUE, GREY, VERMILION, marks
 from beaver_ftc.results.views import (
     AXES,
@@ -91,7 +91,7 @@ def _drawn(view: View, flown: Flown, span: tuple[float, float]) -> "Figure":
     shown = flown.between(*span)
     errors = {f"{axis}_error_rad_s": np.radians(flown.error_deg_s(axis)) for axis in AXES}
     series = {name: values[shown] for name, values in {**flown.log, **errors}.items()}
-    return draw(view, series, marks(Metrics.of(flown.metrics)), f"case {flown.metrics['scenario']}")
+    return draw(view, series, marks(flown.metrics), f"case {flown.metrics.scenario}")
 
 
 def shares(claim: Document) -> tuple[float, float, float]:

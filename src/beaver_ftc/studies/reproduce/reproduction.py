@@ -93,7 +93,11 @@ def document_of(flights: Flights, rows: Sequence[list[float]]) -> Document:
             for setting in (*BEYOND, *VARIANTS)
         ],
         "cases": [
-            {"case": case.name, "shown_in": case.shown_in, "metrics": flights.published[case.name].metrics}
+            {
+                "case": case.name,
+                "shown_in": case.shown_in,
+                "metrics": flights.published[case.name].metrics.document(),
+            }
             for case in PUBLISHED
         ],
         "versions": dict(versions()),

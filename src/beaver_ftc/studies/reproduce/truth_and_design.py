@@ -64,11 +64,11 @@ def _row(name: str, bound: str, healthy: Flown, faulty: Flown) -> Document:
     return {
         "design": name,
         "bound": bound,
-        "alarm_s": healthy.metrics["detection"]["time_s"],
+        "alarm_s": healthy.metrics.detection.time_s,
         "share": {axis: float(share) for axis, share in zip(AXES, healthy.shares().max(axis=1), strict=True)},
-        "detected_s": None if found["false_alarm"] else found["detection"]["delay_s"],
-        "false_alarm": found["false_alarm"],
-        "named": (found["isolation"] or {}).get("fault"),
+        "detected_s": None if found.false_alarm else found.detection.delay_s,
+        "false_alarm": found.false_alarm,
+        "named": found.isolation.fault,
     }
 
 

@@ -116,7 +116,7 @@ class Watched:
             return
         for block in self._statistical["block"]:
             tried = block["hypothesis"][: int(block["n_hypotheses"])]
-            tried = tried[tried["alarms"] == 1]
+            tried = tried[tried["raises_alarm"] == 1]
             losses = tried["kind"] == LOSS
             for test, of_it in (("loss", tried["score"][losses]), ("step", tried["score"][~losses])):
                 self._note(test, of_it.max(initial=0.0))

@@ -141,7 +141,7 @@ def weigh_all(block, innovations, signatures, regressors, first, keep, tolerated
     """Show a block frames `first` onwards: innovations (k, n), signatures (k, h, 2), regressors (k, j, 2)."""
     for k in range(len(innovations)):
         if keep == 1.0:
-            likelihood.start(block, likelihood.slot_to_start(first + k))
+            likelihood.reset_onset(block, likelihood.slot_to_reset(first + k))
         likelihood.advance(block, dt)
         block.scratch[: block.n] = innovations[k]
         likelihood.whiten(block, block.state, block.scratch, dt, block.innovation)
@@ -151,8 +151,8 @@ def weigh_all(block, innovations, signatures, regressors, first, keep, tolerated
             )
         for h in range(block.n_hypotheses):
             block.hypothesis[h].signature[:] = signatures[k, h]
-        likelihood.weigh(block, tolerated, dt, keep)
-        likelihood.judge(block)
+        likelihood.accumulate(block, tolerated, dt, keep)
+        likelihood.evaluate(block)
 
 
 @kernel
@@ -165,9 +165,9 @@ def bounded_all(block, d, signatures, onset, dt):
         likelihood.whiten(block, block.state, block.scratch, dt, block.innovation)
         for h in range(block.n_hypotheses):
             block.hypothesis[h].signature[: block.n] = signatures[k, h]
-        likelihood.reach(block, bounded, dt)
+        likelihood.fill_uncertainty_response(block, bounded, dt)
         if k >= onset:
-            likelihood.weigh(block, False, dt, 1.0)
+            likelihood.accumulate(block, False, dt, 1.0)
 
 
 class Detector:
@@ -213,14 +213,14 @@ def watch_all(detector, innovations, Gu, cubic, first, renew, dt, scores):
         blocks, alarm, tests = detector.block, detector.alarm, detector.tests
         fill_block_signatures(blocks, Gu[k], cubic[k])
         bounded, still = detector.noise.bounded, detector.air
-        statistical.observe(tests, bounded, blocks, still, innovations[k], dt, first + k, 0)
+        statistical.update_blocks(tests, bounded, blocks, still, innovations[k], dt, first + k, 0)
         views = detector.views[: detector.n_views]
-        statistical.score(alarm, tests, blocks, views, detector.forces, still, (first + k) * dt)
+        statistical.update_alarm(alarm, tests, blocks, views, detector.forces, still, (first + k) * dt)
         scores[k] = alarm.score
         if renew and alarm.score > 1.0:
             for slot in range(N_SLOTS):
                 for b in range(detector.block.size):
-                    likelihood.start(blocks[b], slot)
+                    likelihood.reset_onset(blocks[b], slot)
 
 
 def surfaces_at_work(frames, rate_hz, rng, size=0.3):

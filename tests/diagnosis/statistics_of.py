@@ -29,16 +29,18 @@ class Statistical:
     @staticmethod
     def score(record, t, known=True):
         tests, blocks, views = record["tests"], record["block"], views_of(record)
-        statistical.score(record["alarm"], tests, blocks, views, record["forces"], record["air"], t, known)
+        statistical.update_alarm(
+            record["alarm"], tests, blocks, views, record["forces"], record["air"], t, known
+        )
 
     @staticmethod
     def record(record, row):
         tests, blocks, views = record["tests"], record["block"], views_of(record)
-        statistical.write_shares(tests, blocks, views, record["forces"], record["air"], row)
+        statistical.log_scores(tests, blocks, views, record["forces"], record["air"], row)
 
     @staticmethod
-    def follow_rest(record, surprise, dt):
-        statistical.follow_rest(record["block"], record["air"], surprise, dt)
+    def track_residual_mean(record, surprise, dt):
+        statistical.track_residual_mean(record["block"], record["air"], surprise, dt)
 
     @staticmethod
     def unknown_acceleration(record, out):
@@ -47,7 +49,9 @@ class Statistical:
     @staticmethod
     def drifts(record, fdi, design, x, y):
         noise, blocks, air = record["noise"], record["block"], record["air"]
-        statistical.drifts(noise, blocks, air, fdi["bound"], design, _measured(x, y), fdi["config"]["dt"])
+        statistical.fill_drift_and_jitter(
+            noise, blocks, air, fdi["bound"], design, _measured(x, y), fdi["config"]["dt"]
+        )
 
     @staticmethod
     def prepare(record, fdi, design, x, y, u):
@@ -57,12 +61,12 @@ class Statistical:
     @staticmethod
     def look(record, fdi, design, x, y, u, attitude, dt):
         parts = (record[name] for name in ("tests", "noise", "block", "air"))
-        statistical.look(*parts, fdi["bound"], design, _measured(x, y, attitude), u, dt)
+        statistical.accumulate_substep(*parts, fdi["bound"], design, _measured(x, y, attitude), u, dt)
 
     @staticmethod
     def shows(fdi, surface):
         tests, blocks = fdi["statistical"]["tests"], fdi["statistical"]["block"]
-        return statistical.shows(
+        return statistical.confirms_loss(
             tests, blocks, fdi["isolation"]["estimator"], fdi["layout"]["loss_of"], surface
         )
 
@@ -73,7 +77,7 @@ class Statistical:
             fdi["statistical"]["block"],
             fdi["layout"]["loss_of"],
         )
-        return statistical.excludes(
+        return statistical.excludes_loss(
             tests, blocks, fdi["isolation"]["estimator"], loss_of, surface, ends, fdi["config"]["abrupt"]
         )
 

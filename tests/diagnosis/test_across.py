@@ -79,7 +79,7 @@ def test_errors_that_turn_the_column_are_tolerated(signs):
     lanes = view["block"]["lanes"]
     known = lanes["information"] > 0.0
     assert known.any()
-    assert (np.abs(lanes["correlation"]) <= 1.0001 * lanes["slack"] + 1e-9)[known].all()
+    assert (np.abs(lanes["correlation"]) <= 1.0001 * lanes["coefficient_part"] + 1e-9)[known].all()
     if signs[0] != signs[1]:
         assert np.abs(lanes["correlation"]).max() > 1.0
 

@@ -208,11 +208,11 @@ def test_a_frame_is_seen_along_every_direction(fdi, rng, latched, tolerated, fra
         Across.sign(fdi, own, Gu)
         block["scratch"][0] = own["direction"][:3] @ innovation
         if not latched:
-            likelihood.start(block, likelihood.slot_to_start(frame))
-        likelihood.take_in(block, own["bounded"], tolerated, DT, 0.9 if latched else 1.0)
+            likelihood.reset_onset(block, likelihood.slot_to_reset(frame))
+        likelihood.update_block(block, own["bounded"], tolerated, DT, 0.9 if latched else 1.0)
         for name in NAMES:
             assert view["block"][name] == pytest.approx(block[name], rel=1e-12), name
-        for name in ("correlation", "information", "overlap", "slack", "score"):
+        for name in ("correlation", "information", "overlap", "coefficient_part", "score"):
             assert lanes_of(view["block"], name) == pytest.approx(lanes_of(block, name), rel=1e-12), name
 
 
@@ -246,12 +246,12 @@ def test_a_view_has_levels_and_tolerances_of_the_axes_it_looks_at(fdi):
     statistical = fdi["statistical"]
     pitch, lateral = statistical["block"][:2]
     for b, block in enumerate((pitch, lateral)):
-        block["level"], block["chance"], block["pace"] = 5.0 + b, 0.5 + b, 0.01 + b
+        block["level"], block["noise_share"], block["pace"] = 5.0 + b, 0.5 + b, 0.01 + b
     set_up_views(statistical, load())
     for v, view in enumerate(statistical["views"][:5]):
         axes, column = pitch if v == PITCH_AXIS else lateral, v in (PAST_AILERON, PAST_RUDDER)
         block, n = view["block"], int(axes["n_regressors"])
-        for name in ("level", "chance", "pace"):
+        for name in ("level", "noise_share", "pace"):
             assert block[name] == axes[name]
         assert (block["n"], block["keep"]) == (1, 1.0)
         assert block["n_regressors"] == n + column

@@ -56,7 +56,7 @@ def test_the_drift_of_the_detectors_blocks(moving):
         ) = np.eye(3), 1e-3, 0.5
         record["air"]["output"]["axes"] = np.arange(9.0).reshape(3, 3)
         for block, axes in zip(record["block"], ((1,), (0, 2)), strict=False):
-            block["n"], block["axis"][: len(axes)], block["stronger"] = len(axes), axes, 1.0
+            block["n"], block["axis"][: len(axes)], block["drift_scale"] = len(axes), axes, 1.0
         record["noise"]["bounded"] = record["block"]["drift"] = record["block"]["jitter"] = before
         fdi["bound"]["constant"] = 0.02
         Statistical.drifts(record, fdi, design(), X, Y)

@@ -514,10 +514,10 @@ def test_the_alarm_of_a_force_is_the_scores_and_the_logs_and_has_its_time(viewed
     views, tests, alarm = chances["views"][: chances["n_views"]], chances["tests"], chances["alarm"]
     views["direction"] = 0.0
     views["direction"][v], views["peak_score"], tests["naming_level"] = mix, 9.0, 18.0
-    alarm["detected_at_s"], tests["n_columns"] = -1.0, 4
-    statistical.score(alarm, tests, chances["block"], views, chances["forces"], chances["air"], 2.5)
+    alarm["detected_at_s"], tests["n_log_columns"] = -1.0, 4
+    statistical.update_alarm(alarm, tests, chances["block"], views, chances["forces"], chances["air"], 2.5)
     assert (alarm["score"], alarm["axis"], alarm["detected_at_s"]) == (1.5, axis, 2.5)
-    statistical.write_shares(tests, chances["block"], views, chances["forces"], chances["air"], row)
+    statistical.log_scores(tests, chances["block"], views, chances["forces"], chances["air"], row)
     assert row.tolist() == [7.0, 0.0, *(1.5 if i == axis else 0.0 for i in (ROLL, PITCH, YAW))]
 
 

@@ -235,7 +235,7 @@ def told(fdi, loss, step):
         block["n_hypotheses"] = 2
         hypotheses = block["hypothesis"][:2]
         hypotheses["kind"], hypotheses["surface"] = (LOSS, STEP), (0, -1)
-        hypotheses["at_least"] = hypotheses["at_most"] = loss, step
+        hypotheses["min_llr"] = hypotheses["max_llr"] = loss, step
     fdi["isolation"]["config"]["n"], record["tests"]["share"] = 1, 1.0
     return estimator(fdi)
 

@@ -125,8 +125,8 @@ def test_errors_of_coefficients_within_their_tolerance_never_add_to_a_score(case
     for h in range(3):
         before, after = clean["hypothesis"][h], careful["hypothesis"][h]
         assert after["score"] <= before["score"] + 1e-9
-        assert after["at_least"] <= before["at_least"] + 1e-9
-        assert after["at_most"] >= before["at_most"] - 1e-9
+        assert after["min_llr"] <= before["min_llr"] + 1e-9
+        assert after["max_llr"] >= before["max_llr"] - 1e-9
 
 
 def test_the_worst_corner_takes_all_of_the_allowance():
@@ -140,7 +140,7 @@ def test_the_worst_corner_takes_all_of_the_allowance():
     worst = np.sign(clean) * np.sign(by_onset(blank, "overlap")[:2, -1, 0]) * tolerance
     wrong = nu + np.einsum("j,kjn->kn", worst, regressors)
     block = _shown(_block("two axes", STEP, tolerance=tolerance), wrong, signatures, regressors)
-    seen, slack = by_onset(block, "correlation")[-1, 0], by_onset(block, "slack")[-1, 0]
+    seen, slack = by_onset(block, "correlation")[-1, 0], by_onset(block, "coefficient_part")[-1, 0]
     assert abs(seen) - slack == pytest.approx(abs(clean), rel=1e-9)
 
 
@@ -172,7 +172,12 @@ def test_a_bounded_uncertainty_adds_no_more_than_is_allowed_for(case, seed, cour
 
 def _allowed(block):
     """What a bounded uncertainty may add to the correlation of the first hypothesis, (slots,)."""
-    return np.array([likelihood.allowance(block["lanes"][0], k, *block["swing"]) for k in range(N_SLOTS)])
+    return np.array(
+        [
+            likelihood.uncertainty_part(block["lanes"][0], k, *block["transient_response"])
+            for k in range(N_SLOTS)
+        ]
+    )
 
 
 def test_the_allowance_is_not_absurdly_wide():
@@ -194,7 +199,7 @@ def test_there_is_always_an_onset_of_about_every_age():
     frames, oldest = 3000, 2 ** (N_SLOTS - 1)
     onset = np.zeros(N_SLOTS, int)
     for k in range(frames):
-        onset[likelihood.slot_to_start(k)] = k
+        onset[likelihood.slot_to_reset(k)] = k
         ages = k - onset
         age = np.arange(1, min(k, oldest) + 1)[:, None]
         assert np.any((ages >= age / 2) & (ages <= 2 * age), axis=1).all(), k
@@ -210,7 +215,7 @@ def test_a_loss_is_no_gain_and_a_step_may_go_either_way():
         assert step["score"] > 1.0
         assert step["theta"] == pytest.approx(theta, abs=1e-9)
         assert loss["score"] == (pytest.approx(step["score"]) if theta < 0 else 0.0)
-        assert loss["at_most"] == (0.0 if theta > 0 else pytest.approx(loss["at_least"]))
+        assert loss["max_llr"] == (0.0 if theta > 0 else pytest.approx(loss["min_llr"]))
 
 
 @given(st.floats(-200, 200), st.floats(0.01, 100))
@@ -218,16 +223,16 @@ def test_the_likelihood_of_a_loss_is_greatest_within_its_set(evidence, informati
     """By search over theta in [-1, 0] instead of cases; evidence is that for a loss."""
     theta = np.linspace(0, 1, 4001)
     best = np.max(theta * evidence - 0.5 * theta**2 * information)
-    found = likelihood.log_likelihood(True, evidence, information)
+    found = likelihood.log_likelihood_ratio(True, evidence, information)
     assert found == pytest.approx(best, rel=1e-5, abs=1e-4 * information)
 
 
 def test_the_estimate_of_a_loss_knows_that_it_is_one():
     """With no information it is in the middle; with much of it, what was seen."""
-    assert likelihood.estimate(LOSS, 0.0, 0.0) == -0.5
-    assert likelihood.estimate(LOSS, -0.4e6, 1e6) == pytest.approx(-0.4, abs=1e-4)
-    assert likelihood.estimate(LOSS, -5e6, 1e6) == -1.0
-    assert likelihood.estimate(LOSS, 5e6, 1e6) == 0.0
+    assert likelihood.estimate_theta(LOSS, 0.0, 0.0) == -0.5
+    assert likelihood.estimate_theta(LOSS, -0.4e6, 1e6) == pytest.approx(-0.4, abs=1e-4)
+    assert likelihood.estimate_theta(LOSS, -5e6, 1e6) == -1.0
+    assert likelihood.estimate_theta(LOSS, 5e6, 1e6) == 0.0
 
 
 def test_from_the_alarm_on_old_evidence_is_forgotten():
@@ -267,8 +272,8 @@ GUSTS, QUIET_RAD_S, FRAME_S = np.array([[18.0]]), 1.7e-3, 1 / 229
 def _beside(block):
     """The block with the filter that reckons with no gust, as it begins."""
     for name in ("n", "keep", "noise", "jitter", "P_xx", "P_dd"):
-        block["calm"][name] = block[name]
-    block["calm"]["drift"][0, 0] = 0.01
+        block["no_gust_filter"][name] = block[name]
+    block["no_gust_filter"]["drift"][0, 0] = 0.01
     return block
 
 
@@ -277,12 +282,12 @@ def _largest_share(block, innovations, moments, shown=None):
     gust, by the vanes."""
     block["level"], most = 0.0, 0.0
     for k, (nu, moment) in enumerate(zip(innovations, moments, strict=True)):
-        block["shown"][0] = 0.0 if shown is None else shown[k]
-        likelihood.start(block, likelihood.slot_to_start(k))
+        block["gust_response"][0] = 0.0 if shown is None else shown[k]
+        likelihood.reset_onset(block, likelihood.slot_to_reset(k))
         block["scratch"][0], block["hypothesis"][0]["signature"][0] = nu, moment
-        if block["calm"]["n"]:
-            likelihood.follow_calm(block, FRAME_S)
-        likelihood.take_in(block, np.zeros(3), False, FRAME_S, 1.0)
+        if block["no_gust_filter"]["n"]:
+            likelihood.whiten_without_gust(block, FRAME_S)
+        likelihood.update_block(block, np.zeros(3), False, FRAME_S, 1.0)
         most = max(most, block["hypothesis"][0]["score"])
     return most
 
@@ -315,7 +320,7 @@ def _answers_the_vanes(shown):
         flow = lfilter([1.0], [1.0, -np.exp(-FRAME_S / 2.0)], rng.standard_normal(601))
         pitching = 10.0 * lfilter([1.0 - lag], [1.0, -lag], np.diff(flow))
         block = with_hypotheses(block_of(GUSTS, [QUIET_RAD_S]), LOSS)
-        block["glimpsed"] = shown
+        block["has_coarse_gust"] = shown
         noise = np.diff(QUIET_RAD_S * rng.standard_normal(601)) / FRAME_S
         innovations = pitching + noise
         shares.append(_largest_share(block, innovations, -flow[:-1], pitching))

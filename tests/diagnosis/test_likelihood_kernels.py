@@ -42,8 +42,8 @@ def through(block, accelerations):
 
 def test_the_slot_that_starts_anew_counts_the_twos_of_the_frame():
     expected = [min((k & -k).bit_length() - 1, N_SLOTS - 1) for k in range(1, 2**11)]
-    assert [likelihood.slot_to_start(k) for k in range(1, 2**11)] == expected
-    assert likelihood.slot_to_start(0) == N_SLOTS - 1
+    assert [likelihood.slot_to_reset(k) for k in range(1, 2**11)] == expected
+    assert likelihood.slot_to_reset(0) == N_SLOTS - 1
 
 
 def test_an_onset_that_starts_knows_nothing_and_the_others_stay():
@@ -52,11 +52,11 @@ def test_an_onset_that_starts_knows_nothing_and_the_others_stay():
     names = (
         "correlation",
         "information",
-        "stays",
-        "swings",
-        "drifts",
-        "foreseen",
-        "missing",
+        "constant_part",
+        "variation_part",
+        "paced_part",
+        "calm_prediction",
+        "growth_left",
         "response",
         "weight",
         "overlap",
@@ -64,58 +64,58 @@ def test_an_onset_that_starts_knows_nothing_and_the_others_stay():
     for name in names[:-1]:
         block["lanes"][name] = 3.0
     block["overlap"] = 3.0
-    likelihood.start(block, 4)
+    likelihood.reset_onset(block, 4)
     for name in names:
         kept = by_onset(block, name)
         assert (np.delete(kept, 4, axis=-2) == 3.0).all(), name
         cleared = kept[:2, 4] if name == "overlap" else kept[..., 4, :]
-        assert (cleared == (1.0 if name == "missing" else 0.0)).all(), name
+        assert (cleared == (1.0 if name == "growth_left" else 0.0)).all(), name
 
 
 def test_of_a_constant_the_filter_leaves_what_stay_says():
     """One axis, a drift that returns: after its transient a constant of eta_bar shows as g_0."""
     block = steady_block(1)
-    likelihood.reach(block, np.array([0.3, 9.0, 9.0]), DT)
-    assert through(block, np.full((600, 1), 0.3))[-1] == pytest.approx(block["stay"][:1])
+    likelihood.fill_uncertainty_response(block, np.array([0.3, 9.0, 9.0]), DT)
+    assert through(block, np.full((600, 1), 0.3))[-1] == pytest.approx(block["constant_response"][:1])
     still = steady_block(1, keep=1.0)
-    likelihood.reach(still, np.array([0.3, 0.0, 0.0]), DT)
-    assert not still["stay"].any()  # a walk takes in all that is constant
+    likelihood.fill_uncertainty_response(still, np.array([0.3, 0.0, 0.0]), DT)
+    assert not still["constant_response"].any()  # a walk takes in all that is constant
 
 
 @pytest.mark.parametrize("axes", [1, 2])
 def test_a_steps_transient_sums_to_the_inverse_gain(axes):
     """Sum of what the filter leaves of a step: K_d^-1, by axes; RINGING is kept for its swings."""
     block, bounded = steady_block(axes, keep=1.0), np.array([0.3, 0.2, 9.0])
-    likelihood.reach(block, bounded, DT)
+    likelihood.fill_uncertainty_response(block, bounded, DT)
     sums = np.array([through(block, np.tile(unit, (600, 1))).sum(axis=0) for unit in np.eye(axes)]).T
     expected = likelihood.RINGING * np.abs(sums) @ bounded[:axes]
-    assert block["swing"][:axes] == pytest.approx(expected, rel=1e-6)
+    assert block["transient_response"][:axes] == pytest.approx(expected, rel=1e-6)
     assert np.linalg.inv(block["K_d"][:axes, :axes]) == pytest.approx(sums, rel=1e-6)
 
 
 def test_the_room_of_a_bounded_uncertainty_is_summed_up_by_parts():
     rng, frames, keep = np.random.default_rng(4), 12, 0.9
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), STEP)
-    block["stay"], block["swing"], block["pace"] = (0.1, 0.2), (0.3, 0.4), 0.05
+    block["constant_response"], block["transient_response"], block["pace"] = (0.1, 0.2), (0.3, 0.4), 0.05
     w = rng.normal(size=(frames, 2))
     block["K_x"] = block["S_inverse"] = np.eye(2)  # a filter that forgets at once: g_s is the signature
     lanes, lane = block["lanes"][0], 2
     for each in w:
-        lanes["shaped"][:, lane] = each
-        likelihood.respond(block, lanes, N_SLOTS, 1.0, keep)
+        lanes["shaped_signature"][:, lane] = each
+        likelihood.accumulate_correlations(block, lanes, N_SLOTS, 1.0, keep)
     old = keep ** np.arange(frames)[::-1]
     changes = np.abs(np.diff(np.vstack([np.zeros(2), w]), axis=0))
-    stays, swings = old @ np.abs(w) @ [0.1, 0.2], old @ changes @ [0.3, 0.4]
-    drifts = old @ np.abs(w) @ [0.3, 0.4] * 0.05
-    assert lanes["stays"][lane] == pytest.approx(stays)
-    assert lanes["swings"][lane] == pytest.approx(swings)
-    assert lanes["drifts"][lane] == pytest.approx(drifts)
+    constant_part, swings = old @ np.abs(w) @ [0.1, 0.2], old @ changes @ [0.3, 0.4]
+    paced_part = old @ np.abs(w) @ [0.3, 0.4] * 0.05
+    assert lanes["constant_part"][lane] == pytest.approx(constant_part)
+    assert lanes["variation_part"][lane] == pytest.approx(swings)
+    assert lanes["paced_part"][lane] == pytest.approx(paced_part)
     last = np.abs(w[-1]) @ [0.3, 0.4]
-    allowed = likelihood.allowance(lanes, lane, *block["swing"])
-    assert allowed == pytest.approx(stays + min(swings + last, drifts))
-    lanes["drifts"][lane] = 99.0
-    allowed = likelihood.allowance(lanes, lane, *block["swing"])
-    assert allowed == pytest.approx(stays + swings + last)
+    allowed = likelihood.uncertainty_part(lanes, lane, *block["transient_response"])
+    assert allowed == pytest.approx(constant_part + min(swings + last, paced_part))
+    lanes["paced_part"][lane] = 99.0
+    allowed = likelihood.uncertainty_part(lanes, lane, *block["transient_response"])
+    assert allowed == pytest.approx(constant_part + swings + last)
 
 
 def test_a_frame_is_whitened_weighed_and_summed_as_matrices_say():
@@ -127,17 +127,17 @@ def test_a_frame_is_whitened_weighed_and_summed_as_matrices_say():
     block["K_x"], block["K_d"], block["S_inverse"], block["keep"] = K_x, K_d, S, kept
     seen, regressors = rng.normal(size=2), rng.normal(size=(2, 2))
     block["innovation"], block["regressor_response"][:2] = seen, regressors
-    for name in ("shaped", "response", "correlation", "information", "slack"):
+    for name in ("shaped_signature", "response", "correlation", "information", "coefficient_part"):
         block["lanes"][name] = rng.normal(size=block["lanes"][name].shape)
     block["overlap"] = rng.normal(size=block["overlap"].shape)
-    kept_by_name = ("shaped", "response", "correlation", "information", "overlap")
+    kept_by_name = ("shaped_signature", "response", "correlation", "information", "overlap")
     before = {name: lanes_of(block, name) for name in kept_by_name}
     for lanes, overlap in zip(block["lanes"], block["overlap"], strict=True):
-        likelihood.respond(block, lanes, N_LANES, dt, keep)
+        likelihood.accumulate_correlations(block, lanes, N_LANES, dt, keep)
         likelihood.accumulate_overlap(block, lanes, overlap, N_LANES, keep)
-    lane = {name: lanes_of(block, name) for name in (*kept_by_name, "weight", "slack")}
+    lane = {name: lanes_of(block, name) for name in (*kept_by_name, "weight", "coefficient_part")}
     x, d = before["response"][:2], before["response"][2:]
-    r = x + dt * (before["shaped"] - d)
+    r = x + dt * (before["shaped_signature"] - d)
     w = S @ r
     assert lane["response"] == pytest.approx(np.vstack([r - K_x @ r, kept * d + K_d @ r]))
     assert lane["weight"] == pytest.approx(w)
@@ -146,38 +146,47 @@ def test_a_frame_is_whitened_weighed_and_summed_as_matrices_say():
     overlaps = keep * before["overlap"][:2] + regressors @ w
     assert lane["overlap"][:2] == pytest.approx(overlaps)
     assert lane["overlap"][2:] == pytest.approx(before["overlap"][2:])
-    assert lane["slack"] == pytest.approx(np.array([0.1, 0.2]) @ np.abs(overlaps))
+    assert lane["coefficient_part"] == pytest.approx(np.array([0.1, 0.2]) @ np.abs(overlaps))
 
 
 @pytest.mark.parametrize(
-    ("agreement", "size", "share"),
+    ("calm_agreement", "size", "share"),
     [
-        (0.0, 500.0, lambda agreement, size: (agreement + 4.0 + 2.0 * np.sqrt(size + 4.0)) / (size + 4.0)),
-        (-900.0, 500.0, lambda agreement, size: 0.0),
-        (900.0, 500.0, lambda agreement, size: 1.0),
+        (
+            0.0,
+            500.0,
+            lambda calm_agreement, size: (calm_agreement + 4.0 + 2.0 * np.sqrt(size + 4.0)) / (size + 4.0),
+        ),
+        (-900.0, 500.0, lambda calm_agreement, size: 0.0),
+        (900.0, 500.0, lambda calm_agreement, size: 1.0),
     ],
 )
 def test_what_calm_air_foretells_is_what_the_calm_filter_sees_by_as_much_as_it_lately_has(
-    agreement, size, share
+    calm_agreement, size, share
 ):
     block = steady_block()
     for name in ("n", "keep", "noise", "jitter", "P_xx", "P_dd"):
-        block["calm"][name] = block[name]
-    block["calm"]["drift"][:] = 0.1 * TOGETHER
-    alone = block["calm"].copy()
+        block["no_gust_filter"][name] = block[name]
+    block["no_gust_filter"]["drift"][:] = 0.1 * TOGETHER
+    alone = block["no_gust_filter"].copy()
     block["innovation"], block["scratch"] = (0.003, -0.001), (0.4, -0.2)
-    block["agreement"], block["size"] = agreement, size
+    block["calm_agreement"], block["calm_information"] = calm_agreement, size
     inverse, g = block["S_inverse"].copy(), block["innovation"].copy()
-    likelihood.follow_calm(block, DT)
-    likelihood.foresee(block, DT)
+    likelihood.whiten_without_gust(block, DT)
+    likelihood.predict_calm_air(block, DT)
     likelihood.advance(alone, DT)
     likelihood.whiten(alone, alone["state"], np.array([0.4, -0.2]), DT, alone["innovation"])
     foretold = g - alone["innovation"]
     kept = np.exp(-DT / 2.0)
-    agreement, size = kept * agreement + foretold @ inverse @ g, kept * size + foretold @ inverse @ foretold
-    assert (block["agreement"], block["size"]) == pytest.approx((agreement, size), rel=1e-12)
-    assert block["foreseen"] == pytest.approx(share(agreement, size) * foretold, rel=1e-12)
-    assert block["calm"]["state"] == pytest.approx(alone["state"], rel=1e-12)
+    calm_agreement, size = (
+        kept * calm_agreement + foretold @ inverse @ g,
+        kept * size + foretold @ inverse @ foretold,
+    )
+    assert (block["calm_agreement"], block["calm_information"]) == pytest.approx(
+        (calm_agreement, size), rel=1e-12
+    )
+    assert block["calm_prediction"] == pytest.approx(share(calm_agreement, size) * foretold, rel=1e-12)
+    assert block["no_gust_filter"]["state"] == pytest.approx(alone["state"], rel=1e-12)
 
 
 @pytest.mark.parametrize(("kind", "sided"), [(LOSS, -1.0), (ENDING, 1.0), (STEP, 0.0)])
@@ -189,10 +198,10 @@ def test_what_calm_air_foretells_is_taken_off_where_it_speaks_for_the_fault(kind
             for name, value in {
                 "correlation": sided * 8.0 or 8.0,
                 "information": 4.0,
-                "foreseen": it,
+                "calm_prediction": it,
             }.items():
                 block["lanes"][name][0, :N_SLOTS] = value
-            likelihood.judge(block)
+            likelihood.evaluate(block)
             scores.append(block["hypothesis"][0]["score"])
         assert scores[0] == pytest.approx(4.0)
         assert scores[0] - scores[1] == pytest.approx(1.5 if sided * foreseen > 0.0 else 0.0)
@@ -208,8 +217,8 @@ def test_of_hypotheses_that_a_block_does_not_have_nothing_is_reckoned():
     block["overlap"] = rng.uniform(1.0, 2.0, block["overlap"].shape)
     before = {name: lanes_of(block, name) for name in names}
     block["hypothesis"]["signature"], block["scratch"] = rng.normal(size=2), rng.normal(size=2)
-    likelihood.start(block, 3)
-    likelihood.take_in(block, np.full(3, 0.1), True, DT, 0.9)
+    likelihood.reset_onset(block, 3)
+    likelihood.update_block(block, np.full(3, 0.1), True, DT, 0.9)
     for name in names:
         assert (lanes_of(block, name) == before[name])[..., 2 * N_SLOTS :].all(), name
 
@@ -220,20 +229,20 @@ def test_a_lane_without_information_comes_to_nothing():
     block["lanes"]["information"][:, ::2] = 2.0
     with np.errstate(divide="ignore", invalid="ignore"):
         for lanes in block["lanes"]:
-            likelihood.judge_lanes(block, lanes, N_LANES, True, False)
-    for name, nothing in (("score", 0.0), ("at_least", 0.0), ("at_most", 0.0), ("likelihood", -1.0)):
+            likelihood.evaluate_lanes(block, lanes, N_LANES, True, False)
+    for name, nothing in (("score", 0.0), ("min_llr", 0.0), ("max_llr", 0.0), ("llr", -1.0)):
         assert (lanes_of(block, name)[1::2] == nothing).all()
         assert (lanes_of(block, name)[::2] > 0.0).all()
 
 
 def shapes(kind, frames=5):
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), kind)
-    block["hypothesis"]["growth_keep"], block["lanes"]["missing"] = 0.8, 1.0
+    block["hypothesis"]["growth_decay"], block["lanes"]["growth_left"] = 0.8, 1.0
     found = []
     for k in range(frames):
         block["hypothesis"]["signature"][0] = 1.0 + k, -2.0 * k
-        likelihood.shape(block["hypothesis"][0], block["lanes"][0], 0)
-        found.append(by_onset(block, "shaped")[:, 3, 0].copy())
+        likelihood.shape_signature(block["hypothesis"][0], block["lanes"][0], 0)
+        found.append(by_onset(block, "shaped_signature")[:, 3, 0].copy())
     return np.array(found)
 
 
@@ -258,12 +267,12 @@ def test_a_loss_grows_stays_or_gives_back_what_it_was():
 )
 def test_a_loss_takes_away_and_its_end_gives_back(kind, sided, score):
     """The score for a correlation of 3 and of -3, of information 9."""
-    assert bool(likelihood.one_sided(kind)) == sided
+    assert bool(likelihood.is_one_sided(kind)) == sided
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), kind)
     for sign in (1.0, -1.0):
         lanes = block["lanes"][0]
         lanes["correlation"][0], lanes["information"][0] = 3.0 * sign, 9.0
-        likelihood.judge_lanes(block, lanes, N_SLOTS, True, False)
+        likelihood.evaluate_lanes(block, lanes, N_SLOTS, True, False)
         assert lanes["score"][0] == pytest.approx(score * sign if sided else 1.0)
 
 
@@ -273,13 +282,13 @@ def test_a_mapped_error_is_doubt_of_all_but_a_loss(kind, certain):
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), kind)
     lane = block["lanes"][0]
     lane["sense"], lane["correlation"], lane["information"] = likelihood.SENSE[kind], -7.0 * 9.0, 81.0
-    lane["stays"] = 6.0 * 9.0
-    likelihood.judge_lanes(block, lane, N_SLOTS, True, True)
-    assert lane["at_least"][0] == pytest.approx(certain)
-    likelihood.judge_lanes(block, lane, N_SLOTS, True, False)
-    assert lane["at_least"][0] == pytest.approx(24.5)
-    likelihood.judge_lanes(block, lane, N_SLOTS, False, True)
-    assert lane["at_least"][0] == pytest.approx(0.5)
+    lane["constant_part"] = 6.0 * 9.0
+    likelihood.evaluate_lanes(block, lane, N_SLOTS, True, True)
+    assert lane["min_llr"][0] == pytest.approx(certain)
+    likelihood.evaluate_lanes(block, lane, N_SLOTS, True, False)
+    assert lane["min_llr"][0] == pytest.approx(24.5)
+    likelihood.evaluate_lanes(block, lane, N_SLOTS, False, True)
+    assert lane["min_llr"][0] == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize("kind", [LOSS, STEP])
@@ -287,7 +296,7 @@ def test_a_mapped_error_is_doubt_of_all_but_a_loss(kind, certain):
 def test_the_log_likelihood_ratio_is_the_largest_of_any_theta_allowed(kind, evidence):
     theta = np.linspace(0.0, 1.0 if kind == LOSS else 9.0, 9001)
     largest = np.max(theta * evidence - 0.5 * theta**2 * 4.0)
-    assert likelihood.log_likelihood(kind == LOSS, evidence, 4.0) == pytest.approx(
+    assert likelihood.log_likelihood_ratio(kind == LOSS, evidence, 4.0) == pytest.approx(
         max(largest, 0.0), abs=1e-6
     )
 
@@ -297,59 +306,59 @@ def test_the_estimate_of_a_loss_is_the_likeliest_with_a_prior_and_of_a_step_with
     """A normal prior of mean -1/2 and the variance of a uniform one: the mode within [-1, 0]."""
     theta, D = np.linspace(-1.0, 0.0, 100001), 9.0
     posterior = theta * N - 0.5 * theta**2 * D - 0.5 * 12.0 * (theta + 0.5) ** 2
-    assert likelihood.estimate(LOSS, N, D) == pytest.approx(theta[posterior.argmax()], abs=2e-5)
-    assert likelihood.estimate(STEP, N, D) == pytest.approx(N / 9.0)
+    assert likelihood.estimate_theta(LOSS, N, D) == pytest.approx(theta[posterior.argmax()], abs=2e-5)
+    assert likelihood.estimate_theta(STEP, N, D) == pytest.approx(N / 9.0)
 
 
 def test_a_share_is_in_standard_deviations_or_of_what_uncertainty_and_chance_allow():
-    assert likelihood.share(6.0, 0.5, 12.0, 0.0, 9.0) == pytest.approx(4.0)
-    assert likelihood.share(6.0, 0.5, 12.0, 24.0, 9.0) == pytest.approx(12.0 / (4.0 + 1.5))
-    against_chance_alone = likelihood.share(6.0, 0.5, 12.0, 0.6, 9.0)
+    assert likelihood.normalised_evidence(6.0, 0.5, 12.0, 0.0, 9.0) == pytest.approx(4.0)
+    assert likelihood.normalised_evidence(6.0, 0.5, 12.0, 24.0, 9.0) == pytest.approx(12.0 / (4.0 + 1.5))
+    against_chance_alone = likelihood.normalised_evidence(6.0, 0.5, 12.0, 0.6, 9.0)
     assert against_chance_alone == pytest.approx(4.0)  # never more than that
 
 
 def judged(kind=LOSS, tolerated=False, memory=0.0, rooms=(0.0, 0.0), at_most=0.0):
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), kind, tolerance=(0.1, 0.2))
-    block["level"], block["chance"] = 1.0, 0.5
+    block["level"], block["noise_share"] = 1.0, 0.5
     onsets, lanes, overlap = [1, 5], block["lanes"][0], block["overlap"][0]
     lanes["correlation"][onsets], lanes["information"][onsets] = (-3.0, -5.0), (4.0, 16.0)
     lanes["correlation"][7] = -99.0  # nothing is known of that onset
-    overlap[:2, 1], overlap[:2, 5], lanes["stays"][onsets] = (1.0, -2.0), (-3.0, 4.0), rooms
+    overlap[:2, 1], overlap[:2, 5], lanes["constant_part"][onsets] = (1.0, -2.0), (-3.0, 4.0), rooms
     hypothesis = block["hypothesis"][0]
-    hypothesis["score"], hypothesis["at_least"], hypothesis["at_most"] = 99.0, 99.0, at_most
+    hypothesis["score"], hypothesis["min_llr"], hypothesis["max_llr"] = 99.0, 99.0, at_most
     if tolerated:
         likelihood.accumulate_overlap(block, lanes, overlap, N_SLOTS, 1.0)
-    likelihood.judge(block, memory)
+    likelihood.evaluate(block, memory)
     return hypothesis
 
 
 def test_a_hypothesis_is_worth_its_best_onset():
     hypothesis = judged()
     assert hypothesis["score"] == pytest.approx(1.5)  # 3 / 2 beside 5 / 4
-    assert hypothesis["at_least"] == hypothesis["at_most"] == pytest.approx(9.0 / 8.0)
+    assert hypothesis["min_llr"] == hypothesis["max_llr"] == pytest.approx(9.0 / 8.0)
     assert hypothesis["theta"] == pytest.approx(max((-3.0 - 6.0) / 16.0, -1.0))
-    assert hypothesis["certainty"] == 4.0
+    assert hypothesis["information"] == 4.0
 
 
 def test_what_errors_of_coefficients_explain_is_taken_off_and_may_be_added():
     hypothesis = judged(tolerated=True)  # slack 0.5 and 1.1
     assert hypothesis["score"] == pytest.approx(max(2.5 / 2.0, 3.9 / 4.0))
-    assert hypothesis["at_least"] == pytest.approx(max(2.5**2 / 8.0, 3.9**2 / 32.0))
-    assert hypothesis["at_most"] == pytest.approx(max(3.5**2 / 8.0, 6.1**2 / 32.0))
+    assert hypothesis["min_llr"] == pytest.approx(max(2.5**2 / 8.0, 3.9**2 / 32.0))
+    assert hypothesis["max_llr"] == pytest.approx(max(3.5**2 / 8.0, 6.1**2 / 32.0))
 
 
 def test_what_a_bounded_uncertainty_explains_is_held_against_the_evidence():
     hypothesis = judged(rooms=(0.25, 0.5))
     assert hypothesis["score"] == pytest.approx(max(3.0 / 2.0, 5.0 / 4.0))
-    assert hypothesis["at_least"] == pytest.approx(max(2.75**2 / 8.0, 4.5**2 / 32.0))
-    assert hypothesis["at_most"] == pytest.approx(max(3.25**2 / 8.0, 5.5**2 / 32.0))
+    assert hypothesis["min_llr"] == pytest.approx(max(2.75**2 / 8.0, 4.5**2 / 32.0))
+    assert hypothesis["max_llr"] == pytest.approx(max(3.25**2 / 8.0, 5.5**2 / 32.0))
 
 
 def test_where_a_loss_may_end_what_was_explained_is_remembered_and_uncertainty_casts_no_doubt():
     hypothesis = judged(rooms=(0.25, 0.5), memory=0.9, at_most=10.0)
-    assert hypothesis["at_most"] == pytest.approx(9.0)
-    assert hypothesis["at_least"] == pytest.approx(9.0 / 8.0)
-    assert judged(memory=0.0, at_most=10.0)["at_most"] == pytest.approx(9.0 / 8.0)
+    assert hypothesis["max_llr"] == pytest.approx(9.0)
+    assert hypothesis["min_llr"] == pytest.approx(9.0 / 8.0)
+    assert judged(memory=0.0, at_most=10.0)["max_llr"] == pytest.approx(9.0 / 8.0)
 
 
 def detector(**fields):
@@ -381,8 +390,8 @@ def test_signatures_are_what_surfaces_gave_steps_and_the_cubic_moment():
 def with_scores(*scores, alarms=1):
     _, record = detector(detected_at_s=-1.0)
     for block, values in zip(record["block"], scores, strict=True):
-        block["hypothesis"]["score"][:3], block["hypothesis"]["alarms"][:3] = values, alarms
-        block["hypothesis"]["axis"][:3], block["hypothesis"]["column"][:3] = (0, 1, 2), (0, 1, 2)
+        block["hypothesis"]["score"][:3], block["hypothesis"]["raises_alarm"][:3] = values, alarms
+        block["hypothesis"]["axis"][:3], block["hypothesis"]["log_column"][:3] = (0, 1, 2), (0, 1, 2)
     return record
 
 
@@ -405,22 +414,25 @@ def test_the_alarm_is_the_largest_share_of_the_level():
 
 def test_the_log_has_each_test_as_its_largest_share():
     record, row = with_scores((1.0, 2.0, 0.0), (3.0, 0.0, 4.0), (0.5, 1.5, 2.5)), np.full(6, 9.0)
-    record["tests"]["n_columns"] = 4
+    record["tests"]["n_log_columns"] = 4
     Statistical.record(record, row)
     assert row == pytest.approx([9.0, 9.0, 0.6, 0.4, 0.8, 0.0])
-    record["block"]["hypothesis"]["alarms"] = 0
+    record["block"]["hypothesis"]["raises_alarm"] = 0
     Statistical.record(record, row)
     assert row == pytest.approx([9.0, 9.0, 0.0, 0.0, 0.0, 0.0])
 
 
 def test_the_estimate_of_a_loss_is_the_surest():
     _, record = detector()
-    for b, (theta, certainty) in enumerate(((-0.9, 1.0), (-0.4, 5.0), (-0.3, 2.0))):
+    for b, (theta, information) in enumerate(((-0.9, 1.0), (-0.4, 5.0), (-0.3, 2.0))):
         hypothesis = record["block"][b]["hypothesis"][1]
         hypothesis["kind"], hypothesis["surface"] = LOSS, 2
-        hypothesis["theta"], hypothesis["certainty"] = theta, certainty
+        hypothesis["theta"], hypothesis["information"] = theta, information
     record["block"][2]["hypothesis"][0] = record["block"][2]["hypothesis"][1]
-    record["block"][2]["hypothesis"]["kind"][0], record["block"][2]["hypothesis"]["certainty"][0] = STEP, 9.0
+    record["block"][2]["hypothesis"]["kind"][0], record["block"][2]["hypothesis"]["information"][0] = (
+        STEP,
+        9.0,
+    )
     assert statistical.estimated_loss(record["block"], 2) == (-0.4, 5.0)
     assert statistical.estimated_loss(record["block"], 1) == (0.0, 0.0)
 
@@ -437,10 +449,10 @@ def contested(loss=1.0, step=0.0, other=0.0, growing=0.0, ending=0.0, pitch=(0.0
         block["n_hypotheses"] = 5
         block["hypothesis"]["kind"][:5] = LOSS, STEP, LOSS, GROWING, ENDING
         block["hypothesis"]["surface"][:5] = 2, -1, 0, 2, 2
-        block["hypothesis"]["at_least"][:5] = block["hypothesis"]["at_most"][:5] = values
+        block["hypothesis"]["min_llr"][:5] = block["hypothesis"]["max_llr"][:5] = values
     block = record["block"][0]
     block["hypothesis"]["kind"][:3], block["hypothesis"]["surface"][:3] = (STEP, LOSS, ENDING), (-1, 2, 2)
-    block["hypothesis"]["at_least"][:3] = block["hypothesis"]["at_most"][:3] = pitch
+    block["hypothesis"]["min_llr"][:3] = block["hypothesis"]["max_llr"][:3] = pitch
     return bool(Statistical.excludes(fdi, 2, keys.get("ends", False)))
 
 
@@ -489,7 +501,7 @@ def test_a_loss_shows_where_it_explains_better_than_all_else_by_the_naming_level
     block = record["block"][1]
     block["n_hypotheses"] = 3
     block["hypothesis"]["kind"][:3], block["hypothesis"]["surface"][:3] = (STEP, LOSS, GROWING), (-1, 2, 2)
-    block["hypothesis"]["at_least"][:3] = at_least
+    block["hypothesis"]["min_llr"][:3] = at_least
     assert bool(Statistical.shows(fdi, 2)) == shown
     assert not Statistical.shows(fdi, 0)
 
@@ -510,12 +522,12 @@ def test_what_the_beliefs_leave_unexplained_is_followed_by_the_drift(b):
     record["air"]["output"]["mean"], record["air"]["output"]["acceleration"] = mean, (0.1, 0.2, 0.3)
     gains = rng.normal(size=(2, 2))
     record["block"]["K_d"], record["block"]["keep"] = gains, 1.0
-    Statistical.follow_rest(record, surprise, DT)
+    Statistical.track_residual_mean(record, surprise, DT)
     axes = [(1,), (0, 2)][b]
     left = DT * (surprise - mean)[list(axes)]
     drift = gains[: len(axes), : len(axes)] @ left
-    assert record["block"][b]["rest"][2 : 2 + len(axes)] == pytest.approx(drift)
-    assert not record["block"][2]["rest"].any()
+    assert record["block"][b]["residual_state"][2 : 2 + len(axes)] == pytest.approx(drift)
+    assert not record["block"][2]["residual_state"].any()
     out = np.zeros(3)
     Statistical.unknown_acceleration(record, out)
     assert out[list(axes)] == pytest.approx(drift + np.array([0.1, 0.2, 0.3])[list(axes)])
@@ -525,10 +537,10 @@ def test_a_loss_is_open_until_its_estimator_is_excluded():
     fdi, _ = detector()
     estimators, loss_of = fdi["isolation"]["estimator"], np.array([-1, 1, -1, -1])
     estimators["excluded"][:2] = 1, 0
-    assert statistical.is_open(estimators, loss_of, 1)
-    assert statistical.is_open(estimators, loss_of, 3)
+    assert statistical.is_not_excluded(estimators, loss_of, 1)
+    assert statistical.is_not_excluded(estimators, loss_of, 3)
     estimators["excluded"][1] = 1
-    assert not statistical.is_open(estimators, loss_of, 1)
+    assert not statistical.is_not_excluded(estimators, loss_of, 1)
 
 
 def test_what_is_just_as_much_excludes_nothing():

@@ -20,7 +20,7 @@ POSITIONS = {
     "hardover down": lambda k, u: -0.4,
     "stuck": lambda k, u: 0.17,
     "bias": lambda k, u: u + 0.15,
-    "swings": lambda k, u: 0.42 * np.sin(0.05 * k),
+    "variation_part": lambda k, u: 0.42 * np.sin(0.05 * k),
     "jumps": lambda k, u: 0.42 * np.sign(np.sin(0.3 * k)),
     "lost": lambda k, u: 0.0,
 }

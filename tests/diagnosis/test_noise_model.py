@@ -37,7 +37,7 @@ SETTINGS = {
 def test_the_level_shares_the_declared_rate_among_all_tests_of_an_hour(rate_hz, turbulence):
     alone = Detector(rate_hz, bounds={"turbulence": turbulence})
     hypotheses = [h for block in alone.blocks for h in block["hypothesis"][: block["n_hypotheses"]]]
-    tests = sum(N_SLOTS * (1 if h["kind"] == LOSS else 2) for h in hypotheses if h["alarms"])
+    tests = sum(N_SLOTS * (1 if h["kind"] == LOSS else 2) for h in hypotheses if h["raises_alarm"])
     tail = norm.sf(alone.detector["tests"]["alarm_level"])
     assert tail * tests * rate_hz * 3600 == pytest.approx(1e-3, rel=1e-6)
     margin = np.sqrt(2 * alone.detector["tests"]["naming_level"])

@@ -109,7 +109,7 @@ def test_every_plane_has_its_losses_their_courses_steps_and_pitch_the_cubic_mome
 
     def hypotheses(block):
         found = block["hypothesis"][: block["n_hypotheses"]]
-        return {(int(h["kind"]), int(h["surface"]), int(h["axis"]), int(h["alarms"])) for h in found}
+        return {(int(h["kind"]), int(h["surface"]), int(h["axis"]), int(h["raises_alarm"])) for h in found}
 
     assert hypotheses(pitch) == {
         (LOSS, ELEVATOR, 1, 1), (STEP, -1, 1, 1), (ALPHA3, -1, 1, 0), (GROWING, ELEVATOR, 1, 0),
@@ -125,10 +125,10 @@ def test_every_plane_has_its_losses_their_courses_steps_and_pitch_the_cubic_mome
     assert [block["axis"][: block["n"]].tolist() for block in alone.blocks] == [[1], [0, 2], [0, 2]]
     for block in alone.blocks:
         for h in block["hypothesis"][: block["n_hypotheses"]]:
-            if h["alarms"]:
+            if h["raises_alarm"]:
                 place = column[LOSS][int(h["surface"])] if h["kind"] == LOSS else 3 + h["axis"]
-                assert h["column"] == place
-    assert alone.detector["tests"]["n_columns"] == 6
+                assert h["log_column"] == place
+    assert alone.detector["tests"]["n_log_columns"] == 6
     assert alone.detector["block"]["n_hypotheses"].all()
 
 
@@ -158,11 +158,11 @@ def test_the_times_and_levels_of_a_detector(alone):
     assert record["tests"]["enabled"] == 1
     for block in blocks:
         assert block["level"] == record["tests"]["alarm_level"]
-        assert block["chance"] == 0.5
+        assert block["noise_share"] == 0.5
         assert block["pace"] == pytest.approx(15.0 / 50.0)
-        assert block["hypothesis"]["growth_keep"] == pytest.approx(exp(-1.5 / 50.0))
+        assert block["hypothesis"]["growth_decay"] == pytest.approx(exp(-1.5 / 50.0))
     for bounds, chance in (({}, 0.0), ({"turbulence": "light"}, 0.5), ({"sensors": "tactical-grade"}, 0.5)):
-        assert [block["chance"] for block in Detector(50.0, bounds=bounds).blocks] == [chance] * 3
+        assert [block["noise_share"] for block in Detector(50.0, bounds=bounds).blocks] == [chance] * 3
 
 
 def test_a_loss_declared_constant_neither_grows_nor_ends():
@@ -176,9 +176,11 @@ def test_the_second_view_returns_with_a_gust_as_strong_where_it_is_slow(alone):
     air, last = alone.detector["air"], alone.blocks[-1]
     rolling = sqrt(0.3048 * 1750.0 * SPAN_M) / 2.6
     assert air["config"]["rolling"] == pytest.approx(rolling)
-    assert last["lag"] == pytest.approx(noise_model.returning_length(alone.detector, V, 50.0, rolling))
-    assert last["stronger"] == pytest.approx((rolling / last["lag"]) ** 2)
-    assert [float(block["stronger"]) for block in alone.blocks[:-1]] == [1.0, 1.0]
+    assert last["return_length"] == pytest.approx(
+        noise_model.returning_length(alone.detector, V, 50.0, rolling)
+    )
+    assert last["drift_scale"] == pytest.approx((rolling / last["return_length"]) ** 2)
+    assert [float(block["drift_scale"]) for block in alone.blocks[:-1]] == [1.0, 1.0]
     assert air["output"]["moving"] == 1
     assert air["config"]["area_per_mass"] == pytest.approx(AIRCRAFT.geometry.wing_area_m2 / MASS.mass_kg)
     assert air["memory"]["unseen"] == pytest.approx([1.0, 0.003, 0.03])
@@ -409,11 +411,11 @@ def test_an_error_crosses_its_bound_within_a_quarter_of_a_surfaces_travel():
     for step, way in zip(steps, rng.permutation(3)[[0] * 20], strict=True):
         u = error_map.before.copy()
         u[way] += step * (error_map.travel_high - error_map.travel_low)[way]
-        statistical.follow_surfaces(record.noise, record.block, error_map, u)
+        statistical.update_pace(record.noise, record.block, error_map, u)
         assert [block.pace for block in record.block] == pytest.approx([0.02 + 2.0 * step / 0.25] * 3)
-    statistical.follow_surfaces(record.noise, record.block, error_map, error_map.before.copy())
+    statistical.update_pace(record.noise, record.block, error_map, error_map.before.copy())
     assert record.block[0].pace == pytest.approx(0.02)
-    statistical.follow_surfaces(record.noise, record.block, error_map, error_map.travel_low.copy())
+    statistical.update_pace(record.noise, record.block, error_map, error_map.travel_low.copy())
     assert record.block[0].pace == 2.0
 
 
@@ -424,7 +426,7 @@ def test_a_surface_that_stands_still_again_moves_no_error():
     error_map.travel_low, error_map.travel_high = (-0.3, -0.2, -0.4), (0.1, 0.25, 0.5)
     record.noise.pace, paces = 0.02, []
     for u in ((0.0, 0.0, 0.0), *[(0.01, -0.02, 0.0)] * 2, (0.01, -0.02, 0.018), (0.01, -0.02, 0.0)):
-        statistical.follow_surfaces(record.noise, record.block, error_map, np.array(u))
+        statistical.update_pace(record.noise, record.block, error_map, np.array(u))
         paces.append(float(record.block[1].pace))
     shares = [0.0, 0.02 / 0.45, 0.0, 0.02, 0.02]  # of the travel of the surface that moves farthest
     assert paces == pytest.approx([0.02 + 8.0 * share for share in shares])

@@ -263,8 +263,8 @@ def new_detector(**fields):
     record["tests"]["share"], record["noise"]["rapidity"] = 0.25, 2.0
     record["noise"]["jitter"], record["noise"]["deflection"] = (0.1, 0.2, 0.3), (0.01, 0.02, 0.03)
     for block, axes in zip(record["block"], ((1,), (0, 2), (0, 2)), strict=True):
-        block["n"], block["axis"][: len(axes)], block["stronger"] = len(axes), axes, 1.0
-    record["block"][2]["stronger"], record["block"][2]["lag"] = 4.0, 90.0
+        block["n"], block["axis"][: len(axes)], block["drift_scale"] = len(axes), axes, 1.0
+    record["block"][2]["drift_scale"], record["block"][2]["return_length"] = 4.0, 90.0
     put(record, **fields)
     return fdi, record, design_record().view(np.recarray)[0]
 
@@ -433,7 +433,7 @@ def test_the_estimate_is_that_of_whoever_counts():
     block = fdi["statistical"]["block"][0]
     block["n_hypotheses"], block["n"], block["axis"][0] = 1, 1, 1
     hypothesis = block["hypothesis"][0]
-    hypothesis["kind"], hypothesis["surface"], hypothesis["theta"], hypothesis["certainty"] = (
+    hypothesis["kind"], hypothesis["surface"], hypothesis["theta"], hypothesis["information"] = (
         LOSS,
         2,
         -0.6,
@@ -441,7 +441,7 @@ def test_the_estimate_is_that_of_whoever_counts():
     )
     assert on(conclusion.isolated_surface, fdi) == 2
     assert frame.isolated_theta(fdi, 2) == -0.2
-    fdi["fdae"]["network"]["output"], block["rest"] = 0.3, (0, 0, 0.7, 0)
+    fdi["fdae"]["network"]["output"], block["residual_state"] = 0.3, (0, 0, 0.7, 0)
     assert unknown_acceleration(fdi) == [0.0] * 3
     fdi["verdict"]["detected"] = 1
     assert unknown_acceleration(fdi) == pytest.approx([0.3] * 3)
@@ -465,7 +465,7 @@ def test_a_leap_of_the_air_widens_what_a_drift_may_be():
     """By the axes of the block, so much stronger as the gusts are taken to be."""
     block = np.zeros(1, block_dtype(USUAL_SIZE.rates)).view(np.recarray)[0]
     record, rng = new_air(), np.random.default_rng(2)
-    record["output"]["leap"], block["stronger"], block["P_dd"] = rng.normal(size=(3, 3)), 1.7, 0.3
+    record["output"]["leap"], block["drift_scale"], block["P_dd"] = rng.normal(size=(3, 3)), 1.7, 0.3
     block["n"], block["axis"] = 2, (0, 2)
-    statistical.leap(record, block)
+    statistical.add_leap(record, block)
     assert block["P_dd"] == pytest.approx(0.3 + 1.7 * record["output"]["leap"][np.ix_((0, 2), (0, 2))])

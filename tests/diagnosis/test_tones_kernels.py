@@ -29,7 +29,7 @@ def rng():
 def view(rng):
     view = new_fdi()["statistical"]["views"][0]
     block = view["block"]
-    block["n"], block["n_regressors"], block["keep"], block["chance"] = 1, 3, 1.0, 0.5
+    block["n"], block["n_regressors"], block["keep"], block["noise_share"] = 1, 3, 1.0, 0.5
     block["S_inverse"][0, 0], block["K_x"][0, 0], block["K_d"][0, 0] = 4.0, 0.3, 0.8
     block["tolerance"][:3], view["bounded"] = rng.uniform(0.1, 0.2, 3), 0.05
     return view

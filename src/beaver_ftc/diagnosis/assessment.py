@@ -94,6 +94,6 @@ def assess_unknown(assessment, config, conclusion, types, layout, statistics, de
         statistical.unknown_acceleration(statistics.block, statistics.air, unknown)
     elif conclusion.detected and not lags:
         fdae.unknown_acceleration(detector, bound.noise, unknown)
-    is_open = every_type and conclusion.detected and conclusion.isolated == NOT_ISOLATED
+    is_not_excluded = every_type and conclusion.detected and conclusion.isolated == NOT_ISOLATED
     long = types.surface[layout.main[PITCH]].evidence.frames >= types.config.patience
-    assessment.pitch_is_open = is_open and long
+    assessment.pitch_is_open = is_not_excluded and long

@@ -114,14 +114,14 @@ class MappedError(NamedTuple):
 class Hypothesis(NamedTuple):
     """A fault that the statistical test compares with health.
 
-    kind: of `likelihood`; surface, axis: which. alarms: whether it may raise the alarm. score: its largest
+    kind: of `likelihood`; surface, axis: which. raises_alarm: whether it may raise the alarm. score: largest
     log likelihood ratio over all onsets, in the unit of the alarm level.
     """
 
     kind: int
     surface: int
     axis: int
-    alarms: bool
+    raises_alarm: bool
     score: float
 
 
@@ -131,20 +131,20 @@ class Lanes(NamedTuple):
 
     score: np.ndarray
     sense: np.ndarray
-    foreseen: np.ndarray
-    shown: np.ndarray
+    calm_prediction: np.ndarray
+    gust_response: np.ndarray
 
 
 class Block(NamedTuple):
     """One Kalman filter of the statistical detector and the hypotheses on its axes.
 
-    axes: of its states. lag: time constant of the drift, 0 for none. stronger: factor on the variance of a
+    axes: of its states. return_length: of the drift, m; 0 for none. drift_scale: factor on the variance of a
     gust seen roughly. tolerance (regressors,): of the constants that are not known, 0 for one not used.
     """
 
     axes: tuple[int, ...]
-    lag: float
-    stronger: float
+    return_length: float
+    drift_scale: float
     tolerance: np.ndarray
     hypotheses: tuple[Hypothesis, ...]
     lanes: Lanes
@@ -351,8 +351,8 @@ def recorded_always(fdi: np.void, n: int, every_type: bool) -> dict[str, np.ndar
 # State, covariances and inputs of a filter of the statistical detector, of which a certificate wants the
 # frames up to the alarm.
 OF_BLOCK = (
-    "keep", "pace", "state", "P_xx", "P_xd", "P_dd", "drift", "jitter", "noise", "foreseen",
-    "shown", "regressor_state", "regressor_response",
+    "keep", "pace", "state", "P_xx", "P_xd", "P_dd", "drift", "jitter", "noise", "calm_prediction",
+    "gust_response", "regressor_state", "regressor_response",
 )  # fmt: skip
 
 
@@ -395,14 +395,15 @@ def _block(block: np.void) -> Block:
     n = len(hypotheses)
     lanes = (block["lanes"][name].reshape(-1, N_SLOTS)[:n].copy() for name in Lanes._fields)
     return Block(
-        tuple(block["axis"][: block["n"]].tolist()), float(block["lag"]), float(block["stronger"]),
+        tuple(block["axis"][: block["n"]].tolist()),
+        float(block["return_length"]), float(block["drift_scale"]),
         block["tolerance"][: block["n_regressors"]].copy(), hypotheses, Lanes(*lanes),
     )  # fmt: skip
 
 
 def _hypothesis(one: np.void) -> Hypothesis:
     numbers = int(one["kind"]), int(one["surface"]), int(one["axis"])
-    return Hypothesis(*numbers, bool(one["alarms"]), float(one["score"]))
+    return Hypothesis(*numbers, bool(one["raises_alarm"]), float(one["score"]))
 
 
 def read_sensor_monitor(watch: np.void) -> SensorMonitor:

@@ -150,6 +150,6 @@ def lay_out(frame: np.void, scenario: Scenario, diagnoses_itself: bool) -> tuple
     moved |= bool(frame["control"]["engines"]["config"]["n"])
     power = aircraft.power_setting if moved else ""
     logged["power"] = 1 + len(aircraft.effectors) if power else 0
-    logged["tests"] = tests["n_columns"] if tests["enabled"] else 0
+    logged["tests"] = tests["n_log_columns"] if tests["enabled"] else 0
     tested, columns = bool(tests["enabled"]), COLUMNS if profile else ()
     return ch.log_columns(aircraft, estimators, watched, power, columns, tested, sampled)

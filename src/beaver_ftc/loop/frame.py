@@ -250,7 +250,7 @@ def record(frame, commanded, row):
     chances = fdi.statistical
     if logged.tests and chances.tests.enabled:
         views = chances.views[: chances.n_views]
-        statistical.write_shares(chances.tests, chances.block, views, chances.forces, chances.air, row)
+        statistical.log_scores(chances.tests, chances.block, views, chances.forces, chances.air, row)
 
 
 @kernel

@@ -17,7 +17,7 @@ from beaver_ftc.diagnosis.detection import (
     advance_block,
     filter_block,
     reach_of_block,
-    slot_to_start,
+    slot_to_reset,
     whiten_frame,
 )
 from beaver_ftc.diagnosis.detection import STEP_HYPOTHESIS as STEP
@@ -38,7 +38,7 @@ def of_alarm(tape: Tape, history: History, surfaces: Sequence[str], k: int) -> D
     """The statement that chance raised the alarm at row k; None where it is not one onset's, or too old."""
     diagnosis = tape.alarm.diagnosis
     b, h, slot = _loudest(diagnosis.blocks)
-    first = next((r for r in range(k, tape.first, -1) if slot_to_start(r - tape.since) == slot), None)
+    first = next((r for r in range(k, tape.first, -1) if slot_to_reset(r - tape.since) == slot), None)
     if first is None or k - first > _LONGEST:
         return None
     hypothesis = diagnosis.blocks[b].hypotheses[h]
@@ -70,7 +70,7 @@ def with_share(said: Document, logged: float) -> Document:
 def shares(diagnosis: DiagnosisReadout, surfaces: Sequence[str]) -> dict[str, float]:
     """Column, and largest share of the alarm level, of each hypothesis that raises alarms."""
     found: dict[str, float] = {}
-    for hypothesis in (each for block in diagnosis.blocks for each in block.hypotheses if each.alarms):
+    for hypothesis in (each for block in diagnosis.blocks for each in block.hypotheses if each.raises_alarm):
         column, share = _column(hypothesis, surfaces), hypothesis.score / diagnosis.alarm_level
         found[column] = max(found.get(column, 0.0), share)
     return found
@@ -142,7 +142,7 @@ def _loudest(blocks: Sequence[StatisticalBlock]) -> tuple[int, int, int]:
     best, found = -1.0, (0, 0, 0)
     for b, block in enumerate(blocks):
         for h, hypothesis in enumerate(block.hypotheses):
-            if hypothesis.alarms and hypothesis.score > best:
+            if hypothesis.raises_alarm and hypothesis.score > best:
                 best, found = hypothesis.score, (b, h, int(np.argmax(block.lanes.score[h])))
     return found
 
@@ -168,15 +168,17 @@ def _written(tape: Tape, history: History, test: tuple[int, int, int], rows: ran
         "signature": now["signature"][:, h][:, felt], "jitter": dt * dt * then["jitter"][:, felt],
         "drift": drift, "bounded": tape.chances["bounded"][here][:-1][:, axes], "pace": then["pace"],
     }  # fmt: skip
-    if block.lag > 0.0:
+    if block.return_length > 0.0:
         its["keep"] = then["keep"]
     if known:
         its["known"] = (response - before[..., :n]) / dt + before[..., n:]  # that gave this response
     if diagnosis.air.moving:
         its["air"] = tape.chances["air"][here][1:][:, axes]
-        drift += block.stronger * tape.chances["leap"][here][1:][np.ix_(range(len(rows)), axes, axes)]
+        drift += block.drift_scale * tape.chances["leap"][here][1:][np.ix_(range(len(rows)), axes, axes)]
     lanes = block.lanes
-    sense, explained = lanes.sense[h, slot], {"foreseen": lanes.foreseen, "shown": lanes.shown}
+    sense, explained = lanes.sense[h, slot], {
+        "calm_prediction": lanes.calm_prediction, "gust_response": lanes.gust_response,
+    }  # fmt: skip
     taken = [name for name, values in explained.items() if sense * values[h, slot] > 0.0]
     if taken:  # each of them where it speaks for the loss
         its["foreseen"] = np.sum([now[name] for name in taken], axis=0)[:, felt]
@@ -291,10 +293,10 @@ def follow(blocks, inputs, drift, of_frame, states, sums, room, dt):
             before, w[i] = w[i], 0.0
             for j in range(block.n):
                 w[i] += block.S_inverse[i, j] * g[1, j]
-            room[0] += block.swing[i] * abs(w[i] - before)
-            room[1] += given[COURSE, 1] * block.swing[i] * abs(w[i])
-            room[2] += block.swing[i] * abs(w[i])
-            room[3] += block.stay[i] * abs(w[i])
+            room[0] += block.transient_response[i] * abs(w[i] - before)
+            room[1] += given[COURSE, 1] * block.transient_response[i] * abs(w[i])
+            room[2] += block.transient_response[i] * abs(w[i])
+            room[3] += block.constant_response[i] * abs(w[i])
             room[4] += w[i] * given[FORESEEN, i]
             for c in range(len(states)):
                 sums[c] += w[i] * g[c, i]

@@ -21,7 +21,7 @@ CONSTANTS = (  # (section, symbol on the page, module, name there, unit)
     (7, "", likelihood, "RINGING", ""),
     (7, "", noise_model, "CHANCE", ""),
     (7, "", noise_model, "GROWTH_PER_S", "1/s"),
-    (7, "", statistical, "LEAST_PART", ""),
+    (7, "", statistical, "MIN_CONSTANT_SHARE", ""),
     (7, "", tones, "N_TONES", ""),
     (7, r"$\omega$", tones, "FREQUENCIES_RAD_S", "rad/s"),
     (7, r"$\tau$", tones, "MEMORY_S", "s"),

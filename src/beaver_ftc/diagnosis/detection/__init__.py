@@ -6,10 +6,10 @@ from beaver_ftc.public import lazily
 
 if TYPE_CHECKING:
     from beaver_ftc.diagnosis.detection.bank import poles_of
-    from beaver_ftc.diagnosis.detection.likelihood import N_SLOTS, filter_block, slot_to_start
+    from beaver_ftc.diagnosis.detection.likelihood import N_SLOTS, filter_block, slot_to_reset
     from beaver_ftc.diagnosis.detection.likelihood import STEP as STEP_HYPOTHESIS
     from beaver_ftc.diagnosis.detection.likelihood import advance as advance_block
-    from beaver_ftc.diagnosis.detection.likelihood import reach as reach_of_block
+    from beaver_ftc.diagnosis.detection.likelihood import fill_uncertainty_response as reach_of_block
     from beaver_ftc.diagnosis.detection.likelihood import whiten as whiten_frame
     from beaver_ftc.diagnosis.detection.noise_model import CHANCE
 else:

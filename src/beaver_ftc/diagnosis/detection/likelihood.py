@@ -4,52 +4,53 @@ The innovation is whitened by a Kalman filter:
 
     x[k+1] = x[k] + dt (F[k] + d[k] + phi[k])      d[k+1] = a d[k] + drift      measured: x + gyro noise
 
-F is the design model, d what moves slowly beside it: the air's rotation, uncertainty that is merely bounded,
-unknown constants. phi is a fault. With a = 1 the drift is a random walk: whatever is constant has no part in
-what is whitened, and whatever drifts less than declared has less. The filter is linear: a fault, or the error
-of a coefficient, passes through it by itself, and that is what the innovation is compared with.
+x are the rates, rad/s; F, rad/s2, is the acceleration of the design model; d, rad/s2, is the drift: a slow
+error of F by rotation of the air, by bounded uncertainty, by unknown constants. phi, rad/s2, is a fault. With
+a = 1 the drift is a random walk, so a constant error does not appear in the whitened innovation. The filter
+is linear, so the response to a fault or to an error of a coefficient is worked out by itself and compared
+with the innovation:
 
     g = e + dt (nu - d)      e <- g - K_x g      d <- a d + K_d g
 
-with nu the innovation of the frame as acceleration and e what is left of the rate.
+nu, rad/s2, is the innovation of the frame as an acceleration; e, rad/s, is the remaining error of the rate.
 
-A hypothesis says what a fault does: theta times a signature s(t), from an onset on. Passed through the
-whitening filter from that onset, the signature becomes g_s; with g the whitened innovation and S its
-covariance
+A hypothesis is a fault phi = theta s(t) from an onset on, with s(t) a known signature. g_s is the response of
+the whitening filter to the signature, g the whitened innovation, rad/s, S its covariance:
 
     N = sum g_s' S^-1 g,  D = sum g_s' S^-1 g_s:      theta_hat = N / D,   log likelihood ratio N^2 / 2 D
 
-and without a fault N / sqrt(D) is standard normal (or less, where the noise is less than declared). An alarm
-is raised where it leaves a level that follows from the declared rate of false alarms, by the union bound
-over hypotheses, onsets and frames.
+Without a fault N / sqrt(D) is standard normal (or smaller, if the noise is smaller than declared). The alarm
+level follows from the declared rate of false alarms by the union bound over hypotheses, onsets and frames.
 
 Errors of coefficients are constants c_j, |c_j| <= tol_j, times known regressors r_j. Through the same filter
-they add sum_j c_j R_j to N, R_j = sum g_s' S^-1 g_rj, hence no more than sum_j tol_j |R_j|: exactly that is
-taken off the evidence.
+they add sum_j c_j R_j to N, with R_j = sum g_s' S^-1 g_rj. That is at most sum_j tol_j |R_j|, which is
+subtracted from the evidence.
 
-An uncertainty d that is merely bounded, |d| <= eta_bar, is no noise. Through the same filter it shows as g_d.
-Of a constant the filter leaves g_0, of a step besides a transient whose sum is 1 / K_d and whose magnitudes
-add up to little more. With w = S^-1 g_s, by summation by parts,
+A bounded uncertainty |d| <= eta_bar is not noise. g_d is its response of the filter. The response to a unit
+constant settles at g_0; the response to a unit step also has a transient whose sum is 1 / K_d and whose
+magnitudes sum to at most RINGING / K_d. With w = S^-1 g_s, summation by parts gives
 
     |sum w' g_d| <= eta_bar (|g_0| sum |w| + RINGING / K_d TV(w)),     TV(w) = sum |w[k] - w[k-1]|
 
-and, d changing by no more than eta_bar omega dt in a frame, TV(w) may be replaced by omega dt sum |w|. The
-alarm wants evidence beyond all of this.
+d changes by at most eta_bar omega dt in a frame, so omega dt sum |w| may replace TV(w). An alarm requires
+more evidence than this bound explains.
 
-A loss that grows is a loss times 1 - exp(-kappa t); one that ends gives back what the surface did not do at
-that instant, and stays away. Such shapes raise no alarm: they say what a surface may explain.
+A growing loss is a loss times 1 - exp(-kappa t). The end of a loss is a step of the opposite sign, of the
+size that the signature had at the onset. These hypotheses raise no alarm; they are needed to decide whether
+a fault of a surface can explain the data.
 
-The declared drift is a most. In calmer air the filter follows the gyro's noise as if it were gust, and what
-it leaves, g, can be foreseen: by p = g - g_calm, of a filter beside it that reckons with no gust. A law
-answers the same noise through the surfaces, so a loss then shows where there is none. How much of p is in g
-is fitted, lambda = sum p' S^-1 g / sum p' S^-1 p: 0 in air as declared, 1 in calm air. What lambda p gives
-the evidence is taken off it.
+The declared drift is an upper limit. In calmer air the filter interprets gyro noise as gust, and its
+innovation g is then partly predictable: from p = g - g_0, where g_0 is the innovation of a second filter
+without gust. The control law reacts to the same noise, so a loss would seem to be present without one. The
+fraction of p in g is estimated, lambda = sum p' S^-1 g / sum p' S^-1 p: 0 in air as declared, 1 in calm air.
+The evidence that lambda p contributes is subtracted.
 
-Nor is a gust that vanes show, but forces do not tell from the aircraft's own way, independent of the surfaces
-of a law that answers the vanes. What it gives the evidence, whitened alike, is taken off that.
+A gust may be visible to the vanes only roughly, if no force separates it from the aircraft's own motion
+(air.py). It correlates with the surfaces of a law that uses the vanes. Its response is whitened likewise,
+and the evidence that it contributes is subtracted.
 
-Onsets: slot j starts anew every 2^(j+1) frames, so that there is always one of about every age. From the
-alarm on they stay, and old evidence is forgotten slowly.
+Onsets: slot j restarts every 2^(j+1) frames, so that onsets of about every age exist at any time. After an
+alarm no slot restarts, and old evidence decays slowly.
 """
 
 from collections.abc import Sequence
@@ -61,58 +62,63 @@ import numpy as np
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.diagnosis.state import LOSS
 
-# A block is the axes whose noise goes together: pitch, and roll with yaw, the latter twice. States of a
-# filter: what is left of the rate, then the drift.
-PITCH_BLOCK, LATERAL, RETURNING = 0, 1, 2  # the last is the second view of roll and yaw
+# A block is a set of axes with correlated noise: pitch, and roll with yaw, the latter twice. The state of a
+# filter is e, then d.
+PITCH_BLOCK, LATERAL, RETURNING = 0, 1, 2  # RETURNING: roll and yaw again, with a drift that returns to zero
 N_BLOCKS = 3
 N_SLOTS = 10
 N_READINGS = 5  # alpha, beta, airspeed, dynamic pressure, engine power: noise_model.py
-MAX_HYPOTHESES = 8  # of a block of the rates: three losses at most, and what they are held against
-LEAST_UNCERTAINTY_RAD_S2 = 1e-3  # reckoned with: a bound that passes zero does not stay there
+MAX_HYPOTHESES = 8  # of a block of the rates of most aircraft: three losses, and the alternatives to them
+LEAST_UNCERTAINTY_RAD_S2 = 1e-3  # lower limit of the bound that sets the drift: the bound may pass zero
 STEP, ALPHA3, GROWING, ENDING = 2, 3, 4, 5  # further kinds of hypothesis
-# Which sign of a correlation speaks for one: a loss takes away, one that ends gives back; 0: either does.
+# Sign of N that supports a hypothesis: a loss removes moment, its end restores moment; 0: both signs.
 SENSE = {LOSS: -1.0, STEP: 0.0, ALPHA3: 0.0, GROWING: -1.0, ENDING: 1.0}
 
-PRIOR_DRIFT_RAD_S2 = 1.0  # what a drift may be at the start of a flight: soon forgotten
-PRIOR_INFORMATION = 12.0  # of a loss uniform on [0, 1]: one over its variance
-# Magnitudes of a second-order transient of damping 0.7 add up to 1.09 times its sum; on two axes to more.
+PRIOR_DRIFT_RAD_S2 = 1.0  # standard deviation of the drift at the start of a flight; soon irrelevant
+PRIOR_INFORMATION = 12.0  # one over the variance of a loss that is uniform on [0, 1]
+# The magnitudes of a second-order transient of damping 0.7 sum to 1.09 times its sum; on two axes to more.
 RINGING = 1.2
 
-FOLLOWED_S = 2.0  # of the past say how calm the air is: long beside a filter's memory, short beside weather's
-CALM_PRIOR = 4.0  # before anything is known it is calm, and held so within two standard deviations
-CALM_MARGIN = 2.0
+# Time constant, s, of the estimate of lambda: long compared with a filter's memory, short compared with
+# changes of the weather.
+FOLLOWED_S = 2.0
+CALM_PRIOR = 4.0  # prior information for lambda = 1 (calm air), units of sum p' S^-1 p
+CALM_MARGIN = 2.0  # standard deviations by which lambda is taken larger than estimated
 
 HYPOTHESIS = record(
-    kind=int, surface=int, axis=int, alarms=int, column=int, signature=2, growth_keep=float,
-    score=float, theta=float, certainty=float, at_least=float, at_most=float,
+    kind=int, surface=int, axis=int, raises_alarm=int, log_column=int,
+    signature=2,  # s of this frame, rad/s2 per unit of theta
+    growth_decay=float,  # exp(-kappa dt) of a growing loss
+    score=float,  # largest normalised evidence over the onsets, standard deviations
+    theta=float, information=float,  # estimate at the likeliest onset; one over its variance
+    min_llr=float, max_llr=float,  # bounds on the log-likelihood ratio against no fault
 )  # fmt: skip
 
 
 class Capacity(NamedTuple):
-    """How many regressors and hypotheses a block has room for."""
+    """The numbers of regressors and hypotheses for which a block has memory."""
 
     regressors: int
     hypotheses: int
 
 
-# A hypothesis tried from one onset is a lane. The lanes of a few hypotheses lie side by side for vector
-# instructions, lane (h % PER_GROUP) * N_SLOTS + slot in group h // PER_GROUP. A group is as large in every
-# record, so that compiled code knows that none of its arrays overlaps another: to find that out in each frame
-# took a tenth of the detector's time.
+# A lane is one hypothesis with one onset. The lanes of a few hypotheses lie side by side for vector
+# instructions: lane (h % PER_GROUP) * N_SLOTS + slot in group h // PER_GROUP. A group has the same size in
+# every record, so compiled code knows that its arrays do not overlap. Checking that in each frame took a
+# tenth of the detector's time.
 PER_GROUP = 4
 N_LANES = PER_GROUP * N_SLOTS
 LANES = record(
-    sense=N_LANES, shaped=(2, N_LANES), response=(4, N_LANES),
-    weight=(2, N_LANES),  # S^-1 g_s of the frame
-    correlation=N_LANES, information=N_LANES, slack=N_LANES,
-    missing=N_LANES,  # of a loss that grows, what is yet to come
-    held=(2, N_LANES),  # of a loss that ends, its signature as it did
-    # what a bounded uncertainty can add to the correlation: as it stays, as it swings, at its pace
-    stays=N_LANES, swings=N_LANES, drifts=N_LANES,
-    foreseen=N_LANES,  # of the correlation, what calm air gives a law that answers noise
-    shown=N_LANES,  # and a gust that the vanes show a law which answers them
-    # what it comes to, the last three as log likelihood ratios
-    score=N_LANES, at_least=N_LANES, at_most=N_LANES, likelihood=N_LANES,
+    sense=N_LANES,  # sign of N that supports the hypothesis, or 0
+    shaped_signature=(2, N_LANES), response=(4, N_LANES),  # s since the onset, rad/s2; state of its filter
+    weight=(2, N_LANES),  # w = S^-1 g_s of the frame
+    correlation=N_LANES, information=N_LANES, coefficient_part=N_LANES,  # N; D; sum_j tol_j |R_j|
+    growth_left=N_LANES,  # exp(-kappa t) of a growing loss; for the end of a loss: 1 before the onset
+    onset_signature=(2, N_LANES),  # signature when a loss ended, rad/s2
+    # share of |N| that a bounded uncertainty explains: constant; varying by TV(w); varying by its pace
+    constant_part=N_LANES, variation_part=N_LANES, paced_part=N_LANES,
+    calm_prediction=N_LANES, gust_response=N_LANES,  # shares of N: of lambda p; of a roughly visible gust
+    score=N_LANES, min_llr=N_LANES, max_llr=N_LANES, llr=N_LANES,  # llr: log-likelihood ratio
 )  # fmt: skip
 
 
@@ -124,7 +130,7 @@ FILTER = record(**_FILTER)
 
 
 def set_senses(block: np.void, kinds: Sequence[int]) -> None:
-    """Say of the lanes of each hypothesis which sign of a correlation speaks for it."""
+    """Fill the sign of N that supports each hypothesis, in all of its lanes."""
     block["lanes"]["sense"] = 0.0
     for h, kind in enumerate(kinds):
         first = (h % PER_GROUP) * N_SLOTS
@@ -132,22 +138,24 @@ def set_senses(block: np.void, kinds: Sequence[int]) -> None:
 
 
 def groups(capacity: Capacity) -> int:
-    """How many groups of lanes the hypotheses of a block need."""
+    """The number of groups of lanes that the hypotheses of a block need."""
     return (capacity.hypotheses + PER_GROUP - 1) // PER_GROUP
 
 
 @sized
 def block_dtype(capacity: Capacity) -> np.dtype:
-    """A block: its filter, and what its hypotheses come to."""
+    """A block: its whitening filter and its hypotheses."""
     return record(
         axis=(int, 2),  # first: a record that begins as another does is taken for one
         **_FILTER,
-        lag=float, stronger=float, rest=4, scratch=2,
-        # the filter that reckons with no gust, where one is declared; lambda p, and the two sums of lambda
-        calm=FILTER, foreseen=2, agreement=float, size=float,
-        glimpsed=int, shown=2, shown_state=4,  # whether vanes show a gust roughly; what it does, whitened
-        # alarm level; share of it that chance is given beside what is bounded; omega dt of the latter
-        level=float, chance=float, pace=float, stay=2, swing=2,
+        return_length=float, drift_scale=float, residual_state=4, scratch=2,
+        # in turbulence: the filter without gust, lambda p, and numerator and denominator of lambda
+        no_gust_filter=FILTER, calm_prediction=2, calm_agreement=float, calm_information=float,
+        # whether vanes show a gust roughly; its whitened effect, rad/s; the state of its filter
+        has_coarse_gust=int, gust_response=2, gust_state=4,
+        # alarm level, standard deviations; share of it reserved for noise beside a bounded uncertainty; omega
+        # dt of that uncertainty; its responses: see `fill_uncertainty_response`
+        level=float, noise_share=float, pace=float, constant_response=2, transient_response=2,
         n_regressors=int, tolerance=capacity.regressors, regressor=(capacity.regressors, 2),
         regressor_state=(capacity.regressors, 4), regressor_response=(capacity.regressors, 2),
         n_hypotheses=int, hypothesis=(HYPOTHESIS, capacity.hypotheses),
@@ -157,7 +165,7 @@ def block_dtype(capacity: Capacity) -> np.dtype:
 
 
 def filter_block(P: np.ndarray, R: np.ndarray) -> np.ndarray:
-    """A block (1,) that filters n rates and tests nothing.
+    """A block (1,) that filters n rates and has no hypotheses.
 
     P (2 n, 2 n): covariance of rates and their drift; R (n,): variance of a reading's noise."""
     blocks, n = np.zeros(1, block_dtype(Capacity(1, 1))), len(R)
@@ -181,8 +189,8 @@ def invert(n, S):
 
 
 @kernel
-def spread_uncertainty(block, dt):
-    """Advance the covariances over a frame in which the drift acts; `S_inverse` holds S for now."""
+def predict_covariance(block, dt):
+    """Predict the covariances over a frame of dt s; fills `S_inverse` with S, which `invert` inverts."""
     P_xx, P_xd, P_dd, S = block.P_xx, block.P_xd, block.P_dd, block.S_inverse
     for i in range(block.n):
         for j in range(block.n):
@@ -197,20 +205,20 @@ def spread_uncertainty(block, dt):
 
 
 @kernel
-def gains(block):
-    """Fill K_x and K_d (n, n) from the covariances and `S_inverse`."""
+def fill_gains(block):
+    """Fill the Kalman gains K_x = P_xx S^-1 and K_d = P_xd' S^-1, (n, n)."""
     for i in range(block.n):
         for j in range(block.n):
-            of_rate, of_drift = 0.0, 0.0
+            rate_gain, drift_gain = 0.0, 0.0
             for k in range(block.n):
-                of_rate += block.P_xx[i, k] * block.S_inverse[k, j]
-                of_drift += block.P_xd[k, i] * block.S_inverse[k, j]
-            block.K_x[i, j], block.K_d[i, j] = of_rate, of_drift
+                rate_gain += block.P_xx[i, k] * block.S_inverse[k, j]
+                drift_gain += block.P_xd[k, i] * block.S_inverse[k, j]
+            block.K_x[i, j], block.K_d[i, j] = rate_gain, drift_gain
 
 
 @kernel
-def learn(block):
-    """Take off the covariances what is learnt from the measurement."""
+def update_covariance(block):
+    """Update the covariances for the measurement: P <- P - K S K'."""
     K_x, K_d = block.K_x, block.K_d
     for j in range(2):  # a column follows from itself alone
         p0, p1 = block.P_xx[0, j], block.P_xx[1, j]
@@ -223,19 +231,19 @@ def learn(block):
 
 @kernel
 def advance(block, dt):
-    """Bring gains and covariances to the frame just measured; dt s."""
-    spread_uncertainty(block, dt)
+    """Predict the covariances, fill the gains, update the covariances for the frame just measured; dt s."""
+    predict_covariance(block, dt)
     invert(block.n, block.S_inverse)
-    gains(block)
-    learn(block)
+    fill_gains(block)
+    update_covariance(block)
 
 
 @kernel
 def whiten(block, state, acceleration, dt, out):
-    """Pass one frame of an acceleration through the filter.
+    """Advance the filter by one frame of an acceleration (2,) rad/s2; dt s.
 
-    state (4,): what is left of the rates, rad/s, and the drifts, rad/s2, advanced in place. acceleration (2,)
-    rad/s2; out (2,) rad/s: the whitened response, of covariance S were it the innovation's.
+    state (4,): e, rad/s, and d, rad/s2; advanced in place. out (2,) rad/s: the whitened response g; that of
+    the innovation has covariance S.
     """
     for i in range(block.n):
         out[i] = state[i] + dt * (acceleration[i] - state[2 + i])
@@ -250,7 +258,7 @@ def whiten(block, state, acceleration, dt, out):
 
 @kernel
 def whiten_regressors(block, dt):
-    """Whiten the regressors as `whiten` does, all at once; of a block of one axis, the second's are zero."""
+    """Whiten all regressors as `whiten` does; in a block of one axis all values of a second axis are zero."""
     K_x, K_d, kept = block.K_x, block.K_d, block.keep
     x00, x01, x10, x11 = K_x[0, 0], K_x[0, 1], K_x[1, 0], K_x[1, 1]
     d00, d01, d10, d11 = K_d[0, 0], K_d[0, 1], K_d[1, 0], K_d[1, 1]
@@ -265,35 +273,40 @@ def whiten_regressors(block, dt):
 
 
 @kernel
-def follow_calm(block, dt):
-    """Whiten the frame, `scratch`, by the filter that reckons with no gust."""
-    advance(block.calm, dt)
-    whiten(block.calm, block.calm.state, block.scratch, dt, block.calm.innovation)
+def whiten_without_gust(block, dt):
+    """Whiten the frame, `scratch`, rad/s2, by the filter without gust; dt s."""
+    advance(block.no_gust_filter, dt)
+    whiten(
+        block.no_gust_filter, block.no_gust_filter.state, block.scratch, dt, block.no_gust_filter.innovation
+    )
 
 
 @kernel
-def foresee(block, dt):
-    """Fill `foreseen` (2,) rad/s: what of this frame's whitened innovation the past foretells if the air is
-    calmer than declared, as far as it has lately been. `follow_calm` has taken the frame in."""
-    calm, foreseen, g = block.calm, block.foreseen, block.innovation
+def predict_calm_air(block, dt):
+    """Fill `calm_prediction` (2,) rad/s with lambda p: the part of g that calm air makes predictable.
+
+    lambda is estimated over the last FOLLOWED_S. `whiten_without_gust` must have run for this frame.
+    """
+    calm, prediction, g = block.no_gust_filter, block.calm_prediction, block.innovation
     kept = np.exp(-dt / FOLLOWED_S)
-    block.agreement *= kept
-    block.size *= kept
+    block.calm_agreement *= kept
+    block.calm_information *= kept
     for i in range(block.n):
-        foreseen[i] = g[i] - calm.innovation[i]
+        prediction[i] = g[i] - calm.innovation[i]
     for i in range(block.n):
         for j in range(block.n):
-            block.agreement += foreseen[i] * block.S_inverse[i, j] * g[j]
-            block.size += foreseen[i] * block.S_inverse[i, j] * foreseen[j]
-    size = block.size + CALM_PRIOR
-    share = min(max((block.agreement + CALM_PRIOR + CALM_MARGIN * sqrt(size)) / size, 0.0), 1.0)
+            block.calm_agreement += prediction[i] * block.S_inverse[i, j] * g[j]
+            block.calm_information += prediction[i] * block.S_inverse[i, j] * prediction[j]
+    information = block.calm_information + CALM_PRIOR
+    agreement = block.calm_agreement + CALM_PRIOR + CALM_MARGIN * sqrt(information)
+    share = min(max(agreement / information, 0.0), 1.0)
     for i in range(block.n):
-        foreseen[i] *= share
+        prediction[i] *= share
 
 
 @kernel
-def slot_to_start(k):
-    """The slot that starts anew at frame k: slot j at odd multiples of 2^j, the last at all that are left."""
+def slot_to_reset(k):
+    """The slot that restarts at frame k: slot j at odd multiples of 2^j, the last at all other frames."""
     slot = 0
     while k % 2 == 0 and slot < N_SLOTS - 1:
         k //= 2
@@ -302,27 +315,29 @@ def slot_to_start(k):
 
 
 @kernel
-def lanes_in(block, g):
-    """How many lanes of group g there are: the first of each of its arrays."""
+def lane_count(block, g):
+    """The number of lanes in use in group g: the first entries of each array."""
     return min(block.n_hypotheses - g * PER_GROUP, PER_GROUP) * N_SLOTS
 
 
 @kernel
-def n_groups(block):
-    """How many groups of lanes there are."""
+def group_count(block):
+    """The number of groups of lanes in use."""
     return (block.n_hypotheses + PER_GROUP - 1) // PER_GROUP
 
 
 @kernel
-def start(block, slot):
-    """Forget everything about an onset."""
-    for g in range(n_groups(block)):
+def reset_onset(block, slot):
+    """Restart a slot: its onset is the next frame, without evidence."""
+    for g in range(group_count(block)):
         lanes = block.lanes[g]
-        for k in range(slot, lanes_in(block, g), N_SLOTS):
+        for k in range(slot, lane_count(block, g), N_SLOTS):
             lanes.correlation[k] = lanes.information[k] = 0.0
             lanes.weight[0, k] = lanes.weight[1, k] = 0.0
-            lanes.stays[k] = lanes.swings[k] = lanes.drifts[k] = lanes.foreseen[k] = lanes.shown[k] = 0.0
-            lanes.missing[k] = 1.0
+            lanes.constant_part[k] = lanes.variation_part[k] = lanes.paced_part[k] = lanes.calm_prediction[
+                k
+            ] = lanes.gust_response[k] = 0.0
+            lanes.growth_left[k] = 1.0
             for i in range(4):
                 lanes.response[i, k] = 0.0
             for j in range(block.n_regressors):
@@ -330,52 +345,60 @@ def start(block, slot):
 
 
 @kernel
-def reach(block, bounded, dt):
-    """Fill stay and swing (2,): eta_bar |g_0| and eta_bar RINGING / K_d of each axis; bounded (3,) rad/s2."""
+def fill_uncertainty_response(block, bounded, dt):
+    """Fill `constant_response` and `transient_response` (2,) with eta_bar |g_0| and eta_bar RINGING / K_d.
+
+    bounded (3,) rad/s2: eta_bar.
+    """
     K, returns = block.K_d, 1.0 - block.keep
     det = K[0, 0] * K[1, 1] - K[0, 1] * K[1, 0] if block.n > 1 else K[0, 0]
     for i in range(block.n):
-        block.stay[i] = block.swing[i] = 0.0
+        block.constant_response[i] = block.transient_response[i] = 0.0
         for j in range(block.n):
             cofactor = 1.0 if block.n == 1 else (K[1 - i, 1 - i] if i == j else K[i, j])
-            block.swing[i] += RINGING * abs(cofactor / det) * bounded[block.axis[j]]
+            block.transient_response[i] += RINGING * abs(cofactor / det) * bounded[block.axis[j]]
         if returns > 0.0:
             left = dt * returns / (block.K_x[i, i] * returns + dt * K[i, i])
-            block.stay[i] = left * bounded[block.axis[i]]
+            block.constant_response[i] = left * bounded[block.axis[i]]
 
 
 @kernel
-def shape(hypothesis, lanes, first):
-    """Fill `shaped` with the signature of a hypothesis since each onset, from lane `first` on: of growth a
-    part, of an end what it was then."""
+def shape_signature(hypothesis, lanes, first):
+    """Fill `shaped_signature`, rad/s2, of a hypothesis for each onset, from lane `first` on.
+
+    It is the signature of the frame; for a growing loss times 1 - exp(-kappa t); for the end of a loss that
+    of the onset.
+    """
     s0, s1 = hypothesis.signature[0], hypothesis.signature[1]
     for k in range(first, first + N_SLOTS):
         if hypothesis.kind == ENDING:
-            if lanes.missing[k] > 0.0:
-                lanes.held[0, k], lanes.held[1, k], lanes.missing[k] = s0, s1, 0.0
-            lanes.shaped[0, k], lanes.shaped[1, k] = lanes.held[0, k], lanes.held[1, k]
+            if lanes.growth_left[k] > 0.0:
+                lanes.onset_signature[0, k], lanes.onset_signature[1, k], lanes.growth_left[k] = s0, s1, 0.0
+            lanes.shaped_signature[0, k] = lanes.onset_signature[0, k]
+            lanes.shaped_signature[1, k] = lanes.onset_signature[1, k]
         elif hypothesis.kind == GROWING:
-            lanes.missing[k] *= hypothesis.growth_keep
-            grown = 1.0 - lanes.missing[k]
-            lanes.shaped[0, k], lanes.shaped[1, k] = grown * s0, grown * s1
+            lanes.growth_left[k] *= hypothesis.growth_decay
+            grown = 1.0 - lanes.growth_left[k]
+            lanes.shaped_signature[0, k], lanes.shaped_signature[1, k] = grown * s0, grown * s1
         else:
-            lanes.shaped[0, k], lanes.shaped[1, k] = s0, s1
+            lanes.shaped_signature[0, k], lanes.shaped_signature[1, k] = s0, s1
 
 
 @kernel
-def respond(block, lanes, n, dt, keep):
-    """Whiten the shaped signatures of n lanes, as `whiten` does, and bring N and D to this frame.
+def accumulate_correlations(block, lanes, n, dt, keep):
+    """Whiten the shaped signatures of n lanes, and add the frame to N, D and the bounds on N.
 
-    Of a block of one axis, what belongs to a second one is zero.
+    keep: factor by which earlier sums decay. In a block of one axis all values of a second axis are zero.
     """
     K_x, K_d, S = block.K_x, block.K_d, block.S_inverse
     x00, x01, x10, x11 = K_x[0, 0], K_x[0, 1], K_x[1, 0], K_x[1, 1]
     d00, d01, d10, d11 = K_d[0, 0], K_d[0, 1], K_d[1, 0], K_d[1, 1]
     s00, s01, s10, s11 = S[0, 0], S[0, 1], S[1, 0], S[1, 1]
     kept, g0, g1 = block.keep, block.innovation[0], block.innovation[1]
-    p0, p1 = block.foreseen[0], block.foreseen[1]
-    swing0, swing1, stay0, stay1 = block.swing[0], block.swing[1], block.stay[0], block.stay[1]
-    state, shaped, weight, pace = lanes.response, lanes.shaped, lanes.weight, block.pace
+    p0, p1 = block.calm_prediction[0], block.calm_prediction[1]
+    transient0, transient1 = block.transient_response[0], block.transient_response[1]
+    constant0, constant1 = block.constant_response[0], block.constant_response[1]
+    state, shaped, weight, pace = lanes.response, lanes.shaped_signature, lanes.weight, block.pace
     for k in range(n):
         r0 = state[0, k] + dt * (shaped[0, k] - state[2, k])
         r1 = state[1, k] + dt * (shaped[1, k] - state[3, k])
@@ -385,66 +408,78 @@ def respond(block, lanes, n, dt, keep):
         w0, w1 = s00 * r0 + s01 * r1, s10 * r0 + s11 * r1
         lanes.correlation[k] = keep * lanes.correlation[k] + (w0 * g0 + w1 * g1)
         lanes.information[k] = keep * lanes.information[k] + w0 * r0 + w1 * r1
-        lanes.foreseen[k] = keep * lanes.foreseen[k] + (w0 * p0 + w1 * p1)
-        change = swing0 * abs(w0 - weight[0, k]) + swing1 * abs(w1 - weight[1, k])
-        lanes.stays[k] = keep * lanes.stays[k] + (stay0 * abs(w0) + stay1 * abs(w1))
-        lanes.swings[k] = keep * lanes.swings[k] + change
-        lanes.drifts[k] = keep * lanes.drifts[k] + pace * (swing0 * abs(w0) + swing1 * abs(w1))
+        lanes.calm_prediction[k] = keep * lanes.calm_prediction[k] + (w0 * p0 + w1 * p1)
+        change = transient0 * abs(w0 - weight[0, k]) + transient1 * abs(w1 - weight[1, k])
+        lanes.constant_part[k] = keep * lanes.constant_part[k] + (constant0 * abs(w0) + constant1 * abs(w1))
+        lanes.variation_part[k] = keep * lanes.variation_part[k] + change
+        lanes.paced_part[k] = keep * lanes.paced_part[k] + pace * (
+            transient0 * abs(w0) + transient1 * abs(w1)
+        )
         weight[0, k], weight[1, k] = w0, w1
 
 
 @kernel
 def accumulate_overlap(block, lanes, overlap, n, keep):
-    """Bring R_j of n lanes to this frame, `overlap` (regressors, lanes), and `slack`: how much of N the
-    declared errors of the coefficients explain."""
-    weight, slack = lanes.weight, lanes.slack
-    slack[:n] = 0.0
+    """Add the frame to R_j of n lanes, `overlap` (regressors, lanes), and fill their `coefficient_part`."""
+    weight, coefficient_part = lanes.weight, lanes.coefficient_part
+    coefficient_part[:n] = 0.0
     for j in range(block.n_regressors):
         r0, r1 = block.regressor_response[j, 0], block.regressor_response[j, 1]
         total, tolerance = overlap[j], block.tolerance[j]
         for k in range(n):
             total[k] = keep * total[k] + (weight[0, k] * r0 + weight[1, k] * r1)
-            slack[k] += tolerance * abs(total[k])
+            coefficient_part[k] += tolerance * abs(total[k])
 
 
 @kernel
-def glimpse(block, lanes, n, keep):
-    """Bring to this frame what a gust that the vanes show adds to N; `respond` has left the weights."""
-    p0, p1 = block.shown[0], block.shown[1]
+def accumulate_gust(block, lanes, n, keep):
+    """Add the frame to the share of N that a roughly visible gust contributes.
+
+    `accumulate_correlations` must have filled the weights of the frame.
+    """
+    p0, p1 = block.gust_response[0], block.gust_response[1]
     for k in range(n):
-        lanes.shown[k] = keep * lanes.shown[k] + (lanes.weight[0, k] * p0 + lanes.weight[1, k] * p1)
+        lanes.gust_response[k] = keep * lanes.gust_response[k] + (
+            lanes.weight[0, k] * p0 + lanes.weight[1, k] * p1
+        )
 
 
 @kernel
-def weigh(block, tolerated, dt, keep):
-    """Add the frame just whitened to every hypothesis and onset; `keep` is the share of what was there."""
+def accumulate(block, tolerated, dt, keep):
+    """Add the frame just whitened to the sums of every hypothesis and onset; earlier sums decay by `keep`."""
     for h in range(block.n_hypotheses):
-        shape(block.hypothesis[h], block.lanes[h // PER_GROUP], (h % PER_GROUP) * N_SLOTS)
-    for g in range(n_groups(block)):
-        lanes, n = block.lanes[g], lanes_in(block, g)
-        respond(block, lanes, n, dt, keep)
-        if block.glimpsed:
-            glimpse(block, lanes, n, keep)
+        shape_signature(block.hypothesis[h], block.lanes[h // PER_GROUP], (h % PER_GROUP) * N_SLOTS)
+    for g in range(group_count(block)):
+        lanes, n = block.lanes[g], lane_count(block, g)
+        accumulate_correlations(block, lanes, n, dt, keep)
+        if block.has_coarse_gust:
+            accumulate_gust(block, lanes, n, keep)
         if tolerated:
             accumulate_overlap(block, lanes, block.overlap[g], n, keep)
 
 
 @kernel
-def allowance(lanes, k, swing0, swing1):
-    """How much of N, in lane k, a bounded uncertainty can explain; swing0, swing1: a block's `swing`."""
-    last = swing0 * abs(lanes.weight[0, k]) + swing1 * abs(lanes.weight[1, k])
-    return lanes.stays[k] + min(lanes.swings[k] + last, lanes.drifts[k])
+def uncertainty_part(lanes, k, transient0, transient1):
+    """The largest share of |N| in lane k that a bounded uncertainty explains.
+
+    transient0, transient1: the two entries of the block's `transient_response`.
+    """
+    last = transient0 * abs(lanes.weight[0, k]) + transient1 * abs(lanes.weight[1, k])
+    return lanes.constant_part[k] + min(lanes.variation_part[k] + last, lanes.paced_part[k])
 
 
 @kernel
-def one_sided(kind):
-    """Whether a hypothesis has a sign: a loss is no gain."""
+def is_one_sided(kind):
+    """True if only one sign of N supports a hypothesis: a loss cannot be a gain."""
     return kind in (LOSS, GROWING, ENDING)
 
 
 @kernel
-def log_likelihood(is_loss, evidence, information):
-    """Largest log likelihood ratio for an evidence N against no fault; a loss is at most whole."""
+def log_likelihood_ratio(is_loss, evidence, information):
+    """Largest log-likelihood ratio of a fault against none, for evidence N and information D.
+
+    It is N^2 / 2 D; for a loss, whose |theta| is at most 1, it is N - D / 2 if N > D.
+    """
     if evidence <= 0.0:
         return 0.0
     if is_loss and evidence > information:
@@ -453,89 +488,92 @@ def log_likelihood(is_loss, evidence, information):
 
 
 @kernel
-def share(level, chance, evidence, room, D):
-    """Evidence in standard deviations, or as many as it is of all that bounded uncertainty and chance allow.
+def normalised_evidence(level, noise_share, evidence, room, D):
+    """Evidence over its standard deviation sqrt(D), or over what uncertainty and noise together allow.
 
-    room: what a bounded uncertainty can add to the evidence, of information D.
+    room: the share of the evidence that a bounded uncertainty explains; level: of the alarm; noise_share:
+    share of the level that is reserved for noise in addition. The result is compared with the level.
     """
     root = sqrt(D)
-    return evidence / (root if room <= 0.0 else max(root, room / level + chance * root))
+    return evidence / (root if room <= 0.0 else max(root, room / level + noise_share * root))
 
 
 @kernel
-def judge_lanes(block, lanes, n, certain, mapped):
-    """Find what each of n lanes comes to; certain: what a bounded uncertainty may hide is no doubt.
+def evaluate_lanes(block, lanes, n, certain, mapped):
+    """Fill the score and the log-likelihood ratios of n lanes; those of a lane without information are 0.
 
-    A lane without information comes to nothing. A model whose error is `mapped` has more of it than what is
-    published, and the same for long: what is no loss is then doubted.
+    certain: the bounds on the ratio of a loss leave bounded uncertainty out of account. mapped: the model's
+    error is mapped; it is then large and lasting, so the bounds on other hypotheses always include it.
     """
-    sense, swing0, swing1 = lanes.sense, block.swing[0], block.swing[1]
-    level, chance, doubted = block.level, block.chance, 0.0 if certain else 1.0
+    sense, transient0, transient1 = lanes.sense, block.transient_response[0], block.transient_response[1]
+    level, noise_share, doubted = block.level, block.noise_share, 0.0 if certain else 1.0
     for k in range(n):
         N, D = lanes.correlation[k], lanes.information[k]
-        slack = lanes.slack[k] + max(sense[k] * lanes.foreseen[k], 0.0) + max(sense[k] * lanes.shown[k], 0.0)
+        explained = lanes.coefficient_part[k] + max(sense[k] * lanes.calm_prediction[k], 0.0)
+        explained += max(sense[k] * lanes.gust_response[k], 0.0)
         is_loss, known = sense[k] != 0.0, D > 0.0
         evidence = sense[k] * N if is_loss else abs(N)
-        room = allowance(lanes, k, swing0, swing1)
-        doubt = slack + (room if mapped and not is_loss else doubted * room)
-        score = share(level, chance, evidence - slack, room, D)
-        likelihood = log_likelihood(is_loss, evidence, D)
-        at_least = log_likelihood(is_loss, evidence - doubt, D)
-        at_most = log_likelihood(is_loss, evidence + doubt, D)
+        room = uncertainty_part(lanes, k, transient0, transient1)
+        doubt = explained + (room if mapped and not is_loss else doubted * room)
+        score = normalised_evidence(level, noise_share, evidence - explained, room, D)
+        llr = log_likelihood_ratio(is_loss, evidence, D)
+        min_llr = log_likelihood_ratio(is_loss, evidence - doubt, D)
+        max_llr = log_likelihood_ratio(is_loss, evidence + doubt, D)
         lanes.score[k] = score if known else 0.0
-        lanes.at_least[k] = at_least if known else 0.0
-        lanes.at_most[k] = at_most if known else 0.0
-        lanes.likelihood[k] = likelihood if known else -1.0
+        lanes.min_llr[k] = min_llr if known else 0.0
+        lanes.max_llr[k] = max_llr if known else 0.0
+        lanes.llr[k] = llr if known else -1.0
 
 
 @kernel
-def judge(block, memory=0.0, mapped=False):
-    """Fill each hypothesis' score, estimate, and the least and greatest log likelihood ratio it can have.
+def evaluate(block, memory=0.0, mapped=False):
+    """Fill the score, the estimate and the bounds on the log-likelihood ratio of each hypothesis.
 
-    memory: where a loss may end, what a frame leaves of what one explained before; 0 where a loss stays.
-    mapped: as of `judge_lanes`.
+    memory: if a loss may end, the factor by which its earlier upper bound decays per frame; else 0.
+    mapped: see `evaluate_lanes`.
     """
-    for g in range(n_groups(block)):
-        judge_lanes(block, block.lanes[g], lanes_in(block, g), memory > 0.0, mapped)
+    for g in range(group_count(block)):
+        evaluate_lanes(block, block.lanes[g], lane_count(block, g), memory > 0.0, mapped)
     for h, hypothesis in enumerate(block.hypothesis[: block.n_hypotheses]):
         lanes, first = block.lanes[h // PER_GROUP], (h % PER_GROUP) * N_SLOTS
-        score, at_least, at_most, best, likeliest = 0.0, 0.0, memory * hypothesis.at_most, -1.0, -1
+        score, min_llr, max_llr, best, likeliest = 0.0, 0.0, memory * hypothesis.max_llr, -1.0, -1
         for k in range(first, first + N_SLOTS):
             score = max(score, lanes.score[k])
-            at_least, at_most = max(at_least, lanes.at_least[k]), max(at_most, lanes.at_most[k])
-            if lanes.likelihood[k] > best:
-                best, likeliest = lanes.likelihood[k], k
-        hypothesis.score, hypothesis.at_least, hypothesis.at_most = score, at_least, at_most
+            min_llr, max_llr = max(min_llr, lanes.min_llr[k]), max(max_llr, lanes.max_llr[k])
+            if lanes.llr[k] > best:
+                best, likeliest = lanes.llr[k], k
+        hypothesis.score, hypothesis.min_llr, hypothesis.max_llr = score, min_llr, max_llr
         if likeliest >= 0:
             N, D = lanes.correlation[likeliest], lanes.information[likeliest]
-            hypothesis.theta, hypothesis.certainty = estimate(hypothesis.kind, N, D), D
+            hypothesis.theta, hypothesis.information = estimate_theta(hypothesis.kind, N, D), D
 
 
 @kernel
-def take_in(block, bounded, tolerated, dt, keep, memory=0.0, mapped=False):
-    """One frame of a block: its `scratch`, rad/s2, whitened and weighed against every hypothesis.
+def update_block(block, bounded, tolerated, dt, keep, memory=0.0, mapped=False):
+    """Update a block with one frame of the innovation: whiten it and test every hypothesis; dt s.
 
-    Noise, drift and signatures are the frame's already, and so, where `tolerated`, are the regressors.
-    bounded: as of `reach`; keep, memory, mapped: as of `weigh` and `judge`.
+    The innovation, rad/s2, is in `scratch`. Noise, drift, signatures and, if `tolerated`, regressors must be
+    those of the frame. bounded: see `fill_uncertainty_response`; keep: see `accumulate`; memory, mapped: see
+    `evaluate`.
     """
     advance(block, dt)
     if block.level > 0.0:
-        reach(block, bounded, dt)
+        fill_uncertainty_response(block, bounded, dt)
     whiten(block, block.state, block.scratch, dt, block.innovation)
-    if block.calm.n > 0:
-        foresee(block, dt)
-    if block.glimpsed:
-        whiten(block, block.shown_state, block.shown, dt, block.shown)
+    if block.no_gust_filter.n > 0:
+        predict_calm_air(block, dt)
+    if block.has_coarse_gust:
+        whiten(block, block.gust_state, block.gust_response, dt, block.gust_response)
     if tolerated:
         whiten_regressors(block, dt)
-    weigh(block, tolerated, dt, keep)
-    judge(block, memory, mapped)
+    accumulate(block, tolerated, dt, keep)
+    evaluate(block, memory, mapped)
 
 
 @kernel
-def estimate(kind, N, D):
-    """The most likely theta; of a loss, with nothing known before but that it is one."""
-    if not one_sided(kind):
+def estimate_theta(kind, N, D):
+    """The most likely theta; for a loss with a prior that is uniform on its set [-1, 0]."""
+    if not is_one_sided(kind):
         return N / D
     theta = (N - 0.5 * PRIOR_INFORMATION) / (D + PRIOR_INFORMATION)
     return min(max(theta, -1.0), 0.0)

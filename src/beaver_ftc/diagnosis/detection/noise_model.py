@@ -154,27 +154,27 @@ def set_up(
     last, pitch = statistical["block"][-1], statistical["block"][likelihood.PITCH_BLOCK]
     rolling = float(air["config"]["rolling"]) if air["output"]["moving"] else 0.0
     gusts_m = rotation_lengths(air["config"]["span"]) if air["config"]["glimpsed"] else [rolling]
-    last["lag"] = returning_length(statistical, airspeed_mps, rate_hz, float(min(gusts_m)))
+    last["return_length"] = returning_length(statistical, airspeed_mps, rate_hz, float(min(gusts_m)))
     if air["output"]["moving"]:
         # the filters that reckon with no gust: as the others begin, and with a drift that goes anywhere
         for name in ("n", "keep", "noise", "P_xx", "P_dd"):
-            statistical["block"]["calm"][name] = statistical["block"][name]
-        last["stronger"] = (rolling / last["lag"]) ** 2
+            statistical["block"]["no_gust_filter"][name] = statistical["block"][name]
+        last["drift_scale"] = (rolling / last["return_length"]) ** 2
         if not air["output"]["seen"]:
             pitching = float(rotation_lengths(air["config"]["span"])[1])
-            pitch["lag"] = returning_length(statistical, airspeed_mps, rate_hz, pitching)
-            pitch["stronger"] = (pitching / pitch["lag"]) ** 2
+            pitch["return_length"] = returning_length(statistical, airspeed_mps, rate_hz, pitching)
+            pitch["drift_scale"] = (pitching / pitch["return_length"]) ** 2
         set_up_jitter(statistical, errors, design, *start[1:], dt_s)
 
 
 def _set_up_blocks(statistical: np.void, errors: SensorErrors, aircraft: Aircraft) -> None:
     blocks = blocks_of(aircraft)
     losses = [aircraft.surfaces.index(surface) for surface in aircraft.class_of_losses]
-    statistical["tests"]["n_columns"] = len(losses) + len(AXES)
+    statistical["tests"]["n_log_columns"] = len(losses) + len(AXES)
     for block, (axes, members) in zip(statistical["block"], blocks, strict=True):
         block["n"], block["n_hypotheses"] = len(axes), len(members)
         block["n_regressors"] = sum(axis_of(term) in axes for term in aircraft.moments)
-        block["keep"], block["stronger"] = 1.0, 1.0
+        block["keep"], block["drift_scale"] = 1.0, 1.0
         for i, axis in enumerate(axes):
             block["axis"][i] = axis
             variance = max(errors[AXES[axis]].random, LEAST_NOISE_RAD_S) ** 2
@@ -183,8 +183,8 @@ def _set_up_blocks(statistical: np.void, errors: SensorErrors, aircraft: Aircraf
         likelihood.set_senses(block, [kind for kind, *_ in members])
         for hypothesis, (kind, surface, axis, alarms) in zip(block["hypothesis"], members, strict=False):
             hypothesis["kind"], hypothesis["surface"] = kind, surface
-            hypothesis["axis"], hypothesis["alarms"] = axis, alarms
-            hypothesis["column"] = losses.index(surface) if kind == LOSS else len(losses) + axis
+            hypothesis["axis"], hypothesis["raises_alarm"] = axis, alarms
+            hypothesis["log_column"] = losses.index(surface) if kind == LOSS else len(losses) + axis
 
 
 def pace_of(given: Statistical, aircraft: Aircraft, dt_s: float) -> float:
@@ -213,12 +213,12 @@ def _set_up_bounded(
     """What an uncertainty that is bounded may do beside chance. A loss declared constant does not grow."""
     still = declared.is_noise_free
     for block in statistical["block"]:
-        block["level"], block["chance"] = statistical["tests"]["alarm_level"], 0.0 if still else CHANCE
+        block["level"], block["noise_share"] = statistical["tests"]["alarm_level"], 0.0 if still else CHANCE
         block["pace"] = pace
         kinds = block["hypothesis"]["kind"][: block["n_hypotheses"]]
         if config.fault_profile == "abrupt":
             block["n_hypotheses"] = np.sum((kinds != GROWING) & (kinds != ENDING))
-        block["hypothesis"]["growth_keep"] = exp(-GROWTH_PER_S * dt_s)
+        block["hypothesis"]["growth_decay"] = exp(-GROWTH_PER_S * dt_s)
 
 
 def _set_up_noise(

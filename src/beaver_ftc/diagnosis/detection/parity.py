@@ -308,15 +308,15 @@ def project_innovation(views, tolerated, noise, blocks, forces, air, inertial_ai
 def update_views(views, tests, tone_config, y, dt, k, latched):
     """Update filters and tests of every view with frame k, as `statistical.update`; y (5,) as measured."""
     within_envelope = tones.is_within_envelope(tone_config, y)
-    keep, slot = tests.keep if latched else 1.0, likelihood.slot_to_start(k)
+    keep, slot = tests.keep if latched else 1.0, likelihood.slot_to_reset(k)
     for view in views:
         if not view.active:
             view.peak_score = 0.0
             continue
         if not latched:
-            likelihood.start(view.block, slot)
+            likelihood.reset_onset(view.block, slot)
         tolerated = tests.tolerated or view.has_tolerance
-        likelihood.take_in(view.block, view.bounded, tolerated, dt, keep)
+        likelihood.update_block(view.block, view.bounded, tolerated, dt, keep)
         if not view.inertial:  # the error of the integrated angle oscillates with the aircraft's own modes
             tones.update(view, tone_config, tests.alarm_level, within_envelope, tolerated, dt)
         view.peak_score = max((1.0 - (1.0 - tests.keep) / PEAK_MEMORY) * view.peak_score, largest_score(view))
@@ -467,7 +467,7 @@ def set_up_views(statistical: np.void, aircraft: Aircraft) -> None:
         kinds, n = [STEP, *(LOSS for _ in tried)], int(axes["n_regressors"])
         block["n"], block["n_hypotheses"], block["keep"] = 1, len(kinds), 1.0
         block["P_xx"][0, 0], block["P_dd"][0, 0] = axes["noise"].max(), likelihood.PRIOR_DRIFT_RAD_S2**2
-        for name in ("level", "chance", "pace"):
+        for name in ("level", "noise_share", "pace"):
             block[name] = axes[name]
         block["tolerance"][:n] = axes["tolerance"][:n]
         if uses_vane and with_air:

@@ -1,10 +1,10 @@
-"""The statistical detector: likelihood ratios on the whitened innovation, beside the worst-case thresholds.
+"""The statistical detector: likelihood-ratio tests on the whitened innovation (likelihood.py, parity.py).
 
-Pitch is one block, roll and yaw another, whose noise goes together. Roll and yaw are looked at twice: by a
-drift that may go anywhere, which is quick and knows nothing of constants, and by one that returns, which
-gathers evidence for longer; pitch by the latter alone, where no vane shows its gust. The declared rate of
-false alarms holds for the declared noise; the worst-case scheme beside it needs no probability at all.
-`fdi.config.authority` says whose alarms and exclusions count.
+Pitch is one block; roll and yaw, whose noise is correlated, are another. Roll and yaw have two blocks with
+different models of the drift. A random walk reacts fast and ignores constant errors. A drift that returns to
+zero gathers evidence for longer. Pitch has only the latter if no vane measures its gust. The declared rate of
+false alarms holds for the declared noise. The worst-case scheme needs no probability; the scenario's
+`fdi.authority` sets whose alarms and exclusions count.
 """
 
 import numpy as np
@@ -29,41 +29,46 @@ from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE, Size, view_dtype
 from beaver_ftc.diagnosis.detection.tones import TONE_CONFIG
 from beaver_ftc.diagnosis.state import BESIDE_DAMAGE, LOSS
 
-# Of what the best explanation explains, the part that a constant theta leaves to a loss that grows is larger
-# for every rate of growth (docs/theory.md, section 7).
-LEAST_PART = 0.25
-# The error of a model goes from one end of its bound to the other, 2, while a surface moves by a quarter of
-# its travel, and no sooner.
-WITHIN_TRAVEL = 0.25
-FROM_END_TO_END = 2.0 / WITHIN_TRAVEL
+# Least share of the best log-likelihood ratio that a constant theta explains of a loss growing at any rate
+# (docs/theory.md, section 7).
+MIN_CONSTANT_SHARE = 0.25
+# The error of a model moves from one end of its bound to the other, by 2 bounds, no faster than a surface
+# moves by this share of its travel.
+REVERSAL_TRAVEL_SHARE = 0.25
+PACE_PER_TRAVEL = 2.0 / REVERSAL_TRAVEL_SHARE
 LEAST_TRAVEL_RAD = 1e-6
 
-# What the scenario asks of the tests: whether there are any, levels, what of the evidence a frame after the
-# alarm leaves, columns of the log, whether constants are tolerated; one over the instants in a frame; whether
-# the model's error is mapped.
+# Configuration of the tests.
 TESTS = record(
-    enabled=int, alarm_level=float, naming_level=float, keep=float, n_columns=int, tolerated=int, share=float,
-    mapped=int,
+    enabled=int,
+    alarm_level=float, naming_level=float,  # standard deviations; difference of log-likelihood ratios
+    keep=float,  # factor by which evidence decays per frame after the alarm
+    n_log_columns=int,
+    tolerated=int,  # whether unknown constants have tolerances
+    share=float,  # one over the number of instants in a frame
+    mapped=int,  # whether the model's error is mapped
 )  # fmt: skip
 
-# What moves the rates besides a fault. rapidity, 1/s: intensity of the drift of an uncertainty over its bound
-# squared; pace: by what share of its bound it changes in a frame in which no surface moves; bounded, rad/s2:
-# that bound now, of healthy surfaces; beyond: what one anywhere in its travel adds; deflection: its part by
-# that of the surfaces; jitter, (rad/s2)2: noise of the model's own inputs, `own_jitter` what of it is none of
-# the air data's. read: whether errors of the air data count. The last are scratch.
+# The noise model: accelerations that are not caused by a fault.
 NOISE = record(
-    rapidity=float, pace=float, bounded=3, beyond=3, deflection=3, jitter=3, own_jitter=3, read=int,
-    reading=N_READINGS, terms=MAX_TERMS, direction=N_SIGNALS, slope=MAX_MONOMIALS, moved=3,
+    rapidity=float,  # intensity of the drift that represents a bounded uncertainty, over bound squared, 1/s
+    pace=float,  # share of its bound by which the uncertainty changes in a frame if no surface moves
+    bounded=3,  # bound on the uncertainty with healthy surfaces, now, rad/s2
+    beyond=3,  # what one surface anywhere in its travel adds to it, rad/s2
+    deflection=3,  # share of the bound by errors of the deflections, rad/s2
+    jitter=3, own_jitter=3,  # variance by noise of all inputs of the model; without the air data; (rad/s2)2
+    read=int, reading=N_READINGS,  # whether errors of the air data count; their noise, units of the readings
+    terms=MAX_TERMS, direction=N_SIGNALS, slope=MAX_MONOMIALS, moved=3,  # scratch
 )  # fmt: skip
 
-# What the tests say: the largest share of the alarm level and its axis, how close healthy flight came to it,
-# and when it was first passed.
+# Output of the detector: largest score over the alarm level and its axis; the largest so far in healthy
+# flight; time of the first alarm, s, or -1.
 ALARM = record(score=float, axis=int, closest=float, detected_at_s=float)
 
 
 @sized
 def statistical_dtype(size: Size = USUAL_SIZE) -> np.dtype:
-    """What the detector keeps of an aircraft of this size."""
+    """The record of the detector, for an aircraft that needs these capacities."""
     return record(
         tests=TESTS, noise=NOISE, alarm=ALARM, block=(block_dtype(size.rates), N_BLOCKS),
         n_views=int, views=(view_dtype(size.view), size.views), tone_config=TONE_CONFIG,
@@ -72,80 +77,86 @@ def statistical_dtype(size: Size = USUAL_SIZE) -> np.dtype:
 
 
 @kernel
-def observe(tests, bounded, blocks, air, innovation, dt, k, latched, ends=False):
-    """Take in frame k: innovation and `bounded` (3,) rad/s2, whether the alarm is out; ends:
-    a loss may."""
-    keep, slot = tests.keep if latched else 1.0, likelihood.slot_to_start(k)
+def update_blocks(tests, bounded, blocks, air, innovation, dt, k, latched, ends=False):
+    """Update the blocks with frame k, of dt s: innovation and bound `bounded`, both (3,) rad/s2.
+
+    latched: the detector has raised its alarm; ends: a loss may end.
+    """
+    keep, slot = tests.keep if latched else 1.0, likelihood.slot_to_reset(k)
     for b, block in enumerate(blocks):
         if not latched:
-            likelihood.start(block, slot)
+            likelihood.reset_onset(block, slot)
         for i, axis in enumerate(block.axis[: block.n]):
             block.scratch[i] = innovation[axis] - air.output.mean[axis]
-        block.glimpsed = air.config.glimpsed
+        block.has_coarse_gust = air.config.glimpsed
         if air.config.glimpsed:
             for i, axis in enumerate(block.axis[: block.n]):
-                block.shown[i] = air.output.shown[axis]
+                block.gust_response[i] = air.output.shown[axis]
         if air.output.moving:
-            leap(air, block)
+            add_leap(air, block)
             if b < likelihood.RETURNING:
-                likelihood.follow_calm(block, dt)
-            else:  # calm air is the same for both views of roll and yaw
-                block.calm.innovation[:] = blocks[LATERAL].calm.innovation
+                likelihood.whiten_without_gust(block, dt)
+            else:  # without gust both blocks of roll and yaw have the same filter
+                block.no_gust_filter.innovation[:] = blocks[LATERAL].no_gust_filter.innovation
         memory = tests.keep if ends else 0.0
-        likelihood.take_in(block, bounded, tests.tolerated, dt, keep, memory, tests.mapped)
+        likelihood.update_block(block, bounded, tests.tolerated, dt, keep, memory, tests.mapped)
 
 
 @kernel
-def leap(air, block):
-    """Let the drift be elsewhere where the axes of the gusts have swung round."""
+def add_leap(air, block):
+    """Add to the covariance of the drift what a fast turn of the gusts' axes may change in it."""
     for i in range(block.n):
         for j in range(block.n):
-            block.P_dd[i, j] += block.stronger * air.output.leap[block.axis[i], block.axis[j]]
+            block.P_dd[i, j] += block.drift_scale * air.output.leap[block.axis[i], block.axis[j]]
 
 
 @kernel
-def follow_rest(blocks, air, surprise, dt):
-    """Filter what the law's beliefs leave unexplained: surprise (3,) rad/s2, known faults taken off."""
+def track_residual_mean(blocks, air, innovation_after_known_faults, dt):
+    """Filter the innovation after known faults (3,) rad/s2; the state tracks its slowly varying mean."""
     for block in blocks[: likelihood.RETURNING]:
         for i, axis in enumerate(block.axis[: block.n]):
-            block.scratch[i] = surprise[axis] - air.output.mean[axis]
-        likelihood.whiten(block, block.rest, block.scratch, dt, block.scratch)
+            block.scratch[i] = innovation_after_known_faults[axis] - air.output.mean[axis]
+        likelihood.whiten(block, block.residual_state, block.scratch, dt, block.scratch)
 
 
 @kernel
 def unknown_acceleration(blocks, air, out):
-    """Fill out (3,) rad/s2 with what goes on beyond the law's beliefs: the drift that explains the rates
-    best, and the gust the vanes see."""
+    """Fill out (3,) rad/s2 with the estimated acceleration that the control law's model lacks.
+
+    It is the estimated drift plus the effect of the gust estimated from the vanes.
+    """
     for block in blocks[: likelihood.RETURNING]:
         for i, axis in enumerate(block.axis[: block.n]):
-            out[axis] = block.rest[2 + i] + air.output.acceleration[axis]
+            out[axis] = block.residual_state[2 + i] + air.output.acceleration[axis]
 
 
 @kernel
-def score(alarm, tests, blocks, views, forces, air, t, known=True):
-    """Find the largest share of the alarm level that any hypothesis reaches, and its axis; at t s. Where the
-    model's error is not `known`, none does."""
+def update_alarm(alarm, tests, blocks, views, forces, air, t, known=True):
+    """Fill the largest score over the alarm level, its axis, and at the first alarm its time t s.
+
+    The score is 0 where the model's error is not `known`.
+    """
     alarm.score = 0.0
     if not known:
         return
     for block in blocks:
         for hypothesis in block.hypothesis[: block.n_hypotheses]:
-            if hypothesis.alarms:
-                note(alarm, tests.alarm_level, hypothesis.score, hypothesis.axis)
+            if hypothesis.raises_alarm:
+                keep_largest(alarm, tests.alarm_level, hypothesis.score, hypothesis.axis)
     for view in views:
-        note(alarm, tests.alarm_level, parity.alarm_score(view, views, tests, forces, air), view.axis)
+        keep_largest(alarm, tests.alarm_level, parity.alarm_score(view, views, tests, forces, air), view.axis)
     if alarm.score > 1.0 and alarm.detected_at_s < 0.0:
         alarm.detected_at_s = t
 
 
 @kernel
 def note_closest_approach(alarm):
-    """Keep the largest share of its level that the detector has reached."""
+    """Keep the largest score over the alarm level so far."""
     alarm.closest = max(alarm.closest, alarm.score)
 
 
 @kernel
-def note(alarm, level, score, axis):
+def keep_largest(alarm, level, score, axis):
     """Keep a score if it is the largest."""
     share = score / level
     if share > alarm.score:
@@ -153,15 +164,17 @@ def note(alarm, level, score, axis):
 
 
 @kernel
-def write_shares(tests, blocks, views, forces, air, row):
-    """Write the last columns of the log: each test as a share of the alarm level, losses, then steps. What
-    forces and tones show besides is in the step of the axis."""
-    first = row.size - tests.n_columns
+def log_scores(tests, blocks, views, forces, air, row):
+    """Write the last columns of a log row: scores over the alarm level, first of losses, then of steps.
+
+    Scores of forces and of oscillations are in the column of the step on their axis.
+    """
+    first = row.size - tests.n_log_columns
     row[first:] = 0.0
     for block in blocks:
         for hypothesis in block.hypothesis[: block.n_hypotheses]:
-            if hypothesis.alarms:
-                place = first + hypothesis.column
+            if hypothesis.raises_alarm:
+                place = first + hypothesis.log_column
                 row[place] = max(row[place], hypothesis.score / tests.alarm_level)
     for view in views:
         place = row.size - 3 + view.axis
@@ -169,78 +182,82 @@ def write_shares(tests, blocks, views, forces, air, row):
 
 
 @kernel
-def is_open(estimators, loss_of, surface):
-    """Whether a loss of this surface has not been excluded."""
+def is_not_excluded(estimators, loss_of, surface):
+    """True if a loss of this surface has not been excluded."""
     return loss_of[surface] < 0 or not estimators[loss_of[surface]].excluded
 
 
 @kernel
 def best_alternative(block, estimators, loss_of, surface, every=False):
-    """The greatest log likelihood ratio that any hypothesis but the loss of a surface has at least.
+    """The largest lower bound on the log-likelihood ratio of all alternatives to the loss of a surface.
 
-    What has been excluded is no alternative: as the evidence for that fades, uncertainty that goes along with
-    the commands may gather some for it. `every`: it is all the same.
+    Excluded losses are no alternatives, unless `every`: as evidence decays, an uncertainty that correlates
+    with the commands may support them again.
     """
     best = 0.0
     for hypothesis in block.hypothesis[: block.n_hypotheses]:
         if hypothesis.kind in (GROWING, ENDING):
             continue
         other = hypothesis.surface
-        if hypothesis.kind != LOSS or (other != surface and (every or is_open(estimators, loss_of, other))):
-            best = max(best, hypothesis.at_least)
+        if hypothesis.kind != LOSS or (
+            other != surface and (every or is_not_excluded(estimators, loss_of, other))
+        ):
+            best = max(best, hypothesis.min_llr)
     return best
 
 
 @kernel
-def at_most(block, surface, ending):
-    """The log likelihood ratio a loss of this surface, or the end of one, has at most; 0 where the block does
-    not feel it."""
+def max_llr(block, surface, ending):
+    """Upper bound on the log-likelihood ratio of a loss of this surface, or, if `ending`, of its end.
+
+    It is 0 if the block has no such hypothesis.
+    """
     most = 0.0
     for hypothesis in block.hypothesis[: block.n_hypotheses]:
         if hypothesis.surface == surface and (hypothesis.kind == ENDING) == ending:
-            most = max(most, hypothesis.at_most)
+            most = max(most, hypothesis.max_llr)
     return most
 
 
 @kernel
-def shows(tests, blocks, estimators, loss_of, surface):
-    """Whether a loss of this surface explains the flight better than all else, by the naming level.
+def confirms_loss(tests, blocks, estimators, loss_of, surface):
+    """True if a loss of this surface explains the data better than all alternatives, by the naming level.
 
-    estimators: of isolation; loss_of (surfaces,): which of them is of a surface's loss, or -1. Of one that is
-    BESIDE_DAMAGE every other loss counts: damage excludes what it took as well.
+    estimators: of the isolation; loss_of (n,): the estimator of each surface's loss, or -1. If the estimator
+    is doubted BESIDE_DAMAGE, excluded losses are alternatives as well: damage may have excluded them.
     """
     every = loss_of[surface] >= 0 and estimators[loss_of[surface]].doubted == BESIDE_DAMAGE
     for block in blocks:
         least = 0.0
         for hypothesis in block.hypothesis[: block.n_hypotheses]:
             if hypothesis.surface == surface and hypothesis.kind in (LOSS, GROWING):
-                least = max(least, hypothesis.at_least)
+                least = max(least, hypothesis.min_llr)
         if least - best_alternative(block, estimators, loss_of, surface, every) > tests.naming_level:
             return True
     return False
 
 
 @kernel
-def excludes(tests, blocks, estimators, loss_of, surface, ends, abrupt):
-    """Whether something else explains the flight better than a loss of this surface, by the naming level.
+def excludes_loss(tests, blocks, estimators, loss_of, surface, ends, abrupt):
+    """True if an alternative explains the data better than a loss of this surface, by the naming level.
 
-    Each view of roll and yaw is held against that of pitch: a loss explains what it does to its own axes. A
-    loss whose course is not declared `abrupt` may grow, and a constant theta then explains only part of what
-    it does: it is excluded where that part is small besides; so is one that begins within a frame. The end of
-    one is a step like any other, and explains as much or nothing, but within a frame of several instants a
-    part: it shows in two; in pitch, where a fault outside the class may be such a step, only where asked for,
-    by `ends`. Arguments as in `shows`.
+    Each block of roll and yaw is compared together with that of pitch, because a loss acts on its own axes
+    only. A loss that is not declared `abrupt` may grow. A constant theta then explains only a part of its
+    effect, so the loss is excluded only if its ratio is also below MIN_CONSTANT_SHARE of the best. The same
+    holds for a loss that begins inside a frame of several instants, and for the end of a loss there. The end
+    of a loss in pitch counts only if `ends` is set: a fault outside the class may look like it. Arguments as
+    in `confirms_loss`.
     """
     pitch, at_once = blocks[likelihood.PITCH_BLOCK], tests.share == 1.0
-    part = 1.0 if abrupt and at_once else LEAST_PART
-    end_part = 1.0 if at_once else LEAST_PART
+    part = 1.0 if abrupt and at_once else MIN_CONSTANT_SHARE
+    end_part = 1.0 if at_once else MIN_CONSTANT_SHARE
     for lateral in blocks[LATERAL:]:
         better = best_alternative(pitch, estimators, loss_of, surface)
         better = max(better, best_alternative(lateral, estimators, loss_of, surface))
-        worse = max(at_most(pitch, surface, False), at_most(lateral, surface, False))
-        ended = at_most(lateral, surface, True)
+        worse = max(max_llr(pitch, surface, False), max_llr(lateral, surface, False))
+        ended = max_llr(lateral, surface, True)
         if ends:
-            ended = max(ended, at_most(pitch, surface, True))
+            ended = max(ended, max_llr(pitch, surface, True))
         small = worse < part * better and ended < end_part * better
         if small and better - max(worse, ended) > tests.naming_level:
             return True
@@ -249,20 +266,24 @@ def excludes(tests, blocks, estimators, loss_of, surface, ends, abrupt):
 
 @kernel
 def estimated_loss(blocks, surface):
-    """Estimated theta of a loss of effectiveness of a surface, in [-1, 0], and one over its variance."""
-    theta, certainty = 0.0, 0.0
+    """Estimate of theta, in [-1, 0], of a loss of effectiveness of a surface, and one over its variance."""
+    theta, information = 0.0, 0.0
     for block in blocks:
         for hypothesis in block.hypothesis[: block.n_hypotheses]:
-            if hypothesis.kind == LOSS and hypothesis.surface == surface and hypothesis.certainty > certainty:
-                theta, certainty = hypothesis.theta, hypothesis.certainty
-    return theta, certainty
+            if (
+                hypothesis.kind == LOSS
+                and hypothesis.surface == surface
+                and hypothesis.information > information
+            ):
+                theta, information = hypothesis.theta, hypothesis.information
+    return theta, information
 
 
 @kernel
 def prepare(tests, noise, blocks, air, bound, design, measured, u, dt):
-    """Make ready for the frame to come, of dt s: noise as it is now, and what the coefficients multiply.
+    """Prepare the next frame, of dt s: gust, regressors, drift and jitter at this instant.
 
-    bound: what is declared; u (surfaces,) rad: in effect.
+    bound: the declared bounds; u (n,) rad: positions of healthy surfaces.
     """
     x, y = measured.x, measured.y
     if air.output.moving:
@@ -270,48 +291,48 @@ def prepare(tests, noise, blocks, air, bound, design, measured, u, dt):
     if tests.tolerated:
         for block in blocks:
             block.regressor[:] = 0.0
-        constants(tests.share, noise, blocks, bound.admitted, design, measured, u)
-    drifts(noise, blocks, air, bound, design, measured, dt)
+        add_regressors(tests.share, noise, blocks, bound.admitted, design, measured, u)
+    fill_drift_and_jitter(noise, blocks, air, bound, design, measured, dt)
     if bound.error_map.n_boxes > 0:
-        follow_surfaces(noise, blocks, bound.error_map, u)
+        update_pace(noise, blocks, bound.error_map, u)
     if air.output.moving:
         gusts.begin_frame(air, y[AIRSPEED], tests.share * dt)
 
 
 @kernel
-def follow_surfaces(noise, blocks, error_map, u):
-    """Bring the pace to the frame to come: what a model's own terms are off moves with its surfaces."""
+def update_pace(noise, blocks, error_map, u):
+    """Fill the pace of every block for the next frame: the model's mapped error changes with the surfaces."""
     moved = 0.0
     for s in range(u.size):
         travel = max(error_map.travel_high[s] - error_map.travel_low[s], LEAST_TRAVEL_RAD)
         moved = max(moved, abs(u[s] - error_map.before[s]) / travel)
         error_map.before[s] = u[s]
     for block in blocks:
-        block.pace = min(noise.pace + FROM_END_TO_END * moved, FROM_END_TO_END * WITHIN_TRAVEL)
+        block.pace = min(noise.pace + PACE_PER_TRAVEL * moved, PACE_PER_TRAVEL * REVERSAL_TRAVEL_SHARE)
 
 
 @kernel
-def look(tests, noise, blocks, air, bound, design, measured, u, dt):
-    """Take in an instant inside a frame, dt s after the one before."""
+def accumulate_substep(tests, noise, blocks, air, bound, design, measured, u, dt):
+    """Add an instant inside a frame, dt s after the instant before, to gust and regressors."""
     if air.output.moving:
         gusts.look(air, design, measured.x, measured.y, u, measured.attitude, dt)
     if tests.tolerated:
-        constants(tests.share, noise, blocks, bound.admitted, design, measured, u)
+        add_regressors(tests.share, noise, blocks, bound.admitted, design, measured, u)
 
 
 @kernel
-def constants(share, noise, blocks, admitted, design, measured, u):
-    """Add to the regressors what the constants that are not known multiply now, a `share` of the frame."""
+def add_regressors(share, noise, blocks, admitted, design, measured, u):
+    """Add this instant, a `share` of the frame, to the regressors of all unknown constants."""
     y = measured.y
     evaluate(design.moments, measured.x, y)
-    coefficients(share, noise.terms, blocks, design, y, u)
+    add_coefficient_regressors(share, noise.terms, blocks, design, y, u)
     if noise.read:
         noise_model.add_readings(share, noise, blocks, admitted, design, y, u)
 
 
 @kernel
-def drifts(noise, blocks, air, bound, design, measured, dt):
-    """Fill each block's drift and jitter: uncertainty that is merely bounded, and the air not seen."""
+def fill_drift_and_jitter(noise, blocks, air, bound, design, measured, dt):
+    """Fill drift intensity and jitter of each block: for the bounded uncertainty and the unmeasured gust."""
     bounded, V = noise.bounded, measured.y[AIRSPEED]
     bounded[:] = 0.0
     uncertainty_bound(measured.x, design, bound.inertia, bound.constant, bound.earth_rate, bounded)
@@ -328,18 +349,18 @@ def drifts(noise, blocks, air, bound, design, measured, dt):
                 block.drift[i, j] = 0.0
                 if air.output.moving:
                     moved = gusts.unseen_drift(air, V, axis, block.axis[j], b == likelihood.RETURNING)
-                    block.drift[i, j] = block.stronger * moved
+                    block.drift[i, j] = block.drift_scale * moved
             size = max(bounded[axis], likelihood.LEAST_UNCERTAINTY_RAD_S2)
             walk = noise.rapidity * size * size
             block.drift[i, i] += walk
-            block.calm.drift[i, i] = walk
-            block.jitter[i] = block.calm.jitter[i] = noise.jitter[axis]
-        block.keep = np.exp(-dt * V / block.lag) if block.lag > 0.0 else 1.0
+            block.no_gust_filter.drift[i, i] = walk
+            block.jitter[i] = block.no_gust_filter.jitter[i] = noise.jitter[axis]
+        block.keep = np.exp(-dt * V / block.return_length) if block.return_length > 0.0 else 1.0
 
 
 @kernel
-def coefficients(share, terms, blocks, design, y, u):
-    """Add to each block's regressors (n, 2) rad/s2, means over a frame: what the coefficients multiply."""
+def add_coefficient_regressors(share, terms, blocks, design, y, u):
+    """Add this instant, a `share` of the frame, to the regressors (n, 2) rad/s2 of the coefficients."""
     table = design.moments
     regressors(table, table.power, u, terms)
     force = share * y[QDYN] * design.S

@@ -22,7 +22,7 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA
-from beaver_ftc.diagnosis.detection.likelihood import share
+from beaver_ftc.diagnosis.detection.likelihood import normalised_evidence
 
 N_TONES = 16
 # A memory of T s resolves frequencies 1 / T apart. A tone halfway between two frequencies of the grid appears
@@ -163,7 +163,10 @@ def fill_score(tones, tone_config, alarm_level):
         evidence = np.hypot(tones.tone[0, f], tones.tone[1, f]) - tones.coefficient_part[f]
         variance = tone_config.noise_variance[f] * tones.information
         loudest = max(
-            loudest, share(tone_config.level, NOISE_SHARE, evidence, tones.uncertainty_part[f], variance)
+            loudest,
+            normalised_evidence(
+                tone_config.level, NOISE_SHARE, evidence, tones.uncertainty_part[f], variance
+            ),
         )
     tones.score = loudest * alarm_level / tone_config.level
 

@@ -20,10 +20,10 @@ def weigh(fie, tests, blocks, isolation, loss_of, abrupt, hidden):
     others, s = isolation.estimator, fie.surface
     fie.improbable = 0
     if not fie.shown and (fie.doubted or not abrupt):
-        fie.shown = statistical.shows(tests, blocks, others, loss_of, s)  # later may be its end
-    if fie.shown or not statistical.excludes(tests, blocks, others, loss_of, s, False, abrupt):
+        fie.shown = statistical.confirms_loss(tests, blocks, others, loss_of, s)  # later may be its end
+    if fie.shown or not statistical.excludes_loss(tests, blocks, others, loss_of, s, False, abrupt):
         return
-    fie.improbable = statistical.excludes(tests, blocks, others, loss_of, s, True, abrupt)
+    fie.improbable = statistical.excludes_loss(tests, blocks, others, loss_of, s, True, abrupt)
     fie.doubted = max(fie.doubted, 1)
     if fie.improbable and hidden:
         for other in others[: isolation.config.n]:

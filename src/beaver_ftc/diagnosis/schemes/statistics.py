@@ -21,16 +21,16 @@ def compare_likelihoods(fdi, belief, measured, k, t):
     foresee(mean)
     fill_block_signatures(blocks, mean.Gu_foreseen, unanticipated_pitch(belief.design, y, 1.0))
     latched, ends = chances.alarm.detected_at_s >= 0.0, not fdi.config.abrupt
-    statistical.observe(tests, bounded, blocks, seen, innovation, dt, k, latched, ends)
+    statistical.update_blocks(tests, bounded, blocks, seen, innovation, dt, k, latched, ends)
     parity.update_directions(views, felt, seen, fdi.bound, mean.G_foreseen, mean.Gu_foreseen)
     parity.project_innovation(
         views, tests.tolerated, chances.noise, blocks, felt, seen, inertial, innovation, y[AIRSPEED]
     )
     parity.update_views(views, tests, chances.tone_config, y, dt, k, latched)
     known = fdi.bound.error_map.outside == 0
-    statistical.score(chances.alarm, tests, blocks, views, felt, seen, t, known)
+    statistical.update_alarm(chances.alarm, tests, blocks, views, felt, seen, t, known)
     form_innovation(belief, measured.x, dt)
-    statistical.follow_rest(blocks, seen, belief.innovation_after_known_faults, dt)
+    statistical.track_residual_mean(blocks, seen, belief.innovation_after_known_faults, dt)
 
 
 @apart
@@ -47,7 +47,9 @@ def accumulate(fdi, belief, measured):
     """Take in the gust that the vanes measure inside a frame, and what it does to the aircraft."""
     chances, dt = fdi.statistical, belief.share * fdi.config.dt
     tests, noise, seen = chances.tests, chances.noise, chances.air
-    statistical.look(tests, noise, chances.block, seen, fdi.bound, belief.design, measured, belief.u, dt)
+    statistical.accumulate_substep(
+        tests, noise, chances.block, seen, fdi.bound, belief.design, measured, belief.u, dt
+    )
 
 
 @kernel

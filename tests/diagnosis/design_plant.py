@@ -9,7 +9,7 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.model import N_Y
-from beaver_ftc.diagnosis.belief.expectation import look_back, respond
+from beaver_ftc.diagnosis.belief.expectation import evaluate_design, evaluate_frame
 from beaver_ftc.diagnosis.bounds.worst_case import ROUNDING_RAD_S2, bound_now
 from beaver_ftc.diagnosis.detection.bank import note_closest_approach
 from beaver_ftc.loop.assembly import configure_design
@@ -24,7 +24,7 @@ SURFACES = ("aileron", "elevator", "rudder")
 def believe(frames):
     """What the design model makes of this instant."""
     frame = frames[0]
-    respond(frame.belief, frame.measured)
+    evaluate_design(frame.belief, frame.measured)
     bound_now(frame.fdi.bound, frame.belief.design, frame.measured, frame.belief.u)
 
 
@@ -32,7 +32,7 @@ def believe(frames):
 def conclude(frames):
     """The flying diagnosis of this instant."""
     frame = frames[0]
-    look_back(frame.belief, frame.fdi.bound, frame.measured, frame.k, frame.dt)
+    evaluate_frame(frame.belief, frame.fdi.bound, frame.measured, frame.k, frame.dt)
     diagnose(frame)
     note_closest_approach(frame.fdi.bank)
 

@@ -172,15 +172,15 @@ def test_without_the_vanes_every_gust_is_reckoned_with_in_full():
     record = np.zeros(1, air.AIR).view(np.recarray)[0]
     rng = np.random.default_rng(3)
     config, memory, output = (record[part] for part in ("config", "memory", "output"))
-    output["damping"], memory["per_metre"] = rng.normal(size=(3, 3)), rng.uniform(1e-5, 1e-4, 3)
+    output["damping"], memory["intensity"] = rng.normal(size=(3, 3)), rng.uniform(1e-5, 1e-4, 3)
     output["axes"] = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    config["rolling"], config["span"], memory["unseen"] = 34.0, 14.6, 1.0
+    config["rolling_length"], config["span"], memory["unmeasured_share"] = 34.0, 14.6, 1.0
     pairs = [(i, j) for i in range(3) for j in range(3)]
-    unseen = np.reshape([air.unseen_drift(record, 45.0, *pair) for pair in pairs], (3, 3))
+    unseen = np.reshape([air.unmeasured_drift(record, 45.0, *pair) for pair in pairs], (3, 3))
     gusts = output["damping"] @ output["axes"]
-    assert unseen == pytest.approx(45.0 * gusts @ np.diag(memory["per_metre"]) @ gusts.T)
+    assert unseen == pytest.approx(45.0 * gusts @ np.diag(memory["intensity"]) @ gusts.T)
     for m in rng.normal(size=(3, 3)):
-        whole = air.whole_drift(record, 45.0, m @ output["damping"], np.zeros(3))
+        whole = air.full_drift(record, 45.0, m @ output["damping"], np.zeros(3))
         assert whole == pytest.approx(m @ unseen @ m)
 
 

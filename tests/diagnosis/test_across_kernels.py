@@ -39,14 +39,14 @@ def fdi(rng):
     set_up_views(statistical, load())
     tones.set_up_tones(statistical["tone_config"], 1e-8, V, 15.0, DT)
     air = statistical["air"]
-    air["output"]["moving"], air["config"]["rolling"], air["memory"]["per_metre"] = (
+    air["output"]["moving"], air["config"]["rolling_length"], air["memory"]["intensity"] = (
         1,
         34.0,
         rng.uniform(1e-5, 1e-4, 3),
     )
-    for name in ("damping", "axes", "swing", "leap"):
+    for name in ("damping", "axes", "axes_rate", "turn_variance"):
         holder(air, name)[name] = rng.normal(size=(3, 3))
-    air["output"]["leap"] = air["output"]["leap"] @ air["output"]["leap"].T
+    air["output"]["turn_variance"] = air["output"]["turn_variance"] @ air["output"]["turn_variance"].T
     fdi["bound"]["own_per_rad"], fdi["bound"]["own_errors"] = rng.uniform(0.1, 0.4, (3, 4)), 1
     return fdi
 
@@ -78,16 +78,16 @@ def declared_along(statistical, m):
     noise = np.array([lateral["noise"][0], pitch["noise"][0], lateral["noise"][1]])
     bound = np.abs(m) @ statistical["noise"]["bounded"]
     gusts = air["output"]["damping"] @ air["output"]["axes"]
-    walk = gusts @ np.diag(air["memory"]["per_metre"]) @ gusts.T
-    if air["memory"]["swings"]:
-        turned = air["output"]["damping"] @ air["memory"]["swing"]
-        longest_s = air["config"]["rolling"] / V
-        walk += 0.5 * longest_s**2 * turned @ np.diag(air["memory"]["per_metre"]) @ turned.T
+    walk = gusts @ np.diag(air["memory"]["intensity"]) @ gusts.T
+    if air["memory"]["axes_turn_fast"]:
+        turned = air["output"]["damping"] @ air["memory"]["axes_rate"]
+        longest_s = air["config"]["rolling_length"] / V
+        walk += 0.5 * longest_s**2 * turned @ np.diag(air["memory"]["intensity"]) @ turned.T
     moves = float(air["output"]["moving"])
     size = max(bound, LEAST_UNCERTAINTY_RAD_S2)
     drift = statistical["noise"]["rapidity"] * size**2 + moves * V * m @ walk @ m
     jitter = (np.abs(m) @ np.sqrt(statistical["noise"]["jitter"])) ** 2
-    return m**2 @ noise, jitter, bound, drift, moves * m @ air["output"]["leap"] @ m
+    return m**2 @ noise, jitter, bound, drift, moves * m @ air["output"]["turn_variance"] @ m
 
 
 @pytest.mark.parametrize(
@@ -97,7 +97,7 @@ def declared_along(statistical, m):
 @pytest.mark.parametrize("mix", [(0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (-0.6, 0.0, 0.8)])
 def test_what_is_declared_of_the_axes_is_seen_along_a_direction(fdi, mix, changes, swings):
     statistical, view = fdi["statistical"], fdi["statistical"]["views"][PAST_AILERON]
-    view["direction"][:3], statistical["air"]["memory"]["swings"], view["block"]["P_dd"][0, 0] = (
+    view["direction"][:3], statistical["air"]["memory"]["axes_turn_fast"], view["block"]["P_dd"][0, 0] = (
         mix,
         swings,
         0.7,

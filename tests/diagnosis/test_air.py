@@ -55,7 +55,7 @@ class Flown:
         loop.fly_frames(1, 0)
         for _ in range(loop.n_frames - 1):
             loop.fly_frames(1, given.substeps)
-            turn = np.array(record["memory"]["turn"])
+            turn = np.array(record["memory"]["level_to_body"])
             true = turn.T @ [node.get_double_value() for node in nodes]
             felt = [FT * node.get_double_value() for node in accelerations]
             V = loop.frames["measured"]["y"][0][2]
@@ -94,8 +94,8 @@ def test_pitching_and_yawing_gusts_are_seen_but_for_less_than_the_share_declared
 ):
     flown = _flown(turbulence, airspeed_mps, seed)
     left = flown.intensity(flown.true - flown.seen)
-    assert left[1] < air.UNSEEN[1]
-    assert left[2] < air.UNSEEN[2]
+    assert left[1] < air.UNMEASURED_SHARES[1]
+    assert left[2] < air.UNMEASURED_SHARES[2]
     assert np.corrcoef(flown.true[:, 1], flown.seen[:, 1])[0, 1] > 0.98
     assert np.corrcoef(flown.true[:, 2], flown.seen[:, 2])[0, 1] > 0.95
 
@@ -104,8 +104,8 @@ def test_pitching_and_yawing_gusts_are_seen_but_for_less_than_the_share_declared
 def test_and_at_other_rates_and_between_jsbsims_frames(keys):
     flown = Flown("light", duration_s=20, seed=3, **keys)
     left = flown.intensity(flown.true - flown.seen)
-    assert left[1] < air.UNSEEN[1]
-    assert left[2] < air.UNSEEN[2]
+    assert left[1] < air.UNMEASURED_SHARES[1]
+    assert left[2] < air.UNMEASURED_SHARES[2]
 
 
 def test_a_steady_wind_is_not_taken_for_a_gust():
@@ -153,11 +153,14 @@ def test_where_no_model_has_the_forces_only_accelerometers_tell_a_gust(tmp_path,
         )
     )
     statistical = loop.frames["fdi"]["statistical"][0]
-    assert statistical["air"]["output"]["read"] == 1
+    assert statistical["air"]["output"]["uses_accelerometers"] == 1
     if forces != "felt":
-        air.no_longer_read(statistical["air"])
+        air.stop_accelerometers(statistical["air"])
     if forces == "claimed":
-        statistical["air"]["output"]["seen"], statistical["air"]["memory"]["unseen"] = 1, air.UNSEEN
+        statistical["air"]["output"]["measures_gust"], statistical["air"]["memory"]["unmeasured_share"] = (
+            1,
+            air.UNMEASURED_SHARES,
+        )
     for _ in loop.chunks():
         pass
     assert bool(statistical["alarm"]["closest"] > 0.2) is (forces == "claimed")
@@ -204,7 +207,11 @@ def test_where_no_model_has_the_forces_the_vanes_show_a_gust_roughly_for_a_law_t
     for axis in (0, 1):
         assert np.corrcoef(seen[:, axis], true[:, axis])[0, 1] > 0.95
     record = flown.record
-    assert np.abs(record["output"]["shown"]).max() > 0.0 == np.abs(record["output"]["acceleration"]).max()
+    assert (
+        np.abs(record["output"]["coarse_acceleration"]).max()
+        > 0.0
+        == np.abs(record["output"]["acceleration"]).max()
+    )
 
 
 def test_nor_does_it_when_the_force_jumps_between_coarse_frames():
@@ -223,37 +230,37 @@ def test_a_heading_that_turns_round_as_the_nose_passes_the_vertical_is_no_gust(l
     """The turbulence turns with the heading: air from ahead, and a little from aside, turns round at once."""
     record, dt = air_of(), 0.01
     still, gust = np.array([45.0, 0.0, 0.0]), np.array([3.0, 1.0, 0.0])  # m/s; straight down, and level axes
-    record["memory"]["turn"], record["memory"]["gust"][2] = _turn(0.0, -1.56), 0.05
-    air.begin(record, readings(still - record["memory"]["turn"] @ gust), np.array([0.0, -1.56, 0.3]))
+    record["memory"]["level_to_body"], record["memory"]["gust"][2] = _turn(0.0, -1.56), 0.05
+    air.start(record, readings(still - record["memory"]["level_to_body"] @ gust), np.array([0.0, -1.56, 0.3]))
     record["memory"]["gust"][2] = 0.05
     over = np.array([np.pi, -1.56, 0.3 + np.pi])
     held = [0.0, 0.0, -record["config"]["gravity"]]  # nothing accelerates
-    record["memory"]["force"] = record["memory"]["turn"] @ held
+    record["memory"]["force"] = record["memory"]["level_to_body"] @ held
     if late:  # the wind turns a step after the heading
-        air.observe(record, readings(still - _turn(np.pi, -1.56) @ (gust * [-1, -1, 1])), over, dt)
+        air.update_gust(record, readings(still - _turn(np.pi, -1.56) @ (gust * [-1, -1, 1])), over, dt)
         record["memory"]["force"] = _turn(np.pi, -1.56) @ held
-    air.observe(record, readings(still - _turn(np.pi, -1.56) @ gust), over, dt)
+    air.update_gust(record, readings(still - _turn(np.pi, -1.56) @ gust), over, dt)
     assert abs(record["memory"]["gust"][2]) <= 0.05
-    unseen, record["memory"]["unseen"] = np.array(record["memory"]["unseen"]), np.ones(3)
+    unseen, record["memory"]["unmeasured_share"] = np.array(record["memory"]["unmeasured_share"]), np.ones(3)
     record["output"]["damping"] = np.diag([0.0, 0.0, 5.0]) @ record["output"]["axes"].T
-    everything = air.unseen_drift(record, 45.0, 2, 2)
-    record["memory"]["unseen"] = unseen
-    assert air.unseen_drift(record, 45.0, 2, 2) == pytest.approx(everything)
+    everything = air.unmeasured_drift(record, 45.0, 2, 2)
+    record["memory"]["unmeasured_share"] = unseen
+    assert air.unmeasured_drift(record, 45.0, 2, 2) == pytest.approx(everything)
 
 
 def test_a_gust_that_was_seen_acts_as_before_in_the_step_in_which_the_heading_turns_round():
     """JSBSim's gusts point along the heading of the step before, in body axes as they are now."""
     record, y = air_of(), readings(np.array([45.0, 0.0, 2.0]))
-    air.begin(record, y, np.array([0.0, -1.56, 0.3]))
+    air.start(record, y, np.array([0.0, -1.56, 0.3]))
     record["memory"]["gust"][1] = 0.04
     over = np.array([np.pi, -1.56, 0.3 + np.pi])
-    air.observe(record, y, over, 1e-4)
+    air.update_gust(record, y, over, 1e-4)
     now = record["memory"]["gust"][1]
-    air.effect(record, design_record()[0], np.zeros(3), y, np.zeros(4))
+    air.fill_effect(record, design_record()[0], np.zeros(3), y, np.zeros(4))
     assert record["memory"]["rotation"][1] == pytest.approx(now)
-    air.observe(record, y, over, 1e-4)
+    air.update_gust(record, y, over, 1e-4)
     now = record["memory"]["gust"][1]
-    air.effect(record, design_record()[0], np.zeros(3), y, np.zeros(4))
+    air.fill_effect(record, design_record()[0], np.zeros(3), y, np.zeros(4))
     assert record["memory"]["rotation"][1] == pytest.approx(-now)
 
 
@@ -269,7 +276,7 @@ def test_a_yawing_gust_is_lost_as_far_as_the_heading_turns_faster_than_it_change
     record = air_of()
     lag_s, sigma, rate = 3 * 14.63 / (np.pi * 45), 2.0, 0.4
     turned, walked = (rate * sigma * lag_s) ** 2, 3 * sigma**2 * 45 / 533.4 * lag_s
-    assert air.lost_by_turning(record, 45.0, rate) == pytest.approx(turned / walked, rel=1e-9)
+    assert air.share_lost_by_turning(record, 45.0, rate) == pytest.approx(turned / walked, rel=1e-9)
 
 
 def test_the_specific_force_is_the_one_felt_aboard():
@@ -315,7 +322,7 @@ def test_a_gust_acts_through_the_damping_in_body_axes():
     y = np.array([0.1, 0.02, 45.0, 1036.0, 0.3])
     record["output"]["axes"] = _turn(0.6, 0.1)
     record["memory"]["gust"] = [0.0, 0.02, -0.03]
-    air.effect(record, design.view(), np.zeros(3), y, np.zeros(4))
+    air.fill_effect(record, design.view(), np.zeros(3), y, np.zeros(4))
     _, _, slope, _ = jacobian(design, np.zeros(3), y, np.zeros(4))
     body = _turn(0.6, 0.1) @ record["memory"]["gust"]
     assert record["output"]["acceleration"] == pytest.approx(-slope @ body)
@@ -325,10 +332,10 @@ def test_what_is_not_seen_drifts_in_body_axes_as_a_covariance_turns():
     record, design = air_of(), design_record()[0]
     y = np.array([0.1, 0.02, 45.0, 1036.0, 0.3])
     record["output"]["axes"] = turn = _turn(0.6, 0.1)
-    air.effect(record, design, np.zeros(3), y, np.zeros(4))
-    spread = turn @ np.diag(45.0 * Dryden("light").rotation_walk(14.63) * air.UNSEEN) @ turn.T
+    air.fill_effect(record, design, np.zeros(3), y, np.zeros(4))
+    spread = turn @ np.diag(45.0 * Dryden("light").rotation_walk(14.63) * air.UNMEASURED_SHARES) @ turn.T
     expected = record["output"]["damping"] @ spread @ record["output"]["damping"].T
-    found = [[air.unseen_drift(record, 45.0, i, j) for j in range(3)] for i in range(3)]
+    found = [[air.unmeasured_drift(record, 45.0, i, j) for j in range(3)] for i in range(3)]
     assert np.array(found) == pytest.approx(expected, rel=1e-12)
 
 
@@ -336,16 +343,16 @@ def test_a_gust_unseen_drifts_besides_as_its_axis_turns_in_the_body():
     """A gust of the variance of its own process, kept for its own lag while the axis turns, as a walk."""
     record, y, dt = air_of(), readings(np.array([45.0, 0.0, 2.0])), 0.01
     before, after = np.array([0.5, -1.45, 0.2]), np.array([0.53, -1.47, 0.2])
-    air.begin(record, y, before)
-    air.observe(record, y, after, dt)
+    air.start(record, y, before)
+    air.update_gust(record, y, after, dt)
     record["output"]["damping"] = D = np.diag([5.0, 3.0, 1.0])
-    air.begin_frame(record, 45.0, dt)
-    air.elapse(record, 1.0)
+    air.begin_sums(record, 45.0, dt)
+    air.average_frame(record, 1.0)
     turned = (_turn(*after[:2]) - _turn(*before[:2]))[:, 0] / dt
     lag_s = np.sqrt(0.3048 * 1750 * 14.63) / 2.6 / 45
     variance = 45 * Dryden("light").rotation_walk(14.63)[0] * lag_s / 2  # of a first-order process
     expected = np.outer(D @ turned, D @ turned) * variance * lag_s
-    assert record["output"]["leap"] / dt == pytest.approx(expected, rel=1e-9)
+    assert record["output"]["turn_variance"] / dt == pytest.approx(expected, rel=1e-9)
 
 
 TURN = {  # to 30 deg of bank, and round
@@ -366,5 +373,5 @@ def test_the_rolling_gust_rolls_whatever_the_heading(wind_mps):
     across = np.abs(np.cos(flown.heading)) < 0.5
     assert across.sum() > 400
     left = flown.intensity((flown.true - flown.seen)[across])
-    assert left[1] < air.UNSEEN[1]
-    assert left[2] < air.UNSEEN[2]
+    assert left[1] < air.UNMEASURED_SHARES[1]
+    assert left[2] < air.UNMEASURED_SHARES[2]

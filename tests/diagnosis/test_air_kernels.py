@@ -29,9 +29,9 @@ def new_air(**fields):
         record["config"]["span"],
         record["config"]["gravity"],
         record["output"]["moving"],
-        record["output"]["seen"],
+        record["output"]["measures_gust"],
     ) = SPAN, GRAVITY, 1, 1
-    record["config"]["scale"], record["config"]["rolling"] = SCALE, ROLLING
+    record["config"]["turbulence_length"], record["config"]["rolling_length"] = SCALE, ROLLING
     return fill(record, **fields)
 
 
@@ -78,14 +78,14 @@ def test_the_gust_followed_is_the_airs_own_change(seed):
     """Whatever aircraft and heading do: each lag keeps its share, and the change of the air's velocity, seen
     from the level axes of now, is added."""
     flight, record = Flight(seed), new_air()
-    air.begin(record, *flight.reading())
+    air.start(record, *flight.reading())
     pitching = yawing = 0.0
     for _ in range(6):
         wind, axes_then = flight.wind, record["output"]["axes"].copy()
         psi_then = flight.attitude[2]
         record["memory"]["force"] = flight.step()
         y, attitude = flight.reading()
-        air.observe(record, y, attitude, DT)
+        air.update_gust(record, y, attitude, DT)
         change = Rotation.from_euler("z", -flight.attitude[2]).apply(flight.wind - wind)
         tau_q, tau_r = 4.0 * SPAN / (np.pi * y[2]), 3.0 * SPAN / (np.pi * y[2])
         pitching = np.exp(-DT / tau_q) * pitching + change[2] / (y[2] * tau_q)
@@ -94,42 +94,42 @@ def test_the_gust_followed_is_the_airs_own_change(seed):
         # The axes of the gusts: level, along the heading of the instant before.
         axes = (to_earth(flight.attitude).inv() * Rotation.from_euler("z", psi_then)).as_matrix()
         assert record["output"]["axes"] == pytest.approx(axes)
-        assert record["memory"]["swing"] == pytest.approx((axes - axes_then) / DT)
+        assert record["memory"]["axes_rate"] == pytest.approx((axes - axes_then) / DT)
 
 
 @pytest.mark.parametrize(("turn_rad", "swings"), [(1e-3, False), (0.1, True)])
 def test_axes_swing_where_a_gust_that_keeps_its_size_would_be_seen_to_change(turn_rad, swings):
     flight, record = Flight(1, 0.0, 0.0), new_air()
-    air.begin(record, *flight.reading())
+    air.start(record, *flight.reading())
     flight.attitude[1] = 0.0
     for _ in range(3):
         record["memory"]["force"] = flight.step()
         flight.attitude[1] += turn_rad
         y, attitude = flight.reading()
-        air.observe(record, y, attitude, DT)
+        air.update_gust(record, y, attitude, DT)
     fastest = turn_rad / DT  # nearly: a little less where the axis is not square to what turns it
     walk = 0.5 * (fastest * ROLLING / y[2]) ** 2
-    assert not 0.8 * air.LEAST_SWING < walk < 1.3 * air.LEAST_SWING
-    assert bool(record["memory"]["swings"]) == swings == (walk > air.LEAST_SWING)
+    assert not 0.8 * air.MIN_AXES_TURN < walk < 1.3 * air.MIN_AXES_TURN
+    assert bool(record["memory"]["axes_turn_fast"]) == swings == (walk > air.MIN_AXES_TURN)
 
 
 @pytest.mark.parametrize("share", [0.98, 1.02])
 def test_the_fastest_swing_decides(share):
     record = new_air(axes=np.eye(3))
-    most = np.sqrt(2.0 * air.LEAST_SWING) * 45.0 / ROLLING
-    record["memory"]["swing"] = np.eye(3)
-    record["memory"]["swing"][1, 2] = share * most * DT
-    record["memory"]["swing"][0, 0] += 0.5 * most * DT
-    air.note_swing(record, DT, 45.0)
-    assert record["memory"]["swing"][1, 2] == pytest.approx(-share * most)
-    assert record["memory"]["swings"] == (share > 1.0)
+    most = np.sqrt(2.0 * air.MIN_AXES_TURN) * 45.0 / ROLLING
+    record["memory"]["axes_rate"] = np.eye(3)
+    record["memory"]["axes_rate"][1, 2] = share * most * DT
+    record["memory"]["axes_rate"][0, 0] += 0.5 * most * DT
+    air.update_axes_rate(record, DT, 45.0)
+    assert record["memory"]["axes_rate"][1, 2] == pytest.approx(-share * most)
+    assert record["memory"]["axes_turn_fast"] == (share > 1.0)
 
 
 def test_a_yawing_gust_that_turning_hides_fades_and_its_loss_fades_with_it():
     """One fast turn: for that instant and the next nothing is added, and what is lost then decays."""
     record, y = new_air(), np.array([0.0, 0.0, 45.0, 1000.0, 0, 0, 0, 0])
     level = np.zeros(3)
-    air.begin(record, y, level)
+    air.start(record, y, level)
     record["memory"]["force"], record["memory"]["gust"] = (0.0, 0.0, -GRAVITY), (0.0, 0.0, 0.05)
     tau_r, lag = 3.0 * SPAN / (np.pi * 45.0), np.exp(-DT / (3.0 * SPAN / (np.pi * 45.0)))
     enough = np.sqrt(np.pi * 45.0**2 / (SPAN * SCALE))  # rad/s at which all of it is lost
@@ -140,14 +140,14 @@ def test_a_yawing_gust_that_turning_hides_fades_and_its_loss_fades_with_it():
         ((0, 0, turn), 0.05 * lag**3, lag),
         ((0, 0, turn), 0.05 * lag**4, lag**2),
     ):
-        air.observe(record, y, np.array(attitude), DT)
+        air.update_gust(record, y, np.array(attitude), DT)
         assert record["memory"]["gust"][2] == pytest.approx(gust)
-        assert record["memory"]["turning"] == pytest.approx(turning)
+        assert record["memory"]["turning_share"] == pytest.approx(turning)
         record["memory"]["force"] = 0.0, 0.0, -GRAVITY
     part = 0.5 * enough * DT
-    air.observe(record, y, np.array([0, 0, turn + part]), DT)
-    assert record["memory"]["lost"] == pytest.approx(0.25)
-    assert record["memory"]["turning"] == pytest.approx(max(lag**3, 0.25))
+    air.update_gust(record, y, np.array([0, 0, turn + part]), DT)
+    assert record["memory"]["lost_share"] == pytest.approx(0.25)
+    assert record["memory"]["turning_share"] == pytest.approx(max(lag**3, 0.25))
     aside = 45.0 * np.sin(part)  # of the old course, from the left: a gust from the right has come up
     assert record["memory"]["gust"][2] == pytest.approx(0.05 * lag**5 - aside / (45.0 * tau_r))
 
@@ -164,15 +164,19 @@ def test_level_axes_are_a_rotation(seed):
 
 def test_a_diagnosis_that_begins_in_flight_has_seen_no_gust():
     flight = Flight(3)
-    record = new_air(started=1, lost=0.4, turning=0.3, gust=(0.1, 0.2, 0.3))
-    air.begin(record, *flight.reading())
-    assert (record["memory"]["started"], record["memory"]["lost"], record["memory"]["turning"]) == (
+    record = new_air(started=1, lost_share=0.4, turning_share=0.3, gust=(0.1, 0.2, 0.3))
+    air.start(record, *flight.reading())
+    assert (
+        record["memory"]["started"],
+        record["memory"]["lost_share"],
+        record["memory"]["turning_share"],
+    ) == (
         0,
         0.0,
         0.0,
     )
     assert not record["memory"]["gust"].any()
-    assert record["output"]["axes"] == pytest.approx(record["memory"]["turn"])
+    assert record["output"]["axes"] == pytest.approx(record["memory"]["level_to_body"])
     through = Rotation.from_euler("z", -flight.attitude[2]).apply(flight.velocity - flight.wind)
     assert record["memory"]["velocity"] == pytest.approx(through)
 
@@ -189,10 +193,10 @@ def test_what_a_gust_does_is_what_the_opposite_rates_would():
     """By differences of the design model's own response, whose inertia terms the air knows nothing of."""
     design = design_record().view(np.recarray)
     record = new_air(area_per_mass=0.01)
-    fill_table(record["memory"]["forces"], AIRCRAFT, AIRCRAFT.measurable_forces, FORCES)
-    air.begin(record, Y, np.array([0.3, 0.2, 1.0]))
+    fill_table(record["memory"]["force_table"], AIRCRAFT, AIRCRAFT.measurable_forces, FORCES)
+    air.start(record, Y, np.array([0.3, 0.2, 1.0]))
     record["memory"]["gust"] = 0.0, 0.02, -0.03
-    air.effect(record, design[0], X, Y, U)
+    air.fill_effect(record, design[0], X, Y, U)
     rotation = to_earth((0.3, 0.2, 0.0)).inv().apply([0.0, 0.02, -0.03])
     assert record["memory"]["rotation"] == pytest.approx(rotation)
 
@@ -204,16 +208,28 @@ def test_what_a_gust_does_is_what_the_opposite_rates_would():
     step = 1e-6
     expected = (acceleration(X - step * rotation) - acceleration(X + step * rotation)) / (2.0 * step)
     assert record["output"]["acceleration"] == pytest.approx(expected, rel=1e-6)
-    air.effect(record, design[0], X, Y, U)
-    air.begin_frame(record, 45.0, 0.01)
+    air.fill_effect(record, design[0], X, Y, U)
+    air.begin_sums(record, 45.0, 0.01)
     record["output"]["acceleration"] = 0.0
-    assert record["memory"]["total"] == pytest.approx(expected, rel=1e-6)
+    assert record["memory"]["acceleration_sum"] == pytest.approx(expected, rel=1e-6)
 
 
 def test_what_an_earlier_diagnosis_kept_is_gone_when_one_begins():
-    kept = dict.fromkeys(("gust", "started", "lost", "turning", "leaping", "leapt", "leap", "leaps"), 1)
+    kept = dict.fromkeys(
+        (
+            "gust",
+            "started",
+            "lost_share",
+            "turning_share",
+            "turn_variance_now",
+            "turn_variance_before",
+            "turn_variance",
+            "turn_frames",
+        ),
+        1,
+    )
     record = new_air(**kept)
-    air.begin(record, Y, np.array([0.3, 0.2, 1.0]))
+    air.start(record, Y, np.array([0.3, 0.2, 1.0]))
     assert {name for name in kept if np.any(holder(record, name)[name])} == set()
 
 
@@ -226,12 +242,12 @@ def test_the_noise_of_an_attitude_is_in_the_gust_that_is_followed(angle, axis):
     alpha = 0.15
     y, level = np.array([alpha, 0.0, 45.0, 1036.0, 0.3, 0.0, 0.0, 0.0]), np.array([0.0, alpha, 1.0])
     record, seen = new_air(), []
-    air.begin(record, y, level)
+    air.start(record, y, level)
     for _ in range(4000):
         record["memory"]["force"] = -GRAVITY * np.array([-np.sin(alpha), 0.0, np.cos(alpha)])
         blurred = level.copy()
         blurred[place] += np.radians(std_deg) * rng.normal()
-        air.observe(record, y, blurred, DT)
+        air.update_gust(record, y, blurred, DT)
         seen.append(record["memory"]["gust"].copy())
     lags = np.array([4.0, 3.0]) * SPAN / (np.pi * 45.0)
     counted, reckoned = np.std(seen, axis=0)[1:] * lags, variances.flow_noise(SensorErrors(sensors), 45.0)

@@ -51,8 +51,8 @@ def test_the_drift_of_the_detectors_blocks(moving):
         record["air"]["output"]["moving"], record["noise"]["deflection"] = moving, 0.01
         (
             record["air"]["output"]["damping"],
-            record["air"]["memory"]["per_metre"],
-            record["air"]["memory"]["unseen"],
+            record["air"]["memory"]["intensity"],
+            record["air"]["memory"]["unmeasured_share"],
         ) = np.eye(3), 1e-3, 0.5
         record["air"]["output"]["axes"] = np.arange(9.0).reshape(3, 3)
         for block, axes in zip(record["block"], ((1,), (0, 2)), strict=False):
@@ -66,12 +66,12 @@ def test_the_drift_of_the_detectors_blocks(moving):
 
 
 def test_the_gusts_effect():
-    found, filled = [], ("force", "rotation", "acceleration", "shown", "damping")
+    found, filled = [], ("force", "rotation", "acceleration", "coarse_acceleration", "damping")
     for before in (0.0, 9.0):
         record = np.zeros(1, AIR).view(np.recarray)[0]
         fill(record, span=14.0, axes=np.eye(3), gust=(0.0, 0.02, -0.03))
         fill(record, **dict.fromkeys((*filled, "scratch"), before))
-        air.effect(record, design(), X, Y, U)
+        air.fill_effect(record, design(), X, Y, U)
         found.append([holder(record, name)[name].tolist() for name in filled])
     assert found[0] == found[1]
 

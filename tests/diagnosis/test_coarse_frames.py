@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.belief.expectation import begin_frame, elapse, sum_up
+from beaver_ftc.diagnosis.belief.expectation import accumulate, average_frame, begin_sums
 from beaver_ftc.diagnosis.detection.bank import aligned_extremes, extremes
 from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.scenario.schema import Scenario
@@ -16,18 +16,18 @@ from beaver_ftc.scenario.schema import Scenario
 @kernel
 def first(frames):
     fdi = frames[0].fdi
-    begin_frame(frames[0].belief, fdi.bound, fdi.layout, fdi.config.every_type, frames[0].measured)
+    begin_sums(frames[0].belief, fdi.bound, fdi.layout, fdi.config.every_type, frames[0].measured)
 
 
 @kernel
 def another(frames):
     fdi = frames[0].fdi
-    sum_up(frames[0].belief, fdi.bound, fdi.layout, fdi.config.every_type)
+    accumulate(frames[0].belief, fdi.bound, fdi.layout, fdi.config.every_type)
 
 
 @kernel
 def over(frames):
-    elapse(frames[0].belief, frames[0].fdi.bound)
+    average_frame(frames[0].belief, frames[0].fdi.bound)
 
 
 @kernel

@@ -176,10 +176,10 @@ def test_means_over_a_frame_are_of_its_instants(count, own_errors):
         record["f"], record["G"], record["u"] = f, G, u
         fdi["bound"]["eta_bar_now"], fdi["bound"]["admitted"]["per_rad"] = eta_bar, np.abs(per_rad)
         if k == 0:
-            beliefs.begin_frame(record, fdi["bound"], fdi["layout"], fdi["config"]["every_type"], measured)
+            beliefs.begin_sums(record, fdi["bound"], fdi["layout"], fdi["config"]["every_type"], measured)
         else:
-            beliefs.sum_up(record, fdi["bound"], fdi["layout"], fdi["config"]["every_type"])
-    beliefs.elapse(record, fdi["bound"])
+            beliefs.accumulate(record, fdi["bound"], fdi["layout"], fdi["config"]["every_type"])
+    beliefs.average_frame(record, fdi["bound"])
     Gu = np.array([G * u for _, G, u, _, _ in seen])
     mean = record["means"]
     assert record["x_then"] == pytest.approx([1.0, 2.0, 3.0])

@@ -44,13 +44,13 @@ def felt(bounds=None, **admitted):
         fdi["bound"]["admitted"][name] = value
     statistical = fdi["statistical"]
     air = statistical["air"]
-    fill_table(air["memory"]["forces"], AIRCRAFT, AIRCRAFT.measurable_forces, FORCES)
+    fill_table(air["memory"]["force_table"], AIRCRAFT, AIRCRAFT.measurable_forces, FORCES)
     air["config"]["area_per_mass"], air["config"]["gravity"] = (
         AIRCRAFT.geometry.wing_area_m2 / AIRCRAFT.mass.mass_kg,
         GRAVITY,
     )
-    air["config"]["scale"], statistical["forces"]["known"] = 533.4, 1
-    air["output"]["read"] = 1
+    air["config"]["turbulence_length"], statistical["forces"]["known"] = 533.4, 1
+    air["output"]["uses_accelerometers"] = 1
     set_up_forces(fdi, declared_in(bounds or Bounds(), AIRCRAFT), (X, Y, U), ALONG_Y, DT)
     return fdi
 
@@ -226,7 +226,7 @@ def test_without_accelerometers_no_force_is_weighed(viewed):
     views = statistical["views"]
     views["peak_score"], views["block"]["hypothesis"]["score"][:, 0] = 50.0, 50.0
     forces.do_without(*(statistical[name] for name in ("forces", "air", "inertial_air")))
-    assert not statistical["air"]["output"]["read"]
+    assert not statistical["air"]["output"]["uses_accelerometers"]
     assert not statistical["inertial_air"]["output"]["moving"]
     for v in (ELEVATOR_VIEW, ALPHA_VIEW, UP_VIEW, SIDE_VIEW):
         assert Across.shown(statistical, views[v]) == 0.0
@@ -247,7 +247,7 @@ def test_accelerometers_that_may_break_raise_no_alarm_and_tell_no_gust(viewed):
     air["output"]["mean"] = 0.1, 0.2, 0.3
     views["block"]["hypothesis"]["score"][0, 0] = 7.0
     for read in (1, 0):
-        air["output"]["read"] = read
+        air["output"]["uses_accelerometers"] = read
         views["peak_score"][UP_VIEW] = 50.0
         assert Across.alarm(statistical, views[ELEVATOR_VIEW]) == 9.0 * read
         views["peak_score"][UP_VIEW] = 0.0
@@ -266,19 +266,24 @@ def test_a_gust_that_nobody_tells_moves_rate_and_force_in_full(viewed):
         statistical["views"][RUDDER_VIEW],
         statistical["forces"]["component"],
     )
-    air["output"]["moving"], air["output"]["damping"], air["output"]["axes"], air["output"]["read"] = (
+    (
+        air["output"]["moving"],
+        air["output"]["damping"],
+        air["output"]["axes"],
+        air["output"]["uses_accelerometers"],
+    ) = (
         1,
         rng.normal(size=(3, 3)),
         np.eye(3),
         0,
     )
-    air["memory"]["per_metre"], air["memory"]["unseen"] = (1e-5, 2e-5, 3e-5), 0.0
+    air["memory"]["intensity"], air["memory"]["unmeasured_share"] = (1e-5, 2e-5, 3e-5), 0.0
     Across.turn(viewed, view, rng.normal(size=(3, 4)))
     Across.blur(view, statistical, 45.0)
     m = view["direction"]
     by_both = np.abs(m[:3] @ air["output"]["damping"]) + np.abs(m[3:] @ component["damping"])
     still = float(view["block"]["drift"][0, 0])
-    air["memory"]["per_metre"] = 0.0
+    air["memory"]["intensity"] = 0.0
     Across.blur(view, statistical, 45.0)
     gusts = still - float(view["block"]["drift"][0, 0])
     assert gusts == pytest.approx(45.0 * np.sum(by_both**2 * np.array([1e-5, 2e-5, 3e-5])))
@@ -598,16 +603,16 @@ def test_what_is_declared_of_rate_and_force_is_seen_along_a_direction(viewed, v)
         rng.normal(size=(3, 3)),
         np.eye(3),
     )
-    air["memory"]["per_metre"] = 1e-5, 2e-5, 3e-5
+    air["memory"]["intensity"] = 1e-5, 2e-5, 3e-5
     component["jitter"], component["deflection"] = ((2e-6, 1e-7), (3e-5, 2e-5)), (0.001, 0.002)
     component["wander"], statistical["forces"]["strength"] = (1e-4, 2e-4), 1.2
-    for name in ("moving", "damping", "axes", "per_metre"):
+    for name in ("moving", "damping", "axes", "intensity"):
         holder(statistical["inertial_air"], name)[name] = holder(air, name)[name]
-    air["memory"]["unseen"], statistical["inertial_air"]["memory"]["unseen"] = (
+    air["memory"]["unmeasured_share"], statistical["inertial_air"]["memory"]["unmeasured_share"] = (
         (1.0, 0.25, 0.09),
         (1.0, 0.36, 0.16),
     )
-    seen = statistical["inertial_air" if view["immune_to_vane"] else "air"]["memory"]["unseen"]
+    seen = statistical["inertial_air" if view["immune_to_vane"] else "air"]["memory"]["unmeasured_share"]
     Across.turn(viewed, view, rng.normal(size=(3, 4)))
     Across.blur(view, statistical, 45.0)
     m, block = view["direction"], view["block"]
@@ -615,7 +620,7 @@ def test_what_is_declared_of_rate_and_force_is_seen_along_a_direction(viewed, v)
         np.abs(m[:3] @ air["output"]["damping"]),
         1.2 * np.abs(m[3:] @ component["damping"]),
     )
-    gusts = 45.0 * np.sum((np.sqrt(seen) * gust_on_rates + gust_on_forces) ** 2 * air["memory"]["per_metre"])
+    gusts = 45.0 * np.sum((np.sqrt(seen) * gust_on_rates + gust_on_forces) ** 2 * air["memory"]["intensity"])
     sizes = np.sqrt([*statistical["noise"]["jitter"], *component["jitter"][:, int(view["inertial"])]])
     assert block["jitter"][0] == pytest.approx((np.abs(m) @ sizes) ** 2)
     bound = np.abs(m) @ [0.02, 0.02, 0.02, 0.0012, 0.0024]

@@ -175,7 +175,7 @@ def test_a_loss_declared_constant_neither_grows_nor_ends():
 def test_the_second_view_returns_with_a_gust_as_strong_where_it_is_slow(alone):
     air, last = alone.detector["air"], alone.blocks[-1]
     rolling = sqrt(0.3048 * 1750.0 * SPAN_M) / 2.6
-    assert air["config"]["rolling"] == pytest.approx(rolling)
+    assert air["config"]["rolling_length"] == pytest.approx(rolling)
     assert last["return_length"] == pytest.approx(
         noise_model.returning_length(alone.detector, V, 50.0, rolling)
     )
@@ -183,7 +183,7 @@ def test_the_second_view_returns_with_a_gust_as_strong_where_it_is_slow(alone):
     assert [float(block["drift_scale"]) for block in alone.blocks[:-1]] == [1.0, 1.0]
     assert air["output"]["moving"] == 1
     assert air["config"]["area_per_mass"] == pytest.approx(AIRCRAFT.geometry.wing_area_m2 / MASS.mass_kg)
-    assert air["memory"]["unseen"] == pytest.approx([1.0, 0.003, 0.03])
+    assert air["memory"]["unmeasured_share"] == pytest.approx([1.0, 0.003, 0.03])
     assert air["config"]["span"] == SPAN_M
     assert air["config"]["gravity"] == pytest.approx(9.80665)
     assert Detector(50.0).detector["air"]["output"]["moving"] == 0
@@ -352,7 +352,7 @@ def test_a_sense_is_kept_for_every_onset(alone):
 
 
 def test_forces_are_those_the_file_has_a_sensor_for(alone):
-    table = alone.detector["air"]["memory"]["forces"]
+    table = alone.detector["air"]["memory"]["force_table"]
     values = table["value"][: len(AIRCRAFT.measurable_forces)]
     assert sorted(values) == sorted(term.value for term in AIRCRAFT.measurable_forces)
 

@@ -23,8 +23,12 @@ def record_of(dtype):
 
 def in_moving_air():
     record = record_of(air.AIR)
-    record["output"]["seen"], record["config"]["strongest"], record["config"]["forgets"] = 1, 30.0, 0.02
-    record["memory"]["velocity"], record["memory"]["blown"], record["memory"]["fresh"] = (
+    record["output"]["measures_gust"], record["config"]["max_gust"], record["config"]["decay_rate"] = (
+        1,
+        30.0,
+        0.02,
+    )
+    record["memory"]["velocity"], record["memory"]["gust_velocity"], record["memory"]["initial_share"] = (
         (44.0, 1.5, 3.0),
         (5.0, -2.0, 0.7),
         0.8,
@@ -34,46 +38,52 @@ def in_moving_air():
 
 def test_the_speed_is_that_through_the_air_without_the_gust():
     record, dt = in_moving_air(), 0.5
-    air.pass_through(record, 45.0, 1.1, 3.3, 44.1, dt)  # the gust has changed by 1.0, -0.4, 0.3
+    air.update_speed(record, 45.0, 1.1, 3.3, 44.1, dt)  # the gust has changed by 1.0, -0.4, 0.3
     kept = np.exp(-0.02 * dt)
     blown = kept * np.array([5.0, -2.0, 0.7]) + [1.0, -0.4, 0.3]
-    assert record["memory"]["blown"] == pytest.approx(blown)
+    assert record["memory"]["gust_velocity"] == pytest.approx(blown)
     assert record["output"]["speed"] == pytest.approx(np.linalg.norm(blown + np.array([44.0, 1.5, 3.0])))
-    assert record["memory"]["fresh"] == pytest.approx(0.8 * kept**2)
+    assert record["memory"]["initial_share"] == pytest.approx(0.8 * kept**2)
 
 
 def test_no_gust_is_taken_for_stronger_than_is_likely():
     record = in_moving_air()
-    record["config"]["strongest"] = 2.0
-    air.pass_through(record, 90.0, -70.0, 3.3, 44.1, 0.01)
-    assert record["memory"]["blown"][:2] == pytest.approx([2.0, -2.0])
+    record["config"]["max_gust"] = 2.0
+    air.update_speed(record, 90.0, -70.0, 3.3, 44.1, 0.01)
+    assert record["memory"]["gust_velocity"][:2] == pytest.approx([2.0, -2.0])
 
 
 def test_where_no_gust_is_seen_the_airspeed_serves():
     record = in_moving_air()
-    record["output"]["seen"] = 0
-    air.pass_through(record, 45.0, 1.1, 3.3, 44.1, 0.5)
+    record["output"]["measures_gust"] = 0
+    air.update_speed(record, 45.0, 1.1, 3.3, 44.1, 0.5)
     assert record["output"]["speed"] == 44.1
-    assert air.hidden(record, 1) == 0.0
+    assert air.unmeasured_share(record, 1) == 0.0
 
 
 @pytest.mark.parametrize(("g", "further"), [(1, 0.02), (2, 0.05)])
 def test_an_unknown_speed_leaves_a_share_of_the_gusts_that_vanes_show(g, further):
     record = in_moving_air()
-    record["memory"]["unseen"], record["memory"]["late"], record["memory"]["turning"] = (
+    (
+        record["memory"]["unmeasured_share"],
+        record["memory"]["start_share"],
+        record["memory"]["turning_share"],
+    ) = (
         (1.0, 0.003, 0.03),
         0.02,
         0.05,
     )
     (
         record["output"]["speed"],
-        record["config"]["spread"],
-        record["config"]["gusty"],
-        record["config"]["doubt"],
+        record["config"]["speed_variance"],
+        record["config"]["gust_variance"],
+        record["config"]["error_gain"],
     ) = 40.0, 1.3, 4.7, 2.5
     off = 2.5 * (1.3 + 0.8 * 4.7) / 40.0**2
-    assert air.hidden(record, g) == pytest.approx(record["memory"]["unseen"][g] + off + further)
-    assert air.hidden(record, 0) == 1.0
+    assert air.unmeasured_share(record, g) == pytest.approx(
+        record["memory"]["unmeasured_share"][g] + off + further
+    )
+    assert air.unmeasured_share(record, 0) == 1.0
 
 
 def test_a_speed_that_is_off_leaves_no_more_than_is_reckoned_with():
@@ -82,7 +92,7 @@ def test_a_speed_that_is_off_leaves_no_more_than_is_reckoned_with():
     e, tau, level = 1e-3, 0.37, 6.6
     s = 1j * np.geomspace(1e-3, 1e3, 20001)
     error = np.abs(s / (s + 1.0 / tau) - s / (s + (1.0 + e) / tau)) ** 2
-    assert air.passing_doubt(level) / (0.5 * level) ** 2 == pytest.approx(error.max() / e**2, rel=2e-3)
+    assert air.speed_error_share(level) / (0.5 * level) ** 2 == pytest.approx(error.max() / e**2, rel=2e-3)
 
 
 @pytest.mark.parametrize("turbulence", ["light", "moderate", "severe"])
@@ -93,22 +103,22 @@ def test_turbulence_is_as_strong_as_the_standard_has_it_at_a_height_and_no_less_
     h, b = max(height_ft, 10.0), SPAN_M / FT
     low, high = LOW[turbulence] * FT, HIGH[turbulence] * FT
     record = record_of(air.AIR)
-    record["config"]["aloft"] = Dryden(turbulence).rotation_walk(SPAN_M)
-    record["config"]["low"] = Dryden(turbulence).rotation_walk_at_1_m(SPAN_M)
-    record["config"]["altitude_off"], record["config"]["altitude_slope"] = 0.7, 0.02
+    record["config"]["intensity_aloft"] = Dryden(turbulence).rotation_walk(SPAN_M)
+    record["config"]["intensity_at_1_m"] = Dryden(turbulence).rotation_walk_at_1_m(SPAN_M)
+    record["config"]["altitude_error"], record["config"]["altitude_slope"] = 0.7, 0.02
     reading = height_ft * FT / (1.0 - 0.02 / 0.98) + 0.7 / 0.98 / (1.0 - 0.02 / 0.98)
-    air.reach_height(record, reading)
+    air.set_intensity(record, reading)
     L = h * FT
     rolling = 2.0 * 1.9**2 * 2.6 * max(low**2 / L**1.5, high**2 / (1750 * FT) ** 1.5) / SPAN_M**1.5
     vertical = 3.0 * max(low**2 / L, high**2 / (1750 * FT))
     by_gusts = [rolling, vertical * (np.pi / 4 / SPAN_M) ** 2, vertical * (np.pi / 3 / SPAN_M) ** 2]
-    assert record["memory"]["per_metre"] == pytest.approx(by_gusts)
+    assert record["memory"]["intensity"] == pytest.approx(by_gusts)
 
     admitted = record_of(admitted_dtype(4))
     admitted["gust_aloft"] = admitting.GUST_LIMIT_SIGMA * Dryden(turbulence).rotation_limit_rad_s(SPAN_M)
     admitted["gust_low"] = admitting.GUST_LIMIT_SIGMA * Dryden(turbulence).low_rotation_limit_rad_s(SPAN_M)
     admitted["altitude_off"], admitted["altitude_slope"] = 0.7, 0.02
-    worst_case.reach_height(admitted, reading)
+    worst_case.set_gust_bound(admitted, reading)
     sigma = max(1.9 * LOW[turbulence] / np.sqrt(h * b), 1.9 * HIGH[turbulence] / np.sqrt(1750.0 * b))
     assert admitted["gust"] == pytest.approx(6.0 * sigma)
 
@@ -129,15 +139,17 @@ def test_what_is_declared_of_drift_and_gusts_says_how_long_the_sum_lasts():
     kept = []
     for turbulence in ("light", "severe"):
         record = record_of(air.AIR)
-        record["output"]["moving"] = record["output"]["seen"] = record["output"]["read"] = 1
-        air.set_up_passing(record, declared_in(Bounds(turbulence=turbulence), load()), 6.6, 45.0)
+        record["output"]["moving"] = record["output"]["measures_gust"] = record["output"][
+            "uses_accelerometers"
+        ] = 1
+        air.set_up_speed(record, declared_in(Bounds(turbulence=turbulence), load()), 6.6, 45.0)
         sigma, V_L = HIGH[turbulence] * FT, 45.0 / (1750.0 * FT)
         b = (
-            2.0 * record["config"]["forgets"] ** 3 * sigma**2 / V_L
+            2.0 * record["config"]["decay_rate"] ** 3 * sigma**2 / V_L
         ) ** 0.5 / 2.0  # a^3 = 2 b^2 V / (L sigma^2)
         assert b == pytest.approx(2.0 * 7.292e-5 * 45.0 + 0.3 * 0.03, rel=1e-3)
-        a = record["config"]["forgets"]
-        assert record["config"]["spread"] == pytest.approx(sigma**2 * a / (a + V_L) + (b / a) ** 2)
-        assert record["config"]["spread"] < 0.5 * sigma**2
-        kept.append(float(record["config"]["forgets"]))
+        a = record["config"]["decay_rate"]
+        assert record["config"]["speed_variance"] == pytest.approx(sigma**2 * a / (a + V_L) + (b / a) ** 2)
+        assert record["config"]["speed_variance"] < 0.5 * sigma**2
+        kept.append(float(record["config"]["decay_rate"]))
     assert kept[1] < kept[0]

@@ -36,7 +36,7 @@ EITHER = 0
 
 def new_air(**fields):
     record = np.zeros(1, AIR).view(np.recarray)[0]
-    fill(record, span=SPAN, gravity=9.8, moving=1, seen=1)
+    fill(record, span=SPAN, gravity=9.8, moving=1, measures_gust=1)
     return fill(record, **fields)
 
 
@@ -55,7 +55,7 @@ def test_a_gust_is_what_forces_and_gravity_do_not_explain(seed):
     y_then, y_now = Y.copy(), Y.copy()
     y_then[:2], y_now[:2] = rng.uniform(-0.1, 0.2, (2, 2))
     y_now[2] = 47.0
-    air.begin(record, y_then, then)
+    air.start(record, y_then, then)
     assert record["memory"]["velocity"] == pytest.approx(through_air(y_then, then))
     assert record["memory"]["heading"] == then[2]
     assert not record["memory"]["gust"].any()
@@ -65,7 +65,7 @@ def test_a_gust_is_what_forces_and_gravity_do_not_explain(seed):
         level.apply(record["memory"]["force"]) + np.array([0.0, 0.0, 9.8])
     )
     expected = Rotation.from_euler("z", then[2] - now[2]).apply(expected)
-    air.observe(record, y_now, now, dt)
+    air.update_gust(record, y_now, now, dt)
     change = expected - through_air(y_now, now)
     tau_q, tau_r = 4.0 * SPAN / (np.pi * 47.0), 3.0 * SPAN / (np.pi * 47.0)
     pitching = 0.02 * np.exp(-dt / tau_q) + change[2] / (47.0 * tau_q)
@@ -76,7 +76,7 @@ def test_a_gust_is_what_forces_and_gravity_do_not_explain(seed):
 
 def test_the_specific_force_is_that_of_the_terms():
     record, out = new_air(area_per_mass=0.01), np.zeros(3)
-    fill_table(record["memory"]["forces"], AIRCRAFT, AIRCRAFT.measurable_forces, FORCES)
+    fill_table(record["memory"]["force_table"], AIRCRAFT, AIRCRAFT.measurable_forces, FORCES)
     air.specific_force(record, X, Y, U, out)
     of = {
         "alpha": Y[0], "beta": Y[1], "ph": X[0] * SPAN / (2 * V), "rh": X[2] * SPAN / (2 * V), "dpt": Y[4],
@@ -91,13 +91,13 @@ def test_the_specific_force_is_that_of_the_terms():
 
 def test_the_gusts_of_a_frame_are_summed_over_its_instants():
     record, design = new_air(area_per_mass=0.01), design_record().view(np.recarray)[0]
-    air.begin(record, Y, np.zeros(3))
+    air.start(record, Y, np.zeros(3))
     record["memory"]["gust"] = 0.0, 0.02, -0.03
-    air.effect(record, design, X, Y, U)
+    air.fill_effect(record, design, X, Y, U)
     first = record["output"]["acceleration"].copy()
-    air.begin_frame(record, V, 0.01)
-    air.look(record, design, X, Y, U, np.zeros(3), 0.01)
-    assert record["memory"]["total"] == pytest.approx(first + record["output"]["acceleration"])
+    air.begin_sums(record, V, 0.01)
+    air.accumulate_substep(record, design, X, Y, U, np.zeros(3), 0.01)
+    assert record["memory"]["acceleration_sum"] == pytest.approx(first + record["output"]["acceleration"])
     assert np.abs(record["output"]["acceleration"] - first).max() > 1e-5
 
 
@@ -108,33 +108,33 @@ def test_axes_that_turn_move_what_is_not_seen_besides(swings):
     It is reckoned with in the frame in which they turn and in the next, whatever the instants of either.
     """
     rng = np.random.default_rng(7)
-    record = new_air(swings=swings, turning=0.4, rolling=30.0)
-    record["output"]["damping"], record["output"]["axes"], record["memory"]["swing"] = rng.normal(
+    record = new_air(axes_turn_fast=swings, turning_share=0.4, rolling_length=30.0)
+    record["output"]["damping"], record["output"]["axes"], record["memory"]["axes_rate"] = rng.normal(
         size=(3, 3, 3)
     )
-    record["memory"]["unseen"], record["memory"]["per_metre"] = (1.0, 0.2, 0.7), (1e-3, 2e-3, 3e-3)
+    record["memory"]["unmeasured_share"], record["memory"]["intensity"] = (1.0, 0.2, 0.7), (1e-3, 2e-3, 3e-3)
     axes, swing = (
         record["output"]["damping"] @ record["output"]["axes"],
-        record["output"]["damping"] @ record["memory"]["swing"],
+        record["output"]["damping"] @ record["memory"]["axes_rate"],
     )
     expected = axes @ np.diag([1e-3, 4e-4, 3e-3]) @ axes.T  # of the yawing one no more than all of it
     lags = 30.0 / V, 0.0, 3.0 * SPAN / (np.pi * V)
     turned = 0.5 * np.square(lags) * [1e-3, 0.0, 0.4 * 3e-3]
-    found = [[air.unseen_drift(record, V, i, j) for j in range(3)] for i in range(3)]
+    found = [[air.unmeasured_drift(record, V, i, j) for j in range(3)] for i in range(3)]
     assert np.array(found) == pytest.approx(V * expected, rel=1e-12)
     once = swings * DT * V * swing @ np.diag(turned) @ swing.T
     for instants, leap in ((2, 2), (0, 2), (1, 1), (0, 1), (0, 0), (0, 0)):
         for _ in range(instants):
-            air.note_leap(record, V, DT)
-        air.elapse(record, 1.0)
-        assert record["output"]["leap"] == pytest.approx(leap * once, rel=1e-12)
+            air.add_axes_turn(record, V, DT)
+        air.average_frame(record, 1.0)
+        assert record["output"]["turn_variance"] == pytest.approx(leap * once, rel=1e-12)
 
 
 def test_a_turning_heading_hides_a_yawing_gust():
     """(rate sigma)^2 lag over the walk's 3 sigma^2 V / scale, lag 3 span / pi V."""
-    record, rate = new_air(scale=500.0), 0.3
+    record, rate = new_air(turbulence_length=500.0), 0.3
     lag = 3.0 * SPAN / (np.pi * V)
-    assert air.lost_by_turning(record, V, rate) == pytest.approx(rate**2 * lag / (3.0 * V / 500.0))
+    assert air.share_lost_by_turning(record, V, rate) == pytest.approx(rate**2 * lag / (3.0 * V / 500.0))
 
 
 def test_the_bound_of_a_true_estimator_covers_every_course_of_its_parameter():
@@ -275,13 +275,13 @@ def test_the_drift_is_of_what_is_bounded_and_of_the_air_not_seen(moving):
     rng = np.random.default_rng(1)
     record["air"]["output"]["moving"] = moving
     record["air"]["output"]["damping"], record["air"]["output"]["axes"] = rng.normal(size=(2, 3, 3))
-    record["air"]["memory"]["unseen"], record["air"]["memory"]["per_metre"] = (
+    record["air"]["memory"]["unmeasured_share"], record["air"]["memory"]["intensity"] = (
         (1.0, 0.2, 0.3),
         (1e-3, 2e-3, 3e-3),
     )
     (
-        record["air"]["config"]["glimpsed"],
-        record["air"]["config"]["rolling"],
+        record["air"]["config"]["coarse"],
+        record["air"]["config"]["rolling_length"],
         record["air"]["config"]["span"],
     ) = moving, 20.0, 5.0 * np.pi
     fdi["bound"]["constant"], fdi["bound"]["inertia"] = (0.02, 0.0, 0.04), 0.1
@@ -345,9 +345,9 @@ def test_what_is_known_of_a_fault_is_expected(offsets_count):
     mean["G"], mean["Gu"] = rng.normal(size=(2, 3, 4))
     mean["acceleration"] = rng.normal(size=3)
     effectiveness, offset = np.array([0.4, 1.0, 0.0, 1.0]), np.array([0.1, 0, -0.2, 0])
-    expectation.expect(belief, 0, effectiveness, offset, offsets_count)
+    expectation.predict_acceleration(belief, 0, effectiveness, offset, offsets_count)
     assert (belief["expected"] == mean["acceleration"]).all()
-    expectation.expect(belief, 1, effectiveness, offset, offsets_count)
+    expectation.predict_acceleration(belief, 1, effectiveness, offset, offsets_count)
     off = mean["G"] @ offset if offsets_count else 0.0
     expected = mean["acceleration"] + mean["Gu"] @ (effectiveness - 1.0) + off
     assert belief["expected"] == pytest.approx(expected)
@@ -456,8 +456,8 @@ def test_the_estimate_is_that_of_whoever_counts():
 
 @pytest.mark.parametrize("share", [1.0, 0.25])
 def test_the_gusts_mean_is_a_share_of_what_was_summed(share):
-    record = new_air(total=(0.4, -0.8, 1.2))
-    air.elapse(record, share)
+    record = new_air(acceleration_sum=(0.4, -0.8, 1.2))
+    air.average_frame(record, share)
     assert record["output"]["mean"] == pytest.approx(share * np.array([0.4, -0.8, 1.2]))
 
 
@@ -465,7 +465,9 @@ def test_a_leap_of_the_air_widens_what_a_drift_may_be():
     """By the axes of the block, so much stronger as the gusts are taken to be."""
     block = np.zeros(1, block_dtype(USUAL_SIZE.rates)).view(np.recarray)[0]
     record, rng = new_air(), np.random.default_rng(2)
-    record["output"]["leap"], block["drift_scale"], block["P_dd"] = rng.normal(size=(3, 3)), 1.7, 0.3
+    record["output"]["turn_variance"], block["drift_scale"], block["P_dd"] = rng.normal(size=(3, 3)), 1.7, 0.3
     block["n"], block["axis"] = 2, (0, 2)
     statistical.add_leap(record, block)
-    assert block["P_dd"] == pytest.approx(0.3 + 1.7 * record["output"]["leap"][np.ix_((0, 2), (0, 2))])
+    assert block["P_dd"] == pytest.approx(
+        0.3 + 1.7 * record["output"]["turn_variance"][np.ix_((0, 2), (0, 2))]
+    )

@@ -263,7 +263,7 @@ def test_what_raises_the_alarm_beside_the_blocks(surface, plane, mix, inertial, 
         12.5,
         2,
     )
-    statistical["air"]["output"]["read"] = statistical["forces"]["known"] = 1
+    statistical["air"]["output"]["uses_accelerometers"] = statistical["forces"]["known"] = 1
     view, clearing = statistical["views"][:2]
     clearing["immune_to_vane"], clearing["plane"], clearing["peak_score"] = 1, (YAW, SIDE), 50.0
     view["confirmed_by"], view["peak_score"] = SIDE, 9.0

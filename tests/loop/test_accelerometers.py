@@ -155,7 +155,7 @@ def test_where_one_breaks_forces_are_weighed_no_more():
     loop = Loop(flight(fault("az", "lost"), fdi=WEIGHED))
     statistical = loop.frames[0]["fdi"]["statistical"]
     assert statistical["forces"]["known"]
-    assert not statistical["air"]["output"]["read"], "watched: not taken at their word"
+    assert not statistical["air"]["output"]["uses_accelerometers"], "watched: not taken at their word"
     for _ in loop.chunks():
         pass
     assert not statistical["forces"]["known"]

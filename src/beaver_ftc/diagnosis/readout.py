@@ -279,7 +279,7 @@ class DiagnosisReadout:
     def air(self) -> Air:
         """Gusts as the vanes see them."""
         air = self._fdi["statistical"]["air"]["output"]
-        return Air(bool(air["moving"]), bool(air["seen"]), air["acceleration"].copy())
+        return Air(bool(air["moving"]), bool(air["measures_gust"]), air["acceleration"].copy())
 
     @cached_property
     def mapped_error(self) -> MappedError:
@@ -369,7 +369,7 @@ def recorded_until_alarm(fdi: np.void, n: int, statistical: bool) -> dict[str, n
         blocks, air = detector["block"], detector["air"]["output"]
         views |= {name: blocks[name] for name in OF_BLOCK}
         views |= {"signature": blocks["hypothesis"]["signature"], "bounded": detector["noise"]["bounded"]}
-        views |= {"air": air["mean"], "leap": air["leap"]}
+        views |= {"air": air["mean"], "leap": air["turn_variance"]}
     return views
 
 

@@ -90,7 +90,7 @@ class Changing:
         if change.sensors is not None:
             take_configuration(frame["instruments"], new["instruments"])
         statistical = frame["fdi"]["statistical"]
-        forces = statistical["forces"]["known"] or statistical["air"]["output"]["read"]
+        forces = statistical["forces"]["known"] or statistical["air"]["output"]["uses_accelerometers"]
         if frame["fdi"]["watch"]["config"]["enabled"] or frame["instruments"]["engine"] or forces:
             loop.read_more()
         frame["control"]["power"]["config"]["enabled"] = new["control"]["power"]["config"]["enabled"]

@@ -22,12 +22,12 @@ from beaver_ftc.diagnosis import assessment as assessed
 from beaver_ftc.diagnosis import conclusion
 from beaver_ftc.diagnosis.assessment import assess, assess_unknown
 from beaver_ftc.diagnosis.belief.expectation import (
-    begin_frame,
-    expect,
+    accumulate_substep,
+    begin_sums,
+    evaluate_design,
+    evaluate_frame,
     follow_command,
-    look,
-    look_back,
-    respond,
+    predict_acceleration,
 )
 from beaver_ftc.diagnosis.detection import bank, fdae, statistical
 from beaver_ftc.diagnosis.monitors import engine_symmetry, sensor_monitor
@@ -71,7 +71,7 @@ def sense(frame):
         watch_instruments(frame)
     status = flight_status(truth.value, truth.ground_m, truth.slow_mps)
     if status != NOT_FINITE:
-        respond(belief, measured)
+        evaluate_design(belief, measured)
         accounts.effect_of_faults(frame.accounts.guarantee, truth, belief, measured.y)
     return status
 
@@ -94,7 +94,7 @@ def begin(frame):
     start_clock(frame)
     status = sense(frame)
     if status != NOT_FINITE:
-        look_back(frame.belief, frame.fdi.bound, frame.measured, frame.k, frame.dt)
+        evaluate_frame(frame.belief, frame.fdi.bound, frame.measured, frame.k, frame.dt)
     return status
 
 
@@ -110,12 +110,12 @@ def diagnose(frame):
     if k == 0:
         schemes.begin(scheme, fdi, belief, measured)
     else:
-        expect(belief, fdi.verdict.detected, applied.effectiveness, applied.offset, every_type)
+        predict_acceleration(belief, fdi.verdict.detected, applied.effectiveness, applied.offset, every_type)
         schemes.predict(scheme, fdi, belief, measured, k, frame.t)
     schemes.conclude(scheme, fdi, belief, measured, frame.t)
     note_named_surfaces(fdi, frame.t)
     schemes.prepare(scheme, fdi, belief, measured, k)
-    begin_frame(belief, fdi.bound, fdi.layout, every_type, measured)
+    begin_sums(belief, fdi.bound, fdi.layout, every_type, measured)
     accounts.follow_guarantee(frame.accounts.guarantee, fdi.bank, fdi.config.dt, belief.share, k, frame.t)
     assess_faults(frame)
 
@@ -134,7 +134,7 @@ def look_on(frame):
     """Take in an instant inside a frame: what is believed of it, and the gust that the vanes see by then."""
     fdi = frame.fdi
     schemes.accumulate(fdi.config.scheme, fdi, frame.belief, frame.measured)
-    look(frame.belief, fdi.bound, fdi.layout, fdi.config.every_type, frame.measured)
+    accumulate_substep(frame.belief, fdi.bound, fdi.layout, fdi.config.every_type, frame.measured)
 
 
 @kernel

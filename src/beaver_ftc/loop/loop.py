@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from beaver_ftc.compiled import direct
-from beaver_ftc.diagnosis.belief.air import no_longer_read
+from beaver_ftc.diagnosis.belief.air import stop_accelerometers
 from beaver_ftc.diagnosis.monitors import sensor_records
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.loop import memory, stepping
@@ -224,7 +224,7 @@ class Loop:
             return False
         design = self.frames[0]["belief"]["design"]
         sensor_records.configure(fdi["watch"], scenario, design, self.trimmed.y, enabled=True)
-        no_longer_read(fdi["statistical"]["air"])
+        stop_accelerometers(fdi["statistical"]["air"])
         fdi["statistical"]["inertial_air"]["output"]["moving"] = 0
         return True
 

@@ -6,7 +6,7 @@ take -> stepping.diagnose -> believe
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.belief.expectation import follow_command, look_back, respond
+from beaver_ftc.diagnosis.belief.expectation import evaluate_design, evaluate_frame, follow_command
 from beaver_ftc.diagnosis.conclusion import isolated_surface
 from beaver_ftc.loop.frame import accommodate, advance_clock, isolated_theta, start_clock
 from beaver_ftc.plant.instruments import take_sample
@@ -29,8 +29,8 @@ def take(frames, x, y, command, attitude):
     if frame.k > 0:
         follow_command(belief, command)
     take_sample(measured, x, y, attitude)
-    respond(belief, measured)
-    look_back(belief, frame.fdi.bound, measured, frame.k, frame.dt)
+    evaluate_design(belief, measured)
+    evaluate_frame(belief, frame.fdi.bound, measured, frame.k, frame.dt)
     return True
 
 

@@ -1,9 +1,12 @@
-"""What the designer believes of the aircraft: at this instant, and in the mean over the frame that elapsed.
+"""The predicted acceleration f + G u of the designer's model: at this instant, and its mean over a frame.
 
-The order is JSBSim's: after `run()` number k the rates x[k] and the accelerations a[k] = F(x[k], u[k]) are
-there, u[k] being the command written before that run; the next run moves the rates by dt a[k]. With n JSBSim
-frames in one of ours the rates move by dt/n a[k], and then by the accelerations on the way, already under
-u[k+1]: the truth is a left sum over n instants, the first under the old command, and so are these means.
+    F = f(x, y) + G(x, y) u,    x rates (3,) rad/s, y measurements, u surfaces (n,) rad, F (3,) rad/s2
+
+The order of evaluation is that of JSBSim. After `run()` number k the rates are x[k] and the accelerations
+a[k] = F(x[k], u[k]), where u[k] is the command written before that run. The next run adds dt a[k] to the
+rates. If a frame has n JSBSim steps (instants), the rates first change by dt/n a[k], under the old command,
+and then by the accelerations of the other instants, under u[k+1]. The mean over a frame is therefore a left
+sum over its n instants, the first of them under the old command.
 """
 
 from math import exp, radians
@@ -20,7 +23,7 @@ from beaver_ftc.scenario.schema import Scenario
 
 @sized
 def sums_dtype(n: int) -> np.dtype:
-    """Sums over the instants of a frame, n surfaces: f, G, G u and the bound; own errors as in state.py."""
+    """Sums over the instants of a frame, n surfaces: f, G, G u and bounds; own errors as in worst_case.py."""
     return record(
         f=3, G=(3, n), Gu=(3, n), eta_bar=3, own_per_rad=(3, n), own=(3, n),
         Gu_first=(3, n),  # of the first instant alone
@@ -31,35 +34,37 @@ def sums_dtype(n: int) -> np.dtype:
 
 @sized
 def means_dtype(n: int) -> np.dtype:
-    """Means over the elapsed frame. acceleration: f + G u; Gu_spread: see `spread`. G_foreseen, Gu_foreseen:
-    with G of the frame before, of which the readings of this one know nothing: a law answers what they are
-    off by, and chance would take its answer for the work of a broken surface. Within it, where faults
-    of every type are in question: G_least, G_most on each surface's dominant axis, and u_least, u_most, where
-    a healthy one was."""
+    """Means over the elapsed frame, of an aircraft with n surfaces."""
     return record(
-        G=(3, n), Gu=(3, n), Gu_spread=(3, n), acceleration=3, G_foreseen=(3, n), Gu_foreseen=(3, n),
+        G=(3, n), Gu=(3, n), Gu_spread=(3, n),  # rad/s2 per rad; rad/s2; see `fill_spread`, rad/s2
+        acceleration=3,  # f + G u, rad/s2
+        # With G of the frame before. It does not depend on the measurement noise of this frame, to which the
+        # control law reacts: with G of this frame that reaction would correlate with the noise.
+        G_predicted=(3, n), Gu_predicted=(3, n),
+        # If faults of every type are examined, extremes within the frame: of G on each surface's dominant
+        # axis, and of the position of the healthy surface, rad.
         G_least=n, G_most=n, u_least=n, u_most=n,
     )  # fmt: skip
 
 
 @sized
 def belief_dtype(n: int) -> np.dtype:
-    """The belief about an aircraft with n surfaces; rad, rad/s, rad/s2."""
+    """The designer's model of an aircraft with n surfaces and its predictions; rad, rad/s, rad/s2."""
     return record(
         design=design_dtype(n), actuators=actuators_dtype(n),
-        share=float,  # one over the instants in a frame
+        share=float,  # one over the number of instants in a frame
         commanded=n,
-        u=n, u_then=n,  # where healthy surfaces are under it, and where they were
+        u=n, u_then=n,  # positions of healthy surfaces under the command: now, and an instant before
         f=3, G=(3, n),  # at this instant
-        x_then=3,  # measured as the elapsed frame began
+        x_then=3,  # rates measured at the start of the elapsed frame
         sums=sums_dtype(n), means=means_dtype(n),
-        expected=3,  # mean acceleration with the known faults in it
-        innovation_after_known_faults=3,  # what the rates did beyond it
+        expected=3,  # mean acceleration of the elapsed frame, known faults included
+        innovation_after_known_faults=3,  # measured minus expected mean acceleration
     )  # fmt: skip
 
 
 def configure(belief: np.void, scenario: Scenario, travel: np.ndarray) -> None:
-    """Fill in the design model and the declared actuators; travel (2, n) rad."""
+    """Fill the design model and the declared actuators; travel (2, n) rad: the stops."""
     belief["share"] = 1.0 / scenario.substeps
     belief["design"] = design_of(scenario.design_model, scenario.airframe)[0]
     actuators, dt = belief["actuators"], 1.0 / scenario.rate_hz / scenario.substeps
@@ -73,15 +78,14 @@ def configure(belief: np.void, scenario: Scenario, travel: np.ndarray) -> None:
 
 
 @kernel
-def respond(belief, measured):
-    """Fill f (3,) and G (3, n) with what the design model makes of this instant."""
+def evaluate_design(belief, measured):
+    """Fill f (3,) rad/s2 and G (3, n) rad/s2 per rad of the design model at this instant."""
     response(belief.design, measured.x, measured.y, belief.f, belief.G)
 
 
 @kernel
-def sum_up(belief, bound, layout, every_type):
-    """Add what the design model makes of this instant to the sums over the frame, with extremes where faults
-    of every type are in question."""
+def accumulate(belief, bound, layout, every_type):
+    """Add this instant to the sums over the frame and, for faults of `every_type`, to the extremes."""
     total, G, u = belief.sums, belief.G, belief.u
     for i in range(3):
         total.f[i] += belief.f[i]
@@ -89,7 +93,7 @@ def sum_up(belief, bound, layout, every_type):
         for s in range(u.size):
             total.G[i, s] += G[i, s]
             total.Gu[i, s] += G[i, s] * u[s]
-            if bound.own_errors:  # per rad and at the command
+            if bound.own_errors:
                 total.own_per_rad[i, s] += bound.admitted.per_rad[i, s]
                 total.own[i, s] += bound.admitted.per_rad[i, s] * abs(u[s])
     if bound.error_map.anywhere:
@@ -104,13 +108,13 @@ def sum_up(belief, bound, layout, every_type):
 
 
 @kernel
-def elapse(belief, bound):
-    """Means over the frame that has elapsed: G, the moment of each surface, f + G u, and the bound."""
+def average_frame(belief, bound):
+    """Fill the means over the elapsed frame: G, the effect G u of each surface, f + G u, and the bound."""
     share, total, mean = belief.share, belief.sums, belief.means
     for i in range(3):
         rate = share * total.f[i]
         for s in range(belief.u.size):
-            mean.G_foreseen[i, s] = mean.G[i, s]
+            mean.G_predicted[i, s] = mean.G[i, s]
             mean.G[i, s] = share * total.G[i, s]
             mean.Gu[i, s] = share * total.Gu[i, s]
             rate += mean.Gu[i, s]
@@ -122,26 +126,25 @@ def elapse(belief, bound):
         bound.own_per_rad[:] = share * total.own_per_rad
         bound.own[:] = share * total.own
     if share < 1.0:
-        spread(belief)
+        fill_spread(belief)
 
 
 @kernel
-def foresee(mean):
-    """Fill Gu_foreseen (3, n) rad/s2, for those who ask."""
+def predict_next(mean):
+    """Fill `Gu_predicted` (3, n) rad/s2: the effect of each surface with G of the frame before."""
     for i in range(3):
         for s in range(mean.G_least.size):
-            moved = mean.G_foreseen[i, s] / mean.G[i, s] if mean.G[i, s] != 0.0 else 0.0
-            mean.Gu_foreseen[i, s] = moved * mean.Gu[i, s]
+            moved = mean.G_predicted[i, s] / mean.G[i, s] if mean.G[i, s] != 0.0 else 0.0
+            mean.Gu_predicted[i, s] = moved * mean.Gu[i, s]
 
 
 @kernel
-def spread(belief):
-    """Fill Gu_spread (3, n) rad/s2: by how much the mean over the frame can mislead about a fault that
-    changed in it.
+def fill_spread(belief):
+    """Fill `Gu_spread` (3, n) rad/s2: the error of the mean effect if a fault changes within the frame.
 
-    A fault grows, begins or ends from one frame to the next, so the first JSBSim frame and the others may
-    differ in it. With z0 and z the moments of a surface in the first and the others, the mean effect lies
-    no further outside the extremes for the mean moment than |z0 - z| / n.
+    A fault changes between frames, that is between the first JSBSim step of a frame and the others. z0 and z
+    are the effects of a healthy surface in the first and in the other n - 1 steps. The mean effect of the
+    fault then exceeds the extremes for the mean of z0 and z by at most |z0 - z| / n.
     """
     share, total = belief.share, belief.sums
     for i in range(3):
@@ -152,9 +155,8 @@ def spread(belief):
 
 
 @kernel
-def look_back(belief, bound, measured, k, dt):
-    """What the design model makes of the frame that has elapsed, of dt s: its bound and its means; k: its
-    number."""
+def evaluate_frame(belief, bound, measured, k, dt):
+    """Fill the bound on the uncertainty at this instant, and the means over the elapsed frame, k, of dt s."""
     bound.error_map.time_s = k * dt
     bound_now(bound, belief.design, measured, belief.u)
     bound.eta_bar[:] = bound.eta_bar_now
@@ -162,12 +164,12 @@ def look_back(belief, bound, measured, k, dt):
         for i in range(3):
             bound.noise[i] = changing_error(bound.admitted, i, measured.x[i])
     if k > 0:
-        elapse(belief, bound)
+        average_frame(belief, bound)
 
 
 @kernel
-def begin_frame(belief, bound, layout, every_type, measured):
-    """Begin the next frame's sums with this instant, the command in effect still the old one."""
+def begin_sums(belief, bound, layout, every_type, measured):
+    """Start the next frame's sums with this instant, at which the old command is still in effect."""
     belief.x_then[:] = measured.x
     bound.noise_then[:] = bound.noise
     total = belief.sums
@@ -178,23 +180,23 @@ def begin_frame(belief, bound, layout, every_type, measured):
     if bound.own_errors:
         total.own_per_rad[:], total.own[:] = 0.0, 0.0
     bound.beyond[:] = 0.0
-    sum_up(belief, bound, layout, every_type)
+    accumulate(belief, bound, layout, every_type)
     total.Gu_first[:] = total.Gu
 
 
 @kernel
-def look(belief, bound, layout, every_type, measured):
-    """Take an instant inside the frame into the means over it; the surfaces move on."""
+def accumulate_substep(belief, bound, layout, every_type, measured):
+    """Add an instant inside the frame to its sums, and move the healthy surfaces on."""
     bound_now(bound, belief.design, measured, belief.u)
-    sum_up(belief, bound, layout, every_type)
+    accumulate(belief, bound, layout, every_type)
     move(belief.actuators, belief.commanded, belief.u)
 
 
 @kernel
-def expect(belief, known, effectiveness, offset, offsets_count):
-    """Fill expected (3,) rad/s2: f + G u, mean over the elapsed frame, with the faults that are `known`.
+def predict_acceleration(belief, known, effectiveness, offset, offsets_count):
+    """Fill `expected` (3,) rad/s2: mean of f + G u over the elapsed frame, with the faults if `known`.
 
-    effectiveness (n,): of each surface; offset (n,) rad: its bias, where offsets_count.
+    effectiveness (n,): estimate for each surface; offset (n,) rad: its bias, used if `offsets_count`.
     """
     expected, mean = belief.expected, belief.means
     expected[:] = mean.acceleration
@@ -212,7 +214,7 @@ def expect(belief, known, effectiveness, offset, offsets_count):
 
 @kernel
 def form_innovation(belief, x, dt):
-    """Fill innovation_after_known_faults (3,) rad/s2 of the elapsed frame, of dt s; x (3,) rad/s now."""
+    """Fill `innovation_after_known_faults` (3,) rad/s2 of the elapsed frame, of dt s; x (3,) rad/s: now."""
     for i in range(3):
         belief.innovation_after_known_faults[i] = (x[i] - belief.x_then[i]) / dt - belief.expected[i]
 

@@ -32,7 +32,7 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft, Term
 from beaver_ftc.design.context import Context
 from beaver_ftc.design.model import inertia_coefficients
-from beaver_ftc.diagnosis.belief.air import UNSEEN
+from beaver_ftc.diagnosis.belief.air import UNMEASURED_SHARES
 
 UNEXPLAINED_S = 0.1
 LEAST_RATE_RAD_S = 1e-5  # what perfect instruments are taken for
@@ -100,7 +100,7 @@ def aware_of_the_air(context: Context, noise_rad_s2: np.ndarray) -> Context:
         return context
     seen = replace(
         declared,
-        gust_rad_s=declared.gust_rad_s * np.sqrt(UNSEEN),
+        gust_rad_s=declared.gust_rad_s * np.sqrt(UNMEASURED_SHARES),
         model_rad_s2=np.hypot(declared.model_rad_s2, noise_rad_s2),
     )
     return replace(context, declared=seen)

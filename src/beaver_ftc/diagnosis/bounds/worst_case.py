@@ -387,7 +387,7 @@ def least_height(altitude, off, slope):
 
 
 @kernel
-def reach_height(admitted, altitude):
+def set_gust_bound(admitted, altitude):
     """Bring the bound on the air's rotation to this altitude, m as measured."""
     if admitted.gust_low > 0.0:
         height = least_height(altitude, admitted.altitude_off, admitted.altitude_slope)
@@ -400,7 +400,7 @@ def bound_now(bound, design, measured, u):
     x, y = measured.x, measured.y
     bound.eta_bar_now[:] = 0.0
     if bound.admitted.any:
-        reach_height(bound.admitted, measured.altitude)
+        set_gust_bound(bound.admitted, measured.altitude)
         derived_bound(bound.admitted, design, x, y, u, bound.eta_bar_now)
         if bound.own_errors:
             for s in range(u.size):

@@ -23,7 +23,7 @@ from beaver_ftc.aircraft.units import EARTH_RATE_RAD_S
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.engine import slipstream_slopes
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, DPT, N_Y, QDYN, evaluate
-from beaver_ftc.diagnosis.belief.air import no_longer_read, stop
+from beaver_ftc.diagnosis.belief.air import stop_accelerometers, stop_gust_filter
 from beaver_ftc.diagnosis.monitors.redundancy import FALLING_M_S2
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
 from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
@@ -75,7 +75,7 @@ def look(forces, air, measured, u, dt):
     """
     if forces.begun == 0:
         flow_rates(forces, measured)
-    evaluate(air.memory.forces, measured.x, measured.y)
+    evaluate(air.memory.force_table, measured.x, measured.y)
     forces.strength = measured.y[QDYN] / forces.pressure
     for f in range(2):
         before = forces.component[f].whole
@@ -107,8 +107,8 @@ def without_vanes(forces, rotation, y):
 @kernel
 def do_without(forces, air, inertial_air):
     """Weigh no force from now on, and follow the gust without accelerometers."""
-    no_longer_read(air)
-    stop(inertial_air)
+    stop_accelerometers(air)
+    stop_gust_filter(inertial_air)
     forces.known = 0
 
 
@@ -124,7 +124,7 @@ def follow(forces, force, f, y, dt):
 @kernel
 def look_along(forces, air, f, measured, u):
     """The same along one direction: e, what surfaces do to it, and what the errors multiply."""
-    table, force = air.memory.forces, forces.component[f]
+    table, force = air.memory.force_table, forces.component[f]
     first, last = table.free_from[CY + f], table.surface_to[CY + f]
     scale, whole = measured.y[QDYN] * air.config.area_per_mass * forces.per_m, 0.0
     force.foreseen[:] = force.column

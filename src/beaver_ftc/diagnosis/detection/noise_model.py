@@ -19,7 +19,13 @@ from beaver_ftc.design.dryden import rotation_lengths
 from beaver_ftc.design.engine import slipstream_slopes
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, PH, QDYN, RH, directional, whole_sum
 from beaver_ftc.design.variants import jacobian
-from beaver_ftc.diagnosis.belief.air import BY_FORCE, UNSEEN, set_up_air, set_up_jitter, set_up_passing
+from beaver_ftc.diagnosis.belief.air import (
+    FORCE_ERROR_SHARE,
+    UNMEASURED_SHARES,
+    set_up_air,
+    set_up_jitter,
+    set_up_speed,
+)
 from beaver_ftc.diagnosis.bounds.variances import axis_of, steady_tolerance
 from beaver_ftc.diagnosis.detection import likelihood
 from beaver_ftc.diagnosis.detection.forces import set_up_forces
@@ -125,12 +131,12 @@ def set_up(
     tests["enabled"], tests["share"] = 1, 1.0 / max(instants, 1)
     tests["mapped"] = aircraft.file.model_error_map is not None and not aircraft.loses_surfaces
     statistical["forces"]["known"] = forces = declared.uses_accelerometers
-    air["output"]["read"] = declared.follows_gusts_by_accelerometers
+    air["output"]["uses_accelerometers"] = declared.follows_gusts_by_accelerometers
     set_up_air(air, declared, mass)
     across = config.compares_across(instants)
     n_tests = tests_a_frame(aircraft, *(views_of(aircraft, forces) if across else ()))
     tests["alarm_level"] = alarm_level(given.false_alarms_per_h, rate_hz, n_tests)
-    set_up_passing(air, declared, float(tests["alarm_level"]), airspeed_mps)
+    set_up_speed(air, declared, float(tests["alarm_level"]), airspeed_mps)
     tests["naming_level"] = naming_level(given.misnaming, rate_hz, aircraft)
     tests["keep"] = exp(-1.0 / (rate_hz * config.forgetting_time_s))
     _set_up_blocks(statistical, errors, aircraft)
@@ -146,21 +152,25 @@ def set_up(
         if forces:
             along_y = jacobian(design, *start)[3]
             set_up_forces(fdi, declared, start, along_y, dt_s)
-            air["output"]["read"] = not declared.monitors_sensors  # the monitor may find them broken
+            air["output"][
+                "uses_accelerometers"
+            ] = not declared.monitors_sensors  # the monitor may find them broken
             statistical["inertial_air"] = air
-            statistical["inertial_air"]["output"]["moving"] *= air["output"]["read"]
-            statistical["inertial_air"]["memory"]["unseen"] = np.minimum(np.add(UNSEEN, BY_FORCE), 1.0)
+            statistical["inertial_air"]["output"]["moving"] *= air["output"]["uses_accelerometers"]
+            statistical["inertial_air"]["memory"]["unmeasured_share"] = np.minimum(
+                np.add(UNMEASURED_SHARES, FORCE_ERROR_SHARE), 1.0
+            )
         set_up_views(statistical, aircraft)
     last, pitch = statistical["block"][-1], statistical["block"][likelihood.PITCH_BLOCK]
-    rolling = float(air["config"]["rolling"]) if air["output"]["moving"] else 0.0
-    gusts_m = rotation_lengths(air["config"]["span"]) if air["config"]["glimpsed"] else [rolling]
+    rolling = float(air["config"]["rolling_length"]) if air["output"]["moving"] else 0.0
+    gusts_m = rotation_lengths(air["config"]["span"]) if air["config"]["coarse"] else [rolling]
     last["return_length"] = returning_length(statistical, airspeed_mps, rate_hz, float(min(gusts_m)))
     if air["output"]["moving"]:
         # the filters that reckon with no gust: as the others begin, and with a drift that goes anywhere
         for name in ("n", "keep", "noise", "P_xx", "P_dd"):
             statistical["block"]["no_gust_filter"][name] = statistical["block"][name]
         last["drift_scale"] = (rolling / last["return_length"]) ** 2
-        if not air["output"]["seen"]:
+        if not air["output"]["measures_gust"]:
             pitching = float(rotation_lengths(air["config"]["span"])[1])
             pitch["return_length"] = returning_length(statistical, airspeed_mps, rate_hz, pitching)
             pitch["drift_scale"] = (pitching / pitch["return_length"]) ** 2

@@ -41,7 +41,7 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.schema import MAX_TERMS_OF_ONE
 from beaver_ftc.compiled import kernel, record, sized
-from beaver_ftc.diagnosis.belief.air import along, drift_beside, whole_drift
+from beaver_ftc.diagnosis.belief.air import full_drift, project_on_axis, remaining_drift
 from beaver_ftc.diagnosis.bounds.variances import axis_of
 from beaver_ftc.diagnosis.detection import forces, likelihood, tones
 from beaver_ftc.diagnosis.detection.forces import ASIDE, COMPONENTS, SETTLED, UP, terms_of
@@ -158,8 +158,8 @@ def set_direction_past_gust(view, forces, air):
     force = forces.component[0]
     roll, yaw, side = force.vane_roll, force.vane[0], force.vane[1]
     roll_gust, yaw_gust = (
-        along(air.output.damping[ROLL], air.output.axes, 0),
-        along(air.output.damping[YAW], air.output.axes, 0),
+        project_on_axis(air.output.damping[ROLL], air.output.axes, 0),
+        project_on_axis(air.output.damping[YAW], air.output.axes, 0),
     )
     by_roll, by_yaw, by_side = -side * yaw_gust, side * roll_gust, roll * yaw_gust - yaw * roll_gust
     length = np.sqrt(by_roll * by_roll + by_yaw * by_yaw + by_side * by_side)
@@ -175,7 +175,7 @@ def set_direction_past_gust(view, forces, air):
 @kernel
 def uses_gust_estimate(view, air):
     """True if the gust estimate is subtracted from a view: the measured force separates it from faults."""
-    return view.confirmed_by > 0 and air.output.read == 1
+    return view.confirmed_by > 0 and air.output.uses_accelerometers == 1
 
 
 @kernel
@@ -225,14 +225,14 @@ def set_noise(view, noise, blocks, forces, air, inertial_air, V):
     if air.output.moving:
         fill_gust_sensitivity(view, forces, air.output.damping)
         if uses_gust_estimate(view, air):
-            drift += drift_beside(
+            drift += remaining_drift(
                 gust_estimate_for(view, air, inertial_air), V, view.gust_on_rates, view.gust_on_forces
             )
         else:
-            drift += whole_drift(air, V, view.gust_on_rates, view.gust_on_forces)
+            drift += full_drift(air, V, view.gust_on_rates, view.gust_on_forces)
         for i in range(3):
             for j in range(3):
-                block.P_dd[0, 0] += m[i] * m[j] * air.output.leap[i, j]
+                block.P_dd[0, 0] += m[i] * m[j] * air.output.turn_variance[i, j]
     size = max(bound, likelihood.LEAST_UNCERTAINTY_RAD_S2)
     block.noise[0], block.jitter[0], view.bounded[0] = variance, jitter * jitter, bound
     block.drift[0, 0] = drift + noise.rapidity * size * size
@@ -373,7 +373,7 @@ def alarm_score(view, views, tests, forces, air):
     if view.surface == AXIS_VIEW and not view.inertial:
         return view.tones.score
     is_mostly_force = view.plane[1] >= SIDE and abs(view.direction[view.plane[1]]) > MIN_FORCE_SHARE
-    if view.surface >= 0 and is_mostly_force and air.output.read == 1:
+    if view.surface >= 0 and is_mostly_force and air.output.uses_accelerometers == 1:
         return confirmed_score(view, views, tests, forces, air)
     return 0.0
 

@@ -88,10 +88,10 @@ def update_blocks(tests, bounded, blocks, air, innovation, dt, k, latched, ends=
             likelihood.reset_onset(block, slot)
         for i, axis in enumerate(block.axis[: block.n]):
             block.scratch[i] = innovation[axis] - air.output.mean[axis]
-        block.has_coarse_gust = air.config.glimpsed
-        if air.config.glimpsed:
+        block.has_coarse_gust = air.config.coarse
+        if air.config.coarse:
             for i, axis in enumerate(block.axis[: block.n]):
-                block.gust_response[i] = air.output.shown[axis]
+                block.gust_response[i] = air.output.coarse_acceleration[axis]
         if air.output.moving:
             add_leap(air, block)
             if b < likelihood.RETURNING:
@@ -107,7 +107,7 @@ def add_leap(air, block):
     """Add to the covariance of the drift what a fast turn of the gusts' axes may change in it."""
     for i in range(block.n):
         for j in range(block.n):
-            block.P_dd[i, j] += block.drift_scale * air.output.leap[block.axis[i], block.axis[j]]
+            block.P_dd[i, j] += block.drift_scale * air.output.turn_variance[block.axis[i], block.axis[j]]
 
 
 @kernel
@@ -287,7 +287,7 @@ def prepare(tests, noise, blocks, air, bound, design, measured, u, dt):
     """
     x, y = measured.x, measured.y
     if air.output.moving:
-        gusts.effect(air, design, x, y, u)
+        gusts.fill_effect(air, design, x, y, u)
     if tests.tolerated:
         for block in blocks:
             block.regressor[:] = 0.0
@@ -296,7 +296,7 @@ def prepare(tests, noise, blocks, air, bound, design, measured, u, dt):
     if bound.error_map.n_boxes > 0:
         update_pace(noise, blocks, bound.error_map, u)
     if air.output.moving:
-        gusts.begin_frame(air, y[AIRSPEED], tests.share * dt)
+        gusts.begin_sums(air, y[AIRSPEED], tests.share * dt)
 
 
 @kernel
@@ -315,7 +315,7 @@ def update_pace(noise, blocks, error_map, u):
 def accumulate_substep(tests, noise, blocks, air, bound, design, measured, u, dt):
     """Add an instant inside a frame, dt s after the instant before, to gust and regressors."""
     if air.output.moving:
-        gusts.look(air, design, measured.x, measured.y, u, measured.attitude, dt)
+        gusts.accumulate_substep(air, design, measured.x, measured.y, u, measured.attitude, dt)
     if tests.tolerated:
         add_regressors(tests.share, noise, blocks, bound.admitted, design, measured, u)
 
@@ -348,7 +348,7 @@ def fill_drift_and_jitter(noise, blocks, air, bound, design, measured, dt):
             for j in range(block.n):
                 block.drift[i, j] = 0.0
                 if air.output.moving:
-                    moved = gusts.unseen_drift(air, V, axis, block.axis[j], b == likelihood.RETURNING)
+                    moved = gusts.unmeasured_drift(air, V, axis, block.axis[j], b == likelihood.RETURNING)
                     block.drift[i, j] = block.drift_scale * moved
             size = max(bounded[axis], likelihood.LEAST_UNCERTAINTY_RAD_S2)
             walk = noise.rapidity * size * size

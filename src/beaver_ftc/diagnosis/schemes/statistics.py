@@ -3,7 +3,7 @@
 from beaver_ftc.compiled import apart, kernel
 from beaver_ftc.design.model import AIRSPEED, unanticipated_pitch
 from beaver_ftc.diagnosis.belief import air
-from beaver_ftc.diagnosis.belief.expectation import foresee, form_innovation
+from beaver_ftc.diagnosis.belief.expectation import form_innovation, predict_next
 from beaver_ftc.diagnosis.detection import forces, parity, statistical
 from beaver_ftc.diagnosis.detection.signatures import fill_block_signatures
 
@@ -15,14 +15,14 @@ def compare_likelihoods(fdi, belief, measured, k, t):
     tests, blocks, seen, felt = chances.tests, chances.block, chances.air, chances.forces
     views, inertial, mean = chances.views[: chances.n_views], chances.inertial_air, belief.means
     innovation, dt = fdi.bank.output.innovation, fdi.config.dt
-    air.elapse(seen, belief.share)
+    air.average_frame(seen, belief.share)
     if inertial.output.moving:
-        air.elapse(inertial, belief.share)
-    foresee(mean)
-    fill_block_signatures(blocks, mean.Gu_foreseen, unanticipated_pitch(belief.design, y, 1.0))
+        air.average_frame(inertial, belief.share)
+    predict_next(mean)
+    fill_block_signatures(blocks, mean.Gu_predicted, unanticipated_pitch(belief.design, y, 1.0))
     latched, ends = chances.alarm.detected_at_s >= 0.0, not fdi.config.abrupt
     statistical.update_blocks(tests, bounded, blocks, seen, innovation, dt, k, latched, ends)
-    parity.update_directions(views, felt, seen, fdi.bound, mean.G_foreseen, mean.Gu_foreseen)
+    parity.update_directions(views, felt, seen, fdi.bound, mean.G_predicted, mean.Gu_predicted)
     parity.project_innovation(
         views, tests.tolerated, chances.noise, blocks, felt, seen, inertial, innovation, y[AIRSPEED]
     )
@@ -56,12 +56,12 @@ def accumulate(fdi, belief, measured):
 def see_air(seen, inertial, felt, belief, measured, k, dt):
     """Take in the air as the vanes see it, and what the accelerometers say of it (forces.py)."""
     if seen.output.moving:
-        air.reach_height(seen, measured.altitude)
-        air.follow(seen, measured.y, measured.attitude, belief.share * dt, k)
-    if (felt.known or seen.output.read) and not measured.inertial:
+        air.set_intensity(seen, measured.altitude)
+        air.update(seen, measured.y, measured.attitude, belief.share * dt, k)
+    if (felt.known or seen.output.uses_accelerometers) and not measured.inertial:
         forces.do_without(felt, seen, inertial)
-    if felt.known or seen.output.read:
-        air.take_force(seen, measured.force)
+    if felt.known or seen.output.uses_accelerometers:
+        air.take_accelerometers(seen, measured.force)
     if felt.known:
         weigh_forces(seen, inertial, felt, belief, measured, k, dt)
 
@@ -72,8 +72,8 @@ def weigh_forces(seen, inertial, felt, belief, measured, k, dt):
     forces.look(felt, seen, measured, belief.u, dt)
     if inertial.output.moving:
         forces.without_vanes(felt, inertial.memory.rotation, measured.y)
-        air.take_force(inertial, measured.force)
-        air.reach_height(inertial, measured.altitude)
-        air.follow(inertial, felt.y, measured.attitude, dt, k)
-        air.effect(inertial, belief.design, measured.x, felt.y, belief.u)
-        air.begin_frame(inertial, felt.y[AIRSPEED], dt)
+        air.take_accelerometers(inertial, measured.force)
+        air.set_intensity(inertial, measured.altitude)
+        air.update(inertial, felt.y, measured.attitude, dt, k)
+        air.fill_effect(inertial, belief.design, measured.x, felt.y, belief.u)
+        air.begin_sums(inertial, felt.y[AIRSPEED], dt)

@@ -47,7 +47,7 @@ PARTS: dict[str, dict[str, Kernel]] = {
     # the design model, the detection estimator and its bank of filters
     "fdae": {
         "design.variants.response": nothing, "loop.accounts.effect_of_faults": nothing,
-        "diagnosis.belief.expectation.look_back": nothing, "loop.frame.diagnose": nothing,
+        "diagnosis.belief.expectation.evaluate_frame": nothing, "loop.frame.diagnose": nothing,
     },
     # the isolation estimators, and the decision among them
     "fies": {

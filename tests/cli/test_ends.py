@@ -61,7 +61,7 @@ os.execv(sys.argv[1], sys.argv[1:])
 """
 
 
-@pytest.mark.parametrize("seconds", [6.0])
+@pytest.mark.parametrize("seconds", [3.0])
 def test_tuning_that_is_ended_says_nothing(tmp_path, seconds):
     """Before its workers have started and while they fly; what the rivals ship with is as it was."""
     from beaver_ftc.diagnosis.rivals import TUNED

@@ -25,7 +25,7 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.parametrize("seconds", [0.0, 3.0])
+@pytest.mark.parametrize("seconds", [0.0, 1.5])
 def test_workers_end_before_and_after_they_have_started(tmp_path, seconds):
     program = tmp_path / "dismissed.py"
     program.write_text(PROGRAM)

@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents.paths import data_root
 from beaver_ftc.documents.problems import ScenarioError
-from beaver_ftc.scenario.loader import MAX_BYTES, load_scenario, load_text
+from beaver_ftc.scenario.loader import MAX_BYTES, load_scenario, load_text, resolve
 
 LINE = re.compile(r"^[^:\n]+(:\d+: \S[^:\n]*)?: [^\n]+allowed: [^\n]+$")
 
@@ -305,3 +306,13 @@ def test_one_wrong_key_hides_no_other_mistake_on_its_line(text, keys):
 def test_a_near_miss_of_type_is_suggested():
     with pytest.raises(ScenarioError, match=r"faults\[0\].typ: unknown key, did you mean type\?"):
         load_text("name: x\nfaults: [{typ: stuck, actuator: elevator, at_s: 3}]\n")
+
+
+@pytest.mark.parametrize(("name", "kind", "file"), [
+    ("elevator-partial-loss", "scenario", "scenarios/elevator-partial-loss.yaml"),
+    ("elevator-effectiveness", "sweep", "scenarios/sweeps/elevator-effectiveness.yaml"),
+    ("flight-controls", "plan", "evidence/flight-controls.yaml"),
+    ("elevator-partial-loss", "sweep", None), ("elevator-effectiveness", "scenario", None), ("a.yaml", "plan", None),
+])  # fmt: skip
+def test_a_name_stands_for_a_file_of_its_kind_and_for_itself_otherwise(name, kind, file):
+    assert resolve(name, kind) == (Path(name) if file is None else data_root() / file)

@@ -209,3 +209,15 @@ def test_nothing_is_said_where_the_nose_is_steep():
     angles = [("roll", Column(t_s, phi)), ("pitch", Column(t_s, theta)), ("yaw", Column(t_s, psi))]
     assert physics.attitude_says(rates, angles, {}) is None
     assert physics.roll_of(list(rates.values()), angles[0][1], angles[1][1]) is None
+
+
+def test_what_turns_while_nothing_is_logged_says_nothing_of_a_rate():
+    """A window over a gap of 5 s, in which the roll angle changes by 1 rad, is left out."""
+    t_s = np.arange(0.0, 20.0, 0.05)
+    p = 0.3 * np.sin(1.3 * t_s)
+    roll = 0.3 / 1.3 * (1.0 - np.cos(1.3 * t_s))
+    late = t_s >= 10.0
+    t_s, roll = t_s + 5.0 * late, roll + 1.0 * late
+    zero = Column(t_s, np.zeros(len(t_s)))
+    found = physics.roll_of([Column(t_s, p), zero, zero], Column(t_s, roll), None)
+    assert (found.slope, found.correlation) == (pytest.approx(1.0, abs=0.01), pytest.approx(1.0, abs=1e-3))

@@ -389,3 +389,17 @@ def test_a_mistake_is_told_where_it_explains_every_part_more_than_chance(monkeyp
     assert trust._likelier("as it is", small.model()) == told
     parts["as it is"] = None
     assert trust._likelier("as it is", small.model()) is None
+
+
+def test_what_each_column_brings_to_the_axes_of_others():
+    """Of a rate what its past does to other axes than its own; of a signal what it does to all."""
+    model = small.model(small.TAIL)
+    flown = small.flight(model, n=7)
+    found, names = trust._by_column(flown, model)
+    past, rates = np.array(model.past), flown.rates
+    assert names == ["p_rad_s", "q_rad_s", "r_rad_s", "airspeed_m_s"]
+    for k in range(2, 7):
+        for i in range(3):
+            brought = rates[k - 1, i] * past[i] + rates[k - 2, i] * past[3 + i]
+            np.testing.assert_allclose(found[k, i], np.where(np.arange(3) == i, 0.0, brought))
+        np.testing.assert_allclose(found[k, 3], flown.signals[k - 1, 0] * past[6])

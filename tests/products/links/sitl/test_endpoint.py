@@ -260,6 +260,25 @@ def test_a_peer_that_goes_on_talking_is_hung_up_on():
     assert took_s < 1.5
 
 
+def test_a_peer_that_still_talks_and_then_hangs_up_is_heard_to_its_end_and_no_longer():
+    near, far = pair()
+
+    def last_words():
+        time.sleep(0.1)
+        far.sendall(b"last")
+        far.close()
+
+    with near, far:
+        far.sendall(b"first")
+        talking = threading.Thread(target=last_words)
+        began_s = time.monotonic()
+        talking.start()
+        serving._hang_up(near)
+        took_s = time.monotonic() - began_s
+        talking.join()
+    assert 0.1 <= took_s < serving.HANG_UP_S
+
+
 def test_a_slow_pace_ends_with_the_flight():
     pace = Pace(0.001)
     pace.wait(0.0)

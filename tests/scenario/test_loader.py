@@ -312,7 +312,8 @@ def test_a_near_miss_of_type_is_suggested():
     ("elevator-partial-loss", "scenario", "scenarios/elevator-partial-loss.yaml"),
     ("elevator-effectiveness", "sweep", "scenarios/sweeps/elevator-effectiveness.yaml"),
     ("flight-controls", "plan", "evidence/flight-controls.yaml"),
-    ("elevator-partial-loss", "sweep", None), ("elevator-effectiveness", "scenario", None), ("a.yaml", "plan", None),
+    ("elevator-partial-loss", "sweep", None), ("elevator-effectiveness", "scenario", None),
+    ("a.yaml", "plan", None),
 ])  # fmt: skip
 def test_a_name_stands_for_a_file_of_its_kind_and_for_itself_otherwise(name, kind, file):
     assert resolve(name, kind) == (Path(name) if file is None else data_root() / file)

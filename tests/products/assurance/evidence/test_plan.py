@@ -92,9 +92,6 @@ MISTAKES = {
         "own", "also",
         "7: requirements: deeper/also.yaml and also are both named also, allowed: each name once",
     ),
-    "too-many": (
-        "2, 3]}}", "2, 99998]}}", "7: requirements: 100001 flights, allowed: at most 100000",
-    ),
     "unused": ("[own, many, elevator-stuck]", "[elevator-stuck]", "4: flights.many: no requirement is ove"),
 }  # fmt: skip
 
@@ -109,6 +106,18 @@ def test_a_mistake_is_a_line_with_its_place(mistake, write):
     with pytest.raises(BadInput) as error:
         load_plan(write(text))
     assert f"plan.yaml:{line}" in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("most", "says"), [(6, ""), (5, "plan.yaml:7: requirements: 6 flights, allowed: at most 5")]
+)
+def test_a_plan_has_as_many_flights_as_are_allowed(write, monkeypatch, most, says):
+    monkeypatch.setattr("beaver_ftc_assurance.evidence.plan.MOST_FLIGHTS", most)
+    if says:
+        with pytest.raises(BadInput, match=says):
+            load_plan(write(GOOD))
+    else:
+        assert len(load_plan(write(GOOD)).cases) == 6
 
 
 @pytest.mark.parametrize("meant", ["many", "elevator-stuck", "surfaces-grid"])

@@ -125,6 +125,11 @@ BUILDS = {
                    "groups": {"pitch": ["tab", "elevator"]}},
     "high rudder": {"moments": {"Cn": [term("a", surface="rudder"), term("b", {"beta": 1})],
                                 "Cl": [term("c", surface="rudder"), term("d", surface="aileron")]}},
+    "elevator that yaws more than the rudder": {"moments": {
+        "Cl": [term("c", surface="rudder", value=8.0), term("d", surface="aileron")],
+        "Cm": [term("e", surface="elevator", value=9.0)],
+        "Cn": [term("a", surface="rudder"), term("f", surface="elevator", value=1.5), term("b", {"beta": 1})],
+    }},
     "rudder of alpha": {**box(alpha_rad=[0.1, 0.3]), "moments": {
         "Cl": [term("a", {"alpha": 2}, surface="aileron"), term("b", {"alpha": 1}, surface="rudder")],
         "Cn": [term("c", {"alpha": 1}, surface="aileron"), term("d", surface="rudder")],

@@ -77,6 +77,7 @@ CASES = {
     "profile-without-speed": ({}, PILOT | {
         "autopilot.commanded": [1, 0, 1, 0], "autopilot.held_worst": 1.25,
     }),
+    "profile-of-nothing": ({}, PILOT | {"autopilot.commanded": [0, 0, 0, 0]}),
     "limits": ({}, PILOT | {
         "autopilot.holding.from_s": [5.0, 3.0, 0.0], "autopilot.holding.value": [55.0, 38.5, radians(25.0)],
         "autopilot.holding.in_force": [1, 0, 1], "autopilot.holding.acting": radians(-4.25),

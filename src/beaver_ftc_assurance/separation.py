@@ -26,7 +26,7 @@ from beaver_ftc.diagnosis import UNANTICIPATED, DiagnosisReadout
 from beaver_ftc.diagnosis.types import TYPE_NAMES as NAMES
 from beaver_ftc.documents import BadInput
 from beaver_ftc.loop import Stepping, fly
-from beaver_ftc.results import MemoryLog, result_folder
+from beaver_ftc.results import Document, MemoryLog, result_folder
 from beaver_ftc.scenario import Scenario
 from beaver_ftc.studies import DOUBLET_COLUMNS as DOUBLET
 from beaver_ftc_assurance.certificates import proved
@@ -41,7 +41,6 @@ LONGEST_S = 0.5  # until the frame that tells
 LARGEST_RATE_DEG_S = 20.0
 GRID = 801  # deflections tried over the travel
 HELD_DEG = 1e-9  # by less no surface is moved
-Document = dict[str, Any]
 CONSTANT = (CONSTANT_LOSS, STUCK, FLOAT, BIAS)
 
 
@@ -222,7 +221,7 @@ def situation_of(tape: Tape, scenario: Scenario, rate: float) -> Situation:
     """What is known of the aircraft as the flight ends; rate: rad/s at most."""
     frame, aircraft, dt = tape.last, scenario.airframe, 1.0 / scenario.rate_hz
     bound, declared, actuators = frame.diagnosis.bound, declared_of(frame), frame.actuators
-    coupled = np.array(declared["inertia_coupling"]) * np.abs(declared["coupling"]) * rate**2
+    coupled = declared.coupled * rate**2
     return Situation(
         G=frame.mean_G, u=frame.expected_u_rad, x=frame.rates_rad_s, rate=rate,
         bound=MARGIN * (bound.eta_bar_rad_s2 + coupled + 2.0 * bound.noise_rad_s / dt),

@@ -8,7 +8,7 @@ fault excluded. Outside the aircraft's envelope, after a gap and where a number 
 from dataclasses import dataclass, field, replace
 from math import pi
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents import BadInput
+from beaver_ftc.results import Document
 from beaver_ftc_logs import findings, trust
 from beaver_ftc_logs.diagnose import Rows
 from beaver_ftc_logs.recording import Floats, Recording, nearest_ten
@@ -26,7 +27,6 @@ from beaver_ftc_logs.vehicle import Quantity, Vehicle
 if TYPE_CHECKING:
     from beaver_ftc.loop import Diagnosis
 
-Document = dict[str, Any]
 Mask = NDArray[np.bool_]
 
 _FASTEST_HZ, _SLOWEST_HZ = 1000.0, 20.0

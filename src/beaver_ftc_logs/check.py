@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.documents import BadInput
+from beaver_ftc.results import Document
 from beaver_ftc_logs import physics
 from beaver_ftc_logs.readers import check_exists, evident, read_parts
 from beaver_ftc_logs.readers.table import TIME, first_of, names_of
@@ -20,8 +21,6 @@ from beaver_ftc_logs.recording import Column, Floats, Recording, nearest_ten
 from beaver_ftc_logs.samples import Samples, parts_for, sample
 from beaver_ftc_logs.units import ACCELERATION, RATE, SECONDS, UNITS, nearest_unit
 from beaver_ftc_logs.vehicle import Vehicle, further_keys
-
-Document = dict[str, Any]
 
 
 def _rate(name: str, angle: str, axis: str, index: int) -> str:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from beaver_ftc.results import Document
 from beaver_ftc_logs import trust
 from beaver_ftc_logs.bank import Bank, bank_of
 from beaver_ftc_logs.diagnose import UNKNOWN, Rows
@@ -19,8 +20,6 @@ from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import TINY, Floats
 from beaver_ftc_logs.regression import predicted
 from beaver_ftc_logs.samples import Samples, constant_parts
-
-Document = dict[str, Any]
 
 BRIEF_S = 3.0
 HORIZONS_S = (5.0, 20.0, 60.0)

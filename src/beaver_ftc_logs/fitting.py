@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from beaver_ftc.documents import BadInput
+from beaver_ftc.results import Document
 from beaver_ftc_logs import extremes, regression, trust
 from beaver_ftc_logs.bank import adaptation_of, bank_of
 from beaver_ftc_logs.diagnose import Rows, rows_of
@@ -84,7 +85,6 @@ _MOST_PARTS, _MOST_GAIN_SD = 12, 0.33
 """A gain that is known no better than to a third is not known to be there."""
 _PRIOR_CHANGES = 20
 """Changes that count as seen before the labels are read, half of them repairs."""
-Document = dict[str, Any]
 _MASSES = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
 _WANTED = 0.93
 """Coverage the bounds aim at: 90 % and some of what another day takes away."""

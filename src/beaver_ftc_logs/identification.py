@@ -8,14 +8,13 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.documents import BadInput
+from beaver_ftc.results import Document
 from beaver_ftc_logs import extremes, fitting, regression, trust
 from beaver_ftc_logs.model import Fitted, Model
 from beaver_ftc_logs.recording import Floats
 from beaver_ftc_logs.regression import group_indices, spectrum, variance_inflation
 from beaver_ftc_logs.samples import Samples, whitened, with_pressure
 from beaver_ftc_logs.vehicle import Vehicle
-
-Document = dict[str, Any]
 
 _COLLINEAR = 10.0
 _FIGURES = {

@@ -14,11 +14,10 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.documents import BadInput
+from beaver_ftc.results import Document
 from beaver_ftc.scenario import TIME_TOLERANCE_S
 from beaver_ftc_logs.readers.table import check_time, read_numbers
 from beaver_ftc_logs.recording import Floats
-
-Document = dict[str, Any]
 
 
 def is_own_log(path: Path) -> bool:

@@ -4,16 +4,14 @@ Used after the fact (`--score`, the benchmark, identification's own tests), neve
 """
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
+from beaver_ftc.results import Document
 from beaver_ftc.scenario import Onset
 from beaver_ftc_logs.diagnose import Rows
 from beaver_ftc_logs.recording import Event, Floats
 from beaver_ftc_logs.samples import Samples
-
-Document = dict[str, Any]
 
 ENGINE = "engine"
 _SETTLED_S = 2.0

@@ -10,12 +10,13 @@ A row uses nothing later than its time.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from beaver_ftc.documents import BadInput
+from beaver_ftc.results import Document
 from beaver_ftc_logs import energy, regression
 from beaver_ftc_logs.model import Fitted, Model
 from beaver_ftc_logs.readings import mended
@@ -23,7 +24,6 @@ from beaver_ftc_logs.recording import TINY, Floats
 from beaver_ftc_logs.samples import MOST_SAMPLES, Samples, whitened
 from beaver_ftc_logs.signals import STILL_S
 
-Document = dict[str, Any]
 Mask = NDArray[np.bool_]
 
 _WIDER = 0.5

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from beaver_ftc.results.flight import Flight, Proof
     from beaver_ftc.results.log import Columns, Log, MemoryLog, ParquetLog, SpooledLog, StoredLog
     from beaver_ftc.results.metrics import as_json, faults_of, measure, versions
-    from beaver_ftc.results.model import Metrics
+    from beaver_ftc.results.model import Document, Metrics
     from beaver_ftc.results.simulation import Simulation
     from beaver_ftc.results.style import SERIES as SERIES_COLOURS
     from beaver_ftc.results.temporal import Formula, FormulaError

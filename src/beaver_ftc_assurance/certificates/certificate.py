@@ -131,7 +131,7 @@ def _declared(scenario: Scenario, history: History, said: list[Document]) -> Doc
     if not all("looks" in one or "missing" in one for one in said):
         about["dt_s"] = history.dt
     if frames:
-        about |= {"instants": scenario.substeps, "omega_E": history.declared["earth_rad_s"]}
+        about |= {"instants": scenario.substeps, "omega_E": history.declared.earth_rad_s}
     return about
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from beaver_ftc.design import AXES
 from beaver_ftc.diagnosis.bounds import ROUNDING_RAD_S2
 from beaver_ftc.loop import FrameReadout
+from beaver_ftc.results import Document
 
 WINDOW = 16  # frames that are written out; what was before them is the filter's state
 _LEAST = 1e-9  # of a margin, as a share of the limit: more than another order of summation makes
@@ -26,7 +27,23 @@ _LEAST_EFFECT = 1e-12  # rad/s2, of a fault: less is rounding
 _LEAST_SLOPE = 1e-12  # of a theta that two terms let drop out
 _FORGOTTEN = 16.0  # time constants of a filter: of what is older e^-16 is left
 
-Document = dict[str, Any]
+
+@dataclass(frozen=True)
+class DeclaredErrors:
+    """Declared errors that the bound on the model's error has in it, by axis (3,).
+
+    coupled: share by which the inertial coupling may be off, times its coefficient; of products of two rates.
+    constant_rad_s2. earth_rad_s: rate of the Earth that the model leaves out, earth_share: what of it each
+    axis feels. gyro: error of a reading, offset + slope |rate|; steady: what of the offset does not change.
+    """
+
+    coupled: np.ndarray
+    constant_rad_s2: np.ndarray
+    earth_rad_s: float
+    earth_share: np.ndarray
+    gyro_offset_rad_s: np.ndarray
+    gyro_steady_rad_s: np.ndarray
+    gyro_slope: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -39,13 +56,12 @@ class History:
     x: np.ndarray
     model: np.ndarray
     eta_bar: np.ndarray
-    declared: Document
+    declared: DeclaredErrors
 
     def asking(self, axes: np.ndarray) -> "History":
         """The same, with what gyros are always off by on these axes alone, (3,); on others it may change."""
-        gyro = self.declared["gyro"]
-        gyro = gyro | {"steady_rad_s": (gyro["steady_rad_s"] * axes).tolist()}
-        return replace(self, declared=self.declared | {"gyro": gyro})
+        steady = self.declared.gyro_steady_rad_s * axes
+        return replace(self, declared=replace(self.declared, gyro_steady_rad_s=steady))
 
     @property
     def said(self) -> Document:
@@ -55,17 +71,15 @@ class History:
     @cached_property
     def noise(self) -> np.ndarray:
         """n of theory, section 2, (rows, 3) rad/s."""
-        gyro = self.declared["gyro"]
-        slope = np.array(gyro["slope"])
-        changing = np.array(gyro["offset_rad_s"]) - gyro["steady_rad_s"]
-        return np.asarray(changing + slope * (np.abs(self.x) + self.off))
+        declared = self.declared
+        changing = declared.gyro_offset_rad_s - declared.gyro_steady_rad_s
+        return np.asarray(changing + declared.gyro_slope * (np.abs(self.x) + self.off))
 
     @cached_property
     def off(self) -> np.ndarray:
         """How far a rate can be from its reading, (rows, 3) rad/s."""
-        gyro = self.declared["gyro"]
-        slope = np.array(gyro["slope"])
-        return np.asarray((np.array(gyro["offset_rad_s"]) + slope * np.abs(self.x)) / (1.0 - slope))
+        slope = self.declared.gyro_slope
+        return np.asarray((self.declared.gyro_offset_rad_s + slope * np.abs(self.x)) / (1.0 - slope))
 
     @cached_property
     def _nu(self) -> np.ndarray:
@@ -82,13 +96,11 @@ class History:
     def rest(self, rows: slice) -> np.ndarray:
         """What of eta_bar is neither published nor the Earth's, nor of the row before; (rows, 3) rad/s2."""
         declared, f = self.declared, _before(np.abs(self.x) + self.off)[rows]
-        earth, g = declared["earth_rad_s"], np.array(declared["earth_share"])
+        earth, g = declared.earth_rad_s, declared.earth_share
         pairs = np.column_stack((f[:, 1] * f[:, 2], f[:, 0] * f[:, 2], f[:, 0] * f[:, 1]))
         of_earth = earth * ((1.0 + g) * f.sum(axis=1, keepdims=True) + g * earth) + ROUNDING_RAD_S2
-        coupled = np.array(declared["inertia_coupling"]) * np.abs(declared["coupling"]) * pairs
-        return np.asarray(
-            self.eta_bar[rows] - self.share * (coupled + declared["constant_rad_s2"] + of_earth)
-        )
+        declared_now = declared.coupled * pairs + declared.constant_rad_s2 + of_earth
+        return np.asarray(self.eta_bar[rows] - self.share * declared_now)
 
 
 def _before(values: np.ndarray) -> np.ndarray:
@@ -96,8 +108,8 @@ def _before(values: np.ndarray) -> np.ndarray:
     return np.concatenate([np.full_like(values[:1], nan), values[:-1]])
 
 
-def declared_of(frame: FrameReadout) -> Document:
-    """What a flight's record says of bounds declared, and of the coefficients in them."""
+def declared_of(frame: FrameReadout) -> DeclaredErrors:
+    """What a flight's record holds of the declared bounds, and of the coefficients in them."""
     bound, of = frame.diagnosis.bound, frame.inertia
     most = {name: abs(value) for name, value in of._asdict().items()}
     shares = (
@@ -105,34 +117,29 @@ def declared_of(frame: FrameReadout) -> Document:
         most["Qpr"] + 2.0 * max(most["Qpp"], most["Qrr"]),
         most["Rpq"] + most["Rqr"],
     )
-    return {
-        "inertia_coupling": bound.inertia.tolist(),
-        "constant_rad_s2": bound.constant_rad_s2.tolist(),
-        "coupling": [of.Pqr, of.Qpr, of.Rpq],
-        "earth_rad_s": bound.earth_rate_rad_s,
-        "earth_share": [max(share, 1.0) for share in shares],
-        "gyro": {
-            "offset_rad_s": bound.gyro_offset_rad_s.tolist(),
-            "steady_rad_s": bound.gyro_steady_rad_s.tolist(),
-            "slope": bound.gyro_slope.tolist(),
-        },
-    }
+    return DeclaredErrors(
+        coupled=bound.inertia * np.abs([of.Pqr, of.Qpr, of.Rpq]), constant_rad_s2=bound.constant_rad_s2,
+        earth_rad_s=bound.earth_rate_rad_s, earth_share=np.maximum(shares, 1.0),
+        gyro_offset_rad_s=bound.gyro_offset_rad_s, gyro_steady_rad_s=bound.gyro_steady_rad_s,
+        gyro_slope=bound.gyro_slope,
+    )  # fmt: skip
 
 
 def declaration(history: History, frames: list[np.ndarray], asked: np.ndarray) -> Document:
     """What the certificate says of it, in the letters of theory, section 2, by axis: what is not zero, and
     adds anything to the bounds of these rows, on the axes `asked` (3,)."""
-    declared, gyro = history.declared, history.declared["gyro"]
-    of = {"o": gyro["offset_rad_s"], "B": gyro["steady_rad_s"] * asked, "m": gyro["slope"]}
+    declared = history.declared
+    steady = declared.gyro_steady_rad_s * asked
+    of = {"o": declared.gyro_offset_rad_s, "B": steady, "m": declared.gyro_slope}
     if not frames:
         return _by_axis(of | {name: [] for name in "cbg"})
     rows = np.concatenate(frames)
     f = (np.abs(history.x) + history.off)[rows - 1]
     pairs = np.column_stack((f[:, 1] * f[:, 2], f[:, 0] * f[:, 2], f[:, 0] * f[:, 1]))
-    c = np.array(declared["inertia_coupling"]) * np.abs(declared["coupling"])
+    c = declared.coupled.copy()
     c[(c * pairs * history.share <= _ROUNDING * history.eta_bar[rows]).all(axis=0)] = 0.0
-    g = declared["earth_share"] if declared["earth_rad_s"] else []
-    return _by_axis(of | {"c": c, "b": declared["constant_rad_s2"], "g": g})
+    g = declared.earth_share if declared.earth_rad_s else np.empty(0)
+    return _by_axis(of | {"c": c, "b": declared.constant_rad_s2, "g": g})
 
 
 def _by_axis(of: Mapping[str, Sequence[float] | np.ndarray]) -> Document:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.results import versions
+from beaver_ftc.results import Document, versions
 from beaver_ftc.scenario import Sweep, SweepExpect
 from beaver_ftc.scenario.faults import DAMAGE, TYPES, UNANTICIPATED
 from beaver_ftc.studies.engine import fingerprint, plug_ins
@@ -23,7 +23,6 @@ from beaver_ftc.studies.sweep import evaluate_summary as evaluate
 from beaver_ftc_assurance.evidence.flown import ALTITUDES_M, BANDS, MET, NOT_MET, NOT_SHOWN, Row, part
 from beaver_ftc_assurance.evidence.plan import EvidencePlan, OfSweep, Requirement
 
-Document = dict[str, Any]
 MOST_NAMED = 50  # flights that do not meet a requirement
 Judged = tuple[str, Row]  # a flight, and one part of what it shows
 

@@ -13,7 +13,7 @@ from statistics import fmean, median
 from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.documents import BadInput, BeaverFtcError
-from beaver_ftc.results import as_json, versions
+from beaver_ftc.results import Document, as_json, versions
 from beaver_ftc.studies.compare import ORACLE_LAW as ORACLE
 from beaver_ftc.studies.compare import OUR_LAW as LAW
 from beaver_ftc.studies.compare import OUR_SCHEME as SCHEME
@@ -45,7 +45,6 @@ from beaver_ftc_live.challenge.line import (
 if TYPE_CHECKING:
     from beaver_ftc.scenario import Scenario
 
-Document = dict[str, Any]
 DETECTOR, BUILT_IN_LAW = "built-in scheme", "built-in law"
 OURS = {DETECTOR: Entry(SCHEME, "nominal"), BUILT_IN_LAW: Entry(SCHEME, LAW), ORACLE: Entry(SCHEME, ORACLE)}
 FULL, NAMED, SLOW_S = 100.0, 50.0, 5.0

@@ -14,7 +14,7 @@ import numpy as np
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import SERIES_COLOURS as SERIES
-from beaver_ftc.results import as_json
+from beaver_ftc.results import Document, as_json
 from beaver_ftc.studies.engine import poisson
 from beaver_ftc.studies.present import GRID, Files, aligned, markdown_table, marker, panels, replace_between
 from beaver_ftc_logs import scoring
@@ -27,7 +27,6 @@ from beaver_ftc_logs.samples import Samples, read_for, sample
 from beaver_ftc_logs.scoring import ENGINE
 from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
 
-Document = dict[str, Any]
 Table = tuple[list[str], list[list[str]]]
 FIGURES = {
     "classes": "classes", "healthy_or_faulty": "healthy or faulty", "side": "side",

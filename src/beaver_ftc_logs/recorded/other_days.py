@@ -9,11 +9,11 @@ what counts is the others.
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from beaver_ftc.documents import BadInput
+from beaver_ftc.results import Document
 from beaver_ftc_logs import scoring
 from beaver_ftc_logs.detectors import BANK, diagnose_with
 from beaver_ftc_logs.fitting import Stretch, fit_model, folds, stretches_of
@@ -22,7 +22,6 @@ from beaver_ftc_logs.recorded import benchmark
 from beaver_ftc_logs.recording import Floats
 from beaver_ftc_logs.samples import Samples, mixer
 
-Document = dict[str, Any]
 CHOSEN_ON, JUDGED_ON = range(8), range(8, 16)
 _BESIDE = "sliding-least-squares"
 _WORST = {"mean_error": max}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc_assurance.certificates.inequality import ROUNDING_RAD_S2, History
+from beaver_ftc_assurance.certificates.inequality import ROUNDING_RAD_S2, DeclaredErrors, History
 from telling import apart, numbers
 
 DT, SHARE = 0.02, 1 / 3
@@ -23,7 +23,13 @@ def history():
         eta_bar=eta_bar,
         **{k: v for k, v in DECLARED.items() if k not in ("gyro", "earth_rad_s")},
     )
-    return History(DT, SHARE, x, model, np.abs(eta_bar), DECLARED)
+    gyro = {f"gyro_{name}": np.array(values) for name, values in GYRO.items()}
+    declared = DeclaredErrors(
+        coupled=np.array(DECLARED["inertia_coupling"]) * np.abs(DECLARED["coupling"]),
+        constant_rad_s2=np.array(DECLARED["constant_rad_s2"]), earth_rad_s=DECLARED["earth_rad_s"],
+        earth_share=np.array(DECLARED["earth_share"]), **gyro,
+    )  # fmt: skip
+    return History(DT, SHARE, x, model, np.abs(eta_bar), declared)
 
 
 @pytest.mark.parametrize("k", range(4))
@@ -58,5 +64,5 @@ def off(history, k, i):
 
 def test_what_is_always_off_counts_on_the_axes_that_are_looked_at(history):
     asked = history.asking(np.array([0.0, 1.0, 0.0]))
-    assert asked.declared["gyro"]["steady_rad_s"] == [0.0, 0.02, 0.0]
+    assert asked.declared.gyro_steady_rad_s.tolist() == [0.0, 0.02, 0.0]
     np.testing.assert_allclose(asked.noise - history.noise, np.full((4, 3), [0.01, 0.0, 0.04]))

@@ -60,6 +60,21 @@ def configure(fdi: np.void, belief: np.void, scenario: Scenario, travel: np.ndar
     conclusions.configure(fdi["verdict"])
 
 
+def begin_anew(fdi: np.void, before: np.void, in_flight: bool) -> None:
+    """Prepare a configured diagnosis to take over from the one in `before`, of the same flight.
+
+    Nothing of a diagnosis goes on but how close healthy flight has come to an alarm, by the same filters.
+    in_flight: whether the air moves by then. The sensor monitor's first JSBSim frame begins a frame of the
+    loop.
+    """
+    fdi["statistical"]["alarm"]["closest"] = before["statistical"]["alarm"]["closest"]
+    if fdi["bank"]["config"]["n"] == before["bank"]["config"]["n"]:
+        fdi["bank"]["output"]["closest"] = before["bank"]["output"]["closest"]
+    for air in ("air", "inertial_air"):
+        fdi["statistical"][air]["config"]["in_flight"] = in_flight
+    fdi["watch"]["memory"]["past"] = 0
+
+
 def _check_pairs(scenario: Scenario) -> None:
     """Raises BadInput where a change in flight declares errors with which pairs are not available."""
     if why := pairs_refused(Declared.of(scenario).sensors.declared, scenario.airframe):

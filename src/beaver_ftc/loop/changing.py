@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from beaver_ftc.control.state import take_over
+from beaver_ftc.diagnosis.scheme import begin_anew
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.loop.plugin_frame import PluginFrame, named_detector, named_law, plugged
@@ -138,12 +139,6 @@ def take_law(frame: np.void, new: np.void) -> None:
 
 
 def take_diagnosis(frame: np.void, new: np.void, k: int) -> None:
-    """Begin the diagnosis anew with frame k; what healthy flight has shown of its margins is kept."""
-    fdi, other = frame["fdi"], new["fdi"]
-    other["watch"]["memory"]["past"] = 0  # its first look begins a frame
-    if fdi["bank"]["config"]["n"] == other["bank"]["config"]["n"]:
-        other["bank"]["output"]["closest"] = fdi["bank"]["output"]["closest"]
-    for air in ("air", "inertial_air"):
-        other["statistical"][air]["config"]["in_flight"] = k > 0
-    other["statistical"]["alarm"]["closest"] = fdi["statistical"]["alarm"]["closest"]
-    frame["fdi"], frame["since"] = other, k
+    """Begin the diagnosis anew with frame k, as configured in `new`."""
+    begin_anew(new["fdi"], frame["fdi"], in_flight=k > 0)
+    frame["fdi"], frame["since"] = new["fdi"], k

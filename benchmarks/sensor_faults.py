@@ -93,9 +93,11 @@ def fly(words: dict[str, Any], last: bool = False) -> tuple[str, bool]:
     for _ in loop.chunks():
         pass
     frame = loop.frames[0]
-    said = instrument_found(frame["fdi"]["watch"], float(frame["t"]))
+    said = instrument_found(frame["fdi"]["sensor_monitor"], float(frame["t"]))
     lost = bool(frame["departed"])
-    if frame["fdi"]["verdict"]["isolated"] >= 0 or (frame["fdi"]["watch"]["output"]["misnamed"] and not last):
+    if frame["fdi"]["verdict"]["isolated"] >= 0 or (
+        frame["fdi"]["sensor_monitor"]["output"]["misnamed"] and not last
+    ):
         return "surface", lost
     if said is None:
         return ("unanticipated" if frame["fdi"]["verdict"]["detected"] else "no alarm"), lost
@@ -287,7 +289,7 @@ def speaks(words: dict[str, Any]) -> bool:
     loop = Loop(load(words))
     alarmed = False
     for _ in loop.chunks():
-        alarmed |= bool(loop.frames["fdi"]["watch"]["output"]["alarmed"][0])
+        alarmed |= bool(loop.frames["fdi"]["sensor_monitor"]["output"]["alarmed"][0])
     landed = loop.land()
     found = [landed.detection_time_s, *(change.get("detection_time_s") for change in landed.changes)]
     return alarmed or (not words.get("faults") and any(time_s is not None for time_s in found))

@@ -155,7 +155,7 @@ def fly_one(given: tuple[int, argparse.Namespace]) -> Flown | None:
             kind for kind, raised in (
                 ("statistical", fdi["statistical"]["alarm"]["detected_at_s"] >= 0.0),
                 ("verdict", bool(fdi["verdict"]["detected"])),
-                ("instrument", bool(fdi["watch"]["output"]["alarmed"])),
+                ("instrument", bool(fdi["sensor_monitor"]["output"]["alarmed"])),
             ) if raised
         )  # fmt: skip
         largest = watched.largest

@@ -50,7 +50,7 @@ from beaver_ftc.studies.engine import cores, single_threaded
 from beaver_ftc.studies.engine import process_context as context
 
 DEPARTURE = -100.0
-NOBODY = {"control.law": "nominal", "control.options": {}}  # the surfaces are the agent's
+NO_SENSOR = {"control.law": "nominal", "control.options": {}}  # the surfaces are the agent's
 
 _STEP, _NOTHING = b"", b""  # to a worker, and from one that has no more to say
 _PATIENCE_S = 5.0  # for a worker to end by itself
@@ -113,7 +113,7 @@ class BeaverEnv(gymnasium.Env[Vector, Vector]):
     metadata = {"render_modes": []}  # noqa: RUF012  (the name and form Gymnasium looks for)
 
     def __init__(self, scenario: ScenarioLike = "fault-free", frames_per_step: int = 1) -> None:
-        self.scenario = load(scenario).with_(NOBODY)
+        self.scenario = load(scenario).with_(NO_SENSOR)
         _check_count("frames_per_step", frames_per_step)
         self.frames_per_step = frames_per_step
         surfaces = len(aircraft(self.scenario.aircraft).surfaces)

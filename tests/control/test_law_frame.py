@@ -157,7 +157,7 @@ def alarmed(known=0, speaks=0, score=2.0):
     frame = new_frame()
     fdi = frame["fdi"]
     fdi["verdict"]["detected"], fdi["config"]["authority"] = known, WORST_CASE
-    fdi["watch"]["config"]["enabled"] = fdi["watch"]["output"]["alarmed"] = speaks
+    fdi["sensor_monitor"]["config"]["enabled"] = fdi["sensor_monitor"]["output"]["alarmed"] = speaks
     fdi["bank"]["output"]["threshold"] = 0.1
     fdi["bank"]["output"]["residual"][0, 1] = 0.1 * score
     fdi["fdae"]["network"]["memory"]["weights"], fdi["fdae"]["network"]["output"] = 1.0, 0.0

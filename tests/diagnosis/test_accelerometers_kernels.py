@@ -13,10 +13,10 @@ from beaver_ftc.diagnosis.monitors.sensor_records import (
     BETA_FLOW,
     CLIMB,
     DENSITY,
-    NOBODY,
+    NO_SENSOR,
     QDYN,
+    SENSOR_MONITOR,
     SPEED,
-    WATCH,
     P,
 )
 from beaver_ftc.plant.instruments import ALTITUDE, AX, MEASURED, N_SENSORS, PHI
@@ -36,32 +36,32 @@ def level(alpha=INCIDENCE, beta=0.02):
 
 
 def new_watch(lead=ALPHA_FLOW, bound=1e-3):
-    watch = np.zeros(1, WATCH).view(np.recarray)[0]
+    monitor = np.zeros(1, SENSOR_MONITOR).view(np.recarray)[0]
     (
-        watch["output"]["named"],
-        watch["output"]["lead"],
-        watch["output"]["alarmed"],
-        watch["config"]["longest_still"],
-    ) = NOBODY, lead, 1, 3
-    step = watch["step"]
+        monitor["output"]["named"],
+        monitor["output"]["lead"],
+        monitor["output"]["alarmed"],
+        monitor["config"]["longest_identical"],
+    ) = NO_SENSOR, lead, 1, 3
+    step = monitor["step"]
     step["config"]["h"], step["config"]["decay"] = H, (0.0, 0.9, 0.99)
     step["test"]["bound"] = bound
-    step["memory"]["then"] = watch["memory"]["earlier"] = level()
-    return watch
+    step["memory"]["then"] = monitor["memory"]["earlier"] = level()
+    return monitor
 
 
-def looks(watch, readings, residuals):
+def looks(monitor, readings, residuals):
     """Each look's readings, and the residual of the test that leads."""
     for signal, residual in zip(readings, residuals, strict=True):
-        watch["step"]["test"]["residual"][watch["output"]["lead"]] = residual
-        accelerometers.note_stillness(watch, signal)
-        accelerometers.weigh(watch, signal)
-        watch["memory"]["earlier"] = watch["step"]["memory"]["then"]
-        watch["step"]["memory"]["then"] = signal
+        monitor["step"]["test"]["residual"][monitor["output"]["lead"]] = residual
+        accelerometers.count_identical_samples(monitor, signal)
+        accelerometers.weigh(monitor, signal)
+        monitor["memory"]["earlier"] = monitor["step"]["memory"]["then"]
+        monitor["step"]["memory"]["then"] = signal
 
 
-def cleared(watch):
-    return set(np.flatnonzero(watch["memory"]["cleared"]).tolist())
+def cleared(monitor):
+    return set(np.flatnonzero(monitor["memory"]["cleared"]).tolist())
 
 
 def course(of, values):
@@ -73,22 +73,22 @@ def course(of, values):
 
 
 def test_which_instrument_a_test_of_the_flow_asks():
-    assert [accelerometers.instrument_of(test) for test in OF] == list(OF.values())
-    flow = [test for test in range(13) if accelerometers.of_the_flow(test)]
+    assert [accelerometers.sensor_of(test) for test in OF] == list(OF.values())
+    flow = [test for test in range(13) if accelerometers.is_flow_test(test)]
     assert flow == [SPEED, ALPHA_FLOW, BETA_FLOW]
 
 
 def test_a_reading_that_is_the_same_is_counted_until_it_is_not():
-    watch, signal = new_watch(), level()
+    monitor, signal = new_watch(), level()
     for expected in (1, 2, 3):
-        accelerometers.note_stillness(watch, signal)
-        assert watch["memory"]["still"][ALPHA] == expected
-    assert accelerometers.stands_still(watch, ALPHA)
-    watch["config"]["longest_still"][ALPHA] = 4
-    assert not accelerometers.stands_still(watch, ALPHA)
+        accelerometers.count_identical_samples(monitor, signal)
+        assert monitor["memory"]["identical"][ALPHA] == expected
+    assert accelerometers.is_frozen(monitor, ALPHA)
+    monitor["config"]["longest_identical"][ALPHA] = 4
+    assert not accelerometers.is_frozen(monitor, ALPHA)
     signal[ALPHA] += 1e-15
-    accelerometers.note_stillness(watch, signal)
-    assert watch["memory"]["still"][[ALPHA, BETA]].tolist() == [0, 4]
+    accelerometers.count_identical_samples(monitor, signal)
+    assert monitor["memory"]["identical"][[ALPHA, BETA]].tolist() == [0, 4]
 
 
 @pytest.mark.parametrize("lead", OF)
@@ -98,12 +98,12 @@ def test_what_comes_at_once_and_is_in_the_reading_is_no_accelerometer_s(lead, si
     least = 1e-3 + accelerometers.LEAP_M_S2 * H * UNIT[lead]
     for size, leaps in ((1.01, True), (0.99, False)):
         jump = sign * size * least
-        watch = new_watch(lead)
-        looks(watch, course(OF[lead], [jump]), [jump])
-        assert cleared(watch) == (set(FORCES) if leaps else set())
-    watch = new_watch(lead)
-    looks(watch, course(OF[lead], [0.49 * sign * least]), [1.01 * sign * least])
-    assert cleared(watch) == set(), "the reading has not half of it"
+        monitor = new_watch(lead)
+        looks(monitor, course(OF[lead], [jump]), [jump])
+        assert cleared(monitor) == (set(FORCES) if leaps else set())
+    monitor = new_watch(lead)
+    looks(monitor, course(OF[lead], [0.49 * sign * least]), [1.01 * sign * least])
+    assert cleared(monitor) == set(), "the reading has not half of it"
 
 
 @pytest.mark.parametrize("sensor", FORCES)
@@ -112,54 +112,54 @@ def test_where_an_accelerometer_has_leapt_the_reading_s_own_says_nothing(sensor)
     jump = 0.05
     for ago in (0, 40):
         for share, leaps in ((0.99, True), (1.01, False)):
-            watch = new_watch(bound=1.0)
-            watch["step"]["memory"]["then"][sensor] += share * 0.5 * jump / (1.5 * H / V) / 0.995**ago
-            looks(watch, course(ALPHA, np.zeros(ago) + 1e-9 * np.arange(ago)), np.zeros(ago))
-            watch["step"]["test"]["bound"] = 1e-3
+            monitor = new_watch(bound=1.0)
+            monitor["step"]["memory"]["then"][sensor] += share * 0.5 * jump / (1.5 * H / V) / 0.995**ago
+            looks(monitor, course(ALPHA, np.zeros(ago) + 1e-9 * np.arange(ago)), np.zeros(ago))
+            monitor["step"]["test"]["bound"] = 1e-3
             (signal,) = course(ALPHA, [jump])
             signal[list(FORCES)] = (
-                watch["step"]["memory"]["then"][list(FORCES)] if ago else level()[list(FORCES)] + 1e-9
+                monitor["step"]["memory"]["then"][list(FORCES)] if ago else level()[list(FORCES)] + 1e-9
             )
-            looks(watch, [signal], [jump])
-            assert (AZ in cleared(watch)) == leaps
+            looks(monitor, [signal], [jump])
+            assert (AZ in cleared(monitor)) == leaps
 
 
 def test_what_accelerometers_have_leapt_is_forgotten_in_two_seconds_at_any_rate():
     for h in (0.002, 0.01, 0.02):
-        watch = new_watch()
-        watch["step"]["config"]["h"], watch["memory"]["restless"] = h, 3.0
+        monitor = new_watch()
+        monitor["step"]["config"]["h"], monitor["memory"]["largest_jump"] = h, 3.0
         for _ in range(round(2.0 / h)):
-            accelerometers.note_stillness(watch, watch["step"]["memory"]["then"].copy())
-        assert watch["memory"]["restless"] == pytest.approx(3.0 * np.exp(-1.0), rel=0.02)
+            accelerometers.count_identical_samples(monitor, monitor["step"]["memory"]["then"].copy())
+        assert monitor["memory"]["largest_jump"] == pytest.approx(3.0 * np.exp(-1.0), rel=0.02)
 
 
 def test_long_after_the_alarm_a_leap_says_nothing():
     """A second after it, whatever the rate of the looks."""
-    for h, gathering, clear in (
+    for h, n_summed, clear in (
         (0.01, 99, set(FORCES)), (0.01, 100, set()), (0.002, 499, set(FORCES)), (0.002, 500, set()),
     ):  # fmt: skip
-        watch = new_watch()
-        watch["step"]["config"]["h"], watch["memory"]["gathering"] = h, gathering
-        watch["memory"]["least"], watch["memory"]["most"] = -1.0, 99.0
-        watch["step"]["test"]["bound"][CLIMB] = 99.0
-        looks(watch, course(ALPHA, [0.05]), [0.05])
-        assert cleared(watch) == clear
+        monitor = new_watch()
+        monitor["step"]["config"]["h"], monitor["memory"]["n_summed"] = h, n_summed
+        monitor["memory"]["least"], monitor["memory"]["most"] = -1.0, 99.0
+        monitor["step"]["test"]["bound"][CLIMB] = 99.0
+        looks(monitor, course(ALPHA, [0.05]), [0.05])
+        assert cleared(monitor) == clear
 
 
 def test_a_straight_course_is_no_leap():
     """Second differences: a steady change of the reading is none, however fast."""
-    watch, rate = new_watch(), 0.1
-    watch["memory"]["earlier"][ALPHA] -= rate
-    looks(watch, course(ALPHA, [rate]), [rate])
-    assert cleared(watch) == set()
+    monitor, rate = new_watch(), 0.1
+    monitor["memory"]["earlier"][ALPHA] -= rate
+    looks(monitor, course(ALPHA, [rate]), [rate])
+    assert cleared(monitor) == set()
 
 
 @pytest.mark.parametrize("lead", OF)
 def test_an_error_of_a_force_goes_on_and_clears_the_reading_that_has_hardly_moved(lead):
     moving = 1e-5 * V * UNIT[lead] * np.sin(np.arange(400.0))
-    watch = new_watch(lead, bound=1.0)
-    looks(watch, course(OF[lead], moving), np.full(400, H * 1.0 * UNIT[lead]))
-    assert cleared(watch) == {OF[lead]}
+    monitor = new_watch(lead, bound=1.0)
+    looks(monitor, course(OF[lead], moving), np.full(400, H * 1.0 * UNIT[lead]))
+    assert cleared(monitor) == {OF[lead]}
     large = new_watch(lead, bound=99.0)
     looks(large, course(OF[lead], 1e4 * moving), np.full(400, H * 1.0 * UNIT[lead]))
     assert cleared(large) == set()
@@ -168,93 +168,97 @@ def test_an_error_of_a_force_goes_on_and_clears_the_reading_that_has_hardly_move
 def test_what_goes_on_is_beyond_what_sound_instruments_may_add_up_to():
     moving = 1e-6 * np.sin(np.arange(100.0))
     for share, clear in ((0.9, set()), (1.1, {ALPHA})):
-        watch = new_watch(bound=1.0)
-        test = watch["step"]["test"][ALPHA_FLOW]
+        monitor = new_watch(bound=1.0)
+        test = monitor["step"]["test"][ALPHA_FLOW]
         test["rate"], test["noise"] = 0.01, 1e-4
         each = share * (accelerometers.CLEARLY * (0.01 * H * 99 + 2e-4) + 30.0 * 2e-6) / 99
-        looks(watch, course(ALPHA, moving), np.full(100, each))
-        assert cleared(watch) == clear
+        looks(monitor, course(ALPHA, moving), np.full(100, each))
+        assert cleared(monitor) == clear
 
 
 def test_the_look_of_the_alarm_counts_for_a_jump_only():
     """A vane that jumps by less than it takes is not cleared by its own jump, nor later."""
     jump = 1.5e-3
-    watch = new_watch()
-    looks(watch, course(ALPHA, jump + 1e-7 * np.sin(np.arange(300.0))), [jump, *np.zeros(299)])
-    assert cleared(watch) == set()
-    assert watch["memory"]["gathered"][1] == 0.0
+    monitor = new_watch()
+    looks(monitor, course(ALPHA, jump + 1e-7 * np.sin(np.arange(300.0))), [jump, *np.zeros(299)])
+    assert cleared(monitor) == set()
+    assert monitor["memory"]["residual_sum"][1] == 0.0
 
 
 def test_scatter_of_a_vane_does_not_go_on():
     scatter = np.random.default_rng(2).normal(0.0, 1e-3, 300)
-    watch = new_watch(bound=1.0)
-    looks(watch, course(ALPHA, scatter), np.diff(scatter, prepend=0.0))
-    assert cleared(watch) == set()
+    monitor = new_watch(bound=1.0)
+    looks(monitor, course(ALPHA, scatter), np.diff(scatter, prepend=0.0))
+    assert cleared(monitor) == set()
 
 
 @pytest.mark.parametrize("lead", OF)
 def test_who_stands_still_is_frozen(lead):
     """A vane that does not move clears the accelerometers; an accelerometer that does not, the vane."""
     for frozen, clear in ((OF[lead], set(FORCES)), (AY, {OF[lead]})):
-        watch = new_watch(lead, bound=1.0)
-        looks(watch, course(frozen, np.zeros(6)), np.full(6, 1e-5))
-        assert cleared(watch) == clear
-        accelerometers.suspect_accelerometers(watch, False)
-        who = np.flatnonzero(watch["output"]["suspect"]).tolist()
+        monitor = new_watch(lead, bound=1.0)
+        looks(monitor, course(frozen, np.zeros(6)), np.full(6, 1e-5))
+        assert cleared(monitor) == clear
+        accelerometers.suspect_accelerometers(monitor, False)
+        who = np.flatnonzero(monitor["output"]["suspect"]).tolist()
         assert who == ([] if clear == set(FORCES) else [AY])
 
 
 def test_an_airspeed_s_error_is_in_the_density_too():
     seen = new_watch(SPEED, bound=1.0)
-    seen["memory"]["fired"][DENSITY] = 1
+    seen["memory"]["exceeded"][DENSITY] = 1
     looks(seen, course(AIRSPEED, [1e-5]), [0.5])
     assert cleared(seen) == set(FORCES)
     for size, clear in ((0.99, set()), (1.01, {AIRSPEED})):
-        watch = new_watch(SPEED, bound=1.0)
-        test = watch["step"]["test"]
+        monitor = new_watch(SPEED, bound=1.0)
+        test = monitor["step"]["test"]
         test["bound"][DENSITY], test["bound"][SPEED] = 1e-3, 0.2
         test["filtered"][SPEED, 2] = -(0.2 + size * accelerometers.CLEARLY * 1e-3 * V / 2.0)
-        looks(watch, course(AIRSPEED, [1e-5]), [0.01])
-        assert cleared(watch) == clear
+        looks(monitor, course(AIRSPEED, [1e-5]), [0.01])
+        assert cleared(monitor) == clear
 
 
 def test_an_incidence_s_error_is_in_the_climb_too():
     """The climb that the angle added up would make, through the same filters as that which is seen."""
     for bound, clear in ((0.9, {ALPHA}), (1.1, set())):
-        watch, rng = new_watch(bound=1.0), np.random.default_rng(5)
+        monitor, rng = new_watch(bound=1.0), np.random.default_rng(5)
         readings = course(ALPHA, rng.normal(0.0, 0.02, 100))
         for signal in readings:
             signal[PHI : PHI + 2] = 0.3, 0.2
         each, fallen = 1e-3, 0.0
         for k in range(100):
             fallen = 0.99 * fallen + H * V * each * k * np.cos(0.3) * np.cos(0.2)
-        watch["step"]["test"]["bound"][CLIMB] = 9.0, 9.0, bound * fallen / accelerometers.CLEARLY
-        looks(watch, readings, np.full(100, each))
-        assert cleared(watch) == clear
-        assert watch["memory"]["fallen"][2] == pytest.approx(fallen)
+        monitor["step"]["test"]["bound"][CLIMB] = 9.0, 9.0, bound * fallen / accelerometers.CLEARLY
+        looks(monitor, readings, np.full(100, each))
+        assert cleared(monitor) == clear
+        assert monitor["memory"]["climb_error"][2] == pytest.approx(fallen)
 
 
 def test_a_climb_that_shows_clears_nobody():
-    watch = new_watch(bound=1.0)
-    watch["step"]["test"]["bound"][CLIMB], watch["memory"]["fired"][CLIMB], watch["memory"]["fallen"] = (
+    monitor = new_watch(bound=1.0)
+    (
+        monitor["step"]["test"]["bound"][CLIMB],
+        monitor["memory"]["exceeded"][CLIMB],
+        monitor["memory"]["climb_error"],
+    ) = (
         1e-9,
         1,
         1.0,
     )
-    assert not accelerometers.would_show_elsewhere(watch, level())
-    watch["memory"]["fired"][CLIMB] = 0
-    assert accelerometers.would_show_elsewhere(watch, level())
-    watch["output"]["lead"] = BETA_FLOW
-    assert not accelerometers.would_show_elsewhere(watch, level())
+    assert not accelerometers.error_would_show_elsewhere(monitor, level())
+    monitor["memory"]["exceeded"][CLIMB] = 0
+    assert accelerometers.error_would_show_elsewhere(monitor, level())
+    monitor["output"]["lead"] = BETA_FLOW
+    assert not accelerometers.error_would_show_elsewhere(monitor, level())
 
 
 def test_other_alarms_are_none_of_theirs():
     for lead in (P, DENSITY, CLIMB):
-        watch = new_watch(lead)
-        watch["memory"]["still"] = 9
-        looks(watch, course(ALPHA, [0.1]), [0.1])
-        assert cleared(watch) == set()
-        assert not watch["memory"]["gathering"]
+        monitor = new_watch(lead)
+        monitor["memory"]["identical"] = 9
+        looks(monitor, course(ALPHA, [0.1]), [0.1])
+        assert cleared(monitor) == set()
+        assert not monitor["memory"]["n_summed"]
 
 
 @pytest.mark.parametrize("i", range(3))
@@ -262,26 +266,26 @@ def test_other_alarms_are_none_of_theirs():
 def test_the_axis_of_the_velocity_made_up_is_that_of_the_accelerometer(i, flow):
     """By turning a step along a body axis into speed, incidence and sideslip."""
     alpha, beta = flow
-    watch = new_watch()
-    watch["step"]["memory"]["then"] = level(alpha, beta)
+    monitor = new_watch()
+    monitor["step"]["memory"]["then"] = level(alpha, beta)
     v = V * np.array([np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)])
     moved = v + 1e-4 * np.eye(3)[i]
     speed = np.linalg.norm(moved)
-    watch["memory"]["gathered"] = (
+    monitor["memory"]["residual_sum"] = (
         speed - V, np.arctan2(moved[2], moved[0]) - alpha, np.arcsin(moved[1] / speed) - beta
     )  # fmt: skip
-    accelerometers.suspect_accelerometers(watch, False)
-    assert watch["memory"]["made_up"] == pytest.approx(1e-4 * np.eye(3)[i], abs=1e-8)
-    assert np.flatnonzero(watch["output"]["suspect"]).tolist() == [AX + i]
+    accelerometers.suspect_accelerometers(monitor, False)
+    assert monitor["memory"]["spurious_velocity"] == pytest.approx(1e-4 * np.eye(3)[i], abs=1e-8)
+    assert np.flatnonzero(monitor["output"]["suspect"]).tolist() == [AX + i]
     for doubt, all_of_them in ((0.49e-4, False), (0.51e-4, True)):
-        watch["memory"]["sound"] = doubt, 0.0, 0.0
-        accelerometers.suspect_accelerometers(watch, False)
-        assert bool(watch["output"]["suspect"][AX:].all()) == all_of_them
-    accelerometers.suspect_accelerometers(watch, True)
-    assert not watch["output"]["suspect"].any(), "a gyro explains it"
-    accelerometers.clear_accelerometers(watch)
-    accelerometers.suspect_accelerometers(watch, False)
-    assert not watch["output"]["suspect"].any()
+        monitor["memory"]["sound_sum"] = doubt, 0.0, 0.0
+        accelerometers.suspect_accelerometers(monitor, False)
+        assert bool(monitor["output"]["suspect"][AX:].all()) == all_of_them
+    accelerometers.suspect_accelerometers(monitor, True)
+    assert not monitor["output"]["suspect"].any(), "a gyro explains it"
+    accelerometers.clear_accelerometers(monitor)
+    accelerometers.suspect_accelerometers(monitor, False)
+    assert not monitor["output"]["suspect"].any()
 
 
 @pytest.mark.parametrize(
@@ -289,11 +293,11 @@ def test_the_axis_of_the_velocity_made_up_is_that_of_the_accelerometer(i, flow):
     [({}, 1), ({"replaced": AZ}, 0), ({"suspect": AX}, 0), ({"replaced": ALPHA, "suspect": BETA}, 1)],
 )
 def test_none_is_used_once_one_may_be_broken(fields, used):
-    watch, measured = new_watch(), np.zeros(1, MEASURED).view(np.recarray)[0]
+    monitor, measured = new_watch(), np.zeros(1, MEASURED).view(np.recarray)[0]
     measured["inertial"] = 1
     for name, i in fields.items():
-        holder(watch, name)[name][i] = 1
-    accelerometers.discard(watch, measured)
+        holder(monitor, name)[name][i] = 1
+    accelerometers.discard(monitor, measured)
     assert measured["inertial"] == used
 
 

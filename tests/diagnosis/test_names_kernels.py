@@ -60,7 +60,11 @@ def test_which_surfaces_are_named(pair, alarmed, beside, named):
     fdi = nameless()
     fdi["verdict"]["isolated"], fdi["types"]["surface"]["status"]["named"][[AILERON, RUDDER]] = ELEVATOR, 1
     fdi["types"]["pair"]["enabled"] = pair
-    fdi["watch"]["config"]["enabled"], fdi["watch"]["output"]["alarmed"], fdi["watch"]["output"]["beside"] = (
+    (
+        fdi["sensor_monitor"]["config"]["enabled"],
+        fdi["sensor_monitor"]["output"]["alarmed"],
+        fdi["sensor_monitor"]["output"]["keeps_surface"],
+    ) = (
         1,
         alarmed,
         beside,

@@ -90,11 +90,11 @@ def test_a_prediction_turns_attitude_and_velocity_by_the_rates(seed):
     step, before = new_step(), rng.normal(size=3)
     redundancy.look(step, signal, rng.normal(size=3))
     step["memory"]["acceleration_then"], now = before, step["memory"]["acceleration"].copy()
-    step["memory"]["pull"], step["memory"]["pulled"] = 3.0, (2.0, 1.0)
+    step["memory"]["size"], step["memory"]["sizes_before"] = 3.0, (2.0, 1.0)
     redundancy.predict(step)
-    assert step["memory"]["pull"] == pytest.approx(np.linalg.norm(1.5 * now - 0.5 * before))
-    assert step["memory"]["pulled"].tolist() == [3.0, 2.0]
-    assert step["memory"]["felt_then"] == pytest.approx(np.linalg.norm(before))
+    assert step["memory"]["size"] == pytest.approx(np.linalg.norm(1.5 * now - 0.5 * before))
+    assert step["memory"]["sizes_before"].tolist() == [3.0, 2.0]
+    assert step["memory"]["size_then"] == pytest.approx(np.linalg.norm(before))
     size = np.linalg.norm(signal[:3])
     by = Rotation.from_rotvec(signal[:3] / size * 2.0 * np.arctan(0.5 * H * size))
     attitude = (as_rotation(signal[PHI : PHI + 3]) * by).as_euler("ZYX")[::-1]
@@ -269,7 +269,7 @@ def test_a_declared_error_is_of_the_reading_and_what_is_steady_does_not_change()
     step, signal = new_step(), np.full(N_SENSORS, -3.0)
     signal[PHI + 2] += 2.0 * np.pi  # a heading is off by its slope of the angle from north
     step["config"]["offset"], step["config"]["slope"], step["config"]["steady"] = 0.3, 0.1, 0.25
-    redundancy.note_declared(step, signal)
+    redundancy.bound_errors(step, signal)
     truth = (3.0 + 0.3) / 0.9
     assert step["memory"]["error"] == pytest.approx(truth - 3.0)
     assert step["memory"]["changing"] == pytest.approx(truth - 3.0 - 0.25 + 3e-10, rel=1e-9)
@@ -420,7 +420,7 @@ def test_the_bound_of_a_climb_knows_the_hardest_of_three_pulls_whichever_it_was(
     def rate(*pulled):
         step, signal = new_step(), reading()
         redundancy.look(step, signal, np.array([0.0, 0.0, -GRAVITY]))
-        step["memory"]["pull"], step["memory"]["pulled"] = 1.0, pulled
+        step["memory"]["size"], step["memory"]["sizes_before"] = 1.0, pulled
         redundancy.allow(step, signal)
         return step["test"]["rate"][CLIMB]
 
@@ -434,7 +434,7 @@ def test_a_wrong_airspeed_turns_the_flow_at_most_by_what_it_makes_of_the_pull():
     for off in (0.0, 2.0):
         step = new_step()
         redundancy.look(step, signal, np.array([0.0, 0.0, -GRAVITY]))
-        step["memory"]["pull"] = pull
+        step["memory"]["size"] = pull
         rates.append(allowed(step, signal, AIRSPEED, off, 0.0)[0][list(FLOWS)])
     V = signal[AIRSPEED]
     turned = pull * (1.0 / (V - 2.0) - 1.0 / V)

@@ -22,11 +22,11 @@ from beaver_ftc.diagnosis.monitors.sensor_records import (
     OF_SPEED,
     OF_THETA,
     QDYN,
+    SENSOR_MONITOR,
     SPEED,
     STARTERS,
     THETA,
     TURN,
-    WATCH,
 )
 from beaver_ftc.plant.instruments import ALTITUDE, AX, N_SENSORS, PHI
 
@@ -76,8 +76,8 @@ def course(kind, size, true, h):
 
 
 def new_watch(h):
-    watch = np.zeros(1, WATCH).view(np.recarray)[0]
-    step = watch["step"]
+    monitor = np.zeros(1, SENSOR_MONITOR).view(np.recarray)[0]
+    step = monitor["step"]
     step["config"]["h"], step["config"]["decay"], step["config"]["gravity"] = (
         h,
         np.exp([-1e6 * h, -10.0 * h, -h]),
@@ -91,7 +91,7 @@ def new_watch(h):
         2.0,
         0.5,
     )
-    return watch
+    return monitor
 
 
 def sizes(i, reading, true):
@@ -100,19 +100,19 @@ def sizes(i, reading, true):
 
 
 def looks(signal, h):
-    """Each look's number and the watch, all that was beyond its bound by then noted as fired."""
-    watch = new_watch(h)
-    redundancy.begin(watch["step"], signal[0], signal[0, AX:])
-    since_start.begin(watch["since"], signal[0])
-    redundancy.look(watch["step"], signal[0], signal[0, AX:])
+    """Each look's number and the monitor, all that was beyond its bound by then noted as fired."""
+    monitor = new_watch(h)
+    redundancy.begin(monitor["step"], signal[0], signal[0, AX:])
+    since_start.begin(monitor["since"], signal[0])
+    redundancy.look(monitor["step"], signal[0], signal[0, AX:])
     fired = np.zeros(N_TESTS, int)
     for k in range(1, len(signal)):
-        redundancy.check(watch["step"], signal[k], 0)
-        since_start.follow(watch["step"], watch["since"], signal[k])
-        fired |= watch["step"]["test"]["share"] > 1.0
-        since_start.note_refuted(watch["step"], watch["since"], fired)
-        yield k, watch, fired
-        redundancy.look(watch["step"], signal[k], signal[k, AX:])
+        redundancy.check(monitor["step"], signal[k], 0)
+        since_start.follow(monitor["step"], monitor["since"], signal[k])
+        fired |= monitor["step"]["test"]["share"] > 1.0
+        since_start.record_refuted(monitor["step"], monitor["since"], fired)
+        yield k, monitor, fired
+        redundancy.look(monitor["step"], signal[k], signal[k, AX:])
 
 
 @pytest.mark.parametrize("kind", ["constant", "scale", "swinging"])
@@ -128,8 +128,8 @@ def test_what_is_broken_from_the_start_is_never_refuted(seed, h, swiftly, i, kin
         )
         off = abs(sizes(i, broken[:, READING[i]], true[:, READING[i]]))
         moved = set()
-        for k, watch, _ in looks(broken, h):
-            since = watch["since"]
+        for k, monitor, _ in looks(broken, h):
+            since = monitor["since"]
             assert off[k] <= (since["off"][i] + since["changed"][i]) * (1.0 + 1e-9), (size, k)
             moved |= set(np.flatnonzero(since["refuted"][i]).tolist())
         assert all(since_start.moves(i, t) for t in moved), (size, moved)
@@ -139,9 +139,9 @@ def test_what_is_broken_from_the_start_is_never_refuted(seed, h, swiftly, i, kin
 def test_a_sound_flight_shows_each_reading_to_be_sound():
     """None is beyond its bound, and none can be off by more than a little any more; the airspeed by as little
     as the density of the air says from the first look on."""
-    for k, watch, fired in looks(flight(5, 0.01, True), 0.01):
+    for k, monitor, fired in looks(flight(5, 0.01, True), 0.01):
         assert not fired.any(), k
-        since = watch["since"]
+        since = monitor["since"]
     for i, little in SHOWN.items():
         assert since["off"][i] < little < since["first"][i], NAMES[i]
     assert since["off"][OF_SPEED] < 0.2
@@ -157,9 +157,9 @@ def test_in_steady_flight_nothing_shows_the_sideslip_or_the_airspeed():
     body = V * np.array([np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)])
     down = Rotation.from_euler("ZYX", signal[0, PHI : PHI + 3][::-1]).apply(body)[2]
     signal[:, ALTITUDE] -= 0.01 * down * np.arange(LOOKS)
-    for _, watch, fired in looks(signal, 0.01):
+    for _, monitor, fired in looks(signal, 0.01):
         assert not fired.any()
-        off, first = watch["since"]["off"], watch["since"]["first"]
+        off, first = monitor["since"]["off"], monitor["since"]["first"]
     assert off[OF_BETA] == first[OF_BETA]
     assert off[OF_SPEED] == first[OF_SPEED]
     assert max(off[OF_PHI], off[OF_THETA]) < 0.06

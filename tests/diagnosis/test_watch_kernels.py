@@ -1,4 +1,4 @@
-"""The watch over the instruments a decision at a time: who is suspected, who named, what stands in."""
+"""The monitor over the instruments a decision at a time: who is suspected, who named, what stands in."""
 
 import numpy as np
 import pytest
@@ -19,16 +19,16 @@ from beaver_ftc.diagnosis.monitors.sensor_records import (
     DENSITY,
     N_TESTS,
     NO,
-    NOBODY,
+    NO_SENSOR,
     PRESSURE,
     PSI,
     QDYN,
     RPM,
+    SENSOR_MONITOR,
     SPEED,
     THETA,
     TURN,
     UNKNOWN,
-    WATCH,
     YES,
 )
 from beaver_ftc.diagnosis.state import NOT_ISOLATED
@@ -50,24 +50,28 @@ GYROS, FORCES = (0, 1, 2), (AX, AX + 1, AX + 2)
 
 
 def new_watch(**fields):
-    watch = np.zeros(1, WATCH).view(np.recarray)[0]
+    monitor = np.zeros(1, SENSOR_MONITOR).view(np.recarray)[0]
     (
-        watch["config"]["enabled"],
-        watch["config"]["instants"],
-        watch["output"]["named"],
-        watch["config"]["follows"],
-    ) = 1, 4, NOBODY, 1.0
-    watch["step"]["config"]["h"], watch["step"]["config"]["decay"], watch["output"]["alarmed_at_s"] = (
+        monitor["config"]["enabled"],
+        monitor["config"]["instants"],
+        monitor["output"]["named"],
+        monitor["config"]["follows"],
+    ) = 1, 4, NO_SENSOR, 1.0
+    monitor["step"]["config"]["h"], monitor["step"]["config"]["decay"], monitor["output"]["alarmed_at_s"] = (
         H,
         (0.0, 0.9, 0.99),
         -1.0,
     )
-    watch["step"]["test"]["bound"], watch["config"]["longest_still"], watch["step"]["config"]["swift"] = (
+    (
+        monitor["step"]["test"]["bound"],
+        monitor["config"]["longest_identical"],
+        monitor["step"]["config"]["swift"],
+    ) = (
         1.0,
         3,
         80.0,
     )
-    return fill(watch, **fields)
+    return fill(monitor, **fields)
 
 
 def seen(*missing):
@@ -78,11 +82,11 @@ def seen(*missing):
 
 def with_shares(shares, **fields):
     """Tests {test: share of its bound}, of which the residual is as large."""
-    watch = new_watch(**fields)
+    monitor = new_watch(**fields)
     for test, share in shares.items():
-        watch["step"]["test"]["share"][test] = share
-        watch["step"]["test"]["filtered"][test] = share
-    return watch
+        monitor["step"]["test"]["share"][test] = share
+        monitor["step"]["test"]["filtered"][test] = share
+    return monitor
 
 
 @pytest.mark.parametrize(
@@ -91,18 +95,18 @@ def with_shares(shares, **fields):
      ({12: 2.0}, 1, (12, 2.0)), ({3: 0.4}, 1, (5, 0.7)), ({3: 0.4}, 0, (3, 0.4))],
 )  # fmt: skip
 def test_of_the_looks_of_a_frame_the_test_furthest_towards_its_bound_is_kept(shares, past, furthest):
-    watch = with_shares(shares, furthest=5, share=0.7, past=past)
-    watching.note_furthest(watch)
-    assert (watch["output"]["furthest"], watch["output"]["share"]) == furthest
+    monitor = with_shares(shares, largest_test=5, share=0.7, past=past)
+    watching.find_largest_share(monitor)
+    assert (monitor["output"]["largest_test"], monitor["output"]["share"]) == furthest
 
 
 def suspects(shares, lead=None, **fields):
     """Who can have brought the tests here."""
-    watch = with_shares(shares, **fields)
-    watch["output"]["lead"] = max(shares, key=shares.get) if lead is None else lead
-    watching.note_fired(watch)
-    watching.suspect(watch)
-    return set(np.flatnonzero(watch["output"]["suspect"]).tolist())
+    monitor = with_shares(shares, **fields)
+    monitor["output"]["lead"] = max(shares, key=shares.get) if lead is None else lead
+    watching.record_exceeded_tests(monitor)
+    watching.suspect(monitor)
+    return set(np.flatnonzero(monitor["output"]["suspect"]).tolist())
 
 
 @pytest.mark.parametrize(
@@ -141,8 +145,8 @@ def test_an_angle_that_is_frozen_is_no_gyro_s_doing():
     shares, still = {TURN + 1: 2.0, ANGLE + 1: 1.5}, np.zeros(N_SENSORS, int)
     for looks, who in ((2, {1, THETA}), (3, {THETA})):
         still[THETA] = looks
-        assert suspects(shares, still=still) == who
-    assert suspects({TURN: 2.1}, still=still) == set()
+        assert suspects(shares, identical=still) == who
+    assert suspects({TURN: 2.1}, identical=still) == set()
 
 
 def test_a_large_error_moves_its_neighbours_a_little():
@@ -157,28 +161,28 @@ def test_a_large_error_moves_its_neighbours_a_little():
 )
 def test_an_airspeed_as_wrong_as_the_density_has_it_would_show_in_its_own_test(airspeed, who):
     """0.5 V ln(density ratio) against twice the bound of the airspeed's test, 2."""
-    watch = with_shares({DENSITY: 0.2})
-    watch["step"]["test"]["share"][DENSITY] = 2.0
-    watch["step"]["memory"]["then"][AIRSPEED], watch["output"]["lead"] = airspeed, DENSITY
-    watch["since"]["refuted"] = 1
-    assert watching.would_show(watch) == (who == {QDYN})
-    watching.suspect(watch)
-    assert set(np.flatnonzero(watch["output"]["suspect"]).tolist()) == who
-    watch["memory"]["still"][AIRSPEED] = 1
-    watching.suspect(watch)
-    assert watch["output"]["suspect"][AIRSPEED], "one that stands still may be frozen"
+    monitor = with_shares({DENSITY: 0.2})
+    monitor["step"]["test"]["share"][DENSITY] = 2.0
+    monitor["step"]["memory"]["then"][AIRSPEED], monitor["output"]["lead"] = airspeed, DENSITY
+    monitor["since"]["refuted"] = 1
+    assert watching.airspeed_error_would_show(monitor) == (who == {QDYN})
+    watching.suspect(monitor)
+    assert set(np.flatnonzero(monitor["output"]["suspect"]).tolist()) == who
+    monitor["memory"]["identical"][AIRSPEED] = 1
+    watching.suspect(monitor)
+    assert monitor["output"]["suspect"][AIRSPEED], "one that stands still may be frozen"
 
 
 @pytest.mark.parametrize(("say", "who"), [(UNKNOWN, {1, THETA}), (YES, {1}), (NO, {THETA})])
 def test_the_rates_decide_between_a_gyro_and_the_attitude(say, who):
-    assert suspects({TURN + 1: 2.0, ANGLE + 1: 1.5}, rates_say=(UNKNOWN, say, UNKNOWN)) == who
+    assert suspects({TURN + 1: 2.0, ANGLE + 1: 1.5}, rates_confirm=(UNKNOWN, say, UNKNOWN)) == who
 
 
 def test_an_angle_shows_what_the_axis_furthest_beyond_its_bound_does():
-    watch = with_shares({TURN: 0.2, TURN + 1: 0.5, TURN + 2: 0.3})
-    assert [watching.axis_of(watch, i) for i in range(3)] == [1, 1, 1]
-    watch = with_shares({TURN: 0.5, TURN + 1: 0.5, TURN + 2: 0.5})
-    assert [watching.axis_of(watch, i) for i in range(3)] == [0, 1, 2]
+    monitor = with_shares({TURN: 0.2, TURN + 1: 0.5, TURN + 2: 0.3})
+    assert [watching.axis_of(monitor, i) for i in range(3)] == [1, 1, 1]
+    monitor = with_shares({TURN: 0.5, TURN + 1: 0.5, TURN + 2: 0.5})
+    assert [watching.axis_of(monitor, i) for i in range(3)] == [0, 1, 2]
 
 
 @pytest.mark.parametrize("known", [0, 1])
@@ -186,15 +190,15 @@ def test_an_angle_shows_what_the_axis_furthest_beyond_its_bound_does():
 @pytest.mark.parametrize("blurred", [0, 1])
 def test_a_surface_may_be_named_where_no_gyro_can_be_it(known, no_gyro, blurred):
     fields = {"no_gyro": no_gyro, "blurred": blurred}
-    assert watching.clears_surfaces(new_watch(enabled=0, **fields), known)
+    assert watching.allows_isolation(new_watch(enabled=0, **fields), known)
     clear = bool(known and (no_gyro or not blurred))
-    assert bool(watching.clears_surfaces(new_watch(**fields), known)) == clear
+    assert bool(watching.allows_isolation(new_watch(**fields), known)) == clear
 
 
 @pytest.mark.parametrize(("detected_at_s", "early"), [(2.5, True), (3.49, True), (3.51, False)])
 def test_an_alarm_of_the_first_second_may_be_an_instruments_first_error(detected_at_s, early):
-    assert watching.shown_from_the_start(new_watch(begun_at_s=2.5), detected_at_s) == early
-    assert not watching.shown_from_the_start(new_watch(enabled=0, begun_at_s=2.5), detected_at_s)
+    assert watching.alarm_is_at_start(new_watch(begun_at_s=2.5), detected_at_s) == early
+    assert not watching.alarm_is_at_start(new_watch(enabled=0, begun_at_s=2.5), detected_at_s)
 
 
 @pytest.mark.parametrize(
@@ -206,29 +210,33 @@ def test_an_alarm_of_the_first_second_may_be_an_instruments_first_error(detected
 @pytest.mark.parametrize("less", [0.99, 1.01])
 def test_how_much_of_the_flow_a_gyro_may_move_unseen(flow, gyro, share, less):
     """Twice what its own test leaves, by the kinematics of a flow at 0.2 rad and -0.3 rad."""
-    watch = new_watch()
-    watch["step"]["memory"]["then"][[ALPHA, BETA]] = 0.2, -0.3
-    watch["step"]["test"]["bound"][TURN + gyro] = 40.0
+    monitor = new_watch()
+    monitor["step"]["memory"]["then"][[ALPHA, BETA]] = 0.2, -0.3
+    monitor["step"]["test"]["bound"][TURN + gyro] = 40.0
     own = (flow, gyro) in ((ALPHA_FLOW, 1), (BETA_FLOW, 2))
-    watch["step"]["test"]["filtered"][flow] = -less * (80.0 * share + (2.0 if own else 1.0))
-    assert watching.may_hide(watch, flow, gyro, own) == (less < 1.0 and share > 0.0)
+    monitor["step"]["test"]["filtered"][flow] = -less * (80.0 * share + (2.0 if own else 1.0))
+    assert watching.gyro_may_be_hidden(monitor, flow, gyro, own) == (less < 1.0 and share > 0.0)
 
 
 @pytest.mark.parametrize("name", ["alpha", "beta", "V", "qdyn"])
 def test_no_surface_is_named_while_a_reading_of_the_flow_stands_still(name):
     """Whatever moves the aircraft moves it; but a sideslip of zero may stay one."""
     i = SENSORS.index(name)
-    watch = new_watch(blurred=0)
-    watch["config"]["longest_still"], watch["step"]["memory"]["then"] = 3, 0.1
+    monitor = new_watch(blurred=0)
+    monitor["config"]["longest_identical"], monitor["step"]["memory"]["then"] = 3, 0.1
     for still, value, clear in ((2, 0.1, True), (3, 0.1, False), (3, 0.0, True)):
-        watch["memory"]["still"][i], watch["step"]["memory"]["then"][i] = still, value
-        assert bool(watching.clears_surfaces(watch, 1)) == clear
-    watch["step"]["memory"]["then"], watch["memory"]["still"], watch["memory"]["still"][0] = 0.1, 0, 9
-    assert watching.clears_surfaces(watch, 1), "a gyro is held against the attitude"
+        monitor["memory"]["identical"][i], monitor["step"]["memory"]["then"][i] = still, value
+        assert bool(watching.allows_isolation(monitor, 1)) == clear
+    monitor["step"]["memory"]["then"], monitor["memory"]["identical"], monitor["memory"]["identical"][0] = (
+        0.1,
+        0,
+        9,
+    )
+    assert watching.allows_isolation(monitor, 1), "a gyro is held against the attitude"
 
 
 def test_the_watch_has_the_word_once_it_has_raised_its_alarm():
-    words = [bool(watching.speaks(new_watch(enabled=e, alarmed=a))) for e in (0, 1) for a in (0, 1)]
+    words = [bool(watching.has_alarm(new_watch(enabled=e, alarmed=a))) for e in (0, 1) for a in (0, 1)]
     assert words == [False, False, False, True]
 
 
@@ -244,12 +252,12 @@ def detected_fdi(at_s=-1.0, isolated=NOT_ISOLATED):
 
 @pytest.mark.parametrize("isolated", [NOT_ISOLATED, 0, 1])
 def test_an_alarm_voids_what_a_moment_ago_was_made_of_it(isolated):
-    watch, fdi = new_watch(), detected_fdi(9.6, isolated)
-    on(watching.raise_alarm, fdi, watch, 10.0)
-    assert watch["output"]["alarmed"]
-    assert watch["output"]["alarmed_at_s"] == 9.6  # the same fault, seen first in the rates
-    assert watch["output"]["misnamed"] == (isolated >= 0)
-    assert not watch["output"]["beside"]
+    monitor, fdi = new_watch(), detected_fdi(9.6, isolated)
+    on(watching.raise_alarm, fdi, monitor, 10.0)
+    assert monitor["output"]["alarmed"]
+    assert monitor["output"]["alarmed_at_s"] == 9.6  # the same fault, seen first in the rates
+    assert monitor["output"]["misnamed"] == (isolated >= 0)
+    assert not monitor["output"]["keeps_surface"]
     frame.reset_surface_diagnosis(fdi)
     verdict = fdi["verdict"]
     assert [verdict[name] for name in ("detected", "isolated", "type")] == [0, NOT_ISOLATED, -1]
@@ -258,58 +266,58 @@ def test_an_alarm_voids_what_a_moment_ago_was_made_of_it(isolated):
     assert (fdi["types"]["surface"]["accommodation"]["mode"] == -1).all()
     assert not fdi["fdae"]["network"]["memory"]["weights"].any()
     assert not fdi["fdae"]["network"]["output"].any()
-    on(watching.raise_alarm, detected_fdi(9.6, 1), watch, 11.0)
-    assert watch["output"]["alarmed_at_s"] == 9.6
+    on(watching.raise_alarm, detected_fdi(9.6, 1), monitor, 11.0)
+    assert monitor["output"]["alarmed_at_s"] == 9.6
 
 
 def test_a_surface_found_long_before_stays_found():
-    watch, fdi = new_watch(), detected_fdi(9.4, 1)
-    on(watching.raise_alarm, fdi, watch, 10.0)
-    assert watch["output"]["beside"]
-    assert watch["output"]["alarmed_at_s"] == 10.0
+    monitor, fdi = new_watch(), detected_fdi(9.4, 1)
+    on(watching.raise_alarm, fdi, monitor, 10.0)
+    assert monitor["output"]["keeps_surface"]
+    assert monitor["output"]["alarmed_at_s"] == 10.0
     assert fdi["verdict"]["isolated"] == 1
-    watch, fdi = new_watch(), detected_fdi(9.5, 1)
-    on(watching.raise_alarm, fdi, watch, 10.0)  # half a second is no long time
-    assert not watch["output"]["beside"]
+    monitor, fdi = new_watch(), detected_fdi(9.5, 1)
+    on(watching.raise_alarm, fdi, monitor, 10.0)  # half a second is no long time
+    assert not monitor["output"]["keeps_surface"]
 
 
 def test_with_nothing_found_before_the_alarm_is_of_now():
-    watch, fdi = new_watch(), detected_fdi()
-    on(watching.raise_alarm, fdi, watch, 10.0)
-    assert watch["output"]["alarmed_at_s"] == 10.0
-    assert not watch["output"]["beside"]
-    assert not watch["output"]["misnamed"]
+    monitor, fdi = new_watch(), detected_fdi()
+    on(watching.raise_alarm, fdi, monitor, 10.0)
+    assert monitor["output"]["alarmed_at_s"] == 10.0
+    assert not monitor["output"]["keeps_surface"]
+    assert not monitor["output"]["misnamed"]
 
 
 def test_an_instrument_without_a_reading_is_named_at_once():
-    watch = new_watch()
-    on(watching.decide, new_fdi(), watch, seen(BETA, PSI), 5.0)
-    assert watch["output"]["alarmed"]
-    assert watch["output"]["named"] == BETA
-    assert watch["output"]["named_at_s"] == 5.0
-    assert np.flatnonzero(watch["output"]["replaced"]).tolist() == [BETA]
-    on(watching.decide, new_fdi(), watch, seen(PSI), 6.0)
-    assert watch["output"]["named"] == BETA
+    monitor = new_watch()
+    on(watching.decide, new_fdi(), monitor, seen(BETA, PSI), 5.0)
+    assert monitor["output"]["alarmed"]
+    assert monitor["output"]["named"] == BETA
+    assert monitor["output"]["named_at_s"] == 5.0
+    assert np.flatnonzero(monitor["output"]["replaced"]).tolist() == [BETA]
+    on(watching.decide, new_fdi(), monitor, seen(PSI), 6.0)
+    assert monitor["output"]["named"] == BETA
 
 
 def test_the_one_suspect_left_is_named_and_two_are_not():
-    watch = with_shares({CLIMB: 2.0})
-    on(watching.decide, new_fdi(), watch, seen(), 5.0)
-    assert (watch["output"]["alarmed"], watch["output"]["lead"], watch["output"]["named"]) == (
+    monitor = with_shares({CLIMB: 2.0})
+    on(watching.decide, new_fdi(), monitor, seen(), 5.0)
+    assert (monitor["output"]["alarmed"], monitor["output"]["lead"], monitor["output"]["named"]) == (
         1,
         CLIMB,
         ALTITUDE,
     )
-    watch = with_shares({ALPHA_FLOW: 2.0})
-    on(watching.decide, new_fdi(), watch, seen(), 5.0)
-    assert (watch["output"]["alarmed"], watch["output"]["lead"], watch["output"]["named"]) == (
+    monitor = with_shares({ALPHA_FLOW: 2.0})
+    on(watching.decide, new_fdi(), monitor, seen(), 5.0)
+    assert (monitor["output"]["alarmed"], monitor["output"]["lead"], monitor["output"]["named"]) == (
         1,
         ALPHA_FLOW,
-        NOBODY,
+        NO_SENSOR,
     )
-    watch["step"]["test"]["share"][SPEED] = 9.0
-    on(watching.decide, new_fdi(), watch, seen(), 6.0)
-    assert watch["output"]["lead"] == ALPHA_FLOW  # the first alarm leads
+    monitor["step"]["test"]["share"][SPEED] = 9.0
+    on(watching.decide, new_fdi(), monitor, seen(), 6.0)
+    assert monitor["output"]["lead"] == ALPHA_FLOW  # the first alarm leads
     quiet = new_watch()
     on(watching.decide, new_fdi(), quiet, seen(), 5.0)
     assert not quiet["output"]["alarmed"]
@@ -319,12 +327,12 @@ def asked(
     error=(0.0, 0.0, 0.0), then=(0.0, 0.0, 0.0), innovation=(0.0, 0.0, 0.0), noise=0.0, spike=0.0, **fields
 ):
     """What the rates say by axis; by default the bound of a frame is 1 rad/s2."""
-    watch, fdi = new_watch(gyro_error=error, gyro_error_then=then, spike_before=spike, **fields), new_fdi()
+    monitor, fdi = new_watch(gyro_error=error, gyro_error_then=then, spike_before=spike, **fields), new_fdi()
     fdi["bank"]["output"]["innovation"], fdi["bound"]["frame"] = innovation, 1.0
     fdi["bank"]["output"]["threshold"][:3] = 1.0
-    watch["step"]["test"]["noise"] = noise
-    on(watching.ask_rates, fdi, watch)
-    return watch["memory"]["rates_say"].tolist()
+    monitor["step"]["test"]["noise"] = noise
+    on(watching.compare_rates_with_dynamics, fdi, monitor)
+    return monitor["memory"]["rates_confirm"].tolist()
 
 
 def test_a_jump_of_a_gyro_is_an_acceleration_and_one_of_the_attitude_is_none():
@@ -373,30 +381,33 @@ def test_a_gyros_error_stays_within_what_the_filter_may_have_of_it(error, say):
 
 
 def test_what_the_rates_have_said_stays_said():
-    assert asked(error=(0, 0.3, 0), rates_say=(YES, YES, NO)) == [YES, YES, NO]
+    assert asked(error=(0, 0.3, 0), rates_confirm=(YES, YES, NO)) == [YES, YES, NO]
 
 
 @pytest.mark.parametrize(("first", "say"), [(1.0, UNKNOWN), (0.5, UNKNOWN), (0.2, NO)])
 def test_a_first_error_of_a_gyro_need_not_be_in_the_filter(first, say):
     """An error there from the first look on, which brought no innovation: 0.7 of it is within the bound."""
-    watch = new_watch(begun=1, past=0, gyro_error=(first, -first, 2.0 * first))
+    monitor = new_watch(begun=1, past=0, gyro_error=(first, -first, 2.0 * first))
     for past in (0, 1, 2, 3):
-        watch["memory"]["past"] = past
-        watching.note_first_errors(watch)
-    assert watch["memory"]["begun"] == 2
-    assert watch["memory"]["W_bound"].tolist() == [first, first, 2.0 * first], (
+        monitor["memory"]["past"] = past
+        watching.allow_for_first_errors(monitor)
+    assert monitor["memory"]["begun"] == 2
+    assert monitor["memory"]["W_bound"].tolist() == [first, first, 2.0 * first], (
         "once, at the first look of the frame"
     )
     error = (0.7, -0.7, 1.4)
-    assert asked(error=error, then=error, W_bound=watch["memory"]["W_bound"])[0] == say
+    assert asked(error=error, then=error, W_bound=monitor["memory"]["W_bound"])[0] == say
 
 
 @pytest.mark.parametrize(("begun", "asked"), [(1, False), (2, False), (3, True)])
 def test_the_first_whole_frame_shows_no_jump(begun, asked):
-    watch, fdi = with_shares({TURN: 2.0, ANGLE: 1.5}, past=0, gyro_error=(0, 0.3, 0), begun=begun), new_fdi()
+    monitor, fdi = (
+        with_shares({TURN: 2.0, ANGLE: 1.5}, past=0, gyro_error=(0, 0.3, 0), begun=begun),
+        new_fdi(),
+    )
     fdi["bank"]["output"]["threshold"], fdi["bound"]["frame"] = 1.0, 1.0
-    on(watching.decide, fdi, watch, seen(), 5.0)
-    assert (watch["memory"]["rates_say"][1] == NO) == asked
+    on(watching.decide, fdi, monitor, seen(), 5.0)
+    assert (monitor["memory"]["rates_confirm"][1] == NO) == asked
 
 
 @pytest.mark.parametrize("quiet", ["error", "then", "spike_then"])
@@ -411,7 +422,7 @@ def test_the_filter_of_a_gyros_error_follows_it_exactly():
     """W' = -D W + nu with nu = e' + D e, for an e of any course; and the bound of its own uncertainty."""
     rng, frames, fdi = np.random.default_rng(3), 40, new_fdi()
     D = np.array([[3.0, 0.4, -0.2], [0.1, 2.0, 0.3], [-0.5, 0.2, 1.0]])
-    watch = new_watch(damping=D)
+    monitor = new_watch(damping=D)
     error = np.vstack([np.zeros(3), rng.normal(size=(frames, 3))])
     bound, eta_bar = np.zeros(3), np.array([0.3, 0.2, 0.1])
     growing = np.abs(D)
@@ -419,45 +430,45 @@ def test_the_filter_of_a_gyros_error_follows_it_exactly():
     fdi["bound"]["eta_bar"] = eta_bar
     for k in range(frames):
         fdi["bank"]["output"]["innovation"] = (error[k + 1] - error[k]) / DT + D @ error[k]
-        watching.follow_rates(
-            watch, fdi["bank"]["output"]["innovation"], fdi["bound"]["eta_bar"], fdi["config"]["dt"]
+        watching.update_rate_filter(
+            monitor, fdi["bank"]["output"]["innovation"], fdi["bound"]["eta_bar"], fdi["config"]["dt"]
         )
         bound = bound + DT * (eta_bar + growing @ bound)
-    assert watch["memory"]["W"] == pytest.approx(error[-1])
-    assert watch["memory"]["W_bound"] == pytest.approx(bound)
+    assert monitor["memory"]["W"] == pytest.approx(error[-1])
+    assert monitor["memory"]["W_bound"] == pytest.approx(bound)
 
 
 def test_a_bound_of_that_filter_is_never_below_zero():
-    watch = new_watch(damping=np.diag([200.0, 1.0, 1.0]), W_bound=(1.0, 1.0, 1.0))
-    watching.follow_rates(watch, np.zeros(3), np.zeros(3), DT)
-    assert watch["memory"]["W_bound"] == pytest.approx([0.0, 1 - DT, 1 - DT])
+    monitor = new_watch(damping=np.diag([200.0, 1.0, 1.0]), W_bound=(1.0, 1.0, 1.0))
+    watching.update_rate_filter(monitor, np.zeros(3), np.zeros(3), DT)
+    assert monitor["memory"]["W_bound"] == pytest.approx([0.0, 1 - DT, 1 - DT])
 
 
 @pytest.mark.parametrize(("size", "clear"), [(0.999, 0), (1.001, 1)])
 def test_what_no_gyro_can_be_is_further_from_w_than_all_bounds(size, clear):
-    watch = new_watch(W=(0.0, -0.5, 0.0), W_bound=(0.1, 0.3, 0.1))
-    test = watch["step"]["test"]
+    monitor = new_watch(W=(0.0, -0.5, 0.0), W_bound=(0.1, 0.3, 0.1))
+    test = monitor["step"]["test"]
     test["bound"][:] = 9.0
     test["bound"][TURN + 1, 0] = 0.02
     limit = 0.02 + H * (0.3 + watching.SLACK * 0.5)
     test["residual"][TURN + 1] = size * limit + H * 0.5
-    watching.clear_gyros(watch)
-    assert watch["memory"]["no_gyro"] == clear
-    assert watch["memory"]["apart"][1] == pytest.approx([size * limit] * 3)
-    watching.clear_gyros(watch)
-    assert watch["memory"]["apart"][1] == pytest.approx(size * limit * (1.0 + np.array([0.0, 0.9, 0.99])))
-    assert watch["memory"]["apart_bound"][1] == pytest.approx(H * 0.4 * (1.0 + np.array([0.0, 0.9, 0.99])))
+    watching.exclude_gyros(monitor)
+    assert monitor["memory"]["no_gyro"] == clear
+    assert monitor["memory"]["apart"][1] == pytest.approx([size * limit] * 3)
+    watching.exclude_gyros(monitor)
+    assert monitor["memory"]["apart"][1] == pytest.approx(size * limit * (1.0 + np.array([0.0, 0.9, 0.99])))
+    assert monitor["memory"]["apart_bound"][1] == pytest.approx(H * 0.4 * (1.0 + np.array([0.0, 0.9, 0.99])))
 
 
 def test_a_watch_begins_with_its_first_look():
-    watch = new_watch(past=3)
+    monitor = new_watch(past=3)
     measured = np.zeros(1, [("signal", "f8", (N_SENSORS,)), ("force", "f8", (3,))]).view(np.recarray)[0]
     measured["signal"][AIRSPEED], measured["signal"][QDYN], measured["force"] = 45.0, 1000.0, (1.0, 2.0, -9.0)
-    watch["step"]["config"]["gravity"], watch["step"]["config"]["offset"][ALTITUDE] = 9.8, 0.7
-    watch["step"]["config"]["drift"], watch["step"]["config"]["swift"] = 2e-3, 80.0
-    watching.begin(watch, measured, 5.0)
-    step = watch["step"]
-    assert (watch["memory"]["begun"], watch["memory"]["past"]) == (1, 0)
+    monitor["step"]["config"]["gravity"], monitor["step"]["config"]["offset"][ALTITUDE] = 9.8, 0.7
+    monitor["step"]["config"]["drift"], monitor["step"]["config"]["swift"] = 2e-3, 80.0
+    watching.begin(monitor, measured, 5.0)
+    step = monitor["step"]
+    assert (monitor["memory"]["begun"], monitor["memory"]["past"]) == (1, 0)
     assert step["memory"]["error_then"][[PHI, ALTITUDE]] == pytest.approx(
         [0.01, 0.7]
     )  # drifted since the flight began
@@ -470,18 +481,18 @@ def test_a_watch_begins_with_its_first_look():
 
 
 def stood_in(i, signal=(), **fields):
-    watch = new_watch(**fields)
+    monitor = new_watch(**fields)
     belief = np.zeros(1, belief_dtype(4)).view(np.recarray)[0]
-    step = watch["step"]
+    step = monitor["step"]
     step["memory"]["predicted"], step["memory"]["command"] = np.arange(N_SENSORS) / 10.0, (1800.0, 20.0)
     step["memory"]["then"][[QDYN, AIRSPEED]] = 1000.0, 40.0
-    step["memory"]["then"][:3], watch["config"]["trim"] = (0.1, 0.2, 0.3), 7.0
+    step["memory"]["then"][:3], monitor["config"]["trim"] = (0.1, 0.2, 0.3), 7.0
     values = np.zeros(N_SENSORS)
     for sensor, value in dict(signal).items():
         values[sensor] = value
     belief["f"], belief["G"], belief["u"], belief["u_then"] = (1, 2, 3), 0.5, (0.1, 0.2, 0, 0), (0.7, 0, 0, 0)
     step["test"]["residual"][:3], step["test"]["filtered"][:3, 1] = (0.01, 0.02, 0.03), (0.4, 0.5, 0.6)
-    return float(watching.stand_in(watch, belief, values, i)), watch
+    return float(watching.substitute_of(monitor, belief, values, i)), monitor
 
 
 def test_vanes_are_predicted_and_drift_back_to_trim():
@@ -506,11 +517,11 @@ def test_attitude_and_altitude_are_predicted_and_the_engine_is_as_commanded():
 @pytest.mark.parametrize("gyro", GYROS)
 @pytest.mark.parametrize("past", [0, 1])
 def test_a_rate_is_what_the_attitude_shows_and_the_models_change_since(gyro, past):
-    value, watch = stood_in(gyro, past=past)
+    value, monitor = stood_in(gyro, past=past)
     u_sum = 0.7 if past == 0 else 0.3
     acceleration = (1, 2, 3)[gyro] + 0.5 * u_sum
     assert value == pytest.approx((0.1, 0.2, 0.3)[gyro] + (0.01, 0.02, 0.03)[gyro] / H + H * acceleration)
-    assert watch["memory"]["taken_over"][gyro]
+    assert monitor["memory"]["taken_over"][gyro]
 
 
 def test_where_the_attitude_is_noisy_a_rate_follows_it_slowly_after_one_step():
@@ -520,62 +531,62 @@ def test_where_the_attitude_is_noisy_a_rate_follows_it_slowly_after_one_step():
     assert value == pytest.approx(0.2 + 0.1 * 0.02 / H + H * 2.35)
 
 
-def looked(watch, fdi, **signal):
+def looked(monitor, fdi, **signal):
     """A look at instruments in level flight, with some readings moved."""
     measured = np.zeros(1, MEASURED).view(np.recarray)[0]
     measured["signal"][AIRSPEED], measured["signal"][QDYN] = 45.0, 1000.0
     for name, value in signal.items():
         measured["signal"][{"phi": PHI, "altitude": ALTITUDE, "p": 0}[name]] += value
     belief = np.zeros(1, belief_dtype(4)).view(np.recarray)[0]
-    on(watching.monitor, fdi, watch, belief, measured, 3.0)
+    on(watching.monitor_sensors, fdi, monitor, belief, measured, 3.0)
     return measured
 
 
 def test_looks_of_a_frame_follow_one_another():
-    watch, fdi = new_watch(past=3), new_fdi()
+    monitor, fdi = new_watch(past=3), new_fdi()
     fdi["bank"]["output"]["threshold"], fdi["bound"]["frame"] = 1.0, 1.0
-    watch["step"]["config"]["gravity"] = watch["step"]["config"]["offset"] = 0.0
-    watch["step"]["config"]["offset"][:] = 1.0
+    monitor["step"]["config"]["gravity"] = monitor["step"]["config"]["offset"] = 0.0
+    monitor["step"]["config"]["offset"][:] = 1.0
     fdi["bank"]["output"]["innovation"] = 0.5, 0.0, 0.0
-    looked(watch, fdi)
-    assert (watch["memory"]["begun"], watch["memory"]["past"]) == (1, 0)
+    looked(monitor, fdi)
+    assert (monitor["memory"]["begun"], monitor["memory"]["past"]) == (1, 0)
     for k in range(4):
-        looked(watch, fdi, phi=1e-3 * (k % 2))
-        assert watch["memory"]["past"] == (k + 1) % 4
-    assert watch["memory"]["W"][0] == pytest.approx(0.5 * DT)  # once a frame
+        looked(monitor, fdi, phi=1e-3 * (k % 2))
+        assert monitor["memory"]["past"] == (k + 1) % 4
+    assert monitor["memory"]["W"][0] == pytest.approx(0.5 * DT)  # once a frame
     # the gyro's error as the frame began, and the largest inside it: the attitude moved, the rates did not
-    assert watch["memory"]["gyro_error"] == pytest.approx(np.zeros(3), abs=1e-12)
-    assert watch["memory"]["spike"][0] == pytest.approx(1e-3 / H, rel=1e-3)
-    before = watch["memory"]["spike"].copy()
-    looked(watch, fdi, phi=2e-3)
-    assert watch["memory"]["gyro_error"][0] == pytest.approx(-1e-3 / H, rel=1e-2)
-    assert watch["memory"]["spike_then"] == pytest.approx(before)
-    assert not watch["memory"]["spike"].any()
-    assert watch["memory"]["gyro_error_then"] == pytest.approx(np.zeros(3), abs=1e-12)
-    assert watch["memory"]["W"][0] == pytest.approx(2 * 0.5 * DT)
+    assert monitor["memory"]["gyro_error"] == pytest.approx(np.zeros(3), abs=1e-12)
+    assert monitor["memory"]["spike"][0] == pytest.approx(1e-3 / H, rel=1e-3)
+    before = monitor["memory"]["spike"].copy()
+    looked(monitor, fdi, phi=2e-3)
+    assert monitor["memory"]["gyro_error"][0] == pytest.approx(-1e-3 / H, rel=1e-2)
+    assert monitor["memory"]["spike_then"] == pytest.approx(before)
+    assert not monitor["memory"]["spike"].any()
+    assert monitor["memory"]["gyro_error_then"] == pytest.approx(np.zeros(3), abs=1e-12)
+    assert monitor["memory"]["W"][0] == pytest.approx(2 * 0.5 * DT)
 
 
 def test_a_broken_altimeter_is_named_and_replaced_from_then_on():
-    watch, fdi = new_watch(), new_fdi()
+    monitor, fdi = new_watch(), new_fdi()
     fdi["bound"]["frame"], fdi["bank"]["output"]["threshold"] = 1.0, 1.0
-    looked(watch, fdi)
-    looked(watch, fdi)
-    assert not watch["output"]["alarmed"]
-    measured = looked(watch, fdi, altitude=50.0)
-    assert watch["output"]["named"] == ALTITUDE
+    looked(monitor, fdi)
+    looked(monitor, fdi)
+    assert not monitor["output"]["alarmed"]
+    measured = looked(monitor, fdi, altitude=50.0)
+    assert monitor["output"]["named"] == ALTITUDE
     assert abs(measured["signal"][ALTITUDE]) < 0.1
     assert abs(measured["altitude"]) < 0.1
 
 
 @pytest.mark.parametrize(("past", "asked"), [(0, True), (1, False)])
 def test_the_rates_are_asked_once_a_frame(past, asked):
-    watch, fdi = (
-        with_shares({TURN: 2.0, ANGLE: 1.5}, past=past, gyro_error=(0, 0.3, 0), begun=watching.ASKED),
+    monitor, fdi = (
+        with_shares({TURN: 2.0, ANGLE: 1.5}, past=past, gyro_error=(0, 0.3, 0), begun=watching.RUNNING),
         new_fdi(),
     )
     fdi["bank"]["output"]["threshold"], fdi["bound"]["frame"] = 1.0, 1.0
-    on(watching.decide, fdi, watch, seen(), 5.0)
-    assert (watch["memory"]["rates_say"][1] == NO) == asked
+    on(watching.decide, fdi, monitor, seen(), 5.0)
+    assert (monitor["memory"]["rates_confirm"][1] == NO) == asked
 
 
 @pytest.mark.parametrize(
@@ -591,20 +602,20 @@ def test_the_rates_are_asked_once_a_frame(past, asked):
 def test_what_is_replaced_is_shared_out_and_the_slipstream_is_that_of_what_it_is_made_of(
     broken, engine, shared, slipstream, missing
 ):
-    watch, measured = new_watch(engine=engine), np.zeros(1, MEASURED).view(np.recarray)[0]
+    monitor, measured = new_watch(engine=engine), np.zeros(1, MEASURED).view(np.recarray)[0]
     belief = np.zeros(1, belief_dtype(4)).view(np.recarray)[0]
-    watch["step"]["memory"]["predicted"], watch["step"]["memory"]["command"] = 0.1, (1800.0, 20.0)
-    watch["step"]["memory"]["then"][[QDYN, AIRSPEED]] = 1000.0, 44.0
+    monitor["step"]["memory"]["predicted"], monitor["step"]["memory"]["command"] = 0.1, (1800.0, 20.0)
+    monitor["step"]["memory"]["then"][[QDYN, AIRSPEED]] = 1000.0, 44.0
     measured["signal"], measured["y"], measured["attitude"] = 0.3, 9.0, 9.0
     measured["signal"][[AIRSPEED, QDYN, ENGINE_SPEED, MANIFOLD]] = 45.0, 1036.0, 1900.0, 21.0
     for i in broken:
         if missing:
             measured["missing"][i] = 1
         else:
-            watch["output"]["replaced"][i] = 1
+            monitor["output"]["replaced"][i] = 1
     before = measured["signal"].copy()
-    watching.replace(watch, belief, measured)
-    assert np.flatnonzero(watch["output"]["replaced"]).tolist() == sorted(broken)
+    watching.replace(monitor, belief, measured)
+    assert np.flatnonzero(monitor["output"]["replaced"]).tolist() == sorted(broken)
     assert set(np.flatnonzero(measured["signal"] != before)) == set(broken)
     assert (measured["attitude"][1] != 9.0) == shared
     assert (measured["y"][DPT] != 9.0) == slipstream
@@ -624,18 +635,21 @@ def test_at_its_bound_a_test_is_within_it():
 
 def test_of_a_kind_the_first_filter_says_how_large_it_is():
     """The others have less of it, or more of what was before."""
-    watch = with_shares({TURN: 0.5, TURN + 1: 2.0}, lead=TURN + 1)
-    watch["step"]["test"]["filtered"][TURN : TURN + 3, 1:] = 1e3
-    watch["step"]["test"]["filtered"][TURN, 0] = 50.0
-    assert watching.involved(watch, TURN + 1, TURN)
-    watch["step"]["test"]["filtered"][TURN, 0] = 70.0
-    assert not watching.involved(watch, TURN + 1, TURN)
-    watch["step"]["test"]["filtered"][TURN, 0], watch["step"]["test"]["filtered"][TURN + 2, 0] = 0.0, -70.0
-    assert not watching.involved(watch, TURN + 1, TURN)
+    monitor = with_shares({TURN: 0.5, TURN + 1: 2.0}, lead=TURN + 1)
+    monitor["step"]["test"]["filtered"][TURN : TURN + 3, 1:] = 1e3
+    monitor["step"]["test"]["filtered"][TURN, 0] = 50.0
+    assert watching.is_involved(monitor, TURN + 1, TURN)
+    monitor["step"]["test"]["filtered"][TURN, 0] = 70.0
+    assert not watching.is_involved(monitor, TURN + 1, TURN)
+    monitor["step"]["test"]["filtered"][TURN, 0], monitor["step"]["test"]["filtered"][TURN + 2, 0] = (
+        0.0,
+        -70.0,
+    )
+    assert not watching.is_involved(monitor, TURN + 1, TURN)
     for c in (TURN, ANGLE):
         small = new_watch()
         small["step"]["test"]["share"][c], small["step"]["test"]["filtered"][c, 0] = 2.0, 1e-6
-        assert watching.involved(small, c, c), "of small residuals the largest is involved"
+        assert watching.is_involved(small, c, c), "of small residuals the largest is involved"
 
 
 def test_angles_are_held_against_angles_and_rates_against_rates():
@@ -644,39 +658,39 @@ def test_angles_are_held_against_angles_and_rates_against_rates():
 
 
 def test_suspicions_of_the_frame_before_are_gone():
-    watch = with_shares({CLIMB: 2.0}, lead=CLIMB)
-    watch["output"]["suspect"] = 1
-    watching.note_fired(watch)
-    watching.suspect(watch)
-    assert np.flatnonzero(watch["output"]["suspect"]).tolist() == [ALTITUDE]
+    monitor = with_shares({CLIMB: 2.0}, lead=CLIMB)
+    monitor["output"]["suspect"] = 1
+    watching.record_exceeded_tests(monitor)
+    watching.suspect(monitor)
+    assert np.flatnonzero(monitor["output"]["suspect"]).tolist() == [ALTITUDE]
 
 
 def test_an_alarm_on_roll_counts_as_one():
     """The first axis of the bank has number 0, and no axis is -1."""
-    watch, fdi = new_watch(gyro_error=(0.0, 0.3, 0.0), W_bound=(9.0, 9.0, 9.0)), new_fdi()
-    fdi["bound"]["frame"], fdi["bank"]["output"]["threshold"][:3], watch["memory"]["gyro_error_then"] = (
+    monitor, fdi = new_watch(gyro_error=(0.0, 0.3, 0.0), W_bound=(9.0, 9.0, 9.0)), new_fdi()
+    fdi["bound"]["frame"], fdi["bank"]["output"]["threshold"][:3], monitor["memory"]["gyro_error_then"] = (
         1.0,
         1.0,
         (0.0, 0.3, 0.0),
     )
     fdi["bank"]["output"]["residual"][0, 0] = 2.0
-    on(watching.ask_rates, fdi, watch)
-    assert watch["memory"]["rates_say"].tolist() == [YES] * 3
+    on(watching.compare_rates_with_dynamics, fdi, monitor)
+    assert monitor["memory"]["rates_confirm"].tolist() == [YES] * 3
 
 
 def test_what_is_named_is_replaced_and_flags_are_one():
-    watch = new_watch()
-    watching.name(watch, CLIMB, 3.0)
-    assert watch["output"]["replaced"][CLIMB] == 1
-    watch = new_watch()
-    on(watching.raise_alarm, detected_fdi(9.4, 1), watch, 10.0)
-    assert (watch["output"]["beside"], watch["output"]["alarmed"]) == (1, 1)
+    monitor = new_watch()
+    watching.name(monitor, CLIMB, 3.0)
+    assert monitor["output"]["replaced"][CLIMB] == 1
+    monitor = new_watch()
+    on(watching.raise_alarm, detected_fdi(9.4, 1), monitor, 10.0)
+    assert (monitor["output"]["keeps_surface"], monitor["output"]["alarmed"]) == (1, 1)
 
 
 def test_where_the_attitude_is_blurred_a_look_asks_whether_any_gyro_can_be_it():
     for blurred in (0, 1):
-        watch, fdi = new_watch(blurred=blurred, begun=1, past=1), new_fdi()
-        watch["memory"]["W"], fdi["bank"]["output"]["threshold"] = (0.5, 0.0, 0.0), 1.0
-        watch["step"]["config"]["offset"][:] = 1.0
-        looked(watch, fdi)
-        assert bool(watch["memory"]["apart"].any()) == bool(blurred)
+        monitor, fdi = new_watch(blurred=blurred, begun=1, past=1), new_fdi()
+        monitor["memory"]["W"], fdi["bank"]["output"]["threshold"] = (0.5, 0.0, 0.0), 1.0
+        monitor["step"]["config"]["offset"][:] = 1.0
+        looked(monitor, fdi)
+        assert bool(monitor["memory"]["apart"].any()) == bool(blurred)

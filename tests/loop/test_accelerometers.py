@@ -30,12 +30,12 @@ def fault(sensor, kind, at_s=5.0, **more):
 
 
 def names(scenario):
-    """All that the diagnosis names, frame by frame; what it would have named before the watch spoke, too."""
+    """All that the diagnosis names, frame by frame, what it names before the alarm of the monitor too."""
     sim, named = bf.Simulation(scenario), set()
     while not sim.done:
         sim.step()
         named.add(sim.verdict.isolated)
-    assert not sim._loop.frames[0]["fdi"]["watch"]["output"]["misnamed"]
+    assert not sim._loop.frames[0]["fdi"]["sensor_monitor"]["output"]["misnamed"]
     assert not sim.departed
     return named - {None}
 
@@ -54,7 +54,7 @@ def test_a_broken_accelerometer_is_no_surface_and_no_other_instrument(sensor, ki
 @pytest.mark.parametrize(("rate_hz", "substeps"), [(20, 1), (50, 5), (200, 1)])
 @pytest.mark.parametrize("turbulence", ["none", "light"])
 def test_with_errors_and_gusts_as_declared_it_is_neither(rate_hz, substeps, turbulence):
-    """Small faults, that the watch may never see, stay without an alarm."""
+    """Small faults, that the monitor may never see, stay without an alarm."""
     bounds = {"sensors": "tactical-grade", "turbulence": turbulence}
     air = {"turbulence": "dryden", "severity": "light"} if turbulence == "light" else {}
     for i, size in enumerate((0.3, 3.0)):
@@ -92,7 +92,7 @@ def test_a_vane_that_jumps_is_named_at_once_and_one_that_sticks_soon():
 def test_sound_accelerometers_with_the_declared_errors_are_never_suspected(
     sensors, rate_hz, substeps, turbulence
 ):
-    """The watch's guarantee: worst-case bounds, whatever is drawn."""
+    """The monitor's guarantee: worst-case bounds, whatever is drawn."""
     air = {"turbulence": "dryden", "severity": "light"} if turbulence == "light" else {}
     for seed in range(3):
         fdi = {"sensor_monitor": "always", "bounds": {"sensors": sensors, "turbulence": turbulence}}
@@ -100,9 +100,9 @@ def test_sound_accelerometers_with_the_declared_errors_are_never_suspected(
         loop = Loop(flight(sensors=sensors, environment=air, fdi=fdi, **given))
         for _ in loop.chunks():
             pass
-        watch = loop.frames[0]["fdi"]["watch"]
-        assert watch["memory"]["begun"]
-        assert not watch["output"]["alarmed"]
+        monitor = loop.frames[0]["fdi"]["sensor_monitor"]
+        assert monitor["memory"]["begun"]
+        assert not monitor["output"]["alarmed"]
 
 
 def test_beyond_what_is_declared_they_are():
@@ -112,7 +112,7 @@ def test_beyond_what_is_declared_they_are():
         loop = Loop(flight(sensors={"az": {"bias_mps2": off}}, fdi=fdi))
         for _ in loop.chunks():
             pass
-        assert bool(loop.frames[0]["fdi"]["watch"]["output"]["alarmed"]) == seen
+        assert bool(loop.frames[0]["fdi"]["sensor_monitor"]["output"]["alarmed"]) == seen
 
 
 @pytest.mark.parametrize(
@@ -138,7 +138,7 @@ def test_errors_that_nobody_declared_do():
 
 
 def test_they_are_read_from_the_frame_on_in_which_an_instrument_breaks():
-    """The first look of the watch is at readings with their errors, not at the truth."""
+    """The first look of the monitor is at readings with their errors, not at the truth."""
     errors = {"az": {"bias_mps2": 0.5}, "p": {"noise_std_deg_s": 0.01}}
     sim = bf.Simulation(flight(sensors=errors, fdi={"bounds": {"sensors": errors}}))
     sim.step(frames=300)

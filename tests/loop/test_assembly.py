@@ -205,7 +205,7 @@ def test_a_plug_in_that_diagnoses_has_the_record_to_itself():
     before = frames["fdi"][0]
     switches = (
         before["config"]["enabled"],
-        before["watch"]["config"]["enabled"],
+        before["sensor_monitor"]["config"]["enabled"],
         before["config"]["every_type"],
     )
     assert switches == (1, 1, 1)
@@ -215,7 +215,7 @@ def test_a_plug_in_that_diagnoses_has_the_record_to_itself():
         fdi["config"]["enabled"],
         fdi["isolation"]["config"]["n"],
         fdi["config"]["every_type"],
-        fdi["watch"]["config"]["enabled"],
+        fdi["sensor_monitor"]["config"]["enabled"],
     )
     power = frames["control"]["power"]["config"]
     assert (*off, fdi["statistical"]["tests"]["enabled"], power["enabled"][0]) == (0,) * 6

@@ -81,7 +81,7 @@ def test_sound_instruments_are_never_suspected(more):
     loop = Loop(scenario)
     for _ in loop.chunks():
         pass
-    watch = loop.frames[0]["fdi"]["watch"]
+    watch = loop.frames[0]["fdi"]["sensor_monitor"]
     assert watch["memory"]["begun"]
     assert not watch["output"]["alarmed"]
 

@@ -89,8 +89,8 @@ CASES = {
     }),
     "no-limits": ({}, {"autopilot.holding.from_s": [5.0, 3.0, 0.0]}),
     "instrument": ({"fdi": {"sensor_monitor": "always"}}, ALARM | {
-        "t": 5.0, "fdi.watch.output.alarmed": 1, "fdi.watch.output.alarmed_at_s": 1.5,
-        "fdi.watch.output.named": 1, "fdi.watch.output.named_at_s": 1.75,
+        "t": 5.0, "fdi.sensor_monitor.output.alarmed": 1, "fdi.sensor_monitor.output.alarmed_at_s": 1.5,
+        "fdi.sensor_monitor.output.named": 1, "fdi.sensor_monitor.output.named_at_s": 1.75,
     }),
 }  # fmt: skip
 
@@ -185,7 +185,7 @@ NOISY = {"q": {"noise_std_deg_s": 1.0}}
         ({}, ALARM | {"fdi.verdict.detected_at_s": 1.99}, False, False),
         ({}, {"fdi.verdict.detected_at_s": 1.99}, False, True),
         ({}, {"fdi.config.authority": STATISTICS}, False, False),
-        ({}, {"fdi.watch.output.alarmed": 1}, False, False),
+        ({}, {"fdi.sensor_monitor.output.alarmed": 1}, False, False),
         ({"faults": [FAULT, BROKEN | {"at_s": 2.5}]}, {}, False, False),
         ({"faults": [FAULT, BROKEN | {"at_s": 2.51}]}, {}, False, True),
         (WRONG, {}, False, False), ({"sensors": NOISY}, {}, False, False),

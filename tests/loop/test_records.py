@@ -62,7 +62,7 @@ def loop(request):
 def test_the_instruments_and_the_watch(loop, changed):
     frame = loop.frames[0]
     assert not changed(of_record(frame["instruments"]), part="instruments")
-    assert not changed(of_record(frame["fdi"]["watch"]), part="watch")
+    assert not changed(of_record(frame["fdi"]["sensor_monitor"]), part="watch")
 
 
 def test_what_is_read_logged_and_told_of_the_start(loop, changed):
@@ -93,7 +93,7 @@ def test_what_a_plug_in_is_told_before_and_in_flight(loop, changed):
     [(0.0, 0.0, 3), (1.0, 0.0, 3), (0.26, 1.0, 50), (0.25, 1.0, sensor_records.NEVER_STILL)],
 )
 def test_for_how_long_a_sound_instrument_may_stand_still(noise, quantum, looks):
-    assert sensor_records.longest_still(noise, quantum) == looks
+    assert sensor_records.longest_identical(noise, quantum) == looks
 
 
 def test_gusts_that_the_watch_reckons_with():
@@ -122,11 +122,11 @@ def test_when_the_instruments_are_watched(monitor, scheme, breaks, watched):
     flown = _scenario(fdi=fdi, faults=[fault] if breaks else [])
     assert Declared.of(flown).monitors_sensors is watched
     assert instrument_records.breaks_instruments(flown) is breaks
-    assert instrument_records.comes_to_be_watched(flown) is watched
+    assert instrument_records.are_ever_monitored(flown) is watched
     later = _scenario(
         fdi={**fdi, "scheme": "none"}, faults=flown.faults, changes=[{"at_s": 2, "scheme": scheme}]
     )
-    assert instrument_records.comes_to_be_watched(later) is watched
+    assert instrument_records.are_ever_monitored(later) is watched
 
 
 @pytest.mark.parametrize(

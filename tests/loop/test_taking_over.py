@@ -121,12 +121,12 @@ def test_a_diagnosis_begun_anew_keeps_what_healthy_flight_has_shown():
     frame, new = _frame("nominal"), _frame("nominal")
     frame["fdi"]["bank"]["output"]["closest"], frame["fdi"]["statistical"]["alarm"]["closest"] = 0.5, 0.75
     for same in (True, False):
-        new["fdi"]["bank"]["output"]["closest"], new["fdi"]["watch"]["memory"]["past"] = 0.0, 3
+        new["fdi"]["bank"]["output"]["closest"], new["fdi"]["sensor_monitor"]["memory"]["past"] = 0.0, 3
         new["fdi"]["bank"]["config"]["n"] = frame["fdi"]["bank"]["config"]["n"] + (not same)
         then = frame.copy()
         take_diagnosis(then, new, 77)
         assert then["since"] == 77
-        assert then["fdi"]["watch"]["memory"]["past"] == 0
+        assert then["fdi"]["sensor_monitor"]["memory"]["past"] == 0
         assert then["fdi"]["statistical"]["alarm"]["closest"] == 0.75
         assert set(then["fdi"]["bank"]["output"]["closest"]) == {0.5 if same else 0.0}
 
@@ -183,7 +183,7 @@ def test_a_plug_in_detectors_word_stands_while_another_law_takes_over():
 
 def test_an_instrument_broken_in_flight_is_watched_by_a_diagnosis_begun_anew(monkeypatch):
     sim, watched = bf.Simulation(scenario(duration_s=1.0)), []
-    monkeypatch.setattr(sim._loop, "enable_watch", lambda *given: watched.append(given))
+    monkeypatch.setattr(sim._loop, "enable_sensor_monitor", lambda *given: watched.append(given))
     sim.change({"scheme": "adaptive-estimators"})
     sim.step(frames=10)
     assert watched == []

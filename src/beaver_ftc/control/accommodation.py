@@ -61,7 +61,7 @@ def accommodate(control, assessment, faults, belief, measured):
 def begin_frame(output, assessment, informed):
     """Nothing is given up or parked yet; a slow surface has lost authority."""
     output.given_up[:], output.parked[:] = 0, 0
-    output.authority_lost = assessment.hedge and not informed
+    output.authority_lost = assessment.surface_lags and not informed
 
 
 @kernel

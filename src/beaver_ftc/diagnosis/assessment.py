@@ -18,14 +18,17 @@ SURE = 400.0  # one over the variance of an effectiveness known to 0.05, which n
 
 @sized
 def assessment_dtype(n: int) -> np.dtype:
-    """The assessment of n surfaces. detected: a fault; unknown: no surface is isolated or leads; named: the
-    isolated surface, -1 for none. measure: accommodation mode of each, -1 where it is open, or where faults
-    of every type are not diagnosed; effectiveness; offset, lag rad; at_once: whether its effectiveness need
-    not be eased in. hedge: a surface is slow. unknown_acceleration (3,) rad/s2: that no known fault explains;
-    pitch_is_open: whether elevator or flap is at fault and it has long been open which."""
+    """The assessment of n surfaces.
+
+    detected: a fault; unknown: no surface is isolated or leads; named: the isolated surface, -1 for none.
+    surface_lags: a surface follows its command late. measure: accommodation mode of each, -1 where open,
+    or where faults of every type are not diagnosed; effectiveness; at_once: whether the law applies it at
+    once, not gradually; offset, lag rad. unknown_acceleration (3,) rad/s2: explained by no known fault.
+    pitch_is_open: elevator or flap is at fault, and it has long been open which.
+    """
     return record(
-        detected=int, unknown=int, every_type=int, named=int, hedge=int, measure=(int, n), effectiveness=n,
-        at_once=(int, n), offset=n, lag=n, unknown_acceleration=3, pitch_is_open=int,
+        detected=int, unknown=int, every_type=int, named=int, surface_lags=int, measure=(int, n),
+        effectiveness=n, at_once=(int, n), offset=n, lag=n, unknown_acceleration=3, pitch_is_open=int,
     )  # fmt: skip
 
 
@@ -34,7 +37,7 @@ def assess(assessment, config, conclusion, types, layout, estimators, statistics
     """Bring the assessment to this frame, by the stages' outputs; statistics: of `statistical_dtype`."""
     every_type, named = config.every_type, isolated_surface(conclusion, estimators)
     assessment.detected, assessment.every_type = conclusion.detected, every_type
-    assessment.named, assessment.hedge, assessment.unknown = named, 0, is_unknown(conclusion)
+    assessment.named, assessment.surface_lags, assessment.unknown = named, 0, is_unknown(conclusion)
     for s in range(assessment.measure.size):
         assessment.measure[s] = types.surface[s].accommodation.mode if every_type else -1
         assessment.effectiveness[s], assessment.at_once[s] = 1.0, 0
@@ -64,7 +67,7 @@ def assess_type(assessment, types, layout, estimators, s):
         assessment.offset[s] = verdict.deflection_error(surface, at_fault)
     elif mode == LAGS:
         assessment.lag[s] = middle_error(surface)
-        assessment.hedge = 1
+        assessment.surface_lags = 1
 
 
 @kernel

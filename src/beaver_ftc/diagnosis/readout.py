@@ -305,7 +305,7 @@ class DiagnosisReadout:
     @cached_property
     def sensor_monitor(self) -> SensorMonitor:
         """The sensor monitor."""
-        return read_sensor_monitor(self._fdi["watch"])
+        return read_sensor_monitor(self._fdi["sensor_monitor"])
 
 
 def estimators_of(fdi: np.void) -> np.ndarray:
@@ -324,7 +324,7 @@ def disable(fdi: np.void) -> None:
     then. A plug-in goes on."""
     if fdi["config"]["enabled"]:
         fdi["config"]["scheme"] = place_of("none")
-    fdi["config"]["enabled"] = fdi["watch"]["config"]["enabled"] = False
+    fdi["config"]["enabled"] = fdi["sensor_monitor"]["config"]["enabled"] = False
 
 
 def recorded_always(fdi: np.void, n: int, every_type: bool) -> dict[str, np.ndarray]:
@@ -375,7 +375,7 @@ def recorded_until_alarm(fdi: np.void, n: int, statistical: bool) -> dict[str, n
 
 def alarm_flags(fdi: np.void) -> tuple[np.int64, np.int64]:
     """Whether the alarm of the surfaces stands, and that of the sensor monitor."""
-    return fdi["verdict"]["detected"], fdi["watch"]["output"]["alarmed"]
+    return fdi["verdict"]["detected"], fdi["sensor_monitor"]["output"]["alarmed"]
 
 
 def _estimator(fie: np.void) -> Estimator:
@@ -406,15 +406,15 @@ def _hypothesis(one: np.void) -> Hypothesis:
     return Hypothesis(*numbers, bool(one["raises_alarm"]), float(one["score"]))
 
 
-def read_sensor_monitor(watch: np.void) -> SensorMonitor:
-    """The sensor monitor, of its record (dtype `WATCH`)."""
-    output, config, memory = watch["output"], watch["step"]["config"], watch["step"]["memory"]
-    furthest = int(output["furthest"])
-    test = watch["step"]["test"][furthest]
+def read_sensor_monitor(monitor: np.void) -> SensorMonitor:
+    """The sensor monitor, of its record (dtype `SENSOR_MONITOR`)."""
+    output, config, memory = monitor["output"], monitor["step"]["config"], monitor["step"]["memory"]
+    furthest = int(output["largest_test"])
+    test = monitor["step"]["test"][furthest]
     residual, rate, noise, air = (float(test[name]) for name in ("residual", "rate", "noise", "air"))
     of_test = SensorTest(residual, rate, noise, air, test["filtered"].copy(), test["bound"].copy())
     return SensorMonitor(
-        bool(watch["config"]["enabled"]), bool(output["alarmed"]), furthest, float(output["share"]),
+        bool(monitor["config"]["enabled"]), bool(output["alarmed"]), furthest, float(output["share"]),
         of_test, int(output["named"]),
         output["replaced"].astype(bool), float(config["h"]), config["gusts"].copy(),
         memory["predicted"].copy(), memory["error"].copy(), memory["command"].copy(),

@@ -15,7 +15,7 @@ from beaver_ftc.diagnosis.detection.bank import largest_share
 from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE, Size
 from beaver_ftc.diagnosis.isolation import estimators
 from beaver_ftc.diagnosis.monitors import engine_symmetry, sensor_monitor
-from beaver_ftc.diagnosis.monitors.sensor_records import WATCH
+from beaver_ftc.diagnosis.monitors.sensor_records import SENSOR_MONITOR
 from beaver_ftc.diagnosis.schemes import fault_classes
 from beaver_ftc.diagnosis.state import STATISTICS
 from beaver_ftc.diagnosis.types import registry
@@ -32,8 +32,8 @@ def diagnosis_dtype(n: int, size: Size = USUAL_SIZE) -> np.dtype:
         config=state.CONFIG, bound=bound_dtype(n, size.boxes), bank=bank.BANK, fdae=fdae.FDAE,
         verdict=conclusions.conclusion_dtype(n), layout=state.layout_dtype(n),
         isolation=estimators.isolation_dtype(n),
-        types=registry.types_dtype(n), statistical=statistical.statistical_dtype(size), watch=WATCH,
-        published=zhang2005.PUBLISHED, engines=engine_symmetry.ENGINES,
+        types=registry.types_dtype(n), statistical=statistical.statistical_dtype(size),
+        sensor_monitor=SENSOR_MONITOR, published=zhang2005.PUBLISHED, engines=engine_symmetry.ENGINES,
         plugin_verdict=state.verdict_dtype(n),
     )  # fmt: skip
 
@@ -72,7 +72,7 @@ def begin_anew(fdi: np.void, before: np.void, in_flight: bool) -> None:
         fdi["bank"]["output"]["closest"] = before["bank"]["output"]["closest"]
     for air in ("air", "inertial_air"):
         fdi["statistical"][air]["config"]["in_flight"] = in_flight
-    fdi["watch"]["memory"]["past"] = 0
+    fdi["sensor_monitor"]["memory"]["past"] = 0
 
 
 def _check_pairs(scenario: Scenario) -> None:
@@ -102,8 +102,8 @@ def predict_estimators(fdi, belief):
 def note_named_surfaces(fdi, t):
     """Record at t s which surfaces are named: those of a pair, or the isolated one; none once a sensor is
     found broken."""
-    found, watch = fdi.verdict, fdi.watch
-    void = sensor_monitor.speaks(watch) and not watch.output.beside
+    found, monitor = fdi.verdict, fdi.sensor_monitor
+    void = sensor_monitor.has_alarm(monitor) and not monitor.output.keeps_surface
     only = conclusions.isolated_surface(found, fdi.isolation.estimator)
     for s in range(fdi.types.surface.size):
         named = fdi.types.surface[s].status.named if fdi.types.pair.enabled else s == only

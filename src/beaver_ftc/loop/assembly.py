@@ -37,9 +37,9 @@ from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.dump import texts_of
 from beaver_ftc.scenario.schema import Scenario
 
-# How many columns the log has for estimators, the watch, sensors with rates of their own, the engine,
-# statistical tests.
-LOGGED = record(estimators=int, watch=int, sampled=int, power=int, tests=int)
+# How many columns the log has for estimators, the sensor monitor, sensors with rates of their own, the
+# engine, statistical tests.
+LOGGED = record(estimators=int, sensor_monitor=int, sampled=int, power=int, tests=int)
 
 
 @sized
@@ -110,7 +110,7 @@ def configure_diagnosis_at_trim(frame: np.void, scenario: Scenario, trim: Trim) 
     design = belief["design"]
     belief["u"] = belief["commanded"] = frame["control"]["layout"]["trim"] = trim.u
     anchor(design, *trim)
-    sensor_records.configure(fdi["watch"], scenario, design, trim.y, declared.monitors_sensors)
+    sensor_records.configure(fdi["sensor_monitor"], scenario, design, trim.y, declared.monitors_sensors)
     mass = mass_of(scenario.design_model, scenario.airframe)
     noise_model.set_up(fdi, scenario.fdi, declared, design, mass, tuple(trim), scenario.rate_hz)
 
@@ -143,7 +143,7 @@ def lay_out(frame: np.void, scenario: Scenario, diagnoses_itself: bool) -> tuple
     aircraft, tests = scenario.airframe, fdi["statistical"]["tests"]
     estimators = estimator_names(scenario.fdi.fault_class, aircraft) if diagnoses_itself else ()
     logged["estimators"] = fdi["isolation"]["config"]["n"] if diagnoses_itself else 0
-    watched = logged["watch"] = instrument_records.columns_of_the_watch(scenario)
+    watched = logged["sensor_monitor"] = instrument_records.columns_of_the_monitor(scenario)
     sampled = instrument_records.reads_further(scenario)
     logged["sampled"] = N_SAMPLED if sampled else 0
     moved = frame["control"]["power"]["config"]["enabled"] or (profile and aircraft.airspeed_by == "power")

@@ -86,13 +86,13 @@ class Changing:
             take_law(frame, new["control"])
         if stage.renews:
             if loop.sensor_schedule.any:  # broken in flight, as the scenario had not said
-                loop.enable_watch(new["fdi"], stage.scenario)
+                loop.enable_sensor_monitor(new["fdi"], stage.scenario)
             take_diagnosis(frame, new, stage.frame)
         if change.sensors is not None:
             take_configuration(frame["instruments"], new["instruments"])
         statistical = frame["fdi"]["statistical"]
         forces = statistical["forces"]["known"] or statistical["air"]["output"]["uses_accelerometers"]
-        if frame["fdi"]["watch"]["config"]["enabled"] or frame["instruments"]["engine"] or forces:
+        if frame["fdi"]["sensor_monitor"]["config"]["enabled"] or frame["instruments"]["engine"] or forces:
             loop.read_more()
         frame["control"]["power"]["config"]["enabled"] = new["control"]["power"]["config"]["enabled"]
         before = loop.plugin_frame

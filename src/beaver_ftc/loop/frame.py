@@ -42,15 +42,17 @@ from beaver_ftc.plant.sensing import NOT_FINITE, flight_status, hand_over, measu
 
 
 @apart
-def watch_instruments(frame):
-    """Hold the instruments against one another; what is known to be broken is replaced. What an instant
-    inside a frame shows is known with that frame."""
-    fdi, watch, engine = frame.fdi, frame.fdi.watch, frame.control.power.output
-    before, t = watch.output.alarmed, frame.k * frame.dt
+def monitor_sensors(frame):
+    """Compare the sensors with one another, and replace the broken one. Time inside a frame counts as that of
+    its end."""
+    fdi, monitor, engine = frame.fdi, frame.fdi.sensor_monitor, frame.control.power.output
+    before, t = monitor.output.alarmed, frame.k * frame.dt
     if engine.in_use:
-        sensor_monitor.note_command(watch, engine.command[0])
-    sensor_monitor.monitor(watch, frame.belief, frame.measured, fdi.verdict, fdi.bank, fdi.bound, frame.dt, t)
-    if watch.output.alarmed and not (before or watch.output.beside):
+        sensor_monitor.expect_manifold_pressure(monitor, engine.command[0])
+    sensor_monitor.monitor_sensors(
+        monitor, frame.belief, frame.measured, fdi.verdict, fdi.bank, fdi.bound, frame.dt, t
+    )
+    if monitor.output.alarmed and not (before or monitor.output.keeps_surface):
         reset_surface_diagnosis(fdi)
 
 
@@ -67,8 +69,8 @@ def sense(frame):
     """Measure, and see what the design model makes of this instant. Returns the flight's status."""
     truth, belief, measured = frame.truth, frame.belief, frame.measured
     measure(truth, frame.instruments, measured)
-    if frame.fdi.watch.config.enabled:
-        watch_instruments(frame)
+    if frame.fdi.sensor_monitor.config.enabled:
+        monitor_sensors(frame)
     status = flight_status(truth.value, truth.ground_m, truth.slow_mps)
     if status != NOT_FINITE:
         evaluate_design(belief, measured)
@@ -124,13 +126,13 @@ def diagnose(frame):
 def assess_faults(frame):
     """Put what the diagnosis says of each surface, and of what is unknown, where the law reads it."""
     fdi, assessment = frame.fdi, frame.assessment
-    config, found, types, layout, chances = fdi.config, fdi.verdict, fdi.types, fdi.layout, fdi.statistical
-    assess(assessment, config, found, types, layout, fdi.isolation.estimator, chances)
-    assess_unknown(assessment, config, found, types, layout, chances, fdi.fdae, fdi.bound)
+    config, found, types, layout, detector = fdi.config, fdi.verdict, fdi.types, fdi.layout, fdi.statistical
+    assess(assessment, config, found, types, layout, fdi.isolation.estimator, detector)
+    assess_unknown(assessment, config, found, types, layout, detector, fdi.fdae, fdi.bound)
 
 
 @kernel
-def look_on(frame):
+def accumulate_instant(frame):
     """Take in an instant inside a frame: what is believed of it, and the gust that the vanes see by then."""
     fdi = frame.fdi
     schemes.accumulate(fdi.config.scheme, fdi, frame.belief, frame.measured)
@@ -239,18 +241,19 @@ def record(frame, commanded, row):
         column += log_row.PER_ESTIMATOR
     column = put(row, column, frame.assessment.effectiveness)
     column = log_row.record_used(effectiveness, control.config.uses_verdict, row, column)
-    row[column], row[column + 1] = frame.supervisor.mode, fdi.verdict.detected or fdi.watch.output.alarmed
+    monitor, missing = fdi.sensor_monitor, frame.measured.missing
+    row[column], row[column + 1] = frame.supervisor.mode, fdi.verdict.detected or monitor.output.alarmed
     column += 2
-    if logged.watch:
-        column = log_row.record_watch(fdi.watch, frame.measured.missing, row, column, logged.watch)
+    if logged.sensor_monitor:
+        column = log_row.record_sensor_monitor(monitor, missing, row, column, logged.sensor_monitor)
     column = log_row.record_sampled(frame.measured.signal, row, column, logged.sampled)
     column = put(row, column, control.power.output.command[: logged.power])
     if frame.autopilot.enabled:
         log_row.record_profile(frame.autopilot, row, column)
-    chances = fdi.statistical
-    if logged.tests and chances.tests.enabled:
-        views = chances.views[: chances.n_views]
-        statistical.log_scores(chances.tests, chances.block, views, chances.forces, chances.air, row)
+    detector = fdi.statistical
+    if logged.tests and detector.tests.enabled:
+        views = detector.views[: detector.n_views]
+        statistical.log_scores(detector.tests, detector.block, views, detector.forces, detector.air, row)
 
 
 @kernel

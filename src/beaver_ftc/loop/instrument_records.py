@@ -24,16 +24,16 @@ def breaks_instruments(scenario: Scenario) -> bool:
     return any(of_a_sensor(fault) for fault in scenario.faults)
 
 
-def comes_to_be_watched(scenario: Scenario) -> bool:
+def are_ever_monitored(scenario: Scenario) -> bool:
     """Whether they are at some time of the flight."""
     flown = (scenario, *(then for _, then in stages(scenario)))
     return any(Declared.of(then).monitors_sensors for then in flown)
 
 
-def columns_of_the_watch(scenario: Scenario) -> int:
+def columns_of_the_monitor(scenario: Scenario) -> int:
     """How many the log has: none, share and test, and of flights in which readings go missing, which."""
     lost = any(fault.type == "lost" for fault in scenario.faults)
-    return comes_to_be_watched(scenario) * (3 if lost else 2)
+    return are_ever_monitored(scenario) * (3 if lost else 2)
 
 
 def has_real_engine(scenario: Scenario) -> bool:

@@ -79,11 +79,11 @@ def record_used(effectiveness, used, row, column):
 
 
 @kernel
-def record_watch(watch, missing, row, column, columns):
+def record_sensor_monitor(monitor, missing, row, column, columns):
     """How near a test between the instruments came to its bound in this frame, and which; of three `columns`
     the first instrument that gives no reading, missing (N_SENSORS,). Returns the next column."""
-    if watch.config.enabled and watch.memory.begun:
-        row[column], row[column + 1] = watch.output.share, watch.output.furthest
+    if monitor.config.enabled and monitor.memory.begun:
+        row[column], row[column + 1] = monitor.output.share, monitor.output.largest_test
     if columns > 2:
         for i in range(missing.size - 1, -1, -1):
             if missing[i]:

@@ -15,7 +15,7 @@ from beaver_ftc.loop import memory, stepping
 from beaver_ftc.loop.assembly import Trim, configure_at_trim, configure_design, lay_out, y_places
 from beaver_ftc.loop.cockpit import Cockpit, note_failures, set_origin, travel_rad
 from beaver_ftc.loop.outcome import Landing, landing_of
-from beaver_ftc.loop.stepping import fly_frame, fly_on, hold, look_inside
+from beaver_ftc.loop.stepping import fly_frame, fly_on, hold, sense_inside
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.adapter import Plant, translated
 from beaver_ftc.plant.conditions import ready
@@ -211,19 +211,19 @@ class Loop:
             return
         frame = self.frames[0]
         self.read_more()
-        if self.enable_watch(frame["fdi"], self.scenario) and frame["k"] > 0:
+        if self.enable_sensor_monitor(frame["fdi"], self.scenario) and frame["k"] > 0:
             if not frame["measured"]["inertial"]:
                 self._read_further(frame["measured"])
-            direct(stepping.begin_watch, self.frames)(self.frames)
+            direct(stepping.begin_sensor_monitor, self.frames)(self.frames)
 
-    def enable_watch(self, fdi: np.void, scenario: Scenario) -> bool:
+    def enable_sensor_monitor(self, fdi: np.void, scenario: Scenario) -> bool:
         """Have the sensors monitored as `scenario` declares them, if that is allowed and was not so before.
         Accelerometers no longer count as sound. Returns whether the monitor has just been enabled."""
         wanted = self.scenario.fdi.sensor_monitor != "never" and fdi["config"]["enabled"]
-        if not wanted or fdi["watch"]["config"]["enabled"]:
+        if not wanted or fdi["sensor_monitor"]["config"]["enabled"]:
             return False
         design = self.frames[0]["belief"]["design"]
-        sensor_records.configure(fdi["watch"], scenario, design, self.trimmed.y, enabled=True)
+        sensor_records.configure(fdi["sensor_monitor"], scenario, design, self.trimmed.y, enabled=True)
         stop_accelerometers(fdi["statistical"]["air"])
         fdi["statistical"]["inertial_air"]["output"]["moving"] = 0
         return True
@@ -328,7 +328,7 @@ class Loop:
 
     @cached_property
     def _look(self) -> Callable[[np.ndarray], int]:
-        return direct(look_inside, self.frames)
+        return direct(sense_inside, self.frames)
 
     def _landed(self, status: int) -> int:
         if status == NOT_FINITE:

@@ -285,7 +285,7 @@ def _alarm(fdi: np.void) -> dict[str, Any]:
 def _findings(frame: np.void, surfaces: Sequence[str]) -> dict[str, Any]:
     """What `_alarm` and `_isolation` have, of surfaces or of an instrument."""
     fdi = frame["fdi"]
-    broken = instrument_found(fdi["watch"], float(frame["t"]))
+    broken = instrument_found(fdi["sensor_monitor"], float(frame["t"]))
     if broken is not None:
         return {"detection_axis": None, **broken, "so_far": False if broken["isolated"] else None}
     said = _alarm(fdi) | _isolation(fdi, surfaces)
@@ -304,7 +304,7 @@ def _withdrawn(fdi: np.void, surfaces: Sequence[str]) -> tuple[dict[str, Any], .
 def verdict_of(frame: np.void, surfaces: Sequence[str]) -> Verdict:
     """What the built-in diagnosis makes of the flight so far, as a plug-in law is given it."""
     fdi = frame["fdi"]
-    if not (fdi["verdict"]["detected"] or fdi["watch"]["output"]["alarmed"]):
+    if not (fdi["verdict"]["detected"] or fdi["sensor_monitor"]["output"]["alarmed"]):
         return Verdict()
     said = _findings(frame, surfaces)
     return Verdict(
@@ -346,7 +346,7 @@ def guaranteed_delay_s(frame: np.void, scenario: Scenario, plugged: bool) -> flo
         return None
     fault_s, verdict = float(truth["fault_at_s"]), fdi["verdict"]
     early = verdict["detected"] and verdict["detected_at_s"] < fault_s - TIME_TOLERANCE_S
-    if early or fdi["config"]["authority"] == STATISTICS or fdi["watch"]["output"]["alarmed"]:
+    if early or fdi["config"]["authority"] == STATISTICS or fdi["sensor_monitor"]["output"]["alarmed"]:
         return None
     return None if _is_off(scenario, certain_s) else certain_s - fault_s
 

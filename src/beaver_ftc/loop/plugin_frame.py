@@ -260,7 +260,7 @@ def plugged(
     if detector is not None:  # no built-in isolation; instead, one estimator a surface for its verdict
         fdi = frames["fdi"][0]
         fdi["config"]["enabled"] = fdi["config"]["every_type"] = fdi["isolation"]["config"]["n"] = 0
-        fdi["statistical"]["tests"]["enabled"] = fdi["watch"]["config"]["enabled"] = 0
+        fdi["statistical"]["tests"]["enabled"] = fdi["sensor_monitor"]["config"]["enabled"] = 0
         fdi["config"]["scheme"], fdi["config"]["fault_class"] = PLUGGED, PUBLISHED
         fdi["types"]["pair"]["enabled"] = 0
         n = fdi["types"]["surface"].size

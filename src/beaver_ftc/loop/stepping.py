@@ -18,13 +18,13 @@ from beaver_ftc.plant.sensing import FLYING, NOT_FINITE, hand_over, sample_force
 
 
 @kernel
-def begin_watch(frames):
+def begin_sensor_monitor(frames):
     """Begin to watch the instruments, with the readings there are. Where accelerometers were not read, their
     truth stands there."""
     frame = frames[0]
     if not frame.measured.inertial:
         sample_forces(frame.instruments, frame.measured)
-    sensor_monitor.begin(frame.fdi.watch, frame.measured, frame.t)
+    sensor_monitor.begin(frame.fdi.sensor_monitor, frame.measured, frame.t)
 
 
 @kernel
@@ -85,14 +85,14 @@ def hold(frames):
 
 
 @kernel
-def look_inside(frames):
+def sense_inside(frames):
     """See an instant inside a frame of the loop, for the means over that frame; nothing is commanded.
 
     A departure, or what is not finite, is left for `fly_frame` to find.
     """
     frame = frames[0]
     if whole.sense(frame) != NOT_FINITE:
-        whole.look_on(frame)
+        whole.accumulate_instant(frame)
         add_effect(frame.accounts.guarantee)
 
 
@@ -133,7 +133,7 @@ def fly_on(frames, references, log, order):
         for left in range(order[1] - 1, -1, -1):
             advance(running)
             if left > 0:
-                look_inside(frames)
+                sense_inside(frames)
         status = fly_frame(frames, references, log)
         if status != FLYING:
             return status

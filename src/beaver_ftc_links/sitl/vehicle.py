@@ -181,7 +181,7 @@ class Flown(Simulation):
     def _begin_diagnosis(self) -> None:
         loop, fresh = self._loop, self._fresh[0]  # type: ignore[index]
         if loop.sensor_schedule.any:  # broken meanwhile
-            loop.enable_watch(diagnosis_record(fresh), loop.scenario)
+            loop.enable_sensor_monitor(diagnosis_record(fresh), loop.scenario)
         take_diagnosis(self._frame, fresh, self._next)
         self._diagnoses = True
         if self.listens_from_s is None:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from beaver_ftc.scenario import Scenario
 
 LOOPBACK = "127.0.0.1"
-NOBODY = ((socket.AF_INET, "198.51.100.1"), (socket.AF_INET6, "2001:db8::1"))  # addresses for documents
+NO_SENSOR = ((socket.AF_INET, "198.51.100.1"), (socket.AF_INET6, "2001:db8::1"))  # addresses for documents
 LAST_WORDS_S = 3.0  # the flight process is given so long to end
 
 Heard = Callable[[int | str, bytes | str], None]  # a page and its message, or why the flight has ended
@@ -150,7 +150,7 @@ def _is_address(host: str) -> bool:
 
 def _outward() -> str:
     """The address of this machine by which it reaches others. Nothing is sent to find it."""
-    for family, nobody in NOBODY:
+    for family, nobody in NO_SENSOR:
         with contextlib.suppress(OSError), socket.socket(family, socket.SOCK_DGRAM) as probe:
             probe.connect((nobody, 9))
             return str(probe.getsockname()[0])

@@ -1,16 +1,18 @@
-"""Is it an accelerometer that is broken, or the vane or the airspeed that it is held against?
+"""Separates a broken accelerometer from a broken vane or airspeed sensor.
 
-Both move the same test of the flow. An accelerometer goes on adding: an error e makes up a velocity e t. What
-a vane or the airspeed is off by comes once, and its reading has it. So from the alarm on
+A test of the flow (airspeed, incidence, sideslip) compares a flow sensor with the accelerometers, so an error
+of either moves it. An accelerometer's error e integrates into a velocity error e t; an error of a flow sensor
+is a step, which its own reading contains. From the alarm on
 
-    an accelerometer is cleared where the reading of the flow has leapt as the test has, soon after the alarm,
-    and none of theirs of late; where the former stands still; for the airspeed, where the density shows it
-    a reading of the flow is cleared where the residuals add up to many times what it has moved by; where an
-    airspeed, or incidence, as wrong as that would show in density, or climb; or where an accelerometer stands
-    still
+    the accelerometers are cleared if the reading of the flow sensor jumps as the test does, soon after the
+    alarm, while no accelerometer has jumped; if the flow sensor is frozen; for the airspeed, if the test of
+    the density is exceeded
+    the flow sensor is cleared if the residuals add up to many times the range of its reading; if an airspeed,
+    or incidence, of that error would exceed the test of the density, or of the climb; if an accelerometer is
+    frozen
 
-Which accelerometer it is follows from the direction of the velocity that is made up. Where nothing tells, no
-instrument is named. None that may be broken is used: `measured.inertial`.
+The direction of the spurious velocity says which accelerometer is broken. If neither is cleared, no sensor is
+named. The diagnosis uses no accelerometer that may be broken: `measured.inertial`.
 """
 
 import numpy as np
@@ -34,16 +36,16 @@ from beaver_ftc.diagnosis.monitors.since_start import hidden
 from beaver_ftc.plant.instruments import AX, N_SENSORS, PHI
 from beaver_ftc.scenario.sensors import N_IN_EQUATIONS
 
-SOON_S = 1.0  # after the alarm: later, chance has had too many tries
-CALMED_S = 2.0  # in which a leap of an accelerometer is forgotten
-GOES_ON = 30.0  # times what the reading has moved by: a scale error within 3 % of -1 would do that
-CLEARLY = 3.0  # beyond a bound, of what is not seen
+SOON_S = 1.0  # after the alarm: later, a jump by chance is too likely
+CALMED_S = 2.0  # time constant with which the largest jump of an accelerometer fades
+GROWTH_FACTOR = 30.0  # residual sum over the range of the reading: a scale error within 3 % of -1 gives that
+CLEARLY = 3.0  # times the bound of a test that is not exceeded
 _ROUNDING_S = 1e-9
 
 
 @kernel
-def instrument_of(test):
-    """The instrument that a test of the flow holds against the accelerometers."""
+def sensor_of(test):
+    """The flow sensor that a test compares with the accelerometers."""
     if test == SPEED:
         return AIRSPEED
     return ALPHA if test == ALPHA_FLOW else BETA
@@ -51,154 +53,161 @@ def instrument_of(test):
 
 @kernel
 def hypothesis_of(test):
-    """That this instrument was broken when the watch began (since_start.py)."""
+    """The hypothesis that this sensor was broken when the monitor began (since_start.py)."""
     if test == SPEED:
         return OF_SPEED
     return OF_ALPHA if test == ALPHA_FLOW else OF_BETA
 
 
 @kernel
-def of_the_flow(test):
-    """Whether a test is one of those that accelerometers move."""
+def is_flow_test(test):
+    """Whether accelerometers take part in a test."""
     return SPEED <= test <= BETA_FLOW
 
 
 @kernel
-def note_stillness(watch, signal):
-    """Count the looks for which each reading (N_SENSORS,) has been the very same; and how far accelerometers
-    have leapt in a look of late, m/s2."""
-    watch.memory.restless *= 1.0 - watch.step.config.h / CALMED_S
+def count_identical_samples(monitor, signal):
+    """Count the samples for which each reading (N_SENSORS,) has been the very same, and find the largest jump
+    of an accelerometer from one sample to the next, m/s2, which fades within CALMED_S."""
+    memory, before = monitor.memory, monitor.step.memory.then
+    memory.largest_jump *= 1.0 - monitor.step.config.h / CALMED_S
     for i in range(N_SENSORS):
-        watch.memory.still[i] = watch.memory.still[i] + 1 if signal[i] == watch.step.memory.then[i] else 0
+        memory.identical[i] = memory.identical[i] + 1 if signal[i] == before[i] else 0
         if AX <= i < N_IN_EQUATIONS:
-            watch.memory.restless = max(watch.memory.restless, abs(signal[i] - watch.step.memory.then[i]))
+            memory.largest_jump = max(memory.largest_jump, abs(signal[i] - before[i]))
 
 
 @kernel
-def stands_still(watch, i):
-    """Whether instrument i is frozen: no sound one gives the same reading for so long."""
-    return watch.memory.still[i] >= watch.config.longest_still[i]
+def is_frozen(monitor, i):
+    """Whether sensor i is frozen: no sound one gives the same reading for so many samples."""
+    return monitor.memory.identical[i] >= monitor.config.longest_identical[i]
 
 
 @kernel
-def weigh(watch, signal):
-    """Clear instruments of the flow, or accelerometers, by this look, that of the alarm or a later one."""
-    if not of_the_flow(watch.output.lead):
+def weigh(monitor, signal):
+    """Clear the flow sensor, or the accelerometers, by this sample, that of the alarm or a later one."""
+    if not is_flow_test(monitor.output.lead):
         return
-    if watch.memory.gathering * watch.step.config.h < SOON_S - _ROUNDING_S and leapt(watch, signal):
-        clear_accelerometers(watch)
-    gather(watch, signal)
-    flow = instrument_of(watch.output.lead)
-    if stands_still(watch, flow) or (watch.output.lead == SPEED and watch.memory.fired[DENSITY]):
-        clear_accelerometers(watch)
+    since_alarm_s = monitor.memory.n_summed * monitor.step.config.h
+    if since_alarm_s < SOON_S - _ROUNDING_S and reading_jumped(monitor, signal):
+        clear_accelerometers(monitor)
+    sum_residuals(monitor, signal)
+    flow = sensor_of(monitor.output.lead)
+    if is_frozen(monitor, flow) or (monitor.output.lead == SPEED and monitor.memory.exceeded[DENSITY]):
+        clear_accelerometers(monitor)
     frozen = False
     for i in range(AX, N_IN_EQUATIONS):
-        frozen = frozen or stands_still(watch, i)
-    if frozen or goes_on(watch) or would_show_elsewhere(watch, signal):
-        watch.memory.cleared[flow] = 1
+        frozen = frozen or is_frozen(monitor, i)
+    if frozen or residual_keeps_growing(monitor) or error_would_show_elsewhere(monitor, signal):
+        monitor.memory.cleared[flow] = 1
 
 
 @kernel
-def clear_accelerometers(watch):
-    """None of them is it."""
-    watch.memory.cleared[AX:] = 1
+def clear_accelerometers(monitor):
+    """Clear all accelerometers."""
+    monitor.memory.cleared[AX:] = 1
 
 
 @kernel
-def leapt(watch, signal):
-    """Whether the residual is more than accelerometers make in a look, and in the reading, not in theirs."""
-    i, step = instrument_of(watch.output.lead), watch.step
-    per_m_s = 1.0 if watch.output.lead == SPEED else 1.0 / max(step.memory.then[AIRSPEED], 1.0)
-    test, per_m_s2 = step.test[watch.output.lead], step.config.h * per_m_s
-    second = signal[i] - 2.0 * step.memory.then[i] + watch.memory.earlier[i]
-    half, theirs = 0.5 * abs(test.residual), 1.5 * watch.memory.restless * per_m_s2
+def reading_jumped(monitor, signal):
+    """Whether the residual exceeds any jump of an accelerometer in one sample, and the flow sensor's reading
+    jumps with it."""
+    i, step = sensor_of(monitor.output.lead), monitor.step
+    per_m_s = 1.0 if monitor.output.lead == SPEED else 1.0 / max(step.memory.then[AIRSPEED], 1.0)
+    test, per_m_s2 = step.test[monitor.output.lead], step.config.h * per_m_s
+    second = signal[i] - 2.0 * step.memory.then[i] + monitor.memory.earlier[i]
+    half, theirs = 0.5 * abs(test.residual), 1.5 * monitor.memory.largest_jump * per_m_s2
     return 2.0 * half > test.bound[0] + LEAP_M_S2 * per_m_s2 and abs(second) >= half > theirs
 
 
 @kernel
-def gather(watch, signal):
-    """Add up the residuals of the flow after the look of the alarm, (3,), what sound instruments may have of
-    them, what a first error of the reading may, and how far each reading has moved meanwhile."""
-    step = watch.step
+def sum_residuals(monitor, signal):
+    """Add up, after the sample of the alarm, the residuals of the flow (3,), the part of sound sensors and
+    that of an error that a reading has had from the start; and find the range of each reading."""
+    step = monitor.step
     for j in range(3):
-        i, test = instrument_of(SPEED + j), step.test[SPEED + j]
-        if watch.memory.gathering == 0:
-            watch.memory.least[j] = watch.memory.most[j] = signal[i]
-            watch.memory.sound[j] = 2.0 * test.noise + test.air * step.config.gust
+        i, test = sensor_of(SPEED + j), step.test[SPEED + j]
+        if monitor.memory.n_summed == 0:
+            monitor.memory.least[j] = monitor.memory.most[j] = signal[i]
+            monitor.memory.sound_sum[j] = 2.0 * test.noise + test.air * step.config.gust
             continue
-        watch.memory.gathered[j] += test.residual
+        monitor.memory.residual_sum[j] += test.residual
         of = hypothesis_of(SPEED + j)
-        watch.memory.sound[j] += step.config.h * test.rate
-        watch.memory.first[j] += watch.since.held[of] * watch.since.reach[of, SPEED + j]
-        watch.memory.least[j], watch.memory.most[j] = (
-            min(watch.memory.least[j], signal[i]),
-            max(watch.memory.most[j], signal[i]),
+        monitor.memory.sound_sum[j] += step.config.h * test.rate
+        monitor.memory.first[j] += monitor.since.held[of] * monitor.since.reach[of, SPEED + j]
+        monitor.memory.least[j], monitor.memory.most[j] = (
+            min(monitor.memory.least[j], signal[i]),
+            max(monitor.memory.most[j], signal[i]),
         )
-    excess = np.sign(watch.memory.gathered[1]) * max(
-        abs(watch.memory.gathered[1]) - watch.memory.sound[1] - watch.memory.first[1], 0.0
+    excess = np.sign(monitor.memory.residual_sum[1]) * max(
+        abs(monitor.memory.residual_sum[1]) - monitor.memory.sound_sum[1] - monitor.memory.first[1], 0.0
     )
     fallen = step.config.h * signal[AIRSPEED] * excess * np.cos(signal[PHI]) * np.cos(signal[PHI + 1])
     for m in range(step.config.decay.size):
-        watch.memory.fallen[m] = step.config.decay[m] * watch.memory.fallen[m] + fallen
-    watch.memory.gathering += 1
+        monitor.memory.climb_error[m] = step.config.decay[m] * monitor.memory.climb_error[m] + fallen
+    monitor.memory.n_summed += 1
 
 
 @kernel
-def goes_on(watch):
-    """Whether the residuals add up to what no error of a reading is, that has moved by so much."""
-    j = watch.output.lead - SPEED
-    moved = watch.memory.most[j] - watch.memory.least[j]
-    sound = watch.memory.sound[j] + watch.memory.first[j]
-    return moved > 0.0 and abs(watch.memory.gathered[j]) > GOES_ON * moved + CLEARLY * sound
+def residual_keeps_growing(monitor):
+    """Whether the residuals add up to more than an error of a flow sensor whose reading has this range."""
+    j = monitor.output.lead - SPEED
+    moved = monitor.memory.most[j] - monitor.memory.least[j]
+    sound = monitor.memory.sound_sum[j] + monitor.memory.first[j]
+    return moved > 0.0 and abs(monitor.memory.residual_sum[j]) > GROWTH_FACTOR * moved + CLEARLY * sound
 
 
 @kernel
-def would_show_elsewhere(watch, signal):
-    """Whether an airspeed as wrong as that would show in the density, or an incidence in the climb; neither
-    does."""
-    step = watch.step
-    elsewhere = DENSITY if watch.output.lead == SPEED else CLIMB
-    if watch.output.lead == BETA_FLOW or watch.memory.fired[elsewhere]:
+def error_would_show_elsewhere(monitor, signal):
+    """Whether an airspeed of this error would exceed the test of the density, or an incidence that of the
+    climb, while that test is within its bound."""
+    step = monitor.step
+    elsewhere = DENSITY if monitor.output.lead == SPEED else CLIMB
+    if monitor.output.lead == BETA_FLOW or monitor.memory.exceeded[elsewhere]:
         return False
-    of = hypothesis_of(watch.output.lead)
+    of = hypothesis_of(monitor.output.lead)
     for m in range(step.config.decay.size):
-        error, speed = abs(watch.memory.fallen[m]), step.test[SPEED]
-        if watch.output.lead == SPEED:
+        error, speed = abs(monitor.memory.climb_error[m]), step.test[SPEED]
+        if monitor.output.lead == SPEED:
             error = 2.0 * (abs(speed.filtered[m]) - speed.bound[m]) / max(signal[AIRSPEED], 1.0)
-            error *= 1.0 - min(watch.since.held[of], 1.0)
-        if error > CLEARLY * (step.test[elsewhere].bound[m] + hidden(watch.since, of, elsewhere, m)):
+            error *= 1.0 - min(monitor.since.held[of], 1.0)
+        if error > CLEARLY * (step.test[elsewhere].bound[m] + hidden(monitor.since, of, elsewhere, m)):
             return True
     return False
 
 
 @kernel
-def suspect_accelerometers(watch, shown):
-    """Fill in which of them can be it: along whose axis there is most of the velocity made up; shown: a gyro
-    explains it."""
-    step, who = watch.step, watch.output.suspect
+def suspect_accelerometers(monitor, shown):
+    """Suspect the accelerometers along whose axis most of the spurious velocity is; shown: a gyro explains
+    it."""
+    step, who = monitor.step, monitor.output.suspect
     alpha, beta, V = step.memory.then[ALPHA], step.memory.then[BETA], max(step.memory.then[AIRSPEED], 1.0)
     faster, down, aside = (
-        watch.memory.gathered[0],
-        V * np.cos(beta) * watch.memory.gathered[1],
-        V * watch.memory.gathered[2],
+        monitor.memory.residual_sum[0],
+        V * np.cos(beta) * monitor.memory.residual_sum[1],
+        V * monitor.memory.residual_sum[2],
     )
-    made_up, size = watch.memory.made_up, 0.0
-    made_up[0] = np.cos(alpha) * (np.cos(beta) * faster - np.sin(beta) * aside) - np.sin(alpha) * down
-    made_up[1] = np.sin(beta) * faster + np.cos(beta) * aside
-    made_up[2] = np.sin(alpha) * (np.cos(beta) * faster - np.sin(beta) * aside) + np.cos(alpha) * down
-    doubt = watch.memory.sound[0] + V * (watch.memory.sound[1] + watch.memory.sound[2])
+    velocity, size, ahead = (
+        monitor.memory.spurious_velocity,
+        0.0,
+        np.cos(beta) * faster - np.sin(beta) * aside,
+    )
+    velocity[0] = np.cos(alpha) * ahead - np.sin(alpha) * down
+    velocity[1] = np.sin(beta) * faster + np.cos(beta) * aside
+    velocity[2] = np.sin(alpha) * ahead + np.cos(alpha) * down
+    doubt = monitor.memory.sound_sum[0] + V * (monitor.memory.sound_sum[1] + monitor.memory.sound_sum[2])
     frozen = -1
     for i in range(3):
-        size = max(size, abs(made_up[i]))
-        frozen = AX + i if stands_still(watch, AX + i) else frozen
+        size = max(size, abs(velocity[i]))
+        frozen = AX + i if is_frozen(monitor, AX + i) else frozen
     for i in range(AX, N_IN_EQUATIONS):
-        along = frozen == i or (frozen < 0 and abs(made_up[i - AX]) + doubt >= 0.5 * size)
-        who[i] = along and not shown and not watch.memory.cleared[i]
+        along = frozen == i or (frozen < 0 and abs(velocity[i - AX]) + doubt >= 0.5 * size)
+        who[i] = along and not shown and not monitor.memory.cleared[i]
 
 
 @kernel
-def discard(watch, measured):
-    """Have no accelerometer used once one may be broken."""
+def discard(monitor, measured):
+    """Mark the accelerometers as unusable once one of them may be broken."""
     for i in range(AX, N_IN_EQUATIONS):
-        if watch.output.replaced[i] or (watch.output.alarmed and watch.output.suspect[i]):
+        if monitor.output.replaced[i] or (monitor.output.alarmed and monitor.output.suspect[i]):
             measured.inertial = 0

@@ -109,7 +109,7 @@ def turn_back(x, h, vector, out):
 
 
 @kernel
-def note_declared(step, signal):
+def bound_errors(step, signal):
     """Fill error and changing (N_SENSORS,): how far each reading can be off, and by how much that changes."""
     for i in range(N_SENSORS):
         size = abs(wrapped(signal[i])) if i == PSI else abs(signal[i])
@@ -153,11 +153,11 @@ def predict(step):
     tilt, bank, v = step.memory.then[THETA], step.memory.then[PHI], step.memory.velocity
     up = v[0] * np.sin(tilt) - v[1] * np.sin(bank) * np.cos(tilt) - v[2] * np.cos(bank) * np.cos(tilt)
     out[ALTITUDE] = step.memory.then[ALTITUDE] + h * up
-    step.memory.pulled[1], step.memory.pulled[0] = step.memory.pulled[0], step.memory.pull
-    step.memory.felt_then = length(step.memory.acceleration_then)
+    step.memory.sizes_before[1], step.memory.sizes_before[0] = step.memory.sizes_before[0], step.memory.size
+    step.memory.size_then = length(step.memory.acceleration_then)
     for i in range(3):
         moved[i] = 1.5 * step.memory.acceleration[i] - 0.5 * step.memory.acceleration_then[i]
-    step.memory.pull = length(moved)
+    step.memory.size = length(moved)
     for i in range(3):
         moved[i] = v[i] + h * moved[i]
     turn_back(rates, h, moved, v)
@@ -211,7 +211,7 @@ def misjudged(step, turning, rates):
     for i in range(AX, AX + 3):
         felt += stepped(step, i) ** 2
         steady += step.config.steady[i]
-    back = step.config.h * (turning * steady + 0.5 * rates * step.memory.felt_then)
+    back = step.config.h * (turning * steady + 0.5 * rates * step.memory.size_then)
     return FALLING_M_S2 + step.memory.unknown + g * tilt + np.sqrt(felt) + back
 
 
@@ -257,7 +257,7 @@ def allow_flow(step, signal, turning, rates):
     slip = max(abs(signal[BETA]) + e[BETA], abs(step.memory.then[BETA]) + E[BETA])
     aslant, vanes = 1.0 / np.cos(min(slip, STEEPEST_RAD)), E[ALPHA] + E[BETA]
     off = misjudged(step, turning, rates)
-    pull, coarse = step.memory.pull + off, 1.0 + step.config.h * (2.0 * step.memory.pull / slow + turning)
+    pull, coarse = step.memory.size + off, 1.0 + step.config.h * (2.0 * step.memory.size / slow + turning)
     gusty = np.sqrt(
         max(signal[AIRSPEED] / step.config.swift, 1.0) * max(step.config.low / lowest(step, signal), 1.0)
     )
@@ -266,7 +266,7 @@ def allow_flow(step, signal, turning, rates):
     test[SPEED].rate = off + coarse * pull * vanes + step.config.h * (pull / slow) ** 2 * E[AIRSPEED]
     for c, vane in ((ALPHA_FLOW, ALPHA), (BETA_FLOW, BETA)):
         test[c].air, test[c].noise, test[c].rate = gusty * aslant / slow, n[vane], coarse * flow
-    tilt, hardest = E[PHI] + E[THETA], max(pull, step.memory.pulled[0], step.memory.pulled[1])
+    tilt, hardest = E[PHI] + E[THETA], max(pull, step.memory.sizes_before[0], step.memory.sizes_before[1])
     climb = (step.memory.then[AIRSPEED] + E[AIRSPEED]) * (tilt + vanes) + E[AIRSPEED]
     test[CLIMB].rate = step.config.rising + step.config.gust + climb + 4.0 / 3.0 * step.config.h * hardest
     test[CLIMB].noise = n[ALTITUDE]
@@ -358,13 +358,13 @@ def compare_equals(step, signal, fresh):
 @kernel
 def begin(step, signal, force):
     """The first look: what was before it is not known."""
-    note_declared(step, signal)
+    bound_errors(step, signal)
     look(step, signal, force)
     step.memory.error_before[:], step.memory.acceleration_then[:] = (
         step.memory.error_then,
         step.memory.acceleration,
     )
-    step.memory.pull = step.memory.pulled[0] = length(step.memory.acceleration) + LEAP_M_S2
+    step.memory.size = step.memory.sizes_before[0] = length(step.memory.acceleration) + LEAP_M_S2
     step.memory.unknown = 0.5 * LEAP_M_S2
     allow(step, signal)
     for c in range(RPM):
@@ -375,7 +375,7 @@ def begin(step, signal, force):
 def check(step, signal, engine):
     """Hold this instant's readings (N_SENSORS,) against the look before; engine: it has instruments."""
     step.memory.drifted += step.config.h * step.config.drift
-    note_declared(step, signal)
+    bound_errors(step, signal)
     predict(step)
     compare(step, signal)
     allow(step, signal)

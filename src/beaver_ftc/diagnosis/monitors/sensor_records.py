@@ -35,7 +35,7 @@ EQUAL_SHOWS = np.array([TESTS[ROWS[SENSORS.index(to.reading)].test] for _, to in
 EQUAL_WITHIN = np.array([to.within for _, to in EQUAL], float)
 POLES_PER_S = (1e6, 10.0, 1.0)
 N_POLES = len(POLES_PER_S)
-NOBODY = -1
+NO_SENSOR = -1
 LEAP_M_S2 = 8.0  # by which no specific force changes from one look to the next
 UNKNOWN, YES, NO = 0, 1, 2
 FASTER = 1.4  # than in trim a flight may become
@@ -45,7 +45,7 @@ WAIT_S = 1.0  # for the instrument to be found; then the fault is outside what c
 P, Q, R, ALPHA, BETA, AIRSPEED, QDYN = range(len(SIGNALS))
 THETA, PSI = PHI + 1, PHI + 2
 
-# Hypotheses of since_start.py: the instruments that may be broken when the watch begins
+# Hypotheses of since_start.py: the instruments that may be broken when the monitor begins
 OF_ALPHA, OF_BETA, OF_SPEED, OF_PHI, OF_THETA = range(5)
 STARTERS, N_COUPLINGS = 5, 14
 
@@ -73,7 +73,7 @@ STEP = record(
         # the look before: readings, attitude as a quaternion, velocity, acceleration there and before that
         then=N_SENSORS, turned=4, velocity=3, acceleration=3, acceleration_then=3,
         # m/s2: size of the acceleration of the elapsed step, and of those before it; of acceleration_then
-        pull=float, pulled=2, felt_then=float,
+        size=float, sizes_before=2, size_then=float,
         unknown=float,  # of the acceleration of the first step, for want of the instant before
         predicted=N_SENSORS, scratch=4, now=4,
         command=2,  # engine speed rpm, manifold pressure inHg
@@ -89,49 +89,52 @@ SINCE = record(
     refuted=(int, STARTERS, N_TESTS),  # since the alarm, and by which test
 )  # fmt: skip
 
-WATCH_CONFIG = record(
+MONITOR_CONFIG = record(
     enabled=int, instants=int, engine=int, trim=N_SENSORS,
     follows=float,  # share of its error a replaced rate makes up a look
     blurred=int,  # the attitude is noisy: a surface is named only once no gyro can be the cause
-    longest_still=(int, N_SENSORS),  # how many looks with the very same reading say that it is frozen
+    longest_identical=(int, N_SENSORS),  # how many looks with the very same reading say that it is frozen
     damping=(3, 3),
 )  # fmt: skip
 
-WATCH_MEMORY = record(
-    begun=int, begun_at_s=float, past=int, fired=(int, N_TESTS),
+MONITOR_MEMORY = record(
+    begun=int, begun_at_s=float, past=int, exceeded=(int, N_TESTS),
     # what tells a gyro from the attitude, by axis
     gyro_error=3, gyro_error_then=3,  # as each frame began, rad/s
     spike=3, spike_then=3, spike_before=3, W=3, W_bound=3, W_then=3, before=3,
     # no gyro can be what the rates show: what attitude and W make of that, and how far one gyro goes
     agreed=(int, max(len(EQUAL), 1)),  # whether a sensor has equalled the reading that it should
-    no_gyro=int, apart=(3, N_POLES), apart_bound=(3, N_POLES), rates_say=(int, 3), taken_over=(int, 3),
+    no_gyro=int, apart=(3, N_POLES), apart_bound=(3, N_POLES), rates_confirm=(int, 3), taken_over=(int, 3),
     # accelerometers.py: looks with the very same reading; readings of two looks ago; who is cleared
-    still=(int, N_SENSORS), earlier=N_SENSORS, cleared=(int, N_SENSORS),
+    identical=(int, N_SENSORS), earlier=N_SENSORS, cleared=(int, N_SENSORS),
     # how far accelerometers have leapt of late. Since the alarm: looks, residuals of speed, incidence and
     # sideslip, how much of them is sound, how much is of a first error; least and most of the readings; the
     # climb that such an incidence makes up; the velocity made up, body axes
-    restless=float, gathering=int, gathered=3, sound=3, first=3, least=3, most=3, fallen=N_POLES, made_up=3,
+    largest_jump=float, n_summed=int, residual_sum=3, sound_sum=3, first=3, least=3, most=3,
+    climb_error=N_POLES, spurious_velocity=3,
 )  # fmt: skip
 
-WATCH_OUTPUT = record(
+MONITOR_OUTPUT = record(
     alarmed=int, alarmed_at_s=float,
-    beside=int,  # a surface was found long before, with sound sensors: it stays found
+    keeps_surface=int,  # a surface was found long before, with sound sensors: it stays found
     misnamed=int,  # a surface had been named in the moment before the alarm
     lead=int,  # the test that has raised the alarm
-    furthest=int, share=float,  # of this frame: the test nearest its bound, and how near
+    largest_test=int, share=float,  # of this frame: the test nearest its bound, and how near
     suspect=(int, N_SENSORS), named=int, named_at_s=float, replaced=(int, N_SENSORS),
 )  # fmt: skip
 
-WATCH = record(config=WATCH_CONFIG, memory=WATCH_MEMORY, output=WATCH_OUTPUT, step=STEP, since=SINCE)
+SENSOR_MONITOR = record(
+    config=MONITOR_CONFIG, memory=MONITOR_MEMORY, output=MONITOR_OUTPUT, step=STEP, since=SINCE
+)
 
 
-def configure(watch: np.void, scenario: Scenario, design: np.void, y: np.ndarray, enabled: bool) -> None:
+def configure(monitor: np.void, scenario: Scenario, design: np.void, y: np.ndarray, enabled: bool) -> None:
     """Fill the monitor's record at the trim: y, the measured signals there; design: the designer's record.
 
     A monitor that is not `enabled` has found nothing, and its record holds no more than that.
     """
-    output, config = watch["output"], watch["config"]
-    output["named"], output["alarmed_at_s"], output["named_at_s"] = NOBODY, -1.0, -1.0
+    output, config = monitor["output"], monitor["config"]
+    output["named"], output["alarmed_at_s"], output["named_at_s"] = NO_SENSOR, -1.0, -1.0
     config["enabled"] = enabled
     if not enabled:
         return
@@ -139,11 +142,11 @@ def configure(watch: np.void, scenario: Scenario, design: np.void, y: np.ndarray
     config["instants"], config["engine"] = scenario.substeps, scenario.airframe.has_engine_instruments
     config["trim"][3:7] = y[:4]
     config["damping"] = gust_effect(DesignFunctions(np.array([design])), y)
-    watch["memory"]["past"] = scenario.substeps - 1  # the first JSBSim frame ends a frame of the loop
+    monitor["memory"]["past"] = scenario.substeps - 1  # the first JSBSim frame ends a frame of the loop
     if config["engine"]:  # whose keys the aircraft names
-        watch["step"]["memory"]["command"] = initial.engine_rpm, initial.manifold_pressure_inhg
-    configure_step(watch["step"]["config"], declared, scenario)
-    configure_readings(watch, declared, watch["step"]["config"]["h"])
+        monitor["step"]["memory"]["command"] = initial.engine_rpm, initial.manifold_pressure_inhg
+    configure_step(monitor["step"]["config"], declared, scenario)
+    configure_readings(monitor, declared, monitor["step"]["config"]["h"])
 
 
 def configure_step(step: np.void, declared: Declared, scenario: Scenario) -> None:
@@ -156,13 +159,13 @@ def configure_step(step: np.void, declared: Declared, scenario: Scenario) -> Non
     step["low"], step["rising"] = declared.air.low_m, declared.vertical_wind_mps
 
 
-def configure_readings(watch: np.void, declared: Declared, h: float) -> None:
+def configure_readings(monitor: np.void, declared: Declared, h: float) -> None:
     """Fill the declared errors of the readings; h: seconds of a JSBSim frame."""
-    step, config, errors = watch["step"]["config"], watch["config"], declared.sensors
+    step, config, errors = monitor["step"]["config"], monitor["config"], declared.sensors
     for i, name in enumerate(SENSORS):
         error = errors[name]
         step["offset"][i], step["slope"][i], step["steady"][i] = error.worst, error.slope, error.steady
-        config["longest_still"][i] = longest_still(error.noise, error.resolution) * frames_apart(i, h)
+        config["longest_identical"][i] = longest_identical(error.noise, error.resolution) * frames_apart(i, h)
         drift_rad_s = getattr(getattr(errors.declared, name), "drift_rad_s", 0.0)
         step["drift"] = max(step["drift"], abs(drift_rad_s))
     attitude = slice(PHI, PHI + 3)
@@ -170,7 +173,7 @@ def configure_readings(watch: np.void, declared: Declared, h: float) -> None:
     config["follows"] = min(1.0, h * ATTITUDE_TAKES_OVER_PER_S) if config["blurred"] else 1.0
 
 
-def longest_still(noise: float, quantum: float) -> int:
+def longest_identical(noise: float, quantum: float) -> int:
     """For how many samples no sound sensor, of this noise and resolution, gives the very same reading."""
     if quantum == 0.0:
         return 3
@@ -188,19 +191,19 @@ def gusts_seen(air: Dryden, airspeed_mps: float, h: float) -> tuple[float, np.nd
     return GUST_LIMIT_SIGMA * sigma_mps, GUST_LIMIT_SIGMA * np.sqrt(intensity * np.array(kept_s))
 
 
-def instrument_found(watch: np.void, t_s: float) -> dict[str, Any] | None:
+def instrument_found(monitor: np.void, t_s: float) -> dict[str, Any] | None:
     """The verdict's parts as of t_s, where an instrument is found broken; None where none is."""
-    if not watch["output"]["alarmed"] or watch["output"]["beside"]:
+    if not monitor["output"]["alarmed"] or monitor["output"]["keeps_surface"]:
         return None
     said: dict[str, Any] = {"isolated": None, "isolation_type": None, "estimate": None, "candidates": ()}
-    said["detection_time_s"], said["isolation_time_s"] = float(watch["output"]["alarmed_at_s"]), None
-    if watch["output"]["named"] >= 0:
-        said["isolated"] = sensor_words(SENSORS[int(watch["output"]["named"])])
-        said["isolation_time_s"] = float(watch["output"]["named_at_s"])
+    said["detection_time_s"], said["isolation_time_s"] = float(monitor["output"]["alarmed_at_s"]), None
+    if monitor["output"]["named"] >= 0:
+        said["isolated"] = sensor_words(SENSORS[int(monitor["output"]["named"])])
+        said["isolation_time_s"] = float(monitor["output"]["named_at_s"])
     elif t_s > said["detection_time_s"] + WAIT_S:
         said["isolated"] = said["isolation_type"] = "unanticipated"
         said["isolation_time_s"] = said["detection_time_s"] + WAIT_S
     else:
-        left = zip(SENSORS, watch["output"]["suspect"], strict=True)
+        left = zip(SENSORS, monitor["output"]["suspect"], strict=True)
         said["candidates"] = tuple(sensor_words(name) for name, possible in left if possible)
     return said

@@ -1,4 +1,4 @@
-"""Which instruments may have been broken when the watch over them began, and what that can do to its tests.
+"""Which instruments may have been broken when the monitor began, and what that can do to its tests.
 
 A reading that was off by a constant from the first look on has leapt in no test of its own: it shows through
 the kinematics of the others alone, in tests that are held to be theirs. For each reading that others are
@@ -62,7 +62,7 @@ SIDEWAYS_RAD = 0.7  # no aircraft whose attitude and flow are followed flies at 
 TIMES = 10.0  # what is read may be so many times the truth, or a part of it
 WEATHER = 0.25  # share by which the air is thicker or thinner than the standard has it at a height
 STEADY = 0.8  # share of a coupling that is left when speed and flow have changed within a filter's memory
-SLOW = 2  # of watch.POLES_PER_S
+SLOW = 2  # of monitor.POLES_PER_S
 
 # Couplings that are followed with their sign
 Q_TURNS, R_TURNS, G_DOWN, G_ASIDE, G_AHEAD, CLIMBS, ROLLS, YAWS, BESIDE_ALPHA, BESIDE_BETA = range(10)
@@ -108,7 +108,7 @@ def own_test(i):
 
 
 @kernel
-def note_changes(step, since):
+def bound_changes(step, since):
     """By how much each may have moved: within the slowest filter's memory, and what that has forgotten."""
     for i in range(STARTERS):
         changed = most(step, own_test(i), SLOW) + since.off[i] * since.reached[i, own_test(i), SLOW]
@@ -153,7 +153,7 @@ def reach_flow(step, since, V, p, q, r):
     sp, cp, st, ct = np.sin(then[PHI]), np.cos(then[PHI]), np.sin(then[THETA]), np.cos(then[THETA])
     slip, wide = abs(then[BETA]), abs(then[BETA]) + angle_of(since.off[OF_BETA])
     aslant, aslant_true = 1.0 / np.cos(min(slip, STEEPEST_RAD)), 1.0 / np.cos(min(wide, STEEPEST_RAD))
-    normal, pull = s[2] * ca - s[0] * sa, max(step.memory.pull, np.sqrt(s[0] ** 2 + s[1] ** 2 + s[2] ** 2))
+    normal, pull = s[2] * ca - s[0] * sa, max(step.memory.size, np.sqrt(s[0] ** 2 + s[1] ** 2 + s[2] ** 2))
     aside = s[1] * cb - (s[0] * ca + s[2] * sa) * sb
     roll, yaw = p * ca + r * sa, p * sa - r * ca
     coarse = h * (1.0 + h * (pull / V + abs(p) + abs(q) + abs(r)))
@@ -206,12 +206,12 @@ def most(step, t, m):
 @kernel
 def shown(step, since, i, t, m):
     """What the error that hypothesis i has now has added to test t through filter m, at most: what is there,
-    and what the error was less or more by while the filter gathered it."""
+    and what the error was less or more by while the filter residual_sum it."""
     return most(step, t, m) + 2.0 * since.changed[i] * since.reached[i, t, m]
 
 
 @kernel
-def narrow_by(since, i, shown, coupling):
+def tighten_by(since, i, shown, coupling):
     """An error that adds at least `coupling` a unit has added no more than `shown`."""
     if coupling > 0.0:
         since.off[i] = min(since.off[i], shown / (STEADY * coupling))
@@ -236,35 +236,35 @@ def narrow(step, since):
     """Bring down how far each may be off."""
     for m in range(step.config.decay.size):
         c = since.coupled[:, m]
-        narrow_by(since, OF_PHI, turned(step, since, OF_PHI, m), np.hypot(c[Q_TURNS], c[R_TURNS]))
-        narrow_by(since, OF_PHI, pulled(step, since, OF_PHI, m), np.hypot(c[G_DOWN], c[G_ASIDE]))
-        narrow_by(since, OF_THETA, pulled(step, since, OF_THETA, m), c[G_AHEAD])
+        tighten_by(since, OF_PHI, turned(step, since, OF_PHI, m), np.hypot(c[Q_TURNS], c[R_TURNS]))
+        tighten_by(since, OF_PHI, pulled(step, since, OF_PHI, m), np.hypot(c[G_DOWN], c[G_ASIDE]))
+        tighten_by(since, OF_THETA, pulled(step, since, OF_THETA, m), c[G_AHEAD])
         about = np.hypot(shown(step, since, OF_THETA, TURN, m), turned(step, since, OF_THETA, m))
-        narrow_by(since, OF_THETA, about, abs(c[HEADS]))
-        narrow_vanes(step, since, m)
-        narrow_speed(step, since, m)
+        tighten_by(since, OF_THETA, about, abs(c[HEADS]))
+        tighten_vanes(step, since, m)
+        tighten_speed(step, since, m)
 
 
 @kernel
-def narrow_vanes(step, since, m):
+def tighten_vanes(step, since, m):
     """The same of incidence and sideslip."""
     c, half = since.coupled[:, m], 0.5 * angle_of(since.off[OF_ALPHA])
     rolled = np.cos(half) * abs(c[ROLLS]) - np.sin(half) * abs(c[YAWS]) - c[BESIDE_ALPHA]
-    narrow_by(since, OF_ALPHA, shown(step, since, OF_ALPHA, CLIMB, m), c[CLIMBS])
-    narrow_by(since, OF_ALPHA, shown(step, since, OF_ALPHA, BETA_FLOW, m), rolled)
+    tighten_by(since, OF_ALPHA, shown(step, since, OF_ALPHA, CLIMB, m), c[CLIMBS])
+    tighten_by(since, OF_ALPHA, shown(step, since, OF_ALPHA, BETA_FLOW, m), rolled)
     rolled = np.cos(0.5 * angle_of(since.off[OF_BETA])) * abs(c[ROLLS]) - c[BESIDE_BETA]
-    narrow_by(since, OF_BETA, shown(step, since, OF_BETA, ALPHA_FLOW, m), rolled)
+    tighten_by(since, OF_BETA, shown(step, since, OF_BETA, ALPHA_FLOW, m), rolled)
 
 
 @kernel
-def narrow_speed(step, since, m):
+def tighten_speed(step, since, m):
     """The same of the airspeed. Bounds of the flow are for one that is right; the density shows its changes,
     and so does its own test: a scale error is in both alike."""
     c, slower = since.coupled[:, m], 1.0 + since.off[OF_SPEED]
-    narrow_by(since, OF_SPEED, slower * shown(step, since, OF_SPEED, ALPHA_FLOW, m), abs(c[PULLS]))
-    narrow_by(since, OF_SPEED, slower * shown(step, since, OF_SPEED, BETA_FLOW, m), abs(c[PUSHES]))
+    tighten_by(since, OF_SPEED, slower * shown(step, since, OF_SPEED, ALPHA_FLOW, m), abs(c[PULLS]))
+    tighten_by(since, OF_SPEED, slower * shown(step, since, OF_SPEED, BETA_FLOW, m), abs(c[PUSHES]))
     changes = 2.0 * slower * most(step, SPEED, m) / max(step.memory.then[AIRSPEED], 1.0)
-    narrow_by(since, OF_SPEED, shown(step, since, OF_SPEED, DENSITY, m) + changes, abs(c[FASTER]))
+    tighten_by(since, OF_SPEED, shown(step, since, OF_SPEED, DENSITY, m) + changes, abs(c[FASTER]))
 
 
 @kernel
@@ -273,7 +273,7 @@ def follow(step, since, signal):
     if steepest(step, signal) > STEEPEST_RAD:  # turning is not tested
         since.coupled[:] = 0.0
         return
-    note_changes(step, since)
+    bound_changes(step, since)
     reach(step, since, signal)
     accumulate(step, since)
     narrow(step, since)
@@ -305,7 +305,7 @@ def hidden(since, i, t, m):
 
 
 @kernel
-def note_refuted(step, since, fired):
+def record_refuted(step, since, fired):
     """Since the alarm: note the tests, of those that have `fired`, that a first error does not explain."""
     for i in range(STARTERS):
         for t in range(fired.size):

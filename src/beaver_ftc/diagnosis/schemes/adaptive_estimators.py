@@ -35,7 +35,7 @@ def predict(fdi, belief, measured, k, t):
 @apart
 def conclude(fdi, belief, measured, t):
     """From residuals to the alarm and a verdict, unless a sensor is at fault (contract.CompiledScheme)."""
-    if sensor_monitor.speaks(fdi.watch):
+    if sensor_monitor.has_alarm(fdi.sensor_monitor):
         return
     known, found = fdi.verdict.detected, fdi.verdict
     fdae.form_residual(fdi.fdae, measured.x)

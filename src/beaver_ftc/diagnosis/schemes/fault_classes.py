@@ -40,12 +40,12 @@ def isolate_fault(fdi, measured, t, known):
     Where sensors are monitored, the isolation starts one frame after the alarm, because the attitude reveals
     a gyro fault one frame late (later where it is noisy). With a broken sensor or engine nothing is isolated.
     """
-    row, watch = fdi.config.fault_class, fdi.watch
+    row, monitor = fdi.config.fault_class, fdi.sensor_monitor
     if not known:
         estimators.start(fdi.isolation, fdi.bound.noise, measured.x)
         begin(row, fdi)
-    sound = not sensor_monitor.shown_from_the_start(watch, fdi.verdict.detected_at_s)
-    if sound and sensor_monitor.clears_surfaces(watch, known) and not fdi.engines.output.failed:
+    sound = not sensor_monitor.alarm_is_at_start(monitor, fdi.verdict.detected_at_s)
+    if sound and sensor_monitor.allows_isolation(monitor, known) and not fdi.engines.output.failed:
         isolate(row, fdi, measured, t, known)
 
 
@@ -58,12 +58,12 @@ def is_possible(fdi, fie, x, started):
 @kernel
 def is_improbable(fdi, fie):
     """Whether the statistical detector excludes the loss of estimator fie, once it has raised its alarm."""
-    chances, config = fdi.statistical, fdi.config
-    if chances.alarm.detected_at_s < 0.0:
+    detector, config = fdi.statistical, fdi.config
+    if detector.alarm.detected_at_s < 0.0:
         return False
-    hidden = fdi.watch.config.enabled and chances.air.output.moving
+    hidden = fdi.sensor_monitor.config.enabled and detector.air.output.moving
     by_chance.weigh(
-        fie, chances.tests, chances.block, fdi.isolation, fdi.layout.loss_of, config.abrupt, hidden
+        fie, detector.tests, detector.block, fdi.isolation, fdi.layout.loss_of, config.abrupt, hidden
     )
     return fie.improbable == 1
 
@@ -71,9 +71,9 @@ def is_improbable(fdi, fie):
 @kernel
 def is_off_the_column(fdi, fie):
     """Whether a parity view shows motion that the surface of estimator fie cannot cause."""
-    chances, position = fdi.statistical, fdi.layout.position_of[fie.surface]
-    views, column = chances.views[: chances.n_views], fdi.isolation.estimator[position].effect.Z
-    return parity.excludes(views, chances.tests, chances.forces, chances.air, fie.surface, column)
+    detector, position = fdi.statistical, fdi.layout.position_of[fie.surface]
+    views, column = detector.views[: detector.n_views], fdi.isolation.estimator[position].effect.Z
+    return parity.excludes(views, detector.tests, detector.forces, detector.air, fie.surface, column)
 
 
 @kernel

@@ -39,7 +39,7 @@ def hold_thresholds(fdi, constant):
 @apart
 def conclude(fdi, belief, measured, t):
     """Raise the alarm by the FDAE, evaluate its network, and isolate (contract.CompiledScheme)."""
-    if sensor_monitor.speaks(fdi.watch):
+    if sensor_monitor.has_alarm(fdi.sensor_monitor):
         return
     known, found = fdi.verdict.detected, fdi.verdict
     fdae.form_residual(fdi.fdae, measured.x)

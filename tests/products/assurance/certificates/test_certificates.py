@@ -622,7 +622,7 @@ def test_an_alarm_of_instruments_adds_up_to_its_test_whatever_is_declared(turned
     """Of a watch every number of which is another, gusts among them: the last look by its own limit, and what
     the filter nearest to its bound keeps of those before."""
     watch = fill(np.zeros(1, WATCH)[0], seed=2, size=0.3)
-    watch["output"]["furthest"], watch["output"]["share"] = TESTS.index("alpha"), 1.2
+    watch["output"]["largest_test"], watch["output"]["share"] = TESTS.index("alpha"), 1.2
     step, config = watch["step"], watch["step"]["config"]
     test = step["test"][TESTS.index("alpha")]
     test["filtered"], test["bound"] = turned * np.array([3.0, 8.0, 5.5]), (2.9, 4.7, 5.1)

@@ -269,6 +269,6 @@ def test_a_port_in_use_is_said_whatever_the_address(host):
 
 
 def test_a_machine_without_a_way_to_others_is_told_to_name_its_address(monkeypatch):
-    monkeypatch.setattr(serve, "NOBODY", ((socket.AF_INET, "255.255.255.255"),))
+    monkeypatch.setattr(serve, "NO_SENSOR", ((socket.AF_INET, "255.255.255.255"),))
     with pytest.raises(BadInput, match="allowed: the address that they know it by"):
         serve._outward()

@@ -205,7 +205,7 @@ def test_a_diagnosis_that_begins_again_is_said_to_run_since_it_first_did(monkeyp
     )
     monkeypatch.setattr(vehicle_module, "diagnosis_record", lambda fresh: f"record of {fresh}")
     loop = SimpleNamespace(sensor_schedule=SimpleNamespace(any=broken), scenario="case")
-    loop.enable_watch = lambda record, of: watched.append((record, of))
+    loop.enable_sensor_monitor = lambda record, of: watched.append((record, of))
     flown = SimpleNamespace(
         _loop=loop, _fresh=["fresh"], _frame="frame", _diagnoses=False, listens_from_s=None
     )

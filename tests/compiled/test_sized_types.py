@@ -213,11 +213,11 @@ def test_what_changes_in_size_stands_last():
     assert shape_of(dtype) == shape_of(whole_dtype(1, 7)) != shape_of(block_dtype(4, 2))
 
 
-def test_a_room_stays_one_in_sums_and_products():
+def test_a_room_stays_one_in_sums_products_and_quotients():
     n = Room(4)
-    for made, number in ((n + 1, 5), (1 + n, 5), (3 * n, 12), (n * 3, 12), (n - 1, 3), (2 + 3 * n, 14)):
-        assert made == number
-        assert isinstance(made, Room)
+    made = (n + 1, 1 + n, 3 * n, n * 3, n - 1, 2 + 3 * n, (n + 3) // 3)
+    assert made == (5, 5, 12, 12, 3, 14, 2)
+    assert {type(each) for each in made} == {Room}
 
 
 def test_records_that_change_in_size_stand_in_a_row():

@@ -26,6 +26,9 @@ class Room(int):
     def __mul__(self, other: int) -> "Room":
         return Room(int(self) * int(other))
 
+    def __floordiv__(self, other: int) -> "Room":
+        return Room(int(self) // int(other))
+
     __radd__, __rmul__ = __add__, __mul__
 
 

@@ -222,7 +222,7 @@ class DiagnosisReadout:
 
     @cached_property
     def isolated(self) -> int:
-        """Number of the surface that is isolated; NOT_ISOLATED or UNANTICIPATED of `state`."""
+        """Number of the estimator whose fault is isolated; NOT_ISOLATED or UNANTICIPATED of `state`."""
         return int(self._fdi["verdict"]["isolated"])
 
     @cached_property

@@ -1,0 +1,107 @@
+"""Readouts say what the log says of the same frame, and what a scenario and its aircraft declare."""
+
+import numpy as np
+import pytest
+
+import beaver_ftc as bf
+from beaver_ftc.diagnosis.readout import OF_BLOCK
+from beaver_ftc.loop import Stepping, recorded_always, recorded_until_alarm
+from beaver_ftc.plant.instruments import SENSORS
+
+FLIGHT = {
+    "name": "read", "duration_s": 3.0, "sensors": "consumer-grade",
+    "control": {"law": "fault-tolerant"},
+    "fdi": {
+        "fault_class": "all", "statistical": {}, "sensor_monitor": "always",
+        "bounds": {"sensors": "consumer-grade"},
+    },
+    "faults": [{"type": "stuck", "actuator": "elevator", "at_s": 1.0, "position_deg": 8.0}],
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def flown():
+    """Step to the end; the readouts of the first and last frame, the last row, when the alarm was raised."""
+    flight = Stepping(bf.load(FLIGHT))
+    first = flight.readout
+    first.rates_rad_s  # noqa: B018  # read, so that it stays
+    alarm_s = None
+    while not flight.done:
+        flight.step()
+        if alarm_s is None and flight.verdict.detected:
+            alarm_s = flight.t_s
+    row = dict(zip(flight.columns, flight.values, strict=True))
+    yield flight, first, flight.readout, row, alarm_s
+    flight.release()
+
+
+def by_axis(row, name):
+    return [row[f"{axis}_{name}"] for axis in "pqr"]
+
+
+def test_a_frame_is_read_as_the_log_has_it(flown):
+    flight, _, now, row, _ = flown
+    assert (now.k, now.dt_s, now.since) == (flight.frames, 1.0 / flight.rate_hz, 0)
+    assert now.rates_rad_s.tolist() == by_axis(row, "measured_rad_s")
+    assert now.airspeed_mps == row["airspeed_mps"]
+    assert now.diagnosis.bound.eta_bar_rad_s2.tolist() == by_axis(row, "eta_bar_rad_s2")
+    assert now.alarmed == bool(row["detected"])
+
+
+def test_the_diagnosis_is_read_as_the_log_has_it(flown):
+    flight, _, now, row, alarm_s = flown
+    diagnosis, verdict = now.diagnosis, flight.verdict
+    assert diagnosis.detected
+    columns = [name for name in row if name.startswith("fie_") and name.endswith("_excluded")]
+    names = [name.removeprefix("fie_").removesuffix("_excluded") for name in columns]
+    assert diagnosis.detected_at_s == alarm_s
+    assert names[diagnosis.isolated].removesuffix("_position") == verdict.isolated
+    assert diagnosis.excluded.tolist() == [bool(row[f"fie_{name}_excluded"]) for name in names]
+    assert [one.excluded for one in diagnosis.estimators] == diagnosis.excluded.tolist()
+    assert (diagnosis.enabled, diagnosis.every_type) == (True, True)
+    aircraft = bf.load(FLIGHT).airframe
+    for s, name in enumerate(aircraft.surfaces):
+        stops, actuator = aircraft.travel[name], diagnosis.surfaces[s].actuator
+        assert (actuator.travel_low_rad, actuator.travel_high_rad) == (stops.min_rad, stops.max_rad)
+        assert names[diagnosis.layout.position_of[s]] == f"{name}_position"
+        assert names[diagnosis.layout.loss_of[s]] == name
+        assert diagnosis.layout.dominant_axis[s] == aircraft.dominant_axis[s]
+
+
+def test_the_statistical_detector_and_the_sensor_monitor_are_read_as_the_log_has_them(flown):
+    _, _, now, row, _ = flown
+    diagnosis, monitor = now.diagnosis, now.diagnosis.sensor_monitor
+    shares = [one.score / diagnosis.alarm_level for block in diagnosis.blocks for one in block.hypotheses]
+    logged = [value for name, value in row.items() if name.endswith("_likelihood_share")]
+    assert max(shares) == pytest.approx(max(logged), rel=1e-12)
+    for block in diagnosis.blocks:
+        assert block.lanes.score.shape[0] == len(block.hypotheses)
+        assert len(block.axes) in (1, 2)
+    assert monitor.enabled
+    assert (monitor.share, monitor.furthest) == (row["watch_share"], row["watch_test"])
+    assert len(monitor.predicted) == len(SENSORS)
+
+
+def test_a_readout_stays_when_the_flight_goes_on(flown):
+    _, first, now, *_ = flown
+    assert (first.rates_rad_s != now.rates_rad_s).any()
+    assert first.k != 1 or now.k > 1
+
+
+def test_every_property_can_be_read(flown):
+    _, _, now, *_ = flown
+    for part in (now, now.diagnosis, now.control):
+        for name in vars(type(part)):
+            if not name.startswith("_"):
+                assert getattr(part, name) is not None, name
+
+
+def test_what_is_recorded_is_part_of_the_record(flown):
+    """Not copies: a recorder takes the places of these arrays in the record."""
+    flight, _, now, *_ = flown
+    record, n = flight.records, len(now.diagnosis.estimators)
+    always, early = recorded_always(record[0], n, True), recorded_until_alarm(record[0], n, True)
+    assert {*OF_BLOCK} < {*early}
+    for name, view in (always | early).items():
+        assert np.shares_memory(view, record), name
+        assert view.base is not None

@@ -106,17 +106,17 @@ def test_what_a_fault_can_have_done_is_the_filtered_extreme_of_what_it_does(seed
 @pytest.mark.parametrize("axis", range(3))
 @pytest.mark.parametrize("side", [-1, 1])
 def test_a_fault_explains_what_is_within_its_reach_and_the_bound(m, axis, side):
-    def explained(beyond, unasked=False):
+    def explained(beyond, ignored_axes=False):
         fdi, fie = reach_of(0.0, 0.0, 0.0, across=(0.0, 0.0, 0.0))
         fie["reach_low"], fie["reach_high"], fdi["bank"]["output"]["threshold"] = -0.3, 0.5, 0.1
-        fie["unasked"][axis] = unasked
+        fie["ignored_axes"][axis] = ignored_axes
         limit = -0.4 if side < 0 else 0.6
         fdi["bank"]["output"]["residual"][m, axis] = limit + side * beyond
         return bool(on(bank.explains, fdi, fie, True))
 
     assert explained(-1e-9)
     assert not explained(1e-9)
-    assert explained(1e-9, unasked=True)
+    assert explained(1e-9, ignored_axes=True)
 
 
 @pytest.mark.parametrize("side", [-1, 1])

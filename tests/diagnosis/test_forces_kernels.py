@@ -11,7 +11,7 @@ from beaver_ftc.aircraft.schema import SIDESLIP_RATE
 from beaver_ftc.design.engine import slipstream_slopes
 from beaver_ftc.design.terms import fill_table
 from beaver_ftc.diagnosis.detection import forces, parity, statistical
-from beaver_ftc.diagnosis.detection.forces import ASIDE, UP, look, set_up_forces
+from beaver_ftc.diagnosis.detection.forces import ASIDE, UP, set_up_forces, update
 from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, VANE_VIEW, set_up_views
 from beaver_ftc.diagnosis.detection.tones import set_up_tones
 from beaver_ftc.diagnosis.state import NORMAL, PITCH, ROLL, SIDE, YAW
@@ -71,8 +71,8 @@ def per_coefficient(y=Y):
 def test_the_model_is_the_sum_of_its_terms_and_the_rest_is_the_innovation(f, name):
     fdi, rate = felt(), 0.04
     record, seen = fdi["statistical"]["forces"], measured()
-    record["rate"][ASIDE], record["begun"] = rate, 1
-    look(record, fdi["statistical"]["air"], seen, U, DT)
+    record["rate"][ASIDE], record["n_updates"] = rate, 1
+    update(record, fdi["statistical"]["air"], seen, U, DT)
     whole = per_coefficient() * coefficient(name, rate=rate)
     force = record["component"][f]
     expected = seen["force"][1 + f] / AIRCRAFT.geometry.chord_m - whole
@@ -94,13 +94,13 @@ def test_the_model_is_the_sum_of_its_terms_and_the_rest_is_the_innovation(f, nam
 def test_a_surface_s_column_is_the_slope_along_it_and_its_errors_are_shares_of_the_terms(f, name):
     fdi = felt(Bounds(coefficients=0.05))
     record = fdi["statistical"]["forces"]
-    look(record, fdi["statistical"]["air"], measured(), U, DT)
+    update(record, fdi["statistical"]["air"], measured(), U, DT)
     force = record["component"][f]
     for s in range(4):
         ahead = U + 1e-4 * np.eye(4)[s]
         slope = per_coefficient() * (coefficient(name, u=ahead) - coefficient(name)) / 1e-4
         assert force["column"][s] == pytest.approx(slope, abs=1e-9)
-        assert force["moment"][s] == pytest.approx(slope * U[s], abs=1e-9)
+        assert force["effect"][s] == pytest.approx(slope * U[s], abs=1e-9)
         own = [
             t
             for t in AIRCRAFT.measurable_forces
@@ -109,7 +109,7 @@ def test_a_surface_s_column_is_the_slope_along_it_and_its_errors_are_shares_of_t
         size = sum(
             abs(t.value) * Y[0] ** dict(t.of).get("alpha", 0) * Y[1] ** dict(t.of).get("beta", 0) for t in own
         )
-        assert force["own"][s] == pytest.approx(0.05 * per_coefficient() * size)
+        assert force["column_error"][s] == pytest.approx(0.05 * per_coefficient() * size)
 
 
 def test_the_flow_s_rates_are_those_of_a_body_that_moves_on():
@@ -133,11 +133,11 @@ def test_followed_by_inertial_motion_a_force_does_not_know_its_vane(f, place):
     for course in courses:
         fdi = felt()
         record = fdi["statistical"]["forces"]
-        record["of_rate"] = 0.0
+        record["sideslip_rate_coefficient"] = 0.0
         for error in course:
             y = Y.copy()
             y[place] += error
-            look(record, fdi["statistical"]["air"], measured(y=y), U, DT)
+            update(record, fdi["statistical"]["air"], measured(y=y), U, DT)
         left.append((record["component"][f]["inertial"], record["component"][f]["innovation"]))
     (inertial, plain), (inertial_too, other) = left
     assert abs(plain - other) > 0.005
@@ -148,11 +148,11 @@ def test_the_angle_followed_is_the_sum_of_its_rates_and_its_drift_is_counted():
     fdi = felt()
     record = fdi["statistical"]["forces"]
     for _ in range(11):
-        look(record, fdi["statistical"]["air"], measured(), U, DT)
+        update(record, fdi["statistical"]["air"], measured(), U, DT)
     for f, place in ((ASIDE, 1), (UP, 0)):
         force = record["component"][f]
         assert force["angle"] == pytest.approx(Y[place] + 10 * DT * record["rate"][f])
-        assert force["drifted"] == pytest.approx(11 * DT * force["vane"][1])
+        assert force["angle_sensitivity"] == pytest.approx(11 * DT * force["vane"][1])
 
 
 def test_noise_of_the_readings_is_jitter_of_the_forces():
@@ -166,9 +166,9 @@ def test_noise_of_the_readings_is_jitter_of_the_forces():
     std = np.radians([0.03, 0.02]), 0.1, 4.0, np.radians(0.05)
     for _ in range(1500):
         y = Y + np.array([*(std[0] * rng.normal(size=2)), std[1] * rng.normal(), std[2] * rng.normal(), 0.0])
-        look(record, fdi["statistical"]["air"], measured(X + std[3] * rng.normal(size=3), y), U, DT)
+        update(record, fdi["statistical"]["air"], measured(X + std[3] * rng.normal(size=3), y), U, DT)
         drawn.append(record["component"]["innovation"].copy())
-    look(record, fdi["statistical"]["air"], measured(), U, DT)
+    update(record, fdi["statistical"]["air"], measured(), U, DT)
     assert np.sqrt(record["component"]["jitter"][:, 0]) == pytest.approx(np.std(drawn, axis=0), rel=0.06)
     without = record["component"]["jitter"][:, 0] - record["component"]["jitter"][:, 1]
     slopes = record["component"]["vane"][:, 1] * np.radians([0.02, 0.03])
@@ -180,7 +180,7 @@ def test_noise_of_the_pressure_is_jitter_as_the_innovation_moves_with_it():
     fdi = felt(Bounds(sensors={"qdyn": {"noise_std_pa": 4.0}}))
     record, innovation = fdi["statistical"]["forces"], []
     for more in (0.5, -0.5, 0.0):
-        look(record, fdi["statistical"]["air"], measured(y=Y + np.array([0, 0, 0, more, 0])), U, DT)
+        update(record, fdi["statistical"]["air"], measured(y=Y + np.array([0, 0, 0, more, 0])), U, DT)
         innovation.append(record["component"]["innovation"].copy())
     slopes = innovation[0] - innovation[1]
     assert record["component"]["jitter"] == pytest.approx(np.outer((4.0 * slopes) ** 2, [1, 1]), rel=1e-6)
@@ -193,7 +193,9 @@ def test_noise_of_accelerometers_is_jitter_that_the_pressure_does_not_scale():
         fdi, y = felt(Bounds(sensors=sensors)), Y * (1.0, 1.0, 1.0, strength, 1.0)
         record, drawn = fdi["statistical"]["forces"], []
         for noise in rng.normal(0.0, (0.04, 0.07), (1500, 2)):
-            look(record, fdi["statistical"]["air"], measured(y=y, force=(0.5, *(noise - (0.0, 9.5)))), U, DT)
+            update(
+                record, fdi["statistical"]["air"], measured(y=y, force=(0.5, *(noise - (0.0, 9.5)))), U, DT
+            )
             drawn.append(record["component"]["innovation"].copy())
         for inertial in range(2):
             jitter = record["component"]["jitter"][:, inertial]
@@ -207,7 +209,7 @@ def test_bias_and_slope_of_accelerometers_are_tolerated():
     """As one more constant, 1 / c of the bias, and as a share of the whole."""
     sensors = {"ay": {"bias_mps2": -0.2}, "az": {"bias_mps2": 0.3, "scale_error": -0.01}}
     record, none = (felt(Bounds(sensors=given))["statistical"]["forces"] for given in (sensors, {}))
-    look(record, felt()["statistical"]["air"], measured(), U, DT)
+    update(record, felt()["statistical"]["air"], measured(), U, DT)
     for f, bias, scale in ((ASIDE, 0.2, 0.0), (UP, 0.3, 0.01)):
         force, before = record["component"][f], none["component"][f]
         n = int(force["n"])
@@ -225,7 +227,7 @@ def test_without_accelerometers_no_force_is_weighed(viewed):
     statistical["inertial_air"]["output"]["moving"] = 1
     views = statistical["views"]
     views["peak_score"], views["block"]["hypothesis"]["score"][:, 0] = 50.0, 50.0
-    forces.do_without(*(statistical[name] for name in ("forces", "air", "inertial_air")))
+    forces.stop_forces(*(statistical[name] for name in ("forces", "air", "inertial_air")))
     assert not statistical["air"]["output"]["uses_accelerometers"]
     assert not statistical["inertial_air"]["output"]["moving"]
     for v in (ELEVATOR_VIEW, ALPHA_VIEW, UP_VIEW, SIDE_VIEW):
@@ -291,13 +293,13 @@ def test_a_gust_that_nobody_tells_moves_rate_and_force_in_full(viewed):
 
 def test_noise_of_the_gust_that_forces_tell_blurs_what_clears_a_vane(viewed):
     statistical = viewed["statistical"]
-    statistical["forces"]["blurred"] = 0.1, 0.2, 0.3
-    for v, blurred in ((ALPHA_VIEW, True), (ELEVATOR_VIEW, False)):
+    statistical["forces"]["gust_noise"] = 0.1, 0.2, 0.3
+    for v, gust_noise in ((ALPHA_VIEW, True), (ELEVATOR_VIEW, False)):
         view = statistical["views"][v]
         view["direction"] = 0.0, -0.6, 0.0, 0.0, 0.8
         Across.blur(view, statistical, 45.0)
         own = 0.8 * np.sqrt(statistical["forces"]["component"][UP]["jitter"][0])
-        assert view["block"]["jitter"][0] == pytest.approx((own + 0.6 * 0.2 * blurred) ** 2)
+        assert view["block"]["jitter"][0] == pytest.approx((own + 0.6 * 0.2 * gust_noise) ** 2)
 
 
 def test_a_vane_s_error_moves_rate_and_force_by_their_slopes():
@@ -369,7 +371,7 @@ def viewed():
     set_up_views(statistical, AIRCRAFT)
     set_up_tones(statistical["tone_config"], 1e-8, 45.0, 15.0, DT)
     for _ in range(2):
-        look(statistical["forces"], statistical["air"], measured(), U, DT)
+        update(statistical["forces"], statistical["air"], measured(), U, DT)
     fdi["layout"]["position_of"] = range(4)
     return fdi
 
@@ -377,8 +379,8 @@ def viewed():
 @pytest.mark.parametrize(("before", "begun", "expected"), [(1.0, 1, 0.3), (2.2, 1, 0.3), (1.0, 0, 0.0)])
 def test_a_force_is_off_by_what_it_changes_in_two_milliseconds(before, begun, expected):
     force = new_fdi()["statistical"]["forces"]["component"][0]
-    force["whole"] = 1.6
-    forces.settle(force, before, begun, 0.004)
+    force["model"] = 1.6
+    forces.fill_unsettled(force, before, begun, 0.004)
     assert force["unsettled"] == pytest.approx(expected)
 
 
@@ -395,12 +397,12 @@ def test_what_a_force_is_off_widens_what_is_merely_bounded(viewed):
 def test_how_fast_a_force_changes_is_told_from_one_instant_to_the_next(viewed):
     statistical = viewed["statistical"]
     component = statistical["forces"]["component"]
-    then, seen = component["whole"].copy(), measured()
+    then, seen = component["model"].copy(), measured()
     seen["y"][1] += 0.01
-    look(statistical["forces"], statistical["air"], seen, U, DT)
-    changed = np.abs(component["whole"] - then)
+    update(statistical["forces"], statistical["air"], seen, U, DT)
+    changed = np.abs(component["model"] - then)
     assert changed[ASIDE] > 0.01
-    assert component["unsettled"] == pytest.approx(forces.UNSETTLED_S * changed / DT)
+    assert component["unsettled"] == pytest.approx(forces.MODEL_LAG_S * changed / DT)
 
 
 def test_each_surface_is_looked_past_in_the_axis_it_leads_and_its_force(viewed):
@@ -543,8 +545,8 @@ def test_a_force_is_weighed_once_the_rate_of_sideslip_of_the_run_before_is_known
     set_up_tones(statistical["tone_config"], 1e-8, 45.0, 15.0, DT)
     swinging["force"][1] += 20.0
     for looks in (1, 2):
-        look(statistical["forces"], statistical["air"], swinging, U, DT)
-        assert statistical["forces"]["begun"] == looks
+        update(statistical["forces"], statistical["air"], swinging, U, DT)
+        assert statistical["forces"]["n_updates"] == looks
         Across.observe(fdi, np.zeros(3), np.ones((3, 4)), np.zeros((3, 4)), Y, looks, False)
         active = [v for v in statistical["views"] if parity.uses_force(v) and parity.largest_score(v) > 0.0]
         assert bool(active) == (looks == 2)
@@ -576,14 +578,14 @@ def test_what_errors_multiply_along_a_direction_is_that_of_rate_and_force(viewed
     alone = statistical["views"][UP_VIEW]
     Across.regress(viewed, alone, np.zeros(3), 0.0)
     assert alone["block"]["regressor"][3 : 3 + n, 0] == pytest.approx(force["regressor"][:n])
-    assert alone["block"]["regressor"][3 + n, 0] == pytest.approx(force["drifted"])
+    assert alone["block"]["regressor"][3 + n, 0] == pytest.approx(force["angle_sensitivity"])
 
 
 def test_a_loss_signs_with_the_force_it_takes(viewed):
     view, Gu = viewed["statistical"]["views"][FLAP_VIEW], np.random.default_rng(1).normal(size=(3, 4))
     view["direction"] = 0.0, 0.9, 0.0, 0.0, 0.4
     Across.sign(viewed, view, Gu)
-    moment = viewed["statistical"]["forces"]["component"][UP]["moment"][ELEVATOR]
+    moment = viewed["statistical"]["forces"]["component"][UP]["effect"][ELEVATOR]
     assert view["block"]["hypothesis"]["signature"][:2, 0] == pytest.approx(
         [1.0, 0.9 * Gu[1, ELEVATOR] + 0.4 * moment]
     )
@@ -635,29 +637,29 @@ def test_noise_and_slopes_of_forces_go_with_the_pressure(strength):
     sensors = {"alpha": {"noise_std_deg": 0.03}, "beta": {"noise_std_deg": 0.02}}
     fdi, fast = felt(Bounds(sensors=sensors)), Y * (1.0, 1.0, 1.0, strength, 1.0)
     record = fdi["statistical"]["forces"]
-    look(record, fdi["statistical"]["air"], measured(y=fast), U, DT)
+    update(record, fdi["statistical"]["air"], measured(y=fast), U, DT)
     slopes = strength * record["component"]["vane"][:, 1]
     noise = np.radians([0.02, 0.03])
     assert record["strength"] == pytest.approx(strength)
     assert record["component"]["jitter"][:, 0] == pytest.approx((slopes * noise) ** 2, rel=0.01)
-    assert record["component"]["drifted"] == pytest.approx(DT * slopes)
+    assert record["component"]["angle_sensitivity"] == pytest.approx(DT * slopes)
 
 
 def test_without_vanes_the_flow_is_what_the_forces_say():
     """A vane that is off by little: forces give back where the flow is."""
     fdi = felt()
     record, air = fdi["statistical"]["forces"], fdi["statistical"]["air"]
-    look(record, air, measured(), U, DT)
+    update(record, air, measured(), U, DT)
     sound = [
         measured().force[1 + f] - record["component"][f]["innovation"] * AIRCRAFT.geometry.chord_m
         for f in (ASIDE, UP)
     ]
     off = Y + np.array([0.004, -0.003, 0.0, 0.0, 0.0])
-    look(record, air, measured(y=off, force=(0.5, *sound)), U, DT)
-    forces.without_vanes(record, np.zeros(3), np.append(off, np.zeros(record["y"].size - 5)))
+    update(record, air, measured(y=off, force=(0.5, *sound)), U, DT)
+    forces.fill_readings_without_vanes(record, np.zeros(3), np.append(off, np.zeros(record["y"].size - 5)))
     assert record["y"][:5] == pytest.approx(Y, abs=6e-4), "an eighth of what they are off"
     still, turning = record["y"][:2].copy(), np.array([0.02, -0.03, 0.01])
-    forces.without_vanes(record, turning, np.append(off, np.zeros(record["y"].size - 5)))
+    forces.fill_readings_without_vanes(record, turning, np.append(off, np.zeros(record["y"].size - 5)))
     damped = record["component"]["damping"] @ turning / record["component"]["vane"][:, 1]
     assert still - record["y"][:2] == pytest.approx(damped[::-1])
 
@@ -737,7 +739,7 @@ def test_what_noise_of_the_readings_makes_up_of_a_force(f, name, vane, engine):
     sizes = [next(iter(each.values())) for each in NOISY.values()]
     apart(noise=sizes)
     told = {"engine": engine, "engine_kw": 7.0, "thin_air_kw": 31.0}
-    found = felt(Bounds(sensors=NOISY), **told)["statistical"]["forces"]["component"][f]["quiet"]
+    found = felt(Bounds(sensors=NOISY), **told)["statistical"]["forces"]["component"][f]["trim_variance"]
     sd = dict(zip(NOISY, sizes, strict=True))
     sd |= {axis: np.radians(sd[axis]) for axis in ("alpha", "beta", "p", "q", "r")}
 

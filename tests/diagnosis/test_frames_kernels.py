@@ -77,7 +77,7 @@ def loss_flown(surface, kind=exactly, frames=60, **fdi):
         fie, verdict = flown.fdi["isolation"]["estimator"][surface], flown.fdi["verdict"]
         assert not fie["excluded"]
         if verdict["detected"]:
-            asked = fie["unasked"] == 0
+            asked = fie["ignored_axes"] == 0
             room = 1e-12
             assert (fie["lower"] - room <= fie["residual"])[asked].all()
             assert (fie["residual"] <= fie["upper"] + room)[asked].all()

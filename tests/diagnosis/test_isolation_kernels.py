@@ -127,12 +127,12 @@ def test_a_shared_theta_is_corrected_axis_by_axis_with_what_is_left():
 @pytest.mark.parametrize("axis", range(3))
 @pytest.mark.parametrize("side", [-1, 1])
 def test_a_residual_at_its_limit_is_within_and_beyond_it_is_not(thresholds, axis, side):
-    def within(beyond, unasked=False):
+    def within(beyond, ignored_axes=False):
         fdi = new_fdi()
         fie = estimator(fdi, low=-0.9, high=0.2)
         fdi["isolation"]["config"]["thresholds"] = thresholds
         fie["rise"], fie["fall"], fie["bound"], fie["theta"] = 0.5, -0.2, 0.03, -0.3
-        fie["omega"], fie["unasked"][axis] = 0.3, unasked
+        fie["omega"], fie["ignored_axes"][axis] = 0.3, ignored_axes
         lower, upper = -0.9 * 0.5 - 0.2 * 0.2, 0.2 * 0.5 + 0.9 * 0.2
         limits = (lower + 0.09 - 0.03, upper + 0.09 + 0.03)
         if thresholds == PUBLISHED:
@@ -143,7 +143,7 @@ def test_a_residual_at_its_limit_is_within_and_beyond_it_is_not(thresholds, axis
 
     assert within(-1e-12)
     assert not within(1e-9)
-    assert within(1e-9, unasked=True)
+    assert within(1e-9, ignored_axes=True)
 
 
 def excludes(fdi, row, x=0.0):
@@ -192,7 +192,10 @@ def test_the_one_left_is_the_fault(excluded, isolated):
 def test_one_that_is_left_for_an_end_that_nobody_saw_begin_is_not_named(doubted, shown, named):
     fdi = new_fdi()
     fdi["isolation"]["config"]["n"], fdi["isolation"]["estimator"]["excluded"][:3] = 3, (1, 0, 1)
-    fdi["isolation"]["estimator"]["doubted"][1], fdi["isolation"]["estimator"]["shown"][1] = doubted, shown
+    fdi["isolation"]["estimator"]["weakly_excluded"][1], fdi["isolation"]["estimator"]["confirmed"][1] = (
+        doubted,
+        shown,
+    )
     assert on(estimators.decide, fdi, 4.0) == (1 if named else NOT_ISOLATED)
     fdi["isolation"]["estimator"]["excluded"][1] = 1
     assert on(estimators.decide, fdi, 5.0) == UNANTICIPATED
@@ -214,12 +217,12 @@ def test_what_is_supposed_of_a_frame(memory):
     estimator(fdi, surface=2)
     G, Gu, spread = rng.normal(size=(3, 3, 4))
     fdi["isolation"]["config"]["memory"], fdi["verdict"]["detected"] = memory, 0
-    on(estimators.suppose_all, fdi, G, Gu, np.abs(spread))
+    on(estimators.update_hypotheses, fdi, G, Gu, np.abs(spread))
     fie = fdi["isolation"]["estimator"][0]
     assert fie["reach_low"][:3, :3].any() == memory
     assert fie["effect"]["Z"].any() == memory
     fdi["verdict"]["detected"] = 1
-    on(estimators.suppose_all, fdi, G, Gu, np.abs(spread))
+    on(estimators.update_hypotheses, fdi, G, Gu, np.abs(spread))
     assert fie["effect"]["Z"] == pytest.approx(Gu[:, 2])
     assert fie["effect"]["spread"] == pytest.approx(np.abs(spread[:, 2]))
 
@@ -267,7 +270,7 @@ def test_a_loss_that_has_shown_is_not_excluded_by_what_comes_later(abrupt):
     fdi = new_fdi()
     fie, fdi["config"]["abrupt"] = told(fdi, 20.0, 0.0), abrupt
     assert not excludes(fdi, ("published", "either"))
-    assert fie["shown"] == (not abrupt)
+    assert fie["confirmed"] == (not abrupt)
     told(fdi, 0.0, 90.0)
     assert excludes(fdi, ("published", "either")) == bool(abrupt)
 
@@ -322,7 +325,7 @@ def test_errors_of_a_surfaces_own_terms_widen_the_room_of_its_position(kind, err
     G, Gu = rng.normal(size=(2, 3, 4))
     fdi["bound"]["own_errors"], fdi["bound"]["own_per_rad"], fdi["bound"]["frame"] = errors, 0.3, 1.0
     fdi["config"]["instants"] = 1
-    on(estimators.suppose, fdi, fie, G, Gu, np.full((3, 4), 0.1))
+    on(estimators.update_hypothesis, fdi, fie, G, Gu, np.full((3, 4), 0.1))
     assert (fie["effect"]["spread"] > 0.1).tolist() == [wider] * 3
 
 

@@ -41,7 +41,7 @@ def test_one_theta_has_to_explain_all_axes():
     assert on(membership.agree, *agreeing(exact + np.array([0.149, 0.149, -0.149])))
     # axis 0 allows theta up to -0.35 - ..., axis 2 asks for one below: no theta is left
     assert not on(membership.agree, *agreeing(exact + np.array([0.16, 0.0, 0.16])))
-    assert on(membership.agree, *agreeing(exact + np.array([0.16, 0.0, 0.16]), unasked=(0, 0, 1)))
+    assert on(membership.agree, *agreeing(exact + np.array([0.16, 0.0, 0.16]), ignored_axes=(0, 0, 1)))
     assert on(membership.agree, *agreeing(np.full(3, 0.1)))  # what is healthy agrees
     assert not on(membership.agree, *agreeing(0.3 + 0.2 * np.array([1.0, 2.0, -1.0])))  # a gain is no loss
 

@@ -187,7 +187,7 @@ def test_in_pairs_each_plane_is_asked_for_itself():
     fdi = assembled(substeps=1, fdi={**GIVEN["fdi"], "pairs": True, "authority": "worst-case"})["fdi"]
     assert fdi["types"]["surface"]["status"]["is_candidate"].tolist() == [0, 1, 0, 1]
     pitch, others = [1, 0, 1], [0, 1, 0]
-    assert fdi["isolation"]["estimator"]["unasked"][:4].tolist() == [others, pitch, others, pitch]
+    assert fdi["isolation"]["estimator"]["ignored_axes"][:4].tolist() == [others, pitch, others, pitch]
 
 
 def test_what_is_trimmed_beyond_the_engines_range_is_within_it():

@@ -379,7 +379,7 @@ def alarm_flags(fdi: np.void) -> tuple[np.int64, np.int64]:
 
 
 def _estimator(fie: np.void) -> Estimator:
-    axes = tuple(np.flatnonzero(fie["unasked"] == 0).tolist())
+    axes = tuple(np.flatnonzero(fie["ignored_axes"] == 0).tolist())
     ends = float(fie["low"]), float(fie["high"])
     return Estimator(int(fie["kind"]), *ends, bool(fie["excluded"]), axes, fie["across"].copy())
 

@@ -93,7 +93,7 @@ def predict_estimators(fdi, belief):
     """Bring the isolation estimators from the frame before to this one, once the bank has its innovation."""
     config, bound, records, mean = fdi.config, fdi.bound, fdi.isolation, belief.means
     known = fdi.verdict.detected
-    estimators.suppose_all(records, fdi.bank, bound, config, known, mean.G, mean.Gu, mean.Gu_spread)
+    estimators.update_hypotheses(records, fdi.bank, bound, config, known, mean.G, mean.Gu, mean.Gu_spread)
     if known:
         estimators.predict_all(records, bound, belief.x_then, mean.acceleration, config.dt)
 

@@ -582,8 +582,8 @@ def set_up_jitter(
         flow += TWO_STEP_NOISE * errors.each("random", ("az", "ay")) * dt_s / y[AIRSPEED]
     if statistical["forces"]["known"]:
         forces = statistical["forces"]["component"][::-1]  # normal to the body, and across
-        by_force = np.sqrt(forces["felt"]) / np.abs(forces["vane"][:, 1])
-        statistical["forces"]["blurred"] = jitter(by_force, design, y, u, span_m)
+        by_force = np.sqrt(forces["accelerometer_variance"]) / np.abs(forces["vane"][:, 1])
+        statistical["forces"]["gust_noise"] = jitter(by_force, design, y, u, span_m)
     for name in ("own_jitter", "jitter"):
         statistical["noise"][name] += jitter(flow, design, y, u, span_m) ** 2
 

@@ -173,7 +173,7 @@ def explains(bank, fie, shared):
         residual, bound = 0.0, 0.0
         for i in range(3):
             r, b = bank.output.residual[m, i], bank.output.threshold[m, i]
-            if not fie.reach_low[m, i] - b <= r <= fie.reach_high[m, i] + b and not fie.unasked[i]:
+            if not fie.reach_low[m, i] - b <= r <= fie.reach_high[m, i] + b and not fie.ignored_axes[i]:
                 return False
             residual += fie.across[i] * r
             bound += abs(fie.across[i]) * b

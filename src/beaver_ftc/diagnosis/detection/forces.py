@@ -1,17 +1,18 @@
-"""What accelerometers say beside the rates: with which force a moment comes.
+"""Innovations of the side force and the normal force from accelerometers, as an addition to the rates.
 
-Elevator and flap both pitch the aircraft, so the rates alone do not tell whose fault it is. Their forces do.
-Across and normal to the body, i = Y, Z, and as if it acted at the chord c,
+Elevator and flap both pitch the aircraft, so the rates alone do not separate their faults. Their forces do.
+The innovation of a force, i = Y (side) or Z (normal), is scaled as if the force acted at the chord c, m:
 
     e_i = (a_i - qdyn S C_i / m) / c       rad/s2
 
-with C_i at the measured flow and at the surfaces as commanded. A fault of a surface moves e beside the
-angular acceleration in the ratio of its terms, and so does a vane that is off, in a ratio of its own. Terms
-of forces have the tolerance declared of those of moments, and a force as a whole that of the mass. Of the
-accelerometers themselves noise is jitter, and a bias and a slope are tolerated as declared.
+a_i, m/s2, is the reading; qdyn, Pa, the dynamic pressure; S, m2, the wing area; m, kg, the mass; C_i the
+model's coefficient at the measured flow and the commanded surfaces. A fault of a surface changes e_i and the
+angular acceleration in the ratio of the surface's terms. An error of a vane changes both in another ratio.
+Terms of forces have the same declared tolerance as those of moments, and the whole force has that of the
+mass. Noise of the accelerometers is jitter; their declared bias and slope are tolerated constants.
 
-The side force has a term in the rate of sideslip. It follows from the accelerometers, and JSBSim takes that
-of the run before.
+The side force has a term in the rate of sideslip. It is worked out from the accelerometers. JSBSim uses the
+rate of the run before.
 """
 
 import numpy as np
@@ -32,10 +33,10 @@ from beaver_ftc.scenario.sensors import ACCELEROMETERS
 ASIDE, UP = range(2)  # across the body, and normal to it
 COMPONENTS = ("CY", "CZ")
 CY = FORCES.index("CY")
-LIVELY_RAD_S, STEEP_RAD = 0.2, 0.3  # rates and slope of the path that a drift is reckoned with
-SETTLED = 2  # looks: from the second on the rate of sideslip is that of the run before
-UNSETTLED_S = 0.002  # that force and flow of one instant may be apart, of JSBSim's own: seen to 0.001
-CHANGES = 0.3  # what of a drift may be another a second later
+TYPICAL_RATE_RAD_S, TYPICAL_SLOPE_RAD = 0.2, 0.3  # typical rates and path slope, for the drift
+SETTLED = 2  # updates: from the second one on the rate of sideslip of the run before is known
+MODEL_LAG_S = 0.002  # time between force and flow of one instant in JSBSim, at most; 0.001 was measured
+DRIFT_CHANGE_SHARE = 0.3  # share of a drift that may change within a second
 RATE_TOLERANCE = {False: 0.05, True: 0.2}  # of the term in the rate of sideslip: gusts have a part in it
 # The rate of sideslip, the bias of the accelerometer and the force as a whole come last.
 MAX_ERRORS = MAX_TERMS_OF_ONE + 3
@@ -43,59 +44,62 @@ MAX_ERRORS = MAX_TERMS_OF_ONE + 3
 Trim = tuple[np.ndarray, np.ndarray, np.ndarray]  # x (3,) rad/s, y and u rad
 
 FORCE = record(
-    innovation=float,  # e as the elapsed frame began
-    # the same by the angle that follows from inertial motion; that angle, rad; how fast it may drift,
-    # rad/s, and what that comes to per rad/s; how far errors and gusts let e wander, (rad/s2)2/s
-    inertial=float, angle=float, drift=float, drifted=float, wander=float,
-    # of each surface per rad, by this instant's readings and by those before, and at its command; of its
-    # errors per rad
-    column=MAX_SURFACES, foreseen=MAX_SURFACES, moment=MAX_SURFACES, own=MAX_SURFACES,
-    # of an error of its vane: angular acceleration, and e, per rad; that in roll
-    vane=2, vane_roll=float, quiet=2, jitter=2, damping=3, deflection=float,
-    whole=float, unsettled=float,  # e as the model has it; how far a lag lets it be off, rad/s2
-    felt=float,  # variance of e by noise of the accelerometer, which the pressure does not scale
+    innovation=float,  # e at the start of the elapsed frame, rad/s2
+    # e at the flow angle from inertial motion; that angle, rad; bound on its drift, rad/s; integral of the
+    # force's slope, e per rad/s of drift; intensity of the drift of e by errors and gusts, (rad/s2)2/s
+    inertial=float, angle=float, drift=float, angle_sensitivity=float, wander=float,
+    # of each surface: e per rad, now and with the readings before; e at the command; error of e per rad
+    column=MAX_SURFACES, column_predicted=MAX_SURFACES, effect=MAX_SURFACES, column_error=MAX_SURFACES,
+    # of an error of the vane, per rad: angular acceleration and e, angular acceleration in roll
+    vane=2, vane_roll=float,
+    trim_variance=2, jitter=2,  # variance of e in trim and now: with the vane, without it; (rad/s2)2
+    damping=3, deflection=float,  # e per rad/s of rotation of the air; bound by errors of deflections
+    model=float, unsettled=float,  # e of the model; bound on its error by a time lag, rad/s2
+    accelerometer_variance=float,  # of e, by noise of the accelerometer; independent of the pressure
     n=int, tolerance=MAX_ERRORS, regressor=MAX_ERRORS,
 )  # fmt: skip
 FORCES_FELT = record(
-    known=int, per_m=float, gravity=float, span=float,  # one over the chord; m/s2; m
-    pressure=float, pressure_noise=float,  # Pa: in trim, and of its reading
-    strength=float,  # of the pressure, as a share of trim: so much more do forces than stands here
-    # coefficient of the rate of sideslip; rates of sideslip and incidence, rad/s, of the instant before
-    of_rate=float, rate=2, begun=int,  # looks, up to SETTLED
-    blurred=3,  # rad/s2: what their noise adds to the gust that follows from them
+    known=int, per_m=float, gravity=float, span=float,  # whether forces are used; one over the chord; m/s2; m
+    pressure=float, pressure_noise=float,  # Pa: in trim, and noise of its reading
+    strength=float,  # dynamic pressure over that in trim: forces scale with it
+    # coefficient of the rate of sideslip; rates of sideslip and incidence of the instant before, rad/s
+    sideslip_rate_coefficient=float, rate=2, n_updates=int,  # updates so far, up to SETTLED
+    gust_noise=3,  # noise of the gust estimate from forces, rad/s2
     y=N_Y, component=(FORCE, 2),
 )  # fmt: skip
 
 
 @kernel
-def look(forces, air, measured, u, dt):
-    """Compare this instant's accelerometers with the model, surfaces at u (n,) rad, dt s after the last.
+def update(forces, air, measured, u, dt):
+    """Update the innovations of the forces at this instant, dt s after the last; u (n,) rad: surfaces.
 
-    Of the first instant the rate of sideslip of the run before is not known: that of the instant stands in.
+    At the first instant the rate of sideslip of the run before is not known; that of this instant is used.
     """
-    if forces.begun == 0:
+    if forces.n_updates == 0:
         flow_rates(forces, measured)
     evaluate(air.memory.force_table, measured.x, measured.y)
     forces.strength = measured.y[QDYN] / forces.pressure
     for f in range(2):
-        before = forces.component[f].whole
-        look_along(forces, air, f, measured, u)
-        settle(forces.component[f], before, forces.begun, dt)
-        follow(forces, forces.component[f], f, measured.y, dt)
+        before = forces.component[f].model
+        update_component(forces, air, f, measured, u)
+        fill_unsettled(forces.component[f], before, forces.n_updates, dt)
+        integrate_angle(forces, forces.component[f], f, measured.y, dt)
     flow_rates(forces, measured)
-    forces.begun = min(forces.begun + 1, SETTLED)
+    forces.n_updates = min(forces.n_updates + 1, SETTLED)
 
 
 @kernel
-def settle(force, before, begun, dt):
-    """Note how fast the force changes, `before` being what it was; it is not all of one instant."""
-    force.unsettled = UNSETTLED_S * abs(force.whole - before) / dt if begun else 0.0
+def fill_unsettled(force, before, begun, dt):
+    """Fill `unsettled` from the change of the model's e since `before`: force and flow differ in time."""
+    force.unsettled = MODEL_LAG_S * abs(force.model - before) / dt if begun else 0.0
 
 
 @kernel
-def without_vanes(forces, rotation, y):
-    """Fill `y` with the readings, alpha and beta being what the forces say they are; rotation (3,) rad/s: of
-    the air, in body axes, which damps as the aircraft's own does."""
+def fill_readings_without_vanes(forces, rotation, y):
+    """Fill `y` with the readings y, but alpha and beta worked out from the forces.
+
+    rotation (3,) rad/s: of the air in body axes; it damps like the aircraft's own rotation.
+    """
     forces.y[:] = y
     for f in range(2):
         force, place, damped = forces.component[f], BETA if f == ASIDE else ALPHA, 0.0
@@ -105,57 +109,69 @@ def without_vanes(forces, rotation, y):
 
 
 @kernel
-def do_without(forces, air, inertial_air):
-    """Weigh no force from now on, and follow the gust without accelerometers."""
+def stop_forces(forces, air, inertial_air):
+    """Stop using forces, and estimate the gust without accelerometers."""
     stop_accelerometers(air)
     stop_gust_filter(inertial_air)
     forces.known = 0
 
 
 @kernel
-def follow(forces, force, f, y, dt):
-    """Follow the angle of a vane by inertial motion alone, and see the force with it."""
+def integrate_angle(forces, force, f, y, dt):
+    """Integrate the flow angle of a vane from inertial motion, and fill the force's innovation at it."""
     reading, slope = y[BETA if f == ASIDE else ALPHA], force.vane[1] * forces.strength
-    force.angle = force.angle + dt * forces.rate[f] if forces.begun else reading
-    force.drifted += dt * slope
+    force.angle = force.angle + dt * forces.rate[f] if forces.n_updates else reading
+    force.angle_sensitivity += dt * slope
     force.inertial = force.innovation - slope * (reading - force.angle)
 
 
 @kernel
-def look_along(forces, air, f, measured, u):
-    """The same along one direction: e, what surfaces do to it, and what the errors multiply."""
+def update_component(forces, air, f, measured, u):
+    """Update one force: its innovation e, the effects of surfaces, and the regressors of its errors."""
     table, force = air.memory.force_table, forces.component[f]
     first, last = table.free_from[CY + f], table.surface_to[CY + f]
     scale, whole = measured.y[QDYN] * air.config.area_per_mass * forces.per_m, 0.0
-    force.foreseen[:] = force.column
-    force.column[:], force.own[:] = 0.0, 0.0
+    force.column_predicted[:] = force.column
+    force.column[:], force.column_error[:] = 0.0, 0.0
     for k in range(first, last):
         s, of_one = table.surface[k], scale * table.power[table.monomial[k]]
         if s >= 0:
             force.column[s] += table.value[k] * of_one
-            force.own[s] += force.tolerance[k - first] * abs(of_one)
+            force.column_error[s] += force.tolerance[k - first] * abs(of_one)
             of_one *= u[s]
         force.regressor[k - first] = of_one
         whole += table.value[k] * of_one
     if f == ASIDE:
-        turning = scale * forces.of_rate * forces.rate[ASIDE] * forces.span / (2.0 * measured.y[AIRSPEED])
+        turning = (
+            scale
+            * forces.sideslip_rate_coefficient
+            * forces.rate[ASIDE]
+            * forces.span
+            / (2.0 * measured.y[AIRSPEED])
+        )
         force.regressor[last - first] = turning
         whole += turning
-    force.regressor[force.n - 1], force.whole = whole, whole
-    if forces.begun == 0:
-        force.foreseen[:] = force.column
+    force.regressor[force.n - 1], force.model = whole, whole
+    if forces.n_updates == 0:
+        force.column_predicted[:] = force.column
     for s in range(u.size):
-        force.moment[s] = force.foreseen[s] * u[s]
+        force.effect[s] = force.column_predicted[s] * u[s]
     force.innovation = measured.force[1 + f] * forces.per_m - whole
     by_pressure = whole * forces.pressure_noise / measured.y[QDYN]
     for k in range(2):
-        force.jitter[k] = force.quiet[k] * forces.strength**2 + by_pressure * by_pressure + force.felt
+        force.jitter[k] = (
+            force.trim_variance[k] * forces.strength**2
+            + by_pressure * by_pressure
+            + force.accelerometer_variance
+        )
 
 
 @kernel
 def flow_rates(forces, measured):
-    """Fill `rate` with d beta / dt and d alpha / dt in air at rest, rad/s: from accelerometers, rates,
-    attitude and flow."""
+    """Fill `rate` with d beta / dt and d alpha / dt in still air, rad/s.
+
+    They follow from accelerometers, rates, attitude and flow.
+    """
     gravity, x, a = forces.gravity, measured.x, measured.force
     phi, theta = measured.attitude[0], measured.attitude[1]
     alpha, beta, V = measured.y[ALPHA], measured.y[BETA], measured.y[AIRSPEED]
@@ -186,7 +202,7 @@ def set_up_forces(fdi: np.void, declared: Declared, trim: Trim, along_y: np.ndar
     forces["per_m"], forces["gravity"] = 1.0 / size.chord_m, air["config"]["gravity"]
     forces["pressure"], forces["pressure_noise"] = y[QDYN], sensors["qdyn"].random
     rates = [t.value for t in aircraft.forces if t.coefficient == "CY" and t.of == ((SIDESLIP_RATE, 1),)]
-    forces["span"], forces["of_rate"] = size.span_m, sum(rates)
+    forces["span"], forces["sideslip_rate_coefficient"] = size.span_m, sum(rates)
     scale = y[QDYN] * air["config"]["area_per_mass"] * forces["per_m"]
     errors = sensors.each("random", ("alpha", "beta", "V", *AXES))
     by_airspeed, by_others = _slipstream_noise(y, fdi["bound"]["admitted"], sensors)
@@ -200,14 +216,14 @@ def set_up_forces(fdi: np.void, declared: Declared, trim: Trim, along_y: np.ndar
         felt[AIRSPEED] += slipstream * by_airspeed
         parts = (felt * errors) ** 2
         quiet = parts.sum() + slipstream**2 * by_others
-        force["quiet"] = quiet, quiet - parts[vane]
+        force["trim_variance"] = quiet, quiet - parts[vane]
         noise = sensors[ACCELEROMETERS[1 + f]].random
-        force["felt"] = (forces["per_m"] * noise) ** 2
+        force["accelerometer_variance"] = (forces["per_m"] * noise) ** 2
         _set_up_tolerances(force, declared, terms, y, slopes[vane] / scale, f, forces["per_m"])
         turned = scale * sum(abs(term.value) for term in terms if term.surface)
         force["deflection"] = turned * declared.actuators.deflection_rad
         force["drift"] = _drift(sensors, air["config"]["gravity"], y[AIRSPEED], f)
-        wander = (CHANGES * force["drift"]) ** 2 + dt_s * (noise / y[AIRSPEED]) ** 2
+        wander = (DRIFT_CHANGE_SHARE * force["drift"]) ** 2 + dt_s * (noise / y[AIRSPEED]) ** 2
         force["wander"] = slopes[vane] ** 2 * (wander + declared.air.angle_walk(y[AIRSPEED]))
 
 
@@ -224,12 +240,12 @@ def _drift(errors: SensorErrors, gravity: float, airspeed_mps: float, f: int) ->
     """How fast the angle that is followed can drift, rad/s. Gravity acts along the path's slope only on the
     incidence, and in full on sideslip."""
     tilt = errors["phi"].steady + errors["theta"].steady
-    turning = sum(errors[gyro].steady + LIVELY_RAD_S * errors[gyro].slope for gyro in AXES)
+    turning = sum(errors[gyro].steady + TYPICAL_RATE_RAD_S * errors[gyro].slope for gyro in AXES)
     # how far accelerometers can be off across the flow in level flight: that of the axis, and of the one
     # ahead as much as the flow's angle lets it
     own = errors[ACCELEROMETERS[1 + f]]
-    misfelt = own.steady + STEEP_RAD * errors["ax"].steady + gravity * (own.slope if f == UP else 0.0)
-    falls = gravity * tilt * (STEEP_RAD if f == UP else 1.0) + FALLING_M_S2 + misfelt
+    misfelt = own.steady + TYPICAL_SLOPE_RAD * errors["ax"].steady + gravity * (own.slope if f == UP else 0.0)
+    falls = gravity * tilt * (TYPICAL_SLOPE_RAD if f == UP else 1.0) + FALLING_M_S2 + misfelt
     return float(EARTH_RATE_RAD_S + turning + falls / airspeed_mps)
 
 

@@ -124,7 +124,7 @@ def column_component(view, forces, bound, G, j):
         return size, VANE_TOLERANCE * abs(size)
     if i >= SIDE:
         force = forces.component[i - SIDE]
-        return force.foreseen[s], force.own[s]
+        return force.column_predicted[s], force.column_error[s]
     return G[i, s], bound.own_per_rad[i, s] if bound.own_errors else 0.0
 
 
@@ -215,7 +215,7 @@ def set_noise(view, noise, blocks, forces, air, inertial_air, V):
         variance += m[i] * m[i] * blocks[PITCH_BLOCK if i == PITCH else LATERAL].noise[i // 2]
         jitter += abs(m[i]) * np.sqrt(noise.jitter[i])
         if view.immune_to_vane:
-            jitter += abs(m[i]) * forces.blurred[i]
+            jitter += abs(m[i]) * forces.gust_noise[i]
         bound += abs(m[i]) * (noise.bounded[i] + noise.beyond[i])
     for f, force in enumerate(forces.component):
         jitter += abs(m[SIDE + f]) * np.sqrt(force.jitter[view.inertial])
@@ -261,7 +261,7 @@ def fill_regressors(view, blocks, forces, air, inertial_air, innovation):
             block.regressor[n + j, 0] = m[second] * force.regressor[j]
         n += force.n
         if view.inertial:
-            block.regressor[n, 0], n = m[second] * force.drifted, n + 1
+            block.regressor[n, 0], n = m[second] * force.angle_sensitivity, n + 1
     if view.surface != AXIS_VIEW:
         block.regressor[n, 0] = 0.0
         for i in range(m.size):
@@ -277,7 +277,7 @@ def update_directions(views, forces, air, bound, G, Gu):
     G (3, n) rad/s2 per rad, Gu (3, n) rad/s2: control effectiveness and effect of each surface in the frame.
     """
     for view in views:
-        view.active = not uses_force(view) or (forces.known and forces.begun == SETTLED)
+        view.active = not uses_force(view) or (forces.known and forces.n_updates == SETTLED)
         if view.active:
             view.column_leak = (
                 set_direction(view, forces, air, bound, G) if view.surface != AXIS_VIEW else 0.0

@@ -42,5 +42,5 @@ def fill_view_signatures(view, forces, Gu):
         if hypothesis.kind != STEP:
             moment = m[0] * Gu[0, s] + m[1] * Gu[1, s] + m[2] * Gu[2, s]
             for f in range(2):
-                moment += m[SIDE + f] * forces.component[f].moment[s]
+                moment += m[SIDE + f] * forces.component[f].effect[s]
             hypothesis.signature[0] = moment

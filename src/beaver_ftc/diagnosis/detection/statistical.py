@@ -226,7 +226,7 @@ def confirms_loss(tests, blocks, estimators, loss_of, surface):
     estimators: of the isolation; loss_of (n,): the estimator of each surface's loss, or -1. If the estimator
     is doubted BESIDE_DAMAGE, excluded losses are alternatives as well: damage may have excluded them.
     """
-    every = loss_of[surface] >= 0 and estimators[loss_of[surface]].doubted == BESIDE_DAMAGE
+    every = loss_of[surface] >= 0 and estimators[loss_of[surface]].weakly_excluded == BESIDE_DAMAGE
     for block in blocks:
         least = 0.0
         for hypothesis in block.hypothesis[: block.n_hypotheses]:

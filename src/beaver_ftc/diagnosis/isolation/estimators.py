@@ -12,12 +12,12 @@ Every hypothesis is linear in one unknown parameter per axis, phi_i = base_i + t
     loss of effectiveness   base 0          Z_i = G_is u_s      theta in [-1, 0]       [Zhang2005, eq. (4)]
     position                base -G_is u_s  Z_i = G_is          theta in the travel
 
-LOSS on aileron, elevator and rudder is the published class. POSITION says only that the surface is not
-where its command puts it: its parameter, the deflection in rad, may change in any way, so it covers every
-fault of the surface. The two together are `fdi.fault_class: all`; types/ finds out which type of fault it is.
+LOSS on aileron, elevator and rudder is the published class. POSITION states only that the surface does not
+follow its command. Its parameter, the deflection in rad, may change in any way, so it covers every fault of
+the surface. Both together are `fdi.fault_class: all`; types/ decides which type of fault it is.
 
-The sharpened tests (bank.py, membership.py) exclude beside it, each by its own switch; a fault is excluded
-by the first test that fails.
+The sharpened tests (bank.py, membership.py) exclude as well, each by its own switch. The first test that
+fails excludes a fault.
 """
 
 from math import exp
@@ -43,14 +43,14 @@ from beaver_ftc.diagnosis.state import (
 from beaver_ftc.scenario.diagnosis import MAX_POLES
 from beaver_ftc.scenario.schema import Scenario
 
-# What a fault adds to the angular acceleration, as its estimator supposes: offset + theta Z, give or take.
+# Acceleration by a fault, rad/s2: offset + theta Z, within +/- spread.
 EFFECT = record(offset=3, Z=3, spread=3)
 
 ESTIMATOR = record(
     kind=int, surface=int,
     low=float, high=float,  # the known set of theta
-    excluded=int, excluded_at_s=float, unasked=(int, 3), xhat=3, residual=3, lower=3, upper=3,
-    shown=int, doubted=int, improbable=int,  # by_chance.py
+    excluded=int, excluded_at_s=float, ignored_axes=(int, 3), xhat=3, residual=3, lower=3, upper=3,
+    confirmed=int, weakly_excluded=int, excluded_by_likelihood=int,  # by_chance.py
     omega=3, rise=3, fall=3, bound=3, bound_eta=3, bound_noise=3, theta=3, covariance=3,
     effect=EFFECT, block_effect=EFFECT,  # of the frame; mean over a block
     furthest=float, used=float,  # rad from neutral, share of its travel, where it can have been in the frame
@@ -117,11 +117,11 @@ def configure(
         fie["kind"], fie["surface"] = kind, surface
         fie["low"], fie["high"] = PARAMETER_SET[kind] if kind == LOSS else reach[:, surface]
         if config.pairs:  # each plane by itself: pitch by its two surfaces, roll and yaw by theirs
-            fie["unasked"] = (1, 0, 1) if aircraft.dominant_axis[surface] == PITCH else (0, 1, 0)
+            fie["ignored_axes"] = (1, 0, 1) if aircraft.dominant_axis[surface] == PITCH else (0, 1, 0)
     # Damage is outside the class: what is merely left when chance has excluded the others is not yet at
     # fault.
     doubted = BESIDE_DAMAGE if config.weighs_chance and aircraft.damage else 0
-    isolation["estimator"]["doubted"] = doubted
+    isolation["estimator"]["weakly_excluded"] = doubted
     isolation["config"]["patience_s"] = PATIENCE_S if aircraft.damage else 0.0
     lost = {surface for case in aircraft.damage.values() for surface in case.takes}
     isolation["config"]["taken"] = [surface in lost for surface in aircraft.surfaces]
@@ -141,11 +141,11 @@ def hypothesis(kind, surface, G, Gu, base, Z):
 
 
 @kernel
-def suppose(isolation, fie, bank, bound, config, G, Gu, spread):
-    """What the fault would have done in the elapsed frame, and to the bank since the flight began.
+def update_hypothesis(isolation, fie, bank, bound, config, G, Gu, spread):
+    """Fill the effect of an estimator's fault in the elapsed frame, and update its reach in the bank.
 
-    G (3, 4) rad/s2 per rad; Gu (3, 4) rad/s2, the contribution of each surface; means over the frame. spread
-    (3, 4) rad/s2: by how much the mean can mislead about a fault that changed in the frame.
+    G (3, n) rad/s2 per rad; Gu (3, n) rad/s2: effect of each surface; means over the frame. spread (3, n)
+    rad/s2: error of the mean if a fault changes within the frame.
     """
     effect = fie.effect
     hypothesis(fie.kind, fie.surface, G, Gu, effect.offset, effect.Z)
@@ -158,18 +158,18 @@ def suppose(isolation, fie, bank, bound, config, G, Gu, spread):
 
 
 @kernel
-def suppose_all(isolation, bank, bound, config, detected, G, Gu, spread):
-    """`suppose` for every estimator, where something will ask for it."""
+def update_hypotheses(isolation, bank, bound, config, detected, G, Gu, spread):
+    """`update_hypothesis` for every estimator, where something will ask for it."""
     if isolation.config.memory or config.every_type or detected:
         for fie in isolation.estimator[: isolation.config.n]:
-            suppose(isolation, fie, bank, bound, config, G, Gu, spread)
+            update_hypothesis(isolation, fie, bank, bound, config, G, Gu, spread)
 
 
 @kernel
 def start(isolation, noise, x):
-    """Start every estimator at the measured x (3,) rad/s, with no residual and no knowledge of theta.
+    """Start every estimator at the measured x (3,) rad/s, without residual and with the prior of theta.
 
-    noise (3,) rad/s: by how much the gyros' errors may change.
+    noise (3,) rad/s: bound on the change of the gyros' errors.
     """
     for fie in isolation.estimator[: isolation.config.n]:
         fie.xhat[:], fie.bound_noise[:] = x, noise
@@ -179,7 +179,7 @@ def start(isolation, noise, x):
 
 @kernel
 def within_limits(fie, thresholds, x):
-    """Form the residual and its limits; whether it is within them on every axis."""
+    """Form the residual and its thresholds; true if it is within them on every axis that counts."""
     within = True
     for i in range(3):
         fie.residual[i] = x[i] - fie.xhat[i]
@@ -191,15 +191,16 @@ def within_limits(fie, thresholds, x):
         else:
             limits = published(low, high, omega, theta, bound)
         fie.lower[i], fie.upper[i] = limits
-        within = within and (fie.lower[i] <= fie.residual[i] <= fie.upper[i] or fie.unasked[i])
+        within = within and (fie.lower[i] <= fie.residual[i] <= fie.upper[i] or fie.ignored_axes[i])
     return within
 
 
 @kernel
 def possible(isolation, fie, bank, frame_bound, abrupt, x, started):
-    """Whether the fault can be the one, by every test switched on. `started`: a frame or more ago.
+    """True if no test that is switched on excludes the fault of estimator fie.
 
-    frame_bound (3,): on the innovation of a healthy frame; abrupt: whether a fault stays as it is.
+    frame_bound (3,) rad/s2: on the innovation of a healthy frame; abrupt: a fault is declared to stay as it
+    is; x (3,) rad/s: measured; started: the isolation started a frame or more ago.
     """
     can_be = within_limits(fie, isolation.config.thresholds, x)
     if isolation.config.memory:
@@ -229,11 +230,11 @@ def exclude(fie, t):
 
 @kernel
 def decide(isolation, t):
-    """The isolated fault by the generalised observer scheme: the estimator left, NOT_ISOLATED, or, with none
-    left, UNANTICIPATED: the fault is outside the class.
+    """The fault isolated by the generalised observer scheme: the one estimator that is not excluded.
 
-    An estimator that is doubted and does not show by itself is not named, nor, of an aircraft that declares
-    damage, one that has not yet been the only one left for `patience_s`.
+    NOT_ISOLATED if several are left; UNANTICIPATED if none is left: the fault is outside the class. A weakly
+    excluded estimator is not isolated unless it is confirmed. On an aircraft that declares damage, neither is
+    one that has been the only one left for less than `patience_s`.
     """
     left, last, since_s = 0, NOT_ISOLATED, -np.inf
     for s, fie in enumerate(isolation.estimator[: isolation.config.n]):
@@ -241,7 +242,7 @@ def decide(isolation, t):
             since_s = max(since_s, fie.excluded_at_s)
         else:
             left += 1
-            last = NOT_ISOLATED if fie.doubted and not fie.shown else s
+            last = NOT_ISOLATED if fie.weakly_excluded and not fie.confirmed else s
     if t - since_s < isolation.config.patience_s:
         last = NOT_ISOLATED
     return NOT_ISOLATED if left > 1 else (last if left == 1 else UNANTICIPATED)
@@ -258,8 +259,8 @@ def take_estimate(isolation, isolated, theta):
 def correct(fie, i, residual, forgetting, low, high):
     """One least-squares step of thetahat_i on a residual, projected onto [low, high]; returns the step.
 
-    Gradient along Omega with the gain covariance / (noise + Omega^2 covariance); the noise is the bound on
-    the filtered uncertainty, so an estimate moves no faster than its information allows.
+    The gain is covariance Omega / (noise + Omega^2 covariance). The noise is the square of the bound on the
+    filtered uncertainty, so the estimate changes no faster than its information allows.
     """
     noise = fie.bound[i] ** 2
     gain = fie.covariance[i] * fie.omega[i]
@@ -284,7 +285,7 @@ def descend(fie, i, gain, dt):
 
 @kernel
 def adapt_jointly(fie, forgetting):
-    """The same for one theta shared by the axes, each correcting what those before have left."""
+    """The same for one theta shared by the axes: each axis corrects what the axes before left."""
     total = 0.0
     for i in range(3):
         if i > 0:
@@ -301,8 +302,8 @@ def adapt_jointly(fie, forgetting):
 def predict(isolation, fie, bound, x, believed, dt):
     """Advance one estimator by a frame.
 
-    x (3,) rad/s as the frame began; believed (3,) rad/s2 is f + G u, mean over the frame; fie.effect is
-    already this frame's.
+    x (3,) rad/s: at the start of the frame; believed (3,) rad/s2: mean of f + G u over the frame; fie.effect
+    must be that of this frame.
     """
     for i in range(3):
         base, Z, theta, a = fie.effect.offset[i], fie.effect.Z[i], fie.theta[i], isolation.config.decay[i]
@@ -319,7 +320,7 @@ def predict(isolation, fie, bound, x, believed, dt):
 
 @kernel
 def adapt(isolation, fie, dt):
-    """Move the estimate by the residual the frame began with, and the prediction along Omega[k+1]."""
+    """Correct the estimate by the residual at the start of the frame, and the prediction by Omega[k+1]."""
     joint = adapt_jointly(fie, isolation.config.forgetting) if isolation.config.shared else 0.0
     for i in range(3):
         if isolation.config.by_gradient:

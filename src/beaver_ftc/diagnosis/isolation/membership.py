@@ -1,10 +1,10 @@
-"""Set membership: which parameters of a fault agree with the innovation, and have agreed all along.
+"""Set membership: the parameters theta of a fault that are consistent with the innovation.
 
-    theta agrees with a frame on axis i if |nu_i - base_i - theta Z_i| <= eta_bar_i
+    theta is consistent with a frame on axis i if |nu_i - base_i - theta Z_i| <= eta_bar_i
 
-One surface has one parameter, so its axes must agree on one theta. Frame by frame this is the sharpest test
-there is of a parameter that may change in any way; of a constant one (`fdi.fault_profile: abrupt`) the
-sets of all frames since the alarm may be intersected.
+nu, base, Z and eta_bar are in rad/s2 (Z per unit of theta). One surface has one parameter, so one theta must
+be consistent on all axes. For a parameter that may change in any way, no test frame by frame is sharper. For
+a constant parameter (`fdi.fault_profile: abrupt`) the sets of all frames since the alarm are intersected.
 """
 
 import numpy as np
@@ -13,12 +13,12 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.bounds.worst_case import covering, share_used
 
 NOTHING = (1.0, -1.0)
-ROUNDS = 4  # each narrows what is left of the travel to the tolerance's share of it
+ROUNDS = 4  # each round reduces the remaining travel to the share of it that the tolerance is
 
 
 @kernel
 def healthy(innovation, bound):
-    """Whether the admitted uncertainty alone explains an innovation (3,) bounded by `bound` (3,), rad/s2."""
+    """True if the admitted uncertainty alone explains an innovation (3,): |nu| <= bound (3,), rad/s2."""
     within = True
     for i in range(3):
         within = within and abs(innovation[i]) <= bound[i]
@@ -36,11 +36,12 @@ def solve(value, bound, slope, low, high):
 
 @kernel
 def agreeing(innovation, bound, fie, effect, i):
-    """The interval of theta that agrees with an innovation (3,) on axis i, if that axis is asked.
+    """The interval of theta that is consistent with an innovation (3,) rad/s2 on axis i.
 
-    bound (3,): on the innovation without a fault, rad/s2. effect: what the fault does, of dtype EFFECT.
+    It is the whole known set if the axis is ignored. bound (3,) rad/s2: on the innovation without a fault;
+    effect: acceleration by the fault, of dtype EFFECT.
     """
-    if fie.unasked[i]:
+    if fie.ignored_axes[i]:
         return fie.low, fie.high
     value, room = innovation[i] - effect.offset[i], bound[i] + effect.spread[i]
     return solve(value, room, effect.Z[i], fie.low, fie.high)
@@ -58,12 +59,12 @@ def dominant(Z):
 
 @kernel
 def allow_for_own_errors(fie, bound, innovation, instants):
-    """Widen the room of a position by what the errors of the surface's own terms do where it can have been.
+    """Widen the tolerance of a position by the errors of the surface's own terms at that position.
 
-    eta_bar holds them at the command. The further the surface is from neutral, the more they do; how far it
-    can have been follows from the frame itself, in a few rounds from its travel inwards, each of them valid.
-    Of several JSBSim frames in one of ours (instants) the first may have seen it where it was a frame before.
-    So with a map of the model's error, which is for healthy surfaces.
+    eta_bar contains these errors at the commanded position. They grow with the distance from neutral. How far
+    the surface can have been follows from the frame itself, in a few rounds from its travel inwards; every
+    round gives a valid bound. If a frame has several instants, the surface may still be where it was a frame
+    before at the first of them. The same holds for a map of the model's error, which is for healthy surfaces.
     """
     s, effect = fie.surface, fie.effect
     axis = dominant(effect.Z)
@@ -90,8 +91,10 @@ def allow_for_own_errors(fie, bound, innovation, instants):
 
 @kernel
 def within(mapped, fie, where, instants):
-    """The level of the map of errors, 0 without one, that covers a surface which was in the mean over the
-    frame at `where`, (low, high) rad."""
+    """The level of the error map that covers a surface at a mean position within `where`, (low, high) rad.
+
+    It is 0 without a map.
+    """
     if not mapped.anywhere:
         return 0
     return covering(mapped, share_used(mapped, fie.surface, where, fie.used, instants))
@@ -99,7 +102,7 @@ def within(mapped, fie, where, instants):
 
 @kernel
 def agree(fie, innovation, frame_bound):
-    """Whether one theta, or no fault at all, explains the elapsed frame on every axis."""
+    """True if one theta, or no fault at all, is consistent with the elapsed frame on every axis."""
     if healthy(innovation, frame_bound):
         return True
     low, high = fie.low, fie.high
@@ -111,7 +114,7 @@ def agree(fie, innovation, frame_bound):
 
 @kernel
 def start(fie, unprojected):
-    """Begin with the known set of theta on every axis; `unprojected`: with no limit."""
+    """Start with the known set of theta on every axis, or, if `unprojected`, without limits."""
     fie.theta_low[:], fie.theta_high[:] = fie.low, fie.high
     if unprojected:
         fie.theta_low[:], fie.theta_high[:] = -np.inf, np.inf
@@ -119,7 +122,7 @@ def start(fie, unprojected):
 
 @kernel
 def intersect(fie, i, interval, shared):
-    """Keep of the set of theta on axis i, or of every axis if shared, what is also in `interval`."""
+    """Intersect the set of theta on axis i, or on every axis if `shared`, with `interval`."""
     low, high = interval
     for j in range(3):
         if shared or j == i:
@@ -129,9 +132,9 @@ def intersect(fie, i, interval, shared):
 
 @kernel
 def narrow(fie, innovation, frame_bound, shared):
-    """Intersect with what frame and filtered residual say of a constant theta; False when nothing is left.
+    """Intersect the set of a constant theta with those of frame and filtered residual; false if it is empty.
 
-    Filtered: eps + Omega thetahat = Omega theta + filtered uncertainty, whatever the estimate thetahat did.
+    Filtered: eps + Omega thetahat = Omega theta + filtered uncertainty, for any course of the estimate.
     """
     for i in range(3):
         frame = agreeing(innovation, frame_bound, fie, fie.effect, i)

@@ -62,10 +62,10 @@ def is_improbable(fdi, fie):
     if detector.alarm.detected_at_s < 0.0:
         return False
     hidden = fdi.sensor_monitor.config.enabled and detector.air.output.moving
-    by_chance.weigh(
+    by_chance.update_exclusion(
         fie, detector.tests, detector.block, fdi.isolation, fdi.layout.loss_of, config.abrupt, hidden
     )
-    return fie.improbable == 1
+    return fie.excluded_by_likelihood == 1
 
 
 @kernel

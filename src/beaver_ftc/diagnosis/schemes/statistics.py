@@ -59,7 +59,7 @@ def update_air(gust, inertial, force_record, belief, measured, k, dt):
         air.set_intensity(gust, measured.altitude)
         air.update(gust, measured.y, measured.attitude, belief.share * dt, k)
     if (force_record.known or gust.output.uses_accelerometers) and not measured.inertial:
-        forces.do_without(force_record, gust, inertial)
+        forces.stop_forces(force_record, gust, inertial)
     if force_record.known or gust.output.uses_accelerometers:
         air.take_accelerometers(gust, measured.force)
     if force_record.known:
@@ -69,9 +69,9 @@ def update_air(gust, inertial, force_record, belief, measured, k, dt):
 @kernel
 def update_inertial_air(gust, inertial, force_record, belief, measured, k, dt):
     """Take in what the accelerometers say, and the air as it follows from them without the vanes."""
-    forces.look(force_record, gust, measured, belief.u, dt)
+    forces.update(force_record, gust, measured, belief.u, dt)
     if inertial.output.moving:
-        forces.without_vanes(force_record, inertial.memory.rotation, measured.y)
+        forces.fill_readings_without_vanes(force_record, inertial.memory.rotation, measured.y)
         air.take_accelerometers(inertial, measured.force)
         air.set_intensity(inertial, measured.altitude)
         air.update(inertial, force_record.y, measured.attitude, dt, k)

@@ -51,7 +51,7 @@ PARTS: dict[str, dict[str, Kernel]] = {
     },
     # the isolation estimators, and the decision among them
     "fies": {
-        "diagnosis.isolation.estimators.suppose_all": nothing,
+        "diagnosis.isolation.estimators.update_hypotheses": nothing,
         "diagnosis.isolation.estimators.predict_all": nothing,
         "diagnosis.isolation.estimators.start": nothing,
         "diagnosis.schemes.fault_classes.isolate_fault": nothing,

@@ -120,6 +120,17 @@ def test_cells_that_hold_no_number(tmp_path):
     assert list(table.read_numbers(other, ["w", "t_s"])) == ["t_s", "w"]
 
 
+@pytest.mark.parametrize(
+    ("name", "says"), [("a.csv", "is a directory"), ("no.csv", "no such file or directory")]
+)
+def test_why_the_system_does_not_open_a_table_is_said_without_its_numbers(tmp_path, name, says):
+    (tmp_path / "a.csv").mkdir()
+    with pytest.raises(BadInput) as caught:
+        table.names_of(tmp_path / name)
+    says = f"is no table that can be read ({says}), allowed: CSV or Parquet"
+    assert str(caught.value) == f"{tmp_path / name}: {says}"
+
+
 def test_two_columns_of_a_name_are_refused(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text("t_s,p,p\n0,1,2\n1,2,3\n")

@@ -577,3 +577,11 @@ def estimate_theta(kind, N, D):
         return N / D
     theta = (N - 0.5 * PRIOR_INFORMATION) / (D + PRIOR_INFORMATION)
     return min(max(theta, -1.0), 0.0)
+
+
+@kernel
+def set_gust_response(block, acceleration):
+    """Fill the response of the block's axes to the gust that the vanes measure coarsely; acceleration (3,)
+    rad/s2."""
+    for i, axis in enumerate(block.axis[: block.n]):
+        block.gust_response[i] = acceleration[axis]

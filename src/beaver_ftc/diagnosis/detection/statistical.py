@@ -90,8 +90,7 @@ def update_blocks(tests, bounded, blocks, air, innovation, dt, k, latched, ends=
             block.scratch[i] = innovation[axis] - air.output.mean[axis]
         block.has_coarse_gust = air.config.coarse
         if air.config.coarse:
-            for i, axis in enumerate(block.axis[: block.n]):
-                block.gust_response[i] = air.output.coarse_acceleration[axis]
+            likelihood.set_gust_response(block, air.output.coarse_acceleration)
         if air.output.moving:
             add_leap(air, block)
             if b < likelihood.RETURNING:

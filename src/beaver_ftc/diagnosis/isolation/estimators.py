@@ -149,8 +149,7 @@ def update_hypothesis(isolation, fie, bank, bound, config, G, Gu, spread):
     """
     effect = fie.effect
     hypothesis(fie.kind, fie.surface, G, Gu, effect.offset, effect.Z)
-    for i in range(3):
-        effect.spread[i] = spread[i, fie.surface]
+    membership.set_spread(effect, spread, fie.surface)
     if (bound.own_errors or bound.error_map.anywhere) and fie.kind == POSITION:
         membership.allow_for_own_errors(fie, bound, bank.output.innovation, config.instants)
     if isolation.config.memory:

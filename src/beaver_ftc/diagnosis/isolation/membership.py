@@ -145,3 +145,25 @@ def narrow(fie, innovation, frame_bound, shared):
     for i in range(3):
         left = left and fie.theta_low[i] <= fie.theta_high[i]
     return left
+
+
+@kernel
+def set_spread(effect, spread, s):
+    """Fill the spread of a fault's effect by that of its surface s; spread (3, n) rad/s2."""
+    for i in range(3):
+        effect.spread[i] = spread[i, s]
+
+
+@kernel
+def clear_mean(mean):
+    """Begin the mean of a fault's effect over a block of frames (dtype EFFECT)."""
+    mean.offset[:], mean.Z[:], mean.spread[:] = 0.0, 0.0, 0.0
+
+
+@kernel
+def add_to_mean(mean, effect, share):
+    """Add the effect of a frame, a `share` of the block, to the mean over the block."""
+    for i in range(3):
+        mean.offset[i] += share * effect.offset[i]
+        mean.Z[i] += share * effect.Z[i]
+        mean.spread[i] += share * effect.spread[i]

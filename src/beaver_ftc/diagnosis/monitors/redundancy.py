@@ -388,3 +388,9 @@ def check(step, signal, engine):
             follow(step, step.test[c])
     if engine:
         follow_engine(step, signal)
+
+
+@kernel
+def set_drift(step, t):
+    """Fill the bound on the attitude's drift by t s, which begins with the flight."""
+    step.memory.drifted = step.config.drift * t

@@ -121,7 +121,7 @@ def expect_manifold_pressure(monitor, manifold_pressure_inhg):
 def begin(monitor, measured, t):
     """Take the first sample, at t s: there is none to compare it with."""
     monitor.memory.begun, monitor.memory.begun_at_s = 1, t
-    monitor.step.memory.drifted = monitor.step.config.drift * t
+    redundancy.set_drift(monitor.step, t)
     redundancy.begin(monitor.step, measured.signal, measured.force)
     since_start.begin(monitor.since, measured.signal)
     monitor.memory.earlier[:] = monitor.step.memory.then

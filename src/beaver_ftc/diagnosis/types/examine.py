@@ -154,8 +154,7 @@ def begin_block(types, layout, estimators, noise_then):
     block.innovation[:], block.bound[:] = 0.0, 0.0
     block.noise[:] = noise_then
     for e in layout.position_of:
-        effect = estimators[e].block_effect
-        effect.offset[:], effect.Z[:], effect.spread[:] = 0.0, 0.0, 0.0
+        membership.clear_mean(estimators[e].block_effect)
 
 
 @kernel
@@ -166,11 +165,7 @@ def add_to_block(types, layout, estimators, innovation, eta_bar):
         block.innovation[i] += share * innovation[i]
         block.bound[i] += share * eta_bar[i]
     for e in layout.position_of:
-        frame, mean = estimators[e].effect, estimators[e].block_effect
-        for i in range(3):
-            mean.offset[i] += share * frame.offset[i]
-            mean.Z[i] += share * frame.Z[i]
-            mean.spread[i] += share * frame.spread[i]
+        membership.add_to_mean(estimators[e].block_effect, estimators[e].effect, share)
 
 
 @kernel

@@ -18,8 +18,8 @@ from hypothesis import strategies as st
 
 from beaver_ftc import compiled
 from beaver_ftc.compiled import direct, kernel, plain, record, sized, sized_types
+from beaver_ftc.compiled.records import Room, shape_of
 from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE, Capacity, Size
-from beaver_ftc.documents.sized import Room, shape_of
 from beaver_ftc.loop.assembly import frame_dtype
 
 of_known = pytest.mark.skipif(

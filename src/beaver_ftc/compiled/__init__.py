@@ -21,16 +21,17 @@ import numba
 import numpy as np
 from numba.extending import overload
 
+from beaver_ftc.compiled.records import record, sized
+from beaver_ftc.compiled.sources import BY_ADDRESS
 from beaver_ftc.documents.errors import say_once
+from beaver_ftc.documents.files import digest_of_files
 from beaver_ftc.documents.paths import cache_of_version
-from beaver_ftc.documents.sized import record, sized
-from beaver_ftc.documents.sources import BY_ADDRESS, digest_of_files
 
 __all__ = ["apart", "direct", "kernel", "plain", "record", "row_of", "sized"]
 
 ALONE = "numba {} has other parts than are known: each start compiles for minutes, allowed: numba 0.68.*"
 
-_PACKAGE = Path(__file__).parents[1]
+_FOLDER = Path(__file__).parent
 
 
 @lru_cache(maxsize=1)
@@ -39,8 +40,7 @@ def cache_folder() -> Path | None:
 
     It is named after how code is compiled; which code is in a file, the file's name says.
     """
-    beside = (_PACKAGE / "documents" / "sized.py", _PACKAGE / "documents" / "sources.py")
-    return cache_of_version(digest_of_files(*sorted((_PACKAGE / "compiled").glob("*.py")), *beside))
+    return cache_of_version(digest_of_files(*sorted(_FOLDER.glob("*.py"))))
 
 
 def kernel(function):

@@ -20,9 +20,9 @@ import numba
 from numba.core import serialize
 from numba.core.compiler import CompileResult
 
+from beaver_ftc.compiled.sources import digest_of
 from beaver_ftc.documents.errors import say_once
 from beaver_ftc.documents.paths import read_own
-from beaver_ftc.documents.sources import digest_of
 
 COMPILING = "compiling the flight code, once on this machine: some 20 s on an idle one"
 MORE = "compiling what this flight is the first to use, once on this machine: 10 s to a minute on an idle one"

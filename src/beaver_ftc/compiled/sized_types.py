@@ -1,6 +1,6 @@
 """Records of any size as compiled code sees them: the types that are the same for all sizes.
 
-Such a record is its memory and the places in it (documents/sized.py): a row of numbers, found by the record's
+Such a record is its memory and the places in it (compiled/records.py): a row of numbers, found by the record's
 own NumPy type each time that Python calls compiled code. So a copy of a record, one from a file or another
 process brings its places along, and what has none is refused. They never change: LLVM is told so, and need
 not look again after a write.
@@ -38,7 +38,7 @@ from numba.extending import (
 )
 from numba.np.arrayobj import make_array, populate_array
 
-from beaver_ftc.documents.sized import Part, Shape, places, shape_of
+from beaver_ftc.compiled.records import Part, Shape, places, shape_of
 
 _BYTE, _WORD = ir.IntType(8), ir.IntType(64)
 _MEMORY, _PLACES = types.CPointer(types.uint8), types.CPointer(types.int64)

@@ -11,7 +11,7 @@ from typing import Any
 import llvmlite
 import numba
 
-from beaver_ftc.documents.sources import digest_of_files
+from beaver_ftc.documents.files import digest_of_files
 from beaver_ftc.documents.trials import passes as passes_in_a_child
 
 VARIABLE = "BEAVER_FTC_COMPILER"

@@ -1,5 +1,6 @@
 """Reading a small text file that a stranger names: a regular file, of bounded size, UTF-8."""
 
+import hashlib
 import os
 import stat
 from pathlib import Path
@@ -59,3 +60,12 @@ def _check_kind_and_size(status: os.stat_result, max_bytes: int) -> None:
     if status.st_size > max_bytes:
         size = f"{status.st_size / 1e6:.3g} MB"
         raise UnreadableError(f"is too large ({size}), allowed: at most {max_bytes / 1e6:g} MB")
+
+
+def digest_of_files(*files: Path) -> str:
+    """A name for these files of the package as they are now."""
+    digest = hashlib.sha256()
+    for file in files:
+        content = file.read_bytes()
+        digest.update(f"{file.name} {len(content)} ".encode() + content)
+    return digest.hexdigest()[:16]

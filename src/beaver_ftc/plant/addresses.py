@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from beaver_ftc.documents.errors import say_once
-from beaver_ftc.documents.sources import digest_of_files
+from beaver_ftc.documents.files import digest_of_files
 from beaver_ftc.documents.trials import passes
 
 if TYPE_CHECKING:

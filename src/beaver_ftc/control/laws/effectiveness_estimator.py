@@ -21,8 +21,8 @@ back, the others with it along the covariance: to the likeliest place within, ne
 import numpy as np
 
 from beaver_ftc.compiled import apart, kernel, record, sized
+from beaver_ftc.compiled.records import Room
 from beaver_ftc.design.model import ALPHA, BETA
-from beaver_ftc.documents.sized import Room
 
 OBSERVER_ERROR = record(rate=3, disturbance=3)  # e and dd of one acceleration
 _SIGNALS = 5

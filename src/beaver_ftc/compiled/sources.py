@@ -15,16 +15,9 @@ from typing import Any
 
 import numpy as np
 
+from beaver_ftc.documents.files import digest_of_files
+
 BY_ADDRESS = "called_by_address"  # an attribute of a kernel that its callers look up by name when they run
-
-
-def digest_of_files(*files: Path) -> str:
-    """A name for these files as they are now."""
-    digest = hashlib.sha256()
-    for file in files:
-        content = file.read_bytes()
-        digest.update(f"{file.name} {len(content)} ".encode() + content)
-    return digest.hexdigest()[:16]
 
 
 def digest_of(function: FunctionType) -> str:

@@ -11,9 +11,8 @@ import pytest
 
 import beaver_ftc
 from beaver_ftc import compiled
-from beaver_ftc.compiled import target
-from beaver_ftc.documents import sized, sources
-from beaver_ftc.documents.sources import digest_of
+from beaver_ftc.compiled import records, sources, target
+from beaver_ftc.compiled.sources import digest_of
 
 SOLE = """
 from enum import IntEnum
@@ -164,21 +163,17 @@ def test_all_that_kernels_of_the_package_name_is_followed(monkeypatch):
 
 
 # What makes records' types, which are no part of code: it has the name of a kernel, `record`.
-OF_RECORDS = (sized.Room, sized.Part, sized.Shape, sized._shapes)
+OF_RECORDS = (records.Room, records.Part, records.Shape, records._shapes)
 # A type that one of Python's variables has the name of: no kernel takes it from its module.
 ALLOWED = {"type SimpleNamespace"}
 
 
 def test_how_code_is_compiled_names_the_folder(monkeypatch, tmp_path):
-    package = Path(beaver_ftc.__file__).parent
-    files = [f"compiled/{path.name}" for path in sorted((package / "compiled").glob("*.py"))]
-    files += ["documents/sized.py", "documents/sources.py"]
-    for folder in ("compiled", "documents"):
-        (tmp_path / folder).mkdir()
+    files = sorted(Path(compiled.__file__).parent.glob("*.py"))
     for file in files:
-        (tmp_path / file).write_bytes((package / file).read_bytes())
+        (tmp_path / file.name).write_bytes(file.read_bytes())
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
-    monkeypatch.setattr(compiled, "_PACKAGE", tmp_path)
+    monkeypatch.setattr(compiled, "_FOLDER", tmp_path)
 
     def name():
         compiled.cache_folder.cache_clear()
@@ -186,7 +181,7 @@ def test_how_code_is_compiled_names_the_folder(monkeypatch, tmp_path):
 
     names = [name(), name()]
     for file in files:
-        (tmp_path / file).write_bytes((package / file).read_bytes() + b"\n")
+        (tmp_path / file.name).write_bytes(file.read_bytes() + b"\n")
         names.append(name())
     monkeypatch.undo()
     compiled.cache_folder.cache_clear()

@@ -1,7 +1,7 @@
 """Records of any size as compiled code sees them: the types that are the same for all sizes.
 
-Such a record is its memory and the places in it (compiled/records.py): a row of numbers, found by the record's
-own NumPy type each time that Python calls compiled code. So a copy of a record, one from a file or another
+Such a record is its memory and the places in it (records.py): a row of numbers, found by the record's own
+NumPy type each time that Python calls compiled code. So a copy of a record, one from a file or another
 process brings its places along, and what has none is refused. They never change: LLVM is told so, and need
 not look again after a write.
 

@@ -35,6 +35,8 @@ CANNOT = [
     f"faults: [3, {FLOAT}31}}, {FLOAT}'x'}}]",
     "changes: [{at_s: 5, law: nominal}, {at_s: 5, law: lqr}, {at_s: 31, law: lqr}, {at_s: 4, law: lqr}]",
     "changes: [{at_s: 5}]",
+    "faults: [{actuator: rudder, type: loss_of_effectiveness, magnitude: 1, at_s: 5, end_s: 4,"
+    " profile: incipient}]",
     "autopilot: {altitude_m: [{value: -300.5}, {at_s: 1, value: 90000}], airspeed_mps: [{value: 3}]}",
     "expect: {detected_within_s: 1, isolated_as: flap, isolated_type: float, no_departure: true}",
     "expect: {candidate_type: float, isolated_within_s: 1, post_fault_rms_deg_s: {p: 1}}",

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.linalg import block_diag
 
 from beaver_ftc.scenario.control import EnginePower
 from beaver_ftc.studies.matrix import pitch_lost
@@ -142,3 +143,14 @@ def test_a_run_flies_every_pair_under_every_law(given, monkeypatch, tmp_path):
     assert seen == [PitchCase(lost, V, law) for law in LAWS for lost in list(LOST)[:2] for V in speeds]
     assert [found["airspeed_mps"] for found in document["margins"]] == list(speeds)
     assert document["passed"]
+
+
+def test_the_phugoid_is_the_slow_oscillation_that_is_damped_least():
+    """Pairs of poles of frequency and damping (0.2, 0.3), (0.3, 0.1); a fast and a real one do not count."""
+
+    def pair(frequency, damping):
+        return np.array([[0.0, 1.0], [-(frequency**2), -2.0 * damping * frequency]])
+
+    system = block_diag(pair(0.2, 0.3), pair(0.3, 0.1), pair(5.0, 0.05), [[-0.01]])
+    assert pitch_lost._phugoid_damping(system) == pytest.approx(0.1)
+    assert pitch_lost._phugoid_damping(pair(5.0, 0.05)) == 1.0

@@ -204,9 +204,9 @@ class Noise(NamedTuple):
 
 def noise_of(model: Model, colour: Sequence[float] = ()) -> Noise:
     """The noise that a model's settings say, of a colour."""
-    settings, farthest = model.settings, _FARTHEST if len(model.foretold(colour)) else np.inf
+    settings, farthest = model.settings, _FARTHEST if len(model.noise_predictor(colour)) else np.inf
     memory = settings.noise_memory_s * model.rate_hz
     return Noise(
         model.constant(colour), model.arrays()[3], settings.power, settings.tail, memory,
-        _LEAST_SCALE, _LARGEST_SCALE, farthest, model.wider(colour),
+        _LEAST_SCALE, _LARGEST_SCALE, farthest, model.noise_factor(colour),
     )  # fmt: skip

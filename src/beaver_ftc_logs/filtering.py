@@ -41,10 +41,10 @@ def posterior_of(samples: Samples, model: Model, bank: Bank) -> tuple[Floats, Fl
     """
     if model.colours and not samples.colour:
         flights = [whitened(samples, one.average) for one in model.colours]
-        runs = [_filtered(one, model.heard(one.colour), bank) for one in flights]
+        runs = [_filtered(one, model.with_noise_model(one.colour), bank) for one in flights]
         likely = [_likelihood(one, model, of) for one, of in zip(flights, model.colours, strict=True)]
     else:
-        own, delays_s = model.heard(samples.colour), model.settings.delays_s
+        own, delays_s = model.with_noise_model(samples.colour), model.settings.delays_s
         runs = [_filtered(_later(samples, delay_s), own, bank) for delay_s in delays_s]
         likely = [run[3] for run in runs]
     weights = _weights(likely, model.rate_hz)

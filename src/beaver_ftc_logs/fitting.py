@@ -373,7 +373,7 @@ def _answers(model: Model, kept: Stretch) -> tuple[Floats, Floats]:
     """What each axis of each group's answer does to the residuals (n, 3) of a part, (n, 3, G, 3), both in sd
     of the noise, without means."""
     _, residual, answers = left_white(model, kept)
-    whiten = np.linalg.inv(np.linalg.cholesky(np.array(model.heard(kept.samples.colour).noise))).T
+    whiten = np.linalg.inv(np.linalg.cholesky(np.array(model.with_noise_model(kept.samples.colour).noise))).T
     x, e = np.einsum("nga,ab->nbga", answers, whiten), residual @ whiten
     return x - x.mean(axis=0), e - e.mean(axis=0)
 
@@ -389,7 +389,7 @@ def _drift(stretches: Sequence[Stretch], model: Model) -> list[float]:
         like = fit_like(fitted, model)
         for one in kept:
             rows, residual, _ = left_white(like, one)
-            noise = np.array(like.heard(one.samples.colour).noise)
+            noise = np.array(like.with_noise_model(one.samples.colour).noise)
             white = residual / np.sqrt(np.maximum(np.diag(noise), TINY))
             for begin, end in _runs(rows):
                 for i, n in enumerate(lengths.astype(int).tolist()):

@@ -236,24 +236,30 @@ class Model(Section):
         if fitted is not None and any(value < 0.0 for value in (*fitted.gain_sd, *fitted.spread)):
             yield ("fitted",), "gain_sd or spread has a negative number, allowed: at least 0"
 
-    def heard(self, colour: Sequence[float]) -> "Model":
-        """The model with the noise of a colour that it has seen, as much wider as parts left out say."""
-        known = [np.array(one.noise) for one in self.colours if one.average == list(colour)]
-        return self.model_copy(update={"noise": (self.wider(colour) * known[0]).tolist()}) if known else self
+    def with_noise_model(self, average: Sequence[float]) -> "Model":
+        """The model with the noise fitted for flights of this moving average, times its `noise_factor`; the
+        model itself where none was fitted.
 
-    def wider(self, colour: Sequence[float]) -> float:
-        """How many times the noise of a colour is taken as wide as residuals are."""
-        return next((float(one.wider) for one in self.colours if one.average == list(colour)), 1.0)
+        average: 1, c1, ..., the moving-average model of the residual's noise, newest first.
+        """
+        known = [np.array(one.noise) for one in self.colours if one.average == list(average)]
+        if not known:
+            return self
+        return self.model_copy(update={"noise": (self.noise_factor(average) * known[0]).tolist()})
 
-    def foretold(self, colour: Sequence[float]) -> Floats:
-        """What the residuals before one foretell of it in the noise of a colour, (L, 3, 3)."""
-        known = [one.before for one in self.colours if one.average == list(colour)]
+    def noise_factor(self, average: Sequence[float]) -> float:
+        """Factor on the covariance of the fitted noise, by which it covers parts that were not fitted."""
+        return next((float(one.wider) for one in self.colours if one.average == list(average)), 1.0)
+
+    def noise_predictor(self, average: Sequence[float]) -> Floats:
+        """Autoregressive coefficients of the residual, (L, 3, 3), latest lag first; L is 0 if not fitted."""
+        known = [one.before for one in self.colours if one.average == list(average)]
         return np.reshape(np.array(known[0] if known else []), (-1, 3, 3))
 
-    def constant(self, colour: Sequence[float]) -> Floats:
-        """What of the constant is not foretold in a colour, (3,)."""
+    def constant(self, average: Sequence[float]) -> Floats:
+        """The intercept less its prediction by `noise_predictor`, (3,)."""
         constant = np.array(self.intercept)
-        return np.asarray(constant - constant @ self.foretold(colour).sum(axis=0))
+        return np.asarray(constant - constant @ self.noise_predictor(average).sum(axis=0))
 
     def arrays(self) -> tuple[Floats, Floats, Floats, Floats]:
         """intercept (3,), past (m, 3), response (G, L, 3) and noise (3, 3) as arrays."""

@@ -100,17 +100,17 @@ def predicted(
 def in_white(
     samples: Samples, model: Model, scaled: bool = False
 ) -> tuple[NDArray[np.bool_], Floats, Floats]:
-    """As `predicted`, less what the residuals before each sample foretell of it in the colour of the flight:
-    what is then left of health is white."""
+    """As `predicted`, less the prediction from the residuals before each sample by the flight's noise model:
+    of a healthy flight a white residual is left."""
     ok, unexplained, answers = predicted(samples, model, scaled)
-    before, known = model.foretold(samples.colour), ok.copy()
+    before, known = model.noise_predictor(samples.colour), ok.copy()
     for j in range(1, len(before) + 1):
         known &= _delayed(ok, j, False)
-    return known, less_foretold(unexplained, before), less_foretold(answers, before)
+    return known, less_predicted(unexplained, before), less_predicted(answers, before)
 
 
-def less_foretold(values: Floats, before: Floats) -> Floats:
-    """Values (n, ..., 3) less what those before each foretell of it, by (L, 3, 3)."""
+def less_predicted(values: Floats, before: Floats) -> Floats:
+    """Values (n, ..., 3) less their prediction from the L before each; before (L, 3, 3): coefficients."""
     rest = values.copy()
     for j, by in enumerate(before, start=1):
         rest[j:] -= np.einsum("n...r,rs->n...s", values[:-j], by)

@@ -259,9 +259,9 @@ def _in_all_parts(samples: Samples, model: Model, enough: int = MOST_SAMPLES) ->
     """None where a part is too short. enough: of more samples than these, every k-th is taken."""
     ok, unexplained, answers = regression.in_white(samples, model)
     columns, names = _by_column(samples, model)
-    columns = regression.less_foretold(columns, model.foretold(samples.colour))
-    wider, groups = model.wider(samples.colour), len(model.groups)
-    root = np.linalg.cholesky(model.heard(samples.colour).arrays()[3] / wider)
+    columns = regression.less_predicted(columns, model.noise_predictor(samples.colour))
+    wider, groups = model.noise_factor(samples.colour), len(model.groups)
+    root = np.linalg.cholesky(model.with_noise_model(samples.colour).arrays()[3] / wider)
     whiten, power = np.linalg.inv(root).T, model.settings.power / wider
     gains, shares, noises = np.full(groups, -np.inf), np.full(len(names), -np.inf), []
     rows = np.flatnonzero(ok)

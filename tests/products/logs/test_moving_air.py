@@ -159,7 +159,9 @@ def test_the_scale_of_the_noise_is_of_residuals_however_wide_it_is_taken(wider):
     flight = replace(small.flight(model, 3000, seed=3), colour=(1.0,))
     scale = posterior_of(flight, model, bank_of(model))[2]
     assert scale[-1] == pytest.approx(1.0, abs=0.15)
-    assert noise_of(model.heard((1.0,)), (1.0,)).covariance == pytest.approx(wider * np.array(model.noise))
+    assert noise_of(model.with_noise_model((1.0,)), (1.0,)).covariance == pytest.approx(
+        wider * np.array(model.noise)
+    )
 
 
 @pytest.mark.parametrize(("average", "factor"), [((1.0, -0.8, 0.16), 1.7), ((1.0, 0.5), 2.5), ((1.0,), 2.5)])
@@ -174,11 +176,11 @@ def test_of_another_law_the_noise_is_taken_wider(monkeypatch, average, factor):
         model = plain.model_copy(update={"colours": [colour], "vehicle": vehicle})
         flight = replace(small.flight(model, 400, seed=5), colour=average)
         stretches = [fitting.Stretch(flight, np.ones(400, dtype=bool))]
-        found.append(fitting._widened(stretches, model).wider(average))
+        found.append(fitting._widened(stretches, model).noise_factor(average))
     assert found[0] >= 1.0
     assert found[1] == pytest.approx(factor * found[0])
     monkeypatch.setattr(fitting, "_farther", lambda *_: (1e6, 1))
-    assert fitting._widened(stretches, model).wider(average) == pytest.approx(200.0 * factor)
+    assert fitting._widened(stretches, model).noise_factor(average) == pytest.approx(200.0 * factor)
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,7 @@ import numpy as np
 import yaml
 
 import beaver_ftc as bf
-from beaver_ftc.results import verdict
+from beaver_ftc.results import Metrics, verdict
 from beaver_ftc.scenario.control import MODES
 from beaver_ftc.scenario.dump import to_yaml
 from beaver_ftc.scenario.faults import UNANTICIPATED
@@ -289,7 +289,7 @@ def _tracking_alike(log: Any, metrics: Document, scenario: bf.Scenario) -> Itera
 
 def _words_alike(metrics: Document) -> Iterator[str]:
     """The verdict in words says what the document has."""
-    facts, detection = verdict.facts(metrics), metrics["detection"]
+    facts, detection = verdict.facts(Metrics.of(metrics)), metrics["detection"]
     words = dict(facts)
     false = [line for _, line in facts if "FALSE ALARM" in line]
     if bool(false) != metrics["false_alarm"]:
@@ -329,6 +329,6 @@ def _page_alike(page: str, metrics: Document) -> Iterator[str]:
     from markupsafe import escape
 
     said = " ".join(page.split())
-    for what, how in verdict.facts(metrics):
+    for what, how in verdict.facts(Metrics.of(metrics)):
         if " ".join(str(escape(how)).split()) not in said:
             yield f"page: does not say {what}: {how!r:.80}"

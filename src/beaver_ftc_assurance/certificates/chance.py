@@ -271,7 +271,7 @@ def _followed(said: Document, frames: _Frames, P: np.ndarray, R: np.ndarray) -> 
 @kernel
 def follow(blocks, inputs, drift, of_frame, states, sums, room, dt):
     """Run a filter, blocks (1,), over `_Frames`, and add what it makes of each input to `sums`, weighed by
-    what it makes of the second, as `likelihood.respond` does.
+    what it makes of the second, as `likelihood.accumulate_correlations` does.
 
     states (columns, 4): advanced in place. room (5,): what a bounded uncertainty can add as it swings, at its
     pace, in the last frame, as it stays; and of the first of `sums` what calm air foretells.

@@ -1,4 +1,4 @@
-"""A bank of detection filters on one innovation, and the memory of what each fault could have done to them.
+"""A bank of detection filters on one innovation, and the reach of each fault: its possible effect on them.
 
     nu[k] = (x[k+1] - x[k]) / dt - F[k] = eta[k] + phi[k]
     E_m[k+1] = a_m E_m[k] + dt nu[k],   a_m = exp(-lam_m dt)
@@ -45,7 +45,7 @@ def configure(bank: np.void, config: FdiConfig, declared: Declared, dt: float) -
 
 @kernel
 def begin(bank, noise):
-    """Begin with all of the gyros' errors still to come: noise (3,) rad/s, by how much they may change."""
+    """Start with the full bound on the change of the gyros' errors, noise (3,) rad/s."""
     bank.memory.noise[: bank.config.n] = noise
 
 
@@ -57,7 +57,7 @@ def hold_threshold(bank, constant):
 
 @kernel
 def align(isolation, G):
-    """Fix, once, the direction across which each fault has least effect; G (3, 4) as the flight begins.
+    """Fix, once, the direction along which each fault has least effect; G (3, n) at the start of the flight.
 
     Unit length, in the roll-yaw plane, whose two axes are the only ones that one surface moves together.
     The bound is exact for any fixed direction; this one has power while G keeps its direction, which
@@ -155,7 +155,7 @@ def aligned_extremes(fie):
 
 @kernel
 def remember(bank, fie, dt):
-    """Advance what the fault can have done to each filter since the flight began; channel 3 is `across`."""
+    """Advance the reach of the fault in each filter since the flight began; channel 3 is along `across`."""
     for channel in range(4):
         low, high = extremes(fie, channel) if channel < 3 else aligned_extremes(fie)
         for m, a in enumerate(bank.config.decay[: bank.config.n]):
@@ -165,9 +165,9 @@ def remember(bank, fie, dt):
 
 @kernel
 def explains(bank, fie, shared):
-    """Whether the fault, whatever its course since the flight began, can have brought the filters here.
+    """True if the residuals are within the reach of the fault, for any course of it since the flight began.
 
-    `shared`: also across its direction, which only a parameter shared by the axes confines.
+    shared: the axes share one parameter; the residual along `across` is then tested as well.
     """
     for m in range(bank.config.n):
         residual, bound = 0.0, 0.0

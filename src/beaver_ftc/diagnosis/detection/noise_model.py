@@ -1,10 +1,9 @@
-"""From what a scenario declares to the statistical detector's numbers: levels, noise, tolerances.
+"""The noise model and the configuration of the statistical detector, from what a scenario declares.
 
-What errors of the air data do to the accelerations depends on how the aircraft flies now. A reading that is
-off by e moves f + G u by e times its derivative along that reading, to first order. The derivative changes
-in flight: of the share e / qdyn of every moment a slow aircraft feels more, and of a vane's error one that
-slips. A steady error is a constant times a known regressor, as that of a coefficient is; noise is jitter.
-dpt, worked out from the engine's power, airspeed and dynamic pressure, is off with them.
+An error e of an air-data reading changes f + G u by e times its derivative with that reading, to first order.
+The derivative depends on the flight condition and is evaluated in flight. A steady error is a constant times
+a known regressor, like an error of a coefficient; noise is jitter. dpt is worked out from the engine's power,
+airspeed and dynamic pressure, so it has their errors.
 """
 
 from collections.abc import Iterator
@@ -50,11 +49,12 @@ _SENSORS = {"alpha": ALPHA, "beta": BETA, "V": AIRSPEED, "qdyn": QDYN}
 _POWER = N_READINGS - 1  # of the engine, kW
 _SLIPSTREAM = RH + 1  # the first of the declared signals
 SIDES = {LOSS: 1, GROWING: 1, ENDING: 1, STEP: 2, ALPHA3: 2}  # a loss has a sign, a step may go either way
-# Of a loss that grows: of one ten times slower or faster it explains a third, the rest of it a constant one.
+# Rate kappa of the growing-loss hypothesis. It explains a third of a loss that grows ten times slower or
+# faster; a constant loss explains the rest.
 GROWTH_PER_S = 1.5
 
-# Share of the alarm level that noise is given beside an uncertainty at its bound; what it is worth where both
-# matter is in docs/theory.md, section 7.
+# Share of the alarm level reserved for noise in addition to an uncertainty at its bound (docs/theory.md,
+# section 7).
 CHANCE = 0.5
 SLOW_RAD_S = 3.0  # 42 of 75 flights of a GTM not found before; 15: 23, 8: 36, 0.2 and less: 35 and fewer
 LEAST_NOISE_RAD_S = 1e-9  # of a gyro: exact ones are still doubles, and a variance no difference of zeros
@@ -88,7 +88,7 @@ def _steps(axes: tuple[int, ...]) -> Iterator[Hypothesis]:
 
 
 def tests_a_frame(aircraft: Aircraft, *views: Direction) -> int:
-    """How many one-sided tests the detector makes in a frame, in these views besides."""
+    """The number of one-sided tests that the detector makes in a frame, those of these views included."""
     kinds = [kind for _, members in blocks_of(aircraft) for kind, _, _, alarms in members if alarms]
     tones = 0
     for view in views:
@@ -101,13 +101,15 @@ def tests_a_frame(aircraft: Aircraft, *views: Direction) -> int:
 
 
 def alarm_level(false_alarms_per_h: float, rate_hz: float, tests: int) -> float:
-    """Standard deviations at which all tests of an hour together, so many in a frame, give so many false
-    alarms at most."""
+    """The alarm level, standard deviations, for a rate of false alarms per hour with so many tests a frame.
+
+    By the union bound the rate is at most `false_alarms_per_h`.
+    """
     return -NormalDist().inv_cdf(false_alarms_per_h / (3600.0 * rate_hz * tests))
 
 
 def naming_level(misnaming: float, rate_hz: float, aircraft: Aircraft) -> float:
-    """Difference of log likelihoods that chance gives with this probability at most within a second."""
+    """Difference of log-likelihood ratios that noise exceeds in a second with this probability at most."""
     return 0.5 * NormalDist().inv_cdf(misnaming / (rate_hz * tests_a_frame(aircraft))) ** 2
 
 
@@ -198,21 +200,21 @@ def _set_up_blocks(statistical: np.void, errors: SensorErrors, aircraft: Aircraf
 
 
 def pace_of(given: Statistical, aircraft: Aircraft, dt_s: float) -> float:
-    """By what share of its bound an uncertainty that is merely bounded changes within a frame, at most.
+    """Largest change of a bounded uncertainty within a frame, over its bound.
 
-    What an aircraft's own terms are off moves with its surfaces, which a law may throw from frame to frame:
-    there from one end of the bound to the other. Where the error is mapped, that is followed in flight
+    The error of an aircraft's own terms changes with its surfaces, which a law may move fully within a frame:
+    from one end of the bound to the other. If the error is mapped, its pace is worked out in flight
     (`statistical.follow_surfaces`).
     """
     return 2.0 if any(aircraft.model_error_rad_s2) else given.uncertainty_rad_s * dt_s
 
 
 def swing_of(given: Statistical, aircraft: Aircraft) -> float:
-    """How fast, rad/s, the swing of a bounded uncertainty is that the filters' drift stands for.
+    """Frequency, rad/s, of the bounded uncertainty that the drift of the filters represents.
 
-    What it may hide is reckoned with at its own pace, whatever the drift is (`likelihood.allowance`): that
-    shares out between this and chance. Where damage may take surfaces, a weak one finds most: motion that no
-    loss explains is then likely more than an error of the model.
+    The evidence that the uncertainty explains is bounded by its declared pace in any case
+    (`likelihood.uncertainty_part`). The drift only sets how much of it the filters remove. If damage may take
+    surfaces, a weaker drift detects most: motion that no loss explains is then rarely an error of the model.
     """
     return min(SLOW_RAD_S, given.uncertainty_rad_s) if aircraft.loses_surfaces else given.uncertainty_rad_s
 
@@ -234,7 +236,7 @@ def _set_up_bounded(
 def _set_up_noise(
     statistical: np.void, omega: float, declared: Declared, design: np.void, start: Start, dt_s: float
 ) -> None:
-    """What drifts, as swings of omega (rad/s) do, and what is white: noise of what f + G u is made of."""
+    """Fill the drift, for an uncertainty of frequency omega, rad/s, and the jitter by noise of f + G u."""
     errors = declared.sensors.each("random")
     noise = float(errors[:3].max())
     largest = max(declared.constant_rad_s2)
@@ -291,7 +293,7 @@ def _set_up_tolerances(statistical: np.void, aircraft: Aircraft, tolerance: np.n
 
 
 def set_up_readings(statistical: np.void, errors: SensorErrors, admitted: np.void) -> None:
-    """Add the readings to the regressors of the blocks, which have those of their coefficients."""
+    """Add the readings of the air data to the regressors of the blocks."""
     steady, noise = np.zeros(N_READINGS), statistical["noise"]["reading"]
     for name, place in _SENSORS.items():
         steady[place], noise[place] = errors[name].steady, errors[name].random
@@ -307,7 +309,7 @@ def set_up_readings(statistical: np.void, errors: SensorErrors, admitted: np.voi
 
 @kernel
 def sensitivity(table, admitted, y, which, direction):
-    """Fill direction (N_SIGNALS,) with what the signals of a table change by per unit of a reading."""
+    """Fill direction (N_SIGNALS,) with the change of a table's signals per unit of a reading."""
     direction[:] = 0.0
     if which < AIRSPEED:  # a vane
         direction[which] = 1.0
@@ -322,8 +324,10 @@ def sensitivity(table, admitted, y, which, direction):
 
 @kernel
 def moved(design, y, u, which, slope, out):
-    """Fill out (3,) rad/s2 with what the accelerations change by per unit of a reading, the monomials by
-    `slope`."""
+    """Fill out (3,) rad/s2 with the change of the accelerations per unit of a reading.
+
+    slope: the change of the monomials per unit of it.
+    """
     table, force = design.moments, y[QDYN] * design.S
     for i in range(3):
         out[i] = whole_sum(table, i, slope, u)

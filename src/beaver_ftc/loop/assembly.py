@@ -112,7 +112,7 @@ def configure_diagnosis_at_trim(frame: np.void, scenario: Scenario, trim: Trim) 
     anchor(design, *trim)
     sensor_records.configure(fdi["sensor_monitor"], scenario, design, trim.y, declared.monitors_sensors)
     mass = mass_of(scenario.design_model, scenario.airframe)
-    noise_model.set_up(fdi, scenario.fdi, declared, design, mass, tuple(trim), scenario.rate_hz)
+    noise_model.set_up(fdi, scenario.fdi, declared, design, mass, (trim.x, trim.y, trim.u), scenario.rate_hz)
 
 
 def _assemble_design(scenario: Scenario, travel: np.ndarray, line: int) -> np.ndarray:

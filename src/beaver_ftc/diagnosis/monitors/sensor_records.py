@@ -1,7 +1,7 @@
 """The records of the sensor monitor, how they are configured, and its verdict in words."""
 
 from math import exp
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -138,12 +138,12 @@ def configure(monitor: np.void, scenario: Scenario, design: np.void, y: np.ndarr
     config["enabled"] = enabled
     if not enabled:
         return
-    declared, initial = Declared.of(scenario), scenario.initial
+    declared, initial = Declared.of(scenario), cast(Any, scenario.initial)  # whose keys the aircraft names
     config["instants"], config["engine"] = scenario.substeps, scenario.airframe.has_engine_instruments
     config["trim"][3:7] = y[:4]
     config["damping"] = gust_effect(DesignFunctions(np.array([design])), y)
     monitor["memory"]["past"] = scenario.substeps - 1  # the first JSBSim frame ends a frame of the loop
-    if config["engine"]:  # whose keys the aircraft names
+    if config["engine"]:
         monitor["step"]["memory"]["command"] = initial.engine_rpm, initial.manifold_pressure_inhg
     configure_step(monitor["step"]["config"], declared, scenario)
     configure_readings(monitor, declared, monitor["step"]["config"]["h"])

@@ -87,7 +87,9 @@ def _remembered(values: Floats, dt_s: float, forget: bool) -> Floats:
 
 
 def _rows(samples: Samples, model: Model, effectiveness: Floats, sd: Floats) -> Rows:
-    """The nearest level the model knows; faulty where that is not healthy, and surely so without labels."""
+    """Rows of a least-squares estimate. With labelled levels, the effectiveness is the nearest of them, and
+    below 1 it is a fault; without, it is a fault where it is below 1 by more than _SURE_SD standard
+    deviations."""
     bank = bank_of(model)
     low, high = (np.clip(effectiveness + side * _NINETY * sd, 0.0, 1.0) for side in (-1.0, 1.0))
     value, lost = np.clip(effectiveness, 0.0, 1.0), effectiveness + _SURE_SD * sd < 1.0
@@ -104,8 +106,8 @@ def _rows(samples: Samples, model: Model, effectiveness: Floats, sd: Floats) -> 
 
 
 def _told(samples: Samples, named: np.ndarray, estimate: Floats, **known: Floats) -> Rows:
-    """Rows of who says little: faulty where something is named, sure of the estimate where no bounds are
-    known."""
+    """Rows of a detector without bounds or probability: faulty where it names a surface; the bounds are then
+    the estimate, the probability is 0 or 1."""
     faulty = np.array([bool(name) for name in named], dtype=np.int64)
     found = {"low": estimate, "high": estimate, "probability": faulty.astype(float), **known}
     low, high, probability = found["low"], found["high"], found["probability"]

@@ -87,7 +87,8 @@ def _run(mode: str, file: Path, source: str, tests: list[str], note: Path, limit
 
 @contextlib.contextmanager
 def _instead(file: Path, source: str) -> Iterator[None]:
-    """Packages of links to the true ones but for one file come first, for what tests start as well."""
+    """Put a copy of the packages, links but for one file replaced, first on sys.path and PYTHONPATH: the
+    processes that tests start then import it as well."""
     with tempfile.TemporaryDirectory() as folder:
         sources = Path(folder) / "src"
         sources.mkdir()

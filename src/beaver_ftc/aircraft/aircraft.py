@@ -198,8 +198,9 @@ class Aircraft:
 
     @cached_property
     def class_of_losses(self) -> tuple[str, ...]:
-        """Whose losses make the published class: of the surfaces that lead an axis, then of all others but
-        the stand-ins. What turns about an axis with its leader could not be told from it otherwise."""
+        """The surfaces whose loss of effectiveness is in the published fault class: the primary surface of
+        each axis, then all others except those that take over from the elevator. The losses of a primary
+        surface and of one that takes over its axis cannot be told apart."""
         others = set(self.surfaces) - set(self.primary) - set(self.stand_ins)
         return (*self.primary, *(s for s in self.surfaces if s in others))
 

@@ -54,9 +54,10 @@ def _defined(module: Any) -> list[Any]:
 
 
 def _all_called(library: Any) -> list[Any]:
-    """The libraries that one needs, those that were only translated with all that they need.
+    """The libraries that this one calls, directly or through libraries that were only translated.
 
-    A library comes after all that call it: of one that Numba has compiled, LLVM links what is wanted by then.
+    A caller precedes what it calls, because LLVM links from a compiled library only the functions that are
+    referenced by then.
     """
     found: dict[int, Any] = {}
 

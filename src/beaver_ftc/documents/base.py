@@ -13,9 +13,10 @@ Conflict = tuple[Location, str]
 
 
 class Section(BaseModel):
-    """A part of a scenario file: immutable, strict about its keys, finite in its numbers.
+    """A part of a file (scenario, aircraft, model): immutable, strict about its keys, finite in its numbers.
 
-    What the docstring of a section says of a field, `name: ...` at its end, is what an editor says of it.
+    Lines `name: text` at the end of a section's docstring become the descriptions of its fields in the JSON
+    schema, which editors show.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -38,9 +39,12 @@ Flag = Annotated[bool, Strict()]
 
 
 def entry(default: Any, says: str | None = None, **limits: Any) -> Any:
-    """A field and what an editor says of it. default: a value, what makes one, or ... where there is none.
-    says: left out where the section's docstring says it. Besides limits: unit; examples, each a value; range,
-    where limits do not tell it; needs, the keys beside it that the example wants."""
+    """A field and its description in the JSON schema.
+
+    default: a value, a function that makes one, or ... where the key must be given. says: the description,
+    where the section's docstring has none. limits: those of pydantic, and unit; examples, each a value;
+    range, a text where limits do not say it; needs, other keys that the example requires.
+    """
     how = "default_factory" if callable(default) else "default"
     said: dict[str, Any] = {"description": says} if says else {}
     if shown := {key: limits.pop(key) for key in ("unit", "range", "needs") if key in limits}:

@@ -15,10 +15,9 @@ from beaver_ftc.aircraft import M_PER_FT, N_PER_LBF
 from beaver_ftc.plant import LEVER_DIFFERENCE as DIFFERENCE
 from beaver_ftc.plant import FlightState, Plant
 
-OF_ENGINES, FORCE = (
-    "forces/fbx-prop-lbs",
-    "forces/fbx-total-lbs",
-)  # all but weight; what is not the engines' stays as the state is held
+OF_ENGINES = "forces/fbx-prop-lbs"
+# The force along the body's x axis, weight excepted: while the state is held, only the engines' part changes.
+FORCE = "forces/fbx-total-lbs"
 SPEEDS, SETTINGS = 5, 6
 SETTLED_S, LONGEST_S = 6.0, 8.0  # after a step of the power; and of the step that shows the lag
 _FROM, _TO = 0.4, 0.7  # of the range: that step
@@ -26,7 +25,7 @@ _BETWEEN_S = 0.1
 _STEP = 0.2  # of one engine's lever
 _MOMENTS = ("moments/m-prop-lbsft", "moments/n-prop-lbsft")
 LEAST_ARM_M = 0.2  # beside the centre of gravity
-_WHOLE = 1.0 - np.exp(-1.0)  # of a first-order change after its time constant
+_AFTER_TIME_CONSTANT = 1.0 - np.exp(-1.0)  # share of a first-order change
 
 
 def thrust_of(plant: Plant, trim: FlightState) -> dict[str, Any] | None:
@@ -89,7 +88,7 @@ def _lag_s(plant: Plant, trim: FlightState, low: float, high: float) -> float:
     before = plant.read(OF_ENGINES)
     plant.write(plant.aircraft.trim.throttle, low + _TO * (high - low))
     force = np.array([_later(plant, OF_ENGINES) for _ in range(round(LONGEST_S / _BETWEEN_S))])
-    there = np.abs(force - before) >= _WHOLE * abs(force[-1] - before)
+    there = np.abs(force - before) >= _AFTER_TIME_CONSTANT * abs(force[-1] - before)
     return float(np.argmax(there) * _BETWEEN_S)
 
 

@@ -1,5 +1,5 @@
-"""What the diagnosis supposed, frame by frame, kept while it flies: of the frames before an alarm, which may
-come at any time, the last, and all after it.
+"""Records the internal quantities of the diagnosis while it flies: a ring buffer of the last frames before
+the alarm, and every frame after it.
 """
 
 from collections.abc import Callable, Sequence
@@ -34,11 +34,13 @@ _AT_ONCE = 1 << 10  # so many at first
 class Tape:
     """Frames `first` to `first + frames - 1` of the flight, rows of its log.
 
-    alarm, last: the flight as it was at the alarm and at the end. since: the frame
-    with which the diagnosis began. Of each frame x (3,) rad/s, model and eta_bar (3,) rad/s2, what a gyro's
-    error changes by noise (3,) rad/s, and of each estimator offset, slope and spread (estimators, 3): rad/s2,
-    and per unit of its parameter. chances: of each up to the alarm what the statistics reckon with.
-    reach (estimators, poles, 4): what a fault can have done to the filters before.
+    alarm, last: the flight at the alarm and at its end. since: the frame with which the diagnosis began.
+    kept, by frame: measured rates x (3,) rad/s; acceleration of the design model and its bound eta_bar (3,)
+    rad/s2; noise (3,) rad/s, the change of a gyro's error within the frame; of each isolation estimator the
+    offset (rad/s2), slope and spread (rad/s2 per unit of its parameter) of its fault's effect
+    (estimators, 3). chances: the filter states of the statistical detector, by frame up to the alarm.
+    reach_low, reach_high (estimators, poles, 4): bounds on the effect of a fault in the filters before the
+    first frame.
     """
 
     first: int
@@ -150,11 +152,12 @@ class Recorder:
 
 @kernel
 def note(record, always, early, kept, ring, alarm, state):
-    """Keep what stands at the places `always` and, up to the alarm, `early` of a record (words,): in a ring
-    of rows up to the alarm, of which `alarm` becomes a copy of the record; in rows of `kept` beyond it later.
+    """Copy the words `always` of a record (words,) and, up to the alarm, the words `early`: up to the alarm
+    into a ring of rows, after it into the rows of `kept` behind the ring. At the alarm `alarm` becomes a copy
+    of the record.
 
-    state: frames seen; the alarm's, or -1; since which frame there is none, where one was; the two places
-    that say so. Returns whether the next row has no room.
+    state (5,): number of frames; frame of the alarm, or -1; frame in which the last alarm was withdrawn;
+    places in the record of the two alarm flags. Returns whether `kept` has no room for the next row.
     """
     k, rows = state[0], len(ring)
     state[0] = k + 1

@@ -29,7 +29,7 @@ Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,100}$")]
 Finite = Annotated[float, Field(ge=-1000, le=1000)]
 Finite4 = Annotated[float, Field(ge=-10_000, le=10_000)]
 Rate = Annotated[float, Field(ge=-STICK_DEG_S, le=STICK_DEG_S)]
-Metres = Annotated[float, Field(ge=-25, le=25)]
+GustMps = Annotated[float, Field(ge=-25, le=25)]
 
 
 class Request(BaseModel):
@@ -59,7 +59,7 @@ class Blow(Request):
     """A gust now: m/s towards north, east, down."""
 
     do: Literal["blow"]
-    velocity_mps: tuple[Metres, Metres, Metres]
+    velocity_mps: tuple[GustMps, GustMps, GustMps]
 
 
 class Aim(Request):

@@ -1,7 +1,8 @@
 """The benchmark on recorded flights: leave one out, identify from the others, diagnose the one.
 
 The data sets of a folder are ENAC's tables beside their vehicle file and ALFA's folders of topics. Every
-setting is frozen before the flight that is left out is looked at; rivals stand beside ours.
+setting is frozen before the flight that is left out is looked at. Of a single flight, each half is left out
+in turn, with settings fitted to the whole flight. Rivals stand beside ours.
 """
 
 import json
@@ -104,8 +105,8 @@ def files_of(document: Document) -> Files:
 
 def _compare(data: DataSet) -> Document:
     stretches, alone = stretches_of(data.flights), len(data.flights) == 1
-    # Of one flight's halves neither shows all the levels that the test is about: there the settings, and only
-    # they, are those of the whole.
+    # Neither half of a single flight has all levels of effectiveness, so the settings, and only they, are
+    # fitted to the whole flight.
     whole = settings_of(stretches, data) if alone else None
     flights: list[Document] = []
     for fitted, kept, name in folds(stretches):

@@ -80,8 +80,8 @@ def alarms_at(traces: Sequence[Trace], level: float) -> tuple[int, float]:
 class Recording:
     """A flight under the nominal law as a detector sees it, with the built-in statistic beside it.
 
-    known (frames,): whether the design model's error is, where the aircraft is then; error (frames, 3):
-    its bound there, rad/s2, of an aircraft that maps it. With `fdi.statistical`,
+    known (frames,): whether the flight is inside the aircraft's map of the model's error; error (frames, 3)
+    rad/s2: the bound that the map gives there. With `fdi.statistical`,
     where the aircraft's forces are known: air (frames, 3) rad/s2, what the vanes' view of the air explains of
     each elapsed frame, and air_noise (3,) rad/s2, the standard deviation of its noise.
     """

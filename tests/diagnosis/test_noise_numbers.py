@@ -366,7 +366,7 @@ def test_where_forces_are_weighed_their_noise_is_in_the_gust_that_follows_from_t
     statistical, design, dt = np.zeros(1, statistical_dtype())[0], design_record()[0], 0.02
     forces = statistical["forces"]
     statistical["air"]["config"]["span"] = SPAN_M
-    forces["known"], forces["component"]["felt"] = known, (0.3**2, 0.2**2)
+    forces["known"], forces["component"]["accelerometer_variance"] = known, (0.3**2, 0.2**2)
     forces["component"]["vane"][:, 1] = -6.0, 50.0
     air.set_up_jitter(statistical, SensorErrors(sensors.sensors), design, *LEVEL_FLIGHT[1:], dt)
     airspeed = LEVEL_FLIGHT[1][2]

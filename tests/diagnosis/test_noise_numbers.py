@@ -374,8 +374,8 @@ def test_where_forces_are_weighed_their_noise_is_in_the_gust_that_follows_from_t
     added = variances.jitter(walked, design, *LEVEL_FLIGHT[1:], SPAN_M)
     assert np.sqrt(statistical["noise"]["jitter"]) == pytest.approx(added, rel=0.02)
     by_force = known * np.array([0.2 / 50.0, 0.3 / 6.0])
-    blurred = variances.jitter(by_force, design, *LEVEL_FLIGHT[1:], SPAN_M)
-    assert forces["blurred"] == pytest.approx(blurred)
+    expected = variances.jitter(by_force, design, *LEVEL_FLIGHT[1:], SPAN_M)
+    assert forces["gust_noise"] == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(("error", "pace"), [((0.0, 0.0, 0.0), 15.0 * 0.02), ((0.1, 0.0, 0.0), 2.0)])

@@ -29,8 +29,8 @@ def main():
     for plugged in ({}, {"detector": RlsMonitor()}, {"law": IncrementalInversion()}):
         fly(scenario(duration_s=0.2, substeps=2, fdi={"statistical": {}}), **plugged)
     published = load_scenario("elevator-partial-loss")  # after an alarm other kernels are used
-    for fault_class in ("published", "all"):
-        fly(published.with_({"fdi.fault_class": fault_class}))
+    for changed in ({}, {"fdi.fault_class": "all"}, {"control.law": "fault-tolerant"}):
+        fly(published.with_(changed))
     done.touch()
 
 

@@ -16,6 +16,7 @@ from scipy.optimize import linprog
 
 import beaver_ftc as bf
 from beaver_ftc.cli.main import main
+from beaver_ftc.loop import FrameReadout
 from beaver_ftc_assurance.certificates.check_certificate import failures
 from beaver_ftc_assurance.separation import (
     Candidate,
@@ -293,7 +294,7 @@ def test_where_the_flight_ends_is_what_its_record_says_of_the_frame_just_flown()
     bound, design, means = frame["fdi"]["bound"], frame["belief"]["design"], frame["belief"]["means"]
     x, y, actuators = frame["measured"]["x"], frame["measured"]["y"], frame["belief"]["actuators"]
     apart(eta_bar=bound["eta_bar"], noise=bound["noise"], inertia=bound["inertia"], G=means["G"], x=x)
-    at = situation_of(SimpleNamespace(last=frame), ambiguous(substeps=2), 0.3)
+    at = situation_of(SimpleNamespace(last=FrameReadout(frame)), ambiguous(substeps=2), 0.3)
     coupling = np.array([abs(design[name]) for name in ("Pqr", "Qpr", "Rpq")])
     turning = bound["inertia"] * coupling * 0.3**2
     assert at.bound == pytest.approx(1.1 * (bound["eta_bar"] + turning + 2.0 * bound["noise"] * 100.0))

@@ -1,6 +1,7 @@
 """The fault matrix: the bars of every fault type, flown."""
 
 import json
+from types import SimpleNamespace
 
 import pytest
 
@@ -91,17 +92,13 @@ def test_a_row_is_the_same_flown_alone(matrix):
 
 class TestVerdict:
     def of(self, fault, kind, candidates=(), detected=True, false_alarm=False, true_type="stuck"):
-        document = {
-            "detection": {"detected": detected},
-            "false_alarm": false_alarm,
-            "isolation": {
-                "fault": fault,
-                "type": kind,
-                "candidates": list(candidates),
-                "type_correct": None if kind is None else kind == true_type,
-            },
-        }
-        return verdict(document, "elevator", true_type)
+        type_correct = None if kind is None else kind == true_type
+        isolation = SimpleNamespace(
+            fault=fault, type=kind, candidates=tuple(candidates), type_correct=type_correct
+        )
+        detection = SimpleNamespace(detected=detected)
+        found = SimpleNamespace(detection=detection, false_alarm=false_alarm, isolation=isolation)
+        return verdict(found, "elevator", true_type)
 
     def test_each(self):
         assert self.of("elevator", "stuck", ["stuck"]) == "named"

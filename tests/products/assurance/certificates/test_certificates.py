@@ -19,7 +19,7 @@ from tools.drawn.reader import doubts
 
 import beaver_ftc as bf
 from beaver_ftc.cli.main import main
-from beaver_ftc.diagnosis.monitors.sensor_records import WATCH
+from beaver_ftc.diagnosis.monitors.sensor_records import SENSOR_MONITOR
 from beaver_ftc.diagnosis.readout import read_sensor_monitor
 from beaver_ftc.plant.instruments import SENSORS
 from beaver_ftc.results import writer
@@ -621,7 +621,7 @@ def test_by_the_command_line(tmp_path, monkeypatch, capsys):
 def test_an_alarm_of_instruments_adds_up_to_its_test_whatever_is_declared(turned):
     """Of a watch every number of which is another, gusts among them: the last look by its own limit, and what
     the filter nearest to its bound keeps of those before."""
-    watch = fill(np.zeros(1, WATCH)[0], seed=2, size=0.3)
+    watch = fill(np.zeros(1, SENSOR_MONITOR)[0], seed=2, size=0.3)
     watch["output"]["largest_test"], watch["output"]["share"] = TESTS.index("alpha"), 1.2
     step, config = watch["step"], watch["step"]["config"]
     test = step["test"][TESTS.index("alpha")]

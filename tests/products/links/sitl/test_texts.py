@@ -158,7 +158,7 @@ def test_a_link_without_a_packet_is_a_document_too():
 @pytest.mark.parametrize("watched", [0, 1])
 @pytest.mark.parametrize("plugged", [None, "a plug-in"])
 def test_an_alarm_is_of_surfaces_or_of_instruments_and_a_plug_in_may_have_one(detected, watched, plugged):
-    frame = {"fdi": {"verdict": {"detected": detected}, "watch": {"output": {"alarmed": watched}}}}
+    frame = {"fdi": {"verdict": {"detected": detected}, "sensor_monitor": {"output": {"alarmed": watched}}}}
     flight = SimpleNamespace(_frame=frame, _loop=SimpleNamespace(plugin_frame=plugged))
     assert Flown.alarmed.fget(flight) is bool(detected or watched or plugged)
 

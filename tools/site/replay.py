@@ -42,6 +42,7 @@ VIEW = View(
 
 def page() -> str:
     """Fly it; the page as HTML that needs no other file."""
+    from beaver_ftc.results.model import Metrics
     from beaver_ftc.results.writer import run
     from beaver_ftc.scenario.loader import load_scenario
 
@@ -52,7 +53,7 @@ def page() -> str:
         return report.template(Path(__file__).with_name("replay.html.j2")).render(
             scenario=SCENARIO,
             modes=MODE_COLOURS,
-            marks=marks(metrics),
+            marks=marks(Metrics.of(metrics)),
             start_s=metrics["fault"]["at_s"] - LEAD_S,
             span_s=SPAN_S,
             **report.parts([folder], [kept], shown=[VIEW]),

@@ -15,6 +15,8 @@ from llvmlite import ir
 from numba.core import cgutils, serialize, types
 from numba.extending import intrinsic
 
+from beaver_ftc.compiled import interrupts
+
 __all__ = ["stub"]
 
 _ADDRESS = ir.IntType(64)
@@ -47,7 +49,8 @@ def _address(name: tuple[str, ...], packed: bytes) -> int:
         result = _found[name, kinds] = _known[name].result(kinds)
     if result.signature.return_type != types.none:
         raise TypeError(f"{'.'.join(name)} returns something")
-    where: int = result.library.get_pointer_to_function(result.fndesc.llvm_func_name)
+    with interrupts.held():
+        where: int = result.library.get_pointer_to_function(result.fndesc.llvm_func_name)
     return where
 
 

@@ -20,6 +20,7 @@ import numba
 from numba.core import serialize
 from numba.core.compiler import CompileResult
 
+from beaver_ftc.compiled import interrupts
 from beaver_ftc.compiled.sources import digest_of
 from beaver_ftc.documents.errors import say_once
 from beaver_ftc.documents.paths import read_own
@@ -101,7 +102,8 @@ class CodeCache:
                 f"a file of compiled code in {self._folder} is not run: {why_refused}; it is compiled anew"
             )
             return None
-        return CompileResult._rebuild(context, *pickle.loads(content))
+        with interrupts.held():
+            return CompileResult._rebuild(context, *pickle.loads(content))
 
     def save(self, types, result) -> None:
         """Keep it; where that is impossible (a full disk), say so and fly without."""

@@ -9,6 +9,8 @@ from typing import Any
 
 from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
 
+from beaver_ftc.compiled import interrupts
+
 compiling: list[object] = []  # kernels being compiled, each called by the one before; under Numba's lock
 
 
@@ -37,7 +39,8 @@ class Library(JITCodeLibrary):
                 function.linkage = "internal"  # what is called in one place is then put there, however long
         self._optimize_final_module()
         self._final_module.verify()
-        self._finalize_final_module()
+        with interrupts.held():
+            self._finalize_final_module()
 
     def _get_module_for_linking(self) -> Any:
         """The module; with every function of one that was only translated, wanted so far or not."""

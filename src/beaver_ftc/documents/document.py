@@ -107,6 +107,8 @@ def _error_line(error: yaml.YAMLError, text: str) -> int:
 
 def _error_text(error: yaml.YAMLError) -> str:
     reason = getattr(error, "problem", None) or getattr(error, "reason", None) or "not readable"
+    if "maximum nesting depth" in reason:  # PyYAML from 6.0.4 on has a limit of its own
+        return _TOO_DEEP
     if "cannot start any token" in reason:
         reason += " (a tab, or a character that wants quotes?)"
     context = getattr(error, "context", None)

@@ -6,14 +6,8 @@ from beaver_ftc.diagnosis.detection import bank, fdae
 from beaver_ftc.diagnosis.isolation import estimators
 from beaver_ftc.diagnosis.monitors import sensor_monitor
 from beaver_ftc.diagnosis.schemes import contract, fault_classes
+from beaver_ftc.diagnosis.schemes.adaptive_estimators import begin
 from beaver_ftc.diagnosis.schemes.contract import CompiledScheme
-
-
-@apart
-def begin(fdi, belief, measured):
-    """Begin the filters, and fix the parity direction of each fault (contract.CompiledScheme)."""
-    scheme.begin_filters(fdi, measured.x)
-    bank.align(fdi.isolation, belief.G)
 
 
 @apart

@@ -20,8 +20,8 @@ ROOT = Path(__file__).parents[1]
 
 
 def documented():
-    """The first Python text of docs/python.md, whose elisions stand for nothing."""
-    text = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
+    """The first Python text of docs/reference/python.md, whose elisions stand for nothing."""
+    text = (ROOT / "docs/reference/python.md").read_text(encoding="utf-8")
     code = re.search(r"```python\n(.*?)```", text, re.DOTALL).group(1)
     return code.replace("fdi={...}", "fdi={}").replace("(...)", "()")
 
@@ -33,7 +33,7 @@ def test_the_documented_text_runs_as_it_stands(tmp_path, monkeypatch):
         "signals": [0.1, 0.0, 45.0, 1000.0, 1.0],
         "command_rad": [0.0] * 4,
     }
-    exec(compile(documented(), "docs/python.md", "exec"), shown)
+    exec(compile(documented(), "docs/reference/python.md", "exec"), shown)
     assert shown["weaker"].faults[0].magnitude == 0.2
     assert len(shown["table"]) == 200
     assert shown["table"]["faults[0].magnitude"].between(0.2, 1.0).all()
@@ -43,7 +43,7 @@ def test_the_documented_text_runs_as_it_stands(tmp_path, monkeypatch):
 
 def test_the_exclusion_by_hand_is_that_of_the_diagnosis(capsys):
     """The last Python text of the section on the diagnosis alone, as it stands."""
-    text = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs/reference/python.md").read_text(encoding="utf-8")
     section = text.partition("## The diagnosis alone")[2]
     shown = {}
     exec(re.search(r"```python\n(.*?)```", section, re.DOTALL).group(1), shown)

@@ -10,7 +10,7 @@ KEY = re.compile(r"(?<=[\[ ])([A-Z][A-Za-z]*\d{2,4}|FDC|JAWA|MIL-F-8785C|MPU-925
 BRACKET = re.compile(r"\[[A-Z][\w, .-]*\]|\[[A-Z][\w-]*,")  # one key or several, perhaps with a place in it
 PLACES = (
     "README.md", "CONTRIBUTING.md", "src/**/*.py", "src/**/*.yaml", "src/**/*.json", "aircraft/**/*.xml",
-    "aircraft/**/*.yaml", "docs/*.md", "scenarios/**/*.yaml", "examples/**/*.py", "benchmarks/*.py",
+    "aircraft/**/*.yaml", "docs/**/*.md", "scenarios/**/*.yaml", "examples/**/*.py", "benchmarks/*.py",
 )  # fmt: skip
 ENTRIES = re.findall(r"^- \[([^\]]+)\] ", (ROOT / "REFERENCES.md").read_text(encoding="utf-8"), re.M)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from .installation import ROOT
 
-PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md"), *(ROOT / "examples").glob("*/README.md")])
+PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md"), *(ROOT / "examples").glob("*/README.md")])
 PROGRAMS = ("beaver-ftc", "pip", "pytest", "python", "make", "jsbsim", "fgfs", "ray")
 _STARTS = re.compile(rf"({'|'.join(PROGRAMS)}) \S|pytest\b")
 _FENCED = re.compile(r"^ *```(\w*)\n(.*?)^ *```$", re.MULTILINE | re.DOTALL)

@@ -49,26 +49,26 @@ def _shown(page: str, name: str) -> str:
 
 def _my_case(folder: Path) -> None:
     """The first scenario of one's own with the law changed, as the page says."""
-    text = _shown("docs/start.md", "my-case")
+    text = _shown("docs/tutorials/start.md", "my-case")
     assert "law: fault-tolerant-published" in text
     (folder / "my-case.yaml").write_text(text.replace("law: fault-tolerant-published", "law: nominal"))
 
 
 def _shown_scenario(name: str):
-    """Puts a scenario of docs/scenarios.md into its file."""
-    return lambda folder: (folder / f"{name}.yaml").write_text(_shown("docs/scenarios.md", name))
+    """Puts a scenario of docs/reference/scenarios.md into its file."""
+    return lambda folder: (folder / f"{name}.yaml").write_text(_shown("docs/reference/scenarios.md", name))
 
 
 def _my_sweep(folder: Path) -> None:
-    """The sweep of docs/sweeps.md with two flights."""
-    text = _shown("docs/sweeps.md", "elevator-effectiveness")
+    """The sweep of docs/how-to/sweeps.md with two flights."""
+    text = _shown("docs/how-to/sweeps.md", "elevator-effectiveness")
     assert "runs: 2000" in text
     for name in ("my-sweep.yaml", "my.sweep.yaml"):
         (folder / name).write_text(text.replace("runs: 2000", "runs: 2"))
 
 
 def _my_plan(folder: Path) -> None:
-    (folder / "my-plan.yaml").write_text(_shown("docs/evidence.md", "my-plan"))
+    (folder / "my-plan.yaml").write_text(_shown("docs/how-to/evidence.md", "my-plan"))
 
 
 def _scenarios(folder: Path) -> None:
@@ -83,9 +83,9 @@ def _brief(folder: Path) -> None:
 
 
 def _mine(folder: Path) -> None:
-    """The detector of docs/plugins.md as a module of the working folder, and the scenario that names it."""
-    (folder / "mine.py").write_text(python_blocks(ROOT / "docs/plugins.md")[0])
-    (folder / "mine.yaml").write_text(_shown("docs/plugins.md", "mine"))
+    """The detector of plugins.md as a module of the working folder, and the scenario that names it."""
+    (folder / "mine.py").write_text(python_blocks(ROOT / "docs/reference/plugins.md")[0])
+    (folder / "mine.yaml").write_text(_shown("docs/reference/plugins.md", "mine"))
 
 
 def _recorded_flights(folder: Path) -> None:

@@ -203,8 +203,8 @@ SHAPE = r"(\((?:\d|\w+ \+ \w+|surfaces),[\w ]*\))"  # such as (3, surfaces)
 
 
 def _documented(name):
-    """Field -> shape as text, of one of the tables of docs/plugins.md."""
-    page = (ROOT / "docs/plugins.md").read_text()
+    """Field -> shape as text, of one of the tables of docs/reference/plugins.md."""
+    page = (ROOT / "docs/reference/plugins.md").read_text()
     table = page.partition(f"`{name}` (`beaver_ftc")[2].partition("|\n\n")[0]
     for names, says in re.findall(r"^\| ?(`[^|]*?) ?\| ?(.*?) ?\|$", f"{table}|", re.MULTILINE):
         fields, shapes = (

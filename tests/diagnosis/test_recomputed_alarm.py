@@ -1,4 +1,4 @@
-"""An alarm can be recomputed from the log alone, by the recursions that docs/theory.md states (section 3)."""
+"""An alarm can be recomputed from the log alone, by the recursions that theory.md states (section 3)."""
 
 from math import exp, log, pi, radians
 

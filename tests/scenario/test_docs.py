@@ -9,7 +9,7 @@ from beaver_ftc.scenario.loader import load_text
 from beaver_ftc.scenario.schema import Expect, json_schema
 from beaver_ftc.scenario.signals import Signal
 
-MANUAL = (Path(__file__).parents[2] / "docs" / "scenarios.md").read_text()
+MANUAL = (Path(__file__).parents[2] / "docs/reference/scenarios.md").read_text()
 EXAMPLES = re.findall(r"```yaml\n(.*?)```", MANUAL, re.DOTALL)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from tools.docs.tables import class_
 
-PAGE = (Path(__file__).resolve().parents[2] / "docs" / "class.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).resolve().parents[2] / "docs/tutorials/class.md").read_text(encoding="utf-8")
 SHEETS, _, ANSWERS = re.sub(r" *\| *", " | ", PAGE).partition("## Answers")
 
 

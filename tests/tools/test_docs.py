@@ -17,7 +17,7 @@ from beaver_ftc.studies.reproduce.words import headline
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
-PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md"))]
+PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
 
 
 def test_the_first_picture_can_be_drawn():
@@ -51,7 +51,7 @@ def test_property_without_a_meaning_is_refused():
 
 
 def test_reproduction_page_counts_every_statement_and_shows_what_it_promises():
-    text = (DOCS / "reproduction.md").read_text()
+    text = (DOCS / "results/reproduction.md").read_text()
     counts = {verdict: int(n) for n, verdict in re.findall(rf"(\d+) ({'|'.join(VERDICTS)})", text)}
     assert sum(counts.values()) == len(CLAIMS)
     assert headline({"claims": CLAIMS, "counts": counts}) in text
@@ -63,7 +63,7 @@ def test_reproduction_page_counts_every_statement_and_shows_what_it_promises():
     assert 5 < len(stronger) < counts[STRONGER]  # those that are read off a figure alone
     assert all(claim.where.startswith("Fig.") for claim in stronger)
     for view, _, _ in FIGURES:
-        assert f"images/reproduction/{view.name}.png" in text
+        assert f"../images/reproduction/{view.name}.png" in text
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
@@ -80,7 +80,7 @@ def test_every_command_answers_a_question():
 
 
 def test_every_box_of_the_diagram_leads_to_a_page_and_its_heading():
-    links = re.findall(r'href="\.\./([\w-]+)\.html(?:#([\w-]+))?"', (DOCS / "images/loop.svg").read_text())
+    links = re.findall(r'href="\.\./([\w/-]+)\.html(?:#([\w-]+))?"', (DOCS / "images/loop.svg").read_text())
     assert len(links) > 12
     for page, place in links:
         headings = re.findall(r"^#+ (.+)$", (DOCS / f"{page}.md").read_text(), re.MULTILINE)

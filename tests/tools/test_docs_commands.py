@@ -187,7 +187,7 @@ def test_what_tables_share_is_made_once(tmp_path, monkeypatch):
 
 def test_pages_are_named_as_one_likes():
     (theory,) = pages.chosen(["theory"])
-    assert pages.chosen(["docs/theory.md", "theory.md"]) == [theory, theory]
+    assert pages.chosen(["docs/explanation/theory.md", "theory.md"]) == [theory, theory]
     assert pages.chosen([])[0].name == "README.md"
-    with pytest.raises(BadInput, match=r"did you mean docs/theory\.md"):
-        pages.chosen(["docs/teory.md"])
+    with pytest.raises(BadInput, match=r"did you mean docs/explanation/theory\.md"):
+        pages.chosen(["docs/explanation/teory.md"])

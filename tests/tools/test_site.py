@@ -70,7 +70,7 @@ def opened(browser, site):
 
 
 def test_every_public_name_is_in_the_reference_with_its_source(site):
-    page = (site / "python-names.html").read_text(encoding="utf-8")
+    page = (site / "reference/python-names.html").read_text(encoding="utf-8")
     found = set(re.findall(r'id="beaver_ftc\.(?:aircraft\.)?(\w+)"', page))
     assert set(bf.__all__) - {"__version__", "aircraft"} <= found
     assert "load" in found
@@ -78,8 +78,11 @@ def test_every_public_name_is_in_the_reference_with_its_source(site):
 
 
 def test_every_page_and_notebook_is_there(site):
-    pages = {path.stem for path in (ROOT / "docs").glob("*.md")} - {"README"} | {"index", *PAGES}
-    assert pages <= {path.stem for path in site.glob("*.html")}
+    docs = ROOT / "docs"
+    pages = {path.relative_to(docs).with_suffix(".html") for path in docs.rglob("*.md")}
+    pages = {path.with_name("index.html") if path.stem == "README" else path for path in pages}
+    made = {Path("reference", f"{name}.html") for name in PAGES}
+    assert [path for path in sorted(pages | made) if not (site / path).exists()] == []
     notebooks = {path.stem for path in (ROOT / "docs" / "notebooks").glob("*.ipynb")}
     assert {path.stem for path in (site / "notebooks").rglob("*.html")} == notebooks
 
@@ -91,8 +94,8 @@ def test_nothing_is_fetched_from_elsewhere(site):
 
 
 def test_links_out_of_the_documentation_lead_to_copies(site):
-    page = (site / "properties.html").read_text(encoding="utf-8")
-    (link,) = set(re.findall(r'href="(files/[^"]+beaver\.xml\.txt)"', page))
+    page = (site / "reference/properties.html").read_text(encoding="utf-8")
+    (link,) = set(re.findall(r'href="\.\./(files/[^"]+beaver\.xml\.txt)"', page))
     assert (site / link).read_bytes() == (ROOT / "aircraft/beaver/beaver.xml").read_bytes()
 
 
@@ -104,7 +107,7 @@ def test_boxes_of_the_diagram_lead_to_places_that_are_there(site):
 
 
 def test_no_mark_of_a_printed_number_is_left(site):
-    assert "<!-- printed" not in (site / "reproduction.html").read_text(encoding="utf-8")
+    assert "<!-- printed" not in (site / "results/reproduction.html").read_text(encoding="utf-8")
 
 
 @needs_browser
@@ -130,7 +133,7 @@ def test_search_works_from_disk(opened):
 @needs_browser
 @pytest.mark.parametrize("viewport", [PHONE, DESK], ids=["phone", "desk"])
 def test_equations_are_set(opened, viewport):
-    page = opened("theory.html", viewport)
+    page = opened("explanation/theory.html", viewport)
     page.wait_for_function("MathJax.startup?.promise.then(() => true)")
     assert page.locator("mjx-container").count() == page.locator(".arithmatex").count() > 20
     assert page.locator("[data-mml-node=merror]").count() == 0
@@ -141,12 +144,21 @@ def test_equations_are_set(opened, viewport):
 
 
 def test_only_pages_with_equations_load_what_sets_them(site):
-    assert "assets/mathjax.js" in (site / "theory.html").read_text(encoding="utf-8")
-    assert "assets/mathjax.js" not in (site / "commands.html").read_text(encoding="utf-8")
+    assert "assets/mathjax.js" in (site / "explanation/theory.html").read_text(encoding="utf-8")
+    assert "assets/mathjax.js" not in (site / "reference/commands.html").read_text(encoding="utf-8")
 
 
 @needs_browser
-@pytest.mark.parametrize("name", ["index", "scenarios", "theory", "scenario-keys", "notebooks/first-fault"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "index",
+        "reference/scenarios",
+        "explanation/theory",
+        "reference/scenario-keys",
+        "notebooks/first-fault",
+    ],
+)
 def test_a_page_is_no_wider_than_a_phone(opened, name):
     page = opened(f"{name}.html", PHONE)
     assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]

@@ -28,7 +28,8 @@ def every_page(root: Path = ROOT) -> list[Path]:
 
 
 def chosen(names: Iterable[str], root: Path = ROOT) -> list[Path]:
-    """The pages of these names (`docs/theory.md`, `theory.md` or `theory`), all of them without any.
+    """The pages of these names (`docs/explanation/theory.md`, `theory.md` or `theory`),
+    all of them without any.
 
     Raises BadInput for a name that no page has.
     """

@@ -186,7 +186,7 @@ def _kinds(faults: list[Any]) -> set[Any]:
 
 
 def _runs_away(scenario: bf.Scenario, fault: Any) -> bool:
-    """Whether a bias grows so fast that at its stop it counts as a runaway (docs/fault-types.md)."""
+    """Whether a bias grows so fast that at its stop it counts as a runaway (fault-types.md)."""
     if fault.type != "bias" or fault.profile == "abrupt":
         return False
     limit_deg_s = getattr(scenario.actuators, fault.actuator).rate_limit_deg_s or DEFAULT_LIMIT_DEG_S

@@ -1,4 +1,4 @@
-"""A second reader of certificates, written from docs/theory.md alone: its recursions, frame by frame.
+"""A second reader of certificates, written from theory.md alone: its recursions, frame by frame.
 
 It shares no code with tools/check_certificate.py, which sums what is left of each frame; the two must agree.
 What a fault does and which events there are it takes from the log too; what was declared, from the scenario.

@@ -26,7 +26,7 @@ _FRAME = f'<iframe class="replay" src="{REPLAY}" title="a flight, replayed" load
 _MARK = re.compile(r"^<!-- (?:printed|/printed|from ).*?-->$|<!--[=/].*?-->", re.MULTILINE)
 _LINK = re.compile(r"\[([^\]]*)\]\(((?:\.\./)+[^)#\s]+)(?:#[^)]*)?\)")  # out of its folder
 _SHOWN = (".cff", ".css", ".csv", ".js", ".json", ".md", ".py", ".toml", ".xml", ".yaml", ".yml")  # as text
-REFERENCE = "reference.md"
+REFERENCE = "reference/README.md"
 SOURCES = "REFERENCES.md"  # a file of its own beside the README, here a page
 
 
@@ -36,7 +36,7 @@ def on_files(files: Files, config: Any) -> Files:
 
     for name in PAGES:
         content = python_names.directives() if name == "python-names" else page(name)
-        files.append(File.generated(config, f"{name}.md", content=content))
+        files.append(File.generated(config, f"reference/{name}.md", content=content))
     files.append(File.generated(config, SOURCES.lower(), abs_src_path=str(ROOT / SOURCES)))
     files.append(File.generated(config, REPLAY, content=_replay()))
     for name in ASSETS:
@@ -90,7 +90,7 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
     if page.file.src_uri == "README.md":
         markdown = _PICTURE.sub(_FRAME, markdown, count=1)
         page.meta.setdefault("hide", ["navigation", "toc"])
-    if page.file.src_uri.removesuffix(".md") in _reference_pages():
+    if page.file.src_uri in _reference_pages():
         page.meta.setdefault("hide", ["toc"])  # their tables are wide
         page.meta.setdefault("search", {"boost": 0.5})  # who searches for a word wants what explains it
     if page.file.src_uri == REFERENCE:
@@ -112,7 +112,7 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
 def _reference_pages() -> frozenset[str]:
     from tools.docs.reference import PAGES
 
-    return frozenset(PAGES)
+    return frozenset(f"reference/{name}.md" for name in PAGES)
 
 
 def _listed() -> Iterator[str]:

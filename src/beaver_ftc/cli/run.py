@@ -73,7 +73,7 @@ def command(options: Options) -> None:
     acmi: Also write flight.acmi, for Tacview.
     recording: Also write the log as a recorder on board would have, with vehicle.yaml.
     flightgear: Show it in FlightGear, at the pace of the clock.
-    certificate: Also write certificate.json, which proves alarm and exclusions (docs/certificates.md).
+    certificate: Also write certificate.json, which proves alarm and exclusions.
     """
     try:
         loaded = load_all(options.scenarios)

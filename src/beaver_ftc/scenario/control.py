@@ -16,7 +16,7 @@ Law = Annotated[str, named(partial(refusal, LAWS))]
 
 class EnginePower(Section, strict=True):
     """Engine power on pitch, once neither elevator nor flap acts on it; with the fault-tolerant law and
-    fault_class: all, and with the oracle. docs/fault-types.md has the design.
+    fault_class: all, and with the oracle. docs/explanation/fault-types.md has the design.
 
     enabled: false: the engine stays as trimmed, whatever is lost
     speed_gain_inhg_per_mps: less power for more airspeed than usual, inHg per m/s: damps the phugoid

@@ -113,7 +113,7 @@ class Probing(Section):
 
 
 class Sharpen(Section, strict=True):
-    """Margin the published scheme gives away; each step loses no guarantee (docs/theory.md, section 3)."""
+    """Margin the published scheme gives away; each step loses no guarantee (theory.md, section 3)."""
 
     pole_bank: bool = entry(True, "alarm on the first of several filters: `fdi.pole_bank_per_s`")
     memory: bool = entry(True, "hold each fault against the whole flight, not only what follows the alarm")

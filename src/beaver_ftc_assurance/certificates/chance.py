@@ -1,4 +1,4 @@
-"""The alarm of chance: a fault's likelihood ratio from its onset to the alarm (docs/theory.md, section 7).
+"""The alarm of chance: a fault's likelihood ratio from its onset to the alarm (theory.md, section 7).
 
 What the log does not hold is kept frame by frame: signature, what declared constants multiply, variances.
 """

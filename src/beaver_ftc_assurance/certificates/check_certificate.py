@@ -1,4 +1,4 @@
-"""Check the certificate of a flight against its log and its scenario; docs/certificates.md has each field.
+"""Check the certificate of a flight against its log and its scenario; certificates.md has each field.
 
     python check_certificate.py FOLDER                        the folder of a run
     python check_certificate.py CERTIFICATE LOG [SCENARIO]    files that lie elsewhere
@@ -311,7 +311,7 @@ def check_declared(about, declared):
 
 
 class Frames:
-    """Innovation and bounds of each frame (docs/theory.md, sections 1 and 2), arrays (frames, 3).
+    """Innovation and bounds of each frame (docs/explanation/theory.md, sections 1 and 2), arrays (frames, 3).
 
     x: measured rates, rad/s; F: model, eta_bar: bound on what the model does not know, published: the part of
     it that c, b, g and the Earth's rate explain, rad/s2; n: changing error of the gyros, rad/s;
@@ -452,7 +452,7 @@ def of_type(kind, offset, slope, spread, low, high):
     return Effect(offset, slope, spread, low, high)
 
 
-# --- 6. The sum over filters (docs/theory.md, section 4) --------------------------------------------------
+# --- 6. The sum over filters (theory.md, section 4) --------------------------------------------------
 
 
 def sum_of_terms(said, frames, declared):
@@ -555,7 +555,7 @@ def check_copies(term, frames, rows):
     )
 
 
-# --- 7. The course of a surface (docs/fault-types.md) -----------------------------------------------------
+# --- 7. The course of a surface (fault-types.md) -----------------------------------------------------
 
 
 def course(said, frames, declared):
@@ -624,7 +624,7 @@ def deflection(bound, place, k, frames, effect):
     return theta, -h / Z, int(np.sign(Z * known_Z))
 
 
-# --- 8. A statistical alarm (docs/theory.md, section 7) ---------------------------------------------------
+# --- 8. A statistical alarm (theory.md, section 7) ---------------------------------------------------
 
 
 def likelihood(said, frames, declared):
@@ -709,7 +709,7 @@ def like_the_alarm(said, about, frames):
     require(moved.max() == 0, "this fault moves the axes of the alarm")
 
 
-# --- 9. An alarm between instruments (docs/theory.md, section 9) ------------------------------------------
+# --- 9. An alarm between instruments (theory.md, section 9) ------------------------------------------
 
 
 def instruments(said, log):

@@ -1,7 +1,7 @@
 """Exclusions of fault types by their course: what single frames say of where the surface was, compared.
 
 In each frame that health does not explain the surface was between two bounds; a type forbids some of what
-they say together (docs/theory.md, section 4). A rule has the surface `Seen`, and yields what it finds.
+they say together (theory.md, section 4). A rule has the surface `Seen`, and yields what it finds.
 """
 
 from collections.abc import Callable, Iterator

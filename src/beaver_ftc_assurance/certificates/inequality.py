@@ -1,4 +1,4 @@
-"""The inequality that an alarm or an exclusion is, and the search for it (docs/certificates.md).
+"""The inequality that an alarm or an exclusion is, and the search for it (docs/explanation/certificates.md).
 
     c_1 (d_1 . E_1[k_1]) + c_2 (d_2 . E_2[k_2]) + ... > the most that hypothesis and declared errors allow
 

@@ -1,5 +1,5 @@
 """The alarm of instruments: a reading further from what the others predict than sound ones can be
-(docs/theory.md, section 9).
+(docs/explanation/theory.md, section 9).
 """
 
 from collections.abc import Iterator, Mapping

@@ -275,7 +275,7 @@ def test_what_is_tuned(errors, monkeypatch, tmp_path):
     assert asked == [("calibration-errors" if errors else "calibration", 3)]
     assert played[0] == ("observer-constant", {"gain": 2.0 if errors else 1.0, "alarm": 1.0})
     assert found == {
-        "procedure": f"beaver-ftc compare --tune{' --errors' if errors else ''}; docs/benchmark.md",
+        "procedure": f"beaver-ftc compare --tune{' --errors' if errors else ''}; docs/results/benchmark.md",
         "target_false_alarms_per_h": 0.0, "healthy_hours": 1.0, "flights": 2,
         "options": {"observer-constant": {"gain": 3.0 if errors else 2.0, "alarm": 0.6}}
         | ({} if errors else {"lqr": {"weight": 4.0}}),

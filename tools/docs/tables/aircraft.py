@@ -1,4 +1,4 @@
-"""Tables of docs/aircraft.md: what `derive` makes of aircraft of the jsbsim package; are promises kept?"""
+"""Tables of aircraft.md: what `derive` makes of aircraft of the jsbsim package; are promises kept?"""
 
 import argparse
 import json

@@ -1,4 +1,4 @@
-"""The tables of docs/benchmark.md: what schemes find, how laws track, and where a rival does better."""
+"""The tables of benchmark.md: what schemes find, how laws track, and where a rival does better."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory

@@ -1,4 +1,4 @@
-"""The answers of docs/class.md, flown: a row an exercise."""
+"""The answers of docs/tutorials/class.md, flown: a row an exercise."""
 
 from importlib.resources import files
 

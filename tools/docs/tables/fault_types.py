@@ -1,4 +1,4 @@
-"""Tables of docs/fault-types.md."""
+"""Tables of docs/explanation/fault-types.md."""
 
 from pathlib import Path
 from statistics import median

@@ -1,4 +1,4 @@
-"""The table feature x aircraft of docs/aircraft.md: what can be done with which aircraft, or why not."""
+"""The table feature x aircraft of aircraft.md: what can be done with which aircraft, or why not."""
 
 import json
 import re

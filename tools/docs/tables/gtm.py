@@ -1,4 +1,4 @@
-"""Tables and pictures of docs/gtm.md: the converted model beside its specification, `BEAVER_FTC_GTM`."""
+"""Tables and pictures of gtm.md: the converted model beside its specification, `BEAVER_FTC_GTM`."""
 
 import csv
 import os

@@ -1,4 +1,4 @@
-"""What docs/gtm.md prints of damage: where it can be flown, what flies there, what is found of it."""
+"""What docs/results/gtm.md prints of damage: where it can be flown, what flies there, what is found of it."""
 
 import json
 import os

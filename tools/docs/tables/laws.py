@@ -1,4 +1,4 @@
-"""Tables of docs/laws.md."""
+"""Tables of docs/explanation/laws.md."""
 
 from beaver_ftc.scenario.loader import load
 from beaver_ftc.studies.margins import study

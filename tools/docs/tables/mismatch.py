@@ -1,4 +1,4 @@
-"""Tables of docs/mismatch.md."""
+"""Tables of docs/results/mismatch.md."""
 
 import json
 import subprocess

@@ -1,4 +1,4 @@
-"""Tables of docs/performance.md: what a flight, a frame and a command cost, on the machine that measures."""
+"""Tables of performance.md: what a flight, a frame and a command cost, on the machine that measures."""
 
 import re
 import subprocess

@@ -1,4 +1,4 @@
-"""Tables of docs/recorded-flights.md: ways to diagnose the flights in the folder `BEAVER_FTC_FLIGHTS`."""
+"""Tables of recorded-flights.md: ways to diagnose the flights in the folder `BEAVER_FTC_FLIGHTS`."""
 
 import os
 from itertools import islice

@@ -1,4 +1,4 @@
-"""What docs/reproduction.md shows of the study that `beaver-ftc reproduce` flies."""
+"""What docs/results/reproduction.md shows of the study that `beaver-ftc reproduce` flies."""
 
 from pathlib import Path
 from typing import Any

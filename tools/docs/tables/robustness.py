@@ -1,4 +1,4 @@
-"""Tables of docs/robustness.md: what real errors leave of detection and tracking."""
+"""Tables of docs/results/robustness.md: what real errors leave of detection and tracking."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Tables of docs/theory.md."""
+"""Tables of docs/explanation/theory.md."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Tables of docs/verification-fdc.md: the truth against data of the FDC equations."""
+"""Tables of docs/results/verification-fdc.md: the truth against data of the FDC equations."""
 
 from beaver_ftc.documents.paths import data_root
 from beaver_ftc.studies.present.tables import markdown_table

@@ -10,7 +10,7 @@
     lqr                 linear quadratic regulator with integral action     [Anderson1990]
 
 The keys are in REFERENCES.md. What a method leaves open is in its defaults; what is tuned is tuned by
-`beaver-ftc compare --tune`, which writes tuned.json: see docs/benchmark.md. Where errors of instruments, air
+`beaver-ftc compare --tune`, which writes tuned.json: see benchmark.md. Where errors of instruments, air
 or model are declared, what was tuned for them takes the place of what was tuned without.
 """
 

@@ -85,7 +85,7 @@ def tune(
     options |= {name: _best_law(name, grid, faulted, workers) for name, grid in laws.items()}
     hours = sum(flight["observer-constant"][0].healthy_s for flight in played) / 3600.0
     return {
-        "procedure": f"beaver-ftc compare --tune{' --errors' if errors else ''}; docs/benchmark.md",
+        "procedure": f"beaver-ftc compare --tune{' --errors' if errors else ''}; docs/results/benchmark.md",
         "target_false_alarms_per_h": target_per_h,
         "healthy_hours": hours,
         "flights": len(cases),

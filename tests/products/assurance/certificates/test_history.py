@@ -1,4 +1,4 @@
-"""What a log's rows bound, row by row and axis by axis, by scalars (docs/theory.md, sections 1 and 2)."""
+"""What a log's rows bound, row by row and axis by axis, by scalars (theory.md, sections 1 and 2)."""
 
 import numpy as np
 import pytest

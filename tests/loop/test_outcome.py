@@ -72,7 +72,7 @@ CASES = {
     "probed-for-nothing": ({}, {"t": 9.0, "control.probe.memory.from_s": 2.0}),
     "profile": ({}, PILOT | {
         "autopilot.worst": [5.0, 2.5, 0.4, 0.2], "autopilot.held_worst": 1.25,
-        "autopilot.mean_off": [-1.0, 0.5, 0.1, -0.1],
+        "autopilot.largest_off": 4.5, "autopilot.mean_off": [-1.0, 0.5, 0.1, -0.1],
     }),
     "profile-without-speed": ({}, PILOT | {
         "autopilot.commanded": [1, 0, 1, 0], "autopilot.held_worst": 1.25,

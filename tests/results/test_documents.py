@@ -47,7 +47,7 @@ FLIGHTS = {
         engine_power={"from_s": 13.2, "in_charge_s": 0.9, "lowest_inhg": 20.04, "highest_inhg": 22.26},
         profile={
             "altitude_m": 3.0, "airspeed_mps": 1.5, "heading_deg": 0.1, "bank_deg": 0.2,
-            "airspeed_limited_mps": 1.25,
+            "airspeed_limited_mps": 1.25, "airspeed_at_one_instant_mps": 4.5,
         },
         arrival={"altitude_m": -2.0, "airspeed_mps": None, "heading_deg": 0.05, "bank_deg": None},
         limits=({

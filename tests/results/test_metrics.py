@@ -193,10 +193,10 @@ def test_an_alarm_in_the_very_frame_of_the_fault_is_no_false_alarm():
 
 def test_deviations_from_the_profile_are_in_degrees_where_they_are_angles():
     off = {"altitude_m": 3.0, "airspeed_mps": 1.5, "heading_deg": math.radians(2.0), "bank_deg": None}
-    off |= {"airspeed_limited_mps": 0.5}
+    off |= {"airspeed_limited_mps": 0.5, "airspeed_at_one_instant_mps": 4.0}
     assert _of(profile=off)["profile"] == {
         "altitude_m": 3.0, "airspeed_mps": 1.5, "heading_deg": 2.0, "bank_deg": None,
-        "airspeed_limited_mps": 0.5,
+        "airspeed_limited_mps": 0.5, "airspeed_at_one_instant_mps": 4.0,
     }  # fmt: skip
 
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import beaver_ftc as bf
+from beaver_ftc.results import model, verdict
 
 AXES, SURFACES = "pqr", ("aileron", "elevator", "rudder", "flap")
 MODES = ("nominal", "adaptive", "reallocated", "unanticipated")
@@ -303,16 +304,20 @@ COMMANDS = {
     "heading_deg": ("psi_rad", "heading_command_rad"),
     "bank_deg": ("phi_rad", "bank_command_rad"),
     "airspeed_limited_mps": ("airspeed_mps", "airspeed_limited_mps"),
+    "airspeed_at_one_instant_mps": ("airspeed_mps", "airspeed_command_mps"),
 }
 
 
 def away(flown, channel):
     """How far a channel is off its command, frame by frame, deg for angles; None where it is not flown."""
-    if channel.removesuffix("_limited_mps").removesuffix("_mps") not in " ".join(flown.given["autopilot"]):
+    if channel.split("_")[0] not in " ".join(flown.given["autopilot"]):
         return None
     where, command = (flown[column] for column in COMMANDS[channel])
     off = where - command
     return np.rad2deg((off + np.pi) % (2 * np.pi) - np.pi) if channel.endswith("_deg") else off
+
+
+MEANS = ("airspeed_mps", "airspeed_limited_mps")
 
 
 def mean_of_late(flown, off):
@@ -341,7 +346,7 @@ def profile(flown):
     for channel in COMMANDS:
         off = away(flown, channel)
         if off is not None:
-            off = mean_of_late(flown, off) if "airspeed" in channel else off
+            off = mean_of_late(flown, off) if channel in MEANS else off
             rows = settled(flown, channel)
             off = np.abs(off[rows]).max() if rows.any() else None
         found[channel] = off
@@ -351,7 +356,7 @@ def profile(flown):
 def arrival(flown):
     if "autopilot" not in flown.given or departure(flown):
         return None
-    channels = [channel for channel in COMMANDS if "limited" not in channel]
+    channels = [channel for channel in COMMANDS if channel.count("_") == 1]
     off = {channel: away(flown, channel) for channel in channels}
     means = {channel: None if of is None else mean_of_late(flown, of)[-1] for channel, of in off.items()}
     return means | {"in_envelope": bool(flown["envelope_valid"][-1])}
@@ -620,6 +625,21 @@ def test_every_field_is_what_the_log_says(flown):
         except (AssertionError, KeyError) as error:
             wrong.append(f"{where}: {found!r}: {error!r:.300}")
     assert not wrong, "\n".join(wrong)
+
+
+def test_an_airspeed_that_is_within_what_is_expected_as_a_mean_alone():
+    """In gusts, the elevator jammed, the airspeed leaves at one instant the band that its mean keeps."""
+    flight = bf.fly(bf.load("mission-elevator-jammed"))
+    off = np.asarray(flight.log["airspeed_mps"]) - np.asarray(flight.log["airspeed_command_mps"])
+    age_s = np.arange(off.size) / flight.scenario.rate_hz
+    kernel = np.exp(-age_s / MEAN_S) / MEAN_S / flight.scenario.rate_hz  # the lag's impulse response
+    mean, at_once = np.abs(np.convolve(off, kernel)[: off.size]).max(), np.abs(off).max()
+    (judged,) = (one for one in flight.metrics["expectations"] if one["name"] == "airspeed_within_mps")
+    assert judged["passed"]
+    assert mean < judged["expected"] < at_once
+    assert judged["actual"] == pytest.approx(mean, rel=2e-3)
+    said = f"airspeed {judged['actual']:.3g} m/s (10 s mean; largest at one instant {at_once:.3g})"
+    assert said in dict(verdict.facts(model.Metrics.of(flight.metrics)))["profile"]
 
 
 def test_the_flights_show_what_is_compared():

@@ -23,7 +23,7 @@ SAID = [
     ("pre_fault_rms_deg_s.p", 0.5, 0.2, ("≤ 0.5", "0.2")),
     ("post_fault_rms_deg_s.q", 1.0, 0.11249, ("≤ 1", "0.112")),
     ("altitude_within_m", 15, 3.4567, ("≤ 15", "3.46")),
-    ("airspeed_within_limits_mps", 3, 1.25, ("≤ 3", "1.25")),
+    ("airspeed_within_limits_mps", 3, 1.25, ("≤ 3", "1.25 (10 s mean)")),
     ("airspeed_within_mps", 3, None, ("≤ 3", "none")),
     ("heading_within_deg", 5, 7.0, ("≤ 5", "7")),
     ("stays_in_envelope", True, False, ("yes", "no")),

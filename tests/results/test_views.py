@@ -59,10 +59,36 @@ def test_which_views_a_log_allows():
     assert "engine" not in {view.name for view in views(EVERY)}
     assert "profile" not in {view.name for view in views(set(EVERY) - {"bank_command_rad"})}
     unlimited = {view.name: view for view in views([c for c in EVERY if c != "airspeed_limited_mps"])}
-    assert [len(panel.traces) for panel in unlimited["profile"].panels] == [2, 2, 2, 2, 1]
+    assert [len(panel.traces) for panel in unlimited["profile"].panels] == [2, 3, 2, 2, 1]
     assert estimators(EVERY) == ("aileron", "elevator", "rudder")
     assert surfaces(EVERY) == ("aileron", "elevator", "rudder", "flap")
     assert views(["t_s"]) == ()
+
+
+def test_the_mean_airspeed_that_is_judged_is_drawn_within_what_is_expected_of_it():
+    """The largest deviation of the mean in the picture is the number of the verdict, in chunks as in one."""
+    rng, n, dt = np.random.default_rng(3), 900, 0.02
+    flown = 45.0 + np.cumsum(rng.normal(0.0, 0.3, n))
+    command = np.where(np.arange(n) < 40, np.nan, 44.0)
+    mean, means = 0.0, []
+    for one, asked in zip(flown, command, strict=True):
+        mean += 0.0 if np.isnan(asked) else dt / 10.0 * (one - asked - mean)
+        means.append(asked + mean)
+    whole = {"t_s": dt * np.arange(n), "airspeed_mps": flown, "airspeed_command_mps": command}
+
+    class Chunks(dict):
+        def row_count(self):
+            return n
+
+        def read_chunks(self, names):
+            for start in (0, 250, 600):
+                rows = slice(start, {0: 250, 250: 600, 600: n}[start])
+                yield {name: self[name][rows] for name in {*names, "t_s"}}
+
+    drawn = series_of(Chunks(whole), ["airspeed_mean_mps"], (-np.inf, np.inf))
+    np.testing.assert_allclose(drawn["airspeed_mean_mps"], means, rtol=1e-12)
+    (panel,) = [p for p in views(EVERY, within_mps=3.5)[1].panels if p.label == "airspeed"]
+    assert [t.offset for t in panel.traces if t.role == "bound"] == [3.5, -3.5]
 
 
 def test_what_a_shown_column_is_made_from():

@@ -14,7 +14,16 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.control.outer.state import BANK_LIMIT, CHANNELS, FASTEST, LIMITED, NOT_JUDGED, SLOWEST, SPEED
+from beaver_ftc.control.outer.state import (
+    AT_ONE_INSTANT,
+    BANK_LIMIT,
+    CHANNELS,
+    FASTEST,
+    LIMITED,
+    NOT_JUDGED,
+    SLOWEST,
+    SPEED,
+)
 from beaver_ftc.design.model import AXES
 from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.diagnosis.monitors.sensor_records import instrument_found
@@ -233,8 +242,9 @@ def _profile(frame: np.void) -> dict[str, float | None] | None:
     if off is None:
         return None
     judged = {name: None if away == NOT_JUDGED else away for name, away in off.items()}
-    limited = float(autopilot["held_worst"]) if autopilot["commanded"][SPEED] else None
-    return judged | {LIMITED: limited}
+    of_speed = {LIMITED: autopilot["held_worst"], AT_ONE_INSTANT: autopilot["largest_off"]}
+    flown = autopilot["commanded"][SPEED]
+    return judged | {name: float(off) if flown else None for name, off in of_speed.items()}
 
 
 def _limits(frame: np.void, surfaces: Sequence[str]) -> tuple[dict[str, Any], ...]:

@@ -11,7 +11,7 @@ import numpy as np
 from beaver_ftc.results import log
 from beaver_ftc.results.model import Metrics
 from beaver_ftc.results.style import GREY, LOOKS, YELLOW, Mark, closeup_window, marks
-from beaver_ftc.results.views import WHOLE, Panel, Series, Trace, View, read_series, views
+from beaver_ftc.results.views import WHOLE, Panel, Series, Trace, View, read_series, views_of_flight
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,7 +25,7 @@ LOWEST_RATIO = 1e-2  # of a logarithmic axis: what is smaller is nothing
 
 def write_figures(log_path: Path, metrics: Metrics, folder: Path) -> list[Path]:
     """Draw every view of the log as `<view>.png`, some also as `<view>-closeup.png`; return the files."""
-    shown = views(log.column_names(log_path), bool(metrics.engine_power))
+    shown = views_of_flight(log.column_names(log_path), metrics)
     instants = marks(metrics)
     window = closeup_window(instants)
     closeups = [view for view in shown if view.closeup] if window else []
@@ -124,7 +124,7 @@ def _draw_trace(axes: "Axes", trace: Trace, series: Series, stepped: bool) -> No
     look = LOOKS[trace.role]
     axes.plot(
         series["t_s"],
-        trace.factor * series[trace.column],
+        trace.factor * series[trace.column] + trace.offset,
         color=look.colour,
         linestyle=_linestyle(look.dash),
         linewidth=look.width,

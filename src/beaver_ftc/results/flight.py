@@ -174,9 +174,9 @@ class Flight:
         return self._source
 
     def _views(self) -> dict[str, Any]:
-        from beaver_ftc.results.views import views
+        from beaver_ftc.results.views import views_of_flight
 
-        shown = views(self._kept().columns, bool(self.metrics.get("engine_power")))
+        shown = views_of_flight(self._kept().columns, self._typed)
         return {view.name: view for view in shown}
 
     def __repr__(self) -> str:

@@ -307,14 +307,16 @@ class EnginePower(Part):
 
 @dataclass(frozen=True)
 class Profile(Part):
-    """Largest deviation from the commanded profile, by channel; None where it is not flown. limited: from
-    the commanded airspeed as far as it can be held."""
+    """Largest deviation from the commanded profile, by channel; None where it is not flown. Those of the
+    airspeed are of a mean over 10 s, the last excepted. limited: from the commanded airspeed as far as it can
+    be held."""
 
     altitude_m: float | None
     airspeed_mps: float | None
     heading_deg: float | None
     bank_deg: float | None
     airspeed_limited_mps: float | None
+    airspeed_at_one_instant_mps: float | None
 
 
 @dataclass(frozen=True)

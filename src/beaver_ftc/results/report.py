@@ -18,7 +18,16 @@ import numpy as np
 from beaver_ftc.results import log, verdict
 from beaver_ftc.results.model import DeclaredFault, Document, Metrics
 from beaver_ftc.results.style import LOOKS, MODE_COLOURS, closeup_window, marks
-from beaver_ftc.results.views import MAX_POINTS, Panel, View, kinds, read_series, surfaces, views
+from beaver_ftc.results.views import (
+    MAX_POINTS,
+    Panel,
+    View,
+    expected_airspeed_mps,
+    kinds,
+    read_series,
+    surfaces,
+    views,
+)
 
 if TYPE_CHECKING:
     from jinja2 import Template
@@ -121,10 +130,13 @@ def _data(
 
 
 def _common_views(logs: Sequence[Path], documents: Sequence[Document]) -> tuple[View, ...]:
-    """Every view that all runs have."""
+    """Every view that all runs have; with what is expected of the airspeed, if that is the same in all."""
+    flown = [Metrics.of(document) for document in documents]
+    within_mps = {expected_airspeed_mps(metrics) for metrics in flown}
+    common = within_mps.pop() if len(within_mps) == 1 else None
     first, *rest = (
-        views(log.column_names(path), bool(document.get("engine_power")))
-        for path, document in zip(logs, documents, strict=True)
+        views(log.column_names(path), bool(metrics.engine_power), common)
+        for path, metrics in zip(logs, flown, strict=True)
     )
     return tuple(view for view in first if all(view in other for other in rest))
 
@@ -178,7 +190,13 @@ def _panel(panel: Panel) -> Document:
         "shadeLabel": panel.shade_label,
         "level": panel.level,
         "traces": [
-            {"column": trace.column, "label": trace.label, "role": trace.role, "factor": trace.factor}
+            {
+                "column": trace.column,
+                "label": trace.label,
+                "role": trace.role,
+                "factor": trace.factor,
+                "offset": trace.offset,
+            }
             for trace in panel.traces
         ],
     }

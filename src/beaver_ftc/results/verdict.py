@@ -154,9 +154,9 @@ def expectations(metrics: Metrics) -> list[tuple[str, str, str, bool]]:
 
 
 def _actual(found: Expectation) -> str:
-    """What came out, and why if the reason is known."""
-    reason = found.reason
-    return _value(found.actual) + (f"; {reason}" if reason else "")
+    """What came out, that it is a mean where it is one, and why if the reason is known."""
+    mean = " (10 s mean)" if found.name in MEANS and found.actual is not None else ""
+    return _value(found.actual) + mean + (f"; {found.reason}" if found.reason else "")
 
 
 def verdict_text(metrics: Metrics, folder: str, colour: bool = False) -> str:
@@ -231,16 +231,22 @@ def _fault(fault: Fault | None) -> str:
     return f"{what}{' (' + size + ')' if size else ''} at {_time(fault.at_s)}{until}"
 
 
+MEANS = ("airspeed_within_mps", "airspeed_within_limits_mps")  # expectations that read a mean over 10 s
 _CHANNELS = {
-    "altitude_m": "altitude {} m", "airspeed_mps": "airspeed {} m/s", "heading_deg": "heading {} deg",
+    "altitude_m": "altitude {} m",
+    "airspeed_mps": "airspeed {} m/s (10 s mean; largest at one instant {})", "heading_deg": "heading {} deg",
     "bank_deg": "bank {} deg",
 }  # fmt: skip
 
 
 def _profile(metrics: Metrics) -> str:
     """Largest deviations from the commanded profile; nothing where none was flown."""
-    worst = {name: getattr(metrics.profile, name, None) for name in _CHANNELS}
-    off = ", ".join(_CHANNELS[name].format(_value(by)) for name, by in worst.items() if by is not None)
+    profile = metrics.profile
+    worst = {name: getattr(profile, name, None) for name in _CHANNELS}
+    at_once = _value(profile.airspeed_at_one_instant_mps) if profile else ""
+    off = ", ".join(
+        _CHANNELS[name].format(_value(by), at_once) for name, by in worst.items() if by is not None
+    )
     return f"at most off by: {off}" if off else ""
 
 

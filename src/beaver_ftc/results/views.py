@@ -10,14 +10,17 @@ read a row group at a time, so that a ten-hour flight fits; a short flight is sh
 import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import accumulate
 from pathlib import Path
 
 import numpy as np
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.results import log
+from beaver_ftc.results.model import Metrics
 from beaver_ftc.scenario.control import MODES
+from beaver_ftc.scenario.timing import MEAN_S
 
 AXIS_NAMES = {"p": "roll rate p", "q": "pitch rate q", "r": "yaw rate r"}
 
@@ -29,18 +32,23 @@ MAX_POINTS = 4000  # of a curve
 WHOLE = (-math.inf, math.inf)
 Series = dict[str, np.ndarray]
 RATIO = "_ratio"  # ends the name of a derived column: |residual| / threshold
+COMMANDED, FLOWN = "airspeed_command_mps", "airspeed_mps"
+MEAN = "airspeed_mean_mps"  # derived: the commanded airspeed, and the mean deviation from it over 10 s
+MEAN_OF = "airspeed_within_mps"  # the expectation that reads it
 
 _SHOWN = {"rad/s2": "deg/s²", "rad/s": "deg/s", "rad": "deg", "1": ""}  # for people; others as they are
 
 
 @dataclass(frozen=True)
 class Trace:
-    """One curve: a log column, what it is called and its role (from which its look follows)."""
+    """One curve: a log column, what it is called and its role (from which its look follows); offset: added to
+    what is shown."""
 
     column: str
     label: str
     role: str
     sign: float = 1.0
+    offset: float = 0.0
 
     @property
     def factor(self) -> float:
@@ -104,11 +112,22 @@ def surfaces(columns: Sequence[str]) -> tuple[str, ...]:
     return tuple(column.removesuffix(ending) for column in columns if column.endswith(ending))
 
 
-def views(columns: Sequence[str], power: bool = False) -> tuple[View, ...]:
-    """Every view that a log with these columns allows; power: the law has used the engine."""
+def views_of_flight(columns: Sequence[str], metrics: Metrics) -> tuple[View, ...]:
+    """Every view of a flight whose log has these columns."""
+    return views(columns, bool(metrics.engine_power), expected_airspeed_mps(metrics))
+
+
+def expected_airspeed_mps(metrics: Metrics) -> float | None:
+    """How far the mean airspeed may be from the command; None where the scenario does not say."""
+    return next((found.expected for found in metrics.expectations if found.name == MEAN_OF), None)
+
+
+def views(columns: Sequence[str], power: bool = False, within_mps: float | None = None) -> tuple[View, ...]:
+    """Every view that a log with these columns allows; power: the law has used the engine; within_mps: of the
+    commanded airspeed, as the scenario expects its mean."""
     known, moved, engine = set(columns), surfaces(columns), power_column(columns)
     named = (
-        _tracking(), _profile(LIMITED in known, engine), _surfaces(moved), _detection(), _watch(),
+        _tracking(), _profile(LIMITED in known, engine, within_mps), _surfaces(moved), _detection(), _watch(),
         _likelihood(columns), _isolation(estimators(columns)), _ratio(estimators(columns)),
         _effectiveness(moved), _supervisor(), *((_engine(),) if power else ()), _states(),
     )  # fmt: skip
@@ -129,6 +148,8 @@ def sources(columns: Iterable[str]) -> tuple[str, ...]:
 
 
 def _sources(column: str) -> tuple[str, ...]:
+    if column == MEAN:
+        return (COMMANDED, FLOWN)
     stem = column.removesuffix(RATIO)
     if stem == column:
         return (column,)
@@ -159,7 +180,7 @@ def _tracking() -> View:
     return View("tracking", "Tracking: body rates against their reference", panels)
 
 
-def _profile(limited: bool, power: str) -> View:
+def _profile(limited: bool, power: str, within_mps: float | None) -> View:
     held = {"airspeed": [(LIMITED, "what can be held", "command")]} if limited else {}
     flown = (
         ("altitude", "altitude_command_m", "altitude_m"),
@@ -167,13 +188,22 @@ def _profile(limited: bool, power: str) -> View:
         ("heading ψ", "heading_command_rad", "psi_rad"),
         ("bank φ", "bank_command_rad", "phi_rad"),
     )
-    panels = (
+    panels = [
         _panel(label, (command, "commanded", "target"), *held.get(label, ()), (actual, "flown", "actual"))
         for label, command, actual in flown
-    )
+    ]
+    panels[1] = replace(panels[1], traces=(*panels[1].traces, *_judged_airspeed(within_mps)))
     words = power.removesuffix("_inhg").replace("_", " ")
     engine = [_panel(f"engine: {words}", (power, "flown", "actual"))] if power else []
     return View("profile", "Profile: what was commanded, and what was flown", (*panels, *engine))
+
+
+def _judged_airspeed(within_mps: float | None) -> Iterator[Trace]:
+    """The mean of the airspeed that is judged, and what the scenario expects of it."""
+    yield Trace(MEAN, "10 s mean", "residual")
+    if within_mps is not None:
+        yield Trace(COMMANDED, f"± {within_mps:g} m/s, expected of the mean", "bound", offset=within_mps)
+        yield Trace(COMMANDED, "", "bound", offset=-within_mps)
 
 
 def kinds(names: Sequence[str]) -> dict[str, list[str]]:
@@ -357,6 +387,7 @@ def series_of(
     rows = min(source.row_count(), (window_s[1] - window_s[0]) / frame_s)
     stretch = 1 if rows <= max_points else math.ceil(2 * rows / max_points)
     whole = _unwrap_heading(source.read_chunks(sources(wanted)))
+    whole = _add_mean_airspeed(whole, frame_s) if MEAN in wanted else whole
     chunks = (_derive(_within(chunk, window_s), wanted) for chunk in whole)
     parts = [chunk if stretch == 1 else _envelope(chunk, stretch) for chunk in chunks if chunk["t_s"].size]
     return {name: np.concatenate([part[name] for part in parts] or [np.empty(0)]) for name in wanted}
@@ -370,6 +401,17 @@ def _unwrap_heading(chunks: Iterable[Series]) -> Iterator[Series]:
             chunk["psi_rad"] = np.unwrap(np.append(last, chunk["psi_rad"]))[last.size :]
             last = chunk["psi_rad"][-1:]
         yield chunk
+
+
+def _add_mean_airspeed(chunks: Iterable[Series], frame_s: float) -> Iterator[Series]:
+    """The mean as the autopilot judges it: deviations from the command through a lag of MEAN_S."""
+    share = frame_s / MEAN_S if math.isfinite(frame_s) else 1.0
+    last = 0.0
+    for chunk in chunks:
+        off = np.nan_to_num(chunk[FLOWN] - chunk[COMMANDED]).tolist()
+        means = [*accumulate(off, lambda mean, one: mean + share * (one - mean), initial=last)][1:]
+        last = means[-1] if means else last
+        yield chunk | {MEAN: chunk[COMMANDED] + means}
 
 
 def _derive(chunk: Series, wanted: Sequence[str]) -> Series:

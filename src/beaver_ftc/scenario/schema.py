@@ -190,9 +190,9 @@ class Expect(Section):
     pre_fault_rms_deg_s: largest RMS tracking error before the fault, or of a flight without one
     post_fault_rms_deg_s: largest RMS tracking error after the fault
     altitude_within_m: largest deviation from the commanded altitude, m
-    airspeed_within_mps: largest deviation from the commanded airspeed, m/s
-    airspeed_within_limits_mps: largest deviation from the commanded airspeed, as limited to what can
-    still be held, m/s
+    airspeed_within_mps: largest deviation of the airspeed, as a mean over 10 s, from what is commanded, m/s
+    airspeed_within_limits_mps: the same from the commanded airspeed, as limited to what can still be
+    held, m/s
     heading_within_deg: largest deviation from the commanded heading, 30 s after a change of it and later,
     deg
     stays_in_envelope: true: never outside the validated envelope; false: it must leave it

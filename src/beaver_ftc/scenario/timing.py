@@ -7,6 +7,8 @@ from typing import Any
 # is not before t - TIME_TOLERANCE_S.
 TIME_TOLERANCE_S = 1e-9
 
+MEAN_S = 10.0  # time constant of the mean by which airspeed and arrival are judged: a gust passes faster
+
 
 def is_before(t_s: Any, at_s: float) -> Any:
     """Whether a time (or each of several) is before that instant, by more than rounding."""

@@ -355,9 +355,10 @@ def test_deviations_are_judged_once_settled_and_of_the_airspeed_the_mean():
     part, off = DT / 10.0, 2 * np.pi - 6.2
     means = [4.0 - part * 14.0, mean, 0.1 + part * (off - 0.1), -part * 0.3]
     assert pilot["mean_off"] == pytest.approx(means)
+    assert pilot["largest_off"] == 2.0
     assert pilot["worst"] == pytest.approx([10.0, abs(mean), 0.0, 0.0])
-    loops.judge(pilot, 1001.0, 47.0, -3.1, -0.1, 40.0)
-    assert pilot["worst"][ALTITUDE] == 10.0
+    loops.judge(pilot, 1001.0, 41.5, -3.1, -0.1, 40.0)
+    assert (pilot["worst"][ALTITUDE], pilot["largest_off"]) == (10.0, 3.5)
     assert pilot["worst"][[HEADING, BANK]] == pytest.approx([2 * np.pi - 6.2, 0.3])
     idle = new_autopilot()
     loops.judge(idle, 990.0, 47.0, 1.0, 1.0, 100.0)

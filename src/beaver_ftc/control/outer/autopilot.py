@@ -24,7 +24,7 @@ from beaver_ftc.control.outer.thrust import gained, look_up, power_for, thrust_p
 from beaver_ftc.control.power import ceiling
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
-from beaver_ftc.scenario.timing import TIME_TOLERANCE_S
+from beaver_ftc.scenario.timing import MEAN_S, TIME_TOLERANCE_S
 
 MOST_PATH_RAD = 0.15
 MOST_SIDESLIP_RAD = 0.14
@@ -35,7 +35,6 @@ CUT_INHG_S, RAISE_INHG_S = 8.0, 1.0  # about as fast as the engine follows; and 
 KEPT_ASIDE = 0.15  # of the power's range at either end, for engines that alone yaw the aircraft
 PACE_BY_POWER, BY_POWER_S = 0.25, 5.0  # of the loops of bank and heading there, and since when it counts
 SETTLED_S = 30.0  # after a change of heading
-MEAN_S = 10.0  # over which airspeed and arrival are judged: what comes and goes faster is a gust
 
 
 @kernel
@@ -317,7 +316,7 @@ def throttle(autopilot, power, y, path, push):
 @kernel
 def judge(autopilot, altitude_m, airspeed_mps, heading, bank, t):
     """Note the deviation of every channel from its command: its mean of late, and the largest, of angles
-    once SETTLED_S have passed."""
+    once SETTLED_S have passed. Of the airspeed the mean is judged; `largest_off` is at one instant."""
     where = (altitude_m, airspeed_mps, heading, bank)
     for c in range(N_CHANNELS):
         if not autopilot.commanded[c]:
@@ -327,6 +326,7 @@ def judge(autopilot, altitude_m, airspeed_mps, heading, bank, t):
             away = turn(away)
         autopilot.mean_off[c] += autopilot.dt / MEAN_S * (away - autopilot.mean_off[c])
         if c == SPEED:
+            autopilot.largest_off = max(autopilot.largest_off, abs(away))
             away = autopilot.mean_off[c]
             from_held = where[c] - autopilot.held
             autopilot.held_off += autopilot.dt / MEAN_S * (from_held - autopilot.held_off)

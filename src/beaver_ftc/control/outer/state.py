@@ -8,6 +8,7 @@ N_CHANNELS = 4
 MAX_LEGS = 100
 CHANNELS = ("altitude_m", "airspeed_mps", "heading_deg", "bank_deg")
 NOT_JUDGED = -1.0  # a deviation that no frame has counted for
+AT_ONE_INSTANT = "airspeed_at_one_instant_mps"  # the largest deviation, where `airspeed_mps` is of the mean
 LIMITED = "airspeed_limited_mps"  # the commanded one, as far as it can be held
 COLUMNS = (
     "altitude_command_m", "airspeed_command_mps", "heading_command_rad", "bank_command_rad", LIMITED,
@@ -76,4 +77,5 @@ AUTOPILOT = record(
     # how far off, at most; and the mean deviation of late, from what is commanded and, airspeed, held
     # `worst` is NOT_JUDGED until a channel is: of angles that takes SETTLED_S
     mean_off=N_CHANNELS, held_off=float, held_worst=float, worst=N_CHANNELS,
+    largest_off=float,  # m/s, of the airspeed from what is commanded, at one instant
 )  # fmt: skip

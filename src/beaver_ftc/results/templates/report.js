@@ -216,7 +216,7 @@ class Panel {
       for (const trace of this.spec.traces) {
         const values = series[trace.column];
         for (let i = first; i <= last; i++) {
-          const value = values[i] * trace.factor;
+          const value = values[i] * trace.factor + trace.offset;
           if (value < low) low = value;
           if (value > high) high = value;
         }
@@ -287,7 +287,7 @@ class Panel {
     pen.setLineDash(look.dash);
     pen.beginPath();
     for (let i = first; i <= last; i++) {
-      let value = values[i] * trace.factor;
+      let value = values[i] * trace.factor + trace.offset;
       if (Number.isNaN(value)) { drawn = false; continue; }
       if (this.spec.log && value < low) value = low;
       const px = x(times[i]), py = y(value);
@@ -348,7 +348,7 @@ class Panel {
 
   drawCursor({ pen, x, left, right, top, bottom }, series) {
     const at = x(clock.now), i = indexAt(series.t_s, clock.now);
-    this.spec.traces.forEach((trace, k) => { this.readouts[k].value = this.inWords(series[trace.column][i] * trace.factor); });
+    this.spec.traces.forEach((trace, k) => { this.readouts[k].value = this.inWords(series[trace.column][i] * trace.factor + trace.offset); });
     if (at >= left && at <= right) {
       pen.strokeStyle = "#000";
       pen.lineWidth = 0.8;

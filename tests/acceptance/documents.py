@@ -8,9 +8,15 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+from tools.docs.pages import is_generated
+
 from .installation import ROOT
 
-PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md"), *(ROOT / "examples").glob("*/README.md")])
+_EVERY = sorted(
+    [ROOT / "README.md", *(ROOT / "docs").rglob("*.md"), *(ROOT / "examples").glob("*/README.md")]
+)
+# What is generated shows the examples of `--help`, which test_help.py tries.
+PAGES = [page for page in _EVERY if not is_generated(page.read_text(encoding="utf-8"))]
 PROGRAMS = ("beaver-ftc", "pip", "pytest", "python", "make", "jsbsim", "fgfs", "ray")
 _STARTS = re.compile(rf"({'|'.join(PROGRAMS)}) \S|pytest\b")
 _FENCED = re.compile(r"^ *```(\w*)\n(.*?)^ *```$", re.MULTILINE | re.DOTALL)

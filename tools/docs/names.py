@@ -14,7 +14,7 @@ import yaml
 from beaver_ftc.documents.errors import nearest
 from tools.docs.known import Known, known
 from tools.docs.marks import Page
-from tools.docs.pages import Finding
+from tools.docs.pages import Finding, is_generated
 
 FOREIGN = Path(__file__).with_name("foreign.yaml")
 _FENCED = re.compile(r"^ *(`{3,}|~{3,}).*?^ *\1`* *$", re.MULTILINE | re.DOTALL)
@@ -292,6 +292,8 @@ def check(pages: Sequence[Page], every: bool = True) -> list[Finding]:
     names = Names(known(), frozenset(theirs))
     findings: list[Finding] = []
     for page in pages:
+        if is_generated(page.text):
+            continue
         names.shown = shown(page.text)
         for line, span in spans(page.text):
             wrong = names.wrong(span)

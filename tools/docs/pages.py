@@ -27,6 +27,11 @@ def every_page(root: Path = ROOT) -> list[Path]:
     return [root / "README.md", *sorted((root / "docs").rglob("*.md"))]
 
 
+def is_generated(text: str) -> bool:
+    """Whether a page is printed as a whole: its text comes from code, whose tests hold it."""
+    return text.startswith("<!-- printed: python -m tools.docs reference ")
+
+
 def chosen(names: Iterable[str], root: Path = ROOT) -> list[Path]:
     """The pages of these names (`docs/explanation/theory.md`, `theory.md` or `theory`),
     all of them without any.

@@ -44,10 +44,10 @@ MEANINGS = {
 _HEAD = """# Properties of the aircraft
 
 Which properties of JSBSim does the aircraft have, and what do they mean? They are read from
-[aircraft/beaver/beaver.xml](../../aircraft/beaver/beaver.xml). `<s>` is one of aileron, elevator, rudder,
+[aircraft/beaver/beaver.xml](../aircraft/beaver/beaver.xml). `<s>` is one of aileron, elevator, rudder,
 flap. A name ends with its unit; a name without one is dimensionless. Keys in brackets point to
-[sources](../../REFERENCES.md). Plain JSBSim and its scripts can set and read all of them; scenarios set them
-by `faults:`, `uncertainty:` and `actuators:` ([scenarios](scenarios.md))."""
+[sources](../REFERENCES.md). Plain JSBSim and its scripts can set and read all of them; scenarios set them
+by `faults:`, `uncertainty:` and `actuators:` ([scenarios](reference/scenarios.md))."""
 
 
 def as_markdown() -> str:

@@ -20,7 +20,7 @@ from tools.docs.pages import ROOT, Finding
 
 DECIDES = ("src", "aircraft", "scenarios")  # what a number of a flight depends on
 _FENCE = re.compile(r"(`{3,})(\w*)\n((?:\$ .*\n)*)")
-_MARKDOWN = re.compile(r"python -m tools\.docs table [\w-]+")
+_MARKDOWN = re.compile(r"python -m tools\.docs (?:table|reference) [\w-]+")
 _LONGEST = 90  # of what is quoted in a finding
 
 

@@ -1,4 +1,4 @@
-"""What mkdocs is to do besides: the reference, the flight of the front page, equations, links out of docs/.
+"""What mkdocs is to do besides: public names, the flight of the front page, equations, links out of docs/.
 
 Nothing of it is written into the source tree.
 """
@@ -26,17 +26,12 @@ _FRAME = f'<iframe class="replay" src="{REPLAY}" title="a flight, replayed" load
 _MARK = re.compile(r"^<!-- (?:printed|/printed|from ).*?-->$|<!--[=/].*?-->", re.MULTILINE)
 _LINK = re.compile(r"\[([^\]]*)\]\(((?:\.\./)+[^)#\s]+)(?:#[^)]*)?\)")  # out of its folder
 _SHOWN = (".cff", ".css", ".csv", ".js", ".json", ".md", ".py", ".toml", ".xml", ".yaml", ".yml")  # as text
-REFERENCE = "reference/README.md"
+PYTHON_NAMES = "reference/python-names.md"  # from docstrings, with links to the source
 SOURCES = "REFERENCES.md"  # a file of its own beside the README, here a page
 
 
 def on_files(files: Files, config: Any) -> Files:
-    """Add what is made: pages of the reference, the replay, assets, linked files of the repository."""
-    from tools.docs.reference import PAGES, page, python_names
-
-    for name in PAGES:
-        content = python_names.directives() if name == "python-names" else page(name)
-        files.append(File.generated(config, f"reference/{name}.md", content=content))
+    """Add what is made: the replay, assets, linked files of the repository."""
     files.append(File.generated(config, SOURCES.lower(), abs_src_path=str(ROOT / SOURCES)))
     files.append(File.generated(config, REPLAY, content=_replay()))
     for name in ASSETS:
@@ -93,8 +88,10 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
     if page.file.src_uri in _reference_pages():
         page.meta.setdefault("hide", ["toc"])  # their tables are wide
         page.meta.setdefault("search", {"boost": 0.5})  # who searches for a word wants what explains it
-    if page.file.src_uri == REFERENCE:
-        markdown += "\n\n" + "\n".join(_listed())
+    if page.file.src_uri == PYTHON_NAMES:
+        from tools.docs.reference import python_names
+
+        return python_names.directives()
     above = "../" * page.file.src_uri.count("/")
 
     def inward(link: re.Match[str]) -> str:
@@ -113,20 +110,6 @@ def _reference_pages() -> frozenset[str]:
     from tools.docs.reference import PAGES
 
     return frozenset(f"reference/{name}.md" for name in PAGES)
-
-
-def _listed() -> Iterator[str]:
-    """The pages of the reference, each with its first sentence."""
-    from tools.docs.reference import PAGES, page
-
-    for name in PAGES:
-        title, _, rest = page(name).partition("\n\n")
-        yield f"- [{title.removeprefix('# ')}]({name}.md): {_first_sentence(rest)}"
-
-
-def _first_sentence(text: str) -> str:
-    first = re.split(r"(?<=[.?])\s", " ".join(text.partition("\n\n")[0].split()), maxsplit=1)[0]
-    return first[:1].lower() + first[1:]
 
 
 def on_post_page(output: str, page: Any, config: Any) -> str:

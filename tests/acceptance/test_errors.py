@@ -147,7 +147,7 @@ def test_a_missed_expectation_is_status_1_and_is_named(beaver, tmp_path):
     )
     done = beaver("run", "strict.yaml", "--no-report")
     assert _lines(done, 1) == []
-    assert re.search(r"^ expected +MISSED no_false_alarm no, got yes$", done.stdout, re.MULTILINE)
+    assert re.search(r"^ expected +MISSED a false alarm, got no false alarm$", done.stdout, re.MULTILINE)
     answer = beaver("run", "strict.yaml", "--no-report", "--format", "json", "--junit", "verdict.xml")
     assert (answer.returncode, json.loads(answer.stdout)["passed"]) == (1, False)
     assert 'failures="1"' in (tmp_path / "verdict.xml").read_text()

@@ -108,8 +108,8 @@ def test_a_fault_free_time_ends_with_the_first_alarm_or_fault():
     ("end", "said"),
     [
         ((50.0, 2100.0), ""),
-        ((50.1, 1800.0), "airspeed from 45 to 50 m/s"),
-        ((39.9, 2101.0), "airspeed from 45 to 40 m/s and in altitude from 1800 to 2101 m"),
+        ((50.1, 1800.0), "airspeed rose from 45 to 50 m/s"),
+        ((39.9, 2101.0), "airspeed fell from 45 to 40 m/s and altitude rose from 1800 to 2101 m"),
     ],
 )
 def test_a_flight_has_drifted_beyond_5_mps_or_300_m(end, said):
@@ -117,13 +117,13 @@ def test_a_flight_has_drifted_beyond_5_mps_or_300_m(end, said):
     found = hints(
         Flight(scenario=Scenario(initial=initial), end=end), Metrics.of({"detection": {"detected": True}})
     )
-    assert "".join(found) == (said and f"the flight drifted in {said}: only the body rates are controlled")
+    assert "".join(found) == (said and f"{said} (only the body rates are controlled in this scenario)")
 
 
 @pytest.mark.parametrize(("taken_s", "explained"), [(13.0, False), (13.25, True), (13.5, True)])
 def test_a_late_reallocation_is_explained(taken_s, explained):
     late = Flight(supervisor=[(0.0, "nominal"), (taken_s, "reallocated")], isolation_time_s=12.25)
-    assert any("once it was certain" in said for said in metrics(late)["hints"]) is explained
+    assert any("when it was certain" in said for said in metrics(late)["hints"]) is explained
 
 
 @pytest.mark.parametrize(

@@ -54,7 +54,7 @@ class TestFlown:
     def test_says_the_verdict_in_a_few_lines(self, flight):
         said = repr(flight)
         assert said.startswith("test: FAILED\n")
-        assert "isolated_as rudder, got elevator" in said
+        assert "isolated fault rudder, got elevator" in said
         assert len(said.splitlines()) < 12
         assert "<b>test: FAILED</b>" in flight._repr_html_()
 

@@ -49,7 +49,7 @@ def test_report_says_the_verdict_the_numbers_and_the_versions(folder):
     html = render([folder])
     assert "synthetic: FAILED" in html
     assert html.count("MISSED") == 1
-    for said in ("12.00 s", "0.07 s", "estimated theta -0.39", "isolated_within_s ≤ 0.1", "jsbsim"):
+    for said in ("12.00 s", "0.07 s", "estimated loss 39 %", "isolation delay ≤ 0.1 s", "jsbsim"):
         assert said in html
 
 

@@ -197,9 +197,9 @@ class Flight:
             for when, p, q, r in verdict.tracking(model.Metrics.of(self.metrics))
         ]
         missed = [
-            ("missed", f"{name} {expected}, got {actual}")
-            for name, expected, actual, passed in verdict.expectations(model.Metrics.of(self.metrics))
-            if not passed
+            ("missed", held.sentence)
+            for held in verdict.expectations(model.Metrics.of(self.metrics))
+            if not held.passed
         ]
         return [*verdict.facts(model.Metrics.of(self.metrics)), *tracked, *missed]
 

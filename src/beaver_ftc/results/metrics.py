@@ -312,7 +312,7 @@ def _condition(flight: "Landing") -> model.Condition:
 
 
 def hints(flight: "Landing", found: Metrics) -> list[str]:
-    """What would mislead a reader who is not told of it: one sentence each."""
+    """Notes without which a reader would misread the verdict: one sentence each."""
     scenario = flight.scenario
     of_diagnosis = (_outside_the_class, _several, _too_small) if scenario.fdi.diagnoses else ()
     said = [*(says(scenario, found) for says in of_diagnosis), _on_the_bound(flight), _waited(found)]
@@ -332,8 +332,8 @@ def _outside_the_class(scenario: "Scenario", found: Metrics) -> str:
         return ""
     *first, last = scenario.airframe.class_of_losses
     return (
-        f"{' and '.join(strange)}: outside the fault class the diagnosis looks for (loss of effectiveness of "
-        f"{', '.join(first)} or {last}), so it cannot be named; set fdi.fault_class: all"
+        f"{' and '.join(strange)}: outside the fault class of the diagnosis (loss of effectiveness of "
+        f"{', '.join(first)} or {last}), so that it cannot be named; set fdi.fault_class: all"
     )
 
 
@@ -348,8 +348,8 @@ def _too_small(scenario: "Scenario", found: Metrics) -> str:
     if detection.inconclusive:  # which has a line of its own
         return ""
     return (
-        "no alarm, and none was certain: what the fault did stayed within what fdi.bounds declares as "
-        "uncertainty; a larger fault, a livelier reference or tighter bounds would show it"
+        "no alarm, and none was certain: the effect of the fault stayed within the uncertainty that "
+        "fdi.bounds declares; a larger fault, a stronger reference or tighter bounds would show it"
     )
 
 
@@ -359,9 +359,8 @@ def _on_the_bound(flight: "Landing") -> str:
     if not flight.scenario.faults or not ON_THE_BOUND <= used <= 1.0:
         return ""
     return (
-        f"the healthy part of this flight already uses {math.floor(1000.0 * used) / 10.0:g} % of the "
-        f"bound; that a "
-        "small fault is detected here follows from the uncertainty this scenario flies with"
+        f"the residual of the healthy flight already reaches {math.floor(1000.0 * used) / 10.0:g} % of its "
+        "threshold, so that this scenario's own uncertainty decides how soon a small fault is detected"
     )
 
 
@@ -373,9 +372,9 @@ def _waited(found: Metrics) -> str:
     if not taken_s or isolation.time_s is None or taken_s[0] - isolation.time_s < LONG_S:
         return ""
     return (
-        f"{isolation.fault} was named at {isolation.time_s:.2f} s, and its demand handed over at "
-        f"{taken_s[0]:.2f} s, once it was certain to be weak or stuck: an offset or a slow surface the law "
-        "would have corrected instead"
+        f"{isolation.fault} was named at {isolation.time_s:.2f} s; its demand was reallocated at "
+        f"{taken_s[0]:.2f} s, when it was certain that the surface is weak or stuck. The law would have "
+        "corrected an offset or a slow surface without reallocation"
     )
 
 
@@ -388,7 +387,11 @@ def _drift(flight: "Landing") -> str:
         ("airspeed", initial.airspeed_mps, flight.end[0], DRIFT_MPS, "m/s"),
         ("altitude", initial.altitude_m, flight.end[1], DRIFT_M, "m"),
     )
-    far = [f"{what} from {a:.0f} to {b:.0f} {unit}" for what, a, b, most, unit in ends if abs(b - a) > most]
+    far = [
+        f"{what} {'fell' if b < a else 'rose'} from {a:.0f} to {b:.0f} {unit}"
+        for what, a, b, most, unit in ends
+        if abs(b - a) > most
+    ]
     if not far or getattr(flight.scenario, "autopilot", None):
         return ""
-    return f"the flight drifted in {' and in '.join(far)}: only the body rates are controlled"
+    return f"{' and '.join(far)} (only the body rates are controlled in this scenario)"

@@ -5,7 +5,7 @@ All words follow from the metrics, so that they cannot disagree with `metrics.js
 
 import io
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from beaver_ftc.results.model import (
     AxisAuthority,
@@ -45,7 +45,7 @@ def mood(metrics: Metrics) -> str:
 
 
 def facts(metrics: Metrics) -> list[tuple[str, str]]:
-    """(what, how it went) for each thing worth knowing, in the order in which they happen."""
+    """(name, text) of each line of the verdict, in the order of events."""
     declared = metrics.faults or (metrics.fault,)
     said = (
         ("flight", _flight(metrics)),
@@ -62,7 +62,7 @@ def facts(metrics: Metrics) -> list[tuple[str, str]]:
         ("profile", _profile(metrics)),
         *(("limited", _limit(limit)) for limit in metrics.limits),
         ("authority", _authority(metrics)),
-        ("left", _left(metrics)),
+        ("remaining", _remaining(metrics)),
         ("envelope", _envelope(metrics)),
         ("departure", _departure(metrics)),
         ("link", _link(metrics)),
@@ -73,7 +73,7 @@ def facts(metrics: Metrics) -> list[tuple[str, str]]:
 
 
 def _others(metrics: Metrics) -> list[str]:
-    """What else is at fault, of several faults at once, and what is open."""
+    """The further faults of several at once: named, or the remaining candidates."""
     isolation = metrics.isolation
     rest = isolation.faults[1:] if isolation.isolated else []
     return [_one(fault, metrics) if fault.fault else _still_possible(fault.candidates) for fault in rest]
@@ -146,17 +146,72 @@ def tracking(metrics: Metrics) -> list[tuple[str, str, str, str]]:
     return [(when, _value(rms.p), _value(rms.q), _value(rms.r)) for when, rms in tracked if rms]
 
 
-def expectations(metrics: Metrics) -> list[tuple[str, str, str, bool]]:
-    """(name, expected, actual, passed) for each expectation."""
-    return [
-        (found.name, _bound(found.expected), _actual(found), found.passed) for found in metrics.expectations
-    ]
+class Held(NamedTuple):
+    """An expectation compared with the flight.
+
+    limit: what is expected; actual: what the flight gave, empty where it adds nothing; share: actual / limit
+    """
+
+    name: str
+    limit: str
+    actual: str
+    passed: bool
+    share: float | None
+
+    @property
+    def sentence(self) -> str:
+        """Expected and actual in one line."""
+        return f"{self.limit}, got {self.actual}" if self.actual else self.limit
 
 
-def _actual(found: Expectation) -> str:
-    """What came out, that it is a mean where it is one, and why if the reason is known."""
-    mean = " (10 s mean)" if found.name in MEANS and found.actual is not None else ""
-    return _value(found.actual) + mean + (f"; {found.reason}" if found.reason else "")
+def expectations(metrics: Metrics) -> list[Held]:
+    """Each expectation in words."""
+    return [_held(found) for found in metrics.expectations]
+
+
+_LIMITS = {  # quantity and unit of the expectations that are limits
+    "detected_within_s": ("detection delay", "s"), "isolated_within_s": ("isolation delay", "s"),
+    "altitude_within_m": ("altitude deviation", "m"),
+    "airspeed_within_mps": ("airspeed deviation (10 s mean)", "m/s"),
+    "airspeed_within_limits_mps": ("deviation from the limited airspeed (10 s mean)", "m/s"),
+    "heading_within_deg": ("heading deviation", "deg"),
+    "arrives.altitude_m": ("altitude deviation at the end", "m"),
+    "arrives.airspeed_mps": ("airspeed deviation at the end", "m/s"),
+    "arrives.heading_deg": ("heading deviation at the end", "deg"),
+    **{
+        f"{key}_rms_deg_s.{axis}": (f"{name} rate RMS {when} the fault", "deg/s")
+        for key, when in (("pre_fault", "before"), ("post_fault", "after"))
+        for axis, name in (("p", "roll"), ("q", "pitch"), ("r", "yaw"))
+    },
+}  # fmt: skip
+_FLAGS = {  # what is said of true, and of false
+    "no_false_alarm": ("no false alarm", "a false alarm"),
+    "no_departure": ("no departure", "a departure"),
+    "stays_in_envelope": ("stays in the envelope", "leaves the envelope"),
+    "arrives.in_envelope": ("inside the envelope at the end", "outside the envelope at the end"),
+}  # fmt: skip
+_NAMES = {
+    "isolated_as": "isolated fault", "isolated_type": "fault type",
+    "candidate_type": "fault type still possible",
+}  # fmt: skip
+
+
+def _held(found: Expectation) -> Held:
+    actual, share = _value(found.actual), None
+    if found.name in _FLAGS:
+        limit = _FLAGS[found.name][not found.expected]
+        actual = "" if found.passed or found.actual is None else _FLAGS[found.name][not found.actual]
+    elif found.name in _LIMITS:
+        quantity, unit = _LIMITS[found.name]
+        limit = f"{quantity} ≤ {_value(found.expected)} {unit}"
+        if found.actual is not None:
+            share = abs(float(found.actual)) / found.expected if found.expected else None
+            actual += f" {unit}{'' if share is None else f' ({100 * share:.3g} % of the limit)'}"
+    else:
+        limit = f"{_NAMES.get(found.name, _in_words(found.name))} {_value(found.expected)}"
+        actual = "" if found.passed and found.actual == found.expected else actual
+    reason = found.reason if actual or not found.passed else ""
+    return Held(found.name, limit, "; ".join(filter(None, (actual, reason))), found.passed, share)
 
 
 def verdict_text(metrics: Metrics, folder: str, colour: bool = False) -> str:
@@ -182,9 +237,9 @@ def _table(metrics: Metrics, folder: str) -> "Table":
         table.add_row(what, how)
     for i, (when, p, q, r) in enumerate(tracking(metrics)):
         table.add_row("" if i else "tracking RMS", f"p {p}  q {q}  r {r} deg/s {when} the fault")
-    for name, expected, actual, passed in expectations(metrics):
-        mark = Text("met   " if passed else "MISSED", "green" if passed else "bold red")
-        table.add_row("expected", Text.assemble(mark, f" {name} {expected}, got {actual}"))
+    for held in expectations(metrics):
+        mark = Text("met   " if held.passed else "MISSED", "green" if held.passed else "bold red")
+        table.add_row("expected", Text.assemble(mark, f" {held.sentence}"))
     if metrics.certificate is not None:
         table.add_row("certificate", _certificate(metrics.certificate, folder))
     table.add_row("results", folder)
@@ -205,7 +260,7 @@ def _changed(change: Change) -> str:
     said = f"{', '.join([*to, *(['sensors'] if change.sensors else [])]) or 'declared sensors'}"
     if change.detection_time_s is None:
         return f"{said} at {_time(change.time_s)}"
-    found = change.isolated or "nothing named"
+    found = change.isolated or "not isolated"
     alarm = "FALSE ALARM" if change.false_alarm else "alarm"
     before = f"{alarm} at {_time(change.detection_time_s)}, {found}"
     return f"{said} at {_time(change.time_s)}; the diagnosis before: {before}"
@@ -231,7 +286,6 @@ def _fault(fault: Fault | None) -> str:
     return f"{what}{' (' + size + ')' if size else ''} at {_time(fault.at_s)}{until}"
 
 
-MEANS = ("airspeed_within_mps", "airspeed_within_limits_mps")  # expectations that read a mean over 10 s
 _CHANNELS = {
     "altitude_m": "altitude {} m",
     "airspeed_mps": "airspeed {} m/s (10 s mean; largest at one instant {})", "heading_deg": "heading {} deg",
@@ -247,7 +301,7 @@ def _profile(metrics: Metrics) -> str:
     off = ", ".join(
         _CHANNELS[name].format(_value(by), at_once) for name, by in worst.items() if by is not None
     )
-    return f"at most off by: {off}" if off else ""
+    return f"largest deviation: {off}" if off else ""
 
 
 _LIMITED = {"airspeed_mps": "airspeed to {} {:.1f} m/s", "bank_deg": "bank to {} {:.0f} deg"}
@@ -261,7 +315,7 @@ def _limit(limit: Limit) -> str:
 
 
 def _sizes(fault: Fault) -> list[str]:
-    """How large a declared fault is, in words."""
+    """The size of an injected fault, in words."""
     if not isinstance(fault, DeclaredFault):
         return []
     if fault.sensor:
@@ -284,7 +338,7 @@ def _sensor_sizes(fault: DeclaredFault, sensor: str) -> list[str]:
 
 
 def _true(isolation: Isolation | Named, metrics: Metrics) -> str:
-    """What the estimate ought to be, where the fault named is one that was declared."""
+    """The true size, where the fault named is one that was injected."""
     from beaver_ftc.scenario.faults import TYPES
 
     if isolation.estimate is None:
@@ -296,7 +350,10 @@ def _true(isolation: Isolation | Named, metrics: Metrics) -> str:
         for fault in metrics.faults
         if (fault.actuator, fault.type) == (isolation.fault, isolation.type) and key in fault.size
     ]
-    return f" (true {_value(sign * sizes[0])})" if sizes else ""
+    if not sizes or row is None:
+        return ""
+    in_words = _value if isolation.estimate_deg is not None else row.size_in_words
+    return f" (true {in_words(sign * sizes[0])}{' deg' if isolation.estimate_deg is not None else ''})"
 
 
 def _detection(metrics: Metrics) -> str:
@@ -317,18 +374,18 @@ def _inconclusive(metrics: Metrics) -> str:
 
 
 def _seen(detection: Detection) -> str:
-    """Where an alarm showed: on an axis, or between the instruments."""
-    return f"on {detection.axis}" if detection.axis else "between the instruments"
+    """Which test raised the alarm: the residual of an axis, or the sensor monitor."""
+    return f"on {detection.axis}" if detection.axis else "by the sensor monitor"
 
 
 def _statistical(metrics: Metrics) -> str:
-    """What the statistical detector would have said by itself; nothing if there was none."""
+    """When the statistical detector alone would have raised the alarm; nothing if there was none."""
     said = metrics.detection.statistical
     if said is None:
         return ""
     when = "no alarm" if said.time_s is None else f"alarm at {_time(said.time_s)}"
-    level = f"level {said.alarm_level:.2f} standard deviations"
-    return f"{when}; {level}, in healthy flight at most {said.closest_approach:.2f} of it"
+    peak = f"peak in healthy flight {said.closest_approach:.2f} of it"
+    return f"{when}; threshold {said.alarm_level:.2f} σ, {peak}"
 
 
 def _isolation(metrics: Metrics) -> str:
@@ -358,14 +415,14 @@ def _withdrawn(gone: Sequence[Withdrawn]) -> list[str]:
 
 
 def _one(isolation: Isolation | Named, metrics: Metrics) -> str:
-    """One named fault: `so far` of a surface that data may yet exclude, as they have every other."""
-    far = " so far" if isolation.so_far else ""
-    when = "" if isolation.delay_s is None else f"{',' if far else ''} after {_time(isolation.delay_s)}"
+    """One named fault. The only remaining candidate may still be excluded by later data."""
+    left = " (only remaining candidate)" if isolation.so_far else ""
+    when = "" if isolation.delay_s is None else f" after {_time(isolation.delay_s)}"
     right = "correct" if isolation.correct and isolation.type_correct is not False else "WRONG"
     if isolation.premature:
         right = f"PREMATURE at {_time(isolation.time_s)}"
     size = _estimate(isolation) + _true(isolation, metrics)
-    return f"{isolation.fault}{far}{when}, {right}{_type(isolation)}{size}"
+    return f"{isolation.fault}{left}{when}; {right}{_type(isolation)}{size}"
 
 
 def _probing(metrics: Metrics) -> str:
@@ -378,9 +435,7 @@ def _type(isolation: Isolation | Named) -> str:
     if str(isolation.fault).startswith("sensor "):
         return ""
     if isolation.type is None:
-        left = isolation.candidates
-        few = len(left) < MOST_LISTED
-        return f", {' or '.join(map(_in_words, left)) or 'of no known type' if few else _open_types(left)}"
+        return f", {_open_types(isolation.candidates) if isolation.candidates else 'of no known type'}"
     return "" if isolation.type == "unanticipated" else f", {isolation.type.replace('_', ' ')}"
 
 
@@ -390,8 +445,7 @@ def _estimate(isolation: Isolation | Named) -> str:
     if isolation.estimate_deg is None:
         from beaver_ftc.scenario.faults import TYPES
 
-        said = f"{TYPES[str(isolation.type)].symbol} {_value(isolation.estimate)}"
-        return f", estimated {said.strip()}"
+        return f", estimated {TYPES[str(isolation.type)].estimate_in_words(isolation.estimate)}"
     return f", estimated {_value(isolation.estimate_deg)} deg"
 
 
@@ -420,7 +474,7 @@ def _authority(metrics: Metrics) -> str:
     if not beyond_s:
         return ""
     said = ", ".join(f"{axis} for {_time(time)}" for axis, time in beyond_s.items())
-    return f"no deflection at all could hold the rate: {said}"
+    return f"no deflection could hold the rate: {said}"
 
 
 def _by_axis(metrics: Metrics) -> list[tuple[str, AxisAuthority]]:
@@ -428,8 +482,11 @@ def _by_axis(metrics: Metrics) -> list[tuple[str, AxisAuthority]]:
     return [("p", of.p), ("q", of.q), ("r", of.r)] if of else []
 
 
-def _left(metrics: Metrics) -> str:
-    """What the surfaces can still do about each axis, where it is less than if all were healthy."""
+_AXES = {"p": "roll", "q": "pitch", "r": "yaw"}
+
+
+def _remaining(metrics: Metrics) -> str:
+    """Remaining control authority of each axis that has lost some, as a share of the healthy aircraft's."""
     said = []
     for axis, of in _by_axis(metrics):
         ends = of.least_rad_s2, of.greatest_rad_s2, of.healthy_least_rad_s2, of.healthy_greatest_rad_s2
@@ -437,9 +494,10 @@ def _left(metrics: Metrics) -> str:
             least, greatest, healthy_least, healthy_greatest = map(float, ends)  # type: ignore[arg-type]
             share, most = (greatest - least) / (healthy_greatest - healthy_least), of.engines_greatest_rad_s2
             if share < MUCH_LEFT or most:
-                engines = f", and engines {of.engines_least_rad_s2:.2g} to {most:.2g}" if most else ""
-                said.append(f"{axis} {share:.0%}, {least:.2g} to {greatest:.2g} rad/s2{engines}")
-    return f"of what all surfaces together give: {'; '.join(said)}" if said else ""
+                engines = f", engines {of.engines_least_rad_s2:.2g} to {most:.2g}" if most else ""
+                span = f"{least:.2g} to {greatest:.2g} rad/s2{engines}"
+                said.append(f"{_AXES[axis]} authority {100 * share:.0f} % ({span})")
+    return "; ".join(said)
 
 
 def _envelope(metrics: Metrics) -> str:
@@ -447,7 +505,7 @@ def _envelope(metrics: Metrics) -> str:
     if not exits:
         return ""
     count, total_s = metrics.envelope.exits, metrics.envelope.outside_s
-    return f"left {count} time(s), {_time(total_s)} in all, first at {_time(exits[0].start_s)}"
+    return f"left {_counted(count, 'time')}, {_time(total_s)} in all, first at {_time(exits[0].start_s)}"
 
 
 def _departure(metrics: Metrics) -> str:
@@ -455,15 +513,15 @@ def _departure(metrics: Metrics) -> str:
     return f"LOST at {_time(departure.time_s)}: {departure.signal}" if departure else ""
 
 
-# What of a link's counts is worth a word, if there was any.
+# The counts of a link that are printed where they are not 0.
 _COUNTED = {
-    "repeated": "sent again", "late": "late", "missed": "never came", "malformed": "malformed",
-    "strangers": "of others", "off_rate": "at another rate", "resets": "times begun anew",
+    "repeated": "repeated", "late": "late", "missed": "missing", "malformed": "malformed",
+    "strangers": "from other senders", "off_rate": "at another rate", "resets": "restarts",
 }  # fmt: skip
 
 
 def _link(metrics: Metrics) -> str:
-    """How an autopilot was served; nothing where a law of ours flew."""
+    """Latency and losses of the link to an autopilot; nothing where a law of ours flew."""
     link = metrics.link
     if not link:
         return ""
@@ -472,7 +530,7 @@ def _link(metrics: Metrics) -> str:
         f", {getattr(link, name)} {words}" for name, words in _COUNTED.items() if getattr(link, name)
     )
     times = (
-        f"answered in {latency.median:.2f} ms (99 %: {latency.p99:.2f}), asked every "
+        f"latency {latency.median:.2f} ms (99th percentile {latency.p99:.2f}), interval "
         f"{interval.mean:.2f} ms, jitter {interval.jitter_rms:.2f} ms RMS"
     )
     return f"{link.protocol}, {link.frames} frames at {link.packets_hz:g} Hz{odd}; {times}"
@@ -480,11 +538,6 @@ def _link(metrics: Metrics) -> str:
 
 def _saturation(metrics: Metrics) -> str:
     return ", ".join(f"{surface} {_time(time)}" for surface, time in metrics.saturation_s.items() if time)
-
-
-def _bound(expected: Any) -> str:
-    at_most = isinstance(expected, int | float) and not isinstance(expected, bool)
-    return f"≤ {_value(expected)}" if at_most else _value(expected)
 
 
 def _time(seconds: float | None) -> str:

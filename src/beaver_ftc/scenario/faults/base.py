@@ -54,7 +54,6 @@ class SurfaceFault(Section):
     follows_actuator: ClassVar[bool] = False  # whether `follow` is called in every frame
     truth: ClassVar[tuple[str, float] | None] = None  # the key that an estimate is of, and the sign of that
     size: ClassVar[tuple[str, str] | None] = None  # an estimate in words: "of" so many "%", or "deg"
-    symbol: ClassVar[str] = ""  # of an estimate that is no angle
     in_words: ClassVar[InWords] = {}  # its parameters
     examples: ClassVar[tuple[tuple[str, Keys], ...]] = ()  # of `matrix`: name, fault; off_deg: off the trim
     button: ClassVar[Button | None] = None
@@ -75,6 +74,16 @@ class SurfaceFault(Section):
 
     def _conflicts(self) -> list[Conflict]:
         return order_conflicts(self.at_s, self.end_s, "at_s")
+
+    @classmethod
+    def size_in_words(cls, estimate: float) -> str:
+        """The size that an estimate which is no angle amounts to, with its unit."""
+        return f"{estimate:.3g}"
+
+    @classmethod
+    def estimate_in_words(cls, estimate: float) -> str:
+        """Quantity and size of an estimate that is no angle."""
+        return cls.size_in_words(estimate)
 
     def strike(self, of: Properties, share: float, past: Past) -> None:
         """Change the failure properties of its place, given how far it has grown (0 to 1) and its memory."""
@@ -121,5 +130,5 @@ def constant(**in_words: Callable[[Any], str]) -> InWords:
 
 
 def growing(**in_words: Callable[[Any], str]) -> InWords:
-    """Parameters of a fault in words, and how fast it grows."""
+    """Parameters of a fault in words, and its growth rate."""
     return {**in_words, "kappa_per_s": "growing at {:g} /s".format}

@@ -27,7 +27,7 @@ class LossOfEffectiveness(Gradual):
     """
 
     properties = (("effectiveness", 1.0),)
-    truth, size, symbol = ("magnitude", -1.0), ("of", "%"), "theta"
+    truth, size = ("magnitude", -1.0), ("of", "%")
     in_words = growing(magnitude=lambda value: f"{100 * value:g} %")
     examples = (("40 % loss", {"magnitude": 0.4}), ("total loss", {"magnitude": 1.0}))
     button = Button(1, "lose 40 %", {"magnitude": 0.4})
@@ -36,6 +36,14 @@ class LossOfEffectiveness(Gradual):
     type: Literal["loss_of_effectiveness"]
     actuator: Actuator
     magnitude: Number = number(..., "share of 1", ge=0, le=1, examples=[0.4])
+
+    @classmethod
+    def size_in_words(cls, estimate: float) -> str:
+        return f"{-100.0 * estimate:.3g} %"
+
+    @classmethod
+    def estimate_in_words(cls, estimate: float) -> str:
+        return f"loss {cls.size_in_words(estimate)}"
 
     def strike(self, of: Properties, share: float, past: Past) -> None:
         of["effectiveness"] *= 1.0 - share * self.magnitude
@@ -81,7 +89,7 @@ class Hardover(Switched):
     adds, size = False, ("at", "deg")
     in_words = constant(direction=lambda value: f"to the {'upper' if value > 0 else 'lower'} stop")
     examples = (("hardover +", {"direction": 1}), ("hardover -", {"direction": -1}))
-    button, hidden = Button(4, "run away", {"direction": 1}), (Hidden(1, {"direction": 1}, True),)
+    button, hidden = Button(4, "hardover", {"direction": 1}), (Hidden(1, {"direction": 1}, True),)
     mavlink = 4, {"direction": 1}
 
     type: Literal["hardover"]
@@ -129,7 +137,7 @@ class RateLimit(Gradual):
     properties = (("rate-scale", 1.0),)
     in_words = growing(scale=lambda value: f"{100 * value:g} % of its rate")
     examples = (("rate limit 1.2 deg/s", {"scale": 0.02}),)
-    button, mavlink = Button(7, "slow", {"scale": 0.05}), (5, {"scale": 0.1})
+    button, mavlink = Button(7, "rate limit", {"scale": 0.05}), (5, {"scale": 0.1})
 
     type: Literal["rate_limit"]
     actuator: Actuator = entry(..., "the surface that fails")

@@ -5,6 +5,7 @@ python -m tools.docs --check       print what stands otherwise and every wrong n
 python -m tools.docs table NAME    print a table; `constants` and `properties` print those
 python -m tools.docs screens       take the pictures of report and live page anew, with a browser
 python -m tools.docs reference NAME    print a page of the generated reference, as the web site has it
+python -m tools.docs prose         print how often each page breaks a rule of prose.py, as prose.yaml has it
 """
 
 import argparse
@@ -24,6 +25,7 @@ def main() -> int:
         "properties": _properties,
         "reference": _reference,
         "screens": _screens,
+        "prose": _prose,
     }
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     try:
@@ -51,7 +53,7 @@ def _options() -> argparse.Namespace:
 
 
 def _pages(options: argparse.Namespace) -> int:
-    from tools.docs import bare, names
+    from tools.docs import bare, names, prose
     from tools.docs.marks import read
     from tools.docs.pages import chosen
     from tools.docs.refresh import Wanted, check, slowest, write
@@ -63,7 +65,7 @@ def _pages(options: argparse.Namespace) -> int:
         return 0
     if options.check:
         findings, printed = check(pages, options.jobs)
-        findings += names.check(pages, every=not options.pages)
+        findings += names.check(pages, every=not options.pages) + prose.check(pages)
     else:
         wanted = Wanted(dear=options.dear, only=options.only)
         written, findings = write(pages, wanted, options.jobs)
@@ -103,6 +105,16 @@ def _screens() -> str:
     from tools.docs.screens import write_screens
 
     return "\n".join(map(str, write_screens(ROOT / "docs" / "images")))
+
+
+def _prose() -> str:
+    import yaml
+
+    from tools.docs import prose
+    from tools.docs.marks import read
+    from tools.docs.pages import every_page
+
+    return yaml.safe_dump(prose.counts([read(path) for path in every_page()])).rstrip()
 
 
 def _reference(name: str = "") -> str:

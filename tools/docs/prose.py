@@ -33,7 +33,7 @@ _SYMBOL = re.compile(rf"\\{_GREEK}(?![A-Za-z])|(?<![\\A-Za-z])[A-Za-z]+")
 _NO_SYMBOLS = frozenset(("sin", "cos", "tan", "exp", "ln", "log", "max", "min", "deg", "rad", "Hz"))
 _RELATION = re.compile(r"\$[^$]*(?:[=<>]|\\(?:le|ge|in|approx|ne)(?![a-z]))[^$]*\$")  # a verb in signs
 _SENTENCE = re.compile(r"(?<=[.!?])\s+(?=[A-Z`*\"(])")
-_CAPTION = "*Table "  # a caption may be a noun with what it needs
+_CAPTION = ("*Table ", "*Figure ")  # a caption may be a noun with what it needs
 _LEAST_WORDS = 4  # shorter is a label
 _PLAIN = re.compile(r"`[^`]*`|\$[^$]*\$|!?\[([^\]]*)\]\([^)]*\)")
 

@@ -37,6 +37,7 @@ COMMANDS = {
     "matrix": "beaver_ftc.studies.matrix.command:Matrix",
     "power": "beaver_ftc.studies.power.shown:Power",
     "smallest": "beaver_ftc.studies.smallest.survey:Smallest",
+    "decay": "beaver_ftc.studies.decay.survey:Decay",
     "bench": "beaver_ftc.studies.bench.measure:Bench",
     "verify": "beaver_ftc.studies.verify:Verify",
     "detectability": "beaver_ftc.studies.detectability:Detectability",

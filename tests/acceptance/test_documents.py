@@ -13,8 +13,8 @@ SHOWN = shown()
 TRIED = list(dict.fromkeys(line for line in map(tried, SHOWN) if line is not None))
 # No second time in JSON: another line of the same command is shorter, or there is no such option.
 TEXT_ONLY = re.compile(
-    "power|bench|reproduce|smallest|compare --|detectability|--backend|--flightgear|--search|--out|--help|"
-    "schema|--map|--variant [^ ]*,[^ ]*,|matrix --[dp]|ftc new|challenge new|&&"
+    "power|bench|reproduce|smallest|decay|compare --|detectability|--backend|--flightgear|--search|--out|"
+    "--help|schema|--map|--variant [^ ]*,[^ ]*,|matrix --[dp]|ftc new|challenge new|&&"
 )
 PLUGIN = next(line for line in TRIED if "--target plugins" in line)
 

@@ -211,6 +211,11 @@ SMALLEST = {
     "studies__smallest__survey__as_text": "s",
     "studies__engine__workers__cores": 7,
 }
+DECAY = {
+    "studies__decay__survey__run_decay": {"folder": "f"},
+    "studies__decay__survey__as_text": "d",
+    "studies__engine__workers__cores": 7,
+}
 EVIDENCE = RUN | {
     "beaver_ftc_assurance__evidence__plan__load_plan": lambda name: SimpleNamespace(
         name=name, file=SimpleNamespace(name="of-" + name)
@@ -257,6 +262,8 @@ ASKED = [
     ("sweep elevator-effectiveness --rare no_departure --workers 2 --out o --format json", RARE),
     ("smallest fault-free --surface rudder", SMALLEST),
     ("smallest rudder-stuck --surface flap --within 2 --seed 3 --workers 2 --out o --format json", SMALLEST),
+    ("decay fault-free", DECAY),
+    ("decay rudder-stuck --flights 3 --seed 2 --workers 2 --out o --format json", DECAY),
     ("evidence flight-controls", EVIDENCE),
     ("evidence flight-controls --workers 2 --out o --format json --junit j.xml", EVIDENCE),
     ("evidence flight-controls --replay one", EVIDENCE),

@@ -9,7 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from beaver_ftc.scenario.loader import load_scenario
 from beaver_ftc.scenario.sweeps import load_sweep
+from beaver_ftc.studies.decay.shown import HEAD, cells, sentences
+from beaver_ftc.studies.decay.survey import TOGETHER, run_decay
 from beaver_ftc.studies.engine.statistics import share_within, wilson
 from beaver_ftc.studies.engine.study import fly_all
 from beaver_ftc.studies.power.shown import run_power
@@ -127,3 +130,44 @@ def _duels(comparison: list[Document]) -> str:
 
 def _share(within: Any) -> float:
     return within["value"] if isinstance(within, dict) else within
+
+
+DECAYS = ("elevator-loss-in-turbulence", "elevator-partial-loss")  # all of it declared; next to nothing
+DECAY_HEAD = (
+    "error", "declared", "times", "false alarms, %", "detected, %", "named rightly, %", "named wrongly, %",
+    "tracking RMS, deg/s",
+)  # fmt: skip
+
+
+def robustness_decay() -> str:
+    """How verdicts decay beyond what is declared, of two scenarios; and a picture of the first."""
+    with TemporaryDirectory() as name:
+        found = [run_decay(Path(name), load_scenario(scenario), workers=2) for scenario in DECAYS]
+        Path("images").mkdir(exist_ok=True)
+        Path("images/decay.png").write_bytes(Path(found[0]["folder"], "decay.png").read_bytes())
+    return "\n\n".join([*map(_decay_of, found), f"![{_PICTURED}](images/decay.png)"])
+
+
+_PICTURED = "False alarms, right names and tracking over the size of each error, with 95 % intervals"
+
+
+def robustness_decay_probe() -> str:
+    """Two flights of each row of the first."""
+    with TemporaryDirectory() as name:
+        return _decay_of(run_decay(Path(name), load_scenario(DECAYS[0]), 2, workers=2))
+
+
+def _decay_of(document: Document) -> str:
+    wanted = [DECAY_HEAD.index(head) if head in DECAY_HEAD else -1 for head in HEAD]
+    rows = [
+        tuple(cell for cell, place in zip(cells(row), wanted, strict=True) if place >= 0)
+        for row in document["rows"]
+        if row["factor"] > 1.0 or row["error"] == TOGETHER or _is_undeclared(document, row)
+    ]
+    says = "\n".join(f"- {sentence}" for sentence in sentences(document))
+    flights = f"`{document['scenario']}`, {document['flights']} flights a row:"
+    return f"{flights}\n\n{says}\n\n{markdown_table(DECAY_HEAD, rows)}"
+
+
+def _is_undeclared(document: Document, row: Document) -> bool:
+    return any(e["error"] == row["error"] and not e["is_declared"] for e in document["errors"])

@@ -1,0 +1,1 @@
+"""How alarms, names and tracking change as the truth leaves what a scenario declares."""

@@ -1,0 +1,150 @@
+"""The decay of a verdict as sentences, a table, a figure and files."""
+
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from beaver_ftc.results.model import Document
+from beaver_ftc.studies.present.figures import curve_look, label_edges, marker, panels
+from beaver_ftc.studies.present.page import Makers, Part, Pictures, Table, as_html, versions_line
+from beaver_ftc.studies.present.tables import aligned, as_csv, number
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+NAME = "decay"
+HEAD = (
+    "error", "declared", "times", "flights", "false alarms, %", "detected, %", "named rightly, %",
+    "named wrongly, %", "delay, s", "tracking RMS, deg/s", "bound used, %",
+)  # fmt: skip
+CAPTION = (
+    "In brackets 95 % intervals. Delay, tracking and bound used are medians: of the flights in which the "
+    "aircraft is lost the tracking error is infinite. The bound used is the part of the detection bound that "
+    "the healthy part of a flight takes."
+)
+SHOWN = (("false_alarm", "false alarms, %"), ("named", "named rightly, %"), ("tracking_deg_s", "RMS, deg/s"))
+
+
+def as_text(document: Document) -> str:
+    """What changes first, and the table."""
+    return "\n".join([*sentences(document), "", aligned([HEAD, *map(cells, document["rows"])]), "", CAPTION])
+
+
+def sentences(document: Document) -> Iterator[str]:
+    """What holds as declared, and the least factor at which an error changes the verdict."""
+    *_, together = _by_error(document)
+    alarms, misnamed = (_count(together[0], name) for name in ("false_alarm", "misnamed"))
+    yield (
+        f"{document['scenario']}: with every error at the limit of what is declared, {alarms} flights have a "
+        f"false alarm and {misnamed} a wrong name."
+    )
+    yield from map(_onset, _by_error(document))
+
+
+def _by_error(document: Document) -> list[list[Document]]:
+    """The rows of each error, all together last."""
+    rows = document["rows"]
+    names = dict.fromkeys(row["error"] for row in rows)
+    return [[row for row in rows if row["error"] == name] for name in names]
+
+
+def _count(row: Document, name: str) -> str:
+    return f"{row[name]['count']} of {row[name]['of']}"
+
+
+def _onset(rows: Sequence[Document]) -> str:
+    """The least factor with a false alarm or a wrong name, of one error."""
+    what, declared = rows[0]["error"], rows[0]["declared"]
+    broken = next((row for row in rows if row["false_alarm"]["count"] or row["misnamed"]["count"]), None)
+    if broken is None:
+        return f"{what} ({declared}): no false alarm and no wrong name up to {rows[-1]['factor']:g} times."
+    alarms, misnamed = (_count(broken, name) for name in ("false_alarm", "misnamed"))
+    return (
+        f"{what} ({declared}): at {broken['factor']:g} times {alarms} flights have a false alarm and "
+        f"{misnamed} a wrong name."
+    )
+
+
+def cells(row: Document) -> tuple[str, ...]:
+    """One row for HEAD."""
+    return (
+        row["error"], row["declared"], f"{row['factor']:g}", str(row["flights"]),
+        *(_percent(row[name]) for name in ("false_alarm", "detected", "named", "misnamed")),
+        _interval(row["delay_s"]), _interval(row["tracking_deg_s"]), _interval(row["bound_used"], 100.0),
+    )  # fmt: skip
+
+
+def _percent(rate: Document) -> str:
+    return f"{100 * rate['value']:.0f} ({100 * rate['low']:.0f} to {100 * rate['high']:.0f})"
+
+
+def _interval(found: Document, times: float = 1.0) -> str:
+    if found["value"] is None:
+        return "never"
+    value, low, high = (
+        number(None if found[key] is None else times * found[key], none="never")
+        for key in ("value", "low", "high")
+    )
+    return value if low == high else f"{value} ({low} to {high})"
+
+
+def figure_of(document: Document) -> "Figure":
+    """A panel a quantity, a curve an error, over the factor; bars are intervals."""
+    figure, grid = panels(1, len(SHOWN), 12.0, 4.2, f"{document['scenario']}: beyond what is declared")
+    for panel, (quantity, label) in zip(grid[0], SHOWN, strict=True):
+        for i, rows in enumerate(_by_error(document)):
+            _curve(panel, rows, quantity, i)
+        panel.set_xscale("log", base=2)
+        panel.set_xticks(document["factors"], [f"{factor:g}" for factor in document["factors"]])
+        panel.minorticks_off()
+        panel.set_title(label, fontsize=9)
+        panel.grid(color="#dddddd", linewidth=0.6)
+    label_edges(grid, "times what is declared")
+    handles, labels = grid[0][0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=8)
+    return figure
+
+
+def _curve(panel: Any, rows: Sequence[Document], quantity: str, place: int) -> None:
+    times = 1.0 if quantity.endswith("_deg_s") else 100.0
+    known = [row for row in rows if None not in (row[quantity]["value"], row[quantity]["low"])]
+    at = [row["factor"] * (1.0 + 0.015 * (place - 3)) for row in known]  # beside one another
+    value, low, high = (
+        [float("nan") if row[quantity][key] is None else times * row[quantity][key] for row in known]
+        for key in ("value", "low", "high")
+    )
+    bars = [
+        [middle - end for middle, end in zip(value, low, strict=True)],
+        [end - middle for middle, end in zip(value, high, strict=True)],
+    ]
+    panel.errorbar(
+        at, value, bars, marker=marker(place), markersize=4, linewidth=1.2, elinewidth=0.7, capsize=2,
+        label=f"{rows[0]['error']} ({rows[0]['declared']})", **curve_look(place),
+    )  # fmt: skip
+
+
+def _flat(row: Document) -> Document:
+    flat: Document = {}
+    for name, value in row.items():
+        parts = value if isinstance(value, dict) else {"": value}
+        flat |= {f"{name}_{key}".rstrip("_"): part for key, part in parts.items()}
+    return flat
+
+
+def page_of(document: Document, folder: Path) -> str:
+    """The sentences, the table and the figure."""
+    parts: list[Part] = [
+        *sentences(document), Table(HEAD, [list(cells(row)) for row in document["rows"]]), CAPTION,
+        Pictures([("False alarms, right names and tracking over the factor", NAME)]),
+        versions_line(document["versions"]),
+    ]  # fmt: skip
+    return as_html(f"Beyond what is declared: {document['scenario']}", parts, {NAME: folder / f"{NAME}.png"})
+
+
+FILES: Makers = {
+    f"{NAME}.json": lambda document: json.dumps(document, indent=1) + "\n",
+    f"{NAME}.csv": lambda document: as_csv([_flat(row) for row in document["rows"]]),
+    f"{NAME}.png": figure_of,
+    f"{NAME}.html": lambda document: lambda folder: page_of(document, folder),
+}

@@ -139,16 +139,16 @@ DECAY_HEAD = (
 )  # fmt: skip
 
 
+_PICTURED = "False alarms, right names and tracking over the size of each error, with 95 % intervals"
+
+
 def robustness_decay() -> str:
     """How verdicts decay beyond what is declared, of two scenarios; and a picture of the first."""
     with TemporaryDirectory() as name:
-        found = [run_decay(Path(name), load_scenario(scenario), workers=2) for scenario in DECAYS]
+        whole, published = (run_decay(Path(name), load_scenario(one), workers=2) for one in DECAYS)
         Path("images").mkdir(exist_ok=True)
-        Path("images/decay.png").write_bytes(Path(found[0]["folder"], "decay.png").read_bytes())
-    return "\n\n".join([*map(_decay_of, found), f"![{_PICTURED}](images/decay.png)"])
-
-
-_PICTURED = "False alarms, right names and tracking over the size of each error, with 95 % intervals"
+        Path("images/decay.png").write_bytes(Path(whole["folder"], "decay.png").read_bytes())
+    return "\n\n".join([_decay_of(whole), f"![{_PICTURED}](images/decay.png)", _said_of(published)])
 
 
 def robustness_decay_probe() -> str:
@@ -164,9 +164,12 @@ def _decay_of(document: Document) -> str:
         for row in document["rows"]
         if row["factor"] > 1.0 or row["error"] == TOGETHER or _is_undeclared(document, row)
     ]
+    return f"{_said_of(document)}\n\n{markdown_table(DECAY_HEAD, rows)}"
+
+
+def _said_of(document: Document) -> str:
     says = "\n".join(f"- {sentence}" for sentence in sentences(document))
-    flights = f"`{document['scenario']}`, {document['flights']} flights a row:"
-    return f"{flights}\n\n{says}\n\n{markdown_table(DECAY_HEAD, rows)}"
+    return f"`{document['scenario']}`, {document['flights']} flights a row:\n\n{says}"
 
 
 def _is_undeclared(document: Document, row: Document) -> bool:

@@ -18,7 +18,7 @@ PLAIN := tests/design $(wildcard tests/*/test_*_kernels.py tests/*/*/test_*_kern
   $(addprefix tests/control/test_,decisions.py law_frame.py laws.py supervisor.py compiled_rivals.py) \
   tests/control/laws/test_gains.py tests/diagnosis/rivals/test_filters.py
 
-.PHONY: demo check test core-test nightly promises plain acceptance cost test-fast coverage mutants drawn lint docs docs-check site clean help
+.PHONY: demo check test core-test nightly promises plain acceptance cost waits test-fast coverage mutants drawn lint docs docs-check site clean help
 
 help:
 	@echo "make demo       set up, fly the published elevator case, print the verdict and where the report lies"
@@ -29,6 +29,7 @@ help:
 	@echo "make promises   what is promised, and which tests hold each promise"
 	@echo "make acceptance the installed command from outside: every scenario, page and mistake"
 	@echo "make cost       what a flight costs beside bare JSBSim: no more than a tenth above the recorded revision?"
+	@echo "make waits      how long a person waits for what: one table, beside its bars (WAITS='--beside REVISION': in pairs)"
 	@echo "make test-fast  the tests that fly little or nothing: less than a minute"
 	@echo "make coverage   the whole test suite, and which lines of Python it has run"
 	@echo "make mutants    100 small defects put into the code on purpose: how many of them do tests find?"
@@ -93,6 +94,9 @@ acceptance: $(VENV)/.dev
 
 cost: $(VENV)/.dev
 	$(BIN)/python benchmarks/flight_cost.py --rounds 8 --check benchmarks/ratios.json
+
+waits: $(VENV)/.dev
+	$(BIN)/python benchmarks/waits.py $(WAITS)
 
 test-fast: $(VENV)/.dev
 	$(PYTEST) -m "not nightly" $(FAST)

@@ -87,14 +87,14 @@ def test_what_a_benchmark_times_and_says(timed, monkeypatch, changed):
 def test_kinds_of_flights_take_turns_after_a_warm_up(monkeypatch, changed):
     flown = []
 
-    def fly(sweep, changes, run):
-        flown.append([sweep.name, sorted(changes), run])
+    def fly(sweep, changes, run, alike):
+        flown.append([sweep.name, sorted(changes), run, alike])
         return (1.0 + run) * np.array([1e-3, 2e-3, (1.0 + 0.1 * len(flown)) * 1e-2, 4e-3]), 1500, 6e-3
 
     monkeypatch.setattr(measure, "_flown", fly)
     between = []
     found = measure.by_kind(3, lambda: between.append(len(flown)))
-    assert between == [0, 5, 10, 15]
+    assert between == [0, 6, 12, 18]
     assert not changed({"found": found, "flown": flown})
 
 
@@ -117,7 +117,9 @@ def test_a_flight_is_taken_apart_at_its_marks(monkeypatch):
     assert (parts.tolist(), runs, alone_s) == ([1.0] * 4, 21, 1.0)
     assert ran == [1] * 21 + [0]
     assert "old" not in measure.conditions._trims
-    changed, _, _ = measure._flown(sweep, {"duration_s": 1.0}, 0)
+    measure.conditions._trims["old"] = None
+    changed, _, _ = measure._flown(sweep, {"duration_s": 1.0}, 0, alike=True)
+    assert measure.conditions._trims.pop("old", 0) is None, "flights that begin alike share a trim"
     assert changed.tolist() == [2.0, 1.0, 1.0, 1.0], "a second goes by between two readings"
 
 

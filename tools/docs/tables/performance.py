@@ -46,11 +46,12 @@ def performance_frames() -> str:
     return markdown_table(("a frame", "/ bare"), [(name, f"{ratio:.2f}") for name, ratio in rows])
 
 
-def performance_commands() -> str:
-    """Whole processes by the wall, and their peak memory; the first run compiles."""
-    lines = _printed("cold_start.py", "--rounds", "5").splitlines()[1:]
-    found = [re.fullmatch(r"(.+?)\s+([\d.]+) s\s+[\d.]+ s\s+(\d+) MB", line) for line in lines]
-    return markdown_table(("command", "s", "peak, MB"), [(row[1], row[2], row[3]) for row in found if row])
+def performance_waits() -> str:
+    """Each wait as `make waits` prints it: whole processes by the wall and the processor, and their bars."""
+    head, *lines = _printed("waits.py", "--rounds", "3").splitlines()
+    names = ("", *re.split(r"\s{2,}", head.strip()))
+    found = [re.fullmatch(r"(.+?)\s+([\d.-]+)\s+([\d.-]+)\s+([\d.-]+)\s+([\d.]+)", line) for line in lines]
+    return markdown_table(names, [row.groups() for row in found if row])
 
 
 def _printed(script: str, *arguments: str) -> str:

@@ -1,0 +1,292 @@
+"""How long a person waits: each wait by the wall and by the processor, beside its bar.
+
+    python benchmarks/waits.py [--rounds 5] [--only PATTERN] [--long] [--gtm DATABASE.mat]
+    python benchmarks/waits.py --beside REVISION [--only PATTERN]
+
+Every wait is a whole process of its own, and the processor time is that of the process and of all that it
+starts. A wait that compiles begins each time with a cache of its own: empty, or as a first flight leaves it.
+The waits of a flight in a sweep are ratios to JSBSim's frames alone (`flight_cost.py`). `--long` takes also
+what needs minutes or the network (`reproduce`, `make demo` from a fresh clone); `import gtm` needs the user's
+copy of the data base.
+
+`--beside REVISION` measures in pairs: the code of that revision and today's, in turn, and prints the medians
+of both and of their ratio, which a busy machine changes little.
+"""
+
+import argparse
+import asyncio
+import fnmatch
+import json
+import os
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+BODY = "from beaver_ftc.cli.main import main; main()"
+FAULT = "elevator-partial-loss"  # 30 s at 100 Hz
+OTHER_AIRCRAFT, OTHER_KIND = "mission-split-elevator-lost", "elevator-loss-in-turbulence"
+HALF_HOUR = """\
+name: half-hour
+duration_s: 1800
+rate_hz: 50
+initial: {airspeed_mps: 45, altitude_m: 1800}
+autopilot: {altitude_m: [{hold: true}], heading_deg: [{hold: true}], airspeed_mps: [{hold: true}]}
+"""
+
+
+@dataclass(frozen=True)
+class Taken:
+    """Seconds by the wall and of the processor, and the largest process; of a ratio, the ratio alone."""
+
+    wall: float
+    processor: float | None = None
+    peak_mb: float | None = None
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a wait is measured: the code, a folder for results, kept kernels, the user's GTM data base."""
+
+    tree: Path
+    folder: Path
+    gtm: Path | None = None
+
+    def environment(self, cache: str) -> dict[str, str]:
+        """The code of the tree, and a cache by its name."""
+        own = {"PYTHONPATH": str(self.tree / "src"), "XDG_CACHE_HOME": str(self.folder / cache)}
+        return {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"} | own
+
+    def taken(self, command: list[str], cache: str = "warm") -> Taken:
+        """What a process takes, with all that it starts."""
+        began = time.perf_counter()
+        with tempfile.TemporaryFile() as said:
+            process = subprocess.Popen(
+                command, cwd=self.folder, env=self.environment(cache), stdout=said, stderr=said
+            )
+            taken = ended(process, began)
+            said.seek(0)
+            if process.returncode not in (0, 1):  # 1: an expectation of a flight failed
+                raise SystemExit(
+                    f"{' '.join(command)} ended with {process.returncode}:\n{said.read().decode()}"
+                )
+        return taken
+
+    def said(self, *words: str, cache: str = "warm") -> Taken:
+        """What a command of beaver-ftc takes."""
+        return self.taken([sys.executable, "-c", BODY, *words], cache)
+
+    def file(self, name: str, text: str) -> str:
+        """A file with this text."""
+        (self.folder / name).write_text(text, encoding="utf-8")
+        return name
+
+
+def ended(process: "subprocess.Popen[Any]", began: float, wall_s: float | None = None) -> Taken:
+    """Wait for the end of a process, and read what it used, with all that it has started and waited for."""
+    _, status, used = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    peak_mb = used.ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)
+    return Taken(wall_s or time.perf_counter() - began, used.ru_utime + used.ru_stime, peak_mb)
+
+
+def after_a_first_flight(place: Place, scenario: str) -> Taken:
+    """A first flight of another aircraft or kind, with what the published flight has compiled."""
+    first = place.folder / "first-flight"
+    if not first.exists():
+        place.said("run", FAULT, "--no-report", cache=first.name)
+    shutil.rmtree(place.folder / "other", ignore_errors=True)
+    shutil.copytree(first, place.folder / "other")
+    return place.said("run", scenario, "--no-report", cache="other")
+
+
+def fresh_install(place: Place) -> Taken:
+    """The first run ever."""
+    shutil.rmtree(place.folder / "empty", ignore_errors=True)
+    return place.said("run", FAULT, "--no-report", cache="empty")
+
+
+def derive(place: Place) -> Taken:
+    """An aircraft of JSBSim, into a folder."""
+    return place.said("derive", "jsbsim:c310", "--out", "derived")
+
+
+def import_gtm(place: Place) -> Taken | None:
+    """NASA's Generic Transport Model, into a folder."""
+    return place.said("import", "gtm", str(place.gtm), "--out", "imported") if place.gtm else None
+
+
+def diagnose(place: Place) -> Taken:
+    """A recorded flight of half an hour at 50 Hz, by the aircraft's own model."""
+    if not (place.folder / "runs/half-hour").exists():
+        written = place.file("half-hour.yaml", HALF_HOUR)
+        place.said("run", written, "--no-report", "--as", "table")
+    return place.said("diagnose", "runs/half-hour/flight.csv", "--aircraft", "beaver")
+
+
+def live(place: Place) -> Taken:
+    """From the command until the page has been sent frames of a flight that moves."""
+    from live import Watcher
+
+    began = time.perf_counter()
+    command = [sys.executable, "-c", BODY, "live", "--out", "cockpit"]
+    process = subprocess.Popen(
+        command, cwd=place.folder, env=place.environment("warm"), stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL, text=True,
+    )  # fmt: skip
+    assert process.stdout is not None
+
+    async def until_it_flies(link: str) -> None:
+        page = Watcher(link)
+        async with page.looking_on():
+            while page.frames < 2:
+                await asyncio.sleep(0.005)
+
+    try:
+        asyncio.run(until_it_flies(process.stdout.readline().split()[-1]))
+        wall_s = time.perf_counter() - began
+    finally:
+        process.terminate()
+    return ended(process, began, wall_s)
+
+
+def demo(place: Place) -> Taken:
+    """A clone of the repository, and `make demo` in it, with an empty cache: needs the network."""
+    shutil.rmtree(place.folder / "clone", ignore_errors=True)
+    shutil.rmtree(place.folder / "empty", ignore_errors=True)
+    return place.taken(["sh", "-c", f"git clone -q {ROOT} clone && make -C clone demo"], "empty")
+
+
+def in_a_sweep(place: Place, kind: str) -> Taken:
+    """A flight of a sweep over its bare frames: median of the rounds of `flight_cost.py`."""
+    said = place.folder / "flight-cost.json"
+    script = str(place.tree / "benchmarks/flight_cost.py")
+    place.taken([sys.executable, script, "--rounds", "12", "--record", str(said)])
+    return Taken(json.loads(said.read_text(encoding="utf-8"))["kinds"][kind]["flight_ratio"])
+
+
+@dataclass(frozen=True)
+class Wait:
+    """A row: its name, the bar, how it is measured; what takes long is measured once, and when asked for."""
+
+    name: str
+    bar: float
+    measure: Callable[[Place], Taken | None]
+    once: bool = False
+    long: bool = False
+
+
+def command(*words: str) -> Callable[[Place], Taken]:
+    """The wait for a command."""
+    return lambda place: place.said(*words)
+
+
+def another(scenario: str) -> Callable[[Place], Taken]:
+    """The wait for a first flight of this scenario."""
+    return lambda place: after_a_first_flight(place, scenario)
+
+
+WAITS = (
+    Wait("import beaver_ftc", 0.05, lambda place: place.taken([sys.executable, "-c", "import beaver_ftc"])),
+    Wait("--help", 0.15, command("--help")),
+    Wait("list", 0.3, command("list")),
+    Wait("validate", 0.3, command("validate", FAULT)),
+    Wait("run --no-report", 1.0, command("run", FAULT, "--no-report")),
+    Wait("run", 2.0, command("run", FAULT)),
+    Wait("live, until the page flies", 3.0, live),
+    Wait("derive a JSBSim aircraft", 4.0, derive, once=True),
+    Wait("import gtm", 8.0, import_gtm, once=True),
+    Wait("diagnose, 30 min at 50 Hz", 5.0, diagnose, once=True),
+    Wait("first run of a fresh install", 12.0, fresh_install, once=True),
+    Wait("first flight of another aircraft", 2.0, another(OTHER_AIRCRAFT), once=True),
+    Wait("first flight of another kind", 2.0, another(OTHER_KIND), once=True),
+    Wait("flight in a sweep / bare frames", 1.35, lambda at: in_a_sweep(at, "published"), once=True),
+    Wait("the same, one beginning / bare", 1.20, lambda at: in_a_sweep(at, "one beginning"), once=True),
+    Wait("matrix elevator", 60.0, command("matrix", "elevator-partial-loss"), once=True, long=True),
+    Wait("reproduce", 60.0, command("reproduce"), once=True, long=True),
+    Wait("make demo from a fresh clone", 45.0, demo, once=True, long=True),
+)  # fmt: skip
+
+
+TAKEN = ("wall", "processor", "peak_mb")
+
+
+def medians(rounds: list[Taken]) -> Taken:
+    """Of each number by itself; the largest of the peaks."""
+    if rounds[0].processor is None:
+        return Taken(statistics.median(taken.wall for taken in rounds))
+    wall, processor, peak = ([getattr(taken, what) for taken in rounds] for what in TAKEN)
+    return Taken(statistics.median(wall), statistics.median(processor), max(peak))
+
+
+def alone(wait: Wait, place: Place, rounds: int) -> str:
+    """Wall, processor, memory and bar of a wait; the first process warms up what is kept on purpose."""
+    if not wait.once:
+        wait.measure(place)
+    found = [wait.measure(place) for _ in range(1 if wait.once else rounds)]
+    taken = medians([each for each in found if each]) if all(found) else None
+    return f"{wait.name:34}{''.join(_cell(taken, what) for what in TAKEN)}{wait.bar:10.2f}"
+
+
+def _cell(taken: Taken | None, what: str) -> str:
+    value = getattr(taken, what) if taken else None
+    return f"{'-':>10}" if value is None else f"{value:10.{0 if what == 'peak_mb' else 2}f}"
+
+
+def in_pairs(wait: Wait, places: tuple[Place, Place], pairs: int) -> str:
+    """Then, now, and the median of their ratios, by the processor where it is known; they take turns."""
+    if not wait.once:
+        for place in places:
+            wait.measure(place)
+    then_now = []
+    for pair in range(pairs):
+        seen = {which: wait.measure(places[which]) for which in ((0, 1) if pair % 2 else (1, 0))}
+        then_now.append([taken.processor or taken.wall for _, taken in sorted(seen.items()) if taken])
+    if not all(map(len, then_now)):
+        return f"{wait.name:34}{'-':>10}{'-':>10}"
+    then, now = (statistics.median(column) for column in zip(*then_now, strict=True))
+    ratio = statistics.median(b / a for a, b in then_now)
+    return f"{wait.name:34}{then:10.2f}{now:10.2f}{ratio:10.2f}"
+
+
+def main() -> int:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--only", default="*", help="names of waits, with * and ?")
+    parser.add_argument("--long", action="store_true", help="also what needs minutes or the network")
+    parser.add_argument("--gtm", type=Path, help="your copy of T2_polynomial_aerodatabase.mat")
+    parser.add_argument("--beside", metavar="REVISION", help="in pairs with the code of a revision")
+    given = parser.parse_args()
+    wanted = [w for w in WAITS if fnmatch.fnmatch(w.name, given.only) and (given.long or not w.long)]
+    gtm = given.gtm.resolve() if given.gtm else None
+    with tempfile.TemporaryDirectory() as folder:
+        now = Place(ROOT, Path(folder, "now"), gtm)
+        now.folder.mkdir()
+        if given.beside:
+            from flight_cost import (
+                git,
+                unpack,
+            )  # not above: a process begins as large as the one it is forked from
+
+            then = Place(unpack(given.beside, Path(folder, "code")), Path(folder, "then"), gtm)
+            then.folder.mkdir()
+            said = git("rev-parse", "--short", given.beside).decode().strip()
+            print(f"{'processor s (or ratio)':34}{said:>10}{'now':>10}{'now/then':>10}", flush=True)
+        else:
+            print(f"{'':34}{'wall, s':>10}{'processor':>10}{'peak, MB':>10}{'bar':>10}", flush=True)
+        for wait in wanted:
+            both = given.beside and in_pairs(wait, (then, now), 2 if wait.once else given.rounds)
+            print(both or alone(wait, now, given.rounds), flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from beaver_ftc.results.flight import Flight, fly, open_run
     from beaver_ftc.results.simulation import Simulation
     from beaver_ftc.scenario.airframe import find_aircraft as aircraft
-    from beaver_ftc.scenario.loader import builtin_names as scenarios
+    from beaver_ftc.scenario.builtin import builtin_names as scenarios
     from beaver_ftc.scenario.loader import load
     from beaver_ftc.scenario.schema import Scenario
     from beaver_ftc.studies.sweep.table_of_flights import sweep
@@ -46,7 +46,7 @@ _WHERE = {
     "Scenario": "beaver_ftc.scenario.schema",
     "Simulation": "beaver_ftc.results.simulation",
     "load": "beaver_ftc.scenario.loader",
-    "scenarios": "beaver_ftc.scenario.loader:builtin_names",
+    "scenarios": "beaver_ftc.scenario.builtin:builtin_names",
     "sweep": "beaver_ftc.studies.sweep.table_of_flights",
 }
 __all__ = [

@@ -94,7 +94,7 @@ def _kind_by_its_keys(path: Path, named: bool, all_of_them: bool) -> "type[Flown
     and is not missed; a file that is named alone may be another tool's."""
     from beaver_ftc.documents.problems import ScenarioError
     from beaver_ftc.documents.validation import parse_document
-    from beaver_ftc.scenario.loader import read_file
+    from beaver_ftc.scenario.builtin import read_file
 
     try:
         keys = list(parse_document(read_file(path, str(path)), str(path)).data)

@@ -11,7 +11,8 @@ import typer
 from typer.testing import CliRunner
 
 from beaver_ftc.cli.main import app
-from beaver_ftc.scenario.loader import builtin_names, builtin_path, builtin_sweeps, load_scenario
+from beaver_ftc.scenario.builtin import builtin_names, builtin_path, builtin_sweeps
+from beaver_ftc.scenario.loader import load_scenario
 from beaver_ftc.scenario.sweeps import load_sweep_text
 from commands import beaver
 

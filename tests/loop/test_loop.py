@@ -13,8 +13,9 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant.channels import TRUTH
 from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.verdict import facts
+from beaver_ftc.scenario.builtin import builtin_names
 from beaver_ftc.scenario.faults import of_a_sensor
-from beaver_ftc.scenario.loader import builtin_scenarios, load_scenario
+from beaver_ftc.scenario.loader import load_scenario
 from flying import Memory, flown, loss, scenario
 
 TRAVEL_RAD = {
@@ -23,7 +24,7 @@ TRAVEL_RAD = {
     "rudder": (-0.44, 0.44),
     "flap": (-0.1, 1.03),
 }
-BUILT_IN = [name for name, _, _ in builtin_scenarios()]
+BUILT_IN = builtin_names()
 
 
 def yielded(flight):

@@ -2,8 +2,10 @@
 
 import pytest
 
-from beaver_ftc.scenario.loader import builtin_names, builtin_path, builtin_scenarios, load_scenario, resolve
+from beaver_ftc.scenario.builtin import builtin_names, builtin_path, builtin_sweeps, described, resolve
+from beaver_ftc.scenario.loader import load_scenario
 from beaver_ftc.scenario.schema import Expect
+from beaver_ftc.scenario.sweeps import load_sweep
 
 REQUIRED = {
     "fault-free",
@@ -30,11 +32,11 @@ def test_a_builtin_scenario(name):
     assert len(builtin_path(name).read_text().splitlines()) <= 40
 
 
-def test_the_list_has_name_description_and_file():
-    listed = {name: (says, path) for name, says, path in builtin_scenarios()}
-    assert set(listed) == set(builtin_names())
-    assert "elevator" in listed["elevator-partial-loss"][0]
-    assert listed["elevator-partial-loss"][1].is_file()
+def test_descriptions_are_those_of_the_files_read_whole():
+    scenarios = {name: load_scenario(name).description for name in builtin_names()}
+    sweeps = {name: load_sweep(name).file.description for name in builtin_sweeps()}
+    for kind, whole in (("scenario", scenarios), ("sweep", sweeps)):
+        assert dict(described(kind)) == {name: says.strip() for name, says in whole.items()}
 
 
 @pytest.mark.parametrize("name", ["elevator-partial-loss", "unanticipated"])

@@ -11,7 +11,8 @@ import pytest
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.paths import data_root
 from beaver_ftc.documents.problems import ScenarioError
-from beaver_ftc.scenario.loader import MAX_BYTES, load_scenario, load_text, resolve
+from beaver_ftc.scenario.builtin import MAX_BYTES, resolve
+from beaver_ftc.scenario.loader import load_scenario, load_text
 
 LINE = re.compile(r"^[^:\n]+(:\d+: \S[^:\n]*)?: [^\n]+allowed: [^\n]+$")
 

@@ -2,12 +2,12 @@
 
 from collections.abc import Iterable, Iterator
 from textwrap import fill, indent
-from typing import Annotated
+from typing import Annotated, get_args
 
 import typer
 
 from beaver_ftc.cli.inputs import complete_names
-from beaver_ftc.cli.output import Document, Format, FormatOption, answer, emit, emit_json
+from beaver_ftc.cli.output import Format, FormatOption, answer, emit, emit_json
 from beaver_ftc.commands import declare
 from beaver_ftc.documents.errors import BadInput, suggestion
 
@@ -42,34 +42,22 @@ def list_choices(
 def _available() -> dict[str, Entries]:
     """Kind -> entries, each a name and a description."""
     from beaver_ftc.plugins import DETECTORS, LAWS
-    from beaver_ftc.scenario.loader import builtin_plans, builtin_scenarios, builtin_sweeps
-    from beaver_ftc.scenario.schema import Scenario
-    from beaver_ftc.scenario.sweeps import load_sweep
+    from beaver_ftc.scenario.builtin import described
 
-    parts = Scenario.model_json_schema()["$defs"]
     available: dict[str, Iterable[tuple[str, str]]] = {
-        "scenarios": ((name, says.strip()) for name, says, _ in builtin_scenarios()),
-        "sweeps": ((name, load_sweep(name).file.description.strip()) for name in builtin_sweeps()),
-        "plans": ((name, _described(name)) for name in builtin_plans()),
+        "scenarios": described("scenario"),
+        "sweeps": described("sweep"),
+        "plans": described("plan"),
         "aircraft": _aircraft(),
         "schemes": _registered(DETECTORS),
         "laws": _registered(LAWS),
-        "faults": _faults(parts),
-        "signals": _signals(parts),
+        "faults": _faults(),
+        "signals": _signals(),
     }
     return {
         kind: [{"name": name, "description": says} for name, says in entries]
         for kind, entries in available.items()
     }
-
-
-def _described(plan: str) -> str:
-    """What a built-in plan of evidence says of itself."""
-    from beaver_ftc.documents.validation import parse_document
-    from beaver_ftc.scenario.loader import read_file, resolve
-
-    path = resolve(plan, "plan")
-    return str(parse_document(read_file(path, plan, "plan"), str(path)).data["description"]).strip()
 
 
 def _aircraft() -> Iterator[tuple[str, str]]:
@@ -96,24 +84,24 @@ def _registered(group: str) -> Iterator[tuple[str, str]]:
         yield entry.name, entry.description() + ("" if entry.package == OURS else f" [{entry.package}]")
 
 
-def _faults(schema: Document) -> Iterator[tuple[str, str]]:
-    """The parts of the schema that are fault types, with a fixed `type`: of actuators, then of sensors."""
-    for of_a_sensor, of in ((False, ""), (True, "of a sensor: ")):
-        for part in schema.values():
-            has = part.get("properties", {})
-            kind = has.get("type", {}).get("const")
-            if kind and ("sensor" in has) == of_a_sensor:
-                yield kind, of + _first_line(part)
+def _faults() -> Iterator[tuple[str, str]]:
+    """The fault types: of actuators, then of sensors."""
+    from beaver_ftc.scenario.faults import SENSOR_TYPES, TYPES
+
+    for types, of in ((TYPES, ""), (SENSOR_TYPES, "of a sensor: ")):
+        for name, row in sorted(types.items(), key=lambda each: each[1].__name__):
+            yield name, of + _first_line(row)
 
 
-def _signals(schema: Document) -> Iterator[tuple[str, str]]:
-    for name, node in schema["Signal"]["properties"].items():
-        references = [branch["$ref"] for branch in node.get("anyOf", [node]) if "$ref" in branch]
-        yield name, _first_line(schema[references[0].rpartition("/")[2]] if references else {})
+def _signals() -> Iterator[tuple[str, str]]:
+    from beaver_ftc.scenario.signals import Signal
+
+    for name, shape in Signal.model_fields.items():
+        yield name, _first_line(get_args(shape.annotation)[0])
 
 
-def _first_line(part: Document) -> str:
-    return part.get("description", "").partition("\n")[0]
+def _first_line(described: type) -> str:
+    return (described.__doc__ or "").partition("\n")[0]
 
 
 def _section(kind: str, entries: Entries) -> str:
@@ -140,7 +128,7 @@ def show(
 
     name: A built-in scenario, sweep or plan.
     """
-    from beaver_ftc.scenario.loader import builtin_names, builtin_plans, builtin_sweeps, resolve
+    from beaver_ftc.scenario.builtin import builtin_names, builtin_plans, builtin_sweeps, resolve
 
     kinds = {"scenario": builtin_names(), "sweep": builtin_sweeps(), "plan": builtin_plans()}
     kind = next((kind for kind, names in kinds.items() if name in names), None)

@@ -109,7 +109,7 @@ def check_flyable(scenario: "Scenario", name: str) -> None:
     The trim is kept: the flight does not search for it again."""
     from beaver_ftc.documents.validation import parse_document
     from beaver_ftc.plant.conditions import find_trim
-    from beaver_ftc.scenario.loader import read_file, resolve
+    from beaver_ftc.scenario.builtin import read_file, resolve
 
     try:
         find_trim(scenario)

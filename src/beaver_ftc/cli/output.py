@@ -14,7 +14,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 from beaver_ftc.documents.errors import BeaverFtcError, SimulationFailed
-from beaver_ftc.results.model import Document
+from beaver_ftc.documents.plain import Document
 
 
 class Format(StrEnum):

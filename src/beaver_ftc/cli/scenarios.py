@@ -59,7 +59,8 @@ def validate(
 
 
 def _check(file: str) -> Document:
-    from beaver_ftc.scenario.loader import has_key, load_scenario
+    from beaver_ftc.scenario.builtin import has_key
+    from beaver_ftc.scenario.loader import load_scenario
     from beaver_ftc.scenario.sweeps import is_sweep, load_sweep
 
     errors: list[str] = []
@@ -123,7 +124,7 @@ def _sample_logs(folder: Path, like: str | None) -> None:
 
 
 def _renamed(like: str, name: str) -> str:
-    from beaver_ftc.scenario.loader import builtin_names, builtin_path, no_such
+    from beaver_ftc.scenario.builtin import builtin_names, builtin_path, no_such
 
     if like not in builtin_names():
         raise BadInput(f"new: --like: {no_such(like, 'scenario')}")

@@ -97,6 +97,26 @@ def parse(text: str) -> Document:
         raise MalformedDocumentError(Problem(_error_line(error, text), (), _error_text(error))) from None
 
 
+def first_text(text: str, key: str) -> str:
+    """The text of a key at the top of a YAML mapping, read no further than that; empty where it has none.
+
+    Raises MalformedDocumentError for a text that is no YAML up to there.
+    """
+    depth, name = 0, None  # of the key whose value is next
+    try:
+        for event in yaml.parse(text, _LOADER):
+            if depth == 1 and isinstance(event, yaml.ScalarEvent):
+                if name == key:
+                    return str(event.value)
+                name = event.value if name is None else None
+            elif depth == 1 and isinstance(event, yaml.CollectionStartEvent):
+                name = None
+            depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        return ""
+    except yaml.YAMLError as error:
+        raise MalformedDocumentError(Problem(_error_line(error, text), (), _error_text(error))) from None
+
+
 def _error_line(error: yaml.YAMLError, text: str) -> int:
     mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
     if mark is not None:

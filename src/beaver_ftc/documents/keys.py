@@ -1,12 +1,12 @@
 """Dotted keys: `faults[0].magnitude` as a place in a scenario's data."""
 
 import re
+import sys
 from collections.abc import Mapping
 from functools import lru_cache
 from os import PathLike
 from typing import Any
 
-import numpy as np
 from pydantic import BaseModel
 
 from beaver_ftc.documents.base import Location
@@ -44,7 +44,8 @@ def plain(value: Any) -> Any:
         return value.model_dump(mode="json", by_alias=True, exclude_unset=True)
     if isinstance(value, Mapping):
         return {key: plain(entry) for key, entry in value.items()}
-    if isinstance(value, np.ndarray | np.generic):
+    numpy = sys.modules.get("numpy")  # which nobody has an array of who has not imported it
+    if numpy and isinstance(value, numpy.ndarray | numpy.generic):
         return plain(value.tolist())
     if isinstance(value, list | tuple):
         return [plain(entry) for entry in value]

@@ -10,7 +10,8 @@ from functools import cache
 from types import UnionType
 from typing import Any, Self, Union, get_args, get_origin, get_type_hints
 
-Document = dict[str, Any]  # as JSON has it: what is written, or was read; within the program there are types
+from beaver_ftc.documents.plain import Document
+
 Span = tuple[float, float]
 
 

@@ -12,10 +12,8 @@ from functools import lru_cache
 from itertools import pairwise
 from math import isfinite, pi
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import ConfigDict, ValidationInfo, model_validator
 
 from beaver_ftc.documents.base import Number, Section, deny, entry, number, order_conflicts, refuse
@@ -24,7 +22,11 @@ from beaver_ftc.documents.paths import inside
 from beaver_ftc.scenario.airframe import folder_of
 from beaver_ftc.scenario.timing import TIME_TOLERANCE_S
 
-Samples = NDArray[np.float64]
+if TYPE_CHECKING:  # imported where values in time are computed: to check a file takes none
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Samples = NDArray[np.float64]
 
 RAD_PER_DEG = pi / 180.0
 """Frame times are k / rate in floating point: a signal starts on the frame its start names."""
@@ -49,7 +51,7 @@ def _start() -> Any:
     return number(0.0, "s", "when it starts", ge=0, le=_LATEST_S, examples=[5])
 
 
-def _during(tau_s: Samples, length_s: float | None) -> NDArray[np.bool_]:
+def _during(tau_s: "Samples", length_s: float | None) -> "NDArray[np.bool_]":
     """0 <= tau < length, where length None is for ever."""
     begun = tau_s >= -TIME_TOLERANCE_S
     return begun if length_s is None else begun & (tau_s < length_s - TIME_TOLERANCE_S)
@@ -82,7 +84,9 @@ class _Wave(_Window):
 class Sine(_Wave):
     """amplitude sin(2 pi frequency tau + phase)."""
 
-    def rate_deg_s(self, t_s: Samples) -> Samples:
+    def rate_deg_s(self, t_s: "Samples") -> "Samples":
+        import numpy as np
+
         tau_s = t_s - self.start_s
         wave = self.amplitude_deg_s * np.sin(
             2 * pi * self.frequency_hz * tau_s + self.phase_deg * RAD_PER_DEG
@@ -97,7 +101,7 @@ class Doublet(Section):
     start_s: Number = _start()
     width_s: Number = number(1.0, "s", "length of each of the two pulses", gt=0, le=_LATEST_S)
 
-    def rate_deg_s(self, t_s: Samples) -> Samples:
+    def rate_deg_s(self, t_s: "Samples") -> "Samples":
         tau_s = t_s - self.start_s
         up = _during(tau_s, self.width_s)
         down = _during(tau_s - self.width_s, self.width_s)
@@ -109,14 +113,18 @@ class Step(_Window):
 
     amplitude_deg_s: Number = _amplitude()
 
-    def rate_deg_s(self, t_s: Samples) -> Samples:
+    def rate_deg_s(self, t_s: "Samples") -> "Samples":
+        import numpy as np
+
         return np.where(_during(t_s - self.start_s, self.length_s), self.amplitude_deg_s, 0.0)
 
 
 class Square(_Wave):
     """+amplitude in the first half of each period, -amplitude in the second; phase shifts it as in `sine`."""
 
-    def rate_deg_s(self, t_s: Samples) -> Samples:
+    def rate_deg_s(self, t_s: "Samples") -> "Samples":
+        import numpy as np
+
         tau_s = t_s - self.start_s
         turns = (tau_s + TIME_TOLERANCE_S) * self.frequency_hz + self.phase_deg / 360.0
         wave = np.where(turns % 1.0 < 0.5, self.amplitude_deg_s, -self.amplitude_deg_s)
@@ -138,7 +146,9 @@ class Ramp(_Closed):
 
     amplitude_deg_s: Number = _amplitude()
 
-    def rate_deg_s(self, t_s: Samples) -> Samples:
+    def rate_deg_s(self, t_s: "Samples") -> "Samples":
+        import numpy as np
+
         return self.amplitude_deg_s * np.clip((t_s - self.start_s) / self.length_s, 0.0, 1.0)
 
 
@@ -149,7 +159,9 @@ class Chirp(_Closed):
     start_frequency_hz: Number = _frequency("frequency at start_s")
     end_frequency_hz: Number = _frequency("frequency at end_s")
 
-    def rate_deg_s(self, t_s: Samples) -> Samples:
+    def rate_deg_s(self, t_s: "Samples") -> "Samples":
+        import numpy as np
+
         tau_s = t_s - self.start_s
         sweep_hz_s = (self.end_frequency_hz - self.start_frequency_hz) / self.length_s
         turns = self.start_frequency_hz * tau_s + 0.5 * sweep_hz_s * tau_s**2
@@ -204,7 +216,9 @@ class Csv(Section):
         check_table(self.time_s, self.values_deg_s)
         return self
 
-    def rate_deg_s(self, t_s: Samples) -> Samples:
+    def rate_deg_s(self, t_s: "Samples") -> "Samples":
+        import numpy as np
+
         return np.interp(t_s, self.time_s, self.values_deg_s)
 
 
@@ -303,7 +317,7 @@ class Reference(Section):
     r: Signals = entry((), "yaw rate reference", max_length=50)
 
 
-def sample(reference: Reference, t_s: Samples) -> Samples:
+def sample(reference: Reference, t_s: "Samples") -> "Samples":
     """The commanded body rates at the given times.
 
     Shapes: t_s (n,) -> (n, 3), columns p, q, r. Units: s -> rad/s.
@@ -312,15 +326,19 @@ def sample(reference: Reference, t_s: Samples) -> Samples:
 
 
 @lru_cache(maxsize=4)  # flights of a sweep fly the same, as a rule
-def sample_frames(reference: Reference, first: int, frames: int, rate_hz: float) -> Samples:
+def sample_frames(reference: Reference, first: int, frames: int, rate_hz: float) -> "Samples":
     """The commanded body rates of so many frames from one on, (frames, 3) rad/s, not to be changed."""
+    import numpy as np
+
     sampled = sample(reference, np.arange(first, first + frames) / rate_hz)
     sampled.flags.writeable = False
     return sampled
 
 
-def sample_deg_s(reference: Reference, t_s: Samples) -> Samples:
+def sample_deg_s(reference: Reference, t_s: "Samples") -> "Samples":
     """The same in deg/s, as the file has them."""
+    import numpy as np
+
     t_s = np.asarray(t_s, dtype=float)
     still = np.zeros_like(t_s)
     axes = [sum((item.shape.rate_deg_s(t_s) for item in axis), still) for _, axis in reference]

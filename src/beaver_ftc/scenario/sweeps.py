@@ -21,16 +21,16 @@ from beaver_ftc.documents.paths import inside
 from beaver_ftc.documents.problems import ScenarioError, key_path
 from beaver_ftc.documents.validation import parse_document, validate
 from beaver_ftc.scenario.airframe import checked_against
-from beaver_ftc.scenario.loader import (
+from beaver_ftc.scenario.builtin import (
     builtin_names,
     builtin_path,
     has_key,
-    load_scenario,
     looks_like_a_path,
     no_such,
     read_file,
     resolve,
 )
+from beaver_ftc.scenario.loader import load_scenario
 from beaver_ftc.scenario.schema import NAME_PATTERN, Scenario
 
 MAX_RUNS = 10_000_000

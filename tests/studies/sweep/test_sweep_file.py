@@ -6,7 +6,7 @@ from pydantic import ValidationError
 from beaver_ftc.documents.keys import UnusableKeyError, parse_key, with_values
 from beaver_ftc.documents.problems import ScenarioError
 from beaver_ftc.scenario.airframe import checked_against
-from beaver_ftc.scenario.loader import builtin_sweeps
+from beaver_ftc.scenario.builtin import builtin_sweeps
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sweeps import SweepFile, is_sweep, load_sweep, load_sweep_text
 from beaver_ftc.studies.sweep.sampling import Plan

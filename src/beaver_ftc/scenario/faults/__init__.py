@@ -19,9 +19,9 @@ from beaver_ftc.scenario.faults.surfaces import Bias, LossOfEffectiveness, Unant
 from beaver_ftc.scenario.sensors import sensor_words, sensors_there
 
 __all__ = [
-    "DAMAGE", "HEALTHY", "HOLDING", "MOST_FAULTS", "TYPES", "UNANTICIPATED", "Bias", "Damage", "Fault",
-    "FaultType", "LossOfEffectiveness", "Nameable", "SensorFault", "Unanticipated", "fault_name", "is_share",
-    "of_a_sensor", "place_of",
+    "DAMAGE", "HEALTHY", "HOLDING", "MOST_FAULTS", "SENSOR_TYPES", "TYPES", "UNANTICIPATED", "Bias", "Damage",
+    "Fault", "FaultType", "LossOfEffectiveness", "Nameable", "SensorFault", "Unanticipated", "fault_name",
+    "is_share", "of_a_sensor", "place_of",
 ]  # fmt: skip
 
 UNANTICIPATED, DAMAGE = "unanticipated", "damage"
@@ -42,6 +42,9 @@ def _rows() -> dict[str, type[SurfaceFault]]:
 
 
 TYPES = _rows()
+SENSOR_TYPES = {
+    get_args(row.model_fields["type"].annotation)[0]: row for row in get_args(get_args(AnySensorFault)[0])
+}
 # Failure properties of a surface, and those by which it does not follow its command.
 HEALTHY = {name: value for row in TYPES.values() for name, value in row.properties}
 HOLDING = tuple(row.holds for row in TYPES.values() if row.holds)

@@ -31,7 +31,7 @@ from typing import Annotated, ClassVar
 
 import typer
 
-from beaver_ftc.results.model import Document
+from beaver_ftc.documents.plain import Document
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class StudyCommand(ABC):
 
 def complete_names(incomplete: str) -> list[str]:
     """Built-in scenarios whose names begin so, for the shell."""
-    from beaver_ftc.scenario.loader import builtin_names
+    from beaver_ftc.scenario.builtin import builtin_names
 
     return [name for name in builtin_names() if name.startswith(incomplete)]
 

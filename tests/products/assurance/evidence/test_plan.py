@@ -5,7 +5,7 @@ import json
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.scenario.loader import builtin_plans
+from beaver_ftc.scenario.builtin import builtin_plans
 from beaver_ftc_assurance.evidence.plan import load_plan, plan_json_schema
 
 GOOD = """\

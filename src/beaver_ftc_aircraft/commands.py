@@ -24,21 +24,21 @@ def derive(
 ) -> None:
     """Derive an aircraft's design model from JSBSim.
 
-    And measure the error that is left. It samples the aircraft over its envelope, fits sparse terms,
-    and checks them on states the fit did not see: the largest error becomes the declared bound.
-    Afterwards `aircraft: jsbsim:NAME` flies.
+    It samples the aircraft over its envelope, fits sparse terms, and validates them on states that the fit
+    did not use: the largest error becomes the declared bound. Afterwards scenarios can use `aircraft:
+    jsbsim:NAME`.
 
     aircraft: jsbsim:NAME of the installed jsbsim package, a JSBSim model, or an aircraft's folder.
     envelope: YAML with airspeed_mps, alpha_deg, altitude_m, sideslip_deg: where to sample.
     out: Folder to write the aircraft's folder into, if not the cache.
-    engines: Each engine is an effector as well, with a lever of its own: it turns the aircraft where
-    surfaces no longer reach. With --out.
+    engines: Make each engine an effector with its own lever, for moments that the surfaces no longer
+    give. With --out.
     """
     from beaver_ftc_aircraft.derive.derivation import derive
     from beaver_ftc_aircraft.derive.derived import document_of, text_of
 
     if engines and out is None:
-        raise BadInput("--engines: wants a folder of its own, allowed: with --out")
+        raise BadInput("--engines: needs a folder of its own, allowed: with --out")
     made = derive(aircraft, out, envelope, lambda what: complain(f"deriving: {what}"), engines=engines)
     document = document_of(made)
     answer(format, document, lambda: text_of(document))

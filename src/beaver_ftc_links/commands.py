@@ -45,10 +45,10 @@ class Options:
 
 
 def command(options: Options) -> None:
-    """Fly a scenario under an autopilot in software in the loop.
+    """Fly a scenario under a software-in-the-loop autopilot.
 
-    The autopilot's outputs move the surfaces, as the aircraft's `channels` say; the scenario's faults come
-    between, and its diagnosis watches. Ends with the scenario's duration, or with Ctrl-C.
+    The autopilot commands the surfaces through the aircraft's `channels`; the scenario's faults act on the
+    surfaces, and its diagnosis runs. The flight ends with the scenario's duration, or with Ctrl-C.
 
     Examples:
       beaver-ftc sitl elevator-partial-loss --as ardupilot
@@ -57,12 +57,12 @@ def command(options: Options) -> None:
     protocol: ArduPilot's JSON interface, or PX4's simulator interface.
     host: Address to listen on.
     port: Port to listen on; 9002 for ardupilot, 4560 for px4; 0: any.
-    rate: Frames a second of the autopilot; by itself what its first packet says, 250 for px4.
-    speed: Times real time; 0: as fast as it answers. By itself 0 for ardupilot, which keeps time, 1 for px4.
-    hold: The scenario's own law flies so many seconds first.
-    ground: Height of the autopilot's ground above sea level, by itself 0.
-    mavlink: A ground station: is told what the diagnosis finds, may inject failures.
-    page: Show the flight on the live page at this port, 0 any: break it there, repair it.
+    rate: Autopilot frame rate, Hz. Default: from its first packet; 250 for px4.
+    speed: Multiple of real time; 0: as fast as the autopilot answers. Default: 0 for ardupilot, 1 for px4.
+    hold: Time that the scenario's own law flies first, s.
+    ground: Elevation of the autopilot's ground above sea level, m. Default: 0.
+    mavlink: Ground station that receives the findings and may inject failures.
+    page: Port of a live page that shows the flight and injects faults; 0: any free port.
     """
     from beaver_ftc.results import Metrics, verdict_text
     from beaver_ftc_links.sitl.serve import Options as Served

@@ -32,13 +32,14 @@ def identify(
 ) -> None:
     """Identify a vehicle from recorded flights.
 
-    Writes a model file for `diagnose`. Fitted are the flights' healthy parts, and faulty ones whose
-    effectiveness the labels tell. What the fit did not see tells how good it is: in the model file, and
-    as a page beside it (MODEL with .html).
+    Writes a model file for `diagnose`. The fit uses the healthy parts of the flights, and faulty parts whose
+    labels give the effectiveness. It is validated on data not used for fitting; the result is in the model
+    file and on a page beside it (MODEL with .html).
 
-    vehicle: Vehicle file, or the built-in `alfa`; `beaver-ftc new NAME --log` writes one that says every key.
+    vehicle: Vehicle file, or the built-in `alfa`; `beaver-ftc new NAME --log` writes one that lists every
+    key.
     out: The model file to write; with --check the vehicle file that is proposed.
-    check: Fit nothing; say what the logs are, and propose a vehicle file where none is given.
+    check: Do not fit; report what the logs contain, and propose a vehicle file if none is given.
     false_alarms_per_hour: Alarms that `diagnose` may raise in healthy flight, instead of the vehicle file's.
     """
     if check:
@@ -110,7 +111,7 @@ def _write_new(path: Path, text: str) -> None:
 
 @dataclass(frozen=True)
 class Options:
-    """What is asked of `diagnose`."""
+    """The arguments of `diagnose`."""
 
     flights: FlightsArgument
     model: Annotated[Path | None, typer.Option(metavar="MODEL")] = None
@@ -127,18 +128,18 @@ class Options:
 
 @declare("diagnosis.parquet", "verdict.json")
 def diagnose(options: Options) -> None:
-    """Diagnose recorded flights by a model or an aircraft.
+    """Diagnose recorded flights with a model or an aircraft.
 
-    Writes DIR/<flight>/diagnosis.parquet (a row a sample), verdict.json and report.html. A row uses nothing
-    later than its time. The log.parquet of a run of ours needs no model: it is diagnosed as it was in flight.
+    Writes DIR/<flight>/diagnosis.parquet (one row per sample), verdict.json and report.html. A row uses only
+    samples up to its own time. The log.parquet of `run` needs no model: it is diagnosed as in flight.
 
-    model: The model file `identify` has written; none for our own logs.
-    aircraft: The aircraft by whose own model it is diagnosed, as the loop does, instead of an identified one.
-    scenario: With --aircraft: whose fdi, actuators and design_model say what errors are declared.
+    model: The model file that `identify` wrote; none for logs of `run`.
+    aircraft: Use the design model of this aircraft, as the simulation does, instead of an identified model.
+    scenario: With --aircraft: scenario whose fdi, actuators and design_model declare the errors.
     vehicle: With --aircraft: the vehicle file, if it is not vehicle.yaml beside the log.
     out: Folder for the results.
     score: Compare with the log's labels, after the fact.
-    detector: Who diagnoses: bank-of-filters, or a rival by its name.
+    detector: Detector to use: bank-of-filters, or another one by its name.
     certificate: With --aircraft: also write certificate.json and log.parquet, which prove the alarm.
     """
     _check_options(options)

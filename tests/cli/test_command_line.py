@@ -386,7 +386,7 @@ def test_version_and_help(tmp_path):
     assert beaver("--version", cwd=tmp_path).stdout.startswith("beaver-ftc ")
     said = dict(re.findall(r"^  (\w+)  +(.+)$", beaver("--help", cwd=tmp_path).stdout, re.MULTILINE))
     assert {"run", "validate", "schema", "trim", "list"} <= set(said)
-    assert said["run"] == "Fly scenarios and say the verdict."
+    assert said["run"] == "Simulate scenarios and report the results."
 
 
 @pytest.mark.parametrize("format", ["text", "json"])

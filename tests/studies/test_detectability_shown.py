@@ -126,13 +126,13 @@ def test_magnitudes_of_moments_that_do_not_change():
     assert found["detected"] == found["detected_median"] == pytest.approx(0.25)
     # the rudder by a share b leaves 4 m - 2 b of roll and 1.6 b of yaw: b = 0.625 hides all up to m = 0.5625
     assert found["isolated"] == found["isolated_median"] == pytest.approx(0.5625, abs=1e-4)
-    assert (found["confused_with"], found["why"]) == ("rudder", "rudder explains smaller ones")
+    assert (found["confused_with"], found["why"]) == ("rudder", "a fault of rudder explains smaller losses")
     rudder = judge(seen, "rudder")
     assert rudder["detected"] == pytest.approx(0.5)
     # the aileron explains all roll: yaw alone tells, from 1 / 1.6
     assert rudder["isolated"] == pytest.approx(0.625, abs=1e-4)
     easy = judge(still(aileron=[4.0, 0.0, 0.0], rudder=[0.0, 0.0, 1.6]), "aileron")
-    assert (easy["isolated"], easy["why"]) == (pytest.approx(0.25, abs=1e-4), "isolated once detected")
+    assert (easy["isolated"], easy["why"]) == (pytest.approx(0.25, abs=1e-4), "isolated as soon as detected")
 
 
 def test_a_surface_that_is_hardly_used_and_one_that_another_explains():
@@ -142,10 +142,16 @@ def test_a_surface_that_is_hardly_used_and_one_that_another_explains():
         judge(still(aileron=[2.0, 0.0, 0.0], rudder=[2.2, 0.0, 0.5]), "aileron"),
     )
     assert [weak[name] for name in MAGNITUDES] == [None] * 4
-    assert weak["why"] == "aileron hardly used: in 0.5 s a total loss is 80% of twice the bound"
+    assert (
+        weak["why"]
+        == "aileron barely moves: within 0.5 s even a total loss reaches only 80 % of the detection limit"
+    )
     assert (hidden["detected"], hidden["isolated"]) == (0.5, None)
     # 2 - 2.2 b and 0.5 b are equal at b = 0.74: what is left is 0.37
-    assert hidden["why"] == "for 1 s rudder explains a total loss but for 37% of twice the bound"
+    assert hidden["why"] == (
+        "a fault of rudder explains even a total loss: within 1 s the difference reaches only 37 % of the "
+        "detection limit"
+    )
     assert judge(seen, "elevator")["isolated"] == pytest.approx(1 / 3, abs=1e-4)
 
 

@@ -20,7 +20,7 @@ def list_choices(
     short: bool = False,
     format: FormatOption = Format.text,
 ) -> None:
-    """List what there is to choose from.
+    """List scenarios, aircraft, diagnosis schemes, laws, fault types and signals.
 
     Built-in scenarios, sweeps and plans of evidence, aircraft, diagnosis schemes, control laws, fault types
     and reference signals.

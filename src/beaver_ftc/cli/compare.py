@@ -21,7 +21,7 @@ FILES = (
 
 @dataclass(frozen=True)
 class Options:
-    """What is wanted of it, as `command` says."""
+    """The arguments of `command`."""
 
     runs: Annotated[list[Path] | None, typer.Argument(metavar="RUN")] = None
     sweep: Annotated[Path | None, typer.Option(metavar="FILE")] = None
@@ -42,16 +42,15 @@ class Options:
 
 @declare(*FILES)
 def command(options: Options) -> None:
-    """Compare runs; or schemes and laws on the same flights.
+    """Compare runs, or schemes and laws on the same flights.
 
-    Finished runs; or schemes and laws (--sweep, --benchmark); or ways to diagnose recorded flights
-    (--flights FOLDER), each left out of the model it is diagnosed with.
+    It compares finished runs; or schemes and laws (--sweep, --benchmark); or detectors on recorded flights
+    (--flights FOLDER), each flight with a model identified without it.
 
-    Writes comparison.json, comparison.png and comparison.html (for runs: runs.json, runs.png, runs.html)
-    below --out; for recorded flights, flights.json, flights.md and
-    flights.png.
+    Writes comparison.json, .png and .html; for runs: runs.json, .png and .html; for recorded flights:
+    flights.json, .md and .png.
 
-    Stopped or killed, a comparison on flights goes on where it was with the same command.
+    The same command resumes an interrupted comparison on flights.
 
     runs: Result folders of `run`.
     sweep: Compare on the flights of a sweep.

@@ -27,12 +27,12 @@ def command(
     map: bool = False,
     no_report: NoReportOption = False,
 ) -> None:
-    """Split truth less design model into its sources.
+    """Decompose the model error by source.
 
     With --format json: the document of the flight, axes.{p,q,r}.{source}: rms, max, share, bound_share;
     of several flights {"runs": [...], "recommended": ..., "guarantee": ...}.
 
-    Stopped or killed, a map goes on where it was with the same command.
+    The same command resumes an interrupted map.
 
     variant: Design models to compare, e.g. declared,engine-neglected,linearised,mass=1.1.
     map: Worst mismatch over speed and altitude, too.

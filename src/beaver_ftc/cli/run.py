@@ -60,10 +60,10 @@ class Options:
 
 
 def command(options: Options) -> None:
-    """Fly scenarios and say the verdict.
+    """Simulate scenarios and report the results.
 
-    With --format json: the metrics and `folder` of the run (or its `error`), with `runs`, a list of it; of
-    several scenarios {"passed": ..., "runs": [...]}.
+    With --format json: one JSON object with the metrics, `folder` (or `error`) and a list `runs`; for several
+    scenarios {"passed": ..., "runs": [...]}.
 
     Examples:
       beaver-ftc run elevator-partial-loss
@@ -71,9 +71,9 @@ def command(options: Options) -> None:
 
     csv: Also write the log as log.csv.
     acmi: Also write flight.acmi, for Tacview.
-    recording: Also write the log as a recorder on board would have, with vehicle.yaml.
-    flightgear: Show it in FlightGear, at the pace of the clock.
-    certificate: Also write certificate.json, which proves alarm and exclusions.
+    recording: Also write the log as an on-board recorder would, with vehicle.yaml.
+    flightgear: Show the flight in FlightGear in real time.
+    certificate: Also write certificate.json, which proves the alarm and the exclusions.
     """
     try:
         loaded = load_all(options.scenarios)

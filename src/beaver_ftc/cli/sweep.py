@@ -29,7 +29,7 @@ Objective = StrEnum("Objective", ["delay", "false_alarm", "tracking"])  # what a
 
 @dataclass(frozen=True)
 class Arguments:
-    """What is wanted of it, as `command` says."""
+    """The arguments of `command`."""
 
     file: Annotated[str, typer.Argument(metavar="FILE")]
     out: Path = Path("runs")
@@ -49,22 +49,22 @@ class Arguments:
 
 @declare("results.parquet", "summary.json", "rare.json", "flight.yaml")
 def command(arguments: Arguments) -> None:
-    """Fly a sweep: many flights of one scenario, varied.
+    """Fly many variations of one scenario and summarise them.
 
-    On all cores, or on a cluster. What has been flown is kept, whatever happens: go on with --resume.
-    With --format json: the summary.
+    Uses all cores, or a cluster. Finished flights are kept if the sweep is interrupted; --resume continues
+    it. With --format json: the summary.
 
     file: A sweep file, or the name of a built-in sweep.
     out: Folder for the results, one folder a sweep in it.
-    workers: Processes, or Ray tasks, at a time. Default: one a core.
+    workers: Parallel processes or Ray tasks. Default: one per core.
     backend: Local processes, or a Ray cluster.
     ray_address: Ray cluster to join, e.g. auto. Default: one on this machine.
-    resume: Fly what is missing from an earlier start.
-    keep_logs: Flights to keep a result folder of: none, failed, missed, worst, all, or indices 3,17.
-    replay: Fly this one flight again, as `run` would.
-    search: Look for the worst flight instead of sampling.
-    certificate: Write certificates into the folders kept, of the worst flights if --keep-logs names none.
-    rare: Estimate how likely flights miss this expectation, by subset simulation.
+    resume: Continue an interrupted sweep.
+    keep_logs: Flights that keep a result folder: none, failed, missed, worst, all, or indices 3,17.
+    replay: Fly only this flight again, as `run` would.
+    search: Search for the worst flight instead of sampling.
+    certificate: Write certificates into the kept folders; without --keep-logs, for the worst flights.
+    rare: Estimate the probability that a flight misses this expectation, by subset simulation.
     """
     if arguments.backend is Backend.local and arguments.replay is None:
         from beaver_ftc.studies.engine.workers import start_early

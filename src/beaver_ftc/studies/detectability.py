@@ -65,8 +65,12 @@ MOTION = {"p": "roll", "q": "pitch", "r": "yaw"}
 COLUMNS = (*PLACE, "fault", *MAGNITUDES, "confused_with", "why")
 PARTS = ("points", "pairs")  # of the document: a row a fault, and a row a fault and another
 PAIRS = (*PLACE, "fault", "other", *isolability.SHOWN, *isolability.DOUBLET)
-SUMMARY = ("fault", "excit.", "certain at", "from", "half the time at", "from")
-CERTAIN = "certain: detected and isolated in time, from some magnitude on; of so many grid points"
+SUMMARY = ("fault", "reference scale", "all onsets: places", "loss", "half of onsets: places", "loss")
+CERTAIN = (
+    "Places: grid points where a loss of some size is certain to be detected and isolated in time, whenever\n"
+    "it starts (all onsets) or at half of the possible start times. Loss: the smallest and the largest over\n"
+    "these places, share of the effectiveness."
+)
 
 
 @dataclass(frozen=True)
@@ -206,8 +210,8 @@ def told_apart_rad(column: np.ndarray, other: np.ndarray, bound: np.ndarray) -> 
 
 
 def alike(scenario: Scenario) -> list[Document]:
-    """Pairs of surfaces that move the rates alike: from which deflection on, deg, each is certain to be told
-    from the other, None where none is; and whether the accelerometers of this diagnosis weigh them."""
+    """Pairs of surfaces with similar effects on the rates: the deflection, deg, from which each is certain to
+    be distinguished from the other, None where none is; and whether accelerometers distinguish them."""
     short = scenario.model_copy(update={"duration_s": SETTLED_S + 1.0})
     seen, aircraft = excitation(short), scenario.airframe
     by_force = [{*aircraft.separated_by_force(force)} for force in ("CY", "CZ")]
@@ -228,10 +232,12 @@ def geometry(pairs: Sequence[Document]) -> list[str]:
     lines = []
     for pair in pairs:
         apart = [(name, x) for name, x in pair["told_apart_from_deg"].items() if x is not None]
-        told = " and ".join(f"{name} from {x:.2g} deg off its command on" for name, x in apart)
+        told = " or ".join(f"{name} is at least {x:.2g} deg off its command" for name, x in apart)
         forces = ", accelerometers do" if pair["by_forces"] and not told else ""
-        says = f"the rates tell {told}" if told else f"the rates never tell them apart{forces}"
-        lines.append(f"{' and '.join(pair['surfaces'])} move the rates alike: {says}")
+        says = (
+            f"the rates distinguish them if {told}" if told else f"the rates never distinguish them{forces}"
+        )
+        lines.append(f"{' and '.join(pair['surfaces'])} have similar effects on the rates: {says}")
     return lines
 
 
@@ -265,10 +271,10 @@ def engine_failures(scenario: Scenario) -> list[Document]:
 
 def of_engines(failures: Sequence[Document]) -> list[str]:
     """A line an engine."""
-    signal, against = "; its moment is a signal", ", held against their thrust"
+    signal, against = "; the design model knows its moment", " and monitors it against the thrust"
     return [
-        f"{of['engine']} at idle turns the aircraft by {max(of['turns_rad_s2']):.2g} rad/s2, "
-        f"{of['shows']:.2g} times what is certain to show in a frame"
+        f"{of['engine']} failed to idle accelerates the aircraft by {max(of['turns_rad_s2']):.2g} rad/s2, "
+        f"{of['shows']:.2g} times the detection limit of one frame"
         + signal * of["known"]
         + against * of["held"]
         for of in failures
@@ -398,16 +404,20 @@ def _why(seen: Excitation, fault: str, rival: str, detected: float, excluded: np
     """What limits this fault at the worst instant for it to strike."""
     if detected > 1.0:
         share = 1.0 / detected
-        return f"{fault} hardly used: in {DETECT_WITHIN_S:g} s a total loss is {share:.0%} of twice the bound"
+        return (
+            f"{fault} barely moves: within {DETECT_WITHIN_S:g} s even a total loss reaches only "
+            f"{100 * share:.0f} % of the detection limit"
+        )
     if excluded.max() > 1.0:
         start = int(excluded.argmax())
         window = slice(start, start + frames)
         rest = mismatch(seen.moment[fault][window], seen.moment[rival][window], seen.bound[window]).max()
         return (
-            f"for {ISOLATE_WITHIN_S:g} s {rival} explains a total loss but for {rest:.0%} of twice the bound"
+            f"a fault of {rival} explains even a total loss: within {ISOLATE_WITHIN_S:g} s the difference "
+            f"reaches only {100 * rest:.0f} % of the detection limit"
         )
     as_soon = excluded.max() <= detected + 2.0**-BISECTIONS
-    return "isolated once detected" if as_soon else f"{rival} explains smaller ones"
+    return "isolated as soon as detected" if as_soon else f"a fault of {rival} explains smaller losses"
 
 
 def document_of(name: str, points: Sequence[Mapping[str, Sequence[Document]]]) -> Document:
@@ -433,13 +443,15 @@ FILES: Makers = {
 
 def _page(document: Document, folder: Path) -> str:
     parts: list[Part] = [
-        f"The smallest loss of effectiveness certain to be detected within {DETECT_WITHIN_S:g} s and "
+        " ".join(_conclusions(document["points"])),
+        f"The smallest loss of effectiveness that is certain to be detected within {DETECT_WITHIN_S:g} s and "
         f"isolated within {ISOLATE_WITHIN_S:g} s, whatever the declared uncertainty does.",
-        Pictures([("how small a loss is certain to be found", "detectability")]),
+        Pictures([("smallest loss that is certain to be detected and isolated", "detectability")]),
         Table(SUMMARY, _summary(document["points"])),
+        CERTAIN,
         Heading("Isolability"),
         isolability.SAYS,
-        Pictures([("which losses are told apart", "isolability")]),
+        Pictures([("smallest loss that is distinguished from each other surface", "isolability")]),
         Table(isolability.HEAD, isolability.table(document["pairs"])),
     ]
     figures = {stem: folder / f"{stem}.png" for stem in ("detectability", "isolability")}
@@ -451,8 +463,9 @@ def draw(name: str, rows: Sequence[Document]) -> Any:
     speeds, altitudes = _sorted(rows, "airspeed_mps"), _sorted(rows, "altitude_m")
     faults, scales = _faults(rows), _sorted(rows, "excitation")
     title = (
-        f"{name}: loss of effectiveness certain to be detected within {DETECT_WITHIN_S:g} s / "
-        f"isolated within {ISOLATE_WITHIN_S:g} s (-: not even a total loss)"
+        f"{name}: smallest loss of effectiveness certain to be detected within {DETECT_WITHIN_S:g} s "
+        f"(upper number)\nand isolated within {ISOLATE_WITHIN_S:g} s (lower number); "
+        "hatched, -: not even a total loss"
     )
     size = 3.4 * len(scales) + 1.2, 9.0
     figure, grid = panels(len(faults), len(scales), *size, title, sharex=True, sharey=True)
@@ -467,7 +480,9 @@ def draw(name: str, rows: Sequence[Document]) -> Any:
         image = heat_map(axes, values, labels, *names, 7, **look)
         axes.set_title(f"{fault}, {scale:g} x reference", fontsize=9)
     label_edges(grid, "airspeed (m/s)", ["altitude (m)"] * len(faults))
-    figure.colorbar(image, ax=grid, label="magnitude certain to be detected, whenever it strikes", shrink=0.6)
+    figure.colorbar(
+        image, ax=grid, label="smallest loss certain to be detected (share of effectiveness)", shrink=0.6
+    )
     return figure
 
 
@@ -489,13 +504,33 @@ def _short(magnitude: float | None) -> str:
 
 
 def text(rows: Sequence[Document], pairs: Sequence[Document] = ()) -> str:
-    """A line a fault and grid point, one a fault and excitation, and one a pair and excitation."""
-    place = f"{'fault':<10}{'m/s':>6}{'m':>7}{'excit.':>8}"
-    head = f"{place}{'detected':>10}{'median':>8}{'isolated':>10}{'median':>8}   why"
-    lines = [head, *map(_line, rows), "", aligned([SUMMARY, *_summary(rows)]), CERTAIN]
+    """The conclusions, one line a fault and excitation, one a pair and excitation, one a fault and grid
+    point."""
+    place = f"{'fault':<10}{'m/s':>6}{'m':>7}{'scale':>8}"
+    head = f"{place}{'detected':>10}{'median':>8}{'isolated':>10}{'median':>8}   limited by"
+    lines = [*_conclusions(rows), "", aligned([SUMMARY, *_summary(rows)]), CERTAIN]
     if pairs:
         lines += ["", aligned([isolability.HEAD, *isolability.table(pairs)]), isolability.SAYS]
-    return "\n".join(lines)
+    return "\n".join([*lines, "", head, *map(_line, rows)])
+
+
+def _conclusions(rows: Sequence[Document]) -> list[str]:
+    """One sentence a fault, at the excitation nearest to the scenario's own references."""
+    scale = min(_sorted(rows, "excitation"), key=lambda of: abs(of - 1.0))
+    return [_conclusion(fault, scale, _chosen(rows, fault, scale)) for fault in _faults(rows)]
+
+
+def _conclusion(fault: str, scale: float, rows: Sequence[Document]) -> str:
+    certain = [row["isolated"] for row in rows if row["isolated"] is not None]
+    reference = "the scenario's references" if scale == 1.0 else f"{scale:g} times the scenario's references"
+    if not certain:
+        worst = min(rows, key=lambda row: (row["detected"] is not None, row["why"]))
+        return f"{fault}: at {reference} no loss is certain to be detected and isolated ({worst['why']})."
+    places = "all" if len(certain) == len(rows) else f"{len(certain)} of"
+    return (
+        f"{fault}: at {reference} a loss of {_upwards(max(certain))} or more is certain to be detected and "
+        f"isolated at {places} {len(rows)} places."
+    )
 
 
 def _summary(rows: Sequence[Document]) -> list[tuple[str, ...]]:
@@ -520,23 +555,23 @@ def _line(row: Document) -> str:
 
 @dataclass(frozen=True)
 class Detectability(StudyCommand):
-    """Survey the smallest fault that is certain to be found.
+    """Compute the smallest fault that is certain to be detected and isolated.
 
-    Over speed, altitude and excitation: the smallest loss certain to be detected, and to be isolated.
+    Over airspeed, altitude and excitation. A sentence for each surface comes first, the tables follow.
 
-    Certain: within 0.5 s and 1 s, whatever the declared uncertainty does, along the scenario's references
-    scaled by 0.25 to 2; `median` where the fault strikes at half of all instants. With --surface it answers
-    in a line for each place.
+    Certain: detected within 0.5 s and isolated within 1 s, whatever the declared uncertainty does, along the
+    scenario's references scaled by 0.25 to 2. `median`: for half of the possible start times of the fault.
+    With --surface: one sentence for each place.
 
-    And the map of isolability: which loss is told from which other surface, how small and how soon, and
-    by which doublet.
+    The map of isolability lists, for each pair of surfaces, the smallest loss that is distinguished, its
+    delay, and the smallest doublet that distinguishes it.
 
-    Stopped or killed, it goes on where it was with the same command.
+    The same command resumes an interrupted run.
 
     airspeed: Airspeed, m/s; once for each.
     altitude: Altitude above sea level, m; once for each.
     aircraft: In place of the scenario's: built-in name, jsbsim:NAME, or ./FOLDER in the working directory.
-    surface: The surface to answer for.
+    surface: Only this surface; print one sentence for each place.
     out: Folder for the maps, a page, CSV and JSON.
     """
 

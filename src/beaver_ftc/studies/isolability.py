@@ -22,12 +22,16 @@ from beaver_ftc.studies.present.figures import heat_map, label_edges, panels
 SHOWN = ("magnitude", "magnitude_median", "longest_s", "median_s")
 DOUBLET = ("doublet_deg", "doublet_s", "why")
 NO_DOUBLET = dict(zip(DOUBLET, (None, None, "no installed package offers 'doublets'"), strict=True))
-HEAD = ("loss of", "against", "x reference", "half the time from", "in", "always at", "from", "in", "doublet")
+HEAD = (
+    "loss of", "other surface", "reference scale", "half of onsets: loss", "delay", "all onsets: places",
+    "loss", "delay", "doublet",
+)  # fmt: skip
 TOLD = 0.5  # of the losses that a doublet tells apart
 SAYS = (
-    "The smallest loss from which the other surface is excluded within a second, and how long a total loss\n"
-    "takes: in half of the instants at which it may strike, and always, at so many places. Doublet: the\n"
-    f"smallest, in straight flight, certain to tell losses of {TOLD:.0%} apart. All at the worst place."
+    "Loss: the smallest loss for which the other surface is excluded within a second. Delay: the time\n"
+    "until a total loss excludes it. Both for half of the possible start times, and for all of them at\n"
+    "so many places. Doublet: the smallest one in straight flight that is certain to distinguish losses\n"
+    f"of {100 * TOLD:.0f} %. All values are those of the worst place."
 )
 PER_CELL = 1.55, 0.65  # inches
 ACROSS = 3  # panels

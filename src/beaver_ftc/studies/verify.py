@@ -427,17 +427,19 @@ def _line(label: str, cells: Iterable[str]) -> str:
 
 @dataclass(frozen=True)
 class Verify(StudyCommand):
-    """Fly at random inside all that is declared: what breaks?
+    """Test the guarantees on random flights within the declared bounds.
 
-    Counts, with exact confidence limits, broken promises: false alarms, true faults excluded, wrong
-    isolations and detections later than guaranteed plus a frame, for the published and the sharpened
-    scheme on the same flights. Stopped, it goes on where it was. Exit status 1 if a promise is broken.
+    Counts violations of the guarantees with exact confidence limits: false alarms, excluded true faults,
+    wrong isolations, and detections later than guaranteed plus one frame; for the published and the sharpened
+    scheme on the same flights. Exit status 1 if a guarantee is violated.
+
+    The same command resumes an interrupted run.
 
     hours: Flight hours without a fault.
-    faults: Flights with one random fault.
-    seed: Of everything drawn.
-    out: Folder of the flights flown; a campaign goes on from it.
-    steps: Also fly every step from the published scheme on.
+    faults: Number of flights with one random fault.
+    seed: Seed of all random draws.
+    out: Folder for the flights; an interrupted campaign continues from it.
+    steps: Also fly each step between the published and the sharpened scheme.
     """
 
     hours: Annotated[float, typer.Option(min=0.0, max=1e6)] = 2.0

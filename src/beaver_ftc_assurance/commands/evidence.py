@@ -40,19 +40,19 @@ class Arguments:
 def command(arguments: Arguments) -> None:
     """Fly a plan of requirements and write the evidence.
 
-    Requirement by requirement met, not met or not shown, with its margin, its worst flight and the command
-    that flies it again. Writes evidence.json, evidence.html and evidence.pdf.
+    Reports for each requirement whether it is met, not met or not shown, with its margin, its worst flight
+    and the command that flies it again. Writes evidence.json, evidence.html and evidence.pdf.
 
     Exit status 1 if a requirement is not met, or not shown.
 
-    Stopped or killed, it goes on where it was with the same command.
+    The same command resumes an interrupted run.
 
     Examples:
       beaver-ftc evidence flight-controls
 
     plan: A plan of evidence, or the name of a built-in one.
     out: Folder for the evidence. Default: runs/ and the plan's name.
-    replay: Fly this one flight again, as `run` would, and judge it.
+    replay: Fly only this flight again, as `run` would, and evaluate it.
     """
     from beaver_ftc_assurance.evidence.plan import load_plan
 

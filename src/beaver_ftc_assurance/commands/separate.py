@@ -18,14 +18,14 @@ def command(
 ) -> None:
     """Propose the smallest doublet that separates candidates.
 
-    Flies the scenario to its end. For each two candidates left: which surfaces go how far, there and back,
-    after what time they are told apart for certain, or why no doublet within travel, actuators, rates and
-    angle of attack does it. With `fdi.probing` the doublets are flown, what is left is said, and
-    flown/N/ has log and certificate of the flight with doublet N.
+    Flies the scenario to its end. For each remaining pair of candidates it prints the smallest doublet that
+    is certain to distinguish them and how long it takes, or why no doublet within the limits of travel,
+    actuators, body rates and angle of attack does. With `fdi.probing` it also flies the doublets and reports
+    the remaining candidates; flown/N/ holds log and certificate of the flight with doublet N.
 
-    Exit status 1 if one that was flown left both.
+    Exit status 1 if a doublet was flown and both candidates remain.
 
-    rate_deg_s: Body rates stay below it, deg/s.
+    rate_deg_s: Largest body rate allowed, deg/s.
     out: Folder for separation.json.
     """
     from beaver_ftc.scenario import load_scenario

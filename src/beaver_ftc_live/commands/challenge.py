@@ -85,7 +85,7 @@ def grade(
     Writes grades.json, grades.md and grades.html into DIR/grades. A submission that fails has a row with the
     reason.
 
-    Stopped or killed, it goes on where it was with the same command.
+    The same command resumes an interrupted run.
 
     folder: Folder of the challenge.
     """

@@ -26,9 +26,9 @@ def command(
     out: Path = Path("runs"),
     open_browser: Annotated[bool, typer.Option("--open")] = False,
 ) -> None:
-    """Fly in the browser: break it and watch the diagnosis.
+    """Fly in the browser: inject faults and watch the diagnosis.
 
-    Prints an address of this machine that works once; Ctrl-C ends it.
+    Prints an address of this machine that works once; Ctrl-C ends the flight.
 
     Examples:
       beaver-ftc live rudder-stuck
@@ -37,8 +37,9 @@ def command(
     aircraft: Fly this one, without the scenario's uncertainty.
     port: Port to listen on; 0: any.
     host: Address to listen on; 0.0.0.0: all of this machine's, for a class.
-    guests: Links for guests, who look on until you let them break; 10 if others can reach the host.
-    out: Folder in which the page's Save writes.
+    guests: Number of links for guests, who may inject faults once you allow it. Default: 10 if others can
+    reach the host.
+    out: Folder for flights saved on the page.
     open_browser: Also open the page in a browser.
     """
     from beaver_ftc_live.page.serve import Place, is_loopback, serve

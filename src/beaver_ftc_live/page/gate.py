@@ -108,7 +108,7 @@ class Seat:
         elif asked not in INVITED:
             raise BadInput(f"{asked}: not a guest's to ask, allowed: {', '.join(sorted(INVITED))}")
         elif asked not in LOOKING_ON and not self.is_invited:
-            raise BadInput(f"{asked}: you look on, allowed once you are invited")
+            raise BadInput(f"{asked}: you are watching, allowed once you are invited")
 
     def check_pace(self, now_s: float) -> None:
         """Raise BadInput for a guest who asks too much: requests would keep the flight from flying."""

@@ -1,6 +1,7 @@
 """The flight that the page shows: what is asked of it, what happens to it, and what is said of it."""
 
 from collections import deque
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from math import cos, sin, tan
 from pathlib import Path
@@ -35,6 +36,18 @@ HIDDEN = (
     "_effective_rad", "_pos_rad", "_excluded", "_effectiveness_estimate", "_effectiveness_used", "mode",
     "detected",
 )  # fmt: skip
+
+
+MOST_LISTED = 4  # candidates: more are counted
+
+
+def _remaining(candidates: Sequence[str], before: Sequence[str]) -> str:
+    """The candidates, or how many there are; and those excluded since the event before."""
+    few = len(candidates) <= MOST_LISTED
+    said = (", ".join(candidates) or "none left") if few else f"{len(candidates)} remain"
+    gone = [name for name in before if name not in candidates]
+    more = f" and {len(gone) - MOST_LISTED} more" if len(gone) > MOST_LISTED else ""
+    return said if few or not gone else f"{said}; excluded: {', '.join(gone[:MOST_LISTED])}{more}"
 
 
 class Session:
@@ -124,7 +137,10 @@ class Session:
             return
         before, self._said = self._said, said
         if alarm and before[0] != alarm:
-            beyond, against = f"residual of {alarm} beyond its threshold", f"{alarm} contradict one another"
+            beyond, against = (
+                f"residual of {alarm} beyond its threshold",
+                f"{alarm} disagree beyond their bound",
+            )
             self._tell("alarm", beyond if verdict.axis else against, secret=True)
         if verdict.isolated and before[1:3] != said[1:3]:
             self.game.named(verdict.isolated, t_s)
@@ -132,12 +148,12 @@ class Session:
             what = f", {kind.replace('_', ' ')}" if kind else ""
             self._tell("named", f"{verdict.isolated}{what}", secret=True)
         elif verdict.detected and verdict.candidates != before[3] and not verdict.isolated:
-            self._tell("candidates", ", ".join(verdict.candidates) or "none left", secret=True)
+            self._tell("candidates", _remaining(verdict.candidates, before[3]), secret=True)
         if sim.mode != self._mode:
             self._tell("supervisor", f"{self._mode} to {sim.mode}", secret=True)
             self._mode = sim.mode
         if sim.departed:
-            self._tell("lost", "the aircraft is lost; begin a new flight")
+            self._tell("lost", "the aircraft is lost; start a new flight")
 
     def _tell(self, kind: str, says: str, secret: bool = False) -> None:
         event = {"t": round(self.sim.t_s, 2), "kind": kind, "says": says, "secret": secret}

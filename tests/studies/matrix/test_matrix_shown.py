@@ -177,7 +177,7 @@ def test_a_jam_is_off_the_trimmed_deflection():
 def test_the_shortest_time_beyond_all_deflections_is_a_reason():
     lost = {"axis": "p", "oracle_left_envelope_s": 3.0, "departure_signal": "beta_rad"}
     said = fault_matrix._reason([lost | {"oracle_beyond_s": 0.0}, lost | {"oracle_beyond_s": 0.1}])
-    assert said == "for 0.1 s no deflection at all could hold the p rate"
+    assert said == "for 0.1 s no deflection could hold the p rate"
     assert fault_matrix._reason([lost | {"oracle_beyond_s": 0.0}]).startswith(
         "the validated envelope was left at 3.0"
     )

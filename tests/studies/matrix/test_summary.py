@@ -103,13 +103,13 @@ def test_why_not_even_the_oracle_kept_an_aircraft(found, why):
     cell, _ = cell_of({}, LOST, {**LOST, **found})
     assert cell["remark"] == f"lost in 2 of 3 flights, the oracle in 0: {why}"
     beyond, _ = cell_of({}, {**LOST, "oracle_beyond_s": 1.0, "axis": "p"}, {**LOST, "oracle_beyond_s": 0.5})
-    assert beyond["remark"].endswith("for 1.0 s no deflection at all could hold the p rate")
+    assert beyond["remark"].endswith("for 1.0 s no deflection could hold the p rate")
 
 
 def test_where_nothing_was_lost_the_remark_is_of_what_nobody_saw():
     assert cell_of({}, {}, {"detected": False})[0]["remark"] == ""
     unseen, _ = cell_of(*[{"detected": False}] * 3)
-    assert unseen["remark"] == "no effect beyond the admitted uncertainty: tracking is as before"
+    assert unseen["remark"] == "no effect beyond the declared uncertainty: tracking is as before"
 
 
 def told_of(*chances):
@@ -129,22 +129,24 @@ def test_a_cell_that_not_even_a_told_test_sees_is_marked():
     assert cell["told"] == 0
     marked = next(line for line in text.splitlines() if line.startswith(FAULT))
     assert marked.count("1.0xo") == 1
-    assert "o: not even a test that\nis told surface" in text
+    assert "o: not even the informed test" in text
     seen, text = told_of(0.51, 0.1, 0.2)
     assert seen["told"] == 1
     assert "1.0xo" not in text
     n = 3 * len(FAULTS) * len(SURFACES)
-    assert f"a test that is told the fault sees {n - 2} of {n}; {n - 2} of these are detected" in text
+    assert f"the informed test, which knows the fault, detects {n - 2} of {n}" in text
+    assert f"the diagnosis detects {n - 2},\nnames the right surface in {n - 2} (100 %:" in text
     elevators = 3 * len(FAULTS)
     assert f"elevator {elevators - 2} of {elevators - 2}" in text
-    assert f"the right surface is named in {n - 2} (100 %:" in text
 
 
 def test_where_a_told_test_sees_nothing_it_says_so():
     rows = [row(fault, s, 45.0, told_chance=0.1) for fault, _ in FAULTS for s in SURFACES]
-    assert as_text(document_of(rows)).endswith("a test that is told the fault sees none of them")
+    assert as_text(document_of(rows)).endswith(
+        "the informed test, which knows the fault, detects none of them"
+    )
     plain = as_text(document_of([row(fault, s, 45.0) for fault, _ in FAULTS for s in SURFACES]))
-    assert "told" not in plain
+    assert "informed test" not in plain
     n = len(FAULTS) * len(SURFACES)
     none = "0 named wrongly, 0 false alarms, 0 lost that the oracle kept"
     assert plain.endswith(f"{n} faults flown: {none}")

@@ -5,7 +5,7 @@ from statistics import median
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from beaver_ftc.studies.matrix.fault_matrix import run_matrix
+from beaver_ftc.studies.matrix.fault_matrix import SHOWN, run_matrix
 from beaver_ftc.studies.present.tables import markdown_table
 
 Document = dict[str, Any]
@@ -38,7 +38,7 @@ def _matrix(declared: bool, turbulence: str = "none") -> str:
 
 
 def _verdict(cell: Document) -> str:
-    return f"{cell['verdict']}{'*' if cell['lost'] else ''}"
+    return f"{SHOWN[cell['verdict']]}{'*' if cell['lost'] else ''}"
 
 
 def _summary(document: Document) -> str:
@@ -54,6 +54,6 @@ def _summary(document: Document) -> str:
 def _told(told: Document) -> str:
     each = ", ".join(f"{name} {one['named']} of {one['seen']}" for name, one in told["by_surface"].items())
     return (
-        f"A test that is told the fault sees {told['seen']} of them. Of these {told['detected']} raise the "
-        f"alarm, and the right surface is named in {told['named']}: {each}."
+        f"The informed test, which knows the fault, detects {told['seen']} of them. Of these the diagnosis "
+        f"detects {told['detected']}, and names the right surface in {told['named']}: {each}."
     )

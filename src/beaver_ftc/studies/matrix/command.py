@@ -23,22 +23,22 @@ from beaver_ftc.studies.matrix import pitch_lost as lost
 class Matrix(StudyCommand):
     """Fly every fault type on every surface.
 
-    Says which are detected and named, and how well the rates are tracked beside the oracle's.
+    Reports which faults are detected and named, and the tracking error relative to the informed law, which
+    knows the fault. With --declared it also reports how many of the faults that the informed test detects are
+    named.
 
-    With --declared also how many of the faults that a test told the fault sees are named.
+    Exit status 1 if a fault is named wrongly or an alarm is false; with --pitch-lost, if an aircraft is lost
+    with engine power and kept without it.
 
-    Exit status 1 if a fault is named wrongly or an alarm is false; with --pitch-lost, if engine power loses
-    an aircraft that is kept without it.
-
-    Stopped or killed, it goes on where it was with the same command.
+    The same command resumes an interrupted run.
 
     out: Folder for the results: `fault-matrix`, with what is declared, or `pitch-lost`.
     airspeed: Airspeed, m/s; once for each.
     workers: Processes.
     pitch_lost: Elevator and flap lost at once instead, with engine power and without.
-    declared: With tactical-grade sensors, servos and, where the model lets them be, 5 % wrong moment
-      coefficients, and told so.
-    turbulence: Of --declared: flown, and told so.
+    declared: Simulate tactical-grade sensors, servos and, where the model allows it, 5 % wrong moment
+      coefficients, and declare them to the diagnosis.
+    turbulence: Turbulence to simulate and to declare to the diagnosis (with --declared).
     aircraft: Built-in name, jsbsim:NAME, or ./FOLDER in the working directory.
     """
 
@@ -82,7 +82,7 @@ class Matrix(StudyCommand):
                 "has these, allowed: without --aircraft"
             )
         if self.turbulence is not TurbulenceName.none and not self.declared:
-            raise BadInput("--turbulence is declared or not flown, allowed: with --declared")
+            raise BadInput("--turbulence is only flown where it is declared, allowed: with --declared")
 
     def as_text(self, document: Document, colour: bool) -> str:
         """Table, remarks and totals, and where the files are."""

@@ -6,7 +6,7 @@ surface, the worst of its airspeeds.
 
 from collections import Counter
 from functools import lru_cache
-from math import degrees, log2
+from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -19,6 +19,7 @@ from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.trim import trim
 from beaver_ftc.results.metrics import as_json, measure
 from beaver_ftc.results.model import Document, Metrics
+from beaver_ftc.results.style import CRIMSON, VERMILION
 from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc.scenario.environment import air_of
 from beaver_ftc.scenario.faults import TYPES
@@ -41,8 +42,16 @@ AT_S = 12.0
 DURATION_S = 30.0
 NAMED = ("surface", "named")
 LIKELY = 0.5  # a test that finds a fault more often than not sees it
-WORST_FIRST = ("WRONG", "unseen", "open", "surface", "named")
-MOST_DOUBLINGS = 3.0  # of the tracking error, where the heat map is darkest
+SHOWN = {
+    "WRONG": "WRONG", "unseen": "not detected", "open": "ambiguous", "surface": "surface", "named": "named"
+}  # fmt: skip
+"""Verdicts of the document, and the words for people."""
+
+LOOKS = {  # symbol and colour; lightness orders them in grey
+    "WRONG": ("\u2718", VERMILION), "unseen": ("\u2013", "#c9c9c9"), "open": ("?", "#f3d27f"),
+    "surface": ("\u25d1", "#c3e1f4"), "named": ("\u2714", "#d3f0e5"),
+}  # fmt: skip
+VERDICTS = tuple(LOOKS)  # the worst first
 SPEEDS = (0.9, 1.0, 1.1)  # of another aircraft, as shares of the speed it starts with
 REFERENCE, UNCERTAINTY = SETTING["reference"], SETTING["uncertainty"]
 
@@ -257,7 +266,7 @@ def _cell(fault: str, surface: str, rows: list[Document]) -> Document:
     return {
         "fault": fault,
         "surface": surface,
-        "verdict": min((row["verdict"] for row in here), key=WORST_FIRST.index),
+        "verdict": min((row["verdict"] for row in here), key=VERDICTS.index),
         "delay_s": None if None in delays else max(delays),
         "candidates": sorted({candidate for row in here for candidate in row["candidates"]}),
         "ratio": max((row["ratio"] for row in here if row["ratio"] is not None), default=None),
@@ -273,7 +282,7 @@ def _reason(lost: list[Document]) -> str:
     """Why not even the oracle kept the aircraft."""
     beyond_s = max(row["oracle_beyond_s"] for row in lost)
     if beyond_s > 0.0:
-        return f"for {beyond_s:.1f} s no deflection at all could hold the {lost[0]['axis']} rate"
+        return f"for {beyond_s:.1f} s no deflection could hold the {lost[0]['axis']} rate"
     left_s = [row["oracle_left_envelope_s"] for row in lost if row["oracle_left_envelope_s"] is not None]
     if left_s:
         return f"the validated envelope was left at {min(left_s):.1f} s, the outer loops being open"
@@ -287,7 +296,7 @@ def _remark(here: list[Document]) -> str:
         also = sum(row["oracle_departure_s"] is not None for row in lost)
         return f"lost in {len(lost)} of {len(here)} flights, the oracle in {also}: {_reason(lost)}"
     if all(not row["detected"] for row in here):
-        return "no effect beyond the admitted uncertainty: tracking is as before"
+        return "no effect beyond the declared uncertainty: tracking is as before"
     return ""
 
 
@@ -309,13 +318,14 @@ def run_matrix(
 
 
 LEGEND = (
-    "cell: verdict, delay of the alarm, tracking RMS of the surface's own axis over the oracle's; the worst\n"
-    "of all airspeeds. named: surface and type. surface: type still open. open: surface still open. unseen:\n"
-    "no alarm, no effect beyond the admitted uncertainty. *: aircraft lost (remarks)."
+    "Cell: verdict, delay of the alarm, ratio of the tracking RMS of the surface's own axis to that of the\n"
+    "informed law; the worst of all airspeeds. named: surface and type are right. surface: the surface is\n"
+    "right, its type not determined. ambiguous: several surfaces remain. not detected: no alarm, the effect\n"
+    "stays within the declared uncertainty. WRONG: a wrong name or a false alarm. *: aircraft lost (remarks)."
 )
 TOLD_LEGEND = (
-    " o: not even a test that\nis told surface, course and instant sees it at any airspeed, at the same rate "
-    "of false alarms."
+    "\no: not even the informed test, which knows surface, course and time of the fault, detects it at any\n"
+    "airspeed at the same rate of false alarms."
 )
 
 
@@ -323,9 +333,9 @@ def as_text(document: Document) -> str:
     """Table, legend, remarks and totals."""
     width = max(len(fault) for fault, _ in FAULTS)
     surfaces, cells = _table(document)
-    lines = [" " * width + "".join(f"  {surface:21}" for surface in surfaces)]
+    lines = [" " * width + "".join(f"  {surface:26}" for surface in surfaces)]
     for fault, _ in FAULTS:
-        lines.append(f"{fault:{width}}" + "".join(f"  {_cell_text(cells[fault, s]):21}" for s in surfaces))
+        lines.append(f"{fault:{width}}" + "".join(f"  {_cell_text(cells[fault, s]):26}" for s in surfaces))
     lost = [cell for cell in document["cells"] if cell["lost"]]
     remarks = [f"* {cell['surface']} {cell['fault']}: {cell['remark']}" for cell in lost]
     totals = (
@@ -349,40 +359,51 @@ def _cell_text(cell: Document) -> str:
     delay = "     -" if cell["delay_s"] is None else f"{cell['delay_s']:4.2f} s"
     ratio = "" if cell["ratio"] is None else f"{cell['ratio']:.1f}x"
     unseen = "o" if cell.get("told") == 0 else ""
-    return f"{cell['verdict']:7} {delay} {ratio:>5}{'*' if cell['lost'] else ''}{unseen}"
+    return f"{SHOWN[cell['verdict']]:12} {delay} {ratio:>5}{'*' if cell['lost'] else ''}{unseen}"
 
 
 def _told(told: Document) -> str:
     """How many of the faults that can be seen are named."""
     if not told["seen"]:
-        return "a test that is told the fault sees none of them"
+        return "the informed test, which knows the fault, detects none of them"
     surfaces = ", ".join(f"{s} {of['named']} of {of['seen']}" for s, of in told["by_surface"].items())
     return (
-        f"a test that is told the fault sees {told['seen']} of {told['flights']}; {told['detected']} "
-        f"of these are detected,\nthe right surface is named in {told['named']} "
-        f"({100 * told['share']:.0f} %: {surfaces}), the right type is kept in {told['type_kept']}"
+        f"the informed test, which knows the fault, detects {told['seen']} of {told['flights']}. Of these "
+        f"the diagnosis detects {told['detected']},\nnames the right surface in {told['named']} "
+        f"({100 * told['share']:.0f} %: {surfaces}), and keeps the right type in {told['type_kept']}"
     )
 
 
 def heat_map_of(document: Document) -> "Figure":
-    """Colour says how the flight compares with the oracle's, letters the verdict."""
+    """Colour and symbol give the verdict, a red frame the loss of the aircraft, small text delay and
+    tracking."""
+    from matplotlib.colors import ListedColormap
+    from matplotlib.patches import Patch, Rectangle
+
     names, (surfaces, cells) = [fault for fault, _ in FAULTS], _table(document)
-    grid = np.array([[_doublings(cells[fault, surface]) for surface in surfaces] for fault in names])
-    labels = {
-        (i, j): (_label(cells[names[i], surfaces[j]]), "white" if dark else "black")
-        for (i, j), dark in np.ndenumerate(grid > 0.7 * MOST_DOUBLINGS)
-    }
+    grid = np.array([[VERDICTS.index(cells[fault, s]["verdict"]) for s in surfaces] for fault in names])
     figure, panel = panels(1, 1, 11.0, 0.5 * len(names) + 1.8)
-    axes, most = panel[0, 0], int(MOST_DOUBLINGS)
-    image = heat_map(axes, grid, labels, surfaces, names, 9, cmap="YlOrBr", vmin=0, vmax=MOST_DOUBLINGS)
-    axes.set_title("Each fault on each surface: verdict, and how well the flight goes on")
+    axes, colours = panel[0, 0], [LOOKS[verdict][1] for verdict in VERDICTS]
+    look: dict[str, Any] = {"cmap": ListedColormap(colours), "vmin": -0.5, "vmax": len(VERDICTS) - 0.5}
+    heat_map(axes, grid, {}, surfaces, names, 9, **look)
+    for (i, j), _ in np.ndenumerate(grid):
+        cell = cells[names[i], surfaces[j]]
+        ink = "white" if cell["verdict"] == "WRONG" else "black"
+        axes.text(j, i - 0.12, _label(cell), ha="center", va="center", fontsize=9, color=ink)
+        axes.text(j, i + 0.27, _small(cell), ha="center", va="center", fontsize=7, color=ink)
+        if cell["lost"]:
+            frame: dict[str, Any] = {"fill": False, "edgecolor": CRIMSON, "linewidth": 2.5, "zorder": 3}
+            axes.add_patch(Rectangle((j - 0.47, i - 0.45), 0.94, 0.9, **frame))
+    axes.set_title(
+        "Each fault on each surface: verdict, alarm delay, tracking RMS / that of the informed law"
+    )
     axes.set_xticks(np.arange(0.5, len(surfaces) - 1), minor=True)
     axes.set_yticks(np.arange(0.5, len(names) - 1), minor=True)
     axes.grid(which="minor", color="white", linewidth=1.5)
     axes.tick_params(which="minor", length=0)
-    bar = figure.colorbar(image, ticks=range(most + 1))
-    bar.ax.set_yticklabels([f"{2**n}" for n in range(most)] + [f"{2**most} or more"])
-    bar.set_label("tracking RMS over the oracle's, worst airspeed")
+    key = [Patch(facecolor=LOOKS[of][1], label=f"{LOOKS[of][0]} {SHOWN[of]}") for of in reversed(VERDICTS)]
+    key.append(Patch(fill=False, edgecolor=CRIMSON, linewidth=2.5, label="aircraft lost"))
+    figure.legend(handles=key, loc="outside lower center", ncols=len(key), fontsize=9, frameon=False)
     return figure
 
 
@@ -393,10 +414,11 @@ FILES: Makers = {
 }
 
 
-def _doublings(cell: Document) -> float:
-    return 0.0 if cell["ratio"] is None else min(max(log2(cell["ratio"]), 0.0), MOST_DOUBLINGS)
-
-
 def _label(cell: Document) -> str:
-    delay = "" if cell["delay_s"] is None else f", {cell['delay_s']:.2f} s"
-    return f"{cell['verdict']}{delay}{', lost' if cell['lost'] else ''}"
+    return f"{LOOKS[cell['verdict']][0]} {SHOWN[cell['verdict']]}{', LOST' if cell['lost'] else ''}"
+
+
+def _small(cell: Document) -> str:
+    delay = "" if cell["delay_s"] is None else f"{cell['delay_s']:.2f} s"
+    ratio = "" if cell["ratio"] is None else f"tracking {cell['ratio']:.1f}"
+    return ", ".join(filter(None, (delay, ratio)))

@@ -289,24 +289,24 @@ SensorsName = StrEnum("SensorsName", {"ideal": "ideal", "tactical_grade": "tacti
 
 @dataclass(frozen=True)
 class Power(StudyCommand):
-    """Map how likely and how soon faults are detected.
+    """Estimate the probability and the delay of fault detection.
 
     Over surface, magnitude, excitation, sensors and turbulence.
 
-    Every scheme watches the same flights, at the alarm level that gives all the same false-alarm rate on the
-    same healthy flights. Writes power.json, power.parquet, power.txt, and maps as PNG and SVG.
+    All schemes diagnose the same flights, each at the alarm level that gives the same false-alarm rate on the
+    same healthy flights. Writes power.json, power.parquet, power.txt, and figures as PNG and SVG.
 
-    Stopped or killed, it goes on where it was with the same command.
+    The same command resumes an interrupted run.
 
     grid: quick: a minute of CPU; full: ten or so.
-    schemes: Comma-separated schemes beside ours; all registered ones if left out.
-    sensors: Only with these sensors; left out: all of the grid.
-    turbulence: Only in this air; left out: all of the grid.
+    schemes: Comma-separated schemes to compare with ours. Default: all registered ones.
+    sensors: Only these sensors. Default: all of the grid.
+    turbulence: Only this turbulence. Default: all of the grid.
     airspeed: Airspeed, m/s.
     altitude: Altitude above sea level, m.
     aircraft: Built-in name, jsbsim:NAME, or ./FOLDER in the working directory.
-    surface: Only losses of this one, with an answer in a line for each of them.
-    rates_alone: Do not show plug-ins the air as our detector sees it by the vanes.
+    surface: Only this surface; print a one-line answer per loss.
+    rates_alone: Give plug-ins the body rates alone, without the air data that our detector uses.
     out: Folder for the results: `power` in it.
     """
 

@@ -206,14 +206,14 @@ def _found(rows: Sequence[Any]) -> tuple[Document, Flights]:
 
 @dataclass(frozen=True)
 class Reproduce(StudyCommand):
-    """Fly the published study and judge its statements.
+    """Reproduce the published study and check its statements.
 
-    Every figure, every statement with our number, the number without the mechanism it speaks of, and a
-    verdict; the same cases flown by our defaults, side by side.
+    Reports every figure, and for every statement our number, the number without the mechanism concerned, and
+    a verdict; and the same cases flown with our defaults.
 
     Exit status 1 if a statement is not borne out and the reason is not known.
 
-    Stopped or killed, it goes on where it was with the same command.
+    The same command resumes an interrupted run.
 
     out: Folder for the results: `reproduction` in it.
     workers: Processes that fly them.

@@ -258,23 +258,23 @@ def _counted(count: int, of: int) -> Document:
 
 @dataclass(frozen=True)
 class Smallest(StudyCommand):
-    """Find how small a loss of one surface is found in time.
+    """Find the smallest loss of a surface that is detected in time.
 
-    The size that is certain to be detected, and the size that is found in 90 % of flights with its 95 %
-    interval. Flies the scenario without its own faults; seed and instant of the loss are drawn, and flights
-    are added until the interval is narrow, 480 at most.
+    Reports the size that is certain to be detected, and the size that is detected in 90 % of flights with its
+    95 % interval. It flies the scenario without its own faults, with random seed and time of the loss, and
+    adds flights until the interval is narrow, 480 at most.
 
-    Then what limits it: turbulence, sensors, servos and uncertainty of the model, each left out of the same
-    flights; and which reference would help: twice the amplitude, twice the frequency.
+    Then it reports what limits the size: it flies the same flights without turbulence, sensor errors, servos
+    or model uncertainty, and with references of twice the amplitude and twice the frequency.
 
-    Stopped or killed, it goes on where it was with the same command.
+    The same command resumes an interrupted run.
 
     Examples:
       beaver-ftc smallest elevator-partial-loss --surface elevator --within 0.5
 
     surface: The surface that loses effectiveness.
-    within: From the loss to the alarm, s.
-    seed: Of everything drawn.
+    within: Longest time from the loss to the alarm, s.
+    seed: Seed of all random draws.
     out: Folder for the results: SCENARIO-smallest-SURFACE in it, with a page, CSV and JSON.
     """
 

@@ -184,7 +184,7 @@ def sensitivity_bars(flights: Flights, summary: Document) -> "Figure | None":
     if not rankings:
         return None
     keys = [entry["key"] for entry in next(iter(rankings.values()))][:12]
-    title = "What drives what: share of the outcome's ranks that a key explains"
+    title = "Sensitivity: share of an outcome that a key explains by rank correlation"
     figure, axes = _axes(title, size=(8.0, 1.8 + 0.5 * len(keys)))
     height = 0.8 / len(rankings)
     colours = (BLUE, ORANGE, GREEN, PURPLE)

@@ -44,8 +44,8 @@ def facts(summary: Document) -> list[tuple[str, str]]:
         ("false alarms", _false_alarms(summary["false_alarms"])),
         ("guarantee", _guarantee(summary["guarantee"])),
         ("departures", _rate(lost, "flights lost") if lost["count"] else ""),
-        ("drives the delay", _drivers(summary["sensitivity"]["detection_delay"])),
-        ("drives misses", _drivers(summary["sensitivity"]["missed_detection"])),
+        ("delay follows", _drivers(summary["sensitivity"]["detection_delay"])),
+        ("misses follow", _drivers(summary["sensitivity"]["missed_detection"])),
     )
     return [(what, how) for what, how in said if how]
 
@@ -166,8 +166,8 @@ def _false_alarms(found: Document) -> str:
         return ""
     return (
         f"{found['count']} in {value(found['hours'])} h without a fault: {value(found['per_hour'])}/h "
-        f"({value(found['low'])} to {value(found['high'])}); residuals came to "
-        f"{found['closest_residual_ratio']:.4g} of the threshold"
+        f"({value(found['low'])} to {value(found['high'])}); largest residual/threshold ratio "
+        f"{found['closest_residual_ratio']:.4g}"
     )
 
 
@@ -177,10 +177,9 @@ def _on_the_bound(found: Document) -> str:
     if not found["of"] or found["rate"] < MANY:
         return ""
     return (
-        f"in {found['count']} of {found['of']} flights the healthy part already uses "
-        f"{percent(ON_THE_BOUND)} of the "
-        "bound or more; detection of small faults then measures the scenario's own saturation, not the "
-        "diagnosis"
+        f"in {found['count']} of {found['of']} flights the residual of the healthy flight already reaches "
+        f"{percent(ON_THE_BOUND)} of its threshold or more; the detection of small faults then measures the "
+        "scenario's own uncertainty, not the diagnosis"
     )
 
 
@@ -188,21 +187,22 @@ def _inconclusive(found: Document) -> str:
     if not found["count"]:
         return ""
     return (
-        f"in {found['count']} of {found['of']} flights nothing can be concluded for part of the time, or "
-        f"all of it "
-        "(detection.inconclusive.share); the verdict of a kept flight says why"
+        f"in {found['count']} of {found['of']} flights the diagnosis could conclude nothing for part or all "
+        "of the time (detection.inconclusive.share); the verdict of a kept flight states the reason"
     )
 
 
 def _guarantee(found: Document) -> str:
     if not found["promised"]:
         return ""
-    return f"{found['broken']} of {found['promised']} faults detected later than theory promises"
+    return f"{found['broken']} of {found['promised']} faults detected later than guaranteed"
 
 
 def _drivers(ranking: list[Document]) -> str:
     told = [entry for entry in ranking if entry["p_value"] <= 0.05 and entry["explained"] >= 0.01][:3]
-    return ", ".join(f"{entry['key']} ({percent(entry['explained'])} of the ranks)" for entry in told)
+    return ", ".join(
+        f"{entry['key']} (rank correlation explains {percent(entry['explained'])})" for entry in told
+    )
 
 
 def render(summary: Document, folder: Path) -> str:

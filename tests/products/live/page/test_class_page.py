@@ -53,8 +53,8 @@ def test_a_guest_looks_on_until_it_is_let_and_all_see_who_broke_it(pages):
     assert "token" not in guest.url
     assert guest.evaluate("document.referrer") == ""
     shown = guest.locator("button:visible, select:visible, [role=tab]:visible").all_inner_texts()
-    assert not {"Pause", "Reset", "Save", "Renew", "Fly", "Game", "Flight", "Class"} & set(shown)
-    assert guest.inner_text("#legend") == "you look on"
+    assert not {"Pause", "Reset", "Save", "Reset diagnosis", "Fly", "Game", "Flight", "Class"} & set(shown)
+    assert guest.inner_text("#legend") == "you are watching"
     assert guest.evaluate("document.querySelector('#panel-break').inert")
     for key in ("3", "0", "r", " ", "d"):
         guest.keyboard.press(key)

@@ -164,10 +164,15 @@ def test_each_turn_of_a_verdict_is_told_once(session, monkeypatch):
         (jam | {"type": "rate_limit", "estimate": 0.1}, []),
         (jam | {"isolated": "unanticipated", "type": "unanticipated"}, ["unanticipated"]),
         ({"detected": True, "axis": "q", "candidates": ("flap",)}, ["flap"]),
+        ({"detected": True, "axis": "q", "candidates": tuple("abcdefghijk")}, ["11 remain; excluded: flap"]),
+        (
+            {"detected": True, "axis": "q", "candidates": tuple("abcde")},
+            ["5 remain; excluded: f, g, h, i and 2 more"],
+        ),
         ({"detected": True, "axis": "q"}, ["none left"]),
-        ({"detected": True}, ["instruments contradict one another"]),
+        ({"detected": True}, ["instruments disagree beyond their bound"]),
         ({"mode": "adaptive", "detected": True}, ["nominal to adaptive"]), ({}, ["adaptive to nominal"]),
-        ({"departed": True}, ["the aircraft is lost; begin a new flight"]), ({"departed": True}, []),
+        ({"departed": True}, ["the aircraft is lost; start a new flight"]), ({"departed": True}, []),
     ]  # fmt: skip
     session.take_events()
     for keys, says in turns:

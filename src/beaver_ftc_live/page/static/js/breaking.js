@@ -63,11 +63,11 @@ export function meetSurfaces(hello) {
 // Sizes that can be seen and flown with, in the unit in which a scenario has the sensor.
 const SIZES = { p: 3, q: 3, r: 3, alpha: 3, beta: 3, V: 6, qdyn: 200, phi: 8, theta: 8, psi: 8, altitude: 60, engine_rpm: 300, manifold_pressure: 4, ax: 3, ay: 3, az: 5 };
 const SENSOR_KINDS = [
-  ["is off", (size) => ({ type: "bias", magnitude: size })],
-  ["scatters", (size) => ({ type: "noise", magnitude: size })],
-  ["a third too much", () => ({ type: "scale", magnitude: 0.33 })],
-  ["freezes", () => ({ type: "freeze" })],
-  ["is lost", () => ({ type: "lost" })],
+  ["bias", (size) => ({ type: "bias", magnitude: size })],
+  ["noise", (size) => ({ type: "noise", magnitude: size })],
+  ["scale +33 %", () => ({ type: "scale", magnitude: 0.33 })],
+  ["freeze", () => ({ type: "freeze" })],
+  ["lost", () => ({ type: "lost" })],
 ];
 
 export function wireSensors() {
@@ -105,7 +105,7 @@ export function drawBroken() {
 
 // What is broken is red in the view; said in words beside it.
 function drawLegend(broken) {
-  const legend = byId("legend"), whole = mayBreak() ? "click a surface to break it" : "you look on";
+  const legend = byId("legend"), whole = mayBreak() ? "click a surface to break it" : "you are watching";
   const text = broken.length ? `✕ broken: ${broken.join(", ")}` : whole;
   if (legend.textContent !== text) legend.textContent = text;
   legend.classList.toggle("broken", broken.length > 0);

@@ -5,14 +5,14 @@ import { AXES, DEG, flight, value } from "./state.js";
 
 const WINDOW_S = 20, POINTS = 320, MARK_S = 4;
 const MARKS = "●■▲◆★✚▼○□△◇☆✖▽◀▶◁▷◉◈";  // as many as there are surfaces at most; colours come again
-export const COLOURS = ["#6ec1f0", "#f0a830", "#2fbf94", "#dd92c0", "#f0e442", "#ff7a4d", "#b0bec8", "#ffffff"];
+export const COLOURS = ["#6ec1f0", "#f0a830", "#dd92c0", "#2fbf94", "#f0e442", "#ff7a4d", "#b0bec8", "#ffffff"];
 
 // A chart: curves, each with the value it shows now; solid is what is, dashed is what was asked or estimated.
 function plans(surfaces) {
   const rad = (name) => () => { const x = value(name); return x === null ? null : x * DEG; };
   const share = (axis) => () => {
     const residual = value(`${axis}_residual_rad_s`), threshold = value(`${axis}_threshold_rad_s`);
-    return residual === null || !threshold ? null : Math.max(-3, Math.min(3, residual / threshold));
+    return residual === null || !threshold ? null : residual / threshold;
   };
   const pairs = (names, solid, dashed) => names.flatMap((name, i) => [
     { label: name, colour: i, now: solid(name, i) }, { label: `${name} dashed`, colour: i, dash: true, now: dashed(name, i) },
@@ -20,11 +20,11 @@ function plans(surfaces) {
   return [
     { title: "Residual / threshold", unit: "1", names: AXES, range: [-1.6, 1.6], limits: [-1, 1],
       curves: AXES.map((axis, i) => ({ label: axis, colour: i, now: share(axis) })) },
-    { title: "Rates, deg/s (-- asked for)", names: AXES, floor: 4,
+    { title: "Rates, deg/s (dashed: reference)", names: AXES, floor: 4,
       curves: pairs(AXES, (a) => rad(`${a}_measured_rad_s`), (a) => rad(`${a}_reference_rad_s`)) },
-    { title: "Surfaces, deg (-- cmd)", names: surfaces, floor: 3,
+    { title: "Surfaces, deg (dashed: command)", names: surfaces, floor: 3,
       curves: pairs(surfaces, (s) => rad(`${s}_effective_rad`), (s) => rad(`${s}_cmd_rad`)) },
-    { title: "Effectiveness (-- estimate)", names: surfaces, range: [-0.05, 1.15],
+    { title: "Effectiveness (dashed: estimate)", names: surfaces, range: [-0.05, 1.15],
       curves: pairs(surfaces, (_, i) => () => flight.frame?.effectiveness?.[i] ?? null, (s) => () => value(`${s}_effectiveness_estimate`)) },
   ];
 }
@@ -83,7 +83,7 @@ class Chart {
       series: [{}, ...plan.curves.map(({ label, colour, dash }) => ({
         label, stroke: COLOURS[colour % COLOURS.length], width: dash ? 1 : 1.5, dash: dash ? [5, 4] : undefined, points: { show: false }, spanGaps: false,
       }))],
-      hooks: { draw: [(plot) => this.drawLimits(plot), (plot) => this.drawMarks(plot)] },
+      hooks: { draw: [(plot) => this.drawLimits(plot), (plot) => this.drawMarks(plot), (plot) => this.drawClipped(plot), (plot) => this.drawInstants(plot)] },
     };
   }
 
@@ -128,6 +128,47 @@ class Chart {
         if (y !== null && y !== undefined) ctx.fillText(MARKS[colour], plot.valToPos(times[j], "x", true), plot.valToPos(y, "y", true));
       }
     });
+    ctx.restore();
+  }
+
+  // Beyond a fixed range: an arrow at the edge with the largest value.
+  drawClipped(plot) {
+    if (!this.plan.range) return;
+    const { ctx, bbox } = plot, [low, high] = this.plan.range, [times] = this.data;
+    ctx.save();
+    ctx.font = `bold ${10 * devicePixelRatio}px sans-serif`;
+    ctx.textAlign = "center";
+    this.plan.curves.forEach(({ colour, dash }, i) => {
+      if (dash) return;
+      const values = this.data[i + 1];
+      const peak = values.reduce((most, v, j) => (v !== null && (v > high || v < low) && (most < 0 || Math.abs(v) > Math.abs(values[most])) ? j : most), -1);
+      if (peak < 0) return;
+      const up = values[peak] > high;
+      ctx.fillStyle = COLOURS[colour % COLOURS.length];
+      ctx.textBaseline = up ? "top" : "bottom";
+      const x = Math.min(Math.max(plot.valToPos(times[peak], "x", true), bbox.left + 20), bbox.left + bbox.width - 20);
+      ctx.fillText(`${up ? "▲" : "▼"}${values[peak].toFixed(1)}`, x, up ? bbox.top + 1 : bbox.top + bbox.height - 1);
+    });
+    ctx.restore();
+  }
+
+  // Vertical lines at fault, alarm and name.
+  drawInstants(plot) {
+    const { ctx, bbox } = plot;
+    ctx.save();
+    ctx.font = `bold ${9 * devicePixelRatio}px sans-serif`;
+    ctx.textBaseline = "bottom";
+    ctx.setLineDash([3 * devicePixelRatio, 3 * devicePixelRatio]);
+    ctx.strokeStyle = ctx.fillStyle = "#e8eef3";
+    for (const { t, letter } of flight.instants ?? []) {
+      const x = plot.valToPos(t, "x", true);
+      if (x < bbox.left || x > bbox.left + bbox.width) continue;
+      ctx.beginPath();
+      ctx.moveTo(x, bbox.top);
+      ctx.lineTo(x, bbox.top + bbox.height);
+      ctx.stroke();
+      ctx.fillText(letter, x + 2 * devicePixelRatio, bbox.top + bbox.height - 1);
+    }
     ctx.restore();
   }
 

@@ -14,7 +14,7 @@ export function wireClass() {
   refuseWhat((what) => {
     if (!flight.you || what === "name") return "";
     if (!GUESTS_OWN.includes(what)) return "guests do not fly";
-    return mayBreak() ? "" : "you look on until you are invited";
+    return mayBreak() ? "" : "you are watching until you are invited";
   });
   byId("let-all").addEventListener("click", () => perform({ do: "let", on: true }));
   byId("let-none").addEventListener("click", () => perform({ do: "let", on: false }));

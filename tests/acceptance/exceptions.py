@@ -53,6 +53,9 @@ TABLE = (
         " && python tools/check_certificate.py runs/elevator-partial-loss",
     ),
     Exempt(r"beaver-ftc compare --sweep examples/gtm/.*", "needs NASA's data, imported"),
+    Exempt(r"git clone .*", "needs the network"),
+    Exempt(r"beaver-ftc import gtm .*", "needs NASA's data", "beaver-ftc import gtm --help"),
+    Exempt(r"beaver-ftc run my-damage\.yaml", "needs NASA's data, imported"),
     Exempt(r"python -m tools\.docs reference \S+", "in a checkout; tests/tools prints every such page"),
     Exempt(
         r"(beaver-ftc live(?: (?!--open)\S+)*)( --open)?",

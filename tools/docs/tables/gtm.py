@@ -88,8 +88,8 @@ def gtm_flights() -> str:
     rows = []
     for name, (mine, source, fine, usual) in _flown().items():
         differ = [100.0 * flights.largest(mine, other)[MOTION].max() for other in (fine, usual, source)]
-        rows.append([name, "/".join(f"{share:.2f}" for share in differ)])
-    head = ("flight", "1 kHz/200 Hz/gravity, %")
+        rows.append([name, *(f"{share:.2f}" for share in differ)])
+    head = ("flight", "integrator 1 kHz, %", "integrator 200 Hz, %", "gravity, %")
     _draw()
     return markdown_table(head, rows) + f"\n\n![Eight flights by both]({PICTURE})"
 
@@ -122,26 +122,32 @@ def _draw() -> None:
 
 def gtm_checks() -> str:
     """Coefficients, mass properties, trim and modes: the largest differences."""
-    gravity = _specifications()[1].gravity
     given, drawn = _points()
     (speed, speeds), (alpha, alphas) = _trims()
     frequency, damping = _modes()
-    here, there = _bench().steady(Condition(alpha_deg=3.0)), _steady(heavy=False)
     rows = [
-        ["60 given points, of the span", f"{given:.1e}"],
-        [f"{DRAWN} drawn, inside and beyond", f"{drawn:.1e}"],
-        ["masses, share", f"{_masses():.1e}"],
-        [f"trim at {speeds} speeds, deg", f"{speed:.3f}"],
-        [f"at {alphas} angles, deg", f"{alpha:.3f}"],
-        ["modes, frequency", f"{frequency:.1e}"],
-        ["damping", f"{damping:.1e}"],
-        ["elevator at 3 deg, deg", f"{here.elevator_deg:.3f}/{there.elevator_deg:.3f}"],
-        ["throttle, %", f"{here.throttle_percent:.2f}/{there.throttle_percent:.2f}"],
-        ["gravity, ft/s2", f"{gravity:.3f}/{_specifications()[0].gravity:.3f}"],
-        ["air", f"{_air():.1e}"],
-        *_spiral(),
+        ("coefficients at the 60 points of the source", f"{given:.1e}", "share of the span"),
+        (f"coefficients at {DRAWN} drawn points", f"{drawn:.1e}", "share of the span"),
+        ("mass, inertia, centre of gravity", f"{_masses():.1e}", "share"),
+        ("pressure and density at 800 ft", f"{_air():.1e}", "share"),
+        (f"surfaces in trim at {speeds} airspeeds", f"{speed:.3f}", "deg"),
+        (f"surfaces in trim at {alphas} angles of attack", f"{alpha:.3f}", "deg"),
+        ("frequency of the modes", f"{frequency:.1e}", "share"),
+        ("damping of the modes", f"{damping:.1e}", "1"),
     ]
-    return markdown_table(("what", "largest difference"), rows)
+    return markdown_table(("quantity", "largest difference", "unit"), rows)
+
+
+def gtm_trim() -> str:
+    """Trim at 3 deg of angle of attack, and gravity: JSBSim and the specification."""
+    here, there = _bench().steady(Condition(alpha_deg=3.0)), _steady(heavy=False)
+    source, heavy = _specifications()
+    rows = [
+        ("elevator", "deg", f"{here.elevator_deg:.3f}", f"{there.elevator_deg:.3f}"),
+        ("throttle", "%", f"{here.throttle_percent:.2f}", f"{there.throttle_percent:.2f}"),
+        ("gravity", "ft/s²", f"{heavy.gravity:.3f}", f"{source.gravity:.3f}"),
+    ]
+    return markdown_table(("quantity", "unit", "JSBSim", "specification"), rows)
 
 
 def _air() -> float:
@@ -248,14 +254,16 @@ def gtm_cost() -> str:
     load_s = min(_processor(lambda: bare(model)) for _ in range(3))
     bench, beaver = Bench(model), bare(load().jsbsim)
     flights.begin(bench, flights.state_of(_steady(heavy=True)), flights.of_steady(_steady(heavy=True)))
-    rows = [["steady flight, servos late", _ratio(bench.fdm, beaver)]]
+    rows = [["frame in steady flight", _ratio(bench.fdm, beaver), "frames of the Beaver"]]
     for i, name in enumerate(NAMES.values()):
         bench.fdm[f"fcs/{name}-cmd-rad"] = 0.005 + 0.002 * i
-    rows.append(["no two surfaces alike", _ratio(bench.fdm, beaver)])
+    rows.append(
+        ["frame with all surfaces deflected differently", _ratio(bench.fdm, beaver), "frames of the Beaver"]
+    )
     bench.damage(4)
-    rows.append(["and a wing tip off", _ratio(bench.fdm, beaver)])
-    rows.append(["loading, s", f"{load_s:.2f}"])
-    return markdown_table(("a frame of", "in plain frames of the Beaver"), rows)
+    rows.append(["the same with a wing tip off", _ratio(bench.fdm, beaver), "frames of the Beaver"])
+    rows.append(["loading the model", f"{load_s:.2f}", "s"])
+    return markdown_table(("quantity", "processor time", "unit"), rows)
 
 
 def _processor(work: Callable[[], object]) -> float:
@@ -274,17 +282,19 @@ def _ratio(one: Any, other: Any) -> str:
     return f"{mine / plain:.1f}"
 
 
-# A steep spiral in equilibrium, elevators at -30 deg, other surfaces at 0, no thrust [Cunis2018].
+# A steep spiral in equilibrium, elevators at -30 deg, other surfaces at 0, no thrust [Cunis2018]; m/s, deg,
+# deg/s.
 SPIRAL = {
-    "spiral, m/s": 43.32, "alpha": 20.05, "beta": -7.55, "p": -122.9, "q": 49.1, "r": -45.4,
-    "phi": -47.3, "theta": -61.5,
+    "airspeed": ("m/s", 43.32), "angle of attack": ("deg", 20.05), "sideslip": ("deg", -7.55),
+    "roll rate": ("deg/s", -122.9), "pitch rate": ("deg/s", 49.1), "yaw rate": ("deg/s", -45.4),
+    "bank angle": ("deg", -47.3), "pitch attitude": ("deg", -61.5),
 }  # fmt: skip
 _SETTLED = slice(2000, 2400)  # of 12 s at 5 ms: the height is that of the sea there
 
 
-def _spiral() -> list[list[str]]:
+def gtm_spiral() -> str:
     """A steady steep spiral of NASA's simulation: JSBSim, which starts there at 1500 ft, and as published."""
-    V, *angles = SPIRAL.values()
+    V, *angles = (value for _, value in SPIRAL.values())
     alpha, beta, p, q, r, phi, theta = map(radians, angles)
     along = V / 0.3048 * np.array([cos(alpha) * cos(beta), sin(beta), sin(alpha) * cos(beta)])
     start = flights.State(*map(float, along), p, q, r, phi, theta, 0.0, 1500.0)
@@ -293,4 +303,10 @@ def _spiral() -> list[list[str]]:
     u, v, w = rows[:, :3].T
     size = np.sqrt(u * u + v * v + w * w)
     found = [size * 0.3048, *np.degrees([np.arctan2(w, u), np.arcsin(v / size), *rows[:, 3:8].T])]
-    return [[name, f"{of.mean():.2f}/{SPIRAL[name]}"] for name, of in zip(SPIRAL, found, strict=True)]
+    return markdown_table(
+        ("quantity", "unit", "JSBSim", "published", "difference"),
+        [
+            (name, unit, f"{of.mean():.2f}", f"{given}", f"{of.mean() - given:.2f}")
+            for (name, (unit, given)), of in zip(SPIRAL.items(), found, strict=True)
+        ],
+    )

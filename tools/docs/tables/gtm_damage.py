@@ -46,10 +46,10 @@ def gtm_envelope() -> str:
     for name, turns in of.items():
         held = [turn for turn in turns if turn.held]
         level = [turn.speed_kt for turn in held if turn.bank_deg == 0]
-        flown = "" if name == "whole" else "/".join(str(_flown(name, law)) for law in LAWS)
-        rows.append([name, f"{len(held)}/{len(turns)}", f"{min(level)}", flown])
+        flown = ["" if name == "whole" else str(_flown(name, law)) for law in LAWS]
+        rows.append([name, str(len(turns)), str(len(held)), str(min(level)), *flown])
     _draw(of)
-    head = ("case", "points held", "slowest level, kt", f"flown of {len(FLOWN_KT)}, ours/oracle/nominal")
+    head = ("case", "turns tried", "turns held", "slowest level flight, kt", *LAWS)
     return markdown_table(head, rows) + f"\n\n![Level turns held]({PICTURE})"
 
 
@@ -104,25 +104,47 @@ def _draw(of: dict[str, list[Turn]]) -> None:
 
 
 def gtm_damage() -> str:
-    """The campaign of `benchmarks/gtm_damage.py`; of calm air what is found within 1 s, and wrong names; and
-    what `benchmarks/gtm_informed.py` says of the same flights.
+    """The campaign of `benchmarks/gtm_damage.py`: how soon damage is detected."""
+    columns = (1, 2, 3, 4, 5)
+    rows = [[row[0], *(str(row[k]) for k in columns)] for row in campaign.rows(_flights())]
+    return markdown_table(("case", *(campaign.HEAD[k] for k in columns)), rows)
+
+
+def gtm_damage_named() -> str:
+    """The same flights: what is concluded about the damage."""
+    columns = (1, 7, 8, 9, 10, 11)
+    rows = [[row[0], *(str(row[k]) for k in columns)] for row in campaign.rows(_flights())]
+    return markdown_table(("case", *(campaign.HEAD[k] for k in columns)), rows)
+
+
+def gtm_damage_informed() -> str:
+    """The same flights beside `benchmarks/gtm_informed.py`; and in calm air with exact sensors."""
+    calm = {row[0]: row for row in campaign.rows(campaign.fly_all(CALM, 1, True, _kept() / "calm.jsonl"))}
+    ours = {one["k"]: one for one in _flights()}
+    informed_of = informed.see_all(ours, 1, _kept() / "informed.jsonl")
+    rows = [
+        [row[0], *(str(row[k]) for k in (1, 2, 3)), str(row[-1]), *(str(calm[row[0]][k]) for k in (1, 3, 11))]
+        for row in informed.rows(ours, informed_of)
+    ]
+    head = (
+        "case",
+        "flights",
+        "ours",
+        "informed",
+        "certain",
+        "calm: flights",
+        "calm: within 1 s",
+        "calm: wrong",
+    )
+    return markdown_table(head, rows)
+
+
+def _flights() -> list[campaign.Document]:
+    """The flights in turbulence.
 
     `BEAVER_FTC_GTM_ROWS`: a folder with rows flown before by that benchmark, which are not flown again.
     """
-    kept = _kept()
-    real = campaign.fly_all(FLIGHTS, 1, False, kept / "full.jsonl")
-    calm = campaign.fly_all(CALM, 1, True, kept / "calm.jsonl")
-    within = {row[0]: f"{row[3]}/{row[1]}/{row[11]}" for row in campaign.rows(calm)}
-    ours = {one["k"]: one for one in real}
-    told = informed.see_all(ours, 1, kept / "informed.jsonl")
-    beside = {row[0]: [row[3], row[-1]] for row in informed.rows(ours, told)}
-    shown = [1, 2, 3, 4, 5, 7, 8, 9, 10, 11]
-    rows = [
-        [row[0], *(str(row[k]) for k in shown), within[row[0]], *beside[row[0]]]
-        for row in campaign.rows(real)
-    ]
-    last = ("calm: within/wrong", "told", "certain, not ours")
-    return markdown_table(("case", *(campaign.HEAD[k] for k in shown), *last), rows)
+    return campaign.fly_all(FLIGHTS, 1, False, _kept() / "full.jsonl")
 
 
 @cache
@@ -141,12 +163,14 @@ def gtm_laws() -> str:
     rows = [
         [
             one["law"],
+            str(of["flights"]),
             str(one["departures"]),
             *(_degrees(one[f"{when}_median"]) for when in ("before", "after")),
         ]
         for one in of["lines"]
     ]
-    return markdown_table(("law", f"lost of {of['flights']}", "before, deg/s", "after"), rows)
+    head = ("law", "flights", "aircraft lost", "before damage, deg/s", "after damage, deg/s")
+    return markdown_table(head, rows)
 
 
 def _degrees(rate: float | None) -> str:

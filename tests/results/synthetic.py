@@ -7,6 +7,9 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.aircraft import load
+from beaver_ftc.scenario.actuators import Actuators
+from beaver_ftc.scenario.environment import Environment
+from beaver_ftc.scenario.sensors import Sensors
 
 AXES = ("p", "q", "r")
 SURFACES = ("aileron", "elevator", "rudder", "flap")
@@ -83,6 +86,9 @@ class Scenario:
     control: Any = field(default_factory=lambda: CONTROL)
     initial: Any = field(default_factory=lambda: INITIAL)
     airframe: Any = field(default_factory=load)
+    environment: Any = field(default_factory=lambda: Environment(wind_mps=(0.0, 1.0, 0.0)))
+    sensors: Any = field(default_factory=Sensors)
+    actuators: Any = field(default_factory=Actuators)
     changes: tuple[Any, ...] = ()
 
 

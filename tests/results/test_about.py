@@ -17,10 +17,18 @@ UNKNOWN = {"type": "unanticipated", "at_s": 12}
 ALL, PAIRS = {"fault_class": "all"}, {"fault_class": "all", "pairs": True}
 
 
-def _hints(*faults, detected=True, guaranteed=0.1, end=(45.0, 1828.8), why=None, used=(0.11, 0.5), **keys):
+def _hints(
+    *faults, detected=True, guaranteed=0.1, end=(45.0, 1828.8), why=None, used=(0.11, 0.5), delay=None, **keys
+):
     scenario = Scenario.model_validate({"name": "x", "faults": list(faults), **keys})
-    document = {"detection": {"detected": detected, "guaranteed_delay_s": guaranteed, "inconclusive": why}}
-    return hints(SimpleNamespace(scenario=scenario, end=end, closest_approach=used), Metrics.of(document))
+    detection = {
+        "detected": detected,
+        "guaranteed_delay_s": guaranteed,
+        "inconclusive": why,
+        "delay_s": delay,
+    }
+    flight = SimpleNamespace(scenario=scenario, end=end, closest_approach=used)
+    return hints(flight, Metrics.of({"detection": detection}))
 
 
 @pytest.mark.parametrize(
@@ -30,7 +38,11 @@ def _hints(*faults, detected=True, guaranteed=0.1, end=(45.0, 1828.8), why=None,
         ([STUCK], {"fdi": {"scheme": "none"}}), ([LOSS], {"end": (41.0, 1600.0)}),
         ([LOSS | {"end_s": 13}, RUDDER], {"fdi": ALL}), ([LOSS], {"detected": False}),
         ([LOSS], {"detected": False, "guaranteed": None, "why": {"share": 0.5}}),
-        ([LOSS], {"used": (0.2, 0.899)}), ([LOSS], {"used": (0.2, 1.25)}), ([], {"used": (0.95, 0.2)}),
+        ([LOSS], {"used": (0.2, 0.899)}), ([LOSS], {"used": (0.2, 1.25)}), ([], {"used": (0.899, 0.2)}),
+        ([LOSS], {"delay": 0.02}), ([LOSS], {"delay": 0.01, "sensors": "tactical-grade"}),
+        ([LOSS], {"delay": 0.01, "actuators": "servo"}),
+        ([LOSS], {"delay": 0.01, "environment": {"wind_mps": [0, 3, 0]}}),
+        ([LOSS], {"delay": 0.01, "uncertainty": {"coefficients": {"Cm_de": 1.02}}}),
     ],
 )  # fmt: skip
 def test_nothing_is_said_without_need(arguments, keys):
@@ -50,6 +62,9 @@ def test_nothing_is_said_without_need(arguments, keys):
             r"airspeed fell from 45 to 39 m/s \(only the body rates",
         ),
         ([LOSS], {"used": (0.2, 0.9687)}, "healthy flight already reaches 96.8 % of its threshold"),
+        ([], {"used": (0.95, 0.2)}, "reaches 95 % of its threshold, so that an error a little larger"),
+        ([LOSS], {"delay": 0.01}, r"within one frame \(0.01 s\): sensors exact, servos ideal"),
+        ([LOSS], {"delay": 0.05, "rate_hz": 20}, r"within one frame \(0.05 s\)"),
         ([], {"end": (45.0, 1500.0)}, "altitude fell from 1829 to 1500 m"),
     ],
 )

@@ -539,14 +539,19 @@ def several(flown, said):
 
 
 HINTS = {
-    "the flight drifted": lambda f: (
-        "autopilot" not in f.given
-        and (
-            abs(f["airspeed_mps"][-1] - f.scenario.initial.airspeed_mps) > 5
-            or abs(f["altitude_m"][-1] - 1828.8) > 300
-        )
+    "airspeed ": lambda f: (
+        "autopilot" not in f.given and abs(f["airspeed_mps"][-1] - f.scenario.initial.airspeed_mps) > 5
     ),
-    "the healthy part": lambda f: bool(f.faults) and 0.9 <= loudest(f, f.at_s) <= 1.0,
+    "the residual of the healthy": lambda f: bool(f.faults) and 0.9 <= loudest(f, f.at_s) <= 1.0,
+    "the residual already": lambda f: not f.faults and 0.9 <= loudest(f, np.inf) <= 1.0,
+    "the alarm came within one frame": lambda f: (
+        (
+            (f.metrics["detection"]["delay_s"] or np.inf) <= f.dt + DUST_S
+            or f.metrics["detection"]["delay_s"] == 0.0
+        )
+        and f.given.keys().isdisjoint({"sensors", "actuators", "environment"})
+        and f.given.get("uncertainty", {}).keys() <= {"inertia_coupling", "sinusoid"}
+    ),
     "faults on several": lambda f: len(f.faults) > 1 and not f.scenario.fdi.pairs,
     "no alarm, and none": lambda f: (
         bool(f.faults)

@@ -34,6 +34,8 @@ from beaver_ftc.results.model import Document, Metrics
 from beaver_ftc.scenario.faults import is_share
 from beaver_ftc.scenario.judgement import LOSS_OF_EFFECTIVENESS, DeclaredFault, Truth
 from beaver_ftc.scenario.pairs import of_several
+from beaver_ftc.scenario.timing import TIME_TOLERANCE_S
+from beaver_ftc.scenario.undeclared import undeclared
 
 if TYPE_CHECKING:
     from beaver_ftc.loop.outcome import Landing
@@ -314,7 +316,7 @@ def _condition(flight: "Landing") -> model.Condition:
 def hints(flight: "Landing", found: Metrics) -> list[str]:
     """Notes without which a reader would misread the verdict: one sentence each."""
     scenario = flight.scenario
-    of_diagnosis = (_outside_the_class, _several, _too_small) if scenario.fdi.diagnoses else ()
+    of_diagnosis = (_in_one_frame, _outside_the_class, _several, _too_small) if scenario.fdi.diagnoses else ()
     said = [*(says(scenario, found) for says in of_diagnosis), _on_the_bound(flight), _waited(found)]
     said.append(_drift(flight))
     return [sentence for sentence in said if sentence]
@@ -353,14 +355,37 @@ def _too_small(scenario: "Scenario", found: Metrics) -> str:
     )
 
 
-def _on_the_bound(flight: "Landing") -> str:
-    """The worst-case test has next to nothing left before the fault, which any fault then takes."""
-    used = max(flight.closest_approach, default=0.0)
-    if not flight.scenario.faults or not ON_THE_BOUND <= used <= 1.0:
+def _in_one_frame(scenario: "Scenario", found: Metrics) -> str:
+    """The shortest delay that there is: it says nothing of a flight in which something is uncertain."""
+    delay_s, frame_s = found.detection.delay_s, 1.0 / scenario.rate_hz
+    if delay_s is None or delay_s > frame_s + TIME_TOLERANCE_S or not _is_exact(scenario):
         return ""
     return (
-        f"the residual of the healthy flight already reaches {math.floor(1000.0 * used) / 10.0:g} % of its "
-        "threshold, so that this scenario's own uncertainty decides how soon a small fault is detected"
+        f"the alarm came within one frame ({frame_s:.2g} s): sensors exact, servos ideal, the air "
+        "is still, and no error is undeclared"
+    )
+
+
+def _is_exact(scenario: "Scenario") -> bool:
+    """Whether sensors and servos are ideal, the air is still and nothing is undeclared."""
+    air = scenario.environment
+    still = air.turbulence == "none" and not any(air.wind_mps) and not air.gusts
+    exact = scenario.sensors.is_ideal and scenario.actuators.is_ideal and still
+    return exact and next(undeclared(scenario), None) is None
+
+
+def _on_the_bound(flight: "Landing") -> str:
+    """The worst-case test has next to nothing left before the fault, which any fault then takes, or an error
+    that is larger than declared."""
+    used = max(flight.closest_approach, default=0.0)
+    if not ON_THE_BOUND <= used <= 1.0:
+        return ""
+    reached = f"already reaches {math.floor(1000.0 * used) / 10.0:g} % of its threshold, so that"
+    if not flight.scenario.faults:
+        return f"the residual {reached} an error a little larger than flown here would raise a false alarm"
+    return (
+        f"the residual of the healthy flight {reached} this scenario's own uncertainty decides how soon a "
+        "small fault is detected"
     )
 
 

@@ -280,7 +280,7 @@ def test_an_own_aircraft_is_kept_with_its_flight(own, tmp_path):
 
 def test_a_run_writes_what_is_asked_for(tmp_path, monkeypatch):
     flown, drawn = Scenario(name="short", duration_s=0.2), []
-    monkeypatch.setattr(writer, "write_report_files", lambda *given: drawn.append(given))
+    monkeypatch.setattr(writer, "write_report_files", lambda *given, **_: drawn.append(given))
     usual = {"scenario.yaml", "metrics.json", "log.parquet"}
     asked = [
         ({"report": False}, set()), ({"report": False, "exports": ("csv",)}, {"log.csv"}),
@@ -301,7 +301,7 @@ def test_a_run_writes_what_is_asked_for(tmp_path, monkeypatch):
 
 def test_a_flight_is_saved_with_its_report_unless_told_otherwise(tmp_path, monkeypatch):
     drawn = []
-    monkeypatch.setattr(writer, "write_report_files", lambda folder, document: drawn.append(folder.name))
+    monkeypatch.setattr(writer, "write_report_files", lambda folder, document, **_: drawn.append(folder.name))
     sim = bf.Simulation(Scenario(name="short", duration_s=0.2))
     sim.step(frames=3)
     for saved in (sim, sim.land()):

@@ -320,7 +320,9 @@ def test_the_pictures_of_a_flight_whole_and_around_the_fault(tmp_path, monkeypat
     document, shown = metrics(Flight()), []
     monkeypatch.setattr(figures.log, "column_names", lambda path: COLUMNS)
     monkeypatch.setattr(figures, "draw", lambda *given: _Drawn(*given, shown))
-    monkeypatch.setattr(figures, "read_series", lambda path, columns, span: span)
+    monkeypatch.setattr(
+        figures, "read_series", lambda path, columns, span: dict.fromkeys(("t_s", *columns), span)
+    )
     for given in (document, document | {"engine_power": {"from_s": 1.0}}, metrics(QUIET)):
         shown.clear()
         written = figures.write_figures(tmp_path / "log.parquet", Metrics.of(given), tmp_path / "figures")
@@ -343,9 +345,9 @@ class _Drawn:
     def __init__(self, view, series, _, name, shown):
         self.view, self.series, self.name, self.shown = view, series, name, shown
 
-    def savefig(self, path, metadata):
+    def savefig(self, path, metadata, pil_kwargs):
         assert path.name.startswith(self.view.name)
-        self.shown.append((path, self.series, (self.name, metadata["Software"])))
+        self.shown.append((path, self.series["t_s"], (self.name, metadata["Software"])))
 
 
 def test_a_window_without_a_fault():

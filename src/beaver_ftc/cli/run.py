@@ -35,6 +35,7 @@ from beaver_ftc.extensions import required
 
 if TYPE_CHECKING:
     from beaver_ftc.plant.adapter import Plant
+    from beaver_ftc.results.painters import Painters
     from beaver_ftc.scenario.schema import Scenario
 
     Prepare = Callable[[Plant], None]
@@ -82,7 +83,11 @@ def command(options: Options) -> None:
             emit_json({"passed": False, "runs": [], "errors": str(error).splitlines()})
         write_junit([{"scenario": "scenarios", "error": str(error)}], options.junit)
         raise
-    raise typer.Exit(_run_all(loaded, options))
+    from beaver_ftc.results.painters import painters
+
+    with painters(not options.no_report) as at_work:
+        status = _run_all(loaded, options, at_work)
+    raise typer.Exit(status)
 
 
 def _shown(given: str | None) -> "Prepare | None":
@@ -101,7 +106,7 @@ def _shown(given: str | None) -> "Prepare | None":
     return partial(required("flightgear", "--flightgear"), host=host, port=int(port))
 
 
-def _run_all(scenarios: list["Scenario"], options: Options) -> int:
+def _run_all(scenarios: list["Scenario"], options: Options, painters: "Painters") -> int:
     """Fly one after the other; one that fails does not stop the rest. Returns the worst exit status."""
     from beaver_ftc.results.model import Metrics
     from beaver_ftc.results.verdict import verdict_text
@@ -111,7 +116,7 @@ def _run_all(scenarios: list["Scenario"], options: Options) -> int:
     for scenario in scenarios:
         began = time.perf_counter()
         try:
-            document = _run_one(scenario, options, prepare)
+            document = _run_one(scenario, options, prepare, painters)
         except Exception as error:
             failure = failure_of(error)
             status = max(status, report(failure))
@@ -130,7 +135,9 @@ def _run_all(scenarios: list["Scenario"], options: Options) -> int:
     return status
 
 
-def _run_one(scenario: "Scenario", options: Options, prepare: "Prepare | None") -> Document:
+def _run_one(
+    scenario: "Scenario", options: Options, prepare: "Prepare | None", painters: "Painters"
+) -> Document:
     from beaver_ftc.results.writer import run
 
     for warning in scenario.warnings():
@@ -140,8 +147,9 @@ def _run_one(scenario: "Scenario", options: Options, prepare: "Prepare | None") 
     with progress_bar(scenario.name) as progress:
         certified = options.certificate
         document = run(
-            scenario, options.out, not options.no_report, progress, exports, prepare, recording, certified
-        )
+            scenario, options.out, not options.no_report, progress, exports, prepare, recording, certified,
+            painters,
+        )  # fmt: skip
     folder = options.out / scenario.name
     return document | {"folder": str(folder)} | (_certificate(folder) if certified else {})
 

@@ -22,6 +22,7 @@ from beaver_ftc.extensions import required
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import as_json, metrics
 from beaver_ftc.results.model import Document, Metrics
+from beaver_ftc.results.painters import Painters, drawing
 
 if TYPE_CHECKING:
     from beaver_ftc.plant.adapter import Plant
@@ -56,6 +57,7 @@ def run(
     prepare: "Callable[[Plant], None] | None" = None,
     recording: str | None = None,
     certified: bool = False,
+    painters: Painters = (),
 ) -> Document:
     """Fly `scenario`, write `out/<name>/`, and return the metrics document.
 
@@ -63,9 +65,9 @@ def run(
 
     exports: of "csv" and "acmi". prepare: called with the trimmed plant just before the flight. recording:
     table, ulog or ardupilot, to write the log as a recorder on board would have. certified: write the
-    certificate of its alarm and exclusions. Raises BadInput for a flight that cannot be trimmed or
-    certified, SimulationFailed for one not completed or kept, NotAllWritten where the log is kept but another
-    file could not be written.
+    certificate of its alarm and exclusions. painters: who draws the figures, if not this process. Raises
+    BadInput for a flight that cannot be trimmed or certified, SimulationFailed for one not completed or kept,
+    NotAllWritten where the log is kept but another file could not be written.
     """
     from beaver_ftc.loop.loop import fly
 
@@ -86,7 +88,7 @@ def run(
                 certificate.write(folder)
         if report and document:
             with _kept_whatever(folder, "report.html", failed):
-                write_report_files(folder, document)
+                write_report_files(folder, document, painters=painters)
         if "csv" in exports:
             from beaver_ftc.results.exports import write_csv
 
@@ -153,16 +155,20 @@ def _no_model(folder: str, names: list[str]) -> set[str]:
     return {n for n in names if Path(folder, n).is_file() and Path(n).suffix not in MODEL_FILES}
 
 
-def write_report_files(folder: Path, document: Document, to: Path | None = None) -> None:
+def write_report_files(
+    folder: Path, document: Document, to: Path | None = None, painters: Painters = ()
+) -> None:
     """Draw the figures and the report of a result folder that holds its log and its scenario.
 
-    to: where to, if not into that folder.
+    to: where to, if not into that folder. painters: who draws the figures, if not this process.
     """
-    from beaver_ftc.results.figures import write_figures
+    from beaver_ftc.results.figures import pictures_of
     from beaver_ftc.results.report import write_report
 
-    write_figures(folder / "log.parquet", Metrics.of(document), (to or folder) / "figures")
-    write_report((to or folder) / "report.html", [folder])
+    to = to or folder
+    (to / "figures").mkdir(exist_ok=True)
+    with drawing(pictures_of(folder / "log.parquet", Metrics.of(document), to / "figures"), painters):
+        write_report(to / "report.html", [folder])
 
 
 def add_report(folder: Path, document: Document) -> str:

@@ -1,0 +1,111 @@
+"""Figures drawn by processes beside this one, which import matplotlib while the flight is flown.
+
+They are forked before anything heavy is there, and end with the one that began them. Where a process cannot
+be forked, or has one core, or a painter has died, the figures are drawn here: they are the same.
+"""
+
+import multiprocessing
+import signal
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from multiprocessing.connection import Connection
+from os import cpu_count
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from beaver_ftc.results.figures import Picture
+
+PROCESSES = 2  # the process that flies waits for them
+Painters = Sequence[Connection]
+
+
+@contextmanager
+def painters(wanted: bool = True) -> Iterator[Painters]:
+    """Processes that draw until the end of the block; none where figures are not wanted or not drawn so."""
+    if not wanted or not sys.platform.startswith("linux") or (cpu_count() or 1) < PROCESSES:
+        yield ()
+        return
+    fork = multiprocessing.get_context("fork")
+    ours: list[Connection] = []
+    processes = []
+    for _ in range(PROCESSES):
+        here, there = fork.Pipe()
+        ours.append(here)
+        processes.append(fork.Process(target=_serve, args=(there, tuple(ours)), daemon=True))
+        processes[-1].start()
+        there.close()
+    try:
+        yield ours
+    finally:
+        for process in processes:
+            process.terminate()
+        for process in processes:
+            process.join()
+
+
+@contextmanager
+def drawing(pictures: "Sequence[Picture]", painters: Painters) -> Iterator[None]:
+    """Have the pictures drawn during the block: they are there at its end. Raises what went wrong."""
+    given = list(zip(painters, share(pictures, len(painters)), strict=True)) if painters else []
+    asked = [(painter, own) for painter, own in given if _ask(painter, own)]
+    left = [picture for each in given if each not in asked for picture in each[1]] if given else [*pictures]
+    failures = []
+    try:
+        yield
+    finally:  # whatever fails meanwhile: nobody draws into a folder that is given up
+        for painter, own in asked:
+            try:
+                failures.append(painter.recv())
+            except (EOFError, OSError):  # it was killed
+                left += own
+    save_all(left)
+    for failure in filter(None, failures):
+        raise failure
+
+
+def save_all(pictures: "Sequence[Picture]") -> None:
+    """Draw pictures in this process."""
+    if pictures:
+        from beaver_ftc.results.figures import save
+
+        for picture in pictures:
+            save(picture)
+
+
+def _ask(painter: Connection, pictures: "Sequence[Picture]") -> bool:
+    """Whether this painter has been asked: one that was killed cannot be."""
+    try:
+        painter.send(pictures)
+    except OSError:
+        return False
+    return True
+
+
+def _serve(there: Connection, not_ours: Sequence[Connection]) -> None:
+    """Draw what is asked for until the other end is closed: by its process, or with it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever began us ends us
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    for each in not_ours:
+        each.close()
+    from beaver_ftc.results.figures import figure_class
+
+    figure_class()
+    while True:
+        try:
+            pictures = there.recv()
+        except (EOFError, OSError):
+            return
+        try:
+            save_all(pictures)
+            there.send(None)
+        except Exception as error:
+            there.send(error)
+
+
+def share(pictures: "Sequence[Picture]", among: int) -> "list[list[Picture]]":
+    """As much to draw for each: the largest first, to whoever has the least."""
+    shares: list[list[Picture]] = [[] for _ in range(among)]
+    for picture in sorted(pictures, key=lambda each: -len(each.view.panels)):
+        min(shares, key=lambda given: sum(1 + len(each.view.panels) for each in given)).append(picture)
+    return shares

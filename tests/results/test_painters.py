@@ -1,0 +1,68 @@
+"""Figures drawn by other processes are those drawn by this one, whatever happens to the others."""
+
+import os
+import signal
+import sys
+from dataclasses import replace
+
+import pytest
+
+from beaver_ftc.results.figures import pictures_of, write_figures
+from beaver_ftc.results.metrics import measure
+from beaver_ftc.results.painters import drawing, painters, share
+
+pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="processes are forked on Linux")
+
+
+@pytest.fixture
+def pictures(log_path, flight, tmp_path):
+    (tmp_path / "beside").mkdir()
+    return pictures_of(log_path, measure(flight), tmp_path / "beside")[-3:]
+
+
+def bytes_of(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+@pytest.mark.parametrize("killed", [0, 1, 2])
+def test_figures_are_the_same_whoever_draws_them(killed, pictures, log_path, flight, tmp_path):
+    with painters() as at_work:
+        assert len(at_work) == 2
+        for painter in at_work[:killed]:
+            painter.send("no picture")  # it answers what went wrong, and goes on
+            assert isinstance(painter.recv(), Exception)
+        with drawing(pictures, at_work):
+            for child in children()[:killed]:
+                os.kill(child, signal.SIGKILL)
+    assert children() == []
+    write_figures(log_path, measure(flight), tmp_path / "here")
+    here = bytes_of(tmp_path / "here")
+    assert bytes_of(tmp_path / "beside") == {p.path.name: here[p.path.name] for p in pictures}
+
+
+def children():
+    with open(f"/proc/self/task/{os.getpid()}/children") as file:
+        return [int(word) for word in file.read().split()]
+
+
+def test_a_failure_is_raised_here_once_all_have_ended(pictures, tmp_path):
+    nowhere = replace(pictures[0], path=tmp_path / "nowhere" / "x.png")
+    with (
+        painters() as at_work,
+        pytest.raises(OSError, match="nowhere"),
+        drawing([*pictures, nowhere], at_work),
+    ):
+        pass
+
+
+def test_whoever_has_least_draws_the_next_largest(pictures):
+    sizes = sorted(len(p.view.panels) for p in pictures)
+    assert [[len(p.view.panels) for p in each] for each in share(pictures, 2)] == [
+        [sizes[2]],
+        [sizes[1], sizes[0]],
+    ]
+
+
+def test_nobody_is_begun_for_no_figures():
+    with painters(wanted=False) as at_work:
+        assert at_work == ()

@@ -21,6 +21,7 @@ PROGRAMS = ("beaver-ftc", "pip", "pytest", "python", "make", "jsbsim", "fgfs", "
 _STARTS = re.compile(rf"({'|'.join(PROGRAMS)}) \S|pytest\b")
 _FENCED = re.compile(r"^ *```(\w*)\n(.*?)^ *```$", re.MULTILINE | re.DOTALL)
 _INLINE = re.compile(rf"(?<!`)`((?:{'|'.join(PROGRAMS)})\s[^`]+)`(?!`)")
+_NAMED = re.compile(r"`([\w.-]+\.(?:yaml|py))`:\n\n```\w+\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 _JOB = re.compile(r"^\s*- run: (.+)$", re.MULTILINE)
 
 
@@ -70,6 +71,49 @@ def python_blocks(page: Path) -> list[str]:
 
 def _blocks(page: Path, kind: str) -> list[str]:
     return [block[2] for block in _FENCED.finditer(page.read_text(encoding="utf-8")) if block[1] == kind]
+
+
+def named_files(text: str) -> dict[str, str]:
+    """{file: contents} of the blocks that a page asks to write into a file: "... into `mine.yaml`:"."""
+    return {found[1]: found[2] for found in _NAMED.finditer(text)}
+
+
+def files_of_pages() -> dict[str, str]:
+    """The same of every page. A name stands for one file wherever it is."""
+    found: dict[str, str] = {}
+    for page in PAGES:
+        for name, text in named_files(page.read_text(encoding="utf-8")).items():
+            assert found.setdefault(name, text) == text, f"{_name(page)}: a second {name}"
+    return found
+
+
+@dataclass(frozen=True)
+class Step:
+    """One thing that a tutorial asks its reader to do: write a file, run a command, or run some Python."""
+
+    kind: str  # file, command or python
+    text: str
+    name: str = ""  # of the file
+
+
+def steps(text: str) -> list[Step]:
+    """The steps of a tutorial in their order. What a mark says is printed is no step."""
+    text = re.sub(
+        r"<!-- printed: .*?<!-- /printed -->", lambda mark: " " * len(mark[0]), text, flags=re.DOTALL
+    )
+    found = [(block.start(), Step("file", block[2], block[1])) for block in _NAMED.finditer(text)]
+    for block in _FENCED.finditer(text):
+        if block[1] == "python" and not any(block[2] == step.text for _, step in found):
+            found.append((block.start(), Step("python", block[2])))
+        found += [
+            (block.start() + at, Step("command", _bare(line)))
+            for at, line in enumerate(_of_block(block[1], block[2]))
+        ]
+    prose = _FENCED.sub(lambda block: " " * len(block[0]), text)
+    for line in re.finditer(r"^ {4}(\S.*)$", prose, re.MULTILINE):
+        if _STARTS.match(line[1]):
+            found.append((line.start(), Step("command", _bare(line[1]))))
+    return [step for _, step in sorted(found, key=lambda entry: entry[0])]
 
 
 def shown() -> list[Command]:

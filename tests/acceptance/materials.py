@@ -10,7 +10,7 @@ from beaver_ftc_live.challenge import folders, grading
 from beaver_ftc_logs import sample_logs
 from products.logs.synthetic import fly, write_csv
 
-from .documents import python_blocks, yaml_blocks
+from .documents import files_of_pages, python_blocks, yaml_blocks
 from .installation import ROOT, Installation
 
 BRIEF = """\
@@ -22,6 +22,12 @@ reference: {q: [{sine: {amplitude_deg_s: 3, frequency_hz: 0.5}}]}
 
 def lay_out(line: str, folder: Path, installation: Installation) -> None:
     """Put into the folder what the command names."""
+    for name, text in files_of_pages().items():
+        if any(word in line for word in (name, f"{name.removesuffix('.py')}:")):
+            (folder / name).write_text(text)
+            for other in files_of_pages():  # the base of a sweep, the detector of a scenario
+                if other in text:
+                    (folder / other).write_text(files_of_pages()[other])
     for pattern, put in _MATERIALS.items():
         if re.search(pattern, line):
             put(folder)
@@ -104,7 +110,13 @@ def _sample_logs(folder: Path) -> None:
 
 def _identified(folder: Path, installation: Installation) -> None:
     """The model that the page's command before makes."""
-    given = "identify healthy.csv --vehicle flying-wing.yaml --out wing.json"
+    sample = (folder / "my-logs").exists()
+    logs = (
+        "my-logs/healthy.csv --vehicle my-logs/vehicle.yaml"
+        if sample
+        else "healthy.csv --vehicle flying-wing.yaml"
+    )
+    given = f"identify {logs} --out wing.json"
     assert installation.beaver(*given.split(), cwd=folder).returncode == 0
 
 

@@ -75,7 +75,7 @@ def test_links_lead_somewhere(page):
 
 
 def test_every_command_answers_a_question():
-    questions = (DOCS / "questions.md").read_text()
+    questions = (DOCS / "README.md").read_text()
     assert [name for name in registered_commands() if f"`{name}" not in questions] == []
 
 

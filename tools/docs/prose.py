@@ -174,7 +174,7 @@ def _forms(verb: str) -> Iterator[str]:
 
 def _verbless(text: str) -> Iterator[tuple[str, int, str]]:
     """Sentences of paragraphs and of items of lists in which no word is a verb."""
-    for line, paragraph in _paragraphs(text):
+    for line, paragraph in _paragraphs(text.partition("\n## Next\n")[0]):  # there are labels of links
         if paragraph.startswith(_CAPTION):
             continue
         for sentence in _SENTENCE.split(paragraph):

@@ -19,6 +19,19 @@ from tools.docs.pictures import lighten
 SCENARIO = "elevator-partial-loss"
 ARGUMENTS = ["--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader"]  # without a graphics card
 COMPILED_WITHIN_S = 600.0
+# Parts of the report with a number beside them, in the order of the table of docs/tutorials/verdict.md.
+NUMBERED = ("table", "table:has(td.met)", "table:has(th[scope=col])", "#play", ".key", "#space")
+_NUMBERS = """(parts) => parts.forEach((part, i) => {
+  document.body.style.marginLeft = "24px";
+  const at = document.querySelector(part).getBoundingClientRect();
+  const badge = document.createElement("b");
+  badge.textContent = i + 1;
+  badge.style = `left: ${at.left - 26}px; top: ${at.top + scrollY - 2}px; position: absolute;
+    width: 22px; height: 22px; border-radius: 11px; background: #7d0a1e; color: #fff;
+    font: bold 14px/22px sans-serif;
+    text-align: center; z-index: 9`;
+  document.body.append(badge);
+})"""
 BREAK_AT_S, LOOK_AT_S = 12.0, 20.0
 
 
@@ -45,6 +58,9 @@ def _report(browser: Any, folder: Path, path: Path) -> Path:
     page = browser.new_page(viewport={"width": 1000, "height": 1150})
     page.goto((folder / SCENARIO / "report.html").as_uri())
     page.screenshot(path=path)
+    page.evaluate(_NUMBERS, list(NUMBERED))
+    page.screenshot(path=path.with_stem("report-annotated"))
+    lighten(path.with_stem("report-annotated"))
     page.close()
     return lighten(path)
 

@@ -1,0 +1,131 @@
+"""The gallery of built-in scenarios: a thumbnail of each, its outcome and its description."""
+
+import hashlib
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+import beaver_ftc as bf
+from beaver_ftc.results.flight import Flight
+from beaver_ftc.results.style import LOOKS, SKY, VERMILION
+from beaver_ftc.studies.present.tables import markdown_table
+
+_WIDTH, _HEIGHT, _MARGIN = 220, 104, 4  # of a thumbnail, px
+_UPPER, _LOWER = (6, 46), (56, 98)  # y of the two panels: from, to
+_BINS = 110  # points of a curve: two pixels each
+_HIGHEST = 2.0  # residual over threshold that is drawn
+_GROUPS = {  # heading: what the names begin with
+    "Elevator": ("elevator",),
+    "Aileron": ("aileron",),
+    "Rudder": ("rudder",),
+    "Flap": ("flap",),
+    "Sensors": ("sensor",),
+    "Missions under the autopilot": ("mission",),
+    "No fault, and faults outside the class": ("",),
+}
+
+
+def gallery() -> str:
+    """Every built-in scenario, flown now."""
+    return "\n\n".join(_sections())
+
+
+def gallery_probe() -> str:
+    """What the gallery is made of: changes with a scenario, not with the code that flies it."""
+    scenarios = (bf.load(name).model_dump_json() for name in bf.scenarios())
+    return hashlib.sha256("".join(scenarios).encode()).hexdigest()[:12]
+
+
+def _sections() -> Iterator[str]:
+    left = list(bf.scenarios())
+    for number, (heading, beginnings) in enumerate(_GROUPS.items(), 1):
+        names = [name for name in left if name.startswith(beginnings)]
+        left = [name for name in left if name not in names]
+        rows = [_row(name) for name in names]
+        caption = f"*Table {number}. Scenarios of this kind with a picture and the outcome of each.*"
+        yield f"## {heading}\n\n{caption}\n\n{markdown_table(('flight', 'scenario', 'outcome'), rows)}"
+
+
+def _row(name: str) -> tuple[str, str, str]:
+    flight = bf.fly(name)
+    path = Path("images/gallery", f"{name}.svg")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(_thumbnail(flight), encoding="utf-8")
+    description = " ".join(bf.load(name).description.split())
+    return f"![Curves of {name}]({path.as_posix()})", f"`{name}`: {description}", _outcome(flight)
+
+
+def _outcome(flight: Flight) -> str:
+    detection, isolation = flight.detection, flight.isolation
+    if not flight.fault:
+        return "no alarm" if not detection.detected else f"alarm at {detection.time_s:.2f} s"
+    if not detection.detected:
+        return "not detected"
+    found = f"detected after {detection.delay_s:.2f} s" if detection.delay_s is not None else "false alarm"
+    named = f"named {isolation.fault}" if isolation.fault else "not named"
+    return f"{found}, {named}" + (", aircraft lost" if flight.departure else "")
+
+
+def _thumbnail(flight: Flight) -> str:
+    """Deflection of the broken surface, and below it the largest residual over its threshold."""
+    log = flight.log
+    surface = _surface(log, flight)
+    aircraft = bf.aircraft(flight.scenario.aircraft)
+    look = LOOKS[f"surface {list(aircraft.surfaces).index(surface)}"]
+    deflection = np.degrees(_binned(log[f"{surface}_effective_rad"].to_numpy(), np.mean))
+    share = np.clip(_binned(_share(log), np.max), 0.0, _HIGHEST)
+    threshold = _LOWER[1] - (_LOWER[1] - _LOWER[0]) / _HIGHEST
+    parts = [
+        _line(_scaled(deflection, _UPPER), look.colour),
+        _line(_scaled(share, _LOWER, (0.0, _HIGHEST)), "#333333"),
+        _line(np.full(2, threshold), VERMILION, ' stroke-dasharray="4 3"'),
+        *(_upright(at, log, VERMILION) for at in _faults(flight)),
+        *([_upright(flight.detection.time_s, log, SKY)] if flight.detection.detected else []),
+    ]
+    size = f'width="{_WIDTH}" height="{_HEIGHT}"'
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" {size} fill="none" stroke-width="1.2">'
+        f"<title>{surface} deflection above, residual over threshold below</title>"
+        f'<rect {size} fill="#fff" stroke="#ccc"/>{"".join(parts)}</svg>\n'
+    )
+
+
+def _share(log: pd.DataFrame) -> np.ndarray:
+    """The largest residual over its threshold, of the axes, or of instruments that are compared."""
+    shares = [log[f"{axis}_alarm_residual_rad_s"] / log[f"{axis}_alarm_threshold_rad_s"] for axis in "pqr"]
+    shares += [log["watch_share"]] if "watch_share" in log else []
+    return np.max(np.nan_to_num(np.abs(shares)), axis=0)
+
+
+def _faults(flight: Flight) -> list[float]:
+    return [fault.at_s for fault in flight.scenario.faults]
+
+
+def _surface(log: pd.DataFrame, flight: Flight) -> str:
+    broken = (getattr(fault, "actuator", None) for fault in flight.scenario.faults)
+    return next((name for name in broken if f"{name}_effective_rad" in log), "elevator")
+
+
+def _binned(values: np.ndarray, of) -> np.ndarray:
+    return np.array([of(part) for part in np.array_split(np.nan_to_num(values), _BINS)])
+
+
+def _scaled(
+    values: np.ndarray, panel: tuple[int, int], span: tuple[float, float] | None = None
+) -> np.ndarray:
+    low, high = span or (values.min(), max(values.max(), values.min() + 0.5))
+    top, bottom = panel
+    return bottom - (bottom - top) * (values - low) / (high - low)
+
+
+def _line(y: np.ndarray, colour: str, how: str = "") -> str:
+    x = np.linspace(_MARGIN, _WIDTH - _MARGIN, len(y))
+    points = " ".join(f"{a:.0f},{b:.1f}" for a, b in zip(x, y, strict=True))
+    return f'<polyline points="{points}" stroke="{colour}"{how}/>'
+
+
+def _upright(at_s: float, log: pd.DataFrame, colour: str) -> str:
+    x = _MARGIN + (_WIDTH - 2 * _MARGIN) * at_s / float(log["t_s"].iloc[-1])
+    return f'<path d="M{x:.1f} {_MARGIN}V{_HEIGHT - _MARGIN}" stroke="{colour}"/>'

@@ -102,7 +102,7 @@ def test_the_promises_hold_in_the_small(flown):
     assert document["kept"]
     assert document["healthy"]["hours"] == pytest.approx(4 * 100 / 3600)
     assert document["schemes"]["sharpened"]["detected"] == 6
-    assert "every promise" in summary_text(document)
+    assert "G1 to G3 hold" in summary_text(document)
 
 
 def _faulty_row(**sharpened):

@@ -207,4 +207,4 @@ def test_of_nothing_flown_nothing_is_said():
     found = summarise({"healthy": [], "faulty": []})
     assert (found["faults"], found["skipped"], found["schemes"], found["kept"]) == (0, 0, {}, True)
     assert "delay_shorter_by" not in found
-    assert summary_text(found) == "every promise of the sharpened scheme kept"
+    assert summary_text(found) == "G1 to G3 hold for the sharpened scheme"

@@ -29,17 +29,25 @@ def _surveyed(**where: Any) -> str:
 
 
 def _map_of(rows: list[dict[str, Any]]) -> str:
-    head = ("loss of", "references times", "certain at", "from", "half the time at", "from")
+    head = (
+        "loss of", "references times", "points", "always: points", "always: least, %", "always: largest, %",
+        "half: points", "half: least, %", "half: largest, %",
+    )  # fmt: skip
     faults = dict.fromkeys(row["fault"] for row in rows)
     return markdown_table(head, [
-        (fault, f"{scale:g}", *_smallest(rows, fault, scale, "isolated"),
+        (fault, f"{scale:g}", str(len(_of(rows, fault, scale))), *_smallest(rows, fault, scale, "isolated"),
          *_smallest(rows, fault, scale, "isolated_median"))
         for fault in faults for scale in SCALES
     ])  # fmt: skip
 
 
-def _smallest(rows: list[dict[str, Any]], fault: str, scale: float, key: str) -> tuple[str, str]:
-    """At how many points there is such a loss, and from which to which."""
-    here = [row[key] for row in rows if (row["fault"], row["excitation"]) == (fault, scale)]
-    found = [magnitude for magnitude in here if magnitude is not None]
-    return f"{len(found)}/{len(here)}", f"{min(found):.2f}-{max(found):.2f}" if found else "-"
+def _of(rows: list[dict[str, Any]], fault: str, scale: float) -> list[dict[str, Any]]:
+    """The points of the envelope of one fault, with references of one scale."""
+    return [row for row in rows if (row["fault"], row["excitation"]) == (fault, scale)]
+
+
+def _smallest(rows: list[dict[str, Any]], fault: str, scale: float, key: str) -> tuple[str, str, str]:
+    """At how many points there is such a loss, and from which to which, %."""
+    found = [row[key] for row in _of(rows, fault, scale) if row[key] is not None]
+    ends = (f"{100 * end:.0f}" for end in (min(found), max(found))) if found else ("-", "-")
+    return str(len(found)), *ends

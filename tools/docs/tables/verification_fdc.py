@@ -1,4 +1,4 @@
-"""Tables of docs/results/verification-fdc.md: the truth against data of the FDC equations."""
+"""Tables of docs/results/verification.md: the truth against data of the FDC equations."""
 
 from beaver_ftc.documents.paths import data_root
 from beaver_ftc.studies.present.tables import markdown_table
@@ -17,19 +17,20 @@ def fdc_derivatives() -> str:
         )
         for each in derivative_agreement(DATA)
     ]
-    return markdown_table(("derivative", "error", "bar"), rows)
+    return markdown_table(("derivative", "error", "limit"), rows)
 
 
 def fdc_doublets() -> str:
     """Of each doublet the worst signal's largest error over its span, at both frame rates."""
-    head = ("doublet", *(f"error at {rate_hz} Hz" for rate_hz in RESPONSE_BAR))
+    head = ("doublet", "frame rate, Hz", "worst signal", "error, % of span", "limit, %")
     rows = [
-        (surface, *(_worst(response_agreement(DATA, surface, rate_hz)) for rate_hz in RESPONSE_BAR))
+        (surface, f"{rate_hz}", *_worst(response_agreement(DATA, surface, rate_hz)))
         for surface in ("aileron", "elevator")
+        for rate_hz in RESPONSE_BAR
     ]
     return markdown_table(head, rows)
 
 
-def _worst(agreements: list[Agreement]) -> str:
+def _worst(agreements: list[Agreement]) -> tuple[str, str, str]:
     worst = max(agreements, key=lambda each: each.error)
-    return f"{worst.error:.2%} of {worst.bar:.0%} ({worst.signal.partition('_')[0]})"
+    return worst.signal.partition("_")[0], f"{100 * worst.error:.2f}", f"{100 * worst.bar:.0f}"

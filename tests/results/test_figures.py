@@ -10,14 +10,24 @@ from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.style import LOOKS, closeup_window, marks
 from beaver_ftc.results.views import Panel, Trace, View, read_series, views
 
-EVERY = {"tracking", "surfaces", "detection", "isolation", "ratio", "effectiveness", "supervisor", "states"}
+EVERY = {
+    "candidates",
+    "tracking",
+    "surfaces",
+    "detection",
+    "isolation",
+    "ratio",
+    "effectiveness",
+    "supervisor",
+    "states",
+}
 
 
 def test_every_view_becomes_a_picture_with_something_on_it(log_path, flight, tmp_path):
     files = write_figures(log_path, measure(flight), tmp_path / "figures")
     assert {file.stem.removesuffix("-closeup") for file in files} == EVERY
     assert {file.stem for file in files if "closeup" in file.stem} == {
-        "detection-closeup", "isolation-closeup",
+        "detection-closeup", "candidates-closeup", "isolation-closeup",
     }  # fmt: skip
     for file in files:
         picture = matplotlib.image.imread(file)[..., :3]
@@ -73,7 +83,7 @@ def test_flight_without_alarm_says_that_the_isolation_never_ran(tmp_path):
 
 def test_views_of_a_log_without_estimators_leave_those_out(flight):
     columns = [name for name in flight.columns if not name.startswith("fie_")]
-    assert {view.name for view in views(columns)} == EVERY - {"isolation"}
+    assert {view.name for view in views(columns)} == EVERY - {"isolation", "candidates"}
 
 
 def test_fault_that_never_came_is_not_marked():

@@ -94,6 +94,7 @@ INK = """(canvas) => {
 def test_every_curve_is_drawn_once_it_is_scrolled_to(page):
     empty = page.evaluate(f"""(async () => {{
       const ink = {INK}, empty = [];
+      document.querySelectorAll("details").forEach((part) => {{ part.open = true; }});
       for (const canvas of document.querySelectorAll("canvas")) {{
         canvas.scrollIntoView({{block: "center"}});
         await new Promise((done) => setTimeout(done, 60));

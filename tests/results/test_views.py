@@ -53,8 +53,8 @@ def test_a_view(name, changed):
 
 def test_which_views_a_log_allows():
     assert list(ALL) == [
-        "tracking", "profile", "surfaces", "detection", "watch", "likelihood", "isolation", "ratio",
-        "effectiveness", "supervisor", "engine", "states",
+        "tracking", "profile", "surfaces", "detection", "watch", "likelihood", "candidates", "isolation",
+        "ratio", "effectiveness", "supervisor", "engine", "states",
     ]  # fmt: skip
     assert "engine" not in {view.name for view in views(EVERY)}
     assert "profile" not in {view.name for view in views(set(EVERY) - {"bank_command_rad"})}
@@ -303,7 +303,7 @@ def test_what_a_figure_looks_like():
     (axes,) = figure.axes
     assert figure.bbox.width == 1100
     assert figure._suptitle.get_position()[1] == pytest.approx(1 - 0.12 / figure.get_figheight())
-    assert axes.get_ylim()[0] == 0.01
+    assert axes.get_ylim()[0] == 0.1
     assert axes.yaxis.get_minorticklocs().size == 0
     assert axes.title.get_position()[1] == 1.0
     assert {label.get_fontsize() for label in axes.xaxis.get_ticklabels()} == {8.0}
@@ -319,7 +319,7 @@ def test_what_a_figure_looks_like():
 def test_the_pictures_of_a_flight_whole_and_around_the_fault(tmp_path, monkeypatch):
     document, shown = metrics(Flight()), []
     monkeypatch.setattr(figures.log, "column_names", lambda path: COLUMNS)
-    monkeypatch.setattr(figures, "draw", lambda *given: _Drawn(*given, shown))
+    monkeypatch.setattr(figures, "draw", lambda *given, style: _Drawn(*given, shown))
     monkeypatch.setattr(
         figures, "read_series", lambda path, columns, span: dict.fromkeys(("t_s", *columns), span)
     )
@@ -330,7 +330,9 @@ def test_the_pictures_of_a_flight_whole_and_around_the_fault(tmp_path, monkeypat
         assert {folder for path in written for folder in path.parents[:1]} == {tmp_path / "figures"}
         spans = {path.name: span for path, span, *_ in shown}
         closeups = {name: span for name, span in spans.items() if "closeup" in name}
-        around = {"detection-closeup.png": (11.5, 14.12), "isolation-closeup.png": (11.5, 14.12)}
+        around = dict.fromkeys(
+            [f"{name}-closeup.png" for name in ("detection", "candidates", "isolation")], (11.5, 14.12)
+        )
         assert closeups == ({} if given["fault"] is None else around)
         assert {span for name, span in spans.items() if name not in closeups} == {WHOLE}
         assert {more for *_, more in shown} == {("synthetic", "beaver-ftc")}

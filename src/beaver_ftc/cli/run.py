@@ -2,7 +2,7 @@
 
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import partial
@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
 
     Prepare = Callable[[Plant], None]
+    Drawn = tuple[Painters, Sequence[str]]  # by whom the figures are drawn, and their formats
 
 
 Recording = StrEnum("Recording", ["table", "ulog", "ardupilot"])  # the formats of `results.exports`
@@ -46,7 +47,7 @@ Recording = StrEnum("Recording", ["table", "ulog", "ardupilot"])  # the formats 
 
 @dataclass(frozen=True)
 class Options:
-    """What is asked of it, as `command` says."""
+    """The arguments of `command`."""
 
     scenarios: ScenariosArgument
     out: ResultsOption = Path("runs")
@@ -58,6 +59,7 @@ class Options:
     recording: Annotated[Recording | None, typer.Option("--as")] = None
     flightgear: Annotated[str | None, typer.Option(metavar="HOST:PORT")] = None
     certificate: bool = False
+    figures: Annotated[str, typer.Option(metavar="FORMATS")] = "png"
 
 
 def command(options: Options) -> None:
@@ -75,7 +77,9 @@ def command(options: Options) -> None:
     recording: Also write the log as an on-board recorder would, with vehicle.yaml.
     flightgear: Show the flight in FlightGear in real time.
     certificate: Also write certificate.json, which proves the alarm and the exclusions.
+    figures: Formats of the figures, comma-separated: png, pdf, svg; pdf and svg are sized for papers.
     """
+    formats = _formats(options.figures)
     try:
         loaded = load_all(options.scenarios)
     except BadInput as error:
@@ -86,8 +90,19 @@ def command(options: Options) -> None:
     from beaver_ftc.results.painters import painters
 
     with painters(not options.no_report) as at_work:
-        status = _run_all(loaded, options, at_work)
+        status = _run_all(loaded, options, (at_work, formats))
     raise typer.Exit(status)
+
+
+def _formats(given: str) -> tuple[str, ...]:
+    """The formats of the figures, each once."""
+    from beaver_ftc.results.style import FORMATS
+
+    named = tuple(dict.fromkeys(name.strip() for name in given.split(",")))
+    for name in named:
+        if name not in FORMATS:
+            raise BadInput(f"--figures: {name!r:.60} is no format, allowed: {', '.join(FORMATS)}")
+    return named
 
 
 def _shown(given: str | None) -> "Prepare | None":
@@ -106,7 +121,7 @@ def _shown(given: str | None) -> "Prepare | None":
     return partial(required("flightgear", "--flightgear"), host=host, port=int(port))
 
 
-def _run_all(scenarios: list["Scenario"], options: Options, painters: "Painters") -> int:
+def _run_all(scenarios: list["Scenario"], options: Options, drawn: "Drawn") -> int:
     """Fly one after the other; one that fails does not stop the rest. Returns the worst exit status."""
     from beaver_ftc.results.model import Metrics
     from beaver_ftc.results.verdict import verdict_text
@@ -116,7 +131,7 @@ def _run_all(scenarios: list["Scenario"], options: Options, painters: "Painters"
     for scenario in scenarios:
         began = time.perf_counter()
         try:
-            document = _run_one(scenario, options, prepare, painters)
+            document = _run_one(scenario, options, prepare, drawn)
         except Exception as error:
             failure = failure_of(error)
             status = max(status, report(failure))
@@ -135,9 +150,7 @@ def _run_all(scenarios: list["Scenario"], options: Options, painters: "Painters"
     return status
 
 
-def _run_one(
-    scenario: "Scenario", options: Options, prepare: "Prepare | None", painters: "Painters"
-) -> Document:
+def _run_one(scenario: "Scenario", options: Options, prepare: "Prepare | None", drawn: "Drawn") -> Document:
     from beaver_ftc.results.writer import run
 
     for warning in scenario.warnings():
@@ -148,7 +161,7 @@ def _run_one(
         certified = options.certificate
         document = run(
             scenario, options.out, not options.no_report, progress, exports, prepare, recording, certified,
-            painters,
+            *drawn,
         )  # fmt: skip
     folder = options.out / scenario.name
     return document | {"folder": str(folder)} | (_certificate(folder) if certified else {})

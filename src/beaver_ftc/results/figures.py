@@ -1,4 +1,4 @@
-"""The figures of a flight as PNG: the views drawn with matplotlib, without its global state."""
+"""The figures of a flight as PNG, PDF or SVG: the views drawn with matplotlib, without its global state."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -11,8 +11,8 @@ import numpy as np
 
 from beaver_ftc.results import log
 from beaver_ftc.results.model import Metrics
-from beaver_ftc.results.style import GREY, LOOKS, YELLOW, Mark, closeup_window, marks
-from beaver_ftc.results.views import WHOLE, Panel, Series, Trace, View, read_series, views_of_flight
+from beaver_ftc.results.style import GREY, LOOKS, SHADES, Mark, closeup_window, marks
+from beaver_ftc.results.views import CLIPPED, WHOLE, Panel, Series, Trace, View, read_series, views_of_flight
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,7 +22,9 @@ DPI = 110
 LEFT, STEPS_LEFT, RIGHT, TOP, BOTTOM, GAP = 0.75, 1.2, 0.2, 0.9, 0.85, 0.42  # inches
 LEGEND_LINE = 0.17  # inches, of one more line of the legend
 COMPRESSION = 1  # of a PNG: a tenth larger than with zlib's 6, in two thirds of the time
-LOWEST_RATIO = 1e-2  # of a logarithmic axis: what is smaller is nothing
+LOWEST_RATIO = 0.1  # of a logarithmic axis: what is smaller is noise
+STYLES = ("screen", "paper")
+PAPER_WIDTH, PAPER_DPI, PAPER_FONT = 8.4 / 2.54, 300, 8  # inches: a column of a journal
 
 
 @dataclass(frozen=True)
@@ -45,8 +47,13 @@ def write_figures(log_path: Path, metrics: Metrics, folder: Path) -> list[Path]:
     return [picture.path for picture in pictures]
 
 
-def pictures_of(log_path: Path, metrics: Metrics, folder: Path) -> list[Picture]:
-    """All pictures of a log: every view over the whole flight, some around the fault as well."""
+def pictures_of(
+    log_path: Path, metrics: Metrics, folder: Path, formats: Sequence[str] = ("png",)
+) -> list[Picture]:
+    """All pictures of a log: every view over the whole flight, some around the fault as well.
+
+    formats: of FORMATS; PDF and SVG are drawn for papers.
+    """
     shown = views_of_flight(log.column_names(log_path), metrics)
     instants = marks(metrics)
     window = closeup_window(instants)
@@ -56,21 +63,75 @@ def pictures_of(log_path: Path, metrics: Metrics, folder: Path) -> list[Picture]
         series = read_series(log_path, [name for view in drawn for name in view.columns], span)
         for view in drawn:
             own = {name: series[name] for name in ("t_s", *view.columns)}
-            path = folder / f"{view.name}{ending}.png"
-            found.append(Picture(path, view, own, instants, metrics.scenario))
+            for kind in formats:
+                path = folder / f"{view.name}{ending}.{kind}"
+                found.append(Picture(path, view, own, instants, metrics.scenario))
     return found
 
 
 def save(picture: Picture) -> None:
-    """Draw a picture into its file."""
-    figure = draw(picture.view, picture.series, picture.instants, picture.subtitle)
-    figure.savefig(
-        picture.path, metadata={"Software": "beaver-ftc"}, pil_kwargs={"compress_level": COMPRESSION}
+    """Draw a picture into its file; vector graphics in the style of a paper."""
+    kind = picture.path.suffix.removeprefix(".")
+    raster = kind == "png"
+    style = "screen" if raster else "paper"
+    shown = picture.view, picture.series, picture.instants, picture.subtitle
+    figure = draw(*shown, style=style)
+    how: dict[str, Any] = {"pil_kwargs": {"compress_level": COMPRESSION}} if raster else {}
+    figure.savefig(picture.path, metadata=_SIGNED[kind], **how)
+
+
+# No date: the same flight gives the same file.
+_SIGNED: dict[str, Any] = {
+    "png": {"Software": "beaver-ftc"},
+    "pdf": {"Creator": "beaver-ftc", "CreationDate": None},
+    "svg": {"Creator": "beaver-ftc", "Date": None},
+}
+
+
+def draw(
+    view: View, series: Series, instants: Sequence[Mark], subtitle: str, style: str = "screen"
+) -> "Figure":
+    """One view as a matplotlib figure, over the time that `series` covers; style: of STYLES."""
+    figure = _drawn(view, series, instants, subtitle)
+    return _for_paper(figure) if style == "paper" else figure
+
+
+def _for_paper(figure: "Figure") -> "Figure":
+    """As wide as a column of a journal, letters of 8 points and less; no title, which the caption has."""
+    from matplotlib.text import Text
+
+    shrink = PAPER_WIDTH / figure.get_figwidth()
+    height = figure.get_figheight()
+    figure.suptitle("")
+    figure.set_size_inches(PAPER_WIDTH, min(height, 1.1 * height * shrink + 0.25 * len(figure.axes)))
+    figure.set_dpi(PAPER_DPI)
+    for text in figure.findobj(Text):
+        text.set_fontsize(min(PAPER_FONT, float(text.get_fontsize()) - 1.0))
+    for axes in figure.axes:
+        for line in axes.lines:
+            line.set_linewidth(0.7 * line.get_linewidth())
+            line.set_markersize(0.6 * line.get_markersize())
+    for legend in figure.legends:
+        legend.remove()
+    figure.set_layout_engine("constrained", h_pad=0.02, w_pad=0.02)
+    _draw_legend_outside(figure)
+    return figure
+
+
+def _draw_legend_outside(figure: "Figure") -> None:
+    """The legend of a figure that lays itself out."""
+    shown = _entries(figure.axes)
+    figure.legend(
+        shown.values(),
+        shown.keys(),
+        loc="outside lower center",
+        ncols=2,
+        fontsize=PAPER_FONT - 2,
+        frameon=False,
     )
 
 
-def draw(view: View, series: Series, instants: Sequence[Mark], subtitle: str) -> "Figure":
-    """One view as a matplotlib figure, over the time that `series` covers."""
+def _drawn(view: View, series: Series, instants: Sequence[Mark], subtitle: str) -> "Figure":
     figure, grid = _laid_out(view, figure_class())
     for axes, panel in zip(grid.flat, view.panels, strict=False):
         _draw_panel(axes, panel, series, instants)
@@ -106,7 +167,7 @@ def _laid_out(view: View, new_figure: Any) -> tuple["Figure", Any]:
     width = 10.0 if view.across == 1 else 12.0
     height = TOP + BOTTOM + sum(heights) + GAP * (down - 1)
     figure = new_figure(figsize=(width, height), dpi=DPI)
-    left = STEPS_LEFT if view.panels[0].steps else LEFT
+    left = STEPS_LEFT if view.panels[0].steps or view.panels[0].bars else LEFT
     grid = figure.subplots(
         down, view.across, sharex=True, squeeze=False, height_ratios=heights,
         gridspec_kw={
@@ -119,17 +180,18 @@ def _laid_out(view: View, new_figure: Any) -> tuple["Figure", Any]:
 
 def _height(panel: Panel, across: int) -> float:
     """Height of a panel's axes in inches."""
-    if panel.steps:
-        return 0.25 + 0.25 * len(panel.steps)
+    if panel.steps or panel.bars:
+        return 0.25 + 0.25 * len(panel.steps or panel.rows)
     return 1.75 if across == 1 else 1.5
 
 
 def _draw_panel(axes: "Axes", panel: Panel, series: Series, instants: Sequence[Mark]) -> None:
-    for trace in panel.traces:
+    for trace in () if panel.bars else panel.traces:
         _draw_trace(axes, trace, series, bool(panel.steps))
+    _draw_bars(axes, panel, series)
     _draw_shade(axes, panel, series)
     _draw_marks(axes, instants, series["t_s"])
-    title = panel.label if panel.steps or not panel.unit else f"{panel.label} ({panel.unit})"
+    title = panel.label if panel.steps or panel.bars or not panel.unit else f"{panel.label} ({panel.unit})"
     axes.set_title(title, fontsize=9, y=1.0)  # at this height: looking for one takes a third of the time
     axes.tick_params(labelsize=8)
     axes.grid(visible=True, color="#dddddd", linewidth=0.6)
@@ -141,6 +203,8 @@ def _draw_panel(axes: "Axes", panel: Panel, series: Series, instants: Sequence[M
         axes.set_ylim(-0.4, len(panel.steps) - 0.6)
     elif panel.limits:
         axes.set_ylim(*panel.limits)
+    elif panel.clipped:
+        _clip(axes, panel, series)
     if panel.log_scale:
         axes.set_yscale("log")
         axes.set_ylim(bottom=max(axes.get_ylim()[0], LOWEST_RATIO))
@@ -163,6 +227,45 @@ def _draw_trace(axes: "Axes", trace: Trace, series: Series, stepped: bool) -> No
     )
 
 
+def _draw_bars(axes: "Axes", panel: Panel, series: Series) -> None:
+    """A row a label: a bar while one of its traces is 0, a thin line while all that are there are 1."""
+    t_s, rows = series["t_s"], panel.rows
+    for place, row in enumerate(rows):
+        of = [trace for trace in panel.traces if trace.label == row]
+        values = np.array([series[trace.column] for trace in of])
+        asked, candidate = series[panel.during] == 1, (values == 0).any(axis=0)
+        excluded = asked & (values == 1).any(axis=0) & ~candidate
+        for where, half, colour in (
+            (asked & candidate, 0.36, LOOKS[of[0].role].colour), (excluded, 0.04, GREY)
+        ):  # fmt: skip
+            axes.fill_between(
+                t_s, place - half, place + half, where=where, step="post", color=colour, linewidth=0
+            )
+    if rows:
+        axes.set_yticks(range(len(rows)), rows)
+        axes.set_ylim(len(rows) - 0.4, -0.6)
+
+
+def _clip(axes: "Axes", panel: Panel, series: Series) -> None:
+    """Set the axis by all but the spikes; an arrow and its value mark the largest of those."""
+    values = np.concatenate([trace.factor * series[trace.column] for trace in panel.traces])
+    values = values[np.isfinite(values)]
+    if not values.size:
+        return
+    low, high = np.quantile(values, CLIPPED)
+    pad = 0.1 * (high - low) or 0.1 * abs(high) or 1.0
+    low, high = max(low - pad, values.min() - 0.3 * pad), min(high + pad, values.max() + 0.3 * pad)
+    axes.set_ylim(low, high)
+    for value, edge, arrow, align in (
+        (values.max(), high, "\u25b2", "top"), (values.min(), low, "\u25bc", "bottom")
+    ):  # fmt: skip
+        if (value > high) if align == "top" else (value < low):
+            axes.text(
+                0.995, edge, f"{arrow} {value:.1f}", transform=axes.get_yaxis_transform(), ha="right",
+                va=align, fontsize=7, color="#555555",
+            )  # fmt: skip
+
+
 def _linestyle(dash: tuple[float, ...]) -> Any:
     """Dashes in points as matplotlib takes them (which counts in line widths: about 1.5 points)."""
     return (0, tuple(length / 1.5 for length in dash)) if dash else "-"
@@ -173,7 +276,8 @@ def _draw_shade(axes: "Axes", panel: Panel, series: Series) -> None:
         return
     axes.fill_between(
         series["t_s"], 0, 1, where=series[panel.shade] == 1, transform=axes.get_xaxis_transform(),
-        color=YELLOW, alpha=0.3, linewidth=0, step="post", label=panel.shade_label, zorder=0,
+        color=SHADES.get(panel.shade_label, SHADES["saturated"]), linewidth=0, step="post",
+        label=panel.shade_label, zorder=0,
     )  # fmt: skip
 
 
@@ -206,14 +310,20 @@ def _columns(labels: Sequence[str], width: float) -> int:
     return 1
 
 
-def _draw_legend(figure: "Figure", grid: Iterable["Axes"]) -> None:
-    """One legend for the figure: each label once, but for the single curves that panel titles name."""
+def _entries(grid: Sequence["Axes"]) -> dict[str, Any]:
+    """Label and handle of what a legend is to hold."""
     entries: dict[str, Any] = {}
     for axes in grid:
         handles, labels = axes.get_legend_handles_labels()
         entries = entries | dict(zip(labels, handles, strict=True)) | entries
     titles = {axes.get_title().rpartition(" (")[0] or axes.get_title() for axes in grid}
-    shown = {label: handle for label, handle in entries.items() if label not in titles}
+    return {label: handle for label, handle in entries.items() if label not in titles}
+
+
+def _draw_legend(figure: "Figure", grid: Iterable["Axes"]) -> None:
+    """One legend for the figure: each label once, but for the single curves that panel titles name."""
+    grid = list(grid)
+    shown = _entries(grid)
     columns, tall = _columns(list(shown), figure.get_figwidth()), figure.get_figheight()
     more = LEGEND_LINE * (-(-len(shown) // columns) - 1) / tall
     top, share = 1 - TOP / tall, 1 - more * tall / (tall - TOP - BOTTOM)

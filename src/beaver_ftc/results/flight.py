@@ -7,7 +7,7 @@ from functools import cached_property
 from html import escape
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -122,22 +122,28 @@ class Flight:
         """What `plot` can show of this flight."""
         return tuple(self._views())
 
-    def plot(self, view: str = "tracking", *, closeup: bool = False) -> "Figure":
-        """One view as a matplotlib Figure; closeup: only around the fault.
+    def plot(
+        self, view: str = "tracking", *, closeup: bool = False, style: Literal["screen", "paper"] = "screen"
+    ) -> "Figure":
+        """One view as a matplotlib Figure.
 
-        Raises BadInput for a view that there is not.
+        closeup: only around the fault. style: "paper" is 8.4 cm wide, with letters of 8 points at most, and
+        300 dots per inch where it is no vector graphic. Raises BadInput for a view or style that there is
+        not.
         """
-        from beaver_ftc.results.figures import draw
+        from beaver_ftc.results.figures import STYLES, draw
         from beaver_ftc.results.style import closeup_window, marks
         from beaver_ftc.results.views import WHOLE, series_of
 
         known = self._views()
         if view not in known:
             raise BadInput(f"view: {view!r:.60} is not known{suggestion(str(view), known)}")
+        if style not in STYLES:
+            raise BadInput(f"style: {style!r:.60} is not known, allowed: {', '.join(STYLES)}")
         instants = marks(model.Metrics.of(self.metrics))
         window = (closeup_window(instants) if closeup else None) or WHOLE
         series = series_of(self._kept(), known[view].columns, window)
-        return draw(known[view], series, instants, self.name)
+        return draw(known[view], series, instants, self.name, style)
 
     def certificate(self) -> Document:
         """The document of certificate.json: alarm and exclusions, each with the inequality that proves it.

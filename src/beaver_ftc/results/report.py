@@ -17,7 +17,7 @@ import numpy as np
 
 from beaver_ftc.results import log, verdict
 from beaver_ftc.results.model import DeclaredFault, Document, Metrics
-from beaver_ftc.results.style import LOOKS, MODE_COLOURS, closeup_window, marks
+from beaver_ftc.results.style import LOOKS, MODE_COLOURS, SHADES, closeup_window, marks
 from beaver_ftc.results.views import (
     MAX_POINTS,
     Panel,
@@ -36,6 +36,7 @@ Section = Callable[[Path], str]
 
 _TEMPLATES = Path(__file__).parent / "templates"
 _SECTIONS: list[Section] = []  # studies that add to a run's report register theirs
+AROUND_S, AT_FULL_RATE = 2.5, 10_000  # at full rate around the events, this much before and after; points
 _PATH = ("north_m", "east_m", "altitude_m", "phi_rad", "theta_rad", "psi_rad")
 
 
@@ -58,7 +59,8 @@ def render(folders: Sequence[Path], names: Sequence[str] = ()) -> str:
         runs=[_words(document, text) for document, text in zip(documents, texts, strict=True)],
         names=names,
         modes=MODE_COLOURS,
-        marks={mark.name: mark for document in documents for mark in marks(Metrics.of(document))}.values(),
+        marks=(shown := list({m.name: m for each in documents for m in marks(Metrics.of(each))}.values())),
+        first_mark_s=shown[0].time_s if shown else 0.0,
         **parts(folders, documents, names),
         # what studies have found in a folder, if they have been there
         sections=[Markup("".join(section(folder) for section in _SECTIONS)) for folder in folders],
@@ -147,7 +149,8 @@ def _run(path: Path, metrics: Metrics, columns: Sequence[str], name: str, points
     levels = [read_series(path, columns, max_points=points)]
     t_s = levels[0]["t_s"]
     if window and t_s.size < log.row_count(path):
-        levels.append(read_series(path, columns, window, points))
+        around = window[0] - AROUND_S, window[1] + AROUND_S
+        levels.append(read_series(path, columns, around, AT_FULL_RATE))
     return {
         "name": name,
         "jet": not {"spoiler", "stabiliser"}.isdisjoint(kinds(surfaces(log.column_names(path)))),
@@ -175,6 +178,7 @@ def _view(view: View) -> Document:
         "title": view.title,
         "across": view.across,
         "absent": view.absent,
+        "folded": view.folded,
         "panels": [_panel(panel) for panel in view.panels],
     }
 
@@ -185,9 +189,13 @@ def _panel(panel: Panel) -> Document:
         "unit": panel.unit,
         "log": panel.log_scale,
         "limits": panel.limits,
-        "steps": panel.steps,
+        "steps": panel.steps or panel.rows,
+        "bars": panel.bars,
+        "during": panel.during,
+        "clipped": panel.clipped,
         "shade": panel.shade,
         "shadeLabel": panel.shade_label,
+        "shadeColour": SHADES.get(panel.shade_label, ""),
         "level": panel.level,
         "traces": [
             {

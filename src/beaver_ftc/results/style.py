@@ -12,6 +12,7 @@ from beaver_ftc.results.model import Metrics
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PURPLE, GREY = (
     "#000000", "#e69f00", "#56b4e9", "#009e73", "#f0e442", "#0072b2", "#d55e00", "#cc79a7", "#8a8a8a",
 )  # fmt: skip
+FORMATS = ("png", "pdf", "svg")  # of figures
 SERIES = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, GREY, BLACK)  # of curves that are just several
 
 
@@ -27,26 +28,31 @@ class Look:
 
 LOOKS = {
     "actual": Look(BLUE, (), 1.4, 4),
-    "target": Look(ORANGE, (7, 3), 1.6, 5),
+    "target": Look("#444444", (7, 3), 1.4, 5),
     "command": Look(GREY, (1.5, 2), 1.4, 3),
+    "demand": Look("#b9b9b9", (), 1.0, 1),  # a band where it is thinned to its extremes
+    "unlike": Look(VERMILION, (1.5, 1.5), 1.2, 5),
     "residual": Look(BLACK, (), 1.2, 4),
     "bound": Look(VERMILION, (5, 3), 1.3, 3),
-    "p": Look(ORANGE, (7, 3), 1.4, 4),
-    "q": Look(BLUE, (), 1.4, 5),
-    "r": Look(GREEN, (2, 2), 1.6, 4),
-    # beside `actual` and `target` in one legend: no colour means two things
+    # An axis has the colour of the surface that leads it: aileron, elevator, rudder.
+    "p": Look(SKY, (7, 3), 1.4, 4),
+    "q": Look(ORANGE, (), 1.4, 5),
+    "r": Look(PURPLE, (2, 2), 1.6, 4),
     "error of p": Look(SKY, (7, 3), 1.4, 4),
-    "error of q": Look(PURPLE, (), 1.4, 5),
-    "error of r": Look(GREEN, (2, 2), 1.6, 4),
+    "error of q": Look(ORANGE, (), 1.4, 5),
+    "error of r": Look(PURPLE, (2, 2), 1.6, 4),
+    # One colour a surface in every picture: aileron, elevator, rudder, flap, further ones.
     "surface 0": Look(SKY, (7, 2, 1.5, 2), 1.8, 3),
-    "surface 1": Look(BLUE, (), 1.8, 2),
-    "surface 2": Look(ORANGE, (6, 4), 1.8, 4),
+    "surface 1": Look(ORANGE, (), 1.8, 2),
+    "surface 2": Look(PURPLE, (6, 4), 1.8, 4),
     "surface 3": Look(GREEN, (2, 3), 2.2, 5),
-    "surface 4": Look(PURPLE, (9, 3), 1.8, 3),
+    "surface 4": Look(BLUE, (9, 3), 1.8, 3),
     "surface 5": Look(VERMILION, (1.5, 2), 1.8, 3),
     "surface 6": Look(BLACK, (4, 2), 1.4, 2),
     "surface 7": Look(GREY, (), 2.2, 1),
 }
+LOOKS |= {f"effective {i}": Look(LOOKS[f"surface {i}"].colour, (), 1.5, 3) for i in range(8)}  # one a panel
+SHADES = {"saturated": "#faf6cf", "excluded": "#e4e4e4"}  # of a stretch of time, by what it means
 PLUM = "#8f4a74"  # a darker purple, for letters and thin lines
 CRIMSON = "#7d0a1e"  # the loss of the aircraft, and of nothing else
 MODE_COLOURS = {"nominal": "#bfe5d9", "adaptive": SKY, "reallocated": ORANGE, "unanticipated": PURPLE}

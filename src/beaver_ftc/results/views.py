@@ -32,6 +32,9 @@ MAX_POINTS = 4000  # of a curve
 WHOLE = (-math.inf, math.inf)
 Series = dict[str, np.ndarray]
 RATIO = "_ratio"  # ends the name of a derived column: |residual| / threshold
+UNLIKE = "_unlike_rad"  # and of a position where it is not what the aerodynamics see, else no number
+UNLIKE_RAD = math.radians(0.05)
+CLIPPED = 0.005, 0.995  # quantiles that set the axis where spikes would
 COMMANDED, FLOWN = "airspeed_command_mps", "airspeed_mps"
 MEAN = "airspeed_mean_mps"  # derived: the commanded airspeed, and the mean deviation from it over 10 s
 MEAN_OF = "airspeed_within_mps"  # the expectation that reads it
@@ -68,6 +71,14 @@ class Panel:
     shade: str = ""  # a 0/1 column: the panel is shaded while it is 1
     shade_label: str = ""
     level: float | None = None  # a value worth a line across
+    clipped: bool = False  # spikes beyond the quantiles CLIPPED do not set the axis; an arrow marks them
+    bars: bool = False  # a row for each label, with a bar while one of its traces is 0,
+    during: str = ""  # as long as this column is 1
+
+    @property
+    def rows(self) -> tuple[str, ...]:
+        """The rows of a panel of bars."""
+        return tuple(dict.fromkeys(trace.label for trace in self.traces)) if self.bars else ()
 
     @property
     def unit(self) -> str:
@@ -85,13 +96,14 @@ class View:
     across: int = 1
     absent: str = ""  # what to say where the log holds nothing of this
     closeup: bool = False  # worth a second look around the fault
+    folded: bool = False  # details: the report shows it when asked
 
     @property
     def columns(self) -> tuple[str, ...]:
         """The log columns it shows."""
         traced = [trace.column for panel in self.panels for trace in panel.traces]
-        shaded = [panel.shade for panel in self.panels if panel.shade]
-        return tuple(dict.fromkeys(traced + shaded))
+        flags = [flag for panel in self.panels for flag in (panel.shade, panel.during) if flag]
+        return tuple(dict.fromkeys(traced + flags))
 
 
 def unit_of(column: str) -> tuple[str, float]:
@@ -128,7 +140,8 @@ def views(columns: Sequence[str], power: bool = False, within_mps: float | None 
     known, moved, engine = set(columns), surfaces(columns), power_column(columns)
     named = (
         _tracking(), _profile(LIMITED in known, engine, within_mps), _surfaces(moved), _detection(), _watch(),
-        _likelihood(columns), _isolation(estimators(columns)), _ratio(estimators(columns)),
+        _likelihood(columns), _candidates(moved, estimators(columns)), _isolation(estimators(columns)),
+        _ratio(estimators(columns)),
         _effectiveness(moved), _supervisor(), *((_engine(),) if power else ()), _states(),
     )  # fmt: skip
     return tuple(view for view in named if view.panels and known.issuperset(sources(view.columns)))
@@ -150,6 +163,8 @@ def sources(columns: Iterable[str]) -> tuple[str, ...]:
 def _sources(column: str) -> tuple[str, ...]:
     if column == MEAN:
         return (COMMANDED, FLOWN)
+    if column.endswith(UNLIKE):
+        return tuple(f"{column.removesuffix(UNLIKE)}_{what}_rad" for what in ("pos", "effective"))
     stem = column.removesuffix(RATIO)
     if stem == column:
         return (column,)
@@ -181,7 +196,7 @@ def _tracking() -> View:
 
 
 def _profile(limited: bool, power: str, within_mps: float | None) -> View:
-    held = {"airspeed": [(LIMITED, "what can be held", "command")]} if limited else {}
+    held = {"airspeed": [(LIMITED, "attainable", "command")]} if limited else {}
     flown = (
         ("altitude", "altitude_command_m", "altitude_m"),
         ("airspeed", "airspeed_command_mps", "airspeed_mps"),
@@ -195,7 +210,7 @@ def _profile(limited: bool, power: str, within_mps: float | None) -> View:
     panels[1] = replace(panels[1], traces=(*panels[1].traces, *_judged_airspeed(within_mps)))
     words = power.removesuffix("_inhg").replace("_", " ")
     engine = [_panel(f"engine: {words}", (power, "flown", "actual"))] if power else []
-    return View("profile", "Profile: what was commanded, and what was flown", (*panels, *engine))
+    return View("profile", "Profile: commanded and flown", (*panels, *engine))
 
 
 def _judged_airspeed(within_mps: float | None) -> Iterator[Trace]:
@@ -237,17 +252,20 @@ def _surfaces(names: Sequence[str]) -> View:
         )
         return View("surfaces", "Control surfaces by kind", panels, across=2)
     panels = tuple(
-        _panel(
+        Panel(
             surface,
-            (f"{surface}_cmd_rad", "command", "command"),
-            (f"{surface}_pos_rad", "position", "target"),
-            (f"{surface}_effective_rad", "effective", "actual"),
+            (
+                Trace(f"{surface}_cmd_rad", "command", "demand"),
+                Trace(f"{surface}_effective_rad", "effective", f"effective {place}"),
+                Trace(f"{surface}{UNLIKE}", "position, where it differs from effective", "unlike"),
+            ),
             shade=f"{surface}_saturated",
             shade_label="saturated",
+            clipped=True,
         )
-        for surface in names
+        for place, surface in enumerate(names)
     )
-    return View("surfaces", "Control surfaces: commanded, reached, and as the aerodynamics see them", panels)
+    return View("surfaces", "Control surfaces: commanded, and effective on the aerodynamics", panels)
 
 
 def detection_panel(axis: str, label: str, role: str = "residual") -> Panel:
@@ -268,16 +286,14 @@ def isolation_panel(name: str, axis: str, label: str, threshold: str = "± thres
 def _detection() -> View:
     ratios = [(f"{axis}_alarm{RATIO}", axis, axis) for axis in AXES]
     alarm = _share("alarm test: |residual| / threshold", *ratios)
-    panels = (
-        detection_panel(axis, f"{AXIS_NAMES[axis]}: residual of the detection estimator") for axis in AXES
-    )
+    panels = (detection_panel(axis, f"{AXIS_NAMES[axis]}: detection residual") for axis in AXES)
     title = "Detection: the test that raises the alarm (above 1), and the detection estimator"
     return View("detection", title, (alarm, *panels), closeup=True)
 
 
 def _watch() -> View:
-    label = "largest residual between two instruments / bound"
-    title = "Instruments: held against one another; above 1 one of them is broken"
+    label = "largest residual between sensors / bound"
+    title = "Sensor monitor: largest residual between sensors over its bound; above 1 one of them is faulty"
     return View("watch", title, (_share(label, ("watch_share", "largest", "actual")),), closeup=True)
 
 
@@ -297,6 +313,22 @@ def _likelihood(columns: Sequence[str]) -> View:
     return View("likelihood", title, panels, closeup=True)
 
 
+def _candidates(moved: Sequence[str], names: Sequence[str]) -> View:
+    """One strip: which surfaces may be at fault, from the alarm on, until the last of their estimators is
+    excluded."""
+    roles = dict(zip(moved, SURFACE_ROLES * len(moved), strict=False))
+    traces = tuple(
+        Trace(f"fie_{name}_excluded", _spoken(surface), roles[surface])
+        for surface in moved
+        for name in names
+        if surface == max((of for of in moved if f"{name}_".startswith(f"{of}_")), key=len, default="")
+    )
+    panel = Panel("surfaces that may be at fault", traces, bars=True, during="detected")
+    panels = (panel,) if traces else ()
+    title = "Candidates: a bar from the alarm until the surface is excluded"
+    return View("candidates", title, panels, absent="no alarm: no candidates", closeup=True)
+
+
 def _isolation(names: Sequence[str]) -> View:
     panels = tuple(
         isolation_panel(name, axis, f"{_spoken(name)} estimator: {axis}", "threshold")
@@ -304,7 +336,15 @@ def _isolation(names: Sequence[str]) -> View:
         for axis in AXES
     )
     title = "Isolation: residuals of each isolation estimator against its thresholds"
-    return View("isolation", title, panels, across=3, absent="no alarm: it never ran", closeup=True)
+    return View(
+        "isolation",
+        title,
+        panels,
+        across=3,
+        absent="no alarm: it never ran",
+        closeup=True,
+        folded=True,
+    )
 
 
 def _ratio(names: Sequence[str]) -> View:
@@ -313,7 +353,7 @@ def _ratio(names: Sequence[str]) -> View:
         _share(f"{label}: |residual| / threshold", *((f"{stem}{axis}{RATIO}", axis, axis) for axis in AXES))
         for label, stem in stems
     )
-    title = "How close to the threshold: above 1 is an alarm, or an estimator excluded"
+    title = "Residual over threshold: above 1 is an alarm, or an exclusion"
     return View("ratio", title, panels, across=1 if len(panels) <= 4 else 3)
 
 
@@ -331,7 +371,7 @@ def _effectiveness(names: Sequence[str]) -> View:
         for kind, alike in (_by_kind(names).items() if names else ())
         for which, label in (("estimate", "estimated (1 healthy)"), ("used", "used by the law"))
     )
-    title = "Effectiveness of each surface: the diagnosis' estimate, and what the law uses, rate-limited"
+    title = "Effectiveness of each surface: estimated by the diagnosis, and used by the law (rate-limited)"
     return View("effectiveness", title, panels, across=1 if len(panels) <= 2 else 2)
 
 
@@ -341,7 +381,7 @@ def _supervisor() -> View:
         Panel("alarm", (Trace("detected", "alarm", "actual"),), steps=("quiet", "alarm")),
         Panel("envelope", (Trace("envelope_valid", "envelope", "actual"),), steps=("outside", "inside")),
     )
-    return View("supervisor", "Supervisor: who is in charge", panels)
+    return View("supervisor", "Supervisor: mode, alarm, envelope", panels)
 
 
 def _engine() -> View:
@@ -415,9 +455,14 @@ def _add_mean_airspeed(chunks: Iterable[Series], frame_s: float) -> Iterator[Ser
 
 
 def _derive(chunk: Series, wanted: Sequence[str]) -> Series:
-    return {
-        name: chunk[name] if name in chunk else _share_of_bound(chunk, sources([name])) for name in wanted
-    }
+    return {name: chunk[name] if name in chunk else _derived(chunk, name) for name in wanted}
+
+
+def _derived(chunk: Series, name: str) -> np.ndarray:
+    if not name.endswith(UNLIKE):
+        return _share_of_bound(chunk, sources([name]))
+    position, effective = (chunk[source] for source in sources([name]))
+    return np.where(np.abs(position - effective) > UNLIKE_RAD, position, np.nan)
 
 
 def _share_of_bound(chunk: Series, names: Sequence[str]) -> np.ndarray:

@@ -10,7 +10,7 @@ import ctypes
 import errno
 import os
 import shutil
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
@@ -58,6 +58,7 @@ def run(
     recording: str | None = None,
     certified: bool = False,
     painters: Painters = (),
+    figures: Sequence[str] = ("png",),
 ) -> Document:
     """Fly `scenario`, write `out/<name>/`, and return the metrics document.
 
@@ -65,9 +66,11 @@ def run(
 
     exports: of "csv" and "acmi". prepare: called with the trimmed plant just before the flight. recording:
     table, ulog or ardupilot, to write the log as a recorder on board would have. certified: write the
-    certificate of its alarm and exclusions. painters: who draws the figures, if not this process. Raises
-    BadInput for a flight that cannot be trimmed or certified, SimulationFailed for one not completed or kept,
-    NotAllWritten where the log is kept but another file could not be written.
+    certificate of its alarm and exclusions. painters: who draws the figures, if not this process.
+    figures: their formats.
+
+    Raises BadInput for a flight that cannot be trimmed or certified, SimulationFailed for one not completed
+    or kept, NotAllWritten where the log is kept but another file could not be written.
     """
     from beaver_ftc.loop.loop import fly
 
@@ -88,7 +91,7 @@ def run(
                 certificate.write(folder)
         if report and document:
             with _kept_whatever(folder, "report.html", failed):
-                write_report_files(folder, document, painters=painters)
+                write_report_files(folder, document, painters=painters, formats=figures)
         if "csv" in exports:
             from beaver_ftc.results.exports import write_csv
 
@@ -156,18 +159,24 @@ def _no_model(folder: str, names: list[str]) -> set[str]:
 
 
 def write_report_files(
-    folder: Path, document: Document, to: Path | None = None, painters: Painters = ()
+    folder: Path,
+    document: Document,
+    to: Path | None = None,
+    painters: Painters = (),
+    formats: Sequence[str] = ("png",),
 ) -> None:
     """Draw the figures and the report of a result folder that holds its log and its scenario.
 
-    to: where to, if not into that folder. painters: who draws the figures, if not this process.
+    to: where to, if not into that folder. painters: who draws the figures, if not this process. formats: of
+    the figures.
     """
     from beaver_ftc.results.figures import pictures_of
     from beaver_ftc.results.report import write_report
 
     to = to or folder
     (to / "figures").mkdir(exist_ok=True)
-    with drawing(pictures_of(folder / "log.parquet", Metrics.of(document), to / "figures"), painters):
+    pictures = pictures_of(folder / "log.parquet", Metrics.of(document), to / "figures", formats)
+    with drawing(pictures, painters):
         write_report(to / "report.html", [folder])
 
 

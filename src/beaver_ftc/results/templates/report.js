@@ -45,12 +45,13 @@ function ticks(low, high, count) {
   return { values: found, digits: Math.min(6, Math.max(0, -Math.floor(Math.log10(step) + 1e-9))) };
 }
 
-/** A value in four digits; what is below a millionth of a millionth is nothing. */
-function shown(value) {
-  const size = Math.abs(value);
+const DECIMALS = { deg: 2, "deg/s": 3, "deg/s²": 2, m: 1, "m/s": 2, inHg: 2, "": 3 };
+
+/** A value with the fixed decimals of its unit, so that a legend does not jump; large ones with an exponent. */
+function shown(value, unit) {
   if (Number.isNaN(value)) return "–";
-  if (size < 1e-12) return "0";
-  return size >= 1e4 || size < 1e-3 ? value.toExponential(2) : value.toPrecision(4);
+  if (Math.abs(value) >= 1e6) return value.toExponential(2);
+  return value.toFixed(DECIMALS[unit] ?? 3).replace(/^-(0\.?0*)$/, "$1") + (unit ? ` ${unit}` : "");
 }
 
 // ---- the shared clock and window -------------------------------------------------------------------------------
@@ -147,7 +148,8 @@ function paintable(canvas, draw) {
 const MARGIN = { left: 52, right: 10, top: 20, bottom: 26 };
 const STEPS_LEFT = 86; // room for the longest name of a mode
 const BAND = 6;
-const LOWEST = 1e-2;
+const LOWEST = 0.1; // of a logarithmic axis: what is smaller is noise
+const CLIPPED = 0.005; // share of the values at either end that does not set a clipped axis
 const MODE_COLOURS = DATA.modes.map(([, colour]) => colour);
 
 class Panel {
@@ -157,6 +159,7 @@ class Panel {
     this.readouts = spec.traces.map(() => make("output"));
     this.left = spec.steps.length ? STEPS_LEFT : MARGIN.left;
     this.element = make("figure", { className: spec.steps.length ? "panel steps" : "panel" }, this.caption(), this.canvas);
+    if (spec.bars) this.canvas.style.height = `${MARGIN.top + MARGIN.bottom + 22 * spec.steps.length}px`;
     paintable(this.canvas, (pen, width, height) => this.draw(pen, width, height));
     this.listen();
   }
@@ -165,7 +168,8 @@ class Panel {
     const unit = this.spec.unit ? ` (${this.spec.unit})` : "";
     const caption = make("figcaption", {}, make("strong", { textContent: this.spec.label + unit }));
     this.spec.traces.forEach((trace, i) => {
-      if (!trace.label) return;
+      if (!trace.label || this.spec.bars) return;
+      if (trace.role === "unlike" && this.run.levels[0][trace.column].every(Number.isNaN)) return;
       const entry = make("span");
       if (this.spec.traces.length > 1) {
         entry.innerHTML = sample(DATA.looks[trace.role]);
@@ -174,7 +178,11 @@ class Panel {
       entry.append(this.readouts[i]);
       caption.append(entry);
     });
-    if (this.spec.shade) this.shadeKey = caption.appendChild(make("span", { hidden: true, textContent: `▒ ${this.spec.shadeLabel}` }));
+    if (this.spec.shade) {
+      const box = make("i", { className: "box" });
+      box.style.background = this.spec.shadeColour;
+      this.shadeKey = caption.appendChild(make("span", { hidden: true }, box, ` ${this.spec.shadeLabel}`));
+    }
     return caption;
   }
 
@@ -210,6 +218,7 @@ class Panel {
     if (steps.length) return [-0.4, steps.length - 0.6];
     if (limits) return limits;
     let low = level ?? Infinity, high = level ?? -Infinity;
+    const all = [];
     for (const run of this.runs) {
       const series = seriesFor(run, clock.start, clock.end);
       const first = indexAt(series.t_s, clock.start), last = indexAt(series.t_s, clock.end);
@@ -219,8 +228,16 @@ class Panel {
           const value = values[i] * trace.factor + trace.offset;
           if (value < low) low = value;
           if (value > high) high = value;
+          if (this.spec.clipped && !Number.isNaN(value)) all.push(value);
         }
       }
+    }
+    this.ends = [low, high];
+    if (all.length) {
+      all.sort((one, other) => one - other);
+      const [from, to] = [CLIPPED, 1 - CLIPPED].map((share) => all[Math.round(share * (all.length - 1))]);
+      const pad = 0.1 * (to - from) || 0.1 * Math.abs(to) || 1;
+      return [Math.max(low - 0.3 * pad, from - pad), Math.min(high + 0.3 * pad, to + pad)];
     }
     if (low > high) return log ? [LOWEST, 10] : [-1, 1];
     if (log) return [Math.max(low, LOWEST) / 1.5, Math.max(high, LOWEST) * 1.5];
@@ -243,8 +260,10 @@ class Panel {
     pen.rect(left, top, right - left, bottom - top);
     pen.clip();
     this.drawShade(frame, series);
-    for (const trace of this.inOrder()) this.drawTrace(frame, series, trace);
+    if (this.spec.bars) this.drawBars(frame, series);
+    else for (const trace of this.inOrder()) this.drawTrace(frame, series, trace);
     pen.restore();
+    if (this.spec.clipped) this.drawSpikes(frame);
     this.drawModes(frame, series);
     this.drawMarks(frame);
     this.drawCursor(frame, series);
@@ -268,7 +287,7 @@ class Panel {
     }
     pen.textAlign = "right";
     pen.textBaseline = "middle";
-    for (const [value, label] of valueTicks(low, high, log, steps, (bottom - top) / 28)) {
+    for (const [value, label] of valueTicks(low, high, log, this.spec.bars ? [...steps].reverse() : steps, (bottom - top) / 28)) {
       line(pen, left, y(value), right, y(value));
       pen.fillText(label, left - 6, y(value));
     }
@@ -300,11 +319,41 @@ class Panel {
     pen.setLineDash([]);
   }
 
+  /** A row a label: a bar while one of its traces is 0, a thin line while all that are there are 1. */
+  drawBars({ pen, x, y }, series) {
+    this.spec.steps.forEach((label, place) => {
+      const of = this.spec.traces.filter((trace) => trace.label === label), at = (i, value) => series[this.spec.during][i] === 1 && of.some((trace) => series[trace.column][i] === value);
+      const bar = (inside, half, colour) => {
+        pen.fillStyle = colour;
+        for (const [start, end] of stretches(series.t_s, inside)) pen.fillRect(x(start), y(this.row(place) + half), Math.max(1, x(end) - x(start)), y(this.row(place) - half) - y(this.row(place) + half));
+      };
+      bar((i) => at(i, 0), 0.36, DATA.looks[of[0].role].colour);
+      bar((i) => at(i, 1) && !at(i, 0), 0.04, "#8a8a8a");
+    });
+  }
+
+  /** Rows of bars are read from the top. */
+  row(place) {
+    return this.spec.bars ? this.spec.steps.length - 1 - place : place;
+  }
+
+  /** Beyond a clipped axis: an arrow at its edge, with the largest value. */
+  drawSpikes({ pen, right, top, bottom, low, high }) {
+    const [least, most] = this.ends;
+    pen.fillStyle = "#555";
+    pen.textAlign = "right";
+    for (const [beyond, arrow, value, baseline, at] of [[most > high, "▲", most, "top", top + 2], [least < low, "▼", least, "bottom", bottom - 2]]) {
+      if (!beyond) continue;
+      pen.textBaseline = baseline;
+      pen.fillText(`${arrow} ${shown(value, this.spec.unit)}`, right - 4, at);
+    }
+  }
+
   drawShade({ pen, x, top, bottom }, series) {
     const flags = series[this.spec.shade];
     if (!flags) return;
     let any = false;
-    pen.fillStyle = "#faf6cf";
+    pen.fillStyle = this.spec.shadeColour;
     for (const [start, end] of stretches(series.t_s, (i) => flags[i] === 1)) {
       pen.fillRect(x(start), top, Math.max(1, x(end) - x(start)), bottom - top);
       any = true;
@@ -362,7 +411,7 @@ class Panel {
 
   inWords(value) {
     const { steps, unit } = this.spec;
-    return steps.length ? steps[Math.round(value)] ?? "–" : `${shown(value)}${unit ? " " + unit : ""}`;
+    return steps.length ? steps[Math.round(value)] ?? "–" : shown(value, unit);
   }
 }
 
@@ -650,7 +699,9 @@ function section(view) {
     const body = absentIn(view, run) ? make("p", { className: "hint", textContent: view.absent }) : gridOf(view, run);
     runs.append(make("div", {}, ...title, body));
   }
-  return make("section", { id: view.name }, make("h2", { textContent: view.title }), runs);
+  const title = make("h2", { textContent: view.title });
+  if (!view.folded) return make("section", { id: view.name }, title, runs);
+  return make("section", { id: view.name }, make("details", { ontoggle: repaint }, make("summary", {}, title), runs));
 }
 
 for (const run of DATA.runs) run.marks.sort((one, other) => one.time_s - other.time_s); // badges are placed from left to right

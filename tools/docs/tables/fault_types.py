@@ -5,10 +5,29 @@ from statistics import median
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import beaver_ftc as bf
 from beaver_ftc.studies.matrix.fault_matrix import SHOWN, run_matrix
 from beaver_ftc.studies.present.tables import markdown_table
 
 Document = dict[str, Any]
+EXAMPLE, AFTER_S = "elevator-stuck", 4.0  # of the candidates over time
+
+
+def candidates_over_time() -> str:
+    """Types of the named surface that are left, each time since the fault at which one is excluded."""
+    scenario = bf.load(EXAMPLE)
+    simulation, began_s = bf.Simulation(scenario), scenario.faults[0].at_s
+    before: set[str] = set()
+    rows = []
+    while simulation.t_s < began_s + AFTER_S:
+        simulation.step()
+        left = dict.fromkeys(one.replace("_", " ") for one in simulation.verdict.candidates)
+        if left and set(left) != before:
+            gone = sorted(before - set(left))
+            after = f"{simulation.t_s - began_s:.2f}"
+            rows.append((after, str(len(left)), ", ".join(gone) or "-", ", ".join(sorted(left))))
+            before = set(left)
+    return markdown_table(("time since the fault, s", "types left", "excluded", "still possible"), rows)
 
 
 def fault_matrix() -> str:

@@ -1,5 +1,9 @@
 """Tables of docs/explanation/laws.md."""
 
+import numpy as np
+
+import beaver_ftc as bf
+from beaver_ftc.control.laws.gains import RATIO
 from beaver_ftc.scenario.loader import load
 from beaver_ftc.studies.margins import study
 from beaver_ftc.studies.present.tables import markdown_table
@@ -8,6 +12,24 @@ DECLARED = {
     "nothing": {"name": "level"},
     "servos, tactical-grade sensors": {"name": "level", "actuators": "servo", "sensors": "tactical-grade"},
 }
+
+
+AIRSPEED_MPS = 45.0
+LOOPS = ("roll, aileron", "pitch, elevator", "yaw, rudder", "pitch, flap")
+
+
+def law_gains() -> str:
+    """The gains of the default law that follow from what is declared, at one airspeed."""
+    rows = []
+    for declared, keys in DECLARED.items():
+        scenario = load(keys)
+        law = bf.Simulation(scenario).records["control"]["rejecting"]["config"][0]
+        slowest = scenario.airframe.envelope.airspeed_mps[0]
+        pressure = law["qdyn"][0] * (AIRSPEED_MPS / slowest) ** 2
+        for loop, gains, lead in zip(LOOPS, law["Kp_at"], law["lead"], strict=True):
+            gain = np.interp(pressure, law["qdyn"], gains)
+            rows.append((declared, loop, f"{gain:.1f}", f"{RATIO * gain:.1f}", f"{lead:.1f}"))
+    return markdown_table(("declared", "loop", "K_p, 1/s", "w, 1/s", "lead"), rows)
 
 
 def least_margins() -> str:

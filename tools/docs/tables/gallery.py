@@ -9,7 +9,7 @@ import pandas as pd
 
 import beaver_ftc as bf
 from beaver_ftc.results.flight import Flight
-from beaver_ftc.results.style import LOOKS, SKY, VERMILION
+from beaver_ftc.results.style import BLACK, LOOKS, VERMILION
 from beaver_ftc.studies.present.tables import markdown_table
 
 _WIDTH, _HEIGHT, _MARGIN = 220, 104, 4  # of a thumbnail, px
@@ -44,7 +44,7 @@ def _sections() -> Iterator[str]:
         names = [name for name in left if name.startswith(beginnings)]
         left = [name for name in left if name not in names]
         rows = [_row(name) for name in names]
-        caption = f"*Table {number}. Scenarios of this kind with a picture and the outcome of each.*"
+        caption = f"*Table {number}. {heading}: curves of each flight, its scenario, and its outcome.*"
         yield f"## {heading}\n\n{caption}\n\n{markdown_table(('flight', 'scenario', 'outcome'), rows)}"
 
 
@@ -54,7 +54,7 @@ def _row(name: str) -> tuple[str, str, str]:
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(_thumbnail(flight), encoding="utf-8")
     description = " ".join(bf.load(name).description.split())
-    return f"![Curves of {name}]({path.as_posix()})", f"`{name}`: {description}", _outcome(flight)
+    return f"![Curves of {name}]({path.as_posix()})", f"`{name}`<br>{description}", _outcome(flight)
 
 
 def _outcome(flight: Flight) -> str:
@@ -81,8 +81,8 @@ def _thumbnail(flight: Flight) -> str:
         _line(_scaled(deflection, _UPPER), look.colour),
         _line(_scaled(share, _LOWER, (0.0, _HIGHEST)), "#333333"),
         _line(np.full(2, threshold), VERMILION, ' stroke-dasharray="4 3"'),
-        *(_upright(at, log, VERMILION) for at in _faults(flight)),
-        *([_upright(flight.detection.time_s, log, SKY)] if flight.detection.detected else []),
+        *(_upright(at, log, VERMILION, _MARGIN) for at in _faults(flight)),
+        *([_upright(flight.detection.time_s, log, BLACK, _LOWER[0])] if flight.detection.detected else []),
     ]
     size = f'width="{_WIDTH}" height="{_HEIGHT}"'
     return (
@@ -126,6 +126,6 @@ def _line(y: np.ndarray, colour: str, how: str = "") -> str:
     return f'<polyline points="{points}" stroke="{colour}"{how}/>'
 
 
-def _upright(at_s: float, log: pd.DataFrame, colour: str) -> str:
+def _upright(at_s: float, log: pd.DataFrame, colour: str, top: int) -> str:
     x = _MARGIN + (_WIDTH - 2 * _MARGIN) * at_s / float(log["t_s"].iloc[-1])
-    return f'<path d="M{x:.1f} {_MARGIN}V{_HEIGHT - _MARGIN}" stroke="{colour}"/>'
+    return f'<path d="M{x:.1f} {top}V{_HEIGHT - _MARGIN}" stroke="{colour}"/>'

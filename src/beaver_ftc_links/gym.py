@@ -21,6 +21,7 @@ import contextlib
 import pickle
 import signal
 from collections.abc import Sequence
+from copy import deepcopy
 from ctypes import Array, c_double
 from itertools import pairwise
 from multiprocessing.connection import Connection
@@ -39,6 +40,7 @@ from beaver_ftc.compiled import direct
 from beaver_ftc.documents import BadInput, SimulationFailed
 from beaver_ftc.loop import LARGEST_OBSERVATION as LARGEST
 from beaver_ftc.loop import OBSERVED_BESIDE_SURFACES as BESIDE_SURFACES
+from beaver_ftc.loop import Asked
 from beaver_ftc.loop import act_as_agent as act
 from beaver_ftc.loop import cost_of_agent as cost
 from beaver_ftc.loop import look_of_agent as look_of
@@ -82,6 +84,7 @@ class Episode(Simulation):
         shares = _numbers("action", action, (self._size,))
         if shares.shape != (self._size,) or not self._acts(self._loop.frames, shares):
             raise BadInput(f"action: {action!r:.80} is not usable, allowed: {self._size} finite numbers")
+        self._asked.append(Asked("act", {"action": shares.copy()}, (0, frames)))
         self._cost, self._by_hand = 0.0, True
         self._fly_to(min(self._next + frames, self._loop.n_frames))
         return self._cost
@@ -151,6 +154,16 @@ class BeaverEnv(gymnasium.Env[Vector, Vector]):
         departed = episode.departed
         info = {"metrics": episode.land().metrics}
         return episode.observation(), reward + DEPARTURE * departed, departed, not departed, info
+
+    def clone(self) -> "BeaverEnv":
+        """Another environment in the same state: what is done to one changes nothing in the other.
+
+        Exact, as `Simulation.clone`, and at its price: the episode is flown again until now.
+        """
+        other = BeaverEnv(self.scenario, self.frames_per_step)
+        other._np_random, other._np_random_seed = deepcopy(self._np_random), self._np_random_seed
+        other._seeded, other._episode = self._seeded, self._episode and self._episode.clone()
+        return other
 
 
 class _Part(NamedTuple):

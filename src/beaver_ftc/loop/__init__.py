@@ -30,7 +30,7 @@ if TYPE_CHECKING:
         set_ground,
         stop_diagnosis,
     )
-    from beaver_ftc.loop.simulation import Stepping
+    from beaver_ftc.loop.simulation import Asked, Stepping
     from beaver_ftc.loop.stream import FLOW, Diagnosis
 else:
     __getattr__, __dir__ = lazily(__name__)

@@ -3,9 +3,10 @@
 What is done to a flight is kept, frame by frame: `scenario_flown` says it all and flies it again to the bit.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from copy import copy
 from difflib import get_close_matches
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,6 +35,22 @@ if TYPE_CHECKING:
     from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
 
 Vector = NDArray[np.float64]
+
+
+class Asked(NamedTuple):
+    """What a flight was asked for: the method's name, its arguments, and the frames of a step; those of the
+    last one by themselves."""
+
+    what: str
+    given: Mapping[str, Any]
+    frames: tuple[int, int]
+
+    def is_of(self, what: str, given: Mapping[str, Any]) -> bool:
+        """Whether it is a step with these arguments."""
+        if not any(self.frames) or self.what != what:
+            return False
+        both = ((of, given[name]) for name, of in self.given.items())
+        return all(a is b or (a is not None and b is not None and np.array_equal(a, b)) for a, b in both)
 
 
 class Stepping:
@@ -82,6 +99,7 @@ class Stepping:
         self._next, self._turn_at, self._written = 0, 0, 0
         self._status, self._by_hand = FLYING, False
         self._stick = StickTrack()
+        self._asked: list[Asked] = []  # of this flight, so far
         self._unsteered: tuple[int, Vector] | None = None  # references of a chunk, and its first frame
         self._last: list[Vector] = []  # rows of the last step, a piece a segment
         if self._sink is not None:
@@ -197,6 +215,7 @@ class Stepping:
         if self._next > 0:
             self._last.clear()
         self._begin()
+        self._note_asked("step", frames, command=deflections, stick=stick)
         self._loop.hold(deflections)  # in the law's place, from the frame just flown on; None gives it back
         self._by_hand |= deflections is not None
         self._fly_to(min(self._next + frames, self._loop.n_frames), rate_deg_s)
@@ -212,6 +231,7 @@ class Stepping:
             return
         if len(self._faults) >= MOST_FAULTS:
             raise BadInput(f"faults: this flight has had {MOST_FAULTS}, allowed: a new flight, or fewer")
+        self._note_asked("inject", fault=dict(fault))
         self._declare((*self._faults, new))
 
     def repair(self, actuator: str | None = None) -> None:
@@ -229,6 +249,7 @@ class Stepping:
             actuator = fault_name(actuator, names)
         if actuator is not None and actuator not in names:
             raise BadInput(f"actuator: {actuator!r:.60} is not known{suggestion(str(actuator), names)}")
+        self._note_asked("repair", actuator=actuator)
         self._declare(tuple(self._repaired(fault, actuator) for fault in self._faults))
 
     @property
@@ -243,6 +264,7 @@ class Stepping:
         """
         self._begin()
         self._scenario = interventions.with_gust(self._scenario, gust, self._now_s)
+        self._note_asked("blow", gust=dict(gust))
         gusts = self._scenario.environment.gusts
         self._loop.gust, self._turn_at = GustSchedule(gusts, self._loop.plant, self.rate_hz), self._next
 
@@ -255,6 +277,7 @@ class Stepping:
         self._begin()
         scenario = interventions.with_change(self._scenario, change, self._now_s)
         self._loop.change(scenario, self._next)
+        self._note_asked("change", change=dict(change))
         self._scenario, self._turn_at = scenario, self._next
 
     def aim(self, targets: Mapping[str, float]) -> None:
@@ -262,6 +285,7 @@ class Stepping:
         self._begin()
         self._scenario = interventions.with_targets(self._scenario, targets, self._now_s)
         set_up_profile(self._loop.frames["autopilot"][0], self._scenario)
+        self._note_asked("aim", targets=dict(targets))
 
     def read(self, name: str) -> float:
         """A property of JSBSim's, in the unit its name says. Raises BadInput if there is none such."""
@@ -274,6 +298,25 @@ class Stepping:
             raise BadInput(f"the aircraft has no property {meant}, allowed: one that JSBSim lists") from None
 
     __getitem__ = read
+
+    def _note_asked(self, what: str, frames: int = 0, **given: Any) -> None:
+        """Keep what this flight was asked for. frames: of a step; steps that ask for the same are one."""
+        given = {name: copy(of) for name, of in given.items()}
+        before = 0
+        if frames and self._asked and self._asked[-1].is_of(what, given):
+            before = sum(self._asked.pop().frames)
+        self._asked.append(Asked(what, given, (before, frames)))
+
+    def _do_again(self, asked: Iterable["Asked"], frames: int) -> None:
+        """Fly what another flight of this scenario was asked for; frames: how many it has flown."""
+        if frames:
+            self._begin()
+        for each in asked:
+            do = getattr(self, each.what)
+            if not any(each.frames):
+                do(**each.given)
+            for some in filter(None, each.frames):
+                do(frames=some, **each.given)
 
     def scenario_flown(self) -> Scenario:
         """The scenario that flies what has been flown, to the bit.

@@ -134,3 +134,17 @@ def test_a_departure_ends_the_episode_and_costs():
 def test_stepping_before_reset_is_said():
     with pytest.raises(gymnasium.error.ResetNeeded):
         BeaverEnv(scenario(duration_s=1)).step(np.zeros(4))
+
+
+def test_a_clone_goes_its_own_way_from_the_same_state():
+    env = BeaverEnv("elevator-loss-in-turbulence", frames_per_step=4)
+    env.reset(seed=3)
+    for share in (0.1, 0.1, -0.2):
+        env.step(np.full(4, share))
+    other = env.clone()
+    away = env.clone()
+    away.step(np.ones(4))
+    for share in (0.0, 0.3):
+        for mine, its in zip(env.step(np.full(4, share)), other.step(np.full(4, share)), strict=True):
+            assert np.array_equal(mine, its)
+    assert np.array_equal(env.reset()[0], other.reset()[0]), "episodes to come are the same, too"

@@ -1,0 +1,87 @@
+"""A flight that is continued from a snapshot equals the one that went on, to the bit, whatever flies."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import beaver_ftc as bf
+from beaver_ftc.documents.errors import BadInput
+from flying import loss, scenario
+
+TRAINER = Path(__file__).parents[1] / "data" / "aircraft" / "trainer-flight.yaml"
+KINDS = {
+    "published": scenario(duration_s=4.0, faults=[loss(at_s=1.5)]),
+    "gust": scenario(duration_s=4.0, environment={"gust": [{"at_s": 1.5, "velocity_mps": [2, 1, -3]}]}),
+    "turbulence, sensors, servos, statistical": bf.load("elevator-loss-in-turbulence"),
+    "autopilot, halves by side": bf.load("mission-split-elevator-lost"),
+    "broken sensor": bf.load("sensor-airspeed-frozen").with_({"faults[0].at_s": 0.5}),
+    "an aircraft of others": bf.load(TRAINER),
+}
+
+
+def ended(sim, at_s=4.0):
+    sim.step(frames=round((at_s - sim.frames / sim.rate_hz) * sim.rate_hz))
+    return sim
+
+
+def same(one, other):
+    return np.array_equal(one, other, equal_nan=True)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_continued_flight_is_the_uninterrupted_one(kind):
+    sim = bf.Simulation(KINDS[kind])
+    sim.step(frames=30)
+    sim.inject({"actuator": "rudder", "type": "bias", "bias_deg": 1})
+    sim.step(stick=[0.01, 0.0, -0.02], frames=60)
+    sim.repair()
+    for _ in range(3):
+        sim.step(sim.trim_rad + 0.01, frames=5)
+    sim.step(frames=77)
+    kept = sim.snapshot()
+    first = kept.resume()
+    assert (first.frames, first.t_s) == (sim.frames, sim.t_s) == (kept.frames, kept.t_s)
+    assert same(first.rows, sim.rows)
+    assert same(ended(first).log, ended(sim).log)
+    assert first.land().metrics == sim.land().metrics
+    assert same(ended(kept.resume()).log, sim.log), "any number of times"
+
+
+def test_clones_go_their_own_ways():
+    sim = bf.Simulation(KINDS["published"])
+    sim.step(frames=140)
+    healthy = sim.clone()
+    healthy.inject({"actuator": "elevator", "type": "stuck", "position_deg": 3})
+    assert not same(ended(healthy).log, ended(sim).log)
+    assert same(sim.log, bf.fly(KINDS["published"]).log), "what was done to the clone changes nothing here"
+
+
+def test_before_the_first_step_nothing_is_flown():
+    kept = bf.Simulation(KINDS["published"], log=False).snapshot()
+    assert kept.resume().frames == kept.frames == 0
+    with pytest.raises(BadInput, match="kept no log"):
+        _ = kept.resume().log
+
+
+class Quiet:
+    """A detector that never raises an alarm."""
+
+    def reset(self, context):
+        self.seen = 0
+
+    def step(self, measured, command):
+        self.seen += 1
+        return bf.Verdict()
+
+
+def test_objects_plugged_in_are_new_ones_of_each_continued_flight():
+    sim = bf.Simulation(KINDS["published"], detector=Quiet())
+    sim.step(frames=50)
+    kept, again = sim.snapshot(), Quiet()
+    with pytest.raises(BadInput, match="resume: a flight with detector is resumed, allowed: new objects"):
+        kept.resume()
+    assert same(ended(kept.resume(detector=again)).log, ended(sim).log)
+    assert again.seen == sim.frames
+    with pytest.raises(BadInput, match="a flight with no plug-in"):
+        bf.Simulation(KINDS["published"]).snapshot().resume(detector=again)

@@ -28,7 +28,7 @@ class Exempt:
 
 TABLE = (
     Exempt(
-        r"make (demo|test|site|cost)",
+        r"make (demo|test|site|cost|docs-check)",
         "in a checkout: sets up from the package index; make test runs this very suite",
     ),
     Exempt(r"beaver-ftc derive AIRCRAFT .*", "names the command's arguments", "beaver-ftc derive --help"),
@@ -52,7 +52,7 @@ TABLE = (
         "beaver-ftc run elevator-partial-loss --no-report --certificate"
         " && python tools/check_certificate.py runs/elevator-partial-loss",
     ),
-    Exempt(r"beaver-ftc compare --sweep examples/gtm/.*", "needs NASA's data, imported"),
+    Exempt(r"beaver-ftc compare --sweep examples/gtm/.*|beaver-ftc import gtm .*", "needs NASA's data"),
     Exempt(r"git clone .*", "needs the network"),
     Exempt(r"beaver-ftc import gtm .*", "needs NASA's data", "beaver-ftc import gtm --help"),
     Exempt(r"beaver-ftc run my-damage\.yaml", "needs NASA's data, imported"),
@@ -92,9 +92,8 @@ TABLE = (
         "half a minute: a few flights",
         "python -m tools.drawn.certificates --flights 4 --altered 4",
     ),
-    Exempt(r"python -m tools\.drawn", "minutes: a few scenarios", "python -m tools.drawn --flights 40"),
     Exempt(
-        r"beaver-ftc (run|validate|sweep|compare|detectability)",
+        r"beaver-ftc (run|validate|sweep|compare|detectability|evidence|sitl)",
         "names the command without its arguments",
         r"beaver-ftc \1 --help",
     ),

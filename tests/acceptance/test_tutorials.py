@@ -9,7 +9,6 @@ from .documents import ROOT, named_files, steps
 from .exceptions import instead
 
 TUTORIALS = sorted((ROOT / "docs/tutorials").glob("*.md"))
-LONGEST_WORDS = 1200  # one sitting
 EXAMPLE = re.compile(r"\]\(\.\./\.\./(examples/[\w./-]+\.\w+)\)")
 BY_HAND = re.compile(r"beaver-ftc validate mistaken\.yaml")  # shows what a mistake looks like
 
@@ -38,14 +37,6 @@ def _is_expected(line, done):
     if done.returncode == 2:
         return bool(BY_HAND.match(line))
     return done.returncode == 1 and re.search("MISSED|FAILED", done.stdout)
-
-
-@pytest.mark.parametrize("page", TUTORIALS, ids=lambda page: page.stem)
-def test_a_tutorial_is_one_sitting(page):
-    prose = re.sub(
-        r"<!-- printed: .*?<!-- /printed -->", "", page.read_text(encoding="utf-8"), flags=re.DOTALL
-    )
-    assert len(prose.split()) <= LONGEST_WORDS
 
 
 def test_tutorials_are_numbered_and_lead_to_each_other():

@@ -55,7 +55,6 @@ TABLE = (
     Exempt(r"beaver-ftc compare --sweep examples/gtm/.*|beaver-ftc import gtm .*", "needs NASA's data"),
     Exempt(r"git clone .*", "needs the network"),
     Exempt(r"beaver-ftc import gtm .*", "needs NASA's data", "beaver-ftc import gtm --help"),
-    Exempt(r"beaver-ftc run my-damage\.yaml", "needs NASA's data, imported"),
     Exempt(r"python -m tools\.docs reference \S+", "in a checkout; tests/tools prints every such page"),
     Exempt(
         r"(beaver-ftc live(?: (?!--open)\S+)*)( --open)?",

@@ -12,6 +12,7 @@ from beaver_ftc.studies.present.tables import markdown_table
 
 DESIGNS = ("declared", "engine-neglected", "linearised", "frozen-alpha", "heavy")
 CONDITIONS = ((30.0, 0.0), (35.0, 1829.0), (45.0, 1829.0), (50.0, 3000.0), (55.0, 4000.0))
+SWING = ("short_period", "phugoid", "dutch_roll")
 PROGRAM = "from beaver_ftc.cli.main import main; main()"
 
 
@@ -25,11 +26,18 @@ def mismatch_designs() -> str:
     for found in json.loads(run.stdout)["runs"]:
         flights[found["scenario"].removeprefix("elevator-partial-loss").lstrip("-") or "declared"] = found
     return markdown_table(
-        ("design model", *AXES, "largest", "false alarm"),
+        (
+            "design model",
+            *(f"{axis}, % of bound" for axis in AXES),
+            *(f"{axis}, rad/s²" for axis in AXES),
+            "largest source",
+            "false alarm",
+        ),
         [
             (
                 name,
-                *(_beside_bound(flights[name]["bound"][axis]) for axis in AXES),
+                *(f"{100 * flights[name]['bound'][axis]['worst_ratio']:.0f}" for axis in AXES),
+                *(f"{flights[name]['bound'][axis]['smallest_constant_rad_s2']:.2g}" for axis in AXES),
                 flights[name]["dominant"]["source"],
                 "yes" if flights[name]["false_alarm"] else "no",
             )
@@ -38,27 +46,30 @@ def mismatch_designs() -> str:
     )
 
 
-def _beside_bound(bound: dict[str, float]) -> str:
-    return f"{100 * bound['worst_ratio']:.0f}%/{bound['smallest_constant_rad_s2']:.2g}"
-
-
 def mismatch_modes() -> str:
     """Frequency, rad/s, and damping of the truth's modes, and how far two other linear models are off."""
     rows = []
     for airspeed_mps, altitude_m in CONDITIONS:
         initial = {"airspeed_mps": airspeed_mps, "altitude_m": altitude_m}
         modes = linear_document(analyse(load({"name": "modes", "initial": initial})))["modes"]
-        of_it = [_said(mode["truth"]) for mode in modes.values()]
+        found = [value for name, mode in modes.items() for value in _said(name, mode["truth"])]
         worst = (
             max(mode["deviation"]["fdc"] for mode in modes.values()),
             max(mode["jsbsim_own_deviation"] for mode in modes.values()),
         )
-        rows.append((f"{airspeed_mps:g}/{altitude_m:g}", *of_it, *(f"{share:.2%}" for share in worst)))
-    names = (name.replace("_", " ") for name in modes)
-    return markdown_table(("m/s/m", *names, "FDC", "JSBSim"), rows)
+        rows.append(
+            (f"{airspeed_mps:g}", f"{altitude_m:g}", *found, *(f"{100 * share:.2f}" for share in worst))
+        )
+    heads = [head for name in modes for head in _heads(name)]
+    return markdown_table(("airspeed, m/s", "altitude, m", *heads, "FDC, %", "JSBSim, %"), rows)
 
 
-def _said(mode: dict[str, float]) -> str:
+def _heads(name: str) -> tuple[str, ...]:
+    words = name.replace("_", " ")
+    return (f"{words}, rad/s", f"{words}, damping") if name in SWING else (f"{words}, 1/s",)
+
+
+def _said(name: str, mode: dict[str, float]) -> tuple[str, ...]:
     """Frequency, and damping where it swings."""
-    damping = f"/{mode['damping']:.2g}" if mode["damping"] < 1.0 else ""
-    return f"{mode['frequency_rad_s']:.3g}{damping}"
+    frequency = f"{mode['frequency_rad_s']:.3g}"
+    return (frequency, f"{mode['damping']:.2g}") if name in SWING else (frequency,)

@@ -4,6 +4,9 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 WORKERS ?= 2
+# One more than cores: some tests wait for a server, a child or the clock.
+WAITING := $(shell expr $(WORKERS) + 1)
+BRING = $(MAKE) --silent $(VENV)/.dev
 SEED ?= 1
 # One thread of linear algebra to a worker: two workers with two each wait for each other half a minute in one test.
 # A file's tests stay in one worker: what its fixtures fly is flown once; conftest.py puts the longest files first.
@@ -14,7 +17,7 @@ FAST := tests/aircraft tests/design tests/plant tests/results tests/scenario $(w
 
 # Kernels on plain arrays, without a compiler: to compile each by itself takes ten times as long as to try it.
 PLAIN := tests/design $(wildcard tests/*/test_*_kernels.py tests/*/*/test_*_kernels.py) \
-  $(addprefix tests/diagnosis/test_,membership.py noise_numbers.py short_flights.py types_verdict.py) \
+  $(addprefix tests/diagnosis/test_,coarse_frames.py membership.py noise_numbers.py short_flights.py types_verdict.py) \
   $(addprefix tests/control/test_,decisions.py law_frame.py laws.py supervisor.py compiled_rivals.py) \
   tests/control/laws/test_gains.py tests/diagnosis/rivals/test_filters.py
 
@@ -53,18 +56,28 @@ $(VENV)/.demo: pyproject.toml | $(BIN)/python
 	$(call install,.)
 	touch $@
 
-$(VENV)/.dev: pyproject.toml | $(BIN)/python
-	$(call install,.[dev])
+# What the first tests of `make test` need: it brings the rest while they run.
+$(VENV)/.test: pyproject.toml | $(BIN)/python
+	$(call install,.[test])
 	touch $(VENV)/.demo $@
+
+# Without the package itself, which tests that run meanwhile import.
+$(VENV)/.dev: pyproject.toml | $(VENV)/.test
+	@echo "installing what development needs besides"; $(BIN)/python -m tools.requirements dev >$(VENV)/dev.txt
+	@{ test -x $(BIN)/uv && $(BIN)/uv pip install --quiet --python $(BIN)/python --requirement $(VENV)/dev.txt; } 2>/dev/null || \
+	  $(PIP) install --quiet --requirement $(VENV)/dev.txt
+	touch $@
 
 demo: $(VENV)/.demo
 	$(BIN)/beaver-ftc run elevator-partial-loss --out runs
 	@echo "report: runs/elevator-partial-loss/report.html"
 
-# What most flights use is compiled while plain kernels are tried; the second run compiles what is missing.
-test: $(VENV)/.dev
-	$(BIN)/python tests/warm.py >/dev/null 2>&1 & NUMBA_DISABLE_JIT=1 $(PYTEST) -m "not nightly" $(PLAIN)
-	$(PYTEST) -m "not nightly" $(addprefix --ignore=,tests/acceptance $(PLAIN))
+# What most flights use is compiled, and what is missing installed, while plain kernels are tried; the second run
+# compiles the rest.
+test: $(VENV)/.test
+	@$(BRING) & installing=$$!; $(BIN)/python tests/warm.py >/dev/null 2>&1 & \
+	  NUMBA_DISABLE_JIT=1 $(PYTEST) -m "not nightly" $(PLAIN) && wait $$installing
+	$(PYTEST) -n $(WAITING) -m "not nightly" $(addprefix --ignore=,tests/acceptance $(PLAIN))
 
 # Every test with all that it draws, what tests/nightly.yaml lists too; then drawn scenarios, mutants.
 nightly: $(VENV)/.dev

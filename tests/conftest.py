@@ -42,13 +42,18 @@ def pytest_addoption(parser):
 
 # Files that take a worker longest: begun last, they would keep it while the other has nothing to do.
 LONGEST = (
-    "aircraft/derive/test_derive.py", "cli/test_command_line.py", "compiled/test_cache.py",
-    "plugins/test_pytest_plugin.py", "live/page/test_guests.py", "live/page/test_server.py",
-    "diagnosis/test_new_type.py", "live/challenge/test_cheats.py", "studies/sweep/test_ray.py",
-    "studies/matrix/test_matrix.py", "studies/mismatch/test_command.py", "logs/test_commands.py",
-    "compiled/test_strangers.py", "studies/sweep/test_campaign.py", "studies/power/test_survey.py",
-    "diagnosis/test_short_flights.py", "control/outer/test_thrust_of_others.py", "tools/test_mutants.py",
-    "studies/compare/test_compare.py", "aircraft/test_engines.py", "diagnosis/test_air_kernels.py",
+    "products/live/page/test_guests.py", "aircraft/derive/test_derive.py", "cli/test_command_line.py",
+    "studies/compare/test_replay.py", "plugins/test_pytest_plugin.py", "studies/compare/test_compare.py",
+    "diagnosis/test_new_type.py", "logs/test_by_aircraft.py", "compiled/test_cache.py", "loop/test_stream.py",
+    "rivals/test_detectors.py", "studies/test_new_study.py", "logs/test_commands.py",
+    "results/test_flight.py",
+    "studies/mismatch/test_command.py", "assurance/certificates/test_certificates.py", "loop/test_loop.py",
+    "aircraft/test_engines.py", "logs/test_check.py", "aircraft/derive/test_derived_document.py",
+    "studies/sweep/test_campaign.py", "studies/sweep/test_ray.py", "studies/power/test_survey.py",
+    "live/page/test_page.py", "live/page/test_server.py", "compiled/test_strangers.py",
+    "scenario/test_new_sensor.py", "plugins/test_plugins.py", "studies/reproduce/test_reproduce.py",
+    "control/test_power.py", "results/test_report.py", "recorded/test_benchmark.py", "sitl/test_endpoint.py",
+    "diagnosis/test_short_flights.py", "diagnosis/test_likelihood.py", "loop/test_accelerometers.py",
 )  # fmt: skip
 
 

@@ -28,9 +28,11 @@ BAR = 90
 # Of the core: other commands, other views of a result, the reports of many flights.
 NOT_FOR_A_RUN = (
     "beaver_ftc.cli.catalogue", "beaver_ftc.cli.scenarios", "beaver_ftc.cli.study", "beaver_ftc.cli.sweep",
-    "beaver_ftc.diagnosis.rivals.", "beaver_ftc.plant.trial", "beaver_ftc.pytest_plugin",
-    "beaver_ftc.results.exports", "beaver_ftc.results.figures", "beaver_ftc.results.flight",
-    "beaver_ftc.results.report", "beaver_ftc.results.views", "beaver_ftc.studies.",
+    "beaver_ftc.control.rivals.indi", "beaver_ftc.control.rivals.l1", "beaver_ftc.control.rivals.lqr",
+    "beaver_ftc.diagnosis.rivals.", "beaver_ftc.loop.plugin_frame",
+    "beaver_ftc.plant.trial", "beaver_ftc.pytest_plugin", "beaver_ftc.results.exports",
+    "beaver_ftc.results.figures", "beaver_ftc.results.flight", "beaver_ftc.results.report",
+    "beaver_ftc.results.views", "beaver_ftc.studies.",
 )  # fmt: skip
 ALLOWED = ("beaver_ftc.studies.engine", "beaver_ftc.studies.engine.command")  # the options of commands
 

@@ -62,13 +62,6 @@ def test_it_flies_by_name_and_by_class(site, tmp_path):
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_without_the_package_its_name_is_unknown(tmp_path):
-    (tmp_path / "a.yaml").write_text("name: a\nfdi: {scheme: my-cusum}\n")
-    done = _beaver(tmp_path, tmp_path, "validate", "a.yaml")
-    assert done.returncode == 2
-    assert "unknown scheme 'my-cusum'" in done.stderr
-
-
 def test_it_is_compared(site, tmp_path):
     (tmp_path / "few.sweep.yaml").write_text(SWEEP)
     arguments = ("--schemes", "my-cusum", "--laws", "nominal", "--workers", "1", "--format", "json")

@@ -89,12 +89,6 @@ class TestFlown:
 
 
 class TestViews:
-    def test_every_view_is_a_figure(self, flight):
-        for name in {*flight.views()} - {"candidates"}:  # bars are no curves
-            figure = flight.plot(name)
-            drawn = [len(line.get_xdata()) for axes in figure.axes for line in axes.lines]
-            assert max(drawn) == 300
-
     def test_a_closeup_is_around_the_fault(self, flight):
         low, high = flight.plot("detection", closeup=True).axes[0].get_xlim()
         assert 0.9 < low < 1.5 < high <= 3.0

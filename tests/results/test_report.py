@@ -7,7 +7,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 from browser import PROGRAM, Browser
-from synthetic import Expect, Fault, Flight, Scenario, rows
+from synthetic import Expect, Flight, Scenario, rows
 
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import as_json, metrics
@@ -265,14 +265,6 @@ def test_runs_stand_side_by_side_on_the_same_scale(browser, folder, tmp_path):
     assert boxes[0][0] < boxes[1][0]
     assert boxes[0][1] == boxes[1][1]
     assert browser.trouble == []
-
-
-def test_first_of_two_faults_is_marked(tmp_path):
-    two = Scenario(faults=(Fault(at_s=20.0), Fault(at_s=12.0)))
-    data = re.search(
-        r'id="data">(.*?)</script>', render([_folder(tmp_path / "two", Flight(scenario=two))])
-    ).group(1)
-    assert [mark["time_s"] for mark in json.loads(data)["runs"][0]["marks"]] == [12.0, 12.07, 12.12]
 
 
 def test_what_damage_takes_is_left_out_from_its_instant_to_its_repair(browser, folder, tmp_path):

@@ -83,8 +83,6 @@ def fault(kind, sensor="radio_altitude", **more):
 
 BROKEN = {  # what happens, who is named, and how soon the alarm comes, s
     "bias": (fault("bias", magnitude=60.0), "radio_altitude", 0.2),
-    "scale": (fault("scale", magnitude=0.05), "radio_altitude", 0.2),
-    "lost": (fault("lost"), "radio_altitude", 0.05),
     "freeze": (fault("freeze"), "radio_altitude", 2.0),
     "altimeter": (fault("bias", sensor="altitude", magnitude=-18.0), "altitude", 0.2),
 }

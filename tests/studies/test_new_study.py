@@ -205,25 +205,3 @@ def test_it_goes_on_where_it_was(curve, tmp_path):
     (tmp_path / "flown.txt").unlink()
     assert curve()[0] == 0
     assert len((tmp_path / "flown.txt").read_text().split()) == 5 - len(kept)
-
-
-def test_its_result_is_replaced_by_another_command_and_a_strangers_file_is_not(curve, copied, tmp_path):
-    assert curve()[0] == 0
-    program = (
-        "from pathlib import Path\nfrom beaver_ftc.results.writer import refuse_foreign\n"
-        "refuse_foreign(Path('runs/level-flight-curve'))"
-    )
-
-    def refused():
-        return subprocess.run(
-            [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=False,
-            env={**os.environ, "PYTHONPATH": str(copied[0])},
-        ).stderr  # fmt: skip
-
-    assert refused() == ""
-    (tmp_path / "runs/level-flight-curve/thesis.doc").touch()
-    assert "it holds thesis.doc, which is no result of beaver-ftc" in refused()
-
-
-def test_a_bad_option_is_one_line(curve):
-    assert curve("--degree", "0")[0] == 2

@@ -15,6 +15,7 @@ from beaver_ftc.documents.errors import BadInput
 from tools.docs import pictures, values
 from tools.docs.commands import Output, outputs
 from tools.docs.compact import compact
+from tools.docs.kept import Kept
 from tools.docs.marks import Block, Document, Origin, Page
 from tools.docs.pages import ROOT, Finding
 
@@ -31,6 +32,7 @@ class Wanted:
     dear: bool = False
     probes: bool = False
     only: str = ""
+    anew: bool = False  # also what is kept of an earlier run
 
     def flies(self, origin: Origin) -> bool:
         """Whether the command itself is run, not its probe."""
@@ -54,10 +56,16 @@ def missing(origin: Origin) -> str:
 
 
 def outputs_of(pages: Sequence[Page], wanted: Wanted, jobs: int | None = None) -> dict[str, Output]:
-    """{command: what it printed} of what the pages' marks want."""
+    """{command: what it printed} of what the pages' marks want; cheap ones run if nothing of them is kept."""
     origins = [origin for page in pages for origin in page.origins]
     cheap, dear = wanted.commands(origins)
-    return outputs(cheap, set(dear), jobs, {origin.needs for origin in origins})
+    needed = {origin.needs for origin in origins}
+    kept = Kept(needed)
+    known = {} if wanted.anew else {line: found for line in set(cheap) if (found := kept.get(line))}
+    printed = outputs([line for line in cheap if line not in known], set(dear), jobs, needed)
+    for line in set(cheap) & printed.keys():
+        kept.put(line, printed[line])
+    return known | printed
 
 
 class Refreshed:
@@ -261,9 +269,11 @@ def write(pages: Sequence[Page], wanted: Wanted, jobs: int | None = None) -> tup
     return written, findings
 
 
-def check(pages: Sequence[Page], jobs: int | None = None) -> tuple[list[Finding], dict[str, Output]]:
+def check(
+    pages: Sequence[Page], jobs: int | None = None, anew: bool = False
+) -> tuple[list[Finding], dict[str, Output]]:
     """What is wrong on the pages, and what is only said; and what every command printed."""
-    wanted = Wanted(probes=True)
+    wanted = Wanted(probes=True, anew=anew)
     printed = outputs_of(pages, wanted, jobs)
     made = [Refreshed(page, printed, wanted) for page in pages]
     return [finding for page in made for finding in (*page.findings, *page.changes)], printed

@@ -4,15 +4,12 @@ import json
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 from pyarrow import parquet
 from typer.testing import CliRunner
 
 from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
 from products.logs import synthetic
-from samples import samples
 
 
 def run(*arguments):
@@ -97,16 +94,6 @@ def whole(folder, tmp_path_factory):
     out = tmp_path_factory.mktemp("whole")
     diagnosed(folder, folder / "flight.csv", out)
     return out / "flight"
-
-
-@settings(max_examples=samples(5), deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(rows=st.integers(min_value=60, max_value=1199))
-def test_cutting_a_log_changes_no_row_before_the_cut(folder, whole, tmp_path, rows):
-    lines = (folder / "flight.csv").read_text().splitlines()
-    (tmp_path / "flight.csv").write_text("\n".join(lines[: 1 + rows]) + "\n")
-    cut = diagnosed(folder, tmp_path / "flight.csv", tmp_path / "cut")
-    assert cut.num_rows == rows
-    assert cut.equals(parquet.read_table(whole / "diagnosis.parquet").slice(0, rows))
 
 
 @pytest.mark.parametrize("options", [(), ("--score",)])

@@ -8,7 +8,6 @@ import pytest
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.fitting import usable
 from beaver_ftc_logs.identification import identify
-from beaver_ftc_logs.regression import least_squares, variance_inflation
 from beaver_ftc_logs.samples import constant_parts, load_flights
 from products.logs import synthetic
 
@@ -56,32 +55,3 @@ def test_too_short_a_flight_is_refused(wing, wing_folder):
     path = synthetic.write_csv(wing_folder / "short.csv", synthetic.fly(8.0))
     with pytest.raises(BadInput, match="samples known to be healthy, allowed: at least"):
         identify(load_flights([path], wing), wing)
-
-
-def test_coloured_residuals_widen_the_standard_errors():
-    """Slopes over many draws scatter as the corrected standard error says, not as the white one does."""
-    rng = np.random.default_rng(2)
-    n, slopes, said, colour = 600, [], [], []
-    for _ in range(200):
-        x, e = _coloured(rng, n), _coloured(rng, n)
-        fit = least_squares(x[:, None], np.tile(e[:, None], 3), np.zeros(n, dtype=int), 40)
-        slopes.append(fit.coefficients[0, 0])
-        said.append(fit.standard_errors[0, 0])
-        colour.append(fit.colour[0, 0])
-    assert np.mean(colour) > 1.8
-    assert np.median(said) == pytest.approx(np.std(slopes), rel=0.25)
-
-
-def _coloured(rng, n):
-    x = np.zeros(n)
-    for k in range(1, n):
-        x[k] = 0.8 * x[k - 1] + rng.standard_normal()
-    return x
-
-
-def test_variance_inflation_is_one_over_one_less_r_squared():
-    rng = np.random.default_rng(3)
-    a, b = rng.standard_normal((2, 4000))
-    x = np.column_stack([a, a + 0.5 * b])
-    r2 = np.corrcoef(x.T)[0, 1] ** 2
-    assert variance_inflation(x) == pytest.approx([1 / (1 - r2)] * 2, rel=1e-6)

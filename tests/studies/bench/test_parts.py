@@ -15,9 +15,9 @@ def test_all_parts_together_are_the_frame_itself():
     assert frame_with(len(PARTS)) is stepping.fly_on
 
 
-def test_every_part_names_kernels_there_are():
-    for i in range(len(PARTS)):
-        assert frame_with(i) is not stepping.fly_on
+@pytest.mark.parametrize("i", range(len(PARTS)))
+def test_every_part_names_kernels_there_are(i):
+    assert frame_with(i) is not stepping.fly_on
 
 
 def test_an_unknown_kernel_is_refused():

@@ -4,7 +4,6 @@ import json
 import subprocess
 import sys
 import time
-from functools import partial
 from pathlib import Path
 
 import pytest
@@ -43,7 +42,6 @@ from beaver_ftc.studies.compare.trial import (
     with_entry,
 )
 from beaver_ftc.studies.compare.tune import _best_detector, alarm_level, candidates, grids
-from beaver_ftc.studies.engine.study import fly_all
 from beaver_ftc.studies.present.page import contents, write_files
 from commands import beaver
 from flying import scenario
@@ -60,22 +58,24 @@ vary: {"faults[0].magnitude": {uniform: [0.3, 0.9]}}
 """
 
 
-@pytest.fixture
-def sweep(tmp_path):
-    (tmp_path / "few.yaml").write_text(SWEEP)
-    return tmp_path / "few.yaml"
+@pytest.fixture(scope="module")
+def sweep(tmp_path_factory):
+    file = tmp_path_factory.mktemp("sweep") / "few.yaml"
+    file.write_text(SWEEP)
+    return file
 
 
 def _run(*arguments):
     return CliRunner().invoke(app, ["compare", *map(str, arguments)])
 
 
-@pytest.fixture
-def compared(sweep, tmp_path):
+@pytest.fixture(scope="module")
+def compared(sweep):
     names = ("--schemes", "observer-constant,augmented-ekf", "--laws", "nominal,lqr")
-    done = _run("--sweep", sweep, *names, "--workers", 1, "--out", tmp_path / "out", "--format", "json")
+    out = sweep.parent / "out"
+    done = _run("--sweep", sweep, *names, "--workers", 1, "--out", out, "--format", "json")
     assert done.exit_code == 0, done.output
-    return json.loads(done.stdout), tmp_path / "out" / "few"
+    return json.loads(done.stdout), out / "few"
 
 
 def test_a_comparison_has_everything_asked_for(compared):
@@ -102,16 +102,6 @@ def test_a_comparison_has_everything_asked_for(compared):
     assert "http" not in page.replace("http://www.w3.org", "")
 
 
-def test_workers_do_not_change_the_result(sweep):
-    entries = entries_of(["observer-constant"], ["lqr"])
-    cases = of_sweep(sweep)
-    one, two = (document_of(fly_all(partial(fly_case, entries=entries), cases, n), entries) for n in (1, 2))
-    for document in (one, two):
-        for row in document["sets"]["few"]["lines"]:
-            assert row.pop("us") > 0  # the one thing that is measured on the clock
-    assert one == two
-
-
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
@@ -135,11 +125,11 @@ def test_bad_usage_is_one_line_and_exit_status_2(tmp_path, arguments, says):
 
 def test_a_plug_in_that_fails_spoils_only_its_own_line(sweep):
     entries = entries_of(["json:JSONDecoder", "observer-constant"], [LAW])
-    document = document_of([fly_case(case, entries) for case in of_sweep(sweep)], entries)
+    document = document_of([fly_case(case, entries) for case in of_sweep(sweep)[:1]], entries)
     part = document["sets"]["few"]
     broken, fine = part["lines"][0], part["lines"][1]
-    assert (broken["flights"], broken["failed"]) == (0, 3)
-    assert (fine["flights"], fine["failed"], fine["detection_rate"]) == (3, 0, 1.0)
+    assert (broken["flights"], broken["failed"]) == (0, 1)
+    assert (fine["flights"], fine["failed"], fine["detection_rate"]) == (1, 0, 1.0)
     assert any("json:JSONDecoder" in error for error in part["errors"])
     assert as_text(document)
 
@@ -293,10 +283,6 @@ def test_a_candidate_is_judged_in_each_air_at_a_level_of_its_own():
     assert best == {"kind": 1.0, "alarm": pytest.approx(12.0)}
 
 
-def test_work_is_spread_in_order():
-    assert fly_all(abs, [-3, 2, -1], 2) == [3, 2, 1]
-
-
 def test_finished_runs_stand_side_by_side(tmp_path):
     for name, law in (("a", "nominal"), ("b", "fault-tolerant")):
         (tmp_path / f"{name}.yaml").write_text(
@@ -304,8 +290,7 @@ def test_finished_runs_stand_side_by_side(tmp_path):
             "reference: {q: [{sine: {amplitude_deg_s: 3, frequency_hz: 0.4}}]}\n"
             "faults: [{actuator: elevator, type: loss_of_effectiveness, magnitude: 0.5, at_s: 2}]\n"
         )
-    command = [BEAVER, "run", "a.yaml", "b.yaml", "--no-report"]
-    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
+    assert beaver("run", "a.yaml", "b.yaml", "--no-report", cwd=tmp_path).returncode == 0
     folders = [tmp_path / "runs" / name for name in "ab"]
     done = _run(*folders, "--out", tmp_path / "out")
     assert done.exit_code == 0
@@ -349,7 +334,7 @@ def test_a_comparison_that_is_killed_goes_on_to_the_same_document(sweep, compare
     document = json.loads((tmp_path / "again" / "few" / "comparison.json").read_text())
     for each in (document, compared[0]):
         for row in each["sets"]["few"]["lines"]:
-            row.pop("us")  # the one thing that is measured on the clock
+            row["us"] = 0.0  # the one thing that is measured on the clock
     assert document["sets"] == compared[0]["sets"]
 
 

@@ -4,24 +4,25 @@ import json
 
 import pytest
 
+from commands import beaver
+
 from .conftest import SHORT
 
 EXPECTING = SHORT + "expect: {detection_rate: {at_least: 0.999, confidence: 0.99}}\n"
 
 
 @pytest.fixture
-def call(tmp_path, start):
+def call(tmp_path):
     def run(text, *arguments):
         (tmp_path / "short.yaml").write_text(text)
-        process = start("short.yaml", *arguments)
-        answer, complaints = process.communicate(timeout=120)
-        return process.returncode, answer, complaints
+        done = beaver("sweep", "short.yaml", *arguments, cwd=tmp_path)
+        return done.returncode, done.stdout, done.stderr
 
     return run
 
 
 def test_json_is_one_document_and_a_missed_expectation_exits_with_1(call):
-    status, answer, complaints = call(EXPECTING, "--format", "json", "--no-report", "--workers", "2")
+    status, answer, complaints = call(EXPECTING, "--format", "json", "--no-report", "--workers", "1")
     document = json.loads(answer)
     assert status == 1
     assert document["passed"] is False
@@ -31,7 +32,7 @@ def test_json_is_one_document_and_a_missed_expectation_exits_with_1(call):
 
 
 def test_text_says_the_verdict_and_a_replay_is_a_run(call, tmp_path):
-    status, answer, _ = call(SHORT, "--no-report", "--workers", "2")
+    status, answer, _ = call(SHORT, "--no-report", "--workers", "1")
     assert status == 0
     assert answer.startswith("short: flown, nothing was expected")
     assert "beaver-ftc sweep short.yaml --replay" in answer

@@ -1,11 +1,12 @@
 """Aircraft nobody wrote by hand: derived from JSBSim, flown with the measured error as the bound."""
 
 import hashlib
-import os
 import shutil
 import tempfile
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -25,13 +26,14 @@ from beaver_ftc.plant import instrumented
 from beaver_ftc.plant.adapter import Plant, bare, translated
 from beaver_ftc.plant.model_file import copy_of
 from beaver_ftc.plant.trial import probe
+from beaver_ftc.plant.trim import trim as trim_plant
 from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc.scenario.loader import load_text
-from beaver_ftc_aircraft.derive import derivation
+from beaver_ftc_aircraft.derive import derivation, first_use
 from beaver_ftc_aircraft.derive import sample as sampling
 from beaver_ftc_aircraft.derive.derivation import derive, source_of, try_out
 from beaver_ftc_aircraft.derive.fit import errors_of, pursue, signals_of_use
-from beaver_ftc_aircraft.derive.outline import not_affine
+from beaver_ftc_aircraft.derive.outline import not_affine, usual_start
 from beaver_ftc_aircraft.derive.sample import SIDESLIP_RAD, Envelope, places, sample
 from beaver_ftc_links.sitl.ardupilot import Ardupilot
 from beaver_ftc_links.sitl.link import Link
@@ -51,19 +53,13 @@ reference:
 
 @pytest.fixture(scope="module", params=["c172p", pytest.param("737", marks=pytest.mark.nightly)])
 def derived(request, tmp_path_factory):
+    """The aircraft, its trim, a folder that has it, its name: derived once, whichever test flies it first."""
+    find_aircraft(f"jsbsim:{request.param}")
     folder = tmp_path_factory.mktemp("derived")
-    made = derive(f"jsbsim:{request.param}", folder)
-    keep(folder / request.param)
-    return made, folder, request.param
-
-
-def keep(made):
-    """Scenarios of other tests, if nothing is kept yet, find here what they would derive for seconds."""
-    kept = derived_folder(made.name)
-    part = kept.with_name(f"{made.name}-{os.getpid()}")
-    if not kept.exists():
-        shutil.copytree(made, part)
-        part.rename(kept)
+    shutil.copytree(derived_folder(request.param), folder / request.param)
+    aircraft = read(folder / request.param)
+    trim = trim_plant(plant=Plant(100, aircraft=aircraft), **usual_start(aircraft))
+    return SimpleNamespace(aircraft=aircraft, trim=trim), folder, request.param
 
 
 @pytest.fixture(scope="module")
@@ -77,11 +73,27 @@ def unseen(derived):
     return sample(Plant(100, aircraft=aircraft), envelope, made.trim, 1000, 77, properties, (0,)), aircraft
 
 
-@pytest.fixture
-def quick(monkeypatch):
+@contextmanager
+def quickly():
     """Where it does not matter how large the errors are."""
-    monkeypatch.setattr(sampling, "STARTS_OF_WORST", 8)
-    monkeypatch.setattr(derivation, "CHECKED", 800)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(sampling, "STARTS_OF_WORST", 8)
+        patched.setattr(derivation, "CHECKED", 800)
+        yield
+
+
+@pytest.fixture
+def quick():
+    with quickly():
+        yield
+
+
+@pytest.fixture(scope="module")
+def again(tmp_path_factory):
+    """The built-in aircraft derived from its model, in a folder."""
+    folder = tmp_path_factory.mktemp("again")
+    with quickly():
+        return derive("beaver", folder), folder
 
 
 def values(aircraft):
@@ -194,18 +206,29 @@ def test_an_aircraft_whose_coefficients_are_known_is_found_again(tmp_path, quick
     assert max(found.model_error_rad_s2) < 1e-3
 
 
-def test_the_built_in_aircraft_is_found_again(tmp_path, quick):
+def test_the_built_in_aircraft_is_found_again(again):
     """Derived from its model, the table written by hand comes out."""
-    made = derive("beaver", tmp_path)
+    made, _ = again
     known, fitted = values(load()), values(made.aircraft)
     assert {key: fitted[key] for key in known} == pytest.approx(known, rel=5e-3)
     assert max(made.checked_rad_s2) < 2e-3
 
 
-def test_the_file_on_disk_is_untouched(tmp_path, quick):
+def test_a_scenario_derives_its_aircraft_at_first_use_and_the_source_is_untouched(
+    tmp_path, monkeypatch, capsys, quick
+):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    made, usual = [], derivation.derive
+    monkeypatch.setattr(first_use, "derive", lambda reference: made.append(usual(reference)))
     source = instrumented.source_of("T37")
     before = hashlib.sha256(source.read_bytes()).hexdigest()
-    made = derive("jsbsim:T37", tmp_path)
+    file = find_aircraft("jsbsim:T37").folder / "aircraft.yaml"
+    assert file.is_relative_to(tmp_path)
+    assert file.read_text().startswith(first_line())
+    assert capsys.readouterr().err.startswith("beaver-ftc: jsbsim:T37: deriving its design model")
+    find_aircraft("jsbsim:T37")
+    assert capsys.readouterr().err == ""
+    (made,) = made
     assert hashlib.sha256(source.read_bytes()).hexdigest() == before
     page = (made.aircraft.folder / "derived.md").read_text()
     assert page.startswith("# T37")
@@ -351,16 +374,6 @@ def test_what_jsbsim_cannot_fly_is_said_in_a_line(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_scenario_derives_its_aircraft_at_first_use(tmp_path, monkeypatch, capsys, quick):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    file = find_aircraft("jsbsim:A4").folder / "aircraft.yaml"
-    assert file.is_relative_to(tmp_path)
-    assert file.read_text().startswith(first_line())
-    assert capsys.readouterr().err.startswith("beaver-ftc: jsbsim:A4: deriving its design model")
-    find_aircraft("jsbsim:A4")
-    assert capsys.readouterr().err == ""
-
-
 def test_the_list_names_them():
     said = CliRunner().invoke(app, ["list", "aircraft"]).output
     assert "beaver " in said
@@ -399,11 +412,9 @@ SAME = ["elevator-partial-loss", "aileron-stuck", "rudder-stuck", "unanticipated
 
 
 @pytest.mark.parametrize("name", SAME)
-def test_the_built_in_aircraft_as_derived_has_the_same_verdicts(name, tmp_path_factory, quick):
+def test_the_built_in_aircraft_as_derived_has_the_same_verdicts(name, again):
     """Its table written by hand, and the one found from its model: the same flights are judged the same."""
-    folder = tmp_path_factory.getbasetemp() / "same-verdicts"
-    if not folder.is_dir():
-        derive("beaver", folder)
+    _, folder = again
     text = (Path(__file__).parents[4] / "scenarios" / f"{name}.yaml").read_text()
     flights = [
         fly(load_text(f"aircraft: {aircraft}\n{text}", folder=folder)) for aircraft in ("beaver", "./beaver")

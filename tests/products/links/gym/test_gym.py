@@ -92,17 +92,17 @@ def test_episodes_after_a_seeded_one_differ_and_follow_from_the_seed():
     assert not np.array_equal(seen[0][1], seen[0][2])
 
 
-def test_a_step_across_the_chunks_of_the_log_is_the_frames_it_has():
+def test_a_step_across_the_chunks_of_the_log_is_the_frames_it_has(monkeypatch):
+    monkeypatch.setattr("beaver_ftc.loop.loop.CHUNK_ROWS", 256)
+    monkeypatch.setattr("beaver_ftc.loop.simulation.CHUNK_ROWS", 256)
     one, many = (
-        BeaverEnv(
-            scenario(duration_s=84, substeps=2, faults=[{**FAULT, "at_s": 81.9, "end_s": 81.95}]), frames
-        )
+        BeaverEnv(scenario(duration_s=4, substeps=2, faults=[{**FAULT, "at_s": 2.54, "end_s": 2.6}]), frames)
         for frames in (1, 41)
     )
     one.reset()
     many.reset()
     action = np.zeros(4)
-    for _ in range(202):
+    for _ in range(9):
         singles = [one.step(action) for _ in range(41)]
         seen, reward, *_ = many.step(action)
         assert np.array_equal(seen, singles[-1][0])

@@ -99,58 +99,6 @@ def test_a_wrong_fault_is_refused_in_words(session):
     assert session.state()["broken"] == []
 
 
-def test_law_diagnosis_and_sensors_are_changed_in_flight_and_fly_again_to_the_bit(session, tmp_path):
-    flown(session, 150)
-    asked(session, do="change", law="lqr")
-    flown(session, 100)
-    asked(session, do="break", fault=LOSS)
-    flown(session, 100)
-    assert session.frame()["isolated"] == "elevator"
-    asked(session, do="change", law="fault-tolerant", scheme="adaptive-estimators", sensors="tactical-grade")
-    flown(session, 1)
-    assert session.frame()["isolated"] is None
-    assert session.state()["flying"] == {
-        "law": "fault-tolerant",
-        "scheme": "adaptive-estimators",
-        "sensors": "tactical-grade",
-    }
-    flown(session, 350)  # found again; and open, for it was broken when the watch began
-    assert session.frame()["detected"]
-    assert session.frame()["isolated"] is None
-    assert any(of.startswith("elevator") for of in session.frame()["candidates"])
-    assert len(told(session, "changed")) == 2
-    with pytest.raises(BadInput, match="unknown law"):
-        asked(session, do="change", law="none-such")
-    with pytest.raises(BadInput, match="says no change"):
-        asked(session, do="change")
-    asked(session, do="save")
-    (folder,) = tmp_path.iterdir()
-    log = session.sim.log
-    assert np.array_equal(log.to_numpy(), bf.fly(folder / "scenario.yaml").log.to_numpy(), equal_nan=True)
-    asked(session, do="game", move="second")
-    with pytest.raises(BadInput, match="a round is on"):
-        asked(session, do="change", law="lqr")
-
-
-def test_a_sensor_is_broken_named_and_looked_at_anew_and_flies_again_to_the_bit(session, tmp_path):
-    assert {"p", "alpha", "V", "engine_rpm"} <= set(session.hello()["sensors"])
-    flown(session, 200)
-    asked(session, do="break", fault={"sensor": "q", "type": "bias", "magnitude": 3})
-    flown(session, 200)
-    frame = session.frame()
-    assert (frame["detected"], frame["isolated"]) == (True, "sensor q")
-    assert session.state()["broken"] == ["q"]
-    assert told(session, "alarm")
-    asked(session, do="change", scheme="adaptive-estimators")
-    flown(session, 300)
-    asked(session, do="repair", actuator="q")
-    flown(session, 50)
-    asked(session, do="save")
-    (folder,) = tmp_path.iterdir()
-    log = session.sim.log
-    assert np.array_equal(log.to_numpy(), bf.fly(folder / "scenario.yaml").log.to_numpy(), equal_nan=True)
-
-
 def by_surface(session, values):
     return dict(zip(session.surfaces, values, strict=True))
 
@@ -315,75 +263,6 @@ def test_the_score_goes_on_from_round_to_round(session):
         assert session.state()["game"]["winner"] == "you"
 
 
-def test_a_stick_left_is_centred_by_no_stick(session):
-    asked(session, do="stick", rates_deg_s=[5, 0, 0])
-    flown(session, 3)
-    assert session.frame()["stick"] == pytest.approx([np.radians(5), 0.0, 0.0])
-    asked(session, do="stick", rates_deg_s=[0, 0, 0])
-    flown(session, 1)
-    assert session.frame()["stick"] is None
-
-
-def test_instruments_are_watched_from_the_start_so_that_it_flies_again_to_the_bit(session, tmp_path):
-    """A surface breaks, and only then an instrument: what was found before is found again."""
-    asked(session, do="break", fault={"type": "float", "actuator": "aileron"})
-    flown(session, 40)
-    asked(session, do="break", fault={"sensor": "q", "type": "bias", "magnitude": 0.3})
-    flown(session, 40)
-    asked(session, do="save")
-    (folder,) = tmp_path.iterdir()
-    log = session.sim.log
-    assert np.array_equal(log.to_numpy(), bf.fly(folder / "scenario.yaml").log.to_numpy(), equal_nan=True)
-    assert session.scenario.fdi.sensor_monitor == "always"
-    own = {"fdi": {"sensor_monitor": "never"}}
-    assert Session(bf.load({"name": "one", **own}), tmp_path).scenario.fdi.sensor_monitor == "never"
-
-
-def test_what_broke_and_was_mended_a_hundred_times_and_more_flies_again(session, tmp_path):
-    for i in range(130):
-        surface = session.surfaces[i % 4]
-        asked(session, do="break", fault={"type": "bias", "actuator": surface, "bias_deg": 0.5})
-        flown(session, 1)
-        asked(session, do="repair", actuator=surface)
-        flown(session, i % 2)
-    asked(session, do="save")
-    (folder,) = tmp_path.iterdir()
-    kept = bf.open_run(folder)
-    again = bf.fly(folder / "scenario.yaml")
-    assert len(bf.load(folder / "scenario.yaml").faults) == 130
-    assert np.array_equal(kept.log.to_numpy(), again.log.to_numpy(), equal_nan=True)
-
-
-def test_who_broke_what_is_told_and_kept(session, tmp_path):
-    """Of two guests and whoever flies; repaired and broken again by another; not of the flight after it."""
-    jam = messages.Break(do="break", fault={"type": "stuck", "actuator": "rudder"})
-    session.handle(messages.Break(do="break", fault=LOSS), by="Ada (guest 1)")
-    session.handle(jam, by="guest 2")
-    session.handle(jam, by="guest 3")  # it is jammed already
-    flown(session, 3)
-    by = {fault["actuator"]: fault["by"] for fault in session.state()["faults"]}
-    assert by == {"elevator": "Ada (guest 1)", "rudder": "guest 2"}
-    session.handle(messages.Repair(do="repair", actuator="rudder"), by="guest 3")
-    flown(session, 3)
-    session.handle(jam)
-    flown(session, 3)
-    assert [fault.get("by") for fault in session.state()["faults"]] == ["Ada (guest 1)", None]
-    assert [event.get("by") for event in told(session, "repaired")] == ["guest 3"]
-    assert [event.get("by") for event in told(session, "broken")][:2] == ["Ada (guest 1)", "guest 2"]
-    flight, kept = session.sim.land(), {}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(session.sim, "land", lambda: flight)
-        patch.setattr(bf.Flight, "save", lambda flight, out, report: kept.update(flight.metrics) or out)
-        asked(session, do="save")
-    said = [(fault["actuator"], fault["end_s"], fault.get("by")) for fault in kept["faults"]]
-    assert said == [
-        ("elevator", None, "Ada (guest 1)"), ("rudder", 0.05, "guest 2"), ("rudder", None, None),
-    ]  # fmt: skip
-    asked(session, do="fresh")
-    session.handle(messages.Break(do="break", fault=LOSS))
-    assert [fault.get("by") for fault in session.state()["faults"]] == [None]
-
-
 def test_more_faults_than_a_scenario_holds_are_refused_in_words(session, monkeypatch):
     monkeypatch.setattr("beaver_ftc.loop.simulation.MOST_FAULTS", 3)
     for _ in range(3):
@@ -443,13 +322,6 @@ def test_the_game_hides_what_is_broken_and_what_the_diagnosis_says(session):
     assert {"broken", "alarm", "named"} <= {event["kind"] for event in session.take_events()}
 
 
-def test_by_chance_something_breaks(session):
-    asked(session, do="game", move="random")
-    flown(session, 2001)
-    assert session.game.broken_s == pytest.approx(session.game.due_s, abs=0.02)
-    assert session.game.fault["actuator"] in session.surfaces
-
-
 def test_a_lost_aircraft_ends_the_flight_and_can_still_be_saved(session, tmp_path):
     asked(session, do="stick", rates_deg_s=[20, 0, 0])
     while not session.over:
@@ -475,20 +347,6 @@ def test_the_rates_of_a_level_turn():
     assert np.linalg.norm(level_turn(0.4, 0.3, 45.0)) == pytest.approx(9.80665 * np.tan(0.4) / 45.0)
 
 
-def test_a_coordinated_turn_keeps_the_aircraft_and_flies_again_to_the_bit(session, tmp_path):
-    asked(session, do="stick", rates_deg_s=[5, 0, 0], coordinated=True)
-    flown(session, 400)
-    asked(session, do="stick", rates_deg_s=[0, 0, 0], coordinated=True)
-    flown(session, 1500)
-    log = session.sim.log
-    assert not session.over
-    assert log["beta_rad"].abs().max() < np.radians(10)
-    assert log["psi_rad"].iloc[-1] > np.radians(60)
-    asked(session, do="save")
-    (folder,) = tmp_path.iterdir()
-    assert np.array_equal(log.to_numpy(), bf.fly(folder / "scenario.yaml").log.to_numpy(), equal_nan=True)
-
-
 def test_the_autopilot_goes_where_it_is_sent_and_flies_again_to_the_bit(session, tmp_path):
     with pytest.raises(BadInput, match="this flight has none"):
         asked(session, do="aim", altitude_m=1850)
@@ -507,16 +365,3 @@ def test_the_autopilot_goes_where_it_is_sent_and_flies_again_to_the_bit(session,
     assert np.array_equal(log.to_numpy(), bf.fly(folder / "scenario.yaml").log.to_numpy(), equal_nan=True)
     asked(session, do="fresh", autopilot=False)
     assert session.hello()["autopilot"] == []
-
-
-def test_rounds_of_the_game_follow_from_the_seed(tmp_path):
-    """Five rounds in a row of two sessions of one seed, and of one of another."""
-    rounds = {}
-    for name, seed in (("one", 3), ("again", 3), ("other", 4)):
-        session = Session(bf.load("fault-free"), tmp_path / name, seed=seed)
-        rounds[name] = []
-        for _ in range(5):
-            asked(session, do="game", move="random")
-            rounds[name].append((session.game.fault, session.game.due_s))
-    assert rounds["one"] == rounds["again"] != rounds["other"]
-    assert len({due_s for _, due_s in rounds["one"]}) == 5

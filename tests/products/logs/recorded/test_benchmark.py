@@ -2,7 +2,6 @@
 
 import json
 
-import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -114,41 +113,3 @@ def _flight(failure, false_alarms=0, delay=None, right=True):
         "false_alarms": false_alarms, "detected": delay is not None, "delay_s": delay, "named": {},
         "right_group": right if delay is not None else None,
     }  # fmt: skip
-
-
-def test_the_tally_counts_by_hand():
-    flights = [
-        _flight("left_aileron", delay=4.0),
-        _flight("right_aileron", delay=8.0, false_alarms=2),
-        _flight("rudder", delay=1.0, right=False),
-        _flight("elevator"),
-        _flight(None),
-        _flight(None, false_alarms=1),
-        _flight("engine", delay=3.0),
-    ]
-    found = benchmark.by_events(flights)
-    assert (found["surface_failures"], found["found"]) == (4, 3)
-    assert found["precision"] == pytest.approx(3 / 5)
-    assert found["recall"] == pytest.approx(3 / 4)
-    assert found["accuracy"] == pytest.approx(4 / 6)
-    assert found["delay_s"]["aileron"] == {"failures": 2, "found": 2, "within_5_s": 1, "mean": 6.0}
-    assert found["wrong_group"] == 1
-    assert found["engine_failures_with_an_alarm"] == 1
-    assert found["false_alarms_per_hour"]["value"] == pytest.approx(3 / (7 * 50 / 3600))
-
-
-def test_labels_are_weighted_by_rows():
-    keys = ("classes", "healthy_or_faulty", "side", "mean_error", "held_by_bounds")
-    one, other = dict.fromkeys(keys, 1.0), dict.fromkeys(keys, 0.0)
-    found = benchmark.by_labels([one | {"rows": 30}, other | {"rows": 10}])
-    assert found["rows"] == 40
-    assert np.allclose([found[key] for key in keys], 0.75)
-
-
-def test_of_the_healthy_flights_those_with_an_alarm_are_counted():
-    quiet = {"failure": None, "false_alarms": 0, "healthy_s": 1800.0, "detected": False}
-    flights = [quiet, quiet, {**quiet, "false_alarms": 2}]
-    found = benchmark.by_events(flights)
-    assert (found["healthy_flights"], found["healthy_flights_with_an_alarm"]) == (3, 1)
-    assert found["false_alarms_per_hour"]["value"] == pytest.approx(2 / 1.5)
-    assert found["accuracy"] == pytest.approx(2 / 3)

@@ -1,0 +1,87 @@
+"""What commands of the marks printed, kept in the user's cache until a file changes that they can read."""
+
+import base64
+import json
+import os
+import time
+from collections.abc import Collection, Iterator
+from hashlib import sha256
+from pathlib import Path
+
+from beaver_ftc.documents.paths import cache_base
+from beaver_ftc.studies.engine.store import write_whole
+from tools.docs.commands import Output
+from tools.docs.pages import ROOT
+
+CODE = (
+    "src",
+    "aircraft",
+    "scenarios",
+    "evidence",
+    "examples",
+    "benchmarks",
+    "tools",
+    "tests",
+    "pyproject.toml",
+)
+PAGES = ("docs", "README.md", "CONTRIBUTING.md")
+MAKES_TABLE = (
+    "python -m tools.docs table "  # it does not read the pages: text can be changed without a flight
+)
+_UNUSED_S = 14.0 * 86400.0
+
+
+class Kept:
+    """Outputs of earlier runs. needed: environment variables that lead to data."""
+
+    def __init__(self, needed: Collection[str] = (), root: Path = ROOT) -> None:
+        base = cache_base()
+        self._folder = base / "printed" if base else None
+        named = "".join(f"{name}={os.environ.get(name)};" for name in sorted(needed))
+        self._code = _digest(root, CODE, named)
+        self._pages = _digest(root, PAGES, self._code)
+
+    def _file(self, line: str) -> Path | None:
+        state = self._code if line.startswith(MAKES_TABLE) else self._pages
+        return self._folder and self._folder / f"{sha256(f'{state} {line}'.encode()).hexdigest()[:24]}.json"
+
+    def get(self, line: str) -> Output | None:
+        """What this command printed when everything that it can read was as it is now."""
+        file = self._file(line)
+        try:
+            found = json.loads(file.read_text(encoding="utf-8")) if file else None
+        except (OSError, ValueError):
+            return None
+        if found is None:
+            return None
+        os.utime(file)
+        drawn = {name: base64.b64decode(content) for name, content in found["pictures"].items()}
+        return Output(found["text"], processor_s=found["processor_s"], pictures=drawn)
+
+    def put(self, line: str, output: Output) -> None:
+        """Keep what can be used; drop what nobody has asked for in a fortnight."""
+        file = self._file(line)
+        if file is None or output.fault:
+            return
+        drawn = {name: base64.b64encode(content).decode() for name, content in output.pictures.items()}
+        document = {"text": output.text, "processor_s": output.processor_s, "pictures": drawn}
+        file.parent.mkdir(parents=True, exist_ok=True)
+        for old in file.parent.glob("*.json"):
+            if old.stat().st_mtime < time.time() - _UNUSED_S:
+                old.unlink(missing_ok=True)
+        write_whole(file, json.dumps(document).encode())
+
+
+def _digest(root: Path, places: Collection[str], more: str) -> str:
+    """A name for the contents of these files and folders, and of the environment that runs them."""
+    digest = sha256(more.encode())
+    for path in _files(root, places):
+        content = path.read_bytes()
+        digest.update(f"{path.relative_to(root)} {len(content)} ".encode() + content)
+    return digest.hexdigest()
+
+
+def _files(root: Path, places: Collection[str]) -> Iterator[Path]:
+    for place in places:
+        found = (root / place).rglob("*") if (root / place).is_dir() else [root / place]
+        yield from sorted(path for path in found if path.is_file() and "__pycache__" not in path.parts)

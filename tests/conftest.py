@@ -90,6 +90,23 @@ def changed(request):
     return differences
 
 
+@pytest.fixture(scope="session")
+def trim_point():
+    from beaver_ftc.plant.trim import trim
+
+    return trim(45.0, 1828.8)
+
+
+@pytest.fixture
+def beaver(trim_point):
+    """A Beaver at 100 Hz, trimmed at 45 m/s and 1828.8 m."""
+    from beaver_ftc.plant.adapter import Plant
+
+    plant = Plant(rate_hz=100)
+    plant.start(trim_point)
+    return plant
+
+
 def pytest_sessionstart(session):
     """Compile what flights use before the first test: what is said meanwhile is a test by itself."""
     plain = os.environ.get("NUMBA_DISABLE_JIT", "0") != "0"

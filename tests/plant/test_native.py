@@ -1,8 +1,5 @@
 """Compiled property access gives what Python gives, to the bit."""
 
-import subprocess
-import sys
-
 import numba
 import numpy as np
 import pytest
@@ -119,19 +116,6 @@ for chunk in loop.chunks():
     rows.update(chunk.tobytes())
 print(loop.cockpit.native, rows.hexdigest())
 """
-
-
-@needs_native
-def test_with_a_wrong_layout_the_flight_is_the_same_by_the_slow_road_and_a_line_is_said():
-    found = {}
-    for name, layout in (("right", {}), ("wrong", {"node_pointer": 16})):
-        program = FLIGHT.replace("**LAYOUT", f"**{layout}")
-        done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-        found[name] = *done.stdout.split()[-2:], done.stderr.count("has a layout that is not known")
-    (right, logged, _), (wrong, slowly, said) = found.values()
-    assert (right, wrong) == ("True", "False")
-    assert logged == slowly
-    assert said == 1
 
 
 ROUGH = {"environment": {"turbulence": "dryden", "severity": "moderate"}, "sensors": "consumer-grade"}

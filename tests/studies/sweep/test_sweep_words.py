@@ -99,34 +99,6 @@ def test_a_share_has_the_digits_that_matter(share, said):
     assert words.percent(share) == said
 
 
-def test_expectations_and_tracking_in_words():
-    assert words.expectations(SUMMARY) == [
-        ("detection_delay_s", "95 % quantile ≤ 0.5 with 90 % confidence", "0.75", False),
-        ("detection_rate", "≥ 0.5", "none", True),
-    ]
-    assert words.tracking(SUMMARY) == [
-        ("before the fault", "0.5", "0.5", "0.5"), ("after", "1.5", "1.5", "1.5"),
-    ]  # fmt: skip
-    titles = [words.title(SUMMARY | c) for c in ({}, {"passed": True}, {"expectations": []})]
-    assert titles == ["a-sweep: FAILED", "a-sweep: PASSED", "a-sweep: flown, nothing was expected"]
-
-
-def test_the_summary_is_a_line_for_each_and_three_flights_to_look_at():
-    lines = words.summary_text(SUMMARY).splitlines()
-    assert lines[0] == "a-sweep: FAILED"
-    width = len("tracking RMS, median")
-    assert f" {'tracking RMS, median':{width}}  p 0.5  q 0.5  r 0.5 deg/s before the fault" in lines
-    assert f" {'':{width}}  p 1.5  q 1.5  r 1.5 deg/s after" in lines
-    ratio = {axis: {**RMS, "ratio": {"median": 3.0}} for axis in "pqr"}
-    assert "p 3  q 3  r 3 ratio" in words.summary_text(SUMMARY | {"tracking": ratio})
-    assert f" {'expected':{width}}  met    detection_rate ≥ 0.5: none" in lines
-    assert lines[-7] == f" {'results':{width}}  runs/a-sweep"
-    assert lines[-6:-4] == [" why 0; and why:", "   beaver-ftc sweep --replay 0"]
-    assert lines[-2:] == [" why 2; and why:", "   beaver-ftc sweep --replay 2"]
-    for what, _ in words.facts(SUMMARY):
-        assert any(line.startswith(f" {what} ") for line in lines)
-
-
 def test_in_colour_a_failure_is_red_and_what_is_missed_too():
     text = words.summary_text(SUMMARY, colour=True)
     assert "\x1b[1;31ma-sweep" in text

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+sys.path.insert(0, str(Path(__file__).parent / "diagnosis"))
 sys.path.insert(0, str(Path(__file__).parent))
 
 from tools.promises import is_at_night, is_spared
@@ -53,7 +54,7 @@ LONGEST = (
     "live/page/test_page.py", "live/page/test_server.py", "compiled/test_strangers.py",
     "scenario/test_new_sensor.py", "plugins/test_plugins.py", "studies/reproduce/test_reproduce.py",
     "control/test_power.py", "results/test_report.py", "recorded/test_benchmark.py", "sitl/test_endpoint.py",
-    "diagnosis/test_short_flights.py", "diagnosis/test_likelihood.py", "loop/test_accelerometers.py",
+    "diagnosis/test_short_flights.py", "detection/test_likelihood.py", "loop/test_accelerometers.py",
 )  # fmt: skip
 
 

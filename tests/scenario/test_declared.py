@@ -1,6 +1,6 @@
 """What `fdi.bounds` declares is asked of one object: who takes part, and that nobody reads the section."""
 
-import re
+import ast
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import Bounds
 from beaver_ftc.scenario.loader import load
 from flying import declared_in
-from test_architecture import PRODUCTS, modules
+from test_architecture import PRODUCTS, modules, tree
 
 ALL = {"fault_class": "all", "statistical": {}}
 # They make other bounds of those given, and ask nothing of them.
@@ -20,11 +20,13 @@ WRITE = {"beaver_ftc:studies.mismatch.bound", "beaver_ftc:scenario.interventions
 def test_nobody_but_declared_reads_the_bounds():
     """`fdi.bounds.turbulence` and its like, anywhere in the core or a product."""
     readers = {
-        f"{package}:{name}: {key}"
+        f"{package}:{name}: {node.attr}"
         for package in ("beaver_ftc", *PRODUCTS)
         for name, file in modules(package).items()
-        for key in re.findall(r"\.bounds\.(\w+)", file.read_text(encoding="utf-8"))
-        if key in Bounds.model_fields and f"{package}:{name}" not in WRITE
+        if f"{package}:{name}" not in WRITE and ".bounds." in file.read_text(encoding="utf-8")
+        for node in ast.walk(tree(name, package))
+        if isinstance(node, ast.Attribute) and node.attr in Bounds.model_fields
+        if isinstance(node.value, ast.Attribute) and node.value.attr == "bounds"
     }
     own = {
         "beaver_ftc:scenario.diagnosis: sensors",

@@ -47,7 +47,7 @@ from beaver_ftc.plant.instruments import wrapped
 from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
 
 # Share of the intensity of the rolling, pitching and yawing gust that remains unmeasured with vanes. With
-# exact vanes and over a filter's memory it is smaller (`tests/diagnosis/test_air.py`).
+# exact vanes and over a filter's memory it is smaller (`tests/diagnosis/belief/test_air.py`).
 UNMEASURED_SHARES = (1.0, 0.003, 0.03)
 FORCE_ERROR_SHARE = 0.01  # share left unmeasured by an error of a tenth in the forces
 TWO_STEP_NOISE = 1.6  # noise gain of the two-step method: sqrt(1.5^2 + 0.5^2)

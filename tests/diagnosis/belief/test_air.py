@@ -23,7 +23,7 @@ from beaver_ftc.scenario.diagnosis import Bounds
 from beaver_ftc.scenario.loader import load as load_given
 from flying import declared_in, scenario
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 MEMORY_S = 0.05  # over which the whitening filter compares, about
 FT = 0.3048
 

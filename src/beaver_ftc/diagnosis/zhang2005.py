@@ -70,6 +70,7 @@ def configure(fdi: np.void, scenario: Scenario, travel: np.ndarray) -> None:
     )
     isolation["config"]["decay"] = euler(config.isolation_pole_per_s, dt)
     isolation["config"]["by_gradient"], isolation["config"]["gradient"] = 1, option["adaptation_gain"]
+    isolation["estimator"]["theta"] = option["initial_theta"]
     isolation["config"]["unprojected"] = not option["projection"]
     if not option["adaptive_threshold"]:
         published["config"]["constant"], isolation["config"]["thresholds"] = (

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.results.model import Metrics
-from beaver_ftc.studies.reproduce import beside, measures, reproduction, truth_and_design, words
+from beaver_ftc.studies.reproduce import beside, cases, measures, reproduction, truth_and_design, words
 from beaver_ftc.studies.reproduce.cases import BEYOND, OURS, PUBLISHED, VARIANTS, Changed, Flown
 from beaver_ftc.studies.reproduce.choices import CHOICES, scenario
 from beaver_ftc.studies.reproduce.claims import ABLATIONS, CLAIMS, MEASURED
@@ -168,17 +168,21 @@ def test_a_claim_holds_up_to_its_limit(at_least, holds):
     assert [claim.holds(number) for number in (1.9, 2.0, 2.1)] == holds
 
 
+TESTED = [i for i, c in enumerate(MEASURED) if c.testable and not c.because and not c.measure.at_least]
+AS_WELL, NOT_THERE, AT_GAIN, AS_WELL_THERE = TESTED[:4]
+
+
 @pytest.fixture
 def document(flights):
     """Statements that hold everywhere, but for a few, and fail without their mechanism, but for one."""
     well = [c.limit * (2.0 if c.measure.at_least else 0.5) for c in MEASURED]
     ill = [-1.0 if c.measure.at_least else 2.0 * c.limit + 1.0 for c in MEASURED]
-    rows = {setting.name: list(well) for setting in reproduction.SETTINGS} | {
-        ablation.name: list(ill) for ablation in ABLATIONS
-    }
-    rows[MEASURED[2].ablation][2] = well[2]
-    rows[VARIANTS[3].name][4], rows[BEYOND[5].name][0] = np.inf, 0.15
-    rows["control network_gain halved"][7] = np.inf
+    rows = {setting.name: [*well, *ill, 3.0] for setting in reproduction.SETTINGS}
+    for row in rows.values():
+        row[len(MEASURED) + AS_WELL] = well[AS_WELL]
+    rows[VARIANTS[3].name][NOT_THERE], rows[BEYOND[5].name][0] = np.inf, 0.15
+    rows["control network_gain halved"][AT_GAIN] = np.inf
+    rows["no integral action"][len(MEASURED) + AS_WELL_THERE] = well[AS_WELL_THERE]
     alarms = [[float(i in (3, 30, 31))] for i in range(54)]
     both = {
         (case.name, whose): flown(f"{case.name} {whose}", None if case is beside.HEALTHY else case.name)
@@ -191,11 +195,7 @@ def document(flights):
     designs = [(without_alarm(), flown()), (flown(), flown()), (without_alarm(), without_alarm())]
     designs[1] = flown(), but(flown(), false_alarm=True)
     every = reproduction.Flights(flights, both, designs)
-    monkey = pytest.MonkeyPatch()
-    ours = dict(zip(MEASURED, well, strict=True))
-    monkey.setattr(type(MEASURED[0]), "number", lambda claim, _: ours[claim])
     found = reproduction.document_of(every, [*rows.values(), *alarms])
-    monkey.undo()
     assert [case["metrics"] for case in found["cases"]] == [
         flown.metrics.document() for flown in flights.values()
     ]
@@ -222,15 +222,29 @@ def test_the_document_and_its_pages(document, changed, tmp_path):
 
 def test_the_document_says_what_failed(document):
     by_statement = {claim["statement"]: claim for claim in document["claims"]}
-    assert by_statement[MEASURED[2].statement]["verdict"] == "cannot be judged"
-    assert by_statement[MEASURED[4].statement]["verdict"] == "borne out"
-    assert by_statement[MEASURED[4].statement]["held_in"] == len(reproduction.ELSEWHERE) - 1
+    as_well, not_there, at_gain, as_well_there = (
+        by_statement[MEASURED[i].statement] for i in (AS_WELL, NOT_THERE, AT_GAIN, AS_WELL_THERE)
+    )
+    assert as_well["verdict"] == "cannot be judged"
+    assert not_there["verdict"] == at_gain["verdict"] == as_well_there["verdict"] == "borne out"
+    settings = len(reproduction.ELSEWHERE)
+    assert (not_there["held_in"], not_there["borne_out_in"]) == (settings - 1, settings - 1)
+    assert (as_well_there["held_in"], as_well_there["borne_out_in"]) == (settings, settings - 1)
+    told = {row["variant"]: row for row in document["sensitivity"]}["no integral action"]["also_without"]
+    assert [one["statement"] for one in told] == [MEASURED[AS_WELL_THERE].statement]
+    tested = sum(c.testable for c in MEASURED)
+    assert document["testable"] == {
+        "statements": tested, "hold": tested - 1, "elsewhere": tested - 4, "do_not": 0, "unsettled": 1,
+    }  # fmt: skip
+    assert document["construction"]["statements"] == len(MEASURED) - tested
+    assert document["background"] == len(CLAIMS) - len(MEASURED)
+    assert document["adaptation"] == {"flights": 4 * (settings + 1), "same": 3 * (settings + 1)}
     assert document["beside"]["false_alarms"] == {"paper": 1, "ours": 2}
     better = {(row["case"], row["quantity"]) for row in document["beside"]["paper_better"]}
     assert better == {("rudder", "surface travel"), ("elevator", "detection after")}
     assert [row["alarm_s"] for row in document["truth_and_design"]["designs"]] == [None, 12.2, None]
     (halved,) = (row for row in document["gains"] if row["key"] == "control.options.network_gain")
-    assert [missed["statement"] for missed in halved["halved"]] == [MEASURED[7].statement]
+    assert [missed["statement"] for missed in halved["halved"]] == [MEASURED[AT_GAIN].statement]
     assert halved["doubled"] == []
     assert document["passed"]
     assert sum(document["counts"].values()) == len(CLAIMS)
@@ -274,14 +288,24 @@ def test_the_cases_and_the_choices(changed):
     )
 
 
-def test_numbers_of_a_setting_are_of_its_own_flights(monkeypatch):
+def test_numbers_of_a_setting_are_of_its_own_flights_each_flown_once(monkeypatch):
     asked = []
-    monkeypatch.setattr(
-        reproduction, "fly_case", lambda case, changes=None: asked.append((case.name, changes)) or flown()
-    )
+    monkeypatch.setattr(cases, "_fly", lambda name, keys: asked.append(repr(sorted(keys.items()))) or flown())
     found = reproduction.row_of((reproduction.NUMBERS, Changed("half", {"rate_hz": 50.0}, "")))
-    assert asked == [(case.name, {"rate_hz": 50.0}) for case in PUBLISHED]
-    assert len(found) == len(MEASURED)
+    assert len(found) == 2 * len(MEASURED) + 1
+    assert all("('rate_hz', 50.0)" in keys for keys in asked)
+    assert len(set(asked)) == len(asked)
+    assert not any(
+        "'magnitude': 0.01" in keys or "lqr" in keys for keys in asked
+    )  # not borne out as published
+    without = {repr((key, value)) for a in ABLATIONS for key, value in a.changes.items() if key != "faults"}
+    built = {
+        "('fdi.options.dead_zone', 0)",
+        "('fdi.options.projection', 0)",
+        "('control.options.projection', 0)",
+    }
+    flown_without = {change for change in without if any(change in keys for keys in asked)}
+    assert without - flown_without == {*built, "('design_model.engine_terms', True)"}
 
 
 def test_what_is_flown_to_be_shown(monkeypatch):

@@ -10,20 +10,23 @@ CLAIMS = [
         "quantity": "delay", "number": 0.2468,
         "unit": "s", "limit": 1.0, "limit_from": "the paper's own", "at_least": False, "none": "never",
         "without": "the alarm", "number_without": None, "verdict": "stronger than the paper", "because": "",
-        "reason": "", "lowest": 0.1, "highest": 123.4, "held_in": 2, "elsewhere": 2,
+        "reason": "", "lowest": 0.1, "highest": 123.4, "held_in": 2, "borne_out_in": 2, "elsewhere": 2,
+        "construction": False,
     },
     {
         "where": "Fig. 5", "statement": "Most of it is given.", "flights": ["rudder"],
         "quantity": "share", "number": 0.25,
         "unit": "of the demand", "limit": 0.5, "limit_from": "most", "at_least": True, "none": "nothing",
         "without": "the flap", "number_without": 0.125, "verdict": "not borne out", "because": "see the text",
-        "reason": "", "lowest": None, "highest": 0.9, "held_in": 1, "elsewhere": 2,
+        "reason": "", "lowest": None, "highest": 0.9, "held_in": 2, "borne_out_in": 1, "elsewhere": 2,
+        "construction": False,
     },
     {
         "where": "IV", "statement": "There are others.", "verdict": "cannot be judged", "reason": "of others",
-        "because": "",
+        "because": "", "construction": False,
     },
 ]  # fmt: skip
+ALSO = {**CLAIMS[1], "number": 0.6, "without": "the flap"}
 MISSED = {**CLAIMS[1], "number": 0.3}
 PAPER = {
     "case": "rudder", "flown_by": "paper", "detected_s": 0.28, "named": "rudder", "isolated_s": 0.29,
@@ -32,13 +35,16 @@ PAPER = {
 }  # fmt: skip
 DOCUMENT = {
     "counts": {"stronger than the paper": 1, "borne out": 0, "not borne out": 1, "cannot be judged": 1},
+    "testable": {"statements": 5, "hold": 2, "elsewhere": 1, "do_not": 2, "unsettled": 1},
+    "construction": {"statements": 7, "hold": 6}, "background": 11,
+    "adaptation": {"flights": 12, "same": 10},
     "claims": CLAIMS,
     "ablations": [
         {"takes": "the flap", "changes": {"a": 1, "b.c": [], "d": {"p": 0.5}}, "statements": 2, "fail": 1},
     ],
     "sensitivity": [
-        {"variant": "at 50 Hz", "missed": [MISSED]},
-        {"variant": "no engine", "missed": []},
+        {"variant": "at 50 Hz", "missed": [MISSED], "also_without": [ALSO]},
+        {"variant": "no engine", "missed": [], "also_without": []},
     ],
     "choices": [{"key": "lambda", "value": {"p": 1.5, "q": [2.0, 3]}, "reason": "not in the paper"}],
     "gains": [
@@ -77,7 +83,7 @@ def test_each_statement_is_a_row_of_the_verdict():
     assert words.verdict_rows(DOCUMENT) == [
         (
             "Fig. 2", "The alarm is early.", "elevator, q: delay 0.247 s", "at most 1: the paper's own",
-            "the alarm: never", "stronger than the paper", "",
+            "the alarm: never", "borne out, elsewhere too", "",
         ),
         (
             "Fig. 5", "Most of it is given.", "rudder: share 25.0 % of the demand",
@@ -97,15 +103,22 @@ def test_each_statement_is_a_row_of_the_verdict():
     ],
 )  # fmt: skip
 def test_what_a_verdict_hangs_on(verdict, because, said):
-    assert words.remark({**CLAIMS[1], "verdict": verdict, "because": because}) == said
+    claim = {**CLAIMS[1], "verdict": verdict, "because": because}
+    assert words.remark(claim) == said
+    built = words.remark({**claim, "construction": True})
+    assert built.startswith("true by the construction of the code")
+    assert ("settings" in built) is False
 
 
 def test_what_changes_make_of_a_statement():
     assert words.sensitivity_rows(DOCUMENT) == [
         ("Fig. 2", "The alarm is early.", "0.1 s", "123 s", "2 of 2"),
-        ("Fig. 5", "Most of it is given.", "nothing", "90.0 % of the demand", "1 of 2"),
+        ("Fig. 5", "Most of it is given.", "nothing", "90.0 % of the demand", "2 of 2"),
     ]
-    assert words.exceptions(DOCUMENT) == ["at 50 Hz: Fig. 5, most of it is given: 30.0 % of the demand"]
+    assert words.exceptions(DOCUMENT) == [
+        "at 50 Hz: Fig. 5, most of it is given: 30.0 % of the demand",
+        "at 50 Hz: Fig. 5, most of it is given: 60.0 % of the demand, without the flap",
+    ]
     assert words.choice_rows(DOCUMENT) == [("lambda", "p 1.5, q 2; 3", "not in the paper")]
     assert words.gain_rows(DOCUMENT) == [
         (
@@ -135,9 +148,13 @@ def test_both_schemes_and_both_designs_in_rows():
 
 def test_the_outcome_in_a_sentence():
     assert words.headline(DOCUMENT) == (
-        "3 published statements: 1 stronger than the paper, 0 borne out, 1 not borne out, 1 cannot be judged."
+        "Of 5 testable statements 2 hold, 1 of them also in 2 settings that the paper did not fly; 2 do not, "
+        "and 1 hold without the mechanism that they speak of as well. Of 7 statements that the code makes "
+        "true by its construction 6 hold; 11 give nothing to measure."
     )
-    assert words.summary(DOCUMENT).endswith("in all of 4 settings that the paper did not fly, too.")
+    assert words.summary(DOCUMENT).endswith(
+        "10 of 12 flights with a fault have the same alarm, the same name and the same time."
+    )
 
 
 def test_the_terminal_shows_the_statements_and_what_excepts_them():
@@ -159,4 +176,4 @@ def test_the_terminal_shows_the_statements_and_what_excepts_them():
 def test_what_is_not_borne_out_is_red_and_where_it_stands_is_there():
     coloured = words.as_text(DOCUMENT, "out", colour=True)
     assert "\x1b[1;31mnot borne out" in coloured
-    assert "\x1b[32mstronger than the paper" in coloured
+    assert "\x1b[32mborne out, elsewhere too" in coloured

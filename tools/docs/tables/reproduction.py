@@ -1,5 +1,6 @@
 """What docs/results/reproduction.md shows of the study that `beaver-ftc reproduce` flies."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -7,10 +8,18 @@ from beaver_ftc.studies.present.page import write_files
 from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc.studies.present.tables import number as plain_number
 from beaver_ftc.studies.reproduce import beside
-from beaver_ftc.studies.reproduce.claims import MEASURED, NOT_BORNE_OUT, STRONGER
+from beaver_ftc.studies.reproduce.claims import BORNE_OUT, CANNOT_BE_JUDGED, MEASURED, NOT_BORNE_OUT, STRONGER
 from beaver_ftc.studies.reproduce.published_figures import FIGURES, SENSITIVITY, figures_of
 from beaver_ftc.studies.reproduce.reproduction import fly_published, reproduced
-from beaver_ftc.studies.reproduce.words import headline, limit, measured, number, ours, without
+from beaver_ftc.studies.reproduce.words import (
+    adaptation_sentence,
+    headline,
+    limit,
+    measured,
+    number,
+    ours,
+    without,
+)
 from tools.docs.tables import shared
 
 Document = dict[str, Any]
@@ -23,8 +32,8 @@ def _document() -> Document:
 
 
 def reproduction_headline() -> str:
-    """How many statements of each verdict there are."""
-    return headline(_document())
+    """What became of the statements, and what adaptation changes."""
+    return f"{headline(_document())}\n\n{adaptation_sentence(_document())}"
 
 
 def reproduction_not_borne_out() -> str:
@@ -48,7 +57,42 @@ def _stronger(document: Document) -> str:
     return markdown_table(("published", "statement", "ours", "without"), [
         (claim["where"], claim["statement"].rstrip("."),
          number(claim["number"], claim["unit"], claim["none"]), without(claim))
-        for claim in measured(document) if claim["verdict"] == STRONGER and claim["where"].startswith("Fig.")
+        for claim in measured(document)
+        if claim["verdict"] == STRONGER and claim["where"].startswith("Fig.") and not claim["construction"]
+    ])  # fmt: skip
+
+
+def reproduction_not_everywhere() -> str:
+    """The testable statements that hold as published, but not in every other setting: in how many, and where
+    not."""
+    return _not_everywhere(_document())
+
+
+def _not_everywhere(document: Document) -> str:
+    return markdown_table(("published", "statement", "settings", "not in"), [
+        (claim["where"], claim["statement"].rstrip("."), f"{claim['borne_out_in']} of {claim['elsewhere']}",
+         "; ".join(_where_not(document, claim)))
+        for claim in measured(document) if claim["verdict"] == BORNE_OUT and not claim["construction"]
+    ])  # fmt: skip
+
+
+def _where_not(document: Document, claim: Document) -> Iterator[str]:
+    for row in document["sensitivity"]:
+        for one in (*row["missed"], *row["also_without"]):
+            if one["statement"] == claim["statement"]:
+                yield row["variant"] + (" (holds without it)" if one in row["also_without"] else "")
+
+
+def reproduction_unsettled() -> str:
+    """The testable statements that hold without their mechanism as well."""
+    return _unsettled(_document())
+
+
+def _unsettled(document: Document) -> str:
+    return markdown_table(("published", "statement", "ours", "without"), [
+        (claim["where"], claim["statement"].rstrip("."),
+         number(claim["number"], claim["unit"], claim["none"]), without(claim))
+        for claim in measured(document) if claim["verdict"] == CANNOT_BE_JUDGED
     ])  # fmt: skip
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from beaver_ftc.results.model import Document, Rates
 from beaver_ftc.studies.present.tables import number
-from beaver_ftc.studies.reproduce.cases import CASES, CORNERS, OURS, Changed, Flown, fly_case
+from beaver_ftc.studies.reproduce.cases import CASES, EDGES, OURS, Changed, Flown, fly_case
 from beaver_ftc.studies.reproduce.measures import AXIS
 
 HEALTHY = Changed("fault-free", {}, "")
@@ -48,7 +48,7 @@ def healthy_settings() -> list[tuple[str, Changed]]:
     return [
         (whose, Changed(corner.name, {**how, **corner.changes}, ""))
         for whose, how in WHOSE.items()
-        for corner in CORNERS
+        for corner in EDGES
     ]
 
 
@@ -60,7 +60,7 @@ def false_alarm_of(setting: Changed) -> float:
 def document_of(flights: Mapping[tuple[str, str], Flown], alarms: Sequence[float]) -> Document:
     """A row a case and scheme, and the false alarms of each; alarms: of each of healthy_settings."""
     rows = [_row(case, whose, flown) for (case, whose), flown in flights.items()]
-    each = len(CORNERS)
+    each = len(EDGES)
     counts = [int(sum(alarms[i * each : (i + 1) * each])) for i in range(len(WHOSE))]
     return {
         "rows": rows,

@@ -4,7 +4,7 @@ Do the conclusions hang on what the paper leaves open? Every choice is changed, 
 statement held against the flights again.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -21,6 +21,7 @@ from beaver_ftc.results.model import Metrics
 from beaver_ftc.studies.reproduce.choices import FAULT_AT_S, GIVEN, gains, scenario
 
 ESTIMATORS = ("aileron", "elevator", "rudder")
+PUBLISHED_LOSS, AFTER_S = 0.4, 18.0  # of the effectiveness; flown on after the fault, s
 SETTLED_S = 2.0  # from rest, or from a fault, to steady tracking: four error time constants
 
 
@@ -45,15 +46,25 @@ GAINS = tuple(  # every gain of the published scheme and law, halved and doubled
     for how, share in (("halved", 0.5), ("doubled", 2.0))
 )
 CASES = {case.name: case for case in PUBLISHED}
-AIRSPEEDS_MPS = (42.0, 43.0, 44.0, 46.0, 47.0, 48.0)
-CORNERS = tuple(
+AIRSPEEDS_MPS = (32.0, 36.0, 40.0, 43.0, 47.0, 54.0)
+SIZES = (0.1, 0.2, 0.6, 0.8, 1.0)  # share of the effectiveness that a published loss takes
+INSTANTS_S = (10.75, 13.0, 14.5)  # of the fault; at each the references are elsewhere in their periods
+SIZE, AT = "published loss", "instant of the fault"  # not keys of a scenario: they change its faults
+EDGES = tuple(
     Changed("theta " + ", ".join(f"{theta:+g}" for theta in corner),
             {"uncertainty.inertia_coupling": dict(zip(AXES, corner, strict=True))}, "")
     for corner in product((-0.25, 0.0, 0.25), repeat=3)
 )  # fmt: skip
+CORNERS = tuple(  # the uncertainty's corners, and none
+    edge
+    for edge in EDGES
+    if set(map(abs, edge.changes["uncertainty.inertia_coupling"].values())) in ({0.25}, {0.0})
+)
 BEYOND = (
     *CORNERS,
     *(Changed(f"airspeed {v:g} m/s", {"initial.airspeed_mps": v}, "") for v in AIRSPEEDS_MPS),
+    *(Changed(f"losses of {size:.0%}".replace("%", " %"), {SIZE: size}, "") for size in SIZES),
+    *(Changed(f"fault at {at_s:g} s", {AT: at_s}, "") for at_s in INSTANTS_S),
 )
 
 
@@ -63,6 +74,11 @@ class Flown:
 
     metrics: Metrics
     log: dict[str, np.ndarray]
+
+    @property
+    def fault_at_s(self) -> float:
+        """When the fault strikes, s; of a healthy flight, when it would."""
+        return self.metrics.fault.at_s if self.metrics.fault else FAULT_AT_S
 
     @property
     def frame_s(self) -> float:
@@ -80,11 +96,11 @@ class Flown:
 
     def before_deg_s(self, axis: str) -> float:
         """RMS tracking error before the fault, once settled, deg/s."""
-        return self.rms_deg_s(axis, SETTLED_S, FAULT_AT_S)
+        return self.rms_deg_s(axis, SETTLED_S, self.fault_at_s)
 
     def after_deg_s(self, axis: str) -> float:
         """RMS tracking error after the fault, once settled, deg/s."""
-        return self.rms_deg_s(axis, FAULT_AT_S + SETTLED_S)
+        return self.rms_deg_s(axis, self.fault_at_s + SETTLED_S)
 
     def between(self, start_s: float, end_s: float = np.inf) -> np.ndarray:
         """Which frames lie in a span of time."""
@@ -124,7 +140,7 @@ class Flown:
 
     def closest_before_fault(self) -> float:
         """Largest |residual| / threshold of the detection estimator before the fault."""
-        return float(np.max(self.shares()[:, self.between(0.0, FAULT_AT_S)]))
+        return float(np.max(self.shares()[:, self.between(0.0, self.fault_at_s)]))
 
     def residuals_of(self, estimator: str) -> np.ndarray:
         """The residuals of an isolation estimator, (3, frames) rad/s; zero while it is not at work."""
@@ -146,9 +162,47 @@ class Flown:
 
 def fly_case(case: Changed, changes: Mapping[str, Any] | None = None) -> Flown:
     """Fly a case, with further changes to the choices."""
+    return _fly(case.name, keys_of(case, changes or {}))
+
+
+def keys_of(case: Changed, changes: Mapping[str, Any]) -> dict[str, Any]:
+    """The dotted keys of a case with further changes: two with the same keys are the same flight."""
+    merged = _apt({**case.changes, **changes})
+    size, at_s = merged.pop(SIZE, PUBLISHED_LOSS), merged.pop(AT, FAULT_AT_S)
+    faults = [fault | _struck(fault, size, at_s) for fault in merged.get("faults", [])]
+    later = {"duration_s": AFTER_S + at_s} if at_s != FAULT_AT_S else {}
+    return merged | ({"faults": faults} if "faults" in merged else {}) | later
+
+
+def _struck(fault: Mapping[str, Any], size: float, at_s: float) -> dict[str, Any]:
+    """The size and instant of a fault; a slight loss, and what is no loss, keep theirs."""
+    return {"at_s": at_s} | ({"magnitude": size} if fault.get("magnitude") == PUBLISHED_LOSS else {})
+
+
+def _fly(name: str, keys: Mapping[str, Any]) -> Flown:
     log = Columns()
-    flight = fly(scenario(case.name, _apt({**case.changes, **(changes or {})})), log)
+    flight = fly(scenario(name, keys), log)
     return Flown(measure(flight), log)
+
+
+class LazyFlights(Mapping[str, Flown]):
+    """The published cases in a setting, each flown when a measure asks for it; flown: by keys, shared."""
+
+    def __init__(self, changes: Mapping[str, Any], flown: dict[str, Flown]) -> None:
+        self._changes, self._flown = changes, flown
+
+    def __getitem__(self, name: str) -> Flown:
+        keys = keys_of(CASES[name], self._changes)
+        known = repr(sorted(keys.items()))
+        if known not in self._flown:
+            self._flown[known] = _fly(name, keys)
+        return self._flown[known]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(CASES)
+
+    def __len__(self) -> int:
+        return len(CASES)
 
 
 def _apt(changes: Mapping[str, Any]) -> dict[str, Any]:

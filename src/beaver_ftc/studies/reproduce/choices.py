@@ -67,6 +67,17 @@ CHOICES = (
 )
 
 
+# Of scheme and law, beside the gains: their defaults, and what they are.
+OPTIONS = (
+    Choice(
+        "fdi.options.initial_theta",
+        0.0,
+        "theta(Td) of the isolation estimators: a healthy surface. From -0.5, the centre of the set, no "
+        "known fault is named for the unanticipated one",
+    ),
+)
+
+
 class Gain(NamedTuple):
     """An option of the published scheme or law that is a number to choose: its dotted key and its name, its
     default, what it is, and how it was chosen."""
@@ -88,7 +99,7 @@ def gains() -> list[Gain]:
         Gain(f"{section}.{name}", name, row["default"], row["says"], row["origin"])
         for section, rows in tables
         for name, row in rows.items()
-        if row["origin"] != ABLATION
+        if row["origin"] != ABLATION and row["default"]
     ]
 
 

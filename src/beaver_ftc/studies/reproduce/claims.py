@@ -1,7 +1,9 @@
 """Each statement of [Zhang2005], how it is read as a number, and what becomes of it.
 
 A statement holds if its number keeps its limit. That alone says little: it is borne out only if it fails in
-the same flights once the mechanism it speaks of is taken out, its ablation.
+the same flights once the mechanism it speaks of is taken out, its ablation; and borne out in a setting only
+if the ablation fails in that setting. Statements that the code makes true by its construction, or that give
+nothing to measure, are counted apart.
 """
 
 from collections.abc import Sequence
@@ -26,7 +28,8 @@ class Claim(NamedTuple):
     """A published statement: what is measured in which flights, its limit with where that comes from, and the
     ablation, of ABLATIONS, in which it must fail.
 
-    reason: why nothing is measured, for those without a measure. because: why it does not hold.
+    reason: why nothing is measured, for those without a measure. because: why it does not hold; such a claim
+    is flown in the published setting alone. construction: whether the code makes it true by its construction.
     """
 
     where: str
@@ -38,6 +41,12 @@ class Claim(NamedTuple):
     ablation: str = ""
     reason: str = ""
     because: str = ""
+    construction: bool = False
+
+    @property
+    def testable(self) -> bool:
+        """Whether flights can contradict it."""
+        return self.measure is not None and not self.construction
 
     def number(self, flights: Flights) -> float:
         """What is measured in the flights."""
@@ -49,19 +58,20 @@ class Claim(NamedTuple):
         assert self.measure is not None
         return bool(number >= self.limit if self.measure.at_least else number <= self.limit)
 
-    def verdict(self, number: float, without: float, elsewhere: Sequence[float]) -> str:
-        """One of VERDICTS. number: as flown; without: in the ablation's flights; elsewhere: wherever else.
+    def is_borne_out(self, number: float, without: float) -> bool:
+        """Whether it holds, and does not without its mechanism; a number that was not flown fails."""
+        return self.holds(number) and not self.holds(without)
 
-        *Stronger than the paper*: it holds, fails without the mechanism, and holds wherever the paper did not
-        fly: with each inertia uncertainty theta at -0.25, 0 and 0.25 (27 corners and edges of what is
-        published), at every whole airspeed from 42 to 48 m/s, under every change to what the paper leaves
-        open and with every gain halved and doubled (BEYOND, VARIANTS and GAINS of cases.py).
-        """
+    def verdict(self, number: float, without: float, elsewhere: Sequence[tuple[float, float]]) -> str:
+        """One of VERDICTS. number: as flown; without: in the ablation's flights; elsewhere: both in every
+        setting that the paper did not fly (ELSEWHERE of reproduction.py). Of a construction, only whether it
+        holds there."""
         if not self.holds(number):
             return NOT_BORNE_OUT
         if self.holds(without):
             return CANNOT_BE_JUDGED
-        return STRONGER if all(map(self.holds, elsewhere)) else BORNE_OUT
+        there = (self.holds(n) if self.construction else self.is_borne_out(n, w) for n, w in elsewhere)
+        return STRONGER if all(there) else BORNE_OUT
 
 
 def _claim(row: dict) -> Claim:
@@ -71,7 +81,7 @@ def _claim(row: dict) -> Claim:
     limit, source = _FILE["limits"][row["limit"]]
     return Claim(
         row["where"], row["says"], MEASURES[what], tuple(names), limit, source, row["without"],
-        because=row.get("because", ""),
+        because=row.get("because", ""), construction=row.get("construction", False),
     )  # fmt: skip
 
 

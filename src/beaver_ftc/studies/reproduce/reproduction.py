@@ -1,9 +1,10 @@
 """Fly the published study and say what became of its statements: the document, and its files."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
+from math import nan
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -16,14 +17,25 @@ from beaver_ftc.studies.engine.study import Progress, Study, fly_all, run_study
 from beaver_ftc.studies.present.page import Makers
 from beaver_ftc.studies.present.tables import finite
 from beaver_ftc.studies.reproduce import beside, truth_and_design
-from beaver_ftc.studies.reproduce.cases import BEYOND, GAINS, PUBLISHED, VARIANTS, Changed, Flown, fly_case
-from beaver_ftc.studies.reproduce.choices import CHOICES, gains
+from beaver_ftc.studies.reproduce.cases import (
+    BEYOND,
+    GAINS,
+    PUBLISHED,
+    VARIANTS,
+    Changed,
+    Flown,
+    LazyFlights,
+    fly_case,
+)
+from beaver_ftc.studies.reproduce.choices import CHOICES, OPTIONS, gains
 from beaver_ftc.studies.reproduce.claims import (
     ABLATIONS,
+    BORNE_OUT,
     CANNOT_BE_JUDGED,
     CLAIMS,
     MEASURED,
     NOT_BORNE_OUT,
+    STRONGER,
     TAKES,
     VERDICTS,
     Claim,
@@ -32,8 +44,12 @@ from beaver_ftc.studies.reproduce.published_figures import figures_of
 from beaver_ftc.studies.reproduce.words import NAME, as_html, as_markdown, as_text
 
 NUMBERS, FALSE_ALARM = "numbers", "false alarm"
+AS_PUBLISHED = Changed("as published", {}, "")
 ELSEWHERE = (*BEYOND, *VARIANTS, *GAINS)  # wherever the paper did not fly
-SETTINGS = (*ABLATIONS, *ELSEWHERE)
+SETTINGS = (AS_PUBLISHED, *ELSEWHERE)
+WITHOUT: Mapping[str, Changed] = {ablation.name: ablation for ablation in ABLATIONS}
+FAULTY = ("elevator", "aileron", "rudder", "unanticipated")
+NO_ADAPTATION = {"fdi.options.adaptation_gain": 0.0}  # of the isolation estimators
 STUDIED: tuple[tuple[str, Changed], ...] = (  # what is asked of a setting, and the setting
     *((NUMBERS, setting) for setting in SETTINGS),
     *((FALSE_ALARM, setting) for _, setting in beside.healthy_settings()),
@@ -51,12 +67,36 @@ class Flights:
 
 
 def row_of(studied: tuple[str, Changed]) -> list[float]:
-    """The number of every measured claim in a setting, in their order, or whether a healthy flight alarms."""
+    """Of a setting the number of every measured claim, in their order, the same without the mechanism, and
+    in how many flights adaptation changes no alarm and no name; or whether a healthy flight alarms. A number
+    that no verdict needs is not flown."""
     asked, setting = studied
     if asked == FALSE_ALARM:
         return [beside.false_alarm_of(setting)]
-    flights = {case.name: fly_case(case, setting.changes) for case in PUBLISHED}
-    return [claim.number(flights) for claim in MEASURED]
+    flown: dict[str, Flown] = {}
+    flights, published = LazyFlights(setting.changes, flown), setting.name == AS_PUBLISHED.name
+
+    def without(claim: Claim) -> float:
+        return claim.number(LazyFlights({**setting.changes, **WITHOUT[claim.ablation].changes}, flown))
+
+    return [
+        *(claim.number(flights) if published or not claim.because else nan for claim in MEASURED),
+        *(
+            without(claim) if published or (claim.testable and not claim.because) else nan
+            for claim in MEASURED
+        ),
+        float(same_without_adaptation(flights, LazyFlights({**setting.changes, **NO_ADAPTATION}, flown))),
+    ]
+
+
+def same_without_adaptation(flights: Mapping[str, Flown], without: Mapping[str, Flown]) -> int:
+    """In how many of the faulty flights the alarm, the name and its time stay as they are."""
+    return sum(_found_in(flights[name]) == _found_in(without[name]) for name in FAULTY)
+
+
+def _found_in(flown: Flown) -> tuple[float | None, str | None, float | None]:
+    found = flown.metrics
+    return found.detection.time_s, found.isolation.fault, found.isolation.time_s
 
 
 def fly_published() -> Flights:
@@ -67,10 +107,16 @@ def fly_published() -> Flights:
 
 def document_of(flights: Flights, rows: Sequence[list[float]]) -> Document:
     """Judge the flights; rows: of every setting of STUDIED."""
-    numbers = {setting.name: row for (_, setting), row in zip(STUDIED, rows[: len(SETTINGS)], strict=False)}
-    ours = [claim.number(flights.published) for claim in MEASURED]
+    settings = rows[: len(SETTINGS)]
+    count = len(MEASURED)
+    numbers = {setting.name: row[:count] for setting, row in zip(SETTINGS, settings, strict=True)}
+    ablated = {setting.name: row[count : 2 * count] for setting, row in zip(SETTINGS, settings, strict=True)}
+    ours = numbers[AS_PUBLISHED.name]
     judged = {
-        claim: _judged(claim, ours[i], {name: row[i] for name, row in numbers.items()})
+        claim: _judged(
+            claim,
+            {name: (numbers[name][i], ablated[name][i]) for name in numbers},
+        )
         for i, claim in enumerate(MEASURED)
     }
     claims = [{"where": c.where, "statement": c.statement} | judged.get(c, _unjudged(c)) for c in CLAIMS]
@@ -78,19 +124,24 @@ def document_of(flights: Flights, rows: Sequence[list[float]]) -> Document:
     return {
         "passed": all(claim["verdict"] != NOT_BORNE_OUT or claim["because"] for claim in claims),
         "counts": {verdict: counts[verdict] for verdict in VERDICTS},
+        **_counted_apart(claims),
+        "adaptation": {"flights": len(FAULTY) * len(SETTINGS), "same": int(sum(row[-1] for row in settings))},
         "claims": claims,
         "ablations": _ablations(claims),
         "beside": beside.document_of(flights.beside, [row[0] for row in rows[len(SETTINGS) :]]),
         "truth_and_design": truth_and_design.document_of(flights.designs),
-        "choices": [asdict(choice) for choice in CHOICES],
+        "choices": [asdict(choice) for choice in (*CHOICES, *OPTIONS)],
         "gains": _gains(ours, numbers),
         "sensitivity": [
             {
                 "variant": setting.name,
                 "changes": dict(setting.changes),
                 "missed": _missed(ours, numbers[setting.name]),
+                "also_without": _also_without(
+                    numbers[setting.name], ablated[setting.name], ablated[AS_PUBLISHED.name]
+                ),
             }
-            for setting in (*BEYOND, *VARIANTS)
+            for setting in (*BEYOND, *VARIANTS, *GAINS)
         ],
         "cases": [
             {
@@ -105,15 +156,22 @@ def document_of(flights: Flights, rows: Sequence[list[float]]) -> Document:
 
 
 def _unjudged(claim: Claim) -> Document:
-    return {"verdict": CANNOT_BE_JUDGED, "reason": claim.reason, "because": "", "number": None}
+    return {
+        "verdict": CANNOT_BE_JUDGED,
+        "reason": claim.reason,
+        "because": "",
+        "number": None,
+        "construction": False,
+    }
 
 
-def _judged(claim: Claim, number: float, by_setting: dict[str, float]) -> Document:
-    """A measured claim. by_setting: its number by the name of the setting."""
+def _judged(claim: Claim, by_setting: Mapping[str, tuple[float, float]]) -> Document:
+    """A measured claim. by_setting: its number, and that without its mechanism, by name of setting."""
     assert claim.measure is not None
-    elsewhere = [by_setting[setting.name] for setting in ELSEWHERE]
-    without = by_setting[claim.ablation]
+    number, without = by_setting[AS_PUBLISHED.name]
+    elsewhere = [] if claim.because else [by_setting[setting.name] for setting in ELSEWHERE]
     verdict = claim.verdict(number, without, elsewhere)
+    flown = [there for there, _ in elsewhere] or [number]
     return {
         "measure": claim.measure.of.__name__,
         "quantity": claim.measure.quantity,
@@ -128,14 +186,36 @@ def _judged(claim: Claim, number: float, by_setting: dict[str, float]) -> Docume
         "without": TAKES[claim.ablation],
         "number_without": finite(without),
         "fails_without": not claim.holds(without),
-        "lowest": finite(min(elsewhere)),
-        "highest": finite(max(elsewhere)),
-        "held_in": sum(map(claim.holds, elsewhere)),
+        "construction": claim.construction,
+        "lowest": finite(min(flown)),
+        "highest": finite(max(flown)),
+        "held_in": sum(claim.holds(there) for there, _ in elsewhere),
+        "borne_out_in": sum(claim.is_borne_out(*both) for both in elsewhere),
         "elsewhere": len(elsewhere),
         "verdict": verdict,
         "because": claim.because if verdict == NOT_BORNE_OUT else "",
         "reason": "",
     }
+
+
+def _counted_apart(claims: Sequence[Document]) -> Document:
+    """How many statements flights can contradict, and what became of them; how many the code makes true by
+    its construction, and how many give nothing to measure."""
+    tested = Counter(c["verdict"] for c in claims if not c["reason"] and not c["construction"])
+    built = [c for c in claims if c["construction"]]
+    return {
+        "testable": {
+            "statements": sum(tested.values()),
+            "hold": tested[STRONGER] + tested[BORNE_OUT],
+            "elsewhere": tested[STRONGER],
+            "do_not": tested[NOT_BORNE_OUT],
+            "unsettled": tested[CANNOT_BE_JUDGED],
+        },
+        "construction": {
+            "statements": len(built), "hold": sum(c["verdict"] != NOT_BORNE_OUT for c in built)
+        },
+        "background": sum(bool(c["reason"]) for c in claims),
+    }  # fmt: skip
 
 
 def _ablations(claims: list[Document]) -> list[Document]:
@@ -161,6 +241,24 @@ def _gains(ours: list[float], numbers: dict[str, list[float]]) -> list[Document]
         missed = {"halved": _missed(ours, numbers[halved]), "doubled": _missed(ours, numbers[doubled])}
         rows.append({**gain._asdict(), **missed})
     return rows
+
+
+def _also_without(numbers: list[float], ablated: list[float], published: list[float]) -> list[Document]:
+    """The testable claims that hold in a setting without their mechanism as well; published: the numbers
+    without it in the published setting, in which they do not."""
+    return [
+        {
+            "where": c.where,
+            "statement": c.statement,
+            "number": finite(ablated[i]),
+            "unit": c.measure.unit,
+            "none": c.measure.none,
+            "without": TAKES[c.ablation],
+        }
+        for i, c in enumerate(MEASURED)
+        if c.measure and c.testable and not c.because
+        if c.holds(numbers[i]) and c.holds(ablated[i]) and not c.holds(published[i])
+    ]
 
 
 def _missed(ours: list[float], numbers: list[float]) -> list[Document]:
@@ -231,7 +329,7 @@ class Reproduce(StudyCommand):
         return "ablations, and changes to what the paper leaves open"
 
     def run(self, reporter: Reporter) -> Document:
-        """Fly the published cases, the ablations and the variants."""
+        """Fly the published cases, and all settings with their ablations."""
         document = reproduce(self.out, self.workers, reporter.progress)
         return document | {"folder": str(self.out / NAME)}
 

@@ -246,10 +246,10 @@ def outside(flights: Flights, *names: str) -> float:
     return float(np.nanmax(np.maximum(effectiveness - 1.0, -effectiveness).clip(0.0)))
 
 
-@_measure("largest |uncertainty| / bound")
+@_measure("uncertainty beyond the bound", "millionths of it")
 def unbounded(flights: Flights, name: str) -> float:
-    """What the design model does not explain before the fault, over the bound of the paper: our thresholds
-    add what the Earth's rotation and rounding do, which it does not have."""
+    """How far what the design model does not explain before the fault exceeds the bound of the paper: our
+    thresholds add what the Earth's rotation and rounding do, which it does not have."""
     flown = flights[name]
     healthy = flown.between(SETTLED_S, flown.fault_at_s)
     rates = sum(np.abs(flown.log[f"{axis}_rad_s"]) for axis in AXES)

@@ -87,6 +87,20 @@ class CoefficientErrors:
         return np.array([self.of(term.name) for term in terms]) * np.abs(values[: len(terms)])
 
 
+_known: dict[int, SensorErrors] = {}  # each holds the section whose number it is found by
+_MOST = 64
+
+
+def _errors_of(sensors: Sensors) -> SensorErrors:
+    """Those of a section. A flight asks several times, and flights of a sweep share what does not vary."""
+    known = _known.get(id(sensors))
+    if known is None:
+        if len(_known) >= _MOST:
+            _known.clear()
+        known = _known[id(sensors)] = SensorErrors(sensors)
+    return known
+
+
 @dataclass(frozen=True)
 class ActuatorErrors:
     """How far a surface may be from its actuator's model, rad."""
@@ -130,7 +144,7 @@ class Declared:
         return cls(
             aircraft,
             Dryden(bounds.turbulence),
-            SensorErrors(bounds.sensors),
+            _errors_of(bounds.sensors),
             CoefficientErrors(bounds.coefficients),
             ActuatorErrors(radians(bounds.deflection_deg)),
             bounds.inertia,

@@ -117,9 +117,10 @@ def test_a_flight_is_taken_apart_at_its_marks(monkeypatch):
     assert (parts.tolist(), runs, alone_s) == ([1.0] * 4, 21, 1.0)
     assert ran == [1] * 21 + [0]
     assert "old" not in measure.conditions._trims
-    measure.conditions._trims["old"] = None
+    found = []
+    monkeypatch.setattr(measure.conditions, "find_trim", found.append)
     changed, _, _ = measure._flown(sweep, {"duration_s": 1.0}, 0, alike=True)
-    assert measure.conditions._trims.pop("old", 0) is None, "flights that begin alike share a trim"
+    assert len(found) == 1, "the trim of flights that begin alike is known before"
     assert changed.tolist() == [2.0, 1.0, 1.0, 1.0], "a second goes by between two readings"
 
 

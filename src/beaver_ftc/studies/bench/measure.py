@@ -194,8 +194,9 @@ def _flown(sweep: Sweep, changes: dict[str, Any], run: int, alike: bool = False)
     All that `sweep` does for a flight. Its trim is a new one each time, or kept where flights begin alike.
     """
     (assignment,) = Plan(sweep).assignments([0 if alike else run])
-    if not alike:
-        conditions._trims.clear()
+    conditions._trims.clear()
+    if alike:
+        conditions.find_trim(scenario_of(sweep, assignment))
     marks = [time.process_time()]
     scenario = scenario_of(sweep, assignment)
     marks.append(time.process_time())

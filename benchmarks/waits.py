@@ -174,12 +174,16 @@ def in_a_sweep(place: Place, kind: str) -> Taken:
 
 @dataclass(frozen=True)
 class Wait:
-    """A row: its name, the bar, how it is measured; what takes long is measured once, and when asked for."""
+    """A row: its name, the bar, how it is measured.
+
+    fresh: what compiles is a part of it, so that nothing is warmed up before, and it is measured once.
+    long: only when asked for.
+    """
 
     name: str
     bar: float
     measure: Callable[[Place], Taken | None]
-    once: bool = False
+    fresh: bool = False
     long: bool = False
 
 
@@ -201,17 +205,17 @@ WAITS = (
     Wait("run --no-report", 1.0, command("run", FAULT, "--no-report")),
     Wait("run", 2.0, command("run", FAULT)),
     Wait("live, until the page flies", 3.0, live),
-    Wait("derive a JSBSim aircraft", 4.0, derive, once=True),
-    Wait("import gtm", 8.0, import_gtm, once=True),
-    Wait("diagnose, 30 min at 50 Hz", 5.0, diagnose, once=True),
-    Wait("first run of a fresh install", 12.0, fresh_install, once=True),
-    Wait("first flight of another aircraft", 2.0, another(OTHER_AIRCRAFT), once=True),
-    Wait("first flight of another kind", 2.0, another(OTHER_KIND), once=True),
-    Wait("flight in a sweep / bare frames", 1.35, lambda at: in_a_sweep(at, "published"), once=True),
-    Wait("the same, one beginning / bare", 1.20, lambda at: in_a_sweep(at, "one beginning"), once=True),
-    Wait("matrix elevator", 60.0, command("matrix", "elevator-partial-loss"), once=True, long=True),
-    Wait("reproduce", 60.0, command("reproduce"), once=True, long=True),
-    Wait("make demo from a fresh clone", 45.0, demo, once=True, long=True),
+    Wait("derive a JSBSim aircraft", 4.0, derive),
+    Wait("import gtm", 8.0, import_gtm),
+    Wait("diagnose, 30 min at 50 Hz", 5.0, diagnose),
+    Wait("first run of a fresh install", 12.0, fresh_install, fresh=True),
+    Wait("first flight of another aircraft", 2.0, another(OTHER_AIRCRAFT), fresh=True),
+    Wait("first flight of another kind", 2.0, another(OTHER_KIND), fresh=True),
+    Wait("flight in a sweep / bare frames", 1.35, lambda at: in_a_sweep(at, "published"), fresh=True),
+    Wait("the same, one beginning / bare", 1.20, lambda at: in_a_sweep(at, "one beginning"), fresh=True),
+    Wait("matrix elevator", 60.0, command("matrix", "elevator-partial-loss"), fresh=True, long=True),
+    Wait("reproduce", 60.0, command("reproduce"), fresh=True, long=True),
+    Wait("make demo from a fresh clone", 45.0, demo, fresh=True, long=True),
 )  # fmt: skip
 
 
@@ -228,21 +232,21 @@ def medians(rounds: list[Taken]) -> Taken:
 
 def alone(wait: Wait, place: Place, rounds: int) -> str:
     """Wall, processor, memory and bar of a wait; the first process warms up what is kept on purpose."""
-    if not wait.once:
+    if not wait.fresh:
         wait.measure(place)
-    found = [wait.measure(place) for _ in range(1 if wait.once else rounds)]
+    found = [wait.measure(place) for _ in range(1 if wait.fresh else rounds)]
     taken = medians([each for each in found if each]) if all(found) else None
-    return f"{wait.name:34}{''.join(_cell(taken, what) for what in TAKEN)}{wait.bar:10.2f}"
+    return f"{wait.name:34}{''.join(_cell(taken, what) for what in TAKEN)}{wait.bar:14.2f}"
 
 
 def _cell(taken: Taken | None, what: str) -> str:
     value = getattr(taken, what) if taken else None
-    return f"{'-':>10}" if value is None else f"{value:10.{0 if what == 'peak_mb' else 2}f}"
+    return f"{'-':>14}" if value is None else f"{value:14.{0 if what == 'peak_mb' else 2}f}"
 
 
 def in_pairs(wait: Wait, places: tuple[Place, Place], pairs: int) -> str:
     """Then, now, and the median of their ratios, by the processor where it is known; they take turns."""
-    if not wait.once:
+    if not wait.fresh:
         for place in places:
             wait.measure(place)
     then_now = []
@@ -281,9 +285,9 @@ def main() -> int:
             said = git("rev-parse", "--short", given.beside).decode().strip()
             print(f"{'processor s (or ratio)':34}{said:>10}{'now':>10}{'now/then':>10}", flush=True)
         else:
-            print(f"{'':34}{'wall, s':>10}{'processor':>10}{'peak, MB':>10}{'bar':>10}", flush=True)
+            print(f"{'':34}{'wall, s':>14}{'processor, s':>14}{'peak, MB':>14}{'bar, s':>14}", flush=True)
         for wait in wanted:
-            both = given.beside and in_pairs(wait, (then, now), 2 if wait.once else given.rounds)
+            both = given.beside and in_pairs(wait, (then, now), 2 if wait.fresh else given.rounds)
             print(both or alone(wait, now, given.rounds), flush=True)
     return 0
 

@@ -376,11 +376,11 @@ def fly_about(plant: Plant, trim: FlightState, seed: int, properties: Mapping[st
 def _move(plant: Plant, trim: FlightState, phases: np.ndarray, t_s: float) -> None:
     """Command the surfaces for one frame."""
     waves = np.sin(2.0 * np.pi * np.array(_FREQUENCIES_HZ) * t_s + phases).sum(axis=1)
-    for (name, surface), wave in zip(plant.aircraft.surface.items(), waves, strict=True):
+    for (name, surface), wave in zip(plant.aircraft.surface.items(), waves.tolist(), strict=True):
         travel = plant.aircraft.travel[name]
         reach = _SHARE_OF_TRAVEL * min(-travel.min_rad, travel.max_rad)
-        there = trim.surfaces_rad[name] + reach * float(wave)
-        plant.write(surface.command, float(np.clip(there, travel.min_rad, travel.max_rad)))
+        there = trim.surfaces_rad[name] + reach * wave
+        plant.write(surface.command, min(max(there, travel.min_rad), travel.max_rad))
     for effector in plant.aircraft.effectors.values():
         side = np.sign(effector.right_m) * np.sin(_APART_RAD_S * t_s)
         plant.write(effector.throttle, _APART * REACHES[0] * float(side))

@@ -46,11 +46,13 @@ def test_both_command_the_same_within_the_travel_and_at_the_stops(rival, most):
     control["layout"]["trim"] = TRIM
     control["layout"]["low"], control["layout"]["high"] = -most, 0.8 * most
     law.compile_into(control["compiled_rivals"])
-    frame = SimpleNamespace(G=G), SimpleNamespace(x=None)
+    means = SimpleNamespace(Gu=np.zeros((3, 4)))
+    frame = SimpleNamespace(G=G, means=means), SimpleNamespace(x=None)
     stops = 0
     for k in range(40):
         x, rate, acceleration = 0.02 * rng.normal(size=(3, 3))
-        seen = Measured(k * DT, x, np.zeros(5), np.zeros(3), np.zeros((3, 4)), np.zeros(3))
+        means.Gu = 0.1 * rng.normal(size=(3, 4))
+        seen = Measured(k * DT, x, np.zeros(5), np.zeros(3), means.Gu, np.zeros(3))
         wanted = law.step(seen, Reference(rate, rate, acceleration), Verdict())
         reference, out = fields(control["reference"]), control["allocation"]["output"]
         reference["model_rate"], reference["model_acceleration"], frame[1].x = rate, acceleration, x

@@ -221,7 +221,7 @@ def test_a_compiled_rival_commands_by_itself(incremental):
         put(control, law="lqr", model_rate=0.01, model_acceleration=0.02)
         rival["incremental"] = incremental
         rival["K"], rival["B_inverse"], rival["A"] = 0.1, np.eye(3) * 0.2, np.eye(3)
-        rival["Kp"], rival["Ki"], rival["keep"], rival["commanded"] = 2.0, 1.0, 0.5, 0.01
+        rival["Kp"], rival["Ki"], rival["keep"], rival["surface_filter"] = 2.0, 1.0, 0.5, 0.01
     given, told = commanded(frame), alone["control"]
     parts = alone["assessment"], alone["faults"], alone["belief"], alone["measured"]
     compiled_rivals.command(told, *parts, MODE_ADAPTIVE, 1.0)

@@ -44,13 +44,13 @@ def loop(name, effectiveness=1.0, disturbance=0.0, duration_s=20.0, **options):
     rad/s."""
     law = plugin_class(LAWS, name)()
     law.reset(context(**{**law.defaults, **options}))  # as the source has it, not as it was tuned
-    x, u, acceleration, errors = np.zeros(3), np.zeros(4), np.zeros(3), []
+    x, u, acceleration, given, errors = np.zeros(3), np.zeros(4), np.zeros(3), np.zeros((3, 4)), []
     for k in range(round(duration_s / DT)):
         rate = np.full(3, 0.02)
-        measured = Measured(k * DT, x.copy(), np.zeros(5), acceleration, np.zeros((3, 4)), np.zeros(3))
+        measured = Measured(k * DT, x.copy(), np.zeros(5), acceleration, given, np.zeros(3))
         command = law.step(measured, Reference(rate, rate, np.zeros(3)), Verdict())
         errors.append(rate - x)
-        acceleration = A @ x + G @ u
+        acceleration, given = A @ x + G @ u, G * u
         x = x + DT * (A @ x + effectiveness * (G @ u) + disturbance)
         u = command
     return np.array(errors)
@@ -132,22 +132,27 @@ def test_the_filter_has_its_step_response():
     assert value[0] == pytest.approx(np.convolve(impulse, impulse)[:n].sum())
 
 
-def test_incremental_inversion_sets_what_was_measured_against_the_command_that_gave_it():
-    """A command acts on the rates two frames later: what is left then is the disturbance alone."""
+@pytest.mark.parametrize("reach", [1.0, 0.2])
+def test_incremental_inversion_sets_what_was_measured_against_the_positions_that_gave_it(reach):
+    """Of an actuator that goes a share of its way in a frame, too: what is left is the disturbance alone."""
     law, d = IncrementalInversion(), np.array([0.3, -0.2, 0.1])
     law.reset(context(**law.defaults))
     rng = np.random.default_rng(5)
     Kp, Ki, pole = (law.defaults[key] for key in ("proportional_per_s", "integral_per_s2", "filter_per_s"))
-    x, integral, given = np.zeros(3), np.zeros(3), [np.zeros(4)] * 2
+    x, integral, position = np.zeros(3), np.zeros(3), np.zeros(4)
     disturbed = LowPass(pole, DT, np.zeros(3))
     for k in range(30):
-        x = x + (DT * (G @ given[-2] + d) if k else 0.0)
+        moved = position if k else np.zeros(4)
+        x = x + (DT * (G @ moved + d) if k else 0.0)
         rate, acceleration = rng.normal(size=(2, 3)) * 0.01
-        seen = Measured(k * DT, x.copy(), np.zeros(5), np.zeros(3), np.zeros((3, 4)), np.zeros(3))
-        given.append(law.step(seen, Reference(rate, rate, acceleration), Verdict()))
+        seen = Measured(k * DT, x.copy(), np.zeros(5), np.zeros(3), G * moved, np.zeros(3))
+        command = law.step(seen, Reference(rate, rate, acceleration), Verdict())
         integral = integral + DT * (rate - x)
         nu = acceleration + Kp * (rate - x) + Ki * integral
-        assert G @ given[-1] == pytest.approx(nu - disturbed.step(d if k else np.zeros(3)), abs=1e-9)
+        if k:
+            disturbed.step(d)
+        assert G @ command == pytest.approx(nu - disturbed.value, abs=1e-9)
+        position = position + reach * (command - position)
 
 
 @pytest.mark.parametrize("name", LAW_NAMES)

@@ -8,7 +8,6 @@ import numpy as np
 from beaver_ftc.compiled import apart, kernel, record, sized
 from beaver_ftc.control.allocation import form_demand, take_command
 from beaver_ftc.control.base import CompiledLaw
-from beaver_ftc.control.rivals.tracking import DELAY_FRAMES
 
 # Filled by `compile_into` of the rival's class. incremental: whether it is incremental inversion, else the
 # regulator. The regulator: gains on error and integral, the linear model, its inverse, the trim. Incremental
@@ -16,12 +15,11 @@ from beaver_ftc.control.rivals.tracking import DELAY_FRAMES
 CONFIG = record(
     incremental=int, K=(3, 6), A=(3, 3), B_inverse=(3, 3), trim_x=3, Kp=float, Ki=float, keep=float
 )
-# Of incremental inversion: rates and commands of before, and both filters. inherited (3,) rad/s2: what the
-# law before attributed to no model.
+# Of incremental inversion: the rates of the frame before, and the filters of the measured acceleration and of
+# the surfaces' share of it. inherited (3,) rad/s2: what the law before attributed to no model.
 MEMORY = record(
-    integral=3, saturated=int, begun=int, x_before=3, commanded=(DELAY_FRAMES, 3), rate_filter=(2, 3),
-    command_filter=(2, 3), inherited=3,
-)  # fmt: skip
+    integral=3, saturated=int, begun=int, x_before=3, rate_filter=(2, 3), surface_filter=(2, 3), inherited=3
+)
 
 
 @sized
@@ -38,7 +36,7 @@ def command(control, assessment, faults, belief, measured, mode, t):
     memory, out, allocated = law.memory, law.output, control.allocation.output
     out.command[:] = layout.trim
     if law.config.incremental:
-        increment(law, reference, layout.main, belief.G, x)
+        increment(law, reference, layout.main, belief, x)
         form_demand(control.axes, out.demand, out.zero, out.zero, out.zero, belief.G, False)
     else:
         regulate(law, reference, layout.main, x)
@@ -46,8 +44,6 @@ def command(control, assessment, faults, belief, measured, mode, t):
     memory.saturated = 0
     for s in range(out.command.size):
         memory.saturated += allocated.saturated[s]
-    if law.config.incremental:
-        remember(memory, allocated.command, layout.main, x)
 
 
 @kernel
@@ -75,20 +71,32 @@ def regulate(law, reference, main, x):
 
 
 @kernel
-def increment(law, reference, main, G, x):
-    """u0 + G^-1 (nu - xdot0), into the output's command; nu - xdot0 into its demand (3,) rad/s2."""
-    config, memory, demand, out = law.config, law.memory, law.output.demand, law.output.command
-    if not memory.begun:
-        memory.begun, memory.x_before[:] = 1, x
+def increment(law, reference, main, belief, x):
+    """G^-1 (nu - xdot0 + G u0), into the output's command; nu - xdot0 into its demand (3,) rad/s2."""
+    config, memory, demand = law.config, law.memory, law.output.demand
     for i in range(3):
         error = missed(memory, reference, i, x)
-        xdot0 = smooth(memory.rate_filter, i, (x[i] - memory.x_before[i]) / reference.config.dt, config.keep)
+        xdot0, given = memory.rate_filter[1, i], memory.surface_filter[1, i]
+        if memory.begun:
+            change = (x[i] - memory.x_before[i]) / reference.config.dt
+            xdot0 = smooth(memory.rate_filter, i, change, config.keep)
+            given = smooth(memory.surface_filter, i, given_by(belief.means.Gu, main, i), config.keep)
         nu = reference.output.model_acceleration[i] + config.Kp * error + config.Ki * memory.integral[i]
-        demand[i] = nu - xdot0
-    solve(G, main, demand, out)
+        demand[i] = nu - xdot0 + given
+    solve(belief.G, main, demand, law.output.command)
     for i in range(3):
-        u0 = smooth(memory.command_filter, i, memory.commanded[0, i], config.keep)
-        out[main[i]] += u0
+        demand[i] -= memory.surface_filter[1, i]
+    memory.begun, memory.x_before[:] = 1, x
+
+
+@kernel
+def given_by(Gu, main, i):
+    """Acceleration of axis i, rad/s2, that the positions of the surfaces main (3,) gave over the elapsed
+    frame."""
+    total = 0.0
+    for s in range(3):
+        total += Gu[i, main[s]]
+    return total
 
 
 @kernel
@@ -97,16 +105,6 @@ def smooth(filtered, i, value, keep):
     filtered[0, i] = keep * filtered[0, i] + (1.0 - keep) * value
     filtered[1, i] = keep * filtered[1, i] + (1.0 - keep) * filtered[0, i]
     return filtered[1, i]
-
-
-@kernel
-def remember(memory, command, main, x):
-    """Keep the rates and the last commands for the frames to come."""
-    for i in range(3):
-        for k in range(DELAY_FRAMES - 1):
-            memory.commanded[k, i] = memory.commanded[k + 1, i]
-        memory.commanded[DELAY_FRAMES - 1, i] = command[main[i]]
-        memory.x_before[i] = x[i]
 
 
 @kernel

@@ -2,9 +2,11 @@
 
     u = u0 + G^-1 (nu - xdot0)          [Sieberling2010]
 
-xdot0 is the filtered difference of the measured rates and u0 the command that gave it, through the same
-filter [Smeur2016, sec. III]. A rate measured now shows the command given two steps ago (JSBSim's frame of
-delay, and the difference's), so that is the u0 that belongs to it.
+xdot0 is the filtered difference of the measured rates. u0 are the positions of the surfaces that gave it,
+through the same filter [Smeur2016, sec. III]: those that the declared actuators' model gives, not the
+commands. G u0 of the elapsed frame is measured.contribution, so that
+
+    G u = nu - xdot0 + G u0
 """
 
 from collections.abc import Mapping
@@ -14,7 +16,7 @@ from typing import ClassVar
 import numpy as np
 
 from beaver_ftc.control.base import Reference
-from beaver_ftc.control.rivals.tracking import DELAY_FRAMES, GAINS, Rival
+from beaver_ftc.control.rivals.tracking import GAINS, Rival
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.base import Measured, Verdict
 
@@ -45,27 +47,29 @@ class IncrementalInversion(Rival):
         pole, dt = self.option["filter_per_s"], context.dt_s
         self.acceleration = LowPass(pole, dt, np.zeros(3))
         self.leading = list(context.leading)
-        trim = context.trim_rad[self.leading]
-        self.commanded = LowPass(pole, dt, trim)
-        self.given = [trim] * (DELAY_FRAMES + 1)
+        self.by_surfaces = LowPass(pole, dt, self.trimmed())
         self.before: np.ndarray | None = None
+
+    def trimmed(self) -> np.ndarray:
+        """Acceleration (3,) rad/s2 that the leading surfaces give in trim."""
+        context = self.context
+        given: np.ndarray = (context.model.G(context.trim_y) * context.trim_rad)[:, self.leading].sum(axis=1)
+        return given
 
     def compile_into(self, law: np.void) -> None:
         """Fill the record of compiled_rivals.py, in trim."""
-        config, memory, trim = law["config"], law["memory"], self.context.trim_rad[self.leading]
+        config = law["config"]
         config["incremental"] = 1
         config["Kp"], config["Ki"] = self.option["proportional_per_s"], self.option["integral_per_s2"]
         config["keep"] = exp(-self.option["filter_per_s"] * self.context.dt_s)
-        memory["commanded"] = memory["command_filter"] = trim
+        law["memory"]["surface_filter"] = self.trimmed()
 
     def step(self, measured: Measured, reference: Reference, verdict: Verdict) -> np.ndarray:
-        """u0 + G^-1 (nu - xdot0)."""
-        before = measured.x if self.before is None else self.before
-        xdot0 = self.acceleration.step((measured.x - before) / self.context.dt_s)
-        u0 = self.commanded.step(self.given[-DELAY_FRAMES])
+        """G^-1 (nu - xdot0 + G u0)."""
+        if self.before is not None:
+            self.acceleration.step((measured.x - self.before) / self.context.dt_s)
+            self.by_surfaces.step(measured.contribution[:, self.leading].sum(axis=1))
+        self.before = measured.x
         nu = self.demand(measured, reference)
         G = self.context.model.G(measured.y)[:, self.leading]
-        command = self.command(u0 + np.linalg.solve(G, nu - xdot0))
-        self.before = measured.x
-        self.given = [*self.given[1:], command[self.leading]]
-        return command
+        return self.command(np.linalg.solve(G, nu - self.acceleration.value + self.by_surfaces.value))

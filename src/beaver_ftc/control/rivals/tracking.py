@@ -1,9 +1,9 @@
 """What the rival laws share: a proportional-integral demand, and surfaces from it.
 
-    nu = xm' + Kp e + Ki int e,   e = xm - x        [the built-in laws' own, with their default gains]
+    nu = xm' + Kp e + Ki int e,   e = xm - x
 
-so that the laws differ in what they make of the demand, not in what they demand. Only the surfaces that lead
-roll, pitch and yaw move; the others stay in trim.
+Kp and Ki are options of each law, tuned for it as its other options are. Only the surfaces that lead roll,
+pitch and yaw move; the others stay in trim.
 """
 
 from collections.abc import Mapping
@@ -17,7 +17,6 @@ from beaver_ftc.diagnosis.base import Measured
 from beaver_ftc.diagnosis.rivals import options_of
 
 GAINS = {"proportional_per_s": 2.0, "integral_per_s2": 1.0}
-DELAY_FRAMES = 2  # from a command to the measured rates that show it, for incremental inversion
 
 
 class Rival:

@@ -18,14 +18,15 @@ from dataclasses import dataclass
 from functools import cache, lru_cache
 from importlib import import_module
 from inspect import getdoc, isclass, signature
+from math import inf
 from pathlib import Path
 from typing import Any
 
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError, suggestion
 
 __all__ = [
-    "DETECTORS", "LAWS", "OURS", "Registered", "is_compiled", "made", "options_of", "plugin_class", "refusal",
-    "register", "registered", "settings", "wrong_options",
+    "DETECTORS", "LAWS", "OURS", "Range", "Registered", "is_compiled", "made", "options_of", "plugin_class",
+    "refusal", "register", "registered", "settings", "tunable", "wrong_options",
 ]  # fmt: skip
 
 DETECTORS, LAWS = "beaver_ftc.detectors", "beaver_ftc.laws"
@@ -59,6 +60,15 @@ class Registered:
             return f"broken: {error}"
 
 
+@dataclass(frozen=True)
+class Range:
+    """Between which limits a parameter is tuned, and whether on the scale of its logarithm or of its odds."""
+
+    low: float
+    high: float
+    scale: str = "log"
+
+
 @cache
 def _ours(group: str) -> dict[str, dict[str, Any]]:
     """Our own by name: what is said of each, and its class, if it is not in the compiled frame itself."""
@@ -82,6 +92,35 @@ def compiled_rows(group: str) -> dict[str, dict[str, Any]]:
 def options_of(group: str, name: str) -> dict[str, dict[str, Any]]:
     """The options of what the compiled frame does itself, as plugins.yaml has them."""
     return _ours(group)[name].get("options", {})
+
+
+def tunable(group: str, name: str) -> dict[str, Range]:
+    """What may be tuned of a detector or law: its row in plugins.yaml says it, or `tunable` of its class.
+
+    A key without a dot is an option of the method, one with dots is a key of the scenario. Raises BadInput.
+    """
+    given = _ours(group)[name].get("tunable", {}) if name in _ours(group) else _tunable_of_class(group, name)
+    return {key: _range(name, key, limits) for key, limits in given.items()}
+
+
+def _tunable_of_class(group: str, name: str) -> Mapping[str, Any]:
+    given = getattr(plugin_class(group, name), "tunable", {})
+    if isinstance(given, Mapping):
+        return given
+    raise BadInput(f"plug-in {name}: tunable is a {type(given).__name__}, allowed: option: (low, high)")
+
+
+def _range(name: str, key: str, limits: Any) -> Range:
+    try:
+        low, high, *scale = limits
+        found = Range(float(low), float(high), *scale)
+    except (TypeError, ValueError):
+        found = Range(0.0, 0.0)
+    most = {"log": inf, "odds": 1.0}.get(found.scale, 0.0)
+    if not 0.0 < found.low < found.high < most:
+        allowed = 'allowed: (low, high) with 0 < low < high, or (low, high, "odds") below 1'
+        raise BadInput(f"{name}: tunable {key}: {limits!r:.60}; {allowed}")
+    return found
 
 
 def settings(group: str, name: str, given: Mapping[str, float]) -> dict[str, float]:

@@ -137,8 +137,13 @@ COMPARE = {
     "studies__compare__leaderboard__as_text": "c\n",
     "studies__compare__leaderboard__write_leaderboard": None,
     "studies__compare__trial__set_names": ["one", "two"],
-    "studies__compare__tune__tune": {"options": {"rls": 3, "ekf": 4}},
-    "studies__compare__tune__write_tuned": None,
+    "studies__compare__tune__tune": lambda methods, *how: {
+        "methods": [f"{method.grade} {method.name}" for method in methods],
+        "how": how[:-1],
+    },
+    "studies__compare__tune__write_tuned": lambda document, folder: folder / "tuned.json",
+    "studies__compare__tune__as_text": str,
+    "studies__compare__tune__read_tuned": lambda path: {"read": str(path)},
     "studies__compare__runs__write_runs": ["r"],
     "studies__compare__runs__labels": lambda runs: ["first"],
     "studies__compare__runs__as_text": "runs",
@@ -313,8 +318,10 @@ ASKED = [
     ("compare --benchmark --set one --flights 3 --laws lqr --format json", COMPARE),
     ("compare --sweep s --schemes rls-monitor --workers 4 --leaderboard page --out o", COMPARE),
     ("compare --sweep s --schemes rls-monito --laws lq", COMPARE),
-    ("compare --tune", COMPARE),
-    ("compare --tune --errors --target 2 --flights 9 --workers 1 --format json", COMPARE),
+    ("compare --tune --laws lqr --grade exact", COMPARE),
+    ("compare --tune --schemes augmented-ekf,none --trials 9 --seed 3 --flights 9 --format json", COMPARE),
+    ("compare --benchmark --set one --schemes zhang2005 --tuned mine.json --format json", COMPARE),
+    ("compare --tune --grade windy", COMPARE), ("compare --tune --laws lq", COMPARE),
     ("compare a b", COMPARE), ("compare a b --out o --format json", COMPARE),
     ("compare --flights recorded", COMPARE),
     ("compare --flights recorded --out o --leaderboard page.md", COMPARE),
@@ -323,7 +330,8 @@ ASKED = [
     ("compare", COMPARE), ("compare a --tune", COMPARE), ("compare --tune --flights recorded", COMPARE),
     ("compare --tune --flights 0", COMPARE), ("compare --tune --flights 1", COMPARE),
     ("compare --tune --flights -3", COMPARE), ("compare --tune --set x", COMPARE),
-    ("compare --benchmark --errors", COMPARE), ("compare --benchmark --other-days", COMPARE),
+    ("compare --benchmark --grade exact", COMPARE),
+    ("compare --tune --tuned a", COMPARE), ("compare --benchmark --other-days", COMPARE),
 ]  # fmt: skip
 
 

@@ -15,7 +15,7 @@ from beaver_ftc.extensions import required
 
 FILES = (
     "comparison.json", "comparison.png", "comparison.html", "runs.json", "runs.png", "runs.html",
-    "flights.json", "flights.md", "flights.png",
+    "flights.json", "flights.md", "flights.png", "tuned.json",
 )  # fmt: skip
 
 
@@ -27,14 +27,16 @@ class Options:
     sweep: Annotated[Path | None, typer.Option(metavar="FILE")] = None
     benchmark: bool = False
     tune: bool = False
-    errors: bool = False
+    grade: str | None = None
+    trials: Annotated[int, typer.Option(min=5)] = 24
+    seed: int = 1
+    tuned: Annotated[Path | None, typer.Option(metavar="FILE")] = None
     schemes: str | None = None
     laws: str | None = None
     only: Annotated[str | None, typer.Option("--set")] = None
     flights: Annotated[str | None, typer.Option(metavar="N|FOLDER")] = None
     other_days: bool = False
     workers: Annotated[int, typer.Option(min=1)] = 2
-    target: Annotated[float, typer.Option(min=0)] = 1.0
     out: Path = Path("comparisons")
     leaderboard: Path | None = None
     format: FormatOption = Format.text
@@ -45,25 +47,28 @@ def command(options: Options) -> None:
     """Compare runs, or schemes and laws on the same flights.
 
     It compares finished runs; or schemes and laws (--sweep, --benchmark); or detectors on recorded flights
-    (--flights FOLDER), each flight with a model identified without it.
+    (--flights FOLDER), each flight with a model identified without it. --tune chooses the parameters of
+    schemes and laws, ours, rivals and plug-ins alike, by one search on the calibration sets.
 
     Writes comparison.json, .png and .html; for runs: runs.json, .png and .html; for recorded flights:
-    flights.json, .md and .png.
+    flights.json, .md and .png; with --tune: tuned.json.
 
     The same command resumes an interrupted comparison on flights.
 
     runs: Result folders of `run`.
     sweep: Compare on the flights of a sweep.
     benchmark: Compare on the standard sets; update the leaderboard.
-    tune: Tune the rivals on the calibration set.
-    errors: With --tune: for declared sensor errors and turbulence.
+    tune: Tune schemes and laws on the calibration sets.
+    grade: With --tune: of flights, exact, actuators or errors; all three without it.
+    trials: With --tune: of each method on each grade.
+    seed: With --tune: of the search.
+    tuned: With --sweep or --benchmark: fly with the values in this file instead of those shipped.
     schemes: Comma-separated schemes; all registered ones if neither schemes nor laws are listed.
     laws: Comma-separated laws; all registered ones if neither schemes nor laws are listed.
     only: With --benchmark: one set.
     flights: At most N flights of each sweep; or recorded flights.
     other_days: With --flights FOLDER: on days made of the labelled flights.
     workers: Processes.
-    target: With --tune: false alarms per hour allowed.
     out: Folder for the comparison.
     leaderboard: With --benchmark or recorded flights: the page to update.
     """
@@ -90,7 +95,12 @@ def _refuse_contradictions(options: Options, folder: Path | None) -> None:
         )
     for option, with_it, allowed in (
         (options.only is not None, options.benchmark, "--set: allowed: only with --benchmark"),
-        (options.errors, options.tune, "--errors: allowed: only with --tune"),
+        (options.grade is not None, options.tune, "--grade: allowed: only with --tune"),
+        (
+            options.tuned is not None,
+            options.sweep is not None or options.benchmark,
+            "--tuned: allowed: only with --sweep or --benchmark",
+        ),
         (options.other_days, folder is not None, "--other-days: allowed: only with --flights FOLDER"),
     ):
         if option and not with_it:
@@ -121,6 +131,7 @@ def _compare_on_flights(options: Options, most: int | None) -> None:
     from beaver_ftc.plugins import DETECTORS, LAWS
     from beaver_ftc.studies.compare.leaderboard import as_text, run_comparison, write_leaderboard
     from beaver_ftc.studies.compare.trial import LAW, SCHEME, entries_of, of_set, of_sweep, set_names
+    from beaver_ftc.studies.compare.tune import read_tuned
 
     if options.sweep is not None:
         cases = of_sweep(options.sweep, most=most)
@@ -129,12 +140,13 @@ def _compare_on_flights(options: Options, most: int | None) -> None:
         sets = [options.only] if options.only else set_names()
         cases = [case for each in sets for case in of_set(each, most)]
         name = f"benchmark-{options.only}" if options.only else "benchmark"
+    chosen = None if options.tuned is None else read_tuned(options.tuned)
     entries = entries_of(
         _chosen("--schemes", DETECTORS, options.schemes, SCHEME, alone=options.laws is None),
         _chosen("--laws", LAWS, options.laws, LAW, alone=options.schemes is None),
     )
     with progress_bar(f"{len(cases)} flights, {len(entries)} times each") as progress:
-        document = run_comparison(options.out, name, cases, entries, options.workers, progress)
+        document = run_comparison(options.out, name, cases, entries, options.workers, progress, chosen)
     folder = options.out / name
     answer(
         options.format,
@@ -149,24 +161,51 @@ def _chosen(option: str, group: str, names: str | None, ours: str, *, alone: boo
     """The names listed, ours among them; without a list all that are registered, or none where the list of
     the other kind is what was asked for (alone: it was not). Raises BadInput with a line a name that is not
     registered."""
-    from beaver_ftc.plugins import refusal, registered
+    from beaver_ftc.plugins import registered
 
     if names is None:
         return list(registered(group)) if alone else []
-    wrong = [f"{option}: {says}" for name in listed(names) if (says := refusal(group, name))]
+    return list(dict.fromkeys([ours, *_registered(option, group, listed(names))]))
+
+
+def _registered(option: str, group: str, names: list[str]) -> list[str]:
+    """These names. Raises BadInput with a line a name that is not registered."""
+    from beaver_ftc.plugins import refusal
+
+    wrong = [f"{option}: {says}" for name in names if (says := refusal(group, name))]
     if wrong:
         raise BadInput("\n".join(wrong))
-    return list(dict.fromkeys([ours, *listed(names)]))
+    return names
 
 
 def _tune(options: Options, most: int | None) -> None:
-    from beaver_ftc.studies.compare.tune import tune, write_tuned
+    from beaver_ftc.plugins import DETECTORS, LAWS, registered
+    from beaver_ftc.studies.compare.trial import STATISTICAL
+    from beaver_ftc.studies.compare.tune import as_text, methods_of, tune, write_tuned
 
-    with progress_bar("calibration flights") as progress:
-        document = tune(options.target, options.workers, most, progress, options.errors)
-    write_tuned(document, errors=options.errors)
-    answer(
-        options.format,
-        document,
-        lambda: "\n".join(f"{name}: {tuned}" for name, tuned in document["options"].items()),
-    )
+    everything = options.schemes is None and options.laws is None
+    schemes = [*registered(DETECTORS), STATISTICAL] if everything else _named("--schemes", options.schemes)
+    laws = list(registered(LAWS)) if everything else _named("--laws", options.laws)
+    methods = methods_of(schemes, laws, _grades(options.grade))
+    with progress_bar(f"{len(methods)} methods and grades, {options.trials} trials each") as progress:
+        document = tune(methods, options.trials, options.seed, most, options.workers, progress)
+    path = write_tuned(document, options.out)
+    answer(options.format, document, lambda: f"{as_text(document)}\n\nwritten: {path}")
+
+
+def _named(option: str, names: str | None) -> list[str]:
+    """The schemes or laws listed."""
+    from beaver_ftc.plugins import DETECTORS, LAWS
+
+    group = DETECTORS if option == "--schemes" else LAWS
+    return _registered(option, group, [] if names is None else listed(names))
+
+
+def _grades(given: str | None) -> list[str]:
+    from beaver_ftc.diagnosis.rivals import GRADES
+
+    if given is None:
+        return list(GRADES)
+    if given not in GRADES:
+        raise BadInput(f"compare: --grade {given[:50]!r}, allowed: {', '.join(GRADES)}")
+    return [given]

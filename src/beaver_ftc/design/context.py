@@ -71,6 +71,12 @@ class DeclaredErrors:
         return bool(any(np.any(share) for share in shares) or self.inertia or self.deflection_rad)
 
     @property
+    def noisy(self) -> bool:
+        """Whether errors of instruments or turbulence are declared."""
+        shares = self.noise, self.bias, self.resolution, self.slope, self.gust_rad_s
+        return any(np.any(share) for share in shares)
+
+    @property
     def air(self) -> bool:
         """Whether turbulence is declared."""
         return bool(np.any(self.gust_rad_s))

@@ -80,7 +80,7 @@ class ControlConfig(Section, strict=True):
     gain_margin_db: float = number(6.0, "dB", gt=0, le=40)
     phase_margin_deg: float = entry(45.0, gt=0, le=80)
     noise_share: float = number(0.5, "share of 1", gt=0, le=1)
-    proportional_per_s: float = entry(2.0, gt=0, le=50)
+    proportional_per_s: float = entry(2.0, gt=0, le=500)
     integral_per_s2: float = number(1.0, "1/s2", ge=0, le=500)
     reference_natural_frequency_rad_s: float = entry(10.0, gt=0, le=100)
     reference_damping: float = number(1.0, "1", ge=0.2, le=5)

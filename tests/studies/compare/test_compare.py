@@ -4,17 +4,17 @@ import json
 import subprocess
 import sys
 import time
+from collections import Counter
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
 from beaver_ftc.cli.main import app
-from beaver_ftc.diagnosis.rivals import TUNED, TUNED_FOR_ERRORS, tuned
+from beaver_ftc.diagnosis.rivals import GRADES
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.loop.loop import Loop
-from beaver_ftc.plugins import plugin_class
 from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.sweeps import load_sweep
 from beaver_ftc.studies.compare.leaderboard import (
     CONTROL,
     DIAGNOSIS,
@@ -23,28 +23,27 @@ from beaver_ftc.studies.compare.leaderboard import (
     makers_of,
     write_leaderboard,
 )
-from beaver_ftc.studies.compare.replay import Trace
 from beaver_ftc.studies.compare.runs import figure_of, read_runs
 from beaver_ftc.studies.compare.scores import better_than_ours, document_of
 from beaver_ftc.studies.compare.trial import (
     CALIBRATION,
-    CALIBRATION_ERRORS,
     LAW,
     ORACLE,
     SCHEME,
+    STATISTICAL,
     Entry,
     SetFlight,
+    benchmark_folder,
     entries_of,
     fly_case,
+    grade_of,
     of_set,
     of_sweep,
     set_names,
     with_entry,
 )
-from beaver_ftc.studies.compare.tune import _best_detector, alarm_level, candidates, grids
 from beaver_ftc.studies.present.page import contents, write_files
 from commands import beaver
-from flying import scenario
 
 BEAVER = Path(sys.executable).with_name("beaver-ftc")
 SWEEP = """
@@ -136,8 +135,29 @@ def test_a_plug_in_that_fails_spoils_only_its_own_line(sweep):
 
 def test_options_are_the_named_schemes_alone():
     named = Scenario(name="n", fdi={"scheme": "augmented-ekf", "options": {"noise": 2.0}})
-    assert with_entry(named, Entry("augmented-ekf", LAW)).fdi.options == {"noise": 2.0}
-    assert with_entry(named, Entry("observer-constant", LAW)).fdi.options == {}
+    assert with_entry(named, Entry("augmented-ekf", LAW), {}).fdi.options == {"noise": 2.0}
+    assert with_entry(named, Entry("observer-constant", LAW), {}).fdi.options == {}
+
+
+def test_values_chosen_fly_on_their_grade_unless_the_scenario_says_otherwise():
+    """Options and keys of the scenario; and our scheme with its statistical detector."""
+    detectors = {
+        "augmented-ekf": {"noise": 3.0, "alarm": 4.0},
+        STATISTICAL: {"fdi.statistical.misnaming": 0.1},
+    }
+    laws = {"nominal": {"control.proportional_per_s": 5.0, "control.integral_per_s2": 6.0}}
+    chosen = {"exact": {"detectors": detectors, "laws": laws}}
+    given = {
+        "fdi": {"scheme": "augmented-ekf", "options": {"noise": 2.0}},
+        "control": {"integral_per_s2": 7.0},
+    }
+    flown = with_entry(Scenario(name="n", **given), Entry("augmented-ekf", "nominal"), chosen)
+    assert flown.fdi.options == {"noise": 2.0, "alarm": 4.0}
+    assert (flown.control.proportional_per_s, flown.control.integral_per_s2) == (5.0, 7.0)
+    ours = with_entry(Scenario(name="n", **given), Entry(STATISTICAL, LAW), chosen)
+    assert (ours.fdi.scheme, ours.fdi.statistical.misnaming, ours.fdi.options) == (SCHEME, 0.1, {})
+    noisy = Scenario(name="n", sensors="tactical-grade", fdi={"bounds": {"sensors": "tactical-grade"}})
+    assert with_entry(noisy, Entry("augmented-ekf", LAW), chosen).fdi.options == {}
 
 
 def test_a_case_that_cannot_be_flown_is_said():
@@ -214,73 +234,33 @@ def test_the_leaderboard_keeps_what_was_written_by_hand(tmp_path, compared):
     assert "What loses:" in text
 
 
-@pytest.mark.parametrize("name", [*set_names(), CALIBRATION])
+CALIBRATED_ON = [CALIBRATION + grade for grade in GRADES]
+
+
+@pytest.mark.parametrize("name", [*set_names(), *CALIBRATED_ON])
 def test_every_standard_set_is_sound(name):
     """Its flights can be drawn, and fly on values of their own."""
     cases = of_set(name)
     assert len({case.scenario.name for case in cases}) == len(cases)
     assert len({case.scenario.seed for case in cases}) == len(cases)
     assert all(case.scenario.fdi.scheme == SCHEME for case in cases)
+    if name in CALIBRATED_ON:
+        assert {CALIBRATION + grade_of(case.scenario) for case in cases} == {name}
 
 
 def test_nothing_is_tuned_on_what_is_compared():
-    tuned_on = {case.scenario.seed for name in (CALIBRATION, CALIBRATION_ERRORS) for case in of_set(name)}
+    """Neither the seeds of flights nor those that sweeps are drawn with."""
+    tuned_on = {case.scenario.seed for name in CALIBRATED_ON for case in of_set(name)}
     compared = {case.scenario.seed for name in set_names() for case in of_set(name)}
     assert not tuned_on & compared
+    drawn = Counter(load_sweep(path).seed for path in benchmark_folder().glob("*/*.yaml"))
+    assert max(drawn.values()) == 1
 
 
 def test_the_sets_cover_the_fault_types():
     types = {fault.type for case in of_set("fault-types") for fault in case.scenario.faults}
     assert types == {"bias", "stuck", "float", "oscillatory", "loss_of_effectiveness"}
     assert not any(case.scenario.faults for case in of_set("healthy"))
-
-
-def test_the_alarm_level_leaves_the_allowed_number_of_alarms():
-    healthy = [Trace(value, (), faulted=False, healthy_s=900.0) for value in (3.0, 1.0, 2.0, 5.0)]  # one hour
-    assert alarm_level(healthy, 0.5) == pytest.approx(1.2 * 5.0)
-    level = alarm_level(healthy, 2.0)
-    assert sum(trace.false_alarm(level) for trace in healthy) == 2
-
-
-@pytest.mark.parametrize(
-    ("rivals", "group", "path"),
-    [
-        ("detectors", "beaver_ftc.detectors", TUNED),
-        ("detectors for errors", "beaver_ftc.detectors", TUNED_FOR_ERRORS),
-        ("laws", "beaver_ftc.laws", TUNED),
-    ],
-)
-def test_what_is_tuned_are_options_the_rivals_have(rivals, group, path):
-    assert grids()[rivals]
-    for name, grid in grids()[rivals].items():
-        known = plugin_class(group, name).defaults
-        assert set(grid) <= set(known)
-        assert set(grid) <= set(tuned(path)[name]) <= set(known)
-        assert len(candidates(grid)) > 1
-
-
-def test_what_is_tuned_for_errors_flies_only_where_errors_are_declared():
-    seen = {}
-    for name, bounds in (("none", {}), ("errors", {"turbulence": "light"})):
-        flown = Loop(scenario(duration_s=1, fdi={"scheme": "augmented-ekf", "bounds": bounds}))
-        seen[name] = flown.plugin_frame.detector.option
-    assert seen["none"]["drift_per_s"] == tuned()["augmented-ekf"]["drift_per_s"]
-    assert seen["errors"]["drift_per_s"] == tuned(TUNED_FOR_ERRORS)["augmented-ekf"]["drift_per_s"]
-
-
-def test_a_candidate_is_judged_in_each_air_at_a_level_of_its_own():
-    """The quick candidate is as noisy in rough air as its fault is loud there; one level for all air would
-    blind it in still air."""
-
-    def flight(before, after):
-        return Trace(before, ((0.5, after),), faulted=after > 0.0, healthy_s=3600.0)
-
-    air = ["none", "none", "light", "light"]
-    keen = [flight(1.0, 0.0), flight(0.5, 2.0), flight(10.0, 0.0), flight(5.0, 20.0)]
-    dull = [flight(1.0, 0.0), flight(0.5, 0.9), flight(1.0, 0.0), flight(0.5, 2.0)]
-    played = [{"x": pair} for pair in zip(dull, keen, strict=True)]
-    best = _best_detector("x", {"kind": (0.0, 1.0)}, played, air, 0.0)
-    assert best == {"kind": 1.0, "alarm": pytest.approx(12.0)}
 
 
 def test_finished_runs_stand_side_by_side(tmp_path):

@@ -9,7 +9,7 @@ import pytest
 from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.judgement import Onset
-from beaver_ftc.studies.compare import leaderboard, runs, tune
+from beaver_ftc.studies.compare import leaderboard, runs
 from beaver_ftc.studies.compare.leaderboard import (
     MARK,
     as_text,
@@ -232,70 +232,6 @@ def test_folders_that_are_no_runs_are_all_named(tmp_path):
         f"{tmp_path / 'a'}: {unreadable}", f"{tmp_path / 'b'}: holds no metrics.json, {allowed}",
         f"{tmp_path / 'c'}: {unreadable}", f"{tmp_path / 'd'}: holds no log.parquet, {allowed}",
     ]  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("target_per_h", "level"), [(0.0, 6.0), (0.9, 6.0), (1.0, 3.0), (2.9, 2.0), (3.0, 1.0), (9.0, 1.0)]
-)
-def test_the_level_with_as_many_alarms_as_are_allowed(target_per_h, level):
-    healthy = [Trace(before, (), faulted=False, healthy_s=900.0) for before in (3.0, 1.0, 5.0, 2.0)]
-    assert tune.alarm_level(healthy, target_per_h) == level
-
-
-def test_a_miss_costs_as_much_as_all_the_time_there_was():
-    found = Trace(0.5, ((0.25, 2.0),), faulted=True, healthy_s=1.0)
-    assert [tune._cost(found, level) for level in (1.0, 2.0, 0.4)] == [0.25, 10.0, 10.0]
-
-
-@pytest.mark.parametrize("errors", [False, True])
-def test_what_is_tuned(errors, monkeypatch, tmp_path):
-    """Two candidates of a detector on two flights, of a law on the faulted one."""
-    cases = [SetFlight("c", scenario(faults=[])), SetFlight("c", scenario())]
-    faulted = scenario(faults=[{"actuator": "elevator", "type": "float", "at_s": 1.0}])
-    cases[1] = SetFlight("c", faulted)
-    asked, played = [], []
-    monkeypatch.setattr(tune, "of_set", lambda name, most: asked.append((name, most)) or cases)
-    of = {
-        "detectors": {"observer-constant": {"gain": [1.0, 2.0]}},
-        "laws": {"lqr": {"weight": [3.0, 4.0, 5.0]}},
-    }
-    of["detectors for errors"] = {"observer-constant": {"gain": [2.0, 3.0]}}
-    monkeypatch.setattr(tune, "grids", lambda: of)
-    monkeypatch.setattr(tune, "record", lambda given: given)
-
-    def replayed(given, name, options):
-        played.append((name, options))
-        late = 1.0 / options["gain"]
-        return Trace(0.5, ((late, 9.0),) if given.faults else (), bool(given.faults), 1800.0)
-
-    monkeypatch.setattr(tune, "replay", replayed)
-    monkeypatch.setattr(tune, "_law_cost", lambda case, name, option: abs(option["weight"] - 4.1))
-    shares = []
-    found = tune.tune(0.0, 1, 3, shares.append, errors)
-    assert asked == [("calibration-errors" if errors else "calibration", 3)]
-    assert played[0] == ("observer-constant", {"gain": 2.0 if errors else 1.0, "alarm": 1.0})
-    assert found == {
-        "procedure": f"beaver-ftc compare --tune{' --errors' if errors else ''}; docs/results/benchmark.md",
-        "target_false_alarms_per_h": 0.0, "healthy_hours": 1.0, "flights": 2,
-        "options": {"observer-constant": {"gain": 3.0 if errors else 2.0, "alarm": 0.6}}
-        | ({} if errors else {"lqr": {"weight": 4.0}}),
-    }  # fmt: skip
-    assert shares == [0.5, 1.0]
-    for name in ("TUNED", "TUNED_FOR_ERRORS"):
-        monkeypatch.setattr(tune, name, tmp_path / name)
-    tune.write_tuned(found, errors)
-    assert [path.name for path in tmp_path.iterdir()] == ["TUNED_FOR_ERRORS" if errors else "TUNED"]
-
-
-def test_a_law_costs_its_error_and_a_departure_ten(monkeypatch):
-    flown = []
-    monkeypatch.setattr(tune, "fly", lambda given: flown.append(given) or given)
-    for rms_deg_s, cost in ((1.5, 1.5), (inf, 10.0)):
-        made = Result(None, False, 0.0, True, rms_deg_s=rms_deg_s)
-        monkeypatch.setattr(tune, "result_of", lambda flight, entry, us, made=made: made)
-        assert tune._law_cost(SetFlight("c", scenario()), "lqr", {"rate_weight": 2.0}) == cost
-    control = flown[0].control
-    assert (control.law, control.options, flown[0].fdi.scheme) == ("lqr", {"rate_weight": 2.0}, SCHEME)
 
 
 def test_flights_of_other_entries_are_others(monkeypatch, tmp_path):

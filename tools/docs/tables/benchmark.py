@@ -1,24 +1,45 @@
-"""The tables of benchmark.md: what schemes find, how laws track, and where a rival does better."""
+"""The tables of benchmark.md: what schemes find, how laws track, and in what a rival does better."""
 
-from pathlib import Path
-from tempfile import TemporaryDirectory
+from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Any
 
 from beaver_ftc.plugins import DETECTORS, LAWS, registered
-from beaver_ftc.studies.compare.leaderboard import run_comparison
-from beaver_ftc.studies.compare.trial import LAW, SCHEME, entries_of, of_set, set_names
+from beaver_ftc.studies.compare.scores import document_of
+from beaver_ftc.studies.compare.trial import (
+    LAW,
+    PASSIVE,
+    SCHEME,
+    STATISTICAL,
+    Entry,
+    SetFlight,
+    entries_of,
+    fly_case,
+    of_set,
+)
+from beaver_ftc.studies.engine.statistics import wilson
+from beaver_ftc.studies.engine.study import fly_all
 from beaver_ftc.studies.present.tables import markdown_table
 
 Document = dict[str, Any]
+Rows = dict[str, dict[str, Document]]  # set -> scheme or law -> its line
 EXACT = ("published", "envelope", "fault-types", "realism", "healthy")
 SHOWN = (*EXACT, "air-still", "air-light", "air-moderate")
-HIDDEN = ("none", "oracle", "fault-tolerant-published", "oracle-published")  # what nobody would choose
+HIDDEN = (
+    "none",
+    "oracle",
+    "fault-tolerant-published",
+    "oracle-published",
+)  # the yardsticks, and parts of ours
 PROBED = ("published", "air-light")
+NO_SCHEME = "none"
+ALONE = f"{LAW}, no scheme"  # our law without any diagnosis
+PASSIVE_LAWS = (PASSIVE, "lqr", "indi", ALONE)  # fixed gains, and nothing from a diagnosis
 
 
 def benchmark() -> str:
-    """All standard sets, flown by every scheme with our law and every law with our scheme."""
-    return _tables(_compared(set_names()))
+    """The standard sets that the page shows, flown by every scheme and by every law."""
+    return _tables(_compared(SHOWN))
 
 
 def benchmark_probe() -> str:
@@ -26,99 +47,145 @@ def benchmark_probe() -> str:
     return _tables(_compared(PROBED, most=1))
 
 
-def _compared(names: tuple[str, ...] | list[str], most: int | None = None) -> Document:
-    """The document that `beaver-ftc compare --benchmark` writes."""
-    cases = [case for name in names for case in of_set(name, most)]
-    entries = entries_of(list(registered(DETECTORS)), list(registered(LAWS)))
-    with TemporaryDirectory() as folder:
-        return run_comparison(Path(folder), "benchmark", cases, entries, 2, None)
+def _compared(names: Iterable[str], most: int | None = None) -> Document:
+    """Schemes with our law, laws with our scheme, our law without any scheme, as tuned.json has them."""
+    cases: list[SetFlight] = [case for name in names for case in of_set(name, most)]
+    schemes = [name for name in (*registered(DETECTORS), STATISTICAL) if name not in HIDDEN]
+    laws = [name for name in registered(LAWS) if name not in HIDDEN]
+    entries = [*entries_of(schemes, laws), Entry(NO_SCHEME, LAW)]
+    trials = fly_all(partial(fly_case, entries=entries, trade_off=False), cases, 2)
+    return document_of(trials, entries)
 
 
 def _tables(document: Document) -> str:
-    """The tables of the page, and in words where a rival is better than ours."""
+    """The tables of the page, each followed by what a rival does better in it."""
     sets = {name: document["sets"][name] for name in SHOWN if name in document["sets"]}
     faulted = {name: part for name, part in sets.items() if part["lines"][0]["faults"]}
-    return "\n\n".join((
-        "Schemes: faults detected / rightly isolated, %, and median delay, s.",
-        _schemes(sets, faulted),
-        "Laws: tracking error after the fault over the oracle's, median / 90 % of flights.",
-        _laws(faulted),
-        "Where a rival is better than our default:",
-        "\n".join(f"- {sentence}" for sentence in _better(faulted)) or "- nowhere",
-    ))  # fmt: skip
+    schemes, laws = _schemes(faulted), _laws(faulted)
+    blocks = [
+        _block("Faults detected, %.", schemes, "detection_rate", _percent, more=True),
+        _block("Faults rightly named at the end, %.", schemes, "isolation_rate", _percent, more=True),
+        _rates(faulted),
+        _block("Median delay of the alarm, s.", schemes, "delay_median_s", _seconds, more=False),
+        _block("Upper limit of that median, 95 %, s.", schemes, "delay_median_high_s", _seconds, None),
+        _alarms(_schemes(sets)),
+        _block(
+            "Tracking error after the fault over the oracle's, median.", laws, "ratio_median", _ratio, False
+        ),
+        _block("Lower limit of that median, 95 %.", laws, "ratio_median_low", _ratio, None),
+        _block("Upper limit of that median, 95 %.", laws, "ratio_median_high", _ratio, None),
+        _block("Tracking error over the oracle's in 90 % of flights.", laws, "ratio_90", _ratio, more=False),
+    ]
+    return "\n\n".join(blocks)
 
 
-def _schemes(sets: dict[str, Document], faulted: dict[str, Document]) -> str:
-    head = ("scheme", *faulted, "false alarms/h: exact sensors", "in air")
-    of = {name: _rows(part, "law", LAW, "scheme") for name, part in sets.items()}
-    return markdown_table(head, [
-        (scheme, *(_found(of[name][scheme]) for name in faulted), *_alarms(scheme, of))
-        for scheme in of[next(iter(of))]
-        if scheme not in HIDDEN
-    ])  # fmt: skip
+def _schemes(sets: dict[str, Document]) -> Rows:
+    return {
+        name: {
+            row["scheme"]: row for row in part["lines"] if row["law"] == LAW and row["scheme"] not in HIDDEN
+        }
+        for name, part in sets.items()
+    }
 
 
-def _found(row: Document) -> str:
-    shares = f"{100 * row['detection_rate']:.0f}/{100 * row['isolation_rate']:.0f}"
-    delay = row["delay_median_s"]
-    return f"{shares}, never" if delay is None else f"{shares}, {delay:.2f}"
+def _laws(sets: dict[str, Document]) -> Rows:
+    """By law; our law without a scheme has a row of its own."""
+    rows: Rows = {}
+    for name, part in sets.items():
+        shown = [row for row in part["lines"] if row["law"] not in HIDDEN]
+        rows[name] = {row["law"]: row for row in shown if row["scheme"] == SCHEME}
+        rows[name] |= dict.fromkeys([ALONE], _alone(shown))
+    return rows
 
 
-def _alarms(scheme: str, of: dict[str, dict[str, Document]]) -> tuple[str, str]:
-    """Per hour flown without a fault, with exact sensors and with declared errors."""
+def _alone(lines: list[Document]) -> Document:
+    return next(row for row in lines if (row["scheme"], row["law"]) == (NO_SCHEME, LAW))
+
+
+def _block(title: str, rows: Rows, key: str, cell: Callable[[Any], str], more: bool | None) -> str:
+    """A caption, a table of one number a cell, and what a rival does better. more: whether more is better;
+    None of limits, which are compared with nothing."""
+    counts = {name: next(iter(of.values()))["faults"] for name, of in rows.items()}
+    head = ("", *(f"{name} ({count})" for name, count in counts.items()))
+    names = list(next(iter(rows.values())))
+    body = [(_label(name), *(cell(of[name].get(key)) for of in rows.values())) for name in names]
+    said = [] if more is None else [_better(rows, key, more)]
+    return "\n\n".join([f"**{title}** In brackets: faulted flights.", markdown_table(head, body), *said])
+
+
+def _label(name: str) -> str:
+    return f"{name} (passive)" if name in PASSIVE_LAWS else name
+
+
+def _percent(share: float | None) -> str:
+    return "-" if share is None else f"{100 * share:.0f}"
+
+
+def _seconds(delay_s: float | None) -> str:
+    return "never" if delay_s is None else f"{delay_s:.2f}"
+
+
+def _ratio(ratio: float | None) -> str:
+    return "lost" if ratio is None else f"{ratio:.2f}"
+
+
+def _better(rows: Rows, key: str, more: bool) -> str:
+    """In which sets which rivals have the better number; ours are what users of ours fly."""
+    ours = SCHEME if SCHEME in next(iter(rows.values())) else LAW
+    beside = (ours, STATISTICAL, ALONE)
+    rivals = [name for name in next(iter(rows.values())) if name not in beside]
     found = []
-    for in_air in (False, True):
-        rows = [rows[scheme] for name, rows in of.items() if (name not in EXACT) == in_air]
-        alarms, hours = (sum(row[key] for row in rows) for key in ("false_alarms", "healthy_h"))
-        found.append(f"{alarms / hours:.3g}" if hours else "-")
-    return found[0], found[1]
-
-
-def _laws(sets: dict[str, Document]) -> str:
-    of = {name: _rows(part, "scheme", SCHEME, "law") for name, part in sets.items()}
-    laws = [law for law in of[next(iter(of))] if law not in HIDDEN]
-    return markdown_table(("law", *sets), [
-        (law, *(_tracked(rows[law]) for rows in of.values())) for law in laws
-    ])  # fmt: skip
-
-
-def _tracked(row: Document) -> str:
-    shares = (row["ratio_median"], row["ratio_90"])
-    return "/".join("lost" if share is None else f"{share:.2f}" for share in shares)
-
-
-def _rows(part: Document, key: str, ours: str, of: str) -> dict[str, Document]:
-    return {row[of]: row for row in part["lines"] if row[key] == ours}
-
-
-BETTER = (  # (what, key, whether more is better, whose)
-    ("detects more", "detection_rate", True, "scheme"),
-    ("isolates more", "isolation_rate", True, "scheme"),
-    ("is sooner in the median", "delay_median_s", False, "scheme"),
-    ("raises fewer false alarms", "false_alarms", False, "scheme"),
-    ("has the smaller median tracking error", "ratio_median", False, "law"),
-    ("has the smaller 90 % tracking error", "ratio_90", False, "law"),
-)
-
-
-def _better(sets: dict[str, Document]) -> list[str]:
-    """A sentence for each rival and the same sets: in what it is better there."""
-    found: dict[tuple[str, str], list[str]] = {}
-    for what, key, more, of in BETTER:
-        other, ours = ("law", SCHEME) if of == "scheme" else ("scheme", LAW)
-        beside = LAW if of == "scheme" else SCHEME
-        shown = {name: _rows(part, other, beside, of) for name, part in sets.items()}
-        for rival in (each for each in shown[next(iter(shown))] if each not in (ours, *HIDDEN)):
-            where = [
-                f"`{name}`" for name, rows in shown.items() if _less(rows[ours][key], rows[rival][key], more)
-            ]
-            if where:
-                found.setdefault((rival, ", ".join(where)), []).append(what)
-    return [f"`{rival}` {' and '.join(whats)} in {where}." for (rival, where), whats in found.items()]
+    for rival in rivals:
+        where = [
+            f"`{name}`" for name, of in rows.items() if _less(of[ours].get(key), of[rival].get(key), more)
+        ]
+        if where:
+            found.append(f"`{rival}` in {', '.join(where)}")
+    return (
+        f"Better than `{ours}`: {'; '.join(found)}." if found else f"No rival is better than `{ours}` here."
+    )
 
 
 def _less(ours: float | None, theirs: float | None, more: bool) -> bool:
-    """Whether theirs is better; what never comes, or is lost, is None and the worst."""
+    """Whether theirs is better; a delay without end, or an aircraft lost, is None and the worst."""
     if theirs is None or ours is None:
         return theirs is not None
     return theirs > ours if more else theirs < ours
+
+
+def _rates(sets: dict[str, Document]) -> str:
+    """What the numbers of flights say of a rate."""
+    counts = sorted({part["lines"][0]["faults"] for part in sets.values()})
+    rows = [(str(n), *(_interval(n, share) for share in (1.0, 0.75, 0.5))) for n in counts]
+    head = ("flights", "of 100 %, from", "of 75 %, from", "to", "of 50 %, from", "to")
+    cells = [(n, high.split()[0], *three.split(), *half.split()) for n, high, three, half in rows]
+    return "\n\n".join(["**Wilson intervals of such rates, 95 %, in %.**", markdown_table(head, cells)])
+
+
+def _interval(n: int, share: float) -> str:
+    found = wilson(round(share * n), n)
+    return f"{100 * found.low:.0f} {100 * found.high:.0f}"
+
+
+def _alarms(rows: Rows) -> str:
+    """Per hour flown without a fault, with exact sensors and with declared errors."""
+    head = ("", "exact sensors", "upper limit, 95 %", "in air", "upper limit, 95 %")
+    names = list(next(iter(rows.values())))
+    body = [(name, *_of_one(rows, name, False), *_of_one(rows, name, True)) for name in names]
+    hours = [_hours(rows, in_air) for in_air in (False, True)]
+    flown = f"{hours[0]:.2f} h with exact sensors, {hours[1]:.2f} h in air"
+    return "\n\n".join([f"**False alarms per hour without a fault.** {flown}.", markdown_table(head, body)])
+
+
+def _hours(rows: Rows, in_air: bool) -> float:
+    return sum(of[SCHEME]["healthy_h"] for name, of in rows.items() if (name not in EXACT) == in_air)
+
+
+def _of_one(rows: Rows, name: str, in_air: bool) -> tuple[str, str]:
+    from beaver_ftc.studies.engine.statistics import CONFIDENCE, poisson_bound
+
+    lines = [of[name] for of_set, of in rows.items() if (of_set not in EXACT) == in_air]
+    alarms, hours = (sum(line[key] for line in lines) for key in ("false_alarms", "healthy_h"))
+    if not hours:
+        return "-", "-"
+    return f"{alarms / hours:.3g}", f"{poisson_bound(alarms, hours, CONFIDENCE, upper=True):.3g}"

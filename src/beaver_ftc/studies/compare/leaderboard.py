@@ -5,6 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from beaver_ftc.diagnosis.rivals import Tuned
 from beaver_ftc.results.metrics import as_json
 from beaver_ftc.results.model import Document
 from beaver_ftc.results.style import BLUE, GREY
@@ -180,12 +181,16 @@ def _draw_ratios(axis: "Axes", part: Document) -> None:
 
 def run_comparison(
     out: Path, name: str, cases: Sequence[SetFlight], entries: Sequence[Entry], workers: int,
-    progress: Progress | None,
+    progress: Progress | None, chosen: Tuned | None = None,
 ) -> Document:  # fmt: skip
-    """Write `out/<name>/` (document, figure, page) of every case with every entry; return the document."""
+    """Write `out/<name>/` (document, figure, page) of every case with every entry; return the document.
+
+    chosen: values of schemes and laws, as in trial.py.
+    """
     study = Study(
-        name, cases, partial(fly_case, entries=tuple(entries)), partial(document_of, entries=entries),
-        makers_of(name), row=Trial, follows_from=entries, lost=lost,
+        name, cases, partial(fly_case, entries=tuple(entries), chosen=chosen),
+        partial(document_of, entries=entries), makers_of(name), row=Trial,
+        follows_from=entries if chosen is None else (entries, chosen), lost=lost,
     )  # fmt: skip
     return run_study(study, out, workers, progress)
 

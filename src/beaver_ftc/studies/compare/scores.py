@@ -7,11 +7,19 @@ from math import inf
 from operator import itemgetter
 from statistics import median
 
+import numpy as np
+
 from beaver_ftc.results.metrics import versions
 from beaver_ftc.results.model import Document
 from beaver_ftc.studies.compare.replay import Trace, alarms_at
 from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, Entry, Result, Trial
-from beaver_ftc.studies.engine.statistics import CONFIDENCE, poisson_bound, share_within, wilson_bound
+from beaver_ftc.studies.engine.statistics import (
+    CONFIDENCE,
+    poisson_bound,
+    quantile_bound,
+    share_within,
+    wilson_bound,
+)
 from beaver_ftc.studies.present.tables import finite
 
 
@@ -41,8 +49,12 @@ def line_of(entry: Entry, results: Sequence[Result], oracle: Sequence[Result]) -
         "delay_median_s": share_within([r.delay_s for r in faulted], 0.5),
         "delay_90_s": share_within([r.delay_s for r in faulted], 0.9),
         "isolation_rate": sum(r.correct for r in faulted) / n if n else None,
+        **_interval("delay_median", [r.delay_s for r in faulted], "_s"),
         "isolation_delay_median_s": share_within([r.isolation_delay_s for r in faulted], 0.5),
         **_spread("ratio", ratios),
+        **_interval("ratio_median", ratios),
+        "detected": detected,
+        "isolated": sum(r.correct for r in faulted),
         "departures": sum(r.departed for r in mine),
         "us": median(r.us for r in mine) if mine else 0.0,
         **_spread("before", [r.before_deg_s for r in mine]),
@@ -55,6 +67,16 @@ def line_of(entry: Entry, results: Sequence[Result], oracle: Sequence[Result]) -
 def _spread(name: str, values: Sequence[float], which: Sequence[str] = ("median", "90")) -> Document:
     shares = {"median": 0.5, "90": 0.9}
     return {f"{name}_{part}": share_within(values, shares[part]) if values else None for part in which}
+
+
+def _interval(name: str, values: Sequence[float], unit: str = "") -> Document:
+    """The two-sided interval of a median, free of any distribution."""
+    ordered = np.sort(values)
+    limits = {"low": False, "high": True}
+    bounds = {
+        side: quantile_bound(ordered, 0.5, (1 + CONFIDENCE) / 2, upper) for side, upper in limits.items()
+    }
+    return {f"{name}_{side}{unit}": bound for side, bound in bounds.items()} if values else {}
 
 
 def lines_of(trials: Sequence[Trial], entries: Sequence[Entry]) -> list[Document]:

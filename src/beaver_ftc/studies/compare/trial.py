@@ -1,23 +1,25 @@
 """Fly one case with every scheme and every law that is compared, and say what came of each."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import hypot, inf
 from pathlib import Path
 from time import thread_time
 
+from beaver_ftc.diagnosis.rivals import GRADES, Tuned, grade, tuned, values_of
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.documents.paths import data_root
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.loop.outcome import Landing
-from beaver_ftc.plugins import DETECTORS, is_compiled
+from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled
 from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.model import Rates
+from beaver_ftc.scenario.declared import Declared
+from beaver_ftc.scenario.diagnosis import Statistical
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.compare.replay import Trace, record, replay, trace
 
-CALIBRATION = "calibration"
-CALIBRATION_ERRORS = "calibration-errors"
+CALIBRATION = "calibration-"  # and the grade: the sets that methods are tuned on
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,7 @@ def benchmark_folder() -> Path:
 
 
 def set_names() -> list[str]:
-    """The standard sets but those that are for tuning."""
+    """The standard sets that are compared, not those for tuning."""
     folders = sorted(path.name for path in benchmark_folder().iterdir() if path.is_dir())
     return [name for name in folders if not name.startswith(CALIBRATION)]
 
@@ -55,12 +57,14 @@ def of_set(name: str, most: int | None = None) -> list[SetFlight]:
     """The flights of a standard set; of each of its sweeps, the first `most`."""
     folder = benchmark_folder() / name
     if not folder.is_dir():
-        allowed = ", ".join([*set_names(), CALIBRATION, CALIBRATION_ERRORS])
+        allowed = ", ".join([*set_names(), *(CALIBRATION + grade for grade in GRADES)])
         raise BadInput(f"no benchmark set {name!r}, allowed: {allowed}")
     return [case for path in sorted(folder.glob("*.yaml")) for case in of_sweep(path, name, most)]
 
 
 SCHEME, LAW, ORACLE = "adaptive-estimators", "fault-tolerant", "oracle"
+STATISTICAL = f"{SCHEME} with fdi.statistical"  # our scheme with its statistical detector beside it
+PASSIVE = "nominal"  # the law that takes nothing from any diagnosis and adapts to nothing
 
 
 @dataclass(frozen=True)
@@ -115,45 +119,82 @@ def entries_of(schemes: Sequence[str], laws: Sequence[str]) -> list[Entry]:
     return list(dict.fromkeys([*pairs, Entry(SCHEME, LAW), Entry(SCHEME, ORACLE)]))
 
 
-def with_entry(scenario: Scenario, entry: Entry) -> Scenario:
-    """The scenario with this scheme and this law; options are those of the one the scenario names, nobody
-    else's."""
-    fdi = scenario.fdi.with_scheme(entry.scheme, options_for(scenario, entry.scheme))
+def with_entry(scenario: Scenario, entry: Entry, chosen: Tuned | None = None) -> Scenario:
+    """The scenario with this scheme and this law, each with the values chosen for it on such flights.
+
+    chosen: as tuned.json has them; without it, each flies with its defaults. What the scenario says of the
+    scheme or law that it names counts for that one alone, and before what was chosen.
+    """
+    scheme = SCHEME if entry.scheme == STATISTICAL else entry.scheme
+    fdi = scenario.fdi.with_scheme(scheme, options_for(scenario, scheme))
+    if entry.scheme == STATISTICAL and fdi.statistical is None:
+        fdi = fdi.model_copy(update={"statistical": Statistical()})
     kept = scenario.control.options if entry.law == scenario.control.law else {}
     control = scenario.control.model_copy(update={"law": entry.law, "options": kept})
-    return scenario.model_copy(update={"fdi": fdi, "control": control})
+    flown, of = scenario.model_copy(update={"fdi": fdi, "control": control}), grade_of(scenario)
+    for group, name in ((DETECTORS, entry.scheme), (LAWS, entry.law)):
+        values = values_of(chosen or {}, of, group, name)
+        flown = with_values(flown, group, {k: v for k, v in values.items() if not _says(scenario, k, group)})
+    return flown
+
+
+def _says(scenario: Scenario, key: str, group: str) -> bool:
+    """Whether the scenario itself sets a parameter."""
+    section, options = (scenario.fdi, "fdi") if group == DETECTORS else (scenario.control, "control")
+    if "." in key:
+        return key.split(".")[1] in section.model_fields_set and key.startswith(f"{options}.")
+    return key in section.options
+
+
+def with_values(scenario: Scenario, group: str, values: Mapping[str, float]) -> Scenario:
+    """The scenario with these values of its detector or law: of options, and of keys with dots in them."""
+    options = "fdi.options" if group == DETECTORS else "control.options"
+    keys = {key if "." in key else f"{options}.{key}": value for key, value in values.items()}
+    return scenario.with_(keys) if keys else scenario
+
+
+def grade_of(scenario: Scenario) -> str:
+    """Which grade of flights a scenario belongs to."""
+    return grade(not Declared.of(scenario).is_noise_free, scenario.actuators.is_ideal)
 
 
 def options_for(scenario: Scenario, scheme: str) -> dict[str, float]:
-    """The options a scheme flies with in this scenario."""
+    """The options that a scenario gives to a scheme."""
     return dict(scenario.fdi.options) if scheme == scenario.fdi.scheme else {}
 
 
-def fly_case(case: SetFlight, entries: Sequence[Entry]) -> Trial:
-    """Fly a case with every entry; record it under the nominal law for the trade-off of each scheme."""
-    trial = Trial(case.set, [_fly(case.scenario, entry) for entry in entries])
+def fly_case(
+    case: SetFlight, entries: Sequence[Entry], chosen: Tuned | None = None, trade_off: bool = True
+) -> Trial:
+    """Fly a case with every entry; record it under the nominal law for the trade-off of each scheme.
+
+    chosen: values of schemes and laws; those that ship without it. trade_off: whether it is asked for.
+    """
+    chosen = tuned() if chosen is None else chosen
+    trial = Trial(case.set, [_fly(case.scenario, entry, chosen) for entry in entries])
+    if not trade_off:
+        return trial
     try:
         recording = record(case.scenario)
     except BeaverFtcError as error:
         trial.failures.append(str(error))
         return trial
     for scheme in dict.fromkeys(entry.scheme for entry in entries if entry.scheme != "none"):
-        options = options_for(case.scenario, scheme)
+        fdi = with_entry(case.scenario, Entry(scheme, LAW), chosen).fdi
         try:
-            if is_compiled(DETECTORS, scheme) and scheme != SCHEME:  # its statistic comes with its flight
-                fdi = case.scenario.fdi.with_scheme(scheme, options)
-                own = record(case.scenario.model_copy(update={"fdi": fdi}))
+            if scheme != SCHEME and (scheme == STATISTICAL or is_compiled(DETECTORS, scheme)):
+                own = record(case.scenario.model_copy(update={"fdi": fdi}))  # with which its statistic comes
                 trial.traces[scheme] = trace(own, own.built_in)
             else:
-                trial.traces[scheme] = replay(recording, scheme, options)
+                trial.traces[scheme] = replay(recording, scheme, fdi.options)
         except Exception as error:  # what a plug-in fails over is not the end of the comparison
             trial.failures.append(f"{scheme}, on a recorded flight: {type(error).__name__}: {error}")
     return trial
 
 
-def _fly(scenario: Scenario, entry: Entry) -> Result:
+def _fly(scenario: Scenario, entry: Entry, chosen: Tuned) -> Result:
     try:
-        loop = Loop(with_entry(scenario, entry))
+        loop = Loop(with_entry(scenario, entry, chosen))
         began = thread_time()
         for _ in loop.chunks():
             pass

@@ -1,154 +1,175 @@
-"""Tunes the rivals: the procedure behind rivals/tuned.json and tuned_for_errors.json, the same for all of
-them.
+"""`beaver-ftc compare --tune`: one procedure that chooses the parameters of every detector and law.
 
-Detectors, on recorded flights of the calibration set (its seeds are in no set that is compared):
-
-1. For each candidate of a small grid of the parameters a method leaves open, take the largest value of its
-statistic
-   on every healthy flight. The alarm level is put where the false-alarm rate is the target: for a target
-   below one alarm in all of them, `MARGIN` times the largest value seen. Flights in different air each have
-   a level of their own; the largest is what the rival ships with.
-2. Of the candidates, keep the one with the smallest mean delay on the faulted flights, a miss counting as
-the rest of
-   the flight.
-
-Laws: the candidate with the smallest mean RMS error after the fault on the faulted flights, a departure
-counting 10 deg/s.
-
-With errors of instruments and air declared only the detectors are tuned anew, on a set of its own, and over a
-grid that suits it.
+The same search (search.py) with the same number of trials from the same seed, by the costs of criteria.py, on
+flights of the sets `calibration-GRADE`, whose seeds are in no set that is compared. Each grade of flights is
+tuned by itself: exact sensors and ideal actuators; actuators that lag; errors of sensors and air. What may be
+tuned is `tunable` in plugins.yaml, or in the class of a plug-in. A method keeps the values that it starts
+with unless the search finds some that cost `LEAST_GAIN` less: the rule is the same for ours and for rivals.
 """
 
-import itertools
 import json
-from collections.abc import Sequence
-from functools import cache, partial
-from math import isfinite
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
-from statistics import fmean
 from typing import Any
 
-from beaver_ftc.diagnosis.rivals import TUNED, TUNED_FOR_ERRORS
-from beaver_ftc.loop.loop import fly
-from beaver_ftc.scenario.declared import Declared
-from beaver_ftc.studies.compare.replay import Trace, record, replay
-from beaver_ftc.studies.compare.trial import (
-    CALIBRATION,
-    CALIBRATION_ERRORS,
-    SCHEME,
-    Entry,
-    SetFlight,
-    of_set,
-    result_of,
-    with_entry,
+from beaver_ftc.diagnosis.rivals import GRADES, KINDS, tuned, values_of
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.plugins import DETECTORS, LAWS, Range, is_compiled, options_of, plugin_class, tunable
+from beaver_ftc.results.model import Document
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.studies.compare.criteria import (
+    FAILED,
+    INADMISSIBLE,
+    DetectorCost,
+    LawCost,
+    flights,
+    least_margins,
 )
+from beaver_ftc.studies.compare.search import Found, Values, search, value_at
+from beaver_ftc.studies.compare.trial import STATISTICAL
 from beaver_ftc.studies.engine.study import Progress, fly_all
+from beaver_ftc.studies.present.tables import aligned
 
-Options = dict[str, float]
-Grid = dict[str, list[float]]  # values of each option that are tried
-
-MARGIN = 1.2
-DEPARTED_DEG_S = 10.0
-LEVEL = "alarm"
-# The level at which the statistic is 1 per unit of itself: traces at any level follow from it.
-_UNIT = {LEVEL: 1.0}
-
-
-@cache
-def grids() -> dict[str, dict[str, Grid]]:
-    """The grid of each rival: of "detectors", of "detectors for errors", of "laws"."""
-    found: dict[str, dict[str, Grid]] = json.loads(Path(__file__).with_name("grids.json").read_text("utf-8"))
-    return found
+TRIALS, SEED = 24, 1
+LEAST_GAIN = 0.05
+NAME = "tuned.json"
+OF_STATISTICAL = {
+    "fdi.statistical.false_alarms_per_h": Range(1e-9, 3600.0),
+    "fdi.statistical.misnaming": Range(1e-9, 0.49),
+}
 
 
-def candidates(grid: Grid) -> list[Options]:
-    """Every combination of a grid."""
-    return [dict(zip(grid, values, strict=True)) for values in itertools.product(*grid.values())]
+@dataclass(frozen=True)
+class Method:
+    """A detector or law to be tuned on a grade of flights."""
+
+    group: str
+    name: str
+    grade: str
+
+    def ranges(self) -> dict[str, Range]:
+        """What may be tuned of it."""
+        return OF_STATISTICAL if self.name == STATISTICAL else tunable(self.group, self.name)
+
+    def start(self) -> Values:
+        """The values it starts with: those it ships with, its defaults, or the middle of their ranges."""
+        shipped = values_of(tuned(), self.grade, self.group, self.name)
+        return {key: shipped.get(key, self._default(key, of)) for key, of in self.ranges().items()}
+
+    def _default(self, key: str, of: Range) -> float:
+        if "." in key:
+            return _in_scenario(key)
+        if is_compiled(self.group, self.name):
+            return float(options_of(self.group, self.name)[key]["default"])
+        defaults = getattr(plugin_class(self.group, self.name), "defaults", {})
+        return float(defaults.get(key, value_at(of, 0.5)))
+
+
+def _in_scenario(key: str) -> float:
+    """The default of a scenario's key; the statistical detector is there if asked for."""
+    found: Any = Scenario(name="defaults", fdi={"statistical": {}})
+    for part in key.split("."):
+        found = getattr(found, part)
+    return float(found)
+
+
+def methods_of(schemes: Sequence[str], laws: Sequence[str], grades: Sequence[str]) -> list[Method]:
+    """Those of the methods that have something to tune, on each grade."""
+    named = [(DETECTORS, name) for name in schemes] + [(LAWS, name) for name in laws]
+    methods = [Method(group, name, grade) for grade in grades for group, name in named]
+    return [method for method in methods if method.ranges()]
 
 
 def tune(
-    target_per_h: float, workers: int, most: int | None, progress: Progress | None, errors: bool
-) -> dict[str, Any]:
-    """The document of tuned.json. most: flights of each calibration sweep; None is all of them.
+    methods: Sequence[Method], trials: int, seed: int, most: int | None, workers: int,
+    progress: Progress | None,
+) -> Document:  # fmt: skip
+    """The document of tuned.json. most: flights of each calibration sweep; None is all of them."""
+    if not methods:
+        raise BadInput("compare --tune: nothing to tune, allowed: methods that declare `tunable`")
+    rows = fly_all(partial(tune_method, trials=trials, seed=seed, most=most), methods, workers, progress)
+    grades: Document = {}
+    for method, row in zip(methods, rows, strict=True):
+        of_kind = grades.setdefault(method.grade, {}).setdefault(KINDS[method.group], {})
+        of_kind[method.name] = row["values"]
+    counts = {grade: len(flights(grade, most)) for grade in grades}
+    how = {"procedure": "beaver-ftc compare --tune; docs/results/benchmark.md", "trials": trials, "seed": seed}
+    return how | {"flights": counts, "grades": grades, "methods": rows}
 
-    errors: that of tuned_for_errors.json.
-    """
-    cases = of_set(CALIBRATION_ERRORS if errors else CALIBRATION, most)
-    detectors = grids()["detectors for errors" if errors else "detectors"]
-    laws = {} if errors else grids()["laws"]
-    played = fly_all(partial(_play, grids=detectors), cases, workers, progress)
-    air = [Declared.of(case.scenario).air.severity for case in cases]
-    options = {
-        name: _best_detector(name, grid, played, air, target_per_h) for name, grid in detectors.items()
-    }
-    faulted = [case for case in cases if case.scenario.faults]
-    options |= {name: _best_law(name, grid, faulted, workers) for name, grid in laws.items()}
-    hours = sum(flight["observer-constant"][0].healthy_s for flight in played) / 3600.0
+
+def tune_method(method: Method, trials: int, seed: int, most: int | None) -> Document:
+    """A row: the values chosen, their cost, that of the values at the start, trials, ranges, margins."""
+    cost = (
+        DetectorCost(method.name, flights(method.grade, most))
+        if method.group == DETECTORS
+        else LawCost(method.name, method.grade, most)
+    )
+    start = method.start()
+    found = search(cost, method.ranges(), start, trials, seed)
+    gains = found.cost < (1.0 - LEAST_GAIN) * found.start_cost
+    values = found.values if gains else start
+    return {**_row(method, found), "values": values, **_margins(cost, values)}
+
+
+def _row(method: Method, found: Found) -> Document:
     return {
-        "procedure": f"beaver-ftc compare --tune{' --errors' if errors else ''}; docs/results/benchmark.md",
-        "target_false_alarms_per_h": target_per_h,
-        "healthy_hours": hours,
-        "flights": len(cases),
-        "options": options,
+        "grade": method.grade,
+        "kind": KINDS[method.group],
+        "name": method.name,
+        "start_cost": found.start_cost,
+        "cost": found.cost,
+        "found": found.values,
+        "ranges": {key: asdict(of) for key, of in found.ranges.items()},
+        "widened": list(found.widened),
+        "trials": found.trials,
     }
 
 
-def write_tuned(document: dict[str, Any], errors: bool) -> None:
-    """Keep what was found where the rivals read it."""
-    path = TUNED_FOR_ERRORS if errors else TUNED
+def _margins(cost: DetectorCost | LawCost, values: Values) -> Document:
+    if isinstance(cost, DetectorCost):
+        return {}
+    gain_db, phase_deg = least_margins(cost.margins(values))
+    return {"gain_margin_db": gain_db, "phase_margin_deg": phase_deg}
+
+
+def write_tuned(document: Document, folder: Path) -> Path:
+    """Write the file that `compare --tuned` reads."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / NAME
     path.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
+    return path
 
 
-def _play(case: SetFlight, grids: dict[str, Grid]) -> dict[str, list[Trace]]:
-    """A flight played to every candidate of every detector."""
-    recording = record(case.scenario)
-    return {
-        name: [replay(recording, name, {**option, **_UNIT}) for option in candidates(grid)]
-        for name, grid in grids.items()
-    }
+def read_tuned(path: Path) -> Document:
+    """The values in a file that `compare --tune` wrote. Raises BadInput."""
+    try:
+        grades: Document = json.loads(path.read_text(encoding="utf-8"))["grades"]
+        assert set(grades) <= set(GRADES)
+        return grades
+    except (OSError, ValueError, KeyError, TypeError, AssertionError) as error:
+        raise BadInput(f"{path}: cannot be read, allowed: a file that compare --tune wrote") from error
 
 
-def _best_detector(
-    name: str, grid: Grid, played: Sequence[dict[str, list[Trace]]], air: Sequence[str], target_per_h: float
-) -> Options:
-    """The candidate with the least delay at its own alarm level; air: what each flight declares of it."""
-    found = []
-    for i, option in enumerate(candidates(grid)):
-        traces = [(condition, flight[name][i]) for condition, flight in zip(air, played, strict=True)]
-        level = {
-            condition: alarm_level([t for c, t in traces if c == condition and not t.faulted], target_per_h)
-            for condition in dict.fromkeys(air)
-        }
-        cost = fmean(_cost(trace, level[condition]) for condition, trace in traces if trace.faulted)
-        found.append((cost, {**option, LEVEL: max(level.values())}))
-    return min(found, key=lambda pair: pair[0])[1]
+def as_text(document: Document) -> str:
+    """A line a method and grade; then where ranges were widened."""
+    rows = [["grade", "method", "cost at the start", "cost found", "margins dB, deg", "values"]]
+    rows += [list(_cells(row)) for row in document["methods"]]
+    edges = [(row["name"], row["grade"], row["widened"]) for row in document["methods"] if row["widened"]]
+    widened = [f"{name}, {of}: on the edge of its range, widened: {', '.join(at)}" for name, of, at in edges]
+    head = f"{document['trials']} trials a method and grade, seed {document['seed']}"
+    return "\n".join([head, "", aligned(rows), *widened])
 
 
-def alarm_level(healthy: Sequence[Trace], target_per_h: float) -> float:
-    """The level of the statistic with at most the target's false alarms on healthy flights."""
-    hours = sum(trace.healthy_s for trace in healthy) / 3600.0
-    allowed = int(target_per_h * hours)
-    largest = sorted((trace.before for trace in healthy), reverse=True)
-    level = largest[min(allowed, len(largest) - 1)] if allowed else MARGIN * largest[0]
-    return round(level, 6)
+def _cells(row: Document) -> Iterator[str]:
+    yield row["grade"]
+    yield row["name"]
+    yield _cost(row["start_cost"])
+    yield _cost(row["cost"])
+    yield f"{row['gain_margin_db']:.1f}, {row['phase_margin_deg']:.0f}" if "gain_margin_db" in row else "-"
+    yield ", ".join(f"{key} {value:.4g}" for key, value in row["values"].items())
 
 
-def _cost(trace: Trace, level: float) -> float:
-    """The delay, a miss counting as all the time there was after the fault."""
-    delay = trace.delay_s(level)
-    return delay if isfinite(delay) else 10.0
-
-
-def _best_law(name: str, grid: Grid, faulted: Sequence[SetFlight], workers: int) -> Options:
-    def cost(option: Options) -> float:
-        return fmean(fly_all(partial(_law_cost, name=name, option=option), faulted, workers))
-
-    return min(candidates(grid), key=cost)
-
-
-def _law_cost(case: SetFlight, name: str, option: Options) -> float:
-    entry = Entry(SCHEME, name)
-    scenario = with_entry(case.scenario, entry)
-    control = scenario.control.model_copy(update={"options": option})
-    result = result_of(fly(scenario.model_copy(update={"control": control})), entry, 0.0)
-    return min(result.rms_deg_s, DEPARTED_DEG_S)
+def _cost(cost: float) -> str:
+    return "cannot fly" if cost >= FAILED else "inadmissible" if cost >= INADMISSIBLE else f"{cost:.3f}"

@@ -1,0 +1,183 @@
+"""The costs by which methods are tuned, ours and rivals alike: what the tables of benchmark.md show.
+
+A detector flies with our default law, over faulted flights F and healthy flights H:
+
+    J = mean over F of [ d / (d + 1 s) + w ] / 2  +  mean over F and H of a
+
+d is the delay of its alarm, infinite for a fault that it misses; w is 1 if the name at the end is wrong or
+missing, a is 1 for an alarm without a fault. 0 is the best, 2 the worst.
+
+A law flies with our default scheme, over faulted flights:
+
+    J = geometric mean of e / e_oracle
+
+e is the RMS tracking error of all axes after the fault, and e_oracle that of the oracle in the same flight.
+An aircraft that is lost counts `LOST`. A candidate is admissible if
+
+    - healthy, it keeps the gain and phase margins that the scenario asks of the default law, at every surface
+      that leads an axis, over the airspeeds of the envelope;
+    - the RMS rate of all surfaces together, over the same flights, is at most `EFFORT` times that of the
+      default law.
+
+One that is not admissible costs `INADMISSIBLE` and more, the more the further it is from it.
+
+A trial is ended early once it cannot win: of a detector, whose costs only add up, once the sum exceeds the
+lowest so far; of a law, once the mean over `LEAST_FLIGHTS` or more flights is `HOPELESS` times the lowest so
+far. Its cost is then the mean up to there.
+"""
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+from math import exp, inf, isfinite, log, sqrt
+from statistics import fmean
+
+from beaver_ftc.documents.errors import BeaverFtcError
+from beaver_ftc.loop.loop import fly
+from beaver_ftc.plugins import DETECTORS, LAWS
+from beaver_ftc.studies.compare.margins_in_flight import margins_of
+from beaver_ftc.studies.compare.trial import (
+    CALIBRATION,
+    LAW,
+    ORACLE,
+    SCHEME,
+    Entry,
+    Result,
+    SetFlight,
+    of_set,
+    result_of,
+    with_entry,
+    with_values,
+)
+from beaver_ftc.studies.margins import Margin
+
+LOST = 100.0
+EFFORT = 1.1
+INADMISSIBLE = 1e3
+FAILED = 1e6  # of a candidate that cannot be flown at all
+DELAY_S = 1.0
+LEAST_FLIGHTS, HOPELESS = 4, 1.5
+
+Values = Mapping[str, float]
+
+
+@cache
+def flights(grade: str, most: int | None) -> tuple[SetFlight, ...]:
+    """The flights that a grade's methods are tuned on; kinds of flights take turns."""
+    of_kind: dict[str, list[SetFlight]] = {}
+    for case in of_set(CALIBRATION + grade, most):
+        of_kind.setdefault(case.scenario.name.rpartition("-")[0], []).append(case)
+    placed = [
+        ((i + 0.5) / len(cases), k, case)
+        for k, cases in enumerate(of_kind.values())
+        for i, case in enumerate(cases)
+    ]
+    return tuple(case for _, _, case in sorted(placed, key=lambda each: each[:2]))
+
+
+def flown(case: SetFlight, entry: Entry, group: str, values: Values) -> Result:
+    """One flight of an entry with these values of its detector or law."""
+    scenario = with_values(with_entry(case.scenario, entry), group, values)
+    return result_of(fly(scenario), entry, 0.0)
+
+
+class DetectorCost:
+    """J of a detector."""
+
+    def __init__(self, name: str, cases: Sequence[SetFlight]) -> None:
+        self._entry, self._cases, self._lowest = Entry(name, LAW), cases, inf
+        self._faulted = sum(bool(case.scenario.faults) for case in cases)
+
+    def __call__(self, values: Values) -> float:
+        """J with these values."""
+        total = 0.0
+        try:
+            for n, case in enumerate(self._cases, 1):
+                total += self._of_flight(flown(case, self._entry, DETECTORS, values))
+                if total > self._lowest:
+                    return total * len(self._cases) / n
+        except BeaverFtcError:
+            return FAILED
+        self._lowest = total
+        return total
+
+    def _of_flight(self, result: Result) -> float:
+        """What one flight adds to J."""
+        cost = result.false_alarm / len(self._cases)
+        if result.faulted:
+            cost += (delay_cost(result.delay_s) + (not result.correct)) / 2.0 / self._faulted
+        return cost
+
+
+def delay_cost(delay_s: float) -> float:
+    """d / (d + 1 s)."""
+    return delay_s / (delay_s + DELAY_S) if isfinite(delay_s) else 1.0
+
+
+class LawCost:
+    """J of a law, with what makes a candidate inadmissible."""
+
+    def __init__(self, name: str, grade: str, most: int | None) -> None:
+        self._entry = Entry(SCHEME, name)
+        self._cases = [case for case in flights(grade, most) if case.scenario.faults]
+        self._oracle, self._effort_allowed = yardsticks(grade, most)
+        self._lowest = inf
+
+    def __call__(self, values: Values) -> float:
+        """J with these values."""
+        try:
+            short = self.shortfall(values)
+            return INADMISSIBLE * (1.0 + short) if short else self._tracking(values)
+        except BeaverFtcError:
+            return FAILED
+
+    def margins(self, values: Values) -> list[Margin]:
+        """Of the healthy loop."""
+        return margins_of(with_values(with_entry(self._cases[0].scenario, self._entry), LAWS, values))
+
+    def shortfall(self, values: Values) -> float:
+        """By which share the worst margin is too small; zero if all are kept."""
+        asked = self._cases[0].scenario.control
+        return max(
+            max(
+                0.0,
+                1.0 - min(margin.up_db, margin.down_db) / asked.gain_margin_db,
+                1.0 - margin.phase_deg / asked.phase_margin_deg,
+            )
+            for margin in self.margins(values)
+        )
+
+    def _tracking(self, values: Values) -> float:
+        results, logs = list[Result](), list[float]()
+        for case, best in zip(self._cases, self._oracle, strict=True):
+            results.append(flown(case, self._entry, LAWS, values))
+            logs.append(log(_ratio(results[-1], best)))
+            if len(logs) >= LEAST_FLIGHTS and exp(fmean(logs)) > HOPELESS * self._lowest:
+                break
+        excess = effort(results) / (EFFORT * self._effort_allowed)
+        if excess > 1.0 and len(results) == len(self._cases):
+            return INADMISSIBLE * excess
+        cost = exp(fmean(logs))
+        self._lowest = min(self._lowest, cost)
+        return cost
+
+
+def _ratio(result: Result, oracle_deg_s: float) -> float:
+    return min(result.rms_deg_s / oracle_deg_s, LOST) if isfinite(result.rms_deg_s) else LOST
+
+
+@cache
+def yardsticks(grade: str, most: int | None) -> tuple[tuple[float, ...], float]:
+    """Of each faulted flight the oracle's error, deg/s; and the default law's RMS surface rate, deg/s."""
+    cases = [case for case in flights(grade, most) if case.scenario.faults]
+    oracle = tuple(flown(case, Entry(SCHEME, ORACLE), LAWS, {}).rms_deg_s for case in cases)
+    return oracle, effort([flown(case, Entry(SCHEME, LAW), LAWS, {}) for case in cases])
+
+
+def effort(results: Sequence[Result]) -> float:
+    """RMS rate of all surfaces over flights, deg/s; of a flight that is lost, up to there."""
+    return sqrt(fmean(result.energy_deg2_s2 for result in results))
+
+
+def least_margins(found: Sequence[Margin]) -> tuple[float, float]:
+    """The smallest gain margin, dB, and phase margin, deg."""
+    return min(min(m.up_db, m.down_db) for m in found), min(m.phase_deg for m in found)

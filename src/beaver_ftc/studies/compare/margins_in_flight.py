@@ -1,0 +1,97 @@
+"""Stability margins of any law, compiled or plugged in, measured in flight.
+
+    L_s = -(v - d) / v
+
+A surface s is moved by a pulse d of one frame beside what the law commands, in trim. v is its position minus
+that of the same flight without the pulse. The difference of the two flights is linear in a small d, and the
+ratio of the two transforms is the loop broken at that surface with all other loops closed, as in
+studies/margins.py, which has the default law's loop in closed form: tests hold the two together. The
+actuators are as declared, and the sensors keep their lag and delay. Noise and air are left out, and no scheme
+diagnoses.
+"""
+
+from collections.abc import Iterator
+from itertools import takewhile
+
+import numpy as np
+
+from beaver_ftc.control.laws.gains import margins
+from beaver_ftc.control.laws.rows import flown_by
+from beaver_ftc.loop.loop import Loop
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.studies import margins as closed_form
+from beaver_ftc.studies.margins import Margin, frequencies
+
+PULSE_DEG, PULSE_AT_S, DURATION_S = 0.1, 0.5, 4.0
+N_AIRSPEEDS = 2  # the slowest and the fastest of the envelope
+DECAYED = 0.2  # of the pulse: more than that at the end, and the loop is unstable
+LAG_KEYS = ("delay_s", "bandwidth_rad_s")
+
+
+def margins_of(scenario: Scenario) -> list[Margin]:
+    """The margins of a scenario's law over the airspeeds of the envelope, of the surfaces that lead an
+    axis."""
+    airspeeds_mps = np.linspace(*scenario.airframe.envelope.airspeed_mps, N_AIRSPEEDS)
+    flights = (scenario.with_({"initial.airspeed_mps": float(V)}) for V in airspeeds_mps)
+    if scenario.control.law in flown_by("rejecting"):
+        return [margin for flight in flights for margin in takewhile(_is_healthy, closed_form.at(flight))]
+    return [margin for flight in flights for margin in _measured(flight)]
+
+
+def _is_healthy(margin: Margin) -> bool:
+    return margin.fault == "none"
+
+
+def _measured(scenario: Scenario) -> Iterator[Margin]:
+    trimmed = in_trim(scenario)
+    still, omega = _positions(trimmed), frequencies(1.0 / scenario.rate_hz)
+    for surface in scenario.airframe.primary:
+        moved = _positions(_pulsed(trimmed, surface))
+        numbers = _margins(still[surface], moved[surface], omega, 1.0 / scenario.rate_hz)
+        yield Margin(scenario.initial.airspeed_mps, "none", surface, *numbers)
+
+
+def in_trim(scenario: Scenario) -> Scenario:
+    """The scenario without faults, references, noise, air and diagnosis."""
+    still: dict[str, object] = {"duration_s": DURATION_S, "faults": [], "reference": {}, "environment": {}}
+    sensors = {
+        name: {key: value for key in LAG_KEYS if (value := getattr(sensor, key))}
+        for name, sensor in scenario.sensors
+        if sensor is not None
+    }
+    still |= {"sensors": {name: lags for name, lags in sensors.items() if lags}, "expect": {}}
+    return scenario.with_({**still, "fdi.scheme": "none", "fdi.options": {}, "fdi.statistical": None})
+
+
+def _pulsed(scenario: Scenario, surface: str) -> Scenario:
+    end_s = PULSE_AT_S + 1.0 / scenario.rate_hz
+    pulse = {"actuator": surface, "type": "bias", "bias_deg": PULSE_DEG, "at_s": PULSE_AT_S, "end_s": end_s}
+    return scenario.with_({"faults": [pulse]})
+
+
+def _positions(scenario: Scenario) -> dict[str, np.ndarray]:
+    """Position of each surface, rad, (frames,)."""
+    loop = Loop(scenario)
+    rows = np.concatenate([chunk.copy() for chunk in loop.chunks()])
+    places = {name: loop.columns.index(f"{name}_pos_rad") for name in scenario.airframe.primary}
+    loop.release()
+    return {name: rows[:, place] for name, place in places.items()}
+
+
+def _margins(still: np.ndarray, moved: np.ndarray, omega: np.ndarray, dt: float) -> tuple[float, ...]:
+    """Gain margins up and down, dB, and phase margin, deg; zero of a loop that is unstable."""
+    if len(still) != len(moved):
+        return 0.0, 0.0, 0.0  # one of the flights has ended in a departure
+    v, pulse = moved - still, np.zeros(len(still))
+    pulse[round(PULSE_AT_S / dt)] = np.radians(PULSE_DEG)
+    if not np.abs(v[-len(v) // 5 :]).max() < DECAYED * np.radians(PULSE_DEG):
+        return 0.0, 0.0, 0.0
+    v_jw, d_jw = (_transform(np.diff(each), omega * dt) for each in (v, pulse))
+    return tuple(map(float, margins(-(v_jw - d_jw) / v_jw)))
+
+
+def _transform(values: np.ndarray, angles: np.ndarray) -> np.ndarray:
+    """Of values (n,) that are zero before and after, at angles (m,) of the unit circle. Changes from frame to
+    frame are transformed instead of positions: an integrator leaves the position somewhere else."""
+    transform: np.ndarray = np.exp(-1j * np.outer(angles, np.arange(len(values)))) @ values
+    return transform

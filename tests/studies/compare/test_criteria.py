@@ -1,0 +1,135 @@
+"""The costs by which methods are tuned, from results made by hand."""
+
+from dataclasses import replace
+from math import exp, inf, log, sqrt
+
+import pytest
+
+from beaver_ftc.studies.compare import criteria
+from beaver_ftc.studies.compare.criteria import (
+    EFFORT,
+    INADMISSIBLE,
+    LOST,
+    DetectorCost,
+    LawCost,
+    effort,
+    flights,
+    least_margins,
+)
+from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, Entry, Result, SetFlight
+from beaver_ftc.studies.margins import Margin
+from flying import loss, scenario
+
+FAULTED, HEALTHY = (SetFlight("c", scenario(faults=faults)) for faults in ([loss("rudder", 0.5)], []))
+CASES = [FAULTED, HEALTHY, FAULTED, FAULTED, FAULTED]
+SOUND = Result(
+    Entry("x", LAW), False, 9.0, True, delay_s=1.0, correct=True, rms_deg_s=2.0, energy_deg2_s2=4.0
+)
+FOUND = [
+    SOUND,  # a delay of 1 s, rightly named: 1/4
+    replace(SOUND, faulted=False, false_alarm=True),  # 1 of 5 flights
+    replace(SOUND, delay_s=0.25, correct=False),  # 0.2 / 2 + 1 / 2
+    replace(SOUND, delay_s=inf, correct=False),  # 1
+    replace(SOUND, delay_s=inf, correct=False, false_alarm=True),  # 1, and 1 of 5 flights
+]
+J = (0.25 + 0.6 + 1.0 + 1.0) / 4 + 2 / 5
+
+
+def given(monkeypatch, results):
+    left, asked = list(results), []
+
+    def flown(case, entry, group, values):
+        asked.append((entry, group, dict(values)))
+        return left.pop(0)
+
+    monkeypatch.setattr(criteria, "flown", flown)
+    return asked
+
+
+def test_a_detector_costs_delay_names_and_false_alarms(monkeypatch):
+    asked = given(monkeypatch, FOUND)
+    assert DetectorCost("x", CASES)({"a": 1.0}) == pytest.approx(J)
+    assert asked[0] == (Entry("x", LAW), criteria.DETECTORS, {"a": 1.0})
+    assert len(asked) == 5
+
+
+def test_a_detector_that_cannot_win_is_not_flown_to_the_end(monkeypatch):
+    best = [SOUND, replace(SOUND, faulted=False), *[SOUND] * 3]
+    asked = given(monkeypatch, [*best, *FOUND])
+    cost = DetectorCost("x", CASES)
+    lowest = cost({})
+    assert lowest == pytest.approx(0.25)
+    assert cost({}) > lowest
+    assert len(asked) == 5 + 3  # 1/16 + 1/5 is more than 1/4 once the third flight adds to it
+
+
+MARGINS = [Margin(40.0, "none", "rudder", 9.0, inf, 60.0), Margin(50.0, "none", "rudder", 7.0, 8.0, 50.0)]
+
+
+@pytest.fixture
+def law(monkeypatch):
+    """A law on four faulted flights; the oracle's errors and the default law's effort are made up."""
+    monkeypatch.setattr(criteria, "flights", lambda grade, most: CASES)
+    monkeypatch.setattr(criteria, "yardsticks", lambda grade, most: ((1.0, 2.0, 4.0, 1.0), 2.0))
+    monkeypatch.setattr(criteria, "margins_of", lambda scenario: MARGINS)
+    return LawCost("lqr", "exact", None)
+
+
+def test_a_law_costs_its_error_over_the_oracles(law, monkeypatch):
+    lost = replace(SOUND, rms_deg_s=inf)
+    asked = given(monkeypatch, [SOUND, SOUND, SOUND, lost])
+    assert law({}) == pytest.approx(exp((log(2.0) + log(1.0) + log(0.5) + log(LOST)) / 4))
+    assert asked[0][0] == Entry(SCHEME, "lqr")
+
+
+def test_a_law_may_spend_no_more_than_the_default_and_a_tenth(law, monkeypatch):
+    allowed = (EFFORT * 2.0) ** 2
+    for energy, admissible in ((allowed * 0.99, True), (allowed * 1.01, False)):
+        given(monkeypatch, [replace(SOUND, energy_deg2_s2=energy)] * 4)
+        assert (law({}) < INADMISSIBLE) == admissible
+
+
+@pytest.mark.parametrize(
+    ("changes", "short"),
+    [
+        ({}, 0.0),
+        ({"up_db": 3.0}, 0.5),
+        ({"down_db": 4.5}, 0.25),
+        ({"phase_deg": 9.0}, 0.8),
+        ({"up_db": 0.0}, 1.0),
+    ],
+)
+def test_a_law_with_too_little_margin_is_not_flown(law, monkeypatch, changes, short):
+    """6 dB and 45 deg are what a scenario asks of the default law."""
+    monkeypatch.setattr(criteria, "margins_of", lambda scenario: [MARGINS[0], replace(MARGINS[1], **changes)])
+    asked = given(monkeypatch, [SOUND] * 4)
+    assert law.shortfall({}) == pytest.approx(short)
+    if short:
+        assert law({}) == pytest.approx(INADMISSIBLE * (1.0 + short))
+        assert asked == []
+
+
+def test_a_law_that_is_far_behind_is_not_flown_to_the_end(monkeypatch, law):
+    monkeypatch.setattr(criteria, "LEAST_FLIGHTS", 2)
+    asked = given(monkeypatch, [SOUND] * 4 + [replace(SOUND, rms_deg_s=20.0)] * 4)
+    assert law({}) < law({})
+    assert len(asked) == 4 + 2
+
+
+def test_effort_is_the_rms_rate_and_the_least_margins_are_of_all_loops():
+    assert effort([SOUND, replace(SOUND, energy_deg2_s2=10.0)]) == pytest.approx(sqrt(7.0))
+    assert least_margins(MARGINS) == (7.0, 50.0)
+
+
+def test_kinds_of_flights_take_turns():
+    names = [case.scenario.name.rpartition("-")[0] for case in flights("errors", 2)]
+    assert len(names) == 12
+    assert len(set(names[:6])) == len(set(names[6:])) == 6
+
+
+def test_the_yardsticks_are_the_oracle_and_the_default_law(monkeypatch):
+    """On the faulted flights alone."""
+    monkeypatch.setattr(criteria, "flights", lambda grade, most: CASES[:3])
+    asked = given(monkeypatch, [replace(SOUND, rms_deg_s=3.0), SOUND, SOUND, SOUND])
+    assert criteria.yardsticks.__wrapped__("exact", None) == ((3.0, 2.0), 2.0)
+    assert [entry.law for entry, _, _ in asked] == [ORACLE, ORACLE, LAW, LAW]

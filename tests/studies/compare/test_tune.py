@@ -1,0 +1,141 @@
+"""`compare --tune`: what ships was found inside its ranges; a plug-in is tuned as everybody is."""
+
+import json
+from dataclasses import asdict
+
+import pytest
+
+from beaver_ftc.diagnosis.rivals import GRADES, KINDS, TUNED, tuned, values_of
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.loop.loop import Loop
+from beaver_ftc.plugins import DETECTORS, LAWS, Range, registered, tunable
+from beaver_ftc.studies.compare import tune as tuning
+from beaver_ftc.studies.compare.search import EDGE, Found, on_scale
+from beaver_ftc.studies.compare.trial import LAW, SCHEME, STATISTICAL
+from beaver_ftc.studies.compare.tune import Method, as_text, methods_of, read_tuned, tune, write_tuned
+from commands import beaver
+from flying import scenario
+
+SHIPPED = json.loads(TUNED.read_text())
+ROWS = [pytest.param(row, id=f"{row['grade']}-{row['kind']}-{row['name']}") for row in SHIPPED["methods"]]
+GROUPS = {kind: group for group, kind in KINDS.items()}
+MINE = """
+from beaver_ftc.diagnosis.rivals.observer import ConstantThresholdObserver
+
+
+class Mine(ConstantThresholdObserver):
+    '''An observer under another name.'''
+
+    name = "mine"
+    tunable = {"alarm": (0.1, 1e4)}
+"""
+
+
+@pytest.mark.parametrize("row", ROWS)
+def test_no_value_that_ships_is_on_the_edge_of_its_range(row):
+    """What was found for it, too."""
+    ranges = {key: Range(**of) for key, of in row["ranges"].items()}
+    for values in (row["values"], row["found"]):
+        assert set(values) == set(ranges)
+        places = [on_scale(ranges[key], value) for key, value in values.items()]
+        assert min(places) > EDGE
+        assert max(places) < 1.0 - EDGE
+
+
+def test_everybody_is_tuned_with_the_same_budget_on_every_grade():
+    everybody = methods_of([*registered(DETECTORS), STATISTICAL], list(registered(LAWS)), GRADES)
+    rows = {(GROUPS[row["kind"]], row["name"], row["grade"]): row for row in SHIPPED["methods"]}
+    assert set(rows) == {(each.group, each.name, each.grade) for each in everybody}
+    assert {SCHEME, LAW} < {each.name for each in everybody}
+    for row in rows.values():
+        searches = 1 + len(row["widened"])
+        assert row["trials"] <= SHIPPED["trials"] * searches
+        assert row["trials"] >= SHIPPED["trials"] - len(row["ranges"])
+        assert row["values"] == values_of(tuned(), row["grade"], GROUPS[row["kind"]], row["name"])
+
+
+def test_rivals_fly_with_what_was_chosen_for_their_grade():
+    errors = {"bounds": {"turbulence": "light"}}
+    for of_grade, given in (
+        ("exact", {}),
+        ("actuators", {"actuators": "servo"}),
+        ("errors", {"fdi": errors}),
+    ):
+        given["fdi"] = {"scheme": "augmented-ekf", **given.get("fdi", {})}
+        flown = Loop(scenario(duration_s=1, **given)).plugin_frame.detector.option
+        assert values_of(tuned(), of_grade, DETECTORS, "augmented-ekf").items() <= flown.items()
+
+
+@pytest.mark.parametrize(("cost", "kept"), [(0.96, True), (0.94, False)])
+def test_a_method_keeps_its_values_unless_others_gain(monkeypatch, cost, kept):
+    """The rule is the same for ours and for rivals."""
+    found = Found({"pole_per_s": 3.0}, cost, 1.0, {"pole_per_s": Range(1.0, 9.0)}, 24)
+    monkeypatch.setattr(tuning, "search", lambda *_: found)
+    for name in (SCHEME, "observer-constant"):
+        method = Method(DETECTORS, name, "exact")
+        row = tuning.tune_method(method, 24, 1, 1)
+        assert row["values"] == (method.start() if kept else found.values)
+        assert (row["found"], row["cost"], row["start_cost"], row["trials"]) == (found.values, cost, 1.0, 24)
+
+
+def test_a_method_starts_with_what_ships_or_its_defaults():
+    assert Method(LAWS, "lqr", "exact").start() == values_of(tuned(), "exact", LAWS, "lqr")
+    ours = Method(DETECTORS, STATISTICAL, "nowhere").start()
+    assert ours == {"fdi.statistical.false_alarms_per_h": 1e-3, "fdi.statistical.misnaming": 1e-4}
+    assert Method(LAWS, "zhang2005", "nowhere").start()["network_gain"] == 40.0
+
+
+def test_a_plug_in_is_tuned_like_everybody(tmp_path):
+    """By its class's own ranges; the file is read again where methods are compared."""
+    (tmp_path / "mine.py").write_text(MINE)
+    asked = (
+        "--schemes",
+        "mine",
+        "--plugin",
+        "mine:Mine",
+        "--grade",
+        "exact",
+        "--flights",
+        "1",
+        "--trials",
+        "5",
+    )
+    done = beaver("compare", "--tune", *asked, "--workers", "1", "--format", "json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    document = json.loads(done.stdout)
+    path = tmp_path / "comparisons" / "tuned.json"
+    assert json.loads(path.read_text()) == document
+    (row,) = document["methods"]
+    assert row["ranges"] == {"alarm": asdict(Range(0.1, 1e4))}
+    assert document["trials"] == row["trials"] == 5
+    assert row["cost"] <= row["start_cost"]
+    assert read_tuned(path) == {"exact": {"detectors": {"mine": row["values"]}}}
+    assert "5 trials a method and grade" in as_text(document)
+
+
+@pytest.mark.parametrize(
+    "given", [{"a": (1.0,)}, {"a": (2.0, 1.0)}, {"a": (0.0, 1.0)}, {"a": (0.5, 2.0, "odds")}, {"a": "ab"}, 7]
+)
+def test_ranges_that_are_none_are_refused(monkeypatch, given):
+    monkeypatch.setattr(
+        "beaver_ftc.plugins.plugin_class", lambda group, name: type("Mine", (), {"tunable": given})
+    )
+    with pytest.raises(BadInput, match=r"tunable.*allowed: "):
+        tunable(DETECTORS, "mine")
+
+
+def test_nothing_to_tune_and_no_file_are_said(tmp_path):
+    with pytest.raises(BadInput, match="nothing to tune"):
+        tune([], 5, 1, None, 1, None)
+    (tmp_path / "a.json").write_text('{"grades": {"windy": {}}}')
+    for name in ("a.json", "nowhere.json"):
+        with pytest.raises(BadInput, match="allowed: a file that compare --tune wrote"):
+            read_tuned(tmp_path / name)
+
+
+def test_what_was_tuned_as_text():
+    text = as_text(SHIPPED)
+    assert f"{SHIPPED['trials']} trials a method and grade, seed {SHIPPED['seed']}" in text
+    assert write_tuned.__doc__
+    for row in SHIPPED["methods"]:
+        assert row["name"] in text

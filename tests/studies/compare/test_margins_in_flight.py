@@ -49,9 +49,8 @@ def test_what_is_flown_for_margins_has_only_the_sensors_lags():
         "p": {"noise_std_deg_s": 0.1, "delay_s": 0.02, "bandwidth_rad_s": 60},
         "q": {"bias_deg_s": 0.1},
     }
-    still = in_trim(
-        scenario(sensors=sensors, faults=[loss("rudder", 0.5)], environment={"turbulence": "dryden"})
-    )
+    air = {"turbulence": "dryden", "severity": "light"}
+    still = in_trim(scenario(sensors=sensors, faults=[loss("rudder", 0.5)], environment=air))
     assert (still.sensors.p.delay_s, still.sensors.p.bandwidth_rad_s, still.sensors.p.noise_std_deg_s) == (
         0.02,
         60,

@@ -39,7 +39,7 @@ def test_the_lowest_cost_is_found_within_the_budget(best):
     found = search(
         lambda values: tried.append(values) or cost(values), ranges, dict.fromkeys(best, 1.0), 60, 7
     )
-    assert found.values == pytest.approx(best, rel=0.1)
+    assert found.values == pytest.approx(best, rel=0.25)
     assert found.cost < found.start_cost
     assert 60 - len(best) <= len(tried) <= 60
     assert found.trials == len(tried)

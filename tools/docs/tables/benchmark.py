@@ -62,21 +62,18 @@ def _tables(document: Document) -> str:
     sets = {name: document["sets"][name] for name in SHOWN if name in document["sets"]}
     faulted = {name: part for name, part in sets.items() if part["lines"][0]["faults"]}
     schemes, laws = _schemes(faulted), _laws(faulted)
-    blocks = [
-        _block("Faults detected, %.", schemes, "detection_rate", _percent, more=True),
-        _block("Faults rightly named at the end, %.", schemes, "isolation_rate", _percent, more=True),
-        _rates(faulted),
-        _block("Median delay of the alarm, s.", schemes, "delay_median_s", _seconds, more=False),
-        _block("Upper limit of that median, 95 %, s.", schemes, "delay_median_high_s", _seconds, None),
-        _alarms(_schemes(sets)),
-        _block(
-            "Tracking error after the fault over the oracle's, median.", laws, "ratio_median", _ratio, False
-        ),
-        _block("Lower limit of that median, 95 %.", laws, "ratio_median_low", _ratio, None),
-        _block("Upper limit of that median, 95 %.", laws, "ratio_median_high", _ratio, None),
-        _block("Tracking error over the oracle's in 90 % of flights.", laws, "ratio_90", _ratio, more=False),
-    ]
-    return "\n\n".join(blocks)
+    return "\n\n".join([
+        _block(2, "Faults detected, %", schemes, "detection_rate", _percent, more=True),
+        _block(3, "Faults named correctly at the end, %", schemes, "isolation_rate", _percent, more=True),
+        _rates(4, faulted),
+        _block(5, "Median delay of the alarm, s", schemes, "delay_median_s", _seconds, more=False),
+        _block(6, "Upper 95 % limit of that median, s", schemes, "delay_median_high_s", _seconds, None),
+        _alarms(7, _schemes(sets)),
+        _block(8, "Median of the tracking error over the oracle's", laws, "ratio_median", _ratio, more=False),
+        _block(9, "Lower 95 % limit of that median", laws, "ratio_median_low", _ratio, None),
+        _block(10, "Upper 95 % limit of that median", laws, "ratio_median_high", _ratio, None),
+        _block(11, "The same error, not exceeded in 90 % of flights", laws, "ratio_90", _ratio, more=False),
+    ])  # fmt: skip
 
 
 def _schemes(sets: dict[str, Document]) -> Rows:
@@ -102,7 +99,9 @@ def _alone(lines: list[Document]) -> Document:
     return next(row for row in lines if (row["scheme"], row["law"]) == (NO_SCHEME, LAW))
 
 
-def _block(title: str, rows: Rows, key: str, cell: Callable[[Any], str], more: bool | None) -> str:
+def _block(
+    number: int, title: str, rows: Rows, key: str, cell: Callable[[Any], str], more: bool | None
+) -> str:
     """A caption, a table of one number a cell, and what a rival does better. more: whether more is better;
     None of limits, which are compared with nothing."""
     counts = {name: next(iter(of.values()))["faults"] for name, of in rows.items()}
@@ -110,7 +109,13 @@ def _block(title: str, rows: Rows, key: str, cell: Callable[[Any], str], more: b
     names = list(next(iter(rows.values())))
     body = [(_label(name), *(cell(of[name].get(key)) for of in rows.values())) for name in names]
     said = [] if more is None else [_better(rows, key, more)]
-    return "\n\n".join([f"**{title}** In brackets: faulted flights.", markdown_table(head, body), *said])
+    return "\n\n".join(
+        [_caption(number, f"{title}; in brackets: faulted flights"), markdown_table(head, body), *said]
+    )
+
+
+def _caption(number: int, title: str) -> str:
+    return f"*Table {number}. {title}.*"
 
 
 def _label(name: str) -> str:
@@ -153,13 +158,15 @@ def _less(ours: float | None, theirs: float | None, more: bool) -> bool:
     return theirs > ours if more else theirs < ours
 
 
-def _rates(sets: dict[str, Document]) -> str:
+def _rates(number: int, sets: dict[str, Document]) -> str:
     """What the numbers of flights say of a rate."""
     counts = sorted({part["lines"][0]["faults"] for part in sets.values()})
     rows = [(str(n), *(_interval(n, share) for share in (1.0, 0.75, 0.5))) for n in counts]
     head = ("flights", "of 100 %, from", "of 75 %, from", "to", "of 50 %, from", "to")
     cells = [(n, high.split()[0], *three.split(), *half.split()) for n, high, three, half in rows]
-    return "\n\n".join(["**Wilson intervals of such rates, 95 %, in %.**", markdown_table(head, cells)])
+    return "\n\n".join(
+        [_caption(number, "Wilson 95 % intervals of such rates, %"), markdown_table(head, cells)]
+    )
 
 
 def _interval(n: int, share: float) -> str:
@@ -167,14 +174,16 @@ def _interval(n: int, share: float) -> str:
     return f"{100 * found.low:.0f} {100 * found.high:.0f}"
 
 
-def _alarms(rows: Rows) -> str:
+def _alarms(number: int, rows: Rows) -> str:
     """Per hour flown without a fault, with exact sensors and with declared errors."""
     head = ("", "exact sensors", "upper limit, 95 %", "in air", "upper limit, 95 %")
     names = list(next(iter(rows.values())))
     body = [(name, *_of_one(rows, name, False), *_of_one(rows, name, True)) for name in names]
     hours = [_hours(rows, in_air) for in_air in (False, True)]
     flown = f"{hours[0]:.2f} h with exact sensors, {hours[1]:.2f} h in air"
-    return "\n\n".join([f"**False alarms per hour without a fault.** {flown}.", markdown_table(head, body)])
+    return "\n\n".join(
+        [_caption(number, f"False alarms per hour without a fault; {flown}"), markdown_table(head, body)]
+    )
 
 
 def _hours(rows: Rows, in_air: bool) -> float:

@@ -32,7 +32,7 @@ from beaver_ftc.studies.compare.trial import STATISTICAL
 from beaver_ftc.studies.engine.study import Progress, fly_all
 from beaver_ftc.studies.present.tables import aligned
 
-TRIALS, SEED = 24, 1
+PROCEDURE = "beaver-ftc compare --tune; docs/results/benchmark.md"
 LEAST_GAIN = 0.05
 NAME = "tuned.json"
 OF_STATISTICAL = {
@@ -95,7 +95,7 @@ def tune(
         of_kind = grades.setdefault(method.grade, {}).setdefault(KINDS[method.group], {})
         of_kind[method.name] = row["values"]
     counts = {grade: len(flights(grade, most)) for grade in grades}
-    how = {"procedure": "beaver-ftc compare --tune; docs/results/benchmark.md", "trials": trials, "seed": seed}
+    how = {"procedure": PROCEDURE, "trials": trials, "seed": seed}
     return how | {"flights": counts, "grades": grades, "methods": rows}
 
 

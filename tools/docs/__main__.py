@@ -12,6 +12,7 @@ import argparse
 import json
 import signal
 import sys
+from concurrent.futures import ThreadPoolExecutor
 
 from beaver_ftc.documents.errors import BeaverFtcError
 
@@ -65,8 +66,10 @@ def _pages(options: argparse.Namespace) -> int:
         print("\n".join([*found, f"{len(found)} sentences with numbers that no command prints"]))
         return 0
     if options.check:
-        findings, printed = check(pages, options.jobs, options.anew)
-        findings += names.check(pages, every=not options.pages) + prose.check(pages)
+        with ThreadPoolExecutor(1) as beside:  # the last command leaves other cores idle
+            words = beside.submit(lambda: names.check(pages, every=not options.pages) + prose.check(pages))
+            findings, printed = check(pages, options.jobs, options.anew)
+            findings += words.result()
     else:
         wanted = Wanted(dear=options.dear, only=options.only, anew=options.anew)
         written, findings = write(pages, wanted, options.jobs)

@@ -24,13 +24,20 @@ def main():
     from beaver_ftc.diagnosis.rivals.rls import RlsMonitor
     from beaver_ftc.loop.loop import fly
     from beaver_ftc.scenario.loader import load_scenario
-    from flying import scenario
+    from flying import loss, scenario
 
     for plugged in ({}, {"detector": RlsMonitor()}, {"law": IncrementalInversion()}):
         fly(scenario(duration_s=0.2, substeps=2, fdi={"statistical": {}}), **plugged)
     published = load_scenario("elevator-partial-loss")  # after an alarm other kernels are used
     for changed in ({}, {"fdi.fault_class": "all"}, {"control.law": "fault-tolerant"}):
         fly(published.with_(changed))
+    every, real = {"fault_class": "all", "statistical": {}}, "tactical-grade"
+    for keys in (
+        {"fdi": every, "faults": [loss(at_s=0.3, magnitude=0.9)]},
+        {"fdi": every | {"bounds": {"sensors": real}}, "sensors": real},
+        {"autopilot": {"altitude_m": [{"hold": True}]}},
+    ):
+        fly(scenario(duration_s=1.0, **keys))
     done.touch()
 
 

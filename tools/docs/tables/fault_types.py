@@ -40,9 +40,14 @@ def fault_matrix_light() -> str:
     return _matrix(declared=True, turbulence="light")
 
 
-def _matrix(declared: bool, turbulence: str = "none") -> str:
+def fault_matrix_light_probe() -> str:
+    """The same at one airspeed."""
+    return _matrix(declared=True, turbulence="light", airspeeds_mps=(45.0,))
+
+
+def _matrix(declared: bool, turbulence: str = "none", airspeeds_mps: tuple[float, ...] | None = None) -> str:
     with TemporaryDirectory() as folder:
-        document = run_matrix(Path(folder), declared=declared, turbulence=turbulence)
+        document = run_matrix(Path(folder), airspeeds_mps, declared=declared, turbulence=turbulence)
     cells = {(cell["fault"], cell["surface"]): cell for cell in document["cells"]}
     surfaces = list(dict.fromkeys(surface for _, surface in cells))
     table = markdown_table(

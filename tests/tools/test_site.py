@@ -133,7 +133,7 @@ def test_search_works_from_disk(opened):
 @needs_browser
 @pytest.mark.parametrize("viewport", [PHONE, DESK], ids=["phone", "desk"])
 def test_equations_are_set(opened, viewport):
-    page = opened("explanation/theory.html", viewport)
+    page = opened("explanation/detection.html", viewport)
     page.wait_for_function("MathJax.startup?.promise.then(() => true)")
     assert page.locator("mjx-container").count() == page.locator(".arithmatex").count() > 20
     assert page.locator("[data-mml-node=merror]").count() == 0
@@ -144,7 +144,7 @@ def test_equations_are_set(opened, viewport):
 
 
 def test_only_pages_with_equations_load_what_sets_them(site):
-    assert "assets/mathjax.js" in (site / "explanation/theory.html").read_text(encoding="utf-8")
+    assert "assets/mathjax.js" in (site / "explanation/detection.html").read_text(encoding="utf-8")
     assert "assets/mathjax.js" not in (site / "reference/commands.html").read_text(encoding="utf-8")
 
 

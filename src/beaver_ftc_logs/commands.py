@@ -1,5 +1,6 @@
 """`beaver-ftc identify` and `diagnose`: from recorded flights to a model, and to what broke in a flight."""
 
+import warnings
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -42,6 +43,7 @@ def identify(
     check: Do not fit; report what the logs contain, and propose a vehicle file if none is given.
     false_alarms_per_hour: Alarms that `diagnose` may raise in healthy flight, instead of the vehicle file's.
     """
+    _silence_numpy()
     if check:
         _check(flights, vehicle, out, reader, format)
         return
@@ -76,6 +78,11 @@ def identify(
     }
     long = [f"  {one.name}: {one.notes[0]}" for one in loaded if one.parts > 1]
     answer(format, document, lambda: "\n".join([summary(model), *long, f"model: {out}", f"page: {page}"]))
+
+
+def _silence_numpy() -> None:
+    """A column of nothing but gaps makes NumPy warn of means of nothing: the readers say so by its name."""
+    warnings.filterwarnings("ignore", category=RuntimeWarning)
 
 
 def _check(
@@ -142,6 +149,7 @@ def diagnose(options: Options) -> None:
     detector: Detector to use: bank-of-filters, or another one by its name.
     certificate: With --aircraft: also write certificate.json and log.parquet, which prove the alarm.
     """
+    _silence_numpy()
     _check_options(options)
     flights, out, format = options.flights, options.out, options.format
     if options.aircraft is not None:

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import energy, trust
+from beaver_ftc_logs.bank import GROUP, Bank, bank_of
 from beaver_ftc_logs.bank import UNKNOWN as UNKNOWN_OFFSET
-from beaver_ftc_logs.bank import Bank, bank_of
 from beaver_ftc_logs.filtering import accumulated, evidence, posterior_of
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import TINY, Floats
@@ -23,7 +23,12 @@ from beaver_ftc_logs.samples import Samples
 _RATE_TOLERANCE = 0.25
 UNKNOWN = "unknown"
 _NAMED = 0.5
+_MISNAMED = 0.001
+"""Chance of a name without the surface at fault: a likelihood ratio of two groups passes 1000 against the
+true one with that chance at most (Markov's inequality), where the model is right."""
 _LATELY_S = 1.0
+_STILL = 1e-6
+"""Share of travel that a command moves by rounding alone."""
 _IDLE = 0.5
 """Probability that nothing answers the commands above which nothing is said of any surface."""
 
@@ -111,11 +116,39 @@ def silenced(
         reasons["of no surface is the effect known from the flights fitted"] = np.ones(
             len(rows.t_s), dtype=bool
         )
-    rows = _without_power(samples, model, rows)
+    rows = _with_untold(samples, model, _without_power(samples, model, rows))
     told = np.array(trust.claimed(model), dtype=float)[None]
     unknown = np.broadcast_to(by_surface(told, model) == 0.0, rows.low.shape)
-    rows = rows.quiet(_of(rows.named, trust.unclaimed(model))).unbounded(unknown)
-    return _at_stamps(samples, rows.silent(reasons))
+    return _at_stamps(samples, rows.unbounded(unknown).silent(reasons))
+
+
+def _with_untold(samples: Samples, model: Model, rows: Rows) -> Rows:
+    """Rows that name, with a surface, each whose effect the model cannot tell and that may be at fault in its
+    place; bounds of a name of several hold where any one of them is at fault.
+
+    A loss shows where a command moves: a surface that stands still in this flight is not named for it. A
+    stuck one may be any.
+    """
+    surfaces = list(model.vehicle.surfaces)
+    moved = np.maximum.accumulate(np.abs(samples.commands - samples.commands[:1]), axis=0) > _STILL
+    moved |= "stuck" in model.vehicle.faults
+    untold = trust.unclaimed(model)
+    joins = moved & np.array([surface in untold for surface in surfaces])
+    named, high = rows.named.copy(), rows.high.copy()
+    for k in np.flatnonzero(rows.faulty == 1):
+        given = set(str(named[k]).split("+"))
+        if not given <= set(surfaces):
+            continue
+        members = np.array([one in given or bool(joins[k, i]) for i, one in enumerate(surfaces)])
+        named[k] = "+".join(compress(surfaces, members))
+        if members.sum() > len(given) or (model.settings.one_group and not _is_group(given, model)):
+            high[k, members] = 1.0
+    return replace(rows, named=named, high=high)
+
+
+def _is_group(given: set[str], model: Model) -> bool:
+    """Whether surfaces are one group of the model, which has one effectiveness."""
+    return any(given <= set(group) for group in model.groups)
 
 
 def _without_power(samples: Samples, model: Model, rows: Rows) -> Rows:
@@ -171,9 +204,6 @@ def check_rate(samples: Samples, model: Model) -> None:
             f"{model.rate_hz:.3g} Hz the model was identified at"
         )
     trust.check_units(samples, model.fitted)
-    if model.fitted is not None and model.fitted.commands:
-        surfaces = list(model.vehicle.surfaces)
-        trust.check_commands(samples.name, samples.commands, samples.rates, model.fitted, surfaces)
     trust.check_columns(samples, model)
 
 
@@ -197,6 +227,8 @@ def rows_of(samples: Samples, model: Model, bank: Bank, posterior: Floats) -> Ro
     estimate, low, high = (np.column_stack(part) for part in zip(*by_group, strict=True))
     still = idle > _IDLE
     estimate[still], low[still], high[still] = 1.0, 0.0, 1.0
+    if model.vehicle.other_laws:  # health is not excluded before an alarm excludes it
+        high[faulty == 0] = 1.0
     return Rows(
         t_s=samples.t_s,
         faulty=faulty,
@@ -269,14 +301,21 @@ def _names(
 ) -> NDArray[np.object_]:
     """The surfaces of the groups that most of the fault's probability is on; `unknown` where it is split.
 
-    sure (n,): where the evidence is enough for a name.
+    sure (n,): where the evidence is enough for a name. Where one group is at fault (`one_group`), each that
+    may be instead is named with it; `unknown` where none that the bank has is left out.
     """
     total = np.maximum(posterior[:, bank.faults].sum(axis=1), TINY)
     shares = [posterior[:, bank.faulty(g)].sum(axis=1) / total for g in range(len(model.groups))]
     share = np.column_stack(shares)
     likelier = (share > _NAMED) & sure[:, None]
     if model.settings.one_group:
-        likelier &= np.arange(share.shape[1]) == share.argmax(axis=1)[:, None]
+        single = bank.kind == GROUP
+        alone = np.column_stack(
+            [posterior[:, bank.faulty(g) & single].sum(axis=1) for g in range(len(model.groups))]
+        )
+        likelier = (alone > _MISNAMED * alone.max(axis=1, keepdims=True)) & sure[:, None]
+        candidates = alone.max(axis=0) > 0.0
+        likelier &= ~(likelier[:, candidates].all(axis=1) & (candidates.sum() > 1))[:, None]
     likely = joined(likelier, ["+".join(group) for group in model.groups])
     named = np.full(len(posterior), "", dtype=object)
     other = posterior[:, bank.kind == UNKNOWN_OFFSET].sum(axis=1) > total
@@ -285,9 +324,15 @@ def _names(
         now, said = likely[k] or UNKNOWN, named[k - 1] if k else ""
         stood = stood + 1 if k and now == (likely[k - 1] or UNKNOWN) else 0
         # an offset of no known cause, or a name that has not stood, while the alarm does: nothing new
-        keeps = said and (other[k] or (said != UNKNOWN and stood < reach))
+        keeps = said and (other[k] or (said != UNKNOWN and (stood < reach or _as_wide(now, said, model))))
         named[k] = said if keeps else now
     return named
+
+
+def _as_wide(now: str, said: str, model: Model) -> bool:
+    """Whether a name holds all that one before it held: what was once excluded stays so (Ville's inequality
+    bounds the chance of a wrong exclusion over all time)."""
+    return model.settings.one_group and (now == UNKNOWN or set(said.split("+")) <= set(now.split("+")))
 
 
 def joined(flags: NDArray[np.bool_], names: Sequence[str]) -> NDArray[np.object_]:

@@ -29,6 +29,8 @@ from beaver_ftc_logs.samples import Samples, whitened
 _DELAY_MEMORY_S = 600.0
 _FLOOR = 1e-15
 _CLIP = 3.0
+_SPANS_S, _LATELY_S = (0.0, 0.1), 2.0
+"""Spans over which a residual is summed, and the seconds in which its size is taken."""
 _EXPECTED = 0.93
 """Mean of the clipped square of a residual per axis when the scale is right."""
 
@@ -111,20 +113,48 @@ def _filtered(samples: Samples, model: Model, bank: Bank) -> tuple[Floats, Float
     """As the kernel gives it."""
     ok, *parts = in_white(samples, model)
     unexplained, answers = (np.ascontiguousarray(np.nan_to_num(part)) for part in parts)
+    noise = noise_of(model, samples.colour)
+    least = np.zeros(len(ok))
+    if model.vehicle.other_laws:
+        residual = np.where(ok[:, None], unexplained - noise.constant - answers.sum(axis=1), 0.0)
+        least = least_scale(residual, ok, noise.covariance, model.rate_hz)
     found: tuple[Floats, Floats, Floats, Floats] = run_bank(
-        unexplained, answers, ok, bank, adaptation_of(model), noise_of(model, samples.colour)
+        unexplained, answers, ok, bank, adaptation_of(model), noise, least
     )
     return found
 
 
+def least_scale(residual: Floats, ok: np.ndarray, covariance: Floats, rate_hz: float) -> Floats:
+    """How many times the covariance of the fitted noise that of a flight's residual (n, 3) was in the last
+    seconds, (n,), at each sample: of a sample, or of the sum of some per sample where these are alike.
+
+    Air, gyros or a law that the fit has not seen leave more unexplained, and evidence is to weigh less at
+    once. A fault leaves more, too; the hypothesis that is right explains it, and gains as much a sample.
+    """
+    white = residual @ np.linalg.inv(np.linalg.cholesky(covariance)).T
+    total = np.cumsum(np.vstack([np.zeros((1, 3)), white]), axis=0)
+    known = np.concatenate([[0], np.cumsum(ok)])
+    end = np.arange(1, len(white) + 1)
+    found = np.zeros(len(white))
+    for span_s in _SPANS_S:
+        begin = np.maximum(end - max(round(span_s * rate_hz), 1), 0)
+        square = ((total[end] - total[begin]) ** 2).sum(axis=1) / (
+            3.0 * np.maximum(known[end] - known[begin], 1)
+        )
+        sums = np.concatenate([[0.0], np.cumsum(square)])
+        begin = np.maximum(end - max(round(_LATELY_S * rate_hz), 1), 0)
+        found = np.maximum(found, (sums[end] - sums[begin]) / (end - begin))
+    return found
+
+
 @kernel
-def run_bank(y, f, ok, bank, own, noise):
+def run_bank(y, f, ok, bank, own, noise, least):
     """Posterior probability of each hypothesis, mean trim and gain, noise scale, and evidence, by sample.
 
     Evidence is the log likelihood of the sample given all before it, raised to the power.
 
     Shapes: y (n, 3); f (n, G, 3) responses; ok (n,) the sample may be used. bank: Bank, own: Adaptation,
-    noise: Noise (bank.py).
+    noise: Noise (bank.py); least (n,): scale of the noise at least.
     """
     n, hypotheses, states = len(y), len(bank.weight), len(own.mean)
     idle = hypotheses - 1
@@ -143,7 +173,7 @@ def run_bank(y, f, ok, bank, own, noise):
         _relax(m, p, own)
         m[idle], p[idle] = own.mean, own.covariance  # while nothing answers, nothing is learnt
         if ok[k]:
-            mu, square, evidence[k] = _correct(prior, m, p, y[k], f[k], bank, noise, scale)
+            mu, square, evidence[k] = _correct(prior, m, p, y[k], f[k], bank, noise, max(scale, least[k]))
             _bound(m, own.mean - own.bound, own.mean + own.bound)
             scale *= np.exp((1.0 - mu[idle]) * (square / 3.0 - _EXPECTED) / noise.memory)
             scale = min(max(scale, noise.least), noise.largest)

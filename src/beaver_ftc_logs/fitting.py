@@ -64,7 +64,7 @@ _OTHER_LAWS: dict[str, Any] = {
 """How far each group's gain wanders under a law and air that the fit has not seen (a law that answers what is
 not modelled ties the command to it), and what a name asks for then. Chosen on simulated flights
 (`own_logs.py`, seeds 1 to 6)."""
-_MOVING_AIR: dict[str, Any] = {"own_gain_sd": 0.08, "own_gain_time_s": 100.0, "name_evidence": 4.0}
+_MOVING_AIR: dict[str, Any] = {"own_gain_sd": 0.08, "own_gain_time_s": 100.0}
 _WINDOW_S, _FORETOLD = 10.0, 20
 """Whitened by the flight's own colour and by what so many samples before foretell; gains differ by flight
 rather than within it: chosen on seeds 11 and 12, in light turbulence; what a name asks for on a pa28's
@@ -81,6 +81,9 @@ _MOST_WIDER = 200.0
 _DELAYS = (-0.4, 0.0, 0.4)
 """Delays beside the model's that a flight may have, in samples."""
 _ALIKE = 1e-9
+_MISREAD_PARTS = 4
+"""Parts left out whose columns are read wrongly, too: the largest of n is passed by the next, if that is
+alike, with the chance 1 / (n + 1)."""
 _MOST_PARTS, _MOST_GAIN_SD = 12, 0.33
 """A gain that is known no better than to a third is not known to be there."""
 _PRIOR_CHANGES = 20
@@ -365,7 +368,8 @@ def _farther(x: Floats, e: Floats, between: Floats) -> tuple[float, int]:
     flights, and how many gains there are."""
     information, score = x.T @ x, x.T @ e
     gains = np.linalg.lstsq(information, score, rcond=_ALIKE)[0]
-    squares = float(score @ np.linalg.solve(np.eye(len(gains)) + between @ information, gains))
+    apart = np.eye(len(gains)) + between @ information  # singular by rounding where nothing tells a gain
+    squares = max(float(score @ np.linalg.lstsq(apart, gains, rcond=_ALIKE)[0]), 0.0)
     return squares, int(np.linalg.matrix_rank(information, tol=_ALIKE * np.trace(information)))
 
 
@@ -434,11 +438,13 @@ def trusted(stretches: Sequence[Stretch], model: Model) -> Model:
     """The model with what it was fitted on, and how it did on parts that were left out: how noisy they were,
     and at which evidence of a fault they would alarm as often as declared."""
     used = [(stretch.samples, stretch.use) for stretch in stretches]
-    scale, parts = 1.0, list[extremes.Part]()
+    scale, misread, parts = 1.0, 0.0, list[extremes.Part]()
     for tested, kept in _left_out(stretches, model, trust.tied(used, model).tolist()):
         for one in kept:
             noise, part = _in_health(tested, one)
             scale = max(scale, noise)
+            if len(parts) < _MISREAD_PARTS:
+                misread = max(misread, _misread(tested, one))
             parts.append(part)
     fit = fit_order(stretches, model.vehicle, model.history, model.lags)
     known = trust.fitted_on(used, model, gain_sd(fit, model), scale)
@@ -449,22 +455,30 @@ def trusted(stretches: Sequence[Stretch], model: Model) -> Model:
         says = f"{_minutes(parts):.1f} min of health left out have too few peaks of the evidence to tell"
         more = extremes.SHOWN * 60.0 / asked - _minutes(parts)
         raise BadInput(f"identify: false_alarms_per_hour {asked:g}: {says}, allowed: {more:.0f} min more")
-    threshold = _threshold(tail, per_hour, model) if tail and per_hour else None
+    asks = per_hour and (tail or model.vehicle.other_laws)
+    threshold = _threshold(tail, per_hour, model) if asks else None
     settings = {"false_alarms_per_hour": per_hour, "threshold": threshold}
     return model.model_copy(
         update={
-            "fitted": known.model_copy(update={"tail": tail}),
+            "fitted": known.model_copy(update={"tail": tail, "misread": misread}),
             "settings": model.settings.model_copy(update=settings),
             "identified": dict(_alone(parts, per_hour, model)),
         }
     )
 
 
-def _threshold(tail: extremes.Tail, per_hour: float, model: Model) -> float:
+def _threshold(tail: extremes.Tail | None, per_hour: float, model: Model) -> float:
     """By the tail; under laws of which the parts left out say nothing, by theory if that asks for more."""
     theories = (1.0 if model.vehicle.moving_air else _THEORIES) if model.vehicle.other_laws else 0.0
     least = theories * extremes.sure_threshold(model.rate_hz, per_hour)
-    return max(extremes.threshold_for(tail, per_hour), least)
+    return max(extremes.threshold_for(tail, per_hour), least) if tail is not None else least
+
+
+def _misread(model: Model, kept: Stretch) -> float:
+    """How much likelier a sample of a part left out, in health, is with its columns read wrongly, at most."""
+    rates = np.where(kept.use[:, None], kept.samples.rates, np.nan)
+    more, _ = trust.mended_likelier(replace(kept.samples, rates=rates), model)
+    return max(0.0, *more.values()) if more else 0.0
 
 
 def _minutes(parts: Sequence[extremes.Part]) -> float:

@@ -13,7 +13,7 @@ from beaver_ftc_logs import extremes, fitting, regression, trust
 from beaver_ftc_logs.model import Fitted, Model
 from beaver_ftc_logs.recording import Floats
 from beaver_ftc_logs.regression import group_indices, spectrum, variance_inflation
-from beaver_ftc_logs.samples import Samples, whitened, with_pressure
+from beaver_ftc_logs.samples import NOISE_COLOURS, Samples, whitened, with_pressure
 from beaver_ftc_logs.vehicle import Vehicle
 
 _COLLINEAR = 10.0
@@ -28,16 +28,12 @@ WINDOW_S = 2.0
 _MOST_WINDOWS = 400
 _POWERS = (0.0, 1.0, 3.0)
 _TURNS = 8
-_COLOURS = (
-    (1.0,), (1.0, 0.5),
-    *((1.0, -2.0 * c, c**2) for c in (0.2, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85, 0.9)),
-)  # fmt: skip
-"""Moving averages of the noise: gusts held within a sample add to the next, gyros' noise takes from it."""
 _MOST_DELAY_S, _LEAST_LAG_S, _MOST_LAG_S = 0.6, 0.005, 1.0
 
 
 def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
     """The model of a vehicle from its flights, with its own account of how good it is in `identified`."""
+    vehicle, found_by = assumed(flights, vehicle)
     _check_commands(flights, vehicle)
     stretches = fitting.stretches_of(coloured(flights, vehicle))
     model = fitting.fit_model(stretches, vehicle)
@@ -45,6 +41,7 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
     model = fitting.trusted(stretches, model)
     tests, bounds = fitting.run_tests(stretches, model)
     found = {
+        "assumed": found_by,
         "flights": [_used(stretch) for stretch in stretches],
         "tests": tests,
         "another_day": another_day(tests, model),
@@ -55,6 +52,31 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
     }
     settings = model.settings.model_copy(update={"bounds": bounds})
     return model.model_copy(update={"settings": settings, "identified": found})
+
+
+def assumed(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Vehicle, list[str]]:
+    """The vehicle with what its file leaves open of laws and air, and a line on each with the reason.
+
+    A log of healthy flight shows neither which law nor which air a later flight has: both are taken to be
+    others, which costs power and raises no false alarm. Labelled faults show what they do under the law that
+    flies, in the air that there is.
+    """
+    labelled = any(np.isfinite(one.labels).any() for one in flights)
+    why = "labels show faults under it" if labelled else "logs of healthy flight do not tell"
+    keys, lines = {"other_laws": "other laws may fly", "moving_air": "the air may move"}, []
+    for key, says in keys.items():
+        if getattr(vehicle, key) is None:
+            vehicle = vehicle.model_copy(update={key: not labelled})
+            lines.append(
+                f"{key}: {str(not labelled).lower()}, {says if not labelled else 'as fitted'} ({why})"
+            )
+        else:
+            lines.append(f"{key}: {str(getattr(vehicle, key)).lower()}, as the vehicle file says")
+    if vehicle.reference_airspeed_mps is None:
+        known = any(one.airspeed is not None for one in flights)
+        what = "explains no more" if known else "is not logged"
+        lines.append(f"reference_airspeed_mps: none, the airspeed {what}")
+    return vehicle, lines
 
 
 def coloured(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples]:
@@ -88,7 +110,7 @@ def _colour(
 
     x, y, _ = fitting.stacked(stretch, vehicle, *order)
     e = y - x @ by
-    left = {one: np.linalg.slogdet(np.cov(lfilter([1.0], one, e, axis=0).T))[1] for one in _COLOURS}
+    left = {one: np.linalg.slogdet(np.cov(lfilter([1.0], one, e, axis=0).T))[1] for one in NOISE_COLOURS}
     colour = min(left, key=lambda one: float(left[one]))
     return float(left[colour]) + 6.0 * float(np.log(sum(colour))), colour
 
@@ -120,6 +142,13 @@ def another_day(tests: list[Document], model: Model) -> Document:
 def by_pressure(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Sequence[Samples], Vehicle]:
     """Flights with commands times the dynamic pressure, and the vehicle that says so, where the airspeed is
     known and this explains more; else both as they are."""
+    given = {key: getattr(vehicle, key) for key in ("other_laws", "moving_air")}
+    vehicle, _ = assumed(flights, vehicle)
+    pressed, faster = _by_pressure(flights, vehicle)
+    return pressed, faster.model_copy(update=given)
+
+
+def _by_pressure(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Sequence[Samples], Vehicle]:
     known = [one.airspeed[np.isfinite(one.airspeed)] for one in flights if one.airspeed is not None]
     speeds_mps = np.concatenate(known) if known else np.empty(0)
     reference_mps = float(np.median(speeds_mps)) if speeds_mps.size else 0.0
@@ -249,6 +278,7 @@ def summary(model: Model) -> str:
     lines = [
         f"{model.vehicle.name}: {used} samples at {model.rate_hz:.3g} Hz, flights: {len(found['flights'])}; "
         f"past samples of the rates: {model.history}, of the commands: {model.lags}",
+        *(f"  {line}" for line in found.get("assumed", [])),
         *(f"  together, not to be told apart: {', '.join(g)}" for g in model.groups if len(g) > 1),
         *_pressure_lines(model),
         *(
@@ -259,7 +289,7 @@ def summary(model: Model) -> str:
         *(f"  {line}" for line in trust.unclaimed_lines(model)),
         *(f"  {flight['name']}: {note}" for flight in found["flights"] for note in flight["notes"]),
         *map(_test_line, found["tests"]),
-        *_another_day_lines(found["another_day"]),
+        *_another_day_lines(found["another_day"], len(found["flights"])),
         f"  the residual's colour widens standard errors by {_axes(found['colour'])}",
     ]
     run = found["output_error"]
@@ -278,13 +308,19 @@ def summary(model: Model) -> str:
     return "\n".join(lines)
 
 
-def _another_day_lines(found: Document) -> list[str]:
+def _another_day_lines(found: Document, flights: int) -> list[str]:
+    """What to expect of a flight that was not fitted; one flight tells of its halves, not of another day."""
+    of = (
+        "another day, each left out in turn"
+        if flights > 1
+        else "another half of this day, not of another day"
+    )
     lines = []
     if "classes" in found:
         says = [
             f"{name} {found[key]['mean']:.3f} ({found[key]['worst']:.3f})" for key, name in _FIGURES.items()
         ]
-        lines.append(f"  expect on another day, mean (worst) of what was left out: {', '.join(says)}")
+        lines.append(f"  expect of {of}, mean (worst): {', '.join(says)}")
     if "false_alarms_per_hour" in found:
         rate, missing = found["false_alarms_per_hour"], found["minutes_missing"]
         lines.append(

@@ -112,6 +112,13 @@ class Fitted(Section):
     scale: Number = Field(
         1.0, gt=0, le=_LARGEST, description="largest scale of the noise on parts not fitted"
     )
+    misread: Number = Field(
+        0.0,
+        ge=0,
+        le=_LARGEST,
+        description="how much likelier at most a sample of a part not fitted was with its columns read "
+        "wrongly, in natural logarithms",
+    )
     energy_climb: Number | None = Field(
         default=None, description="rate of the energy height as without power, m/s"
     )

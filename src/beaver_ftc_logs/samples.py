@@ -30,6 +30,11 @@ _PRESSURES = (0.1, 10.0)
 """Least and largest dynamic pressure over that at the reference, whatever the airspeed says."""
 MOST_SAMPLES, _STRETCH = 200_000, 5000
 """Samples of a log read in parts that a fit takes at most, and how many of them in turn."""
+NOISE_COLOURS = (
+    (1.0,), (1.0, 0.5),
+    *((1.0, -2.0 * c, c**2) for c in (0.2, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85, 0.9)),
+)  # fmt: skip
+"""Moving averages of the noise: gusts held within a sample add to the next, gyros' noise takes from it."""
 _GAP = 3.5
 """A step of more than this many usual steps is a gap: nothing is predicted across it."""
 

@@ -8,7 +8,7 @@ a sample counts for less. A log is refused only where a mistake in its columns e
 A row uses nothing later than its time.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -21,7 +21,7 @@ from beaver_ftc_logs import energy, regression
 from beaver_ftc_logs.model import Fitted, Model
 from beaver_ftc_logs.readings import mended
 from beaver_ftc_logs.recording import TINY, Floats
-from beaver_ftc_logs.samples import MOST_SAMPLES, Samples, whitened
+from beaver_ftc_logs.samples import MOST_SAMPLES, NOISE_COLOURS, Samples, whitened
 from beaver_ftc_logs.signals import STILL_S
 
 Mask = NDArray[np.bool_]
@@ -38,6 +38,7 @@ _TIED, _PLAIN = 0.98, 12.5
 """Of an effect of so many variances of the noise a sample, a fiftieth is half a standard deviation."""
 _UNIT, _SPREAD = 10.0, 1.6
 _ALIKE, _OTHER_UNIT = 3.0, 12.0
+_IN_UNITS = ": one unit (57.3 is deg for rad, 100 percent: `unit`, `scale`)"
 _RARE = (0.001, 0.999)
 _MIDDLE = 2.366
 """The median of a square of three axes."""
@@ -193,11 +194,13 @@ def check_commands(
 
 
 class _InAll(NamedTuple):
-    """Of all parts of a flight: at most how much of the model's answer to each group's command, (G,), and to
-    each column, by its name, there is; the least scale of the noise; and the log likelihood of a sample of
-    each part, (4,), but for what all colours have alike, and as how many white samples a part counts."""
+    """Of all parts of a flight: at most, and at least, how much of the model's answer to each group's
+    command, (G,), and at most to each column, by its name, there is; the least scale of the noise; and the
+    log likelihood of a sample of each part, (4,), but for what all colours have alike, and as how many white
+    samples a part counts."""
 
     gains: list[float]
+    least: list[float]
     columns: dict[str, float]
     noise: float
     likely: Floats
@@ -207,52 +210,80 @@ class _InAll(NamedTuple):
 def check_columns(samples: Samples, model: Model) -> None:
     """Raise BadInput where in every part of a flight the rates answer a command or another column as in no
     flight of the model, or do what no trim and no effectiveness explain: columns, signs or units are others,
-    since no fault has always been there and changes what is not its own. In moving air by what the likeliest
-    colour leaves white: what a law answers to gusts looks like a command that works the other way round."""
+    since no fault has always been there and changes what is not its own.
+
+    What a law answers to gusts or to a gyro's noise looks like a command that works the other way round: an
+    answer is refused only where it is wrong whatever the colour of the noise."""
     flights = [whitened(samples, one.average) for one in model.colours] or [samples]
-    found = [one for flight in flights if (one := _in_all_parts(flight, model)) is not None]
-    if not found:
+    read = [(flight, found) for flight in flights if (found := _in_all_parts(flight, model)) is not None]
+    if not read:
         return
-    says = next(_wrong_columns(samples, model, max(found, key=lambda one: one.likely.mean())), None)
+    flight, found = max(read, key=lambda one: one[1].likely.mean())
+    wrong = _wrong_answers(samples, model, found)
+    for colour in NOISE_COLOURS if wrong else ():
+        other = _in_all_parts(whitened(samples, colour), model)
+        still = _wrong_answers(samples, model, other) if other is not None else wrong
+        wrong = {what: says for what, says in wrong.items() if what in still}
+    says = next(iter(wrong.values()), None) or _likelier(flight, model)
     if says is not None:
         allowed = "allowed: columns, signs and units as in the flights of the model"
         raise BadInput(f"{samples.name}: {says}, {allowed}")
 
 
-def _wrong_columns(samples: Samples, model: Model, found: _InAll) -> Iterator[str]:
-    """What is wrong with a flight's columns, the surest first: in a colour that the flight has not, noise
-    looks like anything."""
-    for group, gain in zip(model.groups, found.gains, strict=True):
-        command, moved = f"the command of {'+'.join(group)}", _moved(samples, model, group)
-        if gain < REVERSED:
-            yield f"the rates answer {command} the other way round in all of it (does `scale: -1` fit?)"
-        elif gain < _LITTLE and moved > _ALIKE:
-            little = f"does at most {gain:.2g} of what it did"
-            yield f"{command} moves {moved:.3g} times as much as in the flights of the model, and {little}"
+def _wrong_answers(samples: Samples, model: Model, found: _InAll) -> dict[str, str]:
+    """What is wrong with the rates' answers to a flight's columns, by what and which, the surest first."""
+    wrong = {}
+    for group, most, least in zip(model.groups, found.gains, found.least, strict=True):
+        name, moved = "+".join(group), _moved(samples, model, group)
+        command, than = f"the command of {name}", f"moves {moved:.3g} times as much as in the flights of the"
+        if most < REVERSED:
+            says = f"the rates answer {command} the other way round in all of it (does `scale: -1` fit?)"
+            wrong[f"sign {name}"] = says
+        elif most < _LITTLE and moved > _ALIKE:
+            does = f"does at most {most:.2g} of what it did"
+            wrong[f"unit {name}"] = f"{command} {than} model, and {does}{_IN_UNITS}"
+        elif least > 1.0 / _LITTLE and 0.0 < moved < 1.0 / _ALIKE:
+            does = f"does at least {least:.3g} times what it did"
+            wrong[f"unit {name}"] = f"{command} {than} model, and {does}{_IN_UNITS}"
     if odd := [name for name, share in found.columns.items() if share < _FAINT]:
-        yield f"what the rates answer to {', '.join(odd)} is not what it is in the model, in all of it"
-    if (says := _likelier(samples, model)) is not None:
-        yield says
+        says = f"what the rates answer to {', '.join(odd)} is not what it is in the model, in all of it"
+        wrong["columns"] = says
+    return wrong
 
 
 def _likelier(samples: Samples, model: Model) -> str | None:
     """The mistake in the columns without which a flight is likelier in every part of it, where there is one.
 
     By chance a wrong reading is K times as likely as the true one in at most one part of K (Markov's
-    inequality for a likelihood ratio); all readings together have the chance `_MISREAD`.
+    inequality for a likelihood ratio); all readings together have the chance `_MISREAD`. That is so of a
+    model that is right: the flight must be likelier by as much more as flights were that the model was not
+    fitted on, whose columns are right, and by as much again for another law (`Fitted.misread`).
     """
-    found, others = _in_all_parts(samples, model, _ENOUGH), list(mended(samples, model.vehicle))
-    if found is None:
+    more, count = mended_likelier(samples, model)
+    if not more:
         return None
+    says, most = max(more.items(), key=lambda one: one[1])
+    usual = 2.0 * model.fitted.misread if model.fitted is not None else 0.0
+    if most * count <= np.log(len(more) / _MISREAD) + usual * count:
+        return None
+    size = most * count / np.log(10.0)
+    return f"each part of the flight is at least 10^{size:.0f} times as likely with {says}"
+
+
+def mended_likelier(samples: Samples, model: Model) -> tuple[dict[str, float], float]:
+    """By each mistake in the columns how much likelier a sample is without it, in natural logarithms, in the
+    part of the flight where that is least; and as how many samples a part counts."""
+    plain = replace(samples, colour=()) if not model.colours else samples
+    found, others = _in_all_parts(plain, model, _ENOUGH), list(mended(plain, model.vehicle))
+    if found is None:
+        return {}, 0.0
     more = {}
     for other in others:
         read = _in_all_parts(other.samples, model, _ENOUGH)
-        gained = -np.inf if read is None else (read.likely + other.density - found.likely).min()
-        more[other.says] = gained * found.counted
-    says, most = max(more.items(), key=lambda one: one[1])
-    if most <= np.log(len(others) / _MISREAD):
-        return None
-    return f"each part of the flight is at least 10^{most / np.log(10.0):.0f} times as likely with {says}"
+        more[other.says] = (
+            -np.inf if read is None else float((read.likely + other.density - found.likely).min())
+        )
+    return more, found.counted
 
 
 def _in_all_parts(samples: Samples, model: Model, enough: int = MOST_SAMPLES) -> _InAll | None:
@@ -263,7 +294,8 @@ def _in_all_parts(samples: Samples, model: Model, enough: int = MOST_SAMPLES) ->
     wider, groups = model.noise_factor(samples.colour), len(model.groups)
     root = np.linalg.cholesky(model.with_noise_model(samples.colour).arrays()[3] / wider)
     whiten, power = np.linalg.inv(root).T, model.settings.power / wider
-    gains, shares, noises = np.full(groups, -np.inf), np.full(len(names), -np.inf), []
+    gains, least, shares = np.full(groups, -np.inf), np.full(groups, np.inf), np.full(len(names), -np.inf)
+    noises = []
     rows = np.flatnonzero(ok)
     if (parts := regression.quarters(rows[:: max(len(rows) // enough, 1)])) is None:
         return None
@@ -272,13 +304,15 @@ def _in_all_parts(samples: Samples, model: Model, enough: int = MOST_SAMPLES) ->
         x = np.concatenate([trim, answers[part], columns[part]], axis=1) @ whiten
         flat, y = x.transpose(0, 2, 1).reshape(3 * len(part), -1), (unexplained[part] @ whiten).ravel()
         gain, square = regression.at_most(flat[:, : 3 + groups], y, power)
+        less, _ = regression.at_most(-flat[:, : 3 + groups], y, power)
         share, _ = regression.at_most(flat, y, power)
-        gains = np.maximum(gains, gain[3:])
+        gains, least = np.maximum(gains, gain[3:]), np.minimum(least, -less[3:])
         shares = np.maximum(shares, 1.0 + share[3 + groups :])  # what the past does is taken off already
         noises.append(float(np.median(square.reshape(-1, 3).sum(axis=1)) / _MIDDLE))
     size = np.log(np.diag(root)).sum() - 3.0 * np.log(sum(samples.colour or (1.0,)))
     return _InAll(
         gains.tolist(),
+        least.tolist(),
         dict(zip(names, shares.tolist(), strict=True)),
         min(noises),
         -size - 1.5 * np.log(noises),

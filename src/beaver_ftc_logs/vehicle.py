@@ -210,16 +210,16 @@ class Vehicle(Section):
         description="what a surface may do: lose effectiveness, be stuck",
         examples=[["loss", "stuck"]],
     )
-    other_laws: bool = Field(
-        default=False,
+    other_laws: bool | None = Field(
+        default=None,
         description="flights to be diagnosed may be flown by other laws than those of `identify`: an alarm "
-        "and a name ask for more",
+        "and a name ask for more; assumed where left out and no labels show faults",
         examples=[True],
     )
-    moving_air: bool = Field(
-        default=False,
+    moving_air: bool | None = Field(
+        default=None,
         description="flights meet gusts, which laws answer: every sample counts, and noise has the colour "
-        "of the flight",
+        "of the flight; assumed where left out and no labels show faults",
         examples=[True],
     )
     max_rate_hz: Number | None = number(
@@ -227,7 +227,7 @@ class Vehicle(Section):
         gt=0,
         le=1000,
         unit="Hz",
-        says="rate above which the log is averaged to this rate; 20, 100 for `moving_air`",
+        says="rate above which the log is averaged to this rate; 100, 20 where the air does not move",
         examples=[50],
     )
 
@@ -304,7 +304,8 @@ class Vehicle(Section):
     def rate_hz(self) -> float:
         """The rate above which a log is averaged. Within an average a law may answer what the same average
         shows, and no fit tells that from what the surface does: of other laws every sample is wanted."""
-        usual_hz = _LAW_HZ if self.moving_air else _USUAL_HZ
+        still = self.moving_air is False or (self.moving_air is None and self.labels)
+        usual_hz = _USUAL_HZ if still else _LAW_HZ
         return float(self.max_rate_hz or usual_hz)
 
     def felt(self, history: int) -> int:

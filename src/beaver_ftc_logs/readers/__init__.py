@@ -30,7 +30,7 @@ def read_flight(
     """The recorded flight in a file or folder.
 
     reader: one of READERS; by the path's own form where None. time: column and unit of a table's time.
-    columns: those that a table is read for, all where None. Raises BadInput with one line: why the log cannot
+    columns: those that a log is read for, all where None. Raises BadInput with one line: why the log cannot
     be used.
     """
     return next(_read(path, reader, time, {"columns": columns, "rows": None}))
@@ -60,7 +60,8 @@ def _read(
     if time is not None and time != _STAMPS[name]:
         column, unit = _STAMPS[name]
         raise BadInput(f"{path}: time: {' in '.join(time)} is not its time, allowed: {column} in {unit}")
-    yield module.read(path)
+    wanted = of_table["columns"] if name in ("ulog", "ardupilot") else None
+    yield module.read(path, wanted) if wanted is not None else module.read(path)
 
 
 def check_exists(path: Path) -> None:

@@ -8,7 +8,7 @@ extra `flights`.
 import os
 import sys
 from array import array
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from math import nan
 from pathlib import Path
@@ -23,15 +23,18 @@ _OVERHEAD = {"FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG"}
 Fields = dict[str, Any]
 
 
-def read(path: Path) -> Recording:
-    """The flight in a dataflash log. Raises BadInput where it is none, or pymavlink is missing."""
-    messages = _messages(path)
+def read(path: Path, wanted: Collection[str] | None = None) -> Recording:
+    """The flight in a dataflash log. Raises BadInput where it is none, or pymavlink is missing.
+
+    wanted: the columns that are kept in memory, all where None.
+    """
+    messages = _messages(path, wanted)
     if not messages:
         raise BadInput(f"{path}: holds no message with a time stamp, allowed: a dataflash log of a flight")
     return Recording(path.stem, columns_of(messages, _TIME)[0])
 
 
-def _messages(path: Path) -> dict[str, Fields]:
+def _messages(path: Path, wanted: Collection[str] | None) -> dict[str, Fields]:
     """The numeric fields of all messages with a stamp, by message and instance: those of its first."""
     found: dict[str, Fields] = {}
     with reading(path, "dataflash log", "pymavlink", "ArduPilot's .bin or .log"), _silence():
@@ -44,9 +47,14 @@ def _messages(path: Path) -> dict[str, Fields]:
             numbers = {k: float(value) for k, value in fields.items() if isinstance(value, int | float)}
             if message.get_type() not in _OVERHEAD and _TIME in numbers:
                 name = _name(message.get_type(), fields)
-                for field, values in found.setdefault(name, {k: array("d") for k in numbers}).items():
+                for field, values in found.setdefault(name, _empty(name, numbers, wanted)).items():
                     values.append(numbers.get(field, nan))
     return found
+
+
+def _empty(name: str, numbers: Fields, wanted: Collection[str] | None) -> Fields:
+    kept = [field for field in numbers if wanted is None or field == _TIME or f"{name}.{field}" in wanted]
+    return {field: array("d") for field in kept}
 
 
 @contextmanager

@@ -3,6 +3,8 @@
 Time counts from the first message of the log. Reading needs pyulog: the extra `flights`.
 """
 
+import re
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +16,14 @@ _LONGEST = 65535
 """Bytes of a message: its length is written in 16 bits."""
 
 
-def read(path: Path) -> Recording:
-    """The flight in a .ulg file. Raises BadInput where it is none, or pyulog is missing."""
-    topics = {_name(topic): topic.data for topic in _topics(path) if len(topic.data.get(_STAMP, ()))}
+def read(path: Path, wanted: Collection[str] | None = None) -> Recording:
+    """The flight in a .ulg file. Raises BadInput where it is none, or pyulog is missing.
+
+    wanted: the columns that are kept in memory, all where None.
+    """
+    topics = {_name(topic): topic.data for topic in _topics(path, wanted) if len(topic.data.get(_STAMP, ()))}
+    if wanted is not None and topics:
+        topics = {name: _fields(name, data, wanted) for name, data in topics.items()}
     if not topics:
         raise BadInput(f"{path}: holds no message, allowed: a log of a flight")
     columns, origin_s = columns_of(topics, _STAMP)
@@ -28,7 +35,12 @@ def _name(topic: Any) -> str:
     return str(topic.name) if topic.multi_id == 0 else f"{topic.name}_{topic.multi_id}"
 
 
-def _topics(path: Path) -> list[Any]:
+def _fields(name: str, data: dict[str, Any], wanted: Collection[str]) -> dict[str, Any]:
+    return {field: of for field, of in data.items() if field == _STAMP or f"{name}.{field}" in wanted}
+
+
+def _topics(path: Path, wanted: Collection[str] | None) -> list[Any]:
+    """Of wanted columns the topics alone, whatever their instance; all where none of these is in the log."""
     with reading(path, "ULog", "pyulog", "a .ulg file of PX4"):
         from pyulog import ULog
 
@@ -36,7 +48,9 @@ def _topics(path: Path) -> list[Any]:
         for name in formats:
             if _length(formats, name, ()) > _LONGEST:  # pyulog writes every field of one out
                 raise ValueError(f"a message {name} would have more than {_LONGEST} bytes")
-        topics = list(ULog(str(path)).data_list)
+        names = {re.sub(r"_\d+$", "", one.partition(".")[0]) for one in wanted or ()}
+        names = (names | {one.partition(".")[0] for one in wanted or ()}) & set(formats)
+        topics = list(ULog(str(path), sorted(names) if names else None).data_list)
     return topics
 
 

@@ -271,8 +271,8 @@ def test_the_sample_logs_are_followed_from_check_to_diagnosis(tmp_path):
         "diagnose", folder / "suspect.csv", "--model", model, "--out", tmp_path / "out", "--format", "json"
     )
     (verdict,) = json.loads(done.stdout)["flights"]
-    assert verdict["credible"] == {"share": 1.0, "reasons": []}
-    assert {event["named"] for event in verdict["events"]} == {"left"}
+    assert verdict["credible"]["share"] > 0.99
+    assert [event["named"] for event in verdict["events"]] == ["unknown", "left"]
     assert 90.0 < verdict["events"][0]["from_s"] < 110.0
     with pytest.raises(BadInput, match="exists, allowed: another name"):
         run("new", "mine", "--log", "--out", tmp_path)

@@ -142,10 +142,9 @@ def another_day(tests: list[Document], model: Model) -> Document:
 def by_pressure(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Sequence[Samples], Vehicle]:
     """Flights with commands times the dynamic pressure, and the vehicle that says so, where the airspeed is
     known and this explains more; else both as they are."""
-    given = {key: getattr(vehicle, key) for key in ("other_laws", "moving_air")}
-    vehicle, _ = assumed(flights, vehicle)
-    pressed, faster = _by_pressure(flights, vehicle)
-    return pressed, faster.model_copy(update=given)
+    left_open = {key: None for key in ("other_laws", "moving_air") if getattr(vehicle, key) is None}
+    pressed, faster = _by_pressure(flights, assumed(flights, vehicle)[0] if left_open else vehicle)
+    return pressed, faster.model_copy(update=left_open) if left_open else faster
 
 
 def _by_pressure(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Sequence[Samples], Vehicle]:

@@ -213,7 +213,7 @@ def check_columns(samples: Samples, model: Model) -> None:
     since no fault has always been there and changes what is not its own.
 
     What a law answers to gusts or to a gyro's noise looks like a command that works the other way round: an
-    answer is refused only where it is wrong whatever the colour of the noise."""
+    answer is refused only where it is wrong by each colour of the noise that is likelier, too."""
     flights = [whitened(samples, one.average) for one in model.colours] or [samples]
     read = [(flight, found) for flight in flights if (found := _in_all_parts(flight, model)) is not None]
     if not read:
@@ -222,8 +222,9 @@ def check_columns(samples: Samples, model: Model) -> None:
     wrong = _wrong_answers(samples, model, found)
     for colour in NOISE_COLOURS if wrong else ():
         other = _in_all_parts(whitened(samples, colour), model)
-        still = _wrong_answers(samples, model, other) if other is not None else wrong
-        wrong = {what: says for what, says in wrong.items() if what in still}
+        if other is not None and other.likely.mean() > found.likely.mean():
+            still = _wrong_answers(samples, model, other)
+            wrong = {what: says for what, says in wrong.items() if what in still}
     says = next(iter(wrong.values()), None) or _likelier(flight, model)
     if says is not None:
         allowed = "allowed: columns, signs and units as in the flights of the model"
@@ -273,8 +274,7 @@ def _likelier(samples: Samples, model: Model) -> str | None:
 def mended_likelier(samples: Samples, model: Model) -> tuple[dict[str, float], float]:
     """By each mistake in the columns how much likelier a sample is without it, in natural logarithms, in the
     part of the flight where that is least; and as how many samples a part counts."""
-    plain = replace(samples, colour=()) if not model.colours else samples
-    found, others = _in_all_parts(plain, model, _ENOUGH), list(mended(plain, model.vehicle))
+    found, others = _in_all_parts(samples, model, _ENOUGH), list(mended(samples, model.vehicle))
     if found is None:
         return {}, 0.0
     more = {}

@@ -50,7 +50,7 @@ def test_commands_count_with_the_dynamic_pressure_where_that_explains_more():
     for plain in ([wind], [flight]):
         assert by_pressure(plain, its) == (plain, its)
     told = its.model_copy(update={"reference_airspeed_mps": 20.0})
-    assert by_pressure([pressed(flight)], told)[1] is told
+    assert by_pressure([pressed(flight)], told)[1] == told
 
 
 def test_under_other_laws_each_surface_has_its_own_power_of_the_airspeed():

@@ -45,7 +45,7 @@ def test_the_smallest_loss_is_where_flights_begin_to_show_it(wing, wing_folder, 
 
 def test_surfaces_that_move_together_are_said_to_and_named_together(wing_folder):
     """Two surfaces on one command: a loss in either gives the same rates, so both are named."""
-    (wing_folder / "slaved.yaml").write_text(SLAVED)
+    (wing_folder / "slaved.yaml").write_text(SLAVED + "\nother_laws: false\nmoving_air: false\n")
     slaved = load_vehicle(wing_folder / "slaved.yaml")
     healthy = synthetic.fly(300.0, seed=61)
     del healthy["right_effectiveness"], healthy["left_effectiveness"]

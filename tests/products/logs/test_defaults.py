@@ -1,0 +1,73 @@
+"""What is assumed where a vehicle file says nothing of laws and air; evidence in other noise; groups."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import small
+
+from beaver_ftc_logs.diagnose import _as_wide, _with_untold
+from beaver_ftc_logs.filtering import least_scale
+from beaver_ftc_logs.identification import assumed
+from beaver_ftc_logs.model import Fitted
+
+BARE = {key: of for key, of in small.WING.items() if key != "labels"}
+RNG = np.random.default_rng(5005)
+
+
+@pytest.mark.parametrize(
+    ("of", "keys", "taken"),
+    [
+        (BARE, {}, (True, True)),
+        (small.WING, {}, (False, False)),
+        (BARE, {"moving_air": False}, (True, False)),
+        (small.WING, {"other_laws": True}, (True, False)),
+    ],
+)
+def test_laws_and_air_are_taken_to_be_others_unless_labels_or_a_key_say(of, keys, taken):
+    model = small.model(of)
+    vehicle, lines = assumed([small.flight(model, n=60)], small.vehicle(of, **keys))
+    assert (vehicle.other_laws, vehicle.moving_air) == taken
+    assert [line.partition(":")[0] for line in lines[:2]] == ["other_laws", "moving_air"]
+    assert sum("as the vehicle file says" in line for line in lines) == len(keys)
+
+
+def test_a_log_is_read_finely_unless_the_air_stands_still_or_labels_show_faults():
+    rates = [small.vehicle(of, **keys).rate_hz for of, keys in (
+        (BARE, {}), (small.WING, {}), (BARE, {"moving_air": False}), (small.WING, {"moving_air": True}),
+    )]  # fmt: skip
+    assert rates == [100.0, 20.0, 20.0, 100.0]
+
+
+@pytest.mark.parametrize(("span", "times"), [(1, 1.0), (10, (2.0 * 10**2 + 1.0) / (3.0 * 10.0))])
+def test_noise_is_as_much_larger_as_it_is_and_as_its_sums_are(span, times):
+    """Noise of nine times the variance, white or held for `span` samples: sums over n = 10 samples at any
+    place have (2 n^2 + 1) / (3 n) times the variance that sums of white noise have."""
+    held = np.repeat(RNG.standard_normal((6000 // span, 3)), span, axis=0)
+    covariance = np.diag([1.0, 4.0, 9.0])
+    residual = 3.0 * held * np.sqrt(np.diag(covariance))
+    scale = least_scale(residual, np.ones(6000, bool), covariance, 100.0)
+    assert np.median(scale[1000:]) == pytest.approx(9.0 * times, rel=0.15)
+    cut = least_scale(residual[:500], np.ones(500, bool), covariance, 100.0)
+    assert np.allclose(cut, scale[:500])
+
+
+def test_a_surface_of_unknown_effect_is_named_with_any_other_once_it_moves():
+    model = small.model(fitted=Fitted(commands=[], rates=[], tied=[1.0, 0.0]).model_dump())
+    rows = small.rows([(20, "", (1.0, 1.0)), (40, "left", (1.0, 0.5))])
+    flown = small.flight(model, n=60)
+    still = replace(flown, commands=np.column_stack([np.full(60, 0.2), flown.commands[:, 1]]))
+    assert set(_with_untold(still, model, rows).named[20:]) == {"left"}
+    found = _with_untold(flown, model, rows)
+    assert set(found.named[20:]) == {"right+left"}
+    assert (found.high[20:] == 1.0).all()
+    assert np.array_equal(found.high[:20], rows.high[:20])
+
+
+@pytest.mark.parametrize(
+    ("now", "said", "wide"),
+    [("unknown", "left", True), ("right+left", "left", True), ("right", "left", False)],
+)
+def test_a_surface_that_was_excluded_stays_so(now, said, wide):
+    assert _as_wide(now, said, small.model(settings={"one_group": True})) is wide
+    assert not _as_wide(now, said, small.model())

@@ -1,5 +1,6 @@
 """`beaver-ftc derive` and `beaver-ftc import`: aircraft of other people."""
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -8,6 +9,8 @@ import typer
 from beaver_ftc.cli import Format, FormatOption, answer, complain
 from beaver_ftc.commands import declare
 from beaver_ftc.documents import BadInput
+
+MOMENT_S = 0.1  # of flight
 
 
 class Import:
@@ -40,6 +43,7 @@ def derive(
     if engines and out is None:
         raise BadInput("--engines: needs a folder of its own, allowed: with --out")
     made = derive(aircraft, out, envelope, lambda what: complain(f"deriving: {what}"), engines=engines)
+    _compile_for(made.aircraft.folder, "deriving")
     document = document_of(made)
     answer(format, document, lambda: text_of(document))
 
@@ -64,5 +68,22 @@ def gtm(
     """
     from beaver_ftc_aircraft.gtm.conversion import convert, document_of, text_of
 
-    document = document_of(convert(database, out, tell=lambda what: complain(f"importing: {what}")))
+    made = convert(database, out, tell=lambda what: complain(f"importing: {what}"))
+    _compile_for(made.folder, "importing")
+    document = document_of(made)
     answer(format, document, lambda: text_of(document))
+
+
+def _compile_for(folder: Path, doing: str) -> None:
+    """Fly an aircraft for a moment: what it compiles, no first flight has to wait for.
+
+    One that cannot be flown so is none the worse for it: its flights say why.
+    """
+    from beaver_ftc.documents import Document
+    from beaver_ftc.loop import fly
+    from beaver_ftc.scenario import validate_scenario
+
+    complain(f"{doing}: compile")
+    with suppress(Exception):
+        beside = {"name": "first-flight", "aircraft": f"./{folder.name}", "duration_s": MOMENT_S}
+        fly(validate_scenario(Document(beside), folder=folder.parent))

@@ -195,13 +195,15 @@ def _check_options(options: Options) -> None:
 
 
 def _by_aircraft(options: Options) -> None:
-    from beaver_ftc_logs import certified
     from beaver_ftc_logs.by_aircraft import as_text, diagnosed, known, take
     from beaver_ftc_logs.pages import write_by_aircraft
     from beaver_ftc_logs.readers import check_exists
     from beaver_ftc_logs.samples import parts_for
     from beaver_ftc_logs.scoring import score
     from beaver_ftc_logs.vehicle import load_vehicle
+
+    if options.certificate:
+        from beaver_ftc_logs import certified
 
     by = known(str(options.aircraft), options.scenario)
     verdicts = []

@@ -10,8 +10,9 @@ from functools import cache
 from types import UnionType
 from typing import Any, Self, Union, get_args, get_origin, get_type_hints
 
-from beaver_ftc.documents.plain import Document
+from beaver_ftc.documents import plain
 
+Document = plain.Document
 Span = tuple[float, float]
 
 

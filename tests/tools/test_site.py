@@ -154,7 +154,7 @@ def test_only_pages_with_equations_load_what_sets_them(site):
     [
         "index",
         "reference/scenarios",
-        "explanation/theory",
+        "explanation/detection",
         "reference/scenario-keys",
         "notebooks/first-fault",
     ],

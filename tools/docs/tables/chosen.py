@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from beaver_ftc.documents.document import parse
-from beaver_ftc.studies.compare.trial import CALIBRATION, CALIBRATION_ERRORS
+from beaver_ftc.studies.compare.trial import CALIBRATION
 from beaver_ftc.studies.present.tables import markdown_table
 
 Document = dict[str, Any]
@@ -49,7 +49,7 @@ def draws_of(flights: Document) -> set[tuple[str, int]]:
 def _of_sets(sets: list[str] | str) -> list[int]:
     known = sorted(path.name for path in BENCHMARK.iterdir() if path.is_dir())
     if sets == COMPARED:
-        sets = [name for name in known if name not in (CALIBRATION, CALIBRATION_ERRORS)]
+        sets = [name for name in known if not name.startswith(CALIBRATION)]
     files = (path for name in sets for path in sorted((BENCHMARK / name).glob("*.yaml")))
     return [int(parse(path.read_text(encoding="utf-8")).data["seed"]) for path in files]
 

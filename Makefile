@@ -127,6 +127,7 @@ drawn: $(VENV)/.dev
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/python -m tools.words
 	$(BIN)/mypy
 
 docs: $(VENV)/.dev

@@ -199,7 +199,7 @@ async def turn(
         await asyncio.sleep(seconds)
         took_s, worked_s = time.monotonic() - start_s, processor_s(pid) - worked_s
         found = {
-            ("frames to whoever flies", "1/s"): flyer.frames / took_s,
+            ("frames to the pilot", "1/s"): flyer.frames / took_s,
             ("jitter of the flight's clock", "ms RMS"): statistics.median(flyer.jitter_ms),
             ("processor, server and flight", "cores"): worked_s / took_s,
         }

@@ -1,7 +1,7 @@
 """Commands of the package as processes of their own, without half a second to two for what each imports.
 
 One process imports the package and flies once; each command is forked from it, with the arguments, folder,
-environment, files and signals of whoever called it. `Served(python, bin)` starts it, with another
+environment, files and signals of its caller. `Served(python, bin)` starts it, with another
 installation's interpreter if need be; `scripts(folder)` puts a `beaver-ftc` and a `python` there that ask it,
 for shells: the latter for modules (`python -m tools.docs`), with any other arguments it is the interpreter.
 It needs Linux. Where the environment says of kernels what it did not say to the one process (where they are
@@ -182,9 +182,9 @@ def _become(asked: dict[str, Any], files: array.array, bin: str) -> NoReturn:
     sys.path[1:1] = filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))
     signal.signal(signal.SIGINT, signal.default_int_handler)
     for stream, number, mode in (("stdin", 0, "r"), ("stdout", 1, "w"), ("stderr", 2, "w")):
-        anew = open(number, mode, encoding="utf-8", buffering=1 if number == 2 else -1, closefd=False)  # noqa: SIM115
-        setattr(sys, stream, anew)
-        setattr(sys, f"__{stream}__", anew)
+        replacement = open(number, mode, encoding="utf-8", buffering=1 if number == 2 else -1, closefd=False)  # noqa: SIM115
+        setattr(sys, stream, replacement)
+        setattr(sys, f"__{stream}__", replacement)
     from beaver_ftc.cli.begin import main
     from beaver_ftc.documents.errors import say_once
 

@@ -2,9 +2,9 @@
 
 Of a fault whose parameter stays as it is, the data since the alarm leave an interval. With it the deflection
 of its surface at a command u lies in an interval: stuck [c-, c+], floating 0, a loss [e- u, e+ u], a bias
-u + [b-, b+]. Two types on one surface are told apart by a frame in which these are further from each other
+u + [b-, b+]. Two types on one surface are distinguished by a frame in which these are further from each other
 than twice what the uncertainty hides, 2 B / |G_i|, on some axis, and from the command: a frame that health
-explains says nothing of a fault that may go. Two surfaces a and b are told apart along d,
+explains says nothing of a fault that may go. Two surfaces a and b are distinguished along d,
 d G_b = 0, by a frame in which a is off its command by more than 2 |d| B / |d G_a|: whatever b does, it does
 nothing there. B is the bound on a frame's innovation at the largest rates the doublet may reach.
 
@@ -99,7 +99,7 @@ class Situation:
 def separate(scenario: Scenario, rate_deg_s: float = LARGEST_RATE_DEG_S) -> Document:
     """Fly it, and propose for each two of the candidates left what is certain to tell them apart.
 
-    Raises BadInput where nothing is to be told apart.
+    Raises BadInput where no candidates remain to be distinguished.
     """
     check_scheme(scenario)
     if scenario.fdi.pairs:

@@ -190,7 +190,7 @@ class BeaverVectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
     """`num_envs` environments as one, flown by `workers` processes, this one among them; as many as there are
     cores if left out.
 
-    options: those of BeaverEnv. An episode that is over begins anew with the next step, whose action is not
+    options: those of BeaverEnv. An episode that is over restarts with the next step, whose action is not
     looked at (AutoresetMode.NEXT_STEP). `infos["metrics"][i]` is the document metrics.json of an episode that
     has ended with this step, `infos["_metrics"]` says which have.
     """

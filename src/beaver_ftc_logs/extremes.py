@@ -1,6 +1,6 @@
 """How often a healthy flight alarms: the tail of the alarm statistic on parts that were not fitted.
 
-The statistic is Page's sum of evidence for a fault [Page1954]. It starts anew whenever it falls to zero, so
+The statistic is Page's sum of evidence for a fault [Page1954]. It starts again whenever it falls to zero, so
 the highest values between two such times are independent of one another. Those over a level u are Poisson in
 time, and their excess has the generalised Pareto distribution [Coles2001, section 4.2]:
 

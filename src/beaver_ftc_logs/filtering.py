@@ -78,7 +78,7 @@ def evidence(posterior: Floats, bank: Bank) -> Floats:
 
 @kernel
 def accumulated(gained, most):
-    """Page's sum of gained (n,): never below zero, where it starts anew, and never above most, (n,)."""
+    """Page's sum of gained (n,): never below zero, where it starts again, and never above most, (n,)."""
     total, found = 0.0, np.zeros(len(gained))
     for k in range(len(gained)):
         total = min(max(total + gained[k], 0.0), most)

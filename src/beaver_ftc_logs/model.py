@@ -134,7 +134,8 @@ class Colour(Section):
     )
     noise: Matrix = Field(description="covariance of the residual whitened by that, (3, 3), (rad/s)2")
     before: Matrix = Field(
-        default=[], description="what so many residuals before foretell of the next, latest first, (3 L, 3)"
+        default=[],
+        description="AR coefficients: the previous residuals predict the next, latest first, (3 L, 3)",
     )
     wider: Number = Field(
         1.0,
@@ -169,7 +170,7 @@ class Model(Section):
     @model_validator(mode="after")
     def _fits(self) -> "Model":
         rows = 3 * self.history + len(self.vehicle.past_names) * self.vehicle.felt(self.history)
-        says = f"has {len(self.past)} rows, allowed: {rows}, as `identify` writes them: identify it anew"
+        says = f"has {len(self.past)} rows, allowed: {rows}, as `identify` writes them: identify it again"
         conflicts: list[Conflict] = [(("past",), says)] * (len(self.past) != rows)
         conflicts += [*self._groups_wrong(), *self._shapes_wrong(len(self.past))]
         refuse(conflicts)  # before any of it is computed with

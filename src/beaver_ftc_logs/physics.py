@@ -45,7 +45,7 @@ class Followed:
 def roll_of(rates: list[Column], roll: Column, pitch: Column | None) -> Followed | None:
     """How the roll angle follows the rates; None where too little moves. All of them as the log says, in SI.
 
-    rates: p, q, r. Not where the nose is so steep that roll and yaw are hardly told apart.
+    rates: p, q, r. Not where the nose is so steep that roll and yaw are hard to distinguish.
     """
     t_s = rates[0].t_s
     p, q, r = (_at(column, t_s) for column in rates)

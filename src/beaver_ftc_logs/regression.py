@@ -3,8 +3,8 @@
     rates[k] = c + A [rates[k-1..k-h], signals[k-1]] + sum over groups g of e_g sum_j b_gj u_g[k-j] + noise
 
 Surfaces whose commands are proportional to one another move together while they are healthy: their effects
-cannot be told apart by any fit, so they form one group with one response. Of a fit: what a coloured residual
-does to its covariance, and which regressors are collinear.
+cannot be distinguished by any fit, so they form one group with one response. Of a fit: what a coloured
+residual does to its covariance, and which regressors are collinear.
 """
 
 from dataclasses import dataclass

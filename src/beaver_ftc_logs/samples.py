@@ -131,7 +131,7 @@ def with_pressure(samples: Samples, reference_mps: float, powers: Sequence[float
 
 def whitened(samples: Samples, colour: Sequence[float], weight: float = 1.0) -> Samples:
     """The flight with rates, commands and signals filtered by C(1) / C(z), C the moving average of the noise
-    (1, c1, ...): what is left of an autoregressive model is then white [Ljung1999, section 4.2]. Begins anew
+    (1, c1, ...): what is left of an autoregressive model is then white [Ljung1999, section 4.2]. Begins again
     after a gap, and where a number is missing."""
     from scipy.signal import lfilter
 

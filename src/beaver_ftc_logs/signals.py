@@ -42,7 +42,7 @@ def clipped(values: Floats) -> Mask:
         since = np.maximum.accumulate(np.where(_moved(side) | ~at_most, rows, 0))
         level = np.cumsum(
             _moved(np.maximum.accumulate(known)).astype(np.int64)
-        )  # a larger value begins the count anew
+        )  # a larger value begins the count again
         met = np.cumsum(at_most) - _before_level(at_most, level)
         found |= at_most & (rows - since >= _CLIPPED_ROWS - 1) & (met >= _CLIPPED_SEEN)
     return found

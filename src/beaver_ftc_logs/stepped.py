@@ -60,7 +60,7 @@ def step_through(diagnosis: Diagnosis, inputs: Sequence[Floats], rate_hz: float)
     expected = np.empty((*innovation.shape, inputs[2].shape[1]))
     for k, sample in enumerate(zip(*map(np.ascontiguousarray, inputs), strict=True)):
         verdicts.append(diagnosis.step(*sample))
-        innovation[k], bound[k], expected[k] = diagnosis.surprise()
+        innovation[k], bound[k], expected[k] = diagnosis.innovation()
     theta = _explaining(innovation[:, :, None], bound[:, :, None], expected)
     theta[0][0], theta[1][0] = -1.0, 0.0  # the first sample ends no frame
     reach = max(round(STANDS_S * rate_hz), 1)

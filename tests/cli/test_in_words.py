@@ -208,7 +208,7 @@ def test_where_a_flightgear_is(given, port):
 def test_runs_end_with_the_worst_status_and_a_document_of_all(monkeypatch, capsys):
     ended = {"good": {"passed": True}, "bad": {"passed": False}, "lost": SimulationFailed("gone")}
 
-    def one(scenario, options, prepare):
+    def one(scenario, options, prepare, drawn):
         if isinstance(ended[scenario.name], Exception):
             raise ended[scenario.name]
         return {"scenario": scenario.name, "folder": "f", **ended[scenario.name]}
@@ -222,7 +222,7 @@ def test_runs_end_with_the_worst_status_and_a_document_of_all(monkeypatch, capsy
     )
     for names, status in ((("good",), 0), (("good", "bad"), 1), (("lost", "bad"), 3), (("lost",), 3)):
         scenarios = [type("S", (), {"name": name})() for name in names]
-        assert run._run_all(scenarios, run.Options(scenarios=[], format=Format.json)) == status
+        assert run._run_all(scenarios, run.Options(scenarios=[], format=Format.json), ((), ())) == status
         shown = capsys.readouterr()
         document = json.loads(shown.out)
         assert document["passed"] is (status == 0)

@@ -92,7 +92,7 @@ POWER = {
     "studies__power__survey__contenders": lambda names: names,
     "studies__engine__workers__cores": 7,
 }
-CHANCES = {"studies__power__chances__answers": ["found soon"]}
+CHANCES = {"studies__power__probabilities__answers": ["found soon"]}
 REPRODUCE = {
     "studies__reproduce__reproduction__reproduce": {"passed": False},
     "studies__reproduce__reproduction__as_text": "r",

@@ -266,7 +266,7 @@ def test_damaged_code_is_compiled_anew_and_it_is_said_once(tmp_path, capsys, har
     capsys.readouterr()
     assert how(tmp_path) == "compiled"
     (line,) = capsys.readouterr().err.splitlines()
-    assert f"is not run: {says}; it is compiled anew" in line
+    assert f"is not run: {says}; it is compiled again" in line
     assert file.stat().st_mode & 0o022 == 0
     assert how(tmp_path) == "loaded"
 

@@ -187,7 +187,7 @@ def test_declared_turbulence_follows_the_altitude_that_is_given():
         sample = [0.01, 0.02, 0.03], [0.1, 0.01, 45.0, 1000.0, 0.2], [0.0] * 4, [0.0, 0.1, 0.0]
         for _ in range(3):
             diagnosis.step(*sample, altitude_m)
-        bounds[altitude_m] = diagnosis.surprise()[1]
+        bounds[altitude_m] = diagnosis.innovation()[1]
     assert (bounds[None] == bounds[1828.8]).all()
     assert (bounds[20.0] > bounds[1828.8]).all()
     with pytest.raises(bf.BadInput, match="is not finite"):
@@ -200,7 +200,7 @@ def test_what_a_frame_left_unexplained_is_held_against_the_bound_of_that_frame()
     diagnosis, rows = noisy.diagnosis(), []
     for sample in noisy.samples[:120]:
         diagnosis.step(*sample)
-        rows.append((*diagnosis.surprise(), diagnosis.inside()[0]["fdi"]["bound"].copy()))
+        rows.append((*diagnosis.innovation(), diagnosis.inside()[0]["fdi"]["bound"].copy()))
     for (*_, then), (innovation, bound, _, now) in pairwise(rows[60:]):
         errors = (then["noise"][0] + now["noise"][0]) * 100.0
         apart(errors=errors, bound=bound, innovation=innovation, eta_bar=then["eta_bar"][0])
@@ -213,7 +213,7 @@ def test_the_model_is_what_the_surfaces_are_expected_to_give():
     for sample in flown.samples[:50]:
         diagnosis.step(*sample)
     f, G = diagnosis.model()
-    means = diagnosis.surprise()[2]
+    means = diagnosis.innovation()[2]
     assert (f.shape, G.shape) == ((3,), (3, 4))
     assert G * flown.samples[49][2] == pytest.approx(means, rel=0.05, abs=1e-3)
     model = bf.linearise(flown.scenario)

@@ -7,7 +7,7 @@ import pytest
 
 from beaver_ftc.results.metrics import faults_of, hints
 from beaver_ftc.results.model import Metrics
-from beaver_ftc.results.verdict import facts, mood, title
+from beaver_ftc.results.verdict import facts, outcome_class, title
 from beaver_ftc.scenario.schema import Scenario
 
 LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4, "at_s": 12}
@@ -106,9 +106,9 @@ def _document(**changes):
 
 def test_a_lost_aircraft_is_said_and_not_green():
     lost = _document(departure={"time_s": 3.0, "signal": "altitude"})
-    assert (title(Metrics.of(lost)), mood(Metrics.of(lost))) == (
+    assert (title(Metrics.of(lost)), outcome_class(Metrics.of(lost))) == (
         "x: flown, the aircraft was LOST, nothing was expected",
         "lost",
     )
-    assert mood(Metrics.of(_document())) == "good"
-    assert mood(Metrics.of(lost | {"passed": False})) == "bad"
+    assert outcome_class(Metrics.of(_document())) == "good"
+    assert outcome_class(Metrics.of(lost | {"passed": False})) == "bad"

@@ -93,7 +93,7 @@ def test_the_words_of_a_flight(name, changed):
     opened = Opened(FLIGHTS[name].scenario, metrics(FLIGHTS[name]))
     assert not changed({
         "terminal": verdict.verdict_text(Metrics.of(opened.metrics), "runs/x").splitlines(),
-        "mood": verdict.mood(Metrics.of(opened.metrics)),
+        "outcome_class": verdict.outcome_class(Metrics.of(opened.metrics)),
         "repr": repr(opened).splitlines(), "html": opened._repr_html_(),
     })  # fmt: skip
 

@@ -379,7 +379,7 @@ def test_a_certificate_is_counted_with_the_command_that_checks_it(statements, wi
 
 
 @pytest.mark.parametrize(
-    ("changes", "title", "mood"),
+    ("changes", "title", "outcome_class"),
     [
         ({"passed": True}, "PASSED", "good"),
         ({"passed": True, "departure": None}, "PASSED", "good"),
@@ -389,9 +389,9 @@ def test_a_certificate_is_counted_with_the_command_that_checks_it(statements, wi
         ({"expectations": [], "passed": True}, "flown, nothing was expected", "good"),
     ],
 )
-def test_the_title_and_the_mood(changes, title, mood):
+def test_the_title_and_the_mood(changes, title, outcome_class):
     document = flown(**changes)
-    assert (verdict.title(Metrics.of(document)), verdict.mood(Metrics.of(document))) == (
+    assert (verdict.title(Metrics.of(document)), verdict.outcome_class(Metrics.of(document))) == (
         f"a-flight: {title}",
-        mood,
+        outcome_class,
     )

@@ -31,9 +31,9 @@ from beaver_ftc.studies.detectability import (
     exclusion_magnitude,
     geometry,
     judge,
+    least_distinguished_rad,
     mismatch,
     run_survey,
-    told_apart_rad,
     with_aircraft,
 )
 from flying import loss, scenario
@@ -230,7 +230,7 @@ def test_what_is_told_apart_no_deflection_of_the_other_explains(column, other, b
     column, other, bound = map(np.array, (column, other, bound))
     if np.abs(column).max() < 0.05 or np.abs(other).max() < 0.05:
         return
-    least = min(told_apart_rad(column, other, bound), 1e3)
+    least = min(least_distinguished_rad(column, other, bound), 1e3)
     tried = np.linspace(-60.0, 60.0, 24001)[:, None]
 
     def unexplained(rad):

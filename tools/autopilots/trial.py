@@ -1,6 +1,6 @@
 """A bad line between an autopilot and an endpoint: what is flown twice, or lost?
 
-Packets are lost, doubled, overtaken, cut; garbage and strangers come between; either side is silent for
+Packets are lost, doubled, overtaken, cut; garbage and other senders come between; either side is silent for
 seconds; the autopilot is started again. The line's own clock runs, so that nothing has to be waited for. Each
 frame bears its number in its outputs; `Spy` keeps what is flown.
 """
@@ -121,14 +121,14 @@ def number_in_pulses(outputs: Any) -> int:
 
 
 def ardupilot(body: Any, frames: int, seed: int, rate_hz: int = 400, a_flight: int = 2500) -> Found:
-    """So many frames of ArduPilot's protocol over a bad line, begun anew after about `a_flight` of them."""
+    """So many frames of ArduPilot's protocol over a bad line, restarted after about `a_flight` of them."""
     line, spy, link, found = Line(seed), Spy(body, number_in_pulses), Link(), Found()
     end, port, done = Ardupilot(spy, link), 1, 0
     while done < frames:
         size = min(int(line.rng.integers(a_flight // 2, 2 * a_flight)), frames - done)
         if found.meant:
             line.now_s += 0.0 if line.rng.random() < 0.5 else 3.0
-            port += bool(line.rng.random() < 0.5)  # a process started anew mostly has another
+            port += bool(line.rng.random() < 0.5)  # a process started again mostly has another
         meant: list[int] = []
         found.meant.append(meant)
         _fly_ardupilot(line, end, port, size, rate_hz, meant)

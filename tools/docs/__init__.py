@@ -1,1 +1,1 @@
-"""Documentation made from what it documents: `python -m tools.docs` writes it anew."""
+"""Documentation made from what it documents: `python -m tools.docs` writes it again."""

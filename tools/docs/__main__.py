@@ -1,9 +1,9 @@
 """Documentation that its commands print.
 
-python -m tools.docs [PAGE ...]    write every cheap block, number and picture anew
+python -m tools.docs [PAGE ...]    write every cheap block, number and picture again
 python -m tools.docs --check       print what stands otherwise and every wrong name; status 1 if any
 python -m tools.docs table NAME    print a table; `constants` and `properties` print those
-python -m tools.docs screens       take the pictures of report and live page anew, with a browser
+python -m tools.docs screens       take the pictures of report and live page again, with a browser
 python -m tools.docs reference NAME    print a page of the generated reference, as the web site has it
 python -m tools.docs prose         print how often each page breaks a rule of prose.py, as prose.yaml has it
 """

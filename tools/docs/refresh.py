@@ -1,4 +1,4 @@
-"""Pages with what their commands print: written anew, or compared with what stands."""
+"""Pages with what their commands print: written again, or compared with what stands."""
 
 import hashlib
 import json
@@ -32,7 +32,7 @@ class Wanted:
     dear: bool = False
     probes: bool = False
     only: str = ""
-    anew: bool = False  # also what is kept of an earlier run
+    refreshed: bool = False  # also what is kept of an earlier run
 
     def flies(self, origin: Origin) -> bool:
         """Whether the command itself is run, not its probe."""
@@ -61,7 +61,7 @@ def outputs_of(pages: Sequence[Page], wanted: Wanted, jobs: int | None = None) -
     cheap, dear = wanted.commands(origins)
     needed = {origin.needs for origin in origins}
     kept = Kept(needed)
-    known = {} if wanted.anew else {line: found for line in set(cheap) if (found := kept.get(line))}
+    known = {} if wanted.refreshed else {line: found for line in set(cheap) if (found := kept.get(line))}
     printed = outputs([line for line in cheap if line not in known], set(dear), jobs, needed)
     for line in set(cheap) & printed.keys():
         kept.put(line, printed[line])
@@ -91,7 +91,7 @@ class Refreshed:
 
     @property
     def text(self) -> str:
-        """The page anew."""
+        """The page again."""
         text = self.page.text
         for begin, end, new in sorted(self._edits, reverse=True):
             text = text[:begin] + new + text[end:]
@@ -253,33 +253,33 @@ def changed_since(name: str) -> bool:
 
 
 def write(pages: Sequence[Page], wanted: Wanted, jobs: int | None = None) -> tuple[list[str], list[Finding]]:
-    """Write pages and pictures anew: (files that were written, what could not be)."""
+    """Write pages and pictures again: (files that were written, what could not be)."""
     printed = outputs_of(pages, wanted, jobs)
     written: list[str] = []
     findings: list[Finding] = []
     for page in pages:
-        anew = Refreshed(page, printed, wanted)
-        findings += anew.findings
-        if anew.text != page.text:
-            (ROOT / page.name).write_text(anew.text, encoding="utf-8")
+        refreshed = Refreshed(page, printed, wanted)
+        findings += refreshed.findings
+        if refreshed.text != page.text:
+            (ROOT / page.name).write_text(refreshed.text, encoding="utf-8")
             written.append(page.name)
-        for name, content in anew.drawn.items():
+        for name, content in refreshed.drawn.items():
             pictures.write(ROOT / "docs" / "images" / name, content)
             written.append(f"docs/images/{name}")
     return written, findings
 
 
 def check(
-    pages: Sequence[Page], jobs: int | None = None, anew: bool = False
+    pages: Sequence[Page], jobs: int | None = None, refreshed: bool = False
 ) -> tuple[list[Finding], dict[str, Output]]:
     """What is wrong on the pages, and what is only said; and what every command printed."""
-    wanted = Wanted(probes=True, anew=anew)
+    wanted = Wanted(probes=True, refreshed=refreshed)
     printed = outputs_of(pages, wanted, jobs)
     made = [Refreshed(page, printed, wanted) for page in pages]
     return [finding for page in made for finding in (*page.findings, *page.changes)], printed
 
 
 def slowest(printed: dict[str, Output], count: int) -> list[str]:
-    """The commands that take longest, for whoever wants the check to be quicker."""
+    """The commands that take longest, to make the check quicker."""
     ranked = sorted(printed.items(), key=lambda entry: -entry[1].processor_s)
     return [f"{output.processor_s:6.1f} s  {line}" for line, output in ranked[:count]]

@@ -4,8 +4,9 @@
 
 Of N flights of our scheme that are certified, from the schema (`python -m tools.drawn`), each certificate is
 checked; then A times one number, index or frame of one of them is altered, drawn by the seed: as it is, and
-with the digest written anew, so that only what is recomputed is left to refuse it. Exit status 1 where a true
-certificate is refused or an altered one accepted, or where a second reader (tools/drawn/reader.py) differs.
+with the digest written again, so that only what is recomputed is left to refuse it. Exit status 1 where a
+true certificate is refused or an altered one accepted, or where a second reader (tools/drawn/reader.py)
+differs.
 """
 
 import argparse
@@ -69,9 +70,9 @@ def main() -> None:
             count["altered"] += 1
             other = altered(written, place)
             count["accepted"] += not [*failures(other, log, scenario)]
-            anew = sealed(other)
-            accepts = not [*failures(anew, log, scenario)]
-            if accepts == bool([*doubts(anew, log, scenario)]):
+            resealed = sealed(other)
+            accepts = not [*failures(resealed, log, scenario)]
+            if accepts == bool([*doubts(resealed, log, scenario)]):
                 count["readers disagree"] += 1
                 print(f"{index}: {place}: accepted by {'the first' if accepts else 'the second'}", flush=True)
             if accepts:
@@ -81,7 +82,7 @@ def main() -> None:
     print(f"of the processor {kept:.1f} ms to keep the frames, {wrote:.1f} ms to write it (medians)")
     for reason, n in without.most_common():
         print(f"{n:6d} without: {reason}")
-    print(f"with the digest written anew {unseen.total()} accepted:", dict(unseen.most_common()))
+    print(f"with the digest written again {unseen.total()} accepted:", dict(unseen.most_common()))
     wrong = ("refused", "doubted by a second reader", "accepted", "readers disagree")
     raise SystemExit(1 if any(count[word] for word in wrong) or unseen else 0)
 

@@ -96,7 +96,7 @@ def _declare_model(truth: Words, bounds: Words) -> None:
 
 
 def _declare_air(words: Words, bounds: Words) -> None:
-    """Turbulence; and gusts, which the vanes see. Who reckons with turbulence takes their slope for a
+    """Turbulence; and gusts, which the vanes see. A diagnosis that expects turbulence takes their slope for a
     rotation of the air, and JSBSim's gusts do not turn it."""
     air = words.get("environment", {})
     there, declared = air.get("severity", "none"), bounds.get("turbulence", "none")

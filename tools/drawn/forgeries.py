@@ -5,8 +5,8 @@
 The true certificates of N drawn flights of our scheme, and of N healthy ones, are taken. F times in all a
 false statement is put into one of them: an alarm in a row in which there was none, an exclusion of a fault
 that is not excluded, or at another time. Its evidence is altered by one to three of ROADS, its sides and the
-digest are written anew. Log and scenario stay as they are. Exit status 1 where either reader accepts a forged
-certificate, or refuses a true one. How often each road was taken is printed.
+digest are written again. Log and scenario stay as they are. Exit status 1 where either reader accepts a
+forged certificate, or refuses a true one. How often each road was taken is printed.
 """
 
 import argparse

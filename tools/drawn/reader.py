@@ -324,10 +324,10 @@ class Fault:
 def _read(said: Document, flight: Flight) -> list[tuple[float, float]]:
     """A residual of section 9 and its bound: what the look before left of both, and what this one adds."""
     k, residual, bound = said["frame"], 0.0, 0.0
-    for reading, foretold, most in reversed(said["looks"]):
+    for reading, predicted, most in reversed(said["looks"]):
         if most < 0.0:
             raise Doubtful("sound instruments that differ by less than nothing")
-        residual, bound = residual + reading - foretold, bound + most
+        residual, bound = residual + reading - predicted, bound + most
     if said["what"] is not None or TESTS[int(flight.log["watch_test"][k])] != said["test"]:
         raise Doubtful(f"row {k} is of another test")
     if residual / bound > flight.log["watch_share"][k] * (1.0 + 1e-9):  # the largest of the row's looks
@@ -530,7 +530,7 @@ def _weighed(said: Document, flight: Flight) -> list[tuple[float, float]]:
     if not said["likelihood"].endswith("_likelihood_share"):
         raise Doubtful("no column of a share")
     axes, tolerance, filters = said["axes"], np.array(said["tolerance"]), Whitening(said)
-    N, D, R, foretold, w = 0.0, 0.0, np.zeros(len(tolerance)), 0.0, np.zeros(len(axes))
+    N, D, R, predicted, w = 0.0, 0.0, np.zeros(len(tolerance)), 0.0, np.zeros(len(axes))
     swinging = pacing = last = staying = 0.0
     last_row = said["first"] + len(said["frames"]) - 1
     if last_row > said["frame"] or (last_row != said["frame"] and "as" not in said):
@@ -541,14 +541,14 @@ def _weighed(said: Document, flight: Flight) -> list[tuple[float, float]]:
         g, S, K_x, K_d = filters.take(inputs, its, flight.dt)
         before, w = w, np.linalg.solve(S, g[:, 1])
         N, D, R = N + w @ g[:, 0], D + w @ g[:, 1], R + w @ g[:, 2:]
-        foretold += w @ its.get("foreseen", np.zeros(len(axes)))
+        predicted += w @ its.get("foreseen", np.zeros(len(axes)))
         if "bounded" in its:
             most, returns = 1.2 * np.abs(np.linalg.inv(K_d)) @ its["bounded"], 1.0 - its.get("keep", 1.0)
             swinging, last = swinging + most @ abs(w - before), most @ abs(w)
             pacing += last * its.get("pace", 1e9)
             for K, of_drift, bound, weight in zip(np.diag(K_x), np.diag(K_d), its["bounded"], w, strict=True):
                 staying += flight.dt * returns / (K * returns + flight.dt * of_drift) * bound * abs(weight)
-    evidence = -N - max(0.0, -foretold) if said["sense"] == "less" else abs(N)
+    evidence = -N - max(0.0, -predicted) if said["sense"] == "less" else abs(N)
     evidence -= tolerance @ abs(R)
     if D < 0.0:
         raise Doubtful("information that is none")

@@ -310,7 +310,7 @@ def _function(test: str) -> str:
 @contextmanager
 def _limit(give_up: Callable[[], None], slow_s: float) -> Iterator[None]:
     """Give up what runs inside after so many seconds of processor, or a good while of waiting for other
-    processes; and again and again, as whoever was at work may not have let go.
+    processes; and again and again, since a process at work may not have released it.
     """
     clocks = {signal.SIGPROF: (signal.ITIMER_PROF, slow_s), signal.SIGALRM: (signal.ITIMER_REAL, WAITS_S)}
 

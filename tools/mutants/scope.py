@@ -150,7 +150,7 @@ def stale() -> list[str]:
 
 
 def runs_at_import(file: Path, line: int) -> bool:
-    """Whether a line is in no function: whoever uses the module uses what it did."""
+    """Whether a line is in no function: every user of the module uses its result."""
     functions = (node for node in ast.walk(_tree(file)) if isinstance(node, ast.FunctionDef))
     return not any(node.body[0].lineno <= line <= (node.end_lineno or 0) for node in functions)
 

@@ -200,7 +200,7 @@ class Aircraft:
     def class_of_losses(self) -> tuple[str, ...]:
         """The surfaces whose loss of effectiveness is in the published fault class: the primary surface of
         each axis, then all others except those that take over from the elevator. The losses of a primary
-        surface and of one that takes over its axis cannot be told apart."""
+        surface and of one that takes over its axis cannot be distinguished."""
         others = set(self.surfaces) - set(self.primary) - set(self.stand_ins)
         return (*self.primary, *(s for s in self.surfaces if s in others))
 

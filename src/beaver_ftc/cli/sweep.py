@@ -169,8 +169,8 @@ def _stoppable() -> Iterator[Callable[[], bool]]:
             signal.setitimer(signal.ITIMER_REAL, LANDS_S)
         complain("\nstopping: flights in the air have a second to land; once more to stop at once")
 
-    heard = [signal.SIGINT, signal.SIGTERM, *([signal.SIGALRM] if hasattr(signal, "setitimer") else [])]
-    before = {number: signal.signal(number, stop) for number in heard}
+    handled = [signal.SIGINT, signal.SIGTERM, *([signal.SIGALRM] if hasattr(signal, "setitimer") else [])]
+    before = {number: signal.signal(number, stop) for number in handled}
     try:
         yield lambda: bool(signals)
     except KeyboardInterrupt:

@@ -99,7 +99,7 @@ class CodeCache:
             why_refused = "it is damaged"
         if why_refused:
             say_once(
-                f"a file of compiled code in {self._folder} is not run: {why_refused}; it is compiled anew"
+                f"a file of compiled code in {self._folder} is not run: {why_refused}; it is compiled again"
             )
             return None
         with interrupts.held():
@@ -112,7 +112,7 @@ class CodeCache:
             self._write(self._path(types, result.codegen), hashlib.sha256(content).digest() + content)
         except OSError as error:
             reason = (error.strerror or str(error)).lower()
-            say_once(f"compiled code cannot be kept in {self._folder}: {reason}; each start compiles anew")
+            say_once(f"compiled code cannot be kept in {self._folder}: {reason}; each start compiles again")
 
     def _write(self, path: Path, content: bytes) -> None:
         self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)

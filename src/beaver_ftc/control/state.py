@@ -19,7 +19,7 @@ from beaver_ftc.scenario.schema import Scenario
 CONFIG = record(law=int, uses_verdict=int, reallocates=int, informed=int)
 
 # What a law takes over from the one before: how the reference stands, what is known of the surfaces, where
-# they and the engine are. All else begins anew.
+# they and the engine are. All else restarts.
 KEPT = (
     ("reference", "output"), ("surfaces", "output"), ("allocation", "output"), ("probe", "memory"),
     ("power", "memory"), ("power", "output"),

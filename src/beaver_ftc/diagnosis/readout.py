@@ -315,7 +315,7 @@ def estimators_of(fdi: np.void) -> np.ndarray:
 
 
 def run_statistical_tests(fdi: np.void, enabled: bool) -> None:
-    """Have the statistical tests run, or not, whoever diagnoses."""
+    """Switch the statistical tests on or off, for every scheme."""
     fdi["statistical"]["tests"]["enabled"] = enabled
 
 

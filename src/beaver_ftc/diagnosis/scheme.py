@@ -60,7 +60,7 @@ def configure(fdi: np.void, belief: np.void, scenario: Scenario, travel: np.ndar
     conclusions.configure(fdi["verdict"])
 
 
-def begin_anew(fdi: np.void, before: np.void, in_flight: bool) -> None:
+def restart_diagnosis(fdi: np.void, before: np.void, in_flight: bool) -> None:
     """Prepare a configured diagnosis to take over from the one in `before`, of the same flight.
 
     Nothing of a diagnosis goes on but how close healthy flight has come to an alarm, by the same filters.

@@ -1,4 +1,4 @@
-"""Files and their mistakes: from a stranger's YAML text to checked data, where files lie, errors in words."""
+"""Files and their mistakes: from third-party YAML text to checked data, where files lie, errors in words."""
 
 from typing import TYPE_CHECKING
 

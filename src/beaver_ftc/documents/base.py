@@ -29,7 +29,7 @@ class Section(BaseModel):
 
 
 def _whole(value: Any) -> Any:
-    """1e4 and 2.0 are whole numbers to whoever writes them."""
+    """1e4 and 2.0 are accepted as whole numbers."""
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 

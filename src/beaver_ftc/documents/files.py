@@ -1,4 +1,4 @@
-"""Reading a small text file that a stranger names: a regular file, of bounded size, UTF-8."""
+"""Reading a small text file that a third party names: a regular file, of bounded size, UTF-8."""
 
 import hashlib
 import os

@@ -95,7 +95,7 @@ def add_effect(guarantee):
 def follow_guarantee(guarantee, bank, dt, share, k, t):
     """Advance the filtered effect by the elapsed frame and note the first instant t (s) of certainty.
 
-    share: one over the instants in a frame. The sum then begins anew with this instant. k: number of the
+    share: one over the instants in a frame. The sum then restarts with this instant. k: number of the
     diagnosis' frame; with its first one, of 0, its filters are empty, whatever went before.
     """
     if k == 0:

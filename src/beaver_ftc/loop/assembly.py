@@ -116,7 +116,7 @@ def configure_diagnosis_at_trim(frame: np.void, scenario: Scenario, trim: Trim) 
 
 
 def _assemble_design(scenario: Scenario, travel: np.ndarray, line: int) -> np.ndarray:
-    """The record of a design, made anew."""
+    """The record of a design, made again."""
     aircraft, dt = scenario.airframe, 1.0 / scenario.rate_hz
     frames = memory.taken_empty((1,), frame_dtype(aircraft.n, size_for(aircraft), line))
     frame, instant_s = frames[0], dt / scenario.substeps

@@ -2,7 +2,7 @@
 
 For each change the record of the flight is assembled once more, as the scenario says it from then on and from
 the same trim. At its frame the part that changes is taken from it: the law's, with what the surfaces and the
-reference stand at; the diagnosis', which begins anew; or the instruments'. Truth, belief, supervisor,
+reference stand at; the diagnosis', which restarts; or the instruments'. Truth, belief, supervisor,
 accounts and log go on, and so do plug-ins that are not changed.
 """
 
@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from beaver_ftc.control.state import take_over
-from beaver_ftc.diagnosis.scheme import begin_anew
+from beaver_ftc.diagnosis.scheme import restart_diagnosis
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.loop.plugin_frame import PluginFrame, named_detector, named_law, plugged
@@ -24,7 +24,7 @@ from beaver_ftc.scenario.timing import frame_of
 
 
 class Stage(NamedTuple):
-    """A change ready to be made: its frame, the scenario from then on, whether the diagnosis begins anew, the
+    """A change ready to be made: its frame, the scenario from then on, whether the diagnosis restarts, the
     record to take it from, the plug-ins from then on."""
 
     frame: int
@@ -122,7 +122,7 @@ def _check_delays(then: np.ndarray, now: np.ndarray) -> None:
 
 
 def renews_diagnosis(change: Change, then: Scenario) -> bool:
-    """Whether the diagnosis begins anew, in a flight that goes on as `then`: as another scheme, told other
+    """Whether the diagnosis restarts, in a flight that goes on as `then`: as another scheme, told other
     errors, or with other sensors of declared errors, since a constant error is then another, and our
     thresholds hold for one that stays."""
     told = change.scheme is not None or change.declared_sensors is not None
@@ -139,6 +139,6 @@ def take_law(frame: np.void, new: np.void) -> None:
 
 
 def take_diagnosis(frame: np.void, new: np.void, k: int) -> None:
-    """Begin the diagnosis anew with frame k, as configured in `new`."""
-    begin_anew(new["fdi"], frame["fdi"], in_flight=k > 0)
+    """Begin the diagnosis again with frame k, as configured in `new`."""
+    restart_diagnosis(new["fdi"], frame["fdi"], in_flight=k > 0)
     frame["fdi"], frame["since"] = new["fdi"], k

@@ -175,7 +175,7 @@ def take_command(frame, deflections):
 
 @kernel
 def command(frame):
-    """The law's command; or that of whoever commands in its place."""
+    """The command of the law, or of what commands in its place."""
     control, mode = frame.control, frame.supervisor.mode
     if frame.held:
         take_command(frame, frame.held_rad)

@@ -37,7 +37,7 @@ def copied(record: np.ndarray) -> np.ndarray:
 
 
 def give_back(array: np.ndarray) -> None:
-    """Whoever took it, or a copy, has done with it and with every view of it."""
+    """Return the buffer to the pool; no view of it may be used afterwards."""
     memory = array
     while isinstance(memory.base, np.ndarray):
         memory = memory.base

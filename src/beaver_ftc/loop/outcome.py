@@ -362,7 +362,7 @@ def guaranteed_delay_s(frame: np.void, scenario: Scenario, plugged: bool) -> flo
 
 
 def _is_off(scenario: Scenario, certain_s: float) -> bool:
-    """Whether by then the diagnosis was told something that is off by more than it reckons with."""
+    """Whether by then an input of the diagnosis was off by more than its declared bound."""
     if any(of_a_sensor(fault) and fault.at_s <= certain_s for fault in scenario.faults):
         return True
     flown = [scenario, *(then for change, then in stages(scenario) if change.at_s <= certain_s)]

@@ -66,7 +66,7 @@ class PluginFrame:
     """One frame of the loop with a detector or a law that is not compiled in, called as `stepping.fly_frame`.
 
     detector, law: the plug-ins, None where the built-in one is in place. start: as in `context_of`.
-    begun: the frame that this one follows in flight, whose plug-ins are not begun anew.
+    begun: the frame that this one follows in flight, whose plug-ins are not restarted.
     """
 
     def __init__(

@@ -186,7 +186,7 @@ def recorded_until_alarm(frame: np.void, n: int, statistical: bool) -> dict[str,
 
 
 def run_statistical_tests(frame: np.void, enabled: bool) -> None:
-    """Have the statistical tests run, or not, whoever diagnoses."""
+    """Switch the statistical tests on or off, for every scheme."""
     of_diagnosis.run_statistical_tests(frame["fdi"], enabled)
 
 

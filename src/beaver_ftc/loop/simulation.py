@@ -1,4 +1,4 @@
-"""A flight a step at a time: whoever calls may look, break, repair, steer and command in between.
+"""A flight step by step: between steps the caller may read, break, repair, steer and command.
 
 What is done to a flight is kept, frame by frame: `scenario_flown` says it all and flies it again to the bit.
 """
@@ -271,7 +271,7 @@ class Stepping:
     def change(self, change: Mapping[str, Any]) -> None:
         """Change law, diagnosis or sensors now, from the next frame on: as one of `changes`, without `at_s`.
 
-        A diagnosis that is changed begins anew; the log keeps its columns. Raises BadInput that names the
+        A diagnosis that is changed restarts; the log keeps its columns. Raises BadInput that names the
         key, the flight going on as it was.
         """
         self._begin()

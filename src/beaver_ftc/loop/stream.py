@@ -1,5 +1,6 @@
 """The diagnosis as a stream, without JSBSim: for another simulator, a log, an autopilot."""
 
+import warnings
 from collections.abc import Mapping
 from typing import Any
 
@@ -143,8 +144,13 @@ class Diagnosis:
         return self._scenario.fdi
 
     def surprise(self) -> tuple[Vector, Vector, Vector]:
-        """What no healthy surface explains of the frame that ended with the last sample: the innovation (3,),
-        its declared bound (3,), and what each surface was expected to give (3, surfaces), rad/s2."""
+        """The former name of `innovation`."""
+        warnings.warn("Diagnosis.surprise is now Diagnosis.innovation", DeprecationWarning, stacklevel=2)
+        return self.innovation()
+
+    def innovation(self) -> tuple[Vector, Vector, Vector]:
+        """Of the frame that ended with the last sample: the innovation (3,), its declared bound (3,), and the
+        predicted effect of each surface (3, surfaces), rad/s2."""
         innovation, bound = self._fdi["bank"]["output"]["innovation"], self._fdi["bound"]["frame"]
         return innovation.copy(), bound.copy(), self._frame["belief"]["means"]["Gu"].copy()
 

@@ -24,7 +24,7 @@ from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.model_file import check_model_has_no_side_effects
 from beaver_ftc.plant.trial import failure
 
-_FORMAT = 3  # of what is checked: aircraft admitted by another are checked anew
+_FORMAT = 3  # of what is checked: aircraft admitted by another are checked again
 
 
 @lru_cache(maxsize=32)

@@ -43,7 +43,7 @@ _SHAPES = {
     "norm": "<quotient> {of} <value> {whole!r} </value> </quotient>",
 }
 # What else of the aircraft's motion and engines its moments may depend on, dimensionless: name, and JSBSim
-# property. The aerodynamics reckon them themselves, so that they are those of the same instant.
+# property. The aerodynamics compute them themselves, so that they are those of the same instant.
 SIGNALS = {
     "thrust": "aero/thrust-coefficient",
     "alpha_rate": "aero/alphadot-hat",
@@ -265,7 +265,7 @@ def _component(surface: str, shape: str, whole: float) -> str:
 
 
 def _add_signals(aerodynamics: Element, engines: int) -> None:
-    """Let the aerodynamics reckon the signals first of all."""
+    """Let the aerodynamics compute the signals first."""
     functions = {function.get("name"): function for function in _parts().iter("function")}
     thrusts = functions["aero/thrust-coefficient"].find("quotient/sum")
     assert thrusts is not None

@@ -1,8 +1,8 @@
 """The files a JSBSim model is made of: found as JSBSim finds them, and refused where they are more than data.
 
 JSBSim obeys what a model says: `<output>` writes files and connects, `<input>` listens, `file` names any file
-of the machine. An aircraft may be a stranger's, so all that is looked for before JSBSim sees it, with the
-parser JSBSim has (expat, without namespaces): both see the same elements.
+of the machine. An aircraft may come from a third party, so all that is looked for before JSBSim sees it, with
+the parser JSBSim has (expat, without namespaces): both see the same elements.
 """
 
 import shutil

@@ -25,7 +25,7 @@ from numba.extending import intrinsic
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.plant.addresses import available, pointer
 
-if TYPE_CHECKING:  # whoever only diagnoses has compiled code of this module, and no JSBSim
+if TYPE_CHECKING:  # a diagnosis alone uses compiled code of this module, without JSBSim
     import jsbsim
 
 # What `advance` needs: code and executive; whether turbulence is to be turned, and the nodes for that.

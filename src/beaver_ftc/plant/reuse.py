@@ -10,7 +10,7 @@ What a flight leaves behind in JSBSim (1.3.3), and what takes it away:
     settings             written back; a property that is written through the plant is remembered.
     random numbers       a flight in turbulence seeds its own.
 
-Aircraft with engines are loaded anew: what their engines remember is more than this.
+Aircraft with engines are loaded again: what their engines remember is more than this.
 """
 
 import os
@@ -33,7 +33,7 @@ _free: dict[object, list[Plant]] = {}
 def borrowed(rate_hz: float, substeps: int, aircraft: Aircraft) -> Plant:
     """An aircraft as freshly loaded: one that was given back, or a new one.
 
-    Loaded anew, within a second, when one of its files has changed.
+    Loaded again, within a second, when one of its files has changed.
     """
     origin = aircraft, _last_written_ns(aircraft.jsbsim, int(monotonic()))
     try:
@@ -48,7 +48,7 @@ def borrowed(rate_hz: float, substeps: int, aircraft: Aircraft) -> Plant:
 
 
 def give_back(plant: Plant) -> None:
-    """Whoever borrowed it has done with it, and keeps nothing that reads or writes its properties."""
+    """Return it to the pool; nothing that reads or writes its properties may be used afterwards."""
     if plant.origin is None or plant.n_engines:
         return
     others = _free.setdefault(plant.origin, [])

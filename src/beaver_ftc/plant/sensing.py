@@ -27,7 +27,7 @@ from beaver_ftc.plant.instruments import (
 from beaver_ftc.plant.native import read_nodes, write_nodes
 
 FLYING, DEPARTED, NOT_FINITE = 0, 1, 2
-AT_REST_MPS = 1.0  # of an aircraft on its wheels: as slow as the truth itself reckons
+AT_REST_MPS = 1.0  # of an aircraft on its wheels: the lower limit of the truth's own equations
 # Beyond these the flight has departed: body rates, incidence and sideslip; or below the ground.
 DEPARTURE_RATE_RAD_S, DEPARTURE_ANGLE_RAD = 6.0, 0.6
 DEPARTURE_SIGNALS = ("p", "q", "r", "alpha", "beta", "altitude")

@@ -282,7 +282,7 @@ def _draw_shade(axes: "Axes", panel: Panel, series: Series) -> None:
 
 
 def _draw_marks(axes: "Axes", instants: Sequence[Mark], t_s: np.ndarray) -> None:
-    """A line each, and symbols at staggered heights so that instants close together are told apart."""
+    """A line each, and symbols at staggered heights so that instants close together can be distinguished."""
     for rank, mark in enumerate(instants):
         if not t_s.size or not t_s[0] <= mark.time_s <= t_s[-1]:
             continue

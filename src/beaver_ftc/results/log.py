@@ -103,7 +103,7 @@ class MemoryLog:
         self._chunks: list[np.ndarray] = []
 
     def open(self, columns: Sequence[str]) -> None:
-        """Start anew; `columns` name the log's columns in order."""
+        """Start again; `columns` name the log's columns in order."""
         self.columns, self._chunks = tuple(columns), []
 
     def write(self, rows: np.ndarray) -> None:
@@ -183,7 +183,7 @@ class SpooledLog(MemoryLog):
     """A `MemoryLog` that is kept in a temporary file: an hour of flight is 0.3 GB."""
 
     def open(self, columns: Sequence[str]) -> None:
-        """Start anew; what `so_far` gave before stays readable."""
+        """Start again; what `so_far` gave before stays readable."""
         super().open(columns)
         self._file = tempfile.TemporaryFile()  # noqa: SIM115 -- gone with this log, or the process
         self._frames = 0

@@ -84,7 +84,7 @@ def _ask(painter: Connection, pictures: "Sequence[Picture]") -> bool:
 
 def _serve(there: Connection, not_ours: Sequence[Connection]) -> None:
     """Draw what is asked for until the other end is closed: by its process, or with it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever began us ends us
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process ends this one
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     for each in not_ours:
         each.close()
@@ -104,7 +104,7 @@ def _serve(there: Connection, not_ours: Sequence[Connection]) -> None:
 
 
 def share(pictures: "Sequence[Picture]", among: int) -> "list[list[Picture]]":
-    """As much to draw for each: the largest first, to whoever has the least."""
+    """As much to draw for each: the largest first, to the process that has least."""
     shares: list[list[Picture]] = [[] for _ in range(among)]
     for picture in sorted(pictures, key=lambda each: -len(each.view.panels)):
         min(shares, key=lambda given: sum(1 + len(each.view.panels) for each in given)).append(picture)

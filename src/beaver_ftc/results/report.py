@@ -80,7 +80,7 @@ def _words(metrics: Document, scenario: str) -> Document:
     return {
         "metrics": metrics,
         "title": verdict.title(found),
-        "mood": verdict.mood(found),
+        "outcome_class": verdict.outcome_class(found),
         "description": yaml.safe_load(scenario).get("description", ""),
         "facts": verdict.facts(found),
         "tracking": verdict.tracking(found),

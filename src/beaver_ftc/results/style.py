@@ -1,6 +1,7 @@
 """How things look, on paper as on the screen: one table for the figures and the report.
 
-Colours are Okabe and Ito's, told apart by the colour-blind; dashes, widths and letters tell the rest in grey.
+Colours are Okabe and Ito's, which colour-blind readers can distinguish; dashes, widths and letters do so in
+grey.
 """
 
 import math

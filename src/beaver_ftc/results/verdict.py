@@ -39,7 +39,7 @@ def title(metrics: Metrics) -> str:
     return f"{metrics.scenario}: {'PASSED' if metrics.passed else 'FAILED'}{lost}"
 
 
-def mood(metrics: Metrics) -> str:
+def outcome_class(metrics: Metrics) -> str:
     """`good`, `bad`, or `lost` for an aircraft lost in a flight that did as expected: never green."""
     return "bad" if not metrics.passed else "lost" if metrics.departure else "good"
 
@@ -228,7 +228,7 @@ def _table(metrics: Metrics, folder: str) -> "Table":
     from rich.table import Table
     from rich.text import Text
 
-    style = {"good": "bold green", "lost": "bold yellow", "bad": "bold red"}[mood(metrics)]
+    style = {"good": "bold green", "lost": "bold yellow", "bad": "bold red"}[outcome_class(metrics)]
     headline = Text(title(metrics), style)
     table = Table(title=headline, title_justify="left", show_header=False, box=None)
     table.add_column(style="bold", no_wrap=True)

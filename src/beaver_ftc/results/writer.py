@@ -236,23 +236,23 @@ def refuse_foreign(folder: Path, files: Iterable[str] = ()) -> None:
         return
     if folder.is_symlink() or not folder.is_dir():
         raise SimulationFailed(f"cannot write {folder}: it exists and is not a folder")
-    strangers = _strangers_in(folder, files)
-    if strangers:
+    foreign = _foreign_files_in(folder, files)
+    if foreign:
         raise SimulationFailed(
-            f"will not replace {folder}: it holds {strangers[0]}, which is no result of beaver-ftc; "
+            f"will not replace {folder}: it holds {foreign[0]}, which is no result of beaver-ftc; "
             "move it away or choose another --out"
         )
 
 
-def _strangers_in(folder: Path, files: Iterable[str]) -> list[str]:
+def _foreign_files_in(folder: Path, files: Iterable[str]) -> list[str]:
     """What lies in a result folder and is none of ours, by its name or beside our pictures."""
     unknown = {entry.name for entry in folder.iterdir()} - FILES_OF_A_RUN - {*files}
-    strangers = [*(unknown and unknown - {*files_of_commands()})]
+    foreign = [*(unknown and unknown - {*files_of_commands()})]
     pictures = (folder / "figures").rglob("*")
-    strangers += [str(path.relative_to(folder)) for path in pictures if not _is_our_picture(path)]
+    foreign += [str(path.relative_to(folder)) for path in pictures if not _is_our_picture(path)]
     copied = (path for path in (folder / AIRCRAFT).rglob("*") if not path.is_dir())
-    strangers += [str(path.relative_to(folder)) for path in copied if path.suffix not in MODEL_FILES]
-    return sorted(strangers)
+    foreign += [str(path.relative_to(folder)) for path in copied if path.suffix not in MODEL_FILES]
+    return sorted(foreign)
 
 
 def _is_our_picture(path: Path) -> bool:

@@ -140,9 +140,9 @@ class Change(Section):
     law: Law | None = entry(
         None, "as control.law; surfaces and reference go on from where they are", examples=["nominal"]
     )
-    scheme: Scheme | None = entry(None, "as fdi.scheme; the diagnosis begins anew", examples=["zhang2005"])
+    scheme: Scheme | None = entry(None, "as fdi.scheme; the diagnosis restarts", examples=["zhang2005"])
     sensors: Sensors | None = entry(None, "as sensors: a preset, or errors by signal")
-    declared_sensors: BoundedSensors | None = entry(None, "as fdi.bounds.sensors; the diagnosis begins anew")
+    declared_sensors: BoundedSensors | None = entry(None, "as fdi.bounds.sensors; the diagnosis restarts")
 
     @model_validator(mode="after")
     def _changes_something(self) -> Self:

@@ -59,7 +59,7 @@ SETTLED_S = 2.0  # the start of a reference is a step of its own
 BISECTIONS = 16  # magnitudes to 2^-16
 MAGNITUDES = ("detected", "detected_median", "isolated", "isolated_median")
 PLACE = ("airspeed_mps", "altitude_m", "excitation")
-ALIKE_DEG = 3.0  # told apart from no less on: the rates move alike
+ALIKE_DEG = 3.0  # distinguished only from this deflection on: similar effects on the rates
 TOO_SHORT = "the flight ends before a fault could be isolated"
 MOTION = {"p": "roll", "q": "pitch", "r": "yaw"}
 COLUMNS = (*PLACE, "fault", *MAGNITUDES, "confused_with", "why")
@@ -200,7 +200,7 @@ def run_survey(
     return run_study(survey, out, progress=progress)
 
 
-def told_apart_rad(column: np.ndarray, other: np.ndarray, bound: np.ndarray) -> float:
+def least_distinguished_rad(column: np.ndarray, other: np.ndarray, bound: np.ndarray) -> float:
     """The least deflection off its command, rad, of a surface with this column of G (3,) that a frame's rates
     are certain to tell from every deflection of another; inf where the columns are parallel. bound (3,)."""
     a, b = (each[None, :] / (2.0 * bound) for each in (column, other))
@@ -218,7 +218,9 @@ def alike(scenario: Scenario) -> list[Document]:
     found = []
     for s, other in combinations(range(aircraft.n), 2):
         pairs = ((s, other), (other, s))
-        apart = [degrees(told_apart_rad(seen.G[:, i], seen.G[:, j], seen.bound[0])) for i, j in pairs]
+        apart = [
+            degrees(least_distinguished_rad(seen.G[:, i], seen.G[:, j], seen.bound[0])) for i, j in pairs
+        ]
         if max(apart) > ALIKE_DEG:
             names = aircraft.surfaces[s], aircraft.surfaces[other]
             from_deg = dict(zip(names, (x if x < inf else None for x in apart), strict=True))

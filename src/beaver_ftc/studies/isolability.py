@@ -53,7 +53,7 @@ def shown(excluded: np.ndarray, frames: int, dt: float) -> Document:
 
 
 def doublets(scenario: Scenario, after_s: float) -> dict[tuple[str, str], Document]:
-    """Of each two surfaces that lead an axis: the smallest doublet that tells losses of TOLD apart, so long
+    """Of each two surfaces that lead an axis: the smallest doublet that distinguishes losses of TOLD, so long
     after the start of a healthy flight, or why there is none."""
     find = offered("doublets")
     pairs = permutations(scenario.airframe.class_of_losses, 2)

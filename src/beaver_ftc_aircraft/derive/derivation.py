@@ -94,7 +94,7 @@ _ALLOWED = "jsbsim:NAME, a built-in name, a JSBSim model FILE.xml, or a folder w
 @dataclass(frozen=True)
 class Source:
     """An aircraft to derive. name: of the folder to be written. model: JSBSim's. folder: of an aircraft file
-    whose moments are to be found anew, else None: the model is instrumented. target: where the result goes
+    whose moments are to be found again, else None: the model is instrumented. target: where the result goes
     unless somebody says otherwise, None if somebody must."""
 
     name: str

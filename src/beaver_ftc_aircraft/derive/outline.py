@@ -2,7 +2,7 @@
 
 Surfaces, mass, dimensions, engines: how these start, at which speed and power it trims. What of the aircraft
 a design model affine in its surfaces cannot hold is found at once, said in a line. An aircraft that has a
-file already keeps all that is in it but its moments: these are found anew.
+file already keeps all that is in it but its moments: these are found again.
 """
 
 import re

@@ -227,7 +227,7 @@ def sample(
     errors: Errors | None = None,
 ) -> Samples:  # fmt: skip
     """So many random states; properties: of each signal to be read there; ages: of the flights; starts: how
-    often the engines are started anew; errors: of samples, (m, 3) rad/s2: if given, states where these are
+    often the engines are started again; errors: of samples, (m, 3) rad/s2: if given, states where these are
     large are looked for as well."""
     draw = Draw(seed, plant.aircraft, envelope, trim, moves)
     standing = _Standing(plant, draw, properties)

@@ -1,1 +1,1 @@
-"""Evidence that a stranger can check: each alarm and exclusion as the inequality that the data violated."""
+"""Evidence for third parties: each alarm and exclusion as the inequality that the data violated."""

@@ -48,7 +48,7 @@ FILE, FORMAT = "certificate.json", 5
 MEASURED_MODEL_BOUND = "measured_rad_s", "design_rad_s2", "eta_bar_rad_s2"  # columns of each axis
 _OF_LOG = {"watch_missing"} | {f"{axis}_{of}" for axis in AXES for of in MEASURED_MODEL_BOUND}
 _EVENT, _SHARE = re.compile("detected|fie_.*_excluded"), "_likelihood_share"  # columns of events, of shares
-LATE = f"more than {MOST_AFTER} frames after the alarm, or with another diagnosis begun anew"
+LATE = f"more than {MOST_AFTER} frames after the alarm, or with another diagnosis restarted"
 
 
 def certificate(

@@ -151,7 +151,7 @@ def _written(tape: Tape, history: History, test: tuple[int, int, int], rows: ran
     """The statement of a test, block, hypothesis and onset's slot, with these frames."""
     (b, h, slot), dt, diagnosis = test, history.dt, tape.alarm.diagnosis
     block, here = diagnosis.blocks[b], slice(rows[0] - 1 - tape.first, rows[-1] + 1 - tape.first)
-    of = {name: tape.chances[name][here, b] for name in (*OF_BLOCK, "signature")}
+    of = {name: tape.filters[name][here, b] for name in (*OF_BLOCK, "signature")}
     then, now = ({name: values[part] for name, values in of.items()} for part in (np.s_[:-1], np.s_[1:]))
     felt = _felt(of, now["signature"][:, h], len(block.axes))
     n, states, axes = len(felt), [*felt, *(2 + i for i in felt)], [block.axes[i] for i in felt]
@@ -166,15 +166,15 @@ def _written(tape: Tape, history: History, test: tuple[int, int, int], rows: ran
     )
     its = {
         "signature": now["signature"][:, h][:, felt], "jitter": dt * dt * then["jitter"][:, felt],
-        "drift": drift, "bounded": tape.chances["bounded"][here][:-1][:, axes], "pace": then["pace"],
+        "drift": drift, "bounded": tape.filters["bounded"][here][:-1][:, axes], "pace": then["pace"],
     }  # fmt: skip
     if block.return_length > 0.0:
         its["keep"] = then["keep"]
     if known:
         its["known"] = (response - before[..., :n]) / dt + before[..., n:]  # that gave this response
     if diagnosis.air.moving:
-        its["air"] = tape.chances["air"][here][1:][:, axes]
-        drift += block.drift_scale * tape.chances["leap"][here][1:][np.ix_(range(len(rows)), axes, axes)]
+        its["air"] = tape.filters["air"][here][1:][:, axes]
+        drift += block.drift_scale * tape.filters["leap"][here][1:][np.ix_(range(len(rows)), axes, axes)]
     lanes = block.lanes
     sense, explained = lanes.sense[h, slot], {
         "calm_prediction": lanes.calm_prediction, "gust_response": lanes.gust_response,
@@ -226,7 +226,7 @@ class _Frames(NamedTuple):
 
 class _Sums(NamedTuple):
     """N, D, each R (2 + constants,); what N owes to each state before the first frame (2 n,); of N what calm
-    air foretells; what a bounded uncertainty adds as it swings, and at its pace."""
+    air predicts; what a bounded uncertainty adds as it swings, and at its pace."""
 
     of: np.ndarray
     owed: np.ndarray
@@ -274,7 +274,7 @@ def follow(blocks, inputs, drift, of_frame, states, sums, room, dt):
     what it makes of the second, as `likelihood.accumulate_correlations` does.
 
     states (columns, 4): advanced in place. room (5,): what a bounded uncertainty can add as it swings, at its
-    pace, in the last frame, as it stays; and of the first of `sums` what calm air foretells.
+    pace, in the last frame, as it stays; and of the first of `sums` the prediction for calm air.
     """
     block, g, w = blocks[0], np.zeros((len(states), 2)), np.zeros(2)
     for k in range(len(inputs)):

@@ -8,7 +8,7 @@ NumPy, the reader of the log's file, the reader of the scenario's file (PyYAML) 
 
 The flight's log and its scenario are taken as true; no number of the certificate is. A statement is accepted
 if the log's own column shows the event in the row that the statement names, and if the inequality, computed
-anew from the log and from the bounds that the scenario declares, is violated as stated.
+again from the log and from the bounds that the scenario declares, is violated as stated.
 """
 
 import sys
@@ -248,7 +248,7 @@ class Declared:
     gyros: dict  # by axis: (offset rad/s, constant part of it rad/s, slope)
     constant: dict  # by axis, rad/s2
     coupled: dict  # by axis
-    from_row: int  # the diagnosis began anew with this row
+    from_row: int  # the diagnosis began again with this row
     scenario: dict
 
 
@@ -263,8 +263,10 @@ def declared_in(scenario, k):
         begins = int(np.ceil((change["at_s"] - 1e-9) * rate))
         if begins <= k:
             sensors = change.get("declared_sensors") or sensors
-            anew = any(change.get(name) is not None for name in ("scheme", "sensors", "declared_sensors"))
-            from_row = begins if anew else from_row
+            restarted = any(
+                change.get(name) is not None for name in ("scheme", "sensors", "declared_sensors")
+            )
+            from_row = begins if restarted else from_row
     gyros = {}
     for axis in AXES:
         gyro = sensors[axis]

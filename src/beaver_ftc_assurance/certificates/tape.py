@@ -38,7 +38,7 @@ class Tape:
     kept, by frame: measured rates x (3,) rad/s; acceleration of the design model and its bound eta_bar (3,)
     rad/s2; noise (3,) rad/s, the change of a gyro's error within the frame; of each isolation estimator the
     offset (rad/s2), slope and spread (rad/s2 per unit of its parameter) of its fault's effect
-    (estimators, 3). chances: the filter states of the statistical detector, by frame up to the alarm.
+    (estimators, 3). filters: the filter states of the statistical detector, by frame up to the alarm.
     reach_low, reach_high (estimators, poles, 4): bounds on the effect of a fault in the filters before the
     first frame.
     """
@@ -52,7 +52,7 @@ class Tape:
     reach_low: np.ndarray
     reach_high: np.ndarray
     kept: dict[str, np.ndarray]
-    chances: dict[str, np.ndarray]
+    filters: dict[str, np.ndarray]
 
     def __getattr__(self, name: str) -> np.ndarray:
         """A quantity over the frames, (frames, ...)."""
@@ -133,12 +133,12 @@ class Recorder:
         seen, alarm, clear = self._state[:3].tolist()
         ring, raised = len(self._ring), alarm >= 0
         alarm, at_alarm = (alarm, FrameReadout(self._alarm[0])) if raised else (seen - 1, last)
-        since, anew = at_alarm.since, last.since
+        since, restarted = at_alarm.since, last.since
         after = round(AFTER_S * self._scenario.rate_hz) if config.fault_class == "all" else 1
         first = max(min(events) - ring + 1, alarm - ring + 1, since, clear, 0)
         end = min(max(events) + after, rows, alarm + 1 + len(self._kept) - ring)
-        if anew > alarm:  # another diagnosis began
-            end = min(end, anew)
+        if restarted > alarm:  # another diagnosis began
+            end = min(end, restarted)
         before = np.arange(first, min(alarm + 1, end)) % ring
         early = self._early.read(self._ring[before])
         return Tape(
@@ -146,7 +146,7 @@ class Recorder:
             names=estimator_names(config.fault_class, self._scenario.airframe),
             reach_low=early.pop("reach_low")[0], reach_high=early.pop("reach_high")[0],
             kept=self._always.read(self._kept[np.r_[before, ring : ring + end - first - len(before)]]),
-            chances=early,
+            filters=early,
         )  # fmt: skip
 
 

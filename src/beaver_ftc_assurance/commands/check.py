@@ -19,7 +19,7 @@ def command(
 ) -> None:
     """Check a run's certificate.
 
-    Computes every statement of certificate.json anew from the log and from the bounds that the scenario
+    Computes every statement of certificate.json again from the log and from the bounds that the scenario
     declares, and prints it in a sentence, or why it is refused. Exit status 0 if all hold, 1 if not.
 
     Examples:

@@ -1,13 +1,13 @@
 """ArduPilot's JSON interface: datagrams in, JSON out, in lockstep. No socket: see `serve`.
 
 A datagram is little-endian: magic, frame rate Hz, frame count, pulses in us [ArduPilot, libraries/SITL/
-examples/JSON/readme.md]. The answer is one line of JSON between two newlines. Whoever reads it looks for the
+examples/JSON/readme.md]. The answer is one line of JSON between two newlines. A reader looks for the
 first occurrence of a key as text, takes what stands right behind the colon, and a vector as `[a,b,c]`
 [libraries/SITL/SIM_JSON.cpp]: so no spaces, and a key that is part of another stands before it.
 
 The count rises with each answer received. A count that comes again is a packet sent again, since its answer
 was lost: it is answered, not flown. A lower one is late, unless it is said again: nobody repeats what has
-been answered, so that is a count begun anew, of an autopilot started again. So is 0 or 1, long after.
+been answered, so that is a count restarted, of an autopilot started again. So is 0 or 1, long after.
 """
 
 import struct
@@ -101,7 +101,7 @@ class Ardupilot:
         if peer != self._peer and not self._may_take_over(packet, now_s):
             counts["strangers"] += 1
             return None
-        if not self._anew(packet, peer):
+        if not self._is_restart(packet, peer):
             if packet.number == self._last:
                 counts["repeated"] += 1
                 return self._answer
@@ -121,8 +121,8 @@ class Ardupilot:
         silent = self._link.silent_s(now_s) > self._link.LONG_S
         return self._peer is None or (packet.number <= 1 and silent)
 
-    def _anew(self, packet: Packet, peer: Hashable) -> bool:
-        """Whether the count has begun anew, or at all."""
+    def _is_restart(self, packet: Packet, peer: Hashable) -> bool:
+        """Whether the count has restarted, or at all."""
         if self._last < 0 or peer != self._peer:
             return True
         starts = packet.number <= 1 and self._last > LATE

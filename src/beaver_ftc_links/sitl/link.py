@@ -11,7 +11,7 @@ COUNTED = {
     "repeated": "repeated, answered again and not flown",
     "late": "late, of a frame long flown",
     "missed": "never came",
-    "resets": "begun anew",
+    "resets": "restarted",
     "malformed": "malformed",
     "strangers": "of another peer",
     "off_rate": "of a rate that is no whole number of JSBSim frames",
@@ -59,30 +59,30 @@ class Times:
 
 
 class Link:
-    """The counts of one endpoint; they go on when the flight begins anew."""
+    """The counts of one endpoint; they go on when the flight restarts."""
 
     LONG_S = 1.0  # a silence
 
     def __init__(self) -> None:
         self.counts: Counter[str] = Counter(dict.fromkeys(COUNTED, 0))
         self.latency, self.interval = Times(), Times()
-        self._heard_s: float | None = None
+        self._received_s: float | None = None
         self.longest_s = 0.0
 
     def hear(self, now_s: float) -> None:
         """A new frame came in."""
-        if self._heard_s is not None:
-            gap_s = now_s - self._heard_s
+        if self._received_s is not None:
+            gap_s = now_s - self._received_s
             self.longest_s = max(self.longest_s, gap_s)
             if gap_s > self.LONG_S:
                 self.counts["silences"] += 1
             else:
                 self.interval.add(gap_s)
-        self._heard_s = now_s
+        self._received_s = now_s
 
     def silent_s(self, now_s: float) -> float:
         """For how long nothing new has come."""
-        return 0.0 if self._heard_s is None else now_s - self._heard_s
+        return 0.0 if self._received_s is None else now_s - self._received_s
 
     def document(self) -> dict[str, Any]:
         """All of it, for the metrics: counts, and times in ms."""

@@ -25,14 +25,14 @@ class Watched(Session):
         self._take_up(self._vehicle.given, self._vehicle.scenario, self._vehicle.flight)
         self._frames = 0
 
-    def begun_anew(self) -> bool:
+    def has_restarted(self) -> bool:
         """Whether it is another flight than at the last call; that is then taken up."""
         flight, before = self._vehicle.flight, self._frames
-        anew = flight is not self.sim or flight.frames < before
-        if anew:
+        restarted = flight is not self.sim or flight.frames < before
+        if restarted:
             self._begin(self.scenario)
         self._frames = flight.frames
-        return anew
+        return restarted
 
     def notice(self) -> None:
         """Notice what the frames since the last call have brought."""
@@ -63,7 +63,7 @@ class Shown(Flying):
             self._there = False
 
     def _serve(self) -> None:
-        if self._watched.begun_anew() and self._pages:
+        if self._watched.has_restarted() and self._pages:
             self._send(0, self._watched.hello())
         while self._pipe.poll(0):
             self._take(*self._pipe.recv())

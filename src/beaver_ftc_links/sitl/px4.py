@@ -67,7 +67,7 @@ class Px4:
         self._frame, self._sent_us, self._last, self._said_s = 0, 0, b"", 0.0
 
     def connect(self, now_s: float) -> bytes:
-        """A new connection is an autopilot started anew, and so is the flight. Returns what to send."""
+        """A new connection is an autopilot started again, and so is the flight. Returns what to send."""
         self._connections += 1
         self._mav.begin()
         self._wait()

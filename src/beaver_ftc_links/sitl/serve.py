@@ -64,7 +64,7 @@ class Pace:
     _from: tuple[float, float] = field(default=(0.0, inf))  # of the clock, of the flight, s
 
     def wait(self, t_s: float, ended: Callable[[], bool] = lambda: False) -> None:
-        """Until flight time t_s is due; a flight begun anew begins anew here, and what is late is let go.
+        """Until flight time t_s is due; a flight restarted restarts here, and what is late is let go.
 
         ended: whether there is nothing to wait for any more; it is called every WAIT_S.
         """
@@ -112,7 +112,7 @@ class Endpoint:
         if self.link.counts["resets"] != self._resets:
             self._resets = self.link.counts["resets"]
             self._teller.begin()
-            self._say("begun anew")
+            self._say("restarted")
         sim = self.vehicle.flight
         news = self._teller.news(sim)
         for t_s, _, text in news:
@@ -236,7 +236,7 @@ def _until_told(endpoint: Endpoint) -> Iterator[None]:
         endpoint.ended = True
 
     before = {}
-    with contextlib.suppress(ValueError):  # not the main thread: whoever flies there has its own way to end
+    with contextlib.suppress(ValueError):  # not the main thread: it ends in its own way
         before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield
@@ -254,7 +254,7 @@ def _serve_datagrams(endpoint: Endpoint, listener: socket.socket, say: Say) -> N
         except TimeoutError:
             endpoint.listen()
             continue
-        except ConnectionError:  # whoever was answered last has gone
+        except ConnectionError:  # the peer that was answered last has gone
             continue
         began_s = time.perf_counter()
         answer = protocol.take(datagram, peer, time.monotonic())

@@ -99,9 +99,9 @@ class Flown(Simulation):
 
     There is a ground at `ground_m` above sea level, if the aircraft's file knows one. Near it nothing is
     diagnosed: what wheels do is no fault of a surface, and no declared bound covers it. The diagnosis begins,
-    anew, once the aircraft is up and as fast as its model has been validated for; in declared turbulence once
-    the air is what the declaration means. Its verdict stands when the aircraft comes down. listens_from_s:
-    when it began, None before.
+    again, once the aircraft is up and as fast as its model has been validated for; in declared turbulence
+    once the air is what the declaration means. Its verdict stands when the aircraft comes down.
+    listens_from_s: when it began, None before.
     """
 
     _loop_type = OverGround
@@ -165,7 +165,7 @@ class Flown(Simulation):
         self._diagnoses = False
 
     def _start_or_stop_diagnosis(self) -> None:
-        """End the diagnosis near the ground, begin it anew in flight unless it has found something."""
+        """End the diagnosis near the ground, begin it again in flight unless it has found something."""
         now = FrameReadout(self._frame)
         height_m = now.height_m - self._standing_m
         if self._diagnoses:
@@ -261,7 +261,7 @@ class Flown(Simulation):
 
 
 class Vehicle:
-    """The flight, begun at the rate the packets have, and begun anew when they are.
+    """The flight, begun at the rate the packets have, and restarted when they are.
 
     pulses: as `Outputs` has it. rate_hz: of the packets, whatever they say themselves. hold_s: so long the
     scenario's own law flies first, level. ground_m: the autopilot's, above sea level; by itself 0, and of a

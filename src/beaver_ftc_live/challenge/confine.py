@@ -1,4 +1,4 @@
-"""Walls around a stranger's code: what is put around this very process before the code is loaded.
+"""Walls around third-party code: what is put around this very process before the code is loaded.
 
     limits      memory, processor time, files written, processes       POSIX
     namespaces  network devices, an administrator's rights             Linux, where users may have them
@@ -7,7 +7,7 @@
     names       what Python is about to do, and what that is called    everywhere
 
 The system keeps the first four up: nothing in this process takes them down. The last one stops only what goes
-through Python. Standard library alone; whoever calls has one thread.
+through Python. Standard library alone; the caller has one thread.
 """
 
 import ctypes
@@ -59,7 +59,7 @@ _NEW_USER_NET_IPC = 0x10000000 | 0x40000000 | 0x08000000
 
 
 def readable() -> list[str]:
-    """Files and folders that a stranger's code may read: Python, its packages but the hidden, this one."""
+    """Files and folders that third-party code may read: Python, its packages but the hidden, this one."""
     paths = sysconfig.get_paths()
     packages = dict.fromkeys(paths[kind] for kind in ("purelib", "platlib"))
     entries = [os.path.join(folder, name) for folder in packages for name in _names_in(folder)]
@@ -169,7 +169,7 @@ def _restrict_calls() -> bool:
     return system.prctl(_SET_SECCOMP, _FILTER, program, 0, 0) == 0
 
 
-# What Python is about to do (sys.audit) and a stranger's code has no business doing: the beginning of the
+# What Python is about to do (sys.audit) and third-party code must not do: the beginning of the
 # event's name, and what it is called.
 _CHANGES = (
     "os.remove", "os.rename", "os.mkdir", "os.rmdir", "os.link", "os.symlink", "os.truncate", "os.chmod",

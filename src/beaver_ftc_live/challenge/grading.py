@@ -36,9 +36,9 @@ from beaver_ftc_live.challenge.folders import Submission
 from beaver_ftc_live.challenge.line import (
     Allowance,
     Barred,
-    Stranger,
-    StrangersDetector,
-    StrangersLaw,
+    SubmittedCode,
+    SubmittedDetector,
+    SubmittedLaw,
     plain,
 )
 
@@ -90,9 +90,9 @@ def tried(source: str, name: str) -> Document:
     """What a submission makes of a practice flight. Raises BadInput with what it does wrong."""
     flight, allowance = folders.practice(), Allowance()
     try:
-        with Stranger(source, name, allowance) as first:
+        with SubmittedCode(source, name, allowance) as first:
             first.look()
-        result = fly_stranger(first, source, name, allowance, flight)
+        result = fly_submission(first, source, name, allowance, flight)
     except BeaverFtcError as error:
         raise BadInput(f"{name}: {error}") from error
     if first.kind == "detector":
@@ -120,14 +120,14 @@ def grade_case(case: Submission | str, flights: Sequence["Scenario"]) -> Graded:
 def _grade(graded: Graded, source: str, name: str, flights: Sequence["Scenario"]) -> None:
     allowance = Allowance()
     try:
-        with Stranger(source, name, allowance) as first:
+        with SubmittedCode(source, name, allowance) as first:
             first.look()
     except BeaverFtcError as error:  # it cannot be loaded, and never will
         raise Barred(str(error)) from error
     graded.kind, graded.class_name, graded.walls = first.kind, first.class_name, first.walls
     for flight in flights:
         try:
-            graded.results.append(fly_stranger(first, source, name, allowance, flight))
+            graded.results.append(fly_submission(first, source, name, allowance, flight))
         except Barred:
             raise
         except BeaverFtcError as error:
@@ -135,14 +135,16 @@ def _grade(graded: Graded, source: str, name: str, flights: Sequence["Scenario"]
             graded.reason = graded.reason or plain(str(error))
 
 
-def fly_stranger(first: Stranger, source: str, name: str, allowance: Allowance, flight: "Scenario") -> Result:
+def fly_submission(
+    first: SubmittedCode, source: str, name: str, allowance: Allowance, flight: "Scenario"
+) -> Result:
     """Fly a flight with a class in a process of its own; first: what was found out about it."""
     if first.kind == "detector":
         entry = OURS[DETECTOR]
-        with StrangersDetector(source, name, allowance) as detector:
+        with SubmittedDetector(source, name, allowance) as detector:
             return _flown(with_entry(flight, entry), entry, detector=detector)
     entry = OURS[BUILT_IN_LAW]
-    with StrangersLaw(source, name, allowance) as law:
+    with SubmittedLaw(source, name, allowance) as law:
         law.fault_tolerant = first.fault_tolerant
         return _flown(with_entry(flight, entry), entry, law=law)
 

@@ -1,4 +1,4 @@
-"""The grader's end of the line: a stranger's detector or law in a process of its own, flown as a plug-in.
+"""The grader's end of the line: a submitted detector or law in a process of its own, flown as a plug-in.
 
 Nothing that comes from there is trusted: messages have a length that is known before, hold plain numbers,
 and bear the number of the frame they answer. No answer in time ends the process.
@@ -53,7 +53,7 @@ class Allowance:
 
 
 def plain(text: str) -> str:
-    """A stranger's text, fit for a terminal, a page and a table: plain letters of ASCII, not many."""
+    """Third-party text, fit for a terminal, a page and a table: plain letters of ASCII, not many."""
     shown = "".join(letter if " " <= letter <= "~" and letter not in "<>&|`[]" else "?" for letter in text)
     return shown if len(shown) <= MOST_TEXT else shown[: MOST_TEXT - 3] + "..."
 
@@ -98,7 +98,7 @@ class _Accounts:
             os.close(self._files.pop())
 
 
-class Stranger:
+class SubmittedCode:
     """A class of a submission, in a process that is begun by `reset`; a context manager that ends it.
 
     source, name: the submission's text and what it is called. kind, class_name, walls: known once it has
@@ -119,13 +119,13 @@ class Stranger:
         self._sizes = (0, 0)
         self.surfaces: tuple[str, ...] = ()
 
-    def __enter__(self) -> "Stranger":
+    def __enter__(self) -> "SubmittedCode":
         return self
 
     def __exit__(self, *_: object) -> None:
         self.end()
 
-    def look(self) -> "Stranger":
+    def look(self) -> "SubmittedCode":
         """Start it, and find out which class there is and of which kind."""
         self._start(None)
         return self
@@ -232,7 +232,7 @@ class Stranger:
         return f", at {self._t_s:g} s" if self._frame else ""
 
     def _evaluate(self, asked: bytes, times: int) -> None:
-        """What the design model says of x and y: f, then G. That is not the stranger's time."""
+        """What the design model says of x and y: f, then G. That time is not charged to the submission."""
         if times > MOST_ASKED:
             raise Barred(f"asks the design model more than {MOST_ASKED} times in a frame")
         deadline, began = self._deadline, time.monotonic()
@@ -307,8 +307,8 @@ def _finite(numbers: np.ndarray, what: str) -> np.ndarray:
     return numbers
 
 
-class StrangersDetector(Stranger):
-    """A stranger's detector as the loop calls one."""
+class SubmittedDetector(SubmittedCode):
+    """A submitted detector as the loop calls one."""
 
     def step(self, measured: Measured, command: np.ndarray) -> Verdict:
         """Its verdict on the present frame."""
@@ -323,8 +323,8 @@ class StrangersDetector(Stranger):
         return pilot.verdict_of(said, self.surfaces)
 
 
-class StrangersLaw(Stranger):
-    """A stranger's law as the loop calls one."""
+class SubmittedLaw(SubmittedCode):
+    """A submitted law as the loop calls one."""
 
     def step(self, measured: Measured, reference: Reference, verdict: Verdict) -> np.ndarray:
         """Its command at the present frame."""

@@ -1,4 +1,4 @@
-"""The stranger's end of the line: `python pilot.py`, a process for one flight.
+"""The submission's end of the line: `python pilot.py`, a process for one flight.
 
 It is told a class's source and what a plug-in may know before a flight, puts up the walls, loads the class,
 and answers each frame. What it sends is a kind, the frame's number and plain numbers (`line.py` reads them).

@@ -23,7 +23,7 @@ def new(
     """Write a challenge for a class.
 
     DIR/public is for the students: rules, flights to practise on, a detector and a law to begin with.
-    DIR/teacher has the hidden flights, with seeds drawn anew: keep it to yourself.
+    DIR/teacher has the hidden flights, with seeds drawn again: keep it to yourself.
 
     Examples:
       beaver-ftc challenge new autumn

@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 
 GUESTS = 10  # on another address than the loopback
 OTHERS = (
-    "live: {} is no loopback: whoever has a link and reaches this machine gets in, "
-    "and whoever can listen on the network reads flight and links (http).\n"
+    "live: {} is no loopback: anyone who has a link and reaches this machine gets in, "
+    "and anyone who can listen on the network reads flight and links (http).\n"
 )
 
 

@@ -33,7 +33,7 @@ class Pace:
         self.hold(now_s)
 
     def hold(self, now_s: float) -> None:
-        """Begin anew from here: after a pause, or a change of speed."""
+        """Begin again from here: after a pause, or a change of speed."""
         self._from_s, self._frames = now_s, 0
         self.next_s = now_s + TICK_S
 

@@ -3,7 +3,7 @@
 A link's token becomes a cookie, and only this server's own page may use it. Cookies know no ports: a browser
 would hand one for 127.0.0.1 to whatever else listens there. So each seat has a path that nobody else can
 know, and its cookie is bound to that: a browser may hold several seats, none opens another. The link of
-whoever flies works once; a guest's works again, since that guest has to come back by it.
+the pilot's link works once; a guest's works again, since that guest has to come back by it.
 
 Host and Origin are checked against the address that the server has, which keeps out pages of other ports and
 names that were made to resolve to this machine.
@@ -24,7 +24,7 @@ COOKIE = "beaver-ftc-live"
 LOOPBACK_NAMES = ("127.0.0.1", "localhost")
 HTTP_PORT = 80  # which browsers leave out
 TOKENS_OPEN = 16  # addresses given out and not yet used
-MAX_PAGES = 20  # of whoever flies
+MAX_PAGES = 20  # of the pilot
 MAX_PAGES_OF_A_GUEST = 3
 LOOKING_ON = frozenset({"name"})
 INVITED = LOOKING_ON | {"break", "repair", "blow"}
@@ -49,7 +49,7 @@ class Allowance:
 
 
 class Seat:
-    """What one link opens. number: of a guest, from 1; 0: whoever flies."""
+    """What one link opens. number: of a guest, from 1; 0: the pilot."""
 
     def __init__(self, number: int = 0) -> None:
         self.number, self.name, self.is_invited = number, "", False
@@ -154,7 +154,7 @@ class Gate:
         return f"{who} may break" if on else f"{who} may only look on"
 
     def roster(self) -> dict[str, Any]:
-        """All guests, as whoever flies is told."""
+        """All guests, as the pilot's page shows them."""
         guests = [{**seat.shown(), "pages": seat.pages} for seat in self.guests]
         return {"k": "class", "guests": guests, "wrong": self.wrong}
 

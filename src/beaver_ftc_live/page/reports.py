@@ -55,7 +55,7 @@ class Reports:
 
 
 def _begun(*folders: Path) -> "subprocess.Popen[str]":
-    """A process that hears no Ctrl-C of this terminal, and imports nothing from the folder it starts in."""
+    """A process that ignores Ctrl-C of this terminal, and imports nothing from the folder it starts in."""
     paths = [str(folder.resolve()) for folder in folders]
     return subprocess.Popen(
         [sys.executable, "-P", "-c", DRAW, *paths], text=True, start_new_session=True,

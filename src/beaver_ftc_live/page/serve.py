@@ -28,8 +28,8 @@ LOOPBACK = "127.0.0.1"
 NO_SENSOR = ((socket.AF_INET, "198.51.100.1"), (socket.AF_INET6, "2001:db8::1"))  # addresses for documents
 LAST_WORDS_S = 3.0  # the flight process is given so long to end
 
-Heard = Callable[[int | str, bytes | str], None]  # a page and its message, or why the flight has ended
-Say = Callable[[str, list[str]], None]  # an address for whoever flies, and one for each guest
+Receive = Callable[[int | str, bytes | str], None]  # a page and its message, or why the flight has ended
+Say = Callable[[str, list[str]], None]  # an address for the pilot, and one for each guest
 
 
 @dataclass(frozen=True)
@@ -214,14 +214,14 @@ async def _serve(
     _on_signals(server)
     ended: list[tuple[str, str]] = []
 
-    def heard(page: int | str, message: bytes | str) -> None:
+    def receive(page: int | str, message: bytes | str) -> None:
         if isinstance(page, int) and isinstance(message, bytes):
             pages.tell(page, message)
         else:
             ended.append((str(page), str(message)))
             server.should_exit = True
 
-    arguments = pipe, asyncio.get_running_loop(), heard
+    arguments = pipe, asyncio.get_running_loop(), receive
     threading.Thread(target=_listen, args=arguments, daemon=True, name="flight").start()
     serving = asyncio.create_task(server.serve(sockets=[listener]))
     while not (server.started or serving.done()):
@@ -232,14 +232,14 @@ async def _serve(
     return ended[0] if ended else None
 
 
-def _listen(pipe: Connection, loop: asyncio.AbstractEventLoop, heard: Heard) -> None:
+def _listen(pipe: Connection, loop: asyncio.AbstractEventLoop, receive: Receive) -> None:
     """Hand on what the flight process says, from a thread of its own, until there is nothing more."""
     with contextlib.suppress(RuntimeError):  # the loop is closed: the server has ended
         try:
             while True:
-                loop.call_soon_threadsafe(heard, *pipe.recv())
+                loop.call_soon_threadsafe(receive, *pipe.recv())
         except (EOFError, OSError):
-            loop.call_soon_threadsafe(heard, "died", "the flight process has ended unexpectedly")
+            loop.call_soon_threadsafe(receive, "died", "the flight process has ended unexpectedly")
 
 
 def _on_signals(server: "uvicorn.Server") -> None:

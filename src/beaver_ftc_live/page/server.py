@@ -1,7 +1,7 @@
 """The web side: the page, its files, and the websocket; nothing else can be reached.
 
 Who is let in is the gate's to say (`gate.py`); what a guest may not ask is refused here, before the flight
-hears of it.
+receives it.
 
 Who looks on: a slow page misses frames; it never holds up the flight, nor the others.
 """
@@ -28,7 +28,7 @@ from beaver_ftc_live.page.gate import COOKIE, Gate, Seat
 
 STATIC = Path(__file__).parent / "static"
 GUEST_FRAME_S = 0.05  # between the frames that a guest is sent
-SLOW_S, MAX_SLOW = 1.0, 20  # whoever tries tokens waits so long for an answer; so many wait at once
+SLOW_S, MAX_SLOW = 1.0, 20  # an attempt with a wrong token waits so long for an answer; so many wait at once
 MAX_WAITING = 1000  # messages that must not be missed; a page that lets more pile up is let go
 FRAME = b'{"k":"f"'
 UNSUPPORTED = 1003  # a websocket's status for a kind of data that is not taken
@@ -118,7 +118,7 @@ class Pages:
                 ask(0, f"called {page.number} {seat.label}")
 
     def tell_class(self, gate: Gate) -> None:
-        """Tell whoever flies who is there, and each guest what it may do."""
+        """Send the list of guests to the pilot, and its rights to each guest."""
         if not gate.guests:
             return
         roster = messages.encode(gate.roster())
@@ -163,7 +163,7 @@ class Doorkeeper:
         return await self._slowly(PRINTED) if token or cookie else PRINTED
 
     async def _slowly(self, refusal: Response) -> Response:
-        """Count a token or a cookie that opens nothing, and have whoever tries wait."""
+        """Count a token or a cookie that opens nothing, and delay the answer."""
         self._gate.wrong += 1
         if self._slow >= MAX_SLOW:
             return PlainTextResponse("too many wrong addresses at once", 429)
@@ -213,7 +213,7 @@ def _came_to(scope: Scope) -> str | None:
 def application(gate: Gate, pages: Pages, ask: Ask, say: Say) -> Starlette:
     """The whole of it, below the paths of the gate's seats.
 
-    ask: hands a page's words to the flight. say: shows whoever flies an address that works, in the terminal.
+    ask: hands a page's words to the flight. say: shows the pilot a valid address, in the terminal.
     """
 
     async def home(_: Request) -> Response:

@@ -51,7 +51,7 @@ def _remaining(candidates: Sequence[str], before: Sequence[str]) -> str:
 
 
 class Session:
-    """One flight at a time, begun anew by `fresh`. out: where `save` writes.
+    """One flight at a time, restarted by `fresh`. out: where `save` writes.
 
     unreported: folders that were saved, and have no report so far.
     """
@@ -408,7 +408,7 @@ def ready_for_hands(scenario: "bf.Scenario") -> "bf.Scenario":
 
 def changes_of(request: messages.Fresh, aircraft: Aircraft) -> dict[str, Any]:
     """Dotted keys of the scenario for what a new flight asks. Errors of the air and the sensors are declared
-    to the diagnosis as well: it is to live with them, not to be surprised."""
+    to the diagnosis as well: its bounds then include them."""
     keys = (
         ("control.law", request.law),
         ("fdi.scheme", request.scheme),

@@ -47,7 +47,7 @@ def flown(seed=1, tied=0.0):
 
 
 def listened(given, signals, missed, believed=None, airframe=True, forgets=True):
-    """The record after all frames; believed (N,): the effectiveness that the observer reckoned with."""
+    """The record after all frames; believed (N,): the effectiveness that the observer assumed with."""
     record = np.zeros(1, estimator_dtype(N)).view(np.recarray)[0]
     effectiveness_estimator.begin(record, np.zeros(3), np.zeros(3), DT)
     record.unsure[:] *= forgets
@@ -117,7 +117,7 @@ def test_what_the_law_already_reckons_with_is_no_news():
 
 
 def test_noise_never_leads_it_away():
-    """With noise many times what is reckoned with, theta stays about its limits and A finite."""
+    """With noise many times what is assumed with, theta stays about its limits and A finite."""
     given, signals, missed = flown(5)
     noisy = missed + np.random.default_rng(2).normal(0.0, 0.05, missed.shape)
     record = listened(given, signals, noisy, forgets=False)

@@ -11,7 +11,7 @@ import pytest
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.compare.replay import Trace
 from beaver_ftc.studies.power import shown, survey
-from beaver_ftc.studies.power.chances import answers, document_of
+from beaver_ftc.studies.power.probabilities import answers, document_of
 from beaver_ftc.studies.power.survey import (
     BOTH,
     ESTIMATORS,

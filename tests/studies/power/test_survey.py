@@ -15,7 +15,7 @@ from beaver_ftc.cli.main import app
 from beaver_ftc.diagnosis.bounds.clairvoyant import chance
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.compare.replay import Trace, record
-from beaver_ftc.studies.power.chances import document_of, level_at, level_for, limit, rows_of, summary
+from beaver_ftc.studies.power.probabilities import document_of, level_at, level_for, limit, rows_of, summary
 from beaver_ftc.studies.power.shown import as_text, comparison, run_power
 from beaver_ftc.studies.power.survey import (
     BUILT_IN,

@@ -38,7 +38,7 @@ _FORGOTTEN_S = 30.0  # what is not seen again in that time may have changed
 def estimator_dtype(n: int) -> np.dtype:
     """Memory for n surfaces. active: whether it estimates; found (N,): theta of each, then A row by row; P
     (N, N): their covariance; errors: of the observer, for each surface's moment, each signal and the moments
-    that the law reckons with; noise (3,) (rad/s)2: of the innovation in health; unsure (N,): variances begun
+    that the law assumes; noise (3,) (rad/s)2: of the innovation in health; unsure (N,): variances begun
     with; h, Ph (N,): for the update."""
     many = n > _FEW
     size, errors = (n + 3 * _SIGNALS, n + _SIGNALS + 1) if many else (Room(1), Room(1))
@@ -84,7 +84,7 @@ def end(estimator):
 @apart
 def estimate(estimator, innovation, L_rate, L_disturbance, dt, x, y, effectiveness, moments):
     """Take in the innovation of all axes (3,) rad/s; L_rate 1, L_disturbance 1/s (3,): the observer's gains;
-    x (3,) rad/s, y: measured; effectiveness (n,): that the law reckons with; moments (3, n) rad/s2: of
+    x (3,) rad/s, y: measured; effectiveness (n,): that the law assumes; moments (3, n) rad/s2: of
     healthy surfaces."""
     n, h, signal, unsure = effectiveness.size, estimator.h, estimator.signal, estimator.unsure
     for j in range(h.size):
@@ -94,14 +94,14 @@ def estimate(estimator, innovation, L_rate, L_disturbance, dt, x, y, effectivene
     signal[0], signal[1] = y[ALPHA], y[BETA]
     signal[2:] = x
     for i in range(3):
-        L, M, errors, reckoned = L_rate[i], L_disturbance[i], estimator.errors, 0.0
+        L, M, errors, assumed = L_rate[i], L_disturbance[i], estimator.errors, 0.0
         h[:] = 0.0
         for s in range(n):
-            reckoned += (effectiveness[s] - 1.0) * moments[i, s]
+            assumed += (effectiveness[s] - 1.0) * moments[i, s]
             h[s] = observer_response(errors[s], i, moments[i, s], L, M, dt)
         for j in range(_SIGNALS):
             h[n + i * _SIGNALS + j] = observer_response(errors[n + j], i, signal[j], L, M, dt)
-        seen = innovation[i] + observer_response(errors[n + _SIGNALS], i, reckoned, L, M, dt)
+        seen = innovation[i] + observer_response(errors[n + _SIGNALS], i, assumed, L, M, dt)
         update(estimator, seen, estimator.noise[i])
     for s in range(n):
         beyond = estimator.found[s] - min(max(estimator.found[s], -1.0), 0.0)

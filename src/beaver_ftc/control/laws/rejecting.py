@@ -67,11 +67,11 @@ def config_dtype(n: int) -> np.dtype:
 @sized
 def memory_dtype(n: int) -> np.dtype:
     """Kp, L_rate, L_disturbance (3,): the gains of this frame. ahead (3,) rad/s: the rate when the command
-    acts. innovation (3,) rad/s. at_stop_s, withdrawn (n,): see `withdraw`. healthy, reckoned: the observer's
-    errors for the moments of healthy main surfaces and for those that the law reckons with."""
+    acts. innovation (3,) rad/s. at_stop_s, withdrawn (n,): see `withdraw`. healthy, assumed: the observer's
+    errors for the moments of healthy main surfaces and for those that the law assumes."""
     return record(
         Kp=3, L_rate=3, L_disturbance=3, ahead=3, innovation=3, at_stop_s=n, withdrawn=(int, n),
-        healthy=OBSERVER_ERROR, reckoned=OBSERVER_ERROR, sums=SUMS, estimator=estimator_dtype(n),
+        healthy=OBSERVER_ERROR, assumed=OBSERVER_ERROR, sums=SUMS, estimator=estimator_dtype(n),
     )  # fmt: skip
 
 
@@ -238,7 +238,7 @@ def start_or_end_estimator(memory, layout, detected, dt):
 
 @kernel
 def explained(surfaces, i, design, moments, G):
-    """Acceleration of axis i that the law reckons with, rad/s2: the design model's with the faults in it;
+    """Acceleration of axis i that the law assumes, rad/s2: the design model's with the faults in it;
     surfaces: the Output of accommodation.py."""
     total = design[i]
     for s in range(G.shape[1]):
@@ -266,13 +266,13 @@ def observe(law, surfaces, main, x, design, moments, G):
 
 @kernel
 def accumulate(config, memory, i, effectiveness, moment, innovation):
-    """Add this frame to the sums of axis i; innovation rad/s; effectiveness: that the law reckons with, of
+    """Add this frame to the sums of axis i; innovation rad/s; effectiveness: that the law assumes, of
     the main surface; moment: of a healthy one, rad/s2."""
     sums, fading, dt = memory.sums, config.fading, config.dt
     L_rate, L_disturbance = memory.L_rate[i], memory.L_disturbance[i]
-    reckoned = (effectiveness - 1.0) * moment
+    assumed = (effectiveness - 1.0) * moment
     psi = observer_response(memory.healthy, i, moment, L_rate, L_disturbance, dt)
-    innovation += observer_response(memory.reckoned, i, reckoned, L_rate, L_disturbance, dt)
+    innovation += observer_response(memory.assumed, i, assumed, L_rate, L_disturbance, dt)
     sums.product[i] += psi * innovation - fading * sums.product[i]
     sums.square[i] += psi * psi - fading * sums.square[i]
     sums.innovation[i] += innovation * innovation - fading * sums.innovation[i]

@@ -215,7 +215,7 @@ def glide_of(autopilot):
 
 @kernel
 def find_missing(autopilot, error):
-    """Integrate the acceleration that an airspeed takes beside what is reckoned; error m/s."""
+    """Integrate the acceleration that an airspeed takes in addition to the computed one; error m/s."""
     found = autopilot.throttle + autopilot.dt * autopilot.gain.speed_i * error
     autopilot.throttle = clamp(found, MOST_MISSING * autopilot.gravity)
 

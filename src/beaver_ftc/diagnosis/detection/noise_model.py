@@ -168,7 +168,7 @@ def set_up(
     gusts_m = rotation_lengths(air["config"]["span"]) if air["config"]["coarse"] else [rolling]
     last["return_length"] = returning_length(statistical, airspeed_mps, rate_hz, float(min(gusts_m)))
     if air["output"]["moving"]:
-        # the filters that reckon with no gust: as the others begin, and with a drift that goes anywhere
+        # the filters that assume no gust: they start as the others, with a drift in any direction
         for name in ("n", "keep", "noise", "P_xx", "P_dd"):
             statistical["block"]["no_gust_filter"][name] = statistical["block"][name]
         last["drift_scale"] = (rolling / last["return_length"]) ** 2

@@ -49,7 +49,7 @@ from beaver_ftc.scenario.sensors import N_IN_EQUATIONS
 TURNING_RAD_S = 4e-5  # Earth rate is in the rates; the level turns with the flight over the round Earth
 FALLING_M_S2 = 0.03  # Coriolis, centrifugal, and gravity's change with place
 DENSITY_HEIGHT_M = 6300.0  # over which the density falls by no more than a factor e: in the stratosphere
-STEEPEST_RAD = 1.3  # beyond, roll and heading are not to be told apart
+STEEPEST_RAD = 1.3  # beyond it, roll and heading cannot be distinguished
 
 
 @kernel

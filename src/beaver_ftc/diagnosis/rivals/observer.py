@@ -3,7 +3,7 @@
     eps[k+1] = a eps[k] + dt nu,   a = exp(-pole dt)        alarm when |eps_i| > alarm constant_i / pole
 
 The residual is that of the published detection estimator; only the threshold does not move with the state.
-From the alarm on, a residual started anew is fitted by the filtered effect of each surface, by least squares
+From the alarm on, a residual started again is fitted by the filtered effect of each surface, by least squares
 over a fading window; the best fit names the fault, and a window after the alarm the name stands.
 
 What is declared of gyros and air has a known deviation behind that filter; the threshold is `alarm` times all

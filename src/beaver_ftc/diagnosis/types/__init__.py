@@ -17,7 +17,7 @@ test can exclude a type sooner without excluding a true one at some time.
     growing bias    p = u + b              b of one sign and never smaller (incipient)
 
 A frame that eta alone explains gives no information: so a fault may be intermittent. The promise: the type,
-constant while it is there, is never excluded, and so never misnamed. What cannot be told apart stays a
+constant while it is there, is never excluded, and so never misnamed. What cannot be distinguished stays a
 candidate.
 
 One file a type under table/ (contract.py says what is in it); registry.py reads them into arrays and records.

@@ -1,6 +1,6 @@
 """The feasible set of each type's parameter on one surface: the only writer of these sets.
 
-A type is excluded once its set is empty, and stays excluded until the surface's diagnosis begins anew.
+A type is excluded once its set is empty, and stays excluded until the surface's diagnosis restarts.
 interval: (low, high) of a parameter; low > high is the empty set.
 """
 

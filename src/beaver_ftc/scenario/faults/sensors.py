@@ -97,7 +97,7 @@ class SensorFreeze(SensorFault):
 
 
 class SensorLost(SensorFault):
-    """There is no reading any more, and whoever reads can tell."""
+    """The reading is missing, and is flagged as missing."""
 
     type: Literal["lost"]
 

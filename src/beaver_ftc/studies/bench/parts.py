@@ -1,7 +1,7 @@
 """The compiled frame with parts of it taken out, for timing.
 
 A part is a set of kernels. Taken out, each is replaced by a stand-in that does nothing, and everything that
-calls it is compiled anew from the same source: what is timed is the frame itself, less that part.
+calls it is compiled again from the same source: what is timed is the frame itself, less that part.
 """
 
 import hashlib

@@ -31,7 +31,7 @@ class Recorder:
         self.seen: list[tuple[Measured, np.ndarray]] = []
 
     def reset(self, context: Context) -> None:
-        """Keep the context as well: whoever is played the flight needs it."""
+        """Keep the context as well: a detector that replays the flight needs it."""
         self.context = context
 
     def step(self, measured: Measured, command: np.ndarray) -> Verdict:

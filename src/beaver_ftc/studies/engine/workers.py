@@ -115,7 +115,7 @@ class _Worker:
         for pause_s in STARTS_AFTER_S:
             time.sleep(pause_s)
             self._pool = ProcessPoolExecutor(1, mp_context=context(), initializer=_begin, initargs=(work,))
-            with contextlib.suppress(EOFError, ConnectionError):  # what it is forked from was killed: anew
+            with contextlib.suppress(EOFError, ConnectionError):  # what it is forked from was killed: again
                 self.pid = self._started()
                 return
         raise SimulationFailed("a worker process cannot start: what it is forked from is ended, each time")

@@ -1,6 +1,6 @@
 """The mismatch as pictures: sources in time, sources against the bound, the linear models side by side.
 
-Colours are told apart by the colour-blind; dashes and order tell the curves in grey.
+Colour-blind readers can distinguish the colours; dashes and order distinguish the curves in grey.
 """
 
 from collections.abc import Sequence

@@ -1,7 +1,7 @@
 """The mismatch of a flight, frame by frame, split into its sources; a stretch of the log at a time.
 
 Kept of it are figures (RMS, peaks, shares of the bound, exceedances), and every frame in a parquet file for
-whoever wants to look closer.
+readers who want to look closer.
 """
 
 from collections.abc import Iterable, Iterator

@@ -24,8 +24,16 @@ from beaver_ftc.studies.engine.command import (
     listed,
 )
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
-from beaver_ftc.studies.power import chances, survey
-from beaver_ftc.studies.power.chances import JUDGED_S, SIGNIFICANT, Row, document_of, grouped, limit, summary
+from beaver_ftc.studies.power import probabilities, survey
+from beaver_ftc.studies.power.probabilities import (
+    JUDGED_S,
+    SIGNIFICANT,
+    Row,
+    document_of,
+    grouped,
+    limit,
+    summary,
+)
 from beaver_ftc.studies.power.survey import BUILT_IN, GRIDS, WITHIN_S, Grid, Watched, fly_block, lost
 from beaver_ftc.studies.present.figures import curve_look, heat_map, label_edges, marker, panels
 from beaver_ftc.studies.present.page import Files, Makers
@@ -335,7 +343,7 @@ class Power(StudyCommand):
         grid = replace(GRIDS[self.grid].only(self.sensors, self.turbulence), vanes=not self.rates_alone)
         grid = grid.elsewhere(self.aircraft, self.airspeed, self.altitude, self.surface)
         document = run_power(self.out, grid, chosen, self.processes, reporter.progress)
-        said = chances.answers(document, self.surface) if self.surface else []
+        said = probabilities.answers(document, self.surface) if self.surface else []
         return document | ({"answers": said} if said else {}) | {"folder": str(self.out / NAME)}
 
     def as_text(self, document: Document, colour: bool) -> str:

@@ -238,7 +238,7 @@ def deflections(
 class Watched:
     """What came of a block: of every scheme, a trace for each of its flights, in order; why one is missing.
 
-    deflections: how far each fault stands out of the noise, after each of WITHIN_S (chances.py).
+    deflections: how far each fault stands out of the noise, after each of WITHIN_S (probabilities.py).
     """
 
     block: Block

@@ -2,8 +2,8 @@
 
 Subset simulation [AuBeck2001]: levels of a score that rises towards the event, each reached by a tenth of the
 flights that reached the one before; these are continued as Markov chains in the space of standard normals
-behind the varied keys, by conditional sampling [Papaioannou2015]. A step draws the flight's own seed anew, so
-sensors and air are part of the chain. It is done in independent runs: their mean is the estimate, and what
+behind the varied keys, by conditional sampling [Papaioannou2015]. A step draws the flight's own seed again,
+so sensors and air are part of the chain. It is done in independent runs: their mean is the estimate, and what
 they differ by the interval, that of a lognormal mean [Cox, in Land1972].
 """
 

@@ -159,7 +159,7 @@ class Store:
         if not resume:
             raise BadInput(
                 f"{self._manifest}: {what}, allowed: --resume, which sets aside what is there and flies "
-                "anew, or another --out"
+                "again, or another --out"
             )
         with clear_disk_errors(self.folder):
             for name in sorted(OWN_FILES - {"lock", files.LOCK}):
@@ -217,11 +217,11 @@ def _refuse_foreign(folder: Path) -> None:
     if not folder.is_dir():
         raise SimulationFailed(f"cannot write {folder}: it exists and is not a folder")
     names = sorted(entry.name for entry in folder.iterdir())
-    strangers = [name for name in names if name not in OWN_FILES and not _is_leftover(name)]
+    foreign = [name for name in names if name not in OWN_FILES and not _is_leftover(name)]
     known = {"sweep.json", "lock", files.LOCK, "flights"}
-    if strangers or (names and not known & set(names) and not any(map(_is_leftover, names))):
+    if foreign or (names and not known & set(names) and not any(map(_is_leftover, names))):
         raise SimulationFailed(
-            f"will not write into {folder}: it holds {(strangers or names)[0]}, which is no part of a sweep; "
+            f"will not write into {folder}: it holds {(foreign or names)[0]}, which is no part of a sweep; "
             "move it away or choose another --out"
         )
 

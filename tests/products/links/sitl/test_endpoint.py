@@ -107,8 +107,8 @@ def test_a_flight_goes_on_after_its_autopilot_is_started_again():
         peers.Px4(Small().outputs, silent=0).fly(at.address, 500)
     metrics = at.flight.metrics
     assert (metrics["frames"], metrics["link"]["resets"]) == (100, 1)
-    alarms = [line for line in at.said if line.endswith("FDI: alarm on q") or line == "begun anew"]
-    assert alarms == [alarms[0], "begun anew", alarms[0]]  # what is said of the first is forgotten
+    alarms = [line for line in at.said if line.endswith("FDI: alarm on q") or line == "restarted"]
+    assert alarms == [alarms[0], "restarted", alarms[0]]  # what is said of the first is forgotten
     assert [text["text"] for text in metrics["link"]["said"]].count("FDI: alarm on q") == 1
 
 

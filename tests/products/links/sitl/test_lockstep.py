@@ -241,7 +241,7 @@ def test_a_state_is_read_again_as_it_was_at_altitude():
 def test_when_a_count_begins_anew(last, again, number, peer, anew):
     endpoint = Ardupilot(None, Link())
     endpoint._last, endpoint._again, endpoint._peer = last, again, "a"
-    assert endpoint._anew(Packet(400, number, ()), peer) is anew
+    assert endpoint._is_restart(Packet(400, number, ()), peer) is anew
 
 
 @pytest.mark.parametrize(("of", "number", "now_s", "may"), [

@@ -19,7 +19,7 @@ from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.studies.compare.trial import Entry, Result, with_entry
 from beaver_ftc_live.challenge import folders, grading, line, pilot
-from beaver_ftc_live.challenge.line import Allowance, Barred, Stranger
+from beaver_ftc_live.challenge.line import Allowance, Barred, SubmittedCode
 
 ENTRY = Entry("adaptive-estimators", "nominal")
 SEEN = Result(ENTRY, False, 8.0, True, delay_s=1.0, correct=True, rms_deg_s=0.4)
@@ -225,7 +225,7 @@ def test_nor_can_what_is_said_of_a_file_that_is_refused(monkeypatch):
 def test_what_a_stranger_says_is_one_of_the_verdicts_there_are(monkeypatch, said, verdict):
     """Axis and name by their places, none at 0; past the last of them it has written on the line itself."""
     monkeypatch.setattr(line, "_shown", lambda measured: [])
-    stranger = object.__new__(line.StrangersDetector)
+    stranger = object.__new__(line.SubmittedDetector)
     stranger.surfaces = ("aileron", "elevator", "rudder", "flap")
     stranger.asked = lambda *_: np.array([*said, 1.0, nan, 0.5, 0.2])
     if isinstance(verdict, tuple):
@@ -240,7 +240,7 @@ def test_what_a_stranger_says_is_one_of_the_verdicts_there_are(monkeypatch, said
 @pytest.mark.parametrize("place", [4, 7, 8, 9, 10])
 def test_every_number_of_an_answer_must_be_finite(monkeypatch, place):
     monkeypatch.setattr(line, "_shown", lambda measured: [])
-    stranger, said = object.__new__(line.StrangersDetector), np.array([1.0] * 7 + [0.9, 0.8, 0.7, 0.6])
+    stranger, said = object.__new__(line.SubmittedDetector), np.array([1.0] * 7 + [0.9, 0.8, 0.7, 0.6])
     stranger.surfaces, stranger.asked = ("aileron", "elevator", "rudder", "flap"), lambda *_: said
     found = stranger.step(SimpleNamespace(t_s=1.0), np.zeros(4))
     assert found.effectiveness.tolist() == [0.9, 0.8, 0.7, 0.6]
@@ -253,9 +253,9 @@ def test_every_number_of_an_answer_must_be_finite(monkeypatch, place):
 def test_it_flies_behind_the_walls_as_it_flies_here(name, challenge):
     """To the bit: what is measured arrives whole, and so does what is answered."""
     source, flight = handed_out(challenge, name), folders.hidden_flights(challenge)[-1]
-    with Stranger(source, name, Allowance()) as first:
+    with SubmittedCode(source, name, Allowance()) as first:
         first.look()
-    found = grading.fly_stranger(first, source, name, Allowance(), flight)
+    found = grading.fly_submission(first, source, name, Allowance(), flight)
     here = {"bf": bf}
     exec(source, here)
     plug_in = here[first.class_name]()

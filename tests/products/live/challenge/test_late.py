@@ -50,7 +50,7 @@ def test_who_has_had_its_time_is_late(monkeypatch, over_s, wants, computed_s, wa
     """3 s are allowed; before, 2 s were computed and 1 s waited."""
     monkeypatch.setattr(line.time, "monotonic", lambda: 100.0 + over_s)
     monkeypatch.setattr(line.select, "select", lambda *_: ([], [], []))
-    stranger = object.__new__(line.StrangersDetector)
+    stranger = object.__new__(line.SubmittedDetector)
     stranger._deadline, stranger._before = 100.0, (3.0, 1.0, 2.0)
     stranger._accounts = SimpleNamespace(
         wants_a_processor=lambda: wants, computed_s=lambda: computed_s, waited_s=lambda: waited_s
@@ -75,7 +75,7 @@ def test_what_an_answer_takes_is_charged_less_the_wait_for_others(monkeypatch, c
         return said.pop(0)
 
     monkeypatch.setattr(line.time, "monotonic", lambda: clock[0])
-    stranger = object.__new__(line.StrangersLaw)
+    stranger = object.__new__(line.SubmittedLaw)
     stranger._frame, stranger._sizes, stranger._read = 3, (5, 4), read
     stranger._allowance = SimpleNamespace(left_s=10.0)
     stranger._accounts = SimpleNamespace(waited_s=lambda: waits.pop(0), computed_s=lambda: 0.0)

@@ -1,4 +1,4 @@
-"""From traces to alarm levels at an equal false-alarm rate, rows, chances of detection, and one document."""
+"""From traces to alarm levels at an equal false-alarm rate, rows, probabilities, and one document."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass

@@ -1,0 +1,49 @@
+"""The linter of words: where it finds a term, where it does not, and that nothing is left to find."""
+
+import pytest
+
+from tools import words
+
+TABLE = """
+## Avoided terms
+
+| avoid | use | why |
+|---|---|---|
+| foretell*, foretold | predict | archaic |
+| told apart | distinguished | idiom |
+
+## Exceptions
+
+| term | where | reason |
+|---|---|---|
+| foretold | src/contract/* | a key |
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "lines"),
+    [
+        ("src/a.py", "def foretell_rate(x):\n    return x\n", [1]),
+        ("src/a.py", "class Foretelling:\n    pass\n", [1]),
+        ("src/a.py", "x = 1  # is foretold\n", [1]),
+        ("src/a.py", '"""One.\n\nFaults are told apart."""\n', [3]),
+        ("src/a.py", 'print(f"{1} was Foretold")\n', [1]),
+        ("src/a.py", "x = 1  # is predicted\nforest = unforetold = 2\n", []),
+        ("src/contract/a.py", 'key = "foretold"\nforetell = 1\n', [2]),
+        ("docs/a.md", "One.\nIt is told apart.\n", [2]),
+    ],
+)
+def test_where_a_term_is_found(name, text, lines):
+    assert [int(one.split(":")[1]) for one in words.findings(name, text, TABLE)] == lines
+
+
+def test_every_exception_is_of_a_term_that_is_avoided_and_has_a_reason():
+    text = (words.ROOT / words.PAGE).read_text(encoding="utf-8")
+    avoided, exceptions = words.table(text)
+    assert {term for term, _ in exceptions} <= set(avoided)
+    assert all(reason for _, _, reason in words.rows("Exceptions", text))
+    assert all(list(words.ROOT.glob(place)) for _, place in exceptions), "an exception of no file"
+
+
+def test_nothing_is_left_to_find(capsys):
+    assert words.main() == 0, capsys.readouterr().out

@@ -65,8 +65,8 @@ _OTHER_LAWS: dict[str, Any] = {
 not modelled ties the command to it), and what a name asks for then. Chosen on simulated flights
 (`own_logs.py`, seeds 1 to 6)."""
 _MOVING_AIR: dict[str, Any] = {"own_gain_sd": 0.08, "own_gain_time_s": 100.0}
-_WINDOW_S, _FORETOLD = 10.0, 20
-"""Whitened by the flight's own colour and by what so many samples before foretell; gains differ by flight
+_WINDOW_S, _AR_ORDER = 10.0, 20
+"""Whitened by the flight's own noise model and an AR predictor of so many samples; gains differ by flight
 rather than within it: chosen on seeds 11 and 12, in light turbulence; what a name asks for on a pa28's
 seed 11."""
 _POWER_OTHER_LAWS, _THEORIES = 0.4, 2.0
@@ -251,20 +251,20 @@ def _colours(stretches: Sequence[Stretch], model: Model) -> list[Colour]:
     found = []
     for colour in sorted({one.samples.colour for one in stretches} - {()}):
         alike = [residuals(model, one) for one in stretches if one.samples.colour == colour]
-        found.append(_foretelling(list(colour), alike))
+        found.append(_with_predictor(list(colour), alike))
     return found
 
 
-def _foretelling(average: list[float], residual: Sequence[tuple[NDArray[np.int64], Floats]]) -> Colour:
-    """A colour with what those before foretell of a residual, by least squares where they follow one another,
-    and the noise that is left; nothing is foretold where too few do."""
+def _with_predictor(average: list[float], residual: Sequence[tuple[NDArray[np.int64], Floats]]) -> Colour:
+    """A noise model with an AR predictor of the residual, by least squares where samples follow one another,
+    and the remaining noise; without a predictor where too few do."""
     parts = [e[begin:end] for rows, e in residual for begin, end in _runs(rows)]
-    ends = [part[_FORETOLD:] for part in parts]
-    if sum(map(len, ends)) < 10 * 3 * _FORETOLD:
+    ends = [part[_AR_ORDER:] for part in parts]
+    if sum(map(len, ends)) < 10 * 3 * _AR_ORDER:
         return Colour(average=average, noise=np.cov(np.vstack(parts).T).tolist())
     x = np.vstack([
-        np.hstack([part[_FORETOLD - j : len(part) - j] for j in range(1, _FORETOLD + 1)])
-        for part in parts if len(part) > _FORETOLD
+        np.hstack([part[_AR_ORDER - j : len(part) - j] for j in range(1, _AR_ORDER + 1)])
+        for part in parts if len(part) > _AR_ORDER
     ])  # fmt: skip
     y = np.vstack(ends)
     by = np.linalg.lstsq(x, y, rcond=None)[0]
@@ -599,7 +599,7 @@ def prediction(model: Model, kept: Stretch) -> Document:
 
 
 def left_white(model: Model, kept: Stretch) -> tuple[NDArray[np.int64], Floats, Floats]:
-    """Places (n,) of the samples in use, what residual (n, 3) those before do not foretell, and answers
+    """Places (n,) of the samples in use, the unpredicted part of the residual (n, 3), and answers
     (n, G, 3) as they show in it."""
     ok, unexplained, answers = regression.in_white(kept.samples, model, scaled=True)
     rows = np.flatnonzero(kept.use & ok)

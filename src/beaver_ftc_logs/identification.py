@@ -278,7 +278,7 @@ def summary(model: Model) -> str:
         f"{model.vehicle.name}: {used} samples at {model.rate_hz:.3g} Hz, flights: {len(found['flights'])}; "
         f"past samples of the rates: {model.history}, of the commands: {model.lags}",
         *(f"  {line}" for line in found.get("assumed", [])),
-        *(f"  together, not to be told apart: {', '.join(g)}" for g in model.groups if len(g) > 1),
+        *(f"  together, not distinguishable: {', '.join(g)}" for g in model.groups if len(g) > 1),
         *_pressure_lines(model),
         *(
             f"  noise of the colour {', '.join(f'{c:.3g}' for c in one.average)}: {one.wider:.2g} times as "

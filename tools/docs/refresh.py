@@ -32,7 +32,7 @@ class Wanted:
     dear: bool = False
     probes: bool = False
     only: str = ""
-    refreshed: bool = False  # also what is kept of an earlier run
+    again: bool = False  # also what is kept of an earlier run
 
     def flies(self, origin: Origin) -> bool:
         """Whether the command itself is run, not its probe."""
@@ -61,7 +61,7 @@ def outputs_of(pages: Sequence[Page], wanted: Wanted, jobs: int | None = None) -
     cheap, dear = wanted.commands(origins)
     needed = {origin.needs for origin in origins}
     kept = Kept(needed)
-    known = {} if wanted.refreshed else {line: found for line in set(cheap) if (found := kept.get(line))}
+    known = {} if wanted.again else {line: found for line in set(cheap) if (found := kept.get(line))}
     printed = outputs([line for line in cheap if line not in known], set(dear), jobs, needed)
     for line in set(cheap) & printed.keys():
         kept.put(line, printed[line])
@@ -270,10 +270,10 @@ def write(pages: Sequence[Page], wanted: Wanted, jobs: int | None = None) -> tup
 
 
 def check(
-    pages: Sequence[Page], jobs: int | None = None, refreshed: bool = False
+    pages: Sequence[Page], jobs: int | None = None, again: bool = False
 ) -> tuple[list[Finding], dict[str, Output]]:
     """What is wrong on the pages, and what is only said; and what every command printed."""
-    wanted = Wanted(probes=True, refreshed=refreshed)
+    wanted = Wanted(probes=True, again=again)
     printed = outputs_of(pages, wanted, jobs)
     made = [Refreshed(page, printed, wanted) for page in pages]
     return [finding for page in made for finding in (*page.findings, *page.changes)], printed

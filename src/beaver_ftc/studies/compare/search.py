@@ -7,7 +7,7 @@
 Every parameter is searched on the scale of its range (0 to 1 between its limits). Of the trials whose cost is
 within `TIE` of the lowest, the one nearest the middle of the ranges is taken: where the cost does not depend
 on a parameter, the parameter does not drift to a limit. A range with the result within `EDGE` of a limit is
-widened there and searched anew.
+widened there and searched again.
 """
 
 from collections.abc import Callable, Mapping, Sequence

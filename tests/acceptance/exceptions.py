@@ -54,7 +54,6 @@ TABLE = (
     ),
     Exempt(r"beaver-ftc compare --sweep examples/gtm/.*|beaver-ftc import gtm .*", "needs NASA's data"),
     Exempt(r"git clone .*", "needs the network"),
-    Exempt(r"beaver-ftc import gtm .*", "needs NASA's data", "beaver-ftc import gtm --help"),
     Exempt(r"python -m tools\.docs reference \S+", "in a checkout; tests/tools prints every such page"),
     Exempt(
         r"(beaver-ftc live(?: (?!--open)\S+)*)( --open)?",
@@ -92,7 +91,7 @@ TABLE = (
         "python -m tools.drawn.certificates --flights 4 --altered 4",
     ),
     Exempt(
-        r"beaver-ftc (run|validate|sweep|compare|detectability|evidence|sitl)",
+        r"beaver-ftc (run|validate|sweep|compare|detectability|evidence|sitl|mismatch|separate|import gtm)",
         "names the command without its arguments",
         r"beaver-ftc \1 --help",
     ),

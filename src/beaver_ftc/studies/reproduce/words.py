@@ -76,7 +76,8 @@ def verdict_rows(document: Document) -> list[tuple[str, ...]]:
 
 def said(claim: Document) -> str:
     """The verdict in words."""
-    return SHOWN_AS.get(claim["verdict"], claim["verdict"])
+    verdict: str = claim["verdict"]
+    return SHOWN_AS.get(verdict, verdict)
 
 
 def remark(claim: Document) -> str:

@@ -86,6 +86,8 @@ def _margins(still: np.ndarray, moved: np.ndarray, omega: np.ndarray, dt: float)
     pulse[round(PULSE_AT_S / dt)] = np.radians(PULSE_DEG)
     if not np.abs(v[-len(v) // 5 :]).max() < DECAYED * np.radians(PULSE_DEG):
         return 0.0, 0.0, 0.0
+    if not v.any():
+        return 0.0, 0.0, 0.0  # the surface is at a stop: there is no loop
     v_jw, d_jw = (_transform(np.diff(each), omega * dt) for each in (v, pulse))
     return tuple(map(float, margins(-(v_jw - d_jw) / v_jw)))
 

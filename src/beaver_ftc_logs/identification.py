@@ -10,10 +10,10 @@ import numpy as np
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import extremes, fitting, regression, trust
-from beaver_ftc_logs.model import Fitted, Model
+from beaver_ftc_logs.model import Colour, Fitted, Model
 from beaver_ftc_logs.recording import Floats
 from beaver_ftc_logs.regression import group_indices, spectrum, variance_inflation
-from beaver_ftc_logs.samples import NOISE_COLOURS, Samples, whitened, with_pressure
+from beaver_ftc_logs.samples import NOISE_COLOURS, UNSEEN_NOISE, Samples, whitened, with_pressure
 from beaver_ftc_logs.vehicle import Vehicle
 
 _COLLINEAR = 10.0
@@ -38,7 +38,7 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
     stretches = fitting.stretches_of(coloured(flights, vehicle))
     model = fitting.fit_model(stretches, vehicle)
     check_explains(fitting.explained(stretches, model), stretches, model)
-    model = fitting.trusted(stretches, model)
+    model = with_unseen_noise(fitting.trusted(stretches, model), flights)
     tests, bounds = fitting.run_tests(stretches, model)
     found = {
         "assumed": found_by,
@@ -52,6 +52,21 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
     }
     settings = model.settings.model_copy(update={"bounds": bounds})
     return model.model_copy(update={"settings": settings, "identified": found})
+
+
+def with_unseen_noise(model: Model, flights: Sequence[Samples]) -> Model:
+    """In moving air the model with colours of noise that no fitted flight had: another gyro or air may have
+    them, and a law answers noise. How large it is the flight itself shows (`filtering.least_scale`)."""
+    if not model.colours:
+        return model
+    known, wider = [tuple(one.average) for one in model.colours], max(one.wider for one in model.colours)
+    colours = list(model.colours)
+    for average in UNSEEN_NOISE:
+        if average not in known:
+            white = fitting.stretches_of([whitened(one, average) for one in flights])
+            left = np.vstack([fitting.residuals(model, one)[1] for one in white])
+            colours.append(Colour(average=list(average), noise=np.cov(left.T).tolist(), wider=wider))
+    return model.model_copy(update={"colours": colours})
 
 
 def assumed(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Vehicle, list[str]]:

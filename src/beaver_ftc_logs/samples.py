@@ -35,6 +35,8 @@ NOISE_COLOURS = (
     *((1.0, -2.0 * c, c**2) for c in (0.2, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85, 0.9)),
 )  # fmt: skip
 """Moving averages of the noise: gusts held within a sample add to the next, gyros' noise takes from it."""
+UNSEEN_NOISE = ((1.0,), (1.0, 0.5), *(NOISE_COLOURS[k] for k in (3, 6, 9)))
+"""Those of them that a flight is tried with where no fitted flight had them."""
 _GAP = 3.5
 """A step of more than this many usual steps is a gap: nothing is predicted across it."""
 

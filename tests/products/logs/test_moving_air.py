@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_logs import diagnose, fitting, identification, trust
+from beaver_ftc_logs import diagnose, fitting, identification, samples, trust
 from beaver_ftc_logs.bank import bank_of, noise_of
 from beaver_ftc_logs.filtering import _update, posterior_of
 from beaver_ftc_logs.model import Colour, Fitted, as_text, load_model
@@ -225,3 +225,18 @@ def test_a_model_that_is_read_again_samples_as_it_did(tmp_path, keys, rate_hz):
     assert model.vehicle.rate_hz == rate_hz
     (tmp_path / "model.json").write_text(as_text(model))
     assert load_model(tmp_path / "model.json").vehicle.rate_hz == rate_hz
+
+
+def test_a_flight_is_tried_with_noise_that_no_fitted_flight_had(moving):
+    """Each colour once, the fitted as they were; the noise of another is what it leaves of the flights."""
+    flights = [flown((1.0,), 0.5, 2000, 31)]
+    model = moving.model_copy(update={"colours": moving.colours[:1]})
+    found = identification.with_unseen_noise(model, flights)
+    averages = [tuple(one.average) for one in found.colours]
+    assert found.colours[0] == model.colours[0]
+    assert set(averages) == {*samples.UNSEEN_NOISE, tuple(model.colours[0].average)}
+    assert len(set(averages)) == len(averages)
+    white = fitting.stretches_of([whitened(flights[0], averages[-1])])[0]
+    noise = np.cov(fitting.residuals(model, white)[1].T)
+    assert np.allclose(found.colours[-1].noise, noise)
+    assert identification.with_unseen_noise(small.model(), flights).colours == []

@@ -33,12 +33,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from beaver_ftc.studies.power.chances import level_for
 
 from beaver_ftc.aircraft import DEFAULT
 from beaver_ftc.diagnosis.bounds.clairvoyant import chance
 from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc.studies.compare.replay import Recording, Trace, aware_of_the_air, record, trace
+from beaver_ftc.studies.power.probabilities import level_for
 from beaver_ftc.studies.power.survey import (
     BOTH,
     WATCHED_S,

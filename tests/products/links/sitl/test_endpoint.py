@@ -161,7 +161,7 @@ def test_the_command_leaves_what_run_leaves(protocol, tmp_path):
     ]  # fmt: skip
     assert len(pd.read_parquet(folder / "log.parquet")) == metrics["frames"] == 250
     assert "case: PASSED" in printed
-    assert re.search(rf"link +{protocol}, 2\d\d frames at 100 Hz; answered in", printed)
+    assert re.search(rf"link +{protocol}, 2\d\d frames at 100 Hz; latency", printed)
     assert 'failures="0"' in (tmp_path / "verdict.xml").read_text(encoding="utf-8")
     assert bf.open_run(folder).metrics == metrics
 

@@ -455,8 +455,8 @@ def trusted(stretches: Sequence[Stretch], model: Model) -> Model:
         says = f"{_minutes(parts):.1f} min of health left out have too few peaks of the evidence to tell"
         more = extremes.SHOWN * 60.0 / asked - _minutes(parts)
         raise BadInput(f"identify: false_alarms_per_hour {asked:g}: {says}, allowed: {more:.0f} min more")
-    asks = per_hour and (tail or model.vehicle.other_laws)
-    threshold = _threshold(tail, per_hour, model) if asks else None
+    calibrates = bool(tail or model.vehicle.other_laws)
+    threshold = _threshold(tail, per_hour, model) if per_hour and calibrates else None
     settings = {"false_alarms_per_hour": per_hour, "threshold": threshold}
     return model.model_copy(
         update={

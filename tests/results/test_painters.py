@@ -3,10 +3,12 @@
 import os
 import signal
 import sys
+import threading
 from dataclasses import replace
 
 import pytest
 
+from beaver_ftc.results import painters as module
 from beaver_ftc.results.figures import pictures_of, write_figures
 from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.painters import drawing, painters, share
@@ -15,7 +17,8 @@ pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="pr
 
 
 @pytest.fixture
-def pictures(log_path, flight, tmp_path):
+def pictures(log_path, flight, tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "_can_fork", lambda: True)  # whatever threads other tests have left
     (tmp_path / "beside").mkdir()
     return pictures_of(log_path, measure(flight), tmp_path / "beside")[-3:]
 
@@ -66,3 +69,15 @@ def test_whoever_has_least_draws_the_next_largest(pictures):
 def test_nobody_is_begun_for_no_figures():
     with painters(wanted=False) as at_work:
         assert at_work == ()
+
+
+def test_nobody_is_begun_beside_another_thread():
+    done = threading.Event()
+    other = threading.Thread(target=done.wait)
+    other.start()
+    try:
+        with painters() as at_work:
+            assert at_work == ()
+    finally:
+        done.set()
+        other.join()

@@ -1,16 +1,18 @@
 """Figures drawn by processes beside this one, which import matplotlib while the flight is flown.
 
 They are forked before anything heavy is there, and end with the one that began them. Where a process cannot
-be forked, or has one core, or a painter has died, the figures are drawn here: they are the same.
+be forked, has other threads, whose locks a fork would copy, or one core, or where a painter has died, the figures
+are drawn here: they are the same.
 """
 
 import multiprocessing
+import os
 import signal
 import sys
+import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from multiprocessing.connection import Connection
-from os import cpu_count
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -23,7 +25,7 @@ Painters = Sequence[Connection]
 @contextmanager
 def painters(wanted: bool = True) -> Iterator[Painters]:
     """Processes that draw until the end of the block; none where figures are not wanted or not drawn so."""
-    if not wanted or not sys.platform.startswith("linux") or (cpu_count() or 1) < PROCESSES:
+    if not wanted or not _can_fork():
         yield ()
         return
     fork = multiprocessing.get_context("fork")
@@ -39,9 +41,16 @@ def painters(wanted: bool = True) -> Iterator[Painters]:
         yield ours
     finally:
         for process in processes:
-            process.terminate()
+            process.kill()  # one that has just begun would still handle SIGTERM as this process does
         for process in processes:
             process.join()
+
+
+def _can_fork() -> bool:
+    """Whether painters can work beside this process, and a fork copies no lock that another thread holds."""
+    if not sys.platform.startswith("linux") or (os.cpu_count() or 1) < PROCESSES:
+        return False
+    return threading.active_count() == 1
 
 
 @contextmanager

@@ -212,7 +212,7 @@ def test_a_run_says_what_it_would_have_said_by_itself(given):
     said = dict(facts(measure(flight)))
     if given:
         assert said["statistical"].startswith("alarm at 4.0")
-        assert "standard deviations" in said["statistical"]
+        assert "threshold 6.62 σ" in said["statistical"]
     else:
         assert "statistical" not in said
 

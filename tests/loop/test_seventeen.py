@@ -112,8 +112,9 @@ def test_what_is_left_of_an_axis_is_computed_and_said():
     spans = {s: (t.max_rad - t.min_rad) * abs(halves.effect[s][0]) for s, t in halves.travel.items()}
     expected = 1.0 - spans["aileron_left"] / sum(spans.values())
     whole = of["healthy_greatest_rad_s2"] - of["healthy_least_rad_s2"]
-    assert (of["greatest_rad_s2"] - of["least_rad_s2"]) / whole == pytest.approx(expected, abs=0.03)
-    assert "of what all surfaces together give" in verdict_text(Metrics.of(flight.metrics), "here")
+    share = (of["greatest_rad_s2"] - of["least_rad_s2"]) / whole
+    assert share == pytest.approx(expected, abs=0.03)
+    assert f"roll authority {100 * share:.0f} %" in verdict_text(Metrics.of(flight.metrics), "here")
     assert flight.metrics["tracking"]["post_fault_rms_deg_s"]["p"] < 0.2
 
 

@@ -118,7 +118,7 @@ def test_any_broken_promise_is_counted_and_said(broken):
     document = summarise({"healthy": [], "faulty": [_faulty_row(**{broken: True})]})
     assert not document["kept"]
     assert sum(document["schemes"]["sharpened"][promise] for promise in PROMISES) == 1
-    assert "BROKEN" in summary_text(document)
+    assert "A GUARANTEE IS VIOLATED" in summary_text(document)
 
 
 def test_a_false_alarm_in_healthy_flight_is_counted_per_hour():

@@ -100,20 +100,20 @@ def test_bounds_lean_on_no_prior_where_laws_differ():
     assert (rows.low > 0.9).all()
 
 
-def test_what_those_before_foretell_of_a_residual_is_found():
-    """Drawn: e[k] = 0.8 e[k-1] + w[k]. The noise left is that of w; too few tell nothing."""
+def test_the_predictor_of_a_residual_is_found():
+    """Drawn: e[k] = 0.8 e[k-1] + w[k]. The remaining noise is that of w; few samples give no predictor."""
     rng, size = np.random.default_rng(3), np.array([0.1, 0.2, 0.05])
     e = np.zeros((20_000, 3))
     w = size * rng.standard_normal(e.shape)
     for k in range(1, len(e)):
         e[k] = 0.8 * e[k - 1] + w[k]
     rows = np.concatenate([np.arange(9_000), np.arange(9_500, 20_500)])
-    found = fitting._foretelling([1.0], [(rows, e)])
+    found = fitting._with_predictor([1.0], [(rows, e)])
     before = np.reshape(found.before, (-1, 3, 3))
     np.testing.assert_allclose(before[0], 0.8 * np.eye(3), atol=0.1)
     np.testing.assert_allclose(np.diag(found.noise), size**2, rtol=0.05)
     np.testing.assert_allclose(before[1:].sum(axis=0), 0.0, atol=0.15)
-    few = fitting._foretelling([1.0], [(np.arange(100), e[:100])])
+    few = fitting._with_predictor([1.0], [(np.arange(100), e[:100])])
     assert few.before == []
     np.testing.assert_allclose(few.noise, np.cov(e[:100].T))
 

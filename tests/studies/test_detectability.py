@@ -245,7 +245,8 @@ def test_the_rates_never_tell_elevator_from_flap_and_accelerometers_do():
     (pair,) = alike(scenario())
     assert pair["surfaces"] == ("elevator", "flap")
     assert geometry([pair]) == [
-        "elevator and flap have similar effects on the rates: the rates never distinguish them, accelerometers do"
+        "elevator and flap have similar effects on the rates: "
+        "the rates never distinguish them, accelerometers do"
     ]
 
 

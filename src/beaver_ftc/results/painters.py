@@ -1,8 +1,8 @@
 """Figures drawn by processes beside this one, which import matplotlib while the flight is flown.
 
-They are forked before anything heavy is there, and end with the one that began them. Where a process cannot
-be forked, has other threads, whose locks a fork would copy, or one core, or where a painter has died, the figures
-are drawn here: they are the same.
+They are forked before anything heavy is there, and end with the one that began them. The figures are drawn in
+this process, and are the same, where it cannot be forked, has one core or other threads (whose locks a fork
+would copy), or where a painter has died.
 """
 
 import multiprocessing

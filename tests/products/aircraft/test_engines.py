@@ -276,8 +276,9 @@ def test_detectability_says_how_an_engine_at_idle_turns_the_aircraft(jet):
     assert left["turns_rad_s2"] == pytest.approx(right["turns_rad_s2"], rel=1e-3)
     assert left["known"]
     assert left["shows"] > 10.0
-    assert of_engines([left])[0].endswith("the design model knows its moment and monitors it against the thrust")
-    assert of_engines([left | {"held": False}])[0].endswith("the design model knows its moment")
+    known = "the design model knows its moment"
+    assert of_engines([left])[0].endswith(f"{known} and monitors it against the thrust")
+    assert of_engines([left | {"held": False}])[0].endswith(known)
 
 
 def test_of_an_aircraft_without_effectors_it_says_nothing_on_engines():

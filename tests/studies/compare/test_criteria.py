@@ -1,7 +1,7 @@
 """The costs by which methods are tuned, from results made by hand."""
 
 from dataclasses import replace
-from math import exp, inf, log, sqrt
+from math import exp, inf, log, nan, sqrt
 
 import pytest
 
@@ -97,6 +97,9 @@ def test_a_law_may_spend_no_more_than_the_default_and_a_tenth(law, monkeypatch):
         ({"down_db": 4.5}, 0.25),
         ({"phase_deg": 9.0}, 0.8),
         ({"up_db": 0.0}, 1.0),
+        ({"up_db": nan}, 1.0),
+        ({"down_db": nan}, 1.0),
+        ({"phase_deg": nan}, 1.0),
     ],
 )
 def test_a_law_with_too_little_margin_is_not_flown(law, monkeypatch, changes, short):

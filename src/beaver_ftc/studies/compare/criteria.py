@@ -28,7 +28,7 @@ far. Its cost is then the mean up to there.
 
 from collections.abc import Mapping, Sequence
 from functools import cache
-from math import exp, inf, isfinite, log, sqrt
+from math import exp, inf, isfinite, isnan, log, sqrt
 from statistics import fmean
 
 from beaver_ftc.documents.errors import BeaverFtcError
@@ -135,16 +135,19 @@ class LawCost:
         return margins_of(with_values(with_entry(self._cases[0].scenario, self._entry), LAWS, values))
 
     def shortfall(self, values: Values) -> float:
-        """By which share the worst margin is too small; zero if all are kept."""
+        """By which share the worst margin is too small; zero if all are kept. One that is NaN is none."""
         asked = self._cases[0].scenario.control
-        return max(
-            max(
-                0.0,
-                1.0 - min(margin.up_db, margin.down_db) / asked.gain_margin_db,
-                1.0 - margin.phase_deg / asked.phase_margin_deg,
-            )
+        shares = [
+            found / least
             for margin in self.margins(values)
-        )
+            for found, least in (
+                (margin.up_db, asked.gain_margin_db),
+                (margin.down_db, asked.gain_margin_db),
+                (margin.phase_deg, asked.phase_margin_deg),
+            )
+        ]
+        worst = max(1.0 if isnan(share) else 1.0 - share for share in shares)
+        return max(0.0, worst)
 
     def _tracking(self, values: Values) -> float:
         results, logs = list[Result](), list[float]()

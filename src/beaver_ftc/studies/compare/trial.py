@@ -180,8 +180,8 @@ def fly_case(
         trial.failures.append(str(error))
         return trial
     for scheme in dict.fromkeys(entry.scheme for entry in entries if entry.scheme != "none"):
-        fdi = with_entry(case.scenario, Entry(scheme, LAW), chosen).fdi
         try:
+            fdi = with_entry(case.scenario, Entry(scheme, LAW), chosen).fdi
             if scheme != SCHEME and (scheme == STATISTICAL or is_compiled(DETECTORS, scheme)):
                 own = record(case.scenario.model_copy(update={"fdi": fdi}))  # with which its statistic comes
                 trial.traces[scheme] = trace(own, own.built_in)

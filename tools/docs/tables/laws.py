@@ -2,8 +2,9 @@
 
 import numpy as np
 
-import beaver_ftc as bf
 from beaver_ftc.control.laws.gains import RATIO
+from beaver_ftc.loop.loop import Loop
+from beaver_ftc.loop.readout import FrameReadout
 from beaver_ftc.scenario.loader import load
 from beaver_ftc.studies.margins import study
 from beaver_ftc.studies.present.tables import markdown_table
@@ -23,11 +24,12 @@ def law_gains() -> str:
     rows = []
     for declared, keys in DECLARED.items():
         scenario = load(keys)
-        law = bf.Simulation(scenario).records["control"]["rejecting"]["config"][0]
+        law = FrameReadout(Loop(scenario).frames[0]).control
         slowest = scenario.airframe.envelope.airspeed_mps[0]
-        pressure = law["qdyn"][0] * (AIRSPEED_MPS / slowest) ** 2
-        for loop, gains, lead in zip(LOOPS, law["Kp_at"], law["lead"], strict=True):
-            gain = np.interp(pressure, law["qdyn"], gains)
+        qdyn_pa = law.schedule.qdyn_pa
+        pressure = qdyn_pa[0] * (AIRSPEED_MPS / slowest) ** 2
+        for loop, gains, lead in zip(LOOPS, law.schedule.Kp, law.lead, strict=True):
+            gain = np.interp(pressure, qdyn_pa, gains)
             rows.append((declared, loop, f"{gain:.1f}", f"{RATIO * gain:.1f}", f"{lead:.1f}"))
     return markdown_table(("declared", "loop", "K_p, 1/s", "w, 1/s", "lead"), rows)
 

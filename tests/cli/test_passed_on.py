@@ -125,7 +125,11 @@ SAID = {
 }
 BENCH = {"studies__bench__measure__bench": {"b": 1}, "studies__bench__measure__text_of": "bench"}
 DERIVE = {
-    "beaver_ftc_aircraft__derive__derivation__derive": "made",
+    "beaver_ftc_aircraft__derive__derivation__derive": SimpleNamespace(
+        name="made", aircraft=SimpleNamespace(folder=Path("folder/made"))
+    ),
+    "scenario__validate_scenario": SimpleNamespace(name="first"),
+    "loop__fly": None,
     "beaver_ftc_aircraft__derive__derived__document_of": {"d": 2},
     "beaver_ftc_aircraft__derive__derived__text_of": "derived",
 }

@@ -72,7 +72,7 @@ def test_a_network_trained_on_few_flights_finds_what_it_has_seen(learned):
 
 
 def test_its_flights_are_none_of_those_that_are_compared():
-    own = [load_sweep(path).seed for path in EXAMPLE.glob("*.yaml")]
-    others = [load_sweep(path).seed for path in benchmark_folder().glob("*/*.yaml")]
+    own = [load_sweep(path).file.seed for path in EXAMPLE.glob("*.yaml")]
+    others = [load_sweep(path).file.seed for path in benchmark_folder().glob("*/*.yaml")]
     assert len(own) == 2
     assert not set(own) & set(others)

@@ -253,7 +253,7 @@ def test_nothing_is_tuned_on_what_is_compared():
     tuned_on = {case.scenario.seed for name in CALIBRATED_ON for case in of_set(name)}
     compared = {case.scenario.seed for name in set_names() for case in of_set(name)}
     assert not tuned_on & compared
-    drawn = Counter(load_sweep(path).seed for path in benchmark_folder().glob("*/*.yaml"))
+    drawn = Counter(load_sweep(path).file.seed for path in benchmark_folder().glob("*/*.yaml"))
     assert max(drawn.values()) == 1
 
 

@@ -57,7 +57,7 @@ def test_what_is_flown_for_margins_has_only_the_sensors_lags():
         0,
     )
     assert still.sensors.q.is_ideal
-    assert (still.faults, still.environment.severity, still.fdi.scheme) == ([], None, "none")
+    assert (still.faults, still.environment.severity, still.fdi.scheme) == ((), None, "none")
     assert not np.any([vars(still.reference)[axis] for axis in "pqr"])
 
 

@@ -112,9 +112,9 @@ def test_what_other_threads_do_meanwhile_is_no_cost_of_a_law(monkeypatch):
             pass
 
     monkeypatch.setattr(trial, "Loop", Slow)
-    monkeypatch.setattr(trial, "with_entry", lambda scenario, entry: None)
+    monkeypatch.setattr(trial, "with_entry", lambda scenario, entry, chosen: None)
     monkeypatch.setattr(trial, "result_of", lambda flight, entry, us: us)
-    assert trial._fly(None, None) < 25.0  # us a frame; the thread takes 50
+    assert trial._fly(None, None, {}) < 25.0  # us a frame; the thread takes 50
 
 
 def test_shares_of_the_faulted_flights_and_of_all():

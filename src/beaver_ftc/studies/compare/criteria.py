@@ -157,6 +157,8 @@ class LawCost:
             if len(logs) >= LEAST_FLIGHTS and exp(fmean(logs)) > HOPELESS * self._lowest:
                 break
         excess = effort(results) / (EFFORT * self._effort_allowed)
+        if not isfinite(excess):
+            return FAILED
         if excess > 1.0 and len(results) == len(self._cases):
             return INADMISSIBLE * excess
         cost = exp(fmean(logs))

@@ -28,7 +28,7 @@ class Exempt:
 
 TABLE = (
     Exempt(
-        r"make (demo|test|site|cost|docs-check)",
+        r"make (demo|test|site|cost|waits|docs-check)",
         "in a checkout: sets up from the package index; make test runs this very suite",
     ),
     Exempt(r"beaver-ftc derive AIRCRAFT .*", "names the command's arguments", "beaver-ftc derive --help"),
@@ -76,9 +76,17 @@ TABLE = (
         "needs the recorded flights, which are not of this project (tests/products/logs has some of its own)",
     ),
     Exempt(
-        r"beaver-ftc compare --tune( --errors)?",
-        "a search of minutes, which tests/studies/compare does on few flights",
+        r"beaver-ftc compare (--tune|.*--tuned|.*learned-network).*",
+        "a search of minutes, which tests/studies/compare does on few flights, or what it writes",
         "beaver-ftc compare --help",
+    ),
+    Exempt(
+        r"(pip install \./examples/learned-detector|python -m learned_detector\.train .*)",
+        "needs scikit-learn; tests/plugins/test_learned.py trains it",
+    ),
+    Exempt(
+        r"cd my-logs|beaver-ftc identify (--check )?healthy\.csv --vehicle vehicle\.yaml.*",
+        "in the folder of logs, which tests/acceptance/test_tutorials.py has",
     ),
     Exempt(
         r"python -m tools\.drawn\.forgeries",

@@ -20,7 +20,7 @@ def list_choices(
     short: bool = False,
     format: FormatOption = Format.text,
 ) -> None:
-    """List scenarios, aircraft, diagnosis schemes, laws, fault types and signals.
+    """List scenarios, aircraft, schemes, laws and fault types.
 
     Built-in scenarios, sweeps and plans of evidence, aircraft, diagnosis schemes, control laws, fault types
     and reference signals.

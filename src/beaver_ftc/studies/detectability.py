@@ -557,7 +557,7 @@ def _line(row: Document) -> str:
 
 @dataclass(frozen=True)
 class Detectability(StudyCommand):
-    """Compute the smallest fault that is certain to be detected and isolated.
+    """Compute the smallest fault that is certain to be isolated.
 
     Over airspeed, altitude and excitation. A sentence for each surface comes first, the tables follow.
 

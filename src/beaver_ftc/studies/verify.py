@@ -429,7 +429,7 @@ def _line(label: str, cells: Iterable[str]) -> str:
 
 @dataclass(frozen=True)
 class Verify(StudyCommand):
-    """Test the guarantees on random flights within the declared bounds.
+    """Test the guarantees on flights within the declared bounds.
 
     Counts violations of the guarantees with exact confidence limits: false alarms, excluded true faults,
     wrong isolations, and detections later than guaranteed plus one frame; for the published and the sharpened

@@ -190,7 +190,7 @@ def median(rows: Sequence[Mapping[str, Any]], name: str) -> Document:
 
 @dataclass(frozen=True)
 class Decay(StudyCommand):
-    """Fly how a verdict decays as the truth leaves what the scenario declares.
+    """Fly how a verdict changes beyond what is declared.
 
     Each error that `fdi.bounds` can declare at 1, 1.5, 2 and 4 times what is declared, alone and all
     together: false alarms, detection, right and wrong names and tracking, each with its 95 % interval. Every

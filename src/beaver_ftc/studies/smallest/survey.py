@@ -258,7 +258,7 @@ def _counted(count: int, of: int) -> Document:
 
 @dataclass(frozen=True)
 class Smallest(StudyCommand):
-    """Find the smallest loss of a surface that is detected in time.
+    """Find the smallest loss that is detected within a time.
 
     Reports the size that is certain to be detected, and the size that is detected in 90 % of flights with its
     95 % interval. It flies the scenario without its own faults, with random seed and time of the loss, and

@@ -147,7 +147,9 @@ def _better(rows: Rows, key: str, more: bool) -> str:
         if where:
             found.append(f"`{rival}` in {', '.join(where)}")
     return (
-        f"Better than `{ours}`: {'; '.join(found)}." if found else f"No rival is better than `{ours}` here."
+        f"These are better than `{ours}`: {'; '.join(found)}."
+        if found
+        else f"No rival is better than `{ours}` here."
     )
 
 

@@ -64,7 +64,11 @@ class SensorErrors(dict[str, Error]):
 
     def exceeded_by(self, sensors: Sensors) -> list[str]:
         """The instruments of a truth whose errors are not within the declared ones."""
-        return [name for name, sensor in sensors if not sensor.is_within(getattr(self.declared, name))]
+        return [
+            name
+            for name, sensor in sensors
+            if not (sensor.is_ideal or sensor.is_within(getattr(self.declared, name)))
+        ]
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,7 @@ class _Sensor(Section):
 
     @property
     def is_ideal(self) -> bool:
-        return all(value == 0 for _, value in self)
+        return not any(vars(self).values())
 
     @property
     def is_bounded(self) -> bool:

@@ -368,10 +368,8 @@ def _in_one_frame(scenario: "Scenario", found: Metrics) -> str:
 
 def _is_exact(scenario: "Scenario") -> bool:
     """Whether sensors and servos are ideal, the air is still and nothing is undeclared."""
-    air = scenario.environment
-    still = air.turbulence == "none" and not any(air.wind_mps) and not air.gusts
-    exact = scenario.sensors.is_ideal and scenario.actuators.is_ideal and still
-    return exact and next(undeclared(scenario), None) is None
+    parts = scenario.sensors.is_ideal, scenario.actuators.is_ideal, scenario.environment.is_still
+    return all(parts) and next(undeclared(scenario), None) is None
 
 
 def _on_the_bound(flight: "Landing") -> str:

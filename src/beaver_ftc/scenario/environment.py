@@ -76,6 +76,11 @@ class Environment(Section):
             return ()
         return (self.gust,) if isinstance(self.gust, Gust) else self.gust
 
+    @property
+    def is_still(self) -> bool:
+        """Whether there is no wind, gust or turbulence."""
+        return self.turbulence == "none" and not any(self.wind_mps) and not self.gusts
+
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
         turbulent = self.turbulence != "none"

@@ -138,9 +138,12 @@ def test_a_failure_before_the_first_row_leaves_nothing(tmp_path):
     def fail(case):
         raise SimulationFailed("at once")
 
-    with pytest.raises(SimulationFailed, match="at once"):
-        rows_of(tmp_path / "out" / "study", range(3), fail)
-    assert hidden(tmp_path) == []
+    for out in (tmp_path / "out", tmp_path / "there"):  # which was there before, and empty, stays
+        (tmp_path / "there").mkdir(exist_ok=True)
+        with pytest.raises(SimulationFailed, match="at once"):
+            rows_of(out / "study", range(3), fail)
+        assert hidden(tmp_path) == ["there"]
+    assert hidden(tmp_path / "there") == []
 
 
 def test_two_processes_do_not_fly_the_same_study(tmp_path):

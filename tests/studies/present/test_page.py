@@ -55,6 +55,11 @@ def test_panels_bear_their_labels_at_the_edges_alone():
     assert [[a.get_ylabel() for a in row] for row in axes] == [["top", ""], ["bottom", ""]]
     assert [[a.get_title() for a in row] for row in axes] == [["left", "right"], ["", ""]]
     assert figure.get_size_inches().tolist() == [4.0, 4.0]
+    assert (figure.dpi, panels(1, 1, 3.0, 2.0, dpi=85)[0].dpi, panels(1, 1, 3.0, 2.0, "of it")[0].dpi) == (
+        110,
+        85,
+        110,
+    )
 
 
 def test_what_stands_outside_the_marks_of_a_page_stays(tmp_path):

@@ -67,7 +67,27 @@ def test_a_frequent_event_needs_no_levels():
     found = chains.estimate()
     assert (found.levels, found.flights) == (0, rare.RUNS * rare.MEMBERS)
     assert found.low < 0.5 < found.high
-    assert found.plain["events"] == pytest.approx(880, abs=90)
+    assert (found.plain["events"], found.plain["of"]) == (int((chains.points >= 0.0).sum()), 1760)
+    assert found.probability == pytest.approx(found.plain["events"] / 1760)
+
+
+def test_a_score_of_zero_is_an_event_and_a_run_that_has_one_in_ten_flies_no_more():
+    """Of one run every fifth flight is an event, of the other every fiftieth: this one alone flies on."""
+    chains = Chains(1, 3, runs=2, members=100)
+    chains.points[:] = -1.0 - np.arange(200).reshape(2, 100, 1) / 1e3
+    chains.points[0, ::5], chains.points[1, ::50] = 1.0, 1.0
+    rounds = []
+
+    def fly(number, points):
+        rounds.append((number, len(points)))
+        return np.minimum(points[:, 0], 0.0)
+
+    chains.go(fly)
+    assert chains.plain == (22, 200)
+    assert rounds == [(0, 200), *((number, 10) for number in range(1, 10))]
+    assert (chains.levels, chains.flights, chains.share[0]) == (1, 290, 0.2)
+    assert (chains.scores[0] == 0.0).sum() == 20
+    assert chains.share[1] == pytest.approx(0.1 * (chains.scores[1] == 0.0).mean())
 
 
 @pytest.mark.parametrize(
@@ -84,6 +104,9 @@ def test_where_it_cannot_get_there_it_says_so(score, why):
     found = chains.estimate()
     assert (math.isnan(found.probability), found.low, found.why) == (True, 0.0, why)
     assert chains.design is None
+    assert found.levels == (0 if "stops" in why else 10)
+    assert found.flights == rare.RUNS * rare.MEMBERS + found.levels * rare.RUNS * 9 * 22
+    assert (found.high == 1.0) if "stops" in why else (1e-10 <= found.high < 1e-9)
 
 
 def test_the_mean_of_lognormals_in_its_interval():

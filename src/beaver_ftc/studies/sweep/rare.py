@@ -92,9 +92,10 @@ class Chains:
         """The next level of a run, whose share of flights goes into its probability."""
         scores = self.scores[run]
         level = float(np.sort(scores)[-max(1, round(SHARE * scores.size))])
-        if level >= 0.0 or not math.isfinite(level):
-            level, self.reached[run] = 0.0, level >= 0.0
-            self.stuck |= not self.reached[run]
+        if not math.isfinite(level):  # too few have a score: nothing is known below the level before
+            self.stuck = True
+            return level
+        level, self.reached[run] = min(level, 0.0), level >= 0.0
         share = float((scores >= level).mean())
         self.stuck |= share == 1.0 and not self.reached[run]  # all alike: nothing leads on
         self.share[run] *= share

@@ -127,6 +127,24 @@ def test_the_envelope_is_about_trim_unless_somebody_says_where():
     assert data["envelope"]["alpha_deg"] == [-3.0, 9.0]
 
 
+def test_regions_are_the_whole_envelope_or_parts_each_about_a_trim_of_its_own(monkeypatch):
+    trim = SimpleNamespace(altitude_m=700.0, settings={"flap_deg": 5.0})
+    of = {"alpha_deg": [-9.0, 18.0], "airspeed_mps": [31.0, 47.0], "altitude_m": [60.0, 1900.0]}
+    (whole,) = derivation._regions({"envelope": of}, "plant", trim, 0.3, ())
+    assert whole.trim is trim
+    assert whole.envelope.alpha_rad == pytest.approx((-0.15707963, 0.31415927))
+    assert (whole.envelope.airspeed_mps, whole.envelope.beta_rad) == ((31.0, 47.0), 0.3)
+    assert whole.envelope.altitude_m == (0.0, 2000.0)  # 100 m beyond either end, none below the ground
+    above = derivation._regions({"envelope": of | {"altitude_m": [300, 800]}}, "plant", trim, 0.3, ())
+    assert above[0].envelope.altitude_m == (200, 900)
+    monkeypatch.setattr(derivation, "trim_at", lambda *of, **settings: (of, settings))
+    parts = [derivation.Envelope(ends, (0.0, 0.1), 0.2) for ends in ((30.0, 37.0), (36.0, 50.0))]
+    assert derivation._regions({"envelope": of}, "plant", trim, 0.3, parts) == [
+        derivation.Region(part, ((middle, 700.0, "plant"), {"flap_deg": 5.0}))
+        for part, middle in zip(parts, (33.5, 43.0), strict=True)
+    ]
+
+
 def test_where_to_sample_is_read_from_a_file(tmp_path):
     (tmp_path / "envelope.yaml").write_text("airspeed_mps: [42, 58]\n")
     read = outline.read_envelope(tmp_path / "envelope.yaml")

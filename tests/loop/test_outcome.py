@@ -44,6 +44,16 @@ CASES = {
     "named": ({}, NAMED | {"fdi.isolation.estimator.0.excluded": 1, "fdi.isolation.estimator.2.excluded": 1,
                            "fdi.isolation.estimator.1.theta": [-0.1, -0.4, -0.7], "fdi.bank.config.n": 0,
                            "fdi.bank.output.closest": [0.3, 0.7]}),
+    "a-damage-besides": ({"aircraft": "beaver", "fdi": {"fault_class": "published"}}, ALARM | {
+        "fdi.isolation.estimator.0.excluded": 1, "fdi.isolation.config.taken": [0, 1, 0, 1],
+    }),
+    "a-damage-excluded": ({}, NAMED | {
+        "fdi.isolation.estimator.0.excluded": 1, "fdi.isolation.estimator.2.excluded": 1,
+        "fdi.isolation.config.taken": [0, 1, 0, 1],
+    }),
+    "named-first": ({}, NAMED | {
+        "fdi.verdict.isolated": 0, "fdi.isolation.estimator.0.theta": [-0.3, -0.5, -0.7],
+    }),
     "nothing": ({}, {}),
     "alarm-at-once": ({}, ALARM | {"fdi.verdict.detected_at_s": 0.0}),
     "unanticipated": ({}, ALARM | {"fdi.verdict.isolated": UNANTICIPATED, "fdi.verdict.isolated_at_s": 3.0}),

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 import beaver_ftc as bf
+from beaver_ftc.loop import stream
 from flying import loss, scenario
-from telling import apart
+from telling import apart, numbers
 
 PAIR = [loss(at_s=1.0), {"type": "stuck", "actuator": "rudder", "position_deg": 3.0, "at_s": 2.0}]
 NOISY = {"p": {"noise_std_deg_s": 0.06}, "q": {"noise_std_deg_s": 0.05}, "r": {"noise_std_deg_s": 0.04}}
@@ -172,6 +173,33 @@ def test_of_an_aircraft_beside_the_scenario(published, tmp_path):
 def own_aircraft(folder):
     shutil.copytree(bf.aircraft("beaver").folder, folder / "my-uav")
     return bf.aircraft("./my-uav", folder)
+
+
+def test_it_holds_on_to_the_trim_that_was_given_and_takes_the_sample_as_it_is(monkeypatch):
+    """Without a given trim the first finite sample is one; each is a copy of its own."""
+    seen = []
+    monkeypatch.setattr(
+        stream, "configure_diagnosis_at_trim", lambda frame, scenario, trim: seen.append(trim)
+    )
+    start, sample = (tuple(numbers(n, seed=seed) for n in (3, 5, 4)) for seed in (1, 2))
+    for given in (start, None):
+        diagnosis = bf.Diagnosis(bf.aircraft("beaver"), start=given)
+        places = diagnosis._x, diagnosis._signals, diagnosis._command
+        for place, values in zip(places, sample, strict=True):
+            place[:] = values
+        places[2][1] = np.nan if given is None else places[2][1]
+        diagnosis._begin()
+        assert diagnosis._fresh is (given is None)
+        places[2][:] = sample[2]
+        if diagnosis._fresh:
+            diagnosis._begin()
+        for held, place, values, expected in zip(seen[-1], places, sample, given or sample, strict=True):
+            np.testing.assert_array_equal(held, expected)
+            np.testing.assert_array_equal(place, values)
+            assert not np.shares_memory(held, place)
+    assert len(seen) == 2
+    with pytest.raises(bf.BadInput, match=r"^signals: .* allowed: 5 numbers"):
+        bf.Diagnosis(bf.aircraft("beaver"), start=(start[0], start[0], start[2]))._begin()
 
 
 def test_a_name_is_no_aircraft_of_a_stream():

@@ -11,6 +11,8 @@ from beaver_ftc.aircraft.loading import read
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario import airframe
 from beaver_ftc.scenario.airframe import find_aircraft
+from beaver_ftc.scenario.loader import load
+from beaver_ftc.scenario.schema import Scenario
 
 TRAINER = Path(__file__).parents[1] / "data" / "aircraft" / "trainer"
 
@@ -99,3 +101,20 @@ def test_an_aircraft_of_the_users_own_alone_is_compared_with_its_model(folder, m
     monkeypatch.setattr(airframe, "offered", {"compare": asked.append}.get)
     own = [find_aircraft(name, folder) for name in ("beaver", "./trainer")][1]
     assert asked == [own]
+
+
+def test_an_unknown_aircraft_is_the_one_mistake_and_a_scenario_keeps_its_own():
+    """Of an aircraft nobody knows nothing else is held against: names are checked against the built-in."""
+    with pytest.raises(BadInput) as error:
+        load({"name": "x", "aircraft": "bever", "faults": [{"type": "float", "actuator": "nose", "at_s": 1}]})
+    first, second = str(error.value).splitlines()
+    assert first.startswith("aircraft: 'bever' is not known, did you mean beaver")
+    assert second.startswith("faults[0].actuator: 'nose' is not known")
+    split = load({"name": "x", "aircraft": "beaver-split"})
+    assert split.airframe.name == "beaver-split"
+    assert Scenario.model_validate(split).airframe is split.airframe
+    assert (
+        split.with_({"faults": [{"type": "float", "actuator": "flap_left", "at_s": 1}]}).airframe
+        is split.airframe
+    )
+    assert load({"name": "x"}).airframe.name == "beaver"

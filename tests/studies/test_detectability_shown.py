@@ -4,6 +4,7 @@ import json
 import re
 from itertools import permutations
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -281,3 +282,42 @@ def test_the_name_of_a_survey_is_no_longer_than_a_folders_may_be():
     assert survey_name(given) == f"{given.name}-detectability"
     long = given.model_copy(update={"name": "x" * 90})
     assert survey_name(long) == "x" * 86 + "-detectability"
+
+
+def test_the_command_surveys_what_was_asked_and_shows_one_surface_or_all(monkeypatch, tmp_path):
+    """Of the survey's document every row, or those of one surface with its answers."""
+    parts = {part: [{"fault": s, "n": n} for n, s in enumerate(("aileron", "elevator", "rudder"))]
+             for part in detectability.PARTS}  # fmt: skip
+    asked, progress = [], []
+    monkeypatch.setattr(
+        detectability, "run_survey",
+        lambda *given, progress: asked.append((*given, progress)) or {"scenario": "made", **parts},
+    )  # fmt: skip
+    monkeypatch.setattr(detectability, "alike", lambda of: [f"alike {of.airframe.name}"])
+    monkeypatch.setattr(
+        detectability, "engine_failures", lambda of: ["left"] if of.airframe.name == "beaver-split" else []
+    )
+    monkeypatch.setattr(detectability, "answers", lambda of, rows: [f"{of.name} {len(rows)}"])
+    told = SimpleNamespace(progress=progress.append)
+
+    def found(**options):
+        return detectability.Detectability("fault-free", out=tmp_path, **options).run(told)
+
+    folder = str(tmp_path / "fault-free-detectability")
+    assert found() == {"scenario": "made", **parts, "alike": ["alike beaver"], "folder": folder}
+    other = found(aircraft="beaver-split", airspeed=(41.0,), altitude=(900.0, 70.0))
+    assert (other["engines"], other["alike"]) == (["left"], ["alike beaver-split"])
+    rudder = {part: [{"fault": "rudder", "n": 2}] for part in parts}
+    assert found(surface="rudder") == {
+        "scenario": "made",
+        **rudder,
+        "answers": ["fault-free 1"],
+        "folder": folder,
+    }
+    assert [(out, of.airframe.name, *places) for out, of, *places, _ in asked] == [
+        (tmp_path, "beaver", (), ()), (tmp_path, "beaver-split", (41.0,), (900.0, 70.0)),
+        (tmp_path, "beaver", (), ()),
+    ]  # fmt: skip
+    assert asked[0][-1] == progress.append
+    with pytest.raises(BadInput, match=r"^--surface 'flap': allowed: aileron, elevator, rudder$"):
+        found(surface="flap")

@@ -1,11 +1,16 @@
 """Exclusions by a course, rule by rule, on a surface seen by hand: which frames, compared with what."""
 
+import copy
+import math
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from beaver_ftc.diagnosis.readout import Actuator, TypesConfig
-from beaver_ftc_assurance.certificates import courses
+from beaver_ftc_assurance.certificates import chance, courses, kinds
 from beaver_ftc_assurance.certificates.courses import Found, Seen
+from telling import numbers
 
 NOTHING = -9.0
 
@@ -84,3 +89,70 @@ def test_of_several_instants_a_runaway_is_held_against_the_frame_before():
     assert [*courses._runaway(seen([0.2] * 3, [9.0, 9.0, 0.35]), ACTUATOR, several)] == []
     (found,) = courses._runaway(seen([0.2] * 3, [9.0, 9.0, 0.25]), ACTUATOR, several)
     np.testing.assert_allclose(found.compared[-1], (0.3, 0.25))
+
+
+def tape(travel=(-0.2, 0.7), blocks=1):
+    """Surface 1 of three, whose position is estimator 2: all that it adds, five frames from the tenth on."""
+    offset, slope, spread = numbers(3, 5, 4, 3)
+    actuator = Actuator(*travel, 0.1, 0.2, 0.3)
+    diagnosis = SimpleNamespace(
+        layout=SimpleNamespace(position_of=(0, 2, 3), dominant_axis=(0, 1, 2)),
+        estimators=[SimpleNamespace(axes=(e,)) for e in "abcd"],
+        surfaces=[None, SimpleNamespace(actuator=actuator), None],
+        types_config=CONFIG._replace(block_frames=blocks),
+    )
+    return SimpleNamespace(
+        first=10, offset=offset, slope=slope, spread=spread, alarm=SimpleNamespace(diagnosis=diagnosis)
+    )
+
+
+@pytest.mark.parametrize("travel", [(-0.2, 0.7), (0.1, 0.7), (-0.7, -0.3)])
+def test_what_a_fault_adds_to_the_innovation(travel):
+    """Of u, in effect since the frame before, -offset; of a position, rad, the slope: from there the fault
+    p = u + what the type says."""
+    made = tape(travel)
+    Gu, G, spread = -made.offset[:, 2], made.slope[:, 2], made.spread[:, 2]
+    low, high = travel
+    still, wide = min(abs(low), abs(high)) if low * high > 0 else 0.0, high - low
+    still = still if low > 0 else -still
+    expected = {  # offset, slope, least, most, one number
+        "stuck": (-Gu, G, low, high, True), "float": (still * G - Gu, 0 * G, 0.0, 0.0, True),
+        "bias": (0 * G, G, -wide, wide, True), "loss_of_effectiveness": (0 * G, Gu, -1.0, 0.0, True),
+    }  # fmt: skip
+    for kind, parts in [*expected.items(), (None, (0 * G, Gu, -1.0, 0.0, False))]:
+        number = kinds.VARYING_LOSS if kind is None else kinds.kind_of(kind)
+        found = kinds.hypothesis(made, 1, number)
+        for value, part in zip((found.offset, found.slope, found.low, found.high), parts, strict=False):
+            np.testing.assert_allclose(value, part, err_msg=str(kind))
+        assert (found.first, found.constant, found.shown, found.asked) == (10, parts[-1], parts[-1], ("c",))
+        np.testing.assert_array_equal(found.spread, spread)
+    assert kinds.hypothesis(tape(travel, 2), 1, kinds.STUCK).asked == (1,)
+
+
+def test_what_decides_nothing_is_left_out_of_the_variances(monkeypatch):
+    """Evidence and limit, each linear in P and R: what moves neither by a 1e-7 of the limit goes, with what
+    stands opposite, and what stays is untouched."""
+    P, R = [[3.0, 4e-8, 6e-8], [4e-8, 0.5, 7.0], [6e-8, 7.0, 2e-8]], [9e-8, 4.0]
+    weights = np.array([[1.0, 1.0, 1.0], [1.0, -1e-8, 0.0], [1.0, 0.0, 1.0]])
+    said = {"P": copy.deepcopy(P), "R": list(R)}
+    monkeypatch.setattr(chance, "_frames", lambda said, history: None)
+    monkeypatch.setattr(chance, "_followed", lambda said, frames, P, R: (P, R))
+    monkeypatch.setattr(
+        chance,
+        "_weighed",
+        lambda said, sums: (10 + (weights * sums[0]).sum(), 1.0 + sums[1][0] + 0 * sums[1][1], 0),
+    )
+    chance._leave_out_variances(said, None)
+    assert said == {"P": [[3.0, None, 6e-8], [None, None, None], [6e-8, None, None]], "R": [None, None]}
+    monkeypatch.setattr(
+        chance,
+        "_weighed",
+        lambda said, sums: (
+            0.0,
+            1.0 / sums[1].min(initial=0.5, where=sums[1] > 1) if sums[1].all() else math.nan,
+            0,
+        ),
+    )
+    said = {"P": P, "R": R}
+    chance._leave_out_variances(said, None)
+    assert said["R"] == R  # without it there is no covariance

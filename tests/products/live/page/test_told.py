@@ -257,6 +257,25 @@ def test_a_saved_flight_is_said_and_its_report_is_to_be_drawn(session, tmp_path,
     assert session.events[-1]["says"] == "x"  # guests hear this: no folder of whoever flies
 
 
+def test_a_saved_flight_says_of_each_fault_who_broke_it(tmp_path, monkeypatch):
+    """Those of the scenario come before, between and after those of the guests, and not in their order."""
+    own = [{"type": "float", "actuator": "flap", "at_s": at_s} for at_s in (0.06, 0.11, 0.01)]
+    session, saved = Session(bf.load({"name": "own", "faults": own}), tmp_path), []
+    monkeypatch.setattr(bf.Flight, "save", lambda flight, out, report: saved.append(flight) or out / "x")
+    for by, surface in (("Ada", "rudder"), ("", "aileron"), ("Bo", "elevator")):
+        request = {"do": "break", "fault": LOSS | {"actuator": surface}}
+        session.handle(messages.parse(json.dumps(request)), by)
+        _flown(session, 3)
+    asked(session, do="repair", actuator="rudder")
+    _flown(session, 3)
+    asked(session, do="save")
+    found = [(fault["at_s"], fault["actuator"], fault.get("by")) for fault in saved[0].metrics["faults"]]
+    assert found == [
+        (0.01, "flap", None), (0.02, "rudder", "Ada"), (0.05, "aileron", None), (0.06, "flap", None),
+        (0.08, "elevator", "Bo"), (0.11, "flap", None),
+    ]  # fmt: skip
+
+
 def test_reports_are_drawn_one_by_one_and_what_waits_at_the_end_all_the_same(tmp_path, monkeypatch):
     begun = []
 

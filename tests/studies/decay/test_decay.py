@@ -170,8 +170,12 @@ def test_what_the_rows_say():
         "0 of 4 a wrong name."
     )
     says = {error.name: error.says for error in errors} | {TOGETHER: "all that are declared"}
-    sound = [f"{name} ({of}): no false alarm and no wrong name up to 4 times." for name, of in says.items()]
-    found = "inertia coupling (0.25): at 2 times 1 of 4 flights have a false alarm and 2 of 4 a wrong name."
+    sound = [
+        f"{name} ({of}): no false alarm and no wrong name up to 4 times this size."
+        for name, of in says.items()
+    ]
+    counts = "1 of 4 flights have a false alarm and 2 of 4 a wrong name."
+    found = f"inertia coupling (0.25): at 2 times this size, {counts}"
     assert others == [found if line.startswith("inertia coupling") else line for line in sound]
     lines = as_text(document).splitlines()
     (line,) = (line for line in lines if re.match(r"inertia coupling +0.25 +2 ", line))

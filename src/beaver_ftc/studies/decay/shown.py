@@ -58,11 +58,12 @@ def _onset(rows: Sequence[Document]) -> str:
     what, declared = rows[0]["error"], rows[0]["declared"]
     broken = next((row for row in rows if row["false_alarm"]["count"] or row["misnamed"]["count"]), None)
     if broken is None:
-        return f"{what} ({declared}): no false alarm and no wrong name up to {rows[-1]['factor']:g} times."
+        most = rows[-1]["factor"]
+        return f"{what} ({declared}): no false alarm and no wrong name up to {most:g} times this size."
     alarms, misnamed = (_count(broken, name) for name in ("false_alarm", "misnamed"))
     return (
-        f"{what} ({declared}): at {broken['factor']:g} times {alarms} flights have a false alarm and "
-        f"{misnamed} a wrong name."
+        f"{what} ({declared}): at {broken['factor']:g} times this size, {alarms} flights have a false alarm "
+        f"and {misnamed} a wrong name."
     )
 
 

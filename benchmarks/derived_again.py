@@ -11,7 +11,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from beaver_ftc.aircraft.loading import DEFAULT
+from beaver_ftc.aircraft.aircraft import DEFAULT
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.builtin import builtin_names, resolve
 from beaver_ftc.scenario.loader import load_text

@@ -15,7 +15,7 @@ import pytest
 
 import beaver_ftc
 from beaver_ftc import public
-from beaver_ftc.aircraft.loading import builtin_names
+from beaver_ftc.aircraft.aircraft import builtin_names
 from beaver_ftc.plant import instrumented
 
 ROOT = Path(beaver_ftc.__file__).parent
@@ -264,4 +264,4 @@ def test_no_line_of_python_names_an_aircraft():
             if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in documents:
                 words = re.findall(r"(?<!-)\b[\w-]+", node.value)
                 named += [(path.relative_to(ROOT.parent).as_posix(), word) for word in words if word in names]
-    assert named == [("beaver_ftc/aircraft/loading.py", "beaver")]
+    assert named == [("beaver_ftc/aircraft/aircraft.py", "beaver")]

@@ -9,8 +9,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent))
 
 from beaver_ftc.compiled import cache_folder
-from beaver_ftc.documents.files import digest_of_files
-from beaver_ftc.documents.paths import PACKAGE
+from beaver_ftc.documents.files import PACKAGE, digest_of_files
 
 
 def main():

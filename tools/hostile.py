@@ -24,7 +24,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from beaver_ftc.documents.paths import data_root
+from beaver_ftc.documents.files import data_root
 from beaver_ftc_logs.sample_logs import files
 
 COMMAND = [sys.executable, "-P", "-c", "from beaver_ftc.cli.main import main; main()"]

@@ -3,8 +3,7 @@
 import pytest
 from pydantic import ValidationError
 
-from beaver_ftc.aircraft.channels import ChannelsSection, OutputSection
-from beaver_ftc.aircraft.schema import AircraftFile
+from beaver_ftc.aircraft.schema import AircraftFile, ChannelsSection, OutputSection
 from trainer import trainer_file
 
 

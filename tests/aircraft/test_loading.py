@@ -5,8 +5,8 @@ import shutil
 
 import pytest
 
-from beaver_ftc.aircraft import load, loading
-from beaver_ftc.aircraft.loading import UnknownAircraft, derived_folder, is_derived, read
+from beaver_ftc.aircraft import aircraft, load
+from beaver_ftc.aircraft.aircraft import UnknownAircraft, derived_folder, is_derived, read
 from beaver_ftc.documents.errors import BadInput
 from trainer import FOLDER
 
@@ -14,7 +14,7 @@ from trainer import FOLDER
 @pytest.fixture
 def beside(tmp_path, monkeypatch):
     """A scenario's folder with an aircraft below it; nothing was looked for yet."""
-    monkeypatch.setattr(loading, "_SEEN", {})
+    monkeypatch.setattr(aircraft, "_SEEN", {})
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     shutil.copytree(FOLDER, tmp_path / "here" / "trainer")
     return tmp_path / "here"
@@ -108,10 +108,10 @@ def test_what_was_derived_by_this_way_of_deriving_is_an_aircraft(beside):
     shutil.copytree(FOLDER, folder)
     text = (FOLDER / "aircraft.yaml").read_text()
     for line, known in (
-        (loading.first_line(), True),
-        (loading.first_line().replace("format ", "format 1"), False),
+        (aircraft.first_line(), True),
+        (aircraft.first_line().replace("format ", "format 1"), False),
     ):
         (folder / "aircraft.yaml").write_text(line + text)
         assert is_derived(name) is known
-    (folder / "aircraft.yaml").write_text(loading.first_line() + text)
+    (folder / "aircraft.yaml").write_text(aircraft.first_line() + text)
     assert load(f"jsbsim:{name}").name == "trainer"

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from beaver_ftc.documents.paths import data_root
+from beaver_ftc.documents.files import data_root
 
 RUNNER = Path(sys.executable).with_name("jsbsim")
 SCRIPT = "aircraft/beaver/scripts/elevator-doublet.xml"

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 import yaml
 
-from beaver_ftc.cli.output import status_of_stop
+from beaver_ftc.cli.shared import status_of_stop
 from commands import beaver
 
 BEAVER = Path(sys.executable).with_name("beaver-ftc")

@@ -27,7 +27,7 @@ HEAVY = {"beaver_ftc.scenario.schema", "jsbsim", "matplotlib", "numba", "numpy",
 BAR = 90
 # Of the core: other commands, other views of a result, the reports of many flights.
 NOT_FOR_A_RUN = (
-    "beaver_ftc.cli.catalogue", "beaver_ftc.cli.scenarios", "beaver_ftc.cli.study", "beaver_ftc.cli.sweep",
+    "beaver_ftc.cli.catalogue", "beaver_ftc.cli.scenarios", "beaver_ftc.cli.sweep",
     "beaver_ftc.control.rivals.indi", "beaver_ftc.control.rivals.l1", "beaver_ftc.control.rivals.lqr",
     "beaver_ftc.diagnosis.rivals.", "beaver_ftc.loop.plugin_frame",
     "beaver_ftc.plant.trial", "beaver_ftc.pytest_plugin", "beaver_ftc.results.exports",

@@ -14,9 +14,9 @@ import pytest
 import beaver_ftc
 from beaver_ftc import compiled
 from beaver_ftc.compiled import cache
-from beaver_ftc.documents import paths
+from beaver_ftc.documents import files
 from beaver_ftc.documents.errors import say_once
-from beaver_ftc.documents.paths import data_root
+from beaver_ftc.documents.files import data_root
 
 REPOSITORY = data_root()
 
@@ -27,7 +27,7 @@ def nowhere(monkeypatch, tmp_path):
     for name in ("XDG_CACHE_HOME", "NUMBA_CACHE_DIR"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv("HOME", os.devnull)
-    monkeypatch.setattr(paths.tempfile, "gettempdir", lambda: os.devnull)
+    monkeypatch.setattr(files.tempfile, "gettempdir", lambda: os.devnull)
     monkeypatch.setenv("BEAVER_FTC_REFUSED", "")
     compiled.cache_folder.cache_clear()
     yield monkeypatch
@@ -46,7 +46,7 @@ def test_numbas_own_setting_beats_it(nowhere, tmp_path):
 
 
 def test_without_a_home_there_is_the_folder_for_temporary_files(nowhere, tmp_path):
-    nowhere.setattr(paths.tempfile, "gettempdir", lambda: str(tmp_path))
+    nowhere.setattr(files.tempfile, "gettempdir", lambda: str(tmp_path))
     folder = compiled.cache_folder().parent
     assert folder.parent == tmp_path
     assert folder.stat().st_mode & 0o077 == 0, "code is loaded from it: it is nobody else's business"
@@ -63,15 +63,15 @@ def test_no_home_at_all_and_no_folder_for_temporary_files_is_no_error(nowhere):
     def no_folder():
         raise FileNotFoundError("no usable temporary directory")
 
-    nowhere.setattr(paths.Path, "expanduser", none)
-    nowhere.setattr(paths.tempfile, "gettempdir", no_folder)
+    nowhere.setattr(files.Path, "expanduser", none)
+    nowhere.setattr(files.tempfile, "gettempdir", no_folder)
     assert compiled.cache_folder() is None
 
 
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="folders have no owner here")
 def test_a_folder_somebody_else_owns_is_not_trusted(nowhere, tmp_path, capsys):
     nowhere.setenv("XDG_CACHE_HOME", str(tmp_path))
-    nowhere.setattr(paths, "_user", lambda: os.getuid() + 1)
+    nowhere.setattr(files, "_user", lambda: os.getuid() + 1)
     assert compiled.cache_folder() is None
     assert (
         f"{tmp_path / 'beaver-ftc'}: it belongs to user {os.getuid()}, allowed: " in capsys.readouterr().err
@@ -137,7 +137,7 @@ def test_what_old_versions_left_goes_but_for_the_latest(nowhere, tmp_path):
     assert {path.name for path in base.iterdir()} == {
         new,
         "keep-me",
-        *(folder.name for folder in old[-paths._VERSIONS_KEPT :]),
+        *(folder.name for folder in old[-files._VERSIONS_KEPT :]),
     }
 
 
@@ -287,7 +287,7 @@ def test_content_of_a_file_that_is_not_ours_is_not_even_unpickled(tmp_path, monk
         file.rename(tmp_path / "elsewhere")
         file.symlink_to(tmp_path / "elsewhere")
     else:
-        monkeypatch.setattr(paths, "_user", lambda: os.getuid() + 1)
+        monkeypatch.setattr(files, "_user", lambda: os.getuid() + 1)
     monkeypatch.setattr(cache.pickle, "loads", None)
     again = compiled.compile_into(folder, doubled)
     assert again(3) == 6

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import beaver_ftc
-from beaver_ftc.documents.paths import data_root
+from beaver_ftc.documents.files import data_root
 
 SOURCE = Path(beaver_ftc.__path__[0])
 FILE, ROWS = "control/laws/sliding.py", "plugins.yaml"

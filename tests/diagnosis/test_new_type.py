@@ -16,7 +16,7 @@ import pytest
 import beaver_ftc
 import needs
 from beaver_ftc.diagnosis.types import contract, registry
-from beaver_ftc.documents.paths import data_root
+from beaver_ftc.documents.files import data_root
 from fault_kinds import DOWN, UP
 
 HERE = Path(__file__).parent
@@ -57,7 +57,7 @@ WEARS = '''
 from math import degrees
 from typing import Literal
 
-from beaver_ftc.documents.base import Number, entry, number
+from beaver_ftc.documents.document import Number, entry, number
 from beaver_ftc.scenario.airframe import Actuator
 from beaver_ftc.scenario.faults.base import Button, Past, Properties, Switched, constant
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from beaver_ftc.documents import document, files, paths
+from beaver_ftc.documents import document, files
 from beaver_ftc.documents.document import MAX_NODES, MalformedDocumentError, parse, scalar
 from beaver_ftc.documents.files import UnreadableError, read_bytes, read_text
-from beaver_ftc.documents.keys import UnusableKeyError, parse_key, plain, with_values
+from beaver_ftc.documents.validation import UnusableKeyError, parse_key, plain, with_values
 
 
 @pytest.mark.parametrize(
@@ -70,59 +70,59 @@ def test_a_file_that_grows_while_it_is_read_is_too_large(tmp_path, monkeypatch):
 def test_a_folder_that_others_can_write_is_refused_and_said_once(
     tmp_path, monkeypatch, capsys, mode, sticky_base, is_ours
 ):
-    monkeypatch.delenv(paths._REFUSED, raising=False)
+    monkeypatch.delenv(files._REFUSED, raising=False)
     folder = tmp_path / "code"
     folder.mkdir()
     folder.chmod(mode)
     for _ in range(2):
-        assert paths._is_ours(folder, base=sticky_base) is is_ours
+        assert files._is_ours(folder, base=sticky_base) is is_ours
     lines = capsys.readouterr().err.splitlines()
     assert lines == ([] if is_ours else [
         f"beaver-ftc: no compiled code is run from {folder}: its mode is 0{mode:o}, allowed: a folder of "
         "your own that neither group nor others can write (chmod go-w)"
     ])  # fmt: skip
-    assert (str(folder) in os.environ.get(paths._REFUSED, "")) is not is_ours
+    assert (str(folder) in os.environ.get(files._REFUSED, "")) is not is_ours
 
 
 def test_links_are_followed_to_a_base_alone(tmp_path, monkeypatch):
-    monkeypatch.delenv(paths._REFUSED, raising=False)
+    monkeypatch.delenv(files._REFUSED, raising=False)
     (tmp_path / "true").mkdir(mode=0o700)
     (tmp_path / "link").symlink_to(tmp_path / "true")
-    assert paths._is_ours(tmp_path / "link", base=True)
-    assert not paths._is_ours(tmp_path / "link")
+    assert files._is_ours(tmp_path / "link", base=True)
+    assert not files._is_ours(tmp_path / "link")
     (tmp_path / "file").write_text("")
-    assert not paths._is_ours(tmp_path / "file" / "below")
-    assert paths._is_ours(tmp_path / "made" / "anew")
+    assert not files._is_ours(tmp_path / "file" / "below")
+    assert files._is_ours(tmp_path / "made" / "anew")
     assert (tmp_path / "made" / "anew").stat().st_mode & 0o777 == 0o700
 
 
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="where there are users")
 @pytest.mark.parametrize("base", [True, False])
 def test_a_folder_of_another_user_is_refused_by_that_users_number(tmp_path, monkeypatch, capsys, base):
-    monkeypatch.delenv(paths._REFUSED, raising=False)
+    monkeypatch.delenv(files._REFUSED, raising=False)
     other = os.getuid() + 1
-    monkeypatch.setattr(paths, "_user", lambda: other)
-    monkeypatch.setattr(paths, "_ROOT", other)
+    monkeypatch.setattr(files, "_user", lambda: other)
+    monkeypatch.setattr(files, "_ROOT", other)
     tmp_path.chmod(0o755)
-    assert not paths._is_ours(tmp_path, base=base)
+    assert not files._is_ours(tmp_path, base=base)
     assert f"from {tmp_path}: it belongs to user {os.getuid()}, allowed: " in capsys.readouterr().err
 
 
 def test_where_code_is_kept(tmp_path, monkeypatch):
     for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME"):
         monkeypatch.setenv(name, str(tmp_path / name))
-    monkeypatch.setattr(paths.tempfile, "gettempdir", lambda: str(tmp_path))
+    monkeypatch.setattr(files.tempfile, "gettempdir", lambda: str(tmp_path))
     last = tmp_path / f"beaver-ftc-{os.getuid()}"
-    assert list(paths._candidates()) == [
+    assert list(files._candidates()) == [
         tmp_path / "NUMBA_CACHE_DIR",
         tmp_path / "XDG_CACHE_HOME" / "beaver-ftc",
         last,
     ]
-    assert paths.cache_base() == tmp_path / "NUMBA_CACHE_DIR"
+    assert files.cache_base() == tmp_path / "NUMBA_CACHE_DIR"
     monkeypatch.delenv("NUMBA_CACHE_DIR")
     monkeypatch.setenv("XDG_CACHE_HOME", "")
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
-    assert next(paths._candidates()) == tmp_path / "home" / ".cache" / "beaver-ftc"
+    assert next(files._candidates()) == tmp_path / "home" / ".cache" / "beaver-ftc"
 
 
 def test_the_latest_versions_of_code_are_kept(tmp_path, monkeypatch):
@@ -132,9 +132,9 @@ def test_the_latest_versions_of_code_are_kept(tmp_path, monkeypatch):
         (tmp_path / version).mkdir()
         os.utime(tmp_path / version, (i, i))
     (tmp_path / "other").mkdir()
-    assert paths.cache_of_version(versions[0]) == tmp_path / versions[0]  # it is there: nothing goes
+    assert files.cache_of_version(versions[0]) == tmp_path / versions[0]  # it is there: nothing goes
     assert len(list(tmp_path.iterdir())) == 8
-    assert paths.cache_of_version("f" * 16) == tmp_path / ("f" * 16)
+    assert files.cache_of_version("f" * 16) == tmp_path / ("f" * 16)
     assert sorted(path.name for path in tmp_path.iterdir()) == [*versions[2:], "f" * 16, "other"]
 
 
@@ -156,8 +156,8 @@ def test_files_inside_a_folder(tmp_path, file, place):
     folder = tmp_path / "in"
     (folder / "b").mkdir(parents=True)
     (folder / "up").symlink_to(tmp_path)
-    assert paths.inside(folder, file) == (None if place is None else folder.resolve() / place)
-    assert paths.inside(folder, str(folder / "a")) is None
+    assert files.inside(folder, file) == (None if place is None else folder.resolve() / place)
+    assert files.inside(folder, str(folder / "a")) is None
 
 
 DATA = {"a": [{"b": 1}, 2], "c": "ideal", "d": None, "e": [], "f": {"g": {}}}

@@ -6,13 +6,22 @@ from typing import Annotated, Any, Literal
 import pytest
 from pydantic import Discriminator, Field, Tag
 
-from beaver_ftc.documents import problems, validation
-from beaver_ftc.documents.base import Flag, Number, Section, Whole, entry, number, order_conflicts
-from beaver_ftc.documents.document import MAX_PROBLEMS, Document, Problem
+from beaver_ftc.documents import validation
+from beaver_ftc.documents.document import (
+    MAX_PROBLEMS,
+    Document,
+    Flag,
+    Number,
+    Problem,
+    Section,
+    Whole,
+    entry,
+    number,
+    order_conflicts,
+)
 from beaver_ftc.documents.errors import nearest, suggestion
 from beaver_ftc.documents.files import AbsentFileError
-from beaver_ftc.documents.problems import ScenarioError, key_path, one_line
-from beaver_ftc.documents.validation import parse_document, validate
+from beaver_ftc.documents.validation import ScenarioError, key_path, one_line, parse_document, validate
 
 
 class Ant(Section):
@@ -303,12 +312,12 @@ def test_nothing_follows_from_the_words_of_a_mistake(monkeypatch):
     before = _repairs(MISTAKES)
     assert (4, ("animal", "legz"), True, "legs") in before
     assert (4, ("animal", "type"), False, "bee") in before
-    said = problems._Said
+    said = validation._Said
 
     def reworded(text, *rest, **named):
         return said(f"({text.upper().replace(' ', '_')})", *rest, **named)
 
-    monkeypatch.setattr(problems, "_Said", reworded)
+    monkeypatch.setattr(validation, "_Said", reworded)
     assert _repairs(MISTAKES) == before
 
 

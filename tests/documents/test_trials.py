@@ -5,23 +5,23 @@ import subprocess
 
 import pytest
 
-from beaver_ftc.documents import trials
+from beaver_ftc.documents import files
 
 
 @pytest.fixture
 def passes(tmp_path, monkeypatch):
     """Whether a child with this code ends well, and how many children there were."""
-    monkeypatch.setattr(trials, "cache_base", lambda: tmp_path)
+    monkeypatch.setattr(files, "cache_base", lambda: tmp_path)
     children, run = [], subprocess.run
 
     def counted(command, **given):
         children.append(command)
         return run(command, **given)
 
-    monkeypatch.setattr(trials.subprocess, "run", counted)
+    monkeypatch.setattr(files.subprocess, "run", counted)
 
     def answer(code, build="1", **environment):
-        return trials.passes("x", build, code, environment), len(children)
+        return files.passes("x", build, code, environment), len(children)
 
     return answer
 
@@ -47,7 +47,7 @@ def test_the_child_has_the_package_and_not_the_working_directory(passes, tmp_pat
 
 
 def test_a_child_that_cannot_be_started_or_does_not_end_is_no_answer_for_others(passes, monkeypatch):
-    monkeypatch.setattr(trials.sys, "executable", "/nowhere/python")
+    monkeypatch.setattr(files.sys, "executable", "/nowhere/python")
     assert passes("pass") == (False, 1)
     monkeypatch.undo()
 
@@ -58,7 +58,7 @@ def test_one_that_could_not_find_out_is_asked_again(passes, code):
 
 
 def test_one_that_does_not_end_is_asked_again(passes, monkeypatch):
-    monkeypatch.setattr(trials, "PATIENCE_S", 0.5)
+    monkeypatch.setattr(files, "PATIENCE_S", 0.5)
     assert passes("import time; time.sleep(60)") == (False, 1)
     assert passes("import time; time.sleep(60)") == (False, 2)
 
@@ -67,12 +67,12 @@ def test_one_that_does_not_end_is_asked_again(passes, monkeypatch):
 def test_an_answer_that_another_user_can_write_does_not_count(passes, tmp_path):
     assert passes("raise SystemExit(3)") == (False, 1)
     (file,) = tmp_path.glob("trial-*")
-    file.write_bytes(trials.PASSED)
+    file.write_bytes(files.PASSED)
     file.chmod(0o666)
     assert passes("raise SystemExit(3)") == (False, 2)
     assert file.stat().st_mode & 0o022 == 0
 
 
 def test_without_a_folder_it_is_asked_each_time(passes, monkeypatch):
-    monkeypatch.setattr(trials, "cache_base", lambda: None)
+    monkeypatch.setattr(files, "cache_base", lambda: None)
     assert [passes("pass"), passes("pass")] == [(True, 1), (True, 2)]

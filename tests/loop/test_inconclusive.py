@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 import beaver_ftc as bf
-from beaver_ftc.aircraft import loading
+from beaver_ftc.aircraft import aircraft
 from beaver_ftc.diagnosis.bounds.worst_case import UNKNOWN_RAD_S2
 
 FULL = {
@@ -22,12 +22,12 @@ FULL = {
 def folder(tmp_path_factory):
     """The built-in aircraft with a map that holds between 1,550 and 2,060 m, for the first 15 s."""
     own = tmp_path_factory.mktemp("mapped")
-    source = loading.load("beaver").folder
+    source = aircraft.load("beaver").folder
     shutil.copytree(source, own / "mapped")
-    data = yaml.safe_load((source / loading.FILE).read_text())
+    data = yaml.safe_load((source / aircraft.FILE).read_text())
     error_map = {"travel_share": [1.0], "until_s": [15.0], "boxes": [FULL]}
     text = yaml.safe_dump(data | {"name": "mapped", "model_error_map": error_map})
-    (own / "mapped" / loading.FILE).write_text(text)
+    (own / "mapped" / aircraft.FILE).write_text(text)
     return own
 
 

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from beaver_ftc.aircraft.loading import read
+from beaver_ftc.aircraft.aircraft import read
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.documents.problems import ScenarioError
+from beaver_ftc.documents.validation import ScenarioError
 from beaver_ftc.plant import admission
 from beaver_ftc.scenario import airframe
 

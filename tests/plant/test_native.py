@@ -4,7 +4,7 @@ import numba
 import numpy as np
 import pytest
 
-from beaver_ftc.documents import trials
+from beaver_ftc.documents import files
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plant import addresses, native
 from beaver_ftc.plant.adapter import Plant
@@ -94,7 +94,7 @@ WRONG = {
 @needs_native
 @pytest.mark.parametrize("wrong", WRONG.values(), ids=list(WRONG))
 def test_another_layout_is_recognised_without_a_crash(monkeypatch, tmp_path, wrong):
-    monkeypatch.setattr(trials, "cache_base", lambda: tmp_path)
+    monkeypatch.setattr(files, "cache_base", lambda: tmp_path)
     assert not addresses.is_proved.__wrapped__(addresses.LAYOUT._replace(**wrong))
 
 

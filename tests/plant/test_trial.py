@@ -10,7 +10,7 @@ import pytest
 import beaver_ftc as bf
 import needs
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.documents.paths import data_root
+from beaver_ftc.documents.files import data_root
 from beaver_ftc.plant import adapter, model_file, trial
 from beaver_ftc.plant.model_file import check_model_has_no_side_effects
 

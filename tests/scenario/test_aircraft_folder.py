@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 import needs
-from beaver_ftc.aircraft.loading import load as load_aircraft
-from beaver_ftc.aircraft.loading import read
+from beaver_ftc.aircraft.aircraft import load as load_aircraft
+from beaver_ftc.aircraft.aircraft import read
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario import airframe
 from beaver_ftc.scenario.airframe import find_aircraft

@@ -9,8 +9,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from beaver_ftc.documents.document import Document
-from beaver_ftc.documents.problems import ScenarioError
-from beaver_ftc.documents.validation import validate
+from beaver_ftc.documents.validation import ScenarioError, validate
 from beaver_ftc.scenario.builtin import builtin_path
 from beaver_ftc.scenario.loader import load_scenario, load_text
 from beaver_ftc.scenario.schema import Scenario

@@ -4,8 +4,7 @@ import jsonschema
 import pytest
 from hypothesis import given, settings
 
-from beaver_ftc.documents.base import Section
-from beaver_ftc.documents.document import parse
+from beaver_ftc.documents.document import Section, parse
 from beaver_ftc.scenario.builtin import builtin_names, builtin_path
 from beaver_ftc.scenario.schema import Scenario, json_schema
 from samples import samples

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.documents.paths import data_root
-from beaver_ftc.documents.problems import ScenarioError
+from beaver_ftc.documents.files import data_root
+from beaver_ftc.documents.validation import ScenarioError
 from beaver_ftc.scenario.builtin import MAX_BYTES, resolve
 from beaver_ftc.scenario.loader import load_scenario, load_text
 

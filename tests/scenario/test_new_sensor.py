@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 import beaver_ftc
-from beaver_ftc.documents.paths import data_root
+from beaver_ftc.documents.files import data_root
 
 ERRORS = '''@_reads("ft", "ft", 1000, 0.3048)
 class RadioAltimeter(_Sensor):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from beaver_ftc.documents.problems import ScenarioError
+from beaver_ftc.documents.validation import ScenarioError
 from beaver_ftc.scenario.consistency import conflicts
 from beaver_ftc.scenario.dump import to_yaml
 from beaver_ftc.scenario.environment import air_of

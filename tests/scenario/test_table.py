@@ -6,7 +6,7 @@ import re
 import pytest
 from pydantic_core import PydanticCustomError
 
-from beaver_ftc.documents.problems import ScenarioError
+from beaver_ftc.documents.validation import ScenarioError
 from beaver_ftc.scenario.loader import load_scenario, load_text
 from beaver_ftc.scenario.signals import check_table
 

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import beaver_ftc
-from beaver_ftc.documents.paths import data_root
+from beaver_ftc.documents.files import data_root
 from beaver_ftc.plant import conditions
 
 ROW = '    "curve": "beaver_ftc.studies.curve:Curve",\n'

@@ -14,7 +14,7 @@ from tools.drawn.compose import EVERYTHING, array_of, drawn_flights
 from tools.drawn.promises import broken, told_alike
 
 import beaver_ftc as bf
-from beaver_ftc.documents.base import Flag, Number, Section, number
+from beaver_ftc.documents.document import Flag, Number, Section, number
 from beaver_ftc.scenario.schema import Scenario, Uncertainty, json_schema
 
 AIRCRAFT = ("beaver", "jsbsim:c172p")

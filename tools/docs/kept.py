@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterator
 from hashlib import sha256
 from pathlib import Path
 
-from beaver_ftc.documents.paths import cache_base
+from beaver_ftc.documents.files import cache_base
 from beaver_ftc.studies.engine.store import write_whole
 from tools.docs.commands import Output
 from tools.docs.pages import ROOT

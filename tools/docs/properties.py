@@ -6,7 +6,7 @@ from xml.etree.ElementTree import Element
 
 from beaver_ftc.design.fdc import SURFACES
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.documents.paths import data_root
+from beaver_ftc.documents.files import data_root
 from beaver_ftc.plant.model_file import with_systems
 
 _XML = "aircraft/beaver/beaver.xml"

@@ -5,25 +5,23 @@ from typing import TYPE_CHECKING
 from beaver_ftc.public import lazily
 
 if TYPE_CHECKING:
-    from beaver_ftc.cli.inputs import (
+    from beaver_ftc.cli.shared import (
+        Document,
+        Format,
+        FormatOption,
         JunitOption,
         NoReportOption,
         ResultsOption,
         ScenarioArgument,
         WorkersOption,
-        load_all,
-    )
-    from beaver_ftc.cli.output import (
-        Document,
-        Format,
-        FormatOption,
         answer,
         complain,
         emit,
         emit_json,
         judged,
+        load_all,
+        progress_bar,
         write_junit,
     )
-    from beaver_ftc.cli.progress import progress_bar
 else:
     __getattr__, __dir__ = lazily(__name__)

@@ -6,8 +6,7 @@ from typing import Annotated, get_args
 
 import typer
 
-from beaver_ftc.cli.inputs import complete_names
-from beaver_ftc.cli.output import Format, FormatOption, answer, emit, emit_json
+from beaver_ftc.cli.shared import Format, FormatOption, answer, complete_names, emit, emit_json
 from beaver_ftc.commands import declare
 from beaver_ftc.documents.errors import BadInput, suggestion
 
@@ -63,7 +62,7 @@ def _available() -> dict[str, Entries]:
 def _aircraft() -> Iterator[tuple[str, str]]:
     """The built-in aircraft, those that are imported or can be, and those of the jsbsim package."""
     from beaver_ftc.aircraft import builtin_names, load
-    from beaver_ftc.aircraft.loading import FILE, IMPORTED, imported_folder, is_derived
+    from beaver_ftc.aircraft.aircraft import FILE, IMPORTED, imported_folder, is_derived
     from beaver_ftc.plant.instrumented import names
 
     for name in builtin_names():

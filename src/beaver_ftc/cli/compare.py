@@ -6,9 +6,7 @@ from typing import Annotated
 
 import typer
 
-from beaver_ftc.cli.inputs import listed
-from beaver_ftc.cli.output import Format, FormatOption, answer
-from beaver_ftc.cli.progress import progress_bar
+from beaver_ftc.cli.shared import Format, FormatOption, answer, listed, progress_bar
 from beaver_ftc.commands import declare
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.extensions import required

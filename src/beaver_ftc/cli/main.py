@@ -1,21 +1,51 @@
 """The command `beaver-ftc`: its commands, and what becomes of errors.
 
 `commands.py` has a row each. A command is a study, or a thin function of a module of this package. Its
-docstring is its help: what it does, examples, what each option means. `--help` must answer at once.
+docstring is its help: what it does, examples, what each option means. `--help` must answer at once. A
+study as a command has its options, a progress bar, its answer and its exit status, the same for all.
 """
 
 import signal
 import sys
 from collections.abc import Callable
+from inspect import Parameter, Signature, signature
 from typing import Annotated, Any, NoReturn
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 
 from beaver_ftc import __version__, commands
-from beaver_ftc.cli.inputs import as_typer_reads
-from beaver_ftc.cli.output import failure_of, report_last, status_of_stop
+from beaver_ftc.cli.shared import (
+    Format,
+    FormatOption,
+    answer,
+    as_typer_reads,
+    complain,
+    failure_of,
+    progress_bar,
+    report_last,
+    status_of_stop,
+)
 from beaver_ftc.extensions import loaded
+from beaver_ftc.studies.engine.command import Reporter, StudyCommand
+
+
+def command_of(study: type[StudyCommand]) -> Callable[..., None]:
+    """The command that runs a study; its parameters are the study's fields and `format`."""
+
+    def command(format: Format, **options: Any) -> None:
+        asked = study(**options)
+        with progress_bar(asked.label) as progress:
+            document = asked.run(Reporter(progress, complain))
+        answer(format, document, lambda: asked.as_text(document, sys.stdout.isatty()))
+        if not asked.passed(document):
+            raise typer.Exit(1)
+
+    own = signature(study).parameters.values()
+    last = Parameter("format", Parameter.KEYWORD_ONLY, default=Format.text, annotation=FormatOption)
+    command.__signature__ = Signature([*own, last])  # type: ignore[attr-defined]
+    command.__doc__ = study.__doc__
+    return command
 
 
 class Row(TyperCommand):
@@ -33,7 +63,7 @@ class Row(TyperCommand):
         """What the row names, as typer reads it."""
         found = loaded(self.target)
         if isinstance(found, type):
-            from beaver_ftc.cli.study import command_of
+            pass
 
             return as_typer_reads(command_of(found), getattr(found, "PLUGINS", True))
         return as_typer_reads(found, getattr(found, "PLUGINS", True))

@@ -5,9 +5,19 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from beaver_ftc.cli.inputs import NoReportOption, ResultsOption, ScenariosArgument, load_all
-from beaver_ftc.cli.output import Document, Format, FormatOption, complain, emit, emit_json
-from beaver_ftc.cli.progress import progress_bar
+from beaver_ftc.cli.shared import (
+    Document,
+    Format,
+    FormatOption,
+    NoReportOption,
+    ResultsOption,
+    ScenariosArgument,
+    complain,
+    emit,
+    emit_json,
+    load_all,
+    progress_bar,
+)
 from beaver_ftc.commands import declare
 from beaver_ftc.documents.errors import BadInput
 

@@ -11,25 +11,23 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from beaver_ftc.cli.inputs import (
+from beaver_ftc.cli.shared import (
+    Document,
+    Format,
+    FormatOption,
     JunitOption,
     NoReportOption,
     ResultsOption,
     ScenariosArgument,
-    load_all,
-)
-from beaver_ftc.cli.output import (
-    Document,
-    Format,
-    FormatOption,
     complain,
     emit,
     emit_json,
     failure_of,
+    load_all,
+    progress_bar,
     report,
     write_junit,
 )
-from beaver_ftc.cli.progress import progress_bar
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.extensions import required
 

@@ -6,8 +6,16 @@ from typing import Annotated
 
 import typer
 
-from beaver_ftc.cli.inputs import check_flyable, complete_names
-from beaver_ftc.cli.output import Document, Format, FormatOption, complain, emit, emit_json
+from beaver_ftc.cli.shared import (
+    Document,
+    Format,
+    FormatOption,
+    check_flyable,
+    complain,
+    complete_names,
+    emit,
+    emit_json,
+)
 from beaver_ftc.commands import declare
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.extensions import required

@@ -11,8 +11,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from beaver_ftc.cli.inputs import JunitOption, NoReportOption
-from beaver_ftc.cli.output import Document, Format, FormatOption, answer, complain, judged
+from beaver_ftc.cli.shared import (
+    Document,
+    Format,
+    FormatOption,
+    JunitOption,
+    NoReportOption,
+    answer,
+    complain,
+    judged,
+)
 from beaver_ftc.commands import declare
 from beaver_ftc.documents.errors import BadInput
 
@@ -86,7 +94,7 @@ def command(arguments: Arguments) -> None:
 
 def _rare(sweep: "Sweep", arguments: Arguments) -> None:
     """How likely an expectation is not met: a number and its interval."""
-    from beaver_ftc.cli.progress import told
+    from beaver_ftc.cli.shared import told
     from beaver_ftc.studies.engine.workers import cores
     from beaver_ftc.studies.sweep.rare import as_text, run_rare
 
@@ -133,7 +141,7 @@ def _keep(flights: str, certified: bool = False) -> "Keep":
 
 
 def _fly(sweep: "Sweep", options: "Options", format: Format) -> Document:
-    from beaver_ftc.cli.progress import live_progress
+    from beaver_ftc.cli.shared import live_progress
     from beaver_ftc.studies.sweep.campaign import named_for, run_sweep
     from beaver_ftc.studies.sweep.summary_page import summary_text, verdict
 

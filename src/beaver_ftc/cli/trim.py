@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from beaver_ftc.cli.output import Format, FormatOption, answer
+from beaver_ftc.cli.shared import Format, FormatOption, answer
 
 if TYPE_CHECKING:
     from beaver_ftc.plant.trim import TrimPoint

@@ -24,8 +24,7 @@ from numba.extending import overload
 from beaver_ftc.compiled.records import record, sized
 from beaver_ftc.compiled.sources import BY_ADDRESS
 from beaver_ftc.documents.errors import say_once
-from beaver_ftc.documents.files import digest_of_files
-from beaver_ftc.documents.paths import cache_of_version
+from beaver_ftc.documents.files import cache_of_version, digest_of_files
 
 __all__ = ["apart", "direct", "kernel", "plain", "record", "row_of", "sized"]
 

@@ -23,7 +23,7 @@ from numba.core.compiler import CompileResult
 from beaver_ftc.compiled import interrupts
 from beaver_ftc.compiled.sources import digest_of
 from beaver_ftc.documents.errors import say_once
-from beaver_ftc.documents.paths import read_own
+from beaver_ftc.documents.files import read_own
 
 COMPILING = "compiling the flight code, once on this machine: some 20 s on an idle one"
 MORE = "compiling what this flight is the first to use, once on this machine: 10 s to a minute on an idle one"

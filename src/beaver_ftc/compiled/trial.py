@@ -12,7 +12,7 @@ import llvmlite
 import numba
 
 from beaver_ftc.documents.files import digest_of_files
-from beaver_ftc.documents.trials import passes as passes_in_a_child
+from beaver_ftc.documents.files import passes as passes_in_a_child
 
 VARIABLE = "BEAVER_FTC_COMPILER"
 CODE = (

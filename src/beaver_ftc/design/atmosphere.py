@@ -2,7 +2,7 @@
 
 from math import exp, log
 
-from beaver_ftc.aircraft.units import GRAVITY_MPS2
+from beaver_ftc.aircraft.aircraft import GRAVITY_MPS2
 
 T0_K, LAPSE_K_M, P0_HPA, SCALE, STRATOSPHERE_M = 288.15, 0.0065, 1013.25, 5.2558797, 11000.0
 R_AIR, PA_PER_HPA, KELVIN_AT_0_C = 287.05287, 100.0, 273.15

@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from beaver_ftc.aircraft.units import M_PER_FT
+from beaver_ftc.aircraft.aircraft import M_PER_FT
 
 Severity = Literal["none", "light", "moderate", "severe"]
 SEVERITIES: tuple[Severity, ...] = ("none", "light", "moderate", "severe")

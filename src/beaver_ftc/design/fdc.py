@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from beaver_ftc.aircraft import Term, load
-from beaver_ftc.aircraft.aircraft import FORCES, MOMENTS
-from beaver_ftc.aircraft.units import GRAVITY_MPS2
+from beaver_ftc.aircraft.aircraft import FORCES, GRAVITY_MPS2, MOMENTS
 from beaver_ftc.design.engine import engine_power_kw, slipstream
 from beaver_ftc.design.model import inertia_coefficients
 

@@ -5,10 +5,12 @@ from typing import TYPE_CHECKING
 from beaver_ftc.public import lazily
 
 if TYPE_CHECKING:
-    from beaver_ftc.documents.base import (
+    from beaver_ftc.documents.document import (
         Conflict,
+        Document,
         Location,
         Number,
+        Problem,
         Section,
         Whole,
         deny,
@@ -16,12 +18,10 @@ if TYPE_CHECKING:
         number,
         refuse,
     )
-    from beaver_ftc.documents.document import Document, Problem
     from beaver_ftc.documents.document import parse as parse_yaml
     from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFailed, suggestion
-    from beaver_ftc.documents.paths import cache_base, inside
-    from beaver_ftc.documents.problems import ScenarioError
-    from beaver_ftc.documents.validation import parse_document, read_file, text_of
+    from beaver_ftc.documents.files import cache_base, inside
+    from beaver_ftc.documents.validation import ScenarioError, parse_document, read_file, text_of
     from beaver_ftc.documents.validation import validate as validate_model
 else:
     __getattr__, __dir__ = lazily(__name__)

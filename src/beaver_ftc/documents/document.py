@@ -1,21 +1,99 @@
-"""YAML text to plain data that remembers its lines.
+"""What a file holds: sections (frozen, strict about their keys, without coercion of values), and before them
+plain data that remembers the line of each value.
 
-The tree is built from libyaml's event stream, so nothing but mappings, lists, texts, numbers, truth values
-and null can come out, and a hostile file is stopped while it is read: nesting, size and alias expansion are
-bounded. No library does that: PyYAML's composer, whose nodes have lines too, ends the process by recursion.
+The plain data is built from libyaml's event stream, so nothing but mappings, lists, texts, numbers, truth
+values and null can come out, and a hostile file is stopped while it is read: nesting, size and alias
+expansion are bounded. No library does that: PyYAML's composer, whose nodes have lines too, ends the
+process by recursion.
 
-Anchors and aliases are read, because repeating a value by name is what YAML users do, but what they expand to
-counts towards the bound: an alias bomb ends at MAX_NODES. Merge keys (`<<`) and tags are not read.
+Anchors and aliases are read, because repeating a value by name is what YAML users do, but what they expand
+to counts towards the bound: an alias bomb ends at MAX_NODES. Merge keys (`<<`) and tags are not read.
 Numbers are read as YAML 1.2 and everybody's eyes do: 1e-3 is a number, 12:30 and 012 are not.
 """
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, NoReturn
 
 import yaml
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, Strict
+from pydantic_core import PydanticCustomError
 
-from beaver_ftc.documents.base import Location
+from beaver_ftc.documents.errors import split_docstring
+
+Location = tuple[int | str, ...]
+Conflict = tuple[Location, str]
+
+
+class Section(BaseModel):
+    """A part of a file (scenario, aircraft, model): immutable, strict about its keys, finite in its numbers.
+
+    Lines `name: text` at the end of a section's docstring become the descriptions of its fields in the JSON
+    schema, which editors show.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    def __init_subclass__(cls, **given: Any) -> None:
+        super().__init_subclass__(**given)
+        cls.__doc__, says = split_docstring(cls.__doc__, cls.__annotations__)
+        for name, text in says.items():
+            cls.__annotations__[name] = Annotated[cls.__annotations__[name], Field(description=text)]
+
+
+def _whole(value: Any) -> Any:
+    """1e4 and 2.0 are accepted as whole numbers."""
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+Number = Annotated[float, Strict()]
+Whole = Annotated[int, Strict(), BeforeValidator(_whole)]
+Flag = Annotated[bool, Strict()]
+
+
+def entry(default: Any, says: str | None = None, **limits: Any) -> Any:
+    """A field and its description in the JSON schema.
+
+    default: a value, a function that makes one, or ... where the key must be given. says: the description,
+    where the section's docstring has none. limits: those of pydantic, and unit; examples, each a value;
+    range, a text where limits do not say it; needs, other keys that the example requires.
+    """
+    how = "default_factory" if callable(default) else "default"
+    said: dict[str, Any] = {"description": says} if says else {}
+    if shown := {key: limits.pop(key) for key in ("unit", "range", "needs") if key in limits}:
+        said["json_schema_extra"] = shown
+    return Field(**{how: default}, **said, **limits)
+
+
+def number(default: Any, unit: str, says: str | None = None, **limits: Any) -> Any:
+    """A field of one number, or several alike: the JSON Schema has their unit and meaning."""
+    return entry(default, says and f"{says}, {unit}", unit=unit, **limits)
+
+
+def refuse(conflicts: Iterable[Conflict]) -> None:
+    """Raise if values that are each fine contradict one another; every conflict keeps its own location."""
+    if found := list(conflicts):
+        raise PydanticCustomError("conflict", "contradictory values", {"conflicts": found})
+
+
+def refuse_unknown(keys: Iterable[Any], known: Iterable[str]) -> None:
+    """Raise if there are keys of a mapping that are none of those known."""
+    if unknown := list(keys):
+        raise PydanticCustomError("unknown_keys", "unknown keys", {"unknown": unknown, "known": list(known)})
+
+
+def deny(says: str, *at: int | str) -> NoReturn:
+    """Raise what is wrong with a value, or with what is below it at these keys."""
+    raise PydanticCustomError("conflict", "contradictory values", {"conflicts": [(at, says)]})
+
+
+def order_conflicts(start_s: float, end_s: float | None, start_key: str) -> list[Conflict]:
+    """The conflict of an end that does not come after its start."""
+    if end_s is None or end_s > start_s:
+        return []
+    return [(("end_s",), f"{end_s:g} is not after {start_key}, allowed: later than {start_s:g} s")]
+
 
 MAX_NODES = 400_000
 MAX_DEPTH = 32

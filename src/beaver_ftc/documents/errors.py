@@ -1,9 +1,13 @@
-"""What can go wrong, the exit status each kind ends with, and what was perhaps meant."""
+"""Words for the user: what can go wrong, with the exit status of each kind; what was perhaps meant; what a
+docstring says of a command's options and of a section's keys.
+"""
 
+import re
 import sys
 from collections.abc import Iterable
 from difflib import SequenceMatcher, get_close_matches
 from functools import cache
+from inspect import cleandoc
 
 SHORTEST_BEGINNING = 3  # of a name, to be taken for it
 CLEAR_LINE = "\r\033[K"  # of a terminal
@@ -57,3 +61,13 @@ def nearest(given: str, names: Iterable[str], cutoff: float = 0.6) -> str | None
 def say_once(line: str) -> None:
     """Say something on standard error, once a process; a line of progress may stand there."""
     print(f"{CLEAR_LINE * sys.stderr.isatty()}beaver-ftc: {line}", file=sys.stderr, flush=True)
+
+
+def split_docstring(docstring: str | None, names: Iterable[str]) -> tuple[str | None, dict[str, str]]:
+    """The docstring without its end, and what it says there of each of these names: `name: ...`."""
+    if docstring is None:
+        return None, {}
+    about, *said = re.split(rf"^({'|'.join(names)}): ", cleandoc(docstring), flags=re.MULTILINE)
+    return about.rstrip(), {
+        name: " ".join(text.split()) for name, text in zip(said[::2], said[1::2], strict=True)
+    }

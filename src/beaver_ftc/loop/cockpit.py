@@ -4,7 +4,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from beaver_ftc.aircraft.units import EARTH_RADIUS_M
+from beaver_ftc.aircraft.aircraft import EARTH_RADIUS_M
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.addresses import GETTER, RUN, SETTER, address

@@ -14,10 +14,9 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft import load as load_aircraft
-from beaver_ftc.aircraft.loading import kept_folder
-from beaver_ftc.aircraft.units import M_PER_FT, N_PER_LBF
+from beaver_ftc.aircraft.aircraft import M_PER_FT, N_PER_LBF, kept_folder
 from beaver_ftc.documents.errors import SimulationFailed
-from beaver_ftc.documents.paths import data_root
+from beaver_ftc.documents.files import data_root
 from beaver_ftc.plant.addresses import available
 from beaver_ftc.plant.model_file import check_model_has_no_side_effects, package, shared
 from beaver_ftc.plant.state import START_LATITUDE_DEG, FlightState

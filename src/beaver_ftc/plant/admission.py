@@ -13,13 +13,12 @@ from importlib.metadata import version
 from pathlib import Path
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.aircraft.loading import FILE
+from beaver_ftc.aircraft.aircraft import FILE
 from beaver_ftc.aircraft.schema import AircraftFile
 from beaver_ftc.documents.document import Location, Problem
 from beaver_ftc.documents.errors import SimulationFailed
-from beaver_ftc.documents.paths import cache_base
-from beaver_ftc.documents.problems import ScenarioError
-from beaver_ftc.documents.validation import parse_document
+from beaver_ftc.documents.files import cache_base
+from beaver_ftc.documents.validation import ScenarioError, parse_document
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.model_file import check_model_has_no_side_effects
 from beaver_ftc.plant.trial import failure

@@ -8,8 +8,8 @@ POS + n + s and POS + 2 n + s, and signal k at POS + 3 n + k.
 from functools import lru_cache
 
 from beaver_ftc.aircraft import AXES, Aircraft, load
+from beaver_ftc.aircraft.aircraft import M_PER_FT
 from beaver_ftc.aircraft.schema import MAX_SIGNALS
-from beaver_ftc.aircraft.units import M_PER_FT
 from beaver_ftc.scenario.sensors import N_IN_EQUATIONS, ROWS
 
 PSF = 47.88025898033584  # Pa per lbf/ft2

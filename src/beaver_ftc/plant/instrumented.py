@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from beaver_ftc.documents.errors import BadInput, suggestion
-from beaver_ftc.documents.paths import data_root
+from beaver_ftc.documents.files import data_root
 from beaver_ftc.plant.model_file import SYSTEMS, copy_of, files_of, package
 
 PREFIX = "actuated-"

@@ -21,7 +21,7 @@ import jsbsim
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.aircraft.units import EARTH_RADIUS_M, M_PER_FT
+from beaver_ftc.aircraft.aircraft import EARTH_RADIUS_M, M_PER_FT
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.configure import configure

@@ -9,7 +9,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from beaver_ftc.documents.errors import SimulationFailed
-from beaver_ftc.documents.problems import one_line
+from beaver_ftc.documents.validation import one_line
 from beaver_ftc.results.model import Document
 
 _LONGEST = 10_000  # characters of one line

@@ -10,9 +10,9 @@ from functools import cache
 from types import UnionType
 from typing import Any, Self, Union, get_args, get_origin, get_type_hints
 
-from beaver_ftc.documents import plain
+from beaver_ftc.documents import files
 
-Document = plain.Document
+Document = files.Document
 Span = tuple[float, float]
 
 

@@ -7,7 +7,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.documents.base import Number, Section, deny, number, refuse_unknown
+from beaver_ftc.documents.document import Number, Section, deny, number, refuse_unknown
 from beaver_ftc.scenario.airframe import checked_aircraft
 
 

@@ -9,8 +9,8 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
 from beaver_ftc.aircraft import DEFAULT, Aircraft, load
-from beaver_ftc.aircraft.loading import BESIDE, NotDerived, UnknownAircraft
-from beaver_ftc.documents.base import Number, deny
+from beaver_ftc.aircraft.aircraft import BESIDE, NotDerived, UnknownAircraft
+from beaver_ftc.documents.document import Number, deny
 from beaver_ftc.documents.errors import BeaverFtcError, suggestion
 from beaver_ftc.extensions import offered, required
 

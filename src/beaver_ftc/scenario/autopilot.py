@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, create_model, model_validator
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.aircraft import THRUST_TERM
-from beaver_ftc.documents.base import Conflict, Flag, Number, Section, deny, entry, number, refuse
+from beaver_ftc.documents.document import Conflict, Flag, Number, Section, deny, entry, number, refuse
 from beaver_ftc.scenario.airframe import checked_aircraft
 from beaver_ftc.scenario.initial import airspeeds_of, highest_of
 

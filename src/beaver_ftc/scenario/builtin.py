@@ -4,9 +4,8 @@ from pathlib import Path
 
 from beaver_ftc.documents.document import first_text
 from beaver_ftc.documents.errors import nearest
-from beaver_ftc.documents.paths import data_root
-from beaver_ftc.documents.problems import ScenarioError
-from beaver_ftc.documents.validation import parse_document, text_of
+from beaver_ftc.documents.files import data_root
+from beaver_ftc.documents.validation import ScenarioError, parse_document, text_of
 
 MAX_BYTES = 4_000_000
 """A hand-written scenario is a few kB; a fully resolved one with reference tables in it stays below this."""

@@ -10,7 +10,7 @@ from itertools import pairwise
 from math import isfinite
 from typing import Any
 
-from beaver_ftc.documents.base import Conflict
+from beaver_ftc.documents.document import Conflict
 
 DURATION_S = 30.0
 RATE_HZ = 100.0

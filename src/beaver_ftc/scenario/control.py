@@ -5,7 +5,7 @@ from typing import Annotated, Self
 
 from pydantic import model_validator
 
-from beaver_ftc.documents.base import Section, deny, entry, number, refuse
+from beaver_ftc.documents.document import Section, deny, entry, number, refuse
 from beaver_ftc.plugins import LAWS, refusal, wrong_options
 from beaver_ftc.scenario.airframe import named
 

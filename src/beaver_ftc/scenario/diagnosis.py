@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AfterValidator, Field, Strict, field_validator, model_validator
 
 from beaver_ftc.design.dryden import Severity
-from beaver_ftc.documents.base import Section, deny, entry, number, refuse
+from beaver_ftc.documents.document import Section, deny, entry, number, refuse
 from beaver_ftc.documents.errors import suggestion
 from beaver_ftc.plugins import DETECTORS, refusal, wrong_options
 from beaver_ftc.scenario.airframe import checked_aircraft, named

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
-from beaver_ftc.documents.base import Conflict, Number, Section, deny, entry, number, refuse
+from beaver_ftc.documents.document import Conflict, Number, Section, deny, entry, number, refuse
 
 MAX_GUSTS = 100
 Wind = Annotated[Number, Field(ge=-100, le=100)]

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Self
 from pydantic import create_model, model_validator
 
 from beaver_ftc.aircraft import Aircraft, load
-from beaver_ftc.documents.base import Flag, Number, Section, deny, entry, number
+from beaver_ftc.documents.document import Flag, Number, Section, deny, entry, number
 from beaver_ftc.scenario.airframe import checked_aircraft
 
 

@@ -7,12 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from beaver_ftc.aircraft import AXES
-from beaver_ftc.documents.base import Section
-from beaver_ftc.documents.document import Document, Problem
+from beaver_ftc.documents.document import Document, Problem, Section
 from beaver_ftc.documents.errors import BadInput, suggestion
-from beaver_ftc.documents.keys import plain
-from beaver_ftc.documents.problems import ScenarioError
-from beaver_ftc.documents.validation import validate
+from beaver_ftc.documents.validation import ScenarioError, plain, validate
 from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.autopilot import Autopilot
 from beaver_ftc.scenario.consistency import OF_A_FAULT

@@ -7,9 +7,7 @@ from typing import Any
 
 from beaver_ftc.documents.document import Document, Problem
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.documents.keys import plain
-from beaver_ftc.documents.problems import ScenarioError
-from beaver_ftc.documents.validation import parse_document, validate
+from beaver_ftc.documents.validation import ScenarioError, parse_document, plain, validate
 from beaver_ftc.scenario.builtin import read_file, resolve
 from beaver_ftc.scenario.consistency import conflicts
 from beaver_ftc.scenario.schema import Scenario

@@ -7,7 +7,7 @@ takes gyros whose error is no more than a constant.
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from beaver_ftc.documents.base import Conflict
+from beaver_ftc.documents.document import Conflict
 from beaver_ftc.scenario.sensors import Sensors
 
 if TYPE_CHECKING:

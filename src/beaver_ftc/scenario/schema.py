@@ -18,11 +18,9 @@ from pydantic import (
 )
 
 from beaver_ftc.aircraft import DEFAULT, Aircraft, UnknownAircraft, load
-from beaver_ftc.documents.base import Flag, Number, Section, Whole, deny, entry, number, refuse
-from beaver_ftc.documents.document import Document
+from beaver_ftc.documents.document import Document, Flag, Number, Section, Whole, deny, entry, number, refuse
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.documents.keys import UnusableKeyError, parse_key, plain, with_values
-from beaver_ftc.documents.validation import validate
+from beaver_ftc.documents.validation import UnusableKeyError, parse_key, plain, validate, with_values
 from beaver_ftc.scenario.actuators import Actuators
 from beaver_ftc.scenario.airframe import (
     Ratio,

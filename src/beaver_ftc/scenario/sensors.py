@@ -14,8 +14,7 @@ from pydantic import Field, GetJsonSchemaHandler, create_model, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from beaver_ftc.documents.base import Number, Section, number
-from beaver_ftc.documents.document import parse
+from beaver_ftc.documents.document import Number, Section, number, parse
 from beaver_ftc.scenario.airframe import checked_aircraft
 
 # Noise is normal and cut off at so many standard deviations: a bound on it can be declared, and holds.

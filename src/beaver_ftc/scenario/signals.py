@@ -16,9 +16,8 @@ from typing import TYPE_CHECKING, Any, Self
 
 from pydantic import ConfigDict, ValidationInfo, model_validator
 
-from beaver_ftc.documents.base import Number, Section, deny, entry, number, order_conflicts, refuse
-from beaver_ftc.documents.files import UnreadableError, read_text
-from beaver_ftc.documents.paths import inside
+from beaver_ftc.documents.document import Number, Section, deny, entry, number, order_conflicts, refuse
+from beaver_ftc.documents.files import UnreadableError, inside, read_text
 from beaver_ftc.scenario.airframe import folder_of
 from beaver_ftc.scenario.timing import TIME_TOLERANCE_S
 

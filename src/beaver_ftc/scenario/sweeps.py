@@ -14,12 +14,29 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from beaver_ftc.aircraft import Aircraft, load
-from beaver_ftc.documents.base import Conflict, Location, Number, Section, Whole, deny, entry, number, refuse
-from beaver_ftc.documents.document import Document, Problem
-from beaver_ftc.documents.keys import UnusableKeyError, parse_key, with_values
-from beaver_ftc.documents.paths import inside
-from beaver_ftc.documents.problems import ScenarioError, key_path
-from beaver_ftc.documents.validation import parse_document, validate
+from beaver_ftc.documents.document import (
+    Conflict,
+    Document,
+    Location,
+    Number,
+    Problem,
+    Section,
+    Whole,
+    deny,
+    entry,
+    number,
+    refuse,
+)
+from beaver_ftc.documents.files import inside
+from beaver_ftc.documents.validation import (
+    ScenarioError,
+    UnusableKeyError,
+    key_path,
+    parse_document,
+    parse_key,
+    validate,
+    with_values,
+)
 from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.builtin import (
     builtin_names,

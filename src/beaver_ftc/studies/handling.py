@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.aircraft.units import GRAVITY_MPS2
+from beaver_ftc.aircraft.aircraft import GRAVITY_MPS2
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.plant.conditions import trimmed
 from beaver_ftc.plant.linear import LinearModel, differences

@@ -1,4 +1,4 @@
-"""From an autopilot's outputs to deflections and power: see `aircraft/channels.py` for the equation."""
+"""From an autopilot's outputs to deflections and power: see `aircraft/schema.py` for the equation."""
 
 from collections.abc import Sequence
 from math import isfinite

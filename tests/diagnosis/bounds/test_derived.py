@@ -141,7 +141,7 @@ def test_poles_for_noise_give_the_greatest_excess():
 
 
 def test_errors_that_have_no_bound_cannot_be_declared():
-    from beaver_ftc.documents.problems import ScenarioError
+    from beaver_ftc.documents.validation import ScenarioError
     from beaver_ftc.scenario.loader import load_text
 
     with pytest.raises(ScenarioError, match=r"fdi\.bounds\.sensors\.p"):

@@ -9,14 +9,14 @@ import pytest
 import yaml
 
 import beaver_ftc as bf
-from beaver_ftc.aircraft.loading import read
+from beaver_ftc.aircraft.aircraft import read
 from beaver_ftc.control import engines
 from beaver_ftc.control.power import POWER, move_differences
 from beaver_ftc.control.state import control_dtype
 from beaver_ftc.diagnosis.monitors import engine_symmetry
 from beaver_ftc.diagnosis.monitors.engine_symmetry import ENGINES
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.documents.problems import ScenarioError
+from beaver_ftc.documents.validation import ScenarioError
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.instrumented import source_of
 from beaver_ftc.plant.trim import trim

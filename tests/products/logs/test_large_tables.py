@@ -82,7 +82,7 @@ def test_a_log_with_more_rows_at_once_than_a_run_writes_is_one_line(tmp_path):
 
 
 def test_used_up_memory_is_said_in_plain_words():
-    from beaver_ftc.cli.output import failure_of
+    from beaver_ftc.cli.shared import failure_of
 
     assert str(failure_of(MemoryError("4 GiB wanted"))) == "there is not enough memory for this: 4 GiB wanted"
     assert str(failure_of(MemoryError())) == "there is not enough memory for this"

@@ -3,8 +3,7 @@ from dataclasses import replace
 import pytest
 from pydantic import ValidationError
 
-from beaver_ftc.documents.keys import UnusableKeyError, parse_key, with_values
-from beaver_ftc.documents.problems import ScenarioError
+from beaver_ftc.documents.validation import ScenarioError, UnusableKeyError, parse_key, with_values
 from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.builtin import builtin_sweeps
 from beaver_ftc.scenario.schema import Scenario

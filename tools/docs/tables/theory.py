@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from beaver_ftc.aircraft import units
+from beaver_ftc.aircraft import aircraft
 from beaver_ftc.diagnosis.bounds import admitted, worst_case
 from beaver_ftc.diagnosis.detection import likelihood, noise_model, statistical, tones
 from beaver_ftc.diagnosis.monitors import redundancy, sensor_records
@@ -11,7 +11,7 @@ from beaver_ftc.scenario.diagnosis import Bounds, FdiConfig, Statistical
 from beaver_ftc.studies.present.tables import markdown_table
 
 CONSTANTS = (  # (section, meaning, module, name there, unit)
-    (2, "rate of the Earth", units, "EARTH_RATE_RAD_S", "rad/s"),
+    (2, "rate of the Earth", aircraft, "EARTH_RATE_RAD_S", "rad/s"),
     (2, "rounding", worst_case, "ROUNDING_RAD_S2", "rad/s2"),
     (2, "limit of instrument noise, standard deviations", instruments, "NOISE_LIMIT_SIGMA", ""),
     (2, "limit of gusts, standard deviations", admitted, "GUST_LIMIT_SIGMA", ""),

@@ -1,6 +1,6 @@
 """Tables of docs/results/verification.md: the truth against data of the FDC equations."""
 
-from beaver_ftc.documents.paths import data_root
+from beaver_ftc.documents.files import data_root
 from beaver_ftc.studies.present.tables import markdown_table
 from tools.fdc_check import RESPONSE_BAR, Agreement, derivative_agreement, response_agreement
 

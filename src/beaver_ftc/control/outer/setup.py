@@ -13,8 +13,7 @@ from math import inf, nan, radians
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.aircraft.aircraft import THRUST_TERM
-from beaver_ftc.aircraft.units import GRAVITY_MPS2
+from beaver_ftc.aircraft.aircraft import GRAVITY_MPS2, THRUST_TERM
 from beaver_ftc.control.outer.state import CHANNELS, GAINS, N_FLAP, N_QDYN, NOT_JUDGED
 from beaver_ftc.control.outer.thrust import set_up_engine
 from beaver_ftc.design.engine import SEA_LEVEL_DENSITY_KG_M3

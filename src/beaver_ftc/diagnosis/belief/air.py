@@ -33,9 +33,8 @@ from math import pi
 import numpy as np
 
 from beaver_ftc.aircraft import MassProperties
-from beaver_ftc.aircraft.aircraft import FORCES
+from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S, FORCES, GRAVITY_MPS2
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS
-from beaver_ftc.aircraft.units import EARTH_RATE_RAD_S, GRAVITY_MPS2
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.dryden import SCALE_M, rotation_lengths
 from beaver_ftc.design.model import rate_damping

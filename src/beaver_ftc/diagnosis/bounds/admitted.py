@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from beaver_ftc.aircraft import AXES, MassProperties
-from beaver_ftc.aircraft.units import EARTH_RATE_RAD_S
+from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S
 from beaver_ftc.design.engine import power_error_kw
 from beaver_ftc.design.model import inertia_coefficients
 from beaver_ftc.design.variants import mass_of

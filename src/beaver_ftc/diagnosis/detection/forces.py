@@ -18,9 +18,8 @@ rate of the run before.
 import numpy as np
 
 from beaver_ftc.aircraft import AXES, Aircraft, Term
-from beaver_ftc.aircraft.aircraft import FORCES
+from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S, FORCES
 from beaver_ftc.aircraft.schema import MAX_SURFACES, MAX_TERMS_OF_ONE, SIDESLIP_RATE
-from beaver_ftc.aircraft.units import EARTH_RATE_RAD_S
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.engine import slipstream_slopes
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, DPT, N_Y, QDYN, evaluate

@@ -5,7 +5,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from beaver_ftc.aircraft.units import EARTH_RADIUS_M, GRAVITY_MPS2
+from beaver_ftc.aircraft.aircraft import EARTH_RADIUS_M, GRAVITY_MPS2
 from beaver_ftc.compiled import record
 from beaver_ftc.design.context import DesignFunctions
 from beaver_ftc.design.dryden import Dryden
@@ -138,7 +138,7 @@ def configure(monitor: np.void, scenario: Scenario, design: np.void, y: np.ndarr
     config["enabled"] = enabled
     if not enabled:
         return
-    declared, initial = Declared.of(scenario), cast(Any, scenario.initial)  # whose keys the aircraft names
+    declared, initial = Declared.of(scenario), cast("Any", scenario.initial)  # whose keys the aircraft names
     config["instants"], config["engine"] = scenario.substeps, scenario.airframe.has_engine_instruments
     config["trim"][3:7] = y[:4]
     config["damping"] = gust_effect(DesignFunctions(np.array([design])), y)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Self
 
 from pydantic import model_validator
 
-from beaver_ftc.documents.base import Conflict, Number, Section, entry, number, order_conflicts, refuse
+from beaver_ftc.documents.document import Conflict, Number, Section, entry, number, order_conflicts, refuse
 
 Keys = Mapping[str, Any]  # of a fault in a scenario, beside type, actuator and times
 Properties = dict[str, float]  # failure properties of one surface

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from beaver_ftc.documents.base import entry
+from beaver_ftc.documents.document import entry
 from beaver_ftc.documents.errors import suggestion
 from beaver_ftc.scenario.airframe import checked_aircraft, named
 from beaver_ftc.scenario.faults.base import Past, Properties, Switched, constant

@@ -7,7 +7,16 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from beaver_ftc.documents.base import Conflict, Number, Section, deny, entry, number, order_conflicts, refuse
+from beaver_ftc.documents.document import (
+    Conflict,
+    Number,
+    Section,
+    deny,
+    entry,
+    number,
+    order_conflicts,
+    refuse,
+)
 from beaver_ftc.scenario.airframe import among
 from beaver_ftc.scenario.sensors import ALIASES, QUANTITIES, sensor_words, sensors_there
 

@@ -3,7 +3,7 @@
 from math import degrees, radians
 from typing import Literal
 
-from beaver_ftc.documents.base import Conflict, Number, entry, number
+from beaver_ftc.documents.document import Conflict, Number, entry, number
 from beaver_ftc.scenario.airframe import Actuator, checked_aircraft
 from beaver_ftc.scenario.faults.base import (
     Button,

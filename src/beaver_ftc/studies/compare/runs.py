@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.documents.problems import one_line
+from beaver_ftc.documents.validation import one_line
 from beaver_ftc.results.model import Document
 from beaver_ftc.results.style import BLACK
 from beaver_ftc.studies.present.figures import panels

@@ -8,7 +8,7 @@ from time import thread_time
 
 from beaver_ftc.diagnosis.rivals import GRADES, Tuned, grade, tuned, values_of
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
-from beaver_ftc.documents.paths import data_root
+from beaver_ftc.documents.files import data_root
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.loop.outcome import Landing
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled

@@ -31,7 +31,7 @@ from typing import Annotated, ClassVar
 
 import typer
 
-from beaver_ftc.documents.plain import Document
+from beaver_ftc.documents.files import Document
 
 
 @dataclass(frozen=True)

@@ -45,7 +45,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.aircraft import AXES
-from beaver_ftc.aircraft.units import EARTH_RADIUS_M, EARTH_RATE_RAD_S
+from beaver_ftc.aircraft.aircraft import EARTH_RADIUS_M, EARTH_RATE_RAD_S
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.fdc import GEOMETRY, SURFACES, TRAVEL
 from beaver_ftc.design.model import InertiaCoefficients, inertial

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from beaver_ftc.documents.keys import parse_key, with_values
+from beaver_ftc.documents.validation import parse_key, with_values
 from beaver_ftc.plugins import DETECTORS, LAWS, options_of
 from beaver_ftc.scenario.schema import Scenario
 

@@ -17,7 +17,7 @@ from pydantic import ValidationError
 
 from beaver_ftc.documents import document as source
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
-from beaver_ftc.documents.problems import key_path, problems_of
+from beaver_ftc.documents.validation import key_path, problems_of
 from beaver_ftc.results.model import Metrics
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sweeps import Sweep, Variation

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.documents.document import Document
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.documents.keys import plain
+from beaver_ftc.documents.validation import plain
 from beaver_ftc.results.log import units
 from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.loader import ScenarioLike, load

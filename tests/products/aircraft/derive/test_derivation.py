@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from beaver_ftc.aircraft import loading
+from beaver_ftc.aircraft import aircraft as loading
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc_aircraft.derive import derivation, outline
 from beaver_ftc_aircraft.derive.derivation import Source, source_of

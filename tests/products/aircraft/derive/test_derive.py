@@ -15,12 +15,12 @@ from tools.autopilots.small import Small
 from typer.testing import CliRunner
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.aircraft.loading import derived_folder, first_line, read
+from beaver_ftc.aircraft.aircraft import derived_folder, first_line, read
 from beaver_ftc.cli.main import app
 from beaver_ftc.design.context import DesignFunctions
 from beaver_ftc.design.model import design_record
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
-from beaver_ftc.documents.paths import data_root
+from beaver_ftc.documents.files import data_root
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant import instrumented
 from beaver_ftc.plant.adapter import Plant, bare, translated

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.aircraft.loading import read
+from beaver_ftc.aircraft.aircraft import read
 from beaver_ftc.design.model import inertia_coefficients
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant import Plant

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from beaver_ftc.aircraft.loading import read
+from beaver_ftc.aircraft.aircraft import read
 from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc_aircraft.derive import first_use
 

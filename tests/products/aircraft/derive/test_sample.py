@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beaver_ftc.aircraft.loading import read
+from beaver_ftc.aircraft.aircraft import read
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.trim import trim as trimmed
 from beaver_ftc_aircraft.derive import sample as sampling

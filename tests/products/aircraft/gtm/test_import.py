@@ -7,7 +7,7 @@ from scipy.io import savemat
 from tools.gtm.specification import DATABASE
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.aircraft.loading import UnknownAircraft, imported_folder
+from beaver_ftc.aircraft.aircraft import UnknownAircraft, imported_folder
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_aircraft.gtm import conversion, elements, folder
 from beaver_ftc_aircraft.gtm.database import read

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.aircraft.channels import OutputSection
+from beaver_ftc.aircraft.schema import OutputSection
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_links.sitl.outputs import Outputs, channels_of, power_range, share_of_pulse
 from trainer import trainer

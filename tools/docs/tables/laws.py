@@ -31,7 +31,7 @@ def law_gains() -> str:
         for loop, gains, lead in zip(LOOPS, law.schedule.Kp, law.lead, strict=True):
             gain = np.interp(pressure, qdyn_pa, gains)
             rows.append((declared, loop, f"{gain:.1f}", f"{RATIO * gain:.1f}", f"{lead:.1f}"))
-    return markdown_table(("declared", "loop", "K_p, 1/s", "w, 1/s", "lead"), rows)
+    return markdown_table(("declared", "loop", "K_p, 1/s", "omega_o, 1/s", "lead"), rows)
 
 
 def least_margins() -> str:

@@ -175,7 +175,7 @@ def derive(
             if moving := outline.moved_by_itself(plant.aircraft, trim, tuple(further)):
                 raise BadInput(
                     f"{source.says}: {', '.join(moving)} moves by itself in steady flight, and its "
-                    "aerodynamics see it, allowed: surfaces that move by command"
+                    "aerodynamics depend on it, allowed: surfaces that move by command"
                 )
             if source.folder is None:
                 _set_envelope(data, trim, wanted)
@@ -221,8 +221,8 @@ def _prepared(
     tell("instrument")
     seen = surfaces_of(source.model)
     if len(seen) < 3:
-        says = ", ".join(seen) or "no surface"
-        raise BadInput(f"{source.says}: its aerodynamics see {says}, allowed: aileron, elevator, rudder")
+        says = f"only on {', '.join(seen)}" if seen else "on no surface"
+        raise BadInput(f"{source.says}: its aerodynamics depend {says}, allowed: aileron, elevator, rudder")
     absent = tuple(name for name in try_out(source) if not is_known_to_jsbsim(name))
     if absent:
         notes.append(f"JSBSim alone gives it no {', '.join(absent)}: 0 in the copy")

@@ -22,12 +22,14 @@ ALTERNATIVES = {
     "straightforward": "all in NumPy, properties by name",
 }
 ROUNDS = 40
+WAITS = ("command", "elapsed, s", "processor, s", "memory, MB", "largest allowed, s")
+PER_FRAMES = "/ bare"  # of `waits.py`: a ratio of Table 1, not a wait
 
 
 def performance_flights() -> str:
     """Flights of a sweep, each beside as many of JSBSim's own frames."""
     kinds = by_kind(ROUNDS)
-    return markdown_table(("flight of 15 s", "frames / bare", "flight / bare", "flight, ms"), [
+    return markdown_table(("flight of 15 s", "frames, ratio", "flight, ratio", "flight, ms"), [
         (name, f"{kinds[kind]['frames_ratio']:.2f}", f"{kinds[kind]['flight_ratio']:.2f}",
          f"{sum(kinds[kind]['parts_ms'].values()):.0f}")
         for kind, name in KINDS.items()
@@ -43,15 +45,15 @@ def performance_frames() -> str:
         ("whole flight with a log file", found["whole_flight"]["with_log_file_ratio"]),
         *((name, found["alternatives"][key]["ratio"]) for key, name in ALTERNATIVES.items()),
     ]
-    return markdown_table(("a frame", "/ bare"), [(name, f"{ratio:.2f}") for name, ratio in rows])
+    return markdown_table(("frame", "ratio"), [(name, f"{ratio:.2f}") for name, ratio in rows])
 
 
 def performance_waits() -> str:
     """Each wait as `make waits` prints it: whole processes by the wall and the processor, and their bars."""
-    head, *lines = _printed("waits.py", "--rounds", "3").splitlines()
-    names = ("", *re.split(r"\s{2,}", head.strip()))
+    _, *lines = _printed("waits.py", "--rounds", "3").splitlines()
     found = [re.fullmatch(r"(.+?)\s+([\d.-]+)\s+([\d.-]+)\s+([\d.-]+)\s+([\d.]+)", line) for line in lines]
-    return markdown_table(names, [row.groups() for row in found if row])
+    rows = [row.groups() for row in found if row and not row[1].endswith(PER_FRAMES)]
+    return markdown_table(WAITS, rows)
 
 
 def _printed(script: str, *arguments: str) -> str:

@@ -186,7 +186,7 @@ def test_a_wish_for_speed_and_altitude_is_in_every_outline_that_is_tried(monkeyp
     ]
     assert notes == ["JSBSim alone gives it no of/other: 0 in the copy", "note of its control"]
     assert told == ["instrument", "trim"] * 2
-    for seen, says in ((["aileron", "rudder"], "aileron, rudder"), ([], "no surface")):
+    for seen, says in ((["aileron", "rudder"], "only on aileron, rudder"), ([], "on no surface")):
         monkeypatch.setattr(derivation, names[0], lambda model, seen=seen: seen)
-        with pytest.raises(BadInput, match=f"^mine: its aerodynamics see {says}, allowed: aileron"):
+        with pytest.raises(BadInput, match=f"^mine: its aerodynamics depend {says}, allowed: aileron"):
             derivation._prepared(source, folder, wish, [], told.append)

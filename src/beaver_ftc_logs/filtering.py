@@ -15,6 +15,7 @@ learns no trim and no gain.
 This is done once for each delay the flight may have; the likelier delay counts more.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -24,7 +25,7 @@ from beaver_ftc_logs.bank import Bank, adaptation_of, noise_of
 from beaver_ftc_logs.model import Colour, Model
 from beaver_ftc_logs.recording import Floats
 from beaver_ftc_logs.regression import in_white
-from beaver_ftc_logs.samples import Samples, whitened
+from beaver_ftc_logs.samples import Samples, first, whitened
 
 _DELAY_MEMORY_S = 600.0
 _FLOOR = 1e-15
@@ -33,6 +34,11 @@ _SPANS_S, _LATELY_S = (0.0, 0.1), 2.0
 """Spans over which a residual is summed, and the seconds in which its size is taken."""
 _EXPECTED = 0.93
 """Mean of the clipped square of a residual per axis when the scale is right."""
+_LEAST_WEIGHT = 1e-3
+"""Probability of a colour of the noise below which it is left out."""
+
+Run = tuple[Floats, Floats, Floats, Floats]
+"""As `run_bank` returns it."""
 
 
 def posterior_of(samples: Samples, model: Model, bank: Bank) -> tuple[Floats, Floats, Floats]:
@@ -42,18 +48,39 @@ def posterior_of(samples: Samples, model: Model, bank: Bank) -> tuple[Floats, Fl
     whitened, each weighted by how well it explains the last minutes.
     """
     if model.colours and not samples.colour:
-        flights = [whitened(samples, one.average) for one in model.colours]
-        runs = [_filtered(one, model.with_noise_model(one.colour), bank) for one in flights]
-        likely = [_likelihood(one, model, of) for one, of in zip(flights, model.colours, strict=True)]
-    else:
-        own, delays_s = model.with_noise_model(samples.colour), model.settings.delays_s
-        runs = [_filtered(_later(samples, delay_s), own, bank) for delay_s in delays_s]
-        likely = [run[3] for run in runs]
+        return _by_colours(samples, model, bank)
+    own, delays_s = model.with_noise_model(samples.colour), model.settings.delays_s
+    runs = [_filtered(_later(samples, delay_s), own, bank) for delay_s in delays_s]
+    return _mean(_weights([run[3] for run in runs], model.rate_hz), runs)
+
+
+def _by_colours(samples: Samples, model: Model, bank: Bank) -> tuple[Floats, Floats, Floats]:
+    """The mean over the colours of the noise. A colour is filtered up to the last sample at which its weight
+    counts: within a second most are far less likely than another, and stay so."""
+    flights = [(whitened(samples, one.average), model.alone_with(one)) for one in model.colours]
+    likely = [_likelihood(flight, of, of.colours[0]) for flight, of in flights]
     weights = _weights(likely, model.rate_hz)
-    posterior = sum(weight[:, None] * run[0] for weight, run in zip(weights, runs, strict=True))
-    state = sum(weight[:, None] * run[1] for weight, run in zip(weights, runs, strict=True))
-    scale = sum(weight * run[2] for weight, run in zip(weights, runs, strict=True))
-    return np.asarray(posterior), np.asarray(state), np.asarray(scale)
+    weights = np.where(weights < _LEAST_WEIGHT, 0.0, weights)
+    weights /= weights.sum(axis=0)
+    last = [int(np.flatnonzero(weight).max(initial=-1)) + 1 for weight in weights]
+    runs = [
+        _filtered(first(flight, count), of.with_noise_model(flight.colour), bank)
+        for (flight, of), count in zip(flights, last, strict=True) if count
+    ]  # fmt: skip
+    return _mean([weight for weight, count in zip(weights, last, strict=True) if count], runs)
+
+
+def _mean(weights: Sequence[Floats], runs: Sequence[Run]) -> tuple[Floats, Floats, Floats]:
+    """Runs with weights (n,) each; a run ends where its weight stays 0."""
+    found: list[Floats] = []
+    for part in range(3):
+        shape = (len(weights[0]), *runs[0][part].shape[1:])
+        total = np.zeros(shape)
+        for weight, run in zip(weights, runs, strict=True):
+            values = run[part]
+            total[: len(values)] += weight[: len(values)].reshape(-1, *[1] * (values.ndim - 1)) * values
+        found.append(total)
+    return found[0], found[1], found[2]
 
 
 def _likelihood(flight: Samples, model: Model, of: Colour) -> Floats:
@@ -99,7 +126,7 @@ def _later(samples: Samples, delay_s: float) -> Samples:
     return replace(samples, commands=(1.0 - share) * commands + share * other)
 
 
-def _weights(evidence: list[Floats], rate_hz: float) -> Floats:
+def _weights(evidence: Sequence[Floats], rate_hz: float) -> Floats:
     """Probability of each delay at each sample, (D, n), by the evidence of some minutes."""
     from scipy.signal import lfilter
 
@@ -109,7 +136,7 @@ def _weights(evidence: list[Floats], rate_hz: float) -> Floats:
     return np.asarray(weights / weights.sum(axis=0))
 
 
-def _filtered(samples: Samples, model: Model, bank: Bank) -> tuple[Floats, Floats, Floats, Floats]:
+def _filtered(samples: Samples, model: Model, bank: Bank) -> Run:
     """As the kernel gives it."""
     ok, *parts = in_white(samples, model)
     unexplained, answers = (np.ascontiguousarray(np.nan_to_num(part)) for part in parts)
@@ -118,9 +145,7 @@ def _filtered(samples: Samples, model: Model, bank: Bank) -> tuple[Floats, Float
     if model.vehicle.other_laws:
         residual = np.where(ok[:, None], unexplained - noise.constant - answers.sum(axis=1), 0.0)
         least = least_scale(residual, ok, noise.covariance, model.rate_hz)
-    found: tuple[Floats, Floats, Floats, Floats] = run_bank(
-        unexplained, answers, ok, bank, adaptation_of(model), noise, least
-    )
+    found: Run = run_bank(unexplained, answers, ok, bank, adaptation_of(model), noise, least)
     return found
 
 

@@ -65,7 +65,7 @@ _OTHER_LAWS: dict[str, Any] = {
 not modelled ties the command to it), and what a name asks for then. Chosen on simulated flights
 (`own_logs.py`, seeds 1 to 6)."""
 _MOVING_AIR: dict[str, Any] = {"own_gain_sd": 0.08, "own_gain_time_s": 100.0}
-_WINDOW_S, _AR_ORDER = 10.0, 20
+_WINDOW_S, AR_ORDER = 10.0, 20
 """Whitened by the flight's own noise model and an AR predictor of so many samples; gains differ by flight
 rather than within it: chosen on seeds 11 and 12, in light turbulence; what a name asks for on a pa28's
 seed 11."""
@@ -259,12 +259,12 @@ def _with_predictor(average: list[float], residual: Sequence[tuple[NDArray[np.in
     """A noise model with an AR predictor of the residual, by least squares where samples follow one another,
     and the remaining noise; without a predictor where too few do."""
     parts = [e[begin:end] for rows, e in residual for begin, end in _runs(rows)]
-    ends = [part[_AR_ORDER:] for part in parts]
-    if sum(map(len, ends)) < 10 * 3 * _AR_ORDER:
+    ends = [part[AR_ORDER:] for part in parts]
+    if sum(map(len, ends)) < 10 * 3 * AR_ORDER:
         return Colour(average=average, noise=np.cov(np.vstack(parts).T).tolist())
     x = np.vstack([
-        np.hstack([part[_AR_ORDER - j : len(part) - j] for j in range(1, _AR_ORDER + 1)])
-        for part in parts if len(part) > _AR_ORDER
+        np.hstack([part[AR_ORDER - j : len(part) - j] for j in range(1, AR_ORDER + 1)])
+        for part in parts if len(part) > AR_ORDER
     ])  # fmt: skip
     y = np.vstack(ends)
     by = np.linalg.lstsq(x, y, rcond=None)[0]

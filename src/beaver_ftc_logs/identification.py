@@ -9,11 +9,18 @@ import numpy as np
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
-from beaver_ftc_logs import extremes, fitting, regression, trust
+from beaver_ftc_logs import extremes, fitting, gyro_noise, regression, trust
 from beaver_ftc_logs.model import Colour, Fitted, Model
 from beaver_ftc_logs.recording import Floats
 from beaver_ftc_logs.regression import group_indices, spectrum, variance_inflation
-from beaver_ftc_logs.samples import NOISE_COLOURS, UNSEEN_NOISE, Samples, whitened, with_pressure
+from beaver_ftc_logs.samples import (
+    NOISE_COLOURS,
+    UNSEEN_GYROS_RAD_S,
+    UNSEEN_NOISE,
+    Samples,
+    whitened,
+    with_pressure,
+)
 from beaver_ftc_logs.vehicle import Vehicle
 
 _COLLINEAR = 10.0
@@ -55,17 +62,23 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
 
 
 def with_unseen_noise(model: Model, flights: Sequence[Samples]) -> Model:
-    """In moving air the model with colours of noise that no fitted flight had: another gyro or air may have
-    them, and a law answers noise. How large it is the flight itself shows (`filtering.least_scale`)."""
+    """In moving air the model with noise that no fitted flight had: gusts held within a sample or not, and
+    noisier gyros, whose colour follows from the model. A law answers noise; which noise a flight has, and how
+    much of it, the flight itself shows (`filtering.least_scale`)."""
     if not model.colours:
         return model
     known, wider = [tuple(one.average) for one in model.colours], max(one.wider for one in model.colours)
+    quietest = min((np.array(one.noise) for one in model.colours), key=np.linalg.det)
     colours = list(model.colours)
     for average in UNSEEN_NOISE:
         if average not in known:
             white = fitting.stretches_of([whitened(one, average) for one in flights])
             left = np.vstack([fitting.residuals(model, one)[1] for one in white])
             colours.append(Colour(average=list(average), noise=np.cov(left.T).tolist(), wider=wider))
+    for gyro_rad_s in UNSEEN_GYROS_RAD_S:
+        before, noise = gyro_noise.whitener(model, quietest, gyro_rad_s, fitting.AR_ORDER)
+        both = {"before": before.tolist(), "noise": noise.tolist()}
+        colours.append(Colour(average=[1.0], wider=wider, **both))
     return model.model_copy(update={"colours": colours})
 
 

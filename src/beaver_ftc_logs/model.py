@@ -244,6 +244,10 @@ class Model(Section):
         if fitted is not None and any(value < 0.0 for value in (*fitted.gain_sd, *fitted.spread)):
             yield ("fitted",), "gain_sd or spread has a negative number, allowed: at least 0"
 
+    def alone_with(self, colour: Colour) -> "Model":
+        """The model with one colour of its noise only."""
+        return self.model_copy(update={"colours": [colour]})
+
     def with_noise_model(self, average: Sequence[float]) -> "Model":
         """The model with the noise fitted for flights of this moving average, times its `noise_factor`; the
         model itself where none was fitted.

@@ -112,8 +112,12 @@ def in_white(
 def less_predicted(values: Floats, before: Floats) -> Floats:
     """Values (n, ..., 3) less their prediction from the L before each; before (L, 3, 3): coefficients."""
     rest = values.copy()
-    for j, by in enumerate(before, start=1):
-        rest[j:] -= np.einsum("n...r,rs->n...s", values[:-j], by)
+    if not len(before) or not values.size:
+        return rest
+    given, left = (np.moveaxis(of.reshape(len(values), -1, 3), 0, -1) for of in (values, rest))
+    for (r, s), taps in zip(np.ndindex(3, 3), before.reshape(-1, 9).T, strict=True):
+        for one, of in zip(np.ascontiguousarray(given[:, r]), left[:, s], strict=True):
+            of[1:] -= np.convolve(one, taps)[: len(one) - 1]
     return rest
 
 

@@ -35,8 +35,10 @@ NOISE_COLOURS = (
     *((1.0, -2.0 * c, c**2) for c in (0.2, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85, 0.9)),
 )  # fmt: skip
 """Moving averages of the noise: gusts held within a sample add to the next, gyros' noise takes from it."""
-UNSEEN_NOISE = ((1.0,), (1.0, 0.5), *(NOISE_COLOURS[k] for k in (3, 6, 9)))
-"""Those of them that a flight is tried with where no fitted flight had them."""
+UNSEEN_NOISE = NOISE_COLOURS[:2]
+UNSEEN_GYROS_RAD_S = tuple(np.geomspace(1e-5, 1e-2, 7).tolist())
+"""What a flight is tried with where no fitted flight had it: gusts of both kinds, and gyros from a
+laboratory's to a toy's, so close together that none is 1.8 times off."""
 _GAP = 3.5
 """A step of more than this many usual steps is a gap: nothing is predicted across it."""
 
@@ -419,6 +421,11 @@ def _flight(path: Path, vehicle: Vehicle, reader: str | None) -> Samples:
             kept, every = kept[::2], 2 * every
         known_s = found.t_s[-1]
     return found if number == 1 else _in_turn(path.stem, kept, number)
+
+
+def first(samples: Samples, count: int) -> Samples:
+    """The first samples."""
+    return samples if count >= len(samples.t_s) else _rows_of(samples, slice(count))
 
 
 def _rows_of(samples: Samples, rows: slice) -> Samples:

@@ -21,7 +21,7 @@ from beaver_ftc_logs import energy, regression
 from beaver_ftc_logs.model import Fitted, Model
 from beaver_ftc_logs.readings import mended
 from beaver_ftc_logs.recording import TINY, Floats
-from beaver_ftc_logs.samples import MOST_SAMPLES, NOISE_COLOURS, Samples, whitened
+from beaver_ftc_logs.samples import NOISE_COLOURS, Samples, whitened
 from beaver_ftc_logs.signals import STILL_S
 
 Mask = NDArray[np.bool_]
@@ -196,15 +196,13 @@ def check_commands(
 class _InAll(NamedTuple):
     """Of all parts of a flight: at most, and at least, how much of the model's answer to each group's
     command, (G,), and at most to each column, by its name, there is; the least scale of the noise; and the
-    log likelihood of a sample of each part, (4,), but for what all colours have alike, and as how many white
-    samples a part counts."""
+    log likelihood of a sample of each part, (4,), but for what all colours have alike."""
 
     gains: list[float]
     least: list[float]
     columns: dict[str, float]
     noise: float
     likely: Floats
-    counted: float
 
 
 def check_columns(samples: Samples, model: Model) -> None:
@@ -214,18 +212,20 @@ def check_columns(samples: Samples, model: Model) -> None:
 
     What a law answers to gusts or to a gyro's noise looks like a command that works the other way round: an
     answer is refused only where it is wrong by each colour of the noise that is likelier, too."""
-    flights = [whitened(samples, one.average) for one in model.colours] or [samples]
-    read = [(flight, found) for flight in flights if (found := _in_all_parts(flight, model)) is not None]
+    tried = [(whitened(samples, one.average), model.alone_with(one)) for one in model.colours]
+    read = [(one, found) for one in tried or [(samples, model)] if (found := _likely_in_parts(*one))]
     if not read:
         return
-    flight, found = max(read, key=lambda one: one[1].likely.mean())
+    flight, likeliest = max(read, key=lambda one: one[1][0].mean())[0]
+    if (found := _in_all_parts(flight, likeliest)) is None:
+        return
     wrong = _wrong_answers(samples, model, found)
     for colour in NOISE_COLOURS if wrong else ():
         other = _in_all_parts(whitened(samples, colour), model)
         if other is not None and other.likely.mean() > found.likely.mean():
             still = _wrong_answers(samples, model, other)
             wrong = {what: says for what, says in wrong.items() if what in still}
-    says = next(iter(wrong.values()), None) or _likelier(flight, model)
+    says = next(iter(wrong.values()), None) or _likelier(flight, likeliest)
     if says is not None:
         allowed = "allowed: columns, signs and units as in the flights of the model"
         raise BadInput(f"{samples.name}: {says}, {allowed}")
@@ -274,49 +274,77 @@ def _likelier(samples: Samples, model: Model) -> str | None:
 def mended_likelier(samples: Samples, model: Model) -> tuple[dict[str, float], float]:
     """By each mistake in the columns how much likelier a sample is without it, in natural logarithms, in the
     part of the flight where that is least; and as how many samples a part counts."""
-    found, others = _in_all_parts(samples, model, _ENOUGH), list(mended(samples, model.vehicle))
+    found, others = _likely_in_parts(samples, model), list(mended(samples, model.vehicle))
     if found is None:
         return {}, 0.0
+    likely, counted = found
     more = {}
     for other in others:
-        read = _in_all_parts(other.samples, model, _ENOUGH)
-        more[other.says] = (
-            -np.inf if read is None else float((read.likely + other.density - found.likely).min())
-        )
-    return more, found.counted
+        read = _likely_in_parts(other.samples, model)
+        more[other.says] = -np.inf if read is None else float((read[0] + other.density - likely).min())
+    return more, counted
 
 
-def _in_all_parts(samples: Samples, model: Model, enough: int = MOST_SAMPLES) -> _InAll | None:
-    """None where a part is too short. enough: of more samples than these, every k-th is taken."""
+def _likely_in_parts(samples: Samples, model: Model) -> tuple[Floats, float] | None:
+    """As `_InAll`: the log likelihood of a sample of each part, and as how many white samples a part counts;
+    of a long flight every k-th sample is taken. None where a part is too short."""
+    whiten, power, size = _white_and_power(samples, model)
     ok, unexplained, answers = regression.in_white(samples, model)
+    rows = np.flatnonzero(ok)
+    if (parts := regression.quarters(rows[:: max(len(rows) // _ENOUGH, 1)])) is None:
+        return None
+    noises = [_noise(regression.at_most(*_stacked(part, unexplained, answers, whiten), power)[1])
+              for part in parts]  # fmt: skip
+    return -size - 1.5 * np.log(noises), power * min(map(len, parts))
+
+
+def _white_and_power(samples: Samples, model: Model) -> tuple[Floats, float, float]:
+    """What whitens the residual of a flight of a colour, (3, 3), as how many white samples one counts, and
+    the logarithm of the size of the noise of a sample that is not filtered."""
+    wider = model.noise_factor(samples.colour)
+    root = np.linalg.cholesky(model.with_noise_model(samples.colour).arrays()[3] / wider)
+    size = float(np.log(np.diag(root)).sum() - 3.0 * np.log(sum(samples.colour or (1.0,))))
+    return np.linalg.inv(root).T, model.settings.power / wider, size
+
+
+def _stacked(
+    part: NDArray[np.int64], unexplained: Floats, answers: Floats, whiten: Floats
+) -> tuple[Floats, Floats]:
+    """Regressors (3 n, 3 + K) of trim and answers (n, K, 3), and what they are to explain, (3 n,)."""
+    trim = np.broadcast_to(np.eye(3), (len(part), 3, 3))
+    x = np.concatenate([trim, answers[part]], axis=1) @ whiten
+    return x.transpose(0, 2, 1).reshape(3 * len(part), -1), (unexplained[part] @ whiten).ravel()
+
+
+def _noise(square: Floats) -> float:
+    """The scale of the noise by the squares of what is left, (3 n,)."""
+    return float(np.median(square.reshape(-1, 3).sum(axis=1)) / _MIDDLE)
+
+
+def _in_all_parts(samples: Samples, model: Model) -> _InAll | None:
+    """None where a part is too short."""
+    ok, unexplained, answers = regression.in_white(samples, model)
+    if (parts := regression.quarters(np.flatnonzero(ok))) is None:
+        return None
     columns, names = _by_column(samples, model)
     columns = regression.less_predicted(columns, model.noise_predictor(samples.colour))
-    wider, groups = model.noise_factor(samples.colour), len(model.groups)
-    root = np.linalg.cholesky(model.with_noise_model(samples.colour).arrays()[3] / wider)
-    whiten, power = np.linalg.inv(root).T, model.settings.power / wider
+    (whiten, power, size), groups = _white_and_power(samples, model), len(model.groups)
     gains, least, shares = np.full(groups, -np.inf), np.full(groups, np.inf), np.full(len(names), -np.inf)
-    noises = []
-    rows = np.flatnonzero(ok)
-    if (parts := regression.quarters(rows[:: max(len(rows) // enough, 1)])) is None:
-        return None
+    noises, both = [], np.concatenate([answers, columns], axis=1)
     for part in parts:
-        trim = np.broadcast_to(np.eye(3), (len(part), 3, 3))
-        x = np.concatenate([trim, answers[part], columns[part]], axis=1) @ whiten
-        flat, y = x.transpose(0, 2, 1).reshape(3 * len(part), -1), (unexplained[part] @ whiten).ravel()
+        flat, y = _stacked(part, unexplained, both, whiten)
         gain, square = regression.at_most(flat[:, : 3 + groups], y, power)
         less, _ = regression.at_most(-flat[:, : 3 + groups], y, power)
         share, _ = regression.at_most(flat, y, power)
         gains, least = np.maximum(gains, gain[3:]), np.minimum(least, -less[3:])
         shares = np.maximum(shares, 1.0 + share[3 + groups :])  # what the past does is taken off already
-        noises.append(float(np.median(square.reshape(-1, 3).sum(axis=1)) / _MIDDLE))
-    size = np.log(np.diag(root)).sum() - 3.0 * np.log(sum(samples.colour or (1.0,)))
+        noises.append(_noise(square))
     return _InAll(
         gains.tolist(),
         least.tolist(),
         dict(zip(names, shares.tolist(), strict=True)),
         min(noises),
         -size - 1.5 * np.log(noises),
-        power * min(map(len, parts)),
     )
 
 

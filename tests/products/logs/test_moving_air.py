@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_logs import diagnose, fitting, identification, samples, trust
+from beaver_ftc_logs import diagnose, fitting, gyro_noise, identification, samples, trust
 from beaver_ftc_logs.bank import bank_of, noise_of
 from beaver_ftc_logs.filtering import _update, posterior_of
 from beaver_ftc_logs.model import Colour, Fitted, as_text, load_model
@@ -228,15 +228,44 @@ def test_a_model_that_is_read_again_samples_as_it_did(tmp_path, keys, rate_hz):
 
 
 def test_a_flight_is_tried_with_noise_that_no_fitted_flight_had(moving):
-    """Each colour once, the fitted as they were; the noise of another is what it leaves of the flights."""
+    """The fitted colours stay as they were; the noise of another gust is what it leaves of the flights, and
+    that of noisier gyros grows with them."""
     flights = [flown((1.0,), 0.5, 2000, 31)]
     model = moving.model_copy(update={"colours": moving.colours[:1]})
     found = identification.with_unseen_noise(model, flights)
-    averages = [tuple(one.average) for one in found.colours]
+    gyros, others = found.colours[-len(samples.UNSEEN_GYROS_RAD_S) :], found.colours[1:]
+    others = others[: -len(gyros)]
     assert found.colours[0] == model.colours[0]
-    assert set(averages) == {*samples.UNSEEN_NOISE, tuple(model.colours[0].average)}
-    assert len(set(averages)) == len(averages)
-    white = fitting.stretches_of([whitened(flights[0], averages[-1])])[0]
-    noise = np.cov(fitting.residuals(model, white)[1].T)
-    assert np.allclose(found.colours[-1].noise, noise)
+    assert {tuple(one.average) for one in others} == {*samples.UNSEEN_NOISE} - {
+        tuple(model.colours[0].average)
+    }
+    for one in others:
+        white = fitting.stretches_of([whitened(flights[0], one.average)])[0]
+        assert np.allclose(one.noise, np.cov(fitting.residuals(model, white)[1].T))
+    assert (np.diff([np.linalg.det(one.noise) for one in gyros]) > 0.0).all()
+    assert {one.wider for one in gyros} == {model.colours[0].wider}
     assert identification.with_unseen_noise(small.model(), flights).colours == []
+
+
+@pytest.mark.parametrize("a", [0.9, 0.3])
+def test_the_colour_of_gyro_noise_follows_from_the_model(a):
+    """w[k] = e[k] + v[k] - a v[k-1] is MA(1): its innovations have the variance S = g0 - g1^2 / S, and the
+    predictor of w[k] has the coefficients -(-g1 / S)^j."""
+    model, gyro = small.model(history=1, past=(a * np.eye(3)).tolist()), 0.05
+    process = np.diag([1.0, 4.0, 9.0]) * 1e-4
+    before, noise = gyro_noise.whitener(model, process, gyro, 40)
+    g0, g1 = np.diag(process) + gyro**2 * (1.0 + a**2), -a * gyro**2
+    innovation = 0.5 * (g0 + np.sqrt(g0**2 - 4.0 * g1**2))
+    np.testing.assert_allclose(noise, np.diag(innovation), rtol=1e-6, atol=1e-12)
+    for j in (1, 2, 5):
+        expected = -((-g1 / innovation) ** j)
+        np.testing.assert_allclose(before.reshape(-1, 3, 3)[j - 1], np.diag(expected), atol=1e-6)
+
+
+def test_no_row_depends_on_a_later_sample_by_which_noise_is_likely(moving):
+    """A colour is filtered up to where it counts last: which that is, the whole flight says."""
+    new = flown(AVERAGE, 0.5, 1500, 9)
+    whole = posterior_of(new, moving, bank_of(moving))
+    short = posterior_of(samples.first(new, 600), moving, bank_of(moving))
+    for part, cut in zip(whole, short, strict=True):
+        np.testing.assert_array_equal(part[:600], cut)

@@ -380,10 +380,10 @@ def test_reasons_come_with_their_shares_the_largest_first():
 @pytest.mark.parametrize(("counted", "says"), [(19.0, None), (19.01, 3), (100.0, 17)])
 def test_a_mistake_is_told_where_it_explains_every_part_more_than_chance(monkeypatch, counted, says):
     """Of two readings by more than 2000 times: in the part that gains least 0.3, and 0.1 by its unit."""
-    found = trust._InAll([], [], {}, 1.0, np.zeros(4), counted)
-    parts = {"as it is": found, "short": None, "other": found._replace(likely=np.array([0.9, 0.3, 0.5, 0.7]))}
+    likely = np.array([0.9, 0.3, 0.5, 0.7])
+    parts = {"as it is": (np.zeros(4), counted), "short": None, "other": (likely, counted)}
     read = [Reading(*one) for one in (("A", "short"), ("B", "other", 0.1))]
-    monkeypatch.setattr(trust, "_in_all_parts", lambda samples, *_: parts[samples])
+    monkeypatch.setattr(trust, "_likely_in_parts", lambda samples, _: parts[samples])
     monkeypatch.setattr(trust, "mended", lambda *_: read)
     told = None if says is None else f"each part of the flight is at least 10^{says} times as likely with B"
     assert trust._likelier("as it is", small.model()) == told

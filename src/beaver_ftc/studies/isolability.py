@@ -117,7 +117,10 @@ def draw(name: str, rows: Sequence[Document]) -> Any:
     scales = [*dict.fromkeys(scale for _, _, scale in of_pairs)]
     n, across = len(faults), min(ACROSS, len(scales) + 1)
     down = -(-(len(scales) + 1) // across)
-    title = f"{name}: losses told from those of another surface: the smallest, and the time a total one takes"
+    title = (
+        f"{name}: smallest loss distinguished from that of another surface, and the time of a total one"
+        "\n(half: at half of the instants; always: at every instant; hatched: not even a total loss)"
+    )
     size = across * (PER_CELL[0] * n + 0.3) + 1.2, down * (PER_CELL[1] * n + 0.8) + 0.5
     figure, grid = panels(down, across, *size, title, sharey=True)
     look: dict[str, Any] = {"cmap": "viridis_r", "vmin": 0.0, "vmax": 1.0, "alpha": 0.6}
@@ -131,12 +134,17 @@ def draw(name: str, rows: Sequence[Document]) -> Any:
             elif scale == of_scale:
                 values[at] = np.nan if half is None else half
                 labels[at] = "\n".join(_said(how, of) for how in ("half", "always")), "black"
-        image = heat_map(axes, values, labels, faults, faults, 7, **look)
+        image = heat_map(axes, values, labels, faults, faults, 7, hatched=scale is not None, **look)
         axes.set_title(f"{scale:g} x reference" if scale else f"doublet, losses of {TOLD:.0%}", fontsize=9)
     for axes in grid.flat[len(scales) + 1 :]:
         axes.set_visible(False)
     label_edges(grid, "taken for", ["loss of"] * down)
-    figure.colorbar(image, ax=grid, label="told in half of the instants from", shrink=0.7)
+    figure.colorbar(
+        image,
+        ax=grid,
+        label="smallest loss distinguished (half), share",
+        shrink=0.7,
+    )
     return figure
 
 

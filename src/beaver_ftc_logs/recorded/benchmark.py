@@ -44,8 +44,6 @@ TITLES = {
     "sliding-least-squares": "sliding least squares, 20 s",
     "forgetting-least-squares": "forgetting least squares, 20 s",
 }
-_HATCHES = ("", "//", "..")  # where the colours begin again
-_GROUP = 0.85  # the width that all methods share at one tick
 _LATEST_S = 30.0
 VEHICLE_FILE = "vehicle.yaml"
 _RAW = "*-mavros-imu-data_raw.csv"
@@ -302,58 +300,55 @@ def update_page(document: Document, page: Path) -> None:
 
 
 def figure_of(document: Document) -> Any:
-    """What each method found and how late, and how near it came to the labels: a panel a data set."""
+    """How late each method found each failure, and how near it came to the labels: a panel a data set."""
     sets = document["sets"]
-    figure, grid = panels(len(sets), 1, 10.0, 3.6 * len(sets))
+    figure, grid = panels(len(sets), 1, 8.6, sum(0.27 * len(_methods(part)) + 1.3 for part in sets))
     for axis, part in zip(grid[:, 0], sets, strict=True):
         draw = _draw_labels if part["scored_by"] == "labels" else _draw_events
         draw(axis, part)
         axis.set_title(f"{part['set']}: left out, {part['left_out']}", fontsize=10, loc="left")
+        axis.set_yticks(range(len(_methods(part))), _methods(part))
+        axis.set_ylim(len(_methods(part)) - 0.5, -0.5)
         axis.tick_params(labelsize=8)
-        axis.legend(fontsize=7, loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
+        axis.grid(color=GRID, linewidth=0.5)
+        axis.set_axisbelow(True)
+        axis.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
     return figure
 
 
+def _methods(part: Document) -> list[str]:
+    return [row["method"] for row in (*part["rows"], *part.get("published", ()))]
+
+
 def _draw_events(axis: Any, part: Document) -> None:
-    """Delay of each method on each surface failure; what is not found stands at the top."""
-    methods = [row["method"] for row in part["rows"]]
+    """A line a method, a mark a failed surface at its delay; right of the line what is not found in time."""
+    methods = _methods(part)
     named = {one["left_out"]: one["failure"] for one in part["flights"]}
-    failures = [name for name, failure in named.items() if failure and ENGINE not in failure]
-    for i, method in enumerate(methods):
-        mine = {one["left_out"]: one for one in part["flights"] if one["method"] == method}
-        delays = [mine[name]["delay_s"] for name in failures]
-        heights = [_LATEST_S if delay is None else min(delay, _LATEST_S) for delay in delays]
-        places = [k + _offset(i, len(methods)) for k in range(len(failures))]
-        axis.plot(places, heights, marker(i), color=_colour(i), markersize=6, label=method)
-    axis.set_xticks(range(len(failures)), [named[name].replace("+", "\n+ ") for name in failures])
-    axis.set_ylabel("delay, s", fontsize=8)
-    axis.set_ylim(0, _LATEST_S + 1.5)
-    axis.axhline(_LATEST_S, color="#999999", linewidth=0.8, linestyle=":", label="not found, or later")
-    axis.axhline(5.0, color="#999999", linewidth=0.8, linestyle="--", label="5 s")
-    axis.grid(axis="y", color=GRID, linewidth=0.5)
+    surfaces = [failure for failure in dict.fromkeys(named.values()) if failure and ENGINE not in failure]
+    for i, surface in enumerate(surfaces):
+        mine = [one for one in part["flights"] if one["failure"] == surface and one["method"] in methods]
+        delays = [_LATEST_S + 1.0 if one["delay_s"] is None else one["delay_s"] for one in mine]
+        heights = [methods.index(one["method"]) + 0.7 * ((i + 0.5) / len(surfaces) - 0.5) for one in mine]
+        label = surface.replace("_", " ").replace("+", " + ")
+        axis.plot(
+            [min(delay, _LATEST_S + 1.0) for delay in delays],
+            heights,
+            marker(i),
+            color=SERIES[i],
+            label=label,
+        )
+    axis.axvspan(_LATEST_S, _LATEST_S + 2.0, color=GRID)
+    axis.set_xlim(-0.5, _LATEST_S + 2.0)
+    axis.set_xlabel(f"delay, s (grey: not found within {_LATEST_S:g} s)", fontsize=9)
 
 
 def _draw_labels(axis: Any, part: Document) -> None:
-    """Shares of the rows that are right, by method; published figures where there are."""
-    keys = {"classes": "class", "healthy_or_faulty": "healthy or faulty", "side": "side"}
+    """A line a method, a mark for each share of the rows that are right; as published where they are."""
+    keys = {"classes": "class", "healthy_or_faulty": "healthy or faulty", "side": "side of the aircraft"}
     rows = [*part["rows"], *part["published"]]
-    for i, row in enumerate(rows):
-        places = [k + _offset(i, len(rows)) for k, key in enumerate(keys) if key in row]
-        shares = [row[key] for key in keys if key in row]
-        hatch, width = _HATCHES[i // len(SERIES) % len(_HATCHES)], 0.9 * _GROUP / len(rows)
-        look = {"color": _colour(i), "hatch": hatch, "edgecolor": "white"}
-        axis.bar(places, shares, width=width, label=row["method"], **look)
-    axis.set_xticks(range(len(keys)), list(keys.values()))
-    axis.set_ylabel("share of rows right", fontsize=8)
-    axis.set_ylim(0, 1)
-    axis.set_axisbelow(True)
-    axis.grid(axis="y", color=GRID, linewidth=0.5)
-
-
-def _offset(i: int, methods: int) -> float:
-    """Where the i-th of so many methods stands beside its tick."""
-    return _GROUP / methods * (i - (methods - 1) / 2)
-
-
-def _colour(i: int) -> str:
-    return SERIES[i % len(SERIES)]
+    for i, (key, label) in enumerate(keys.items()):
+        known = [place for place, row in enumerate(rows) if row.get(key) is not None]
+        heights = [place + 0.22 * (i - 1) for place in known]
+        axis.plot([rows[place][key] for place in known], heights, marker(i), color=SERIES[i], label=label)
+    axis.set_xlim(0, 1)
+    axis.set_xlabel("share of the rows that are right", fontsize=9)

@@ -83,7 +83,9 @@ def test_of_many_keys_those_that_explain_most_are_shown(tmp_path):
     ranked = [{"key": key, "explained": 0.5} for key in keys]
     summary = {"sensitivity": dict.fromkeys(OUTCOMES, ranked)}
     bars, lines = pictures.sensitivity_bars(flights, summary), pictures.parallel_coordinates(flights, summary)
-    assert [text.get_text() for text in bars.axes[0].get_yticklabels()] == keys[:12]
+    assert [text.get_text() for text in bars.axes[0].get_yticklabels()] == [
+        pictures.in_words(key) for key in keys[:12]
+    ]
     assert len(lines.axes[0].get_xticks()) == 9
     assert lines.get_size_inches().tolist() == [pytest.approx(16.6), 5.0]
     names = {text.get_text(): text.xy for text in lines.axes[0].texts if text.get_text() in sensors}
@@ -256,3 +258,16 @@ def test_the_command_that_replays_a_flight():
         "beaver-ftc", "sweep", "a b.yaml", "--search", "delay", "--out", "o"
     ]  # fmt: skip
     assert replay_command("a.yaml", Path("runs")) == "beaver-ftc sweep a.yaml"
+
+
+@pytest.mark.parametrize(
+    ("key", "said"),
+    [
+        ("faults[0].magnitude", "fault 1: magnitude"),
+        ("faults[1].at_s", "fault 2: at (s)"),
+        ("reference.q[0].amplitude_deg_s", "reference: q[0]: amplitude (deg/s)"),
+        ("initial.airspeed_mps", "initial: airspeed (m/s)"),
+    ],
+)
+def test_a_key_in_words(key, said):
+    assert pictures.in_words(key) == said

@@ -102,8 +102,8 @@ def _draw() -> None:
         t = 0.005 * np.arange(len(mine))
         for axis, (_, column, factor) in zip(row, _SHOWN, strict=True):
             for of, style in (
-                (mine, {"lw": 3.2, "color": "#9ec9e8"}),
-                (fine, {"lw": 0.9, "color": "#10304d"}),
+                (mine, {"lw": 3.2, "color": "#9ec9e8", "label": "specification"}),
+                (fine, {"lw": 0.9, "color": "#10304d", "label": "JSBSim at 1 kHz"}),
             ):
                 values = np.linalg.norm(of[:, :3], axis=1) if column is None else factor * of[:, column]
                 axis.plot(t, values, **style)
@@ -113,8 +113,11 @@ def _draw() -> None:
     for axis, (says, *_) in zip(axes[0], _SHOWN, strict=True):
         axis.set_title(says, fontsize=9)
     for axis in axes[-1]:
-        axis.set_xlabel("s", fontsize=8)
-    figure.tight_layout()
+        axis.set_xlabel("time, s", fontsize=8)
+    figure.legend(
+        *axes[0, 0].get_legend_handles_labels(), loc="upper center", ncols=2, fontsize=9, frameon=False
+    )
+    figure.tight_layout(rect=(0.0, 0.0, 1.0, 0.98))
     Path("images").mkdir(exist_ok=True)
     figure.savefig(PICTURE, dpi=110, metadata={"Software": None})
     plt.close(figure)

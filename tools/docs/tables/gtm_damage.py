@@ -85,10 +85,14 @@ def _draw(of: dict[str, list[Turn]]) -> None:
         share = np.zeros((len(SPEEDS_KT), len(BANKS_DEG)))
         for turn in turns:
             share[SPEEDS_KT.index(turn.speed_kt), BANKS_DEG.index(turn.bank_deg)] += turn.held / asked
-        drawn = axis.pcolormesh(BANKS_DEG, SPEEDS_KT, share, cmap="YlGn", vmin=0, vmax=1, shading="nearest")
+        drawn = axis.pcolormesh(
+            BANKS_DEG, SPEEDS_KT, share, cmap="cividis", vmin=0, vmax=1, shading="nearest"
+        )
         for (i, j), part in np.ndenumerate(share):
             if part == 0.0:
-                axis.text(BANKS_DEG[j], SPEEDS_KT[i], "x", ha="center", va="center", color="#b00", fontsize=8)
+                axis.text(
+                    BANKS_DEG[j], SPEEDS_KT[i], "x", ha="center", va="center", color="white", fontsize=8
+                )
         says = "any" if asked == 1 else f"{len(SIDESLIPS_DEG)} sideslips"
         axis.set_title(f"{name.replace('left-outboard-', '').replace('left-', '')}\n{says}", fontsize=8)
         axis.set_xlabel("bank, deg", fontsize=8)
@@ -96,7 +100,7 @@ def _draw(of: dict[str, list[Turn]]) -> None:
         axis.tick_params(labelsize=7)
     axes[0].set_ylabel("speed, kt", fontsize=8)
     bar = figure.colorbar(drawn, ax=axes, fraction=0.015, pad=0.01)
-    bar.set_label("share held", fontsize=8)
+    bar.set_label("share of the sideslips\nin which the turn is held\n(x: none)", fontsize=8)
     bar.ax.tick_params(labelsize=7)
     Path("images").mkdir(exist_ok=True)
     figure.savefig(PICTURE, dpi=110, bbox_inches="tight", metadata={"Software": None})

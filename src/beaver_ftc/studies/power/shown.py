@@ -1,4 +1,4 @@
-"""The survey as people see it: a table a condition, where ours is better or worse, maps and curves; and the
+"""The survey as people see it: a table a condition, where ours is better or worse, maps and dots; and the
 command `power`."""
 
 import io
@@ -14,6 +14,7 @@ import numpy as np
 
 from beaver_ftc.results.metrics import as_json
 from beaver_ftc.results.model import Document
+from beaver_ftc.results.style import SERIES
 from beaver_ftc.studies.engine.command import (
     AirspeedOption,
     AltitudeOption,
@@ -35,7 +36,7 @@ from beaver_ftc.studies.power.probabilities import (
     summary,
 )
 from beaver_ftc.studies.power.survey import BUILT_IN, GRIDS, WITHIN_S, Grid, Watched, fly_block, lost
-from beaver_ftc.studies.present.figures import curve_look, heat_map, label_edges, marker, panels
+from beaver_ftc.studies.present.figures import GRID, heat_map, label_edges, marker, panels
 from beaver_ftc.studies.present.page import Files, Makers
 from beaver_ftc.studies.present.tables import plain, printed, seconds
 
@@ -200,7 +201,7 @@ def _figures(document: Document, rows: Sequence[Row]) -> Iterator[tuple[str, "Fi
     for (scheme,), of in grouped(rows, "scheme").items():
         yield f"map-{scheme.replace(':', '-')}", _maps(document, scheme, of)
     for (sensors,), of in grouped(rows, "sensors").items():
-        yield f"schemes-{sensors}", _curves(document, sensors, of)
+        yield f"schemes-{sensors}", _dots(document, sensors, of)
 
 
 def _maps(document: Document, scheme: str, rows: Sequence[Row]) -> "Figure":
@@ -248,46 +249,58 @@ def _map(panel: "Axes", grid: Document, rows: Sequence[Row]) -> "AxesImage":
     )  # fmt: skip
 
 
-def _curves(document: Document, sensors: str, rows: Sequence[Row]) -> "Figure":
-    """Rows surfaces, columns air; in each, the share detected over magnitude, a line a scheme."""
+def _dots(document: Document, sensors: str, rows: Sequence[Row]) -> "Figure":
+    """Rows air, columns surfaces; in each, a line of dots a scheme: the share detected, a dot a magnitude."""
     surfaces = document["grid"]["surfaces"]
     conditions = [condition for condition in document["grid"]["conditions"] if condition[0] == sensors]
-    schemes = list(dict.fromkeys(row["scheme"] for row in rows))
+    names = [*dict.fromkeys(row["scheme"] for row in rows), TOLD]
     most = f"at most {document['false_alarms_per_h']:g} false alarms per hour"
-    title = f"Loss of effectiveness, {most}, all references"
     figure, axes = panels(
-        len(surfaces), len(conditions), 3.4 * len(conditions) + 2.6, 2.5 * len(surfaces) + 0.6, title,
+        len(conditions), len(surfaces), 2.3 * len(surfaces) + 1.7,
+        (0.3 * len(names) + 0.6) * len(conditions) + 1.2, f"Loss of effectiveness, {most}, all references",
         dpi=120, sharex=True, sharey=True,
     )  # fmt: skip
-    for panel, here in _by_place(axes, surfaces, conditions, rows):
-        _draw(panel, here, schemes, document["false_alarms_per_h"])
+    for panel, here in _by_place(axes.T, surfaces, conditions, rows):
+        _draw(panel, here, names, document)
     label_edges(
-        axes, "effectiveness lost, %", [f"{s}\ndetected within {JUDGED_S:g} s, %" for s in surfaces],
-        [title_of(*condition) for condition in conditions],
+        axes, f"detected within {JUDGED_S:g} s, %",
+        [title_of(*condition).replace(", ", ",\n") for condition in conditions], surfaces,
     )  # fmt: skip
     handles, labels = axes[0][0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside right center", fontsize=8)
+    each = len(document["grid"]["excitations_deg_s"])
+    flights = [each * cell["flights"] for cell in document["cells"] if cell["sensors"] == sensors]
+    figure.legend(
+        handles, labels, loc="outside lower center", ncols=len(labels), fontsize=8, frameon=False,
+        title=f"of {min(flights, default=0)} to {max(flights, default=0)} flights, exact 95 % interval",
+        title_fontsize=8,
+    )  # fmt: skip
     return figure
 
 
-def _draw(panel: "Axes", rows: Sequence[Row], schemes: Sequence[str], per_h: float) -> None:
-    """Of each scheme, and of the test told the fault, the share detected over the effectiveness lost."""
-    for (scheme,), of in grouped(rows, "scheme").items():
-        place = schemes.index(scheme)
-        found = {m: summary(here) for (m,), here in sorted(grouped(of, "magnitude").items())}
-        flown = {m: cell["within"][f"{JUDGED_S:g}"]["value"] for m, cell in found.items() if cell["flights"]}
-        panel.plot(
-            [100 * m for m in flown], [100 * share for share in flown.values()], label=scheme,
-            marker=marker(place), **curve_look(place), markersize=5, linewidth=1.6,
+def _draw(panel: "Axes", rows: Sequence[Row], names: Sequence[str], document: Document) -> None:
+    """Of each scheme the share detected with its exact 95 % interval, magnitudes below one another."""
+    magnitudes, within = document["grid"]["magnitudes"], f"{JUDGED_S:g}"
+    apart = 0.6 / len(magnitudes)
+    for place, magnitude in enumerate(magnitudes):
+        here = [row for row in rows if row["magnitude"] == magnitude]
+        found = {scheme: summary(of) for (scheme,), of in grouped(here, "scheme").items()}
+        shares = {scheme: cell["within"][within] for scheme, cell in found.items() if cell["flights"]}
+        if here:
+            told = limit(here, document["false_alarms_per_h"])[within]
+            shares[TOLD] = {"value": told, "low": told, "high": told}
+        percent = 100.0 * np.array([[of["value"], of["low"], of["high"]] for of in shares.values()])
+        values, lows, highs = percent.reshape(-1, 3).T
+        panel.errorbar(
+            values, [names.index(of) + apart * (place - 0.5 * (len(magnitudes) - 1)) for of in shares],
+            xerr=(np.maximum(values - lows, 0.0), np.maximum(highs - values, 0.0)), linestyle="none",
+            marker=marker(place), markersize=4.5, color=SERIES[place], elinewidth=1.0, clip_on=False,
+            label=f"{100 * magnitude:g} % lost",
         )  # fmt: skip
-    told = {m: limit(here, per_h) for (m,), here in sorted(grouped(rows, "magnitude").items())}
-    panel.plot(
-        [100 * m for m in told], [100 * within[f"{JUDGED_S:g}"] for within in told.values()], label=TOLD,
-        color="#000000", linewidth=3.5, alpha=0.25, zorder=0,
-    )  # fmt: skip
-    panel.set_ylim(-4, 104)
-    panel.set_xlim(left=0)
-    panel.grid(alpha=0.3)
+    panel.set_yticks(range(len(names)), names)
+    panel.set_ylim(len(names) - 0.5, -0.5)
+    panel.set_xlim(-2, 102)
+    panel.grid(axis="x", alpha=0.3)
+    panel.hlines(np.arange(len(names) - 1) + 0.5, -2, 102, color=GRID, linewidth=0.6)
     panel.tick_params(labelsize=8)
 
 

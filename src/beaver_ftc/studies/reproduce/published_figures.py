@@ -11,7 +11,7 @@ import numpy as np
 
 from beaver_ftc.results.figures import draw
 from beaver_ftc.results.model import Document
-from beaver_ftc.results.style import BLUE, GREY, VERMILION, marks
+from beaver_ftc.results.style import BLACK, BLUE, GREY, VERMILION, marks
 from beaver_ftc.results.views import (
     AXES,
     AXIS_NAMES,
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 SENSITIVITY = "sensitivity"
 _LEAST, _MOST = 1e-3, 10.0  # of its axis: what is smaller is nothing, what is larger never happens
+_CLIPPED = {_LEAST: "<", _MOST: ">"}
 WHOLE = (0.0, np.inf)
 CLOSE = (FAULT_AT_S - 0.5, FAULT_AT_S + 5.0)
 
@@ -118,7 +119,7 @@ def margins_figure(document: Document) -> "Figure":
     for row, claim in enumerate(claims):
         low, ours, high = (min(max(share, _LEAST), _MOST) for share in shares(claim))
         axes.plot([low, high], [row, row], color=BLUE if high <= 1 else VERMILION, linewidth=3, alpha=0.55)
-        axes.plot(ours, row, "o", color=BLUE, markersize=5)
+        axes.plot(ours, row, _CLIPPED.get(ours, "o"), color=BLACK, markersize=5)
     axes.axvline(1.0, color=GREY, linewidth=1.0)
     axes.set_xscale("log")
     axes.set_xlim(0.8 * _LEAST, 1.25 * _MOST)
@@ -126,6 +127,10 @@ def margins_figure(document: Document) -> "Figure":
     axes.set_yticks(range(len(claims)), [f"{c['where']}  {c['statement']}" for c in claims], fontsize=8)
     axes.tick_params(axis="x", labelsize=8)
     axes.grid(axis="x", color="#dddddd", linewidth=0.6)
-    axes.set_xlabel("share of what is allowed: dot as flown, bar over all changes", fontsize=9)
+    axes.set_xlabel("share of what is allowed (arrow: beyond the axis)", fontsize=9)
     axes.set_title("Left of 1 the statement holds", fontsize=9)
+    axes.plot([], [], "o", color=BLACK, markersize=5, label="as flown")
+    axes.plot([], [], color=BLUE, linewidth=3, alpha=0.55, label="over all changes, which it survives")
+    axes.plot([], [], color=VERMILION, linewidth=3, alpha=0.55, label="over all changes, one breaks it")
+    axes.legend(loc="lower right", fontsize=8)
     return figure

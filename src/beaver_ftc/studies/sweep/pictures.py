@@ -33,6 +33,10 @@ _SEARCHED = {
     "false_alarm": "residual / threshold without a fault",
     "tracking": "RMS tracking error after the fault (deg/s)",
 }
+_UNITS = {  # the longest ending first
+    "_rad_s": "rad/s", "_deg_s": "deg/s", "_deg": "deg", "_rad": "rad", "_mps": "m/s", "_hz": "Hz",
+    "_m": "m", "_s": "s",
+}  # fmt: skip
 MOST_LINES = 400  # of parallel coordinates: more is a grey block
 _FAULT_LOOKS = (
     (BLUE, "o", "-"),
@@ -66,6 +70,20 @@ def _axes(
     return figure, axes
 
 
+def in_words(key: str) -> str:
+    """A varied key for people: `faults[0].at_s` is `fault 1: at (s)`."""
+    said = re.sub(r"faults\[(\d+)\]", lambda found: f"fault {int(found[1]) + 1}", key)
+    ending = next((ending for ending in _UNITS if said.endswith(ending)), "")
+    name = said.removesuffix(ending).replace(".", ": ").replace("_", " ")
+    return f"{name} ({_UNITS[ending]})" if ending else name
+
+
+def _log_of_numbers(axes: "Axes") -> None:
+    """A logarithmic axis whose ticks are plain numbers."""
+    axes.set_xscale("log")
+    axes.xaxis.set_major_formatter("{x:g}")
+
+
 def magnitude_key(flights: Flights, summary: Document) -> str | None:
     """How large the fault is: of the varied numbers of a fault, the one that delays hang on most."""
     ranked = [entry["key"] for entry in summary["sensitivity"]["detection_delay"]]
@@ -79,7 +97,7 @@ def detection_probability(flights: Flights, summary: Document) -> "Figure | None
     key = magnitude_key(flights, summary)
     if key is None or not flights.faulted.any():
         return None
-    figure, axes = _axes("Detection probability (bars: 95 % intervals)", key, "share detected")
+    figure, axes = _axes("Detection probability (bars: 95 % intervals)", in_words(key), "share detected")
     for (colour, marker, dash), label, group in _faults(flights):
         values, hits = flights[key][group], flights.detected[group]
         bins = _levels(values) if flights.vary[key].count else _bins(values)
@@ -91,7 +109,7 @@ def detection_probability(flights: Flights, summary: Document) -> "Figure | None
             marker=marker, linestyle=dash, markersize=4.5, linewidth=1.3, elinewidth=0.8, capsize=2,
         )  # fmt: skip
     if flights.vary[key].loguniform:
-        axes.set_xscale("log")
+        _log_of_numbers(axes)
     axes.set_ylim(-0.03, 1.03)
     axes.legend(fontsize=8)
     return figure
@@ -122,18 +140,21 @@ def delay_distribution(flights: Flights, summary: Document) -> "Figure | None":
     """Share of faults detected within a time, a curve a fault; what is missing at the top was missed."""
     if not flights.detected.any():
         return None
-    title = "Detection delay: share of faults detected within a time"
-    figure, axes = _axes(title, "detection delay (s)", "share of faults")
+    figure, axes = _axes("", "detection delay (s)", "share of faults detected within the delay")
+    axes.set_title("Detection delay", fontsize=10, loc="left")
     for (colour, _, dash), label, group in _faults(flights):
         delays = np.sort(flights.detection_delay_s[group & flights.detected])
         if delays.size:
             shares = np.arange(1, delays.size + 1) / group.sum()
             axes.step(delays, shares, where="post", label=label, color=colour, linestyle=dash, linewidth=1.4)
-    for q in (0.5, 0.95):
+    for q, says in ((0.5, "half"), (0.95, "95 %")):
         axes.axhline(q, color=GREY, linewidth=0.8, linestyle=":")
+        axes.annotate(says, (1.0, q), xycoords=("axes fraction", "data"), ha="right", va="bottom", fontsize=7)
+    never = (flights.faulted & ~flights.detected).sum()
+    axes.set_title(f"never: {never} of {flights.faulted.sum()} →", fontsize=8, loc="right")
     positive = flights.detection_delay_s[flights.detected & (flights.detection_delay_s > 0)]
     if positive.size and positive.max() > 20 * np.median(positive):
-        axes.set_xscale("log")
+        _log_of_numbers(axes)
     axes.set_ylim(0, 1.02)
     axes.legend(fontsize=8, loc="lower right")
     return figure
@@ -192,7 +213,7 @@ def sensitivity_bars(flights: Flights, summary: Document) -> "Figure | None":
         explained = {entry["key"]: entry["explained"] for entry in ranking}
         places = np.arange(len(keys)) + (position + 0.5) * height - 0.4
         axes.barh(places, [explained[key] for key in keys], height, label=name, color=colours[position])
-    axes.set_yticks(range(len(keys)), keys)
+    axes.set_yticks(range(len(keys)), [in_words(key) for key in keys])
     axes.invert_yaxis()
     axes.set_xlim(0, 1)
     figure.legend(loc="outside lower center", ncols=4, fontsize=8, frameon=False)
@@ -216,7 +237,7 @@ def parallel_coordinates(flights: Flights, summary: Document) -> "Figure | None"
         if lines.size:
             axes.plot(lines.T, color=colour, alpha=alpha, linewidth=0.8)
             axes.plot([], [], color=colour, label=label)
-    names = [*(key.replace(".", "\n.") for key in keys), "detection\ndelay"]
+    names = [*(in_words(key).replace(": ", ":\n").replace(" (", "\n(") for key in keys), "detection\ndelay"]
     axes.set_xticks(range(len(keys) + 1), names, fontsize=8)
     axes.set_yticks([])
     axes.set_ylim(-0.06, 1.06)
@@ -305,7 +326,7 @@ FIGURES: dict[str, tuple[str, Drawer]] = {
     "search": ("Worst-case search", search_history),
     "detection-probability": ("Detection probability against magnitude", detection_probability),
     "delay-distribution": ("Detection delay", delay_distribution),
-    "confusion-matrix": ("Confusion matrix", confusion_matrix),
+    "confusion-matrix": ("Faults and diagnoses", confusion_matrix),
     "sensitivity": ("Sensitivity", sensitivity_bars),
     "parallel-coordinates": ("Parallel coordinates", parallel_coordinates),
 }

@@ -152,14 +152,14 @@ class Chart {
     ctx.restore();
   }
 
-  // Vertical lines at fault, alarm and name.
+  // Vertical lines at fault, alarm and name; letters of lines that are close together share one flag.
   drawInstants(plot) {
     const { ctx, bbox } = plot;
+    const unit = devicePixelRatio;
+    const flags = [];
     ctx.save();
-    ctx.font = `bold ${9 * devicePixelRatio}px sans-serif`;
-    ctx.textBaseline = "bottom";
-    ctx.setLineDash([3 * devicePixelRatio, 3 * devicePixelRatio]);
-    ctx.strokeStyle = ctx.fillStyle = "#e8eef3";
+    ctx.setLineDash([3 * unit, 3 * unit]);
+    ctx.strokeStyle = "#e8eef3";
     for (const { t, letter } of flight.instants ?? []) {
       const x = plot.valToPos(t, "x", true);
       if (x < bbox.left || x > bbox.left + bbox.width) continue;
@@ -167,7 +167,21 @@ class Chart {
       ctx.moveTo(x, bbox.top);
       ctx.lineTo(x, bbox.top + bbox.height);
       ctx.stroke();
-      ctx.fillText(letter, x + 2 * devicePixelRatio, bbox.top + bbox.height - 1);
+      const close = flags.find((flag) => Math.abs(flag.x - x) < 14 * unit);
+      if (close) close.letters += ` ${letter}`;
+      else flags.push({ x, letters: letter });
+    }
+    ctx.font = `bold ${11 * unit}px sans-serif`;
+    ctx.textBaseline = "bottom";
+    ctx.textAlign = "left";
+    for (const { x, letters } of flags) {
+      const width = ctx.measureText(letters).width + 6 * unit;
+      const left = Math.min(x, bbox.left + bbox.width - width);
+      const bottom = bbox.top + bbox.height;
+      ctx.fillStyle = "#e8eef3";
+      ctx.fillRect(left, bottom - 14 * unit, width, 14 * unit);
+      ctx.fillStyle = "#16202a";
+      ctx.fillText(letters, left + 3 * unit, bottom - unit);
     }
     ctx.restore();
   }

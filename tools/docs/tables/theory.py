@@ -12,22 +12,22 @@ from beaver_ftc.studies.present.tables import markdown_table
 
 CONSTANTS = (  # (section, meaning, module, name there, unit)
     (2, "rate of the Earth", aircraft, "EARTH_RATE_RAD_S", "rad/s"),
-    (2, "rounding", worst_case, "ROUNDING_RAD_S2", "rad/s2"),
-    (2, "limit of instrument noise, standard deviations", instruments, "NOISE_LIMIT_SIGMA", ""),
-    (2, "limit of gusts, standard deviations", admitted, "GUST_LIMIT_SIGMA", ""),
-    (2, "model error outside the measured region", worst_case, "UNKNOWN_RAD_S2", "rad/s2"),
+    (2, "allowance for rounding", worst_case, "ROUNDING_RAD_S2", "rad/s2"),
+    (2, "limit of instrument noise, in standard deviations", instruments, "NOISE_LIMIT_SIGMA", ""),
+    (2, "limit of gusts, in standard deviations", admitted, "GUST_LIMIT_SIGMA", ""),
+    (2, "bound where the error of a derived model was not measured", worst_case, "UNKNOWN_RAD_S2", "rad/s2"),
     (3, "delays for which poles are chosen", admitted, "DELAYS_S", "s"),
-    (7, "onsets", likelihood, "N_SLOTS", ""),
-    (7, "magnitude of a transient over its sum", likelihood, "RINGING", ""),
+    (7, "number of onsets that are tested together", likelihood, "N_SLOTS", ""),
+    (7, "sum of the magnitudes of a transient over its sum", likelihood, "RINGING", ""),
     (7, "share of the level reserved for noise", noise_model, "CHANCE", ""),
-    (7, "rate of a growing loss", noise_model, "GROWTH_PER_S", "1/s"),
-    (7, "least share that a constant loss explains", statistical, "MIN_CONSTANT_SHARE", ""),
-    (7, "frequencies of the oscillation tests", tones, "N_TONES", ""),
-    (7, "frequencies", tones, "FREQUENCIES_RAD_S", "rad/s"),
+    (7, "rate of the signature of a growing loss", noise_model, "GROWTH_PER_S", "1/s"),
+    (7, "least share of the best ratio that a constant loss explains", statistical, "MIN_CONSTANT_SHARE", ""),
+    (7, "number of frequencies of the oscillation tests", tones, "N_TONES", ""),
+    (7, "range of these frequencies", tones, "FREQUENCIES_RAD_S", "rad/s"),
     (7, "memory of the oscillation tests", tones, "MEMORY_S", "s"),
     (9, "poles of the filters", sensor_records, "POLES_PER_S", "1/s"),
     (9, "rotation and curvature of the Earth", redundancy, "TURNING_RAD_S", "rad/s"),
-    (9, "Coriolis, centrifugal, change of gravity", redundancy, "FALLING_M_S2", "m/s2"),
+    (9, "Coriolis and centrifugal acceleration, change of gravity", redundancy, "FALLING_M_S2", "m/s2"),
     (9, "height in which density falls by a factor e", redundancy, "DENSITY_HEIGHT_M", "m"),
     (9, "largest pitch attitude of the attitude tests", redundancy, "STEEPEST_RAD", "rad"),
 )
@@ -36,7 +36,7 @@ SETTINGS = (  # (section, meaning, key of a scenario, of which section of it, un
     (3, "further poles", "pole_bank_per_s", FdiConfig(), "1/s"),
     (4, "pole of the isolation estimators", "isolation_pole_per_s", FdiConfig(), "1/s"),
     (4, "memory of the estimates", "forgetting_time_s", FdiConfig(), "s"),
-    (7, "false alarms", "false_alarms_per_h", Statistical(), "1/h"),
+    (7, "declared rate of false alarms", "false_alarms_per_h", Statistical(), "1/h"),
     (7, "probability of a wrong exclusion in a second", "misnaming", Statistical(), ""),
     (7, "fastest swing of the model error", "uncertainty_rad_s", Statistical(), "rad/s"),
     (9, "strongest vertical wind", "vertical_wind_mps", Bounds(), "m/s"),
@@ -48,9 +48,9 @@ def theory_constants() -> str:
     rows = [(at, meaning, name, getattr(module, name), unit) for at, meaning, module, name, unit in CONSTANTS]
     rows += [(at, meaning, key, getattr(section, key), unit) for at, meaning, key, section, unit in SETTINGS]
     return markdown_table(
-        ("section", "constant", "name", "value"),
+        ("section", "constant", "name", "value", "unit"),
         [
-            (str(at), meaning, f"`{name}`", f"{_said(value)} {unit}".strip())
+            (str(at), meaning, f"`{name}`", _said(value), unit)
             for at, meaning, name, value, unit in sorted(rows, key=lambda row: row[0])
         ],
     )

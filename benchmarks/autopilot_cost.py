@@ -13,7 +13,7 @@ from time import process_time
 import numpy as np
 
 from beaver_ftc.loop.loop import Loop
-from beaver_ftc.scenario.loader import load
+from beaver_ftc.scenario.schema import load
 
 FRAMES = 1000
 PROFILE = {

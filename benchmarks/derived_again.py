@@ -14,7 +14,7 @@ from typing import Any
 from beaver_ftc.aircraft.aircraft import DEFAULT
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.builtin import builtin_names, resolve
-from beaver_ftc.scenario.loader import load_text
+from beaver_ftc.scenario.schema import load_text
 from beaver_ftc_aircraft.derive.derivation import derive
 from beaver_ftc_aircraft.derive.derived import differences
 

@@ -21,7 +21,7 @@ import numpy as np
 
 import beaver_ftc as bf
 from beaver_ftc.aircraft import load
-from beaver_ftc.scenario.loader import load_text
+from beaver_ftc.scenario.schema import load_text
 from beaver_ftc.studies.present.tables import markdown_table
 
 M_S_PER_KT = 0.514444

@@ -41,7 +41,7 @@ from tools.gtm.specification import Controls, Specification, folder
 import beaver_ftc as bf
 from beaver_ftc.aircraft import load
 from beaver_ftc.loop.loop import Loop, fly
-from beaver_ftc.scenario.loader import load_text
+from beaver_ftc.scenario.schema import load_text
 from beaver_ftc.studies.compare.replay import Recording, aware_of_the_air, record, trace
 from beaver_ftc.studies.present.tables import markdown_table
 

@@ -31,7 +31,7 @@ import numpy as np
 from beaver_ftc.diagnosis.monitors.sensor_records import instrument_found
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import Loop
-from beaver_ftc.scenario.loader import load
+from beaver_ftc.scenario.schema import load
 from beaver_ftc.scenario.sensors import ENGINE, PRESETS, Sensors
 
 TYPES = ("bias", "freeze", "noise", "scale", "lost")

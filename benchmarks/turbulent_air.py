@@ -26,9 +26,8 @@ from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, uses_force
 from beaver_ftc.diagnosis.state import LOSS
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.loop.loop import Loop
-from beaver_ftc.scenario.autopilot import channels_of
-from beaver_ftc.scenario.loader import load
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.schema import Scenario, load
+from beaver_ftc.scenario.signals import channels_of
 from beaver_ftc.studies.engine.statistics import poisson
 from beaver_ftc.studies.present.tables import markdown_table
 

@@ -11,7 +11,7 @@ import yaml
 from beaver_ftc.extensions import SERVICES, entries
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.results.metrics import metrics
-from beaver_ftc.scenario.loader import load
+from beaver_ftc.scenario.schema import load
 from kept import in_short, of_record
 
 _ALL = yaml.safe_load_all((Path(__file__).parent / "data" / "short_flights.yaml").read_text())

@@ -22,7 +22,7 @@ def main():
     from beaver_ftc.control.rivals.indi import IncrementalInversion
     from beaver_ftc.diagnosis.rivals.rls import RlsMonitor
     from beaver_ftc.loop.loop import fly
-    from beaver_ftc.scenario.loader import load_scenario
+    from beaver_ftc.scenario.schema import load_scenario
     from flying import loss, scenario
 
     for plugged in ({}, {"detector": RlsMonitor()}, {"law": IncrementalInversion()}):

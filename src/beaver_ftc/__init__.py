@@ -29,8 +29,7 @@ if TYPE_CHECKING:
     from beaver_ftc.results.simulation import Simulation
     from beaver_ftc.scenario.airframe import find_aircraft as aircraft
     from beaver_ftc.scenario.builtin import builtin_names as scenarios
-    from beaver_ftc.scenario.loader import load
-    from beaver_ftc.scenario.schema import Scenario
+    from beaver_ftc.scenario.schema import Scenario, load
     from beaver_ftc.studies.sweep.table_of_flights import sweep
 
 __version__ = "0.1.0"
@@ -45,7 +44,7 @@ _WHERE = {
     "Diagnosis": "beaver_ftc.loop.stream",
     "Scenario": "beaver_ftc.scenario.schema",
     "Simulation": "beaver_ftc.results.simulation",
-    "load": "beaver_ftc.scenario.loader",
+    "load": "beaver_ftc.scenario.schema",
     "scenarios": "beaver_ftc.scenario.builtin:builtin_names",
     "sweep": "beaver_ftc.studies.sweep.table_of_flights",
 }

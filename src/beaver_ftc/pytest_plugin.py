@@ -161,8 +161,8 @@ class ScenarioFile(FlownFile):
     """One scenario."""
 
     def _read(self) -> tuple[str, list[str]]:
-        from beaver_ftc.results.expectations import names
-        from beaver_ftc.scenario.loader import load
+        from beaver_ftc.results.metrics import names
+        from beaver_ftc.scenario.schema import load
 
         self.scenario = load(self.path)
         return self.scenario.name, names(self.scenario.expect)

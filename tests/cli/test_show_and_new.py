@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from beaver_ftc.cli.main import app
 from beaver_ftc.scenario.builtin import builtin_names, builtin_path, builtin_sweeps
-from beaver_ftc.scenario.loader import load_scenario
+from beaver_ftc.scenario.schema import load_scenario
 from beaver_ftc.scenario.sweeps import load_sweep_text
 from commands import beaver
 

@@ -9,7 +9,7 @@ import pytest
 import beaver_ftc as bf
 import commands
 import needs
-from beaver_ftc.scenario.loader import load_text
+from beaver_ftc.scenario.schema import load_text
 
 ROOT = Path(__file__).parents[2]
 ALL_SENSORS = "name: x\nduration_s: 1\nsensors: tactical-grade\n"

@@ -156,7 +156,7 @@ PROGRAM = """
 import sys
 from beaver_ftc.loop.stepping import fly_on
 from beaver_ftc.loop.loop import fly
-from beaver_ftc.scenario.loader import load_scenario
+from beaver_ftc.scenario.schema import load_scenario
 import beaver_ftc
 flight = fly(load_scenario("elevator-partial-loss"))
 assert flight.isolated == "elevator"

@@ -240,7 +240,7 @@ from pathlib import Path
 import yaml
 from beaver_ftc.compiled.cache import CodeCache
 from beaver_ftc.loop.loop import fly
-from beaver_ftc.scenario.loader import load_text
+from beaver_ftc.scenario.schema import load_text
 sys.path.insert(0, sys.argv[1])
 import seventeen
 

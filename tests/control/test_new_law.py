@@ -85,7 +85,7 @@ FLY = """
 import json, sys
 import numpy as np
 from beaver_ftc.loop.loop import Loop
-from beaver_ftc.scenario.loader import load
+from beaver_ftc.scenario.schema import load
 
 def flown(law, **more):
     loss = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.4, "at_s": 1.0}

@@ -20,8 +20,8 @@ from beaver_ftc.plant.trim import trim
 from beaver_ftc.results.metrics import measure, metrics
 from beaver_ftc.results.verdict import facts
 from beaver_ftc.results.views import views
-from beaver_ftc.scenario.control import EnginePower
-from beaver_ftc.scenario.loader import load_text
+from beaver_ftc.scenario.diagnosis import EnginePower
+from beaver_ftc.scenario.schema import load_text
 from beaver_ftc.studies.matrix.fault_matrix import REFERENCE, trimmed_deg
 from beaver_ftc.studies.matrix.pitch_lost import closed_loop
 from beaver_ftc.studies.mismatch.linear import in_fdc

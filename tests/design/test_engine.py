@@ -6,7 +6,7 @@ import pytest
 from beaver_ftc.design.engine import engine_power_kw, measured_slipstream, power_error_kw, slipstream
 from beaver_ftc.diagnosis.bounds.worst_case import slipstream_error
 from beaver_ftc.loop.assembly import configure_design
-from beaver_ftc.scenario.loader import load
+from beaver_ftc.scenario.schema import load
 
 RNG = np.random.default_rng(5)
 TRAVEL_RAD = np.array([[-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]])

@@ -6,7 +6,7 @@ import pytest
 from beaver_ftc.aircraft import load
 from beaver_ftc.design import engine, fdc, model, variants
 from beaver_ftc.design.context import Context, Declared
-from beaver_ftc.scenario.loader import load as load_scenario
+from beaver_ftc.scenario.schema import load as load_scenario
 from kept import in_short, of_record
 from trainer import trainer
 

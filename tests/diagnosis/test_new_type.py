@@ -128,7 +128,7 @@ import json
 from beaver_ftc.cli.catalogue import _available
 from beaver_ftc.results.metrics import faults_of
 from beaver_ftc.scenario.faults.base import Past
-from beaver_ftc.scenario.loader import load
+from beaver_ftc.scenario.schema import load
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.matrix.fault_matrix import FaultCase, scenario_of
 schema = Scenario.model_json_schema()["$defs"]

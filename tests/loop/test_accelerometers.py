@@ -5,7 +5,7 @@ import pytest
 
 import beaver_ftc as bf
 from beaver_ftc.loop.loop import Loop
-from beaver_ftc.scenario.loader import load
+from beaver_ftc.scenario.schema import load
 
 MOVING = {
     axis: [{"sine": {"amplitude_deg_s": 3, "frequency_hz": hz}}]

@@ -3,7 +3,7 @@
 import pytest
 
 import beaver_ftc as bf
-from beaver_ftc.scenario.loader import load
+from beaver_ftc.scenario.schema import load
 
 MOVING = {
     "p": [{"sine": {"amplitude_deg_s": 4, "frequency_hz": 0.3}}],

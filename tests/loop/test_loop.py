@@ -15,7 +15,7 @@ from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.verdict import facts
 from beaver_ftc.scenario.builtin import builtin_names
 from beaver_ftc.scenario.faults import of_a_sensor
-from beaver_ftc.scenario.loader import load_scenario
+from beaver_ftc.scenario.schema import load_scenario
 from flying import Memory, flown, loss, scenario
 
 TRAVEL_RAD = {

@@ -23,7 +23,7 @@ from beaver_ftc.results.log import column_names as log_columns
 from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.views import views
 from beaver_ftc.results.writer import result_folder
-from beaver_ftc.scenario.loader import load_scenario, load_text
+from beaver_ftc.scenario.schema import load_scenario, load_text
 
 FOLDER = Path(__file__).parents[1] / "data" / "aircraft"
 FLIGHT = FOLDER / "trainer-flight.yaml"

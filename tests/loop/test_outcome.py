@@ -11,7 +11,7 @@ from beaver_ftc.diagnosis.state import STATISTICS, UNANTICIPATED
 from beaver_ftc.loop.assembly import Trim, assemble
 from beaver_ftc.loop.outcome import Landing, guaranteed_delay_s, landing_of, verdict_of
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.scenario.timing import TIME_TOLERANCE_S
+from beaver_ftc.scenario.signals import TIME_TOLERANCE_S
 
 SURFACES = ("aileron", "elevator", "rudder", "flap")
 TRIM, Y = np.array([0.01, -0.02, 0.03, 0.04]), np.array([0.1, 0.02, 45.0, 1036.0, 0.3])

@@ -15,7 +15,7 @@ from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.trim import trim
 from beaver_ftc.results.model import Metrics
 from beaver_ftc.results.verdict import verdict_text
-from beaver_ftc.scenario.loader import load_text
+from beaver_ftc.scenario.schema import load_text
 
 AILERONS = {"aileron_right_0", "aileron_right_1", "aileron_right_2"}
 

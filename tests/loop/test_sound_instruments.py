@@ -6,7 +6,7 @@ import pytest
 
 import beaver_ftc as bf
 from beaver_ftc.diagnosis.monitors.sensor_records import ALPHA_FLOW, BETA_FLOW, RPM
-from beaver_ftc.scenario.loader import load
+from beaver_ftc.scenario.schema import load
 from beaver_ftc.scenario.sensors import PRESETS
 
 SWINGING = {

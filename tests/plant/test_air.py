@@ -6,7 +6,7 @@ import pytest
 from beaver_ftc.design.dryden import Dryden
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.configure import NEVER, GustSchedule, configure, take_off, trim_of
-from beaver_ftc.scenario.environment import Gust
+from beaver_ftc.scenario.airframe import Gust
 from beaver_ftc.scenario.schema import Scenario
 
 SPAN_FT, SCALE_FT, FT = 48.0, 1750.0, 0.3048

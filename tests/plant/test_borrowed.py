@@ -6,7 +6,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant import addresses, conditions, reuse
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.reuse import borrowed, give_back
-from beaver_ftc.scenario.loader import load
+from beaver_ftc.scenario.schema import load
 
 
 @pytest.fixture(autouse=True)

@@ -8,7 +8,7 @@ from beaver_ftc import Simulation
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import metrics
-from beaver_ftc.scenario.loader import load
+from beaver_ftc.scenario.schema import load
 from scenario.damageable import damageable
 
 CASE = {"type": "damage", "case": "tail-off", "at_s": 0.1}

@@ -9,7 +9,7 @@ from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plant import addresses, native
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.native import NodeBank
-from beaver_ftc.scenario.loader import load
+from beaver_ftc.scenario.schema import load
 
 READ = [
     "velocities/vt-fps",
@@ -109,7 +109,7 @@ import hashlib, sys
 from beaver_ftc.plant import addresses
 addresses.LAYOUT = addresses.LAYOUT._replace(**LAYOUT)
 from beaver_ftc.loop.loop import Loop
-from beaver_ftc.scenario.loader import load
+from beaver_ftc.scenario.schema import load
 loop = Loop(load({"name": "run", "duration_s": 2.0, "substeps": 2, "sensors": "consumer-grade"}))
 rows = hashlib.sha256()
 for chunk in loop.chunks():

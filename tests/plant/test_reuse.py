@@ -13,7 +13,7 @@ from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plant import conditions, reuse
 from beaver_ftc.plant.conditions import ready
 from beaver_ftc.plant.configure import take_off
-from beaver_ftc.scenario.loader import load
+from beaver_ftc.scenario.schema import load
 from samples import samples
 
 SURFACES = ("aileron", "elevator", "rudder", "flap")

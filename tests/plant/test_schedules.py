@@ -15,7 +15,7 @@ from beaver_ftc.plant.faults import (
 )
 from beaver_ftc.plant.instruments import SENSORS, instruments_dtype
 from beaver_ftc.scenario.faults import HEALTHY
-from beaver_ftc.scenario.loader import load
+from beaver_ftc.scenario.schema import load
 
 LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.5, "at_s": 0.1}
 GROWING = {"profile": "incipient", "kappa_per_s": 370.0}

@@ -17,7 +17,7 @@ from beaver_ftc.plant.conditions import trimmed
 from beaver_ftc.plant.linear import LinearModel, differences, engine_slope, own
 from beaver_ftc.plant.state import FlightState
 from beaver_ftc.plant.trim import TrimPoint, trim
-from beaver_ftc.scenario.loader import load as load_scenario
+from beaver_ftc.scenario.schema import load as load_scenario
 from trainer import trainer
 
 

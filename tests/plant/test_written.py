@@ -14,8 +14,8 @@ from beaver_ftc.plant.configure import NEVER, GustSchedule, configure, take_off,
 from beaver_ftc.plant.model_file import copy_of, package
 from beaver_ftc.plant.state import FlightState
 from beaver_ftc.plant.trial import probe
-from beaver_ftc.scenario.environment import Gust
-from beaver_ftc.scenario.loader import load
+from beaver_ftc.scenario.airframe import Gust
+from beaver_ftc.scenario.schema import load
 from trainer import FOLDER, trainer
 
 BANKED = {

@@ -14,7 +14,7 @@ from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plugins import DETECTORS, LAWS, VARIABLE, _hyphenated, plugin_class, register, registered
 from beaver_ftc.results.metrics import metrics
-from beaver_ftc.scenario.loader import load_text
+from beaver_ftc.scenario.schema import load_text
 from commands import beaver
 from flying import Memory, scenario
 

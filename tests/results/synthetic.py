@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.scenario.actuators import Actuators
-from beaver_ftc.scenario.environment import Environment
+from beaver_ftc.scenario.airframe import Actuators, Environment
 from beaver_ftc.scenario.sensors import Sensors
 
 AXES = ("p", "q", "r")

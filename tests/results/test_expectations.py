@@ -2,7 +2,7 @@
 
 import pytest
 
-from beaver_ftc.results.expectations import evaluate, margin
+from beaver_ftc.results.metrics import evaluate, margin
 from beaver_ftc.results.model import Expectation, Metrics
 from beaver_ftc.scenario.schema import Expect
 

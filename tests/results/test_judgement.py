@@ -8,7 +8,7 @@ from synthetic import Flight
 
 from beaver_ftc.results.metrics import measure
 from beaver_ftc.scenario.judgement import DeclaredFault, Onset, Truth, is_late
-from beaver_ftc.scenario.loader import load
+from beaver_ftc.scenario.schema import load
 from beaver_ftc.studies.compare.replay import Recording, trace
 from beaver_ftc.studies.mismatch import bound
 from beaver_ftc.studies.verify import judge

@@ -11,8 +11,7 @@ from beaver_ftc.aircraft.aircraft import read
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario import airframe
 from beaver_ftc.scenario.airframe import find_aircraft
-from beaver_ftc.scenario.loader import load
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.schema import Scenario, load
 
 TRAINER = Path(__file__).parents[1] / "data" / "aircraft" / "trainer"
 

@@ -3,8 +3,7 @@
 import pytest
 
 from beaver_ftc.scenario.builtin import builtin_names, builtin_path, builtin_sweeps, described, resolve
-from beaver_ftc.scenario.loader import load_scenario
-from beaver_ftc.scenario.schema import Expect
+from beaver_ftc.scenario.schema import Expect, load_scenario
 from beaver_ftc.scenario.sweeps import load_sweep
 
 REQUIRED = {

@@ -2,9 +2,8 @@
 
 import pytest
 
-from beaver_ftc.scenario.initial import Initial, initial_of
-from beaver_ftc.scenario.loader import load_text
-from beaver_ftc.scenario.schema import json_schema
+from beaver_ftc.scenario.airframe import Initial, initial_of
+from beaver_ftc.scenario.schema import json_schema, load_text
 from beaver_ftc.scenario.sweeps import sweep_json_schema
 from kept import keys_of
 from trainer import trainer

@@ -8,7 +8,7 @@ import pytest
 from beaver_ftc.design.dryden import SEVERITIES, Dryden
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import Bounds
-from beaver_ftc.scenario.loader import load
+from beaver_ftc.scenario.schema import load
 from flying import declared_in
 from test_architecture import PRODUCTS, modules, tree
 

@@ -5,8 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from beaver_ftc.scenario.loader import load_text
-from beaver_ftc.scenario.schema import Expect, json_schema
+from beaver_ftc.scenario.schema import Expect, json_schema, load_text
 from beaver_ftc.scenario.signals import Signal
 
 MANUAL = (Path(__file__).parents[2] / "docs/reference/scenarios.md").read_text()

@@ -4,9 +4,8 @@ import pytest
 import yaml
 from hypothesis import given, settings
 
-from beaver_ftc.scenario.dump import to_yaml
-from beaver_ftc.scenario.loader import load, load_scenario, load_text
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.builtin import to_yaml
+from beaver_ftc.scenario.schema import Scenario, load, load_scenario, load_text
 from samples import samples
 
 from .strategies import SCENARIOS

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from beaver_ftc.documents.document import Document
 from beaver_ftc.documents.validation import ScenarioError, validate
 from beaver_ftc.scenario.builtin import builtin_path
-from beaver_ftc.scenario.loader import load_scenario, load_text
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.schema import Scenario, load_scenario, load_text
 from samples import samples
 
 from .strategies import SCENARIOS

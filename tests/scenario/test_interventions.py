@@ -6,7 +6,7 @@ import pytest
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario import interventions as done
 from beaver_ftc.scenario.interventions import StickTrack
-from beaver_ftc.scenario.loader import load
+from beaver_ftc.scenario.schema import load
 
 LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4}
 STUCK = {"type": "stuck", "actuator": "rudder", "position_deg": 3}

@@ -12,7 +12,7 @@ from samples import samples
 from .strategies import SCENARIOS
 
 SCHEMA = json_schema()
-OWN_HOME = ("beaver_ftc.scenario.diagnosis", "beaver_ftc.scenario.control")
+OWN_HOME = ("beaver_ftc.scenario.diagnosis", "beaver_ftc.scenario.diagnosis")
 VALIDATOR = jsonschema.Draft202012Validator(SCHEMA)
 
 

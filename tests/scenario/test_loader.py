@@ -12,7 +12,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.files import data_root
 from beaver_ftc.documents.validation import ScenarioError
 from beaver_ftc.scenario.builtin import MAX_BYTES, resolve
-from beaver_ftc.scenario.loader import load_scenario, load_text
+from beaver_ftc.scenario.schema import load_scenario, load_text
 
 LINE = re.compile(r"^[^:\n]+(:\d+: \S[^:\n]*)?: [^\n]+allowed: [^\n]+$")
 

@@ -5,7 +5,8 @@ import re
 import pytest
 
 from beaver_ftc.design.atmosphere import altitude_of, standard_density
-from beaver_ftc.scenario.measured import (
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.warnings import (
     ALTITUDE,
     BETWEEN,
     LATE,
@@ -16,7 +17,6 @@ from beaver_ftc.scenario.measured import (
     percent,
     quantities,
 )
-from beaver_ftc.scenario.schema import Scenario
 from trainer import trainer
 
 # Density by altitude [ISA], m and kg/m3.

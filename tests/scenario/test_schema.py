@@ -7,8 +7,7 @@ from pydantic import ValidationError
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.faults import Bias, LossOfEffectiveness, Unanticipated
-from beaver_ftc.scenario.loader import load_text
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.schema import Scenario, load_text
 
 CONTRACT = """
 name: elevator-partial-loss          # letters, digits, - and _

@@ -3,11 +3,9 @@
 import pytest
 
 from beaver_ftc.documents.validation import ScenarioError
-from beaver_ftc.scenario.consistency import conflicts
-from beaver_ftc.scenario.dump import to_yaml
-from beaver_ftc.scenario.environment import air_of
-from beaver_ftc.scenario.loader import load, load_text
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.airframe import air_of
+from beaver_ftc.scenario.builtin import to_yaml
+from beaver_ftc.scenario.schema import Scenario, conflicts, load, load_text
 
 FLOAT = "{type: float, actuator: flap, at_s: "
 GUST = "{velocity_mps: [0, 0, 1], rise_s: 1, hold_s: 2, fade_s: 3, at_s: "

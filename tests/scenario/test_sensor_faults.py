@@ -4,7 +4,7 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.faults import fault_name
-from beaver_ftc.scenario.loader import load
+from beaver_ftc.scenario.schema import load
 
 
 def faulty(**fault):

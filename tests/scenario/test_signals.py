@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.scenario import signals
-from beaver_ftc.scenario.loader import load_text
+from beaver_ftc.scenario.schema import load_text
 from beaver_ftc.scenario.signals import sample
 
 FRAMES = np.arange(1000) / 100.0

@@ -7,7 +7,7 @@ import pytest
 from pydantic_core import PydanticCustomError
 
 from beaver_ftc.documents.validation import ScenarioError
-from beaver_ftc.scenario.loader import load_scenario, load_text
+from beaver_ftc.scenario.schema import load_scenario, load_text
 from beaver_ftc.scenario.signals import check_table
 
 GOOD = "t_s,rate_deg_s\n0,0\n1,2\n"

@@ -6,9 +6,8 @@ import pytest
 
 from beaver_ftc.documents.document import Document
 from beaver_ftc.loop.loop import Loop, fly
-from beaver_ftc.scenario.loader import load_text, validate_scenario
-from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.scenario.undeclared import Kind, Reader, Undeclared, undeclared
+from beaver_ftc.scenario.declared import Kind, Reader, Undeclared, undeclared
+from beaver_ftc.scenario.schema import Scenario, load_text, validate_scenario
 
 TOLD = """
 fdi: {bounds: {sensors: tactical-grade, turbulence: light, coefficients: {Cm_alpha: 0.05}, inertia: 0.05}}

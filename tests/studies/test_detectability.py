@@ -15,7 +15,7 @@ import needs
 from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
-from beaver_ftc.scenario.loader import load_text
+from beaver_ftc.scenario.schema import load_text
 from beaver_ftc.studies import detectability as surveying
 from beaver_ftc.studies.detectability import (
     EXCITATIONS,

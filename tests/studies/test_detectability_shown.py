@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.scenario.loader import load_text
+from beaver_ftc.scenario.schema import load_text
 from beaver_ftc.studies import detectability, isolability
 from beaver_ftc.studies.detectability import (
     ALTITUDES_M,

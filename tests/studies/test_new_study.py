@@ -34,8 +34,8 @@ from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
 from beaver_ftc.results.metrics import as_json
-from beaver_ftc.scenario.loader import load
-from beaver_ftc.studies.engine.command import Document, Reporter, StudyCommand, WorkersOption
+from beaver_ftc.scenario.schema import load
+from beaver_ftc.commands import Document, Reporter, StudyCommand, WorkersOption
 from beaver_ftc.studies.engine.study import Study, run_study
 from beaver_ftc.studies.present.figures import panels
 from beaver_ftc.studies.present.page import Makers, Pictures, Table, as_html

@@ -19,7 +19,7 @@ from beaver_ftc.aircraft.schema import AircraftFile
 from beaver_ftc.cli.main import every_command
 from beaver_ftc.commands import registered as registered_commands
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.scenario.loader import load_text
+from beaver_ftc.scenario.schema import load_text
 from beaver_ftc.scenario.signals import Signal
 from beaver_ftc.scenario.sweeps import Variation, load_sweep_text
 from beaver_ftc_assurance.evidence.plan import load_plan

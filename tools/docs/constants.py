@@ -24,8 +24,7 @@ def constants() -> dict[str, Any]:
     from beaver_ftc.cli.catalogue import _available
     from beaver_ftc.commands import registered as registered_commands
     from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled, options_of, registered
-    from beaver_ftc.scenario.loader import load_text
-    from beaver_ftc.scenario.schema import Scenario
+    from beaver_ftc.scenario.schema import Scenario, load_text
 
     plain = load_text("name: default\n")
     options = {

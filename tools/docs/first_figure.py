@@ -41,7 +41,7 @@ def write_figure(path: Path) -> Path:
     from beaver_ftc.results.style import marks
     from beaver_ftc.results.views import read_series
     from beaver_ftc.results.writer import run
-    from beaver_ftc.scenario.loader import load_scenario
+    from beaver_ftc.scenario.schema import load_scenario
 
     with TemporaryDirectory() as folder:
         metrics = Metrics.of(run(load_scenario("elevator-partial-loss"), Path(folder), report=False))

@@ -52,7 +52,7 @@ def write_screens(images: Path) -> Iterator[Path]:
 def _report(browser: Any, folder: Path, path: Path) -> Path:
     """The first screen of the report of a run."""
     from beaver_ftc.results.writer import run
-    from beaver_ftc.scenario.loader import load_scenario
+    from beaver_ftc.scenario.schema import load_scenario
 
     run(load_scenario(SCENARIO), folder)
     page = browser.new_page(viewport={"width": 1000, "height": 1150})

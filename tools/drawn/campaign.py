@@ -84,7 +84,7 @@ def commanded(flight: bf.Flight) -> Iterator[str]:
 
     from beaver_ftc.cli.main import app
     from beaver_ftc.results.report import write_report
-    from beaver_ftc.scenario.dump import to_yaml
+    from beaver_ftc.scenario.builtin import to_yaml
 
     with tempfile.TemporaryDirectory() as place, contextlib.redirect_stderr(io.StringIO()):
         file = Path(place) / "drawn.yaml"

@@ -22,7 +22,7 @@ import numpy as np
 import beaver_ftc as bf
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
-from beaver_ftc.scenario.dump import to_yaml
+from beaver_ftc.scenario.builtin import to_yaml
 from beaver_ftc_assurance.certificates.certificate import (
     Evidence,
     as_text,

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 import beaver_ftc as bf
-from beaver_ftc.scenario.dump import to_yaml
+from beaver_ftc.scenario.builtin import to_yaml
 from beaver_ftc_assurance.certificates import check_certificate as checker
 from beaver_ftc_assurance.certificates.certificate import as_text, sealed
 from tools.drawn.certificates import certified

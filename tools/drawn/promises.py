@@ -17,10 +17,10 @@ import yaml
 
 import beaver_ftc as bf
 from beaver_ftc.results import Metrics, verdict
-from beaver_ftc.scenario.control import MODES
-from beaver_ftc.scenario.dump import to_yaml
+from beaver_ftc.scenario.builtin import to_yaml
+from beaver_ftc.scenario.diagnosis import MODES
 from beaver_ftc.scenario.faults import UNANTICIPATED
-from beaver_ftc.scenario.loader import load_text
+from beaver_ftc.scenario.schema import load_text
 
 Document = dict[str, Any]
 

@@ -18,7 +18,7 @@ from collections.abc import Callable
 import numpy as np
 
 import beaver_ftc as bf
-from beaver_ftc.scenario.dump import to_yaml
+from beaver_ftc.scenario.builtin import to_yaml
 from beaver_ftc_assurance import separation
 from beaver_ftc_assurance.certificates.certificate import as_text
 from beaver_ftc_assurance.certificates.check_certificate import failures

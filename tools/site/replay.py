@@ -44,7 +44,7 @@ def page() -> str:
     """Fly it; the page as HTML that needs no other file."""
     from beaver_ftc.results.model import Metrics
     from beaver_ftc.results.writer import run
-    from beaver_ftc.scenario.loader import load_scenario
+    from beaver_ftc.scenario.schema import load_scenario
 
     with TemporaryDirectory() as out:
         metrics = run(load_scenario(SCENARIO), Path(out), report=False)

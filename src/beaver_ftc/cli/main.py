@@ -26,8 +26,8 @@ from beaver_ftc.cli.shared import (
     report_last,
     status_of_stop,
 )
+from beaver_ftc.commands import Reporter, StudyCommand
 from beaver_ftc.extensions import loaded
-from beaver_ftc.studies.engine.command import Reporter, StudyCommand
 
 
 def command_of(study: type[StudyCommand]) -> Callable[..., None]:

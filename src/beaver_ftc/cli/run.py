@@ -3,6 +3,7 @@
 import sys
 import time
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import partial
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     Drawn = tuple[Painters, Sequence[str]]  # by whom the figures are drawn, and their formats
 
 
+FORMATS = ("png", "pdf", "svg")  # of figures
 Recording = StrEnum("Recording", ["table", "ulog", "ardupilot"])  # the formats of `results.exports`
 
 
@@ -85,17 +87,22 @@ def command(options: Options) -> None:
             emit_json({"passed": False, "runs": [], "errors": str(error).splitlines()})
         write_junit([{"scenario": "scenarios", "error": str(error)}], options.junit)
         raise
-    from beaver_ftc.results.painters import painters
-
-    with painters(not options.no_report) as at_work:
+    with _painters(not options.no_report) as at_work:
         status = _run_all(loaded, options, (at_work, formats))
     raise typer.Exit(status)
 
 
+def _painters(wanted: bool) -> "AbstractContextManager[Painters]":
+    """Processes that draw the figures meanwhile, where they are wanted."""
+    if not wanted:
+        return nullcontext(())
+    from beaver_ftc.results.painters import painters
+
+    return painters()
+
+
 def _formats(given: str) -> tuple[str, ...]:
     """The formats of the figures, each once."""
-    from beaver_ftc.results.style import FORMATS
-
     named = tuple(dict.fromkeys(name.strip() for name in given.split(",")))
     for name in named:
         if name not in FORMATS:

@@ -68,7 +68,7 @@ def validate(
 
 def _check(file: str) -> Document:
     from beaver_ftc.scenario.builtin import has_key
-    from beaver_ftc.scenario.loader import load_scenario
+    from beaver_ftc.scenario.schema import load_scenario
     from beaver_ftc.scenario.sweeps import is_sweep, load_sweep
 
     errors: list[str] = []

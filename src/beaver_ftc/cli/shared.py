@@ -25,15 +25,9 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn, get_args
 
 import typer
 
+from beaver_ftc.commands import SCENARIO, ScenarioArgument, WorkersOption, complete_names, listed
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFailed, split_docstring
 from beaver_ftc.documents.files import Document
-from beaver_ftc.studies.engine.command import (
-    SCENARIO,
-    ScenarioArgument,
-    WorkersOption,
-    complete_names,
-    listed,
-)
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
@@ -114,9 +108,9 @@ def report_last(error: BeaverFtcError) -> int:
 
 def write_junit(runs: list[Document], path: Path | None) -> None:
     """The verdicts as JUnit XML, where they are asked for."""
-    from beaver_ftc.results import junit
-
     if path is not None:
+        from beaver_ftc.results import junit
+
         junit.write_junit(runs, path)
 
 
@@ -357,7 +351,7 @@ def _annotated(parameter: Parameter, help: str | None) -> Parameter:
 
 def load_all(names: list[str]) -> list["Scenario"]:
     """The scenarios of these files or built-in names. Raises BadInput with every mistake in all of them."""
-    from beaver_ftc.scenario.loader import load_scenario
+    from beaver_ftc.scenario.schema import load_scenario
 
     loaded: list[Scenario] = []
     mistakes: list[str] = []

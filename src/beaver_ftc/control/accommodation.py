@@ -15,7 +15,7 @@ from beaver_ftc.compiled import apart, kernel, record, sized
 from beaver_ftc.design.model import unanticipated_pitch
 from beaver_ftc.diagnosis.state import PITCH
 from beaver_ftc.diagnosis.types.contract import FIXED
-from beaver_ftc.scenario.control import ControlConfig
+from beaver_ftc.scenario.diagnosis import ControlConfig
 
 # The largest change of an effectiveness a frame; the least that a law divides by.
 CONFIG = record(effectiveness_step=float, least_effectiveness=float)

@@ -22,8 +22,7 @@ from beaver_ftc.control import least_squares
 from beaver_ftc.control.accommodation import usable_effectiveness
 from beaver_ftc.control.least_squares import problem_dtype
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW, leaders_of
-from beaver_ftc.scenario.control import ControlConfig
-from beaver_ftc.scenario.diagnosis import Probing
+from beaver_ftc.scenario.diagnosis import ControlConfig, Probing
 
 RELUCTANT, TINY = 1e-4, 1e-300  # weight of a backup that is not asked, beside the others
 

@@ -13,7 +13,7 @@ attitude, so what is missed on one side is asked for on neither.
 import numpy as np
 
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.scenario.control import ControlConfig
+from beaver_ftc.scenario.diagnosis import ControlConfig
 
 MISSED_RAD_S = 0.1  # a rate missed in all by this much: the reference is given up
 RECOVERY_S = 30.0  # and asked for again within this time: several periods of a slow reference

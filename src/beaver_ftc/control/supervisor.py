@@ -8,7 +8,7 @@ rudder: no second surface), or unanticipated (no known fault fits).
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.diagnosis.state import PITCH, UNANTICIPATED
 from beaver_ftc.diagnosis.types.contract import FIXED, LOSES
-from beaver_ftc.scenario.control import MODES
+from beaver_ftc.scenario.diagnosis import MODES
 
 MODE_NOMINAL, MODE_ADAPTIVE, MODE_REALLOCATED, MODE_UNANTICIPATED = range(len(MODES))
 MAX_EVENTS = 64

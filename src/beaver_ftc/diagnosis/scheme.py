@@ -21,7 +21,7 @@ from beaver_ftc.diagnosis.state import STATISTICS
 from beaver_ftc.diagnosis.types import registry
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.declared import Declared
-from beaver_ftc.scenario.pairs import pairs_refused
+from beaver_ftc.scenario.diagnosis import pairs_refused
 from beaver_ftc.scenario.schema import Scenario
 
 

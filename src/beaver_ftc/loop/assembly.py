@@ -33,8 +33,8 @@ from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.instruments import MEASURED, N_SAMPLED, USUAL_LINE, instruments_dtype
 from beaver_ftc.plant.native import RUNNING
 from beaver_ftc.plant.sensing import truth_dtype
+from beaver_ftc.scenario.builtin import texts_of
 from beaver_ftc.scenario.declared import Declared
-from beaver_ftc.scenario.dump import texts_of
 from beaver_ftc.scenario.schema import Scenario
 
 # How many columns the log has for estimators, the sensor monitor, sensors with rates of their own, the

@@ -20,7 +20,7 @@ from beaver_ftc.plant.instruments import take_configuration
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.interventions import stages
 from beaver_ftc.scenario.schema import Change, Scenario
-from beaver_ftc.scenario.timing import frame_of
+from beaver_ftc.scenario.signals import frame_of
 
 
 class Stage(NamedTuple):

@@ -8,7 +8,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.design.atmosphere import altitude_of
-from beaver_ftc.scenario.measured import (
+from beaver_ftc.scenario.warnings import (
     ALTITUDE,
     BETWEEN,
     LATE,

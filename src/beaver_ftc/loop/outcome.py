@@ -33,12 +33,12 @@ from beaver_ftc.loop.frame import isolated_theta
 from beaver_ftc.loop.inconclusive import inconclusive_of
 from beaver_ftc.plant.channels import AIRSPEED, ALTITUDE
 from beaver_ftc.plant.sensing import DEPARTURE_SIGNALS
-from beaver_ftc.scenario.control import MODES
+from beaver_ftc.scenario.declared import undeclared
+from beaver_ftc.scenario.diagnosis import MODES
 from beaver_ftc.scenario.faults import of_a_sensor
 from beaver_ftc.scenario.interventions import stages
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.scenario.timing import TIME_TOLERANCE_S
-from beaver_ftc.scenario.undeclared import undeclared
+from beaver_ftc.scenario.signals import TIME_TOLERANCE_S
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from beaver_ftc.plant.configure import GustSchedule
 from beaver_ftc.plant.faults import is_there
 from beaver_ftc.scenario import interventions
 from beaver_ftc.scenario.airframe import checked_against
-from beaver_ftc.scenario.control import MODES
+from beaver_ftc.scenario.diagnosis import MODES
 from beaver_ftc.scenario.faults import DAMAGE, MOST_FAULTS, UNANTICIPATED, fault_name, place_of
 from beaver_ftc.scenario.interventions import StickTrack, fault_of, is_same_again
 from beaver_ftc.scenario.schema import Scenario

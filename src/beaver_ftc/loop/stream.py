@@ -19,8 +19,7 @@ from beaver_ftc.plugins import DETECTORS, is_compiled
 from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import FdiConfig
-from beaver_ftc.scenario.loader import load
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.schema import Scenario, load
 
 Vector = NDArray[np.float64]
 FLOW = ("alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa")  # signals every aircraft measures

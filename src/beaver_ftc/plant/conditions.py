@@ -6,9 +6,8 @@ from beaver_ftc.plant.configure import configure, trim_of
 from beaver_ftc.plant.linear import LinearModel, differences
 from beaver_ftc.plant.reuse import borrowed, give_back
 from beaver_ftc.plant.trim import TrimPoint
-from beaver_ftc.scenario.dump import texts_of
-from beaver_ftc.scenario.loader import ScenarioLike, load
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.builtin import texts_of
+from beaver_ftc.scenario.schema import Scenario, ScenarioLike, load
 
 
 def trim(scenario: ScenarioLike | None = None, **initial: float) -> TrimPoint:

@@ -12,9 +12,9 @@ from beaver_ftc.design.dryden import EXCEEDENCE, WIND_AT_20_FT
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.adapter import FT_PER_M, Plant
 from beaver_ftc.plant.trim import TrimPoint, trim
-from beaver_ftc.scenario.environment import Gust
+from beaver_ftc.scenario.airframe import Gust
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.scenario.timing import frame_of
+from beaver_ftc.scenario.signals import frame_of
 
 DELAY = "actuators/delay-s"
 LB_PER_KG, IN_PER_M = 1.0 / KG_PER_LB, 12.0 * FT_PER_M

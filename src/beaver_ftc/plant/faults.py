@@ -23,7 +23,7 @@ import numpy as np
 from beaver_ftc.scenario.faults import DAMAGE, HEALTHY, SensorFault, place_of
 from beaver_ftc.scenario.faults.base import Past, SurfaceFault
 from beaver_ftc.scenario.sensors import ENGINE, QUANTITIES, Sensors
-from beaver_ftc.scenario.timing import frame_of, grown_share
+from beaver_ftc.scenario.signals import frame_of, grown_share
 
 if TYPE_CHECKING:
     from beaver_ftc.plant.adapter import Plant

@@ -52,7 +52,7 @@ def pictures_of(
 ) -> list[Picture]:
     """All pictures of a log: every view over the whole flight, some around the fault as well.
 
-    formats: of FORMATS; PDF and SVG are drawn for papers.
+    formats: png, pdf, svg; PDF and SVG are drawn for papers.
     """
     shown = views_of_flight(log.column_names(log_path), metrics)
     instants = marks(metrics)

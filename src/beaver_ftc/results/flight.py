@@ -17,8 +17,7 @@ from beaver_ftc.results import model, verdict
 from beaver_ftc.results.log import Log, MemoryLog, StoredLog
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.results.model import Document
-from beaver_ftc.scenario.loader import ScenarioLike, load
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.schema import Scenario, ScenarioLike, load
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -11,7 +11,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.simulation import Asked, Stepping
 from beaver_ftc.results.flight import Flight, check_plug_in
 from beaver_ftc.results.log import MemoryLog
-from beaver_ftc.scenario.loader import ScenarioLike, load
+from beaver_ftc.scenario.schema import ScenarioLike, load
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -64,7 +64,7 @@ class Simulation(Stepping):
 
     def clone(self) -> Self:
         """Another flight in the same state, of which each goes its own way: `snapshot().resume()`."""
-        return cast(Self, self.snapshot().resume())
+        return cast("Self", self.snapshot().resume())
 
     def land(self) -> Flight:
         """What the flight has yielded so far, as `fly` would say it; the flight may go on."""

@@ -19,8 +19,8 @@ import numpy as np
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.results import log
 from beaver_ftc.results.model import Metrics
-from beaver_ftc.scenario.control import MODES
-from beaver_ftc.scenario.timing import MEAN_S
+from beaver_ftc.scenario.diagnosis import MODES
+from beaver_ftc.scenario.signals import MEAN_S
 
 AXIS_NAMES = {"p": "roll rate p", "q": "pitch rate q", "r": "yaw rate r"}
 

@@ -16,16 +16,15 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 from uuid import uuid4
 
-from beaver_ftc.commands import files_of_commands
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.extensions import required
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import as_json, metrics
 from beaver_ftc.results.model import Document, Metrics
-from beaver_ftc.results.painters import Painters, drawing
 
 if TYPE_CHECKING:
     from beaver_ftc.plant.adapter import Plant
+    from beaver_ftc.results.painters import Painters
     from beaver_ftc.scenario.schema import Scenario
 
 try:
@@ -57,7 +56,7 @@ def run(
     prepare: "Callable[[Plant], None] | None" = None,
     recording: str | None = None,
     certified: bool = False,
-    painters: Painters = (),
+    painters: "Painters" = (),
     figures: Sequence[str] = ("png",),
 ) -> Document:
     """Fly `scenario`, write `out/<name>/`, and return the metrics document.
@@ -145,7 +144,7 @@ def write_documents(folder: Path, scenario: "Scenario", document: Document) -> N
 
 def write_scenario(folder: Path, scenario: "Scenario") -> None:
     """Write what was flown into a result folder."""
-    from beaver_ftc.scenario.dump import to_yaml
+    from beaver_ftc.scenario.builtin import to_yaml
 
     if str(scenario.aircraft).startswith("./"):  # the user's own, copied: it can be flown again from here
         shutil.copytree(scenario.airframe.folder, folder / AIRCRAFT, ignore=_no_model, dirs_exist_ok=True)
@@ -162,7 +161,7 @@ def write_report_files(
     folder: Path,
     document: Document,
     to: Path | None = None,
-    painters: Painters = (),
+    painters: "Painters" = (),
     formats: Sequence[str] = ("png",),
 ) -> None:
     """Draw the figures and the report of a result folder that holds its log and its scenario.
@@ -171,6 +170,7 @@ def write_report_files(
     the figures.
     """
     from beaver_ftc.results.figures import pictures_of
+    from beaver_ftc.results.painters import drawing
     from beaver_ftc.results.report import write_report
 
     to = to or folder
@@ -247,7 +247,11 @@ def refuse_foreign(folder: Path, files: Iterable[str] = ()) -> None:
 def _foreign_files_in(folder: Path, files: Iterable[str]) -> list[str]:
     """What lies in a result folder and is none of ours, by its name or beside our pictures."""
     unknown = {entry.name for entry in folder.iterdir()} - FILES_OF_A_RUN - {*files}
-    foreign = [*(unknown and unknown - {*files_of_commands()})]
+    if unknown:
+        from beaver_ftc.commands import files_of_commands
+
+        unknown -= {*files_of_commands()}
+    foreign = [*unknown]
     pictures = (folder / "figures").rglob("*")
     foreign += [str(path.relative_to(folder)) for path in pictures if not _is_our_picture(path)]
     copied = (path for path in (folder / AIRCRAFT).rglob("*") if not path.is_dir())

@@ -5,26 +5,32 @@ from typing import TYPE_CHECKING
 from beaver_ftc.public import lazily
 
 if TYPE_CHECKING:
-    from beaver_ftc.scenario.airframe import checked_against, find_aircraft
-    from beaver_ftc.scenario.autopilot import channels_of
+    from beaver_ftc.scenario.airframe import checked_against, find_aircraft, initial_of
     from beaver_ftc.scenario.builtin import (
         builtin_names,
         builtin_sweeps,
         looks_like_a_path,
         read_file,
         resolve,
+        to_yaml,
     )
-    from beaver_ftc.scenario.consistency import conflicts
     from beaver_ftc.scenario.declared import Declared
     from beaver_ftc.scenario.diagnosis import Bounds
-    from beaver_ftc.scenario.dump import to_yaml
-    from beaver_ftc.scenario.initial import initial_of
     from beaver_ftc.scenario.judgement import Onset
-    from beaver_ftc.scenario.loader import ScenarioLike, is_of_a_sweep, load, load_scenario, validate_scenario
-    from beaver_ftc.scenario.measured import measured_spans, plural, span_in_words
-    from beaver_ftc.scenario.schema import NAME_PATTERN, Expect, Scenario
+    from beaver_ftc.scenario.schema import (
+        NAME_PATTERN,
+        Expect,
+        Scenario,
+        ScenarioLike,
+        conflicts,
+        is_of_a_sweep,
+        load,
+        load_scenario,
+        validate_scenario,
+    )
     from beaver_ftc.scenario.sensors import sensor_words, sensors_there
+    from beaver_ftc.scenario.signals import TIME_TOLERANCE_S, channels_of
     from beaver_ftc.scenario.sweeps import Sweep, SweepExpect, is_sweep, load_sweep, validate_sweep
-    from beaver_ftc.scenario.timing import TIME_TOLERANCE_S
+    from beaver_ftc.scenario.warnings import measured_spans, plural, span_in_words
 else:
     __getattr__, __dir__ = lazily(__name__)

@@ -1,16 +1,48 @@
-"""The aircraft of a scenario, found by what the scenario calls it, and the names that are its own."""
+"""What flies in a scenario, where it starts, and the air around it: aircraft, `initial`, `actuators`,
+`environment`.
+
+The aircraft is found by what the scenario calls it; names that are its own are checked against it. A
+flight starts from a trimmed flight condition, whose keys depend on the aircraft. The surfaces' actuators
+are ideal, a preset, one set of numbers for all, or one a surface. The air has steady wind, turbulence and
+gusts.
+"""
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from functools import lru_cache
+from itertools import pairwise
+from math import degrees
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Discriminator,
+    Field,
+    GetJsonSchemaHandler,
+    Tag,
+    ValidationInfo,
+    create_model,
+    model_validator,
+)
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
 
 from beaver_ftc.aircraft import DEFAULT, Aircraft, load
 from beaver_ftc.aircraft.aircraft import BESIDE, NotDerived, UnknownAircraft
-from beaver_ftc.documents.document import Number, deny
+from beaver_ftc.documents.document import (
+    Conflict,
+    Flag,
+    Number,
+    Section,
+    deny,
+    entry,
+    number,
+    refuse,
+    refuse_unknown,
+)
 from beaver_ftc.documents.errors import BeaverFtcError, suggestion
 from beaver_ftc.extensions import offered, required
 
@@ -114,3 +146,253 @@ Actuator = Annotated[str, among(lambda: checked_aircraft().surfaces), Field(json
 TermName = Annotated[str, among(lambda: checked_aircraft().terms, "unknown aerodynamic term")]
 Ratio = Annotated[Number, Field(ge=-10, le=10, json_schema_extra={"unit": "share of 1"})]
 Ratios = Annotated[dict[TermName, Ratio], BeforeValidator(_no_more_than_there_are)]
+
+
+class Initial(Section):
+    """The trimmed flight condition the run starts from."""
+
+    airspeed_mps: Number = number(45.0, "m/s", "true airspeed, validated from 30 to 55", ge=20, le=70)
+    altitude_m: Number = number(1828.8, "m", "altitude above sea level", ge=-300, le=6000)
+    on_ground: Flag | None = entry(
+        None, "true: standing on the ground, which is at altitude_m; under an autopilot alone (`sitl`)"
+    )
+
+    _airframe: ClassVar[Aircraft | None] = None
+
+    @model_validator(mode="after")
+    def _can_stand(self) -> Self:
+        if self.on_ground and self._airframe is not None and self._airframe.file.ground is None:
+            deny(f"{self._airframe.name}'s file has no `ground` to stand on, allowed: false", "on_ground")
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Classes of a single aircraft are made again where they are read."""
+        return _initial_again, (self._airframe, self.model_dump(exclude_unset=True))
+
+
+@lru_cache(maxsize=32)
+def initial_of(aircraft: Aircraft) -> type[Initial]:
+    """The flight condition of an aircraft: with its engine's settings, and the surfaces trim leaves alone."""
+    keys = _flow_keys(aircraft)
+    for name, setting in aircraft.engine.settings.items():
+        low, high = setting.range
+        says = setting.says or name
+        keys[name] = Number, number(setting.default, setting.unit, says, ge=low, le=high)
+    for surface in aircraft.left_by_trim:
+        travel, says = aircraft.travel[surface], f"{surface} deflection"
+        low, high = degrees(travel.min_rad), degrees(travel.max_rad)
+        of = number(0.0, "deg", says, ge=low, le=high, examples=[round(0.25 * high, 1)])
+        keys[f"{surface}_deg"] = Number, of
+    made = create_model("Initial", __base__=Initial, __doc__=Initial.__doc__, **keys)
+    made._airframe = aircraft
+    return made
+
+
+def airspeeds_of(aircraft: Aircraft) -> tuple[float, float]:
+    """The lowest and the highest airspeed that a scenario of an aircraft may name, m/s."""
+    low, high = aircraft.envelope.airspeed_mps
+    return min(20.0, 2.0 / 3.0 * low), max(70.0, 14.0 / 11.0 * high)
+
+
+def highest_of(aircraft: Aircraft) -> float:
+    """The highest altitude that a scenario of an aircraft may name, m."""
+    return max(6000.0, aircraft.file.start.altitude_m or 0.0)
+
+
+def _flow_keys(aircraft: Aircraft) -> dict[str, Any]:
+    """Airspeed and altitude, whose range and default make room for the aircraft's own."""
+    (low, high), start = aircraft.envelope.airspeed_mps, aircraft.file.start
+    slowest, fastest = airspeeds_of(aircraft)
+    default = start.airspeed_mps or (45.0 if low <= 45.0 <= high else 0.5 * (low + high))
+    says = f"true airspeed, validated from {low:g} to {high:g}"
+    speed = number(default, "m/s", says, ge=slowest, le=fastest)
+    keys: dict[str, Any] = {"airspeed_mps": (Number, speed)}
+    if start.altitude_m is not None:
+        most = highest_of(aircraft)
+        altitude = number(start.altitude_m, "m", "altitude above sea level", ge=-300, le=most)
+        keys["altitude_m"] = Number, altitude
+    return keys
+
+
+def _initial_again(aircraft: Aircraft | None, values: dict[str, Any]) -> Initial:
+    return (initial_of(aircraft) if aircraft else Initial).model_validate(values)
+
+
+def given_initial(given: Any) -> Any:
+    """The flight condition given, as one of the aircraft in question."""
+    if isinstance(given, Initial):
+        given = given.model_dump(exclude_unset=True)
+    return initial_of(checked_aircraft()).model_validate(given)
+
+
+def default_initial() -> Initial:
+    """The default flight condition of the aircraft in question."""
+    return initial_of(checked_aircraft())()
+
+
+def initial_schema(schema: dict[str, Any]) -> None:
+    """Show an editor the keys of the built-in aircraft."""
+    schema.clear()
+    schema.update(initial_of(load()).model_json_schema())
+
+
+class ActuatorDynamics(Section):
+    """First-order lag, rate limit and stops of one surface.
+
+    bandwidth_rad_s: bandwidth of the lag, 0 means none, rad/s
+    rate_limit_deg_s: largest surface rate, 0 means no limit, deg/s
+    travel_deg: lower and upper stop; left out: the aircraft's own, deg
+    """
+
+    bandwidth_rad_s: Number = number(0.0, "rad/s", ge=0, le=10_000, examples=[20])
+    rate_limit_deg_s: Number = number(0.0, "deg/s", ge=0, le=100_000, examples=[60])
+    travel_deg: tuple[Number, Number] | None = number(
+        None, "deg", range="rising, -90 to 90", examples=[[-20, 20]]
+    )
+
+    @model_validator(mode="after")
+    def _stops_are_in_order(self) -> Self:
+        if self.travel_deg is not None and not -90 <= self.travel_deg[0] < self.travel_deg[1] <= 90:
+            deny("stops out of order or range, allowed: [lower, upper] from -90 to 90 deg", "travel_deg")
+        return self
+
+    @property
+    def is_ideal(self) -> bool:
+        """No lag and no rate limit; the stops are always there."""
+        return self.bandwidth_rad_s == 0 and self.rate_limit_deg_s == 0
+
+
+PRESETS: dict[str, dict[str, float]] = {
+    "ideal": {},
+    "servo": {"bandwidth_rad_s": 20.0, "rate_limit_deg_s": 60.0},  # rates as in [SL03]
+}
+
+
+class Actuators(Section, extra="allow"):
+    """One set of dynamics a surface; a preset's name, or numbers beside the surfaces, stand for all."""
+
+    __pydantic_extra__: dict[str, ActuatorDynamics]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _expand(cls, given: Any) -> Any:
+        if isinstance(given, str):
+            given = PRESETS.get(given, given)
+        return _by_surface(given) if isinstance(given, dict) else given
+
+    @property
+    def is_ideal(self) -> bool:
+        """Whether no surface has a lag or a rate limit."""
+        return all(dynamics.is_ideal for _, dynamics in self)
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        mapping = handler.resolve_ref_schema(handler(core))
+        reference = mapping["additionalProperties"]
+        one = handler.resolve_ref_schema(reference)
+        mapping["properties"] = {**one["properties"], **dict.fromkeys(load().surfaces, reference)}
+        preset = {"enum": list(PRESETS), "type": "string", "description": "a preset"}
+        return {"anyOf": [preset, mapping]}
+
+
+def _by_surface(given: dict[str, Any]) -> dict[str, Any]:
+    """Numbers given for all surfaces become each surface's own, unless it has its own already."""
+    surfaces = checked_aircraft().surfaces
+    for_all = {key: value for key, value in given.items() if key in ActuatorDynamics.model_fields}
+    rest = {key: value for key, value in given.items() if key not in for_all}
+    known = (*ActuatorDynamics.model_fields, *surfaces)
+    wrong = [key for key in rest if key not in surfaces]
+    refuse_unknown(wrong, known)
+    own = {surface: rest.get(surface, {}) for surface in surfaces}
+    return {surface: {**for_all, **it} if isinstance(it, dict) else it for surface, it in own.items()}
+
+
+MAX_GUSTS = 100
+Wind = Annotated[Number, Field(ge=-100, le=100)]
+
+
+class Gust(Section):
+    """A one-minus-cosine gust: it rises, stays and fades as JSBSim's own does."""
+
+    at_s: Number = number(..., "s", "when it starts", ge=0, le=360_000, examples=[10])
+    velocity_mps: tuple[Wind, Wind, Wind] = number(
+        ..., "m/s", "at its height, towards north, east, down", examples=[[0, 0, -3]]
+    )
+    rise_s: Number = number(1.0, "s", "duration of the rise", gt=0, le=3600)
+    hold_s: Number = number(0.0, "s", "time at its height", ge=0, le=3600, examples=[2])
+    fade_s: Number = number(1.0, "s", "duration of the decay", gt=0, le=3600)
+
+    @property
+    def end_s(self) -> float:
+        """When it has faded."""
+        return self.at_s + self.rise_s + self.hold_s + self.fade_s
+
+
+def air_of(severity: str) -> dict[str, str]:
+    """`environment` with turbulence of a severity; or `none`."""
+    return {"turbulence": "none"} if severity == "none" else {"turbulence": "dryden", "severity": severity}
+
+
+def _one_or_several(given: Any) -> str:
+    return "several" if isinstance(given, list | tuple) else "one"
+
+
+Severity = Literal["light", "moderate", "severe"]
+
+
+def _no_severity(given: Any) -> Any:
+    """`turbulence: moderate` is what many write; say where that belongs."""
+    if given in get_args(Severity):
+        deny(f"{given!r} is a severity, allowed: none, or turbulence: dryden with severity: {given}")
+    return given
+
+
+class Environment(Section):
+    """The air."""
+
+    turbulence: Annotated[Literal["none", "dryden"], BeforeValidator(_no_severity)] = entry(
+        "none", "still air or Dryden turbulence", needs={"severity": "light"}, examples=["dryden"]
+    )
+    severity: Severity | None = entry(
+        None, "of the turbulence", needs={"turbulence": "dryden"}, examples=["light"]
+    )
+    wind_mps: tuple[Wind, Wind, Wind] = number(
+        (0.0, 0.0, 0.0), "m/s", "steady wind towards north, east, down", examples=[[5, 0, 0]]
+    )
+    gust: (
+        Annotated[
+            Annotated[Gust, Tag("one")]
+            | Annotated[tuple[Gust, ...], Tag("several"), Field(max_length=MAX_GUSTS)],
+            Discriminator(_one_or_several),
+        ]
+        | None
+    ) = entry(None, "a one-minus-cosine gust, or a list of them, each begun after the one before has faded")
+
+    @property
+    def gusts(self) -> tuple[Gust, ...]:
+        """Every gust, in the order in which they start."""
+        if self.gust is None:
+            return ()
+        return (self.gust,) if isinstance(self.gust, Gust) else self.gust
+
+    @property
+    def is_still(self) -> bool:
+        """Whether there is no wind, gust or turbulence."""
+        return self.turbulence == "none" and not any(self.wind_mps) and not self.gusts
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        turbulent = self.turbulence != "none"
+        if turbulent and self.severity is None:
+            deny("required key is missing, allowed: light, moderate, severe", "severity")
+        if self.severity is not None and not turbulent:
+            deny("has no meaning here, allowed: only with turbulence: dryden", "severity")
+        refuse(self._overlapping())
+        return self
+
+    def _overlapping(self) -> Iterator[Conflict]:
+        """JSBSim flies one gust at a time."""
+        for i, (early, late) in enumerate(pairwise(self.gusts), start=1):
+            if late.at_s < early.end_s:
+                allowed = f"allowed: {early.end_s:g} s or later"
+                yield ("gust", i, "at_s"), f"{late.at_s:g} is before the gust before it has faded, {allowed}"

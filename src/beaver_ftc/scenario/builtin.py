@@ -1,6 +1,16 @@
-"""Scenarios, sweeps and plans of evidence that come with the project, by name; none is checked here."""
+"""Scenario files as text: those that come with the project, by name, and a scenario back to text.
 
+Scenarios, sweeps and plans of evidence come with the project; none is checked here. A scenario is written
+complete and flyable again, or by section, a key to what was computed.
+"""
+
+import re
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
+
+import yaml
+from pydantic import BaseModel
 
 from beaver_ftc.documents.document import first_text
 from beaver_ftc.documents.errors import nearest
@@ -90,3 +100,59 @@ def has_key(path_or_name: str | Path, kind: str, key: str) -> bool:
 def looks_like_a_path(given: str) -> bool:
     """A built-in name has no folder and no dot."""
     return any(mark in given for mark in "/\\.")
+
+
+_MOST = 256
+_SEPARATORS = re.compile("[\x85\u2028\u2029]")
+_texts: dict[int, tuple[BaseModel, str]] = {}  # a section is kept, so its id stays its own
+
+
+class _Dumper(yaml.SafeDumper):
+    """Short mappings and lists of numbers on one line, no aliases."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
+def _is_leaf(value: Any) -> bool:
+    return not isinstance(value, dict | list)
+
+
+def _mapping(dumper: yaml.SafeDumper, mapping: dict[str, Any]) -> yaml.Node:
+    flow = bool(mapping) and all(map(_is_leaf, mapping.values())) and "description" not in mapping
+    return dumper.represent_mapping("tag:yaml.org,2002:map", mapping.items(), flow_style=flow)
+
+
+def _list(dumper: yaml.SafeDumper, items: list[Any]) -> yaml.Node:
+    return dumper.represent_sequence("tag:yaml.org,2002:seq", items, flow_style=all(map(_is_leaf, items)))
+
+
+def _text(dumper: yaml.SafeDumper, text: str) -> yaml.Node:
+    """Line separators of Unicode are escaped: as they are, they read back as a space."""
+    style = '"' if _SEPARATORS.search(text) else None
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
+
+
+_Dumper.add_representer(str, _text)
+_Dumper.add_representer(dict, _mapping)
+_Dumper.add_representer(list, _list)
+
+
+def to_yaml(scenario: BaseModel) -> str:
+    """The fully resolved scenario, every default written out; loading it again gives an equal one."""
+    data = scenario.model_dump(mode="json", exclude_none=True, by_alias=True)
+    return yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=110)
+
+
+def texts_of(scenario: BaseModel, sections: Iterable[str]) -> tuple[str, ...]:
+    """What sections hold. Flights of a sweep share those that do not vary, whose text is written once."""
+    return tuple(_text_of(getattr(scenario, name)) for name in sections)
+
+
+def _text_of(section: BaseModel) -> str:
+    known = _texts.get(id(section))
+    if known is None:
+        if len(_texts) >= _MOST:
+            _texts.clear()
+        known = _texts[id(section)] = section, section.model_dump_json()
+    return known[1]

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from math import inf
 from typing import Any, Self
 
+from beaver_ftc.scenario.diagnosis import failing
 from beaver_ftc.scenario.faults import DAMAGE, UNANTICIPATED, Damage, of_a_sensor
-from beaver_ftc.scenario.pairs import failing
 from beaver_ftc.scenario.sensors import sensor_words
-from beaver_ftc.scenario.timing import TIME_TOLERANCE_S, first_frame_s, is_before
+from beaver_ftc.scenario.signals import TIME_TOLERANCE_S, first_frame_s, is_before
 
 LOSS_OF_EFFECTIVENESS = "loss_of_effectiveness"
 _NOT_SIZE = {"actuator", "sensor", "type", "at_s", "end_s", "profile"}

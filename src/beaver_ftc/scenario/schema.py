@@ -1,6 +1,17 @@
-"""The scenario file as frozen, typed, strict sections; ranges are the contract's."""
+"""The scenario file as frozen, typed, strict sections, and how it is read; ranges are the contract's.
 
-from collections.abc import Mapping
+Contradictions between sections are looked for in a finished scenario and in a half-wrong file's data
+alike, so that a contradiction is reported along with the mistakes of the sections and not only after they
+are mended. What cannot be read is unknown, for instance because it is itself a mistake, and contradicts
+nothing.
+
+`load` takes a file, a built-in name or a mapping: every mistake at once, one line each.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
+from math import isfinite
+from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -17,31 +28,139 @@ from pydantic import (
     model_validator,
 )
 
-from beaver_ftc.aircraft import DEFAULT, Aircraft, UnknownAircraft, load
-from beaver_ftc.documents.document import Document, Flag, Number, Section, Whole, deny, entry, number, refuse
+from beaver_ftc.aircraft import DEFAULT, Aircraft, UnknownAircraft
+from beaver_ftc.aircraft import load as load_aircraft
+from beaver_ftc.documents.document import (
+    Conflict,
+    Document,
+    Flag,
+    Number,
+    Problem,
+    Section,
+    Whole,
+    deny,
+    entry,
+    number,
+    refuse,
+)
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.documents.validation import UnusableKeyError, parse_key, plain, validate, with_values
-from beaver_ftc.scenario.actuators import Actuators
+from beaver_ftc.documents.validation import (
+    ScenarioError,
+    UnusableKeyError,
+    parse_document,
+    parse_key,
+    plain,
+    validate,
+    with_values,
+)
 from beaver_ftc.scenario.airframe import (
+    Actuators,
+    Environment,
+    Initial,
     Ratio,
     Ratios,
     aircraft_called,
     checked_against,
     checked_aircraft,
+    default_initial,
     find_aircraft,
     folder_of,
+    given_initial,
+    initial_schema,
     known_aircraft,
 )
-from beaver_ftc.scenario.autopilot import Autopilot
-from beaver_ftc.scenario.consistency import DURATION_S, RATE_HZ, conflicts
-from beaver_ftc.scenario.control import ControlConfig, Law
-from beaver_ftc.scenario.diagnosis import BoundedSensors, FdiConfig, Scheme
-from beaver_ftc.scenario.environment import Environment
+from beaver_ftc.scenario.builtin import read_file, resolve
+from beaver_ftc.scenario.diagnosis import (
+    BoundedSensors,
+    ControlConfig,
+    FdiConfig,
+    Law,
+    Scheme,
+    changes_refused,
+)
 from beaver_ftc.scenario.faults import MOST_FAULTS, Fault, FaultType, Nameable
-from beaver_ftc.scenario.initial import Initial, default_initial, given_initial, initial_schema
-from beaver_ftc.scenario.pairs import changes_refused
 from beaver_ftc.scenario.sensors import Sensors
-from beaver_ftc.scenario.signals import Reference
+from beaver_ftc.scenario.signals import Autopilot, Reference
+
+DURATION_S = 30.0
+RATE_HZ = 100.0
+OF_A_FAULT = (
+    "detected_within_s", "isolated_as", "isolated_type", "candidate_type", "isolated_within_s",
+    "post_fault_rms_deg_s",
+)  # fmt: skip
+# What can be expected of a profile, below `expect`, and the channel of the autopilot it is of.
+_OF_A_PROFILE: dict[tuple[str, ...], str] = {
+    ("altitude_within_m",): "altitude_m",
+    ("airspeed_within_mps",): "airspeed_mps",
+    ("airspeed_within_limits_mps",): "airspeed_mps",
+    ("heading_within_deg",): "heading_deg",
+    **{("arrives", channel): channel for channel in ("altitude_m", "airspeed_mps", "heading_deg")},
+}
+
+Instants = Sequence[float | None]
+
+
+def conflicts(said: Mapping[str, Any]) -> Iterator[Conflict]:
+    """Every contradiction, at the key to change. said: sections by name, faults and changes as they are,
+    others as mappings."""
+    duration_s = _positive(said.get("duration_s", DURATION_S))
+    rate_hz = _positive(said.get("rate_hz", RATE_HZ))
+    faults_s, changes_s = (_instants(said.get(section, [])) for section in ("faults", "changes"))
+    if duration_s and rate_hz and duration_s * rate_hz < 1:
+        yield ("duration_s",), f"{duration_s:g} is less than one frame, allowed: at least {1 / rate_hz:g} s"
+    yield from _too_late("faults", faults_s or (), duration_s)
+    yield from _too_late("changes", changes_s or (), duration_s)
+    yield from _out_of_order(changes_s or ())
+    expect, autopilot = said.get("expect"), said.get("autopilot")
+    if faults_s is not None and not faults_s:
+        yield from _expected_of_no_fault(expect)
+    if isinstance(autopilot, Mapping | None):
+        yield from _expected_of_no_profile(expect, autopilot or {})
+
+
+def _too_late(section: str, starts_s: Instants, end_s: float | None) -> Iterator[Conflict]:
+    for i, at_s in enumerate(starts_s):
+        if at_s and end_s and at_s >= end_s:
+            allowed = f"allowed: earlier than duration_s, {end_s:g} s"
+            yield (section, i, "at_s"), f"{at_s:g} is after the end, {allowed}"
+
+
+def _out_of_order(changes_s: Instants) -> Iterator[Conflict]:
+    """Changes stand in the order in which they come, so that a reader need not sort them."""
+    for i, (early, late) in enumerate(pairwise(changes_s), start=1):
+        if early and late and late <= early:
+            allowed = f"allowed: later than {early:g} s"
+            yield ("changes", i, "at_s"), f"{late:g} is not after the change before it, {allowed}"
+
+
+def _expected_of_no_fault(expect: Any) -> Iterator[Conflict]:
+    for key in expect if isinstance(expect, Mapping) else ():
+        if key in OF_A_FAULT and expect[key] is not None:
+            yield ("expect", key), "there is no fault to expect it of, allowed: only with faults"
+
+
+def _expected_of_no_profile(expect: Any, autopilot: Mapping[str, Any]) -> Iterator[Conflict]:
+    for path, channel in _OF_A_PROFILE.items():
+        expected = expect
+        for key in path:
+            expected = expected.get(key) if isinstance(expected, Mapping) else None
+        if expected is not None and not autopilot.get(channel):
+            says = f"there is no profile to expect it of, allowed: only with autopilot.{channel}"
+            yield ("expect", *path), says
+
+
+def _instants(given: Any) -> Instants | None:
+    """`at_s` of each entry of a list, None where it is no positive number."""
+    if not isinstance(given, list | tuple):
+        return None
+    return [_positive(e.get("at_s") if isinstance(e, dict) else getattr(e, "at_s", None)) for e in given]
+
+
+def _positive(value: Any) -> float | None:
+    """The value if it is a positive finite number."""
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return float(value) if number and 0 < value <= 1e9 and isfinite(value) else None
+
 
 NAME_PATTERN = r"^[A-Za-z0-9_-]+$"
 MOST_NAMES = 20  # of a flight: as many surfaces as an aircraft may have
@@ -287,7 +406,7 @@ class Scenario(Section, title="beaver-ftc scenario"):
         try:
             aircraft = aircraft_called(reference, folder_of(info))
         except UnknownAircraft:
-            aircraft, reference = load(), None
+            aircraft, reference = load_aircraft(), None
         with checked_against(aircraft, reference):
             scenario = read(given)
         if isinstance(given, dict):
@@ -327,3 +446,48 @@ class Scenario(Section, title="beaver-ftc scenario"):
 def json_schema() -> dict[str, Any]:
     """The JSON Schema of a scenario file, for editors; descriptions and units of every key are in it."""
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **Scenario.model_json_schema()}
+
+
+UNNAMED = "unnamed"
+
+ScenarioLike = Scenario | str | PathLike[str] | Mapping[str, Any]
+
+
+def load(scenario: ScenarioLike) -> Scenario:
+    """The scenario of a built-in name, a file's path or a mapping; a Scenario is returned as it is.
+
+    A mapping has the keys of a scenario file, `name` may be left out; its CSV files are in the working
+    directory. Raises BadInput with one line a mistake.
+    """
+    if isinstance(scenario, Scenario):
+        return scenario
+    if isinstance(scenario, Mapping):
+        return validate_scenario(Document({"name": UNNAMED, **plain(scenario)}), folder=Path())
+    if isinstance(scenario, str | PathLike):
+        return load_scenario(Path(scenario) if isinstance(scenario, PathLike) else scenario)
+    raise BadInput(f"{scenario!r:.60} is no scenario, allowed: a built-in name, a path or a mapping")
+
+
+def load_scenario(path_or_name: str | Path) -> Scenario:
+    """The scenario in a file or of a built-in name. Raises ScenarioError with one line a mistake."""
+    path = resolve(path_or_name)
+    return load_text(read_file(path, str(path_or_name)), source=str(path), folder=path.parent)
+
+
+def load_text(text: str, source: str = "<text>", folder: Path | None = None) -> Scenario:
+    """The scenario in a text; `source` begins its error lines, `folder` is where its CSV files are."""
+    document = parse_document(text, source)
+    if is_of_a_sweep(document.data):
+        says = f"this is a sweep file, allowed: a scenario; `beaver-ftc sweep {source}` flies it"
+        raise ScenarioError(source, [Problem(document.line(("base",)), ("base",), says)])
+    return validate_scenario(document, source, folder)
+
+
+def is_of_a_sweep(data: dict[str, Any]) -> bool:
+    """Whether a file's keys are those of a sweep: a base, and what becomes of it."""
+    return "base" in data and not {"runs", "vary", "set", "expect"}.isdisjoint(data)
+
+
+def validate_scenario(document: Document, source: str = "", folder: Path | None = None) -> Scenario:
+    """The scenario in a document; without a source its error lines begin with the key."""
+    return validate(Scenario, document, source, folder, conflicts)

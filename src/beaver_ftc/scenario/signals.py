@@ -1,34 +1,83 @@
-"""The shapes a body-rate reference can have, and their values in time.
+"""What is to be flown in time: body rates (`reference:`) and the flight path (`autopilot:`); and instants as
+frames.
 
-One class a kind: its parameters and `rate_deg_s(t_s)`. tau = t - start_s; every signal but the table is zero
-before `start_s` and, but for the ramp, from `end_s` on. A new kind is a class here and a line in `Signal`.
+Body rates: one class a kind, its parameters and `rate_deg_s(t_s)`. tau = t - start_s; every signal but the
+table is zero before `start_s` and, but for the ramp, from `end_s` on. A new kind is a class here and a
+line in `Signal`. A table comes from a CSV file: of bounded size, in the scenario's own folder, time
+increasing.
 
-A table comes from a CSV file: of bounded size, in the scenario's own folder, time increasing.
+The flight path: altitude, airspeed, heading or bank in time, a list of legs each.
 """
 
 import csv as csv_files
-from collections.abc import Sequence
-from functools import lru_cache
+from collections.abc import Iterator, Sequence
+from functools import lru_cache, partial
 from itertools import pairwise
-from math import isfinite, pi
+from math import ceil, exp, inf, isfinite, pi
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
-from pydantic import ConfigDict, ValidationInfo, model_validator
+from pydantic import BeforeValidator, ConfigDict, ValidationInfo, create_model, model_validator
 
-from beaver_ftc.documents.document import Number, Section, deny, entry, number, order_conflicts, refuse
+from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.aircraft.aircraft import THRUST_TERM
+from beaver_ftc.documents.document import (
+    Conflict,
+    Flag,
+    Number,
+    Section,
+    deny,
+    entry,
+    number,
+    order_conflicts,
+    refuse,
+)
 from beaver_ftc.documents.files import UnreadableError, inside, read_text
-from beaver_ftc.scenario.airframe import folder_of
-from beaver_ftc.scenario.timing import TIME_TOLERANCE_S
+from beaver_ftc.scenario.airframe import airspeeds_of, checked_aircraft, folder_of, highest_of
 
-if TYPE_CHECKING:  # imported where values in time are computed: to check a file takes none
+if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
     Samples = NDArray[np.float64]
 
+
+# Frame times are k / rate_hz in floating point: what happens at t is in force in the first frame whose time
+# is not before t - TIME_TOLERANCE_S.
+TIME_TOLERANCE_S = 1e-9
+
+MEAN_S = 10.0  # time constant of the mean by which airspeed and arrival are judged: a gust passes faster
+
+
+def is_before(t_s: Any, at_s: float) -> Any:
+    """Whether a time (or each of several) is before that instant, by more than rounding."""
+    return t_s < at_s - TIME_TOLERANCE_S
+
+
+def is_in_force(fault: Any, t_s: Any) -> Any:
+    """Whether a fault is there at a time, or at each of several: begun, and neither repaired nor over."""
+    ends_s = inf if fault.end_s is None else fault.end_s
+    return (t_s >= fault.at_s - TIME_TOLERANCE_S) & is_before(t_s, ends_s)
+
+
+def grown_share(fault: Any, t_s: float) -> float:
+    """B(t - T0), 0 to 1: how far a fault that has begun has grown [Zhang2005]."""
+    if fault.profile != "incipient":
+        return 1.0
+    return 1.0 - exp(-fault.kappa_per_s * max(0.0, t_s - fault.at_s))
+
+
+def frame_of(time_s: float, rate_hz: float) -> int:
+    """The first frame k whose time k / rate_hz is not before time_s."""
+    return ceil((time_s - TIME_TOLERANCE_S) * rate_hz)
+
+
+def first_frame_s(time_s: float, rate_hz: float) -> float:
+    """Time, s, of that frame."""
+    return frame_of(time_s, rate_hz) / rate_hz
+
+
 RAD_PER_DEG = pi / 180.0
-"""Frame times are k / rate in floating point: a signal starts on the frame its start names."""
 
 _LATEST_S = 360_000.0
 
@@ -342,3 +391,120 @@ def sample_deg_s(reference: Reference, t_s: "Samples") -> "Samples":
     still = np.zeros_like(t_s)
     axes = [sum((item.shape.rate_deg_s(t_s) for item in axis), still) for _, axis in reference]
     return np.column_stack(axes)
+
+
+MAX_LEGS = 100
+
+
+class _Leg(Section):
+    """From a time on: a value, or hold what is flown."""
+
+    at_s: Number = number(0.0, "s", "from when on", ge=0, le=_LATEST_S, examples=[10])
+    hold: Flag = entry(False, "true: hold what is flown or commanded at that time")
+    value: Number | None = None
+
+    @model_validator(mode="after")
+    def _either_hold_or_value(self) -> Self:
+        if self.hold and self.value is not None:
+            deny("contradicts value, allowed: one of the two", "hold")
+        if not self.hold and self.value is None:
+            deny("required key is missing, allowed: value, or hold: true", "value")
+        return self
+
+
+class AltitudeLeg(_Leg):
+    """An altitude, reached at a steady climb or descent."""
+
+    value: Number | None = number(None, "m", "altitude above sea level", ge=-300, le=6000, examples=[1900])
+    climb_mps: Number = number(2.5, "m/s", "how fast the command goes there", gt=0, le=10)
+
+
+class AirspeedLeg(_Leg):
+    """An airspeed."""
+
+    value: Number | None = number(None, "m/s", "true airspeed", ge=20, le=70, examples=[45])
+    change_mps2: Number = number(0.2, "m/s2", "how fast the command goes there", gt=0, le=5)
+
+
+class HeadingLeg(_Leg):
+    """A true heading, by the shorter turn."""
+
+    value: Number | None = number(None, "deg", "true heading", ge=-360, le=360, examples=[90])
+
+
+class BankLeg(_Leg):
+    """A bank angle, right wing down positive."""
+
+    value: Number | None = number(None, "deg", "bank angle", ge=-45, le=45, examples=[20])
+
+
+@lru_cache
+def _wide(kind: type[_Leg]) -> type[_Leg]:
+    """A leg of any value."""
+    keys: dict[str, Any] = {"value": (Number | None, number(None, "as said"))}
+    return create_model(kind.__name__, __base__=kind, __doc__=kind.__doc__, **keys)
+
+
+def _checked(kind: type[_Leg], given: Any) -> Any:
+    """A leg whose value the aircraft in question can be asked for."""
+    if isinstance(given, kind):
+        return given
+    leg, aircraft = _wide(kind).model_validate(given), checked_aircraft()
+    low, high = (-300.0, highest_of(aircraft)) if kind is AltitudeLeg else airspeeds_of(aircraft)
+    if leg.value is not None and not low <= leg.value <= high:
+        says = str(kind.model_fields["value"].description)
+        deny(f"{leg.value:g} is out of range, allowed: a number from {low:g} to {high:g} ({says})", "value")
+    return kind.model_construct(leg.model_fields_set, **dict(leg))
+
+
+def channels_of(aircraft: Aircraft) -> tuple[str, ...]:
+    """What can be flown with an aircraft."""
+    by = aircraft.airspeed_by
+    refused = {"power": (), "pitch": ("altitude_m",), "": ("airspeed_mps",)}[by]
+    return tuple(name for name in Autopilot.model_fields if name not in refused)
+
+
+def _legs(says: str) -> Any:
+    return entry((), says, max_length=MAX_LEGS)
+
+
+class Autopilot(Section):
+    """The profile to fly; a channel left out is left to the reference and the trim."""
+
+    altitude_m: tuple[Annotated[AltitudeLeg, BeforeValidator(partial(_checked, AltitudeLeg))], ...] = _legs(
+        "altitude in time"
+    )
+    airspeed_mps: tuple[Annotated[AirspeedLeg, BeforeValidator(partial(_checked, AirspeedLeg))], ...] = _legs(
+        "true airspeed in time, by engine power; by pitch where there is none"
+    )
+    heading_deg: tuple[HeadingLeg, ...] = _legs("true heading in time")
+    bank_deg: tuple[BankLeg, ...] = _legs("bank angle in time")
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        refuse(self._conflicts())
+        return self
+
+    def _conflicts(self) -> Iterator[Conflict]:
+        for name, legs in self:
+            for i, (before, leg) in enumerate(pairwise(legs), start=1):
+                if leg.at_s <= before.at_s:
+                    says = f"{leg.at_s:g} is not after {before.at_s:g}, allowed: legs in order"
+                    yield (name, i, "at_s"), says
+        if self.heading_deg and self.bank_deg:
+            yield ("bank_deg",), "contradicts heading_deg, allowed: one of the two"
+        aircraft = checked_aircraft()
+        known = channels_of(aircraft)
+        why = {
+            "airspeed_mps": f"the file of {aircraft.name} does not say what thrust does (no engine.thrust, "
+            f"and no term {THRUST_TERM} among its forces), so no airspeed can be held",
+            "altitude_m": f"{aircraft.name} has no steady thrust, so it glides: no altitude can be held",
+        }
+        for name in self.channels:
+            if name not in known:
+                yield (name,), f"{why[name]}, allowed: {', '.join(known)}"
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The channels with something to fly."""
+        return tuple(name for name, legs in self if legs)

@@ -47,8 +47,7 @@ from beaver_ftc.scenario.builtin import (
     read_file,
     resolve,
 )
-from beaver_ftc.scenario.loader import load_scenario
-from beaver_ftc.scenario.schema import NAME_PATTERN, Scenario
+from beaver_ftc.scenario.schema import NAME_PATTERN, Scenario, load_scenario
 
 MAX_RUNS = 10_000_000
 Sampling = Literal["random", "grid", "lhs", "sobol"]

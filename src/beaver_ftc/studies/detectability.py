@@ -26,6 +26,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.aircraft import load
+from beaver_ftc.commands import AirspeedsOption, AltitudesOption, Reporter, ScenarioArgument, StudyCommand
 from beaver_ftc.control.engines import effects_of as effects_of_engines
 from beaver_ftc.design.model import AXES, N_Y, both_responses
 from beaver_ftc.design.variants import design_of
@@ -35,16 +36,8 @@ from beaver_ftc.plant.instrumented import ENGINE_SIGNALS
 from beaver_ftc.results.log import Columns
 from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.airframe import find_aircraft
-from beaver_ftc.scenario.loader import load_scenario
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.schema import Scenario, load_scenario
 from beaver_ftc.studies import isolability
-from beaver_ftc.studies.engine.command import (
-    AirspeedsOption,
-    AltitudesOption,
-    Reporter,
-    ScenarioArgument,
-    StudyCommand,
-)
 from beaver_ftc.studies.engine.statistics import quantile
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.present.figures import heat_map, label_edges, panels

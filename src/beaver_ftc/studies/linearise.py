@@ -6,9 +6,9 @@ from typing import Annotated
 
 import typer
 
-from beaver_ftc.scenario.loader import load
+from beaver_ftc.commands import Document, Reporter, StudyCommand
+from beaver_ftc.scenario.schema import load
 from beaver_ftc.studies import handling, margins
-from beaver_ftc.studies.engine.command import Document, Reporter, StudyCommand
 
 
 @dataclass(frozen=True)

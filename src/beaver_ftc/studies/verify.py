@@ -19,6 +19,7 @@ import typer
 
 from beaver_ftc import __version__
 from beaver_ftc.aircraft import AXES, load
+from beaver_ftc.commands import Reporter, StudyCommand, WorkersOption
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.loop.outcome import Landing
@@ -26,8 +27,7 @@ from beaver_ftc.results.metrics import fault_free_s
 from beaver_ftc.scenario.faults import LossOfEffectiveness
 from beaver_ftc.scenario.judgement import Truth, is_late
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.scenario.timing import grown_share
-from beaver_ftc.studies.engine.command import Reporter, StudyCommand, WorkersOption
+from beaver_ftc.scenario.signals import grown_share
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial_upper, poisson_bound, share_within
 from beaver_ftc.studies.engine.store import UNREADABLE, Parts, RowsAsJson, fingerprint, set_aside, write_whole
 from beaver_ftc.studies.engine.study import GO_ON, Batches, Progress

@@ -20,7 +20,7 @@ from beaver_ftc.diagnosis.belief import air
 from beaver_ftc.diagnosis.belief.air import AIR
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.scenario.diagnosis import Bounds
-from beaver_ftc.scenario.loader import load as load_given
+from beaver_ftc.scenario.schema import load as load_given
 from flying import declared_in, scenario
 
 ROOT = Path(__file__).resolve().parents[3]

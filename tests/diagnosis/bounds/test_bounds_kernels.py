@@ -11,7 +11,7 @@ from beaver_ftc.design.model import design_record, inertia_coefficients
 from beaver_ftc.diagnosis.bounds import admitted
 from beaver_ftc.diagnosis.bounds.worst_case import admitted_dtype
 from beaver_ftc.scenario.declared import SensorErrors
-from beaver_ftc.scenario.loader import load as scenario
+from beaver_ftc.scenario.schema import load as scenario
 from flying import declared_in
 
 AIRCRAFT = load()

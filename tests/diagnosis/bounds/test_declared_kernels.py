@@ -7,7 +7,7 @@ from beaver_ftc.aircraft import load
 from beaver_ftc.design.dryden import SCALE_FT, Dryden
 from beaver_ftc.design.model import design_record
 from beaver_ftc.diagnosis.bounds.variances import gust_effect, model_error, variances_of
-from beaver_ftc.scenario.actuators import Actuators
+from beaver_ftc.scenario.airframe import Actuators
 from beaver_ftc.scenario.diagnosis import Bounds
 from flying import declared_in
 

@@ -142,7 +142,7 @@ def test_poles_for_noise_give_the_greatest_excess():
 
 def test_errors_that_have_no_bound_cannot_be_declared():
     from beaver_ftc.documents.validation import ScenarioError
-    from beaver_ftc.scenario.loader import load_text
+    from beaver_ftc.scenario.schema import load_text
 
     with pytest.raises(ScenarioError, match=r"fdi\.bounds\.sensors\.p"):
         load_text("name: x\nfdi: {bounds: {sensors: {p: {delay_s: 0.1}}}}\n")

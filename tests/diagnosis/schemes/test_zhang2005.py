@@ -12,7 +12,7 @@ from beaver_ftc.diagnosis.isolation import estimators
 from beaver_ftc.diagnosis.isolation.estimators import isolation_dtype
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plugins import DETECTORS, options_of, settings
-from beaver_ftc.scenario.loader import load_text
+from beaver_ftc.scenario.schema import load_text
 from flying import PUBLISHED_UNCERTAINTY, flown, loss, scenario
 
 SCHEME = {"scheme": "zhang2005", "thresholds": "published"}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.loop.loop import fly
-from beaver_ftc.scenario.loader import load_scenario
+from beaver_ftc.scenario.schema import load_scenario
 from beaver_ftc.studies.bench import measure
 from beaver_ftc.studies.bench.contenders import (
     Bare,

@@ -13,7 +13,7 @@ import beaver_ftc as bf
 from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.model import Metrics
-from beaver_ftc.scenario.undeclared import undeclared
+from beaver_ftc.scenario.declared import undeclared
 from beaver_ftc.studies.decay.errors import errors_of
 from beaver_ftc.studies.decay.shown import as_text, sentences
 from beaver_ftc.studies.decay.survey import (

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from beaver_ftc.scenario.control import EnginePower
+from beaver_ftc.scenario.diagnosis import EnginePower
 from beaver_ftc.studies.matrix.command import Matrix
 from beaver_ftc.studies.matrix.pitch_lost import (
     LAWS,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
-from beaver_ftc.scenario.control import EnginePower
+from beaver_ftc.scenario.diagnosis import EnginePower
 from beaver_ftc.studies.matrix import pitch_lost
 from beaver_ftc.studies.matrix.pitch_lost import (
     FILES,

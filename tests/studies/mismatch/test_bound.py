@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from beaver_ftc.results.model import Metrics
-from beaver_ftc.scenario.loader import load_scenario
+from beaver_ftc.scenario.schema import load_scenario
 from beaver_ftc.studies.mismatch import bound
 from beaver_ftc.studies.mismatch.bound import (
     PUBLISHED_CASE,

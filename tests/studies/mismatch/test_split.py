@@ -10,7 +10,7 @@ from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.configure import configure
 from beaver_ftc.plant.state import FlightState
 from beaver_ftc.scenario.builtin import builtin_names
-from beaver_ftc.scenario.loader import load_scenario
+from beaver_ftc.scenario.schema import load_scenario
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.mismatch.split import split
 from beaver_ftc.studies.mismatch.study import tally_of_flight, variant_of

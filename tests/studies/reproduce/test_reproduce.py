@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 from beaver_ftc.cli.main import app
 from beaver_ftc.results.style import LOOKS
-from beaver_ftc.scenario.loader import load_scenario
+from beaver_ftc.scenario.schema import load_scenario
 from beaver_ftc.studies.reproduce import (
     beside,
     cases,

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from beaver_ftc.documents.errors import BeaverFtcError
-from beaver_ftc.scenario.loader import load
+from beaver_ftc.scenario.schema import load
 from beaver_ftc.studies.matrix.fault_matrix import FAULTS, FaultCase, airspeeds_of, fly_case
 from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc_aircraft.derive.first_use import derive_if_needed

@@ -5,7 +5,7 @@ import numpy as np
 from beaver_ftc.control.laws.gains import RATIO
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.loop.readout import FrameReadout
-from beaver_ftc.scenario.loader import load
+from beaver_ftc.scenario.schema import load
 from beaver_ftc.studies.margins import study
 from beaver_ftc.studies.present.tables import markdown_table
 

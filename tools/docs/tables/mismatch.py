@@ -6,7 +6,7 @@ import sys
 import tempfile
 
 from beaver_ftc.aircraft import AXES
-from beaver_ftc.scenario.loader import load
+from beaver_ftc.scenario.schema import load
 from beaver_ftc.studies.mismatch.linear import analyse, linear_document
 from beaver_ftc.studies.present.tables import markdown_table
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.scenario.loader import load_scenario
+from beaver_ftc.scenario.schema import load_scenario
 from beaver_ftc.scenario.sweeps import load_sweep
 from beaver_ftc.studies.decay.shown import HEAD, cells, sentences
 from beaver_ftc.studies.decay.survey import TOGETHER, run_decay

@@ -4,7 +4,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from beaver_ftc.scenario.loader import load_scenario
+from beaver_ftc.scenario.schema import load_scenario
 from beaver_ftc.studies.detectability import run_survey
 from beaver_ftc.studies.present.tables import markdown_table
 

@@ -24,7 +24,7 @@ from beaver_ftc.control.outer.thrust import gained, look_up, power_for, thrust_p
 from beaver_ftc.control.power import ceiling
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
-from beaver_ftc.scenario.timing import MEAN_S, TIME_TOLERANCE_S
+from beaver_ftc.scenario.signals import MEAN_S, TIME_TOLERANCE_S
 
 MOST_PATH_RAD = 0.15
 MOST_SIDESLIP_RAD = 0.14

@@ -12,7 +12,7 @@ from beaver_ftc.design.model import inertia_coefficients
 from beaver_ftc.design.terms import AIRSPEED, PH, QH, RH
 from beaver_ftc.design.variants import coefficient_slopes, jacobian
 from beaver_ftc.diagnosis.bounds.admitted import inertia_slack
-from beaver_ftc.scenario.actuators import Actuators
+from beaver_ftc.scenario.airframe import Actuators
 from beaver_ftc.scenario.declared import Declared, SensorErrors
 
 _GYRO_OF = dict(zip(RATE_SIGNALS, AXES, strict=True))

@@ -12,11 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 from pydantic import Discriminator, Field, Tag
 
 from beaver_ftc.scenario.airframe import among, checked_aircraft
-from beaver_ftc.scenario.faults.base import SurfaceFault
-from beaver_ftc.scenario.faults.damage import Damage
-from beaver_ftc.scenario.faults.sensors import AnySensorFault, SensorFault, fault_name
-from beaver_ftc.scenario.faults.surfaces import Bias, LossOfEffectiveness, Unanticipated
-from beaver_ftc.scenario.sensors import sensor_words, sensors_there
+from beaver_ftc.scenario.faults.base import Bias, Damage, LossOfEffectiveness, SurfaceFault, Unanticipated
+from beaver_ftc.scenario.sensors import AnySensorFault, SensorFault, fault_name, sensor_words, sensors_there
 
 __all__ = [
     "DAMAGE", "HEALTHY", "HOLDING", "MOST_FAULTS", "SENSOR_TYPES", "TYPES", "UNANTICIPATED", "Bias", "Damage",

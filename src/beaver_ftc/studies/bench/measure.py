@@ -13,13 +13,13 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
+from beaver_ftc.commands import Reporter, StudyCommand
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.plant import addresses, conditions
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.model import Document
-from beaver_ftc.scenario.loader import load_scenario
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.schema import Scenario, load_scenario
 from beaver_ftc.scenario.sweeps import Sweep, load_sweep
 from beaver_ftc.studies.bench.contenders import (
     Bare,
@@ -33,7 +33,6 @@ from beaver_ftc.studies.bench.contenders import (
 )
 from beaver_ftc.studies.bench.parts import PARTS, frame_with
 from beaver_ftc.studies.bench.straightforward import Straightforward
-from beaver_ftc.studies.engine.command import Reporter, StudyCommand
 from beaver_ftc.studies.engine.workers import cores, environment
 from beaver_ftc.studies.sweep.one_flight import row_of, scenario_of
 from beaver_ftc.studies.sweep.sampling import Plan

@@ -12,8 +12,8 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.results.model import Document
+from beaver_ftc.scenario.airframe import air_of
 from beaver_ftc.scenario.declared import Declared
-from beaver_ftc.scenario.environment import air_of
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sensors import PRESETS
 

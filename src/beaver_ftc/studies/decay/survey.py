@@ -15,15 +15,14 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 import typer
 
+from beaver_ftc.commands import Reporter, ScenarioArgument, StudyCommand, WorkersOption
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import measure, versions
 from beaver_ftc.results.model import Document, Metrics
-from beaver_ftc.scenario.loader import load_scenario
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.schema import Scenario, load_scenario
 from beaver_ftc.studies.decay.errors import Error, changes_of, errors_of
 from beaver_ftc.studies.decay.shown import FILES, as_text
-from beaver_ftc.studies.engine.command import Reporter, ScenarioArgument, StudyCommand, WorkersOption
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial, quantile, quantile_bound
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.present.tables import finite

@@ -7,14 +7,8 @@ from typing import Annotated
 import typer
 
 from beaver_ftc.aircraft import DEFAULT
+from beaver_ftc.commands import AirspeedsOption, Document, Reporter, StudyCommand, TurbulenceName
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.studies.engine.command import (
-    AirspeedsOption,
-    Document,
-    Reporter,
-    StudyCommand,
-    TurbulenceName,
-)
 from beaver_ftc.studies.matrix import fault_matrix
 from beaver_ftc.studies.matrix import pitch_lost as lost
 

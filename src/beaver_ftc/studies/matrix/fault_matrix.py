@@ -20,12 +20,10 @@ from beaver_ftc.plant.trim import trim
 from beaver_ftc.results.metrics import as_json, measure
 from beaver_ftc.results.model import Document, Metrics
 from beaver_ftc.results.style import CRIMSON, VERMILION
-from beaver_ftc.scenario.airframe import find_aircraft
-from beaver_ftc.scenario.environment import air_of
+from beaver_ftc.scenario.airframe import air_of, find_aircraft, initial_of
 from beaver_ftc.scenario.faults import TYPES
-from beaver_ftc.scenario.initial import initial_of
-from beaver_ftc.scenario.loader import load as load_scenario
 from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.schema import load as load_scenario
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.matrix.clairvoyant import columns_of, seen_when_told
 from beaver_ftc.studies.present.figures import heat_map, panels

@@ -19,8 +19,9 @@ from beaver_ftc.plant.trim import trim
 from beaver_ftc.results.log import Columns
 from beaver_ftc.results.metrics import as_json, metrics
 from beaver_ftc.results.model import Document
-from beaver_ftc.scenario.control import EnginePower
-from beaver_ftc.scenario.schema import Initial, Scenario
+from beaver_ftc.scenario.airframe import Initial
+from beaver_ftc.scenario.diagnosis import EnginePower
+from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.linear_systems import zeros
 from beaver_ftc.studies.matrix.fault_matrix import AIRSPEEDS_MPS, AT_S, REFERENCE, UNCERTAINTY, trimmed_deg

@@ -7,8 +7,7 @@ from typing import Any
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.judgement import Truth
-from beaver_ftc.scenario.loader import load_scenario
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.schema import Scenario, load_scenario
 from beaver_ftc.studies.mismatch.split import Tally, tally_of_flight
 
 PUBLISHED_CASE = "elevator-partial-loss"

@@ -50,10 +50,10 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.design.fdc import GEOMETRY, SURFACES, TRAVEL
 from beaver_ftc.design.model import InertiaCoefficients, inertial
 from beaver_ftc.plant.state import START_LATITUDE_DEG
-from beaver_ftc.scenario.actuators import ActuatorDynamics
+from beaver_ftc.scenario.airframe import ActuatorDynamics
 from beaver_ftc.scenario.faults import UNANTICIPATED, place_of
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.scenario.timing import grown_share, is_before, is_in_force
+from beaver_ftc.scenario.signals import grown_share, is_before, is_in_force
 from beaver_ftc.studies.mismatch.models import (
     ENGINE_TERMS,
     MOMENT_TERMS,

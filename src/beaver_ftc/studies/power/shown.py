@@ -12,10 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from beaver_ftc.results.metrics import as_json
-from beaver_ftc.results.model import Document
-from beaver_ftc.results.style import SERIES
-from beaver_ftc.studies.engine.command import (
+from beaver_ftc.commands import (
     AirspeedOption,
     AltitudeOption,
     Reporter,
@@ -24,6 +21,9 @@ from beaver_ftc.studies.engine.command import (
     WorkersOption,
     listed,
 )
+from beaver_ftc.results.metrics import as_json
+from beaver_ftc.results.model import Document
+from beaver_ftc.results.style import SERIES
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.power import probabilities, survey
 from beaver_ftc.studies.power.probabilities import (

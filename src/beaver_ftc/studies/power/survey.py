@@ -16,8 +16,7 @@ from beaver_ftc.aircraft import DEFAULT
 from beaver_ftc.diagnosis.bounds.clairvoyant import Whitening
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.plugins import DETECTORS, is_compiled, refusal, registered
-from beaver_ftc.scenario.airframe import find_aircraft
-from beaver_ftc.scenario.environment import air_of
+from beaver_ftc.scenario.airframe import air_of, find_aircraft
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.compare import replay
 from beaver_ftc.studies.compare.replay import Recording, Trace

@@ -10,9 +10,9 @@ from typing import Annotated, Any
 
 import typer
 
+from beaver_ftc.commands import Reporter, StudyCommand
 from beaver_ftc.results.metrics import as_json, versions
 from beaver_ftc.results.model import Document
-from beaver_ftc.studies.engine.command import Reporter, StudyCommand
 from beaver_ftc.studies.engine.study import Progress, Study, fly_all, run_study
 from beaver_ftc.studies.present.page import Makers
 from beaver_ftc.studies.present.tables import finite

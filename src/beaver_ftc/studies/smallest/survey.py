@@ -18,17 +18,16 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 import typer
 
+from beaver_ftc.commands import Reporter, ScenarioArgument, StudyCommand, WorkersOption
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import measure, versions
 from beaver_ftc.results.model import Document
 from beaver_ftc.results.writer import result_folder
 from beaver_ftc.scenario.declared import Declared
-from beaver_ftc.scenario.loader import load_scenario
-from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.scenario.timing import TIME_TOLERANCE_S
+from beaver_ftc.scenario.schema import Scenario, load_scenario
+from beaver_ftc.scenario.signals import TIME_TOLERANCE_S
 from beaver_ftc.studies.detectability import SETTLED_S
-from beaver_ftc.studies.engine.command import Reporter, ScenarioArgument, StudyCommand, WorkersOption
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial
 from beaver_ftc.studies.engine.study import FlyRound, Study, in_rounds
 from beaver_ftc.studies.present.page import contents, write_files

@@ -22,7 +22,7 @@ from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFail
 from beaver_ftc.results.log import Columns
 from beaver_ftc.results.metrics import as_json, measure, versions
 from beaver_ftc.results.writer import result_folder
-from beaver_ftc.scenario.dump import to_yaml
+from beaver_ftc.scenario.builtin import to_yaml
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sweeps import Sweep
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial

@@ -14,7 +14,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.validation import plain
 from beaver_ftc.results.log import units
 from beaver_ftc.scenario.airframe import checked_against
-from beaver_ftc.scenario.loader import ScenarioLike, load
+from beaver_ftc.scenario.schema import ScenarioLike, load
 from beaver_ftc.scenario.sweeps import Sweep, validate_sweep
 
 if TYPE_CHECKING:

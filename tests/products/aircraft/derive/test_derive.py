@@ -28,7 +28,7 @@ from beaver_ftc.plant.model_file import copy_of
 from beaver_ftc.plant.trial import probe
 from beaver_ftc.plant.trim import trim as trim_plant
 from beaver_ftc.scenario.airframe import find_aircraft
-from beaver_ftc.scenario.loader import load_text
+from beaver_ftc.scenario.schema import load_text
 from beaver_ftc_aircraft.derive import derivation, first_use
 from beaver_ftc_aircraft.derive import sample as sampling
 from beaver_ftc_aircraft.derive.derivation import derive, source_of, try_out

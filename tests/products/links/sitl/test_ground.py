@@ -186,8 +186,7 @@ def test_what_cannot_begin_on_the_ground():
 
 
 def test_an_aircraft_that_knows_no_ground_does_not_stand():
-    from beaver_ftc.scenario.airframe import checked_against
-    from beaver_ftc.scenario.initial import given_initial
+    from beaver_ftc.scenario.airframe import checked_against, given_initial
 
     with checked_against(trainer()), pytest.raises(ValueError, match="contradictory") as error:
         given_initial({"on_ground": True})

@@ -72,11 +72,11 @@ demo: $(VENV)/.demo
 	$(BIN)/beaver-ftc run elevator-partial-loss --out runs
 	@echo "report: runs/elevator-partial-loss/report.html"
 
-# What most flights use is compiled, and what is missing installed, while plain kernels are tried; the second run
-# compiles the rest.
+# What most flights use is compiled, and what is missing installed, while plain kernels are tried: these give way,
+# since the second run waits for the compiled code. It compiles the rest.
 test: $(VENV)/.test
 	@$(BRING) & installing=$$!; $(BIN)/python tests/warm.py >/dev/null 2>&1 & \
-	  NUMBA_DISABLE_JIT=1 $(PYTEST) -m "not nightly" $(PLAIN) && wait $$installing
+	  NUMBA_DISABLE_JIT=1 nice $(PYTEST) -m "not nightly" $(PLAIN) && wait $$installing
 	$(PYTEST) -n $(WAITING) -m "not nightly" $(addprefix --ignore=,tests/acceptance $(PLAIN))
 
 # Every test with all that it draws, what tests/nightly.yaml lists too; then drawn scenarios, mutants.

@@ -1,5 +1,7 @@
 """What all tests share: the helpers of tests/flying.py, and property tests that repeat themselves."""
 
+import gc
+import hashlib
 import os
 import sys
 from pathlib import Path
@@ -22,19 +24,29 @@ settings.register_profile("repeatable", deadline=None, derandomize=True, max_exa
 settings.load_profile("repeatable")
 
 
+# Nearly all that a worker imports and collects stays to its end: to look through it often finds nothing.
+RARELY = 50_000, 20, 50
+
+
 def pytest_configure(config):
+    gc.set_threshold(*RARELY)
     suite_cost.pytest_configure(config)
     worker = getattr(config, "workerinput", {"workerid": "gw0"})["workerid"]
-    if config.args == ["tests"] and int(worker[2:]) % 2:
-        config.args = _from_the_other_end(config.getoption("ignore") or ())
+    number = int(worker[2:])
+    if config.args == ["tests"] and number:
+        config.args = _from_elsewhere(number, config.getoption("ignore") or ())
 
 
-def _from_the_other_end(ignored):
-    """Every second worker collects backwards: whoever comes first to a file rewrites its assertions."""
+def _from_elsewhere(number, ignored):
+    """Workers collect forwards, backwards, and from the middle: whoever comes first to a file rewrites its
+    assertions, and others read them.
+    """
     here = Path(__file__).parent
     children = {each for each in here.iterdir() if each.is_dir() or each.match("test_*.py")}
     children -= {Path(each).resolve() for each in ignored}
-    return [str(each) for each in sorted(children, reverse=True)]
+    found = [str(each) for each in sorted(children, reverse=number % 2 == 1)]
+    first = len(found) // 2 if number >= 2 else 0
+    return found[first:] + found[:first]
 
 
 def pytest_addoption(parser):
@@ -54,7 +66,7 @@ LONGEST = (
     "live/page/test_page.py", "live/page/test_server.py", "compiled/test_strangers.py",
     "scenario/test_new_sensor.py", "plugins/test_plugins.py", "studies/reproduce/test_reproduce.py",
     "control/test_power.py", "results/test_report.py", "recorded/test_benchmark.py", "sitl/test_endpoint.py",
-    "diagnosis/test_short_flights.py", "detection/test_likelihood.py", "loop/test_accelerometers.py",
+    "detection/test_likelihood.py", "loop/test_accelerometers.py",
 )  # fmt: skip
 
 
@@ -77,6 +89,11 @@ def pytest_collection_modifyitems(items):
         seen.add(of)
 
 
+def pytest_collection_finish():
+    gc.collect()
+    gc.freeze()
+
+
 @pytest.fixture
 def changed(request):
     """changed(document): how it differs from what an earlier revision made, kept below tests/kept/; see
@@ -89,6 +106,27 @@ def changed(request):
         return kept.differences(f"{file}/{name}", document, request.config.getoption("--keep"))
 
     return differences
+
+
+@pytest.fixture(scope="module")
+def figures_in_short():
+    """A figure of a flight is a dot that bears what it would show: to draw one takes 0.3 s. tests/results/
+    test_figures.py and test_files.py have them drawn.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("beaver_ftc.results.figures.save", _save_in_short)
+        yield
+
+
+def _save_in_short(picture):
+    from PIL import Image
+    from PIL.PngImagePlugin import PngInfo
+
+    bears, shown = PngInfo(), [picture.view, picture.instants, picture.subtitle]
+    columns = {name: values.tobytes() for name, values in picture.series.items()}
+    bears.add_text("Software", "beaver-ftc")
+    bears.add_text("Description", hashlib.sha256(repr([*shown, columns]).encode()).hexdigest())
+    Image.new("L", (1, 1)).save(picture.path, pnginfo=bears)
 
 
 @pytest.fixture(scope="session")

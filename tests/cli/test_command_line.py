@@ -41,6 +41,7 @@ def _names(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
+@pytest.mark.usefixtures("figures_in_short")
 def test_run_writes_the_contract_says_the_verdict_and_stops_for_a_users_file_beside_the_figures(short):
     done = beaver("run", "short.yaml", cwd=short)
     assert (done.returncode, done.stderr) == (0, "")

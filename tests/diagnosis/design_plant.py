@@ -13,7 +13,7 @@ from beaver_ftc.diagnosis.belief.expectation import evaluate_design, evaluate_fr
 from beaver_ftc.diagnosis.bounds.worst_case import ROUNDING_RAD_S2, bound_now
 from beaver_ftc.diagnosis.detection.bank import note_closest_approach
 from beaver_ftc.loop.assembly import configure_design
-from beaver_ftc.loop.frame import diagnose
+from beaver_ftc.loop.stepping import diagnose
 from beaver_ftc.scenario.schema import Scenario
 
 TRAVEL_RAD = np.array([[-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]])
@@ -29,12 +29,23 @@ def believe(frames):
 
 
 @kernel
-def conclude(frames):
-    """The flying diagnosis of this instant."""
+def evaluate(frames):
+    """What the design model makes of the frame that ends at this instant."""
     frame = frames[0]
     evaluate_frame(frame.belief, frame.fdi.bound, frame.measured, frame.k, frame.dt)
-    diagnose(frame)
-    note_closest_approach(frame.fdi.bank)
+
+
+@kernel
+def note(frames):
+    """How close the residuals have come to their thresholds."""
+    note_closest_approach(frames[0].fdi.bank)
+
+
+def conclude(frames):
+    """The flying diagnosis of this instant: compiled once, for all who call it from Python."""
+    evaluate(frames)
+    diagnose(frames)
+    note(frames)
 
 
 class DesignPlant:

@@ -13,6 +13,7 @@ from beaver_ftc.results import model
 from beaver_ftc.results.writer import run
 from flying import loss, scenario
 
+pytestmark = pytest.mark.usefixtures("figures_in_short")
 SHORT = {"duration_s": 3.0, "faults": [loss(at_s=1.5)], "expect": {"isolated_as": "rudder"}}
 
 
@@ -22,7 +23,7 @@ def flight():
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
+def folder(tmp_path_factory, figures_in_short):
     out = tmp_path_factory.mktemp("runs")
     run(scenario(**SHORT), out)
     return out / "test"

@@ -7,15 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given
-from hypothesis import strategies as st
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.aircraft.schema import MAX_MONOMIALS
 from beaver_ftc.design.dryden import Dryden, rotation_lengths
 from beaver_ftc.design.fdc import MASS
-from beaver_ftc.design.model import design_record, rate_damping
-from beaver_ftc.design.variants import jacobian
 from beaver_ftc.diagnosis.belief import air
 from beaver_ftc.diagnosis.belief.air import AIR
 from beaver_ftc.loop.loop import Loop
@@ -229,134 +224,12 @@ def test_nor_does_it_when_the_force_jumps_between_coarse_frames():
     assert np.abs(np.diff(flown.seen[:, 1:], axis=0)).max() < 5e-4
 
 
-@pytest.mark.parametrize("late", [False, True])
-def test_a_heading_that_turns_round_as_the_nose_passes_the_vertical_is_no_gust(late):
-    """The turbulence turns with the heading: air from ahead, and a little from aside, turns round at once."""
-    record, dt = air_of(), 0.01
-    still, gust = np.array([45.0, 0.0, 0.0]), np.array([3.0, 1.0, 0.0])  # m/s; straight down, and level axes
-    record["memory"]["level_to_body"], record["memory"]["gust"][2] = _turn(0.0, -1.56), 0.05
-    air.start(record, readings(still - record["memory"]["level_to_body"] @ gust), np.array([0.0, -1.56, 0.3]))
-    record["memory"]["gust"][2] = 0.05
-    over = np.array([np.pi, -1.56, 0.3 + np.pi])
-    held = [0.0, 0.0, -record["config"]["gravity"]]  # nothing accelerates
-    record["memory"]["force"] = record["memory"]["level_to_body"] @ held
-    if late:  # the wind turns a step after the heading
-        air.update_gust(record, readings(still - _turn(np.pi, -1.56) @ (gust * [-1, -1, 1])), over, dt)
-        record["memory"]["force"] = _turn(np.pi, -1.56) @ held
-    air.update_gust(record, readings(still - _turn(np.pi, -1.56) @ gust), over, dt)
-    assert abs(record["memory"]["gust"][2]) <= 0.05
-    unseen, record["memory"]["unmeasured_share"] = np.array(record["memory"]["unmeasured_share"]), np.ones(3)
-    record["output"]["damping"] = np.diag([0.0, 0.0, 5.0]) @ record["output"]["axes"].T
-    everything = air.unmeasured_drift(record, 45.0, 2, 2)
-    record["memory"]["unmeasured_share"] = unseen
-    assert air.unmeasured_drift(record, 45.0, 2, 2) == pytest.approx(everything)
-
-
-def test_a_gust_that_was_seen_acts_as_before_in_the_step_in_which_the_heading_turns_round():
-    """JSBSim's gusts point along the heading of the step before, in body axes as they are now."""
-    record, y = air_of(), readings(np.array([45.0, 0.0, 2.0]))
-    air.start(record, y, np.array([0.0, -1.56, 0.3]))
-    record["memory"]["gust"][1] = 0.04
-    over = np.array([np.pi, -1.56, 0.3 + np.pi])
-    air.update_gust(record, y, over, 1e-4)
-    now = record["memory"]["gust"][1]
-    air.fill_effect(record, design_record()[0], np.zeros(3), y, np.zeros(4))
-    assert record["memory"]["rotation"][1] == pytest.approx(now)
-    air.update_gust(record, y, over, 1e-4)
-    now = record["memory"]["gust"][1]
-    air.fill_effect(record, design_record()[0], np.zeros(3), y, np.zeros(4))
-    assert record["memory"]["rotation"][1] == pytest.approx(-now)
-
-
-def readings(velocity):
-    """alpha, beta, V of a velocity (3,) through the air, m/s in body axes."""
-    u, v, w = velocity
-    V = np.linalg.norm(velocity)
-    return np.array([np.arctan2(w, u), np.arcsin(v / V), V, 0.6 * V * V, 0.3])
-
-
-def test_a_yawing_gust_is_lost_as_far_as_the_heading_turns_faster_than_it_changes():
-    """By the two variances over the lag of the yawing gust, in numbers: 14.63 m, 533.4 m."""
-    record = air_of()
-    lag_s, sigma, rate = 3 * 14.63 / (np.pi * 45), 2.0, 0.4
-    turned, walked = (rate * sigma * lag_s) ** 2, 3 * sigma**2 * 45 / 533.4 * lag_s
-    assert air.share_lost_by_turning(record, 45.0, rate) == pytest.approx(turned / walked, rel=1e-9)
-
-
 def test_the_specific_force_is_the_one_felt_aboard():
     """At the centre of gravity, against JSBSim's accelerometer, under references on all axes."""
     flown = Flown("none", duration_s=8)
     wrong = np.abs(flown.force - flown.felt)
     assert flown.felt[:, 2].mean() == pytest.approx(-9.8, abs=0.5)
     assert (wrong.max(axis=0) < [0.05, 0.1, 0.1]).all()
-
-
-def _turn(phi, theta):
-    turn = np.zeros((3, 3))
-    air.level_axes(phi, theta, turn)
-    return turn
-
-
-@given(st.floats(-3, 3), st.floats(-1.5, 1.5))
-def test_level_axes_are_turned_not_bent(phi, theta):
-    turn = _turn(phi, theta)
-    assert turn @ turn.T == pytest.approx(np.eye(3), abs=1e-12)
-    assert np.linalg.det(turn) == pytest.approx(1.0)
-    down = turn @ [0.0, 0.0, 1.0]
-    assert down == pytest.approx([-np.sin(theta), np.sin(phi) * np.cos(theta), np.cos(phi) * np.cos(theta)])
-    vector = np.array([0.3, -1.0, 2.0])
-    assert [air.to_level(turn, vector, i) for i in range(3)] == pytest.approx(turn.T @ vector)
-    assert (turn.T @ [1.0, 0.0, 0.0])[1] == 0.0  # the nose points ahead, up or down, not aside
-
-
-@given(st.floats(30, 55), st.floats(0, 0.25), st.floats(-0.1, 0.1))
-def test_the_damping_is_the_slope_of_the_aerodynamic_moments(V, alpha, beta):
-    """f without its inertia coupling, which is of second order in the rates: at none, its slope vanishes."""
-    design = design_record()[0]
-    y = np.array([alpha, beta, V, 0.5 * V * V, 0.3])
-    _, _, slope, _ = jacobian(design, np.zeros(3), y, np.zeros(4))
-    out = np.zeros((3, 3))
-    rate_damping(design, np.zeros(3), y, np.zeros(4), np.zeros(MAX_MONOMIALS), out)
-    assert out == pytest.approx(slope, rel=1e-9, abs=1e-12)
-
-
-def test_a_gust_acts_through_the_damping_in_body_axes():
-    """The air pitches up: against it the aircraft pitches down, and is damped as if it did."""
-    record, design = air_of(), design_record()[0]
-    y = np.array([0.1, 0.02, 45.0, 1036.0, 0.3])
-    record["output"]["axes"] = _turn(0.6, 0.1)
-    record["memory"]["gust"] = [0.0, 0.02, -0.03]
-    air.fill_effect(record, design.view(), np.zeros(3), y, np.zeros(4))
-    _, _, slope, _ = jacobian(design, np.zeros(3), y, np.zeros(4))
-    body = _turn(0.6, 0.1) @ record["memory"]["gust"]
-    assert record["output"]["acceleration"] == pytest.approx(-slope @ body)
-
-
-def test_what_is_not_seen_drifts_in_body_axes_as_a_covariance_turns():
-    record, design = air_of(), design_record()[0]
-    y = np.array([0.1, 0.02, 45.0, 1036.0, 0.3])
-    record["output"]["axes"] = turn = _turn(0.6, 0.1)
-    air.fill_effect(record, design, np.zeros(3), y, np.zeros(4))
-    spread = turn @ np.diag(45.0 * Dryden("light").rotation_walk(14.63) * air.UNMEASURED_SHARES) @ turn.T
-    expected = record["output"]["damping"] @ spread @ record["output"]["damping"].T
-    found = [[air.unmeasured_drift(record, 45.0, i, j) for j in range(3)] for i in range(3)]
-    assert np.array(found) == pytest.approx(expected, rel=1e-12)
-
-
-def test_a_gust_unseen_drifts_besides_as_its_axis_turns_in_the_body():
-    """A gust of the variance of its own process, kept for its own lag while the axis turns, as a walk."""
-    record, y, dt = air_of(), readings(np.array([45.0, 0.0, 2.0])), 0.01
-    before, after = np.array([0.5, -1.45, 0.2]), np.array([0.53, -1.47, 0.2])
-    air.start(record, y, before)
-    air.update_gust(record, y, after, dt)
-    record["output"]["damping"] = D = np.diag([5.0, 3.0, 1.0])
-    air.begin_sums(record, 45.0, dt)
-    air.average_frame(record, 1.0)
-    turned = (_turn(*after[:2]) - _turn(*before[:2]))[:, 0] / dt
-    lag_s = np.sqrt(0.3048 * 1750 * 14.63) / 2.6 / 45
-    variance = 45 * Dryden("light").rotation_walk(14.63)[0] * lag_s / 2  # of a first-order process
-    expected = np.outer(D @ turned, D @ turned) * variance * lag_s
-    assert record["output"]["turn_variance"] / dt == pytest.approx(expected, rel=1e-9)
 
 
 TURN = {  # to 30 deg of bank, and round

@@ -152,6 +152,35 @@ def test_a_yawing_gust_that_turning_hides_fades_and_its_loss_fades_with_it():
     assert record["memory"]["gust"][2] == pytest.approx(0.05 * lag**5 - aside / (45.0 * tau_r))
 
 
+@pytest.mark.parametrize("late", [False, True])
+def test_a_heading_that_turns_round_as_the_nose_passes_the_vertical_is_no_gust(late):
+    """The turbulence turns with the heading: air from ahead, and a little from aside, turns round at once."""
+    record = new_air()
+    still, gust = np.array([45.0, 0.0, 0.0]), np.array([3.0, 1.0, 0.0])  # m/s; straight down, and level axes
+    then, over = np.array([0.0, -1.56, 0.3]), np.array([np.pi, -1.56, 0.3 + np.pi])
+
+    def look(attitude, turned):  # nothing accelerates
+        level = to_earth((*attitude[:2], 0.0)).inv()
+        return vanes(still - level.apply(gust * turned)), level.apply(
+            [0.0, 0.0, -GRAVITY]
+        )  # nothing accelerates
+
+    y, record["memory"]["force"] = look(then, 1)
+    air.start(record, y, then)
+    record["memory"]["gust"][2] = 0.05
+    if late:  # the wind turns a step after the heading
+        y, force = look(over, [-1, -1, 1])
+        air.update_gust(record, y, over, DT)
+        record["memory"]["force"] = force
+    air.update_gust(record, look(over, 1)[0], over, DT)
+    assert abs(record["memory"]["gust"][2]) <= 0.05
+    unseen, record["memory"]["unmeasured_share"] = np.array(record["memory"]["unmeasured_share"]), np.ones(3)
+    record["output"]["damping"] = np.diag([0.0, 0.0, 5.0]) @ record["output"]["axes"].T
+    everything = air.unmeasured_drift(record, 45.0, 2, 2)
+    record["memory"]["unmeasured_share"] = unseen
+    assert air.unmeasured_drift(record, 45.0, 2, 2) == pytest.approx(everything)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_level_axes_are_a_rotation(seed):
     phi, theta = np.random.default_rng(seed).uniform(-1.4, 1.4, 2)

@@ -10,6 +10,7 @@ from beaver_ftc.aircraft import load
 from beaver_ftc.diagnosis.detection import likelihood, parity, tones
 from beaver_ftc.diagnosis.detection.likelihood import LEAST_UNCERTAINTY_RAD_S2, STEP
 from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, USUAL_SIZE, set_up_views
+from beaver_ftc.diagnosis.schemes.fault_classes import is_off_the_column
 from beaver_ftc.diagnosis.state import LOSS, POSITION
 
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)
@@ -184,6 +185,23 @@ def test_a_fault_shows_along_every_axis_that_its_column_moves(fdi, axis):
     assert not Across.is_sensitive_to(fdi, view, RUDDER, moved), "across its own column it shows nothing"
 
 
+@pytest.mark.parametrize(
+    ("surface", "blind"),
+    [(AILERON, (PITCH_AXIS, PAST_AILERON)), (RUDDER, (PITCH_AXIS, PAST_RUDDER)),
+     (ELEVATOR, (ROLL_AXIS, YAW_AXIS, PAST_AILERON, PAST_RUDDER))],
+)  # fmt: skip
+def test_a_fault_of_any_course_shows_nothing_where_its_surface_moves_nothing(fdi, surface, blind):
+    G = np.array([[-9.0, 0.0, 1.2, 0.0], [0.0, -8.0, 0.0, -1.5], [-0.4, 0.0, -3.0, 0.0]])
+    statistical, course = fdi["statistical"], np.cumsum(np.random.default_rng(surface).normal(size=20))
+    statistical["n_views"], statistical["tests"]["tolerated"] = 5, 0
+    for k in range(20):
+        Across.observe(fdi, course[k] * G[:, surface], G, 0.05 * G, FLOW, k, False)
+    for v, view in enumerate(statistical["views"][:5]):
+        felt = Across.is_sensitive_to(fdi, view, surface, G[:, surface])
+        assert felt == (v not in blind)
+        assert (np.abs(view["block"]["lanes"]["correlation"]).max() > 1e-6) == felt
+
+
 @pytest.mark.parametrize(("latched", "tolerated", "frame"), [(False, 1, 6), (True, 1, 6), (False, 0, 7)])
 def test_a_frame_is_seen_along_every_direction(fdi, rng, latched, tolerated, frame):
     """Each view as a block of its own that is given what matrices say of the frame."""
@@ -228,6 +246,7 @@ def test_views_that_are_not_there_are_not_asked(fdi, rng):
 def test_any_hypothesis_beyond_the_level_excludes_whom_it_is_not_felt_of(fdi):
     statistical = fdi["statistical"]
     statistical["tests"]["alarm_level"], fdi["layout"]["position_of"] = 5.0, range(4)
+    statistical["tests"]["enabled"] = fdi["config"]["every_type"] = 1
     for s, fie in enumerate(fdi["isolation"]["estimator"][:4]):
         fie["kind"], fie["surface"], fie["effect"]["Z"] = POSITION, s, np.eye(3, 4)[:, s]
     view = statistical["views"][ROLL_AXIS]
@@ -237,6 +256,7 @@ def test_any_hypothesis_beyond_the_level_excludes_whom_it_is_not_felt_of(fdi):
         view["block"]["hypothesis"]["score"] = np.where(np.arange(room) == h, 5.1, 4.9)
         assert Across.excludes(fdi, ELEVATOR) == (h < tried)
         assert not Across.excludes(fdi, AILERON)
+        assert is_off_the_column(fdi, fdi["isolation"]["estimator"][ELEVATOR]) == (h < tried)
     view["block"]["hypothesis"]["score"] = 5.0
     assert not Across.excludes(fdi, ELEVATOR), "the level is what chance may reach"
 
@@ -245,6 +265,7 @@ def test_a_view_has_levels_and_tolerances_of_the_axes_it_looks_at(fdi):
     """And across a column one tolerance more, which is of the column itself."""
     statistical = fdi["statistical"]
     pitch, lateral = statistical["block"][:2]
+    statistical["air"]["output"]["moving"] = 0  # else no view of pitch tries what answers the gusts
     for b, block in enumerate((pitch, lateral)):
         block["level"], block["noise_share"], block["pace"] = 5.0 + b, 0.5 + b, 0.01 + b
     set_up_views(statistical, load())
@@ -260,6 +281,8 @@ def test_a_view_has_levels_and_tolerances_of_the_axes_it_looks_at(fdi):
         assert block["P_xx"][0, 0] == axes["noise"].max()
         assert block["P_dd"][0, 0] == 1.0
         tried = block["hypothesis"][: block["n_hypotheses"]]
+        losses = {PITCH_AXIS: [ELEVATOR, FLAP], PAST_AILERON: [RUDDER], PAST_RUDDER: [AILERON]}
+        assert tried["surface"].tolist() == [-1, *losses.get(v, [AILERON, RUDDER])]
         assert tried["kind"].tolist() == [STEP] + [LOSS] * (len(tried) - 1)
         sense = by_onset(block, "sense")
         assert (sense[:, : len(tried)] == -1.0 * (tried["kind"] == LOSS)).all()

@@ -30,7 +30,7 @@ def beaver(folder, *arguments):
 
 
 @pytest.fixture(scope="module")
-def flown_folder(tmp_path_factory):
+def flown_folder(tmp_path_factory, figures_in_short):
     folder = tmp_path_factory.mktemp("mismatch")
     (folder / "short.yaml").write_text(SHORT)
     done = beaver(folder, "mismatch", "short.yaml", "--out", "out", "--format", "json")

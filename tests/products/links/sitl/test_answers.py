@@ -15,7 +15,7 @@ from tools.autopilots.reader import Unreadable, read
 from beaver_ftc_links.sitl.ardupilot import decoded, encoded
 from beaver_ftc_links.sitl.vehicle import Instant
 
-PAGE = Path(__file__).parents[4] / "docs/how-to/autopilots.md"
+PAGE = Path(__file__).parents[4] / "docs/how-to/own-autopilot.md"
 COMPILER = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 NUMBER = st.floats(-1e6, 1e6)
 THREE = st.tuples(NUMBER, NUMBER, NUMBER)

@@ -13,7 +13,7 @@ import numpy as np
 from beaver_ftc.compiled import kernel
 from beaver_ftc.control import allocation
 from beaver_ftc.control.state import control_dtype
-from beaver_ftc.diagnosis.belief.expectation import belief_dtype
+from beaver_ftc.diagnosis.expectation import belief_dtype
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.trim import trim
 

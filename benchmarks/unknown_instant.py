@@ -35,7 +35,7 @@ from typing import NamedTuple
 import numpy as np
 
 from beaver_ftc.aircraft import DEFAULT
-from beaver_ftc.diagnosis.bounds.clairvoyant import chance
+from beaver_ftc.diagnosis.informed_test import detection_probability
 from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc.studies.compare.replay import Recording, Trace, aware_of_the_air, record, trace
 from beaver_ftc.studies.power.probabilities import level_for
@@ -243,7 +243,9 @@ def cell_of(survey: Survey, surface: str, healthy: list[Recording], noise: White
     for _, _, recording in known:
         for magnitude, statistic in ratios(recording, surface, noise).items():
             seen[magnitude].append(trace(recording, statistic))
-    told = [chance(m * deflection(one, surface, noise), WITHIN_S, PER_H) for _, m, one in known]
+    told = [
+        detection_probability(m * deflection(one, surface, noise), WITHIN_S, PER_H) for _, m, one in known
+    ]
     return Cell(
         survey.aircraft, surface,
         np.array([flight for flight, _, _ in known], dtype=int), np.array([m for _, m, _ in known]),

@@ -2,7 +2,7 @@
 each surface.
 
 theta in [-1, 0] of a loss explains a frame if |nu_i - theta Z_i| <= eta_bar_i on every axis: as in
-diagnosis/isolation/membership.py. Where one surface alone is at fault, and its effectiveness stands for a
+diagnosis/isolation.py. Where one surface alone is at fault, and its effectiveness stands for a
 second, it is in the intersection of that second's sets.
 """
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.aircraft import FORCES, MOMENTS
-from beaver_ftc.diagnosis.isolation.estimators import members_of
+from beaver_ftc.diagnosis.isolation import members_of
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.trim import trim
 from samples import samples

@@ -19,7 +19,7 @@ from beaver_ftc.control.supervisor import (
 )
 from beaver_ftc.design.model import design_record, unanticipated_pitch
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
-from beaver_ftc.diagnosis.types.contract import FIXED, LAGS, LOSES, SHIFTED
+from beaver_ftc.diagnosis.types.contract import GIVE_UP, SCALE_COMMAND, SUBTRACT_OFFSET, WAIT_FOR_SURFACE
 from beaver_ftc.loop import frame as whole
 from beaver_ftc.loop.accounts import true_faults_dtype
 from beaver_ftc.loop.assembly import frame_dtype
@@ -94,11 +94,13 @@ def test_every_change_of_mode_is_noted_and_of_too_many_the_latest():
     [
         (0, 5, -1, -1, FLAP, MODE_REALLOCATED), (0, 5, -1, -1, -1, MODE_ADAPTIVE),
         (0, 6, -1, -1, FLAP, MODE_ADAPTIVE), (0, UNANTICIPATED, -1, -1, FLAP, MODE_UNANTICIPATED),
-        (1, 5, ELEVATOR, LOSES, FLAP, MODE_REALLOCATED), (1, 5, ELEVATOR, FIXED, FLAP, MODE_REALLOCATED),
-        (1, 5, ELEVATOR, SHIFTED, FLAP, MODE_ADAPTIVE), (1, 5, ELEVATOR, LAGS, FLAP, MODE_ADAPTIVE),
-        (1, 5, ELEVATOR, FIXED, -1, MODE_ADAPTIVE), (1, 6, RUDDER, FIXED, FLAP, MODE_ADAPTIVE),
+        (1, 5, ELEVATOR, SCALE_COMMAND, FLAP, MODE_REALLOCATED),
+        (1, 5, ELEVATOR, GIVE_UP, FLAP, MODE_REALLOCATED),
+        (1, 5, ELEVATOR, SUBTRACT_OFFSET, FLAP, MODE_ADAPTIVE),
+        (1, 5, ELEVATOR, WAIT_FOR_SURFACE, FLAP, MODE_ADAPTIVE),
+        (1, 5, ELEVATOR, GIVE_UP, -1, MODE_ADAPTIVE), (1, 6, RUDDER, GIVE_UP, FLAP, MODE_ADAPTIVE),
         (1, UNANTICIPATED, -1, -1, FLAP, MODE_UNANTICIPATED), (1, NOT_ISOLATED, -1, -1, FLAP, MODE_ADAPTIVE),
-        (1, NOT_ISOLATED, ELEVATOR, FIXED, FLAP, MODE_REALLOCATED),
+        (1, NOT_ISOLATED, ELEVATOR, GIVE_UP, FLAP, MODE_REALLOCATED),
     ],
 )  # fmt: skip
 def test_the_mode_that_the_diagnosis_asks_for(every_type, isolated, lead, lead_kind, stand_in, mode):
@@ -164,9 +166,11 @@ def test_what_the_law_takes_the_unknown_for():
     assert compensated("adaptive")[0] == pytest.approx([0.1, 0.2, 0.3])
     assert compensated("adaptive", detected=0)[0] == [0.0] * 3
     assert compensated("nominal")[0] == [0.0] * 3
-    assert compensated("adaptive", lead=ELEVATOR, lead_kind=LAGS)[0] == [0.0] * 3
-    assert compensated("adaptive", lead=ELEVATOR, lead_kind=SHIFTED)[0] == pytest.approx([0.1, 0.2, 0.3])
-    assert compensated("adaptive", lead=AILERON, lead_kind=LAGS)[0] == [0.0] * 3
+    assert compensated("adaptive", lead=ELEVATOR, lead_kind=WAIT_FOR_SURFACE)[0] == [0.0] * 3
+    assert compensated("adaptive", lead=ELEVATOR, lead_kind=SUBTRACT_OFFSET)[0] == pytest.approx(
+        [0.1, 0.2, 0.3]
+    )
+    assert compensated("adaptive", lead=AILERON, lead_kind=WAIT_FOR_SURFACE)[0] == [0.0] * 3
     known, expected = compensated("oracle-published")
     assert known == [0.0, expected, 0.0]
     assert expected != 0.0
@@ -180,7 +184,7 @@ def test_a_surface_given_up_goes_to_its_trim(which):
     surfaces = control["surfaces"]["output"]
     out["command"], out["saturated"], fdi["config"]["every_type"] = 0.1, 1, 1
     if "jam" in which:
-        fdi["types"]["surface"]["accommodation"]["mode"][RUDDER] = FIXED
+        fdi["types"]["surface"]["accommodation"]["mode"][RUDDER] = GIVE_UP
         surfaces["effectiveness"][RUDDER] = 0.0 if which == "jammed" else 0.5
     surfaces["given_up"][RUDDER] = which == "abandoned"
     given_up(frame)
@@ -309,7 +313,7 @@ def test_only_what_may_still_act_is_taken_for_what_the_observer_sees(law, fixed,
     fdi["verdict"]["detected"], fdi["verdict"]["isolated"] = 1, 0
     fdi["isolation"]["estimator"]["surface"][:4], fdi["isolation"]["estimator"]["theta"][0] = range(4), -0.9
     fdi["types"]["surface"]["accommodation"]["mode"][AILERON], fdi["config"]["every_type"] = (
-        FIXED if fixed else -1,
+        GIVE_UP if fixed else -1,
         fixed,
     )
     found = control["rejecting"]["memory"]["sums"]

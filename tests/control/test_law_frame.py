@@ -8,8 +8,8 @@ from beaver_ftc.control.laws.rows import row_of
 from beaver_ftc.control.rivals import compiled_rivals
 from beaver_ftc.control.supervisor import MODE_ADAPTIVE
 from beaver_ftc.diagnosis.schemes import adaptive_estimators
-from beaver_ftc.diagnosis.state import LOSS, NOT_ISOLATED, WORST_CASE
-from beaver_ftc.diagnosis.types.contract import FIXED, LAGS, LOSES, SHIFTED
+from beaver_ftc.diagnosis.state import LOSS, NOT_ISOLATED, WORST_CASE_DETECTOR
+from beaver_ftc.diagnosis.types.contract import GIVE_UP, SCALE_COMMAND, SUBTRACT_OFFSET, WAIT_FOR_SURFACE
 from beaver_ftc.diagnosis.types.registry import N_TYPES
 from beaver_ftc.loop import frame as whole
 from beaver_ftc.loop.assembly import Trim, assemble
@@ -108,12 +108,14 @@ def test_the_oracle_knows_and_no_other_law_looks():
         assert surfaces["offset"][AILERON] == pytest.approx(0.1 - 0.05 if target == 0.5 else 0.0)
 
 
-@pytest.mark.parametrize("measure", [LOSES, FIXED, SHIFTED, LAGS])
+@pytest.mark.parametrize("measure", [SCALE_COMMAND, GIVE_UP, SUBTRACT_OFFSET, WAIT_FOR_SURFACE])
 def test_what_is_done_about_each_kind_of_fault(measure):
     frame = new_frame("fault-tolerant-published", fault_class="all")
     fdi = frame["fdi"]
     surface = fdi["types"]["surface"][RUDDER]
-    kind = {LOSES: CONSTANT_LOSS, FIXED: STUCK, SHIFTED: BIAS, LAGS: BIAS}[measure]
+    kind = {SCALE_COMMAND: CONSTANT_LOSS, GIVE_UP: STUCK, SUBTRACT_OFFSET: BIAS, WAIT_FOR_SURFACE: BIAS}[
+        measure
+    ]
     fdi["types"]["surface"]["accommodation"]["mode"], surface["accommodation"]["mode"] = -1, measure
     surface["feasible"]["excluded"] = [other != kind for other in range(N_TYPES)]
     surface["feasible"]["low"][kind], surface["feasible"]["high"][kind] = 0.1, 0.2
@@ -121,13 +123,13 @@ def test_what_is_done_about_each_kind_of_fault(measure):
     loss = fdi["layout"]["loss_of"][RUDDER]
     fdi["isolation"]["estimator"][int(loss)]["theta"] = -0.3
     surfaces = accommodated(frame)
-    target = {LOSES: 0.7, FIXED: 0.0}.get(measure, 1.0)
+    target = {SCALE_COMMAND: 0.7, GIVE_UP: 0.0}.get(measure, 1.0)
     assert surfaces["target"] == pytest.approx([1.0, 1.0, target, 1.0])
-    offset = {FIXED: 0.15, SHIFTED: 0.15}.get(measure, 0.0)  # where it is jammed; how far it is off
+    offset = {GIVE_UP: 0.15, SUBTRACT_OFFSET: 0.15}.get(measure, 0.0)  # where it is jammed; how far it is off
     assert surfaces["offset"][RUDDER] == pytest.approx(offset)
-    assert surfaces["lag"][RUDDER] == pytest.approx(0.27 if measure == LAGS else 0.0)
-    assert surfaces["authority_lost"] == (measure == LAGS)
-    assert (surfaces["effectiveness"][RUDDER] == 0.0) == (measure == FIXED)  # a jam bypasses the rate limit
+    assert surfaces["lag"][RUDDER] == pytest.approx(0.27 if measure == WAIT_FOR_SURFACE else 0.0)
+    assert surfaces["authority_lost"] == (measure == WAIT_FOR_SURFACE)
+    assert (surfaces["effectiveness"][RUDDER] == 0.0) == (measure == GIVE_UP)  # a jam bypasses the rate limit
 
 
 @pytest.mark.parametrize(
@@ -156,7 +158,7 @@ def test_when_it_has_long_been_open_whether_elevator_or_flap(
 def alarmed(known=0, speaks=0, score=2.0):
     frame = new_frame()
     fdi = frame["fdi"]
-    fdi["verdict"]["detected"], fdi["config"]["authority"] = known, WORST_CASE
+    fdi["verdict"]["detected"], fdi["config"]["authority"] = known, WORST_CASE_DETECTOR
     fdi["sensor_monitor"]["config"]["enabled"] = fdi["sensor_monitor"]["output"]["alarmed"] = speaks
     fdi["bank"]["output"]["threshold"] = 0.1
     fdi["bank"]["output"]["residual"][0, 1] = 0.1 * score

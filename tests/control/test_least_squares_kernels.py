@@ -8,7 +8,7 @@ from scipy.optimize import lsq_linear
 
 from beaver_ftc.control import allocation, least_squares
 from beaver_ftc.control.least_squares import problem_dtype
-from beaver_ftc.diagnosis.belief.expectation import belief_dtype
+from beaver_ftc.diagnosis.expectation import belief_dtype
 from law_records import new_control
 from samples import samples
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.model import N_Y
-from beaver_ftc.diagnosis.belief.expectation import evaluate_design, evaluate_frame
-from beaver_ftc.diagnosis.bounds.worst_case import ROUNDING_RAD_S2, bound_now
-from beaver_ftc.diagnosis.detection.bank import note_closest_approach
+from beaver_ftc.diagnosis.bounds import ROUNDING_RAD_S2, fill_bound_now
+from beaver_ftc.diagnosis.detection.filters import note_closest_approach
+from beaver_ftc.diagnosis.expectation import evaluate_design, evaluate_frame
 from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.loop.stepping import diagnose
 from beaver_ftc.scenario.schema import Scenario
@@ -25,7 +25,7 @@ def believe(frames):
     """What the design model makes of this instant."""
     frame = frames[0]
     evaluate_design(frame.belief, frame.measured)
-    bound_now(frame.fdi.bound, frame.belief.design, frame.measured, frame.belief.u)
+    fill_bound_now(frame.fdi.bound, frame.belief.design, frame.measured, frame.belief.u)
 
 
 @kernel

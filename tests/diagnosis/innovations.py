@@ -13,17 +13,17 @@ from statistics_of import Statistical
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.engine import DPT_0, KW_TO_DPT, SEA_LEVEL_DENSITY_KG_M3
 from beaver_ftc.design.fdc import MASS
-from beaver_ftc.diagnosis.bounds import variances
+from beaver_ftc.diagnosis import bounds
 from beaver_ftc.diagnosis.detection import likelihood, noise_model, statistical
 from beaver_ftc.diagnosis.detection.likelihood import (
     MAX_HYPOTHESES,
     N_LANES,
     N_SLOTS,
-    SENSE,
+    SUPPORTING_SIGN,
     Capacity,
     block_dtype,
 )
-from beaver_ftc.diagnosis.detection.signatures import fill_block_signatures
+from beaver_ftc.diagnosis.detection.parity import fill_block_signatures
 from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.scenario.declared import Declared, SensorErrors
 from beaver_ftc.scenario.schema import Scenario
@@ -62,7 +62,7 @@ def with_hypotheses(block, *kinds, tolerance=()):
     for h, kind in enumerate(kinds):
         block["hypothesis"][h]["kind"] = kind
         group, lane = divmod(h * N_SLOTS, N_LANES)
-        block["lanes"]["sense"][group, lane : lane + N_SLOTS] = SENSE[kind]
+        block["lanes"]["sense"][group, lane : lane + N_SLOTS] = SUPPORTING_SIGN[kind]
     return block
 
 
@@ -131,7 +131,7 @@ class PlainKalman:
 def filter_all(block, innovations, dt, out):
     """Innovations (k, n) rad/s2 whitened into out (k, 2)."""
     for k in range(len(innovations)):
-        likelihood.advance(block, dt)
+        likelihood.advance_covariance(block, dt)
         block.scratch[: block.n] = innovations[k]
         likelihood.whiten(block, block.state, block.scratch, dt, out[k])
 
@@ -142,7 +142,7 @@ def weigh_all(block, innovations, signatures, regressors, first, keep, tolerated
     for k in range(len(innovations)):
         if keep == 1.0:
             likelihood.reset_onset(block, likelihood.slot_to_reset(first + k))
-        likelihood.advance(block, dt)
+        likelihood.advance_covariance(block, dt)
         block.scratch[: block.n] = innovations[k]
         likelihood.whiten(block, block.state, block.scratch, dt, block.innovation)
         for j in range(block.n_regressors):
@@ -151,8 +151,8 @@ def weigh_all(block, innovations, signatures, regressors, first, keep, tolerated
             )
         for h in range(block.n_hypotheses):
             block.hypothesis[h].signature[:] = signatures[k, h]
-        likelihood.accumulate(block, tolerated, dt, keep)
-        likelihood.evaluate(block)
+        likelihood.accumulate_evidence(block, tolerated, dt, keep)
+        likelihood.evaluate_hypotheses(block)
 
 
 @kernel
@@ -160,14 +160,14 @@ def bounded_all(block, d, signatures, onset, dt):
     """Show a block an uncertainty d (k, n) up to 0.02 rad/s2, and from `onset` on signatures (k, h, n)."""
     bounded = np.full(3, 0.02)
     for k in range(len(d)):
-        likelihood.advance(block, dt)
+        likelihood.advance_covariance(block, dt)
         block.scratch[: block.n] = d[k]
         likelihood.whiten(block, block.state, block.scratch, dt, block.innovation)
         for h in range(block.n_hypotheses):
             block.hypothesis[h].signature[: block.n] = signatures[k, h]
         likelihood.fill_uncertainty_response(block, bounded, dt)
         if k >= onset:
-            likelihood.accumulate(block, False, dt, 1.0)
+            likelihood.accumulate_evidence(block, False, dt, 1.0)
 
 
 class Detector:
@@ -180,7 +180,9 @@ class Detector:
         frame = self.frames[0]
         self.fdi, self.dt = frame["fdi"], 1.0 / rate_hz
         design, declared = frame["belief"]["design"], Declared.of(scenario)
-        noise_model.set_up(self.fdi, scenario.fdi, declared, design, MASS, LEVEL_FLIGHT, rate_hz)
+        noise_model.configure_statistics(
+            self.fdi, scenario.fdi, declared, design, MASS, LEVEL_FLIGHT, rate_hz
+        )
         self.detector = self.fdi["statistical"]
         Statistical.prepare(self.detector, self.fdi, design, *LEVEL_FLIGHT)
         self.frame = 0
@@ -236,5 +238,5 @@ def surfaces_at_work(frames, rate_hz, rng, size=0.3):
 
 def gust_jitter(sensors, design, span_m):
     """What the noise of vanes and airspeed adds to the gust they see, in level flight."""
-    flow = variances.flow_noise(SensorErrors(sensors), LEVEL_FLIGHT[1][2])
-    return variances.jitter(flow, design, *LEVEL_FLIGHT[1:], span_m)
+    flow = bounds.flow_angle_noise(SensorErrors(sensors), LEVEL_FLIGHT[1][2])
+    return bounds.gust_estimate_noise(flow, design, *LEVEL_FLIGHT[1:], span_m)

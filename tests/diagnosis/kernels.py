@@ -4,7 +4,7 @@ from inspect import signature
 
 import numpy as np
 
-from beaver_ftc.diagnosis.scheme import diagnosis_dtype
+from beaver_ftc.diagnosis.schemes import diagnosis_dtype
 from beaver_ftc.diagnosis.state import LOSS
 
 DT, POLES = 0.02, np.array([1e6, 4.0, 0.5])

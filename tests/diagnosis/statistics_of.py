@@ -3,7 +3,7 @@
 import numpy as np
 
 from beaver_ftc.diagnosis.detection import parity, statistical
-from beaver_ftc.diagnosis.detection.signatures import fill_block_signatures, fill_view_signatures
+from beaver_ftc.diagnosis.detection.parity import fill_block_signatures, fill_view_signatures
 from beaver_ftc.plant.instruments import MEASURED
 
 
@@ -44,7 +44,7 @@ class Statistical:
 
     @staticmethod
     def unknown_acceleration(record, out):
-        statistical.unknown_acceleration(record["block"], record["air"], out)
+        statistical.statistical_unknown_acceleration(record["block"], record["air"], out)
 
     @staticmethod
     def drifts(record, fdi, design, x, y):
@@ -56,12 +56,12 @@ class Statistical:
     @staticmethod
     def prepare(record, fdi, design, x, y, u):
         parts = (record[name] for name in ("tests", "noise", "block", "air"))
-        statistical.prepare(*parts, fdi["bound"], design, _measured(x, y), u, fdi["config"]["dt"])
+        statistical.prepare_tests(*parts, fdi["bound"], design, _measured(x, y), u, fdi["config"]["dt"])
 
     @staticmethod
     def look(record, fdi, design, x, y, u, attitude, dt):
         parts = (record[name] for name in ("tests", "noise", "block", "air"))
-        statistical.accumulate_substep(*parts, fdi["bound"], design, _measured(x, y, attitude), u, dt)
+        statistical.accumulate_test_substep(*parts, fdi["bound"], design, _measured(x, y, attitude), u, dt)
 
     @staticmethod
     def shows(fdi, surface):
@@ -102,13 +102,13 @@ class Across:
     @staticmethod
     def blur(view, record, V):
         parts = (record[name] for name in ("noise", "block", "forces", "air", "inertial_air"))
-        parity.set_noise(view, *parts, V)
+        parity.set_view_noise(view, *parts, V)
 
     @staticmethod
     def regress(fdi, view, innovation, share):
         view["column_leak"] = share
         parts = (fdi["statistical"][name] for name in ("block", "forces", "air", "inertial_air"))
-        parity.fill_regressors(view, *parts, innovation)
+        parity.fill_view_regressors(view, *parts, innovation)
 
     @staticmethod
     def sign(fdi, view, Gu):
@@ -144,7 +144,7 @@ class Across:
             fdi["isolation"]["estimator"]["effect"]["Z"][fdi["layout"]["position_of"][s]],
         )
         views = views_of(record)
-        return parity.excludes(views, record["tests"], record["forces"], record["air"], s, column)
+        return parity.excludes_surface(views, record["tests"], record["forces"], record["air"], s, column)
 
 
 def put(record, **fields):

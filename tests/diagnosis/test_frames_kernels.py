@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from design_plant import UNCERTAINTIES, DesignPlant
 
-from beaver_ftc.diagnosis.bounds.worst_case import ROUNDING_RAD_S2
+from beaver_ftc.diagnosis.bounds import ROUNDING_RAD_S2
 
 RATE_HZ, AT, THETA = 50.0, 5, -0.6
 AILERON, ELEVATOR, RUDDER = range(3)

@@ -27,14 +27,14 @@ REVERSED = '''
 """A surface rigged the wrong way round: p = -u."""
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.types.contract import ANYTHING, NOTHING, FaultType
+from beaver_ftc.diagnosis.types.contract import EMPTY_SET, UNLIMITED_SET, FaultType
 
 
 @kernel
 def judge(config, surface, kind, k):
     """Whether the mirrored command explains this frame."""
     seen = surface.judged
-    return ANYTHING if seen.low <= -seen.command <= seen.high else NOTHING
+    return UNLIMITED_SET if seen.low <= -seen.command <= seen.high else EMPTY_SET
 
 
 @kernel
@@ -86,8 +86,8 @@ WORN = '''
 """A surface that moves further than it is told, by a factor that never becomes smaller: p = g u, g >= 1."""
 
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.diagnosis.isolation import membership
-from beaver_ftc.diagnosis.types.contract import ANYTHING, NOTHING, SHIFTED, FaultType
+from beaver_ftc.diagnosis.isolation import consistent_parameters
+from beaver_ftc.diagnosis.types.contract import EMPTY_SET, SUBTRACT_OFFSET, UNLIMITED_SET, FaultType
 
 MOST = 2.0
 
@@ -103,11 +103,11 @@ def judge(config, surface, kind, k):
     """A factor explains this frame that is no smaller than one that was needed before."""
     low, high, worn = surface.judged.low, surface.judged.high, surface.overdrive
     middle, slack = 0.5 * (low + high), 0.5 * (high - low)
-    low, high = membership.solve(middle, slack, surface.judged.command, worn.least, MOST)
+    low, high = consistent_parameters(middle, slack, surface.judged.command, worn.least, MOST)
     if low > high:
-        return NOTHING
+        return EMPTY_SET
     worn.least = max(worn.least, low)
-    return ANYTHING
+    return UNLIMITED_SET
 
 
 def estimate(fdi, s, kind):
@@ -118,7 +118,7 @@ def estimate(fdi, s, kind):
 TYPES = (
     FaultType(
         name="overdrive", constant=False, rank=5, begin=begin, judge=judge, record="overdrive",
-        memory=record(least=float), accommodation=SHIFTED, estimate=estimate,
+        memory=record(least=float), accommodation=SUBTRACT_OFFSET, estimate=estimate,
     ),
 )  # fmt: skip
 '''
@@ -153,12 +153,13 @@ FLIGHT = """
 import sys
 sys.path.insert(0, {folder!r})
 from design_plant import UNCERTAINTIES, DesignPlant
-from beaver_ftc.diagnosis.types.findings import found
+from beaver_ftc.diagnosis.types.verdict import fault_findings
 SURFACES = ("aileron", "elevator", "rudder", "flap")
 reverse = lambda k, u: -u if k >= 20 else u
 plant = DesignPlant(4, 50.0, surface=2, position=reverse, fault_class="all")
-plant.fly(220, UNCERTAINTIES["random"], until=lambda plant: found(plant.fdi, SURFACES)["isolation_type"])
-said = found(plant.fdi, SURFACES)
+found = lambda plant: fault_findings(plant.fdi, SURFACES)
+plant.fly(220, UNCERTAINTIES["random"], until=lambda plant: found(plant)["isolation_type"])
+said = found(plant)
 print(said["isolated"], said["isolation_type"], said["estimate"])
 """
 # Whether the type is excluded, frame by frame, on the surface that has it: against every uncertainty; and on
@@ -307,7 +308,7 @@ def test_the_live_page_knows_it(in_a_copy):
 def test_every_type_keeps_the_contract():
     for row in registry.TYPES:
         assert callable(row.judge)
-        assert row.deflection is not contract.anywhere or not row.constant
+        assert row.deflection is not contract.within_reach or not row.constant
         assert bool(row.memory) == bool(row.record)
 
 

@@ -10,7 +10,7 @@ from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.schema import MAX_EFFECTORS
 from beaver_ftc.diagnosis.detection.parity import size_for
 from beaver_ftc.diagnosis.detection.statistical import statistical_dtype
-from beaver_ftc.diagnosis.isolation.estimators import estimator_names
+from beaver_ftc.diagnosis.isolation import estimator_names
 from beaver_ftc.diagnosis.rivals.rls import RlsMonitor
 from beaver_ftc.loop import plugin_frame
 from beaver_ftc.loop.assembly import Trim, assemble

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from beaver_ftc.diagnosis.bounds.worst_case import N_PLACES
-from beaver_ftc.diagnosis.scheme import diagnosis_dtype
+from beaver_ftc.diagnosis.bounds import N_PLACES
+from beaver_ftc.diagnosis.schemes import diagnosis_dtype
 from beaver_ftc.loop.accounts import INCONCLUSIVE, note_inconclusive
 
 DENSITY = 6

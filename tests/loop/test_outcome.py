@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.diagnosis.base import Verdict
-from beaver_ftc.diagnosis.state import STATISTICS, UNANTICIPATED
+from beaver_ftc.diagnosis.state import STATISTICAL_DETECTOR, UNANTICIPATED
 from beaver_ftc.loop.assembly import Trim, assemble
 from beaver_ftc.loop.outcome import Landing, guaranteed_delay_s, landing_of, verdict_of
 from beaver_ftc.scenario.schema import Scenario
@@ -194,7 +194,7 @@ NOISY = {"q": {"noise_std_deg_s": 1.0}}
         ({}, ALARM | {"fdi.verdict.detected_at_s": 2.0 - TIME_TOLERANCE_S}, False, True),
         ({}, ALARM | {"fdi.verdict.detected_at_s": 1.99}, False, False),
         ({}, {"fdi.verdict.detected_at_s": 1.99}, False, True),
-        ({}, {"fdi.config.authority": STATISTICS}, False, False),
+        ({}, {"fdi.config.authority": STATISTICAL_DETECTOR}, False, False),
         ({}, {"fdi.sensor_monitor.output.alarmed": 1}, False, False),
         ({"faults": [FAULT, BROKEN | {"at_s": 2.5}]}, {}, False, False),
         ({"faults": [FAULT, BROKEN | {"at_s": 2.51}]}, {}, False, True),

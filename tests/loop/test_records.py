@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from beaver_ftc.design.dryden import Dryden
-from beaver_ftc.diagnosis.bounds.admitted import GUST_LIMIT_SIGMA
-from beaver_ftc.diagnosis.monitors import sensor_records
+from beaver_ftc.diagnosis.bounds import GUST_LIMIT_SIGMA
+from beaver_ftc.diagnosis.monitors import redundancy
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop import cockpit, instrument_records, memory
 from beaver_ftc.loop.assembly import lay_out, y_places
@@ -90,22 +90,22 @@ def test_what_a_plug_in_is_told_before_and_in_flight(loop, changed):
 
 @pytest.mark.parametrize(
     ("noise", "quantum", "looks"),
-    [(0.0, 0.0, 3), (1.0, 0.0, 3), (0.26, 1.0, 50), (0.25, 1.0, sensor_records.NEVER_STILL)],
+    [(0.0, 0.0, 3), (1.0, 0.0, 3), (0.26, 1.0, 50), (0.25, 1.0, redundancy.NEVER_FROZEN)],
 )
 def test_for_how_long_a_sound_instrument_may_stand_still(noise, quantum, looks):
-    assert sensor_records.longest_identical(noise, quantum) == looks
+    assert redundancy.longest_identical(noise, quantum) == looks
 
 
 def test_gusts_that_the_watch_reckons_with():
     """Changes of variance 3 sigma^2 V / L a second, V 1.4 times that at the start, L 533.4 m (1750 ft); the
     filter passes h / (1 - exp(-2 lam h)) of them."""
-    speed, changes = sensor_records.gusts_seen(Dryden("light"), 45.0, 0.01)
+    speed, changes = redundancy.gust_bounds(Dryden("light"), 45.0, 0.01)
     sigma = 7.4 * 0.3048
     assert speed == pytest.approx(GUST_LIMIT_SIGMA * sigma)
     per_s = GUST_LIMIT_SIGMA * sigma * sqrt(3.0 * 1.4 * 45.0 / 533.4)
-    expected = [per_s * sqrt(0.01 / (1 - exp(-2 * pole * 0.01))) for pole in sensor_records.POLES_PER_S]
+    expected = [per_s * sqrt(0.01 / (1 - exp(-2 * pole * 0.01))) for pole in redundancy.POLES_PER_S]
     assert changes == pytest.approx(expected)
-    assert sensor_records.gusts_seen(Dryden("none"), 45.0, 0.01)[0] == 0.0
+    assert redundancy.gust_bounds(Dryden("none"), 45.0, 0.01)[0] == 0.0
 
 
 @pytest.mark.parametrize(

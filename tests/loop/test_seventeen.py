@@ -9,7 +9,7 @@ import beaver_ftc as bf
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.schema import MAX_SURFACES
 from beaver_ftc.diagnosis.detection.parity import size_for
-from beaver_ftc.diagnosis.isolation.estimators import members_of
+from beaver_ftc.diagnosis.isolation import members_of
 from beaver_ftc.loop.assembly import frame_dtype
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.trim import trim

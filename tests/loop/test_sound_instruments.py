@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import beaver_ftc as bf
-from beaver_ftc.diagnosis.monitors.sensor_records import ALPHA_FLOW, BETA_FLOW, RPM
+from beaver_ftc.diagnosis.monitors.redundancy import ALPHA_FLOW, BETA_FLOW, RPM
 from beaver_ftc.scenario.schema import load
 from beaver_ftc.scenario.sensors import PRESETS
 

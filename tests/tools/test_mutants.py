@@ -72,23 +72,23 @@ def test_a_change_elsewhere_draws_the_same_mutants(module, monkeypatch):
 
 
 def test_half_of_what_is_drawn_is_glue_and_a_kernel_is_what_compiled_code_is_made_of():
-    named = ("loop/changing.py", "diagnosis/isolation/estimators.py", "loop/frame.py")
+    named = ("loop/changing.py", "diagnosis/isolation.py", "loop/frame.py")
     pairs, numbers = scope.drawn(1, [f"beaver_ftc/{name}" for name in named])
     assert [kind for kind, _ in pairs[:60]] == [scope.KERNELS, scope.GLUE] * 30
     files = {kind: {m.file.name for of, m in pairs if of == kind} for kind in numbers}
-    assert files == {scope.KERNELS: {"estimators.py"}, scope.GLUE: {"changing.py", "estimators.py"}}
+    assert files == {scope.KERNELS: {"isolation.py"}, scope.GLUE: {"changing.py", "isolation.py"}}
     assert sum(numbers.values()) == len(pairs)
 
 
 def test_what_fills_the_records_of_kernels_is_glue_and_what_lays_them_out_is_not():
     of = {}
-    for name in ("isolation/estimators.py", "detection/likelihood.py"):
+    for name in ("isolation.py", "detection/likelihood.py"):
         file = scope.CORE / "diagnosis" / name
         functions = [f for f in ast.parse(file.read_text()).body if isinstance(f, ast.FunctionDef)]
         for mutant in mutants(file):
             around = [f.name for f in functions if f.lineno <= mutant.lines[0] <= f.end_lineno]
             of.setdefault((*around, "a constant")[0], set()).add(scope.kind_of(mutant))
-    assert of["configure"] == {scope.GLUE}
+    assert of["configure_isolation"] == {scope.GLUE}
     assert of["a constant"] == of["whiten"] == {scope.KERNELS}
     frame = {scope.kind_of(mutant) for mutant in mutants(scope.CORE / "loop" / "frame.py")}
     assert frame == {"fly"}
@@ -158,7 +158,10 @@ def test_what_is_kept_once_a_process_is_forgotten_so_that_each_test_is_known_to_
 
 
 def test_tests_of_a_module_without_functions_are_those_of_what_imports_it():
-    watch, user = "src/beaver_ftc/diagnosis/monitors/sensor_records.py", "src/beaver_ftc/diagnosis/scheme.py"
+    watch, user = (
+        "src/beaver_ftc/diagnosis/monitors/redundancy.py",
+        "src/beaver_ftc/diagnosis/schemes/__init__.py",
+    )
     lines = {user: {"1": [], "150": ["b"]}, "src/beaver_ftc/design/terms.py": {"20": ["a"]}}
     found = reach.Reach([{"seconds": {}, "left_out": {}, "lines": lines}])
     assert found.of(watch, (60, 40)) == {"b"}

@@ -138,7 +138,7 @@ class Known:
         """Of a log with everything in it, of every built-in aircraft."""
         from beaver_ftc.aircraft import builtin_names, load
         from beaver_ftc.control.outer.state import COLUMNS
-        from beaver_ftc.diagnosis.isolation.estimators import estimator_names
+        from beaver_ftc.diagnosis.isolation import estimator_names
         from beaver_ftc.plant.channels import log_columns
 
         found: dict[str, None] = {}

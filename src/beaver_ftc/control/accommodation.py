@@ -1,6 +1,6 @@
 """How effective the law takes each surface to be: effectiveness, offset and lag, moved smoothly.
 
-From the diagnosis (diagnosis/assessment.py): an isolated loss scales the command, a surface that does not
+From the diagnosis (diagnosis/conclusion.py): an isolated loss scales the command, a surface that does not
 follow its command is parked, an offset is subtracted, a slow surface is left to its pace. The oracle is
 informed of the truth instead: the loop fills in the true faults of the instant (loop/accounts.py), and no
 other law reads them.
@@ -14,7 +14,7 @@ import numpy as np
 from beaver_ftc.compiled import apart, kernel, record, sized
 from beaver_ftc.design.model import unanticipated_pitch
 from beaver_ftc.diagnosis.state import PITCH
-from beaver_ftc.diagnosis.types.contract import FIXED
+from beaver_ftc.diagnosis.types.contract import GIVE_UP
 from beaver_ftc.scenario.diagnosis import ControlConfig
 
 # The largest change of an effectiveness a frame; the least that a law divides by.
@@ -121,7 +121,7 @@ def park_failed_surfaces(output, assessment, faults, informed):
     shows. From then on the reference is governed."""
     for s in range(output.parked.size):
         immovable = informed and faults.immovable[s]
-        fixed = assessment.measure[s] == FIXED and output.effectiveness[s] == 0.0
+        fixed = assessment.measure[s] == GIVE_UP and output.effectiveness[s] == 0.0
         output.parked[s] = immovable or output.given_up[s] or fixed
         if output.parked[s]:
             output.authority_lost = 1

@@ -21,7 +21,7 @@ from beaver_ftc.compiled import apart, kernel, record, sized
 from beaver_ftc.control import least_squares
 from beaver_ftc.control.accommodation import usable_effectiveness
 from beaver_ftc.control.least_squares import problem_dtype
-from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW, leaders_of
+from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW, leading_surfaces
 from beaver_ftc.scenario.diagnosis import ControlConfig, Probing
 
 RELUCTANT, TINY = 1e-4, 1e-300  # weight of a backup that is not asked, beside the others
@@ -67,7 +67,7 @@ def configure(control: np.void, config: ControlConfig, travel: np.ndarray, aircr
     """Fill `layout` and `allocation` of a law's record; travel (2, n) rad."""
     layout = control["layout"]
     layout["low"], layout["high"] = travel
-    layout["main"], layout["stand_in"] = leaders_of(aircraft), _stand_in(aircraft)
+    layout["main"], layout["stand_in"] = leading_surfaces(aircraft), _stand_in(aircraft)
     layout["is_backup"] = [surface in aircraft.stand_ins for surface in aircraft.surfaces]
     layout["authority"], layout["general"] = _authority(aircraft, layout), _is_general(aircraft)
     step = control["reference"]["config"]["dt"] / config.hand_over_s

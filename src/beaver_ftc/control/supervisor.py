@@ -7,7 +7,7 @@ rudder: no second surface), or unanticipated (no known fault fits).
 
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.diagnosis.state import PITCH, UNANTICIPATED
-from beaver_ftc.diagnosis.types.contract import FIXED, LOSES
+from beaver_ftc.diagnosis.types.contract import GIVE_UP, SCALE_COMMAND
 from beaver_ftc.scenario.diagnosis import MODES
 
 MODE_NOMINAL, MODE_ADAPTIVE, MODE_REALLOCATED, MODE_UNANTICIPATED = range(len(MODES))
@@ -49,7 +49,7 @@ def mode_from(config, layout, verdict, assessment):
     if not assessment.every_type:
         relieved = assessment.named == elevator and relievable
         return mode_of(config, verdict.detected, verdict.isolated, relieved)
-    replaced = verdict.lead_kind in (LOSES, FIXED)
+    replaced = verdict.lead_kind in (SCALE_COMMAND, GIVE_UP)
     relieved = replaced and verdict.lead == elevator and relievable
     isolated = verdict.lead if replaced else min(verdict.isolated, 0)
     return mode_of(config, verdict.detected, isolated, relieved)

@@ -1,7 +1,7 @@
 """The diagnosis at one frame, as certificates, studies and integrations read it: values with names and units.
 
 The layout of the records is the business of their stages alone. A readout copies what it returns: it does not
-change when the flight goes on. `fdi` is a record of `scheme.diagnosis_dtype`.
+change when the flight goes on. `fdi` is a record of `schemes.diagnosis_dtype`.
 """
 
 from functools import cached_property
@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from beaver_ftc.diagnosis.detection.likelihood import N_SLOTS
-from beaver_ftc.diagnosis.schemes.rows import place_of
+from beaver_ftc.diagnosis.state import scheme_number
 
 
 class Estimator(NamedTuple):
@@ -202,7 +202,7 @@ class DiagnosisReadout:
 
     @cached_property
     def scheme(self) -> int:
-        """Place of its scheme, as `schemes.rows.place_of` says."""
+        """Place of its scheme, as `state.scheme_number` says."""
         return int(self._fdi["config"]["scheme"])
 
     @cached_property
@@ -323,7 +323,7 @@ def disable(fdi: np.void) -> None:
     """Stop the built-in diagnosis of surfaces and sensors from the next frame on: scheme `none` is in charge
     then. A plug-in goes on."""
     if fdi["config"]["enabled"]:
-        fdi["config"]["scheme"] = place_of("none")
+        fdi["config"]["scheme"] = scheme_number("none")
     fdi["config"]["enabled"] = fdi["sensor_monitor"]["config"]["enabled"] = False
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.control.supervisor import MAX_EVENTS
 from beaver_ftc.design.model import unanticipated_pitch
-from beaver_ftc.diagnosis.bounds.worst_case import N_PLACES, age_of, is_beyond
+from beaver_ftc.diagnosis.bounds import N_PLACES, is_outside_all_boxes, time_row
 from beaver_ftc.diagnosis.state import PITCH
 from beaver_ftc.plant.sensing import effective, effectiveness, position
 from beaver_ftc.scenario.diagnosis import MAX_POLES
@@ -174,7 +174,7 @@ def note_inconclusive(inconclusive, fdi, t):
     inconclusive.frames += 1
     if not enabled:
         inconclusive.undiagnosed += 1
-    elif age_of(error_map) < 0:
+    elif time_row(error_map) < 0:
         inconclusive.late += 1
     else:
         note_place(inconclusive, error_map)
@@ -185,7 +185,7 @@ def note_place(inconclusive, error_map):
     """Count the quantities in which this place is outside the map."""
     explained = False
     for i in range(error_map.place.size):
-        if is_beyond(error_map, i):
+        if is_outside_all_boxes(error_map, i):
             now, first = error_map.place[i], inconclusive.beyond[i] == 0
             inconclusive.least[i] = now if first else min(now, inconclusive.least[i])
             inconclusive.greatest[i] = now if first else max(now, inconclusive.greatest[i])

@@ -20,13 +20,12 @@ from beaver_ftc.control.outer.setup import set_up_autopilot
 from beaver_ftc.control.outer.state import AUTOPILOT, COLUMNS
 from beaver_ftc.control.supervisor import SUPERVISOR
 from beaver_ftc.design.variants import anchor, mass_of
-from beaver_ftc.diagnosis import scheme
-from beaver_ftc.diagnosis.assessment import assessment_dtype
-from beaver_ftc.diagnosis.belief import expectation
+from beaver_ftc.diagnosis import expectation, schemes
+from beaver_ftc.diagnosis.conclusion import assessment_dtype
 from beaver_ftc.diagnosis.detection import noise_model
-from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE, Size, size_for
-from beaver_ftc.diagnosis.isolation.estimators import estimator_names
-from beaver_ftc.diagnosis.monitors import sensor_records
+from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE, RecordSize, size_for
+from beaver_ftc.diagnosis.isolation import estimator_names
+from beaver_ftc.diagnosis.monitors import redundancy
 from beaver_ftc.loop import instrument_records, memory
 from beaver_ftc.loop.accounts import accounts_dtype, true_faults_dtype
 from beaver_ftc.plant import channels as ch
@@ -43,7 +42,7 @@ LOGGED = record(estimators=int, sensor_monitor=int, sampled=int, power=int, test
 
 
 @sized
-def frame_dtype(n: int, size: Size = USUAL_SIZE, line: int = USUAL_LINE) -> np.dtype:
+def frame_dtype(n: int, size: RecordSize = USUAL_SIZE, line: int = USUAL_LINE) -> np.dtype:
     """All that a flight of an aircraft with n surfaces remembers between frames; size: of its statistics;
     line: of its delay lines."""
     return record(
@@ -51,7 +50,7 @@ def frame_dtype(n: int, size: Size = USUAL_SIZE, line: int = USUAL_LINE) -> np.d
         running=RUNNING,
         since=int, logged=LOGGED,  # the frame with which this diagnosis has begun
         truth=truth_dtype(n), instruments=instruments_dtype(line), measured=MEASURED,
-        belief=expectation.belief_dtype(n), fdi=scheme.diagnosis_dtype(n, size),
+        belief=expectation.belief_dtype(n), fdi=schemes.diagnosis_dtype(n, size),
         assessment=assessment_dtype(n), faults=true_faults_dtype(n), supervisor=SUPERVISOR,
         control=control.control_dtype(n), autopilot=AUTOPILOT,
         held=int, held_rad=n,  # whether another than the law commands, and what
@@ -110,9 +109,11 @@ def configure_diagnosis_at_trim(frame: np.void, scenario: Scenario, trim: Trim) 
     design = belief["design"]
     belief["u"] = belief["commanded"] = frame["control"]["layout"]["trim"] = trim.u
     anchor(design, *trim)
-    sensor_records.configure(fdi["sensor_monitor"], scenario, design, trim.y, declared.monitors_sensors)
+    redundancy.configure_monitor(fdi["sensor_monitor"], scenario, design, trim.y, declared.monitors_sensors)
     mass = mass_of(scenario.design_model, scenario.airframe)
-    noise_model.set_up(fdi, scenario.fdi, declared, design, mass, (trim.x, trim.y, trim.u), scenario.rate_hz)
+    noise_model.configure_statistics(
+        fdi, scenario.fdi, declared, design, mass, (trim.x, trim.y, trim.u), scenario.rate_hz
+    )
 
 
 def _assemble_design(scenario: Scenario, travel: np.ndarray, line: int) -> np.ndarray:
@@ -126,7 +127,7 @@ def _assemble_design(scenario: Scenario, travel: np.ndarray, line: int) -> np.nd
     truth["factor"][: len(channels)] = [factor for _, _, factor in channels]
     instrument_records.configure(frame["instruments"], scenario, instant_s)
     expectation.configure(frame["belief"], scenario, travel)
-    scheme.configure(frame["fdi"], frame["belief"], scenario, travel)
+    schemes.configure_diagnosis(frame["fdi"], frame["belief"], scenario, travel)
     control.configure(frame["control"], scenario, travel)
     return frames
 

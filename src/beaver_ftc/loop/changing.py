@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from beaver_ftc.control.state import take_over
-from beaver_ftc.diagnosis.scheme import restart_diagnosis
+from beaver_ftc.diagnosis.schemes import restart_diagnosis
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.loop.plugin_frame import PluginFrame, named_detector, named_law, plugged

@@ -18,21 +18,20 @@ from beaver_ftc.compiled import apart, kernel
 from beaver_ftc.control import allocation, power, reference, supervisor
 from beaver_ftc.control.laws import table
 from beaver_ftc.control.outer.autopilot import judge, steer
-from beaver_ftc.diagnosis import assessment as assessed
-from beaver_ftc.diagnosis import conclusion
-from beaver_ftc.diagnosis.assessment import assess, assess_unknown
-from beaver_ftc.diagnosis.belief.expectation import (
+from beaver_ftc.diagnosis import conclusion, schemes
+from beaver_ftc.diagnosis import conclusion as assessed
+from beaver_ftc.diagnosis.conclusion import assess_surfaces, assess_unknown_acceleration
+from beaver_ftc.diagnosis.detection import filters, statistical
+from beaver_ftc.diagnosis.expectation import (
     accumulate_substep,
     begin_sums,
     evaluate_design,
     evaluate_frame,
-    follow_command,
+    move_healthy_surfaces,
     predict_acceleration,
 )
-from beaver_ftc.diagnosis.detection import bank, fdae, statistical
 from beaver_ftc.diagnosis.monitors import engine_symmetry, sensor_monitor
-from beaver_ftc.diagnosis.scheme import note_named_surfaces
-from beaver_ftc.diagnosis.schemes import table as schemes
+from beaver_ftc.diagnosis.schemes import record_named_surfaces
 from beaver_ftc.diagnosis.state import PITCH
 from beaver_ftc.diagnosis.types import verdict
 from beaver_ftc.loop import accounts, log_row
@@ -48,7 +47,7 @@ def monitor_sensors(frame):
     fdi, monitor, engine = frame.fdi, frame.fdi.sensor_monitor, frame.control.power.output
     before, t = monitor.output.alarmed, frame.k * frame.dt
     if engine.in_use:
-        sensor_monitor.expect_manifold_pressure(monitor, engine.command[0])
+        sensor_monitor.set_expected_manifold_pressure(monitor, engine.command[0])
     sensor_monitor.monitor_sensors(
         monitor, frame.belief, frame.measured, fdi.verdict, fdi.bank, fdi.bound, frame.dt, t
     )
@@ -59,9 +58,9 @@ def monitor_sensors(frame):
 @kernel
 def reset_surface_diagnosis(fdi):
     """Discard what the diagnosis of the surfaces made of a broken sensor."""
-    conclusion.void(fdi.verdict)
+    conclusion.discard_conclusion(fdi.verdict)
     verdict.clear_modes(fdi.types.surface)
-    fdae.reset_network(fdi.fdae.network)
+    filters.reset_network(fdi.fdae.network)
 
 
 @kernel
@@ -115,7 +114,7 @@ def diagnose(frame):
         predict_acceleration(belief, fdi.verdict.detected, applied.effectiveness, applied.offset, every_type)
         schemes.predict(scheme, fdi, belief, measured, k, frame.t)
     schemes.conclude(scheme, fdi, belief, measured, frame.t)
-    note_named_surfaces(fdi, frame.t)
+    record_named_surfaces(fdi, frame.t)
     schemes.prepare(scheme, fdi, belief, measured, k)
     begin_sums(belief, fdi.bound, fdi.layout, every_type, measured)
     accounts.follow_guarantee(frame.accounts.guarantee, fdi.bank, fdi.config.dt, belief.share, k, frame.t)
@@ -127,8 +126,8 @@ def assess_faults(frame):
     """Put what the diagnosis says of each surface, and of what is unknown, where the law reads it."""
     fdi, assessment = frame.fdi, frame.assessment
     config, found, types, layout, detector = fdi.config, fdi.verdict, fdi.types, fdi.layout, fdi.statistical
-    assess(assessment, config, found, types, layout, fdi.isolation.estimator, detector)
-    assess_unknown(assessment, config, found, types, layout, detector, fdi.fdae, fdi.bound)
+    assess_surfaces(assessment, config, found, types, layout, fdi.isolation.estimator, detector)
+    assess_unknown_acceleration(assessment, config, found, types, layout, detector, fdi.fdae, fdi.bound)
 
 
 @kernel
@@ -141,7 +140,7 @@ def accumulate_instant(frame):
 
 @kernel
 def isolated_theta(fdi, s):
-    """Estimated theta of the isolated loss of surface s: see assessment.py."""
+    """Estimated theta of the isolated loss of surface s: see conclusion.py."""
     return assessed.isolated_theta(
         fdi.config, fdi.verdict, fdi.layout, fdi.isolation.estimator, fdi.statistical, s
     )
@@ -210,7 +209,7 @@ def account(frame):
     if truth.faulted:
         accounts.account_authority(sums.authority, control.axes)
     else:
-        bank.note_closest_approach(frame.fdi.bank)
+        filters.note_closest_approach(frame.fdi.bank)
         statistical.note_closest_approach(frame.fdi.statistical.alarm)
     saturated, dt = control.allocation.output.saturated, control.reference.config.dt
     accounts.account_surfaces(sums, truth, saturated, frame.k, dt)
@@ -267,7 +266,7 @@ def finish(frame, commanded, row):
     reference.follow(control.reference.config, control.reference.output, commanded)
     authority_lost = control.surfaces.output.authority_lost
     reference.govern(control.reference, commanded, control.axes.shortfall, authority_lost)
-    follow_command(belief, control.allocation.output.command)
+    move_healthy_surfaces(belief, control.allocation.output.command)
     hand_over(frame.truth, belief.commanded, control.power.output)
     advance_clock(frame)
     frame.row += 1

@@ -5,7 +5,7 @@ What is not there, or has not begun, is left as the row is given: not a number.
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.control.outer.state import SPEED
-from beaver_ftc.diagnosis.detection.bank import nearest
+from beaver_ftc.diagnosis.detection.filters import nearest_filter
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.sensing import effective, first_signal, position
 
@@ -64,7 +64,7 @@ def record_estimator(fie, started, row, column):
 def record_alarm(bank, row, column):
     """Residual and threshold of what raises the alarm: on each axis the filter nearest to its bound."""
     for i in range(3):
-        m = nearest(bank, i)
+        m = nearest_filter(bank, i)
         row[column + i], row[column + 3 + i] = bank.output.residual[m, i], bank.output.threshold[m, i]
     return column + 6
 

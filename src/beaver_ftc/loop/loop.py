@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from beaver_ftc.compiled import direct
-from beaver_ftc.diagnosis.belief.air import stop_accelerometers
-from beaver_ftc.diagnosis.monitors import sensor_records
+from beaver_ftc.diagnosis.gusts import stop_accelerometers
+from beaver_ftc.diagnosis.monitors import redundancy
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.loop import memory, stepping
 from beaver_ftc.loop.assembly import Trim, configure_at_trim, configure_design, lay_out, y_places
@@ -223,7 +223,7 @@ class Loop:
         if not wanted or fdi["sensor_monitor"]["config"]["enabled"]:
             return False
         design = self.frames[0]["belief"]["design"]
-        sensor_records.configure(fdi["sensor_monitor"], scenario, design, self.trimmed.y, enabled=True)
+        redundancy.configure_monitor(fdi["sensor_monitor"], scenario, design, self.trimmed.y, enabled=True)
         stop_accelerometers(fdi["statistical"]["air"])
         fdi["statistical"]["inertial_air"]["output"]["moving"] = 0
         return True

@@ -26,9 +26,9 @@ from beaver_ftc.control.outer.state import (
 )
 from beaver_ftc.design.model import AXES
 from beaver_ftc.diagnosis.base import Verdict
-from beaver_ftc.diagnosis.monitors.sensor_records import instrument_found
-from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, STATISTICS, UNANTICIPATED, YAW
-from beaver_ftc.diagnosis.types.findings import estimate_of, found
+from beaver_ftc.diagnosis.monitors.redundancy import sensor_finding
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, STATISTICAL_DETECTOR, UNANTICIPATED, YAW
+from beaver_ftc.diagnosis.types.verdict import estimate_of, fault_findings
 from beaver_ftc.loop.frame import isolated_theta
 from beaver_ftc.loop.inconclusive import inconclusive_of
 from beaver_ftc.plant.channels import AIRSPEED, ALTITUDE
@@ -56,7 +56,7 @@ class Landing:
     flight; closest_approach: the same of each filter of the bank, the published one first.
     surface_travel_rad: path of each surface, up and down added. engine_power: if pitch was left to the
     engine, since when and for how long, s, and the lowest and highest manifold pressure, inHg. faults: of
-    several at once (`fdi.pairs`), as in types/findings.py, the first named first. statistical: when the
+    several at once (`fdi.pairs`), as in types/verdict.py, the first named first. statistical: when the
     statistical detector would have raised the alarm, its level in standard deviations, and the largest
     share of it reached in healthy flight. mode_changes, exits: how many there were of `supervisor` and
     `envelope_exits`, which hold the first and the last; the end of an exit that is still open is the end of
@@ -137,7 +137,7 @@ def _estimate(fdi: np.void, surface: int) -> float:
 def _isolation(fdi: np.void, surfaces: Sequence[str]) -> dict[str, Any]:
     """isolated, isolation_type, candidates, estimate, isolation_time_s of a Landing."""
     if fdi["config"]["every_type"]:
-        return found(fdi, surfaces)
+        return fault_findings(fdi, surfaces)
     isolated = int(fdi["verdict"]["isolated"])
     said: dict[str, Any] = {"isolated": None, "isolation_type": None, "estimate": None, "candidates": ()}
     said["isolation_time_s"] = None
@@ -295,7 +295,7 @@ def _alarm(fdi: np.void) -> dict[str, Any]:
 def _findings(frame: np.void, surfaces: Sequence[str]) -> dict[str, Any]:
     """What `_alarm` and `_isolation` have, of surfaces or of an instrument."""
     fdi = frame["fdi"]
-    broken = instrument_found(fdi["sensor_monitor"], float(frame["t"]))
+    broken = sensor_finding(fdi["sensor_monitor"], float(frame["t"]))
     if broken is not None:
         return {"detection_axis": None, **broken, "so_far": False if broken["isolated"] else None}
     said = _alarm(fdi) | _isolation(fdi, surfaces)
@@ -356,7 +356,11 @@ def guaranteed_delay_s(frame: np.void, scenario: Scenario, plugged: bool) -> flo
         return None
     fault_s, verdict = float(truth["fault_at_s"]), fdi["verdict"]
     early = verdict["detected"] and verdict["detected_at_s"] < fault_s - TIME_TOLERANCE_S
-    if early or fdi["config"]["authority"] == STATISTICS or fdi["sensor_monitor"]["output"]["alarmed"]:
+    if (
+        early
+        or fdi["config"]["authority"] == STATISTICAL_DETECTOR
+        or fdi["sensor_monitor"]["output"]["alarmed"]
+    ):
         return None
     return None if _is_off(scenario, certain_s) else certain_s - fault_s
 

@@ -3,7 +3,7 @@
     begin -> diagnose -> decide -> command | take_command -> finish
 
 are the stages of frame.py; left of the bar: built in, right of it: a plug-in's answer. A plug-in's verdict is
-taken by `diagnose` (diagnosis/schemes/plugged.py).
+taken by `diagnose` (adaptive_estimators.PLUGGED).
 """
 
 from collections.abc import Callable, Mapping
@@ -17,10 +17,9 @@ from beaver_ftc.control.base import Law, Reference
 from beaver_ftc.control.laws.rows import has_kernels, row_of
 from beaver_ftc.design.context import Context, DesignFunctions
 from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
-from beaver_ftc.diagnosis.bounds.variances import variances_of
-from beaver_ftc.diagnosis.schemes.fault_classes import PUBLISHED
-from beaver_ftc.diagnosis.schemes.rows import PLUGGED
-from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
+from beaver_ftc.diagnosis.bounds import variances_of
+from beaver_ftc.diagnosis.schemes.adaptive_estimators import PUBLISHED_CLASS
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, PLUGIN_SCHEME, UNANTICIPATED
 from beaver_ftc.documents.errors import BeaverFtcError, SimulationFailed
 from beaver_ftc.loop import stepping as stages
 from beaver_ftc.loop.assembly import y_places
@@ -261,7 +260,7 @@ def plugged(
         fdi = frames["fdi"][0]
         fdi["config"]["enabled"] = fdi["config"]["every_type"] = fdi["isolation"]["config"]["n"] = 0
         fdi["statistical"]["tests"]["enabled"] = fdi["sensor_monitor"]["config"]["enabled"] = 0
-        fdi["config"]["scheme"], fdi["config"]["fault_class"] = PLUGGED, PUBLISHED
+        fdi["config"]["scheme"], fdi["config"]["fault_class"] = PLUGIN_SCHEME, PUBLISHED_CLASS
         fdi["types"]["pair"]["enabled"] = 0
         n = fdi["types"]["surface"].size
         fdi["isolation"]["estimator"]["surface"][:n] = range(n)

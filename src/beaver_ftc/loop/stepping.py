@@ -8,9 +8,9 @@ frames (1,): of `frame_dtype` (assembly.py).
 
 from beaver_ftc.compiled import apart, kernel, row_of
 from beaver_ftc.design.actuators import move
-from beaver_ftc.diagnosis.assessment import likelihood_counts
+from beaver_ftc.diagnosis.conclusion import uses_statistical_estimates
 from beaver_ftc.diagnosis.monitors import sensor_monitor
-from beaver_ftc.diagnosis.scheme import built_in_statistic as largest_statistic
+from beaver_ftc.diagnosis.schemes import built_in_statistic as largest_statistic
 from beaver_ftc.loop import frame as whole
 from beaver_ftc.loop.accounts import add_effect
 from beaver_ftc.plant.native import advance
@@ -24,7 +24,7 @@ def begin_sensor_monitor(frames):
     frame = frames[0]
     if not frame.measured.inertial:
         sample_forces(frame.instruments, frame.measured)
-    sensor_monitor.begin(frame.fdi.sensor_monitor, frame.measured, frame.t)
+    sensor_monitor.begin_monitor(frame.fdi.sensor_monitor, frame.measured, frame.t)
 
 
 @kernel
@@ -66,10 +66,12 @@ def finish(frames, references, log):
 
 @kernel
 def built_in_statistic(frames):
-    """The built-in detection's statistic at this frame: see scheme.py."""
+    """The built-in detection's statistic at this frame: see schemes.built_in_statistic."""
     fdi = frames[0].fdi
     alarm, authority = fdi.statistical.alarm, fdi.config.authority
-    return largest_statistic(fdi.bank, alarm, authority, likelihood_counts(fdi.statistical.tests, authority))
+    return largest_statistic(
+        fdi.bank, alarm, authority, uses_statistical_estimates(fdi.statistical.tests, authority)
+    )
 
 
 @kernel

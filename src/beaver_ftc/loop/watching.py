@@ -6,8 +6,8 @@ take -> stepping.diagnose -> believe
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.belief.expectation import evaluate_design, evaluate_frame, follow_command
 from beaver_ftc.diagnosis.conclusion import isolated_surface
+from beaver_ftc.diagnosis.expectation import evaluate_design, evaluate_frame, move_healthy_surfaces
 from beaver_ftc.loop.frame import accommodate, advance_clock, isolated_theta, start_clock
 from beaver_ftc.plant.instruments import take_sample
 
@@ -27,7 +27,7 @@ def take(frames, x, y, command, attitude):
     belief, measured = frame.belief, frame.measured
     start_clock(frame)
     if frame.k > 0:
-        follow_command(belief, command)
+        move_healthy_surfaces(belief, command)
     take_sample(measured, x, y, attitude)
     evaluate_design(belief, measured)
     evaluate_frame(belief, frame.fdi.bound, measured, frame.k, frame.dt)

@@ -165,7 +165,7 @@ class Row(NamedTuple):
     """One sensor.
 
     name: its key in `sensors`. errors: the model of them. most: the largest offset or noise of a fault, in
-    the unit of its errors. test: the test of the sensor monitor (`diagnosis/monitors/sensor_records.py`) in
+    the unit of its errors. test: the test of the sensor monitor (`diagnosis/monitors/redundancy.py`) in
     which a jump of its reading appears at once. words: another name of it in a scenario's faults.
 
     Only of a sensor that no equation of the diagnosis uses: truth is the JSBSim property that it measures,

@@ -15,9 +15,8 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.design import AXES
-from beaver_ftc.diagnosis import LOSS
+from beaver_ftc.diagnosis import LOSS, scheme_number
 from beaver_ftc.diagnosis.detection import poles_of
-from beaver_ftc.diagnosis.schemes import place_of
 from beaver_ftc.diagnosis.types import TYPE_WORDS as WORDS
 from beaver_ftc.documents import BadInput
 from beaver_ftc.loop import LogSink
@@ -283,7 +282,7 @@ def statements(
     """What can be said of each event; one without a `value` says why it cannot be certified."""
     alarm, diagnosis = events["detected"], tape.alarm.diagnosis
     about: Document = {"what": None, "column": "detected", "frame": alarm}
-    monitor, ours = diagnosis.sensor_monitor, place_of("adaptive-estimators")
+    monitor, ours = diagnosis.sensor_monitor, scheme_number("adaptive-estimators")
     watch = instruments_say.of_alarm(monitor) if monitor.alarmed else None
     if not diagnosis.estimators or not diagnosis.enabled or diagnosis.scheme != ours:
         yield about | (watch or {"because": "another scheme was in charge"})

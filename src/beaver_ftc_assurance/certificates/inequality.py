@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.design import AXES
-from beaver_ftc.diagnosis.bounds import ROUNDING_RAD_S2
+from beaver_ftc.diagnosis import ROUNDING_RAD_S2
 from beaver_ftc.loop import FrameReadout
 from beaver_ftc.results import Document
 

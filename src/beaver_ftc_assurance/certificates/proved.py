@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from beaver_ftc.aircraft import AXES
-from beaver_ftc.diagnosis.isolation import estimator_names
+from beaver_ftc.diagnosis import estimator_names
 from beaver_ftc.loop import FrameReadout
 from beaver_ftc.results import Columns, Log, MemoryLog, Proof
 from beaver_ftc.scenario import Scenario, to_yaml

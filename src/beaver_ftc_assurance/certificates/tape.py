@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from beaver_ftc.compiled import direct, kernel
+from beaver_ftc.diagnosis import estimator_names
 from beaver_ftc.diagnosis.detection import N_SLOTS
-from beaver_ftc.diagnosis.isolation import estimator_names
 from beaver_ftc.loop import (
     FrameReadout,
     Loop,

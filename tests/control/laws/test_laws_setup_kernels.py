@@ -8,7 +8,7 @@ from beaver_ftc.control.laws import gains
 from beaver_ftc.control.laws.gains import N_POINTS
 from beaver_ftc.design.model import AIRSPEED, QDYN, design_record
 from beaver_ftc.design.variants import response
-from beaver_ftc.diagnosis.belief.expectation import belief_dtype
+from beaver_ftc.diagnosis.expectation import belief_dtype
 from beaver_ftc.scenario.schema import Scenario
 from law_records import fields, new_control
 from telling import apart

@@ -14,7 +14,7 @@ from beaver_ftc.control.supervisor import (
     MODE_UNANTICIPATED,
 )
 from beaver_ftc.diagnosis.state import NOT_ISOLATED
-from beaver_ftc.diagnosis.types.contract import FIXED, LAGS, LOSES, SHIFTED
+from beaver_ftc.diagnosis.types.contract import GIVE_UP, SCALE_COMMAND, SUBTRACT_OFFSET, WAIT_FOR_SURFACE
 from beaver_ftc.loop import frame as whole
 from beaver_ftc.loop.assembly import configure_design
 from flying import scenario
@@ -302,7 +302,7 @@ class TestVerdict:
 
     def test_a_slow_surface_is_left_to_its_pace(self, frame):
         surface, frame["fdi"]["config"]["every_type"] = frame["fdi"]["types"]["surface"][RUDDER], 1
-        surface["accommodation"]["mode"], elapsed = LAGS, surface["elapsed"]
+        surface["accommodation"]["mode"], elapsed = WAIT_FOR_SURFACE, surface["elapsed"]
         elapsed["command"], elapsed["low"], elapsed["high"] = 0.1, 0.02, 0.06
         assert self.taken(frame)["lag"] == pytest.approx([0, 0, 0.04 - 0.1, 0])
         assert frame["control"]["surfaces"]["output"]["authority_lost"] == 1
@@ -310,9 +310,9 @@ class TestVerdict:
     @pytest.mark.parametrize(
         ("every_type", "measure", "target", "surface", "doubtful"),
         [
-            (1, -1, 1.0, RUDDER, True), (1, LOSES, 1.0, RUDDER, False), (0, -1, 1.0, RUDDER, False),
+            (1, -1, 1.0, RUDDER, True), (1, SCALE_COMMAND, 1.0, RUDDER, False), (0, -1, 1.0, RUDDER, False),
             (0, -1, 0.05, RUDDER, True), (0, -1, 0.1, RUDDER, False), (0, -1, 1.0, ELEVATOR, True),
-            (1, SHIFTED, 0.5, AILERON, False),
+            (1, SUBTRACT_OFFSET, 0.5, AILERON, False),
         ],
     )  # fmt: skip
     def test_what_may_be_of_no_use(self, frame, every_type, measure, target, surface, doubtful):
@@ -328,7 +328,7 @@ class TestVerdict:
         out["command"], out["saturated"], surfaces["effectiveness"] = 0.3, 1, 1.0
         frame["faults"]["immovable"][RUDDER] = 1  # which only the oracle may know
         surfaces["given_up"][RUDDER] = why == "withdrawn"
-        assessment["measure"], assessment["measure"][RUDDER] = -1, FIXED
+        assessment["measure"], assessment["measure"][RUDDER] = -1, GIVE_UP
         surfaces["effectiveness"][RUDDER] = 0.0 if why == "fixed" else 0.5
         accommodation.park_failed_surfaces(surfaces, assessment, frame["faults"], why == "truth")
         allocation.park(out, control["layout"], surfaces["parked"])

@@ -11,8 +11,8 @@ import yaml
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.dryden import Dryden, rotation_lengths
 from beaver_ftc.design.fdc import MASS
-from beaver_ftc.diagnosis.belief import air
-from beaver_ftc.diagnosis.belief.air import AIR
+from beaver_ftc.diagnosis import gusts
+from beaver_ftc.diagnosis.gusts import GUST_RECORD
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.scenario.diagnosis import Bounds
 from beaver_ftc.scenario.schema import load as load_given
@@ -25,8 +25,8 @@ FT = 0.3048
 
 def air_of(turbulence="light"):
     """The record as before a flight."""
-    record = np.zeros(1, AIR).view(np.recarray)[0]
-    air.set_up_air(record, declared_in(Bounds(turbulence=turbulence), load()), MASS)
+    record = np.zeros(1, GUST_RECORD).view(np.recarray)[0]
+    gusts.configure_gusts(record, declared_in(Bounds(turbulence=turbulence), load()), MASS)
     return record
 
 
@@ -89,8 +89,8 @@ def test_pitching_and_yawing_gusts_are_seen_but_for_less_than_the_share_declared
 ):
     flown = _flown(turbulence, airspeed_mps, seed)
     left = flown.intensity(flown.true - flown.seen)
-    assert left[1] < air.UNMEASURED_SHARES[1]
-    assert left[2] < air.UNMEASURED_SHARES[2]
+    assert left[1] < gusts.UNMEASURED_SHARES[1]
+    assert left[2] < gusts.UNMEASURED_SHARES[2]
     assert np.corrcoef(flown.true[:, 1], flown.seen[:, 1])[0, 1] > 0.98
     assert np.corrcoef(flown.true[:, 2], flown.seen[:, 2])[0, 1] > 0.95
 
@@ -99,8 +99,8 @@ def test_pitching_and_yawing_gusts_are_seen_but_for_less_than_the_share_declared
 def test_and_at_other_rates_and_between_jsbsims_frames(keys):
     flown = Flown("light", duration_s=20, seed=3, **keys)
     left = flown.intensity(flown.true - flown.seen)
-    assert left[1] < air.UNMEASURED_SHARES[1]
-    assert left[2] < air.UNMEASURED_SHARES[2]
+    assert left[1] < gusts.UNMEASURED_SHARES[1]
+    assert left[2] < gusts.UNMEASURED_SHARES[2]
 
 
 def test_a_steady_wind_is_not_taken_for_a_gust():
@@ -150,11 +150,11 @@ def test_where_no_model_has_the_forces_only_accelerometers_tell_a_gust(tmp_path,
     statistical = loop.frames["fdi"]["statistical"][0]
     assert statistical["air"]["output"]["uses_accelerometers"] == 1
     if forces != "felt":
-        air.stop_accelerometers(statistical["air"])
+        gusts.stop_accelerometers(statistical["air"])
     if forces == "claimed":
         statistical["air"]["output"]["measures_gust"], statistical["air"]["memory"]["unmeasured_share"] = (
             1,
-            air.UNMEASURED_SHARES,
+            gusts.UNMEASURED_SHARES,
         )
     for _ in loop.chunks():
         pass
@@ -187,7 +187,7 @@ def test_where_no_gust_is_seen_each_returns_as_late_as_it_does(without_forces):
         true = 1.0 / (1.0 / lengths[g] ** 2 + omega**2)
         reckoned = (
             long["drift_scale"]
-            * air.slow_power_ratio(record, g)
+            * gusts.low_frequency_power_ratio(record, g)
             / (1.0 / long["return_length"] ** 2 + omega**2)
         )
         assert (reckoned >= true * (1.0 - 1e-9)).all()
@@ -250,5 +250,5 @@ def test_the_rolling_gust_rolls_whatever_the_heading(wind_mps):
     across = np.abs(np.cos(flown.heading)) < 0.5
     assert across.sum() > 400
     left = flown.intensity((flown.true - flown.seen)[across])
-    assert left[1] < air.UNMEASURED_SHARES[1]
-    assert left[2] < air.UNMEASURED_SHARES[2]
+    assert left[1] < gusts.UNMEASURED_SHARES[1]
+    assert left[2] < gusts.UNMEASURED_SHARES[2]

@@ -10,9 +10,8 @@ from beaver_ftc.aircraft.aircraft import FORCES
 from beaver_ftc.design.model import design_record
 from beaver_ftc.design.terms import fill_table
 from beaver_ftc.design.variants import response
-from beaver_ftc.diagnosis.belief import air
-from beaver_ftc.diagnosis.belief.air import AIR
-from beaver_ftc.diagnosis.bounds import variances
+from beaver_ftc.diagnosis import bounds, gusts
+from beaver_ftc.diagnosis.gusts import GUST_RECORD
 from beaver_ftc.scenario.declared import SensorErrors
 from beaver_ftc.scenario.sensors import Sensors
 
@@ -24,7 +23,7 @@ Y = np.array([0.1, 0.03, 45.0, 1036.0, 0.3, 0.0, 0.0, 0.0])
 
 
 def new_air(**fields):
-    record = np.zeros(1, AIR).view(np.recarray)[0]
+    record = np.zeros(1, GUST_RECORD).view(np.recarray)[0]
     (
         record["config"]["span"],
         record["config"]["gravity"],
@@ -78,14 +77,14 @@ def test_the_gust_followed_is_the_airs_own_change(seed):
     """Whatever aircraft and heading do: each lag keeps its share, and the change of the air's velocity, seen
     from the level axes of now, is added."""
     flight, record = Flight(seed), new_air()
-    air.start(record, *flight.reading())
+    gusts.start_gust_estimate(record, *flight.reading())
     pitching = yawing = 0.0
     for _ in range(6):
         wind, axes_then = flight.wind, record["output"]["axes"].copy()
         psi_then = flight.attitude[2]
         record["memory"]["force"] = flight.step()
         y, attitude = flight.reading()
-        air.update_gust(record, y, attitude, DT)
+        gusts.update_gust(record, y, attitude, DT)
         change = Rotation.from_euler("z", -flight.attitude[2]).apply(flight.wind - wind)
         tau_q, tau_r = 4.0 * SPAN / (np.pi * y[2]), 3.0 * SPAN / (np.pi * y[2])
         pitching = np.exp(-DT / tau_q) * pitching + change[2] / (y[2] * tau_q)
@@ -100,27 +99,27 @@ def test_the_gust_followed_is_the_airs_own_change(seed):
 @pytest.mark.parametrize(("turn_rad", "swings"), [(1e-3, False), (0.1, True)])
 def test_axes_swing_where_a_gust_that_keeps_its_size_would_be_seen_to_change(turn_rad, swings):
     flight, record = Flight(1, 0.0, 0.0), new_air()
-    air.start(record, *flight.reading())
+    gusts.start_gust_estimate(record, *flight.reading())
     flight.attitude[1] = 0.0
     for _ in range(3):
         record["memory"]["force"] = flight.step()
         flight.attitude[1] += turn_rad
         y, attitude = flight.reading()
-        air.update_gust(record, y, attitude, DT)
+        gusts.update_gust(record, y, attitude, DT)
     fastest = turn_rad / DT  # nearly: a little less where the axis is not square to what turns it
     walk = 0.5 * (fastest * ROLLING / y[2]) ** 2
-    assert not 0.8 * air.MIN_AXES_TURN < walk < 1.3 * air.MIN_AXES_TURN
-    assert bool(record["memory"]["axes_turn_fast"]) == swings == (walk > air.MIN_AXES_TURN)
+    assert not 0.8 * gusts.MIN_AXES_TURN < walk < 1.3 * gusts.MIN_AXES_TURN
+    assert bool(record["memory"]["axes_turn_fast"]) == swings == (walk > gusts.MIN_AXES_TURN)
 
 
 @pytest.mark.parametrize("share", [0.98, 1.02])
 def test_the_fastest_swing_decides(share):
     record = new_air(axes=np.eye(3))
-    most = np.sqrt(2.0 * air.MIN_AXES_TURN) * 45.0 / ROLLING
+    most = np.sqrt(2.0 * gusts.MIN_AXES_TURN) * 45.0 / ROLLING
     record["memory"]["axes_rate"] = np.eye(3)
     record["memory"]["axes_rate"][1, 2] = share * most * DT
     record["memory"]["axes_rate"][0, 0] += 0.5 * most * DT
-    air.update_axes_rate(record, DT, 45.0)
+    gusts.update_axes_rate(record, DT, 45.0)
     assert record["memory"]["axes_rate"][1, 2] == pytest.approx(-share * most)
     assert record["memory"]["axes_turn_fast"] == (share > 1.0)
 
@@ -129,7 +128,7 @@ def test_a_yawing_gust_that_turning_hides_fades_and_its_loss_fades_with_it():
     """One fast turn: for that instant and the next nothing is added, and what is lost then decays."""
     record, y = new_air(), np.array([0.0, 0.0, 45.0, 1000.0, 0, 0, 0, 0])
     level = np.zeros(3)
-    air.start(record, y, level)
+    gusts.start_gust_estimate(record, y, level)
     record["memory"]["force"], record["memory"]["gust"] = (0.0, 0.0, -GRAVITY), (0.0, 0.0, 0.05)
     tau_r, lag = 3.0 * SPAN / (np.pi * 45.0), np.exp(-DT / (3.0 * SPAN / (np.pi * 45.0)))
     enough = np.sqrt(np.pi * 45.0**2 / (SPAN * SCALE))  # rad/s at which all of it is lost
@@ -140,12 +139,12 @@ def test_a_yawing_gust_that_turning_hides_fades_and_its_loss_fades_with_it():
         ((0, 0, turn), 0.05 * lag**3, lag),
         ((0, 0, turn), 0.05 * lag**4, lag**2),
     ):
-        air.update_gust(record, y, np.array(attitude), DT)
+        gusts.update_gust(record, y, np.array(attitude), DT)
         assert record["memory"]["gust"][2] == pytest.approx(gust)
         assert record["memory"]["turning_share"] == pytest.approx(turning)
         record["memory"]["force"] = 0.0, 0.0, -GRAVITY
     part = 0.5 * enough * DT
-    air.update_gust(record, y, np.array([0, 0, turn + part]), DT)
+    gusts.update_gust(record, y, np.array([0, 0, turn + part]), DT)
     assert record["memory"]["lost_share"] == pytest.approx(0.25)
     assert record["memory"]["turning_share"] == pytest.approx(max(lag**3, 0.25))
     aside = 45.0 * np.sin(part)  # of the old course, from the left: a gust from the right has come up
@@ -166,35 +165,35 @@ def test_a_heading_that_turns_round_as_the_nose_passes_the_vertical_is_no_gust(l
         )  # nothing accelerates
 
     y, record["memory"]["force"] = look(then, 1)
-    air.start(record, y, then)
+    gusts.start_gust_estimate(record, y, then)
     record["memory"]["gust"][2] = 0.05
     if late:  # the wind turns a step after the heading
         y, force = look(over, [-1, -1, 1])
-        air.update_gust(record, y, over, DT)
+        gusts.update_gust(record, y, over, DT)
         record["memory"]["force"] = force
-    air.update_gust(record, look(over, 1)[0], over, DT)
+    gusts.update_gust(record, look(over, 1)[0], over, DT)
     assert abs(record["memory"]["gust"][2]) <= 0.05
     unseen, record["memory"]["unmeasured_share"] = np.array(record["memory"]["unmeasured_share"]), np.ones(3)
     record["output"]["damping"] = np.diag([0.0, 0.0, 5.0]) @ record["output"]["axes"].T
-    everything = air.unmeasured_drift(record, 45.0, 2, 2)
+    everything = gusts.unmeasured_gust_drift(record, 45.0, 2, 2)
     record["memory"]["unmeasured_share"] = unseen
-    assert air.unmeasured_drift(record, 45.0, 2, 2) == pytest.approx(everything)
+    assert gusts.unmeasured_gust_drift(record, 45.0, 2, 2) == pytest.approx(everything)
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_level_axes_are_a_rotation(seed):
     phi, theta = np.random.default_rng(seed).uniform(-1.4, 1.4, 2)
     turn, body = np.full((3, 3), 9.0), np.random.default_rng(seed + 10).normal(size=3)
-    air.level_axes(phi, theta, turn)
+    gusts.fill_level_axes(phi, theta, turn)
     of_level = to_earth((phi, theta, 0.0))
     assert turn == pytest.approx(of_level.inv().as_matrix(), abs=1e-15)
-    assert [air.to_level(turn, body, i) for i in range(3)] == pytest.approx(of_level.apply(body))
+    assert [gusts.to_level(turn, body, i) for i in range(3)] == pytest.approx(of_level.apply(body))
 
 
 def test_a_diagnosis_that_begins_in_flight_has_seen_no_gust():
     flight = Flight(3)
     record = new_air(started=1, lost_share=0.4, turning_share=0.3, gust=(0.1, 0.2, 0.3))
-    air.start(record, *flight.reading())
+    gusts.start_gust_estimate(record, *flight.reading())
     assert (
         record["memory"]["started"],
         record["memory"]["lost_share"],
@@ -223,9 +222,9 @@ def test_what_a_gust_does_is_what_the_opposite_rates_would():
     design = design_record().view(np.recarray)
     record = new_air(area_per_mass=0.01)
     fill_table(record["memory"]["force_table"], AIRCRAFT, AIRCRAFT.measurable_forces, FORCES)
-    air.start(record, Y, np.array([0.3, 0.2, 1.0]))
+    gusts.start_gust_estimate(record, Y, np.array([0.3, 0.2, 1.0]))
     record["memory"]["gust"] = 0.0, 0.02, -0.03
-    air.fill_effect(record, design[0], X, Y, U)
+    gusts.fill_gust_effect(record, design[0], X, Y, U)
     rotation = to_earth((0.3, 0.2, 0.0)).inv().apply([0.0, 0.02, -0.03])
     assert record["memory"]["rotation"] == pytest.approx(rotation)
 
@@ -237,8 +236,8 @@ def test_what_a_gust_does_is_what_the_opposite_rates_would():
     step = 1e-6
     expected = (acceleration(X - step * rotation) - acceleration(X + step * rotation)) / (2.0 * step)
     assert record["output"]["acceleration"] == pytest.approx(expected, rel=1e-6)
-    air.fill_effect(record, design[0], X, Y, U)
-    air.begin_sums(record, 45.0, 0.01)
+    gusts.fill_gust_effect(record, design[0], X, Y, U)
+    gusts.begin_gust_sums(record, 45.0, 0.01)
     record["output"]["acceleration"] = 0.0
     assert record["memory"]["acceleration_sum"] == pytest.approx(expected, rel=1e-6)
 
@@ -258,7 +257,7 @@ def test_what_an_earlier_diagnosis_kept_is_gone_when_one_begins():
         1,
     )
     record = new_air(**kept)
-    air.start(record, Y, np.array([0.3, 0.2, 1.0]))
+    gusts.start_gust_estimate(record, Y, np.array([0.3, 0.2, 1.0]))
     assert {name for name in kept if np.any(holder(record, name)[name])} == set()
 
 
@@ -271,15 +270,15 @@ def test_the_noise_of_an_attitude_is_in_the_gust_that_is_followed(angle, axis):
     alpha = 0.15
     y, level = np.array([alpha, 0.0, 45.0, 1036.0, 0.3, 0.0, 0.0, 0.0]), np.array([0.0, alpha, 1.0])
     record, seen = new_air(), []
-    air.start(record, y, level)
+    gusts.start_gust_estimate(record, y, level)
     for _ in range(4000):
         record["memory"]["force"] = -GRAVITY * np.array([-np.sin(alpha), 0.0, np.cos(alpha)])
         blurred = level.copy()
         blurred[place] += np.radians(std_deg) * rng.normal()
-        air.update_gust(record, y, blurred, DT)
+        gusts.update_gust(record, y, blurred, DT)
         seen.append(record["memory"]["gust"].copy())
     lags = np.array([4.0, 3.0]) * SPAN / (np.pi * 45.0)
-    counted, reckoned = np.std(seen, axis=0)[1:] * lags, variances.flow_noise(SensorErrors(sensors), 45.0)
+    counted, reckoned = np.std(seen, axis=0)[1:] * lags, bounds.flow_angle_noise(SensorErrors(sensors), 45.0)
     assert (counted <= 1.02 * reckoned).all()
     if axis is not None:
         assert counted[axis - 1] == pytest.approx(reckoned[axis - 1], rel=0.05)

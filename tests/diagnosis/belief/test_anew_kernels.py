@@ -7,9 +7,8 @@ from statistics_of import Statistical
 
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS
 from beaver_ftc.design import model
-from beaver_ftc.diagnosis.belief import air
-from beaver_ftc.diagnosis.belief.air import AIR
-from beaver_ftc.diagnosis.bounds import worst_case
+from beaver_ftc.diagnosis import bounds, gusts
+from beaver_ftc.diagnosis.gusts import GUST_RECORD
 from beaver_ftc.diagnosis.monitors import redundancy
 
 X, U = np.array([0.1, -0.05, 0.07]), np.array([0.1, -0.15, 0.05, 0.2])
@@ -25,10 +24,10 @@ FILL = {
     "free response": ((3,), lambda out: model.both_responses(design(), X, Y, out, np.full((3, 4), 9.0))),
     "control effectiveness": ((3, 4), lambda out: model.both_responses(design(), X, Y, np.full(3, 9.0), out)),
     "damping": ((3, 3), lambda out: model.rate_damping(design(), X, Y, U, np.full(MAX_MONOMIALS, 9.0), out)),
-    "level axes": ((3, 3), lambda out: air.level_axes(0.3, 0.2, out)),
-    "quaternion": ((4,), lambda out: redundancy.quaternion(0.3, 0.2, 0.1, out)),
-    "turned": ((4,), lambda out: redundancy.turn(Q, X, 0.02, out)),
-    "turned back": ((3,), lambda out: redundancy.turn_back(X, 0.02, V, out)),
+    "level axes": ((3, 3), lambda out: gusts.fill_level_axes(0.3, 0.2, out)),
+    "quaternion": ((4,), lambda out: redundancy.fill_quaternion(0.3, 0.2, 0.1, out)),
+    "turned": ((4,), lambda out: redundancy.advance_quaternion(Q, X, 0.02, out)),
+    "turned back": ((3,), lambda out: redundancy.rotate_to_new_axes(X, 0.02, V, out)),
 }
 
 
@@ -68,10 +67,10 @@ def test_the_drift_of_the_detectors_blocks(moving):
 def test_the_gusts_effect():
     found, filled = [], ("force", "rotation", "acceleration", "coarse_acceleration", "damping")
     for before in (0.0, 9.0):
-        record = np.zeros(1, AIR).view(np.recarray)[0]
+        record = np.zeros(1, GUST_RECORD).view(np.recarray)[0]
         fill(record, span=14.0, axes=np.eye(3), gust=(0.0, 0.02, -0.03))
         fill(record, **dict.fromkeys((*filled, "scratch"), before))
-        air.fill_effect(record, design(), X, Y, U)
+        gusts.fill_gust_effect(record, design(), X, Y, U)
         found.append([holder(record, name)[name].tolist() for name in filled])
     assert found[0] == found[1]
 
@@ -79,5 +78,5 @@ def test_the_gusts_effect():
 def test_the_published_bound_adds_to_what_is_there():
     once, more = np.zeros(3), np.full(3, 0.5)
     for out in (once, more):
-        worst_case.uncertainty_bound(X, design(), np.full(3, 0.1), np.full(3, 0.02), 7e-5, out)
+        bounds.add_published_bound(X, design(), np.full(3, 0.1), np.full(3, 0.02), 7e-5, out)
     assert more - once == pytest.approx([0.5] * 3)

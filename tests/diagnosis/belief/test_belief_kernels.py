@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.diagnosis.belief import expectation as beliefs
-from beaver_ftc.diagnosis.bounds.worst_case import bound_dtype
+from beaver_ftc.diagnosis import expectation as beliefs
+from beaver_ftc.diagnosis.bounds import bound_dtype
 from beaver_ftc.scenario.schema import Scenario
 from telling import apart
 
@@ -19,8 +19,8 @@ def test_what_is_foreseen_has_the_effectiveness_of_the_frame_before(instants):
     G, u = rng.uniform(0.5, 2.0, (5, 3, n)), rng.uniform(-0.3, 0.3, (5, n))
     for k in range(5):
         belief["sums"]["G"], belief["sums"]["Gu"] = instants * G[k], instants * G[k] * u[k]
-        beliefs.average_frame(belief, bound)
-        beliefs.predict_next(belief["means"])
+        beliefs.fill_frame_means(belief, bound)
+        beliefs.predict_control_effect(belief["means"])
         assert belief["means"]["Gu"] == pytest.approx(G[k] * u[k])
         if k > 0:
             assert belief["means"]["G_predicted"] == pytest.approx(G[k - 1])
@@ -31,8 +31,8 @@ def test_of_the_first_frame_nothing_is_foreseen():
     belief = np.zeros(1, beliefs.belief_dtype(2))[0]
     belief["share"] = 1.0
     belief["sums"]["G"][:, 0] = belief["sums"]["Gu"][:, 0] = 1.0
-    beliefs.average_frame(belief, np.zeros(1, bound_dtype(2))[0])
-    beliefs.predict_next(belief["means"])
+    beliefs.fill_frame_means(belief, np.zeros(1, bound_dtype(2))[0])
+    beliefs.predict_control_effect(belief["means"])
     assert not belief["means"]["Gu_predicted"].any()
 
 

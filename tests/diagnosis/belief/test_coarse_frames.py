@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.belief.expectation import accumulate, average_frame, begin_sums
-from beaver_ftc.diagnosis.detection.bank import aligned_extremes, extremes
+from beaver_ftc.diagnosis.detection.filters import effect_extremes, parity_effect_extremes
+from beaver_ftc.diagnosis.expectation import add_instant_to_sums, begin_sums, fill_frame_means
 from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.scenario.schema import Scenario
 
@@ -22,18 +22,18 @@ def first(frames):
 @kernel
 def another(frames):
     fdi = frames[0].fdi
-    accumulate(frames[0].belief, fdi.bound, fdi.layout, fdi.config.every_type)
+    add_instant_to_sums(frames[0].belief, fdi.bound, fdi.layout, fdi.config.every_type)
 
 
 @kernel
 def over(frames):
-    average_frame(frames[0].belief, frames[0].fdi.bound)
+    fill_frame_means(frames[0].belief, frames[0].fdi.bound)
 
 
 @kernel
 def limits(frames, surface):
     fie = frames[0].fdi.isolation.estimator[surface]
-    return extremes(fie, 0), aligned_extremes(fie)
+    return effect_extremes(fie, 0), parity_effect_extremes(fie)
 
 
 def record(substeps):

@@ -5,10 +5,9 @@ import pytest
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.dryden import Dryden
-from beaver_ftc.diagnosis.belief import air
-from beaver_ftc.diagnosis.bounds import admitted as admitting
-from beaver_ftc.diagnosis.bounds import worst_case
-from beaver_ftc.diagnosis.bounds.worst_case import admitted_dtype
+from beaver_ftc.diagnosis import bounds, gusts
+from beaver_ftc.diagnosis import bounds as admitting
+from beaver_ftc.diagnosis.bounds import admitted_dtype
 from beaver_ftc.scenario.diagnosis import Bounds
 from flying import declared_in
 
@@ -22,7 +21,7 @@ def record_of(dtype):
 
 
 def in_moving_air():
-    record = record_of(air.AIR)
+    record = record_of(gusts.GUST_RECORD)
     record["output"]["measures_gust"], record["config"]["max_gust"], record["config"]["decay_rate"] = (
         1,
         30.0,
@@ -38,7 +37,7 @@ def in_moving_air():
 
 def test_the_speed_is_that_through_the_air_without_the_gust():
     record, dt = in_moving_air(), 0.5
-    air.update_speed(record, 45.0, 1.1, 3.3, 44.1, dt)  # the gust has changed by 1.0, -0.4, 0.3
+    gusts.update_speed(record, 45.0, 1.1, 3.3, 44.1, dt)  # the gust has changed by 1.0, -0.4, 0.3
     kept = np.exp(-0.02 * dt)
     blown = kept * np.array([5.0, -2.0, 0.7]) + [1.0, -0.4, 0.3]
     assert record["memory"]["gust_velocity"] == pytest.approx(blown)
@@ -49,16 +48,16 @@ def test_the_speed_is_that_through_the_air_without_the_gust():
 def test_no_gust_is_taken_for_stronger_than_is_likely():
     record = in_moving_air()
     record["config"]["max_gust"] = 2.0
-    air.update_speed(record, 90.0, -70.0, 3.3, 44.1, 0.01)
+    gusts.update_speed(record, 90.0, -70.0, 3.3, 44.1, 0.01)
     assert record["memory"]["gust_velocity"][:2] == pytest.approx([2.0, -2.0])
 
 
 def test_where_no_gust_is_seen_the_airspeed_serves():
     record = in_moving_air()
     record["output"]["measures_gust"] = 0
-    air.update_speed(record, 45.0, 1.1, 3.3, 44.1, 0.5)
+    gusts.update_speed(record, 45.0, 1.1, 3.3, 44.1, 0.5)
     assert record["output"]["speed"] == 44.1
-    assert air.unmeasured_share(record, 1) == 0.0
+    assert gusts.unmeasured_share(record, 1) == 0.0
 
 
 @pytest.mark.parametrize(("g", "further"), [(1, 0.02), (2, 0.05)])
@@ -80,10 +79,10 @@ def test_an_unknown_speed_leaves_a_share_of_the_gusts_that_vanes_show(g, further
         record["config"]["error_gain"],
     ) = 40.0, 1.3, 4.7, 2.5
     off = 2.5 * (1.3 + 0.8 * 4.7) / 40.0**2
-    assert air.unmeasured_share(record, g) == pytest.approx(
+    assert gusts.unmeasured_share(record, g) == pytest.approx(
         record["memory"]["unmeasured_share"][g] + off + further
     )
-    assert air.unmeasured_share(record, 0) == 1.0
+    assert gusts.unmeasured_share(record, 0) == 1.0
 
 
 def test_a_speed_that_is_off_leaves_no_more_than_is_reckoned_with():
@@ -92,7 +91,7 @@ def test_a_speed_that_is_off_leaves_no_more_than_is_reckoned_with():
     e, tau, level = 1e-3, 0.37, 6.6
     s = 1j * np.geomspace(1e-3, 1e3, 20001)
     error = np.abs(s / (s + 1.0 / tau) - s / (s + (1.0 + e) / tau)) ** 2
-    assert air.speed_error_share(level) / (0.5 * level) ** 2 == pytest.approx(error.max() / e**2, rel=2e-3)
+    assert gusts.speed_error_share(level) / (0.5 * level) ** 2 == pytest.approx(error.max() / e**2, rel=2e-3)
 
 
 @pytest.mark.parametrize("turbulence", ["light", "moderate", "severe"])
@@ -102,12 +101,12 @@ def test_turbulence_is_as_strong_as_the_standard_has_it_at_a_height_and_no_less_
 ):
     h, b = max(height_ft, 10.0), SPAN_M / FT
     low, high = LOW[turbulence] * FT, HIGH[turbulence] * FT
-    record = record_of(air.AIR)
+    record = record_of(gusts.GUST_RECORD)
     record["config"]["intensity_aloft"] = Dryden(turbulence).rotation_walk(SPAN_M)
     record["config"]["intensity_at_1_m"] = Dryden(turbulence).rotation_walk_at_1_m(SPAN_M)
     record["config"]["altitude_error"], record["config"]["altitude_slope"] = 0.7, 0.02
     reading = height_ft * FT / (1.0 - 0.02 / 0.98) + 0.7 / 0.98 / (1.0 - 0.02 / 0.98)
-    air.set_intensity(record, reading)
+    gusts.set_gust_intensity(record, reading)
     L = h * FT
     rolling = 2.0 * 1.9**2 * 2.6 * max(low**2 / L**1.5, high**2 / (1750 * FT) ** 1.5) / SPAN_M**1.5
     vertical = 3.0 * max(low**2 / L, high**2 / (1750 * FT))
@@ -118,7 +117,7 @@ def test_turbulence_is_as_strong_as_the_standard_has_it_at_a_height_and_no_less_
     admitted["gust_aloft"] = admitting.GUST_LIMIT_SIGMA * Dryden(turbulence).rotation_limit_rad_s(SPAN_M)
     admitted["gust_low"] = admitting.GUST_LIMIT_SIGMA * Dryden(turbulence).low_rotation_limit_rad_s(SPAN_M)
     admitted["altitude_off"], admitted["altitude_slope"] = 0.7, 0.02
-    worst_case.set_gust_bound(admitted, reading)
+    bounds.set_gust_bound(admitted, reading)
     sigma = max(1.9 * LOW[turbulence] / np.sqrt(h * b), 1.9 * HIGH[turbulence] / np.sqrt(1750.0 * b))
     assert admitted["gust"] == pytest.approx(6.0 * sigma)
 
@@ -138,11 +137,11 @@ def test_below_2000_ft_the_lateral_gust_and_the_layer_between_are_weaker_than_re
 def test_what_is_declared_of_drift_and_gusts_says_how_long_the_sum_lasts():
     kept = []
     for turbulence in ("light", "severe"):
-        record = record_of(air.AIR)
+        record = record_of(gusts.GUST_RECORD)
         record["output"]["moving"] = record["output"]["measures_gust"] = record["output"][
             "uses_accelerometers"
         ] = 1
-        air.set_up_speed(record, declared_in(Bounds(turbulence=turbulence), load()), 6.6, 45.0)
+        gusts.configure_speed_error(record, declared_in(Bounds(turbulence=turbulence), load()), 6.6, 45.0)
         sigma, V_L = HIGH[turbulence] * FT, 45.0 / (1750.0 * FT)
         b = (
             2.0 * record["config"]["decay_rate"] ** 3 * sigma**2 / V_L

@@ -13,18 +13,21 @@ from beaver_ftc.aircraft.aircraft import FORCES
 from beaver_ftc.design.model import design_record
 from beaver_ftc.design.terms import fill_table, regressors
 from beaver_ftc.design.variants import response
-from beaver_ftc.diagnosis import assessment, conclusion, scheme
-from beaver_ftc.diagnosis.belief import air, expectation
-from beaver_ftc.diagnosis.belief.air import AIR
-from beaver_ftc.diagnosis.belief.expectation import belief_dtype
-from beaver_ftc.diagnosis.bounds import worst_case
-from beaver_ftc.diagnosis.bounds.worst_case import error_map_dtype
-from beaver_ftc.diagnosis.detection import statistical, thresholds
+from beaver_ftc.diagnosis import bounds, conclusion, expectation, gusts, isolation, schemes
+from beaver_ftc.diagnosis.bounds import error_map_dtype
+from beaver_ftc.diagnosis.detection import filters, statistical
 from beaver_ftc.diagnosis.detection.likelihood import block_dtype
 from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE
-from beaver_ftc.diagnosis.isolation import estimators
-from beaver_ftc.diagnosis.state import LOSS, NOT_ISOLATED, STATISTICS, WORST_CASE, verdict_dtype
-from beaver_ftc.diagnosis.types.contract import LAGS
+from beaver_ftc.diagnosis.expectation import belief_dtype
+from beaver_ftc.diagnosis.gusts import GUST_RECORD
+from beaver_ftc.diagnosis.state import (
+    LOSS,
+    NOT_ISOLATED,
+    STATISTICAL_DETECTOR,
+    WORST_CASE_DETECTOR,
+    plugin_verdict_dtype,
+)
+from beaver_ftc.diagnosis.types.contract import WAIT_FOR_SURFACE
 from beaver_ftc.loop import frame
 
 AIRCRAFT = load()
@@ -35,7 +38,7 @@ EITHER = 0
 
 
 def new_air(**fields):
-    record = np.zeros(1, AIR).view(np.recarray)[0]
+    record = np.zeros(1, GUST_RECORD).view(np.recarray)[0]
     fill(record, span=SPAN, gravity=9.8, moving=1, measures_gust=1)
     return fill(record, **fields)
 
@@ -55,7 +58,7 @@ def test_a_gust_is_what_forces_and_gravity_do_not_explain(seed):
     y_then, y_now = Y.copy(), Y.copy()
     y_then[:2], y_now[:2] = rng.uniform(-0.1, 0.2, (2, 2))
     y_now[2] = 47.0
-    air.start(record, y_then, then)
+    gusts.start_gust_estimate(record, y_then, then)
     assert record["memory"]["velocity"] == pytest.approx(through_air(y_then, then))
     assert record["memory"]["heading"] == then[2]
     assert not record["memory"]["gust"].any()
@@ -65,7 +68,7 @@ def test_a_gust_is_what_forces_and_gravity_do_not_explain(seed):
         level.apply(record["memory"]["force"]) + np.array([0.0, 0.0, 9.8])
     )
     expected = Rotation.from_euler("z", then[2] - now[2]).apply(expected)
-    air.update_gust(record, y_now, now, dt)
+    gusts.update_gust(record, y_now, now, dt)
     change = expected - through_air(y_now, now)
     tau_q, tau_r = 4.0 * SPAN / (np.pi * 47.0), 3.0 * SPAN / (np.pi * 47.0)
     pitching = 0.02 * np.exp(-dt / tau_q) + change[2] / (47.0 * tau_q)
@@ -77,7 +80,7 @@ def test_a_gust_is_what_forces_and_gravity_do_not_explain(seed):
 def test_the_specific_force_is_that_of_the_terms():
     record, out = new_air(area_per_mass=0.01), np.zeros(3)
     fill_table(record["memory"]["force_table"], AIRCRAFT, AIRCRAFT.measurable_forces, FORCES)
-    air.specific_force(record, X, Y, U, out)
+    gusts.fill_specific_force(record, X, Y, U, out)
     of = {
         "alpha": Y[0], "beta": Y[1], "ph": X[0] * SPAN / (2 * V), "rh": X[2] * SPAN / (2 * V), "dpt": Y[4],
         "qh": X[1] * AIRCRAFT.geometry.chord_m / V, **dict(zip(AIRCRAFT.surfaces, U, strict=True)),
@@ -91,12 +94,12 @@ def test_the_specific_force_is_that_of_the_terms():
 
 def test_the_gusts_of_a_frame_are_summed_over_its_instants():
     record, design = new_air(area_per_mass=0.01), design_record().view(np.recarray)[0]
-    air.start(record, Y, np.zeros(3))
+    gusts.start_gust_estimate(record, Y, np.zeros(3))
     record["memory"]["gust"] = 0.0, 0.02, -0.03
-    air.fill_effect(record, design, X, Y, U)
+    gusts.fill_gust_effect(record, design, X, Y, U)
     first = record["output"]["acceleration"].copy()
-    air.begin_sums(record, V, 0.01)
-    air.accumulate_substep(record, design, X, Y, U, np.zeros(3), 0.01)
+    gusts.begin_gust_sums(record, V, 0.01)
+    gusts.accumulate_gust_substep(record, design, X, Y, U, np.zeros(3), 0.01)
     assert record["memory"]["acceleration_sum"] == pytest.approx(first + record["output"]["acceleration"])
     assert np.abs(record["output"]["acceleration"] - first).max() > 1e-5
 
@@ -120,13 +123,13 @@ def test_axes_that_turn_move_what_is_not_seen_besides(swings):
     expected = axes @ np.diag([1e-3, 4e-4, 3e-3]) @ axes.T  # of the yawing one no more than all of it
     lags = 30.0 / V, 0.0, 3.0 * SPAN / (np.pi * V)
     turned = 0.5 * np.square(lags) * [1e-3, 0.0, 0.4 * 3e-3]
-    found = [[air.unmeasured_drift(record, V, i, j) for j in range(3)] for i in range(3)]
+    found = [[gusts.unmeasured_gust_drift(record, V, i, j) for j in range(3)] for i in range(3)]
     assert np.array(found) == pytest.approx(V * expected, rel=1e-12)
     once = swings * DT * V * swing @ np.diag(turned) @ swing.T
     for instants, leap in ((2, 2), (0, 2), (1, 1), (0, 1), (0, 0), (0, 0)):
         for _ in range(instants):
-            air.add_axes_turn(record, V, DT)
-        air.average_frame(record, 1.0)
+            gusts.add_axes_turn_variance(record, V, DT)
+        gusts.average_gust_frame(record, 1.0)
         assert record["output"]["turn_variance"] == pytest.approx(leap * once, rel=1e-12)
 
 
@@ -134,26 +137,26 @@ def test_a_turning_heading_hides_a_yawing_gust():
     """(rate sigma)^2 lag over the walk's 3 sigma^2 V / scale, lag 3 span / pi V."""
     record, rate = new_air(turbulence_length=500.0), 0.3
     lag = 3.0 * SPAN / (np.pi * V)
-    assert air.share_lost_by_turning(record, V, rate) == pytest.approx(rate**2 * lag / (3.0 * V / 500.0))
+    assert gusts.share_lost_by_turning(record, V, rate) == pytest.approx(rate**2 * lag / (3.0 * V / 500.0))
 
 
 def test_the_bound_of_a_true_estimator_covers_every_course_of_its_parameter():
     """By corners: theta at either end at each instant, by the sign of what it multiplies."""
-    low, high = thresholds.interval(-0.9, 0.2, 0.5, -0.3, 0.2, -0.4, 0.05)
+    low, high = filters.interval_limits(-0.9, 0.2, 0.5, -0.3, 0.2, -0.4, 0.05)
     assert low == pytest.approx(-0.9 * 0.5 + 0.2 * -0.3 + 0.08 - 0.05)
     assert high == pytest.approx(0.2 * 0.5 + -0.9 * -0.3 + 0.08 + 0.05)
-    assert thresholds.published(-1.0, 0.0, -0.2, -0.3, 0.05) == pytest.approx((-0.19, 0.19))
-    assert thresholds.published(-1.0, 0.0, 0.2, -0.8, 0.05) == pytest.approx((-0.21, 0.21))
+    assert filters.norm_limits(-1.0, 0.0, -0.2, -0.3, 0.05) == pytest.approx((-0.19, 0.19))
+    assert filters.norm_limits(-1.0, 0.0, 0.2, -0.8, 0.05) == pytest.approx((-0.21, 0.21))
 
 
 def test_the_published_bound_and_the_turning_earth():
     design, out = design_record().view(np.recarray)[0], np.array([0.1, 0.2, 0.3])
     inertia, constant, earth = np.array([0.25, 0.2, 0.15]), np.array([0.02, 0.03, 0.04]), 7e-5
-    worst_case.uncertainty_bound(X, design, inertia, constant, earth, out)
+    bounds.add_published_bound(X, design, inertia, constant, earth, out)
     p, q, r = X
     coupling = np.abs([design["Pqr"] * q * r, design["Qpr"] * p * r, design["Rpq"] * p * q])
     turning = earth * (2.0 * np.abs(X).sum() + earth)
-    rounding = worst_case.ROUNDING_RAD_S2
+    rounding = bounds.ROUNDING_RAD_S2
     assert out == pytest.approx(
         [0.1, 0.2, 0.3] + inertia * coupling + constant + turning + rounding, rel=1e-12
     )
@@ -182,13 +185,13 @@ def test_the_turning_earth_moves_no_aircraft_more_whatever_its_inertia(constants
 
     e = earth * np.array(axis) / np.linalg.norm(axis)
     moved = coupling(*(np.array(x) + e)) - coupling(*x) + np.cross(e, x)
-    worst_case.uncertainty_bound(np.array(x), design, np.zeros(3), np.zeros(3), earth, out)
+    bounds.add_published_bound(np.array(x), design, np.zeros(3), np.zeros(3), earth, out)
     assert (np.abs(moved) <= out).all()
 
 
 def test_filters_of_bounds_are_those_of_residuals():
-    assert thresholds.bound_step(0.3, 0.2, 0.9, 0.1) == pytest.approx(0.27 + 0.02)
-    assert thresholds.noise_step(0.3, 0.2, 0.9) == pytest.approx(0.27 + 0.02)
+    assert filters.bound_step(0.3, 0.2, 0.9, 0.1) == pytest.approx(0.27 + 0.02)
+    assert filters.noise_step(0.3, 0.2, 0.9) == pytest.approx(0.27 + 0.02)
 
 
 def new_map(**fields):
@@ -212,20 +215,20 @@ def new_map(**fields):
     ],
 )  # fmt: skip
 def test_the_level_is_the_first_share_of_the_travel_that_covers_the_surfaces(u, level):
-    assert worst_case.level_of(new_map(), np.array(u)) == level
-    assert worst_case.level_of(new_map(whole=1), np.array(u)) == 2
+    assert bounds.travel_level(new_map(), np.array(u)) == level
+    assert bounds.travel_level(new_map(whole=1), np.array(u)) == 2
 
 
 def test_a_surface_beyond_a_travel_that_ends_at_neutral_uses_all_of_it():
     up_only = new_map(travel_low=(-0.4, -0.4, -0.2, 0.0))
-    assert worst_case.level_of(up_only, np.array([0, 0, 0, -0.01])) == 2
-    assert worst_case.level_of(up_only, np.array([0, 0, 0, 0.25])) == 0
-    assert worst_case.level_of(up_only, np.array([0, 0, 0, 0.0])) == 0  # at rest at an end it uses none
+    assert bounds.travel_level(up_only, np.array([0, 0, 0, -0.01])) == 2
+    assert bounds.travel_level(up_only, np.array([0, 0, 0, 0.25])) == 0
+    assert bounds.travel_level(up_only, np.array([0, 0, 0, 0.0])) == 0  # at rest at an end it uses none
 
 
 @pytest.mark.parametrize(("time_s", "age"), [(0.0, 0), (10.0, 0), (10.1, 1), (60.0, 1), (60.1, -1)])
 def test_the_row_is_that_of_a_flight_so_old(time_s, age):
-    assert worst_case.age_of(new_map(time_s=time_s)) == age
+    assert bounds.time_row(new_map(time_s=time_s)) == age
 
 
 @pytest.mark.parametrize(
@@ -242,9 +245,9 @@ def test_the_error_is_that_of_the_innermost_box_or_unknown(roll, airspeed, time_
     record, out = new_map(time_s=time_s), np.full(3, 0.5)
     y = Y.copy()
     y[2] = airspeed
-    worst_case.add_model_error(record, np.array([roll, 0.0, 0.0]), y, np.array([0.1, 0, 0, 0]), out)
+    bounds.add_map_error(record, np.array([roll, 0.0, 0.0]), y, np.array([0.1, 0, 0, 0]), out)
     age = 0 if time_s <= 10.0 else 1
-    expected = record["error"][age, box, 1] if box is not None else worst_case.UNKNOWN_RAD_S2
+    expected = record["error"][age, box, 1] if box is not None else bounds.UNKNOWN_RAD_S2
     assert out == pytest.approx(0.5 + expected)
     assert record["now"] == pytest.approx(np.full(3, expected))
     assert record["outside"] == (box is None)
@@ -254,7 +257,7 @@ def test_the_error_is_that_of_the_innermost_box_or_unknown(roll, airspeed, time_
 def test_the_unknown_is_larger_than_what_terms_give_far_from_where_they_were_fitted():
     """Those of wrightFlyer1903 are 2000 rad/s2 off at an angle of attack of -0.5 rad: a bound of half as much
     excluded the true fault there."""
-    assert worst_case.UNKNOWN_RAD_S2 > 100.0 * 2000.0
+    assert bounds.UNKNOWN_RAD_S2 > 100.0 * 2000.0
 
 
 def new_detector(**fields):
@@ -287,7 +290,7 @@ def test_the_drift_is_of_what_is_bounded_and_of_the_air_not_seen(moving):
     fdi["bound"]["constant"], fdi["bound"]["inertia"] = (0.02, 0.0, 0.04), 0.1
     Statistical.drifts(record, fdi, design, X, Y)
     bounded = np.zeros(3)
-    worst_case.uncertainty_bound(X, design, np.full(3, 0.1), np.array([0.02, 0.0, 0.04]), 0.0, bounded)
+    bounds.add_published_bound(X, design, np.full(3, 0.1), np.array([0.02, 0.0, 0.04]), 0.0, bounded)
     bounded += [0.01, 0.02, 0.03]
     assert record["noise"]["bounded"] == pytest.approx(bounded)
     turned = record["air"]["output"]["damping"] @ record["air"]["output"]["axes"]
@@ -359,12 +362,12 @@ def test_what_is_known_of_a_fault_is_expected(offsets_count):
 
 def take(fdi, given, t):
     """A frame's verdict of a plug-in, as the frame of the loop takes it."""
-    on(conclusion.note_plugin, fdi, given, t)
-    estimators.take_estimate(fdi["isolation"], fdi["verdict"]["isolated"], given["theta"])
+    on(conclusion.record_plugin_verdict, fdi, given, t)
+    isolation.take_plugin_estimate(fdi["isolation"], fdi["verdict"]["isolated"], given["theta"])
 
 
 def test_a_plug_ins_verdict_takes_the_place_of_the_built_in_one():
-    fdi, given = new_fdi(), np.zeros(1, verdict_dtype(4)).view(np.recarray)[0]
+    fdi, given = new_fdi(), np.zeros(1, plugin_verdict_dtype(4)).view(np.recarray)[0]
     fdi["verdict"]["isolated"] = NOT_ISOLATED
     given["isolated"], given["axis"], given["theta"], given["estimates"] = 2, 1, -0.3, 1
     given["effectiveness"] = 0.5
@@ -390,9 +393,10 @@ def test_a_plug_ins_verdict_takes_the_place_of_the_built_in_one():
 @pytest.mark.parametrize(
     ("enabled", "authority", "score", "share", "statistic"),
     [
-        (0, WORST_CASE, 2.0, 0.7, 0.7), (1, WORST_CASE, 2.0, 0.7, 0.7), (1, STATISTICS, 2.0, 3.0, 2.0),
+        (0, WORST_CASE_DETECTOR, 2.0, 0.7, 0.7), (1, WORST_CASE_DETECTOR, 2.0, 0.7, 0.7),
+        (1, STATISTICAL_DETECTOR, 2.0, 3.0, 2.0),
         (1, EITHER, 0.6, 0.9, 0.6), (1, EITHER, 0.6, 1.1, 1.1), (1, EITHER, 2.0, 1.1, 2.0),
-        (0, STATISTICS, 2.0, 0.7, 0.0),
+        (0, STATISTICAL_DETECTOR, 2.0, 0.7, 0.0),
     ],
 )  # fmt: skip
 def test_the_built_in_statistic(enabled, authority, score, share, statistic):
@@ -407,18 +411,18 @@ def test_the_built_in_statistic(enabled, authority, score, share, statistic):
         score,
     )
     fdi["bank"]["output"]["threshold"][0], fdi["bank"]["output"]["residual"][0, 1] = 0.5, 0.5 * share
-    likely = assessment.likelihood_counts(fdi["statistical"]["tests"], authority)
+    likely = conclusion.uses_statistical_estimates(fdi["statistical"]["tests"], authority)
     alarm = fdi["statistical"]["alarm"]
-    found = scheme.built_in_statistic(fdi["bank"], alarm, authority, likely)
+    found = schemes.built_in_statistic(fdi["bank"], alarm, authority, likely)
     assert found == pytest.approx(statistic)
-    assert bool(likely) == (enabled == 1 and authority != WORST_CASE)
+    assert bool(likely) == (enabled == 1 and authority != WORST_CASE_DETECTOR)
 
 
 def unknown_acceleration(fdi):
     """What the assessment explains by no known fault, rad/s2."""
-    assessed = np.zeros(1, assessment.assessment_dtype(4)).view(np.recarray)[0]
+    assessed = np.zeros(1, conclusion.assessment_dtype(4)).view(np.recarray)[0]
     stages = (fdi[name] for name in ("config", "verdict", "types", "layout", "statistical", "fdae", "bound"))
-    assessment.assess_unknown(assessed, *stages)
+    conclusion.assess_unknown_acceleration(assessed, *stages)
     return assessed["unknown_acceleration"].tolist()
 
 
@@ -448,7 +452,7 @@ def test_the_estimate_is_that_of_whoever_counts():
     fdi["statistical"]["tests"]["enabled"] = 1
     assert frame.isolated_theta(fdi, 2) == -0.6
     assert unknown_acceleration(fdi)[1] == 0.7
-    fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"] = 2, LAGS
+    fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"] = 2, WAIT_FOR_SURFACE
     assert unknown_acceleration(fdi) == [0.0] * 3
     fdi["verdict"]["isolated"] = NOT_ISOLATED
     assert on(conclusion.isolated_surface, fdi) == -1
@@ -457,7 +461,7 @@ def test_the_estimate_is_that_of_whoever_counts():
 @pytest.mark.parametrize("share", [1.0, 0.25])
 def test_the_gusts_mean_is_a_share_of_what_was_summed(share):
     record = new_air(acceleration_sum=(0.4, -0.8, 1.2))
-    air.average_frame(record, share)
+    gusts.average_gust_frame(record, share)
     assert record["output"]["mean"] == pytest.approx(share * np.array([0.4, -0.8, 1.2]))
 
 
@@ -467,7 +471,7 @@ def test_a_leap_of_the_air_widens_what_a_drift_may_be():
     record, rng = new_air(), np.random.default_rng(2)
     record["output"]["turn_variance"], block["drift_scale"], block["P_dd"] = rng.normal(size=(3, 3)), 1.7, 0.3
     block["n"], block["axis"] = 2, (0, 2)
-    statistical.add_leap(record, block)
+    statistical.add_turn_variance(record, block)
     assert block["P_dd"] == pytest.approx(
         0.3 + 1.7 * record["output"]["turn_variance"][np.ix_((0, 2), (0, 2))]
     )

@@ -6,7 +6,7 @@ import pytest
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.context import Declared
 from beaver_ftc.design.dryden import GUST_FT_S, SCALE_FT, Dryden
-from beaver_ftc.diagnosis.bounds.variances import gust_effect
+from beaver_ftc.diagnosis.bounds import gust_effect
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.studies.compare.replay import Recorder, record
 from flying import scenario

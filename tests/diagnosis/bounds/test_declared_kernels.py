@@ -6,7 +6,7 @@ import pytest
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.dryden import SCALE_FT, Dryden
 from beaver_ftc.design.model import design_record
-from beaver_ftc.diagnosis.bounds.variances import gust_effect, model_error, variances_of
+from beaver_ftc.diagnosis.bounds import gust_effect, model_error_deviation, variances_of
 from beaver_ftc.scenario.airframe import Actuators
 from beaver_ftc.scenario.diagnosis import Bounds
 from flying import declared_in
@@ -51,7 +51,7 @@ def test_errors_of_the_model_add_by_their_squares(design):
         term = AIRCRAFT.moments[k]
         more = 1.0 + 0.3 * np.sign(design["moments"]["value"][0][k])
         apart.append(acceleration(design, Y, U, {term.name: more}) - here)
-    found = model_error(design, Y, U, air_data, tolerance, deflection)
+    found = model_error_deviation(design, Y, U, air_data, tolerance, deflection)
     assert found == pytest.approx(np.sqrt(np.square(apart).sum(axis=0)), rel=1e-9)
     assert (found > 1e-3).all()
 
@@ -59,7 +59,7 @@ def test_errors_of_the_model_add_by_their_squares(design):
 def test_an_error_of_an_air_datum_moves_the_model_by_it_alone(design):
     for i in (0, 1, 3):
         air_data = 0.04 * Y[:N_AIR_DATA] * (np.arange(N_AIR_DATA) == i)
-        found = model_error(design, Y, U, air_data, np.zeros(len(AIRCRAFT.moments)), 0.0)
+        found = model_error_deviation(design, Y, U, air_data, np.zeros(len(AIRCRAFT.moments)), 0.0)
         off = Y.copy()
         off[i] *= 1.04
         assert found == pytest.approx(np.abs(acceleration(design, off, U) - acceleration(design, Y, U)))

@@ -6,9 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from beaver_ftc.design.model import both_responses, design_record
-from beaver_ftc.diagnosis.bounds.admitted import inertia_slack, poles_for_noise
-from beaver_ftc.diagnosis.bounds.worst_case import derived_bound, slack_per_rad
-from beaver_ftc.diagnosis.detection.thresholds import noise_step
+from beaver_ftc.diagnosis.bounds import (
+    add_declared_errors,
+    fill_error_per_rad,
+    inertia_coefficient_errors,
+    poles_for_noise,
+)
+from beaver_ftc.diagnosis.detection.filters import noise_step
 from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.scenario.declared import SensorErrors
 from beaver_ftc.scenario.schema import Scenario
@@ -42,7 +46,7 @@ def bound(x, y, u, **bounds):
     scenario = Scenario.model_validate({"name": "x", "fdi": {"bounds": bounds}})
     frame = configure_design(scenario, TRAVEL_RAD)[0]
     out = np.zeros(3)
-    derived_bound(frame["fdi"]["bound"]["admitted"], frame["belief"]["design"], x, y, u, out)
+    add_declared_errors(frame["fdi"]["bound"]["admitted"], frame["belief"]["design"], x, y, u, out)
     return out
 
 
@@ -108,7 +112,7 @@ def test_inertia_coefficients_are_extreme_at_the_corners(seed):
     names = ("Ix_kg_m2", "Iy_kg_m2", "Iz_kg_m2", "Jxz_kg_m2")
     change = {n: getattr(MASS, n) * (1 + rng.uniform(-tolerance, tolerance)) for n in names}
     there, nominal = (np.array(inertia_coefficients(m)) for m in (replace(MASS, **change), MASS))
-    assert (np.abs(there - nominal) <= inertia_slack(tolerance, MASS) * (1 + 1e-12)).all()
+    assert (np.abs(there - nominal) <= inertia_coefficient_errors(tolerance, MASS) * (1 + 1e-12)).all()
 
 
 @settings(max_examples=samples(100), deadline=None)
@@ -159,8 +163,8 @@ def test_a_surfaces_own_share_of_the_bound_is_its_slope(seed, surface):
     further = u.copy()
     further[surface] = np.sign(u[surface]) * (abs(u[surface]) + 1.0)
     frame = configure_design(Scenario.model_validate({"name": "x", "fdi": {"bounds": bounds}}), TRAVEL_RAD)[0]
-    derived_bound(frame["fdi"]["bound"]["admitted"], frame["belief"]["design"], x, y, u, np.zeros(3))
-    slack_per_rad(frame["fdi"]["bound"]["admitted"], frame["belief"]["design"], surface)
+    add_declared_errors(frame["fdi"]["bound"]["admitted"], frame["belief"]["design"], x, y, u, np.zeros(3))
+    fill_error_per_rad(frame["fdi"]["bound"]["admitted"], frame["belief"]["design"], surface)
     rise = bound(x, y, further, **bounds) - bound(x, y, u, **bounds)
     assert frame["fdi"]["bound"]["admitted"]["per_rad"][:, surface] == pytest.approx(rise, abs=1e-9)
     assert rise.max() > 0.1

@@ -7,7 +7,7 @@ import pytest
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.engine import DPT_0, KW_TO_DPT, SEA_LEVEL_DENSITY_KG_M3
-from beaver_ftc.diagnosis.bounds import worst_case
+from beaver_ftc.diagnosis import bounds
 from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.scenario.schema import Scenario
 
@@ -92,11 +92,11 @@ def by_terms(admitted, design, u):
 def test_the_bound_is_the_sum_of_what_each_product_can_grow_by(seed):
     admitted, design = records(seed)
     out = np.array([0.1, 0.2, 0.3])
-    worst_case.derived_bound(admitted, design, X, Y, U, out)
+    bounds.add_declared_errors(admitted, design, X, Y, U, out)
     bound, slopes = by_terms(admitted, design, U)
     assert out == pytest.approx(bound + np.array([0.1, 0.2, 0.3]), rel=1e-9)
     for s in range(4):
-        worst_case.slack_per_rad(admitted, design, s)
+        bounds.fill_error_per_rad(admitted, design, s)
     assert admitted["per_rad"] == pytest.approx(slopes, rel=1e-9)
     assert slopes.max() > 0.01
 
@@ -104,7 +104,7 @@ def test_the_bound_is_the_sum_of_what_each_product_can_grow_by(seed):
 def test_the_airspeed_reckoned_with_is_a_tenth_of_the_reading_at_least():
     admitted, _ = records()
     admitted["offset"][5] = 43.0
-    worst_case.magnitudes(admitted, X, Y, U)
+    bounds.fill_magnitudes(admitted, X, Y, U)
     assert admitted["far_y"][2] == pytest.approx(4.4)
 
 
@@ -112,9 +112,9 @@ def test_an_error_is_what_the_truth_may_be_off_and_of_a_gyro_what_changes():
     admitted, _ = records()
     admitted["offset"][1], admitted["slope"][1], admitted["steady"][1] = 0.03, 0.1, 0.01
     truth = (0.2 + 0.03) / 0.9
-    assert worst_case.error(admitted, 1, -0.2) == pytest.approx(truth - 0.2)
+    assert bounds.reading_error(admitted, 1, -0.2) == pytest.approx(truth - 0.2)
     # what is steady drops out; slope times the true rate and the rest of the offset may change
-    assert worst_case.changing_error(admitted, 1, -0.2) == pytest.approx(0.02 + 0.1 * truth)
+    assert bounds.changing_gyro_error(admitted, 1, -0.2) == pytest.approx(0.02 + 0.1 * truth)
 
 
 @pytest.mark.parametrize("dpt", [0.4, 0.05])
@@ -136,8 +136,8 @@ def test_a_slipstream_worked_out_from_instruments_is_off_at_the_corner_of_their_
     more_kw = 2.0 + 150.0 * thinner
     power_kw = abs(dpt - DPT_0) * y[3] * y[2] / KW_TO_DPT
     there = KW_TO_DPT * (power_kw + more_kw) / (y[3] * (1.0 - pressure) * slowest)
-    assert worst_case.slipstream_error(admitted, y) == pytest.approx(there - abs(dpt - DPT_0))
-    worst_case.magnitudes(admitted, X, y, U)
+    assert bounds.slipstream_error(admitted, y) == pytest.approx(there - abs(dpt - DPT_0))
+    bounds.fill_magnitudes(admitted, X, y, U)
     off = there - abs(dpt - DPT_0) if engine else 0.0
     assert admitted["far_y"][4] == pytest.approx(dpt + off)
     assert admitted["near_y"][4] == dpt
@@ -149,9 +149,9 @@ def test_errors_as_large_as_the_reading_leave_a_tenth_of_it():
     admitted["slope"], admitted["offset"] = 0.0, (0, 0, 0, 0, 0, 2.0 * Y[2], 2.0 * Y[3])
     stretch = 1.0 / (0.1 * 0.1)
     expected = stretch * KW_TO_DPT * 2.0 / (Y[3] * Y[2]) + (stretch - 1.0) * (Y[4] - DPT_0)
-    assert worst_case.slipstream_error(admitted, Y) == pytest.approx(expected)
+    assert bounds.slipstream_error(admitted, Y) == pytest.approx(expected)
     admitted["engine_kw"], admitted["thin_air_kw"] = 0.0, 1.0
     denser = (1.0 + 2.0) / 0.1**2 - 1.0
     ratio = 2.0 * Y[3] / Y[2] ** 2 / SEA_LEVEL_DENSITY_KG_M3
     expected = stretch * KW_TO_DPT * denser * ratio / (Y[3] * Y[2]) + (stretch - 1.0) * (Y[4] - DPT_0)
-    assert worst_case.slipstream_error(admitted, Y) == pytest.approx(expected)
+    assert bounds.slipstream_error(admitted, Y) == pytest.approx(expected)

@@ -9,8 +9,8 @@ from statistics_of import Across
 from beaver_ftc.aircraft import load
 from beaver_ftc.diagnosis.detection import likelihood, parity, tones
 from beaver_ftc.diagnosis.detection.likelihood import LEAST_UNCERTAINTY_RAD_S2, STEP
-from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, USUAL_SIZE, set_up_views
-from beaver_ftc.diagnosis.schemes.fault_classes import is_off_the_column
+from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, USUAL_SIZE, configure_views
+from beaver_ftc.diagnosis.schemes.adaptive_estimators import parity_excludes
 from beaver_ftc.diagnosis.state import LOSS, POSITION
 
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)
@@ -37,8 +37,8 @@ def fdi(rng):
         block["noise"][:n] = rng.uniform(1e-8, 1e-7, n)
         block["regressor"] = rng.normal(size=block["regressor"].shape)
         block["tolerance"][:regressors] = rng.uniform(0.1, 0.2, regressors)
-    set_up_views(statistical, load())
-    tones.set_up_tones(statistical["tone_config"], 1e-8, V, 15.0, DT)
+    configure_views(statistical, load())
+    tones.configure_tones(statistical["tone_config"], 1e-8, V, 15.0, DT)
     air = statistical["air"]
     air["output"]["moving"], air["config"]["rolling_length"], air["memory"]["intensity"] = (
         1,
@@ -256,7 +256,7 @@ def test_any_hypothesis_beyond_the_level_excludes_whom_it_is_not_felt_of(fdi):
         view["block"]["hypothesis"]["score"] = np.where(np.arange(room) == h, 5.1, 4.9)
         assert Across.excludes(fdi, ELEVATOR) == (h < tried)
         assert not Across.excludes(fdi, AILERON)
-        assert is_off_the_column(fdi, fdi["isolation"]["estimator"][ELEVATOR]) == (h < tried)
+        assert parity_excludes(fdi, fdi["isolation"]["estimator"][ELEVATOR]) == (h < tried)
     view["block"]["hypothesis"]["score"] = 5.0
     assert not Across.excludes(fdi, ELEVATOR), "the level is what chance may reach"
 
@@ -268,7 +268,7 @@ def test_a_view_has_levels_and_tolerances_of_the_axes_it_looks_at(fdi):
     statistical["air"]["output"]["moving"] = 0  # else no view of pitch tries what answers the gusts
     for b, block in enumerate((pitch, lateral)):
         block["level"], block["noise_share"], block["pace"] = 5.0 + b, 0.5 + b, 0.01 + b
-    set_up_views(statistical, load())
+    configure_views(statistical, load())
     for v, view in enumerate(statistical["views"][:5]):
         axes, column = pitch if v == PITCH_AXIS else lateral, v in (PAST_AILERON, PAST_RUDDER)
         block, n = view["block"], int(axes["n_regressors"])

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from kernels import DT, POLES, estimator, new_fdi, on, weights
 
-from beaver_ftc.diagnosis.bounds.admitted import poles_for_noise
-from beaver_ftc.diagnosis.detection import bank, statistical
+from beaver_ftc.diagnosis.bounds import poles_for_noise
+from beaver_ftc.diagnosis.detection import filters, statistical
 from beaver_ftc.scenario.declared import Declared, SensorErrors
 from beaver_ftc.scenario.schema import Scenario
 from telling import apart
@@ -19,7 +19,7 @@ def test_a_filter_and_its_bound_are_convolutions_of_what_went_in():
     for k in range(frames):
         fdi["bound"]["eta_bar"], fdi["bound"]["noise_then"] = eta[k], noise[k]
         fdi["bound"]["noise"] = noise[k + 1]
-        on(bank.innovate, fdi, x[k + 1], x[k], believed[k])
+        on(filters.update_bank, fdi, x[k + 1], x[k], believed[k])
     innovation = np.diff(x, axis=0) / DT - believed
     assert fdi["bank"]["output"]["innovation"] == pytest.approx(innovation[-1])
     assert fdi["bound"]["frame"] == pytest.approx(eta[-1] + (noise[-1] + noise[-2]) / DT)
@@ -45,25 +45,27 @@ CALM, LEAVES = [[0.1, -0.2, 0.3]] * 3, [[0.1, 0.5, 0.2], [0.3, -1.5, 0.1], [0.4,
 
 
 def test_the_alarm_is_of_the_first_axis_on_which_a_filter_leaves_its_bound():
-    assert on(bank.alarm, with_shares(*CALM)) == -1
-    assert on(bank.alarm, with_shares([1.0, -1.0, 1.0], *CALM[:2])) == -1  # at its bound is within
-    assert on(bank.alarm, with_shares(*LEAVES)) == 1
-    assert [bank.nearest(with_shares(*LEAVES)["bank"], i) for i in range(3)] == [2, 1, 2]
-    assert on(bank.largest_share, with_shares(*LEAVES)) == pytest.approx(1.5)
+    assert on(filters.bank_alarm_axis, with_shares(*CALM)) == -1
+    assert (
+        on(filters.bank_alarm_axis, with_shares([1.0, -1.0, 1.0], *CALM[:2])) == -1
+    )  # at its bound is within
+    assert on(filters.bank_alarm_axis, with_shares(*LEAVES)) == 1
+    assert [filters.nearest_filter(with_shares(*LEAVES)["bank"], i) for i in range(3)] == [2, 1, 2]
+    assert on(filters.largest_share, with_shares(*LEAVES)) == pytest.approx(1.5)
 
 
 def test_the_closest_approach_of_every_filter_is_kept():
     fdi = with_shares(*LEAVES)
     alarm = fdi["statistical"]["alarm"]
     fdi["bank"]["output"]["closest"][:3], alarm["score"] = (0.6, 0.0, 0.0), 0.4
-    bank.note_closest_approach(fdi["bank"])
+    filters.note_closest_approach(fdi["bank"])
     statistical.note_closest_approach(alarm)
     assert fdi["bank"]["output"]["closest"][:3] == pytest.approx([0.6, 1.5, 1.2])
     assert alarm["closest"] == 0.4
     silent = new_fdi()
-    bank.note_closest_approach(silent["bank"])
+    filters.note_closest_approach(silent["bank"])
     assert not silent["bank"]["output"]["closest"].any()
-    assert on(bank.largest_share, silent) == 0.0
+    assert on(filters.largest_share, silent) == 0.0
 
 
 def test_the_direction_across_a_fault_is_of_unit_length_and_sees_nothing_of_it():
@@ -71,7 +73,7 @@ def test_the_direction_across_a_fault_is_of_unit_length_and_sees_nothing_of_it()
     fdi["isolation"]["config"]["n"] = 2
     fdi["isolation"]["estimator"]["surface"][:2] = 2, 1
     G = np.array([[0, 0, 3.0, 0], [0, 5.0, 0, 0], [0, 0, -4.0, 0]])
-    on(bank.align, fdi, G)
+    on(filters.fix_parity_directions, fdi, G)
     assert fdi["isolation"]["estimator"]["across"][0] == pytest.approx([-0.8, 0.0, -0.6])
     assert fdi["isolation"]["estimator"]["across"][0] @ G[:, 2] == pytest.approx(0.0)
     assert not fdi["isolation"]["estimator"]["across"][1].any()
@@ -91,7 +93,7 @@ def test_what_a_fault_can_have_done_is_the_filtered_extreme_of_what_it_does(seed
     rng = np.random.default_rng(seed)
     fdi, fie = reach_of(0.2 * rng.normal(size=3), rng.normal(size=3), rng.uniform(0, 0.3, 3))
     for _ in range(3):
-        on(bank.remember, fdi, fie)
+        on(filters.advance_reach, fdi, fie)
     effect, across = fie["effect"], np.vstack([np.eye(3), fie["across"]])
     at_ends = [effect["offset"] + theta * effect["Z"] for theta in (-1.0, 0.5)]
     does = np.array([*at_ends, np.zeros(3)]) @ across.T
@@ -112,7 +114,7 @@ def test_a_fault_explains_what_is_within_its_reach_and_the_bound(m, axis, side):
         fie["ignored_axes"][axis] = ignored_axes
         limit = -0.4 if side < 0 else 0.6
         fdi["bank"]["output"]["residual"][m, axis] = limit + side * beyond
-        return bool(on(bank.explains, fdi, fie, True))
+        return bool(on(filters.reach_explains, fdi, fie, True))
 
     assert explained(-1e-9)
     assert not explained(1e-9)
@@ -128,8 +130,8 @@ def test_across_its_direction_a_shared_parameter_confines_it_too(side):
     limit = (0.3 if side > 0 else -0.2) + side * (0.6 + 0.8) * 0.1
     for beyond, within in ((-1e-9, True), (1e-9, False)):
         fdi["bank"]["output"]["residual"][1] = (limit + side * beyond) * fie["across"]  # a unit vector
-        assert bool(on(bank.explains, fdi, fie, True)) == within
-        assert on(bank.explains, fdi, fie, False)
+        assert bool(on(filters.reach_explains, fdi, fie, True)) == within
+        assert on(filters.reach_explains, fdi, fie, False)
 
 
 def test_a_filter_without_a_bound_has_no_share_of_it():
@@ -137,17 +139,17 @@ def test_a_filter_without_a_bound_has_no_share_of_it():
     fdi = with_shares(*LEAVES)
     fdi["bank"]["output"]["threshold"][0] = 0.0
     with np.errstate(divide="ignore"):
-        assert on(bank.largest_share, fdi) == pytest.approx(1.5)
-        assert [bank.nearest(fdi["bank"], i) for i in range(3)] == [2, 1, 2]
-        bank.note_closest_approach(fdi["bank"])
+        assert on(filters.largest_share, fdi) == pytest.approx(1.5)
+        assert [filters.nearest_filter(fdi["bank"], i) for i in range(3)] == [2, 1, 2]
+        filters.note_closest_approach(fdi["bank"])
     assert fdi["bank"]["output"]["closest"][:3] == pytest.approx([0.0, 1.5, 1.2])
-    assert on(bank.alarm, fdi) == 0
+    assert on(filters.bank_alarm_axis, fdi) == 0
 
 
 def test_of_filters_that_are_equally_near_the_published_one_is_named():
-    assert bank.nearest(new_fdi()["bank"], 0) == 0
-    assert bank.nearest(with_shares(*[[0.0] * 3] * 3)["bank"], 1) == 0
-    assert bank.nearest(with_shares(*[[0.5] * 3] * 3)["bank"], 1) == 0
+    assert filters.nearest_filter(new_fdi()["bank"], 0) == 0
+    assert filters.nearest_filter(with_shares(*[[0.0] * 3] * 3)["bank"], 1) == 0
+    assert filters.nearest_filter(with_shares(*[[0.5] * 3] * 3)["bank"], 1) == 0
 
 
 @pytest.mark.parametrize("size", [9.0, 0.3])
@@ -155,9 +157,9 @@ def test_across_a_fault_is_square_to_its_column_in_roll_and_yaw(size):
     fdi, G = new_fdi(), np.zeros((3, 4))
     fie = estimator(fdi)
     G[:, 0] = size * np.array([0.8, 5.0, -0.6])
-    on(bank.align, fdi, G)
+    on(filters.fix_parity_directions, fdi, G)
     assert fie["across"] == pytest.approx([-0.6, 0.0, -0.8])
-    on(bank.align, fdi, np.zeros((3, 4)))
+    on(filters.fix_parity_directions, fdi, np.zeros((3, 4)))
     assert fie["across"] == pytest.approx([-0.6, 0.0, -0.8]), "what moves neither has no direction"
 
 
@@ -171,7 +173,7 @@ def test_poles_are_those_asked_for_and_those_that_noise_asks_for(noisy, several)
     scenario, fdi = Scenario.model_validate({"name": "x", "fdi": asked}), new_fdi()
     config = scenario.fdi
     fdi["bank"]["config"]["decay"] = 0.0
-    bank.configure(fdi["bank"], config, Declared.of(scenario), DT)
+    filters.configure_bank(fdi["bank"], config, Declared.of(scenario), DT)
     bound = max(config.bounds.constant_rad_s2.as_tuple())
     for_noise = poles_for_noise(SensorErrors(config.bounds.sensors), bound)
     assert bool(for_noise) is noisy

@@ -5,14 +5,10 @@ import pytest
 from kernels import DT, fill, new_fdi, on
 
 from beaver_ftc.diagnosis import conclusion
-from beaver_ftc.diagnosis.belief import expectation as beliefs
-from beaver_ftc.diagnosis.detection import bank, fdae
-from beaver_ftc.diagnosis.detection.fdae import ALPHA_CENTRES, BETA_CENTRES, N_BASIS, NETWORK
-from beaver_ftc.diagnosis.state import (
-    EITHER,
-    STATISTICS,
-    WORST_CASE,
-)
+from beaver_ftc.diagnosis import expectation as beliefs
+from beaver_ftc.diagnosis.detection import filters as detection_filters
+from beaver_ftc.diagnosis.detection.filters import ALPHA_CENTRES, BETA_CENTRES, N_BASIS, NETWORK
+from beaver_ftc.diagnosis.state import EITHER_DETECTOR, STATISTICAL_DETECTOR, WORST_CASE_DETECTOR
 from beaver_ftc.scenario.schema import Scenario
 
 
@@ -24,7 +20,7 @@ def new_network(**fields):
 @pytest.mark.parametrize("beta", [-0.5, 0.07, 0.3, 0.4])
 def test_the_basis_is_that_of_gaussians_as_wide_as_their_spacing(alpha, beta):
     out = np.zeros(N_BASIS)
-    fdae.basis(alpha, beta, out)
+    detection_filters.fill_basis(alpha, beta, out)
     parts = []
     for place, centres in ((alpha, ALPHA_CENTRES), (beta, BETA_CENTRES)):
         inside = np.clip(place, centres[0], centres[-1])
@@ -37,13 +33,13 @@ def test_the_basis_is_that_of_gaussians_as_wide_as_their_spacing(alpha, beta):
     ("residual", "left"), [(0.5, 0.2), (0.3, 0.0), (-0.3, 0.0), (-0.5, -0.2), (0.1, 0.0)]
 )
 def test_the_dead_zone_leaves_the_excess(residual, left):
-    assert fdae.dead_zone(residual, 0.3) == pytest.approx(left)
+    assert detection_filters.dead_zone(residual, 0.3) == pytest.approx(left)
 
 
 def test_the_output_is_the_weights_on_the_basis():
     rng = np.random.default_rng(1)
     record = new_network(weights=rng.normal(size=(3, N_BASIS)))
-    fdae.evaluate(record, 0.1, -0.05)
+    detection_filters.evaluate_network(record, 0.1, -0.05)
     assert record["output"] == pytest.approx(record["memory"]["weights"] @ record["memory"]["basis"])
 
 
@@ -54,12 +50,12 @@ def test_weights_learn_what_exceeds_the_threshold_and_leak(leaking):
     record = new_network(
         gain=30.0, leak_per_s=2.0, weight_limit=9.0, weights=before, basis=rng.uniform(0, 1, N_BASIS)
     )
-    fdae.learn(record, np.array([0.5, -0.4, 0.1]), np.full(3, 0.2), leaking, DT)
+    detection_filters.train_network(record, np.array([0.5, -0.4, 0.1]), np.full(3, 0.2), leaking, DT)
     kept = np.exp(-2.0 * DT) if leaking else 1.0
     learnt = DT * 30.0 * np.outer([0.3, -0.2, 0.0], record["memory"]["basis"])
     assert record["memory"]["weights"] == pytest.approx(kept * before + learnt)
     record["config"]["weight_limit"] = 0.05
-    fdae.learn(record, np.array([0.5, -0.4, 0.1]), np.full(3, 0.2), leaking, DT)
+    detection_filters.train_network(record, np.array([0.5, -0.4, 0.1]), np.full(3, 0.2), leaking, DT)
     assert np.abs(record["memory"]["weights"]).max() == 0.05
     assert record["memory"]["weights"].min() == -0.05
 
@@ -67,19 +63,21 @@ def test_weights_learn_what_exceeds_the_threshold_and_leak(leaking):
 def test_a_diagnosis_begins_with_no_residual_and_the_gyros_error_to_come():
     fdi = new_fdi()
     fdi["bound"]["noise"] = 0.1, 0.2, 0.3
-    on(fdae.begin, fdi, np.array([1.0, 2.0, 3.0]))
+    on(detection_filters.begin_fdae, fdi, np.array([1.0, 2.0, 3.0]))
     assert fdi["fdae"]["memory"]["xhat"] == pytest.approx([1.0, 2.0, 3.0])
     assert fdi["fdae"]["memory"]["threshold_noise"] == pytest.approx([0.1, 0.2, 0.3])
-    on(bank.begin, fdi)
+    on(detection_filters.begin_bank, fdi)
     assert fdi["bank"]["memory"]["noise"][:3] == pytest.approx(np.tile([0.1, 0.2, 0.3], (3, 1)))
 
 
 @pytest.mark.parametrize(
     ("authority", "filters", "score", "axis"),
     [
-        (WORST_CASE, 1.1, 9.0, 2), (WORST_CASE, 0.9, 9.0, None), (STATISTICS, 9.0, 1.1, 0),
-        (STATISTICS, 9.0, 0.9, None), (STATISTICS, 9.0, 1.0, None), (EITHER, 1.1, 9.0, 2),
-        (EITHER, 0.9, 1.1, 0), (EITHER, 0.9, 0.9, None),
+        (WORST_CASE_DETECTOR, 1.1, 9.0, 2), (WORST_CASE_DETECTOR, 0.9, 9.0, None),
+        (STATISTICAL_DETECTOR, 9.0, 1.1, 0),
+        (STATISTICAL_DETECTOR, 9.0, 0.9, None), (STATISTICAL_DETECTOR, 9.0, 1.0, None),
+        (EITHER_DETECTOR, 1.1, 9.0, 2),
+        (EITHER_DETECTOR, 0.9, 1.1, 0), (EITHER_DETECTOR, 0.9, 0.9, None),
     ],
 )  # fmt: skip
 def test_who_is_in_authority_raises_the_alarm(authority, filters, score, axis):
@@ -95,9 +93,9 @@ def test_who_is_in_authority_raises_the_alarm(authority, filters, score, axis):
         0,
         (1.0, 1.0, 1.0),
     )
-    fdae.form_residual(fdi["fdae"], np.array([1.5, 0.5, 1.0]))
+    detection_filters.form_fdae_residual(fdi["fdae"], np.array([1.5, 0.5, 1.0]))
     assert fdi["fdae"]["output"]["residual"] == pytest.approx([0.5, -0.5, 0.0])
-    assert on(fdae.detect, fdi, authority) == (-1 if axis is None else axis)
+    assert on(detection_filters.alarm_axis, fdi, authority) == (-1 if axis is None else axis)
 
 
 def test_the_first_alarm_stays():
@@ -125,7 +123,7 @@ def test_the_detection_estimator_and_its_threshold_are_convolutions(detected):
     for k in range(frames):
         fdi["bound"]["eta_bar"], fdi["bound"]["noise_then"] = eta[k], noise[k]
         fdi["bound"]["noise"], record["output"]["residual"] = noise[k + 1], 99.0
-        on(fdae.predict, fdi, x[k], believed[k], False)
+        on(detection_filters.predict_fdae, fdi, x[k], believed[k], False)
     w = decay ** np.arange(frames)[::-1, None]
     shares = w * ((1.0 - decay) * x + DT * (believed + output))
     assert record["memory"]["xhat"] == pytest.approx(shares.sum(axis=0))
@@ -142,7 +140,7 @@ def test_beyond_the_model_is_what_was_learnt_and_the_residual_beyond_noise():
     record["network"]["output"], record["config"]["pole"] = 0.1, (2.0, 3.0, 4.0)
     record["output"]["residual"] = 0.5, -0.5, 0.05
     record["memory"]["threshold_noise"], fdi["bound"]["noise"] = 0.1, 0.2
-    on(fdae.unknown_acceleration, fdi, out)
+    on(detection_filters.fdae_unknown_acceleration, fdi, out)
     assert out == pytest.approx([0.1 + 2.0 * 0.2, 0.1 - 3.0 * 0.2, 0.1])
 
 
@@ -178,8 +176,8 @@ def test_means_over_a_frame_are_of_its_instants(count, own_errors):
         if k == 0:
             beliefs.begin_sums(record, fdi["bound"], fdi["layout"], fdi["config"]["every_type"], measured)
         else:
-            beliefs.accumulate(record, fdi["bound"], fdi["layout"], fdi["config"]["every_type"])
-    beliefs.average_frame(record, fdi["bound"])
+            beliefs.add_instant_to_sums(record, fdi["bound"], fdi["layout"], fdi["config"]["every_type"])
+    beliefs.fill_frame_means(record, fdi["bound"])
     Gu = np.array([G * u for _, G, u, _, _ in seen])
     mean = record["means"]
     assert record["x_then"] == pytest.approx([1.0, 2.0, 3.0])
@@ -206,7 +204,7 @@ def test_a_command_is_followed_by_surfaces_that_were_where_they_were():
     record = new_belief(1.0)
     record["u"], record["actuators"]["approach"] = (0.1, 0.2, 0.3, 0.0), 1.0
     record["actuators"]["step"], record["actuators"]["low"], record["actuators"]["high"] = np.inf, -1.0, 1.0
-    beliefs.follow_command(record, np.array([0.4, 0.5, -0.6, 0.2]))
+    beliefs.move_healthy_surfaces(record, np.array([0.4, 0.5, -0.6, 0.2]))
     assert record["u_then"] == pytest.approx([0.1, 0.2, 0.3, 0.0])
     assert record["u"] == pytest.approx(record["commanded"])
     assert record["commanded"] == pytest.approx([0.4, 0.5, -0.6, 0.2])
@@ -218,7 +216,7 @@ def test_an_estimator_forgets_by_the_frame_however_many_instants_it_has(substeps
     control = {"network_gain_per_s2": 91.0, "network_leak_per_s": 0.7, "network_weight_limit_rad_s2": 3.3}
     asked = {"fdi": {"detection_pole_per_s": 2.2}, "control": control, "rate_hz": 40, "substeps": substeps}
     record = new_fdi()["fdae"]
-    fdae.configure(record, Scenario.model_validate({"name": "x", **asked}))
+    detection_filters.configure_fdae(record, Scenario.model_validate({"name": "x", **asked}))
     assert np.unique(record["config"]["pole"]).tolist() == [2.2]
     assert np.unique(record["config"]["decay"]) == pytest.approx([np.exp(-2.2 / 40.0)])
     network = record["network"]

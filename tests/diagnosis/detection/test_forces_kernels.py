@@ -11,10 +11,10 @@ from beaver_ftc.aircraft.schema import SIDESLIP_RATE
 from beaver_ftc.design.engine import slipstream_slopes
 from beaver_ftc.design.terms import fill_table
 from beaver_ftc.diagnosis.detection import forces, parity, statistical
-from beaver_ftc.diagnosis.detection.forces import ASIDE, UP, set_up_forces, update
-from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, VANE_VIEW, set_up_views
-from beaver_ftc.diagnosis.detection.tones import set_up_tones
-from beaver_ftc.diagnosis.state import NORMAL, PITCH, ROLL, SIDE, YAW
+from beaver_ftc.diagnosis.detection.forces import NORMAL, SIDE, configure_forces, update_forces
+from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, VANE_VIEW, configure_views
+from beaver_ftc.diagnosis.detection.tones import configure_tones
+from beaver_ftc.diagnosis.state import NORMAL_FORCE, PITCH, ROLL, SIDE_FORCE, YAW
 from beaver_ftc.plant.instruments import MEASURED
 from beaver_ftc.scenario.diagnosis import Bounds
 from flying import declared_in
@@ -51,7 +51,7 @@ def felt(bounds=None, **admitted):
     )
     air["config"]["turbulence_length"], statistical["forces"]["known"] = 533.4, 1
     air["output"]["uses_accelerometers"] = 1
-    set_up_forces(fdi, declared_in(bounds or Bounds(), AIRCRAFT), (X, Y, U), ALONG_Y, DT)
+    configure_forces(fdi, declared_in(bounds or Bounds(), AIRCRAFT), (X, Y, U), ALONG_Y, DT)
     return fdi
 
 
@@ -67,12 +67,12 @@ def per_coefficient(y=Y):
     return y[3] * AIRCRAFT.geometry.wing_area_m2 / AIRCRAFT.mass.mass_kg / AIRCRAFT.geometry.chord_m
 
 
-@pytest.mark.parametrize(("f", "name"), [(ASIDE, "CY"), (UP, "CZ")])
+@pytest.mark.parametrize(("f", "name"), [(SIDE, "CY"), (NORMAL, "CZ")])
 def test_the_model_is_the_sum_of_its_terms_and_the_rest_is_the_innovation(f, name):
     fdi, rate = felt(), 0.04
     record, seen = fdi["statistical"]["forces"], measured()
-    record["rate"][ASIDE], record["n_updates"] = rate, 1
-    update(record, fdi["statistical"]["air"], seen, U, DT)
+    record["rate"][SIDE], record["n_updates"] = rate, 1
+    update_forces(record, fdi["statistical"]["air"], seen, U, DT)
     whole = per_coefficient() * coefficient(name, rate=rate)
     force = record["component"][f]
     expected = seen["force"][1 + f] / AIRCRAFT.geometry.chord_m - whole
@@ -81,20 +81,20 @@ def test_the_model_is_the_sum_of_its_terms_and_the_rest_is_the_innovation(f, nam
     assert force["regressor"][n - 1] == pytest.approx(whole)
     values = [t.value for t in AIRCRAFT.measurable_forces if t.coefficient == name]
     values += [
-        t.value for t in AIRCRAFT.forces if t.coefficient == "CY" and f == ASIDE and "betadoth" in dict(t.of)
+        t.value for t in AIRCRAFT.forces if t.coefficient == "CY" and f == SIDE and "betadoth" in dict(t.of)
     ]
     terms = force["regressor"][: n - 1]
-    if f == ASIDE:
+    if f == SIDE:
         terms = np.append(terms[:-1], terms[-1] / values[-1])
         assert terms[-1] == pytest.approx(per_coefficient() * rate * AIRCRAFT.geometry.span_m / (2 * Y[2]))
     assert np.dot(values, terms) == pytest.approx(whole)
 
 
-@pytest.mark.parametrize(("f", "name"), [(ASIDE, "CY"), (UP, "CZ")])
+@pytest.mark.parametrize(("f", "name"), [(SIDE, "CY"), (NORMAL, "CZ")])
 def test_a_surface_s_column_is_the_slope_along_it_and_its_errors_are_shares_of_the_terms(f, name):
     fdi = felt(Bounds(coefficients=0.05))
     record = fdi["statistical"]["forces"]
-    update(record, fdi["statistical"]["air"], measured(), U, DT)
+    update_forces(record, fdi["statistical"]["air"], measured(), U, DT)
     force = record["component"][f]
     for s in range(4):
         ahead = U + 1e-4 * np.eye(4)[s]
@@ -115,7 +115,7 @@ def test_a_surface_s_column_is_the_slope_along_it_and_its_errors_are_shares_of_t
 def test_the_flow_s_rates_are_those_of_a_body_that_moves_on():
     """The velocity through air at rest a moment later, by v' = a + g - x cross v."""
     record, a, phi, theta = felt()["statistical"]["forces"], np.array([0.5, 0.3, -9.5]), 0.2, 0.15
-    forces.flow_rates(record, measured())
+    forces.fill_flow_rates(record, measured())
     alpha, beta, V = Y[:3]
     v = V * np.array([np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)])
     g = GRAVITY * np.array([-np.sin(theta), np.cos(theta) * np.sin(phi), np.cos(theta) * np.cos(phi)])
@@ -125,7 +125,7 @@ def test_the_flow_s_rates_are_those_of_a_body_that_moves_on():
     assert record["rate"] == pytest.approx((now - then) / step, rel=1e-4)
 
 
-@pytest.mark.parametrize(("f", "place"), [(ASIDE, 1), (UP, 0)])
+@pytest.mark.parametrize(("f", "place"), [(SIDE, 1), (NORMAL, 0)])
 def test_followed_by_inertial_motion_a_force_does_not_know_its_vane(f, place):
     """Whatever a vane says after the first frame, what is left of the force is the same but for curvature."""
     courses = np.zeros(30), np.append(0.0, np.random.default_rng(3).normal(0.0, 0.002, 29).cumsum())
@@ -137,7 +137,7 @@ def test_followed_by_inertial_motion_a_force_does_not_know_its_vane(f, place):
         for error in course:
             y = Y.copy()
             y[place] += error
-            update(record, fdi["statistical"]["air"], measured(y=y), U, DT)
+            update_forces(record, fdi["statistical"]["air"], measured(y=y), U, DT)
         left.append((record["component"][f]["inertial"], record["component"][f]["innovation"]))
     (inertial, plain), (inertial_too, other) = left
     assert abs(plain - other) > 0.005
@@ -148,8 +148,8 @@ def test_the_angle_followed_is_the_sum_of_its_rates_and_its_drift_is_counted():
     fdi = felt()
     record = fdi["statistical"]["forces"]
     for _ in range(11):
-        update(record, fdi["statistical"]["air"], measured(), U, DT)
-    for f, place in ((ASIDE, 1), (UP, 0)):
+        update_forces(record, fdi["statistical"]["air"], measured(), U, DT)
+    for f, place in ((SIDE, 1), (NORMAL, 0)):
         force = record["component"][f]
         assert force["angle"] == pytest.approx(Y[place] + 10 * DT * record["rate"][f])
         assert force["angle_sensitivity"] == pytest.approx(11 * DT * force["vane"][1])
@@ -166,9 +166,9 @@ def test_noise_of_the_readings_is_jitter_of_the_forces():
     std = np.radians([0.03, 0.02]), 0.1, 4.0, np.radians(0.05)
     for _ in range(1500):
         y = Y + np.array([*(std[0] * rng.normal(size=2)), std[1] * rng.normal(), std[2] * rng.normal(), 0.0])
-        update(record, fdi["statistical"]["air"], measured(X + std[3] * rng.normal(size=3), y), U, DT)
+        update_forces(record, fdi["statistical"]["air"], measured(X + std[3] * rng.normal(size=3), y), U, DT)
         drawn.append(record["component"]["innovation"].copy())
-    update(record, fdi["statistical"]["air"], measured(), U, DT)
+    update_forces(record, fdi["statistical"]["air"], measured(), U, DT)
     assert np.sqrt(record["component"]["jitter"][:, 0]) == pytest.approx(np.std(drawn, axis=0), rel=0.06)
     without = record["component"]["jitter"][:, 0] - record["component"]["jitter"][:, 1]
     slopes = record["component"]["vane"][:, 1] * np.radians([0.02, 0.03])
@@ -180,7 +180,7 @@ def test_noise_of_the_pressure_is_jitter_as_the_innovation_moves_with_it():
     fdi = felt(Bounds(sensors={"qdyn": {"noise_std_pa": 4.0}}))
     record, innovation = fdi["statistical"]["forces"], []
     for more in (0.5, -0.5, 0.0):
-        update(record, fdi["statistical"]["air"], measured(y=Y + np.array([0, 0, 0, more, 0])), U, DT)
+        update_forces(record, fdi["statistical"]["air"], measured(y=Y + np.array([0, 0, 0, more, 0])), U, DT)
         innovation.append(record["component"]["innovation"].copy())
     slopes = innovation[0] - innovation[1]
     assert record["component"]["jitter"] == pytest.approx(np.outer((4.0 * slopes) ** 2, [1, 1]), rel=1e-6)
@@ -193,7 +193,7 @@ def test_noise_of_accelerometers_is_jitter_that_the_pressure_does_not_scale():
         fdi, y = felt(Bounds(sensors=sensors)), Y * (1.0, 1.0, 1.0, strength, 1.0)
         record, drawn = fdi["statistical"]["forces"], []
         for noise in rng.normal(0.0, (0.04, 0.07), (1500, 2)):
-            update(
+            update_forces(
                 record, fdi["statistical"]["air"], measured(y=y, force=(0.5, *(noise - (0.0, 9.5)))), U, DT
             )
             drawn.append(record["component"]["innovation"].copy())
@@ -201,7 +201,7 @@ def test_noise_of_accelerometers_is_jitter_that_the_pressure_does_not_scale():
             jitter = record["component"]["jitter"][:, inertial]
             assert np.sqrt(jitter) == pytest.approx(np.std(drawn, axis=0), rel=0.06)
     more = record["component"]["wander"] - felt()["statistical"]["forces"]["component"]["wander"]
-    walked = [(0.04, 0.07)[f] / Y[2] * np.sqrt(DT) for f in (ASIDE, UP)]
+    walked = [(0.04, 0.07)[f] / Y[2] * np.sqrt(DT) for f in (SIDE, NORMAL)]
     assert np.sqrt(more) == pytest.approx(np.abs(record["component"]["vane"][:, 1]) * walked)
 
 
@@ -209,8 +209,8 @@ def test_bias_and_slope_of_accelerometers_are_tolerated():
     """As one more constant, 1 / c of the bias, and as a share of the whole."""
     sensors = {"ay": {"bias_mps2": -0.2}, "az": {"bias_mps2": 0.3, "scale_error": -0.01}}
     record, none = (felt(Bounds(sensors=given))["statistical"]["forces"] for given in (sensors, {}))
-    update(record, felt()["statistical"]["air"], measured(), U, DT)
-    for f, bias, scale in ((ASIDE, 0.2, 0.0), (UP, 0.3, 0.01)):
+    update_forces(record, felt()["statistical"]["air"], measured(), U, DT)
+    for f, bias, scale in ((SIDE, 0.2, 0.0), (NORMAL, 0.3, 0.01)):
         force, before = record["component"][f], none["component"][f]
         n = int(force["n"])
         assert n == before["n"] + 1
@@ -219,7 +219,9 @@ def test_bias_and_slope_of_accelerometers_are_tolerated():
         assert force["tolerance"][n - 1] == pytest.approx(forces.MASS_TOLERANCE + scale)
         assert force["tolerance"][: n - 2] == pytest.approx(before["tolerance"][: n - 2])
     whole = per_coefficient() * coefficient("CZ")
-    assert record["component"][UP]["regressor"][int(record["component"][UP]["n"]) - 1] == pytest.approx(whole)
+    assert record["component"][NORMAL]["regressor"][
+        int(record["component"][NORMAL]["n"]) - 1
+    ] == pytest.approx(whole)
 
 
 def test_without_accelerometers_no_force_is_weighed(viewed):
@@ -244,7 +246,7 @@ def test_accelerometers_that_may_break_raise_no_alarm_and_tell_no_gust(viewed):
     statistical = viewed["statistical"]
     air, views = statistical["air"], statistical["views"]
     air["output"]["moving"] = 1
-    set_up_views(statistical, AIRCRAFT)
+    configure_views(statistical, AIRCRAFT)
     views["direction"][ELEVATOR_VIEW], views["peak_score"][ELEVATOR_VIEW] = (0.0, 0.3, 0.0, 0.0, -0.95), 9.0
     air["output"]["mean"] = 0.1, 0.2, 0.3
     views["block"]["hypothesis"]["score"][0, 0] = 7.0
@@ -298,13 +300,13 @@ def test_noise_of_the_gust_that_forces_tell_blurs_what_clears_a_vane(viewed):
         view = statistical["views"][v]
         view["direction"] = 0.0, -0.6, 0.0, 0.0, 0.8
         Across.blur(view, statistical, 45.0)
-        own = 0.8 * np.sqrt(statistical["forces"]["component"][UP]["jitter"][0])
+        own = 0.8 * np.sqrt(statistical["forces"]["component"][NORMAL]["jitter"][0])
         assert view["block"]["jitter"][0] == pytest.approx((own + 0.6 * 0.2 * gust_noise) ** 2)
 
 
 def test_a_vane_s_error_moves_rate_and_force_by_their_slopes():
     record = felt()["statistical"]["forces"]
-    for f, name, place, axis in ((ASIDE, "CY", 1, 2), (UP, "CZ", 0, 1)):
+    for f, name, place, axis in ((SIDE, "CY", 1, 2), (NORMAL, "CZ", 0, 1)):
         off = Y + 1e-5 * np.eye(5)[place]
         slope = per_coefficient() * (coefficient(name, y=off) - coefficient(name)) / 1e-5
         assert record["component"][f]["vane"] == pytest.approx([-ALONG_Y[axis, place], -slope], rel=1e-4)
@@ -312,8 +314,8 @@ def test_a_vane_s_error_moves_rate_and_force_by_their_slopes():
 
 def test_constant_errors_are_tolerated_term_by_term():
     given = Bounds(coefficients=0.05, sensors={"alpha": {"bias_deg": 0.5}, "qdyn": {"bias_pa": 23.0}})
-    force = felt(given)["statistical"]["forces"]["component"][UP]
-    terms = forces.terms_of(AIRCRAFT, UP)
+    force = felt(given)["statistical"]["forces"]["component"][NORMAL]
+    terms = forces.force_terms(AIRCRAFT, NORMAL)
     shares = force["tolerance"][: len(terms)] / np.abs([t.value for t in terms])
     assert shares[1:] == pytest.approx(0.05 + 23.0 / 1150.0)
     slope = abs(force["vane"][1]) / per_coefficient()
@@ -368,10 +370,10 @@ def viewed():
         statistical["tests"]["naming_level"],
         statistical["tests"]["keep"],
     ) = 6.0, 0.5 * 5.0**2, 0.99
-    set_up_views(statistical, AIRCRAFT)
-    set_up_tones(statistical["tone_config"], 1e-8, 45.0, 15.0, DT)
+    configure_views(statistical, AIRCRAFT)
+    configure_tones(statistical["tone_config"], 1e-8, 45.0, 15.0, DT)
     for _ in range(2):
-        update(statistical["forces"], statistical["air"], measured(), U, DT)
+        update_forces(statistical["forces"], statistical["air"], measured(), U, DT)
     fdi["layout"]["position_of"] = range(4)
     return fdi
 
@@ -380,7 +382,7 @@ def viewed():
 def test_a_force_is_off_by_what_it_changes_in_two_milliseconds(before, begun, expected):
     force = new_fdi()["statistical"]["forces"]["component"][0]
     force["model"] = 1.6
-    forces.fill_unsettled(force, before, begun, 0.004)
+    forces.fill_lag_error(force, before, begun, 0.004)
     assert force["unsettled"] == pytest.approx(expected)
 
 
@@ -389,7 +391,7 @@ def test_what_a_force_is_off_widens_what_is_merely_bounded(viewed):
     view["direction"] = 0.0, 0.6, 0.0, 0.0, -0.8
     Across.blur(view, statistical, 45.0)
     before = float(view["bounded"][0])
-    statistical["forces"]["component"]["unsettled"][UP] = 0.5
+    statistical["forces"]["component"]["unsettled"][NORMAL] = 0.5
     Across.blur(view, statistical, 45.0)
     assert view["bounded"][0] == pytest.approx(before + 0.8 * 0.5)
 
@@ -399,9 +401,9 @@ def test_how_fast_a_force_changes_is_told_from_one_instant_to_the_next(viewed):
     component = statistical["forces"]["component"]
     then, seen = component["model"].copy(), measured()
     seen["y"][1] += 0.01
-    update(statistical["forces"], statistical["air"], seen, U, DT)
+    update_forces(statistical["forces"], statistical["air"], seen, U, DT)
     changed = np.abs(component["model"] - then)
-    assert changed[ASIDE] > 0.01
+    assert changed[SIDE] > 0.01
     assert component["unsettled"] == pytest.approx(forces.MODEL_LAG_S * changed / DT)
 
 
@@ -411,9 +413,10 @@ def test_each_surface_is_looked_past_in_the_axis_it_leads_and_its_force(viewed):
         for v in viewed["statistical"]["views"][5:13]
     ]
     assert seen == [
-        (1, PITCH, NORMAL, 0, 0), (3, PITCH, NORMAL, 0, 0), (VANE_VIEW, PITCH, NORMAL, 0, 1),
-        (AXIS_VIEW, PITCH, NORMAL, 1, 1), (0, ROLL, SIDE, 0, 0), (2, YAW, SIDE, 0, 0),
-        (VANE_VIEW, YAW, SIDE, 0, 1), (AXIS_VIEW, YAW, SIDE, 1, 1),
+        (1, PITCH, NORMAL_FORCE, 0, 0), (3, PITCH, NORMAL_FORCE, 0, 0),
+        (VANE_VIEW, PITCH, NORMAL_FORCE, 0, 1),
+        (AXIS_VIEW, PITCH, NORMAL_FORCE, 1, 1), (0, ROLL, SIDE_FORCE, 0, 0), (2, YAW, SIDE_FORCE, 0, 0),
+        (VANE_VIEW, YAW, SIDE_FORCE, 0, 1), (AXIS_VIEW, YAW, SIDE_FORCE, 1, 1),
     ]  # fmt: skip
 
 
@@ -423,7 +426,7 @@ def test_what_goes_along_a_column_of_rate_and_force_is_not_seen_past_it(viewed, 
     G[1, [0, 2]] = G[0, [1, 3]] = G[2, [1, 3]] = 0.0
     Across.turn(viewed, view, G)
     first, second = view["plane"]
-    force = viewed["statistical"]["forces"]["component"][second - SIDE]
+    force = viewed["statistical"]["forces"]["component"][second - SIDE_FORCE]
     s = int(view["surface"])
     of_it = force["vane"] if s == VANE_VIEW else (G[first, s], force["column"][s])
     assert view["direction"][[first, second]] @ of_it == pytest.approx(0.0, abs=1e-12)
@@ -432,7 +435,7 @@ def test_what_goes_along_a_column_of_rate_and_force_is_not_seen_past_it(viewed, 
     if s != VANE_VIEW:
         assert Across.is_sensitive_to(viewed, view, s, G[:, s]) == 0
         assert Across.is_sensitive_to(viewed, view, FLAP if s == ELEVATOR else ELEVATOR, G[:, 1]) == (
-            second == NORMAL
+            second == NORMAL_FORCE
         )
 
 
@@ -441,20 +444,20 @@ def test_the_side_vane_is_cleared_across_the_rolling_gust_as_well(viewed):
     what errors of the vane's column let show is the most that its corners do."""
     statistical, rng = viewed["statistical"], np.random.default_rng(3)
     statistical["air"]["output"]["moving"] = 1
-    set_up_views(statistical, AIRCRAFT)
+    configure_views(statistical, AIRCRAFT)
     view, moving = statistical["views"][BETA_VIEW], statistical["air"]
     moving = moving["output"]
     moving["damping"], moving["axes"] = rng.normal(size=(3, 3)), np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    force = statistical["forces"]["component"][ASIDE]
+    force = statistical["forces"]["component"][SIDE]
     column = np.array([force["vane_roll"], *force["vane"]])
     share = Across.turn(viewed, view, np.zeros((3, 4)))
-    mix = view["direction"][[ROLL, YAW, SIDE]]
+    mix = view["direction"][[ROLL, YAW, SIDE_FORCE]]
     assert np.linalg.norm(view["direction"]) == pytest.approx(1.0)
     assert mix @ column == pytest.approx(0.0, abs=1e-12)
     gust = (moving["damping"] @ moving["axes"])[:, 0]
     assert view["direction"][:3] @ gust == pytest.approx(0.0, abs=1e-12)
-    assert view["direction"][PITCH] == view["direction"][NORMAL] == 0.0
-    assert view["column"][[ROLL, YAW, SIDE]] == pytest.approx(column / np.linalg.norm(column))
+    assert view["direction"][PITCH] == view["direction"][NORMAL_FORCE] == 0.0
+    assert view["column"][[ROLL, YAW, SIDE_FORCE]] == pytest.approx(column / np.linalg.norm(column))
     corners = np.stack(np.meshgrid(*[(-0.1, 0.1)] * 3)).reshape(3, -1).T * column
     assert share == pytest.approx(np.max(np.abs(corners @ mix)) / (0.9 * np.linalg.norm(column)))
     n = int(view["block"]["n_regressors"])
@@ -470,7 +473,7 @@ def test_the_side_vane_is_cleared_across_the_rolling_gust_as_well(viewed):
 def test_where_no_vane_and_no_gust_moves_anything_the_direction_stays(viewed):
     statistical = viewed["statistical"]
     statistical["air"]["output"]["moving"] = 1
-    set_up_views(statistical, AIRCRAFT)
+    configure_views(statistical, AIRCRAFT)
     view = statistical["views"][BETA_VIEW]
     view["direction"] = 0.6, 0.0, 0.8, 0.0, 0.0
     statistical["air"]["output"]["damping"] = 0.0
@@ -541,11 +544,11 @@ def test_a_force_is_weighed_once_the_rate_of_sideslip_of_the_run_before_is_known
     fdi = felt()
     statistical, swinging = fdi["statistical"], measured()
     statistical["tests"]["alarm_level"], statistical["tests"]["keep"] = 6.0, 0.99
-    set_up_views(statistical, AIRCRAFT)
-    set_up_tones(statistical["tone_config"], 1e-8, 45.0, 15.0, DT)
+    configure_views(statistical, AIRCRAFT)
+    configure_tones(statistical["tone_config"], 1e-8, 45.0, 15.0, DT)
     swinging["force"][1] += 20.0
     for looks in (1, 2):
-        update(statistical["forces"], statistical["air"], swinging, U, DT)
+        update_forces(statistical["forces"], statistical["air"], swinging, U, DT)
         assert statistical["forces"]["n_updates"] == looks
         Across.observe(fdi, np.zeros(3), np.ones((3, 4)), np.zeros((3, 4)), Y, looks, False)
         active = [v for v in statistical["views"] if parity.uses_force(v) and parity.largest_score(v) > 0.0]
@@ -566,7 +569,7 @@ def test_old_evidence_of_a_force_is_forgotten_slowly(viewed):
 def test_what_errors_multiply_along_a_direction_is_that_of_rate_and_force(viewed):
     """Of the rate's block, then of the force, then how far the followed angle has drifted, or the column."""
     statistical, rng = viewed["statistical"], np.random.default_rng(9)
-    pitch, force = statistical["block"][0], statistical["forces"]["component"][UP]
+    pitch, force = statistical["block"][0], statistical["forces"]["component"][NORMAL]
     pitch["n_regressors"], pitch["regressor"][:3, 0] = 3, rng.normal(size=3)
     view, n = statistical["views"][ELEVATOR_VIEW], int(force["n"])
     view["direction"], view["column"] = (0.0, 0.6, 0.0, 0.0, -0.8), (0.0, -0.8, 0.0, 0.0, -0.6)
@@ -585,7 +588,7 @@ def test_a_loss_signs_with_the_force_it_takes(viewed):
     view, Gu = viewed["statistical"]["views"][FLAP_VIEW], np.random.default_rng(1).normal(size=(3, 4))
     view["direction"] = 0.0, 0.9, 0.0, 0.0, 0.4
     Across.sign(viewed, view, Gu)
-    moment = viewed["statistical"]["forces"]["component"][UP]["effect"][ELEVATOR]
+    moment = viewed["statistical"]["forces"]["component"][NORMAL]["effect"][ELEVATOR]
     assert view["block"]["hypothesis"]["signature"][:2, 0] == pytest.approx(
         [1.0, 0.9 * Gu[1, ELEVATOR] + 0.4 * moment]
     )
@@ -637,7 +640,7 @@ def test_noise_and_slopes_of_forces_go_with_the_pressure(strength):
     sensors = {"alpha": {"noise_std_deg": 0.03}, "beta": {"noise_std_deg": 0.02}}
     fdi, fast = felt(Bounds(sensors=sensors)), Y * (1.0, 1.0, 1.0, strength, 1.0)
     record = fdi["statistical"]["forces"]
-    update(record, fdi["statistical"]["air"], measured(y=fast), U, DT)
+    update_forces(record, fdi["statistical"]["air"], measured(y=fast), U, DT)
     slopes = strength * record["component"]["vane"][:, 1]
     noise = np.radians([0.02, 0.03])
     assert record["strength"] == pytest.approx(strength)
@@ -649,13 +652,13 @@ def test_without_vanes_the_flow_is_what_the_forces_say():
     """A vane that is off by little: forces give back where the flow is."""
     fdi = felt()
     record, air = fdi["statistical"]["forces"], fdi["statistical"]["air"]
-    update(record, air, measured(), U, DT)
+    update_forces(record, air, measured(), U, DT)
     sound = [
         measured().force[1 + f] - record["component"][f]["innovation"] * AIRCRAFT.geometry.chord_m
-        for f in (ASIDE, UP)
+        for f in (SIDE, NORMAL)
     ]
     off = Y + np.array([0.004, -0.003, 0.0, 0.0, 0.0])
-    update(record, air, measured(y=off, force=(0.5, *sound)), U, DT)
+    update_forces(record, air, measured(y=off, force=(0.5, *sound)), U, DT)
     forces.fill_readings_without_vanes(record, np.zeros(3), np.append(off, np.zeros(record["y"].size - 5)))
     assert record["y"][:5] == pytest.approx(Y, abs=6e-4), "an eighth of what they are off"
     still, turning = record["y"][:2].copy(), np.array([0.02, -0.03, 0.01])
@@ -675,17 +678,17 @@ def test_a_view_takes_off_the_gust_as_it_may_know_it(viewed, v):
     seen = 0.5 if v == ALPHA_VIEW else 0.2
     view = statistical["views"][v]
     assert Across.part(viewed, view, np.ones(3), PITCH) == pytest.approx(1.0 - seen)
-    force = statistical["forces"]["component"][UP]["innovation"]
-    assert Across.part(viewed, view, np.ones(3), NORMAL) == force
+    force = statistical["forces"]["component"][NORMAL]["innovation"]
+    assert Across.part(viewed, view, np.ones(3), NORMAL_FORCE) == force
     assert Across.part(viewed, statistical["views"][ROLL_VIEW], np.ones(3), ROLL) == 1.0
 
 
 def test_in_moving_air_the_vanes_are_asked_but_for_the_rolling_gust(viewed):
     for moving in (0, 1):
         viewed["statistical"]["air"]["output"]["moving"] = moving
-        set_up_views(viewed["statistical"], AIRCRAFT)
+        configure_views(viewed["statistical"], AIRCRAFT)
         confirmed_by = viewed["statistical"]["views"]["confirmed_by"][:5].tolist()
-        assert confirmed_by == [moving * NORMAL, 0, moving * SIDE, moving * SIDE, 0]
+        assert confirmed_by == [moving * NORMAL_FORCE, 0, moving * SIDE_FORCE, moving * SIDE_FORCE, 0]
 
 
 def without_force(coefficient, surface):
@@ -697,9 +700,15 @@ def without_force(coefficient, surface):
     return Aircraft(AIRCRAFT.file.model_copy(update={"forces": changed}), AIRCRAFT.folder)
 
 
-UP_VIEWS = [(ELEVATOR, (PITCH, NORMAL)), (FLAP, (PITCH, NORMAL)), (VANE_VIEW, (PITCH, NORMAL)),
-            (AXIS_VIEW, (PITCH, NORMAL))]  # fmt: skip
-SIDE_VIEWS = [(0, (ROLL, SIDE)), (2, (YAW, SIDE)), (VANE_VIEW, (YAW, SIDE)), (AXIS_VIEW, (YAW, SIDE))]
+UP_VIEWS = [(ELEVATOR, (PITCH, NORMAL_FORCE)), (FLAP, (PITCH, NORMAL_FORCE)), (VANE_VIEW,
+    (PITCH, NORMAL_FORCE)),
+            (AXIS_VIEW, (PITCH, NORMAL_FORCE))]  # fmt: skip
+SIDE_VIEWS = [
+    (0, (ROLL, SIDE_FORCE)),
+    (2, (YAW, SIDE_FORCE)),
+    (VANE_VIEW, (YAW, SIDE_FORCE)),
+    (AXIS_VIEW, (YAW, SIDE_FORCE)),
+]
 
 
 @pytest.mark.parametrize(
@@ -715,7 +724,7 @@ def test_an_aircraft_told_apart_in_one_plane_only_has_the_views_of_that_plane(ai
     fdi = felt()
     statistical = fdi["statistical"]
     statistical["air"]["output"]["moving"] = 1
-    set_up_views(statistical, aircraft)
+    configure_views(statistical, aircraft)
     views = statistical["views"][: statistical["n_views"]]
     found = [(int(view["surface"]), tuple(view["plane"].tolist())) for view in views[5:]]
     assert found == expected
@@ -731,7 +740,7 @@ NOISY = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(("f", "name", "vane"), [(ASIDE, "CY", "beta"), (UP, "CZ", "alpha")])
+@pytest.mark.parametrize(("f", "name", "vane"), [(SIDE, "CY", "beta"), (NORMAL, "CZ", "alpha")])
 @pytest.mark.parametrize("engine", [0, 1])
 def test_what_noise_of_the_readings_makes_up_of_a_force(f, name, vane, engine):
     """Variance per metre: that of each reading, by differences, the airspeed's through the slipstream too;

@@ -27,7 +27,7 @@ def steady_block(axes=2, keep=0.97):
     drift, noise = (TOGETHER, [3e-4, 8e-4]) if axes == 2 else (TOGETHER[:1, :1], [3e-4])
     block = block_of(drift, noise, jitter=0.05, keep=keep)
     for _ in range(60):
-        likelihood.advance(block, DT)
+        likelihood.advance_covariance(block, DT)
     return block
 
 
@@ -174,7 +174,7 @@ def test_what_calm_air_foretells_is_what_the_calm_filter_sees_by_as_much_as_it_l
     inverse, g = block["S_inverse"].copy(), block["innovation"].copy()
     likelihood.whiten_without_gust(block, DT)
     likelihood.predict_calm_air(block, DT)
-    likelihood.advance(alone, DT)
+    likelihood.advance_covariance(alone, DT)
     likelihood.whiten(alone, alone["state"], np.array([0.4, -0.2]), DT, alone["innovation"])
     foretold = g - alone["innovation"]
     kept = np.exp(-DT / 2.0)
@@ -201,7 +201,7 @@ def test_what_calm_air_foretells_is_taken_off_where_it_speaks_for_the_fault(kind
                 "calm_prediction": it,
             }.items():
                 block["lanes"][name][0, :N_SLOTS] = value
-            likelihood.evaluate(block)
+            likelihood.evaluate_hypotheses(block)
             scores.append(block["hypothesis"][0]["score"])
         assert scores[0] == pytest.approx(4.0)
         assert scores[0] - scores[1] == pytest.approx(1.5 if sided * foreseen > 0.0 else 0.0)
@@ -281,7 +281,11 @@ def test_a_mapped_error_is_doubt_of_all_but_a_loss(kind, certain):
     """Evidence of 7 standard deviations, of which what is bounded may be 6: logarithms 7^2 / 2, 1 / 2."""
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), kind)
     lane = block["lanes"][0]
-    lane["sense"], lane["correlation"], lane["information"] = likelihood.SENSE[kind], -7.0 * 9.0, 81.0
+    lane["sense"], lane["correlation"], lane["information"] = (
+        likelihood.SUPPORTING_SIGN[kind],
+        -7.0 * 9.0,
+        81.0,
+    )
     lane["constant_part"] = 6.0 * 9.0
     likelihood.evaluate_lanes(block, lane, N_SLOTS, True, True)
     assert lane["min_llr"][0] == pytest.approx(certain)
@@ -328,7 +332,7 @@ def judged(kind=LOSS, tolerated=False, memory=0.0, rooms=(0.0, 0.0), at_most=0.0
     hypothesis["score"], hypothesis["min_llr"], hypothesis["max_llr"] = 99.0, 99.0, at_most
     if tolerated:
         likelihood.accumulate_overlap(block, lanes, overlap, N_SLOTS, 1.0)
-    likelihood.evaluate(block, memory)
+    likelihood.evaluate_hypotheses(block, memory)
     return hypothesis
 
 

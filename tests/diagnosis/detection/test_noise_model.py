@@ -12,7 +12,7 @@ from beaver_ftc.design.fdc import MASS
 from beaver_ftc.design.model import AXES, design_record
 from beaver_ftc.design.terms import evaluate, regressors
 from beaver_ftc.design.variants import response
-from beaver_ftc.diagnosis.bounds import variances
+from beaver_ftc.diagnosis import bounds as bound_kernels
 from beaver_ftc.diagnosis.detection import noise_model
 from beaver_ftc.diagnosis.detection.likelihood import N_SLOTS, PITCH_BLOCK
 from beaver_ftc.diagnosis.state import LOSS
@@ -51,7 +51,7 @@ def test_false_alarms_are_no_more_than_declared_and_not_absurdly_fewer(setting, 
     """On innovations as declared, a new flight after every alarm. The union bound costs a factor of six or
     so: tests of neighbouring onsets and frames go together."""
     alone = Detector(rate_hz, bounds=SETTINGS[setting])
-    tests = noise_model.tests_a_frame(load())
+    tests = noise_model.tests_per_frame(load())
     alone.detector["tests"]["alarm_level"] = noise_model.alarm_level(per_h, rate_hz, tests)
     hours, rng = 240.0 / 3600.0, np.random.default_rng(8)
     frames = round(hours * 3600.0 * rate_hz)
@@ -149,7 +149,9 @@ def test_a_scale_error_of_a_sensor_is_within_the_tolerances_it_is_turned_into(si
     _, y, _ = LEVEL_FLIGHT
     rng = np.random.default_rng(2)
     aircraft, table = load(), design["moments"]
-    tolerance = variances.steady_tolerance(declared_in(bounds, aircraft), design, MASS, y, np.zeros(4))
+    tolerance = bound_kernels.coefficient_tolerances(
+        declared_in(bounds, aircraft), design, MASS, y, np.zeros(4)
+    )
     axis = np.array([["Cl", "Cm", "Cn"].index(term.coefficient) for term in aircraft.moments])
     for _ in range(50):
         x, u = rng.uniform(-0.02, 0.02, 3), np.append(rng.uniform(-0.005, 0.005, 3), 0.0)
@@ -171,8 +173,10 @@ def test_a_scale_error_of_a_sensor_is_within_the_tolerances_it_is_turned_into(si
 def test_tolerances_of_coefficients_and_inertia_add_up():
     bounds = Bounds.model_validate({"coefficients": {"Cm_de": 0.1}, "inertia": 0.05})
     aircraft, design = load(), design_record()[0]
-    tolerance = variances.steady_tolerance(declared_in(bounds, aircraft), design, MASS, *LEVEL_FLIGHT[1:])
-    inertia = variances.steady_tolerance(
+    tolerance = bound_kernels.coefficient_tolerances(
+        declared_in(bounds, aircraft), design, MASS, *LEVEL_FLIGHT[1:]
+    )
+    inertia = bound_kernels.coefficient_tolerances(
         declared_in(Bounds.model_validate({"inertia": 0.05}), aircraft), design, MASS, *LEVEL_FLIGHT[1:]
     )
     i, size = aircraft.index("Cm_de"), abs(aircraft.terms["Cm_de"].value)

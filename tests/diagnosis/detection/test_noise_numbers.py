@@ -12,10 +12,9 @@ from beaver_ftc.design.dryden import Dryden, rotation_lengths
 from beaver_ftc.design.fdc import MASS
 from beaver_ftc.design.model import design_record, inertia_coefficients
 from beaver_ftc.design.variants import coefficient_slopes, jacobian
-from beaver_ftc.diagnosis.belief import air
-from beaver_ftc.diagnosis.bounds import variances
-from beaver_ftc.diagnosis.bounds.admitted import inertia_slack
-from beaver_ftc.diagnosis.bounds.worst_case import error_map_dtype
+from beaver_ftc.diagnosis import bounds as bound_kernels
+from beaver_ftc.diagnosis import gusts
+from beaver_ftc.diagnosis.bounds import error_map_dtype, inertia_coefficient_errors
 from beaver_ftc.diagnosis.detection import noise_model, statistical
 from beaver_ftc.diagnosis.detection.likelihood import ALPHA3, ENDING, GROWING, N_SLOTS, STEP
 from beaver_ftc.diagnosis.detection.statistical import statistical_dtype
@@ -55,7 +54,7 @@ def test_gusts_drift_as_the_specification_has_them(turbulence):
 def test_a_swing_takes_half_the_level_where_gyros_are_noisy():
     """eta_bar omega sqrt(2 sqrt 2 / i w0), w0 = (i / n)^(1/4); so fast that it hardly grows beside a loss."""
     eta_bar, omega, noise, level, dt = 0.02, 500.0, 1e-3, 6.0, 1e-3
-    i = noise_model.rapidity(eta_bar, omega, noise, level, dt) * eta_bar**2
+    i = noise_model.walk_intensity(eta_bar, omega, noise, level, dt) * eta_bar**2
     ramp = 4.0 * (1.204 * eta_bar / level) ** 2 * omega
     walk = sqrt(i**2 - ramp**2)
     w0 = (walk / (noise**2 * dt)) ** 0.25
@@ -65,18 +64,20 @@ def test_a_swing_takes_half_the_level_where_gyros_are_noisy():
 def test_what_grows_beside_a_loss_takes_half_the_level():
     """eta_bar sqrt(omega / i) times 1.204, where next to nothing is left of the swing."""
     eta_bar, omega, level = 0.02, 3.0, 6.0
-    i = noise_model.rapidity(eta_bar, omega, 1e-12, level, 1e-12) * eta_bar**2
+    i = noise_model.walk_intensity(eta_bar, omega, 1e-12, level, 1e-12) * eta_bar**2
     assert 1.204 * eta_bar * sqrt(omega / i) == pytest.approx(level / 2, rel=1e-4)
 
 
 def test_without_noise_the_frame_rate_is_the_bandwidth():
     eta_bar, omega, level, dt = 0.02, 50.0, 6.0, 0.05
-    i = noise_model.rapidity(eta_bar, omega, 0.0, level, dt) * eta_bar**2
+    i = noise_model.walk_intensity(eta_bar, omega, 0.0, level, dt) * eta_bar**2
     assert eta_bar * omega * sqrt(2.0 * sqrt(2.0) * dt / i) == pytest.approx(level / 2)
 
 
 def test_a_bound_of_zero_is_reckoned_with_as_a_small_one():
-    none, least, more = (noise_model.rapidity(bound, 10.0, 1e-4, 6.0, 0.01) for bound in (0.0, 1e-3, 2e-3))
+    none, least, more = (
+        noise_model.walk_intensity(bound, 10.0, 1e-4, 6.0, 0.01) for bound in (0.0, 1e-3, 2e-3)
+    )
     assert none == least != more
 
 
@@ -196,7 +197,7 @@ def test_where_nothing_diagnoses_nothing_is_enabled():
 def _tolerance(**bounds):
     design = design_record()[0]
     given = Bounds.model_validate(bounds)
-    return variances.steady_tolerance(declared_in(given, AIRCRAFT), design, MASS, Y, np.zeros(4))
+    return bound_kernels.coefficient_tolerances(declared_in(given, AIRCRAFT), design, MASS, Y, np.zeros(4))
 
 
 SIZE = np.array([abs(term.value) for term in AIRCRAFT.moments])
@@ -242,7 +243,7 @@ def test_a_gyro_scales_its_own_axis_once_and_its_terms_elsewhere(axis):
 
 def test_inertia_scales_every_term_by_the_worst_of_its_own_axes():
     nominal = np.abs([inertia_coefficients(MASS)])[0]
-    share = (inertia_slack(0.05, MASS) / nominal)[[2, 7, 11]].max()
+    share = (inertia_coefficient_errors(0.05, MASS) / nominal)[[2, 7, 11]].max()
     assert _tolerance(inertia=0.05) == pytest.approx(share * SIZE)
 
 
@@ -280,7 +281,9 @@ def as_set_up(bounds):
     alone = Detector(50.0)
     given = {**GIVEN, "fdi": {"statistical": {}, "bounds": bounds}}
     design, config = alone.frames[0]["belief"]["design"], Scenario.model_validate(given).fdi
-    noise_model.set_up(alone.fdi, config, Declared.by(config, AIRCRAFT), design, MASS, LEVEL_FLIGHT, 50.0)
+    noise_model.configure_statistics(
+        alone.fdi, config, Declared.by(config, AIRCRAFT), design, MASS, LEVEL_FLIGHT, 50.0
+    )
     return alone.detector
 
 
@@ -303,7 +306,9 @@ def test_the_noise_of_what_the_model_is_made_of_is_white():
 
 def test_the_walk_is_that_of_the_largest_bound_and_the_noisiest_gyro():
     record = Detector(50.0, bounds=UNEVEN).detector
-    expected = noise_model.rapidity(0.05, 15.0, radians(0.2), float(record["tests"]["alarm_level"]), 0.02)
+    expected = noise_model.walk_intensity(
+        0.05, 15.0, radians(0.2), float(record["tests"]["alarm_level"]), 0.02
+    )
     assert record["noise"]["rapidity"] == pytest.approx(expected)
 
 
@@ -322,7 +327,9 @@ def test_means_over_a_frame_are_shared_among_its_instants(instants, share):
     alone, config = Detector(50.0), Scenario.model_validate(GIVEN).fdi
     alone.fdi["config"]["instants"] = instants
     design = alone.frames[0]["belief"]["design"]
-    noise_model.set_up(alone.fdi, config, Declared.by(config, AIRCRAFT), design, MASS, LEVEL_FLIGHT, 50.0)
+    noise_model.configure_statistics(
+        alone.fdi, config, Declared.by(config, AIRCRAFT), design, MASS, LEVEL_FLIGHT, 50.0
+    )
     assert alone.detector["tests"]["share"] == share
 
 
@@ -333,8 +340,10 @@ def test_an_elevator_off_trim_is_in_what_constants_multiply():
     alone, design = Detector(50.0), design_record()[0]
     scenario = Scenario.model_validate({**GIVEN, "fdi": {"statistical": {}, "bounds": config.model_dump()}})
     start = np.zeros(3), Y, u
-    noise_model.set_up(alone.fdi, scenario.fdi, Declared.of(scenario), design, MASS, start, 50.0)
-    total = variances.steady_tolerance(declared_in(config, AIRCRAFT), design, MASS, Y, u)
+    noise_model.configure_statistics(
+        alone.fdi, scenario.fdi, Declared.of(scenario), design, MASS, start, 50.0
+    )
+    total = bound_kernels.coefficient_tolerances(declared_in(config, AIRCRAFT), design, MASS, Y, u)
     for block, axes in zip(alone.blocks, ((1,), (0, 2), (0, 2)), strict=True):
         of_it = total[np.isin(AXIS, axes)]
         assert block["tolerance"][: of_it.size] == pytest.approx(of_it)
@@ -368,13 +377,13 @@ def test_where_forces_are_weighed_their_noise_is_in_the_gust_that_follows_from_t
     statistical["air"]["config"]["span"] = SPAN_M
     forces["known"], forces["component"]["accelerometer_variance"] = known, (0.3**2, 0.2**2)
     forces["component"]["vane"][:, 1] = -6.0, 50.0
-    air.set_up_jitter(statistical, SensorErrors(sensors.sensors), design, *LEVEL_FLIGHT[1:], dt)
+    gusts.add_gust_jitter(statistical, SensorErrors(sensors.sensors), design, *LEVEL_FLIGHT[1:], dt)
     airspeed = LEVEL_FLIGHT[1][2]
     walked = known * np.sqrt(1.5**2 + 0.5**2) * np.array([0.2, 0.3]) * dt / airspeed
-    added = variances.jitter(walked, design, *LEVEL_FLIGHT[1:], SPAN_M)
+    added = bound_kernels.gust_estimate_noise(walked, design, *LEVEL_FLIGHT[1:], SPAN_M)
     assert np.sqrt(statistical["noise"]["jitter"]) == pytest.approx(added, rel=0.02)
     by_force = known * np.array([0.2 / 50.0, 0.3 / 6.0])
-    expected = variances.jitter(by_force, design, *LEVEL_FLIGHT[1:], SPAN_M)
+    expected = bound_kernels.gust_estimate_noise(by_force, design, *LEVEL_FLIGHT[1:], SPAN_M)
     assert forces["gust_noise"] == pytest.approx(expected)
 
 
@@ -382,7 +391,9 @@ def test_where_forces_are_weighed_their_noise_is_in_the_gust_that_follows_from_t
 def test_what_an_aircrafts_terms_are_off_may_change_sides_within_a_frame(error, pace):
     """A square wave of the frame rate, -1 and 1 by turns: its largest change is twice its bound."""
     aircraft = SimpleNamespace(model_error_rad_s2=error)
-    assert noise_model.pace_of(Statistical(uncertainty_rad_s=15.0), aircraft, 0.02) == pytest.approx(pace)
+    assert noise_model.uncertainty_pace(Statistical(uncertainty_rad_s=15.0), aircraft, 0.02) == pytest.approx(
+        pace
+    )
 
 
 def test_where_no_vane_shows_it_pitch_reckons_with_a_gust_no_weaker_at_any_frequency():

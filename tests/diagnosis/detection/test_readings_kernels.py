@@ -86,7 +86,7 @@ def test_without_errors_of_the_air_data_nothing_is_read():
     record = alone.detector
     admitted = alone.fdi["bound"]["admitted"]
     before = record["block"]["n_regressors"].copy()
-    noise_model.set_up_readings(record, SensorErrors(gyros), admitted)
+    noise_model.configure_readings(record, SensorErrors(gyros), admitted)
     assert list(record["block"]["n_regressors"]) == list(before)
     assert gyros.p.random_error == pytest.approx(np.radians(0.1))
 

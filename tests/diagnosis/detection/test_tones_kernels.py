@@ -13,7 +13,7 @@ from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA
 from beaver_ftc.diagnosis.detection import likelihood, parity, tones
 from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, VANE_VIEW
 from beaver_ftc.diagnosis.detection.tones import FREQUENCIES_RAD_S, MEMORY_S, N_TONES
-from beaver_ftc.diagnosis.state import PITCH, SIDE, YAW
+from beaver_ftc.diagnosis.state import PITCH, SIDE_FORCE, YAW
 
 CHANCE, PACE, V = 1e-11, 15.0, 45.0
 EVERY = 2  # sums of 0.04 s at DT
@@ -38,7 +38,7 @@ def view(rng):
 @pytest.fixture
 def tone_config():
     tone_config = new_fdi()["statistical"]["tone_config"]
-    tones.set_up_tones(tone_config, CHANCE, V, PACE, DT)
+    tones.configure_tones(tone_config, CHANCE, V, PACE, DT)
     return tone_config
 
 
@@ -47,7 +47,7 @@ def listen(view, tone_config, samples, regressors=None, heard=True, tolerated=Fa
         view["block"]["innovation"][0] = sample
         if regressors is not None:
             view["block"]["regressor_response"][:3, 0] = regressors[k]
-        tones.update(view, tone_config, alarm_level, heard, tolerated, DT)
+        tones.update_tones(view, tone_config, alarm_level, heard, tolerated, DT)
 
 
 def resonance(samples):
@@ -249,11 +249,11 @@ def test_the_loudest_tone_counts_as_the_best_test_of_a_view(view):
     ("surface", "plane", "mix", "inertial", "expected"),
     [
         (AXIS_VIEW, (0, YAW), {YAW: 1.0}, 0, 4.0),  # the tone alone: blocks of the rates look for all else
-        (AXIS_VIEW, (YAW, SIDE), {SIDE: 1.0}, 1, 0.0),
-        (0, (0, SIDE), {SIDE: -0.95, 0: 0.3}, 0, 9.0),
-        (0, (0, SIDE), {SIDE: 0.85, 0: 0.5}, 0, 0.0),
+        (AXIS_VIEW, (YAW, SIDE_FORCE), {SIDE_FORCE: 1.0}, 1, 0.0),
+        (0, (0, SIDE_FORCE), {SIDE_FORCE: -0.95, 0: 0.3}, 0, 9.0),
+        (0, (0, SIDE_FORCE), {SIDE_FORCE: 0.85, 0: 0.5}, 0, 0.0),
         (0, (0, YAW), {YAW: 1.0}, 0, 0.0),
-        (VANE_VIEW, (PITCH, SIDE), {SIDE: 1.0}, 0, 0.0),
+        (VANE_VIEW, (PITCH, SIDE_FORCE), {SIDE_FORCE: 1.0}, 0, 0.0),
     ],
 )
 def test_what_raises_the_alarm_beside_the_blocks(surface, plane, mix, inertial, expected):
@@ -265,8 +265,8 @@ def test_what_raises_the_alarm_beside_the_blocks(surface, plane, mix, inertial, 
     )
     statistical["air"]["output"]["uses_accelerometers"] = statistical["forces"]["known"] = 1
     view, clearing = statistical["views"][:2]
-    clearing["immune_to_vane"], clearing["plane"], clearing["peak_score"] = 1, (YAW, SIDE), 50.0
-    view["confirmed_by"], view["peak_score"] = SIDE, 9.0
+    clearing["immune_to_vane"], clearing["plane"], clearing["peak_score"] = 1, (YAW, SIDE_FORCE), 50.0
+    view["confirmed_by"], view["peak_score"] = SIDE_FORCE, 9.0
     view["surface"], view["plane"], view["inertial"], view["tones"]["score"] = surface, plane, inertial, 4.0
     view["block"]["n_hypotheses"], view["block"]["hypothesis"]["score"] = 1, 9.0
     for i, share in mix.items():

@@ -97,7 +97,7 @@ def test_from_the_first_frame_on_the_covariance_is_as_said(case):
         squares += g[:, :, None] * g[:, None, :]
     block = block_of(drift, noise, keep=keep)
     for k in range(frames):
-        likelihood.advance(block, dt)
+        likelihood.advance_covariance(block, dt)
         whole = np.linalg.cholesky(block["S_inverse"][:n, :n])
         assert whole.T @ (squares[k] / flights) @ whole == pytest.approx(
             np.eye(n), abs=6 * np.sqrt(2 / flights)

@@ -4,17 +4,16 @@ import numpy as np
 import pytest
 from kernels import DT, estimator, new_fdi, on, put
 
-from beaver_ftc.diagnosis import conclusion
+from beaver_ftc.diagnosis import conclusion, isolation
 from beaver_ftc.diagnosis.detection.likelihood import STEP
-from beaver_ftc.diagnosis.isolation import estimators
-from beaver_ftc.diagnosis.isolation.estimators import hypothesis
-from beaver_ftc.diagnosis.schemes import fault_classes
+from beaver_ftc.diagnosis.isolation import fill_hypothesis
+from beaver_ftc.diagnosis.schemes import adaptive_estimators
 from beaver_ftc.diagnosis.state import (
-    INTERVAL,
+    INTERVAL_THRESHOLD,
     LOSS,
     NOT_ISOLATED,
     POSITION,
-    PUBLISHED,
+    PUBLISHED_THRESHOLD,
     UNANTICIPATED,
 )
 from beaver_ftc.plant.instruments import MEASURED
@@ -29,7 +28,7 @@ def run_estimator(shared, theta, kind=LOSS, frames=25, eta_share=1.0, seed=0):
     fie = estimator(fdi, kind, low=-1.0, high=0.6)
     fdi["isolation"]["config"]["shared"], x = shared, rng.normal(size=3)
     fdi["bound"]["noise"] = 0.004, 0.005, 0.006
-    on(estimators.start, fdi, x)
+    on(isolation.start_estimators, fdi, x)
     fed = {name: [] for name in ("Z", "eta", "eta_bar", "noise_then", "spread")}
     for _ in range(frames):
         Z, eta_bar, noise_then = rng.normal(size=3), rng.uniform(0.1, 0.3, 3), rng.uniform(0.01, 0.02, 3)
@@ -38,12 +37,12 @@ def run_estimator(shared, theta, kind=LOSS, frames=25, eta_share=1.0, seed=0):
         offset = rng.normal(size=3)
         fie["effect"]["Z"], fie["effect"]["offset"], fie["effect"]["spread"] = Z, offset, spread
         fdi["bound"]["eta_bar"], fdi["bound"]["noise_then"] = eta_bar, noise_then
-        estimators.within_limits(fie, fdi["isolation"]["config"]["thresholds"], x)
-        on(estimators.predict_all, fdi, x, believed)
+        isolation.update_residual(fie, fdi["isolation"]["config"]["thresholds"], x)
+        on(isolation.predict_estimators, fdi, x, believed)
         x = x + DT * (believed + offset + theta * Z + eta)
         for name, value in zip(fed, (Z, eta, eta_bar, noise_then, spread), strict=True):
             fed[name].append(value)
-    within = estimators.within_limits(fie, fdi["isolation"]["config"]["thresholds"], x)
+    within = isolation.update_residual(fie, fdi["isolation"]["config"]["thresholds"], x)
     return fdi, fie, {name: np.array(value) for name, value in fed.items()}, within
 
 
@@ -83,7 +82,7 @@ def test_a_start_knows_nothing_but_the_set_of_theta():
     fie = estimator(fdi, low=-0.4, high=0.8)
     fie["theta_low"] = fie["theta_high"] = 0.3
     fdi["bound"]["noise"] = 0.1, 0.2, 0.3
-    on(estimators.start, fdi, np.array([1.0, 2.0, 3.0]))
+    on(isolation.start_estimators, fdi, np.array([1.0, 2.0, 3.0]))
     assert fie["xhat"] == pytest.approx([1.0, 2.0, 3.0])
     assert fie["bound_noise"] == pytest.approx([0.1, 0.2, 0.3])
     assert fie["covariance"] == pytest.approx([1.2**2 / 12.0] * 3)  # of a uniform distribution
@@ -96,15 +95,17 @@ def test_a_correction_is_the_step_of_weighted_least_squares():
     fie = estimator(new_fdi())
     fie["bound"][1], fie["omega"][1], fie["covariance"][1], fie["theta"][1] = 0.3, 0.7, 0.05, -0.5
     information = 1.0 / 0.05 + 0.7**2 / 0.3**2
-    step = estimators.correct(fie, 1, 0.2, 0.9, -1.0, 0.0)
+    step = isolation.least_squares_step(fie, 1, 0.2, 0.9, -1.0, 0.0)
     assert step == pytest.approx(0.7 / 0.3**2 * 0.2 / information)
     assert fie["theta"][1] == pytest.approx(-0.5 + step)
     assert fie["covariance"][1] == pytest.approx(1.0 / information / 0.9)
-    step = estimators.correct(fie, 1, 9.0, 1e-9, -1.0, -0.1)
+    step = isolation.least_squares_step(fie, 1, 9.0, 1e-9, -1.0, -0.1)
     assert fie["theta"][1] == -0.1
     assert fie["covariance"][1] == pytest.approx(1.0 / 12.0)
-    assert estimators.correct(fie, 1, -99.0, 1.0, -0.8, 0.0) == pytest.approx(-0.7)
-    assert estimators.correct(estimator(new_fdi()), 0, 1.0, 0.9, -1.0, 0.0) == 0.0  # nothing known yet
+    assert isolation.least_squares_step(fie, 1, -99.0, 1.0, -0.8, 0.0) == pytest.approx(-0.7)
+    assert (
+        isolation.least_squares_step(estimator(new_fdi()), 0, 1.0, 0.9, -1.0, 0.0) == 0.0
+    )  # nothing known yet
 
 
 def test_a_shared_theta_is_corrected_axis_by_axis_with_what_is_left():
@@ -114,16 +115,16 @@ def test_a_shared_theta_is_corrected_axis_by_axis_with_what_is_left():
     residual = np.array([0.02, 0.03, -0.01])
     fie["omega"], fie["bound"], fie["residual"], fie["effect"]["Z"] = omega, noise, residual, 1.0
     fie["theta"], fie["covariance"] = -0.5, 0.06
-    total = estimators.adapt_jointly(fie, 1.0)
+    total = isolation.joint_least_squares_step(fie, 1.0)
     information = 1.0 / 0.06 + np.sum(omega**2 / noise**2)
     assert total == pytest.approx(np.sum(omega * residual / noise**2) / information)
     assert fie["theta"] == pytest.approx([-0.5 + total] * 3)
     assert fie["covariance"] == pytest.approx([1.0 / information] * 3)
     fie["effect"]["Z"] = 0.0
-    assert estimators.adapt_jointly(fie, 0.5) == 0.0
+    assert isolation.joint_least_squares_step(fie, 0.5) == 0.0
 
 
-@pytest.mark.parametrize("thresholds", [INTERVAL, PUBLISHED])
+@pytest.mark.parametrize("thresholds", [INTERVAL_THRESHOLD, PUBLISHED_THRESHOLD])
 @pytest.mark.parametrize("axis", range(3))
 @pytest.mark.parametrize("side", [-1, 1])
 def test_a_residual_at_its_limit_is_within_and_beyond_it_is_not(thresholds, axis, side):
@@ -135,11 +136,11 @@ def test_a_residual_at_its_limit_is_within_and_beyond_it_is_not(thresholds, axis
         fie["omega"], fie["ignored_axes"][axis] = 0.3, ignored_axes
         lower, upper = -0.9 * 0.5 - 0.2 * 0.2, 0.2 * 0.5 + 0.9 * 0.2
         limits = (lower + 0.09 - 0.03, upper + 0.09 + 0.03)
-        if thresholds == PUBLISHED:
+        if thresholds == PUBLISHED_THRESHOLD:
             limits = (-0.6 * 0.3 - 0.03, 0.6 * 0.3 + 0.03)
         x = np.zeros(3)
         x[axis] = limits[side > 0] + side * beyond
-        return bool(estimators.within_limits(fie, fdi["isolation"]["config"]["thresholds"], x))
+        return bool(isolation.update_residual(fie, fdi["isolation"]["config"]["thresholds"], x))
 
     assert within(-1e-12)
     assert not within(1e-9)
@@ -150,7 +151,7 @@ def excludes(fdi, row, x=0.0):
     """Whether a row of the fault classes excludes the first fault of a diagnosis, at rates of x rad/s."""
     measured = np.zeros(1, MEASURED).view(np.recarray)[0]
     measured["x"], estimator(fdi)["excluded"] = x, 0
-    fault_classes.ROWS[row].isolate(fdi, measured, 1.0, False)
+    adaptive_estimators.FAULT_CLASSES[row].isolate(fdi, measured, 1.0, False)
     return bool(estimator(fdi)["excluded"])
 
 
@@ -181,9 +182,9 @@ def test_the_one_left_is_the_fault(excluded, isolated):
     fdi = new_fdi()
     fdi["isolation"]["config"]["n"], fdi["isolation"]["estimator"]["excluded"][:3] = 3, excluded
     fdi["verdict"]["isolated"], fdi["verdict"]["isolated_at_s"] = NOT_ISOLATED, -1.0
-    assert on(estimators.decide, fdi, 4.0) == isolated
+    assert on(isolation.decide_isolation, fdi, 4.0) == isolated
     for t in (4.0, 5.0):
-        on(conclusion.note_isolated, fdi, isolated, t)
+        on(conclusion.record_isolated, fdi, isolated, t)
         assert fdi["verdict"]["isolated"] == isolated
         assert fdi["verdict"]["isolated_at_s"] == (-1.0 if isolated == NOT_ISOLATED else 4.0)
 
@@ -196,9 +197,9 @@ def test_one_that_is_left_for_an_end_that_nobody_saw_begin_is_not_named(doubted,
         doubted,
         shown,
     )
-    assert on(estimators.decide, fdi, 4.0) == (1 if named else NOT_ISOLATED)
+    assert on(isolation.decide_isolation, fdi, 4.0) == (1 if named else NOT_ISOLATED)
     fdi["isolation"]["estimator"]["excluded"][1] = 1
-    assert on(estimators.decide, fdi, 5.0) == UNANTICIPATED
+    assert on(isolation.decide_isolation, fdi, 5.0) == UNANTICIPATED
 
 
 @pytest.mark.parametrize("kind", [LOSS, POSITION])
@@ -206,7 +207,7 @@ def test_a_hypothesis_is_the_difference_it_makes_to_the_moment(kind):
     """Surface 2 at u: healthy it gives G u; at share 1 + theta of it, or at the position theta."""
     rng, u = np.random.default_rng(3), np.array([0.1, -0.2, 0.3, 0.0])
     G, base, Z, theta = rng.normal(size=(3, 4)), np.zeros(3), np.zeros(3), -0.35
-    hypothesis(kind, 2, G, G * u, base, Z)
+    fill_hypothesis(kind, 2, G, G * u, base, Z)
     there = (1.0 + theta) * u[2] if kind == LOSS else theta
     assert base + theta * Z == pytest.approx(G[:, 2] * (there - u[2]))
 
@@ -217,12 +218,12 @@ def test_what_is_supposed_of_a_frame(memory):
     estimator(fdi, surface=2)
     G, Gu, spread = rng.normal(size=(3, 3, 4))
     fdi["isolation"]["config"]["memory"], fdi["verdict"]["detected"] = memory, 0
-    on(estimators.update_hypotheses, fdi, G, Gu, np.abs(spread))
+    on(isolation.update_hypotheses, fdi, G, Gu, np.abs(spread))
     fie = fdi["isolation"]["estimator"][0]
     assert fie["reach_low"][:3, :3].any() == memory
     assert fie["effect"]["Z"].any() == memory
     fdi["verdict"]["detected"] = 1
-    on(estimators.update_hypotheses, fdi, G, Gu, np.abs(spread))
+    on(isolation.update_hypotheses, fdi, G, Gu, np.abs(spread))
     assert fie["effect"]["Z"] == pytest.approx(Gu[:, 2])
     assert fie["effect"]["spread"] == pytest.approx(np.abs(spread[:, 2]))
 
@@ -297,22 +298,24 @@ def doubtful(kind=LOSS, **switches):
 )  # fmt: skip
 def test_each_test_that_is_switched_on_can_exclude(kind, switches, started, possible):
     fdi, fie = doubtful(kind, **switches)
-    assert on(estimators.possible, fdi, fie, np.zeros(3), started) == possible
-    assert not on(estimators.possible, fdi, fie, np.full(3, 9.0), started), "beyond its limits it is excluded"
+    assert on(isolation.is_possible, fdi, fie, np.zeros(3), started) == possible
+    assert not on(isolation.is_possible, fdi, fie, np.full(3, 9.0), started), (
+        "beyond its limits it is excluded"
+    )
 
 
 def test_a_position_is_asked_in_the_first_frame_where_the_past_is_kept():
     fdi, fie = doubtful(POSITION, memory=1)
     fdi["bank"]["output"]["residual"] = 0.0
-    assert not on(estimators.possible, fdi, fie, np.zeros(3), False)
+    assert not on(isolation.is_possible, fdi, fie, np.zeros(3), False)
     fdi["bank"]["output"]["innovation"] = 0.0
-    assert on(estimators.possible, fdi, fie, np.zeros(3), False)
+    assert on(isolation.is_possible, fdi, fie, np.zeros(3), False)
 
 
 def test_what_is_learned_of_a_constant_loss_is_kept_of_no_position():
     fdi, fie = doubtful(POSITION, membership=1, abrupt=1)
     fdi["bank"]["output"]["innovation"] = 0.0
-    on(estimators.possible, fdi, fie, np.zeros(3), True)
+    on(isolation.is_possible, fdi, fie, np.zeros(3), True)
     assert fie["theta_low"].tolist() == [-1.0] * 3
 
 
@@ -325,12 +328,12 @@ def test_errors_of_a_surfaces_own_terms_widen_the_room_of_its_position(kind, err
     G, Gu = rng.normal(size=(2, 3, 4))
     fdi["bound"]["own_errors"], fdi["bound"]["own_per_rad"], fdi["bound"]["frame"] = errors, 0.3, 1.0
     fdi["config"]["instants"] = 1
-    on(estimators.update_hypothesis, fdi, fie, G, Gu, np.full((3, 4), 0.1))
+    on(isolation.update_hypothesis, fdi, fie, G, Gu, np.full((3, 4), 0.1))
     assert (fie["effect"]["spread"] > 0.1).tolist() == [wider] * 3
 
 
 def test_every_type_starts_with_no_knowledge_of_any_surface():
-    for (fault_class, _), row in fault_classes.ROWS.items():
+    for (fault_class, _), row in adaptive_estimators.FAULT_CLASSES.items():
         fdi = new_fdi()
         fdi["types"]["surface"]["evidence"]["frames"] = 7
         row.begin(fdi)
@@ -339,7 +342,7 @@ def test_every_type_starts_with_no_knowledge_of_any_surface():
 
 def test_the_row_of_a_fault_class_follows_from_the_detectors_in_authority():
     """Without the statistical detector the worst case alone excludes; of types it always does."""
-    rows = list(fault_classes.ROWS)
+    rows = list(adaptive_estimators.FAULT_CLASSES)
     for of, statistical, authority, row in (
         ("published", None, "either", ("published", "worst-case")),
         ("published", {}, "either", ("published", "either")),
@@ -350,8 +353,8 @@ def test_the_row_of_a_fault_class_follows_from_the_detectors_in_authority():
         ("all", {}, "worst-case", ("all", "worst-case")),
     ):
         config = FdiConfig(fault_class=of, statistical=statistical, authority=authority)
-        assert rows[fault_classes.place_of(config)] == row
-    assert rows[fault_classes.PUBLISHED] == ("published", "worst-case")
+        assert rows[adaptive_estimators.fault_class_number(config)] == row
+    assert rows[adaptive_estimators.PUBLISHED_CLASS] == ("published", "worst-case")
 
 
 @pytest.mark.parametrize(
@@ -374,7 +377,7 @@ def test_a_frame_is_shown_to_every_type_alone_or_in_its_block(length, started, m
         fie["kind"], fie["surface"], fie["low"], fie["high"] = POSITION, s, -1.0, 1.0
         fie["effect"]["Z"] = np.eye(3)[(0, 1, 2, 1)[s]]
     measured = np.zeros(1, MEASURED).view(np.recarray)[0]
-    fault_classes.ROWS["all", "worst-case"].isolate(fdi, measured, 1.0, started)
+    adaptive_estimators.FAULT_CLASSES["all", "worst-case"].isolate(fdi, measured, 1.0, started)
     assert (fdi["types"]["frame"], fdi["types"]["block"]["filled"]) == (frame, filled)
 
 
@@ -382,10 +385,10 @@ def test_the_axes_of_a_shared_theta_agree_after_each_step():
     fie = estimator(new_fdi())
     fie["omega"], fie["bound"], fie["residual"] = (0.5, -0.8, 0.3), 0.2, (0.02, 0.03, -0.01)
     fie["theta"], fie["covariance"], fie["effect"]["Z"] = (-0.5, -0.9, -0.1), (0.06, 0.01, 0.09), 1.0
-    estimators.adapt_jointly(fie, 1.0)
+    isolation.joint_least_squares_step(fie, 1.0)
     assert len(set(fie["theta"])) == len(set(fie["covariance"])) == 1
     alone = estimator(new_fdi())
     alone["omega"], alone["bound"], alone["residual"] = fie["omega"], 0.2, fie["residual"]
     alone["theta"], alone["covariance"], alone["effect"]["Z"] = -0.5, 0.06, 1.0
-    estimators.adapt_jointly(alone, 1.0)
+    isolation.joint_least_squares_step(alone, 1.0)
     assert alone["theta"].tolist() == fie["theta"].tolist(), "that of the first axis counts"

@@ -4,23 +4,23 @@ import numpy as np
 import pytest
 from kernels import estimator, new_fdi, on
 
-from beaver_ftc.diagnosis.isolation import membership
+from beaver_ftc.diagnosis import isolation
 from beaver_ftc.diagnosis.state import POSITION
 
 
 @pytest.mark.parametrize("slope", [2.0, -2.0])
 def test_the_parameters_that_agree_solve_the_inequality(slope):
-    low, high = membership.solve(0.6, 0.2, slope, -5.0, 5.0)
+    low, high = isolation.consistent_parameters(0.6, 0.2, slope, -5.0, 5.0)
     theta = np.linspace(-1, 1, 2001)
     agrees = theta[np.abs(0.6 - theta * slope) <= 0.2 + 1e-12]
     assert (low, high) == pytest.approx((agrees[0], agrees[-1]))
-    low, high = membership.solve(0.6, 0.2, slope, -0.25, 0.25)
+    low, high = isolation.consistent_parameters(0.6, 0.2, slope, -0.25, 0.25)
     assert sorted([abs(low), abs(high)]) == pytest.approx([0.2, 0.25])
 
 
 def test_without_an_effect_every_parameter_agrees_or_none():
-    assert membership.solve(-0.2, 0.2, 0.0, -1.0, 0.5) == (-1.0, 0.5)
-    low, high = membership.solve(-0.21, 0.2, 0.0, -1.0, 0.5)
+    assert isolation.consistent_parameters(-0.2, 0.2, 0.0, -1.0, 0.5) == (-1.0, 0.5)
+    low, high = isolation.consistent_parameters(-0.21, 0.2, 0.0, -1.0, 0.5)
     assert low > high
 
 
@@ -37,13 +37,15 @@ def agreeing(innovation, **fields):
 def test_one_theta_has_to_explain_all_axes():
     theta = -0.5
     exact = 0.3 + theta * np.array([1.0, 2.0, -1.0])
-    assert on(membership.agree, *agreeing(exact))
-    assert on(membership.agree, *agreeing(exact + np.array([0.149, 0.149, -0.149])))
+    assert on(isolation.is_consistent, *agreeing(exact))
+    assert on(isolation.is_consistent, *agreeing(exact + np.array([0.149, 0.149, -0.149])))
     # axis 0 allows theta up to -0.35 - ..., axis 2 asks for one below: no theta is left
-    assert not on(membership.agree, *agreeing(exact + np.array([0.16, 0.0, 0.16])))
-    assert on(membership.agree, *agreeing(exact + np.array([0.16, 0.0, 0.16]), ignored_axes=(0, 0, 1)))
-    assert on(membership.agree, *agreeing(np.full(3, 0.1)))  # what is healthy agrees
-    assert not on(membership.agree, *agreeing(0.3 + 0.2 * np.array([1.0, 2.0, -1.0])))  # a gain is no loss
+    assert not on(isolation.is_consistent, *agreeing(exact + np.array([0.16, 0.0, 0.16])))
+    assert on(isolation.is_consistent, *agreeing(exact + np.array([0.16, 0.0, 0.16]), ignored_axes=(0, 0, 1)))
+    assert on(isolation.is_consistent, *agreeing(np.full(3, 0.1)))  # what is healthy agrees
+    assert not on(
+        isolation.is_consistent, *agreeing(0.3 + 0.2 * np.array([1.0, 2.0, -1.0]))
+    )  # a gain is no loss
 
 
 @pytest.mark.parametrize("shared", [False, True])
@@ -53,19 +55,19 @@ def test_of_a_constant_theta_every_frame_leaves_what_it_agrees_with(shared):
     fdi["isolation"]["config"]["shared"] = shared
     fie["omega"], fie["theta"], fie["bound"] = (0.5, 0.0, 1.0), -0.2, 0.05
     fie["residual"] = fie["omega"] * (-0.5 + 0.2)
-    assert on(membership.narrow, fdi, fie)
+    assert on(isolation.narrow_sets, fdi, fie)
     # frame: (0.1 + 0.05) / |Z|; filtered: 0.05 / |omega|
     half = np.minimum(0.15 / np.array([1.0, 2.0, 1.0]), [0.1, np.inf, 0.05])
     half = np.full(3, half.min()) if shared else half
     assert fie["theta_low"] == pytest.approx(-0.5 - half)
     assert fie["theta_high"] == pytest.approx(-0.5 + half)
     fie["theta_low"][2], fie["theta_high"][2] = -0.2, -0.1
-    assert not on(membership.narrow, fdi, fie)
+    assert not on(isolation.narrow_sets, fdi, fie)
 
 
 def test_the_dominant_axis_is_that_of_the_largest_effect():
     effects = np.array([(3.0, 1, 2), (1, -3.0, 2), (1, 2, -3.0), (2, 2, 1)])
-    assert [membership.dominant(Z) for Z in effects] == [0, 1, 2, 0]
+    assert [isolation.largest_axis(Z) for Z in effects] == [0, 1, 2, 0]
 
 
 @pytest.mark.parametrize("instants", [1, 4])
@@ -83,10 +85,10 @@ def test_how_far_a_surface_can_have_been_is_narrowed_round_by_round(instants):
     fie["furthest"] = 0.3
     earlier = 2.0 * 0.3 / instants if instants > 1 else 0.0
     reach = 0.6
-    for _ in range(membership.ROUNDS):
+    for _ in range(isolation.SEARCH_ROUNDS):
         room = 0.05 + 0.01 + max(0.4 * (reach + earlier) - 0.02, 0.0)
         reach = min(reach, (1.0 + room) / 5.0)
-    on(membership.allow_for_own_errors, fdi, fie)
+    on(isolation.widen_by_own_errors, fdi, fie)
     assert fie["furthest"] == pytest.approx(reach)
     own = np.maximum(np.array([0.1, 0.4, 0.2]) * (reach + earlier) - [0.01, 0.02, 0.2], 0.0)
     assert fie["effect"]["spread"] == pytest.approx(0.01 + own)
@@ -102,6 +104,6 @@ def test_where_no_position_agrees_the_whole_travel_stays_possible():
     )
     fdi["bound"]["own_per_rad"][:, 1] = 0.1
     fie["effect"]["Z"] = 0.1, 5.0, 1.0
-    on(membership.allow_for_own_errors, fdi, fie)
+    on(isolation.widen_by_own_errors, fdi, fie)
     assert fie["furthest"] == 0.6
     assert fie["effect"]["spread"] == pytest.approx([0.06] * 3)

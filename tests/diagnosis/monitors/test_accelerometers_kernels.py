@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from kernels import holder
 
-from beaver_ftc.diagnosis.monitors import accelerometers, redundancy
-from beaver_ftc.diagnosis.monitors.sensor_records import (
+from beaver_ftc.diagnosis.monitors import redundancy, sensor_monitor
+from beaver_ftc.diagnosis.monitors.redundancy import (
     AIRSPEED,
     ALPHA,
     ALPHA_FLOW,
@@ -54,8 +54,8 @@ def looks(monitor, readings, residuals):
     """Each look's readings, and the residual of the test that leads."""
     for signal, residual in zip(readings, residuals, strict=True):
         monitor["step"]["test"]["residual"][monitor["output"]["lead"]] = residual
-        accelerometers.count_identical_samples(monitor, signal)
-        accelerometers.weigh(monitor, signal)
+        sensor_monitor.count_identical_samples(monitor, signal)
+        sensor_monitor.clear_by_sample(monitor, signal)
         monitor["memory"]["earlier"] = monitor["step"]["memory"]["then"]
         monitor["step"]["memory"]["then"] = signal
 
@@ -73,21 +73,21 @@ def course(of, values):
 
 
 def test_which_instrument_a_test_of_the_flow_asks():
-    assert [accelerometers.sensor_of(test) for test in OF] == list(OF.values())
-    flow = [test for test in range(13) if accelerometers.is_flow_test(test)]
+    assert [sensor_monitor.flow_sensor_of(test) for test in OF] == list(OF.values())
+    flow = [test for test in range(13) if sensor_monitor.is_flow_test(test)]
     assert flow == [SPEED, ALPHA_FLOW, BETA_FLOW]
 
 
 def test_a_reading_that_is_the_same_is_counted_until_it_is_not():
     monitor, signal = new_watch(), level()
     for expected in (1, 2, 3):
-        accelerometers.count_identical_samples(monitor, signal)
+        sensor_monitor.count_identical_samples(monitor, signal)
         assert monitor["memory"]["identical"][ALPHA] == expected
-    assert accelerometers.is_frozen(monitor, ALPHA)
+    assert sensor_monitor.is_frozen(monitor, ALPHA)
     monitor["config"]["longest_identical"][ALPHA] = 4
-    assert not accelerometers.is_frozen(monitor, ALPHA)
+    assert not sensor_monitor.is_frozen(monitor, ALPHA)
     signal[ALPHA] += 1e-15
-    accelerometers.count_identical_samples(monitor, signal)
+    sensor_monitor.count_identical_samples(monitor, signal)
     assert monitor["memory"]["identical"][[ALPHA, BETA]].tolist() == [0, 4]
 
 
@@ -95,7 +95,7 @@ def test_a_reading_that_is_the_same_is_counted_until_it_is_not():
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_what_comes_at_once_and_is_in_the_reading_is_no_accelerometer_s(lead, sign):
     """A jump by more than an accelerometer makes up in a look; one by less may be either's."""
-    least = 1e-3 + accelerometers.LEAP_M_S2 * H * UNIT[lead]
+    least = 1e-3 + sensor_monitor.LEAP_M_S2 * H * UNIT[lead]
     for size, leaps in ((1.01, True), (0.99, False)):
         jump = sign * size * least
         monitor = new_watch(lead)
@@ -129,7 +129,7 @@ def test_what_accelerometers_have_leapt_is_forgotten_in_two_seconds_at_any_rate(
         monitor = new_watch()
         monitor["step"]["config"]["h"], monitor["memory"]["largest_jump"] = h, 3.0
         for _ in range(round(2.0 / h)):
-            accelerometers.count_identical_samples(monitor, monitor["step"]["memory"]["then"].copy())
+            sensor_monitor.count_identical_samples(monitor, monitor["step"]["memory"]["then"].copy())
         assert monitor["memory"]["largest_jump"] == pytest.approx(3.0 * np.exp(-1.0), rel=0.02)
 
 
@@ -171,7 +171,7 @@ def test_what_goes_on_is_beyond_what_sound_instruments_may_add_up_to():
         monitor = new_watch(bound=1.0)
         test = monitor["step"]["test"][ALPHA_FLOW]
         test["rate"], test["noise"] = 0.01, 1e-4
-        each = share * (accelerometers.CLEARLY * (0.01 * H * 99 + 2e-4) + 30.0 * 2e-6) / 99
+        each = share * (sensor_monitor.CLEAR_EXCESS * (0.01 * H * 99 + 2e-4) + 30.0 * 2e-6) / 99
         looks(monitor, course(ALPHA, moving), np.full(100, each))
         assert cleared(monitor) == clear
 
@@ -199,7 +199,7 @@ def test_who_stands_still_is_frozen(lead):
         monitor = new_watch(lead, bound=1.0)
         looks(monitor, course(frozen, np.zeros(6)), np.full(6, 1e-5))
         assert cleared(monitor) == clear
-        accelerometers.suspect_accelerometers(monitor, False)
+        sensor_monitor.suspect_accelerometers(monitor, False)
         who = np.flatnonzero(monitor["output"]["suspect"]).tolist()
         assert who == ([] if clear == set(FORCES) else [AY])
 
@@ -213,7 +213,7 @@ def test_an_airspeed_s_error_is_in_the_density_too():
         monitor = new_watch(SPEED, bound=1.0)
         test = monitor["step"]["test"]
         test["bound"][DENSITY], test["bound"][SPEED] = 1e-3, 0.2
-        test["filtered"][SPEED, 2] = -(0.2 + size * accelerometers.CLEARLY * 1e-3 * V / 2.0)
+        test["filtered"][SPEED, 2] = -(0.2 + size * sensor_monitor.CLEAR_EXCESS * 1e-3 * V / 2.0)
         looks(monitor, course(AIRSPEED, [1e-5]), [0.01])
         assert cleared(monitor) == clear
 
@@ -228,7 +228,7 @@ def test_an_incidence_s_error_is_in_the_climb_too():
         each, fallen = 1e-3, 0.0
         for k in range(100):
             fallen = 0.99 * fallen + H * V * each * k * np.cos(0.3) * np.cos(0.2)
-        monitor["step"]["test"]["bound"][CLIMB] = 9.0, 9.0, bound * fallen / accelerometers.CLEARLY
+        monitor["step"]["test"]["bound"][CLIMB] = 9.0, 9.0, bound * fallen / sensor_monitor.CLEAR_EXCESS
         looks(monitor, readings, np.full(100, each))
         assert cleared(monitor) == clear
         assert monitor["memory"]["climb_error"][2] == pytest.approx(fallen)
@@ -245,11 +245,11 @@ def test_a_climb_that_shows_clears_nobody():
         1,
         1.0,
     )
-    assert not accelerometers.error_would_show_elsewhere(monitor, level())
+    assert not sensor_monitor.error_would_show_elsewhere(monitor, level())
     monitor["memory"]["exceeded"][CLIMB] = 0
-    assert accelerometers.error_would_show_elsewhere(monitor, level())
+    assert sensor_monitor.error_would_show_elsewhere(monitor, level())
     monitor["output"]["lead"] = BETA_FLOW
-    assert not accelerometers.error_would_show_elsewhere(monitor, level())
+    assert not sensor_monitor.error_would_show_elsewhere(monitor, level())
 
 
 def test_other_alarms_are_none_of_theirs():
@@ -274,17 +274,17 @@ def test_the_axis_of_the_velocity_made_up_is_that_of_the_accelerometer(i, flow):
     monitor["memory"]["residual_sum"] = (
         speed - V, np.arctan2(moved[2], moved[0]) - alpha, np.arcsin(moved[1] / speed) - beta
     )  # fmt: skip
-    accelerometers.suspect_accelerometers(monitor, False)
+    sensor_monitor.suspect_accelerometers(monitor, False)
     assert monitor["memory"]["spurious_velocity"] == pytest.approx(1e-4 * np.eye(3)[i], abs=1e-8)
     assert np.flatnonzero(monitor["output"]["suspect"]).tolist() == [AX + i]
     for doubt, all_of_them in ((0.49e-4, False), (0.51e-4, True)):
         monitor["memory"]["sound_sum"] = doubt, 0.0, 0.0
-        accelerometers.suspect_accelerometers(monitor, False)
+        sensor_monitor.suspect_accelerometers(monitor, False)
         assert bool(monitor["output"]["suspect"][AX:].all()) == all_of_them
-    accelerometers.suspect_accelerometers(monitor, True)
+    sensor_monitor.suspect_accelerometers(monitor, True)
     assert not monitor["output"]["suspect"].any(), "a gyro explains it"
-    accelerometers.clear_accelerometers(monitor)
-    accelerometers.suspect_accelerometers(monitor, False)
+    sensor_monitor.clear_accelerometers(monitor)
+    sensor_monitor.suspect_accelerometers(monitor, False)
     assert not monitor["output"]["suspect"].any()
 
 
@@ -297,7 +297,7 @@ def test_none_is_used_once_one_may_be_broken(fields, used):
     measured["inertial"] = 1
     for name, i in fields.items():
         holder(monitor, name)[name][i] = 1
-    accelerometers.discard(monitor, measured)
+    sensor_monitor.discard_accelerometers(monitor, measured)
     assert measured["inertial"] == used
 
 
@@ -311,4 +311,4 @@ def test_what_a_reading_may_be_off_covers_two_steps(steady, changing):
         steady + changing,
     )
     worst = 1.5 * (steady + changing) - 0.5 * (steady - changing)
-    assert redundancy.stepped(step, AX) == pytest.approx(worst)
+    assert redundancy.two_step_error(step, AX) == pytest.approx(worst)

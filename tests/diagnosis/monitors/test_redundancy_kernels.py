@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from beaver_ftc.diagnosis.monitors import redundancy
-from beaver_ftc.diagnosis.monitors.sensor_records import (
+from beaver_ftc.diagnosis.monitors.redundancy import (
     AIRSPEED,
     ALPHA,
     ALPHA_FLOW,
@@ -70,7 +70,7 @@ def test_a_look_keeps_attitude_velocity_and_acceleration(seed):
     )
     step, force = new_step(), rng.normal(size=3)
     step["memory"]["error"], step["memory"]["error_then"] = 0.2, 0.1
-    redundancy.look(step, signal, force)
+    redundancy.store_sample(step, signal, force)
     rotation = as_rotation(signal[PHI : PHI + 3])
     kept = Rotation.from_quat([*step["memory"]["turned"][1:], step["memory"]["turned"][0]])
     acceleration = force + rotation.inv().apply([0, 0, GRAVITY])
@@ -88,10 +88,10 @@ def test_a_prediction_turns_attitude_and_velocity_by_the_rates(seed):
     rng = np.random.default_rng(seed)
     signal = reading(attitude=rng.uniform(-1.0, 1.0, 3), rates=rng.uniform(-0.5, 0.5, 3))
     step, before = new_step(), rng.normal(size=3)
-    redundancy.look(step, signal, rng.normal(size=3))
+    redundancy.store_sample(step, signal, rng.normal(size=3))
     step["memory"]["acceleration_then"], now = before, step["memory"]["acceleration"].copy()
     step["memory"]["size"], step["memory"]["sizes_before"] = 3.0, (2.0, 1.0)
-    redundancy.predict(step)
+    redundancy.predict_readings(step)
     assert step["memory"]["size"] == pytest.approx(np.linalg.norm(1.5 * now - 0.5 * before))
     assert step["memory"]["sizes_before"].tolist() == [3.0, 2.0]
     assert step["memory"]["size_then"] == pytest.approx(np.linalg.norm(before))
@@ -118,20 +118,22 @@ def test_what_each_angle_turns_the_axes_by(i):
     moved = angles + small * (np.arange(3) == i)
     one, other = (Rotation.from_euler("ZYX", of[::-1]) for of in (angles, moved))
     turned = (one.inv() * other).as_rotvec() / small
-    assert [redundancy.turned_by(step, axis, i) for axis in range(3)] == pytest.approx(turned, abs=1e-5)
+    assert [redundancy.axis_turn_per_angle(step, axis, i) for axis in range(3)] == pytest.approx(
+        turned, abs=1e-5
+    )
 
 
 def test_axes_that_do_not_turn_leave_a_vector_as_it_is():
     out = np.zeros(3)
-    redundancy.turn_back(np.zeros(3), H, np.array([1.0, -2.0, 3.0]), out)
+    redundancy.rotate_to_new_axes(np.zeros(3), H, np.array([1.0, -2.0, 3.0]), out)
     assert out == pytest.approx([1.0, -2.0, 3.0])
 
 
 def compared(now, signal, predicted, then):
     step = new_step()
-    redundancy.quaternion(*now, step["memory"]["now"])
+    redundancy.fill_quaternion(*now, step["memory"]["now"])
     step["memory"]["predicted"], step["memory"]["then"] = predicted, then
-    redundancy.compare(step, signal)
+    redundancy.fill_residuals(step, signal)
     return step["test"]["residual"].copy()
 
 
@@ -160,8 +162,8 @@ def test_a_pressure_that_is_gone_shows_and_stays_finite():
 
 def test_an_attitude_and_its_opposite_quaternion_are_the_same():
     one, other = np.zeros(4), np.zeros(4)
-    redundancy.quaternion(0.1, 0.2, 3.1, one)
-    redundancy.quaternion(0.1, 0.2, 3.1001, other)
+    redundancy.fill_quaternion(0.1, 0.2, 3.1, one)
+    redundancy.fill_quaternion(0.1, 0.2, 3.1001, other)
     near = [redundancy.angle_between(one, other, axis) for axis in (1, 2, 3)]
     assert [redundancy.angle_between(one, -other, axis) for axis in (1, 2, 3)] == pytest.approx(near)
     assert np.linalg.norm(near) == pytest.approx(1e-4, rel=1e-6)
@@ -205,12 +207,12 @@ def residuals(looks):
     """The record after three looks, and the residuals (RPM,) of the last."""
     step = new_step()
     step["config"]["drift"] = step["config"]["gust"] = 0.0
-    redundancy.look(step, looks[0], looks[0, AX:])
+    redundancy.store_sample(step, looks[0], looks[0, AX:])
     step["memory"]["acceleration_then"] = step["memory"]["acceleration"]
-    redundancy.predict(step)
-    redundancy.look(step, looks[1], looks[1, AX:])
-    redundancy.predict(step)
-    redundancy.compare(step, looks[2])
+    redundancy.predict_readings(step)
+    redundancy.store_sample(step, looks[1], looks[1, AX:])
+    redundancy.predict_readings(step)
+    redundancy.fill_residuals(step, looks[2])
     return step, step["test"]["residual"][:RPM].copy()
 
 
@@ -221,7 +223,7 @@ def allowed(step, signal, sensor, steady, changing):
         step["memory"][name] = 0.0
         step["memory"][name][sensor] = steady + changing
     step["config"]["steady"][sensor], step["memory"]["changing"][sensor] = steady, changing
-    redundancy.allow(step, signal)
+    redundancy.bound_residuals(step, signal)
     return step["test"]["rate"][:RPM].copy(), step["test"]["noise"][:RPM].copy()
 
 
@@ -269,7 +271,7 @@ def test_a_declared_error_is_of_the_reading_and_what_is_steady_does_not_change()
     step, signal = new_step(), np.full(N_SENSORS, -3.0)
     signal[PHI + 2] += 2.0 * np.pi  # a heading is off by its slope of the angle from north
     step["config"]["offset"], step["config"]["slope"], step["config"]["steady"] = 0.3, 0.1, 0.25
-    redundancy.bound_errors(step, signal)
+    redundancy.fill_reading_errors(step, signal)
     truth = (3.0 + 0.3) / 0.9
     assert step["memory"]["error"] == pytest.approx(truth - 3.0)
     assert step["memory"]["changing"] == pytest.approx(truth - 3.0 - 0.25 + 3e-10, rel=1e-9)
@@ -283,7 +285,7 @@ def test_filters_sum_what_was_with_what_each_pole_keeps():
     residual, rate, noise = rng.normal(size=frames), rng.uniform(1, 2, frames), rng.uniform(1, 2, frames)
     for k in range(frames):
         test["residual"], test["rate"], test["noise"] = residual[k], rate[k], noise[k]
-        redundancy.follow(step, test)
+        redundancy.filter_test(step, test)
     weight = keep[:, None] ** np.arange(frames)[::-1]
     filtered = weight @ residual
     changes = (1.0 - keep) * (weight[:, 1:] @ noise[:-1]) + noise[-1]
@@ -303,9 +305,9 @@ def test_a_whole_look_finds_sound_instruments_sound_and_a_wrong_one_wrong(engine
         10.0,
         0.25,
     )
-    redundancy.look(step, signal, np.array([GRAVITY * np.sin(0.1), 0.0, -GRAVITY * np.cos(0.1)]))
+    redundancy.store_sample(step, signal, np.array([GRAVITY * np.sin(0.1), 0.0, -GRAVITY * np.cos(0.1)]))
     step["test"]["bound_noise"] = 1e-6
-    redundancy.check(step, signal, engine)
+    redundancy.run_tests(step, signal, engine)
     assert (step["test"]["share"][:CLIMB] < 1.0).all()
     # 100 rpm too fast where 10 are declared, 0.5 inHg too low where a quarter is
     shares = step["test"]["share"][[RPM, PRESSURE]]
@@ -315,9 +317,9 @@ def test_a_whole_look_finds_sound_instruments_sound_and_a_wrong_one_wrong(engine
 
 def test_a_reading_that_jumps_fails_its_own_test():
     step, signal = new_step(), reading(rates=np.zeros(3), attitude=(0, 0.1, 0))
-    redundancy.look(step, signal, np.array([GRAVITY * np.sin(0.1), 0.0, -GRAVITY * np.cos(0.1)]))
+    redundancy.store_sample(step, signal, np.array([GRAVITY * np.sin(0.1), 0.0, -GRAVITY * np.cos(0.1)]))
     signal[ALTITUDE] += 5.0
-    redundancy.check(step, signal, False)
+    redundancy.run_tests(step, signal, False)
     assert np.flatnonzero(step["test"]["share"] > 1.0).tolist() == [CLIMB]
 
 
@@ -325,7 +327,9 @@ def test_no_air_of_the_standard_atmosphere_thins_faster_than_the_bound_has_it():
     """Density (1 - 2.25577e-5 h)^4.2559, its logarithm falling fastest high up; above 11 km of 216.65 K."""
     troposphere = 4.2559 * 2.25577e-5 / (1.0 - 2.25577e-5 * np.arange(0.0, 11_000.0))
     stratosphere = 9.80665 / (287.053 * 216.65)
-    assert max(troposphere.max(), stratosphere) < 1.0 / redundancy.DENSITY_HEIGHT_M < 1.01 * stratosphere
+    assert (
+        max(troposphere.max(), stratosphere) < 1.0 / redundancy.DENSITY_SCALE_HEIGHT_M < 1.01 * stratosphere
+    )
 
 
 UNITS = np.array(
@@ -390,10 +394,10 @@ def test_sound_instruments_stay_within_every_bound(seed, h):
     for k in range(looks):
         reading = (1.0 + slope) * true[k] + bias + h * k * drift + noise * rng.choice([-1.0, 1.0], N_SENSORS)
         if k == 0:
-            redundancy.begin(step, reading, reading[AX:])
+            redundancy.begin_tests(step, reading, reading[AX:])
         else:
-            redundancy.check(step, reading, True)
-            redundancy.look(step, reading, reading[AX:])
+            redundancy.run_tests(step, reading, True)
+            redundancy.store_sample(step, reading, reading[AX:])
         nearest = np.maximum(nearest, step["test"]["share"])
     assert (nearest <= 1.0).all(), nearest
     assert (nearest > 0.2).sum() >= 4, nearest
@@ -402,12 +406,12 @@ def test_sound_instruments_stay_within_every_bound(seed, h):
 def test_near_the_vertical_attitude_is_not_compared_and_its_tests_begin_anew():
     step, signal = new_step(), reading(rates=np.zeros(3), attitude=(0.1, 1.25, 0.2))
     step["config"]["decay"] = 0.0, 0.8, 0.97
-    redundancy.begin(step, signal, signal[AX:])
+    redundancy.begin_tests(step, signal, signal[AX:])
     shares = []
     for pitch in (1.28, 1.31, 1.28, 1.25):
         signal[THETA] = pitch
-        redundancy.check(step, signal, False)
-        redundancy.look(step, signal, signal[AX:])
+        redundancy.run_tests(step, signal, False)
+        redundancy.store_sample(step, signal, signal[AX:])
         shares.append(step["test"]["share"][ANGLE + 1])
     assert shares[0] > 1.0  # 0.03 rad in a look, and no rates
     assert shares[1:3] == [0.0, 0.0]  # that of now, or that of before, is beyond 1.3 rad
@@ -419,9 +423,9 @@ def test_the_bound_of_a_climb_knows_the_hardest_of_three_pulls_whichever_it_was(
 
     def rate(*pulled):
         step, signal = new_step(), reading()
-        redundancy.look(step, signal, np.array([0.0, 0.0, -GRAVITY]))
+        redundancy.store_sample(step, signal, np.array([0.0, 0.0, -GRAVITY]))
         step["memory"]["size"], step["memory"]["sizes_before"] = 1.0, pulled
-        redundancy.allow(step, signal)
+        redundancy.bound_residuals(step, signal)
         return step["test"]["rate"][CLIMB]
 
     assert rate(50.0, 20.0) == rate(20.0, 50.0) == rate(50.0, 50.0)
@@ -433,7 +437,7 @@ def test_a_wrong_airspeed_turns_the_flow_at_most_by_what_it_makes_of_the_pull():
     signal, pull, rates = reading(rates=np.zeros(3), attitude=np.zeros(3), alpha=0.0, beta=0.0), 30.0, []
     for off in (0.0, 2.0):
         step = new_step()
-        redundancy.look(step, signal, np.array([0.0, 0.0, -GRAVITY]))
+        redundancy.store_sample(step, signal, np.array([0.0, 0.0, -GRAVITY]))
         step["memory"]["size"] = pull
         rates.append(allowed(step, signal, AIRSPEED, off, 0.0)[0][list(FLOWS)])
     V = signal[AIRSPEED]
@@ -452,8 +456,8 @@ def test_momentary_errors_of_the_attitude_stay_within_bounds_that_remember_long(
     for k in range(400):
         signal[PHI : PHI + 3] = true + sizes * rng.choice([-1.0, 0.0, 1.0], 3)
         if k == 0:
-            redundancy.begin(step, signal, signal[AX:])
+            redundancy.begin_tests(step, signal, signal[AX:])
         else:
-            redundancy.check(step, signal, False)
-            redundancy.look(step, signal, signal[AX:])
+            redundancy.run_tests(step, signal, False)
+            redundancy.store_sample(step, signal, signal[AX:])
         assert (step["test"]["share"][TURN : TURN + 3] <= 1.0).all(), k

@@ -8,32 +8,38 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from beaver_ftc.diagnosis.monitors import redundancy, since_start
-from beaver_ftc.diagnosis.monitors.sensor_records import (
+from beaver_ftc.diagnosis.monitors import initial_errors, redundancy
+from beaver_ftc.diagnosis.monitors.redundancy import (
     AIRSPEED,
+    AIRSPEED_ERROR,
     ALPHA,
+    ALPHA_ERROR,
     BETA,
+    BETA_ERROR,
     CLIMB,
     DENSITY,
+    N_INITIAL,
     N_TESTS,
-    OF_ALPHA,
-    OF_BETA,
-    OF_PHI,
-    OF_SPEED,
-    OF_THETA,
+    PHI_ERROR,
     QDYN,
     SENSOR_MONITOR,
     SPEED,
-    STARTERS,
     THETA,
+    THETA_ERROR,
     TURN,
 )
 from beaver_ftc.plant.instruments import ALTITUDE, AX, N_SENSORS, PHI
 
 GRAVITY, LOOKS = 9.8, 100
-READING = {OF_ALPHA: ALPHA, OF_BETA: BETA, OF_SPEED: AIRSPEED, OF_PHI: PHI, OF_THETA: THETA}
-NAMES = {OF_ALPHA: "alpha", OF_BETA: "beta", OF_SPEED: "V", OF_PHI: "phi", OF_THETA: "theta"}
-SHOWN = {OF_ALPHA: 0.1, OF_BETA: 0.12, OF_PHI: 0.1, OF_THETA: 0.1}
+READING = {ALPHA_ERROR: ALPHA, BETA_ERROR: BETA, AIRSPEED_ERROR: AIRSPEED, PHI_ERROR: PHI, THETA_ERROR: THETA}
+NAMES = {
+    ALPHA_ERROR: "alpha",
+    BETA_ERROR: "beta",
+    AIRSPEED_ERROR: "V",
+    PHI_ERROR: "phi",
+    THETA_ERROR: "theta",
+}
+SHOWN = {ALPHA_ERROR: 0.1, BETA_ERROR: 0.12, PHI_ERROR: 0.1, THETA_ERROR: 0.1}
 
 
 def flight(seed, h, swiftly):
@@ -96,33 +102,33 @@ def new_watch(h):
 
 def sizes(i, reading, true):
     """The error as since_start counts it."""
-    return reading / true - 1.0 if i == OF_SPEED else 2.0 * np.sin(0.5 * (reading - true))
+    return reading / true - 1.0 if i == AIRSPEED_ERROR else 2.0 * np.sin(0.5 * (reading - true))
 
 
 def looks(signal, h):
     """Each look's number and the monitor, all that was beyond its bound by then noted as fired."""
     monitor = new_watch(h)
-    redundancy.begin(monitor["step"], signal[0], signal[0, AX:])
-    since_start.begin(monitor["since"], signal[0])
-    redundancy.look(monitor["step"], signal[0], signal[0, AX:])
+    redundancy.begin_tests(monitor["step"], signal[0], signal[0, AX:])
+    initial_errors.begin_initial_errors(monitor["since"], signal[0])
+    redundancy.store_sample(monitor["step"], signal[0], signal[0, AX:])
     fired = np.zeros(N_TESTS, int)
     for k in range(1, len(signal)):
-        redundancy.check(monitor["step"], signal[k], 0)
-        since_start.follow(monitor["step"], monitor["since"], signal[k])
+        redundancy.run_tests(monitor["step"], signal[k], 0)
+        initial_errors.update_initial_errors(monitor["step"], monitor["since"], signal[k])
         fired |= monitor["step"]["test"]["share"] > 1.0
-        since_start.record_refuted(monitor["step"], monitor["since"], fired)
+        initial_errors.record_refuted(monitor["step"], monitor["since"], fired)
         yield k, monitor, fired
-        redundancy.look(monitor["step"], signal[k], signal[k, AX:])
+        redundancy.store_sample(monitor["step"], signal[k], signal[k, AX:])
 
 
 @pytest.mark.parametrize("kind", ["constant", "scale", "swinging"])
-@pytest.mark.parametrize("i", range(STARTERS), ids=NAMES.get)
+@pytest.mark.parametrize("i", range(N_INITIAL), ids=NAMES.get)
 @pytest.mark.parametrize(("seed", "h", "swiftly"), [(1, 0.01, True), (2, 0.05, False)])
 def test_what_is_broken_from_the_start_is_never_refuted(seed, h, swiftly, i, kind):
     rng, true = np.random.default_rng([seed, i]), flight(seed, h, swiftly)
     for size in rng.uniform(0.8, 1.2) * np.array([-0.4, 0.03, 0.5]):
         broken = true.copy()
-        factor = true[0, AIRSPEED] if i == OF_SPEED else 1.0
+        factor = true[0, AIRSPEED] if i == AIRSPEED_ERROR else 1.0
         broken[:, READING[i]] += course(
             kind, size * (1.0 if kind == "scale" else factor), true[:, READING[i]], h
         )
@@ -132,7 +138,7 @@ def test_what_is_broken_from_the_start_is_never_refuted(seed, h, swiftly, i, kin
             since = monitor["since"]
             assert off[k] <= (since["off"][i] + since["changed"][i]) * (1.0 + 1e-9), (size, k)
             moved |= set(np.flatnonzero(since["refuted"][i]).tolist())
-        assert all(since_start.moves(i, t) for t in moved), (size, moved)
+        assert all(initial_errors.moves_with(i, t) for t in moved), (size, moved)
         assert kind != "constant" or not moved
 
 
@@ -144,7 +150,7 @@ def test_a_sound_flight_shows_each_reading_to_be_sound():
         since = monitor["since"]
     for i, little in SHOWN.items():
         assert since["off"][i] < little < since["first"][i], NAMES[i]
-    assert since["off"][OF_SPEED] < 0.2
+    assert since["off"][AIRSPEED_ERROR] < 0.2
 
 
 def test_in_steady_flight_nothing_shows_the_sideslip_or_the_airspeed():
@@ -160,25 +166,28 @@ def test_in_steady_flight_nothing_shows_the_sideslip_or_the_airspeed():
     for _, monitor, fired in looks(signal, 0.01):
         assert not fired.any()
         off, first = monitor["since"]["off"], monitor["since"]["first"]
-    assert off[OF_BETA] == first[OF_BETA]
-    assert off[OF_SPEED] == first[OF_SPEED]
-    assert max(off[OF_PHI], off[OF_THETA]) < 0.06
+    assert off[BETA_ERROR] == first[BETA_ERROR]
+    assert off[AIRSPEED_ERROR] == first[AIRSPEED_ERROR]
+    assert max(off[PHI_ERROR], off[THETA_ERROR]) < 0.06
 
 
 @pytest.mark.parametrize(
     ("i", "lead", "by", "explained"),
     [
-        (OF_ALPHA, CLIMB, (CLIMB,), False), (OF_ALPHA, CLIMB, (7,), True), (OF_ALPHA, 7, (7,), False),
-        (OF_SPEED, CLIMB, (SPEED, DENSITY), True), (OF_SPEED, DENSITY, (DENSITY,), False),
-        (OF_PHI, 8, (TURN, TURN + 2, 3), True), (OF_PHI, 8, (4,), False), (OF_PHI, TURN, (TURN,), False),
-        (OF_THETA, 8, (TURN + 1, 4), True), (OF_THETA, 8, (3,), False), (OF_BETA, CLIMB, (12,), False),
-        (OF_BETA, CLIMB, (), True),
+        (ALPHA_ERROR, CLIMB, (CLIMB,), False), (ALPHA_ERROR, CLIMB, (7,), True), (ALPHA_ERROR, 7,
+        (7,), False),
+        (AIRSPEED_ERROR, CLIMB, (SPEED, DENSITY), True), (AIRSPEED_ERROR, DENSITY, (DENSITY,), False),
+        (PHI_ERROR, 8, (TURN, TURN + 2, 3), True), (PHI_ERROR, 8, (4,), False), (PHI_ERROR, TURN,
+        (TURN,), False),
+        (THETA_ERROR, 8, (TURN + 1, 4), True), (THETA_ERROR, 8, (3,), False), (BETA_ERROR, CLIMB,
+        (12,), False),
+        (BETA_ERROR, CLIMB, (), True),
     ],
 )  # fmt: skip
 def test_tests_that_show_its_moves_do_not_speak_against_a_first_error(i, lead, by, explained):
     since = new_watch(0.01)["since"]
     since["refuted"][i, list(by)] = 1
-    assert since_start.explains(since, i, lead) == explained
+    assert initial_errors.initial_error_explains(since, i, lead) == explained
 
 
 def test_what_the_airspeed_may_be_off_by_follows_from_the_dynamic_pressure():
@@ -186,7 +195,7 @@ def test_what_the_airspeed_may_be_off_by_follows_from_the_dynamic_pressure():
     for V, true in ((45.0, 45.0), (20.0, 45.0), (90.0, 45.0)):
         signal, since = np.zeros(N_SENSORS), new_watch(0.01)["since"]
         signal[[AIRSPEED, ALTITUDE, QDYN, ALPHA]] = V, 1000.0, 0.5 * 1.1116 * true**2, -0.2
-        since_start.begin(since, signal)
+        initial_errors.begin_initial_errors(since, signal)
         ends = V / true * np.sqrt(1.25) - 1.0, 1.0 - V / true * np.sqrt(0.75)
-        assert since["off"][OF_SPEED] == pytest.approx(max(ends), rel=1e-3)
-        assert since["off"][OF_ALPHA] == pytest.approx(2.0 * np.sin(0.45))
+        assert since["off"][AIRSPEED_ERROR] == pytest.approx(max(ends), rel=1e-3)
+        assert since["off"][ALPHA_ERROR] == pytest.approx(2.0 * np.sin(0.45))

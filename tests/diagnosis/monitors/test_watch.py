@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.diagnosis.monitors.sensor_records import SENSOR_MONITOR, WAIT_S, instrument_found
+from beaver_ftc.diagnosis.monitors.redundancy import NAMING_LIMIT_S, SENSOR_MONITOR, sensor_finding
 from beaver_ftc.plant.instruments import SENSORS
 from beaver_ftc.scenario.sensors import sensor_words
 
@@ -19,28 +19,28 @@ def monitor():
 
 def test_nothing_is_said_without_an_alarm_or_beside_a_surfaces(monitor):
     monitor["output"]["keeps_surface"] = 1
-    assert instrument_found(monitor, 4.5) is None
+    assert sensor_finding(monitor, 4.5) is None
     monitor["output"]["keeps_surface"] = monitor["output"]["alarmed"] = 0
-    assert instrument_found(monitor, 4.5) is None
+    assert sensor_finding(monitor, 4.5) is None
 
 
-@pytest.mark.parametrize("t_s", [4.0, 4.5, 4.0 + WAIT_S])
+@pytest.mark.parametrize("t_s", [4.0, 4.5, 4.0 + NAMING_LIMIT_S])
 def test_until_the_wait_is_over_the_suspects_are_candidates(monitor, t_s):
-    said = instrument_found(monitor, t_s)
+    said = sensor_finding(monitor, t_s)
     assert said["candidates"] == (sensor_words(SENSORS[0]), sensor_words(SENSORS[2]))
     assert (said["detection_time_s"], said["isolation_time_s"], said["isolated"]) == (4.0, None, None)
 
 
 def test_what_cannot_be_named_by_then_is_unanticipated(monitor):
-    said = instrument_found(monitor, 4.01 + WAIT_S)
+    said = sensor_finding(monitor, 4.01 + NAMING_LIMIT_S)
     assert said["isolated"] == said["isolation_type"] == "unanticipated"
-    assert said["isolation_time_s"] == 4.0 + WAIT_S
+    assert said["isolation_time_s"] == 4.0 + NAMING_LIMIT_S
     assert said["candidates"] == ()
 
 
 @pytest.mark.parametrize("named", [0, 1])
 def test_the_instrument_that_is_named_is_said_with_its_instant(monitor, named):
     monitor["output"]["named"], monitor["output"]["named_at_s"] = named, 4.25
-    said = instrument_found(monitor, 9.0)
+    said = sensor_finding(monitor, 9.0)
     assert (said["isolated"], said["isolation_time_s"]) == (sensor_words(SENSORS[named]), 4.25)
     assert said["isolation_type"] is None

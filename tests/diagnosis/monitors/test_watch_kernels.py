@@ -6,9 +6,9 @@ from kernels import DT, fill, new_fdi, on
 
 from beaver_ftc.design.engine import measured_slipstream
 from beaver_ftc.design.model import DPT
-from beaver_ftc.diagnosis.belief.expectation import belief_dtype
+from beaver_ftc.diagnosis.expectation import belief_dtype
 from beaver_ftc.diagnosis.monitors import sensor_monitor as watching
-from beaver_ftc.diagnosis.monitors.sensor_records import (
+from beaver_ftc.diagnosis.monitors.redundancy import (
     AIRSPEED,
     ALPHA,
     ALPHA_FLOW,
@@ -28,7 +28,7 @@ from beaver_ftc.diagnosis.monitors.sensor_records import (
     SPEED,
     THETA,
     TURN,
-    UNKNOWN,
+    UNDECIDED,
     YES,
 )
 from beaver_ftc.diagnosis.state import NOT_ISOLATED
@@ -105,7 +105,7 @@ def suspects(shares, lead=None, **fields):
     monitor = with_shares(shares, **fields)
     monitor["output"]["lead"] = max(shares, key=shares.get) if lead is None else lead
     watching.record_exceeded_tests(monitor)
-    watching.suspect(monitor)
+    watching.find_suspects(monitor)
     return set(np.flatnonzero(monitor["output"]["suspect"]).tolist())
 
 
@@ -166,23 +166,23 @@ def test_an_airspeed_as_wrong_as_the_density_has_it_would_show_in_its_own_test(a
     monitor["step"]["memory"]["then"][AIRSPEED], monitor["output"]["lead"] = airspeed, DENSITY
     monitor["since"]["refuted"] = 1
     assert watching.airspeed_error_would_show(monitor) == (who == {QDYN})
-    watching.suspect(monitor)
+    watching.find_suspects(monitor)
     assert set(np.flatnonzero(monitor["output"]["suspect"]).tolist()) == who
     monitor["memory"]["identical"][AIRSPEED] = 1
-    watching.suspect(monitor)
+    watching.find_suspects(monitor)
     assert monitor["output"]["suspect"][AIRSPEED], "one that stands still may be frozen"
 
 
-@pytest.mark.parametrize(("say", "who"), [(UNKNOWN, {1, THETA}), (YES, {1}), (NO, {THETA})])
+@pytest.mark.parametrize(("say", "who"), [(UNDECIDED, {1, THETA}), (YES, {1}), (NO, {THETA})])
 def test_the_rates_decide_between_a_gyro_and_the_attitude(say, who):
-    assert suspects({TURN + 1: 2.0, ANGLE + 1: 1.5}, rates_confirm=(UNKNOWN, say, UNKNOWN)) == who
+    assert suspects({TURN + 1: 2.0, ANGLE + 1: 1.5}, rates_confirm=(UNDECIDED, say, UNDECIDED)) == who
 
 
 def test_an_angle_shows_what_the_axis_furthest_beyond_its_bound_does():
     monitor = with_shares({TURN: 0.2, TURN + 1: 0.5, TURN + 2: 0.3})
-    assert [watching.axis_of(monitor, i) for i in range(3)] == [1, 1, 1]
+    assert [watching.axis_showing_angle(monitor, i) for i in range(3)] == [1, 1, 1]
     monitor = with_shares({TURN: 0.5, TURN + 1: 0.5, TURN + 2: 0.5})
-    assert [watching.axis_of(monitor, i) for i in range(3)] == [0, 1, 2]
+    assert [watching.axis_showing_angle(monitor, i) for i in range(3)] == [0, 1, 2]
 
 
 @pytest.mark.parametrize("known", [0, 1])
@@ -291,35 +291,35 @@ def test_with_nothing_found_before_the_alarm_is_of_now():
 
 def test_an_instrument_without_a_reading_is_named_at_once():
     monitor = new_watch()
-    on(watching.decide, new_fdi(), monitor, seen(BETA, PSI), 5.0)
+    on(watching.decide_sensor, new_fdi(), monitor, seen(BETA, PSI), 5.0)
     assert monitor["output"]["alarmed"]
     assert monitor["output"]["named"] == BETA
     assert monitor["output"]["named_at_s"] == 5.0
     assert np.flatnonzero(monitor["output"]["replaced"]).tolist() == [BETA]
-    on(watching.decide, new_fdi(), monitor, seen(PSI), 6.0)
+    on(watching.decide_sensor, new_fdi(), monitor, seen(PSI), 6.0)
     assert monitor["output"]["named"] == BETA
 
 
 def test_the_one_suspect_left_is_named_and_two_are_not():
     monitor = with_shares({CLIMB: 2.0})
-    on(watching.decide, new_fdi(), monitor, seen(), 5.0)
+    on(watching.decide_sensor, new_fdi(), monitor, seen(), 5.0)
     assert (monitor["output"]["alarmed"], monitor["output"]["lead"], monitor["output"]["named"]) == (
         1,
         CLIMB,
         ALTITUDE,
     )
     monitor = with_shares({ALPHA_FLOW: 2.0})
-    on(watching.decide, new_fdi(), monitor, seen(), 5.0)
+    on(watching.decide_sensor, new_fdi(), monitor, seen(), 5.0)
     assert (monitor["output"]["alarmed"], monitor["output"]["lead"], monitor["output"]["named"]) == (
         1,
         ALPHA_FLOW,
         NO_SENSOR,
     )
     monitor["step"]["test"]["share"][SPEED] = 9.0
-    on(watching.decide, new_fdi(), monitor, seen(), 6.0)
+    on(watching.decide_sensor, new_fdi(), monitor, seen(), 6.0)
     assert monitor["output"]["lead"] == ALPHA_FLOW  # the first alarm leads
     quiet = new_watch()
-    on(watching.decide, new_fdi(), quiet, seen(), 5.0)
+    on(watching.decide_sensor, new_fdi(), quiet, seen(), 5.0)
     assert not quiet["output"]["alarmed"]
 
 
@@ -337,17 +337,17 @@ def asked(
 
 def test_a_jump_of_a_gyro_is_an_acceleration_and_one_of_the_attitude_is_none():
     jump = 0.3 / DT
-    assert asked(error=(0.3, 0, 0), innovation=(jump, 0, 0)) == [YES, UNKNOWN, UNKNOWN]
-    assert asked(error=(0, 0.3, 0), innovation=(0, 0, 0)) == [UNKNOWN, NO, UNKNOWN]
-    assert asked(error=(0, 0.3, 0), innovation=(0, -jump, 0)) == [UNKNOWN, NO, UNKNOWN]
+    assert asked(error=(0.3, 0, 0), innovation=(jump, 0, 0)) == [YES, UNDECIDED, UNDECIDED]
+    assert asked(error=(0, 0.3, 0), innovation=(0, 0, 0)) == [UNDECIDED, NO, UNDECIDED]
+    assert asked(error=(0, 0.3, 0), innovation=(0, -jump, 0)) == [UNDECIDED, NO, UNDECIDED]
     assert asked(error=(0.3, 0, 0), then=(0.3, 0, 0), W=(0.3, 0, 0), W_bound=(0.1, 1, 1)) == [
         YES,
-        UNKNOWN,
-        UNKNOWN,
+        UNDECIDED,
+        UNDECIDED,
     ]
 
 
-@pytest.mark.parametrize(("less", "say"), [(0.999, UNKNOWN), (1.001, NO)])
+@pytest.mark.parametrize(("less", "say"), [(0.999, UNDECIDED), (1.001, NO)])
 def test_how_much_an_own_error_may_explain(less, say):
     """Of a jump a tenth, of the error ten per second, twice four noises a frame, and the bound of it."""
     jump, noise = 0.02 / DT, 1e-5
@@ -360,18 +360,18 @@ def test_how_much_an_own_error_may_explain(less, say):
     assert (say_[0] == NO) == (say == NO)
 
 
-@pytest.mark.parametrize(("error", "say"), [(0.0029, NO), (0.0031, UNKNOWN)])
+@pytest.mark.parametrize(("error", "say"), [(0.0029, NO), (0.0031, UNDECIDED)])
 def test_what_has_shown_and_is_gone_is_no_gyros(error, say):
     assert asked(error=(error, 0, 0), then=(error, 0, 0), spike=1.0, W_bound=(1, 1, 1))[0] == say
 
 
 def test_a_spike_within_the_attitudes_noise_says_nothing():
     noise = 0.6 * H / 4.0  # a blur of 0.6: below half of which a spike of 1 is none
-    assert asked(spike=1.0, noise=noise, W_bound=(1, 1, 1))[0] == UNKNOWN
+    assert asked(spike=1.0, noise=noise, W_bound=(1, 1, 1))[0] == UNDECIDED
     assert asked(spike=1.21, noise=noise, W_bound=(1, 1, 1))[0] == NO
 
 
-@pytest.mark.parametrize(("error", "say"), [(0.99, UNKNOWN), (1.01, NO)])
+@pytest.mark.parametrize(("error", "say"), [(0.99, UNDECIDED), (1.01, NO)])
 def test_a_gyros_error_stays_within_what_the_filter_may_have_of_it(error, say):
     error = error * (0.5 + 0.2 + 4.0 * 1e-4 / H) / 0.7
     assert (
@@ -384,7 +384,7 @@ def test_what_the_rates_have_said_stays_said():
     assert asked(error=(0, 0.3, 0), rates_confirm=(YES, YES, NO)) == [YES, YES, NO]
 
 
-@pytest.mark.parametrize(("first", "say"), [(1.0, UNKNOWN), (0.5, UNKNOWN), (0.2, NO)])
+@pytest.mark.parametrize(("first", "say"), [(1.0, UNDECIDED), (0.5, UNDECIDED), (0.2, NO)])
 def test_a_first_error_of_a_gyro_need_not_be_in_the_filter(first, say):
     """An error there from the first look on, which brought no innovation: 0.7 of it is within the bound."""
     monitor = new_watch(begun=1, past=0, gyro_error=(first, -first, 2.0 * first))
@@ -406,7 +406,7 @@ def test_the_first_whole_frame_shows_no_jump(begun, asked):
         new_fdi(),
     )
     fdi["bank"]["output"]["threshold"], fdi["bound"]["frame"] = 1.0, 1.0
-    on(watching.decide, fdi, monitor, seen(), 5.0)
+    on(watching.decide_sensor, fdi, monitor, seen(), 5.0)
     assert (monitor["memory"]["rates_confirm"][1] == NO) == asked
 
 
@@ -415,7 +415,7 @@ def test_what_comes_again_within_a_frame_is_not_gone(quiet):
     given = {"error": (0, 0, 0), "then": (0, 0, 0), "spike_then": 0.0}
     assert asked(spike=1.0, W_bound=(1, 1, 1), **given)[0] == NO
     given[quiet] = 0.004 if quiet == "spike_then" else (0.004, 0, 0)
-    assert asked(spike=1.0, W_bound=(1, 1, 1), **given)[0] == UNKNOWN
+    assert asked(spike=1.0, W_bound=(1, 1, 1), **given)[0] == UNDECIDED
 
 
 def test_the_filter_of_a_gyros_error_follows_it_exactly():
@@ -450,7 +450,7 @@ def test_what_no_gyro_can_be_is_further_from_w_than_all_bounds(size, clear):
     test = monitor["step"]["test"]
     test["bound"][:] = 9.0
     test["bound"][TURN + 1, 0] = 0.02
-    limit = 0.02 + H * (0.3 + watching.SLACK * 0.5)
+    limit = 0.02 + H * (0.3 + watching.DAMPING_TOLERANCE * 0.5)
     test["residual"][TURN + 1] = size * limit + H * 0.5
     watching.exclude_gyros(monitor)
     assert monitor["memory"]["no_gyro"] == clear
@@ -466,7 +466,7 @@ def test_a_watch_begins_with_its_first_look():
     measured["signal"][AIRSPEED], measured["signal"][QDYN], measured["force"] = 45.0, 1000.0, (1.0, 2.0, -9.0)
     monitor["step"]["config"]["gravity"], monitor["step"]["config"]["offset"][ALTITUDE] = 9.8, 0.7
     monitor["step"]["config"]["drift"], monitor["step"]["config"]["swift"] = 2e-3, 80.0
-    watching.begin(monitor, measured, 5.0)
+    watching.begin_monitor(monitor, measured, 5.0)
     step = monitor["step"]
     assert (monitor["memory"]["begun"], monitor["memory"]["past"]) == (1, 0)
     assert step["memory"]["error_then"][[PHI, ALTITUDE]] == pytest.approx(
@@ -585,7 +585,7 @@ def test_the_rates_are_asked_once_a_frame(past, asked):
         new_fdi(),
     )
     fdi["bank"]["output"]["threshold"], fdi["bound"]["frame"] = 1.0, 1.0
-    on(watching.decide, fdi, monitor, seen(), 5.0)
+    on(watching.decide_sensor, fdi, monitor, seen(), 5.0)
     assert (monitor["memory"]["rates_confirm"][1] == NO) == asked
 
 
@@ -614,7 +614,7 @@ def test_what_is_replaced_is_shared_out_and_the_slipstream_is_that_of_what_it_is
         else:
             monitor["output"]["replaced"][i] = 1
     before = measured["signal"].copy()
-    watching.replace(monitor, belief, measured)
+    watching.replace_readings(monitor, belief, measured)
     assert np.flatnonzero(monitor["output"]["replaced"]).tolist() == sorted(broken)
     assert set(np.flatnonzero(measured["signal"] != before)) == set(broken)
     assert (measured["attitude"][1] != 9.0) == shared
@@ -661,7 +661,7 @@ def test_suspicions_of_the_frame_before_are_gone():
     monitor = with_shares({CLIMB: 2.0}, lead=CLIMB)
     monitor["output"]["suspect"] = 1
     watching.record_exceeded_tests(monitor)
-    watching.suspect(monitor)
+    watching.find_suspects(monitor)
     assert np.flatnonzero(monitor["output"]["suspect"]).tolist() == [ALTITUDE]
 
 
@@ -680,7 +680,7 @@ def test_an_alarm_on_roll_counts_as_one():
 
 def test_what_is_named_is_replaced_and_flags_are_one():
     monitor = new_watch()
-    watching.name(monitor, CLIMB, 3.0)
+    watching.name_sensor(monitor, CLIMB, 3.0)
     assert monitor["output"]["replaced"][CLIMB] == 1
     monitor = new_watch()
     on(watching.raise_alarm, detected_fdi(9.4, 1), monitor, 10.0)

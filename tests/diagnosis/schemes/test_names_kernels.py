@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from kernels import new_fdi
 
-from beaver_ftc.diagnosis.conclusion import MAX_WITHDRAWN, note_name
-from beaver_ftc.diagnosis.scheme import note_named_surfaces
+from beaver_ftc.diagnosis.conclusion import MAX_WITHDRAWN, record_named
+from beaver_ftc.diagnosis.schemes import record_named_surfaces
 from beaver_ftc.diagnosis.state import NOT_ISOLATED
 
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)
@@ -38,7 +38,7 @@ def test_every_spell_of_a_name_is_kept_and_of_too_many_the_latest(frames):
     conclusion = nameless()["verdict"]
     for k, named in enumerate(frames):
         for s, is_named in zip((ELEVATOR, FLAP), named, strict=True):
-            note_name(conclusion, s, is_named, float(k))
+            record_named(conclusion, s, is_named, float(k))
     expected = sorted(
         (to, s, start)
         for s, column in zip((ELEVATOR, FLAP), zip(*frames, strict=True), strict=False)
@@ -69,7 +69,7 @@ def test_which_surfaces_are_named(pair, alarmed, beside, named):
         alarmed,
         beside,
     )
-    note_named_surfaces(fdi, 2.5)
+    record_named_surfaces(fdi, 2.5)
     since = np.full(4, -1.0)
     since[named] = 2.5
     assert fdi["verdict"]["named_from_s"].tolist() == since.tolist()

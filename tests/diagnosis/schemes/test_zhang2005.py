@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from beaver_ftc.diagnosis import zhang2005
-from beaver_ftc.diagnosis.isolation import estimators
-from beaver_ftc.diagnosis.isolation.estimators import isolation_dtype
+from beaver_ftc.diagnosis import isolation
+from beaver_ftc.diagnosis.isolation import isolation_dtype
+from beaver_ftc.diagnosis.schemes import published as published_scheme
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plugins import DETECTORS, options_of, settings
 from beaver_ftc.scenario.schema import load_text
@@ -22,13 +22,15 @@ POLE, DT = 10.0, 0.01
 
 
 def network(gain=60.0, limit=20.0):
-    new = np.zeros(1, zhang2005.NETWORK).view(np.recarray)[0]
-    zhang2005.configure_network(new, gain, limit, TRAVEL)
+    new = np.zeros(1, published_scheme.STATE_NETWORK).view(np.recarray)[0]
+    published_scheme.configure_network(new, gain, limit, TRAVEL)
     return new
 
 
 def at(new, alpha=0.1, beta=0.0, x=(0.0, 0.0, 0.0), u=(0.0, 0.0, 0.0, 0.0)):
-    zhang2005.evaluate(new, MAIN, np.array(x), np.array([alpha, beta, 45.0, 1000.0, 0.3]), np.array(u))
+    published_scheme.evaluate_state_network(
+        new, MAIN, np.array(x), np.array([alpha, beta, 45.0, 1000.0, 0.3]), np.array(u)
+    )
     return new
 
 
@@ -55,7 +57,7 @@ def test_the_network_learns_along_its_basis_within_its_limit(signal, limit):
     new = at(network(gain=50.0, limit=limit), alpha=0.2)
     weights = np.linspace(-limit, limit, new.memory.weights.size).reshape(new.memory.weights.shape)
     new.memory.weights[:] = weights
-    zhang2005.learn(new, np.array(signal), 0.02)
+    published_scheme.train_state_network(new, np.array(signal), 0.02)
     expected = weights + 0.02 * 50.0 * new.memory.basis * np.array(signal)[:, None]
     np.testing.assert_allclose(new.memory.weights, np.clip(expected, -limit, limit))
     at(new, alpha=0.2)
@@ -69,21 +71,21 @@ def test_the_network_learns_along_its_basis_within_its_limit(signal, limit):
 def test_the_network_learns_what_exceeds_the_threshold_once_there_is_an_alarm(
     dead_zone, detected, residual, learns
 ):
-    published = np.zeros(1, zhang2005.PUBLISHED).view(np.recarray)[0]
+    published = np.zeros(1, published_scheme.PUBLISHED_RECORD).view(np.recarray)[0]
     published.config.dead_zone = dead_zone
-    zhang2005.configure_network(published.network, 60.0, 20.0, TRAVEL)
+    published_scheme.configure_network(published.network, 60.0, 20.0, TRAVEL)
     at(published.network)
     fdae = np.zeros(1, zhang2005_fdae()).view(np.recarray)[0]
     fdae.output.residual[:], fdae.output.threshold[:] = (0.0, residual, -0.001), 0.01
-    zhang2005.approximate(published, fdae, detected, DT)
+    published_scheme.train_fdae_network(published, fdae, detected, DT)
     expected = DT * 60.0 * published.network.memory.basis * fdae.output.residual[:, None] if learns else 0.0
     np.testing.assert_allclose(
-        published.network.memory.weights, np.broadcast_to(expected, (3, zhang2005.N_NODES))
+        published.network.memory.weights, np.broadcast_to(expected, (3, published_scheme.N_NODES))
     )
 
 
 def zhang2005_fdae():
-    from beaver_ftc.diagnosis.detection.fdae import FDAE
+    from beaver_ftc.diagnosis.detection.filters import FDAE
 
     return FDAE
 
@@ -94,7 +96,7 @@ def zhang2005_fdae():
 def test_the_alarm_is_of_the_first_axis_beyond_its_threshold(residual, axis):
     fdae = np.zeros(1, zhang2005_fdae()).view(np.recarray)[0]
     fdae.output.residual[:], fdae.output.threshold[:] = residual, 0.01
-    assert zhang2005.detect(fdae) == (-1 if axis is None else axis)
+    assert published_scheme.fdae_alarm_axis(fdae) == (-1 if axis is None else axis)
 
 
 @given(
@@ -107,7 +109,7 @@ def test_the_residual_of_the_true_estimator_is_omega_times_what_the_estimate_mis
     """However it adapts: the term Om ths' of the estimator sees to that."""
     records = np.zeros(1, isolation_dtype(4)).view(np.recarray)[0]
     records.config.decay[:], records.config.by_gradient, records.config.gradient = (
-        zhang2005.euler(POLE, DT),
+        published_scheme.euler_decay(POLE, DT),
         1,
         gain,
     )
@@ -122,13 +124,13 @@ def test_the_residual_of_the_true_estimator_is_omega_times_what_the_estimate_mis
         fie.effect.Z[:] = z, -z, 0.5 * z
         before = rate.copy()
         rate = before + DT * theta * fie.effect.Z
-        estimators.predict(records, fie, bound, before, np.zeros(3), DT)
+        isolation.predict_estimator(records, fie, bound, before, np.zeros(3), DT)
         if projects:
             assert ((fie.theta >= -1.0) & (fie.theta <= 0.0)).all()
 
 
 def _bound():
-    from beaver_ftc.diagnosis.bounds.worst_case import bound_dtype
+    from beaver_ftc.diagnosis.bounds import bound_dtype
 
     return bound_dtype(4)
 
@@ -252,5 +254,5 @@ def test_it_takes_over_in_flight_from_a_scheme_with_more():
 
 
 def test_a_pole_beyond_the_frame_rate_keeps_nothing():
-    assert zhang2005.euler(10.0, 0.01) == pytest.approx(0.9)
-    assert zhang2005.euler(200.0, 0.01) == 0.0
+    assert published_scheme.euler_decay(10.0, 0.01) == pytest.approx(0.9)
+    assert published_scheme.euler_decay(200.0, 0.01) == 0.0

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from kernels import put
 
-from beaver_ftc.diagnosis.scheme import diagnosis_dtype
-from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
-from beaver_ftc.diagnosis.types import findings
-from beaver_ftc.diagnosis.types.pairs import IN_PITCH
+from beaver_ftc.diagnosis.schemes import diagnosis_dtype
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH_GROUP, UNANTICIPATED
+from beaver_ftc.diagnosis.types import verdict
 from beaver_ftc.diagnosis.types.registry import NAMES, TYPES
 from beaver_ftc.diagnosis.types.verdict import BY_DEDUCTION, RULED_OUT
 from fault_kinds import BIAS, CONSTANT_LOSS, FLOAT, SLOW, STUCK, UP, VARYING_LOSS
@@ -24,8 +23,8 @@ def new(left=None, detected=1, pairs=0, verdict=NOT_ISOLATED, **fields):
     fdi["verdict"]["detected"], fdi["verdict"]["isolated"], fdi["verdict"]["type"] = detected, verdict, -1
     fdi["verdict"]["isolated_at_s"], fdi["types"]["pair"]["enabled"] = 12.5, pairs
     fdi["layout"]["position_of"], fdi["isolation"]["estimator"]["surface"][4:8] = POSITION_OF, range(4)
-    fdi["layout"]["group"] = 1 - IN_PITCH
-    fdi["layout"]["group"][[ELEVATOR, FLAP]] = IN_PITCH
+    fdi["layout"]["group"] = 1 - PITCH_GROUP
+    fdi["layout"]["group"][[ELEVATOR, FLAP]] = PITCH_GROUP
     fdi["types"]["surface"]["refuted"], fdi["types"]["surface"]["feasible"]["excluded"] = 1, 1
     fdi["types"]["surface"]["status"]["type"], fdi["types"]["surface"]["status"]["type_at_s"] = -1, -1.0
     for s, kinds in (left or {}).items():
@@ -40,21 +39,21 @@ def said(*kinds):
 
 
 def test_without_an_alarm_nothing_is_found():
-    found = findings.found(new({ELEVATOR: [STUCK]}, detected=0), SURFACES)
+    found = verdict.fault_findings(new({ELEVATOR: [STUCK]}, detected=0), SURFACES)
     assert (found["isolated"], found["candidates"], found["faults"]) == (None, (), ())
 
 
 def test_what_is_open_is_each_type_of_each_surface_that_is_possible():
-    found = findings.found(new({AILERON: [STUCK, BIAS], RUDDER: [CONSTANT_LOSS]}), SURFACES)
+    found = verdict.fault_findings(new({AILERON: [STUCK, BIAS], RUDDER: [CONSTANT_LOSS]}), SURFACES)
     expected = [f"aileron:{kind}" for kind in said(*sorted((STUCK, BIAS)))] + said(CONSTANT_LOSS)
     assert found["candidates"] == (*expected[:-1], f"rudder:{expected[-1]}")
     assert found["isolated"] is None
 
 
 def test_a_surface_of_which_no_type_fits_is_named_bare_and_the_fault_may_be_unanticipated():
-    assert findings.found(new({AILERON: []}), SURFACES)["candidates"] == ("aileron", "unanticipated")
-    assert findings.found(new(), SURFACES)["candidates"] == ("unanticipated",)
-    both = findings.found(new({AILERON: [], RUDDER: [STUCK]}), SURFACES)["candidates"]
+    assert verdict.fault_findings(new({AILERON: []}), SURFACES)["candidates"] == ("aileron", "unanticipated")
+    assert verdict.fault_findings(new(), SURFACES)["candidates"] == ("unanticipated",)
+    both = verdict.fault_findings(new({AILERON: [], RUDDER: [STUCK]}), SURFACES)["candidates"]
     assert both == ("aileron", f"rudder:{NAMES[STUCK]}")
 
 
@@ -72,7 +71,7 @@ def test_a_surface_is_possible_until_it_is_excluded_or_ruled_out(named, standing
         fdi["types"]["surface"]["status"]["source"][RUDDER],
     ) = named, standing
     fdi["types"]["surface"]["refuted"][RUDDER] = excluded
-    assert (f"rudder:{NAMES[STUCK]}" in findings.found(fdi, SURFACES)["candidates"]) == possible
+    assert (f"rudder:{NAMES[STUCK]}" in verdict.fault_findings(fdi, SURFACES)["candidates"]) == possible
 
 
 @pytest.mark.parametrize(
@@ -95,21 +94,21 @@ def test_what_any_course_explains_counts_only_until_a_constant_has_been_seen_for
         fdi["types"]["surface"]["evidence"]["quiet"][RUDDER],
     ) = evidence, 10
     fdi["types"]["config"]["own_errors"] = own_errors
-    types = findings._types_left(fdi, RUDDER)
+    types = verdict._types_left(fdi, RUDDER)
     assert set(types) == set(said(*constants, *kept))
     assert len(types) == len(set(types))
 
 
 def test_one_fault_is_told_with_its_instant_and_what_it_may_be():
     fdi = new({ELEVATOR: [STUCK, FLOAT]}, verdict=POSITION_OF[ELEVATOR])
-    found = findings.found(fdi, SURFACES)
+    found = verdict.fault_findings(fdi, SURFACES)
     assert (found["isolated"], found["isolation_type"]) == ("elevator", None)
     assert (found["isolation_time_s"], found["type_time_s"]) == (12.5, None)
     assert set(found["candidates"]) == set(said(STUCK, FLOAT))
     assert found["estimate"] is None
     assert found["frequency_rad_s"] is None
     fdi["verdict"]["type"], fdi["verdict"]["type_at_s"] = 0, 14.0
-    found = findings.found(fdi, SURFACES)
+    found = verdict.fault_findings(fdi, SURFACES)
     assert (found["isolation_type"], found["type_time_s"], found["candidates"]) == (
         NAMES[0],
         14.0,
@@ -118,10 +117,10 @@ def test_one_fault_is_told_with_its_instant_and_what_it_may_be():
 
 
 def test_a_fault_outside_the_class_is_unanticipated():
-    found = findings.found(new(verdict=UNANTICIPATED), SURFACES)
+    found = verdict.fault_findings(new(verdict=UNANTICIPATED), SURFACES)
     assert (found["isolated"], found["isolation_type"]) == ("unanticipated", "unanticipated")
     assert (found["isolation_time_s"], found["candidates"]) == (12.5, ())
-    several = findings.found(new({AILERON: [STUCK]}, verdict=UNANTICIPATED, pairs=1), SURFACES)
+    several = verdict.fault_findings(new({AILERON: [STUCK]}, verdict=UNANTICIPATED, pairs=1), SURFACES)
     assert (several["isolated"], several["faults"]) == ("unanticipated", ())
 
 
@@ -133,7 +132,7 @@ def several(named=(), alarmed=(0, 0), left=None):
             at_s,
         )
     fdi["types"]["pair"]["alarmed"] = alarmed
-    return findings.found(fdi, SURFACES)
+    return verdict.fault_findings(fdi, SURFACES)
 
 
 def test_of_several_faults_the_first_named_is_told_first():
@@ -151,7 +150,7 @@ def test_each_of_several_faults_has_instants_of_its_own():
         surface["status"]["named"][s], surface["status"]["named_at_s"][s] = 1, named_at_s
         surface["status"]["type"][s], surface["status"]["type_at_s"][s] = kind, type_at_s
     apart(instants=[9.0, 11.5, 7.0])
-    elevator, rudder = findings.found(fdi, SURFACES)["faults"]
+    elevator, rudder = verdict.fault_findings(fdi, SURFACES)["faults"]
     keys = "isolated", "isolation_time_s", "isolation_type", "type_time_s"
     assert [elevator[key] for key in keys] == ["elevator", 7.0, None, None]
     assert [rudder[key] for key in keys] == ["rudder", 9.0, "stuck", 11.5]
@@ -159,7 +158,7 @@ def test_each_of_several_faults_has_instants_of_its_own():
 
 def test_a_plane_that_is_alarmed_and_not_explained_stays_open():
     alarmed = [0, 0]
-    alarmed[IN_PITCH] = 1
+    alarmed[PITCH_GROUP] = 1
     found = several(alarmed=alarmed, left={ELEVATOR: [BIAS], RUDDER: [BIAS]})
     assert found["isolated"] is None
     (plane,) = found["faults"]
@@ -180,10 +179,10 @@ def test_where_no_plane_is_alarmed_both_stay_open():
 def test_where_one_of_two_in_pitch_stands_still_the_other_may_be_off_as_well(kind):
     fdi = new({ELEVATOR: [kind], RUDDER: [kind]}, pairs=1)
     every = set(said(STUCK, FLOAT, UP, BIAS, CONSTANT_LOSS))
-    assert set(findings._types_left(fdi, ELEVATOR)) == every
-    assert set(findings._types_left(fdi, RUDDER)) == set(said(kind))
-    assert set(findings._types_left(new({ELEVATOR: [BIAS]}, pairs=1), ELEVATOR)) == set(said(BIAS))
-    assert set(findings._types_left(new({ELEVATOR: [kind]}), ELEVATOR)) == set(said(kind))
+    assert set(verdict._types_left(fdi, ELEVATOR)) == every
+    assert set(verdict._types_left(fdi, RUDDER)) == set(said(kind))
+    assert set(verdict._types_left(new({ELEVATOR: [BIAS]}, pairs=1), ELEVATOR)) == set(said(BIAS))
+    assert set(verdict._types_left(new({ELEVATOR: [kind]}), ELEVATOR)) == set(said(kind))
 
 
 @pytest.mark.parametrize("s", [AILERON, RUDDER, FLAP])

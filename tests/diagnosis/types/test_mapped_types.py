@@ -8,8 +8,7 @@ from kernels import estimator, new_fdi, on
 
 from beaver_ftc.aircraft import Aircraft, load
 from beaver_ftc.aircraft.schema import AircraftFile
-from beaver_ftc.diagnosis.bounds import worst_case
-from beaver_ftc.diagnosis.isolation import membership
+from beaver_ftc.diagnosis import bounds, isolation
 from beaver_ftc.diagnosis.state import POSITION
 
 AILERON, ELEVATOR, RUDDER = range(3)
@@ -104,7 +103,7 @@ def test_the_share_of_its_travel_is_the_furthest_at_any_instant(where, before, i
     """Of n instants the first may be as before, p0; the others make up the mean: (n p - p0) / (n - 1)."""
     error_map = new_fdi()["bound"]["error_map"]
     error_map["travel_low"][1], error_map["travel_high"][1] = -0.2, 0.4
-    assert worst_case.share_used(error_map, 1, where, before, instants) == pytest.approx(share)
+    assert bounds.travel_share_used(error_map, 1, where, before, instants) == pytest.approx(share)
 
 
 def test_the_room_of_a_position_is_that_of_where_it_can_have_been():
@@ -119,6 +118,6 @@ def test_the_room_of_a_position_is_that_of_where_it_can_have_been():
     bound["beyond"][:3], bound["frame"], fdi["bank"]["output"]["innovation"] = ERROR, 0.1, (0.0, 1.0, 0.0)
     fie["effect"]["Z"], fdi["config"]["instants"] = (0.0, 20.0, 0.0), 1
     # 1.0 +- 0.1 +- 3.0 over 20: within 0.205 of 0.5 rad, the second level; then 1.4 / 20, the first
-    on(membership.allow_for_own_errors, fdi, fie)
+    on(isolation.widen_by_own_errors, fdi, fie)
     assert fie["effect"]["spread"] == pytest.approx(ERROR[0])
     assert fie["used"] == pytest.approx(1.13 / 20 / 0.5)

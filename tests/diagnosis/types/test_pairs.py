@@ -11,8 +11,8 @@ from pydantic import ValidationError
 from test_fault_types import SURFACES, TYPES, shares, uncertainties
 
 from beaver_ftc.diagnosis.types import registry as types
-from beaver_ftc.diagnosis.types.findings import found
 from beaver_ftc.diagnosis.types.pairs import solve_roll_and_yaw
+from beaver_ftc.diagnosis.types.verdict import fault_findings
 from beaver_ftc.scenario.schema import Scenario
 from flying import flown
 from samples import samples
@@ -41,7 +41,7 @@ def fly(seed, uncertainty, faults, frames=700, pairs=True):
 def check(plant, faults):
     """No surface named that is healthy, no type named or excluded wrongly."""
     true = {("aileron", "elevator", "rudder")[s]: types.NAMES[TYPES[kind][1]] for s, kind, _, _ in faults}
-    for one in found(plant.fdi, SURFACES)["faults"]:
+    for one in fault_findings(plant.fdi, SURFACES)["faults"]:
         if one["isolated"]:
             assert one["isolated"] in true
             assert one["isolation_type"] in (true[one["isolated"]], None)
@@ -72,15 +72,15 @@ def test_one_fault_is_not_taken_for_two(seed, uncertainty, kind, surface, at, sh
     faults = ((surface, kind, at, share),)
     plant = fly(seed, uncertainty, faults)
     check(plant, faults)
-    assert len(found(plant.fdi, SURFACES)["faults"]) <= 1
+    assert len(fault_findings(plant.fdi, SURFACES)["faults"]) <= 1
 
 
 def test_both_are_named_and_a_search_for_one_finds_neither():
     faults = (AILERON, "stuck", 30, 0.6), (RUDDER, "bias", 200, 0.8)
     plant = fly(4, UNCERTAINTIES["random"], faults)
-    assert {one["isolated"] for one in found(plant.fdi, SURFACES)["faults"]} == {"aileron", "rudder"}
+    assert {one["isolated"] for one in fault_findings(plant.fdi, SURFACES)["faults"]} == {"aileron", "rudder"}
     alone = fly(4, UNCERTAINTIES["random"], faults, pairs=False)
-    assert found(alone.fdi, SURFACES)["isolated"] == "unanticipated"
+    assert fault_findings(alone.fdi, SURFACES)["isolated"] == "unanticipated"
 
 
 def test_pairs_belong_to_the_class_of_all_faults():

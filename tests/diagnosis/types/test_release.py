@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from test_fault_types import TYPES, cases, shares, surfaces
 
 import fault_kinds
-from beaver_ftc.diagnosis.types.table import stuck
+from beaver_ftc.diagnosis.types.table import held_surface
 from samples import samples
 
 HELD = ("stuck", "float", "hardover up", "hardover down")
@@ -113,7 +113,7 @@ def test_later_releases_become_the_earlier_ones_when_of_those_none_is_left(earli
     held["high"][:, kind] = 0.15 if earlier else -np.inf, 0.3
     jam["kept_low"], jam["kept_high"] = (0.01, 0.02), (0.05, 0.06)
     surface["feasible"]["low"][kind], surface["feasible"]["high"][kind] = -0.4, 0.4
-    stuck.renew(surface, kind)
+    held_surface.promote_kept_sets(surface, kind)
     low, high = list(held["low"][:, kind]), list(held["high"][:, kind])
     if earlier:
         assert (low, high) == ([0.1, 0.2], [0.15, 0.3])

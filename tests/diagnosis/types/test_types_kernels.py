@@ -6,9 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from kernels import new_fdi, on, put, put_on
 
-from beaver_ftc.diagnosis.types import contract, examine, observation, release, sets
+from beaver_ftc.diagnosis.types import contract, examine
 from beaver_ftc.diagnosis.types.registry import N_TYPES, TYPES
-from beaver_ftc.diagnosis.types.table import bias, hardover, loss, oscillatory, rate_limit, stuck
+from beaver_ftc.diagnosis.types.table import (
+    commanded_surface,
+    held_surface,
+)
 from fault_kinds import (
     BIAS,
     CONSTANT_LOSS,
@@ -39,7 +42,7 @@ def new_surface(left=ALL, low=-0.01, high=0.01, command=0.0, **fields):
         surface["actuator"]["step"],
     ) = LOW, HIGH, 0.5, 0.1
     surface["actuator"]["reach_low"], surface["actuator"]["reach_high"] = min(LOW, 0.0), max(HIGH, 0.0)
-    examine.begin(surface)
+    examine.restart_surface(surface)
     surface["feasible"]["low"][BIAS], surface["feasible"]["high"][BIAS] = -np.inf, np.inf
     surface["judged"]["low"], surface["judged"]["high"], surface["judged"]["command"] = low, high, command
     surface["feasible"]["excluded"] = [kind not in left for kind in range(N_TYPES)]
@@ -49,19 +52,19 @@ def new_surface(left=ALL, low=-0.01, high=0.01, command=0.0, **fields):
 
 def judged(judge, fdi, surface, kind, *given):
     """Take in what a type's row makes of the judged frame."""
-    sets.intersect(surface, kind, on(judge, fdi, surface, kind, *given))
+    contract.intersect_set(surface, kind, on(judge, fdi, surface, kind, *given))
 
 
 def restored(surface):
     """Take in what a jam was before the earliest release still possible."""
-    sets.replace(surface, STUCK, stuck.restored(surface, STUCK))
+    contract.replace_set(surface, STUCK, held_surface.restored_set(surface, STUCK))
 
 
 def test_what_is_known_of_a_surface_as_it_begins():
     _, surface = new_surface(left=())
     surface["evidence"]["frames"], surface["evidence"]["quiet"], surface["evidence"]["started_at"] = 3, 4, 5
     surface["elapsed"]["low"], surface["elapsed"]["high"] = 0.1, 0.2
-    examine.begin(surface)
+    examine.restart_surface(surface)
     assert not surface["feasible"]["excluded"].any()
     assert (
         surface["evidence"]["frames"],
@@ -88,8 +91,8 @@ def test_what_is_known_of_a_surface_as_it_begins():
 )  # fmt: skip
 def test_a_constant_loss_keeps_the_shares_that_explain_the_frame(low, high, command, expected):
     fdi, surface = new_surface(low=low, high=high, command=command)
-    judged(loss.judge, fdi, surface, CONSTANT_LOSS, 5)
-    judged(loss.judge_varying, fdi, surface, VARYING_LOSS, 5)
+    judged(commanded_surface.judge_loss, fdi, surface, CONSTANT_LOSS, 5)
+    judged(commanded_surface.judge_varying_loss, fdi, surface, VARYING_LOSS, 5)
     assert (
         surface["feasible"]["excluded"][CONSTANT_LOSS]
         == surface["feasible"]["excluded"][VARYING_LOSS]
@@ -107,52 +110,55 @@ def test_over_a_block_in_which_the_command_swings_any_mean_may_be_a_varying_loss
         fdi, surface = new_surface(low=0.11, high=0.2, command=0.1)
         fdi["types"]["config"]["length"], surface["orders"]["least"][1] = 5, least
         surface["orders"]["greatest"][1] = greatest
-        judged(loss.judge_varying, fdi, surface, VARYING_LOSS, 5)
+        judged(commanded_surface.judge_varying_loss, fdi, surface, VARYING_LOSS, 5)
         assert surface["feasible"]["excluded"][VARYING_LOSS] == excluded
 
 
 def test_sets_shrink_to_what_is_left_and_end_when_nothing_is():
     _, surface = new_surface()
-    sets.intersect(surface, STUCK, (-0.1, 0.2))
-    sets.intersect(surface, STUCK, (0.0, 0.9))
+    contract.intersect_set(surface, STUCK, (-0.1, 0.2))
+    contract.intersect_set(surface, STUCK, (0.0, 0.9))
     assert (surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK]) == (0.0, 0.2)
-    assert contract.middle(surface, STUCK) == 0.1
+    assert contract.set_middle(surface, STUCK) == 0.1
     assert not surface["feasible"]["excluded"][STUCK]
-    sets.intersect(surface, STUCK, (0.2, 0.9))  # one point is not nothing
+    contract.intersect_set(surface, STUCK, (0.2, 0.9))  # one point is not nothing
     assert not surface["feasible"]["excluded"][STUCK]
-    sets.intersect(surface, STUCK, (0.21, 0.9))
+    contract.intersect_set(surface, STUCK, (0.21, 0.9))
     assert surface["feasible"]["excluded"][STUCK]
 
 
 @pytest.mark.parametrize(
     ("interval", "stands"),
-    [((0.15, 0.05), False), ((0.4, 0.5), False), (contract.NOTHING, True)],
+    [((0.15, 0.05), False), ((0.4, 0.5), False), (contract.EMPTY_SET, True)],
     ids=["axes disagree", "elsewhere", "refuted otherwise"],
 )
 def test_a_surface_stands_nowhere_once_where_it_was_contradicts_itself(interval, stands):
     _, surface = new_surface()
-    sets.replace(surface, STUCK, (0.0, 0.2))
-    sets.intersect(surface, STUCK, interval)
+    contract.replace_set(surface, STUCK, (0.0, 0.2))
+    contract.intersect_set(surface, STUCK, interval)
     assert surface["feasible"]["excluded"][STUCK]
     for place in (-0.1, 0.02, 0.15, 0.19, 0.45):
         surface["judged"]["low"], surface["judged"]["high"] = place - 1e-3, place + 1e-3
-        assert examine.may_stand(surface) == (stands and 0.0 <= place <= 0.2), place
+        assert examine.agrees_with_rest(surface) == (stands and 0.0 <= place <= 0.2), place
 
 
 def test_an_offset_is_unlimited_at_a_stop():
     _, surface = new_surface(low=0.1, high=0.15, command=0.3)
-    assert bias.offset(surface) == pytest.approx((-0.2, -0.15))
+    assert commanded_surface.judged_offset(surface) == pytest.approx((-0.2, -0.15))
     surface["judged"]["high"] = HIGH
-    assert bias.offset(surface) == (pytest.approx(-0.2), np.inf)
+    assert commanded_surface.judged_offset(surface) == (pytest.approx(-0.2), np.inf)
     surface["judged"]["low"] = LOW
-    assert bias.offset(surface)[0] == -np.inf
+    assert commanded_surface.judged_offset(surface)[0] == -np.inf
 
 
 @pytest.mark.parametrize(("low", "high"), [(0.0, 0.09), (0.51, 0.6)])
 def test_no_offset_takes_a_surface_beyond_its_stops(low, high):
     """A loss does, where neutral is out of reach."""
     fdi, surface = new_surface(low=low, high=high, command=0.2, travel_low=0.1)
-    for kind, judge in ((BIAS, bias.judge), (GROWING_BIAS, bias.judge_growing)):
+    for kind, judge in (
+        (BIAS, commanded_surface.judge_bias),
+        (GROWING_BIAS, commanded_surface.judge_growing_bias),
+    ):
         judged(judge, fdi, surface, kind, 5)
         assert surface["feasible"]["excluded"][kind]
 
@@ -163,31 +169,31 @@ def test_within_what_is_seen_at_once_a_stop_may_have_been_met_at_its_furthest_or
     fdi["types"]["config"]["length"] = length
     surface["orders"]["least"][1], surface["orders"]["greatest"][1] = -0.4, 0.34
     # the lowest it was: 0.2 - (0.1 + 0.4) = -0.3; the highest: 0.25 + 0.24 = 0.49, below 0.5
-    assert bias.offset(surface) == pytest.approx((0.1, 0.15))
+    assert commanded_surface.judged_offset(surface) == pytest.approx((0.1, 0.15))
     surface["orders"]["greatest"][1] = 0.36
-    assert bias.offset(surface)[1] == np.inf
+    assert commanded_surface.judged_offset(surface)[1] == np.inf
     surface["orders"]["least"][1] = -0.51
-    assert bias.offset(surface)[0] == -np.inf
+    assert commanded_surface.judged_offset(surface)[0] == -np.inf
 
 
 def test_a_bias_keeps_the_offsets_that_explain_every_frame():
     fdi, surface = new_surface(low=0.1, high=0.15, command=0.3)
-    judged(bias.judge, fdi, surface, BIAS, 5)
+    judged(commanded_surface.judge_bias, fdi, surface, BIAS, 5)
     surface["judged"]["low"], surface["judged"]["high"], surface["judged"]["command"] = 0.23, 0.4, 0.4
-    judged(bias.judge, fdi, surface, BIAS, 6)
+    judged(commanded_surface.judge_bias, fdi, surface, BIAS, 6)
     assert (surface["feasible"]["low"][BIAS], surface["feasible"]["high"][BIAS]) == pytest.approx(
         (-0.17, -0.15)
     )
     surface["elapsed"]["command"] = 0.05
-    assert on(bias.deflection, fdi, surface, BIAS) == pytest.approx((-0.12, -0.1))
+    assert on(commanded_surface.bias_deflection, fdi, surface, BIAS) == pytest.approx((-0.12, -0.1))
     orders, surface["elapsed"]["command"] = surface["orders"], -0.2
     orders["least"][0], orders["greatest"][0] = -0.24, -0.1  # where it was meanwhile: to -0.41 and to -0.25
-    assert on(bias.deflection, fdi, surface, BIAS) == pytest.approx((LOW, -0.35))
+    assert on(commanded_surface.bias_deflection, fdi, surface, BIAS) == pytest.approx((LOW, -0.35))
     orders["least"][0] = orders["greatest"][0] = 0.0
-    assert bias.interval(fdi, 0, BIAS) == pytest.approx((-0.17, -0.15))
-    assert contract.middle_of(fdi, 0, BIAS) == pytest.approx(-0.16)
+    assert commanded_surface.bias_interval(fdi, 0, BIAS) == pytest.approx((-0.17, -0.15))
+    assert contract.set_middle_of(fdi, 0, BIAS) == pytest.approx(-0.16)
     surface["feasible"]["high"][BIAS] = np.inf
-    assert bias.interval(fdi, 0, BIAS) is None
+    assert commanded_surface.bias_interval(fdi, 0, BIAS) is None
 
 
 @pytest.mark.parametrize(
@@ -202,14 +208,14 @@ def test_a_growing_bias_keeps_its_sign_and_never_shrinks(offsets, excluded):
     fdi, surface = new_surface()
     for offset in offsets:
         surface["judged"]["low"], surface["judged"]["high"] = offset - 0.01, offset + 0.01
-        judged(bias.judge_growing, fdi, surface, GROWING_BIAS, 5)
+        judged(commanded_surface.judge_growing_bias, fdi, surface, GROWING_BIAS, 5)
     assert surface["feasible"]["excluded"][GROWING_BIAS] == excluded
 
 
 def test_at_a_stop_a_growing_bias_says_nothing():
     for low, high in ((0.45, 0.5), (-0.4, -0.35)):
         fdi, surface = new_surface(low=low, high=high)
-        judged(bias.judge_growing, fdi, surface, GROWING_BIAS, 5)
+        judged(commanded_surface.judge_growing_bias, fdi, surface, GROWING_BIAS, 5)
         assert surface["growing_bias"]["up"] == surface["growing_bias"]["down"] == 0.0
 
 
@@ -225,12 +231,12 @@ def test_at_a_stop_a_growing_bias_says_nothing():
 def test_a_growing_bias_is_as_fast_as_a_runaway_only_where_that_is_certain(places, ran):
     fdi, surface = new_surface(least_runaway_rate=0.05 / DT)
     for place in places:
-        on(bias.widen_growing, fdi, surface, GROWING_BIAS)
+        on(commanded_surface.widen_offset_range, fdi, surface, GROWING_BIAS)
         if place == "well":
-            on(bias.skip_growing, fdi, surface, GROWING_BIAS)
+            on(commanded_surface.skip_growing_bias, fdi, surface, GROWING_BIAS)
         elif place is not None:
             surface["judged"]["low"], surface["judged"]["high"] = place - 0.01, min(place + 0.01, HIGH)
-            judged(bias.judge_growing, fdi, surface, GROWING_BIAS, 5)
+            judged(commanded_surface.judge_growing_bias, fdi, surface, GROWING_BIAS, 5)
     assert surface["growing_bias"]["ran"].tolist() == ran
 
 
@@ -238,9 +244,9 @@ def test_of_several_instants_a_mean_may_be_that_of_the_last():
     fdi, surface = new_surface(least_runaway_rate=0.05 / DT)
     fdi["types"]["config"]["whole"] = 0
     for place, ran in ((0.0, 0), (0.19, 0), (0.31, 1)):  # beyond 0.01 + 3 * 0.09 after two frames
-        on(bias.widen_growing, fdi, surface, GROWING_BIAS)
+        on(commanded_surface.widen_offset_range, fdi, surface, GROWING_BIAS)
         surface["judged"]["low"], surface["judged"]["high"] = place - 0.01, place + 0.01
-        judged(bias.judge_growing, fdi, surface, GROWING_BIAS, 5)
+        judged(commanded_surface.judge_growing_bias, fdi, surface, GROWING_BIAS, 5)
         assert surface["growing_bias"]["ran"][1] == ran
 
 
@@ -250,7 +256,7 @@ def slow_run(places, orders=(0.0, 0.0), whole=1, frames=None, slowest_step=0.0):
     surface["orders"]["low"], surface["orders"]["high"] = orders[0], orders[1]
     for k, place in enumerate(places):
         surface["judged"]["low"], surface["judged"]["high"] = place - 0.01, place + 0.01
-        judged(rate_limit.judge, fdi, surface, SLOW, (frames or range(99))[k])
+        judged(commanded_surface.judge_rate_limit, fdi, surface, SLOW, (frames or range(99))[k])
     return surface["feasible"]["excluded"][SLOW]
 
 
@@ -290,7 +296,7 @@ def test_which_side_of_its_orders_a_surface_stands_on():
             orders["low"][newest], orders["high"][newest] = low, high
             orders["low"][2] = min(orders["low"][2], low)
             orders["high"][2] = max(orders["high"][2], high)
-            assert on(rate_limit.side, fdi, surface) == side
+            assert on(commanded_surface.side_of_command, fdi, surface) == side
 
 
 def swung(signs, patience=20):
@@ -299,8 +305,8 @@ def swung(signs, patience=20):
     for frame, sign in enumerate(signs):
         fdi["types"]["frame"] = frame + 1
         surface["judged"]["low"], surface["judged"]["high"] = 0.1 * sign - 0.02, 0.1 * sign + 0.02
-        on(oscillatory.add_square, fdi, surface, OSCILLATORY)
-        judged(oscillatory.judge, fdi, surface, OSCILLATORY, frame)
+        on(commanded_surface.add_squared_error, fdi, surface, OSCILLATORY)
+        judged(commanded_surface.judge_oscillation, fdi, surface, OSCILLATORY, frame)
     return fdi, surface
 
 
@@ -309,9 +315,11 @@ def test_an_oscillation_is_counted_by_half_cycles():
     swing = surface["oscillatory"]
     assert swing["half_cycles"] == 3
     assert (swing["first_end"], swing["last_end"]) == (5, 15)
-    assert oscillatory.has_shown(surface)
-    assert not oscillatory.has_shown(swung([1] * 5 + [-1] * 5 + [1])[1])
-    assert oscillatory.frequency_rad_s(fdi, 0, OSCILLATORY) == pytest.approx(2 * np.pi / (10 * DT))
+    assert commanded_surface.oscillation_has_shown(surface)
+    assert not commanded_surface.oscillation_has_shown(swung([1] * 5 + [-1] * 5 + [1])[1])
+    assert commanded_surface.oscillation_frequency_rad_s(fdi, 0, OSCILLATORY) == pytest.approx(
+        2 * np.pi / (10 * DT)
+    )
     # the first half-cycle is cut off and does not count: ten frames, each 0.1 rad off; its first frame is
     # summed before the half-cycle before it is seen to have ended
     assert swing["squares"] == pytest.approx(10 * 0.01)
@@ -319,7 +327,7 @@ def test_an_oscillation_is_counted_by_half_cycles():
 
 def test_the_amplitude_is_that_of_the_mean_square():
     fdi, _ = swung([1] * 5 + [-1] * 5 + [1] * 5 + [-1])
-    assert oscillatory.estimate(fdi, 0, OSCILLATORY) == pytest.approx(np.sqrt(2.0 * 0.01))
+    assert commanded_surface.amplitude(fdi, 0, OSCILLATORY) == pytest.approx(np.sqrt(2.0 * 0.01))
 
 
 def test_a_sign_that_stays_for_longer_than_the_slowest_half_cycle_is_none():
@@ -328,7 +336,7 @@ def test_a_sign_that_stays_for_longer_than_the_slowest_half_cycle_is_none():
     assert swung([-1] * 22)[1]["feasible"]["excluded"][OSCILLATORY]
     assert not swung([1] * 15 + [0] + [1] * 15)[1]["feasible"]["excluded"][OSCILLATORY]
     fdi, surface = swung([1] * 20)
-    on(oscillatory.skip, fdi, surface, OSCILLATORY)
+    on(commanded_surface.skip_oscillation, fdi, surface, OSCILLATORY)
     assert surface["oscillatory"]["steady_since"] == 20
 
 
@@ -337,13 +345,16 @@ def test_a_runaway_has_gone_at_least_its_way(length, ways):
     fdi, surface = new_surface(started_at=3, start_low=0.1, start_high=0.2, least_runaway_rate=1.0)
     fdi["types"]["config"]["length"] = length
     for frame, way in zip((3, 4, 8), ways, strict=True):
-        assert on(hardover.way, fdi, surface, frame) == pytest.approx(way)
-        assert on(hardover.upwards, fdi, surface, frame) == pytest.approx(0.1 + way)
-        assert on(hardover.downwards, fdi, surface, frame) == pytest.approx(0.2 - way)
-    assert on(hardover.upwards, fdi, surface, 99) == HIGH
-    assert on(hardover.downwards, fdi, surface, 99) == LOW
+        assert on(held_surface.runaway_travel, fdi, surface, frame) == pytest.approx(way)
+        assert on(held_surface.least_up, fdi, surface, frame) == pytest.approx(0.1 + way)
+        assert on(held_surface.least_down, fdi, surface, frame) == pytest.approx(0.2 - way)
+    assert on(held_surface.least_up, fdi, surface, 99) == HIGH
+    assert on(held_surface.least_down, fdi, surface, 99) == LOW
     surface["evidence"]["started_at"] = -1
-    assert (on(hardover.upwards, fdi, surface, 9), on(hardover.downwards, fdi, surface, 9)) == (LOW, HIGH)
+    assert (on(held_surface.least_up, fdi, surface, 9), on(held_surface.least_down, fdi, surface, 9)) == (
+        LOW,
+        HIGH,
+    )
 
 
 @pytest.mark.parametrize(
@@ -372,7 +383,7 @@ def test_at_a_stop_the_mean_of_a_quick_swing_keeps_its_sign(whole, hides, exclud
     fdi, surface = new_surface(low=-0.2, high=-0.1, command=0.1)  # below its command all the time
     fdi["types"]["config"]["whole"], surface["judged"]["hides"] = whole, hides
     for frame in range(30):
-        judged(oscillatory.judge, fdi, surface, OSCILLATORY, frame)
+        judged(commanded_surface.judge_oscillation, fdi, surface, OSCILLATORY, frame)
     assert surface["feasible"]["excluded"][OSCILLATORY] == excluded
 
 
@@ -382,15 +393,15 @@ def test_at_a_stop_the_mean_of_a_quick_swing_keeps_its_sign(whole, hides, exclud
 def test_a_stop_hides_what_is_no_wider_than_the_interval_of_a_deflection(least, greatest, hides):
     _, surface = new_surface()
     surface["orders"]["least"][0], surface["orders"]["greatest"][0] = least, greatest
-    observation.note_stops(surface, 0.0999)
+    contract.record_hiding_stops(surface, 0.0999)
     assert surface["elapsed"]["hides"].tolist() == hides
 
 
 def test_a_jam_narrows_to_where_it_is_seen():
     fdi, surface = new_surface(low=0.1, high=0.2)
-    judged(stuck.judge, fdi, surface, STUCK, 5)
-    assert on(stuck.deflection, fdi, surface, STUCK) == (0.1, 0.2)
-    assert contract.set_of(fdi, 0, STUCK) == (0.1, 0.2)
+    judged(held_surface.judge_stuck, fdi, surface, STUCK, 5)
+    assert on(held_surface.stuck_deflection, fdi, surface, STUCK) == (0.1, 0.2)
+    assert contract.feasible_set(fdi, 0, STUCK) == (0.1, 0.2)
 
 
 def test_where_types_have_a_surface():
@@ -399,30 +410,30 @@ def test_where_types_have_a_surface():
     )
     surface["elapsed"]["command"], surface["feasible"]["low"][CONSTANT_LOSS] = -0.2, 0.25
     fdi["types"]["frame"] = 5
-    assert on(loss.deflection, fdi, surface, CONSTANT_LOSS) == pytest.approx((-0.2, -0.05))
-    assert on(stuck.deflection_float, fdi, surface, FLOAT) == (0.0, 0.0)
+    assert on(commanded_surface.loss_deflection, fdi, surface, CONSTANT_LOSS) == pytest.approx((-0.2, -0.05))
+    assert on(held_surface.float_deflection, fdi, surface, FLOAT) == (0.0, 0.0)
     surface["actuator"]["travel_low"] = 0.1  # the lower stop is as near to neutral as it comes
-    assert on(stuck.deflection_float, fdi, surface, FLOAT) == (0.1, 0.1)
-    assert stuck.neutral_of(fdi, 0, FLOAT) == 0.1
+    assert on(held_surface.float_deflection, fdi, surface, FLOAT) == (0.1, 0.1)
+    assert held_surface.neutral_deflection(fdi, 0, FLOAT) == 0.1
     surface["actuator"]["travel_low"] = LOW
-    assert on(hardover.deflection_up, fdi, surface, UP) == pytest.approx((0.14, HIGH))
-    assert on(hardover.deflection_down, fdi, surface, DOWN) == pytest.approx((LOW, 0.16))
+    assert on(held_surface.deflection_up, fdi, surface, UP) == pytest.approx((0.14, HIGH))
+    assert on(held_surface.deflection_down, fdi, surface, DOWN) == pytest.approx((LOW, 0.16))
     assert [TYPES[kind].estimate(fdi, 0, kind) for kind in (FLOAT, UP, DOWN)] == [
         0.0,
         HIGH,
         LOW,
     ]
-    assert loss.interval(fdi, 0, CONSTANT_LOSS) == (-0.75, 0.0)
+    assert commanded_surface.loss_interval(fdi, 0, CONSTANT_LOSS) == (-0.75, 0.0)
 
 
 def released(low=0.2, high=0.3, order=0.0, judged=(-1.0, 1.0), instants=1, **fields):
     fdi, surface = new_surface(low=judged[0], high=judged[1], **fields)
     fdi["types"]["config"]["returns"], fdi["types"]["config"]["instants"] = 1, instants
     surface["orders"]["given"][1] = order
-    for which in (release.EARLIER, release.LATER):
-        release.forget(surface, which, STUCK)
-    surface["release"]["low"][release.LATER, STUCK] = low
-    surface["release"]["high"][release.LATER, STUCK] = high
+    for which in (held_surface.EARLIER, held_surface.LATER):
+        held_surface.clear_releases(surface, which, STUCK)
+    surface["release"]["low"][held_surface.LATER, STUCK] = low
+    surface["release"]["high"][held_surface.LATER, STUCK] = high
     return fdi, surface
 
 
@@ -434,7 +445,9 @@ def test_a_return_goes_by_the_actuator(instants):
     for _ in range(instants):
         path.append(place)
         place -= min(0.5 * place, 0.1)
-    assert on(release.carried, fdi, surface, 0.3) == pytest.approx((np.mean(path), place, 0.0))
+    assert on(held_surface.mean_return_position, fdi, surface, 0.3) == pytest.approx(
+        (np.mean(path), place, 0.0)
+    )
 
 
 @given(st.lists(st.floats(0.5, 2.0), min_size=1, max_size=9), st.floats(-0.4, 0.5), st.floats(-0.4, 0.5))
@@ -447,28 +460,28 @@ def test_what_a_frame_shows_of_a_return_is_weighted_by_the_effectiveness_then(G,
         path.append(path[-1] + np.clip(0.5 * (order - path[-1]), -0.1, 0.1))
     shown = np.sum(G * path) / np.sum(G)
     surface["judged"]["uneven"] = 0.25 * (G.max() - G.min()) / G.mean()
-    mean, _, room = on(release.carried, fdi, surface, held)
+    mean, _, room = on(held_surface.mean_return_position, fdi, surface, held)
     assert abs(shown - mean) <= room + 1e-15
     surface["judged"]["command"], surface["judged"]["low"], surface["judged"]["high"] = (
         9.0,
         shown - 1e-12,
         shown + 1e-12,
     )
-    assert on(release.possible, fdi, surface, STUCK)
+    assert on(held_surface.return_explains, fdi, surface, STUCK)
 
 
 def test_a_return_keeps_where_it_agrees_and_ends_where_it_does_not():
     fdi, surface = released(judged=(0.22, 0.28))
-    assert on(release.possible, fdi, surface, STUCK)
+    assert on(held_surface.return_explains, fdi, surface, STUCK)
     held = surface["release"]
     assert (held["low"][1, STUCK], held["high"][1, STUCK]) == pytest.approx((0.22, 0.28))
     for judged in ((0.31, 0.4), (0.1, 0.19)):
         fdi, surface = released(judged=judged)
-        assert not on(release.possible, fdi, surface, STUCK)
-        assert not release.any_release(surface, release.LATER, STUCK)
+        assert not on(held_surface.return_explains, fdi, surface, STUCK)
+        assert not held_surface.has_release(surface, held_surface.LATER, STUCK)
     fdi, surface = released(low=0.1, high=0.1, judged=(0.0, 0.2), command=0.1)
     assert not on(
-        release.possible, fdi, surface, STUCK
+        held_surface.return_explains, fdi, surface, STUCK
     )  # it is back: no release explains that anything is wrong
 
 
@@ -484,25 +497,25 @@ def test_a_return_has_the_room_that_an_uneven_effectiveness_gives_it(length, ins
             0.05,
         )
         surface["judged"]["uneven"] = 0.2
-        assert on(release.possible, fdi, surface, STUCK) == there
+        assert on(held_surface.return_explains, fdi, surface, STUCK) == there
 
 
 def test_what_is_let_go_joins_the_later_releases_and_is_carried_on():
     fdi, surface = released(low=np.inf, high=-np.inf)
-    release.note_release(surface, STUCK, 0.2, 0.3)
-    release.note_release(surface, STUCK, 0.1, 0.15)
-    release.note_release(surface, STUCK, 0.5, 0.4)  # nowhere
+    held_surface.add_release(surface, STUCK, 0.2, 0.3)
+    held_surface.add_release(surface, STUCK, 0.1, 0.15)
+    held_surface.add_release(surface, STUCK, 0.5, 0.4)  # nowhere
     held = surface["release"]
     assert (held["low"][1, STUCK], held["high"][1, STUCK]) == (0.1, 0.3)
     held["released"][STUCK] = 1
-    release.note_release(surface, STUCK, -0.4, 0.5)
+    held_surface.add_release(surface, STUCK, -0.4, 0.5)
     assert (held["low"][1, STUCK], held["high"][1, STUCK]) == (0.1, 0.3)
     surface["judged"]["wrong"] = 1
-    on(release.propagate, fdi, surface, STUCK)
+    on(held_surface.propagate_returns, fdi, surface, STUCK)
     assert (held["low"][1, STUCK], held["high"][1, STUCK]) == pytest.approx((0.05, 0.2))
     assert held["released"][STUCK] == 1
     surface["judged"]["wrong"] = 0
-    on(release.propagate, fdi, surface, STUCK)
+    on(held_surface.propagate_returns, fdi, surface, STUCK)
     assert held["released"][STUCK] == 0
 
 
@@ -510,23 +523,23 @@ def test_what_is_let_go_joins_the_later_releases_and_is_carried_on():
 def test_a_type_that_no_longer_holds_is_excluded_unless_a_return_explains_it(returns):
     fdi, surface = released(judged=(0.2, 0.3))
     fdi["types"]["config"]["returns"] = returns
-    elsewhere = release.RETURNING if returns else release.REFUTED
-    judged(release.explains, fdi, surface, STUCK, -0.1, 0.1)
+    elsewhere = held_surface.RETURNING if returns else held_surface.REFUTED
+    judged(held_surface.hold_or_return_explains, fdi, surface, STUCK, -0.1, 0.1)
     assert surface["feasible"]["excluded"][STUCK] == (not returns)
     assert surface["release"]["released"][STUCK] == returns
     fdi, surface = released(judged=(0.2, 0.3))
     fdi["types"]["config"]["returns"] = returns
-    assert on(release.status, fdi, surface, STUCK, 0.3, 0.4) == release.HELD
-    assert on(release.status, fdi, surface, STUCK, 0.1, 0.2) == release.HELD
+    assert on(held_surface.hold_status, fdi, surface, STUCK, 0.3, 0.4) == held_surface.HELD
+    assert on(held_surface.hold_status, fdi, surface, STUCK, 0.1, 0.2) == held_surface.HELD
     surface["release"]["released"][STUCK] = 1
-    assert on(release.status, fdi, surface, STUCK, 0.1, 0.2) == elsewhere
+    assert on(held_surface.hold_status, fdi, surface, STUCK, 0.1, 0.2) == elsewhere
 
 
 def test_where_a_surface_was_as_the_judged_frame_began():
     fdi, surface = new_surface(low=0.1, high=0.2, low_before=0.3, high_before=0.4)
-    assert on(release.beginning, fdi, surface) == (0.1, 0.2, 9)
+    assert on(held_surface.position_at_frame_start, fdi, surface) == (0.1, 0.2, 9)
     fdi["types"]["config"]["whole"] = 0
-    assert on(release.beginning, fdi, surface) == (0.3, 0.4, 8)
+    assert on(held_surface.position_at_frame_start, fdi, surface) == (0.3, 0.4, 8)
 
 
 @pytest.mark.parametrize("kind", [STUCK, FLOAT, UP, DOWN])
@@ -535,11 +548,11 @@ def test_from_where_each_type_lets_go(kind):
     surface["actuator"]["least_runaway_rate"], surface["evidence"]["start_high"] = 1.0, 0.1
     surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK] = 0.05, 0.3
     for which in (0, 1):
-        release.forget(surface, which, kind)
+        held_surface.clear_releases(surface, which, kind)
     if kind == STUCK:
         (
-            surface["release"]["low"][release.EARLIER, STUCK],
-            surface["release"]["high"][release.EARLIER, STUCK],
+            surface["release"]["low"][held_surface.EARLIER, STUCK],
+            surface["release"]["high"][held_surface.EARLIER, STUCK],
         ) = 0.0, 0.1
     on(TYPES[kind].on_release, fdi, surface, kind)
     held = surface["release"]
@@ -552,7 +565,7 @@ def test_within_a_frame_of_several_instants_a_runaway_may_be_let_go_further_on(k
     fdi, surface = released(started_at=7, start_low=0.0, start_high=0.1, least_runaway_rate=1.0)
     surface["earlier"]["low"], surface["earlier"]["high"], fdi["types"]["config"]["whole"] = -0.1, 0.2, 0
     for which in (0, 1):
-        release.forget(surface, which, kind)
+        held_surface.clear_releases(surface, which, kind)
     on(TYPES[kind].on_release, fdi, surface, kind)
     held = surface["release"]
     assert (held["low"][1, kind], held["high"][1, kind]) == pytest.approx(expected)
@@ -564,10 +577,10 @@ def test_a_jam_that_may_have_let_go_returns_to_what_was_known_before():
     surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK] = 0.25, 0.26
     restored(surface)
     assert (surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK]) == (0.1, 0.4)
-    stuck.renew(surface, STUCK)  # no earlier release: the later are the earlier ones now
+    held_surface.promote_kept_sets(surface, STUCK)  # no earlier release: the later are the earlier ones now
     held = surface["release"]
     assert (held["low"][0, STUCK], held["high"][0, STUCK]) == (0.2, 0.3)
-    assert not release.any_release(surface, release.LATER, STUCK)
+    assert not held_surface.has_release(surface, held_surface.LATER, STUCK)
     assert (surface["stuck"]["kept_low"].tolist(), surface["stuck"]["kept_high"].tolist()) == (
         [0.1, 0.1],
         [0.4, 0.4],
@@ -609,7 +622,9 @@ def test_let_go_at_any_instant_a_surface_lies_between_the_ways_that_stay_on_one_
             path.append(place)
             place = extreme(way(place, [order])[1], start)
         room = UNEVEN * np.ptp(path)
-        assert on(release.carried, fdi, surface, start, side) == pytest.approx((np.mean(path), place, room))
+        assert on(held_surface.mean_return_position, fdi, surface, start, side) == pytest.approx(
+            (np.mean(path), place, room)
+        )
         for wait in range(len(ORDERS)):  # held so long, then let go
             mean = np.mean([*[start] * wait, *way(start, ORDERS[wait:-1])])
             assert -side * (mean - np.mean(path)) >= -1e-12
@@ -620,22 +635,22 @@ def test_let_go_at_any_instant_a_surface_lies_between_the_ways_that_stay_on_one_
 def test_a_release_within_the_block_explains_what_lies_between_with_some_room(end, inside):
     fdi, surface = within_block(ORDERS)
     start, side = (0.2, -1) if end == "low" else (0.3, 1)
-    mean, _, room = on(release.carried, fdi, surface, start, side)
+    mean, _, room = on(held_surface.mean_return_position, fdi, surface, start, side)
     assert room > 1e-3
     edge = mean + side * room
     beyond = edge - side * 1e-6 if inside else edge + side * 1e-6
     surface["judged"]["low"], surface["judged"]["high"] = (-1.0, beyond) if end == "low" else (beyond, 1.0)
-    assert on(release.released_within, fdi, surface, STUCK) == inside
-    assert on(release.possible, fdi, surface, STUCK) == inside
+    assert on(held_surface.block_release_explains, fdi, surface, STUCK) == inside
+    assert on(held_surface.return_explains, fdi, surface, STUCK) == inside
     held = surface["release"]["held_low"][STUCK] <= surface["release"]["held_high"][STUCK]
     assert held == inside, "what explains nothing is forgotten"
     fdi["types"]["config"]["length"] = 1
-    assert not on(release.released_within, fdi, surface, STUCK)
+    assert not on(held_surface.block_release_explains, fdi, surface, STUCK)
 
 
 def test_what_is_held_nowhere_is_not_let_go_within():
     fdi, surface = within_block(ORDERS, held=(0.3, 0.2))
-    assert not on(release.released_within, fdi, surface, STUCK)
+    assert not on(held_surface.block_release_explains, fdi, surface, STUCK)
 
 
 @pytest.mark.parametrize("joined", [False, True])
@@ -644,14 +659,16 @@ def test_after_a_block_releases_within_it_join_the_later_ones(joined):
     held = surface["release"]
     if joined:
         held["low"][1, STUCK], held["high"][1, STUCK] = 0.25, 0.251
-    on(release.propagate, fdi, surface, STUCK)
-    low, high = (on(release.carried, fdi, surface, *of)[1] for of in ((0.2, -1), (0.3, 1)))
+    on(held_surface.propagate_returns, fdi, surface, STUCK)
+    low, high = (on(held_surface.mean_return_position, fdi, surface, *of)[1] for of in ((0.2, -1), (0.3, 1)))
     assert (held["low"][1, STUCK], held["high"][1, STUCK]) == pytest.approx((low, high))
-    assert not release.any_release(surface, release.EARLIER, STUCK)
+    assert not held_surface.has_release(surface, held_surface.EARLIER, STUCK)
     fdi["types"]["config"]["length"], before = 1, held["high"][1, STUCK].copy()
-    release.forget(surface, release.LATER, STUCK)
-    on(release.propagate, fdi, surface, STUCK)
-    assert not release.any_release(surface, release.LATER, STUCK), "in one frame nothing is let go within"
+    held_surface.clear_releases(surface, held_surface.LATER, STUCK)
+    on(held_surface.propagate_returns, fdi, surface, STUCK)
+    assert not held_surface.has_release(surface, held_surface.LATER, STUCK), (
+        "in one frame nothing is let go within"
+    )
     assert before == pytest.approx(high)
 
 
@@ -663,14 +680,14 @@ def test_where_the_effectiveness_changes_a_return_has_a_share_of_its_way_as_room
     held, start = surface["release"], 0.2 if side == "low" else 0.3
     surface["judged"]["uneven"], path = UNEVEN, way(start, ORDERS)
     mean = path[:-1].mean()
-    assert on(release.carried, fdi, surface, start) == pytest.approx(
+    assert on(held_surface.mean_return_position, fdi, surface, start) == pytest.approx(
         (mean, path[-1], UNEVEN * np.ptp(path[:-1]))
     )
     room = max(UNEVEN * np.ptp(way(other, ORDERS)[:-1]) for other in (0.2, 0.3))
     sign = -1.0 if side == "low" else 1.0
     beyond = mean + sign * (room + (-1e-6 if inside else 1e-6))
     surface["judged"]["low"], surface["judged"]["high"] = (-1.0, beyond) if side == "low" else (beyond, 1.0)
-    assert on(release.agrees, fdi, surface, release.LATER, STUCK) == inside
+    assert on(held_surface.narrow_return, fdi, surface, held_surface.LATER, STUCK) == inside
     if inside:  # nearly all that could have been let go is left out; but the ends may not pass
         assert held["low"][1, STUCK] <= held["high"][1, STUCK]
         kept = held["low" if side == "low" else "high"][1, STUCK]
@@ -680,7 +697,7 @@ def test_where_the_effectiveness_changes_a_return_has_a_share_of_its_way_as_room
 def test_a_jam_let_go_without_an_earlier_release_is_the_earlier_one_then():
     fdi, surface = released(low=0.1, high=0.3, judged=(0.0, 0.25))
     surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK] = 0.15, 0.22
-    on(stuck.on_release, fdi, surface, STUCK)
+    on(held_surface.on_release_stuck, fdi, surface, STUCK)
     held = surface["release"]
     assert (held["low"][0, STUCK], held["high"][0, STUCK]) == (0.1, 0.3)
     assert (held["low"][1, STUCK], held["high"][1, STUCK]) == (0.15, 0.22)
@@ -700,10 +717,10 @@ def test_a_jam_that_looks_healthy_is_what_it_was_before():
 
 def test_a_frame_that_may_be_on_either_side_ends_no_half_cycle_and_begins_the_count_anew():
     fdi, surface = new_surface(low=-0.1, high=0.2)
-    judged(oscillatory.judge, fdi, surface, OSCILLATORY, 10)
+    judged(commanded_surface.judge_oscillation, fdi, surface, OSCILLATORY, 10)
     swing = surface["oscillatory"]
     assert (swing["sign"], swing["half_cycles"], swing["steady_since"]) == (0, 0, 11)
     for low, high in ((0.0, 0.3), (-0.3, 0.0)):
         surface["judged"]["low"], surface["judged"]["high"] = low, high
-        judged(oscillatory.judge, fdi, surface, OSCILLATORY, 10)
+        judged(commanded_surface.judge_oscillation, fdi, surface, OSCILLATORY, 10)
         assert swing["sign"] == 0, "on its command it is on no side of it"

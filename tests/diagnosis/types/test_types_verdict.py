@@ -5,10 +5,10 @@ import pytest
 from kernels import new_fdi, on, put, put_on
 
 from beaver_ftc.diagnosis import conclusion
-from beaver_ftc.diagnosis.belief.expectation import means_dtype
+from beaver_ftc.diagnosis.expectation import means_dtype
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, UNANTICIPATED, YAW
-from beaver_ftc.diagnosis.types import examine, observation, pairs, verdict
-from beaver_ftc.diagnosis.types.contract import FIXED, LAGS, LOSES, SHIFTED
+from beaver_ftc.diagnosis.types import contract, examine, pairs, verdict
+from beaver_ftc.diagnosis.types.contract import GIVE_UP, SCALE_COMMAND, SUBTRACT_OFFSET, WAIT_FOR_SURFACE
 from beaver_ftc.diagnosis.types.registry import N_TYPES
 from beaver_ftc.diagnosis.types.verdict import BY_DEDUCTION, NO_SURFACE, RULED_OUT, SEVERAL
 from fault_kinds import (
@@ -78,12 +78,12 @@ def new_case(**left):
 
 
 def locate(fdi, s, innovation, bound, effect):
-    """`observation.locate` for surface s, with its estimator and its axis."""
+    """`contract.locate_surface` for surface s, with its estimator and its axis."""
     fie = fdi["isolation"]["estimator"][fdi["layout"]["position_of"][s]]
     axis = fdi["layout"]["dominant_axis"][s]
     config, surface = fdi["types"]["config"], fdi["types"]["surface"][s]
-    observation.shift(surface)
-    observation.locate(config, surface, fie, axis, innovation, bound, effect)
+    contract.shift_observations(surface)
+    contract.locate_surface(config, surface, fie, axis, innovation, bound, effect)
 
 
 def one(*kinds, **fields):
@@ -112,13 +112,13 @@ NOBODY_ELSE = {"aileron": None, "elevator": None, "flap": None}
 )
 def test_questions_about_the_types_left(kinds, constant, explained):
     _, surface = one(*kinds)
-    assert sum(map(bool, (verdict.left(surface, kind) for kind in ALL))) == len(kinds)
-    assert all(verdict.left(surface, kind) for kind in kinds)
-    assert bool(verdict.any_constant(surface)) == constant
-    assert bool(verdict.anything_left(surface)) == (kinds != ())
+    assert sum(map(bool, (verdict.is_left(surface, kind) for kind in ALL))) == len(kinds)
+    assert all(verdict.is_left(surface, kind) for kind in kinds)
+    assert bool(verdict.any_constant_type_left(surface)) == constant
+    assert bool(verdict.any_type_left(surface)) == (kinds != ())
     for k, half_cycles in enumerate((2, 3)):
         surface["oscillatory"]["half_cycles"] = half_cycles
-        assert bool(verdict.explained(surface)) == explained[k]
+        assert bool(verdict.is_explained(surface)) == explained[k]
 
 
 @pytest.mark.parametrize(
@@ -141,29 +141,39 @@ def test_questions_about_the_types_left(kinds, constant, explained):
 def test_what_kind_of_fault_it_may_be(kinds, fixed, one_type, sole_type):
     _, surface = one(*kinds)
     same_name = verdict.FAMILY[sole_type] if sole_type >= 0 else -1
-    assert (verdict.mode_for(surface) == FIXED) == fixed
-    assert verdict.one_constant(surface) == one_type
+    assert (verdict.accommodation_mode(surface) == GIVE_UP) == fixed
+    assert verdict.sole_constant_type(surface) == one_type
     found = verdict.sole_type(surface)
     assert (verdict.FAMILY[found] if found >= 0 else -1) == same_name
 
 
 def test_a_surface_is_possible_by_its_estimator_or_by_deduction():
     fdi = new_case(rudder=None)
-    assert [bool(verdict.possible(fdi["types"]["surface"][s])) for s in range(4)] == [True, True, False, True]
+    assert [bool(verdict.can_be_at_fault(fdi["types"]["surface"][s])) for s in range(4)] == [
+        True,
+        True,
+        False,
+        True,
+    ]
     fdi["types"]["surface"]["status"]["source"] = RULED_OUT, BY_DEDUCTION, BY_DEDUCTION, 0
-    assert [bool(verdict.possible(fdi["types"]["surface"][s])) for s in range(4)] == [False, True, True, True]
+    assert [bool(verdict.can_be_at_fault(fdi["types"]["surface"][s])) for s in range(4)] == [
+        False,
+        True,
+        True,
+        True,
+    ]
 
 
 def test_the_sole_surface_that_is_possible():
-    assert on(verdict.sole, new_case(), False) == SEVERAL
-    assert on(verdict.sole, new_case(**NOBODY_ELSE), False) == RUDDER
-    assert on(verdict.sole, new_case(rudder=None, **NOBODY_ELSE), False) == NO_SURFACE
+    assert on(verdict.sole_surface, new_case(), False) == SEVERAL
+    assert on(verdict.sole_surface, new_case(**NOBODY_ELSE), False) == RUDDER
+    assert on(verdict.sole_surface, new_case(rudder=None, **NOBODY_ELSE), False) == NO_SURFACE
     only = new_case(aileron=COURSES, elevator=COURSES, flap=COURSES, rudder=(STUCK,))
-    assert on(verdict.sole, only, True) == RUDDER
-    assert on(verdict.sole, only, False) == SEVERAL
+    assert on(verdict.sole_surface, only, True) == RUDDER
+    assert on(verdict.sole_surface, only, False) == SEVERAL
     only["types"]["surface"]["status"]["is_candidate"] = 0, 0, 0, 1
-    assert on(verdict.sole, only, False) == FLAP
-    assert on(verdict.sole, only, True) == NO_SURFACE
+    assert on(verdict.sole_surface, only, False) == FLAP
+    assert on(verdict.sole_surface, only, True) == NO_SURFACE
 
 
 @pytest.mark.parametrize(
@@ -171,9 +181,9 @@ def test_the_sole_surface_that_is_possible():
 )
 def test_what_looks_like_a_jam_may_be_slow_until_it_has_stood_off_for_long(evidence, quiet, slow):
     fdi, surface = one(STUCK, SLOW, evidence=evidence, quiet=quiet)
-    assert bool(on(verdict.may_be_unseen, fdi, surface)) == slow
-    assert not on(verdict.may_be_unseen, *one(STUCK, evidence=evidence, quiet=quiet))
-    assert not on(verdict.may_be_unseen, *one(SLOW, evidence=evidence, quiet=quiet))
+    assert bool(on(verdict.may_hide_at_rest, fdi, surface)) == slow
+    assert not on(verdict.may_hide_at_rest, *one(STUCK, evidence=evidence, quiet=quiet))
+    assert not on(verdict.may_hide_at_rest, *one(SLOW, evidence=evidence, quiet=quiet))
 
 
 def looked_like_by(kind):
@@ -248,15 +258,17 @@ def test_what_a_stop_may_have_hidden_is_waited_for(kind):
 @pytest.mark.parametrize(
     ("kinds", "measure"),
     [
-        ((STUCK,), FIXED), ((UP,), FIXED), ((SLOW,), LAGS), ((OSCILLATORY,), SHIFTED),
-        ((SLOW, BIAS), SHIFTED),
-        ((CONSTANT_LOSS,), LOSES), ((VARYING_LOSS,), LOSES), ((CONSTANT_LOSS, BIAS), SHIFTED),
-        ((CONSTANT_LOSS, STUCK), SHIFTED), ((VARYING_LOSS, SLOW), LOSES), ((BIAS,), SHIFTED),
-        ((GROWING_BIAS,), SHIFTED), ((FLOAT, CONSTANT_LOSS), LOSES),
+        ((STUCK,), GIVE_UP), ((UP,), GIVE_UP), ((SLOW,), WAIT_FOR_SURFACE), ((OSCILLATORY,), SUBTRACT_OFFSET),
+        ((SLOW, BIAS), SUBTRACT_OFFSET),
+        ((CONSTANT_LOSS,), SCALE_COMMAND), ((VARYING_LOSS,), SCALE_COMMAND),
+        ((CONSTANT_LOSS, BIAS), SUBTRACT_OFFSET),
+        ((CONSTANT_LOSS, STUCK), SUBTRACT_OFFSET), ((VARYING_LOSS, SLOW), SCALE_COMMAND),
+        ((BIAS,), SUBTRACT_OFFSET),
+        ((GROWING_BIAS,), SUBTRACT_OFFSET), ((FLOAT, CONSTANT_LOSS), SCALE_COMMAND),
     ],
 )  # fmt: skip
 def test_what_is_done_about_a_surface(kinds, measure):
-    assert verdict.mode_for(one(*kinds)[1]) == measure
+    assert verdict.accommodation_mode(one(*kinds)[1]) == measure
 
 
 def test_the_surface_at_fault():
@@ -296,7 +308,7 @@ def test_of_elevator_and_flap_the_one_a_constant_explains(flap, evidence, own_er
 
 def conclude(fdi, kernel, *given, lead=()):
     """Hand a finding of the types to the conclusion."""
-    conclusion.note_type(fdi["verdict"], (*on(kernel, fdi, *given), *lead))
+    conclusion.record_finding(fdi["verdict"], (*on(kernel, fdi, *given), *lead))
 
 
 def take_lead(fdi, kernel, *given):
@@ -307,18 +319,18 @@ def take_lead(fdi, kernel, *given):
 def test_a_decision_notes_when_surface_and_type_became_certain():
     fdi = new_case(rudder=(STUCK,), **NOBODY_ELSE)
     fdi["verdict"]["isolated"], fdi["verdict"]["type"] = NOT_ISOLATED, -1
-    conclude(fdi, verdict.decide, 3.0)
+    conclude(fdi, verdict.decide_surface_and_type, 3.0)
     assert fdi["verdict"]["isolated"] == 4 + RUDDER  # its estimator of a position
     assert fdi["verdict"]["type"] == STUCK
     assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_at_s"]) == (3.0, 3.0)
     leave(fdi["types"]["surface"][RUDDER], VARYING_LOSS)
-    conclude(fdi, verdict.decide, 4.0)
+    conclude(fdi, verdict.decide_surface_and_type, 4.0)
     assert fdi["verdict"]["isolated"] == RUDDER  # its estimator of a loss
     assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_at_s"]) == (3.0, 4.0)
-    conclude(fdi, verdict.decide, 5.0)
+    conclude(fdi, verdict.decide_surface_and_type, 5.0)
     assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_at_s"]) == (3.0, 4.0)
     fdi["types"]["surface"]["refuted"][RUDDER] = 1
-    conclude(fdi, verdict.decide, 6.0)
+    conclude(fdi, verdict.decide_surface_and_type, 6.0)
     assert fdi["verdict"]["isolated"] == UNANTICIPATED
     assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_at_s"]) == (6.0, 6.0)
     assert fdi["verdict"]["type"] == -1
@@ -328,12 +340,12 @@ def test_a_decision_notes_when_surface_and_type_became_certain():
 def test_the_law_acts_on_the_likeliest_before_all_doubt_is_gone():
     fdi = new_case(**NOBODY_ELSE)
     fdi["verdict"]["isolated"] = NOT_ISOLATED
-    assert on(verdict.presumed, fdi, fdi["verdict"]["isolated"]) == RUDDER
-    assert on(verdict.presumed, _open(new_case()), NOT_ISOLATED) == ELEVATOR
-    assert on(verdict.presumed, _open(new_case(elevator=None)), NOT_ISOLATED) == FLAP
-    assert on(verdict.presumed, _open(new_case(elevator=None, flap=None)), NOT_ISOLATED) == NO_SURFACE
+    assert on(verdict.presumed_surface, fdi, fdi["verdict"]["isolated"]) == RUDDER
+    assert on(verdict.presumed_surface, _open(new_case()), NOT_ISOLATED) == ELEVATOR
+    assert on(verdict.presumed_surface, _open(new_case(elevator=None)), NOT_ISOLATED) == FLAP
+    assert on(verdict.presumed_surface, _open(new_case(elevator=None, flap=None)), NOT_ISOLATED) == NO_SURFACE
     fdi["verdict"]["isolated"] = 4 + FLAP
-    assert on(verdict.presumed, fdi, fdi["verdict"]["isolated"]) == FLAP
+    assert on(verdict.presumed_surface, fdi, fdi["verdict"]["isolated"]) == FLAP
 
 
 def _open(fdi):
@@ -351,21 +363,21 @@ def test_the_lead_is_taken_on_one_surface_while_its_fault_shows():
     )
     surface["elapsed"]["low"], surface["elapsed"]["high"] = 0.1, 0.2
     fdi["types"]["surface"]["accommodation"]["mode"] = 3
-    take_lead(fdi, verdict.take_the_lead, fdi["verdict"]["isolated"])
-    assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (RUDDER, FIXED)
-    assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [-1, -1, FIXED, -1]
+    take_lead(fdi, verdict.choose_lead, fdi["verdict"]["isolated"])
+    assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (RUDDER, GIVE_UP)
+    assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [-1, -1, GIVE_UP, -1]
     surface["elapsed"]["low"], surface["elapsed"]["high"] = 0.25, 0.35  # it follows its command again
     fdi["types"]["config"]["dt"] = 0.01
     for _ in range(19):
-        take_lead(fdi, verdict.take_the_lead, fdi["verdict"]["isolated"])
+        take_lead(fdi, verdict.choose_lead, fdi["verdict"]["isolated"])
     assert fdi["verdict"]["lead"] == RUDDER
-    take_lead(fdi, verdict.take_the_lead, fdi["verdict"]["isolated"])
+    take_lead(fdi, verdict.choose_lead, fdi["verdict"]["isolated"])
     assert fdi["verdict"]["lead"] == NO_SURFACE
     assert surface["accommodation"]["mode"] == -1
     surface["elapsed"]["low"] = 0.1
-    take_lead(fdi, verdict.take_the_lead, fdi["verdict"]["isolated"])
+    take_lead(fdi, verdict.choose_lead, fdi["verdict"]["isolated"])
     assert (surface["accommodation"]["absent"], fdi["verdict"]["lead"]) == (0, RUDDER)
-    assert on(verdict.still_there, fdi, surface, LOSES, True)
+    assert on(verdict.fault_is_present, fdi, surface, SCALE_COMMAND, True)
 
 
 @pytest.mark.parametrize("dt", [0.01, 0.002, 0.05])
@@ -373,7 +385,7 @@ def test_a_fault_that_has_gone_is_let_go_after_a_fifth_of_a_second_at_any_rate(d
     fdi, surface = one(STUCK, command=0.3, low=0.29, high=0.31, absent=0)
     fdi["types"]["config"]["dt"] = dt
     surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK] = 0.1, 0.2
-    there = [bool(on(verdict.still_there, fdi, surface, FIXED, True)) for _ in range(round(0.3 / dt))]
+    there = [bool(on(verdict.fault_is_present, fdi, surface, GIVE_UP, True)) for _ in range(round(0.3 / dt))]
     assert there.index(False) + 1 == round(0.2 / dt)
     assert not any(there[there.index(False) :])
 
@@ -416,7 +428,7 @@ def test_orders_are_kept_for_the_frames_before():
             fdi["types"]["config"]["length"], fdi["types"]["block"]["filled"] = 2, k
             means["G_least"], means["G_most"] = -1.0 - order, 2.0 - k
             means["u_least"], means["u_most"] = order - 0.01, order + 0.02
-            on(examine.note_orders, fdi, np.full(4, order), means)
+            on(examine.record_commands, fdi, np.full(4, order), means)
     orders = fdi["types"]["surface"][0]["orders"]
     assert orders["given"][:, :2] == pytest.approx(
         np.array([[0.5, 0.0], [0.3, -0.1], [0.1, 0.2]])
@@ -473,7 +485,7 @@ def test_a_surface_is_where_the_innovation_puts_it():
 def test_wrong_frames_are_remembered_for_two_more():
     fdi, bound = new_case(), np.full(3, 0.1)
     for innovation in (0.2, 0.05, 0.2):
-        on(examine.take_in, fdi, np.array([0.0, innovation, 0.0]), bound)
+        on(examine.observe_frame, fdi, np.array([0.0, innovation, 0.0]), bound)
     assert fdi["types"]["surface"]["elapsed"]["wrong"].tolist() == [1] * 4
     assert fdi["types"]["surface"]["judged"]["wrong"].tolist() == [0] * 4
     assert fdi["types"]["surface"]["earlier"]["wrong"].tolist() == [1] * 4
@@ -490,11 +502,11 @@ def test_a_frame_next_to_a_healthy_one_is_judged_only_if_faults_begin_between_fr
     fdi = new_case()
     fdi["types"]["config"]["whole"], fdi["types"]["frame"] = whole, 7
     surface = fdi["types"]["surface"][RUDDER]
-    examine.begin(surface)
+    examine.restart_surface(surface)
     surface["evidence"]["frames"], surface["accommodation"]["mode"] = 5, -1
     surface["earlier"]["wrong"], surface["judged"]["wrong"], surface["elapsed"]["wrong"] = wrong
     surface["judged"]["low"], surface["judged"]["high"] = 0.1, 0.2
-    on(examine.judge_all, fdi)
+    on(examine.judge_frame, fdi)
     assert surface["evidence"]["frames"] == (6 if judged else 5)
     assert surface["evidence"]["started_at"] == (6 if judged else -1)
     assert (surface["evidence"]["start_low"], surface["evidence"]["start_high"]) == (
@@ -507,12 +519,12 @@ def test_a_frame_next_to_a_healthy_one_is_judged_only_if_faults_begin_between_fr
 def test_evidence_counts_for_a_swing_since_a_stop_could_last_hide_one():
     fdi = new_case()
     surface = fdi["types"]["surface"][RUDDER]
-    examine.begin(surface)
+    examine.restart_surface(surface)
     counted = []
     for hides in ((0, 0), (0, 0), (0, 1), (0, 0), (1, 0), (0, 0), (0, 0), (0, 0)):
         surface["judged"]["wrong"], surface["judged"]["hides"] = 1, hides
         surface["judged"]["low"], surface["judged"]["high"] = 0.1, 0.2
-        on(examine.judge_all, fdi)
+        on(examine.judge_frame, fdi)
         counted.append(int(surface["evidence"]["unhidden"]))
     assert counted == [1, 2, 0, 1, 0, 1, 2, 3]
     assert surface["evidence"]["frames"] == 8
@@ -532,9 +544,9 @@ def test_where_a_stop_is_follows_the_surface_by_a_frame():
 def test_a_frame_that_puts_a_surface_nowhere_judges_nothing():
     fdi = new_case()
     surface = fdi["types"]["surface"][RUDDER]
-    examine.begin(surface)
+    examine.restart_surface(surface)
     surface["judged"]["low"], surface["judged"]["high"] = 0.2, 0.1
-    on(examine.judge, fdi, surface, 6)
+    on(examine.judge_surface, fdi, surface, 6)
     assert surface["evidence"]["started_at"] == -1
 
 
@@ -546,7 +558,7 @@ def quiet(low=0.1, high=0.2, frames=1, **fields):
     fdi["types"]["surface"]["evidence"]["frames"] = 0
     put(fdi, **fields)
     for _ in range(frames):
-        on(examine.note_quiet, fdi, RUDDER)
+        on(examine.count_rest, fdi, RUDDER)
     return fdi, surface
 
 
@@ -561,7 +573,7 @@ def test_a_quiet_surface_given_up_does_not_swing():
     assert not quiet(frames=PATIENCE + 1, own_errors=1)[1]["feasible"]["excluded"][OSCILLATORY]
     fdi, surface = quiet()
     fdi["types"]["surface"]["status"]["is_candidate"] = 1, 1, 0, 1
-    on(examine.note_quiet, fdi, RUDDER)
+    on(examine.count_rest, fdi, RUDDER)
     assert fdi["types"]["surface"]["evidence"]["frames"].tolist() == [
         1,
         1,
@@ -582,8 +594,8 @@ def test_a_surface_given_up_is_quiet_where_nothing_is_wrong_and_a_fault_stays(ab
         1.0,
         abrupt,
     )
-    fdi["types"]["surface"][RUDDER]["accommodation"]["mode"] = FIXED
-    on(examine.judge_all, fdi)
+    fdi["types"]["surface"][RUDDER]["accommodation"]["mode"] = GIVE_UP
+    on(examine.judge_frame, fdi)
     assert fdi["types"]["surface"]["evidence"]["quiet"].tolist() == [0, 0, abrupt, 0]
 
 
@@ -621,7 +633,7 @@ def test_alarms_are_noted_by_plane():
     for axis, planes in ((ROLL, [0, 1]), (PITCH, [1, 0]), (YAW, [0, 1])):
         fdi = new_case()
         fdi["bank"]["output"]["threshold"], fdi["bank"]["output"]["residual"][2, axis] = 0.1, -0.11
-        on(pairs.note_alarms, fdi)
+        on(pairs.record_plane_alarms, fdi)
         assert fdi["types"]["pair"]["alarmed"].tolist() == planes
 
 
@@ -668,7 +680,7 @@ def test_where_nothing_explains_both_the_fault_is_outside_the_class():
 def test_a_name_notes_when_it_was_given_and_when_its_type():
     surface = new_case()["types"]["surface"][RUDDER]
     surface["status"]["type"] = -1
-    pairs.name(surface, 1, STUCK, 3.0)
+    pairs.set_named(surface, 1, STUCK, 3.0)
     assert (
         surface["status"]["named"],
         surface["status"]["type"],
@@ -680,11 +692,11 @@ def test_a_name_notes_when_it_was_given_and_when_its_type():
         3.0,
         3.0,
     )
-    pairs.name(surface, 1, BIAS, 4.0)
+    pairs.set_named(surface, 1, BIAS, 4.0)
     assert (surface["status"]["named_at_s"], surface["status"]["type_at_s"]) == (3.0, 4.0)
-    pairs.name(surface, 1, BIAS, 5.0)
+    pairs.set_named(surface, 1, BIAS, 5.0)
     assert surface["status"]["type_at_s"] == 4.0
-    pairs.name(surface, 0, BIAS, 6.0)
+    pairs.set_named(surface, 0, BIAS, 6.0)
     assert (surface["status"]["named"], surface["status"]["type"], surface["status"]["type_at_s"]) == (
         0,
         -1,
@@ -695,32 +707,32 @@ def test_a_name_notes_when_it_was_given_and_when_its_type():
 def test_a_surface_off_its_command_is_within_its_travel():
     surface = new_case()["types"]["surface"][RUDDER]
     surface["elapsed"]["command"] = 0.1
-    assert observation.place(surface, 0.2, 0.05)
+    assert contract.set_deflection(surface, 0.2, 0.05)
     assert (surface["elapsed"]["low"], surface["elapsed"]["high"], surface["elapsed"]["wrong"]) == (
         pytest.approx(0.25),
         pytest.approx(0.35),
         1,
     )
-    assert observation.place(surface, 0.4, 0.05)
+    assert contract.set_deflection(surface, 0.4, 0.05)
     assert surface["elapsed"]["high"] == 0.5
-    assert not observation.place(surface, 0.5, 0.05)
-    assert observation.place(surface, -0.49, 0.05)
+    assert not contract.set_deflection(surface, 0.5, 0.05)
+    assert contract.set_deflection(surface, -0.49, 0.05)
     assert surface["elapsed"]["low"] == -0.4
-    observation.place(surface, 0.04, 0.05)
+    contract.set_deflection(surface, 0.04, 0.05)
     assert surface["elapsed"]["wrong"] == 0
-    observation.place(surface, 0.05, 0.05)
+    contract.set_deflection(surface, 0.05, 0.05)
     assert surface["elapsed"]["wrong"] == 0
 
 
 def test_whereabouts_cover_every_constant_type_left():
     fdi, surface = one(STUCK, FLOAT, SLOW)
     surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK] = 0.1, 0.2
-    assert on(pairs.whereabouts, fdi, surface) == (0.0, 0.2)
+    assert on(pairs.deflection_range, fdi, surface) == (0.0, 0.2)
     leave(surface, BIAS)
     surface["feasible"]["low"][BIAS], surface["feasible"]["high"][BIAS] = -np.inf, 0.0
-    assert on(pairs.whereabouts, fdi, surface) == (-0.4, 0.0)
+    assert on(pairs.deflection_range, fdi, surface) == (-0.4, 0.0)
     surface["feasible"]["low"][BIAS], surface["feasible"]["high"][BIAS] = 0.1, np.inf
-    assert on(pairs.whereabouts, fdi, surface) == (0.1, 0.5)
+    assert on(pairs.deflection_range, fdi, surface) == (0.1, 0.5)
 
 
 def test_beside_the_first_pitch_fault_the_second_is_where_the_rest_puts_it():
@@ -776,16 +788,16 @@ def test_what_is_known_of_the_first_is_kept_once_it_has_settled():
     elevator = fdi["types"]["surface"][ELEVATOR]
     fdi["types"]["pair"]["first"] = NO_SURFACE
     elevator["feasible"]["low"][STUCK], elevator["feasible"]["high"][STUCK] = 0.1, 0.14
-    on(pairs.note_first, fdi, ELEVATOR)
+    on(pairs.store_first_fault, fdi, ELEVATOR)
     known = elevator["known"]
     assert fdi["types"]["pair"]["first"] == ELEVATOR
     assert (known["low"][STUCK], known["high"][STUCK]) == (0.1, 0.14)
     assert known["excluded"].tolist() == [kind != STUCK for kind in range(N_TYPES)]
     elevator["feasible"]["excluded"][STUCK], elevator["feasible"]["low"][STUCK] = 1, 0.12
     for k in range(PATIENCE - 1):
-        on(pairs.note_first, fdi, ELEVATOR)
+        on(pairs.store_first_fault, fdi, ELEVATOR)
         assert (known["low"][STUCK], fdi["types"]["pair"]["unsettled"]) == (0.1, k + 1)
-    on(pairs.note_first, fdi, ELEVATOR)
+    on(pairs.store_first_fault, fdi, ELEVATOR)
     assert (known["low"][STUCK], fdi["types"]["pair"]["unsettled"]) == (0.12, 0)
 
 
@@ -797,7 +809,7 @@ def test_a_second_begins_with_what_was_known_of_the_first():
     for frame in ("elapsed", "judged", "earlier"):
         fdi["types"]["surface"][frame]["wrong"] = 1
     assert on(pairs.two_in_pitch, fdi)
-    assert verdict.one_constant(elevator) == STUCK
+    assert verdict.sole_constant_type(elevator) == STUCK
     assert (elevator["feasible"]["low"][STUCK], elevator["feasible"]["high"][STUCK]) == (0.1, 0.14)
     assert not flap["feasible"]["excluded"].any()
     for surface in (elevator, flap):
@@ -826,7 +838,7 @@ def _first(fdi, surface):
     ],
 )  # fmt: skip
 def test_when_a_first_fault_in_pitch_is_known_well_enough(kinds, evidence, patient):
-    assert bool(on(pairs.patient, *one(*kinds, evidence=evidence, unhidden=evidence))) == patient
+    assert bool(on(pairs.has_waited, *one(*kinds, evidence=evidence, unhidden=evidence))) == patient
 
 
 def test_in_pitch_a_jam_stays_open_as_the_other_may_be_off_by_a_constant():
@@ -855,7 +867,7 @@ def decided(alarmed=(1, 0), **left):
 
 def test_one_fault_in_pitch_is_named_and_acted_upon():
     fdi = decided(elevator=(CONSTANT_LOSS,), flap=None)
-    conclude(fdi, pairs.decide, 3.0)
+    conclude(fdi, pairs.decide_pairs, 3.0)
     assert fdi["types"]["surface"]["status"]["named"].tolist() == [
         0,
         0,
@@ -863,31 +875,31 @@ def test_one_fault_in_pitch_is_named_and_acted_upon():
         0,
     ]  # ailerons and rudder might be it as well
     fdi = decided(elevator=(CONSTANT_LOSS,), flap=None, aileron=None, rudder=None)
-    conclude(fdi, pairs.decide, 3.0)
+    conclude(fdi, pairs.decide_pairs, 3.0)
     assert fdi["types"]["surface"]["status"]["named"].tolist() == [0, 1, 0, 0]
     assert fdi["verdict"]["isolated"] == ELEVATOR
     assert (fdi["verdict"]["type"], fdi["verdict"]["isolated_at_s"]) == (CONSTANT_LOSS, 3.0)
-    assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (ELEVATOR, LOSES)
-    assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [-1, LOSES, -1, -1]
+    assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (ELEVATOR, SCALE_COMMAND)
+    assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [-1, SCALE_COMMAND, -1, -1]
     assert fdi["types"]["pair"]["first"] == ELEVATOR
 
 
 def test_without_an_alarm_in_pitch_nobody_is_named_there():
     fdi = decided(alarmed=(0, 1), elevator=(CONSTANT_LOSS,), flap=None, aileron=None, rudder=None)
-    conclude(fdi, pairs.decide, 3.0)
+    conclude(fdi, pairs.decide_pairs, 3.0)
     assert not fdi["types"]["surface"]["status"]["named"][ELEVATOR]
-    assert not on(pairs.acted_upon, fdi, ELEVATOR)
+    assert not on(pairs.is_acted_upon, fdi, ELEVATOR)
 
 
 def test_the_likeliest_in_pitch_is_acted_upon_until_one_is_named():
     fdi = decided()
-    assert [bool(on(pairs.acted_upon, fdi, s)) for s in range(4)] == [False, True, False, False]
+    assert [bool(on(pairs.is_acted_upon, fdi, s)) for s in range(4)] == [False, True, False, False]
     only_flap = decided(aileron=None, rudder=None, elevator=COURSES)
-    assert [bool(on(pairs.acted_upon, only_flap, s)) for s in range(4)] == [False, False, False, True]
+    assert [bool(on(pairs.is_acted_upon, only_flap, s)) for s in range(4)] == [False, False, False, True]
     assert not on(pairs.named_in_pitch, fdi)
     fdi["types"]["surface"]["status"]["named"] = 1, 0, 0, 1
     assert on(pairs.named_in_pitch, fdi)
-    assert [bool(on(pairs.acted_upon, fdi, s)) for s in range(4)] == [True, False, False, True]
+    assert [bool(on(pairs.is_acted_upon, fdi, s)) for s in range(4)] == [True, False, False, True]
 
 
 def test_the_verdict_is_that_of_the_first_named():
@@ -897,15 +909,15 @@ def test_the_verdict_is_that_of_the_first_named():
         fdi["types"]["surface"]["status"]["type_at_s"][RUDDER],
         fdi["types"]["surface"]["status"]["named_at_s"][RUDDER],
     ) = 2.0, 1.5
-    conclude(fdi, pairs.summarise, RUDDER, False, 3.0, lead=(NO_SURFACE, -1))
+    conclude(fdi, pairs.summary_of, RUDDER, False, 3.0, lead=(NO_SURFACE, -1))
     found = fdi["verdict"]
     assert (found["isolated"], found["type"], found["type_at_s"]) == (4 + RUDDER, STUCK, 2.0)
     assert found["isolated_at_s"] == 1.5
-    conclude(fdi, pairs.summarise, NO_SURFACE, True, 4.0, lead=(NO_SURFACE, -1))
+    conclude(fdi, pairs.summary_of, NO_SURFACE, True, 4.0, lead=(NO_SURFACE, -1))
     assert (found["isolated"], found["type"], found["isolated_at_s"]) == (UNANTICIPATED, -1, 4.0)
-    conclude(fdi, pairs.summarise, NO_SURFACE, True, 5.0, lead=(NO_SURFACE, -1))
+    conclude(fdi, pairs.summary_of, NO_SURFACE, True, 5.0, lead=(NO_SURFACE, -1))
     assert found["isolated_at_s"] == 4.0
-    conclude(fdi, pairs.summarise, NO_SURFACE, False, 6.0, lead=(NO_SURFACE, -1))
+    conclude(fdi, pairs.summary_of, NO_SURFACE, False, 6.0, lead=(NO_SURFACE, -1))
     assert (found["isolated"], found["isolated_at_s"]) == (NOT_ISOLATED, 6.0)
 
 
@@ -920,38 +932,47 @@ def acted(**left):
 def test_the_law_acts_on_all_that_are_named_and_the_lead_is_the_first():
     fdi = acted(alarmed=(0, 1), aileron=(CONSTANT_LOSS,), rudder=(BIAS,), elevator=None, flap=None)
     fdi["types"]["surface"]["status"]["named"] = 1, 0, 1, 0
-    take_lead(fdi, pairs.act)
-    assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [LOSES, -1, SHIFTED, -1]
-    assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (AILERON, LOSES)
+    take_lead(fdi, pairs.choose_accommodation)
+    assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [
+        SCALE_COMMAND,
+        -1,
+        SUBTRACT_OFFSET,
+        -1,
+    ]
+    assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (AILERON, SCALE_COMMAND)
 
 
 @pytest.mark.parametrize(
     ("kinds", "measure", "lead"),
-    [((STUCK,), FIXED, ELEVATOR), ((CONSTANT_LOSS,), LOSES, ELEVATOR), ((BIAS,), SHIFTED, AILERON)],
+    [
+        ((STUCK,), GIVE_UP, ELEVATOR),
+        ((CONSTANT_LOSS,), SCALE_COMMAND, ELEVATOR),
+        ((BIAS,), SUBTRACT_OFFSET, AILERON),
+    ],
 )
 def test_an_elevator_that_is_replaced_comes_first(kinds, measure, lead):
     fdi = acted(aileron=(CONSTANT_LOSS,), elevator=kinds, rudder=None, flap=None)
     fdi["types"]["surface"]["status"]["named"] = 1, 1, 0, 0
-    take_lead(fdi, pairs.act)
-    assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [LOSES, measure, -1, -1]
+    take_lead(fdi, pairs.choose_accommodation)
+    assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [SCALE_COMMAND, measure, -1, -1]
     assert fdi["verdict"]["lead"] == lead
 
 
 def test_a_rudder_that_is_fixed_does_not_come_before_the_first():
     fdi = acted(aileron=(BIAS,), rudder=(STUCK,), elevator=None, flap=None)
     fdi["types"]["surface"]["status"]["named"] = 1, 0, 1, 0
-    take_lead(fdi, pairs.act)
-    assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (AILERON, SHIFTED)
+    take_lead(fdi, pairs.choose_accommodation)
+    assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (AILERON, SUBTRACT_OFFSET)
 
 
 def test_a_surface_acted_upon_that_cannot_be_at_fault_is_shifted_as_it_shows():
     fdi = acted(elevator=None, flap=None, aileron=None, rudder=None)
     leave(fdi["types"]["surface"][ELEVATOR], STUCK)
-    take_lead(fdi, pairs.act)
-    assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [-1, SHIFTED, -1, -1]
+    take_lead(fdi, pairs.choose_accommodation)
+    assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [-1, SUBTRACT_OFFSET, -1, -1]
     fdi["types"]["surface"]["status"]["named"][ELEVATOR] = 1
-    take_lead(fdi, pairs.act)
-    assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [-1, FIXED, -1, -1]
+    take_lead(fdi, pairs.choose_accommodation)
+    assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [-1, GIVE_UP, -1, -1]
     (
         fdi["types"]["surface"]["elapsed"]["low"],
         fdi["types"]["surface"]["elapsed"]["high"],
@@ -961,7 +982,7 @@ def test_a_surface_acted_upon_that_cannot_be_at_fault_is_shifted_as_it_shows():
         0.4,
         99,
     )
-    take_lead(fdi, pairs.act)
+    take_lead(fdi, pairs.choose_accommodation)
     assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [-1, -1, -1, -1]
     assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (NO_SURFACE, -1)
 
@@ -1019,7 +1040,7 @@ def test_the_first_named_is_the_one_the_verdict_is_about():
         (1, 0, 1, 0),
         (2.0, 0.0, 1.0, 0.0),
     )
-    conclude(fdi, pairs.decide, 3.0)
+    conclude(fdi, pairs.decide_pairs, 3.0)
     assert fdi["verdict"]["isolated_at_s"] == 1.0
     assert fdi["isolation"]["estimator"]["surface"][fdi["verdict"]["isolated"]] == RUDDER
 
@@ -1028,32 +1049,32 @@ def test_the_first_surface_and_its_first_estimator_are_not_nobody():
     fdi = new_case(elevator=None, rudder=None, flap=None, aileron=(CONSTANT_LOSS,))
     fdi["verdict"]["isolated"], fdi["verdict"]["type"] = NOT_ISOLATED, -1
     for t in (3.0, 4.0):
-        conclude(fdi, verdict.decide, t)
+        conclude(fdi, verdict.decide_surface_and_type, t)
         found = fdi["verdict"]
         assert (found["isolated"], found["type"], found["lead"]) == (AILERON, CONSTANT_LOSS, AILERON)
-        assert (found["isolated_at_s"], found["type_at_s"], found["lead_kind"]) == (3.0, 3.0, LOSES)
+        assert (found["isolated_at_s"], found["type_at_s"], found["lead_kind"]) == (3.0, 3.0, SCALE_COMMAND)
 
 
 def test_the_one_named_is_acted_upon_though_others_are_possible():
     fdi = new_case()
     fdi["verdict"]["isolated"] = 0  # the estimator of the aileron's loss
-    assert on(verdict.presumed, fdi, fdi["verdict"]["isolated"]) == AILERON
+    assert on(verdict.presumed_surface, fdi, fdi["verdict"]["isolated"]) == AILERON
     fdi["verdict"]["isolated"] = NOT_ISOLATED
-    assert on(verdict.presumed, fdi, fdi["verdict"]["isolated"]) == ELEVATOR
+    assert on(verdict.presumed_surface, fdi, fdi["verdict"]["isolated"]) == ELEVATOR
 
 
 def test_without_anybody_to_act_upon_there_is_no_lead():
     fdi = new_case(aileron=None, elevator=None, rudder=None, flap=None)
     fdi["verdict"]["isolated"] = UNANTICIPATED
     fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"] = 2, 2
-    take_lead(fdi, verdict.take_the_lead, fdi["verdict"]["isolated"])
+    take_lead(fdi, verdict.choose_lead, fdi["verdict"]["isolated"])
     assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (NO_SURFACE, -1)
     assert (fdi["types"]["surface"]["accommodation"]["mode"] == -1).all()
 
 
 def test_the_first_surface_is_named_where_a_constant_explains_it_alone():
     fdi = new_case(aileron=(CONSTANT_LOSS,), elevator=(VARYING_LOSS,), rudder=None, flap=None)
-    assert on(verdict.sole, fdi, False) == SEVERAL
+    assert on(verdict.sole_surface, fdi, False) == SEVERAL
     assert on(verdict.surface_at_fault, fdi) == AILERON
 
 
@@ -1067,7 +1088,7 @@ def test_of_two_faults_the_verdict_is_on_the_first_named(s, outside):
         4.0,
         3.0,
     )
-    conclude(fdi, pairs.summarise, s, outside, 5.0, lead=(NO_SURFACE, -1))
+    conclude(fdi, pairs.summary_of, s, outside, 5.0, lead=(NO_SURFACE, -1))
     found = fdi["verdict"]
     if s < 0:
         assert (found["isolated"], found["type"]) == (UNANTICIPATED if outside else NOT_ISOLATED, -1)

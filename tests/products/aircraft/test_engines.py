@@ -206,14 +206,14 @@ def judged(jet, missing_n, levers=(0.0, 0.0)):
     """Whether an alarm is raised where engines yaw as a thrust does that the left one does not give, by its
     place in JSBSim's own file."""
     aircraft, of_it = read(jet / "aircraft" / "737"), np.zeros(1, ENGINES)[0]
-    engine_symmetry.configure(of_it["config"], aircraft)
+    engine_symmetry.configure_engine_monitor(of_it["config"], aircraft)
     names, size = list(aircraft.signals), 11800.0 * aircraft.geometry.wing_area_m2  # N
     y = np.zeros(4 + len(names))
     y[4 + names.index("thrust")] = (60_000.0 - missing_n) / size
     y[4 + names.index("engines_n")] = -missing_n * 193.0 * M_PER_IN / (size * aircraft.geometry.span_m)
     of_it, before = of_it.view(np.recarray), of_it["config"].copy()
     engine_symmetry.disable_if_differential_thrust(of_it, np.array(levers))
-    alarmed = engine_symmetry.detect(of_it, 1e-6, y)
+    alarmed = engine_symmetry.detect_engine_failure(of_it, 1e-6, y)
     assert of_it["config"] == before
     assert of_it["output"]["failed"] == alarmed
     return alarmed

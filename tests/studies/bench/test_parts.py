@@ -26,14 +26,15 @@ def test_an_unknown_kernel_is_refused():
 
 
 def test_the_loops_own_kernels_are_left_as_they_were():
-    from beaver_ftc.diagnosis.isolation import estimators
 
-    before = stepping.fly_on, estimators.predict_all, compiled.kernel
+    from beaver_ftc.diagnosis import isolation
+
+    before = stepping.fly_on, isolation.predict_estimators, compiled.kernel
     frame_with(1)
-    from beaver_ftc.diagnosis.isolation import estimators as isolation_now
+    from beaver_ftc.diagnosis import isolation as isolation_now
     from beaver_ftc.loop import stepping as stepping_now
 
-    assert (stepping_now.fly_on, isolation_now.predict_all, compiled.kernel) == before
+    assert (stepping_now.fly_on, isolation_now.predict_estimators, compiled.kernel) == before
 
 
 def test_with_reading_alone_the_truth_is_read_and_nothing_else_happens():

@@ -10,7 +10,7 @@ from beaver_ftc.aircraft import load
 from beaver_ftc.design.context import DesignFunctions
 from beaver_ftc.design.model import inertia_coefficients, inertial
 from beaver_ftc.design.variants import design_of
-from beaver_ftc.diagnosis.bounds.clairvoyant import accelerations, healthy
+from beaver_ftc.diagnosis.informed_test import healthy_positions, term_accelerations
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
 from beaver_ftc.scenario.schema import Scenario
@@ -48,13 +48,15 @@ def test_terms_add_up_to_what_the_design_model_makes_of_a_surface_and_of_none():
     apart(deflection=deflection, **kept)
     x = np.column_stack([kept[f"{axis}_rad_s"] for axis in "pqr"])
     y = np.column_stack([kept[name] for name in ("alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", "dpt")])
-    found = sum(t.value * accelerations(AIRCRAFT, t, kept, None) for t in AIRCRAFT.moments if not t.surface)
+    found = sum(
+        t.value * term_accelerations(AIRCRAFT, t, kept, None) for t in AIRCRAFT.moments if not t.surface
+    )
     turning = inertial(inertia_coefficients(AIRCRAFT.mass), x)
     expected = [model.f(*each) for each in zip(x, y, strict=True)]
     assert found + turning == pytest.approx(np.array(expected), rel=1e-9)
     for s, surface in enumerate(AIRCRAFT.surfaces):
         of_it = [term for term in AIRCRAFT.moments if term.surface == surface]
-        found = sum(term.value * accelerations(AIRCRAFT, term, kept, deflection) for term in of_it)
+        found = sum(term.value * term_accelerations(AIRCRAFT, term, kept, deflection) for term in of_it)
         expected = [model.G(one)[:, s] * u for one, u in zip(y, deflection, strict=True)]
         assert found == pytest.approx(np.array(expected), rel=1e-9)
 
@@ -71,7 +73,7 @@ def test_a_healthy_surface_is_where_the_truth_has_it(lost):
         before = kept["t_s"] < until_s
         true = kept[f"{surface}_effective_rad"]
         step = context.declared.rate_limit_rad_s[0] * context.dt_s
-        assert np.abs(healthy(context, kept, surface) - true)[before].max() <= step
+        assert np.abs(healthy_positions(context, kept, surface) - true)[before].max() <= step
 
 
 def test_a_loss_of_what_stands_at_neutral_is_seen_by_nobody(lost):
@@ -118,4 +120,4 @@ def test_an_aircraft_with_signals_of_its_own_keeps_those():
     assert "dpt" not in kept
     for term in scenario.airframe.moments:
         moved = kept.get(f"{term.surface}_cmd_rad")
-        assert np.isfinite(accelerations(scenario.airframe, term, kept, moved)).all()
+        assert np.isfinite(term_accelerations(scenario.airframe, term, kept, moved)).all()

@@ -6,7 +6,7 @@ from statistics import NormalDist
 import numpy as np
 import pytest
 
-from beaver_ftc.diagnosis.bounds.clairvoyant import UNEXPLAINED_S, Whitening, chance
+from beaver_ftc.diagnosis.informed_test import UNEXPLAINED_S, Whitening, detection_probability
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.studies.compare.replay import Recorder, record
 from beaver_ftc.studies.power.survey import Block, Condition, deflections, loss, scenario_of, strikes_at_s
@@ -116,7 +116,7 @@ def test_chance_is_what_throwing_the_noise_counts():
     per_h, within_s, d = 36.0, 5.0, 2.0
     level = np.quantile(rng.normal(size=400_000), 1.0 - per_h * within_s / 3600.0)
     counted = np.mean(d + rng.normal(size=400_000) > level)
-    assert chance(d, within_s, per_h) == pytest.approx(counted, abs=0.01)
-    assert chance(0.0, within_s, per_h) == pytest.approx(per_h * within_s / 3600.0)
-    assert chance(5.0, within_s, 0.0) == 0.0
-    assert chance(NormalDist().inv_cdf(1.0 - 0.05), within_s, per_h) == pytest.approx(0.5)
+    assert detection_probability(d, within_s, per_h) == pytest.approx(counted, abs=0.01)
+    assert detection_probability(0.0, within_s, per_h) == pytest.approx(per_h * within_s / 3600.0)
+    assert detection_probability(5.0, within_s, 0.0) == 0.0
+    assert detection_probability(NormalDist().inv_cdf(1.0 - 0.05), within_s, per_h) == pytest.approx(0.5)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from beaver_ftc.cli.main import app
-from beaver_ftc.diagnosis.bounds.clairvoyant import chance
+from beaver_ftc.diagnosis.informed_test import detection_probability
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.compare.replay import Trace, record
 from beaver_ftc.studies.power.probabilities import document_of, level_at, level_for, limit, rows_of, summary
@@ -183,7 +183,7 @@ class TestCounts:
         far = watched(2, a=0.1)
         far.deflections = [[100.0] * 3]
         found = limit(rows_of([watched(1, a=0.7, b=0.7), far], levels), 36.0)
-        assert found["1"] == pytest.approx(0.5 * chance(2.0, 1.0, 36.0) + 0.5)
+        assert found["1"] == pytest.approx(0.5 * detection_probability(2.0, 1.0, 36.0) + 0.5)
 
     def test_flights_of_a_seed_count_once(self):
         """Each of nine seeds brings two flights that both schemes share: nine throws of a coin, not 18."""

@@ -3,20 +3,20 @@
 import numpy as np
 
 from beaver_ftc.aircraft import aircraft
-from beaver_ftc.diagnosis.bounds import admitted, worst_case
+from beaver_ftc.diagnosis import bounds
 from beaver_ftc.diagnosis.detection import likelihood, noise_model, statistical, tones
-from beaver_ftc.diagnosis.monitors import redundancy, sensor_records
+from beaver_ftc.diagnosis.monitors import redundancy
 from beaver_ftc.plant import instruments
 from beaver_ftc.scenario.diagnosis import Bounds, FdiConfig, Statistical
 from beaver_ftc.studies.present.tables import markdown_table
 
 CONSTANTS = (  # (section, meaning, module, name there, unit)
     (2, "rate of the Earth", aircraft, "EARTH_RATE_RAD_S", "rad/s"),
-    (2, "allowance for rounding", worst_case, "ROUNDING_RAD_S2", "rad/s2"),
+    (2, "allowance for rounding", bounds, "ROUNDING_RAD_S2", "rad/s2"),
     (2, "limit of instrument noise, in standard deviations", instruments, "NOISE_LIMIT_SIGMA", ""),
-    (2, "limit of gusts, in standard deviations", admitted, "GUST_LIMIT_SIGMA", ""),
-    (2, "bound where the error of a derived model was not measured", worst_case, "UNKNOWN_RAD_S2", "rad/s2"),
-    (3, "delays for which poles are chosen", admitted, "DELAYS_S", "s"),
+    (2, "limit of gusts, in standard deviations", bounds, "GUST_LIMIT_SIGMA", ""),
+    (2, "bound where the error of a derived model was not measured", bounds, "UNKNOWN_RAD_S2", "rad/s2"),
+    (3, "delays for which poles are chosen", bounds, "DESIGN_DELAYS_S", "s"),
     (7, "number of onsets that are tested together", likelihood, "N_SLOTS", ""),
     (7, "sum of the magnitudes of a transient over its sum", likelihood, "RINGING", ""),
     (7, "share of the level reserved for noise", noise_model, "CHANCE", ""),
@@ -25,10 +25,16 @@ CONSTANTS = (  # (section, meaning, module, name there, unit)
     (7, "number of frequencies of the oscillation tests", tones, "N_TONES", ""),
     (7, "range of these frequencies", tones, "FREQUENCIES_RAD_S", "rad/s"),
     (7, "memory of the oscillation tests", tones, "MEMORY_S", "s"),
-    (9, "poles of the filters", sensor_records, "POLES_PER_S", "1/s"),
-    (9, "rotation and curvature of the Earth", redundancy, "TURNING_RAD_S", "rad/s"),
-    (9, "Coriolis and centrifugal acceleration, change of gravity", redundancy, "FALLING_M_S2", "m/s2"),
-    (9, "height in which density falls by a factor e", redundancy, "DENSITY_HEIGHT_M", "m"),
+    (9, "poles of the filters", redundancy, "POLES_PER_S", "1/s"),
+    (9, "rotation and curvature of the Earth", redundancy, "EARTH_TURN_RAD_S", "rad/s"),
+    (
+        9,
+        "Coriolis and centrifugal acceleration, change of gravity",
+        redundancy,
+        "EARTH_ACCELERATION_M_S2",
+        "m/s2",
+    ),
+    (9, "height in which density falls by a factor e", redundancy, "DENSITY_SCALE_HEIGHT_M", "m"),
     (9, "largest pitch attitude of the attitude tests", redundancy, "STEEPEST_RAD", "rad"),
 )
 SETTINGS = (  # (section, meaning, key of a scenario, of which section of it, unit)

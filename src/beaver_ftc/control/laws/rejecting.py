@@ -37,7 +37,7 @@ from beaver_ftc.control.laws.gains import N_LOOPS, N_POINTS, configure
 from beaver_ftc.control.reference import advance
 from beaver_ftc.design.model import QDYN
 from beaver_ftc.diagnosis.state import PITCH
-from beaver_ftc.diagnosis.types.contract import FIXED
+from beaver_ftc.diagnosis.types.contract import GIVE_UP
 
 STAND_IN = 3  # the loop of pitch by the surface that stands in
 PATIENCE_S, LONG_PATIENCE_S, RETRY_S = 0.5, 1.0, 20.0
@@ -97,7 +97,7 @@ def accommodate(control, assessment, faults, belief, measured):
         start = start_of(surfaces.output, assessment, s, False)
         if assessment.unknown and memory.estimator.active:
             target = effectiveness_of(memory.estimator, s)
-        elif assessment.measure[s] != FIXED:
+        elif assessment.measure[s] != GIVE_UP:
             target = clamp_to_observer_estimate(memory.sums, layout, s, target, least)
         named = assessment.detected and s == assessment.named
         suspected = named and is_doubtful(assessment, memory.sums, layout, s, target, least)

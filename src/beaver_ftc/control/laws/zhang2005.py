@@ -22,7 +22,12 @@ from beaver_ftc.control.accommodation import approach, begin_frame
 from beaver_ftc.control.base import CompiledLaw
 from beaver_ftc.control.laws import published
 from beaver_ftc.control.laws.published import FEEDBACK
-from beaver_ftc.diagnosis.zhang2005 import NETWORK, configure_network, evaluate, learn
+from beaver_ftc.diagnosis.schemes.published import (
+    STATE_NETWORK,
+    configure_network,
+    evaluate_state_network,
+    train_state_network,
+)
 from beaver_ftc.plugins import LAWS, settings
 from beaver_ftc.scenario.schema import Scenario
 
@@ -35,7 +40,7 @@ MEMORY = record(signal=3)  # -s, rad/s, that both parts learn from
 @sized
 def zhang2005_dtype(n: int) -> np.dtype:
     """The law's records: its own, and those of the feedback and of the network, the second part."""
-    return record(config=CONFIG, memory=MEMORY, feedback=FEEDBACK, network=NETWORK)
+    return record(config=CONFIG, memory=MEMORY, feedback=FEEDBACK, network=STATE_NETWORK)
 
 
 def configure(law: np.void, control: np.void, belief: np.void, scenario: Scenario, y: np.ndarray) -> None:
@@ -67,7 +72,7 @@ def accommodate(control, assessment, faults, belief, measured):
         saturated, reference = control.allocation.output.saturated, control.reference
         error = reference.output.governed_rate - x
         adapt(law, surfaces, main, saturated, error, belief.G, belief.u, reference.config.dt)
-    evaluate(law.network, main, x, measured.y, belief.u)
+    evaluate_state_network(law.network, main, x, measured.y, belief.u)
 
 
 @kernel
@@ -89,7 +94,7 @@ def adapt(law, surfaces, main, saturated, error, G, u, dt):
         estimate = min(max(moved, config.least), config.most)
         approach(surfaces, s, estimate, estimate, False)
     if config.networks:
-        learn(law.network, signal, dt)
+        train_state_network(law.network, signal, dt)
 
 
 @apart

@@ -23,17 +23,17 @@ from beaver_ftc.aircraft.schema import MAX_SURFACES, MAX_TERMS_OF_ONE, SIDESLIP_
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.engine import slipstream_slopes
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, DPT, N_Y, QDYN, evaluate
-from beaver_ftc.diagnosis.belief.air import stop_accelerometers, stop_gust_filter
-from beaver_ftc.diagnosis.monitors.redundancy import FALLING_M_S2
+from beaver_ftc.diagnosis.gusts import stop_accelerometers, stop_gust_filter
+from beaver_ftc.diagnosis.monitors.redundancy import EARTH_ACCELERATION_M_S2
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
 from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
 from beaver_ftc.scenario.sensors import ACCELEROMETERS
 
-ASIDE, UP = range(2)  # across the body, and normal to it
+SIDE, NORMAL = range(2)  # across the body, and normal to it
 COMPONENTS = ("CY", "CZ")
 CY = FORCES.index("CY")
 TYPICAL_RATE_RAD_S, TYPICAL_SLOPE_RAD = 0.2, 0.3  # typical rates and path slope, for the drift
-SETTLED = 2  # updates: from the second one on the rate of sideslip of the run before is known
+SETTLED_UPDATES = 2  # updates: from the second one on the rate of sideslip of the run before is known
 MODEL_LAG_S = 0.002  # time between force and flow of one instant in JSBSim, at most; 0.001 was measured
 DRIFT_CHANGE_SHARE = 0.3  # share of a drift that may change within a second
 RATE_TOLERANCE = {False: 0.05, True: 0.2}  # of the term in the rate of sideslip: gusts have a part in it
@@ -57,7 +57,7 @@ FORCE = record(
     accelerometer_variance=float,  # of e, by noise of the accelerometer; independent of the pressure
     n=int, tolerance=MAX_ERRORS, regressor=MAX_ERRORS,
 )  # fmt: skip
-FORCES_FELT = record(
+MEASURED_FORCES = record(
     known=int, per_m=float, gravity=float, span=float,  # whether forces are used; one over the chord; m/s2; m
     pressure=float, pressure_noise=float,  # Pa: in trim, and noise of its reading
     strength=float,  # dynamic pressure over that in trim: forces scale with it
@@ -69,26 +69,26 @@ FORCES_FELT = record(
 
 
 @kernel
-def update(forces, air, measured, u, dt):
+def update_forces(forces, air, measured, u, dt):
     """Update the innovations of the forces at this instant, dt s after the last; u (n,) rad: surfaces.
 
     At the first instant the rate of sideslip of the run before is not known; that of this instant is used.
     """
     if forces.n_updates == 0:
-        flow_rates(forces, measured)
+        fill_flow_rates(forces, measured)
     evaluate(air.memory.force_table, measured.x, measured.y)
     forces.strength = measured.y[QDYN] / forces.pressure
     for f in range(2):
         before = forces.component[f].model
-        update_component(forces, air, f, measured, u)
-        fill_unsettled(forces.component[f], before, forces.n_updates, dt)
-        integrate_angle(forces, forces.component[f], f, measured.y, dt)
-    flow_rates(forces, measured)
-    forces.n_updates = min(forces.n_updates + 1, SETTLED)
+        update_force(forces, air, f, measured, u)
+        fill_lag_error(forces.component[f], before, forces.n_updates, dt)
+        integrate_flow_angle(forces, forces.component[f], f, measured.y, dt)
+    fill_flow_rates(forces, measured)
+    forces.n_updates = min(forces.n_updates + 1, SETTLED_UPDATES)
 
 
 @kernel
-def fill_unsettled(force, before, begun, dt):
+def fill_lag_error(force, before, begun, dt):
     """Fill `unsettled` from the change of the model's e since `before`: force and flow differ in time."""
     force.unsettled = MODEL_LAG_S * abs(force.model - before) / dt if begun else 0.0
 
@@ -101,7 +101,7 @@ def fill_readings_without_vanes(forces, rotation, y):
     """
     forces.y[:] = y
     for f in range(2):
-        force, place, damped = forces.component[f], BETA if f == ASIDE else ALPHA, 0.0
+        force, place, damped = forces.component[f], BETA if f == SIDE else ALPHA, 0.0
         for k in range(3):
             damped += force.damping[k] * rotation[k]
         forces.y[place] -= (force.innovation / forces.strength + damped) / force.vane[1]
@@ -116,16 +116,16 @@ def stop_forces(forces, air, inertial_air):
 
 
 @kernel
-def integrate_angle(forces, force, f, y, dt):
+def integrate_flow_angle(forces, force, f, y, dt):
     """Integrate the flow angle of a vane from inertial motion, and fill the force's innovation at it."""
-    reading, slope = y[BETA if f == ASIDE else ALPHA], force.vane[1] * forces.strength
+    reading, slope = y[BETA if f == SIDE else ALPHA], force.vane[1] * forces.strength
     force.angle = force.angle + dt * forces.rate[f] if forces.n_updates else reading
     force.angle_sensitivity += dt * slope
     force.inertial = force.innovation - slope * (reading - force.angle)
 
 
 @kernel
-def update_component(forces, air, f, measured, u):
+def update_force(forces, air, f, measured, u):
     """Update one force: its innovation e, the effects of surfaces, and the regressors of its errors."""
     table, force = air.memory.force_table, forces.component[f]
     first, last = table.free_from[CY + f], table.surface_to[CY + f]
@@ -140,11 +140,11 @@ def update_component(forces, air, f, measured, u):
             of_one *= u[s]
         force.regressor[k - first] = of_one
         whole += table.value[k] * of_one
-    if f == ASIDE:
+    if f == SIDE:
         turning = (
             scale
             * forces.sideslip_rate_coefficient
-            * forces.rate[ASIDE]
+            * forces.rate[SIDE]
             * forces.span
             / (2.0 * measured.y[AIRSPEED])
         )
@@ -166,7 +166,7 @@ def update_component(forces, air, f, measured, u):
 
 
 @kernel
-def flow_rates(forces, measured):
+def fill_flow_rates(forces, measured):
     """Fill `rate` with d beta / dt and d alpha / dt in still air, rad/s.
 
     They follow from accelerometers, rates, attitude and flow.
@@ -181,17 +181,17 @@ def flow_rates(forces, measured):
     fall = a[2] + gravity * np.cos(theta) * np.cos(phi)
     faster = ahead * pull + right * push + down * fall
     sideways = push + V * (x[0] * down - x[2] * ahead)
-    forces.rate[ASIDE] = (sideways - faster * right) / (V * np.cos(beta))
+    forces.rate[SIDE] = (sideways - faster * right) / (V * np.cos(beta))
     forwards, downwards = pull + V * (x[2] * right - x[1] * down), fall + V * (x[1] * ahead - x[0] * right)
-    forces.rate[UP] = (downwards * np.cos(alpha) - forwards * np.sin(alpha)) / (V * np.cos(beta))
+    forces.rate[NORMAL] = (downwards * np.cos(alpha) - forwards * np.sin(alpha)) / (V * np.cos(beta))
 
 
-def terms_of(aircraft: Aircraft, f: int) -> list[Term]:
-    """The terms of one direction, as `look` goes through them."""
+def force_terms(aircraft: Aircraft, f: int) -> list[Term]:
+    """The terms of one direction, as `update_force` goes through them."""
     return [term for term in aircraft.measurable_forces if term.coefficient == COMPONENTS[f]]
 
 
-def set_up_forces(fdi: np.void, declared: Declared, trim: Trim, along_y: np.ndarray, dt_s: float) -> None:
+def configure_forces(fdi: np.void, declared: Declared, trim: Trim, along_y: np.ndarray, dt_s: float) -> None:
     """Fill the record of forces that are `known` from what is declared.
 
     along_y (3, y.size): the slopes of the angular accelerations with y. dt_s: of a frame.
@@ -206,8 +206,8 @@ def set_up_forces(fdi: np.void, declared: Declared, trim: Trim, along_y: np.ndar
     errors = sensors.each("random", ("alpha", "beta", "V", *AXES))
     by_airspeed, by_others = _slipstream_noise(y, fdi["bound"]["admitted"], sensors)
     for f, (vane, axis) in enumerate(((BETA, 2), (ALPHA, 1))):
-        force, terms = forces["component"][f], terms_of(aircraft, f)
-        every = scale * _slopes(aircraft, COMPONENTS[f], trim)
+        force, terms = forces["component"][f], force_terms(aircraft, f)
+        every = scale * _coefficient_slopes(aircraft, COMPONENTS[f], trim)
         slopes, slipstream = every[:-1], every[-1]
         force["vane"], force["vane_roll"] = (-along_y[axis, vane], -slopes[vane]), -along_y[0, vane]
         force["damping"] = slopes[3:]
@@ -218,10 +218,10 @@ def set_up_forces(fdi: np.void, declared: Declared, trim: Trim, along_y: np.ndar
         force["trim_variance"] = quiet, quiet - parts[vane]
         noise = sensors[ACCELEROMETERS[1 + f]].random
         force["accelerometer_variance"] = (forces["per_m"] * noise) ** 2
-        _set_up_tolerances(force, declared, terms, y, slopes[vane] / scale, f, forces["per_m"])
+        _configure_force_tolerances(force, declared, terms, y, slopes[vane] / scale, f, forces["per_m"])
         turned = scale * sum(abs(term.value) for term in terms if term.surface)
         force["deflection"] = turned * declared.actuators.deflection_rad
-        force["drift"] = _drift(sensors, air["config"]["gravity"], y[AIRSPEED], f)
+        force["drift"] = _angle_drift(sensors, air["config"]["gravity"], y[AIRSPEED], f)
         wander = (DRIFT_CHANGE_SHARE * force["drift"]) ** 2 + dt_s * (noise / y[AIRSPEED]) ** 2
         force["wander"] = slopes[vane] ** 2 * (wander + declared.air.angle_walk(y[AIRSPEED]))
 
@@ -235,7 +235,7 @@ def _slipstream_noise(y: np.ndarray, admitted: np.void, declared: SensorErrors) 
     return by_airspeed, float((by_pressure * declared["qdyn"].random) ** 2 + (per_kw * power_kw) ** 2)
 
 
-def _drift(errors: SensorErrors, gravity: float, airspeed_mps: float, f: int) -> float:
+def _angle_drift(errors: SensorErrors, gravity: float, airspeed_mps: float, f: int) -> float:
     """How fast the angle that is followed can drift, rad/s. Gravity acts along the path's slope only on the
     incidence, and in full on sideslip."""
     tilt = errors["phi"].steady + errors["theta"].steady
@@ -243,32 +243,34 @@ def _drift(errors: SensorErrors, gravity: float, airspeed_mps: float, f: int) ->
     # how far accelerometers can be off across the flow in level flight: that of the axis, and of the one
     # ahead as much as the flow's angle lets it
     own = errors[ACCELEROMETERS[1 + f]]
-    misfelt = own.steady + TYPICAL_SLOPE_RAD * errors["ax"].steady + gravity * (own.slope if f == UP else 0.0)
-    falls = gravity * tilt * (TYPICAL_SLOPE_RAD if f == UP else 1.0) + FALLING_M_S2 + misfelt
+    misfelt = (
+        own.steady + TYPICAL_SLOPE_RAD * errors["ax"].steady + gravity * (own.slope if f == NORMAL else 0.0)
+    )
+    falls = gravity * tilt * (TYPICAL_SLOPE_RAD if f == NORMAL else 1.0) + EARTH_ACCELERATION_M_S2 + misfelt
     return float(EARTH_RATE_RAD_S + turning + falls / airspeed_mps)
 
 
-def _set_up_tolerances(
+def _configure_force_tolerances(
     force: np.void, declared: Declared, terms: list[Term], y: np.ndarray, of_vane: float, f: int, per_m: float
 ) -> None:
     """Of each term: that of the coefficients, and what constant errors of vane and pressure do; of the
     accelerometer's bias, m/s2; of the whole."""
     share, errors = declared.coefficients.largest, declared.sensors
-    vane, felt = errors["alpha" if f == UP else "beta"], errors[ACCELEROMETERS[1 + f]]
+    vane, felt = errors["alpha" if f == NORMAL else "beta"], errors[ACCELEROMETERS[1 + f]]
     pressure = errors["qdyn"].steady / y[QDYN] + errors["qdyn"].slope
     for k, term in enumerate(terms):
         force["tolerance"][k] = (share + pressure + vane.slope) * abs(term.value)
         if term.is_constant:
             force["tolerance"][k] += vane.steady * abs(of_vane)
     n = len(terms)
-    if f == ASIDE:
+    if f == SIDE:
         force["tolerance"][n], n = share + RATE_TOLERANCE[declared.air.moves], n + 1
     if felt.steady:
         force["tolerance"][n], force["regressor"][n], n = felt.steady, per_m, n + 1
     force["tolerance"][n], force["n"] = MASS_TOLERANCE + felt.slope, n + 1
 
 
-def _value(aircraft: Aircraft, name: str, at: Trim) -> float:
+def _force_coefficient(aircraft: Aircraft, name: str, at: Trim) -> float:
     """A force coefficient at x (3,) rad/s, y, u rad."""
     x, y, u = at
     size, V = aircraft.geometry, y[AIRSPEED]
@@ -278,11 +280,11 @@ def _value(aircraft: Aircraft, name: str, at: Trim) -> float:
     return float(aircraft.coefficient(name, of))
 
 
-def _slopes(aircraft: Aircraft, name: str, trim: Trim) -> np.ndarray:
+def _coefficient_slopes(aircraft: Aircraft, name: str, trim: Trim) -> np.ndarray:
     """(7,): its derivatives with alpha, beta (1/rad), airspeed (s/m), rates (s/rad), dpt, by differences."""
     (x, y, u), step = trim, 1e-5
     states = [(x, y + step * e, u) for e in np.eye(3, y.size)]
     states += [(x + step * e, y, u) for e in np.eye(3)]
     states += [(x, y + step * (np.arange(y.size) == DPT), u)]
-    here = _value(aircraft, name, trim)
-    return np.array([(_value(aircraft, name, state) - here) / step for state in states])
+    here = _force_coefficient(aircraft, name, trim)
+    return np.array([(_force_coefficient(aircraft, name, state) - here) / step for state in states])

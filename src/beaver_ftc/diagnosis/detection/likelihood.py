@@ -46,7 +46,7 @@ fraction of p in g is estimated, lambda = sum p' S^-1 g / sum p' S^-1 p: 0 in ai
 The evidence that lambda p contributes is subtracted.
 
 A gust may be visible to the vanes only roughly, if no force separates it from the aircraft's own motion
-(air.py). It correlates with the surfaces of a law that uses the vanes. Its response is whitened likewise,
+(gusts.py). It correlates with the surfaces of a law that uses the vanes. Its response is whitened likewise,
 and the evidence that it contributes is subtracted.
 
 Onsets: slot j restarts every 2^(j+1) frames, so that onsets of about every age exist at any time. After an
@@ -64,7 +64,11 @@ from beaver_ftc.diagnosis.state import LOSS
 
 # A block is a set of axes with correlated noise: pitch, and roll with yaw, the latter twice. The state of a
 # filter is e, then d.
-PITCH_BLOCK, LATERAL, RETURNING = 0, 1, 2  # RETURNING: roll and yaw again, with a drift that returns to zero
+PITCH_BLOCK, LATERAL, LATERAL_RETURNING = (
+    0,
+    1,
+    2,
+)  # RETURNING: roll and yaw again, with a drift that returns to zero
 N_BLOCKS = 3
 N_SLOTS = 10
 N_READINGS = 5  # alpha, beta, airspeed, dynamic pressure, engine power: noise_model.py
@@ -72,7 +76,7 @@ MAX_HYPOTHESES = 8  # of a block of the rates of most aircraft: three losses, an
 LEAST_UNCERTAINTY_RAD_S2 = 1e-3  # lower limit of the bound that sets the drift: the bound may pass zero
 STEP, ALPHA3, GROWING, ENDING = 2, 3, 4, 5  # further kinds of hypothesis
 # Sign of N that supports a hypothesis: a loss removes moment, its end restores moment; 0: both signs.
-SENSE = {LOSS: -1.0, STEP: 0.0, ALPHA3: 0.0, GROWING: -1.0, ENDING: 1.0}
+SUPPORTING_SIGN = {LOSS: -1.0, STEP: 0.0, ALPHA3: 0.0, GROWING: -1.0, ENDING: 1.0}
 
 PRIOR_DRIFT_RAD_S2 = 1.0  # standard deviation of the drift at the start of a flight; soon irrelevant
 PRIOR_INFORMATION = 12.0  # one over the variance of a loss that is uniform on [0, 1]
@@ -81,7 +85,7 @@ RINGING = 1.2
 
 # Time constant, s, of the estimate of lambda: long compared with a filter's memory, short compared with
 # changes of the weather.
-FOLLOWED_S = 2.0
+CALM_MEMORY_S = 2.0
 CALM_PRIOR = 4.0  # prior information for lambda = 1 (calm air), units of sum p' S^-1 p
 CALM_MARGIN = 2.0  # standard deviations by which lambda is taken larger than estimated
 
@@ -129,15 +133,15 @@ _FILTER = {
 FILTER = record(**_FILTER)
 
 
-def set_senses(block: np.void, kinds: Sequence[int]) -> None:
+def set_supporting_signs(block: np.void, kinds: Sequence[int]) -> None:
     """Fill the sign of N that supports each hypothesis, in all of its lanes."""
     block["lanes"]["sense"] = 0.0
     for h, kind in enumerate(kinds):
         first = (h % PER_GROUP) * N_SLOTS
-        block["lanes"]["sense"][h // PER_GROUP, first : first + N_SLOTS] = SENSE[kind]
+        block["lanes"]["sense"][h // PER_GROUP, first : first + N_SLOTS] = SUPPORTING_SIGN[kind]
 
 
-def groups(capacity: Capacity) -> int:
+def group_total(capacity: Capacity) -> int:
     """The number of groups of lanes that the hypotheses of a block need."""
     return (capacity.hypotheses + PER_GROUP - 1) // PER_GROUP
 
@@ -159,8 +163,8 @@ def block_dtype(capacity: Capacity) -> np.dtype:
         n_regressors=int, tolerance=capacity.regressors, regressor=(capacity.regressors, 2),
         regressor_state=(capacity.regressors, 4), regressor_response=(capacity.regressors, 2),
         n_hypotheses=int, hypothesis=(HYPOTHESIS, capacity.hypotheses),
-        lanes=(LANES, groups(capacity)),
-        overlap=(groups(capacity), capacity.regressors, N_LANES),  # R_j of each lane
+        lanes=(LANES, group_total(capacity)),
+        overlap=(group_total(capacity), capacity.regressors, N_LANES),  # R_j of each lane
     )  # fmt: skip
 
 
@@ -177,7 +181,7 @@ def filter_block(P: np.ndarray, R: np.ndarray) -> np.ndarray:
 
 
 @kernel
-def invert(n, S):
+def invert_symmetric(n, S):
     """Replace the leading n x n part of a symmetric S (2, 2), n at most 2, by its inverse."""
     if n == 1:
         S[0, 0] = 1.0 / S[0, 0]
@@ -190,7 +194,7 @@ def invert(n, S):
 
 @kernel
 def predict_covariance(block, dt):
-    """Predict the covariances over a frame of dt s; fills `S_inverse` with S, which `invert` inverts."""
+    """Predict the covariances over a frame of dt s, and fill `S_inverse` with S, yet to be inverted."""
     P_xx, P_xd, P_dd, S = block.P_xx, block.P_xd, block.P_dd, block.S_inverse
     for i in range(block.n):
         for j in range(block.n):
@@ -230,10 +234,10 @@ def update_covariance(block):
 
 
 @kernel
-def advance(block, dt):
+def advance_covariance(block, dt):
     """Predict the covariances, fill the gains, update the covariances for the frame just measured; dt s."""
     predict_covariance(block, dt)
-    invert(block.n, block.S_inverse)
+    invert_symmetric(block.n, block.S_inverse)
     fill_gains(block)
     update_covariance(block)
 
@@ -275,7 +279,7 @@ def whiten_regressors(block, dt):
 @kernel
 def whiten_without_gust(block, dt):
     """Whiten the frame, `scratch`, rad/s2, by the filter without gust; dt s."""
-    advance(block.no_gust_filter, dt)
+    advance_covariance(block.no_gust_filter, dt)
     whiten(
         block.no_gust_filter, block.no_gust_filter.state, block.scratch, dt, block.no_gust_filter.innovation
     )
@@ -288,7 +292,7 @@ def predict_calm_air(block, dt):
     lambda is estimated over the last FOLLOWED_S. `whiten_without_gust` must have run for this frame.
     """
     calm, prediction, g = block.no_gust_filter, block.calm_prediction, block.innovation
-    kept = np.exp(-dt / FOLLOWED_S)
+    kept = np.exp(-dt / CALM_MEMORY_S)
     block.calm_agreement *= kept
     block.calm_information *= kept
     for i in range(block.n):
@@ -445,7 +449,7 @@ def accumulate_gust(block, lanes, n, keep):
 
 
 @kernel
-def accumulate(block, tolerated, dt, keep):
+def accumulate_evidence(block, tolerated, dt, keep):
     """Add the frame just whitened to the sums of every hypothesis and onset; earlier sums decay by `keep`."""
     for h in range(block.n_hypotheses):
         shape_signature(block.hypothesis[h], block.lanes[h // PER_GROUP], (h % PER_GROUP) * N_SLOTS)
@@ -526,7 +530,7 @@ def evaluate_lanes(block, lanes, n, certain, mapped):
 
 
 @kernel
-def evaluate(block, memory=0.0, mapped=False):
+def evaluate_hypotheses(block, memory=0.0, mapped=False):
     """Fill the score, the estimate and the bounds on the log-likelihood ratio of each hypothesis.
 
     memory: if a loss may end, the factor by which its earlier upper bound decays per frame; else 0.
@@ -553,10 +557,10 @@ def update_block(block, bounded, tolerated, dt, keep, memory=0.0, mapped=False):
     """Update a block with one frame of the innovation: whiten it and test every hypothesis; dt s.
 
     The innovation, rad/s2, is in `scratch`. Noise, drift, signatures and, if `tolerated`, regressors must be
-    those of the frame. bounded: see `fill_uncertainty_response`; keep: see `accumulate`; memory, mapped: see
-    `evaluate`.
+    those of the frame. bounded: see `fill_uncertainty_response`; keep: `accumulate_evidence`; memory, mapped:
+    `evaluate_hypotheses`.
     """
-    advance(block, dt)
+    advance_covariance(block, dt)
     if block.level > 0.0:
         fill_uncertainty_response(block, bounded, dt)
     whiten(block, block.state, block.scratch, dt, block.innovation)
@@ -566,8 +570,8 @@ def update_block(block, bounded, tolerated, dt, keep, memory=0.0, mapped=False):
         whiten(block, block.gust_state, block.gust_response, dt, block.gust_response)
     if tolerated:
         whiten_regressors(block, dt)
-    accumulate(block, tolerated, dt, keep)
-    evaluate(block, memory, mapped)
+    accumulate_evidence(block, tolerated, dt, keep)
+    evaluate_hypotheses(block, memory, mapped)
 
 
 @kernel

@@ -18,16 +18,9 @@ from beaver_ftc.design.dryden import rotation_lengths
 from beaver_ftc.design.engine import slipstream_slopes
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, PH, QDYN, RH, directional, whole_sum
 from beaver_ftc.design.variants import jacobian
-from beaver_ftc.diagnosis.belief.air import (
-    FORCE_ERROR_SHARE,
-    UNMEASURED_SHARES,
-    set_up_air,
-    set_up_jitter,
-    set_up_speed,
-)
-from beaver_ftc.diagnosis.bounds.variances import axis_of, steady_tolerance
+from beaver_ftc.diagnosis.bounds import axis_of_term, coefficient_tolerances
 from beaver_ftc.diagnosis.detection import likelihood
-from beaver_ftc.diagnosis.detection.forces import set_up_forces
+from beaver_ftc.diagnosis.detection.forces import configure_forces
 from beaver_ftc.diagnosis.detection.likelihood import (
     ALPHA3,
     ENDING,
@@ -37,9 +30,16 @@ from beaver_ftc.diagnosis.detection.likelihood import (
     N_SLOTS,
     STEP,
 )
-from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, Direction, set_up_views, views_of
-from beaver_ftc.diagnosis.detection.tones import N_TONES, set_up_tones
-from beaver_ftc.diagnosis.state import LOSS, SIDE
+from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, Direction, configure_views, views_of
+from beaver_ftc.diagnosis.detection.tones import N_TONES, configure_tones
+from beaver_ftc.diagnosis.gusts import (
+    FORCE_ERROR_SHARE,
+    UNMEASURED_SHARES,
+    add_gust_jitter,
+    configure_gusts,
+    configure_speed_error,
+)
+from beaver_ftc.diagnosis.state import LOSS, SIDE_FORCE
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
 from beaver_ftc.scenario.declared import Declared, SensorErrors
 from beaver_ftc.scenario.diagnosis import FdiConfig, Statistical
@@ -48,7 +48,7 @@ PITCH_AXES, LATERAL_AXES = (1,), (0, 2)
 _SENSORS = {"alpha": ALPHA, "beta": BETA, "V": AIRSPEED, "qdyn": QDYN}
 _POWER = N_READINGS - 1  # of the engine, kW
 _SLIPSTREAM = RH + 1  # the first of the declared signals
-SIDES = {LOSS: 1, GROWING: 1, ENDING: 1, STEP: 2, ALPHA3: 2}  # a loss has a sign, a step may go either way
+N_SIGNS = {LOSS: 1, GROWING: 1, ENDING: 1, STEP: 2, ALPHA3: 2}  # a loss has a sign, a step may go either way
 # Rate kappa of the growing-loss hypothesis. It explains a third of a loss that grows ten times slower or
 # faster; a constant loss explains the rest.
 GROWTH_PER_S = 1.5
@@ -56,9 +56,11 @@ GROWTH_PER_S = 1.5
 # Share of the alarm level reserved for noise in addition to an uncertainty at its bound (docs/theory.md,
 # section 7).
 CHANCE = 0.5
-SLOW_RAD_S = 3.0  # 42 of 75 flights of a GTM not found before; 15: 23, 8: 36, 0.2 and less: 35 and fewer
+DAMAGE_DRIFT_RAD_S = (
+    3.0  # 42 of 75 flights of a GTM not found before; 15: 23, 8: 36, 0.2 and less: 35 and fewer
+)
 LEAST_NOISE_RAD_S = 1e-9  # of a gyro: exact ones are still doubles, and a variance no difference of zeros
-Start = tuple[np.ndarray, np.ndarray, np.ndarray]  # x (3,) rad/s, y (5,) and u (4,) rad in trim
+TrimState = tuple[np.ndarray, np.ndarray, np.ndarray]  # x (3,) rad/s, y (5,) and u (4,) rad in trim
 # (kind, surface, axis, raises alarms)
 Hypothesis = tuple[int, int, int, int]
 
@@ -68,7 +70,7 @@ def blocks_of(aircraft: Aircraft) -> tuple[tuple[tuple[int, ...], tuple[Hypothes
     are held against. Roll and yaw are there twice: see statistical.py."""
     pitch = (*_losses(aircraft, PITCH_AXES), *_steps(PITCH_AXES), (ALPHA3, -1, 1, 0))
     lateral = (*_losses(aircraft, LATERAL_AXES), *_steps(LATERAL_AXES))
-    pitch, lateral = ((*of_it, *_of_another_course(of_it)) for of_it in (pitch, lateral))
+    pitch, lateral = ((*of_it, *_growing_and_ending(of_it)) for of_it in (pitch, lateral))
     return (PITCH_AXES, pitch), (LATERAL_AXES, lateral), (LATERAL_AXES, lateral)
 
 
@@ -78,7 +80,7 @@ def _losses(aircraft: Aircraft, axes: tuple[int, ...]) -> Iterator[Hypothesis]:
             yield LOSS, s, axis, 1
 
 
-def _of_another_course(members: tuple[Hypothesis, ...]) -> Iterator[Hypothesis]:
+def _growing_and_ending(members: tuple[Hypothesis, ...]) -> Iterator[Hypothesis]:
     losses = [(surface, axis) for kind, surface, axis, _ in members if kind == LOSS]
     return ((kind, surface, axis, 0) for surface, axis in losses for kind in (GROWING, ENDING))
 
@@ -87,17 +89,17 @@ def _steps(axes: tuple[int, ...]) -> Iterator[Hypothesis]:
     return ((STEP, -1, axis, 1) for axis in axes)
 
 
-def tests_a_frame(aircraft: Aircraft, *views: Direction) -> int:
+def tests_per_frame(aircraft: Aircraft, *views: Direction) -> int:
     """The number of one-sided tests that the detector makes in a frame, those of these views included."""
     kinds = [kind for _, members in blocks_of(aircraft) for kind, _, _, alarms in members if alarms]
     tones = 0
     for view in views:
-        if view.column_of >= 0 and any(view.direction[SIDE:]):
+        if view.column_of >= 0 and any(view.direction[SIDE_FORCE:]):
             kinds += [STEP, *(LOSS for _ in view.losses)]
             tones += N_TONES
         elif view.column_of == AXIS_VIEW and not view.inertial:
             tones += N_TONES
-    return N_SLOTS * sum(SIDES[kind] for kind in kinds) + tones
+    return N_SLOTS * sum(N_SIGNS[kind] for kind in kinds) + tones
 
 
 def alarm_level(false_alarms_per_h: float, rate_hz: float, tests: int) -> float:
@@ -110,16 +112,16 @@ def alarm_level(false_alarms_per_h: float, rate_hz: float, tests: int) -> float:
 
 def naming_level(misnaming: float, rate_hz: float, aircraft: Aircraft) -> float:
     """Difference of log-likelihood ratios that noise exceeds in a second with this probability at most."""
-    return 0.5 * NormalDist().inv_cdf(misnaming / (rate_hz * tests_a_frame(aircraft))) ** 2
+    return 0.5 * NormalDist().inv_cdf(misnaming / (rate_hz * tests_per_frame(aircraft))) ** 2
 
 
-def set_up(
+def configure_statistics(
     fdi: np.void,
     config: FdiConfig,
     declared: Declared,
     design: np.void,
     mass: MassProperties,
-    start: Start,
+    start: TrimState,
     rate_hz: float,
 ) -> None:
     """Fill the statistical part of a diagnosis record; start: x (3,), y and u (surfaces,) in trim."""
@@ -129,31 +131,31 @@ def set_up(
         return
     tests, air, aircraft = statistical["tests"], statistical["air"], declared.aircraft
     errors, dt_s, instants = declared.sensors, 1.0 / rate_hz, int(fdi["config"]["instants"])
-    airspeed_mps, pace = float(start[1][AIRSPEED]), pace_of(given, aircraft, dt_s)
+    airspeed_mps, pace = float(start[1][AIRSPEED]), uncertainty_pace(given, aircraft, dt_s)
     tests["enabled"], tests["share"] = 1, 1.0 / max(instants, 1)
     tests["mapped"] = aircraft.file.model_error_map is not None and not aircraft.loses_surfaces
     statistical["forces"]["known"] = forces = declared.uses_accelerometers
     air["output"]["uses_accelerometers"] = declared.follows_gusts_by_accelerometers
-    set_up_air(air, declared, mass)
+    configure_gusts(air, declared, mass)
     across = config.compares_across(instants)
-    n_tests = tests_a_frame(aircraft, *(views_of(aircraft, forces) if across else ()))
+    n_tests = tests_per_frame(aircraft, *(views_of(aircraft, forces) if across else ()))
     tests["alarm_level"] = alarm_level(given.false_alarms_per_h, rate_hz, n_tests)
-    set_up_speed(air, declared, float(tests["alarm_level"]), airspeed_mps)
+    configure_speed_error(air, declared, float(tests["alarm_level"]), airspeed_mps)
     tests["naming_level"] = naming_level(given.misnaming, rate_hz, aircraft)
     tests["keep"] = exp(-1.0 / (rate_hz * config.forgetting_time_s))
     _set_up_blocks(statistical, errors, aircraft)
     _set_up_bounded(statistical, config, declared, pace, dt_s)
     statistical["noise"]["pace"] = given.uncertainty_rad_s * dt_s
-    _set_up_noise(statistical, swing_of(given, aircraft), declared, design, start, dt_s)
-    tolerance = steady_tolerance(declared, design, mass, *start[1:])
+    _set_up_noise(statistical, drift_frequency(given, aircraft), declared, design, start, dt_s)
+    tolerance = coefficient_tolerances(declared, design, mass, *start[1:])
     _set_up_tolerances(statistical, aircraft, tolerance)
-    set_up_readings(statistical, errors, fdi["bound"]["admitted"])
+    configure_readings(statistical, errors, fdi["bound"]["admitted"])
     if across:
         chance = given.false_alarms_per_h / (3600.0 * rate_hz * n_tests)
-        set_up_tones(statistical["tone_config"], chance, airspeed_mps, pace * rate_hz, dt_s)
+        configure_tones(statistical["tone_config"], chance, airspeed_mps, pace * rate_hz, dt_s)
         if forces:
             along_y = jacobian(design, *start)[3]
-            set_up_forces(fdi, declared, start, along_y, dt_s)
+            configure_forces(fdi, declared, start, along_y, dt_s)
             air["output"][
                 "uses_accelerometers"
             ] = not declared.monitors_sensors  # the monitor may find them broken
@@ -162,7 +164,7 @@ def set_up(
             statistical["inertial_air"]["memory"]["unmeasured_share"] = np.minimum(
                 np.add(UNMEASURED_SHARES, FORCE_ERROR_SHARE), 1.0
             )
-        set_up_views(statistical, aircraft)
+        configure_views(statistical, aircraft)
     last, pitch = statistical["block"][-1], statistical["block"][likelihood.PITCH_BLOCK]
     rolling = float(air["config"]["rolling_length"]) if air["output"]["moving"] else 0.0
     gusts_m = rotation_lengths(air["config"]["span"]) if air["config"]["coarse"] else [rolling]
@@ -176,7 +178,7 @@ def set_up(
             pitching = float(rotation_lengths(air["config"]["span"])[1])
             pitch["return_length"] = returning_length(statistical, airspeed_mps, rate_hz, pitching)
             pitch["drift_scale"] = (pitching / pitch["return_length"]) ** 2
-        set_up_jitter(statistical, errors, design, *start[1:], dt_s)
+        add_gust_jitter(statistical, errors, design, *start[1:], dt_s)
 
 
 def _set_up_blocks(statistical: np.void, errors: SensorErrors, aircraft: Aircraft) -> None:
@@ -185,38 +187,42 @@ def _set_up_blocks(statistical: np.void, errors: SensorErrors, aircraft: Aircraf
     statistical["tests"]["n_log_columns"] = len(losses) + len(AXES)
     for block, (axes, members) in zip(statistical["block"], blocks, strict=True):
         block["n"], block["n_hypotheses"] = len(axes), len(members)
-        block["n_regressors"] = sum(axis_of(term) in axes for term in aircraft.moments)
+        block["n_regressors"] = sum(axis_of_term(term) in axes for term in aircraft.moments)
         block["keep"], block["drift_scale"] = 1.0, 1.0
         for i, axis in enumerate(axes):
             block["axis"][i] = axis
             variance = max(errors[AXES[axis]].random, LEAST_NOISE_RAD_S) ** 2
             block["noise"][i] = block["P_xx"][i, i] = variance
             block["P_dd"][i, i] = likelihood.PRIOR_DRIFT_RAD_S2**2
-        likelihood.set_senses(block, [kind for kind, *_ in members])
+        likelihood.set_supporting_signs(block, [kind for kind, *_ in members])
         for hypothesis, (kind, surface, axis, alarms) in zip(block["hypothesis"], members, strict=False):
             hypothesis["kind"], hypothesis["surface"] = kind, surface
             hypothesis["axis"], hypothesis["raises_alarm"] = axis, alarms
             hypothesis["log_column"] = losses.index(surface) if kind == LOSS else len(losses) + axis
 
 
-def pace_of(given: Statistical, aircraft: Aircraft, dt_s: float) -> float:
+def uncertainty_pace(given: Statistical, aircraft: Aircraft, dt_s: float) -> float:
     """Largest change of a bounded uncertainty within a frame, over its bound.
 
     The error of an aircraft's own terms changes with its surfaces, which a law may move fully within a frame:
     from one end of the bound to the other. If the error is mapped, its pace is worked out in flight
-    (`statistical.follow_surfaces`).
+    (`statistical.update_pace`).
     """
     return 2.0 if any(aircraft.model_error_rad_s2) else given.uncertainty_rad_s * dt_s
 
 
-def swing_of(given: Statistical, aircraft: Aircraft) -> float:
+def drift_frequency(given: Statistical, aircraft: Aircraft) -> float:
     """Frequency, rad/s, of the bounded uncertainty that the drift of the filters represents.
 
     The evidence that the uncertainty explains is bounded by its declared pace in any case
     (`likelihood.uncertainty_part`). The drift only sets how much of it the filters remove. If damage may take
     surfaces, a weaker drift detects most: motion that no loss explains is then rarely an error of the model.
     """
-    return min(SLOW_RAD_S, given.uncertainty_rad_s) if aircraft.loses_surfaces else given.uncertainty_rad_s
+    return (
+        min(DAMAGE_DRIFT_RAD_S, given.uncertainty_rad_s)
+        if aircraft.loses_surfaces
+        else given.uncertainty_rad_s
+    )
 
 
 def _set_up_bounded(
@@ -234,22 +240,24 @@ def _set_up_bounded(
 
 
 def _set_up_noise(
-    statistical: np.void, omega: float, declared: Declared, design: np.void, start: Start, dt_s: float
+    statistical: np.void, omega: float, declared: Declared, design: np.void, start: TrimState, dt_s: float
 ) -> None:
     """Fill the drift, for an uncertainty of frequency omega, rad/s, and the jitter by noise of f + G u."""
     errors = declared.sensors.each("random")
     noise = float(errors[:3].max())
     largest = max(declared.constant_rad_s2)
     level = float(statistical["tests"]["alarm_level"])
-    statistical["noise"]["rapidity"] = rapidity(largest, omega, noise, level, dt_s)
+    statistical["noise"]["rapidity"] = walk_intensity(largest, omega, noise, level, dt_s)
     _, G, f_x, f_y = jacobian(design, *start)
     statistical["noise"]["own_jitter"] = f_x**2 @ errors[:3] ** 2
-    in_trim = f_y[:, [ALPHA, BETA, AIRSPEED, QDYN]] ** 2 @ errors[3:] ** 2  # later as `add_readings` says
+    in_trim = (
+        f_y[:, [ALPHA, BETA, AIRSPEED, QDYN]] ** 2 @ errors[3:] ** 2
+    )  # later as `add_reading_regressors` says
     statistical["noise"]["jitter"] = statistical["noise"]["own_jitter"] + in_trim
     statistical["noise"]["deflection"] = np.abs(G).sum(axis=1) * declared.actuators.deflection_rad
 
 
-def rapidity(eta_bar: float, omega: float, noise: float, level: float, dt_s: float) -> float:
+def walk_intensity(eta_bar: float, omega: float, noise: float, level: float, dt_s: float) -> float:
     """Intensity of the random walk that stands for a bounded uncertainty, over its bound squared, 1/s.
 
     An uncertainty of eta_bar sin(omega t) moves the test for a step by eta_bar omega sqrt(2 sqrt 2 / i w0),
@@ -285,14 +293,14 @@ def returning_length(statistical: np.void, airspeed_mps: float, rate_hz: float, 
 
 def _set_up_tolerances(statistical: np.void, aircraft: Aircraft, tolerance: np.ndarray) -> None:
     """What is constant but unknown, as tolerances of coefficients: theirs, inertia, steady sensor errors."""
-    axis = np.array([axis_of(term) for term in aircraft.moments])
+    axis = np.array([axis_of_term(term) for term in aircraft.moments])
     for block, axes in zip(statistical["block"], (PITCH_AXES, LATERAL_AXES, LATERAL_AXES), strict=True):
         of_it = tolerance[np.isin(axis, axes)]
         block["tolerance"][: of_it.size] = of_it
     statistical["tests"]["tolerated"] = bool(np.any(tolerance))
 
 
-def set_up_readings(statistical: np.void, errors: SensorErrors, admitted: np.void) -> None:
+def configure_readings(statistical: np.void, errors: SensorErrors, admitted: np.void) -> None:
     """Add the readings of the air data to the regressors of the blocks."""
     steady, noise = np.zeros(N_READINGS), statistical["noise"]["reading"]
     for name, place in _SENSORS.items():
@@ -308,7 +316,7 @@ def set_up_readings(statistical: np.void, errors: SensorErrors, admitted: np.voi
 
 
 @kernel
-def sensitivity(table, admitted, y, which, direction):
+def fill_reading_direction(table, admitted, y, which, direction):
     """Fill direction (N_SIGNALS,) with the change of a table's signals per unit of a reading."""
     direction[:] = 0.0
     if which < AIRSPEED:  # a vane
@@ -323,7 +331,7 @@ def sensitivity(table, admitted, y, which, direction):
 
 
 @kernel
-def moved(design, y, u, which, slope, out):
+def fill_reading_effect(design, y, u, which, slope, out):
     """Fill out (3,) rad/s2 with the change of the accelerations per unit of a reading.
 
     slope: the change of the monomials per unit of it.
@@ -338,15 +346,15 @@ def moved(design, y, u, which, slope, out):
 
 
 @kernel
-def add_readings(share, noise, blocks, admitted, design, y, u):
+def add_reading_regressors(share, noise, blocks, admitted, design, y, u):
     """Add this instant, a `share` of the frame, to the readings' regressors, rad/s2 per unit, and fill the
     jitter, rad2/s4, as it is now; `design.moments` is evaluated there."""
     table, out = design.moments, noise.moved
     noise.jitter[:] = noise.own_jitter
     for which in range(N_READINGS):
-        sensitivity(table, admitted, y, which, noise.direction)
+        fill_reading_direction(table, admitted, y, which, noise.direction)
         directional(table, table.signal, table.power, noise.direction, noise.slope)
-        moved(design, y, u, which, noise.slope, out)
+        fill_reading_effect(design, y, u, which, noise.slope, out)
         for i in range(3):
             noise.jitter[i] += (out[i] * noise.reading[which]) ** 2
         pitch = blocks[likelihood.PITCH_BLOCK]

@@ -41,10 +41,9 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.schema import MAX_TERMS_OF_ONE
 from beaver_ftc.compiled import kernel, record, sized
-from beaver_ftc.diagnosis.belief.air import full_drift, project_on_axis, remaining_drift
-from beaver_ftc.diagnosis.bounds.variances import axis_of
+from beaver_ftc.diagnosis.bounds import axis_of_term
 from beaver_ftc.diagnosis.detection import forces, likelihood, tones
-from beaver_ftc.diagnosis.detection.forces import ASIDE, COMPONENTS, SETTLED, UP, terms_of
+from beaver_ftc.diagnosis.detection.forces import COMPONENTS, NORMAL, SETTLED_UPDATES, SIDE, force_terms
 from beaver_ftc.diagnosis.detection.likelihood import (
     LATERAL,
     MAX_HYPOTHESES,
@@ -53,21 +52,21 @@ from beaver_ftc.diagnosis.detection.likelihood import (
     STEP,
     Capacity,
 )
-from beaver_ftc.diagnosis.detection.signatures import fill_view_signatures
 from beaver_ftc.diagnosis.detection.tones import tones_dtype
-from beaver_ftc.diagnosis.state import LOSS, NORMAL, PITCH, ROLL, SIDE, YAW
+from beaver_ftc.diagnosis.gusts import full_gust_drift, project_on_axis, remaining_gust_drift
+from beaver_ftc.diagnosis.state import LOSS, NORMAL_FORCE, PITCH, ROLL, SIDE_FORCE, YAW
 
 VANE_TOLERANCE = 0.1  # relative error of the effect of a vane's error: its column is that of the trim
 PEAK_MEMORY = 5.0  # time constant of `peak_score` over the one with which evidence is forgotten
 MIN_FORCE_SHARE = 0.9  # component of a direction of length 1, above which a view counts as one of the force
 MIN_COLUMN_LENGTH = 0.1  # least length that the errors leave of a column, as a share of its length
-PITCH_PLANE, LATERAL_PLANE, YAW_PLANE = (PITCH, NORMAL), (ROLL, YAW), (YAW, SIDE)
+PITCH_PLANE, LATERAL_PLANE, YAW_PLANE = (PITCH, NORMAL_FORCE), (ROLL, YAW), (YAW, SIDE_FORCE)
 
 # Values of `surface` in a view without one: a view of an axis; one across the column of an error of a vane.
 AXIS_VIEW, VANE_VIEW = -1, -2
 
 
-class Size(NamedTuple):
+class RecordSize(NamedTuple):
     """Capacities of a record: of a block of the rates, of a view; numbers of views and of error-map boxes."""
 
     rates: Capacity
@@ -76,7 +75,7 @@ class Size(NamedTuple):
     boxes: int
 
 
-USUAL_SIZE = Size(
+USUAL_SIZE = RecordSize(
     Capacity(23, MAX_HYPOTHESES), Capacity(36, 3), 13, 6
 )  # enough for most aircraft: see `size_for`
 
@@ -106,12 +105,12 @@ def view_dtype(capacity: Capacity) -> np.dtype:
 @kernel
 def innovation_component(view, forces, air, inertial_air, innovation, i):
     """Component i of the innovation that a view projects, rad/s2: of the rates (3,), or of a force."""
-    if i < SIDE:
+    if i < SIDE_FORCE:
         gust = 0.0
         if uses_gust_estimate(view, air):
             gust = gust_estimate_for(view, air, inertial_air).output.mean[i]
         return innovation[i] - gust
-    force = forces.component[i - SIDE]
+    force = forces.component[i - SIDE_FORCE]
     return force.inertial if view.inertial else force.innovation
 
 
@@ -120,10 +119,10 @@ def column_component(view, forces, bound, G, j):
     """Entry j, 0 or 1, of the column in a view's plane and the bound on its error, rad/s2 per rad."""
     i, s = view.plane[j], view.surface
     if s == VANE_VIEW:
-        size = forces.component[view.plane[1] - SIDE].vane[j]
+        size = forces.component[view.plane[1] - SIDE_FORCE].vane[j]
         return size, VANE_TOLERANCE * abs(size)
-    if i >= SIDE:
-        force = forces.component[i - SIDE]
+    if i >= SIDE_FORCE:
+        force = forces.component[i - SIDE_FORCE]
         return force.column_predicted[s], force.column_error[s]
     return G[i, s], bound.own_per_rad[i, s] if bound.own_errors else 0.0
 
@@ -135,7 +134,7 @@ def set_direction(view, forces, air, bound, G):
     Returns the share of the innovation along the column that errors of the column let leak into the view.
     """
     if view.across_gust:
-        return set_direction_past_gust(view, forces, air)
+        return set_direction_across_gust(view, forces, air)
     first, second = view.plane[0], view.plane[1]
     first_entry, first_error = column_component(view, forces, bound, G, 0)
     second_entry, second_error = column_component(view, forces, bound, G, 1)
@@ -150,7 +149,7 @@ def set_direction(view, forces, air, bound, G):
 
 
 @kernel
-def set_direction_past_gust(view, forces, air):
+def set_direction_across_gust(view, forces, air):
     """The same for the direction across two vectors: their vector product in (roll, yaw, side force).
 
     The vectors are the column of an error of the side vane and the effect of the rolling gust on the rates.
@@ -166,7 +165,7 @@ def set_direction_past_gust(view, forces, air):
     if length == 0.0:
         return 0.0
     size, leak = np.sqrt(roll * roll + yaw * yaw + side * side), 0.0
-    for i, of_vane, by in ((ROLL, roll, by_roll), (YAW, yaw, by_yaw), (SIDE, side, by_side)):
+    for i, of_vane, by in ((ROLL, roll, by_roll), (YAW, yaw, by_yaw), (SIDE_FORCE, side, by_side)):
         view.direction[i], view.column[i] = by / length, of_vane / size
         leak += VANE_TOLERANCE * abs(view.direction[i] * of_vane)
     return leak / ((1.0 - VANE_TOLERANCE) * size)
@@ -181,7 +180,7 @@ def uses_gust_estimate(view, air):
 @kernel
 def uses_force(view):
     """True if a view's direction has a component along a force."""
-    return view.direction[SIDE] != 0.0 or view.direction[SIDE + 1] != 0.0
+    return view.direction[SIDE_FORCE] != 0.0 or view.direction[SIDE_FORCE + 1] != 0.0
 
 
 @kernel
@@ -203,11 +202,11 @@ def fill_gust_sensitivity(view, forces, damping):
         view.gust_on_rates[k] = roll + pitch + yaw
         view.gust_on_forces[k] = 0.0
         for f in range(2):
-            view.gust_on_forces[k] += m[SIDE + f] * forces.component[f].damping[k] * forces.strength
+            view.gust_on_forces[k] += m[SIDE_FORCE + f] * forces.component[f].damping[k] * forces.strength
 
 
 @kernel
-def set_noise(view, noise, blocks, forces, air, inertial_air, V):
+def set_view_noise(view, noise, blocks, forces, air, inertial_air, V):
     """Fill measurement noise, jitter, drift intensity and bound of a view from the declared ones; V m/s."""
     block, m = view.block, view.direction
     variance, jitter, bound, drift = 0.0, 0.0, 0.0, 0.0
@@ -218,18 +217,18 @@ def set_noise(view, noise, blocks, forces, air, inertial_air, V):
             jitter += abs(m[i]) * forces.gust_noise[i]
         bound += abs(m[i]) * (noise.bounded[i] + noise.beyond[i])
     for f, force in enumerate(forces.component):
-        jitter += abs(m[SIDE + f]) * np.sqrt(force.jitter[view.inertial])
+        jitter += abs(m[SIDE_FORCE + f]) * np.sqrt(force.jitter[view.inertial])
         if view.inertial:
-            drift += (m[SIDE + f] * forces.strength) ** 2 * force.wander
-        bound += abs(m[SIDE + f]) * (force.deflection * forces.strength + force.unsettled)
+            drift += (m[SIDE_FORCE + f] * forces.strength) ** 2 * force.wander
+        bound += abs(m[SIDE_FORCE + f]) * (force.deflection * forces.strength + force.unsettled)
     if air.output.moving:
         fill_gust_sensitivity(view, forces, air.output.damping)
         if uses_gust_estimate(view, air):
-            drift += remaining_drift(
+            drift += remaining_gust_drift(
                 gust_estimate_for(view, air, inertial_air), V, view.gust_on_rates, view.gust_on_forces
             )
         else:
-            drift += full_drift(air, V, view.gust_on_rates, view.gust_on_forces)
+            drift += full_gust_drift(air, V, view.gust_on_rates, view.gust_on_forces)
         for i in range(3):
             for j in range(3):
                 block.P_dd[0, 0] += m[i] * m[j] * air.output.turn_variance[i, j]
@@ -239,7 +238,7 @@ def set_noise(view, noise, blocks, forces, air, inertial_air, V):
 
 
 @kernel
-def fill_regressors(view, blocks, forces, air, inertial_air, innovation):
+def fill_view_regressors(view, blocks, forces, air, inertial_air, innovation):
     """Fill the regressors of a view: projections of those of the rates' block, of the force, of the leak.
 
     innovation (3,) rad/s2.
@@ -255,8 +254,8 @@ def fill_regressors(view, blocks, forces, air, inertial_air, innovation):
                 m[ROLL] * block_of_rates.regressor[j, 0] + m[YAW] * block_of_rates.regressor[j, 1]
             )
     n = block_of_rates.n_regressors
-    if second >= SIDE and m[second] != 0.0:
-        force = forces.component[second - SIDE]
+    if second >= SIDE_FORCE and m[second] != 0.0:
+        force = forces.component[second - SIDE_FORCE]
         for j in range(force.n):
             block.regressor[n + j, 0] = m[second] * force.regressor[j]
         n += force.n
@@ -277,7 +276,7 @@ def update_directions(views, forces, air, bound, G, Gu):
     G (3, n) rad/s2 per rad, Gu (3, n) rad/s2: control effectiveness and effect of each surface in the frame.
     """
     for view in views:
-        view.active = not uses_force(view) or (forces.known and forces.n_updates == SETTLED)
+        view.active = not uses_force(view) or (forces.known and forces.n_updates == SETTLED_UPDATES)
         if view.active:
             view.column_leak = (
                 set_direction(view, forces, air, bound, G) if view.surface != AXIS_VIEW else 0.0
@@ -294,19 +293,19 @@ def project_innovation(views, tolerated, noise, blocks, forces, air, inertial_ai
     for view in views:
         if not view.active:
             continue
-        set_noise(view, noise, blocks, forces, air, inertial_air, V)
+        set_view_noise(view, noise, blocks, forces, air, inertial_air, V)
         m, projected = view.direction, view.block.scratch
         projected[0] = 0.0
         for i in range(m.size):
             if m[i] != 0.0:
                 projected[0] += m[i] * innovation_component(view, forces, air, inertial_air, innovation, i)
         if tolerated or view.has_tolerance:
-            fill_regressors(view, blocks, forces, air, inertial_air, innovation)
+            fill_view_regressors(view, blocks, forces, air, inertial_air, innovation)
 
 
 @kernel
 def update_views(views, tests, tone_config, y, dt, k, latched):
-    """Update filters and tests of every view with frame k, as `statistical.update`; y (5,) as measured."""
+    """Update filter and tests of each view with frame k, as `statistical.update_blocks`; y (5,) measured."""
     within_envelope = tones.is_within_envelope(tone_config, y)
     keep, slot = tests.keep if latched else 1.0, likelihood.slot_to_reset(k)
     for view in views:
@@ -318,7 +317,7 @@ def update_views(views, tests, tone_config, y, dt, k, latched):
         tolerated = tests.tolerated or view.has_tolerance
         likelihood.update_block(view.block, view.bounded, tolerated, dt, keep)
         if not view.inertial:  # the error of the integrated angle oscillates with the aircraft's own modes
-            tones.update(view, tone_config, tests.alarm_level, within_envelope, tolerated, dt)
+            tones.update_tones(view, tone_config, tests.alarm_level, within_envelope, tolerated, dt)
         view.peak_score = max((1.0 - (1.0 - tests.keep) / PEAK_MEMORY) * view.peak_score, largest_score(view))
 
 
@@ -331,7 +330,7 @@ def is_sensitive_to(view, forces, s, column):
     for i in range(3):
         sensitivity += m[i] * column[i]
     for f in range(2):
-        sensitivity += m[SIDE + f] * forces.component[f].column[s]
+        sensitivity += m[SIDE_FORCE + f] * forces.component[f].column[s]
     return sensitivity != 0.0
 
 
@@ -372,14 +371,14 @@ def alarm_score(view, views, tests, forces, air):
     """
     if view.surface == AXIS_VIEW and not view.inertial:
         return view.tones.score
-    is_mostly_force = view.plane[1] >= SIDE and abs(view.direction[view.plane[1]]) > MIN_FORCE_SHARE
+    is_mostly_force = view.plane[1] >= SIDE_FORCE and abs(view.direction[view.plane[1]]) > MIN_FORCE_SHARE
     if view.surface >= 0 and is_mostly_force and air.output.uses_accelerometers == 1:
         return confirmed_score(view, views, tests, forces, air)
     return 0.0
 
 
 @kernel
-def excludes(views, tests, forces, air, s, column):
+def excludes_surface(views, tests, forces, air, s, column):
     """True if a view detects a signal that no fault of surface s, with this column (3,) of G, can cause."""
     for view in views:
         tests_surface = not view.immune_to_vane and not is_sensitive_to(view, forces, s, column)
@@ -419,7 +418,7 @@ def views_of(aircraft: Aircraft, with_force: bool = False) -> Iterator[Direction
         yield Direction(s, _along((ROLL,)), LATERAL_PLANE, others, uses_vane=past_roll)
     if not with_force:
         return
-    for f, plane, movers in ((UP, PITCH_PLANE, in_pitch), (ASIDE, YAW_PLANE, lateral)):
+    for f, plane, movers in ((NORMAL, PITCH_PLANE, in_pitch), (SIDE, YAW_PLANE, lateral)):
         found = aircraft.separated_by_force(COMPONENTS[f])
         for s in found:
             own = aircraft.dominant_axis[s], plane[1]
@@ -430,27 +429,29 @@ def views_of(aircraft: Aircraft, with_force: bool = False) -> Iterator[Direction
 
 
 def _along(components: tuple[int, ...]) -> tuple[float, ...]:
-    return tuple(float(i in components) for i in range(NORMAL + 1))
+    return tuple(float(i in components) for i in range(NORMAL_FORCE + 1))
 
 
-def size_for(aircraft: Aircraft) -> Size:
+def size_for(aircraft: Aircraft) -> RecordSize:
     """The capacities that the records of an aircraft need."""
-    axes = [axis_of(term) for term in aircraft.moments]
+    axes = [axis_of_term(term) for term in aircraft.moments]
     views = list(views_of(aircraft, aircraft.forces_separate_surfaces))
     rates = N_READINGS + max(axes.count(PITCH), axes.count(ROLL) + axes.count(YAW))
-    errors = max(len(terms_of(aircraft, f)) for f in (ASIDE, UP)) + forces.MAX_ERRORS - MAX_TERMS_OF_ONE
+    errors = max(len(force_terms(aircraft, f)) for f in (SIDE, NORMAL)) + forces.MAX_ERRORS - MAX_TERMS_OF_ONE
     turns = [aircraft.dominant_axis[aircraft.surfaces.index(s)] for s in aircraft.class_of_losses]
     losses = max(turns.count(PITCH), turns.count(ROLL) + turns.count(YAW))
     tried = max(len(view.losses) for view in views)
     error_map = aircraft.file.model_error_map
     boxes = len(error_map.boxes) if error_map else 0
-    return Size(Capacity(rates, 3 * losses + 2), Capacity(rates + errors + 2, tried + 1), len(views), boxes)
+    return RecordSize(
+        Capacity(rates, 3 * losses + 2), Capacity(rates + errors + 2, tried + 1), len(views), boxes
+    )
 
 
-def set_up_views(statistical: np.void, aircraft: Aircraft) -> None:
+def configure_views(statistical: np.void, aircraft: Aircraft) -> None:
     """Fill the views of a statistical record whose blocks and forces are already set up."""
     forces = statistical["forces"]
-    separated = [aircraft.separated_by_force(COMPONENTS[f]) for f in (ASIDE, UP)]
+    separated = [aircraft.separated_by_force(COMPONENTS[f]) for f in (SIDE, NORMAL)]
     with_air = forces["known"] and statistical["air"]["output"]["moving"] and all(separated)
     views = list(views_of(aircraft, bool(forces["known"])))[: len(statistical["views"])]
     statistical["n_views"] = len(views)
@@ -471,9 +472,9 @@ def set_up_views(statistical: np.void, aircraft: Aircraft) -> None:
             block[name] = axes[name]
         block["tolerance"][:n] = axes["tolerance"][:n]
         if uses_vane and with_air:
-            view["confirmed_by"] = NORMAL if plane == PITCH_PLANE else SIDE
-        if any(direction[SIDE:]):
-            force, view["confirmed_by"] = forces["component"][plane[1] - SIDE], plane[1]
+            view["confirmed_by"] = NORMAL_FORCE if plane == PITCH_PLANE else SIDE_FORCE
+        if any(direction[SIDE_FORCE:]):
+            force, view["confirmed_by"] = forces["component"][plane[1] - SIDE_FORCE], plane[1]
             view["has_tolerance"], of_force = 1, int(force["n"])
             block["tolerance"][n : n + of_force] = force["tolerance"][:of_force]
             n += of_force
@@ -487,4 +488,39 @@ def set_up_views(statistical: np.void, aircraft: Aircraft) -> None:
             surface == VANE_VIEW and plane == YAW_PLANE and statistical["air"]["output"]["moving"]
         )
         view["inertial"], view["immune_to_vane"] = inertial, inertial or surface == VANE_VIEW
-        likelihood.set_senses(block, kinds)
+        likelihood.set_supporting_signs(block, kinds)
+
+
+@kernel
+def fill_block_signatures(blocks, Gu, cubic):
+    """Fill the signatures of the blocks of the rates, rad/s2.
+
+    Gu (3, n) rad/s2: effect of each surface, mean over the frame; cubic rad/s2: pitch acceleration of a
+    coefficient 1 of alpha^3.
+    """
+    for block in blocks:
+        for hypothesis in block.hypothesis[: block.n_hypotheses]:
+            for i in range(block.n):
+                if hypothesis.surface >= 0:
+                    hypothesis.signature[i] = Gu[block.axis[i], hypothesis.surface]
+                elif hypothesis.kind == STEP:
+                    hypothesis.signature[i] = 1.0 if hypothesis.axis == block.axis[i] else 0.0
+                else:
+                    hypothesis.signature[i] = cubic
+
+
+@kernel
+def fill_view_signatures(view, forces, Gu):
+    """Fill the projections of the signatures on the direction of a view: of a step, and of losses.
+
+    Gu (3, n) rad/s2: effect of each surface, mean over the frame.
+    """
+    block, m = view.block, view.direction
+    for hypothesis in block.hypothesis[: block.n_hypotheses]:
+        s = hypothesis.surface
+        hypothesis.signature[0] = 1.0
+        if hypothesis.kind != STEP:
+            moment = m[0] * Gu[0, s] + m[1] * Gu[1, s] + m[2] * Gu[2, s]
+            for f in range(2):
+                moment += m[SIDE_FORCE + f] * forces.component[f].effect[s]
+            hypothesis.signature[0] = moment

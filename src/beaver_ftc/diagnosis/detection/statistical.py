@@ -12,11 +12,10 @@ import numpy as np
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_TERMS
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design.terms import AIRSPEED, N_SIGNALS, QDYN, evaluate, regressors
-from beaver_ftc.diagnosis.belief import air as gusts
-from beaver_ftc.diagnosis.belief.air import AIR
-from beaver_ftc.diagnosis.bounds.worst_case import UNKNOWN_TO_FILTERS_RAD_S2, beyond, uncertainty_bound
+from beaver_ftc.diagnosis import gusts
+from beaver_ftc.diagnosis.bounds import UNKNOWN_IN_FILTERS_RAD_S2, add_published_bound, further_map_error
 from beaver_ftc.diagnosis.detection import likelihood, noise_model, parity
-from beaver_ftc.diagnosis.detection.forces import FORCES_FELT
+from beaver_ftc.diagnosis.detection.forces import MEASURED_FORCES
 from beaver_ftc.diagnosis.detection.likelihood import (
     ENDING,
     GROWING,
@@ -25,9 +24,10 @@ from beaver_ftc.diagnosis.detection.likelihood import (
     N_READINGS,
     block_dtype,
 )
-from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE, Size, view_dtype
+from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE, RecordSize, view_dtype
 from beaver_ftc.diagnosis.detection.tones import TONE_CONFIG
-from beaver_ftc.diagnosis.state import BESIDE_DAMAGE, LOSS
+from beaver_ftc.diagnosis.gusts import GUST_RECORD
+from beaver_ftc.diagnosis.state import DAMAGE_POSSIBLE, LOSS
 
 # Least share of the best log-likelihood ratio that a constant theta explains of a loss growing at any rate
 # (docs/theory.md, section 7).
@@ -67,12 +67,12 @@ ALARM = record(score=float, axis=int, closest=float, detected_at_s=float)
 
 
 @sized
-def statistical_dtype(size: Size = USUAL_SIZE) -> np.dtype:
+def statistical_dtype(size: RecordSize = USUAL_SIZE) -> np.dtype:
     """The record of the detector, for an aircraft that needs these capacities."""
     return record(
         tests=TESTS, noise=NOISE, alarm=ALARM, block=(block_dtype(size.rates), N_BLOCKS),
         n_views=int, views=(view_dtype(size.view), size.views), tone_config=TONE_CONFIG,
-        forces=FORCES_FELT, air=AIR, inertial_air=AIR,
+        forces=MEASURED_FORCES, air=GUST_RECORD, inertial_air=GUST_RECORD,
     )  # fmt: skip
 
 
@@ -92,8 +92,8 @@ def update_blocks(tests, bounded, blocks, air, innovation, dt, k, latched, ends=
         if air.config.coarse:
             likelihood.set_gust_response(block, air.output.coarse_acceleration)
         if air.output.moving:
-            add_leap(air, block)
-            if b < likelihood.RETURNING:
+            add_turn_variance(air, block)
+            if b < likelihood.LATERAL_RETURNING:
                 likelihood.whiten_without_gust(block, dt)
             else:  # without gust both blocks of roll and yaw have the same filter
                 block.no_gust_filter.innovation[:] = blocks[LATERAL].no_gust_filter.innovation
@@ -102,7 +102,7 @@ def update_blocks(tests, bounded, blocks, air, innovation, dt, k, latched, ends=
 
 
 @kernel
-def add_leap(air, block):
+def add_turn_variance(air, block):
     """Add to the covariance of the drift what a fast turn of the gusts' axes may change in it."""
     for i in range(block.n):
         for j in range(block.n):
@@ -112,19 +112,19 @@ def add_leap(air, block):
 @kernel
 def track_residual_mean(blocks, air, innovation_after_known_faults, dt):
     """Filter the innovation after known faults (3,) rad/s2; the state tracks its slowly varying mean."""
-    for block in blocks[: likelihood.RETURNING]:
+    for block in blocks[: likelihood.LATERAL_RETURNING]:
         for i, axis in enumerate(block.axis[: block.n]):
             block.scratch[i] = innovation_after_known_faults[axis] - air.output.mean[axis]
         likelihood.whiten(block, block.residual_state, block.scratch, dt, block.scratch)
 
 
 @kernel
-def unknown_acceleration(blocks, air, out):
+def statistical_unknown_acceleration(blocks, air, out):
     """Fill out (3,) rad/s2 with the estimated acceleration that the control law's model lacks.
 
     It is the estimated drift plus the effect of the gust estimated from the vanes.
     """
-    for block in blocks[: likelihood.RETURNING]:
+    for block in blocks[: likelihood.LATERAL_RETURNING]:
         for i, axis in enumerate(block.axis[: block.n]):
             out[axis] = block.residual_state[2 + i] + air.output.acceleration[axis]
 
@@ -141,9 +141,11 @@ def update_alarm(alarm, tests, blocks, views, forces, air, t, known=True):
     for block in blocks:
         for hypothesis in block.hypothesis[: block.n_hypotheses]:
             if hypothesis.raises_alarm:
-                keep_largest(alarm, tests.alarm_level, hypothesis.score, hypothesis.axis)
+                keep_largest_score(alarm, tests.alarm_level, hypothesis.score, hypothesis.axis)
     for view in views:
-        keep_largest(alarm, tests.alarm_level, parity.alarm_score(view, views, tests, forces, air), view.axis)
+        keep_largest_score(
+            alarm, tests.alarm_level, parity.alarm_score(view, views, tests, forces, air), view.axis
+        )
     if alarm.score > 1.0 and alarm.detected_at_s < 0.0:
         alarm.detected_at_s = t
 
@@ -155,7 +157,7 @@ def note_closest_approach(alarm):
 
 
 @kernel
-def keep_largest(alarm, level, score, axis):
+def keep_largest_score(alarm, level, score, axis):
     """Keep a score if it is the largest."""
     share = score / level
     if share > alarm.score:
@@ -187,7 +189,7 @@ def is_not_excluded(estimators, loss_of, surface):
 
 
 @kernel
-def best_alternative(block, estimators, loss_of, surface, every=False):
+def best_alternative_llr(block, estimators, loss_of, surface, every=False):
     """The largest lower bound on the log-likelihood ratio of all alternatives to the loss of a surface.
 
     Excluded losses are no alternatives, unless `every`: as evidence decays, an uncertainty that correlates
@@ -225,13 +227,13 @@ def confirms_loss(tests, blocks, estimators, loss_of, surface):
     estimators: of the isolation; loss_of (n,): the estimator of each surface's loss, or -1. If the estimator
     is doubted BESIDE_DAMAGE, excluded losses are alternatives as well: damage may have excluded them.
     """
-    every = loss_of[surface] >= 0 and estimators[loss_of[surface]].weakly_excluded == BESIDE_DAMAGE
+    every = loss_of[surface] >= 0 and estimators[loss_of[surface]].weakly_excluded == DAMAGE_POSSIBLE
     for block in blocks:
         least = 0.0
         for hypothesis in block.hypothesis[: block.n_hypotheses]:
             if hypothesis.surface == surface and hypothesis.kind in (LOSS, GROWING):
                 least = max(least, hypothesis.min_llr)
-        if least - best_alternative(block, estimators, loss_of, surface, every) > tests.naming_level:
+        if least - best_alternative_llr(block, estimators, loss_of, surface, every) > tests.naming_level:
             return True
     return False
 
@@ -251,8 +253,8 @@ def excludes_loss(tests, blocks, estimators, loss_of, surface, ends, abrupt):
     part = 1.0 if abrupt and at_once else MIN_CONSTANT_SHARE
     end_part = 1.0 if at_once else MIN_CONSTANT_SHARE
     for lateral in blocks[LATERAL:]:
-        better = best_alternative(pitch, estimators, loss_of, surface)
-        better = max(better, best_alternative(lateral, estimators, loss_of, surface))
+        better = best_alternative_llr(pitch, estimators, loss_of, surface)
+        better = max(better, best_alternative_llr(lateral, estimators, loss_of, surface))
         worse = max(max_llr(pitch, surface, False), max_llr(lateral, surface, False))
         ended = max_llr(lateral, surface, True)
         if ends:
@@ -279,14 +281,14 @@ def estimated_loss(blocks, surface):
 
 
 @kernel
-def prepare(tests, noise, blocks, air, bound, design, measured, u, dt):
+def prepare_tests(tests, noise, blocks, air, bound, design, measured, u, dt):
     """Prepare the next frame, of dt s: gust, regressors, drift and jitter at this instant.
 
     bound: the declared bounds; u (n,) rad: positions of healthy surfaces.
     """
     x, y = measured.x, measured.y
     if air.output.moving:
-        gusts.fill_effect(air, design, x, y, u)
+        gusts.fill_gust_effect(air, design, x, y, u)
     if tests.tolerated:
         for block in blocks:
             block.regressor[:] = 0.0
@@ -295,7 +297,7 @@ def prepare(tests, noise, blocks, air, bound, design, measured, u, dt):
     if bound.error_map.n_boxes > 0:
         update_pace(noise, blocks, bound.error_map, u)
     if air.output.moving:
-        gusts.begin_sums(air, y[AIRSPEED], tests.share * dt)
+        gusts.begin_gust_sums(air, y[AIRSPEED], tests.share * dt)
 
 
 @kernel
@@ -311,10 +313,10 @@ def update_pace(noise, blocks, error_map, u):
 
 
 @kernel
-def accumulate_substep(tests, noise, blocks, air, bound, design, measured, u, dt):
+def accumulate_test_substep(tests, noise, blocks, air, bound, design, measured, u, dt):
     """Add an instant inside a frame, dt s after the instant before, to gust and regressors."""
     if air.output.moving:
-        gusts.accumulate_substep(air, design, measured.x, measured.y, u, measured.attitude, dt)
+        gusts.accumulate_gust_substep(air, design, measured.x, measured.y, u, measured.attitude, dt)
     if tests.tolerated:
         add_regressors(tests.share, noise, blocks, bound.admitted, design, measured, u)
 
@@ -326,7 +328,7 @@ def add_regressors(share, noise, blocks, admitted, design, measured, u):
     evaluate(design.moments, measured.x, y)
     add_coefficient_regressors(share, noise.terms, blocks, design, y, u)
     if noise.read:
-        noise_model.add_readings(share, noise, blocks, admitted, design, y, u)
+        noise_model.add_reading_regressors(share, noise, blocks, admitted, design, y, u)
 
 
 @kernel
@@ -334,20 +336,22 @@ def fill_drift_and_jitter(noise, blocks, air, bound, design, measured, dt):
     """Fill drift intensity and jitter of each block: for the bounded uncertainty and the unmeasured gust."""
     bounded, V = noise.bounded, measured.y[AIRSPEED]
     bounded[:] = 0.0
-    uncertainty_bound(measured.x, design, bound.inertia, bound.constant, bound.earth_rate, bounded)
+    add_published_bound(measured.x, design, bound.inertia, bound.constant, bound.earth_rate, bounded)
     mapped = bound.error_map.n_boxes > 0
     for i in range(3):
         bounded[i] += noise.deflection[i]
         if mapped:
-            bounded[i] += min(bound.error_map.now[i], UNKNOWN_TO_FILTERS_RAD_S2)
+            bounded[i] += min(bound.error_map.now[i], UNKNOWN_IN_FILTERS_RAD_S2)
         if bound.error_map.anywhere:
-            noise.beyond[i] = beyond(bound.error_map, bound.error_map.n_levels - 1, i)
+            noise.beyond[i] = further_map_error(bound.error_map, bound.error_map.n_levels - 1, i)
     for b, block in enumerate(blocks):
         for i, axis in enumerate(block.axis[: block.n]):
             for j in range(block.n):
                 block.drift[i, j] = 0.0
                 if air.output.moving:
-                    moved = gusts.unmeasured_drift(air, V, axis, block.axis[j], b == likelihood.RETURNING)
+                    moved = gusts.unmeasured_gust_drift(
+                        air, V, axis, block.axis[j], b == likelihood.LATERAL_RETURNING
+                    )
                     block.drift[i, j] = block.drift_scale * moved
             size = max(bounded[axis], likelihood.LEAST_UNCERTAINTY_RAD_S2)
             walk = noise.rapidity * size * size

@@ -73,7 +73,7 @@ def is_within_envelope(tone_config, y):
 
 
 @kernel
-def update(view, tone_config, alarm_level, within_envelope, tolerated, dt):
+def update_tones(view, tone_config, alarm_level, within_envelope, tolerated, dt):
     """Update the tests of a view with one frame, which the view's block has whitened; dt s.
 
     tolerated: true if the block has regressors. Without `within_envelope` the frame counts as zero, so the
@@ -181,7 +181,7 @@ def bounded_gain_at(frequency_rad_s: np.ndarray, pace_rad_s: float) -> np.ndarra
     return 2.0 / pi * np.where(x < pi / 2.0, np.sin(x), 1.0) / x
 
 
-def set_up_tones(
+def configure_tones(
     tone_config: np.void, chance: float, airspeed_mps: float, pace_rad_s: float, dt_s: float
 ) -> None:
     """Fill the configuration that all views share.

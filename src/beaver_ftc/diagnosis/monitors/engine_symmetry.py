@@ -22,10 +22,10 @@ OFF_CENTRE_M = 0.05
 
 # n: engines, 0 where they are not monitored. thrust, yawing: places of the signals in y. arm: a. off_centre:
 # of the bound, per CT.
-CONFIG = record(n=int, thrust=int, yawing=int, arm=float, off_centre=float)
-MEMORY = record(disabled=int)  # a law has moved an engine apart: the levers are no longer alike
-OUTPUT = record(failed=int)  # an engine has failed
-ENGINES = record(config=CONFIG, memory=MEMORY, output=OUTPUT)
+ENGINE_CONFIG = record(n=int, thrust=int, yawing=int, arm=float, off_centre=float)
+ENGINE_MEMORY = record(disabled=int)  # a law has moved an engine apart: the levers are no longer alike
+ENGINE_OUTPUT = record(failed=int)  # an engine has failed
+ENGINES = record(config=ENGINE_CONFIG, memory=ENGINE_MEMORY, output=ENGINE_OUTPUT)
 
 
 def mean_arm(aircraft: Aircraft) -> float:
@@ -33,7 +33,7 @@ def mean_arm(aircraft: Aircraft) -> float:
     return -sum(of.share * of.right_m for of in aircraft.effectors.values()) / aircraft.geometry.span_m
 
 
-def configure(config: np.void, aircraft: Aircraft) -> None:
+def configure_engine_monitor(config: np.void, aircraft: Aircraft) -> None:
     """Fill the record (dtype CONFIG); it stays empty where the symmetry of the engines is not measured."""
     known, signals = aircraft.file.model_error_map, list(aircraft.signals)
     if known is None or not known.knows_engines or not {THRUST, YAWING} <= set(signals):
@@ -53,7 +53,7 @@ def disable_if_differential_thrust(engines, levers):
 
 
 @kernel
-def detect(engines, bound, y):
+def detect_engine_failure(engines, bound, y):
     """Whether an engine has failed, by these signals y or before; bound: on |Cn - a CT| here."""
     config = engines.config
     if config.n > 0 and not engines.memory.disabled:

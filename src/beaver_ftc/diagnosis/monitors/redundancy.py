@@ -1,4 +1,4 @@
-"""What the instruments must have in common, whatever the aircraft does: kinematics, air data, engine.
+"""Redundancy tests: relations that sound sensors satisfy in any flight (kinematics, air data, engine).
 
     turning     attitude[k+1] = attitude[k] turned by h (p, q, r)[k]         in body axes, and angle by angle
     flow        v[k+1] = v[k] turned by -h (p, q, r), + h (force + gravity)  v from alpha, beta, airspeed
@@ -7,53 +7,246 @@
     engine      speed and manifold pressure are as commanded
     equal       a sensor that no equation uses, and the reading that its row says it should equal
 
-h is the time between two looks, a JSBSim frame: the truth's own integrators are followed (rates held over the
-step; velocity by Adams and Bashforth's second order), so that residuals of sound instruments are what is left
-out here: the Earth turns and is round. Every residual goes through filters of several poles, with a
-bound on what the declared errors of all instruments together can make of it, as in bank.py. Declared
-turbulence widens the bounds of flow and climb by what its gusts do within a filter's memory.
+h is the time between two samples, a JSBSim frame. The integration is that of JSBSim (rates held over the
+step; velocity by Adams and Bashforth's second order), so that residuals of sound sensors contain only what is
+left out here: the Earth turns and is round. Every residual passes filters of several poles, with a bound on
+the effect of the declared errors of all sensors together, as in detection/filters.py. Declared turbulence
+widens the bounds of flow and climb by the effect of its gusts within a filter's memory.
+
+This file also has the records of the sensor monitor, their configuration, and its finding in words.
 """
+
+from math import exp
+from typing import Any, cast
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel
-from beaver_ftc.design.dryden import LEAST_HEIGHT_M
-from beaver_ftc.diagnosis.detection.thresholds import bound_step, noise_step
-from beaver_ftc.diagnosis.monitors.sensor_records import (
-    AIRSPEED,
-    ALPHA,
-    ALPHA_FLOW,
-    ANGLE,
-    BETA,
-    BETA_FLOW,
-    CLIMB,
-    DENSITY,
-    EQUAL_READING,
-    EQUAL_SENSOR,
-    EQUAL_WITHIN,
-    LEAP_M_S2,
-    N_COMPUTED,
-    PSI,
-    QDYN,
-    RPM,
-    SPEED,
-    THETA,
-    TURN,
-    P,
-    Q,
-    R,
+from beaver_ftc.aircraft.aircraft import EARTH_RADIUS_M, GRAVITY_MPS2
+from beaver_ftc.compiled import kernel, record
+from beaver_ftc.design.context import DesignFunctions
+from beaver_ftc.design.dryden import LEAST_HEIGHT_M, Dryden
+from beaver_ftc.diagnosis.bounds import GUST_LIMIT_SIGMA, gust_effect
+from beaver_ftc.diagnosis.detection.filters import bound_step, noise_step
+from beaver_ftc.plant.instruments import (
+    ALTITUDE,
+    AX,
+    ENGINE_SPEED,
+    MANIFOLD,
+    N_SENSORS,
+    PHI,
+    SENSORS,
+    SIGNALS,
+    wrapped,
 )
-from beaver_ftc.plant.instruments import ALTITUDE, AX, ENGINE_SPEED, MANIFOLD, N_SENSORS, PHI, wrapped
-from beaver_ftc.scenario.sensors import N_IN_EQUATIONS
+from beaver_ftc.scenario.declared import Declared
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.sensors import N_IN_EQUATIONS, ROWS, frames_apart, sensor_words
 
-TURNING_RAD_S = 4e-5  # Earth rate is in the rates; the level turns with the flight over the round Earth
-FALLING_M_S2 = 0.03  # Coriolis, centrifugal, and gravity's change with place
-DENSITY_HEIGHT_M = 6300.0  # over which the density falls by no more than a factor e: in the stratosphere
+TURN, ANGLE, SPEED, ALPHA_FLOW, BETA_FLOW, DENSITY, CLIMB, RPM, PRESSURE = 0, 3, 6, 7, 8, 9, 10, 11, 12
+N_COMPUTED = 13  # tests with an equation; then those of sensors that should equal another reading
+EQUAL = tuple((SENSORS.index(row.name), row.equal) for row in ROWS if row.equal is not None)
+N_TESTS = N_COMPUTED + len(EQUAL)
+# The test in which a jump of a reading appears at once, as the rows of the sensors name it.
+TESTS = {
+    "roll": TURN, "pitch": TURN + 1, "yaw": TURN + 2,
+    "bank angle": ANGLE, "pitch angle": ANGLE + 1, "heading": ANGLE + 2,
+    "speed": SPEED, "incidence": ALPHA_FLOW, "sideslip": BETA_FLOW, "density": DENSITY, "climb": CLIMB,
+    "engine speed": RPM, "manifold pressure": PRESSURE,
+}  # fmt: skip
+# Of each sensor that should equal another reading: its place, that of the reading, the test in which the
+# reading's own errors appear, and by how much the quantities may differ, SI.
+EQUAL_SENSOR = np.array([i for i, _ in EQUAL], np.int64)
+EQUAL_READING = np.array([SENSORS.index(to.reading) for _, to in EQUAL], np.int64)
+EQUAL_READING_TEST = np.array([TESTS[ROWS[SENSORS.index(to.reading)].test] for _, to in EQUAL], np.int64)
+EQUAL_TOLERANCE = np.array([to.within for _, to in EQUAL], float)
+POLES_PER_S = (1e6, 10.0, 1.0)
+N_POLES = len(POLES_PER_S)
+NO_SENSOR = -1
+MAX_FORCE_JUMP_M_S2 = 8.0  # by which no specific force changes from one look to the next
+UNDECIDED, YES, NO = 0, 1, 2
+MAX_SPEED_RATIO = 1.4  # than in trim a flight may become
+ATTITUDE_CORRECTION_PER_S = 3.0  # a rate that it replaces, where the attitude's own noise is declared
+NEVER_FROZEN = 1_000_000_000  # JSBSim frames: of a reading that resolves less than it scatters
+NAMING_LIMIT_S = 1.0  # for the instrument to be found; then the fault is outside what can be named
+P, Q, R, ALPHA, BETA, AIRSPEED, QDYN = range(len(SIGNALS))
+THETA, PSI = PHI + 1, PHI + 2
+
+# Hypotheses of initial_errors.py: the sensors that may be broken when the monitor begins
+ALPHA_ERROR, BETA_ERROR, AIRSPEED_ERROR, PHI_ERROR, THETA_ERROR = range(5)
+N_INITIAL, N_COUPLINGS = 5, 14
+
+TEST = record(
+    residual=float, rate=float, noise=float, noise_then=float,  # of the elapsed step
+    air=float, bound=N_POLES,  # share of `gusts` in it; the whole bound
+    filtered=N_POLES, bound_rate=N_POLES, bound_noise=N_POLES, share=float,
+)  # fmt: skip
+
+STEP = record(
+    config=record(
+        h=float, decay=N_POLES, gravity=float,
+        # of the declared turbulence: its speed at most, m/s, and what passes each filter of a gust's changes
+        # up to an airspeed m/s
+        gust=float, gusts=N_POLES, swift=float,
+        low=float,  # height below which a gust changes faster than those of 2000 ft, m
+        rising=float,  # vertical wind at most, m/s
+        # declared: the whole error of a reading, and what of it changes; drift of the attitude
+        offset=N_SENSORS, slope=N_SENSORS, steady=N_SENSORS, drift=float,
+    ),
+    memory=record(
+        error=N_SENSORS, changing=N_SENSORS,  # how far a reading can be off, and by how much that changes
+        # drift so far, rad; the errors of the look before, and of the one before that
+        drifted=float, error_then=N_SENSORS, error_before=N_SENSORS,
+        # the look before: readings, attitude as a quaternion, velocity, acceleration there and before that
+        then=N_SENSORS, turned=4, velocity=3, acceleration=3, acceleration_then=3,
+        # m/s2: size of the acceleration of the elapsed step, and of those before it; of acceleration_then
+        size=float, sizes_before=2, size_then=float,
+        unknown=float,  # of the acceleration of the first step, for want of the instant before
+        predicted=N_SENSORS, scratch=4, now=4,
+        command=2,  # engine speed rpm, manifold pressure inHg
+    ),
+    test=(TEST, N_TESTS),
+)  # fmt: skip
+
+INITIAL_ERRORS = record(
+    # of each hypothesis: how far it can be off, at first, now, at the alarm; what it may have moved by
+    first=N_INITIAL, off=N_INITIAL, held=N_INITIAL, changed=N_INITIAL,
+    reach=(N_INITIAL, RPM), reached=(N_INITIAL, RPM, N_POLES),  # of a unit: in this look, through the filters
+    coupling=N_COUPLINGS, coupled=(N_COUPLINGS, N_POLES),  # the same with its sign
+    refuted=(int, N_INITIAL, N_TESTS),  # since the alarm, and by which test
+)  # fmt: skip
+
+MONITOR_CONFIG = record(
+    enabled=int, instants=int, engine=int, trim=N_SENSORS,
+    follows=float,  # share of its error a replaced rate makes up a look
+    blurred=int,  # the attitude is noisy: a surface is named only once no gyro can be the cause
+    longest_identical=(int, N_SENSORS),  # how many looks with the very same reading say that it is frozen
+    damping=(3, 3),
+)  # fmt: skip
+
+MONITOR_MEMORY = record(
+    begun=int, begun_at_s=float, past=int, exceeded=(int, N_TESTS),
+    # what tells a gyro from the attitude, by axis
+    gyro_error=3, gyro_error_then=3,  # as each frame began, rad/s
+    spike=3, spike_then=3, spike_before=3, W=3, W_bound=3, W_then=3, before=3,
+    # no gyro can be what the rates show: what attitude and W make of that, and how far one gyro goes
+    agreed=(int, max(len(EQUAL), 1)),  # whether a sensor has equalled the reading that it should
+    no_gyro=int, apart=(3, N_POLES), apart_bound=(3, N_POLES), rates_confirm=(int, 3), taken_over=(int, 3),
+    # accelerometers or flow sensor: number of identical samples; readings two samples ago; sensors cleared
+    identical=(int, N_SENSORS), earlier=N_SENSORS, cleared=(int, N_SENSORS),
+    # how far accelerometers have leapt of late. Since the alarm: looks, residuals of speed, incidence and
+    # sideslip, how much of them is sound, how much is of a first error; least and most of the readings; the
+    # climb that such an incidence makes up; the velocity made up, body axes
+    largest_jump=float, n_summed=int, residual_sum=3, sound_sum=3, first=3, least=3, most=3,
+    climb_error=N_POLES, spurious_velocity=3,
+)  # fmt: skip
+
+MONITOR_OUTPUT = record(
+    alarmed=int, alarmed_at_s=float,
+    keeps_surface=int,  # a surface was found long before, with sound sensors: it stays found
+    misnamed=int,  # a surface had been named in the moment before the alarm
+    lead=int,  # the test that has raised the alarm
+    largest_test=int, share=float,  # of this frame: the test nearest its bound, and how near
+    suspect=(int, N_SENSORS), named=int, named_at_s=float, replaced=(int, N_SENSORS),
+)  # fmt: skip
+
+SENSOR_MONITOR = record(
+    config=MONITOR_CONFIG, memory=MONITOR_MEMORY, output=MONITOR_OUTPUT, step=STEP, since=INITIAL_ERRORS
+)
+
+
+def configure_monitor(
+    monitor: np.void, scenario: Scenario, design: np.void, y: np.ndarray, enabled: bool
+) -> None:
+    """Fill the monitor's record at the trim: y, the measured signals there; design: the designer's record.
+
+    A monitor that is not `enabled` has found nothing, and its record holds no more than that.
+    """
+    output, config = monitor["output"], monitor["config"]
+    output["named"], output["alarmed_at_s"], output["named_at_s"] = NO_SENSOR, -1.0, -1.0
+    config["enabled"] = enabled
+    if not enabled:
+        return
+    declared, initial = Declared.of(scenario), cast("Any", scenario.initial)  # whose keys the aircraft names
+    config["instants"], config["engine"] = scenario.substeps, scenario.airframe.has_engine_instruments
+    config["trim"][3:7] = y[:4]
+    config["damping"] = gust_effect(DesignFunctions(np.array([design])), y)
+    monitor["memory"]["past"] = scenario.substeps - 1  # the first JSBSim frame ends a frame of the loop
+    if config["engine"]:
+        monitor["step"]["memory"]["command"] = initial.engine_rpm, initial.manifold_pressure_inhg
+    configure_step(monitor["step"]["config"], declared, scenario)
+    configure_readings(monitor, declared, monitor["step"]["config"]["h"])
+
+
+def configure_step(step: np.void, declared: Declared, scenario: Scenario) -> None:
+    """Fill what the equations of motion and the gusts are stepped with, a JSBSim frame a step."""
+    initial, h = scenario.initial, 1.0 / scenario.rate_hz / scenario.substeps
+    step["h"], step["decay"] = h, [exp(-pole * h) for pole in POLES_PER_S]
+    step["gravity"] = GRAVITY_MPS2 * (1.0 + initial.altitude_m / EARTH_RADIUS_M) ** -2
+    step["gust"], step["gusts"] = gust_bounds(declared.air, initial.airspeed_mps, h)
+    step["swift"] = MAX_SPEED_RATIO * initial.airspeed_mps
+    step["low"], step["rising"] = declared.air.low_m, declared.vertical_wind_mps
+
+
+def configure_readings(monitor: np.void, declared: Declared, h: float) -> None:
+    """Fill the declared errors of the readings; h: seconds of a JSBSim frame."""
+    step, config, errors = monitor["step"]["config"], monitor["config"], declared.sensors
+    for i, name in enumerate(SENSORS):
+        error = errors[name]
+        step["offset"][i], step["slope"][i], step["steady"][i] = error.worst, error.slope, error.steady
+        config["longest_identical"][i] = longest_identical(error.noise, error.resolution) * frames_apart(i, h)
+        drift_rad_s = getattr(getattr(errors.declared, name), "drift_rad_s", 0.0)
+        step["drift"] = max(step["drift"], abs(drift_rad_s))
+    attitude = slice(PHI, PHI + 3)
+    config["blurred"] = np.any(step["offset"][attitude] > step["steady"][attitude])
+    config["follows"] = min(1.0, h * ATTITUDE_CORRECTION_PER_S) if config["blurred"] else 1.0
+
+
+def longest_identical(noise: float, quantum: float) -> int:
+    """For how many samples no sound sensor, of this noise and resolution, gives the very same reading."""
+    if quantum == 0.0:
+        return 3
+    return 50 if noise > quantum / 4.0 else NEVER_FROZEN
+
+
+def gust_bounds(air: Dryden, airspeed_mps: float, h: float) -> tuple[float, np.ndarray]:
+    """Bounds on the speed of gusts, m/s, and on what passes each filter of their changes in h s.
+
+    The speed of a gust changes like a random walk (`Dryden.velocity_walk`); a filter with a pole of lam 1/s
+    keeps 1 / 2 lam of it.
+    """
+    sigma_mps, intensity = air.sigma_mps, air.velocity_walk(airspeed_mps, MAX_SPEED_RATIO)
+    kept_s = [h / (1.0 - exp(-2.0 * pole * h)) for pole in POLES_PER_S]
+    return GUST_LIMIT_SIGMA * sigma_mps, GUST_LIMIT_SIGMA * np.sqrt(intensity * np.array(kept_s))
+
+
+def sensor_finding(monitor: np.void, t_s: float) -> dict[str, Any] | None:
+    """The verdict's parts as of t_s, where an instrument is found broken; None where none is."""
+    if not monitor["output"]["alarmed"] or monitor["output"]["keeps_surface"]:
+        return None
+    said: dict[str, Any] = {"isolated": None, "isolation_type": None, "estimate": None, "candidates": ()}
+    said["detection_time_s"], said["isolation_time_s"] = float(monitor["output"]["alarmed_at_s"]), None
+    if monitor["output"]["named"] >= 0:
+        said["isolated"] = sensor_words(SENSORS[int(monitor["output"]["named"])])
+        said["isolation_time_s"] = float(monitor["output"]["named_at_s"])
+    elif t_s > said["detection_time_s"] + NAMING_LIMIT_S:
+        said["isolated"] = said["isolation_type"] = "unanticipated"
+        said["isolation_time_s"] = said["detection_time_s"] + NAMING_LIMIT_S
+    else:
+        left = zip(SENSORS, monitor["output"]["suspect"], strict=True)
+        said["candidates"] = tuple(sensor_words(name) for name, possible in left if possible)
+    return said
+
+
+EARTH_TURN_RAD_S = 4e-5  # Earth rate is in the rates; the level turns with the flight over the round Earth
+EARTH_ACCELERATION_M_S2 = 0.03  # Coriolis, centrifugal, and gravity's change with place
+DENSITY_SCALE_HEIGHT_M = (
+    6300.0  # over which the density falls by no more than a factor e: in the stratosphere
+)
 STEEPEST_RAD = 1.3  # beyond it, roll and heading cannot be distinguished
 
 
 @kernel
-def quaternion(phi, theta, psi, out):
+def fill_quaternion(phi, theta, psi, out):
     """Fill out (4,): the rotation from body to level axes, scalar first."""
     a, b, c = np.cos(phi / 2), np.cos(theta / 2), np.cos(psi / 2)
     d, e, f = np.sin(phi / 2), np.sin(theta / 2), np.sin(psi / 2)
@@ -64,7 +257,7 @@ def quaternion(phi, theta, psi, out):
 
 
 @kernel
-def turn(q, x, h, out):
+def advance_quaternion(q, x, h, out):
     """Fill out (4,) with q after h s at the rates x (3,) rad/s, one step of Euler's, to unit length."""
     p, r, s = 0.5 * h * x[0], 0.5 * h * x[1], 0.5 * h * x[2]
     length = np.sqrt(1.0 + p * p + r * r + s * s)
@@ -84,7 +277,7 @@ def angle_between(one, other, axis):
 
 
 @kernel
-def turned_by(step, axis, i):
+def axis_turn_per_angle(step, axis, i):
     """By how much a body axis turns for what angle i changes by."""
     bank, tilt = step.memory.then[PHI], step.memory.then[THETA]
     if axis == 0:
@@ -95,7 +288,7 @@ def turned_by(step, axis, i):
 
 
 @kernel
-def turn_back(x, h, vector, out):
+def rotate_to_new_axes(x, h, vector, out):
     """Fill out (3,): a vector (3,) that stays put, in body axes that turned at x (3,) rad/s for h s."""
     size = np.sqrt(x[0] ** 2 + x[1] ** 2 + x[2] ** 2)
     angle = 2.0 * np.arctan(0.5 * h * size)
@@ -109,7 +302,7 @@ def turn_back(x, h, vector, out):
 
 
 @kernel
-def bound_errors(step, signal):
+def fill_reading_errors(step, signal):
     """Fill error and changing (N_SENSORS,): how far each reading can be off, and by how much that changes."""
     for i in range(N_SENSORS):
         size = abs(wrapped(signal[i])) if i == PSI else abs(signal[i])
@@ -121,11 +314,11 @@ def bound_errors(step, signal):
 
 
 @kernel
-def look(step, signal, force):
+def store_sample(step, signal, force):
     """Keep this instant for the next look; signal (N_SENSORS,) SI, force (3,) m/s2."""
     step.memory.then[:], step.memory.error_before[:] = signal, step.memory.error_then
     step.memory.error_then[:] = step.memory.error
-    quaternion(signal[PHI], signal[THETA], signal[PSI], step.memory.turned)
+    fill_quaternion(signal[PHI], signal[THETA], signal[PSI], step.memory.turned)
     alpha, beta, V = signal[ALPHA], signal[BETA], signal[AIRSPEED]
     step.memory.velocity[0] = V * np.cos(alpha) * np.cos(beta)
     step.memory.velocity[1], step.memory.velocity[2] = V * np.sin(beta), V * np.sin(alpha) * np.cos(beta)
@@ -136,16 +329,16 @@ def look(step, signal, force):
 
 
 @kernel
-def length(vector):
+def vector_length(vector):
     """The length of a vector (3,)."""
     return np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
 
 
 @kernel
-def predict(step):
+def predict_readings(step):
     """Fill predicted (N_SENSORS,): what the look before says of attitude, flow and altitude now."""
     rates, h, out, moved = step.memory.then[:3], step.config.h, step.memory.predicted, step.memory.scratch[:3]
-    turn(step.memory.turned, rates, h, step.memory.now)
+    advance_quaternion(step.memory.turned, rates, h, step.memory.now)
     a, b, c, d = step.memory.now[0], step.memory.now[1], step.memory.now[2], step.memory.now[3]
     out[PHI] = np.arctan2(2.0 * (a * b + c * d), 1.0 - 2.0 * (b * b + c * c))
     out[THETA] = np.arcsin(min(max(2.0 * (a * c - b * d), -1.0), 1.0))
@@ -154,24 +347,24 @@ def predict(step):
     up = v[0] * np.sin(tilt) - v[1] * np.sin(bank) * np.cos(tilt) - v[2] * np.cos(bank) * np.cos(tilt)
     out[ALTITUDE] = step.memory.then[ALTITUDE] + h * up
     step.memory.sizes_before[1], step.memory.sizes_before[0] = step.memory.sizes_before[0], step.memory.size
-    step.memory.size_then = length(step.memory.acceleration_then)
+    step.memory.size_then = vector_length(step.memory.acceleration_then)
     for i in range(3):
         moved[i] = 1.5 * step.memory.acceleration[i] - 0.5 * step.memory.acceleration_then[i]
-    step.memory.size = length(moved)
+    step.memory.size = vector_length(moved)
     for i in range(3):
         moved[i] = v[i] + h * moved[i]
-    turn_back(rates, h, moved, v)
-    turn_back(rates, h, step.memory.acceleration, step.memory.acceleration_then)
-    speed = length(v)
+    rotate_to_new_axes(rates, h, moved, v)
+    rotate_to_new_axes(rates, h, step.memory.acceleration, step.memory.acceleration_then)
+    speed = vector_length(v)
     out[AIRSPEED] = speed
     out[ALPHA], out[BETA] = np.arctan2(v[2], v[0]), np.arcsin(v[1] / max(speed, 1e-3))
 
 
 @kernel
-def compare(step, signal):
+def fill_residuals(step, signal):
     """Fill the residual of each test with what the readings (N_SENSORS,) are beyond what was predicted."""
     test, predicted = step.test, step.memory.predicted
-    quaternion(signal[PHI], signal[THETA], signal[PSI], step.memory.scratch)
+    fill_quaternion(signal[PHI], signal[THETA], signal[PSI], step.memory.scratch)
     for i in range(3):
         test[TURN + i].residual = angle_between(step.memory.now, step.memory.scratch, i + 1)
         test[ANGLE + i].residual = wrapped(signal[PHI + i] - predicted[PHI + i])
@@ -187,7 +380,7 @@ def compare(step, signal):
 
 
 @kernel
-def steepest(step, signal):
+def steepest_pitch_angle(step, signal):
     """How far from level the nose can have been since the look before, rad."""
     return max(
         abs(signal[THETA]) + step.memory.error[THETA],
@@ -196,42 +389,44 @@ def steepest(step, signal):
 
 
 @kernel
-def stepped(step, i):
+def two_step_error(step, i):
     """How far off 3/2 a - 1/2 a_then can be by what reading i is off at the two instants: a constant counts
     once."""
     return 1.5 * step.memory.error_then[i] + 0.5 * step.memory.error_before[i] - step.config.steady[i]
 
 
 @kernel
-def misjudged(step, turning, rates):
+def acceleration_error(step, turning, rates):
     """How far off the acceleration of the elapsed step can be, m/s2: by accelerometers, by gravity sought
     where the attitude has it, by turning the one before back. turning; rates: of gyros, errors; rad/s."""
-    tilt, g = stepped(step, PHI) + stepped(step, THETA), step.config.gravity
+    tilt, g = two_step_error(step, PHI) + two_step_error(step, THETA), step.config.gravity
     felt, steady = 0.0, g * (step.config.steady[PHI] + step.config.steady[THETA])
     for i in range(AX, AX + 3):
-        felt += stepped(step, i) ** 2
+        felt += two_step_error(step, i) ** 2
         steady += step.config.steady[i]
     back = step.config.h * (turning * steady + 0.5 * rates * step.memory.size_then)
-    return FALLING_M_S2 + step.memory.unknown + g * tilt + np.sqrt(felt) + back
+    return EARTH_ACCELERATION_M_S2 + step.memory.unknown + g * tilt + np.sqrt(felt) + back
 
 
 @kernel
-def allow_turning(step, signal, turning, rates):
-    """The same as `allow`, of attitude. That a constant error of it turns with the aircraft: of the rates
-    J(phi, theta) (phi', theta', psi') it changes J. An error of a moment turns an axis when it comes and back
-    when it goes, and J has changed between."""
+def bound_attitude_tests(step, signal, turning, rates):
+    """The same as `bound_residuals`, of attitude.
+
+    A constant error of the attitude turns with the aircraft: in the rates J(phi, theta) (phi', theta', psi')
+    it changes J. A momentary error turns an axis when it begins, and back when it ends with another J.
+    """
     test, E, n = step.test, step.memory.error_then, step.memory.changing
-    level = 1.0 / np.cos(min(steepest(step, signal), STEEPEST_RAD))
+    level = 1.0 / np.cos(min(steepest_pitch_angle(step, signal), STEEPEST_RAD))
     tilt, around = E[PHI] + E[THETA] + E[PSI], step.config.h * turning
     tipped = abs(signal[PHI] - step.memory.then[PHI]) + abs(signal[THETA] - step.memory.then[THETA])
     momentary = E[THETA] - step.config.steady[THETA] + E[PSI] - step.config.steady[PSI] + n[THETA] + n[PSI]
     for i in range(3):
         by_attitude = turning * (tilt + level * E[THETA]) + tipped * momentary / step.config.h
         test[TURN + i].rate = (
-            TURNING_RAD_S + 2.0 * step.config.drift + E[P + i] + around * rates + by_attitude
+            EARTH_TURN_RAD_S + 2.0 * step.config.drift + E[P + i] + around * rates + by_attitude
         )
         by_attitude = 2.0 * level * turning * (E[PHI] + E[THETA])
-        off = TURNING_RAD_S + (1.0 + level * around) * rates + by_attitude
+        off = EARTH_TURN_RAD_S + (1.0 + level * around) * rates + by_attitude
         test[ANGLE + i].rate, test[ANGLE + i].noise = level * off + step.config.drift, n[PHI + i]
     tilted, banked = abs(np.sin(signal[THETA])) + n[THETA], abs(np.sin(signal[PHI])) + n[PHI]
     test[TURN].noise = n[PHI] + tilted * n[PSI]
@@ -240,7 +435,7 @@ def allow_turning(step, signal, turning, rates):
 
 
 @kernel
-def lowest(step, signal):
+def lowest_sample_height(step, signal):
     """The least height of the two looks, m, that the altimeter leaves."""
     now, then = (
         signal[ALTITUDE] - step.memory.error[ALTITUDE],
@@ -250,16 +445,17 @@ def lowest(step, signal):
 
 
 @kernel
-def allow_flow(step, signal, turning, rates):
+def bound_flow_tests(step, signal, turning, rates):
     """The same, of flow and climb: slopes of their kinematics with each reading, where they are greatest."""
     test, e, E, n = step.test, step.memory.error, step.memory.error_then, step.memory.changing
     slow = max(min(signal[AIRSPEED] - e[AIRSPEED], step.memory.then[AIRSPEED] - E[AIRSPEED]), 1.0)
     slip = max(abs(signal[BETA]) + e[BETA], abs(step.memory.then[BETA]) + E[BETA])
     aslant, vanes = 1.0 / np.cos(min(slip, STEEPEST_RAD)), E[ALPHA] + E[BETA]
-    off = misjudged(step, turning, rates)
+    off = acceleration_error(step, turning, rates)
     pull, coarse = step.memory.size + off, 1.0 + step.config.h * (2.0 * step.memory.size / slow + turning)
     gusty = np.sqrt(
-        max(signal[AIRSPEED] / step.config.swift, 1.0) * max(step.config.low / lowest(step, signal), 1.0)
+        max(signal[AIRSPEED] / step.config.swift, 1.0)
+        * max(step.config.low / lowest_sample_height(step, signal), 1.0)
     )
     flow = aslant**2 * ((off + pull * (vanes + E[AIRSPEED] / slow)) / slow + turning * vanes) + aslant * rates
     test[SPEED].air, test[SPEED].noise = gusty, n[AIRSPEED]
@@ -273,7 +469,7 @@ def allow_flow(step, signal, turning, rates):
 
 
 @kernel
-def reciprocal_moved(step, signal, i):
+def log_change_error(step, signal, i):
     """How far the logarithm of a quantity can seem to move, the reading of which is off by a constant."""
     least = max(min(signal[i], step.memory.then[i]), 1.0)
     moved = step.config.steady[i] * abs(1.0 / max(signal[i], 1.0) - 1.0 / max(step.memory.then[i], 1.0))
@@ -281,20 +477,20 @@ def reciprocal_moved(step, signal, i):
 
 
 @kernel
-def allow_density(step, signal):
+def bound_density_test(step, signal):
     """The same, of the logarithm of the density."""
     test, e, n = step.test[DENSITY], step.memory.error, step.memory.changing
     fastest = (
         step.memory.then[AIRSPEED] + step.memory.error_then[AIRSPEED] + step.config.rising + step.config.gust
     )
-    seems = reciprocal_moved(step, signal, QDYN) + 2.0 * reciprocal_moved(step, signal, AIRSPEED)
-    test.rate = fastest / DENSITY_HEIGHT_M + seems / step.config.h
+    seems = log_change_error(step, signal, QDYN) + 2.0 * log_change_error(step, signal, AIRSPEED)
+    test.rate = fastest / DENSITY_SCALE_HEIGHT_M + seems / step.config.h
     test.noise = n[QDYN] / max(signal[QDYN] - e[QDYN], 1.0)
     test.noise += 2.0 * n[AIRSPEED] / max(signal[AIRSPEED] - e[AIRSPEED], 1.0)
 
 
 @kernel
-def allow(step, signal):
+def bound_residuals(step, signal):
     """Fill what sound instruments with the declared errors may add to each residual: per second, at all.
 
     What was predicted is off by the errors of the readings it was predicted from (E, of the look before),
@@ -303,13 +499,13 @@ def allow(step, signal):
     E = step.memory.error_then
     rates = E[P] + E[Q] + E[R]
     turning = abs(step.memory.then[P]) + abs(step.memory.then[Q]) + abs(step.memory.then[R]) + rates
-    allow_turning(step, signal, turning, rates)
-    allow_flow(step, signal, turning, rates)
-    allow_density(step, signal)
+    bound_attitude_tests(step, signal, turning, rates)
+    bound_flow_tests(step, signal, turning, rates)
+    bound_density_test(step, signal)
 
 
 @kernel
-def follow(step, test):
+def filter_test(step, test):
     """Pass one residual through its filters; note the largest share of a bound."""
     test.share = 0.0
     for m, a in enumerate(step.config.decay):
@@ -323,7 +519,7 @@ def follow(step, test):
 
 
 @kernel
-def start(test):
+def start_test(test):
     """Begin a test with this look: there is nothing in its filters yet, and all of the noise to come."""
     test.share = test.residual = 0.0
     test.filtered[:], test.bound_rate[:], test.bound_noise[:] = 0.0, 0.0, test.noise
@@ -331,7 +527,7 @@ def start(test):
 
 
 @kernel
-def follow_engine(step, signal):
+def test_engine(step, signal):
     """The engine's instruments against what was commanded: no filter, an error is there or not."""
     step.test[RPM].residual = signal[ENGINE_SPEED] - step.memory.command[0]
     step.test[RPM + 1].residual = signal[MANIFOLD] - step.memory.command[1]
@@ -341,7 +537,7 @@ def follow_engine(step, signal):
 
 
 @kernel
-def compare_equals(step, signal, fresh):
+def test_equal_sensors(step, signal, fresh):
     """Compare each sensor that should equal a reading with that reading, when it gives a new sample, `fresh`:
     beyond what the errors of both and the two quantities may differ by, one of the two is broken."""
     for k in range(EQUAL_SENSOR.size):
@@ -351,43 +547,45 @@ def compare_equals(step, signal, fresh):
             test.residual = signal[i] - signal[reading]
             if PHI <= reading <= PSI:
                 test.residual = wrapped(test.residual)
-            test.bound[0] = EQUAL_WITHIN[k] + step.memory.error[i] + step.memory.error[reading] + 1e-6
+            test.bound[0] = EQUAL_TOLERANCE[k] + step.memory.error[i] + step.memory.error[reading] + 1e-6
             test.share = abs(test.residual) / test.bound[0]
 
 
 @kernel
-def begin(step, signal, force):
+def begin_tests(step, signal, force):
     """The first look: what was before it is not known."""
-    bound_errors(step, signal)
-    look(step, signal, force)
+    fill_reading_errors(step, signal)
+    store_sample(step, signal, force)
     step.memory.error_before[:], step.memory.acceleration_then[:] = (
         step.memory.error_then,
         step.memory.acceleration,
     )
-    step.memory.size = step.memory.sizes_before[0] = length(step.memory.acceleration) + LEAP_M_S2
-    step.memory.unknown = 0.5 * LEAP_M_S2
-    allow(step, signal)
+    step.memory.size = step.memory.sizes_before[0] = (
+        vector_length(step.memory.acceleration) + MAX_FORCE_JUMP_M_S2
+    )
+    step.memory.unknown = 0.5 * MAX_FORCE_JUMP_M_S2
+    bound_residuals(step, signal)
     for c in range(RPM):
-        start(step.test[c])
+        start_test(step.test[c])
 
 
 @kernel
-def check(step, signal, engine):
+def run_tests(step, signal, engine):
     """Hold this instant's readings (N_SENSORS,) against the look before; engine: it has instruments."""
     step.memory.drifted += step.config.h * step.config.drift
-    bound_errors(step, signal)
-    predict(step)
-    compare(step, signal)
-    allow(step, signal)
+    fill_reading_errors(step, signal)
+    predict_readings(step)
+    fill_residuals(step, signal)
+    bound_residuals(step, signal)
     step.memory.unknown = 0.0
-    steep = steepest(step, signal) > STEEPEST_RAD
+    steep = steepest_pitch_angle(step, signal) > STEEPEST_RAD
     for c in range(RPM):
         if steep and c < SPEED:
-            start(step.test[c])
+            start_test(step.test[c])
         else:
-            follow(step, step.test[c])
+            filter_test(step, step.test[c])
     if engine:
-        follow_engine(step, signal)
+        test_engine(step, signal)
 
 
 @kernel

@@ -8,41 +8,58 @@ exactly, and stays within its bound for an error of the attitude.
 
 After the alarm no surface is isolated. A named sensor is replaced by an estimate from the others
 (`substitute_of`), for the diagnosis and for the laws, until the end of the flight.
+
+*Accelerometers or flow sensor?* A test of the flow (airspeed, incidence, sideslip) compares a flow sensor
+with the accelerometers, so an error of either moves it. An accelerometer's error e integrates into a velocity
+error e t; an error of a flow sensor is a step, which its own reading contains. From the alarm on
+
+    the accelerometers are cleared if the reading of the flow sensor jumps as the test does, soon after the
+    alarm, while no accelerometer has jumped; if the flow sensor is frozen; for the airspeed, if the test of
+    the density is exceeded
+    the flow sensor is cleared if the residuals add up to many times the range of its reading; if an airspeed,
+    or incidence, of that error would exceed the test of the density, or of the climb; if an accelerometer is
+    frozen
+
+The direction of the spurious velocity says which accelerometer is broken. If neither is cleared, no sensor is
+named. The diagnosis uses no accelerometer that may be broken: `measured.inertial`.
 """
 
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.detection.bank import alarm
-from beaver_ftc.diagnosis.detection.thresholds import bound_step
-from beaver_ftc.diagnosis.monitors import accelerometers, redundancy, since_start
-from beaver_ftc.diagnosis.monitors.sensor_records import (
+from beaver_ftc.diagnosis.detection.filters import bank_alarm_axis, bound_step
+from beaver_ftc.diagnosis.monitors import initial_errors, redundancy
+from beaver_ftc.diagnosis.monitors.initial_errors import held_error_part
+from beaver_ftc.diagnosis.monitors.redundancy import (
     AIRSPEED,
+    AIRSPEED_ERROR,
     ALPHA,
+    ALPHA_ERROR,
     ALPHA_FLOW,
     ANGLE,
     BETA,
+    BETA_ERROR,
     BETA_FLOW,
     CLIMB,
     DENSITY,
     EQUAL_READING,
+    EQUAL_READING_TEST,
     EQUAL_SENSOR,
-    EQUAL_SHOWS,
+    MAX_FORCE_JUMP_M_S2,
     N_COMPUTED,
+    N_INITIAL,
     N_TESTS,
-    NEVER_STILL,
+    NEVER_FROZEN,
     NO,
     NO_SENSOR,
-    OF_PHI,
-    OF_SPEED,
+    PHI_ERROR,
     PRESSURE,
     QDYN,
     RPM,
     SPEED,
-    STARTERS,
     THETA,
     TURN,
-    UNKNOWN,
+    UNDECIDED,
     YES,
 )
 from beaver_ftc.plant.instruments import (
@@ -57,12 +74,191 @@ from beaver_ftc.plant.instruments import (
 )
 from beaver_ftc.scenario.sensors import N_IN_EQUATIONS
 
+JUMP_WINDOW_S = 1.0  # after the alarm: later, a jump by chance is too likely
+JUMP_MEMORY_S = 2.0  # time constant with which the largest jump of an accelerometer fades
+GROWTH_FACTOR = 30.0  # residual sum over the range of the reading: a scale error within 3 % of -1 gives that
+CLEAR_EXCESS = 3.0  # times the bound of a test that is not exceeded
+_ROUNDING_S = 1e-9
+
+
+@kernel
+def flow_sensor_of(test):
+    """The flow sensor that a test compares with the accelerometers."""
+    if test == SPEED:
+        return AIRSPEED
+    return ALPHA if test == ALPHA_FLOW else BETA
+
+
+@kernel
+def hypothesis_of(test):
+    """The hypothesis that this sensor was broken when the monitor began (initial_errors.py)."""
+    if test == SPEED:
+        return AIRSPEED_ERROR
+    return ALPHA_ERROR if test == ALPHA_FLOW else BETA_ERROR
+
+
+@kernel
+def is_flow_test(test):
+    """Whether accelerometers take part in a test."""
+    return SPEED <= test <= BETA_FLOW
+
+
+@kernel
+def count_identical_samples(monitor, signal):
+    """Count the samples for which each reading (N_SENSORS,) has been the very same, and find the largest jump
+    of an accelerometer from one sample to the next, m/s2, which fades within CALMED_S."""
+    memory, before = monitor.memory, monitor.step.memory.then
+    memory.largest_jump *= 1.0 - monitor.step.config.h / JUMP_MEMORY_S
+    for i in range(N_SENSORS):
+        memory.identical[i] = memory.identical[i] + 1 if signal[i] == before[i] else 0
+        if AX <= i < N_IN_EQUATIONS:
+            memory.largest_jump = max(memory.largest_jump, abs(signal[i] - before[i]))
+
+
+@kernel
+def is_frozen(monitor, i):
+    """Whether sensor i is frozen: no sound one gives the same reading for so many samples."""
+    return monitor.memory.identical[i] >= monitor.config.longest_identical[i]
+
+
+@kernel
+def clear_by_sample(monitor, signal):
+    """Clear the flow sensor, or the accelerometers, by this sample, that of the alarm or a later one."""
+    if not is_flow_test(monitor.output.lead):
+        return
+    since_alarm_s = monitor.memory.n_summed * monitor.step.config.h
+    if since_alarm_s < JUMP_WINDOW_S - _ROUNDING_S and reading_jumped(monitor, signal):
+        clear_accelerometers(monitor)
+    sum_residuals(monitor, signal)
+    flow = flow_sensor_of(monitor.output.lead)
+    if is_frozen(monitor, flow) or (monitor.output.lead == SPEED and monitor.memory.exceeded[DENSITY]):
+        clear_accelerometers(monitor)
+    frozen = False
+    for i in range(AX, N_IN_EQUATIONS):
+        frozen = frozen or is_frozen(monitor, i)
+    if frozen or residual_keeps_growing(monitor) or error_would_show_elsewhere(monitor, signal):
+        monitor.memory.cleared[flow] = 1
+
+
+@kernel
+def clear_accelerometers(monitor):
+    """Clear all accelerometers."""
+    monitor.memory.cleared[AX:] = 1
+
+
+@kernel
+def reading_jumped(monitor, signal):
+    """Whether the residual exceeds any jump of an accelerometer in one sample, and the flow sensor's reading
+    jumps with it."""
+    i, step = flow_sensor_of(monitor.output.lead), monitor.step
+    per_m_s = 1.0 if monitor.output.lead == SPEED else 1.0 / max(step.memory.then[AIRSPEED], 1.0)
+    test, per_m_s2 = step.test[monitor.output.lead], step.config.h * per_m_s
+    second = signal[i] - 2.0 * step.memory.then[i] + monitor.memory.earlier[i]
+    half, theirs = 0.5 * abs(test.residual), 1.5 * monitor.memory.largest_jump * per_m_s2
+    return 2.0 * half > test.bound[0] + MAX_FORCE_JUMP_M_S2 * per_m_s2 and abs(second) >= half > theirs
+
+
+@kernel
+def sum_residuals(monitor, signal):
+    """Add up, after the sample of the alarm, the residuals of the flow (3,), the part of sound sensors and
+    that of an error that a reading has had from the start; and find the range of each reading."""
+    step = monitor.step
+    for j in range(3):
+        i, test = flow_sensor_of(SPEED + j), step.test[SPEED + j]
+        if monitor.memory.n_summed == 0:
+            monitor.memory.least[j] = monitor.memory.most[j] = signal[i]
+            monitor.memory.sound_sum[j] = 2.0 * test.noise + test.air * step.config.gust
+            continue
+        monitor.memory.residual_sum[j] += test.residual
+        of = hypothesis_of(SPEED + j)
+        monitor.memory.sound_sum[j] += step.config.h * test.rate
+        monitor.memory.first[j] += monitor.since.held[of] * monitor.since.reach[of, SPEED + j]
+        monitor.memory.least[j], monitor.memory.most[j] = (
+            min(monitor.memory.least[j], signal[i]),
+            max(monitor.memory.most[j], signal[i]),
+        )
+    excess = np.sign(monitor.memory.residual_sum[1]) * max(
+        abs(monitor.memory.residual_sum[1]) - monitor.memory.sound_sum[1] - monitor.memory.first[1], 0.0
+    )
+    fallen = step.config.h * signal[AIRSPEED] * excess * np.cos(signal[PHI]) * np.cos(signal[PHI + 1])
+    for m in range(step.config.decay.size):
+        monitor.memory.climb_error[m] = step.config.decay[m] * monitor.memory.climb_error[m] + fallen
+    monitor.memory.n_summed += 1
+
+
+@kernel
+def residual_keeps_growing(monitor):
+    """Whether the residuals add up to more than an error of a flow sensor whose reading has this range."""
+    j = monitor.output.lead - SPEED
+    moved = monitor.memory.most[j] - monitor.memory.least[j]
+    sound = monitor.memory.sound_sum[j] + monitor.memory.first[j]
+    return moved > 0.0 and abs(monitor.memory.residual_sum[j]) > GROWTH_FACTOR * moved + CLEAR_EXCESS * sound
+
+
+@kernel
+def error_would_show_elsewhere(monitor, signal):
+    """Whether an airspeed of this error would exceed the test of the density, or an incidence that of the
+    climb, while that test is within its bound."""
+    step = monitor.step
+    elsewhere = DENSITY if monitor.output.lead == SPEED else CLIMB
+    if monitor.output.lead == BETA_FLOW or monitor.memory.exceeded[elsewhere]:
+        return False
+    of = hypothesis_of(monitor.output.lead)
+    for m in range(step.config.decay.size):
+        error, speed = abs(monitor.memory.climb_error[m]), step.test[SPEED]
+        if monitor.output.lead == SPEED:
+            error = 2.0 * (abs(speed.filtered[m]) - speed.bound[m]) / max(signal[AIRSPEED], 1.0)
+            error *= 1.0 - min(monitor.since.held[of], 1.0)
+        if error > CLEAR_EXCESS * (
+            step.test[elsewhere].bound[m] + held_error_part(monitor.since, of, elsewhere, m)
+        ):
+            return True
+    return False
+
+
+@kernel
+def suspect_accelerometers(monitor, shown):
+    """Suspect the accelerometers along whose axis most of the spurious velocity is; shown: a gyro explains
+    it."""
+    step, who = monitor.step, monitor.output.suspect
+    alpha, beta, V = step.memory.then[ALPHA], step.memory.then[BETA], max(step.memory.then[AIRSPEED], 1.0)
+    faster, down, aside = (
+        monitor.memory.residual_sum[0],
+        V * np.cos(beta) * monitor.memory.residual_sum[1],
+        V * monitor.memory.residual_sum[2],
+    )
+    velocity, size, ahead = (
+        monitor.memory.spurious_velocity,
+        0.0,
+        np.cos(beta) * faster - np.sin(beta) * aside,
+    )
+    velocity[0] = np.cos(alpha) * ahead - np.sin(alpha) * down
+    velocity[1] = np.sin(beta) * faster + np.cos(beta) * aside
+    velocity[2] = np.sin(alpha) * ahead + np.cos(alpha) * down
+    doubt = monitor.memory.sound_sum[0] + V * (monitor.memory.sound_sum[1] + monitor.memory.sound_sum[2])
+    frozen = -1
+    for i in range(3):
+        size = max(size, abs(velocity[i]))
+        frozen = AX + i if is_frozen(monitor, AX + i) else frozen
+    for i in range(AX, N_IN_EQUATIONS):
+        along = frozen == i or (frozen < 0 and abs(velocity[i - AX]) + doubt >= 0.5 * size)
+        who[i] = along and not shown and not monitor.memory.cleared[i]
+
+
+@kernel
+def discard_accelerometers(monitor, measured):
+    """Mark the accelerometers as unusable once one of them may be broken."""
+    for i in range(AX, N_IN_EQUATIONS):
+        if monitor.output.replaced[i] or (monitor.output.alarmed and monitor.output.suspect[i]):
+            measured.inertial = 0
+
+
 INVOLVED = 0.03  # share of the largest residual of its kind: less is the effect of an error on its neighbours
 RUNNING = 3  # `begun`: after the first sample 1, with the first whole frame 2, from the next one on 3
 KEPT_SURFACE_S = 0.5  # before the alarm: a surface detected earlier was detected with sound sensors
 SETTLED_S = 1.0  # after the monitor has begun: an earlier alarm of the surfaces may be a sensor's
-SLACK = 0.2  # tolerance of the damping, away from trim
-GONE = 0.003  # share of a jump of the attitude that may be left in the next frame
+DAMPING_TOLERANCE = 0.2  # tolerance of the damping, away from trim
+GONE_SHARE = 0.003  # share of a jump of the attitude that may be left in the next frame
 QUICK_PER_S = 10.0  # the second of POLES_PER_S
 FORGETTING_S = 20.0  # time constant with which a replaced vane returns to trim: kinematics alone drift
 CROSS_DAMPING_PER_S = 10.0  # by which a gyro's own error moves the innovation
@@ -76,16 +272,16 @@ def monitor_sensors(monitor, belief, measured, conclusion, bank, bound, dt, t):
     """
     step, signal = monitor.step, measured.signal
     if not monitor.memory.begun:
-        begin(monitor, measured, t)
+        begin_monitor(monitor, measured, t)
         return
     if monitor.memory.past == 0:
         update_rate_filter(monitor, bank.output.innovation, bound.eta_bar, dt)
-    redundancy.check(step, signal, monitor.config.engine)
+    redundancy.run_tests(step, signal, monitor.config.engine)
     if N_TESTS > N_COMPUTED:
-        redundancy.compare_equals(step, signal, measured.fresh)
+        redundancy.test_equal_sensors(step, signal, measured.fresh)
         record_agreement(monitor, measured.fresh)
-    since_start.follow(step, monitor.since, signal)
-    accelerometers.count_identical_samples(monitor, signal)
+    initial_errors.update_initial_errors(step, monitor.since, signal)
+    count_identical_samples(monitor, signal)
     if monitor.memory.past == 0:
         monitor.memory.gyro_error_then[:], monitor.memory.spike_before[:] = (
             monitor.memory.gyro_error,
@@ -103,27 +299,27 @@ def monitor_sensors(monitor, belief, measured, conclusion, bank, bound, dt, t):
         allow_for_first_errors(monitor)
     if monitor.config.blurred:
         exclude_gyros(monitor)
-    decide(monitor, measured, conclusion, bank, bound, dt, t)
-    replace(monitor, belief, measured)
-    accelerometers.discard(monitor, measured)
+    decide_sensor(monitor, measured, conclusion, bank, bound, dt, t)
+    replace_readings(monitor, belief, measured)
+    discard_accelerometers(monitor, measured)
     monitor.memory.earlier[:] = step.memory.then
-    redundancy.look(step, signal, measured.force)
+    redundancy.store_sample(step, signal, measured.force)
     monitor.memory.past = (monitor.memory.past + 1) % monitor.config.instants
 
 
 @kernel
-def expect_manifold_pressure(monitor, manifold_pressure_inhg):
+def set_expected_manifold_pressure(monitor, manifold_pressure_inhg):
     """Predict the engine's sensors from the command of the law in charge of the engine."""
     monitor.step.memory.command[1] = manifold_pressure_inhg
 
 
 @kernel
-def begin(monitor, measured, t):
+def begin_monitor(monitor, measured, t):
     """Take the first sample, at t s: there is none to compare it with."""
     monitor.memory.begun, monitor.memory.begun_at_s = 1, t
     redundancy.set_drift(monitor.step, t)
-    redundancy.begin(monitor.step, measured.signal, measured.force)
-    since_start.begin(monitor.since, measured.signal)
+    redundancy.begin_tests(monitor.step, measured.signal, measured.force)
+    initial_errors.begin_initial_errors(monitor.since, measured.signal)
     monitor.memory.earlier[:] = monitor.step.memory.then
     monitor.memory.past = (monitor.memory.past + 1) % monitor.config.instants
 
@@ -163,7 +359,10 @@ def exclude_gyros(monitor):
     """
     step = monitor.step
     for i in range(3):
-        test, rate = step.test[TURN + i], monitor.memory.W_bound[i] + SLACK * abs(monitor.memory.W[i])
+        test, rate = (
+            step.test[TURN + i],
+            monitor.memory.W_bound[i] + DAMPING_TOLERANCE * abs(monitor.memory.W[i]),
+        )
         for m, a in enumerate(step.config.decay):
             monitor.memory.apart[i, m] = (
                 a * monitor.memory.apart[i, m] + test.residual + step.config.h * monitor.memory.W[i]
@@ -176,7 +375,7 @@ def exclude_gyros(monitor):
 
 
 @kernel
-def decide(monitor, measured, conclusion, bank, bound, dt, t):
+def decide_sensor(monitor, measured, conclusion, bank, bound, dt, t):
     """Raise the alarm, and name the sensor once it is the only suspect."""
     find_largest_share(monitor)
     if monitor.output.named != NO_SENSOR:
@@ -184,25 +383,25 @@ def decide(monitor, measured, conclusion, bank, bound, dt, t):
     for i in range(N_SENSORS):
         if measured.missing[i] and monitor.output.named == NO_SENSOR:
             raise_alarm(monitor, conclusion, t)
-            name(monitor, i, t)
+            name_sensor(monitor, i, t)
     if monitor.output.named != NO_SENSOR:
         return
     if monitor.output.share > 1.0 and not monitor.output.alarmed:
         raise_alarm(monitor, conclusion, t)
         monitor.output.lead = monitor.output.largest_test
-        since_start.hold(monitor.since)
+        initial_errors.hold_errors_at_alarm(monitor.since)
     if monitor.output.alarmed:
         if monitor.memory.past == 0 and monitor.memory.begun == RUNNING:
             compare_rates_with_dynamics(monitor, bank, bound, dt)
         record_exceeded_tests(monitor)
-        accelerometers.weigh(monitor, measured.signal)
-        suspect(monitor)
+        clear_by_sample(monitor, measured.signal)
+        find_suspects(monitor)
         left, last = 0, NO_SENSOR
         for i in range(N_SENSORS):
             if monitor.output.suspect[i]:
                 left, last = left + 1, i
         if left == 1:
-            name(monitor, last, t)
+            name_sensor(monitor, last, t)
 
 
 @kernel
@@ -231,7 +430,7 @@ def raise_alarm(monitor, conclusion, t):
 
 
 @kernel
-def name(monitor, i, t):
+def name_sensor(monitor, i, t):
     """Name sensor i at t s."""
     monitor.output.named, monitor.output.named_at_s = i, t
     monitor.output.replaced[i] = 1
@@ -245,9 +444,9 @@ def compare_rates_with_dynamics(monitor, bank, bound, dt):
     An error that appears inside a frame and is absent in all of the next is no gyro's: an error of a gyro
     stays, and one that varies is not as small in every sample.
     """
-    alarmed, innovation = alarm(bank), bank.output.innovation
+    alarmed, innovation = bank_alarm_axis(bank), bank.output.innovation
     for i in range(3):
-        if monitor.memory.rates_confirm[i] != UNKNOWN:
+        if monitor.memory.rates_confirm[i] != UNDECIDED:
             continue
         error, jump = (
             monitor.memory.gyro_error[i],
@@ -267,7 +466,7 @@ def compare_rates_with_dynamics(monitor, bank, bound, dt):
             monitor.memory.spike_before[i],
             max(abs(monitor.memory.gyro_error_then[i]), monitor.memory.spike_then[i], abs(error)),
         )
-        sudden = left < GONE * spike and spike > 2.0 * blur
+        sudden = left < GONE_SHARE * spike and spike > 2.0 * blur
         explained = abs(innovation[i] - jump) <= most + own + blur / dt
         slow = 0.7 * abs(error) <= monitor.memory.W_bound[i] + abs(monitor.memory.W[i]) + blur
         if not explained or (not seen and (sudden or not slow)):
@@ -295,11 +494,11 @@ def record_exceeded_tests(monitor):
         beyond = is_involved(monitor, c, triple) if c < SPEED else monitor.step.test[c].share > 1.0
         if beyond:
             monitor.memory.exceeded[c] = 1
-    since_start.record_refuted(monitor.step, monitor.since, monitor.memory.exceeded)
+    initial_errors.record_refuted(monitor.step, monitor.since, monitor.memory.exceeded)
 
 
 @kernel
-def suspect(monitor):
+def find_suspects(monitor):
     """Fill suspect (N_SENSORS,): the sensors whose error explains all tests."""
     who, lead, fired = monitor.output.suspect, monitor.output.lead, monitor.memory.exceeded
     who[:] = 0
@@ -309,7 +508,7 @@ def suspect(monitor):
     if lead < SPEED:
         suspect_attitude(monitor)
     if lead == SPEED:
-        accelerometers.suspect_accelerometers(monitor, False)
+        suspect_accelerometers(monitor, False)
         who[AIRSPEED] = not monitor.memory.cleared[AIRSPEED]
     elif lead == DENSITY:
         may_be_frozen = monitor.memory.identical[AIRSPEED] > 0  # then it need not show how it is wrong
@@ -320,8 +519,8 @@ def suspect(monitor):
     who[ALTITUDE] = lead == CLIMB and is_only_exceeded(monitor, CLIMB)
     who[ENGINE_SPEED], who[MANIFOLD] = lead == RPM, lead == PRESSURE
     frozen = a_suspect_is_frozen(monitor)
-    for i in range(STARTERS):
-        if not frozen and since_start.explains(monitor.since, i, lead):
+    for i in range(N_INITIAL):
+        if not frozen and initial_errors.initial_error_explains(monitor.since, i, lead):
             who[(ALPHA, BETA, AIRSPEED, PHI, THETA)[i]] = 1
 
 
@@ -341,11 +540,11 @@ def suspect_unequal(monitor, k):
 
     No test shows an error that a reading has had from the first sample on, nor a frozen reading.
     """
-    step, reading, shows = monitor.step, EQUAL_READING[k], EQUAL_SHOWS[k]
+    step, reading, shows = monitor.step, EQUAL_READING[k], EQUAL_READING_TEST[k]
     own, test = step.test[shows], step.test[N_COMPUTED + k]
     least = abs(test.residual) - test.bound[0]  # of the error, if it is the reading's
     hidden = least <= 2.0 * max(own.bound[0], step.memory.error[reading])
-    frozen = accelerometers.is_frozen(monitor, reading)
+    frozen = is_frozen(monitor, reading)
     monitor.output.suspect[EQUAL_SENSOR[k]] = not monitor.memory.exceeded[shows]
     monitor.output.suspect[reading] = (
         monitor.memory.exceeded[shows] == 1 or hidden or frozen or not monitor.memory.agreed[k]
@@ -366,11 +565,7 @@ def a_suspect_is_frozen(monitor):
     """Whether a suspect is frozen, which an error of another sensor from the start does not explain. A sound
     sensor may read zero."""
     for i in range(N_SENSORS):
-        if (
-            monitor.output.suspect[i]
-            and monitor.step.memory.then[i] != 0.0
-            and accelerometers.is_frozen(monitor, i)
-        ):
+        if monitor.output.suspect[i] and monitor.step.memory.then[i] != 0.0 and is_frozen(monitor, i):
             return True
     return False
 
@@ -383,7 +578,7 @@ def suspect_vane(monitor, vane, flow, gyro):
         return
     exceeded = monitor.memory.exceeded
     turns = exceeded[TURN] + exceeded[TURN + 1] + exceeded[TURN + 2]
-    accelerometers.suspect_accelerometers(monitor, turns > 0)
+    suspect_accelerometers(monitor, turns > 0)
     monitor.output.suspect[vane] = not (turns > 0 or monitor.memory.cleared[vane])
     for i in range(3):
         shown = turns == 1 and exceeded[TURN + i] == 1
@@ -409,9 +604,11 @@ def gyro_may_be_hidden(monitor, flow, i, own):
 def airspeed_error_would_show(monitor):
     """Whether the airspeed error that the density shows would exceed the bound of the airspeed's own test."""
     density, speed = monitor.step.test[DENSITY], monitor.step.test[SPEED]
-    most = 1.0 + monitor.since.held[OF_SPEED]
+    most = 1.0 + monitor.since.held[AIRSPEED_ERROR]
     for m in range(density.filtered.size):
-        shown = abs(density.filtered[m]) - since_start.hidden(monitor.since, OF_SPEED, DENSITY, m)
+        shown = abs(density.filtered[m]) - initial_errors.held_error_part(
+            monitor.since, AIRSPEED_ERROR, DENSITY, m
+        )
         if 0.5 * monitor.step.memory.then[AIRSPEED] * shown > 2.0 * most * speed.bound[m]:
             return True
     return False
@@ -425,15 +622,15 @@ def suspect_attitude(monitor):
     turns, frozen = 0, False
     for i in range(3):
         turns += fired[TURN + i]
-        frozen = frozen or accelerometers.is_frozen(monitor, PHI + i)
+        frozen = frozen or is_frozen(monitor, PHI + i)
     for i in range(3):
         alone = turns == 0 or (fired[TURN + i] == 1 and turns == 1)
         who[i] = alone and monitor.memory.rates_confirm[i] != NO and not frozen
-        fits = explains(monitor, i)
+        fits = angle_explains(monitor, i)
         mine = no_other_angle_moved(monitor, i) and (fired[ANGLE + i] == 1 or fits)
-        moved = mine and monitor.memory.rates_confirm[axis_of(monitor, i)] != YES
+        moved = mine and monitor.memory.rates_confirm[axis_showing_angle(monitor, i)] != YES
         still, longest = monitor.memory.identical[PHI + i], monitor.config.longest_identical[PHI + i]
-        may_be_frozen = 0 < still < longest < NEVER_STILL  # too early to say
+        may_be_frozen = 0 < still < longest < NEVER_FROZEN  # too early to say
         who[PHI + i] = moved or (fits and may_be_frozen)
 
 
@@ -441,22 +638,26 @@ def suspect_attitude(monitor):
 def no_other_angle_moved(monitor, i):
     """Whether no test of another angle shows an error that one of angle i from the start does not explain."""
     for j in range(3):
-        shown = monitor.memory.exceeded[ANGLE + j] if i == 2 else monitor.since.refuted[OF_PHI + i, ANGLE + j]
+        shown = (
+            monitor.memory.exceeded[ANGLE + j] if i == 2 else monitor.since.refuted[PHI_ERROR + i, ANGLE + j]
+        )
         if j != i and shown:
             return False
     return True
 
 
 @kernel
-def explains(monitor, i):
+def angle_explains(monitor, i):
     """Whether an error of angle i, as large as its own test can hide, explains the tests of the axes."""
     step, angle = monitor.step, monitor.step.test[ANGLE + i]
     unsure = step.memory.error[PHI] + step.memory.error[PHI + 1]
     for j in range(3):
-        turn, per_angle = step.test[TURN + j], abs(redundancy.turned_by(step, j, i)) + unsure
+        turn, per_angle = step.test[TURN + j], abs(redundancy.axis_turn_per_angle(step, j, i)) + unsure
         for m in range(step.config.decay.size):
             most = abs(angle.filtered[m]) + angle.bound[m]
-            hidden = since_start.hidden(monitor.since, OF_PHI + i, TURN + j, m) if i < 2 else 0.0
+            hidden = (
+                initial_errors.held_error_part(monitor.since, PHI_ERROR + i, TURN + j, m) if i < 2 else 0.0
+            )
             if (
                 monitor.memory.exceeded[TURN + j]
                 and abs(turn.filtered[m]) > per_angle * most + turn.bound[m] + hidden
@@ -466,7 +667,7 @@ def explains(monitor, i):
 
 
 @kernel
-def axis_of(monitor, i):
+def axis_showing_angle(monitor, i):
     """The body axis whose rate shows the error of angle i: the one with the largest share of its bound."""
     axis = i
     for j in range(3):
@@ -499,7 +700,7 @@ def flow_is_frozen(monitor):
     """Whether a flow sensor is frozen: a surface that moves the aircraft moves its reading. In symmetric
     flight a sideslip of zero stays zero."""
     for i in (ALPHA, BETA, AIRSPEED, QDYN):
-        if monitor.step.memory.then[i] != 0.0 and accelerometers.is_frozen(monitor, i):
+        if monitor.step.memory.then[i] != 0.0 and is_frozen(monitor, i):
             return True
     return False
 
@@ -511,7 +712,7 @@ def has_alarm(monitor):
 
 
 @kernel
-def replace(monitor, belief, measured):
+def replace_readings(monitor, belief, measured):
     """Replace the readings of named or missing sensors by estimates from the others. Accelerometers are not
     replaced: then none of them is used."""
     signal, changed = measured.signal, 0

@@ -2,7 +2,7 @@
 
 Hypotheses: healthy; each surface with little and with much of its effectiveness lost; and one that explains
 anything badly, by noise alone, for faults outside the class. Mixing, filtering, combination as in
-[Blom1988]; actuator faults as modes as in [Zhang1998]. Declared turbulence is a state of each (air.py).
+[Blom1988]; actuator faults as modes as in [Zhang1998]. Declared turbulence is a state of each (kalman.py).
 """
 
 from collections.abc import Mapping

@@ -1,14 +1,17 @@
-"""What a compiled scheme is: the contract between the frame and its kernels."""
+"""The contract between the frame and a compiled scheme, and the scheme `none`, which diagnoses nothing."""
 
 from collections.abc import Callable
 from typing import NamedTuple
 
-from beaver_ftc.compiled import apart
+from beaver_ftc.compiled import apart, kernel
+from beaver_ftc.diagnosis import isolation
+from beaver_ftc.diagnosis.detection import filters
 
 
 class CompiledScheme(NamedTuple):
-    """Lazy kernels (compiled.py), called with `fdi` (diagnosis/scheme.py), and `belief` and `measured`, the
-    records of the expectation and the sensors. A row of plugins.yaml names their file.
+    """Lazy kernels (compiled.py), called with `fdi` (`diagnosis_dtype`), and `belief` and `measured`, the
+    records of the expectation and the sensors. A row of plugins.yaml names
+    the scheme: `module`, whose SCHEME it is, or `module:NAME`.
 
     begin(fdi, belief, measured): start the estimators at the first frame.
     predict(fdi, belief, measured, k, t): bring the estimators from the frame before to frame k at t s.
@@ -42,3 +45,31 @@ def prepare_nothing(fdi, belief, measured, k):
 @apart
 def accumulate_nothing(fdi, belief, measured):
     """The `accumulate` of such a scheme."""
+
+
+@kernel
+def begin_filters(fdi, x):
+    """Begin the detection filters at the first measurement x (3,) rad/s."""
+    filters.begin_fdae(fdi.fdae, fdi.bound.noise, x)
+    filters.begin_bank(fdi.bank, fdi.bound.noise)
+
+
+@kernel
+def update_estimators(fdi, belief):
+    """Bring the isolation estimators from the frame before to this one, once the bank has its innovation."""
+    config, bound, records, mean = fdi.config, fdi.bound, fdi.isolation, belief.means
+    known = fdi.verdict.detected
+    isolation.update_hypotheses(records, fdi.bank, bound, config, known, mean.G, mean.Gu, mean.Gu_spread)
+    if known:
+        isolation.predict_estimators(records, bound, belief.x_then, mean.acceleration, config.dt)
+
+
+@apart
+def begin_none(fdi, belief, measured):
+    """Begin the detection filters, which the log records (contract.CompiledScheme)."""
+    begin_filters(fdi, measured.x)
+
+
+NONE = CompiledScheme(
+    begin_none, predict_nothing, conclude_nothing, prepare_nothing, accumulate_nothing
+)  # fmt: skip

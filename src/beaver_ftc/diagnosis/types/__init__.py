@@ -20,9 +20,9 @@ A frame that eta alone explains gives no information: so a fault may be intermit
 constant while it is there, is never excluded, and so never misnamed. What cannot be distinguished stays a
 candidate.
 
-One file a type under table/ (contract.py says what is in it); registry.py reads them into arrays and records.
-Each frame observation.py finds where a surface was, examine.py holds the types against it, sets.py keeps what
-is left of them; verdict.py and pairs.py conclude; findings.py puts the conclusion in words.
+Each type is a row of a file under table/. contract.py says what is in a row, and has feasible sets and
+observations of a surface; registry.py reads the rows into arrays and records. Each frame examine.py finds
+where each surface was and tests every type; verdict.py and pairs.py conclude.
 """
 
 from typing import TYPE_CHECKING

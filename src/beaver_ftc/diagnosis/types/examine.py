@@ -20,9 +20,9 @@ types: of `types_dtype`. estimators: those of the isolation, by the layout. boun
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.isolation import membership
-from beaver_ftc.diagnosis.types import observation, sets
-from beaver_ftc.diagnosis.types.contract import EXCLUDED, FIXED, STANDS
+from beaver_ftc.diagnosis import isolation
+from beaver_ftc.diagnosis.types import contract
+from beaver_ftc.diagnosis.types.contract import GIVE_UP, REST_AGREES, REST_EXCLUDES
 from beaver_ftc.diagnosis.types.registry import (
     AT_REST,
     HISTORY,
@@ -39,25 +39,25 @@ from beaver_ftc.diagnosis.types.registry import (
 
 
 @kernel
-def start(types):
+def restart_types(types):
     """Nothing is known of any surface yet."""
     for surface in types.surface:
-        begin(surface)
+        restart_surface(surface)
 
 
 @kernel
-def begin(surface):
+def restart_surface(surface):
     """Nothing is known of this surface yet."""
-    sets.begin(surface)
+    contract.begin_sets(surface)
     fill_each(surface)
-    observation.begin(surface)
+    contract.begin_observation(surface)
     surface.evidence.started_at = -1
     surface.evidence.frames = surface.evidence.quiet = surface.evidence.unhidden = 0
     begin_each(surface)
 
 
 @kernel
-def note_orders(types, commanded, means):
+def record_commands(types, commanded, means):
     """Add a frame to the orders of the surfaces: commanded (n,) rad; positions of healthy surfaces and their
     least and greatest effectiveness within it: means of a `belief.means_dtype`.
     """
@@ -82,29 +82,29 @@ def note_orders(types, commanded, means):
 
 
 @kernel
-def take_in(types, layout, estimators, innovation, bound):
+def observe_frame(types, layout, estimators, innovation, bound):
     """Find where each surface was in the elapsed frame, or block, if it alone is at fault.
 
     bound (3,): on its innovation (3,) without a fault, rad/s2.
     """
-    wrong = not membership.healthy(innovation, bound)
+    wrong = not isolation.is_healthy(innovation, bound)
     for s, surface in enumerate(types.surface):
-        observation.shift(surface)
-        observation.note_wrong(surface, wrong)
+        contract.shift_observations(surface)
+        contract.set_anomalous(surface, wrong)
         fie, axis = estimators[layout.position_of[s]], layout.dominant_axis[s]
         effect = fie.block_effect if types.config.length > 1 else fie.effect
-        observation.locate(types.config, surface, fie, axis, innovation, bound, effect)
+        contract.locate_surface(types.config, surface, fie, axis, innovation, bound, effect)
 
 
 @kernel
-def note_evidence(surface):
-    """Count a frame as evidence, and as evidence since a stop could last hide a swing (`judge_all`)."""
+def count_evidence(surface):
+    """Count a frame as evidence, and as evidence since a stop could last hide a swing (`judge_frame`)."""
     surface.evidence.frames += 1
     surface.evidence.unhidden += 1
 
 
 @kernel
-def judge(config, surface, k):
+def judge_surface(config, surface, k):
     """Hold every type of one surface against the frame before the elapsed one: something was wrong in it."""
     evidence, seen = surface.evidence, surface.judged
     if seen.low > seen.high:
@@ -115,18 +115,18 @@ def judge(config, surface, k):
 
 
 @kernel
-def judge_all(types):
+def judge_frame(types):
     """Judge the frame before the elapsed one."""
     config, k = types.config, types.frame - 1
     for s, surface in enumerate(types.surface):
         on_frame_each(config, surface)
         if config.returns and types.frame > 0:
             on_release_each(config, surface, k)
-        if config.abrupt and surface.accommodation.mode == FIXED and not surface.judged.wrong:
-            note_quiet(types, s)
+        if config.abrupt and surface.accommodation.mode == GIVE_UP and not surface.judged.wrong:
+            count_rest(types, s)
         elif surface.judged.wrong and (config.whole or (surface.earlier.wrong and surface.elapsed.wrong)):
-            note_evidence(surface)
-            judge(config, surface, k)
+            count_evidence(surface)
+            judge_surface(config, surface, k)
         else:
             on_skipped_frame_each(config, surface, k)
         if config.returns and types.frame > 0:
@@ -138,13 +138,13 @@ def judge_all(types):
 
 
 @kernel
-def examine(types, layout, estimators, innovation, bound):
+def examine_frame(types, layout, estimators, innovation, bound):
     """Take in the elapsed frame, and judge the one before: it, or the block that it completes."""
     if types.config.length > 1:
         examine_block(types, layout, estimators, innovation, bound)
         return
-    take_in(types, layout, estimators, innovation, bound.frame)
-    judge_all(types)
+    observe_frame(types, layout, estimators, innovation, bound.frame)
+    judge_frame(types)
 
 
 @kernel
@@ -154,7 +154,7 @@ def begin_block(types, layout, estimators, noise_then):
     block.innovation[:], block.bound[:] = 0.0, 0.0
     block.noise[:] = noise_then
     for e in layout.position_of:
-        membership.clear_mean(estimators[e].block_effect)
+        isolation.clear_mean_effect(estimators[e].block_effect)
 
 
 @kernel
@@ -165,7 +165,7 @@ def add_to_block(types, layout, estimators, innovation, eta_bar):
         block.innovation[i] += share * innovation[i]
         block.bound[i] += share * eta_bar[i]
     for e in layout.position_of:
-        membership.add_to_mean(estimators[e].block_effect, estimators[e].effect, share)
+        isolation.add_to_mean_effect(estimators[e].block_effect, estimators[e].effect, share)
 
 
 @kernel
@@ -181,36 +181,36 @@ def examine_block(types, layout, estimators, innovation, bound):
     block.filled = 0
     for i in range(3):
         block.bound[i] += (block.noise[i] + bound.noise[i]) / config.span_s
-    take_in(types, layout, estimators, block.innovation, block.bound)
-    judge_all(types)
+    observe_frame(types, layout, estimators, block.innovation, block.bound)
+    judge_frame(types)
 
 
 @kernel
-def note_quiet(types, s):
+def count_rest(types, s):
     """A surface given up, and commanded to where it happens to be, shows by its quiet that it does not swing.
 
     That is evidence against the other surfaces too, as far as only one of them all is in question. It takes a
     fault that is declared to stay: of one that may go, the quiet may be that of health.
     """
     surface = types.surface[s]
-    if not may_stand(surface):
+    if not agrees_with_rest(surface):
         return
     for i, other in enumerate(types.surface):
         if i == s or (surface.status.is_candidate and other.status.is_candidate):
-            note_evidence(other)
+            count_evidence(other)
     surface.evidence.quiet += 1
     if surface.evidence.quiet > types.config.patience and not types.config.own_errors:
         for kind in range(N_TYPES):
-            if AT_REST[kind] == EXCLUDED:
-                sets.exclude(surface, kind)
+            if AT_REST[kind] == REST_EXCLUDES:
+                contract.exclude_type(surface, kind)
 
 
 @kernel
-def may_stand(surface):
+def agrees_with_rest(surface):
     """Whether the judged frame agrees with where the surface is known to stand."""
     for kind in range(N_TYPES):
         low, high = surface.feasible.low[kind], surface.feasible.high[kind]
         apart = surface.judged.low > high or surface.judged.high < low
-        if AT_REST[kind] == STANDS and apart:
+        if AT_REST[kind] == REST_AGREES and apart:
             return False
     return True

@@ -18,19 +18,19 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis import state
-from beaver_ftc.diagnosis.state import IN_PITCH, IN_ROLL_AND_YAW, PITCH, ROLL, YAW
+from beaver_ftc.diagnosis.state import LATERAL_GROUP, PITCH, PITCH_GROUP, ROLL, YAW
+from beaver_ftc.diagnosis.types import contract, verdict
 from beaver_ftc.diagnosis.types import examine as frames
-from beaver_ftc.diagnosis.types import observation, sets, verdict
-from beaver_ftc.diagnosis.types.contract import FIXED, LOSES, SHIFTED
+from beaver_ftc.diagnosis.types.contract import GIVE_UP, SCALE_COMMAND, SUBTRACT_OFFSET
 from beaver_ftc.diagnosis.types.registry import ACCOMMODATION, N_CONSTANT, deflection
-from beaver_ftc.diagnosis.types.verdict import NO_SURFACE, any_constant, left, possible
+from beaver_ftc.diagnosis.types.verdict import NO_SURFACE, any_constant_type_left, can_be_at_fault, is_left
 
 
 @kernel
-def note_alarms(pair, bank):
+def record_plane_alarms(pair, bank):
     """In which plane a filter of the bank has left its bound."""
     for i in range(3):
-        plane = IN_PITCH if i == PITCH else IN_ROLL_AND_YAW
+        plane = PITCH_GROUP if i == PITCH else LATERAL_GROUP
         for m in range(bank.config.n):
             if abs(bank.output.residual[m, i]) > bank.output.threshold[m, i]:
                 pair.alarmed[plane] = 1
@@ -49,19 +49,19 @@ def solve_roll_and_yaw(types, layout, estimators, innovation, frame_bound):
     determinant = a_p * r_r - a_r * r_p
     size = abs(determinant)
     off, slack = (p * r_r - r * r_p) / determinant, (slack_p * abs(r_r) + slack_r * abs(r_p)) / size
-    fits = observation.place(types.surface[a], off, slack)
+    fits = contract.set_deflection(types.surface[a], off, slack)
     off, slack = (r * a_p - p * a_r) / determinant, (slack_r * abs(a_p) + slack_p * abs(a_r)) / size
-    if not (observation.place(types.surface[b], off, slack) and fits):
+    if not (contract.set_deflection(types.surface[b], off, slack) and fits):
         types.pair.no_lateral_pair = 1
 
 
 @kernel
-def whereabouts(config, surface, k):
+def deflection_range(config, surface, k):
     """Least and greatest deflection (rad) of a surface by the elapsed frame, of this number, over all types
     of a constant that are left."""
     least, greatest = np.inf, -np.inf
     for kind in range(N_CONSTANT):
-        if left(surface, kind):
+        if is_left(surface, kind):
             low, high = deflection(config, surface, kind, k)
             least, greatest = min(least, low), max(greatest, high)
     low, high = surface.actuator.reach_low, surface.actuator.reach_high
@@ -73,43 +73,43 @@ def solve_pitch(types, layout, estimators, innovation, frame_bound):
     """Whether pitch shows a fault; once a second one has begun beside one that was named, where it was."""
     first = types.pair.first
     if first != NO_SURFACE and not types.surface[first].status.is_candidate:
-        solve_beside_the_first(types, layout, estimators, innovation, frame_bound)
+        solve_second_in_pitch(types, layout, estimators, innovation, frame_bound)
         return
     for s, surface in enumerate(types.surface):
-        if layout.group[s] == IN_PITCH:
-            observation.note_wrong(surface, abs(innovation[PITCH]) > frame_bound[PITCH])
+        if layout.group[s] == PITCH_GROUP:
+            contract.set_anomalous(surface, abs(innovation[PITCH]) > frame_bound[PITCH])
 
 
 @kernel
-def solve_beside_the_first(types, layout, estimators, innovation, frame_bound):
+def solve_second_in_pitch(types, layout, estimators, innovation, frame_bound):
     """Where the second surface was, given what is known of the first."""
     first = types.pair.first
     second = layout.partner[first]
     known = estimators[layout.position_of[first]].effect
     other = estimators[layout.position_of[second]].effect
     surface = types.surface[first]
-    low, high = whereabouts(types.config, surface, types.frame)
-    observation.place_known(surface, low, high)
+    low, high = deflection_range(types.config, surface, types.frame)
+    contract.set_known_deflection(surface, low, high)
     Z, Z_known = other.Z[PITCH], known.Z[PITCH]
-    share = Z_known * observation.middle_error(surface)
+    share = Z_known * contract.observed_error(surface)
     slack = abs(Z_known) * 0.5 * (high - low)
     slack += frame_bound[PITCH] + known.spread[PITCH] + other.spread[PITCH]
-    if not observation.place(types.surface[second], (innovation[PITCH] - share) / Z, slack / abs(Z)):
+    if not contract.set_deflection(types.surface[second], (innovation[PITCH] - share) / Z, slack / abs(Z)):
         types.surface[second].status.source = verdict.RULED_OUT
 
 
 @kernel
-def examine(types, layout, estimators, bank, frame_bound):
+def examine_pairs(types, layout, estimators, bank, frame_bound):
     """Take in the elapsed frame, plane by plane, and judge the one before; frame_bound (3,): of its own."""
-    note_alarms(types.pair, bank)
-    frames.take_in(types, layout, estimators, bank.output.innovation, frame_bound)
+    record_plane_alarms(types.pair, bank)
+    frames.observe_frame(types, layout, estimators, bank.output.innovation, frame_bound)
     solve_roll_and_yaw(types, layout, estimators, bank.output.innovation, frame_bound)
     solve_pitch(types, layout, estimators, bank.output.innovation, frame_bound)
-    frames.judge_all(types)
+    frames.judge_frame(types)
 
 
 @kernel
-def name(surface, named, kind, t):
+def set_named(surface, named, kind, t):
     """Name a surface and the type of its fault (-1 if open), or take the name back; t s."""
     kind = kind if named else -1
     status = surface.status
@@ -125,19 +125,19 @@ def decide_roll_and_yaw(types, layout, t):
     """Which of the two is at fault, if any. Returns whether the plane's fault is outside the class."""
     config, pair = types.config, types.pair
     one, other = types.surface[layout.main[ROLL]], types.surface[layout.main[YAW]]
-    one_left, other_left = possible(one), possible(other)
+    one_left, other_left = can_be_at_fault(one), can_be_at_fault(other)
     both = not one_left and not other_left
-    no_pair = pair.no_lateral_pair == 1 or not verdict.anything_left(one) or not verdict.anything_left(other)
+    no_pair = pair.no_lateral_pair == 1 or not verdict.any_type_left(one) or not verdict.any_type_left(other)
     outside = both and no_pair
-    open_yet = both and not (verdict.explained(one) and verdict.explained(other))
-    certain = pair.alarmed[IN_ROLL_AND_YAW] == 1 and not (outside or open_yet)
-    name(one, certain and not other_left, verdict.type_at_fault(config, one), t)
-    name(other, certain and not one_left, verdict.type_at_fault(config, other), t)
+    open_yet = both and not (verdict.is_explained(one) and verdict.is_explained(other))
+    certain = pair.alarmed[LATERAL_GROUP] == 1 and not (outside or open_yet)
+    set_named(one, certain and not other_left, verdict.type_at_fault(config, one), t)
+    set_named(other, certain and not one_left, verdict.type_at_fault(config, other), t)
     return outside
 
 
 @kernel
-def note_first(types, s):
+def store_first_fault(types, s):
     """Keep what is known of the one pitch fault, and again when fewer types have been left for a while.
 
     What refutes a type may be a second fault that begins to show, and is about to refute all of them.
@@ -158,20 +158,20 @@ def note_first(types, s):
 def begin_second(types, layout):
     """The one known pitch fault no longer explains the flight: there is another beside it."""
     first, second = types.surface[types.pair.first], types.surface[layout.partner[types.pair.first]]
-    sets.recall(first)
-    frames.begin(second)
+    contract.restore_known_sets(first)
+    frames.restart_surface(second)
     for surface in (first, second):
         surface.status.is_candidate, surface.status.source = 0, verdict.BY_DEDUCTION
-        observation.forget_wrong(surface)
+        contract.clear_anomalies(surface)
 
 
 @kernel
-def patient(config, surface):
+def has_waited(config, surface):
     """Whether a slow oscillation, a slow surface or a growing bias would have shown by now."""
-    growing = verdict.may_be_mistaken(surface, verdict.one_constant(surface), False)
-    open_yet = growing or verdict.may_be_unseen(config, surface)
+    growing = verdict.may_be_mistaken(surface, verdict.sole_constant_type(surface), False)
+    open_yet = growing or verdict.may_hide_at_rest(config, surface)
     long = surface.evidence.frames >= config.patience
-    return long and verdict.would_have_shown(config, surface) and not open_yet
+    return long and verdict.others_would_have_shown(config, surface) and not open_yet
 
 
 @kernel
@@ -180,7 +180,7 @@ def two_in_pitch(types, layout):
     if types.pair.first == NO_SURFACE or layout.partner[types.pair.first] < 0:
         return False
     surface = types.surface[types.pair.first]
-    if surface.status.is_candidate and not (possible(surface) and any_constant(surface)):
+    if surface.status.is_candidate and not (can_be_at_fault(surface) and any_constant_type_left(surface)):
         begin_second(types, layout)
     return not surface.status.is_candidate
 
@@ -192,7 +192,7 @@ def type_in_pitch(config, surface):
     A jam may as well be a trailing surface or one at its stop, if the other surface is off by a constant.
     """
     kind = verdict.type_at_fault(config, surface)
-    return verdict.OPEN if kind >= 0 and ACCOMMODATION[kind] == FIXED else kind
+    return verdict.OPEN if kind >= 0 and ACCOMMODATION[kind] == GIVE_UP else kind
 
 
 @kernel
@@ -201,29 +201,29 @@ def decide_pitch(types, layout, t):
     if two_in_pitch(types, layout):
         first, s = types.surface[types.pair.first], layout.partner[types.pair.first]
         second = types.surface[s]
-        name(first, 1, first.status.type, t)
-        shows = second.evidence.frames > 0 and possible(second) and verdict.explained(second)
-        name(second, shows, verdict.type_at_fault(types.config, second), t)
+        set_named(first, 1, first.status.type, t)
+        shows = second.evidence.frames > 0 and can_be_at_fault(second) and verdict.is_explained(second)
+        set_named(second, shows, verdict.type_at_fault(types.config, second), t)
         return
     s = one_in_pitch(types, layout)
     for member, surface in enumerate(types.surface):
-        if layout.group[member] == IN_PITCH:
-            name(surface, member == s, type_in_pitch(types.config, surface) if member == s else -1, t)
+        if layout.group[member] == PITCH_GROUP:
+            set_named(surface, member == s, type_in_pitch(types.config, surface) if member == s else -1, t)
 
 
 @kernel
 def one_in_pitch(types, layout):
     """The surface of pitch at fault if a constant explains everything on it, or NO_SURFACE."""
-    s = verdict.surface_at_fault(types, layout) if types.pair.alarmed[IN_PITCH] else NO_SURFACE
-    if s < 0 or not any_constant(types.surface[s]):
+    s = verdict.surface_at_fault(types, layout) if types.pair.alarmed[PITCH_GROUP] else NO_SURFACE
+    if s < 0 or not any_constant_type_left(types.surface[s]):
         return NO_SURFACE
-    if patient(types.config, types.surface[s]):
-        note_first(types, s)
+    if has_waited(types.config, types.surface[s]):
+        store_first_fault(types, s)
     return s
 
 
 @kernel
-def decide(types, conclusion, layout, t):
+def decide_pairs(types, conclusion, layout, t):
     """Name surfaces and types plane by plane; t s. Returns the finding as `conclusion.note_type` takes it:
     `isolated` is the one named first, the law acts on all. conclusion: that of the frame before."""
     outside = decide_roll_and_yaw(types, layout, t)
@@ -233,18 +233,18 @@ def decide(types, conclusion, layout, t):
         status, first = surface.status, types.surface[max(earliest, 0)].status
         if status.named and (earliest < 0 or status.named_at_s < first.named_at_s):
             earliest = s
-    isolated, isolated_at_s, kind, type_at_s = summarise(types, conclusion, layout, earliest, outside, t)
-    lead, lead_kind = act(types, layout)
+    isolated, isolated_at_s, kind, type_at_s = summary_of(types, conclusion, layout, earliest, outside, t)
+    lead, lead_kind = choose_accommodation(types, layout)
     return isolated, isolated_at_s, kind, type_at_s, lead, lead_kind
 
 
 @kernel
-def summarise(types, conclusion, layout, s, outside, t):
+def summary_of(types, conclusion, layout, s, outside, t):
     """The finding on surface s, the first named, as that of a single fault: estimator, its instant, type, its
     instant. NO_SURFACE: none is named, and the fault of roll and yaw may be `outside` the class."""
     if s >= 0:
         status = types.surface[s].status
-        isolated = verdict.estimator_for(layout, s, status.type)
+        isolated = verdict.estimator_of_fault(layout, s, status.type)
         return isolated, status.named_at_s, status.type, status.type_at_s
     isolated = state.UNANTICIPATED if outside else state.NOT_ISOLATED
     isolated_at_s = t if isolated != conclusion.isolated else conclusion.isolated_at_s
@@ -255,35 +255,35 @@ def summarise(types, conclusion, layout, s, outside, t):
 def named_in_pitch(types, layout):
     """Whether a surface of pitch is named."""
     for s, surface in enumerate(types.surface):
-        if layout.group[s] == IN_PITCH and surface.status.named:
+        if layout.group[s] == PITCH_GROUP and surface.status.named:
             return True
     return False
 
 
 @kernel
-def acted_upon(types, layout, s):
+def is_acted_upon(types, layout, s):
     """Whether the law acts on surface s: it is named, or the likeliest in pitch."""
     if types.surface[s].status.named:
         return True
-    if layout.group[s] != IN_PITCH or named_in_pitch(types, layout) or not types.pair.alarmed[IN_PITCH]:
+    if layout.group[s] != PITCH_GROUP or named_in_pitch(types, layout) or not types.pair.alarmed[PITCH_GROUP]:
         return False
-    likeliest = verdict.sole(types.surface, True)
+    likeliest = verdict.sole_surface(types.surface, True)
     return s == (likeliest if likeliest >= 0 else layout.main[PITCH])
 
 
 @kernel
-def act(types, layout):
+def choose_accommodation(types, layout):
     """Settle what the law does about each surface. Returns the lead, which the supervisor follows, and what
     is done about it: a replaced elevator leads before all others."""
     lead, lead_kind = NO_SURFACE, -1
     for s, surface in enumerate(types.surface):
         verdict.set_mode(surface, -1)
-        if acted_upon(types, layout, s):
-            at_fault = surface.status.named == 1 or possible(surface)
-            mode = verdict.mode_for(surface) if at_fault else SHIFTED
-            if verdict.still_there(types.config, surface, mode, at_fault):
+        if is_acted_upon(types, layout, s):
+            at_fault = surface.status.named == 1 or can_be_at_fault(surface)
+            mode = verdict.accommodation_mode(surface) if at_fault else SUBTRACT_OFFSET
+            if verdict.fault_is_present(types.config, surface, mode, at_fault):
                 verdict.set_mode(surface, mode)
-                replaced = s == layout.main[PITCH] and mode in (LOSES, FIXED)
+                replaced = s == layout.main[PITCH] and mode in (SCALE_COMMAND, GIVE_UP)
                 if lead == NO_SURFACE or replaced:
                     lead, lead_kind = s, mode
     return lead, lead_kind

@@ -12,10 +12,9 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.compiled import kernel, record, sized
-from beaver_ftc.diagnosis.state import IN_PITCH
-from beaver_ftc.diagnosis.types import sets, table
-from beaver_ftc.diagnosis.types.contract import NOTHING, FaultType, Kernel
-from beaver_ftc.diagnosis.types.observation import OBSERVATION
+from beaver_ftc.diagnosis.state import PITCH_GROUP
+from beaver_ftc.diagnosis.types import contract, table
+from beaver_ftc.diagnosis.types.contract import EMPTY_SET, OBSERVATION, FaultType, Kernel
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 
@@ -35,7 +34,7 @@ N_TYPES = len(TYPES)
 N_CONSTANT = sum(row.constant for row in TYPES)
 NAMES: tuple[str, ...] = tuple(row.name for row in TYPES)
 WORDS: tuple[str, ...] = tuple(row.words or row.name for row in TYPES)
-FAMILY = tuple(NAMES.index(name) for name in NAMES)  # the first type of the same name
+FIRST_OF_NAME = tuple(NAMES.index(name) for name in NAMES)  # the first type of the same name
 
 
 def _column(name: str) -> np.ndarray:
@@ -92,7 +91,7 @@ def _space(parts: dict[int, Kernel], **further: Any) -> dict[str, Any]:
     return {"__name__": __name__, **{f"part_{kind}": part for kind, part in parts.items()}, **further}
 
 
-def _of_all(name: str, arguments: str, then: Kernel | None = None) -> Kernel:
+def _call_each(name: str, arguments: str, then: Kernel | None = None) -> Kernel:
     """A kernel that calls this part of every type; then(surface, kind, interval): with what that returns."""
     parts = _parts(name)
     taken = ", ".join(argument for argument in arguments.split(", ") if argument != "kind")
@@ -101,7 +100,7 @@ def _of_all(name: str, arguments: str, then: Kernel | None = None) -> Kernel:
     return _compiled(f"{name}_each", taken, [*lines, "return"], _space(parts, then=then))
 
 
-def _of_one(name: str, arguments: str, otherwise: Any) -> Kernel:
+def _call_one(name: str, arguments: str, otherwise: Any) -> Kernel:
     """A kernel that returns what this part of the type `kind` returns; `otherwise` for a type without it."""
     parts = _parts(name)
     lines = [f"if kind == {kind}: return {_call(kind, arguments)}" for kind in parts]
@@ -110,24 +109,24 @@ def _of_one(name: str, arguments: str, otherwise: Any) -> Kernel:
 
 
 _FRAME = "config, surface, kind, k"
-begin_each = _of_all("begin", "surface, kind")
-fill_each = _of_all("whole_range", "surface", sets.replace)
-on_frame_each = _of_all("on_frame", "config, surface, kind")
-on_skipped_frame_each = _of_all("on_skipped_frame", _FRAME)
-judge_each = _of_all("judge", _FRAME, sets.intersect)
-on_release_each = _of_all("on_release", _FRAME)
-restore_each = _of_all("restored", "surface, kind", sets.replace)
-propagate_release_each = _of_all("propagate_release", "config, surface, kind")
-has_shown = _of_one("has_shown", "surface", True)
-differs = _of_one("differs", "surface, direction", False)
-deflection = _of_one("deflection", _FRAME, NOTHING)
-expected_error = _of_one("expected_error", "surface, kind", np.nan)
+begin_each = _call_each("begin", "surface, kind")
+fill_each = _call_each("whole_range", "surface", contract.replace_set)
+on_frame_each = _call_each("on_frame", "config, surface, kind")
+on_skipped_frame_each = _call_each("on_skipped_frame", _FRAME)
+judge_each = _call_each("judge", _FRAME, contract.intersect_set)
+on_release_each = _call_each("on_release", _FRAME)
+restore_each = _call_each("restored", "surface, kind", contract.replace_set)
+propagate_release_each = _call_each("propagate_release", "config, surface, kind")
+has_shown = _call_one("has_shown", "surface", True)
+differs = _call_one("differs", "surface, direction", False)
+deflection = _call_one("deflection", _FRAME, EMPTY_SET)
+expected_error = _call_one("expected_error", "surface, kind", np.nan)
 
 MAX_BLOCK = 256  # frames of a block: examine.py
 HISTORY = 3  # frames, or blocks, of which the orders are kept: the elapsed one and two before it
 
 # Orders to one surface, rad; [0] belongs to the elapsed frame or block, [1] to the one before: examine.py.
-ORDERS = record(
+COMMANDS = record(
     given=(HISTORY, MAX_BLOCK), low=HISTORY, high=HISTORY,
     least=2, greatest=2,  # where a healthy surface was within it
     G_least=float, G_most=float,  # its effectiveness within the elapsed frame or block
@@ -140,7 +139,7 @@ ACTUATOR = record(
     approach=float, step=float, slowest_step=float,
 )  # fmt: skip
 
-# The set of each type's parameter: sets.py.
+# The set of each type's parameter: contract.py.
 FEASIBLE = record(low=N_TYPES, high=N_TYPES, excluded=(int, N_TYPES))
 
 # Frames in which something was wrong, and of them those in which a surface that was given up was quiet, and
@@ -154,7 +153,7 @@ STATUS = record(is_candidate=int, source=int, named=int, named_at_s=float, type=
 # The mode of accommodation, -1 for none; frames since the fault last showed: verdict.py.
 ACCOMMODATED = record(mode=int, absent=int)
 
-# Where a surface that a type has held and let go can be, rad: release.py.
+# Where a surface that a type has held and let go can be, rad: table/held_surface.py.
 RELEASE = record(
     low=(2, N_TYPES), high=(2, N_TYPES), released=(int, N_TYPES),
     held_low=N_TYPES, held_high=N_TYPES,  # where it is held by then
@@ -180,11 +179,11 @@ FRAME_BLOCK = record(filled=int, innovation=3, bound=3, noise=3)
 
 @lru_cache
 def surface_dtype() -> np.dtype:
-    """One surface's records: configuration, observations (observation.py), the memories of the types, and
+    """One surface's records: configuration, observations (contract.py), the memories of the types, and
     what is concluded. refuted: its estimator is excluded (verdict.py)."""
     own = {row.record: row.memory for row in TYPES if row.memory}
     return record(
-        actuator=ACTUATOR, orders=ORDERS, elapsed=OBSERVATION, judged=OBSERVATION, earlier=OBSERVATION,
+        actuator=ACTUATOR, orders=COMMANDS, elapsed=OBSERVATION, judged=OBSERVATION, earlier=OBSERVATION,
         evidence=EVIDENCE, feasible=FEASIBLE, release=RELEASE, **own,
         refuted=int, status=STATUS, accommodation=ACCOMMODATED, known=KNOWN,
     )  # fmt: skip
@@ -196,7 +195,7 @@ def types_dtype(n: int) -> np.dtype:
     return record(config=TYPES_CONFIG, frame=int, pair=PAIR, block=FRAME_BLOCK, surface=(surface_dtype(), n))
 
 
-def configure(
+def configure_types(
     types: np.void, layout: np.void, actuators: np.void, scenario: Scenario, travel: np.ndarray
 ) -> None:
     """Fill in what the types go by, and what they know of each surface's actuator; travel (2, n) rad."""
@@ -215,5 +214,5 @@ def configure(
         actuator["approach"], actuator["step"] = actuators["approach"][s], actuators["step"][s]
         actuator["least_runaway_rate"] = 0.5 * (radians(rate_deg_s) or RUNAWAY_RATE_RAD_S)
         actuator["slowest_step"] = min(radians(config.slowest_rate_deg_s) * instant_s, actuator["step"])
-        place["status"]["is_candidate"] = not config.pairs or layout["group"][s] == IN_PITCH
+        place["status"]["is_candidate"] = not config.pairs or layout["group"][s] == PITCH_GROUP
         place["accommodation"]["mode"] = place["status"]["type"] = -1

@@ -1,22 +1,37 @@
-"""From the types left to a verdict: the surface at fault, the type of its fault, and what the law does.
+"""From the types left to a verdict: surface, type, and what the law does; and the findings in words.
 
 No type is named here: the columns of the table (contract.py) say what distinguishes one from another. Kernels
-of one surface answer under the premise that it is at fault; `possible` says whether it can be. types: of
-`types_dtype`; conclusion: of `conclusion_dtype`; estimators: those of the isolation.
+of one surface assume that it is at fault; `can_be_at_fault` says whether it can be. types: of `types_dtype`;
+conclusion: of `conclusion_dtype`; estimators: those of the isolation.
+
+`fault_findings` puts the verdict in words: surface, type, candidates, estimate. estimate, by type: theta in
+[-1, 0] of a loss of effectiveness; deflection in rad of a stuck, floating or runaway surface; offset in rad
+of a bias; amplitude in rad of an oscillation.
 """
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, UNANTICIPATED
-from beaver_ftc.diagnosis.types.contract import FIXED, LAGS, LOSES, SHIFTED, UNSEEN, middle
-from beaver_ftc.diagnosis.types.observation import middle_error
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, PITCH_GROUP, UNANTICIPATED
+from beaver_ftc.diagnosis.types import registry
+from beaver_ftc.diagnosis.types.contract import (
+    GIVE_UP,
+    REST_HIDES,
+    SCALE_COMMAND,
+    SUBTRACT_OFFSET,
+    WAIT_FOR_SURFACE,
+    observed_error,
+    set_middle,
+)
 from beaver_ftc.diagnosis.types.registry import (
     ACCOMMODATION,
     AT_REST,
     DIRECTION,
     ERROR_ORDER,
-    FAMILY,
+    FIRST_OF_NAME,
     FOLLOWS_COMMAND,
     HALF_CYCLES,
     LIMIT,
@@ -40,14 +55,14 @@ _ROUNDING = 1e-9
 
 
 @kernel
-def note_refuted(surfaces, layout, estimators):
+def record_refuted(surfaces, layout, estimators):
     """Keep for every surface whether its estimator is excluded."""
     for s, surface in enumerate(surfaces):
         surface.refuted = estimators[layout.position_of[s]].excluded
 
 
 @kernel
-def possible(surface):
+def can_be_at_fault(surface):
     """Whether anything on a surface can be the fault."""
     if surface.status.source != BY_ESTIMATOR:
         return surface.status.source == BY_DEDUCTION
@@ -55,74 +70,77 @@ def possible(surface):
 
 
 @kernel
-def left(surface, kind):
+def is_left(surface, kind):
     """Whether a type is not excluded."""
     return not surface.feasible.excluded[kind]
 
 
 @kernel
-def any_constant(surface):
+def any_constant_type_left(surface):
     """Whether a type with a constant parameter is left."""
     return not np.all(surface.feasible.excluded[:N_CONSTANT])
 
 
 @kernel
-def anything_left(surface):
+def any_type_left(surface):
     """Whether any type is left."""
     return not np.all(surface.feasible.excluded)
 
 
 @kernel
-def explained(surface):
+def is_explained(surface):
     """Whether some type explains the flight: it is left, and if it must show itself it has."""
     for kind in range(N_TYPES):
-        if left(surface, kind) and has_shown(surface, kind):
+        if is_left(surface, kind) and has_shown(surface, kind):
             return True
     return False
 
 
 @kernel
-def would_have_shown(config, surface):
+def others_would_have_shown(config, surface):
     """Whether each type that must show itself is excluded, or has had the time to, hidden by no stop."""
     for kind in range(N_TYPES):
-        if left(surface, kind) and surface.evidence.unhidden < SHOWS_WITHIN[kind] * config.patience:
+        if is_left(surface, kind) and surface.evidence.unhidden < SHOWS_WITHIN[kind] * config.patience:
             return False
     return True
 
 
 @kernel
-def one_of(surface, n):
+def sole_type_among(surface, n):
     """The one of the first n types that is left, or OPEN; of one name, such as a runaway's two, the first."""
     found = OPEN
     for kind in range(n):
-        if left(surface, kind):
-            if found >= 0 and FAMILY[kind] != FAMILY[found]:
+        if is_left(surface, kind):
+            if found >= 0 and FIRST_OF_NAME[kind] != FIRST_OF_NAME[found]:
                 return OPEN
             found = kind if found < 0 else found
     return found
 
 
 @kernel
-def one_constant(surface):
+def sole_constant_type(surface):
     """The one type of constant parameter left, or OPEN."""
-    return one_of(surface, N_CONSTANT)
+    return sole_type_among(surface, N_CONSTANT)
 
 
 @kernel
 def sole_type(surface):
     """The one type left whatever its course, or OPEN: in coarse sets a constant proves nothing."""
-    found = one_of(surface, N_TYPES)
+    found = sole_type_among(surface, N_TYPES)
     return found if found >= 0 and has_shown(surface, found) else OPEN
 
 
 @kernel
-def may_be_unseen(config, surface):
+def may_hide_at_rest(config, surface):
     """Whether what a constant explains may be a type that does not show in a surface at rest, such as a slow
     surface that has come to where it is commanded: it has not stood off its command for long."""
-    if not any_constant(surface) or surface.evidence.frames - surface.evidence.quiet >= config.patience:
+    if (
+        not any_constant_type_left(surface)
+        or surface.evidence.frames - surface.evidence.quiet >= config.patience
+    ):
         return False
     for kind in range(N_TYPES):
-        if AT_REST[kind] == UNSEEN and left(surface, kind):
+        if AT_REST[kind] == REST_HIDES and is_left(surface, kind):
             return True
     return False
 
@@ -132,7 +150,11 @@ def may_look_like(surface, kind, found):
     """Whether a fault of type `kind` may look like one of the type `found`, or of another type left of that
     name and of constant parameter."""
     for other in range(N_CONSTANT):
-        alike = FAMILY[other] == FAMILY[found] and MISTAKEN_FOR[kind, other] and left(surface, other)
+        alike = (
+            FIRST_OF_NAME[other] == FIRST_OF_NAME[found]
+            and MISTAKEN_FOR[kind, other]
+            and is_left(surface, other)
+        )
         if alike and not differs(surface, DIRECTION[other], kind):
             return True
     return False
@@ -144,18 +166,22 @@ def may_be_mistaken(surface, found, whatever):
     one that does not follow the command."""
     if found >= 0:
         for kind in range(N_CONSTANT, N_TYPES):
-            counts = left(surface, kind) and (whatever or not FOLLOWS_COMMAND[kind])
+            counts = is_left(surface, kind) and (whatever or not FOLLOWS_COMMAND[kind])
             if counts and may_look_like(surface, kind, found):
                 return True
     return False
 
 
 @kernel
-def sole(surfaces, constant):
+def sole_surface(surfaces, constant):
     """The one possible surface, with a type of constant parameter left if so asked; NO_SURFACE or SEVERAL."""
     found = NO_SURFACE
     for s, surface in enumerate(surfaces):
-        if surface.status.is_candidate and possible(surface) and (any_constant(surface) or not constant):
+        if (
+            surface.status.is_candidate
+            and can_be_at_fault(surface)
+            and (any_constant_type_left(surface) or not constant)
+        ):
             found = s if found == NO_SURFACE else SEVERAL
     return found
 
@@ -168,12 +194,12 @@ def surface_at_fault(types, layout):
     explains it. Of elevator and flap, each of which can do what the other does if it only moves accordingly,
     the one is named for which a constant suffices, once a slow oscillation of the other would have shown.
     """
-    s = sole(types.surface, False)
+    s = sole_surface(types.surface, False)
     if s == NO_SURFACE:
         return UNANTICIPATED
     if s >= 0:
-        return s if layout.dominant_axis[s] != PITCH or explained(types.surface[s]) else NOT_ISOLATED
-    s = sole(types.surface, True)
+        return s if layout.dominant_axis[s] != PITCH or is_explained(types.surface[s]) else NOT_ISOLATED
+    s = sole_surface(types.surface, True)
     return s if s >= 0 and others_refuted(types, s) else NOT_ISOLATED
 
 
@@ -186,13 +212,13 @@ def others_refuted(types, chosen):
     """
     config, half_cycles = types.config, 1
     for s, surface in enumerate(types.surface):
-        if s != chosen and surface.status.is_candidate and possible(surface):
-            if config.own_errors and anything_left(surface):
+        if s != chosen and surface.status.is_candidate and can_be_at_fault(surface):
+            if config.own_errors and any_type_left(surface):
                 return False
-            if not would_have_shown(config, surface):
+            if not others_would_have_shown(config, surface):
                 return False
             for kind in range(N_TYPES):
-                if left(surface, kind):
+                if is_left(surface, kind):
                     if not FOLLOWS_COMMAND[kind]:
                         return False
                     half_cycles = max(half_cycles, HALF_CYCLES[kind])
@@ -203,40 +229,40 @@ def others_refuted(types, chosen):
 def type_at_fault(config, surface):
     """The type of the fault on a surface, taken to be at fault; OPEN while more than one fits or one may yet
     show itself."""
-    if surface.evidence.frames < config.patience or may_be_unseen(config, surface):
+    if surface.evidence.frames < config.patience or may_hide_at_rest(config, surface):
         return OPEN
     if config.own_errors:
         return sole_type(surface)
-    patient = would_have_shown(config, surface)
-    if any_constant(surface):
-        found = one_constant(surface)
+    patient = others_would_have_shown(config, surface)
+    if any_constant_type_left(surface):
+        found = sole_constant_type(surface)
         return found if patient and not may_be_mistaken(surface, found, True) else OPEN
-    return one_course(surface, patient)
+    return varying_type_at_fault(surface, patient)
 
 
 @kernel
-def one_course(surface, patient):
+def varying_type_at_fault(surface, patient):
     """The same when no constant explains it: the one type left that need not show itself; else the one that
     has."""
-    found = sole_course(surface, False)
+    found = sole_varying_type(surface, False)
     if found == NO_TYPE:
-        found = sole_course(surface, True)
+        found = sole_varying_type(surface, True)
         return found if found >= 0 and has_shown(surface, found) else OPEN
     if found < 0 or not patient:
         return OPEN
     for kind in range(N_CONSTANT, N_TYPES):
-        if left(surface, kind) and MISTAKEN_FOR[kind, found]:
+        if is_left(surface, kind) and MISTAKEN_FOR[kind, found]:
             return OPEN
     return found
 
 
 @kernel
-def sole_course(surface, must_show):
+def sole_varying_type(surface, must_show):
     """The one type of a parameter that varies which is left, of those that must show themselves or of those
     that need not; NO_TYPE, or OPEN if there are several."""
     found = NO_TYPE
     for kind in range(N_CONSTANT, N_TYPES):
-        if left(surface, kind) and MUST_SHOW[kind] == must_show:
+        if is_left(surface, kind) and MUST_SHOW[kind] == must_show:
             found = kind if found == NO_TYPE else OPEN
             if found == OPEN:
                 return OPEN
@@ -244,7 +270,7 @@ def sole_course(surface, must_show):
 
 
 @kernel
-def decide(types, conclusion, layout, estimators, t):
+def decide_surface_and_type(types, conclusion, layout, estimators, t):
     """The finding on the surface and, when it is certain, on the type, as `conclusion.note_type` takes it.
 
     conclusion: that of the frame before, which gives the instants of what has not changed; t s.
@@ -255,58 +281,58 @@ def decide(types, conclusion, layout, estimators, t):
     kind = type_at_fault(types.config, types.surface[s]) if s >= 0 else -1
     isolated_at_s = t if s != before else conclusion.isolated_at_s
     type_at_s = t if kind != conclusion.type else conclusion.type_at_s
-    isolated = estimator_for(layout, s, kind) if s >= 0 else s
-    lead, lead_kind = take_the_lead(types, isolated, layout, estimators)
+    isolated = estimator_of_fault(layout, s, kind) if s >= 0 else s
+    lead, lead_kind = choose_lead(types, isolated, layout, estimators)
     return isolated, isolated_at_s, kind, type_at_s, lead, lead_kind
 
 
 @kernel
-def estimator_for(layout, s, kind):
+def estimator_of_fault(layout, s, kind):
     """The estimator that stands for a fault of this type (OPEN if open) on surface s."""
-    return layout.loss_of[s] if kind >= 0 and ACCOMMODATION[kind] == LOSES else layout.position_of[s]
+    return layout.loss_of[s] if kind >= 0 and ACCOMMODATION[kind] == SCALE_COMMAND else layout.position_of[s]
 
 
 @kernel
-def mode_for(surface):
+def accommodation_mode(surface):
     """The mode of accommodation for a surface at fault as far as is known: LOSES, FIXED, LAGS or SHIFTED.
 
     SHIFTED subtracts what the last frame shows to be off: that is right for a bias and an oscillation, serves
     a loss of effectiveness meanwhile, and moves the command so that a jam shows in the next frame.
     """
-    constant = any_constant(surface)
-    for mode in (FIXED, LOSES, LAGS):
-        if constant and serves_all_constant(surface, mode):
+    constant = any_constant_type_left(surface)
+    for mode in (GIVE_UP, SCALE_COMMAND, WAIT_FOR_SURFACE):
+        if constant and serves_all_constant_types(surface, mode):
             return mode
-    for mode in (LOSES, LAGS, FIXED):
-        if not constant and suits_a_course(surface, mode):
+    for mode in (SCALE_COMMAND, WAIT_FOR_SURFACE, GIVE_UP):
+        if not constant and suits_a_varying_type(surface, mode):
             return mode
-    return SHIFTED
+    return SUBTRACT_OFFSET
 
 
 @kernel
-def serves_all_constant(surface, mode):
+def serves_all_constant_types(surface, mode):
     """Whether a mode is that of some type of constant parameter left, and serves all of them."""
     suits = False
     for kind in range(N_CONSTANT):
-        if left(surface, kind):
+        if is_left(surface, kind):
             suits = suits or ACCOMMODATION[kind] == mode
-            at_limit = LIMIT[kind] >= 0 and left(surface, LIMIT[kind]) and SERVES[mode, LIMIT[kind]]
+            at_limit = LIMIT[kind] >= 0 and is_left(surface, LIMIT[kind]) and SERVES[mode, LIMIT[kind]]
             if not (SERVES[mode, kind] or at_limit):
                 return False
     return suits
 
 
 @kernel
-def suits_a_course(surface, mode):
+def suits_a_varying_type(surface, mode):
     """Whether a mode is that of some type left whose parameter varies."""
     for kind in range(N_CONSTANT, N_TYPES):
-        if left(surface, kind) and ACCOMMODATION[kind] == mode:
+        if is_left(surface, kind) and ACCOMMODATION[kind] == mode:
             return True
     return False
 
 
 @kernel
-def presumed(types, isolated, layout, estimators):
+def presumed_surface(types, isolated, layout, estimators):
     """The surface the law acts upon: the one at fault, or the likeliest; NO_SURFACE yet.
 
     It acts before all doubt is gone, since it can take it back. Of elevator and flap it does not matter which
@@ -314,11 +340,11 @@ def presumed(types, isolated, layout, estimators):
     """
     if isolated >= 0:
         return estimators[isolated].surface
-    s = sole(types.surface, True)
+    s = sole_surface(types.surface, True)
     if s >= 0:
         return s
     for s, surface in enumerate(types.surface):
-        if layout.dominant_axis[s] == PITCH and possible(surface):
+        if layout.dominant_axis[s] == PITCH and can_be_at_fault(surface):
             return s
     return NO_SURFACE
 
@@ -337,26 +363,26 @@ def clear_modes(surfaces):
 
 
 @kernel
-def take_the_lead(types, isolated, layout, estimators):
+def choose_lead(types, isolated, layout, estimators):
     """The surface on which the law acts, or NO_SURFACE, and how; isolated: an estimator, if any."""
-    s = presumed(types, isolated, layout, estimators)
+    s = presumed_surface(types, isolated, layout, estimators)
     clear_modes(types.surface)
     if s < 0:
         return NO_SURFACE, -1
     surface = types.surface[s]
-    mode = mode_for(surface)
-    if still_there(types.config, surface, mode, True):
+    mode = accommodation_mode(surface)
+    if fault_is_present(types.config, surface, mode, True):
         set_mode(surface, mode)
         return s, mode
     return NO_SURFACE, mode
 
 
 @kernel
-def still_there(config, surface, mode, at_fault):
+def fault_is_present(config, surface, mode, at_fault):
     """Whether the fault of a surface shows, or did a moment ago."""
     seen, accommodation = surface.elapsed, surface.accommodation
     deflection = deflection_error(surface, at_fault) + seen.command
-    there = seen.low <= deflection <= seen.high or mode == LOSES
+    there = seen.low <= deflection <= seen.high or mode == SCALE_COMMAND
     accommodation.absent = 0 if there else accommodation.absent + 1
     return accommodation.absent * config.dt < ABSENT_S - _ROUNDING
 
@@ -367,12 +393,12 @@ def deflection_error(surface, at_fault):
     shows it."""
     if at_fault:
         for kind in ERROR_ORDER:
-            if left(surface, kind):
+            if is_left(surface, kind):
                 error = expected_error(surface, kind)
                 if np.isfinite(error):
                     return error
                 break
-    return middle_error(surface)
+    return observed_error(surface)
 
 
 @kernel
@@ -382,8 +408,144 @@ def effectiveness_left(types, layout, estimators, s):
     The estimator fits both axes of a surface, so beside another fault the set of a constant loss says it.
     """
     surface = types.surface[s]
-    if types.pair.enabled and possible(surface):
+    if types.pair.enabled and can_be_at_fault(surface):
         for kind in range(N_CONSTANT):
-            if ACCOMMODATION[kind] == LOSES and left(surface, kind):
-                return middle(surface, kind)
+            if ACCOMMODATION[kind] == SCALE_COMMAND and is_left(surface, kind):
+                return set_middle(surface, kind)
     return 1.0 + estimators[layout.loss_of[s]].theta[layout.dominant_axis[s]]
+
+
+Findings = dict[str, Any]
+_NOTHING: Findings = {
+    "isolated": None, "isolation_type": None, "estimate": None, "isolation_time_s": None,
+    "candidates": (), "faults": (),
+}  # fmt: skip
+
+
+def fault_findings(fdi: np.void, surfaces: Sequence[str]) -> Findings:
+    """isolated, isolation_type, candidates, estimate and more of a Flight diagnosed for every type.
+
+    surfaces: their names.
+    """
+    if not fdi["verdict"]["detected"]:
+        return dict(_NOTHING)
+    if fdi["types"]["pair"]["enabled"]:
+        return _found_of_several(fdi, surfaces)
+    return _found_of_one(fdi, surfaces)
+
+
+def _found_of_several(fdi: np.void, names: Sequence[str]) -> Findings:
+    """The fault named first as if it were alone, and all of them; what is open in a plane where none is."""
+    status = fdi["types"]["surface"]["status"]
+    at_fault = sorted(np.flatnonzero(status["named"]).tolist(), key=lambda s: status["named_at_s"][s])
+    faults = [_found_on(fdi, s, int(status["type"][s]), names) for s in at_fault]
+    planes = fdi["types"]["pair"]["alarmed"]
+    surfaces_of = [np.flatnonzero(fdi["layout"]["group"] == g).tolist() for g in range(len(planes))]
+    if not planes.any() and not faults and int(fdi["verdict"]["isolated"]) == NOT_ISOLATED:
+        planes = np.ones_like(planes)  # a statistical alarm by itself says of no plane that it is there
+    open_planes = [
+        {**_NOTHING, "candidates": tuple(_remaining_candidates(fdi, plane, names))}
+        for alarmed, plane in zip(planes, surfaces_of, strict=True)
+        if alarmed and not set(plane) & set(at_fault)
+    ]
+    if faults:
+        return {**faults[0], "faults": (*faults, *open_planes)}
+    if int(fdi["verdict"]["isolated"]) == UNANTICIPATED:
+        return {**_found_of_one(fdi, names), "faults": tuple(open_planes)}
+    left = tuple(candidate for plane in open_planes for candidate in plane["candidates"])
+    return {**_NOTHING, "candidates": left, "faults": tuple(open_planes)}
+
+
+def _found_of_one(fdi: np.void, names: Sequence[str]) -> Findings:
+    verdict, at_s = int(fdi["verdict"]["isolated"]), float(fdi["verdict"]["isolated_at_s"])
+    if verdict == NOT_ISOLATED:
+        return {**_NOTHING, "candidates": tuple(_remaining_candidates(fdi, range(len(names)), names))}
+    if verdict == UNANTICIPATED:
+        said = "unanticipated"
+        return {**_NOTHING, "isolated": said, "isolation_type": said, "isolation_time_s": at_s}
+    s, kind = int(fdi["isolation"]["estimator"][verdict]["surface"]), int(fdi["verdict"]["type"])
+    return {
+        **_found_on(fdi, s, kind, names),
+        "isolation_time_s": at_s,
+        "type_time_s": float(fdi["verdict"]["type_at_s"]) if kind >= 0 else None,
+    }
+
+
+def _found_on(fdi: np.void, s: int, kind: int, names: Sequence[str]) -> Findings:
+    """What is known of surface s, which is at fault; kind: of which type, -1 if open."""
+    surface = fdi["types"]["surface"][s]
+    return {
+        "isolated": names[s],
+        "isolation_time_s": float(surface["status"]["named_at_s"]),
+        "isolation_type": registry.NAMES[kind] if kind >= 0 else None,
+        "type_time_s": float(surface["status"]["type_at_s"]) if kind >= 0 else None,
+        "candidates": (registry.NAMES[kind],) if kind >= 0 else tuple(_types_left(fdi, s)),
+        "estimate": estimate_of(fdi, s, kind),
+        "estimate_interval": _of_type(kind, "interval", fdi, s, kind),
+        "frequency_rad_s": _of_type(kind, "frequency_rad_s", fdi, s, kind),
+    }
+
+
+def estimate_of(fdi: np.void, s: int, kind: int) -> float | None:
+    """What is known of the size of a fault of this type on surface s; see the top of this file."""
+    estimate: float | None = _of_type(kind, "estimate", fdi, s, kind)
+    return estimate
+
+
+def _of_type(kind: int, what: str, *arguments: Any) -> Any:
+    """What a type's row says; None while the type is open."""
+    return getattr(registry.TYPES[kind], what)(*arguments) if kind >= 0 else None
+
+
+def _can_be_at_fault(fdi: np.void, s: int) -> bool:
+    surface = fdi["types"]["surface"][s]
+    if surface["status"]["named"] or surface["status"]["source"] == BY_DEDUCTION:
+        return True
+    return not (surface["status"]["source"] == RULED_OUT or surface["refuted"])
+
+
+def _types_left(fdi: np.void, s: int) -> list[str]:
+    """Types still possible on surface s, each once.
+
+    Where a constant explains the flight, a type that varies and need not show itself counts only until the
+    constant has been seen for long enough, or until those types are excluded that it can look like.
+    """
+    surface = fdi["types"]["surface"][s]
+    left = [
+        kind
+        for kind, out in enumerate(surface["feasible"]["excluded"])
+        if _can_be_at_fault(fdi, s) and not out
+    ]
+    constant = [kind for kind in left if kind < registry.N_CONSTANT]
+    if constant and not fdi["types"]["config"]["own_errors"]:
+        evidence, patience = surface["evidence"], fdi["types"]["config"]["patience"]
+        early = evidence["frames"] - evidence["quiet"] < patience
+        left = [kind for kind in left if kind in constant or early or _is_open(kind, constant)]
+    beside_another = fdi["types"]["pair"]["enabled"] and fdi["layout"]["group"][s] == PITCH_GROUP
+    if beside_another and any(registry.ACCOMMODATION[kind] == GIVE_UP for kind in constant):
+        # if the other surface is off as well, each constant may be one of another type
+        left += sorted(
+            range(registry.N_CONSTANT), key=lambda kind: registry.ACCOMMODATION[kind] == SCALE_COMMAND
+        )
+    return list(dict.fromkeys(registry.NAMES[kind] for kind in left))
+
+
+def _is_open(kind: int, constant: list[int]) -> bool:
+    """Whether a type that varies counts beside these constant ones: it may yet show itself, or looks like
+    one of them."""
+    return bool(registry.MUST_SHOW[kind] or registry.MISTAKEN_FOR[kind, constant].any())
+
+
+def _remaining_candidates(fdi: np.void, among: Iterable[int], names: Sequence[str]) -> Iterator[str]:
+    """`surface:type` for each that is possible; bare surfaces and `unanticipated` where no type fits.
+
+    Of one plane also both its surfaces, as `elevator+flap`.
+    """
+    possible = [s for s in among if _can_be_at_fault(fdi, s)]
+    for s in possible:
+        types = _types_left(fdi, s)
+        yield from (f"{names[s]}:{kind}" for kind in types) if types else (names[s],)
+    if fdi["types"]["pair"]["enabled"]:
+        yield "+".join(names[s] for s in among)
+    if not any(_types_left(fdi, s) for s in possible):
+        yield "unanticipated"

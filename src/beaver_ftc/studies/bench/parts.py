@@ -30,7 +30,7 @@ def flying(value, ground_m, slow_mps):
 
 
 def unlimited(bound, eta_bar, decay, dt):
-    """Stands in for `thresholds.bound_step`."""
+    """Stands in for `filters.bound_step`."""
     return UNLIMITED_RAD_S
 
 
@@ -47,24 +47,27 @@ PARTS: dict[str, dict[str, Kernel]] = {
     # the design model, the detection estimator and its bank of filters
     "fdae": {
         "design.variants.response": nothing, "loop.accounts.effect_of_faults": nothing,
-        "diagnosis.belief.expectation.evaluate_frame": nothing, "loop.frame.diagnose": nothing,
+        "diagnosis.expectation.evaluate_frame": nothing, "loop.frame.diagnose": nothing,
     },
     # the isolation estimators, and the decision among them
     "fies": {
-        "diagnosis.isolation.estimators.update_hypotheses": nothing,
-        "diagnosis.isolation.estimators.predict_all": nothing,
-        "diagnosis.isolation.estimators.start": nothing,
-        "diagnosis.schemes.fault_classes.isolate_fault": nothing,
+        "diagnosis.isolation.update_hypotheses": nothing,
+        "diagnosis.isolation.predict_estimators": nothing,
+        "diagnosis.isolation.start_estimators": nothing,
+        "diagnosis.schemes.adaptive_estimators.isolate_fault": nothing,
     },
     # the bound on the uncertainty, and every threshold that follows from it
     "thresholds": {
-        "diagnosis.bounds.worst_case.uncertainty_bound": nothing,
-        "diagnosis.detection.thresholds.bound_step": unlimited,
-        "diagnosis.detection.thresholds.interval": all_residuals,
-        "diagnosis.detection.thresholds.published": all_residuals,
+        "diagnosis.bounds.add_published_bound": nothing,
+        "diagnosis.detection.filters.bound_step": unlimited,
+        "diagnosis.detection.filters.interval_limits": all_residuals,
+        "diagnosis.detection.filters.norm_limits": all_residuals,
     },
     # the network of the detection estimator, which learns after the alarm
-    "network": {"diagnosis.detection.fdae.learn": nothing, "diagnosis.detection.fdae.evaluate": nothing},
+    "network": {
+        "diagnosis.detection.filters.train_network": nothing,
+        "diagnosis.detection.filters.evaluate_network": nothing,
+    },
     # who is in charge
     "supervisor": {"loop.frame.decide": nothing},
     # the command, into the aircraft's properties

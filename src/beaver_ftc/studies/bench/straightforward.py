@@ -11,7 +11,7 @@ from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S
 from beaver_ftc.control.reference import discretise
 from beaver_ftc.design.fdc import GEOMETRY, MASS, SURFACES, TERMS
 from beaver_ftc.design.model import inertia_coefficients
-from beaver_ftc.diagnosis.detection.fdae import ALPHA_CENTRES, BETA_CENTRES, N_BASIS
+from beaver_ftc.diagnosis.detection.filters import ALPHA_CENTRES, BETA_CENTRES, N_BASIS
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario

@@ -14,8 +14,8 @@ from time import process_time
 import numpy as np
 
 from beaver_ftc.design.context import Context
+from beaver_ftc.diagnosis import informed_test
 from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
-from beaver_ftc.diagnosis.bounds import clairvoyant
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.loop.readout import FrameReadout, run_statistical_tests
 from beaver_ftc.loop.stepping import built_in_statistic
@@ -142,7 +142,7 @@ def aware_of_the_air(recording: Recording) -> Recording:
         (measured._replace(acceleration=measured.acceleration + air), command)
         for (measured, command), air in zip(recording.seen, recording.air, strict=True)
     ]
-    context = clairvoyant.aware_of_the_air(recording.context, recording.air_noise)
+    context = informed_test.with_measured_gust(recording.context, recording.air_noise)
     return replace(recording, context=context, seen=seen)
 
 

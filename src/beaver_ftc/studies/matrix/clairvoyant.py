@@ -11,12 +11,12 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.design.context import Context
-from beaver_ftc.diagnosis.bounds.clairvoyant import (
+from beaver_ftc.diagnosis.informed_test import (
     Whitening,
-    accelerations,
-    aware_of_the_air,
-    chance,
-    healthy,
+    detection_probability,
+    healthy_positions,
+    term_accelerations,
+    with_measured_gust,
 )
 from beaver_ftc.results.log import Columns
 from beaver_ftc.results.model import Document
@@ -41,16 +41,18 @@ def seen_when_told(scenario: "Scenario", kept: Columns, surface: str) -> Documen
     aircraft, (context, coefficients) = scenario.airframe, _declared(scenario)
     at_s = scenario.faults[0].at_s
     struck = kept["t_s"] > at_s + 0.5 * context.dt_s
-    off_rad = np.where(struck, kept[f"{surface}_effective_rad"] - healthy(context, kept, surface), 0.0)
+    off_rad = np.where(
+        struck, kept[f"{surface}_effective_rad"] - healthy_positions(context, kept, surface), 0.0
+    )
     own = [term for term in aircraft.moments if term.surface == surface]
-    phi = np.sum([term.value * accelerations(aircraft, term, kept, off_rad) for term in own], axis=0)
+    phi = np.sum([term.value * term_accelerations(aircraft, term, kept, off_rad) for term in own], axis=0)
     unknown = [(t, c) for t, c in zip(aircraft.moments, coefficients, strict=True) if c > 0.0]
-    regressors = [accelerations(aircraft, t, kept, kept.get(f"{t.surface}_cmd_rad")) for t, _ in unknown]
+    regressors = [term_accelerations(aircraft, t, kept, kept.get(f"{t.surface}_cmd_rad")) for t, _ in unknown]
     sigma = np.array([c for _, c in unknown]) / sqrt(3.0)
     beside = np.stack(regressors, axis=-1) if unknown else np.zeros((*phi.shape, 0))
     d = Whitening(context).deflection_beside(phi, beside, sigma)
     rate = scenario.fdi.statistical.false_alarms_per_h
-    return {"told_deflection": d, "told_chance": chance(d, scenario.duration_s - at_s, rate)}
+    return {"told_deflection": d, "told_chance": detection_probability(d, scenario.duration_s - at_s, rate)}
 
 
 def _declared(scenario: "Scenario") -> tuple[Context, np.ndarray]:
@@ -66,6 +68,6 @@ def _declared(scenario: "Scenario") -> tuple[Context, np.ndarray]:
     context = context_of(loop.frames, exact, loop.start, {})
     diagnosis = FrameReadout(loop.frames[0]).diagnosis
     if diagnosis.air.seen:
-        context = aware_of_the_air(context, np.sqrt(diagnosis.model_noise))
+        context = with_measured_gust(context, np.sqrt(diagnosis.model_noise))
     loop.release()
     return context, coefficients

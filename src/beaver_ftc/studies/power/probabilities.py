@@ -7,7 +7,7 @@ from math import inf
 from statistics import fmean
 from typing import Any
 
-from beaver_ftc.diagnosis.bounds.clairvoyant import chance
+from beaver_ftc.diagnosis.informed_test import detection_probability
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.metrics import versions
 from beaver_ftc.results.model import Document
@@ -110,7 +110,9 @@ def limit(rows: Sequence[Row], per_h: float) -> Document:
     one_each = {(row["excitation_deg_s"], row["seed"], row["surface"], row["magnitude"]): row for row in rows}
     flights = list(one_each.values())
     return {
-        f"{within_s:g}": fmean(chance(row[f"deflection_{within_s:g}"], within_s, per_h) for row in flights)
+        f"{within_s:g}": fmean(
+            detection_probability(row[f"deflection_{within_s:g}"], within_s, per_h) for row in flights
+        )
         for within_s in WITHIN_S
     }
 

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from beaver_ftc.aircraft import DEFAULT
-from beaver_ftc.diagnosis.bounds.clairvoyant import Whitening
+from beaver_ftc.diagnosis.informed_test import Whitening
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.plugins import DETECTORS, is_compiled, refusal, registered
 from beaver_ftc.scenario.airframe import air_of, find_aircraft

@@ -10,7 +10,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S
-from beaver_ftc.diagnosis.bounds.worst_case import ROUNDING_RAD_S2
+from beaver_ftc.diagnosis.bounds import ROUNDING_RAD_S2
 from beaver_ftc.studies.reproduce.cases import ESTIMATORS, SETTLED_S, Flown
 from beaver_ftc.studies.reproduce.choices import AMPLITUDE_DEG_S
 

@@ -19,7 +19,7 @@ from tools.drawn.reader import doubts
 
 import beaver_ftc as bf
 from beaver_ftc.cli.main import main
-from beaver_ftc.diagnosis.monitors.sensor_records import SENSOR_MONITOR
+from beaver_ftc.diagnosis.monitors.redundancy import SENSOR_MONITOR
 from beaver_ftc.diagnosis.readout import read_sensor_monitor
 from beaver_ftc.plant.instruments import SENSORS
 from beaver_ftc.results import writer

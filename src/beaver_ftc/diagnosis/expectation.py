@@ -17,13 +17,13 @@ from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design.actuators import actuators_dtype, move
 from beaver_ftc.design.model import design_dtype
 from beaver_ftc.design.variants import design_of, response
-from beaver_ftc.diagnosis.bounds.worst_case import beyond, bound_now, changing_error
+from beaver_ftc.diagnosis.bounds import changing_gyro_error, fill_bound_now, further_map_error
 from beaver_ftc.scenario.schema import Scenario
 
 
 @sized
 def sums_dtype(n: int) -> np.dtype:
-    """Sums over the instants of a frame, n surfaces: f, G, G u and bounds; own errors as in worst_case.py."""
+    """Sums over the instants of a frame, n surfaces: f, G, G u and bounds; own errors as in bounds.py."""
     return record(
         f=3, G=(3, n), Gu=(3, n), eta_bar=3, own_per_rad=(3, n), own=(3, n),
         Gu_first=(3, n),  # of the first instant alone
@@ -36,7 +36,7 @@ def sums_dtype(n: int) -> np.dtype:
 def means_dtype(n: int) -> np.dtype:
     """Means over the elapsed frame, of an aircraft with n surfaces."""
     return record(
-        G=(3, n), Gu=(3, n), Gu_spread=(3, n),  # rad/s2 per rad; rad/s2; see `fill_spread`, rad/s2
+        G=(3, n), Gu=(3, n), Gu_spread=(3, n),  # rad/s2 per rad; rad/s2; see `fill_effect_spread`, rad/s2
         acceleration=3,  # f + G u, rad/s2
         # With G of the frame before. It does not depend on the measurement noise of this frame, to which the
         # control law reacts: with G of this frame that reaction would correlate with the noise.
@@ -84,7 +84,7 @@ def evaluate_design(belief, measured):
 
 
 @kernel
-def accumulate(belief, bound, layout, every_type):
+def add_instant_to_sums(belief, bound, layout, every_type):
     """Add this instant to the sums over the frame and, for faults of `every_type`, to the extremes."""
     total, G, u = belief.sums, belief.G, belief.u
     for i in range(3):
@@ -99,7 +99,7 @@ def accumulate(belief, bound, layout, every_type):
     if bound.error_map.anywhere:
         for j in range(bound.error_map.n_levels):
             for i in range(3):
-                bound.beyond[j, i] += belief.share * beyond(bound.error_map, j, i)
+                bound.beyond[j, i] += belief.share * further_map_error(bound.error_map, j, i)
     if every_type:
         for s, axis in enumerate(layout.dominant_axis):
             now = G[axis, s]
@@ -108,7 +108,7 @@ def accumulate(belief, bound, layout, every_type):
 
 
 @kernel
-def average_frame(belief, bound):
+def fill_frame_means(belief, bound):
     """Fill the means over the elapsed frame: G, the effect G u of each surface, f + G u, and the bound."""
     share, total, mean = belief.share, belief.sums, belief.means
     for i in range(3):
@@ -126,11 +126,11 @@ def average_frame(belief, bound):
         bound.own_per_rad[:] = share * total.own_per_rad
         bound.own[:] = share * total.own
     if share < 1.0:
-        fill_spread(belief)
+        fill_effect_spread(belief)
 
 
 @kernel
-def predict_next(mean):
+def predict_control_effect(mean):
     """Fill `Gu_predicted` (3, n) rad/s2: the effect of each surface with G of the frame before."""
     for i in range(3):
         for s in range(mean.G_least.size):
@@ -139,7 +139,7 @@ def predict_next(mean):
 
 
 @kernel
-def fill_spread(belief):
+def fill_effect_spread(belief):
     """Fill `Gu_spread` (3, n) rad/s2: the error of the mean effect if a fault changes within the frame.
 
     A fault changes between frames, that is between the first JSBSim step of a frame and the others. z0 and z
@@ -158,13 +158,13 @@ def fill_spread(belief):
 def evaluate_frame(belief, bound, measured, k, dt):
     """Fill the bound on the uncertainty at this instant, and the means over the elapsed frame, k, of dt s."""
     bound.error_map.time_s = k * dt
-    bound_now(bound, belief.design, measured, belief.u)
+    fill_bound_now(bound, belief.design, measured, belief.u)
     bound.eta_bar[:] = bound.eta_bar_now
     if bound.admitted.any:
         for i in range(3):
-            bound.noise[i] = changing_error(bound.admitted, i, measured.x[i])
+            bound.noise[i] = changing_gyro_error(bound.admitted, i, measured.x[i])
     if k > 0:
-        average_frame(belief, bound)
+        fill_frame_means(belief, bound)
 
 
 @kernel
@@ -180,15 +180,15 @@ def begin_sums(belief, bound, layout, every_type, measured):
     if bound.own_errors:
         total.own_per_rad[:], total.own[:] = 0.0, 0.0
     bound.beyond[:] = 0.0
-    accumulate(belief, bound, layout, every_type)
+    add_instant_to_sums(belief, bound, layout, every_type)
     total.Gu_first[:] = total.Gu
 
 
 @kernel
 def accumulate_substep(belief, bound, layout, every_type, measured):
     """Add an instant inside the frame to its sums, and move the healthy surfaces on."""
-    bound_now(bound, belief.design, measured, belief.u)
-    accumulate(belief, bound, layout, every_type)
+    fill_bound_now(bound, belief.design, measured, belief.u)
+    add_instant_to_sums(belief, bound, layout, every_type)
     move(belief.actuators, belief.commanded, belief.u)
 
 
@@ -220,7 +220,7 @@ def form_innovation(belief, x, dt):
 
 
 @kernel
-def follow_command(belief, command):
+def move_healthy_surfaces(belief, command):
     """Move the healthy surfaces by one JSBSim frame towards the new command (n,) rad."""
     for s in range(command.size):
         belief.commanded[s] = command[s]

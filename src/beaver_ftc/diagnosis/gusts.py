@@ -39,9 +39,8 @@ from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.dryden import SCALE_M, rotation_lengths
 from beaver_ftc.design.model import rate_damping
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, QDYN, TABLE, evaluate, fill_table, whole_sum
-from beaver_ftc.diagnosis.bounds.variances import flow_noise, jitter
-from beaver_ftc.diagnosis.bounds.worst_case import least_height
-from beaver_ftc.diagnosis.monitors.redundancy import FALLING_M_S2
+from beaver_ftc.diagnosis.bounds import flow_angle_noise, gust_estimate_noise, lowest_height
+from beaver_ftc.diagnosis.monitors.redundancy import EARTH_ACCELERATION_M_S2
 from beaver_ftc.plant.instruments import wrapped
 from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
 
@@ -52,8 +51,8 @@ FORCE_ERROR_SHARE = 0.01  # share left unmeasured by an error of a tenth in the 
 TWO_STEP_NOISE = 1.6  # noise gain of the two-step method: sqrt(1.5^2 + 0.5^2)
 MIN_BANK_COSINE = 0.5  # cosine of the steepest bank at which lift is assumed to balance the weight
 MAX_GUST_SIGMA = 4.0  # limit of the estimated gust velocity, standard deviations
-SLOPE_RAD = 0.3  # of the path, along which gravity acts
-DRAG = 0.3  # upper limit of drag over weight: errors of coefficients are a share of it
+MAX_PATH_SLOPE_RAD = 0.3  # of the path, along which gravity acts
+MAX_DRAG_OVER_WEIGHT = 0.3  # upper limit of drag over weight: errors of coefficients are a share of it
 MIN_AXES_TURN = 0.01  # share of a gust's own intensity below which the turn of its axes is ignored
 
 CONFIG = record(
@@ -106,11 +105,11 @@ OUTPUT = record(
     damping=(3, 3), axes=(3, 3),  # 1/s; rotation from the gusts' axes to body axes
 )  # fmt: skip
 
-AIR = record(config=CONFIG, memory=MEMORY, output=OUTPUT)
+GUST_RECORD = record(config=CONFIG, memory=MEMORY, output=OUTPUT)
 
 
 @kernel
-def specific_force(air, x, y, u, out):
+def fill_specific_force(air, x, y, u, out):
     """Fill out (3,) m/s2 with the aerodynamic and propulsive force over mass in body axes, by the model.
 
     x (3,) rad/s, y (4 + declared,), u (n,) rad. The term of the rate of sideslip is omitted: it is below a
@@ -123,7 +122,7 @@ def specific_force(air, x, y, u, out):
 
 
 @kernel
-def level_axes(phi, theta, turn):
+def fill_level_axes(phi, theta, turn):
     """Fill turn (3, 3), the rotation from level axes (forward, right, down) to body axes; angles rad."""
     sin_phi, cos_phi, sin_theta, cos_theta = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
     turn[0, 0], turn[0, 1], turn[0, 2] = cos_theta, 0.0, -sin_theta
@@ -138,13 +137,13 @@ def to_level(turn, body, i):
 
 
 @kernel
-def advance_axes(air, y, attitude):
+def measure_air_velocity(air, y, attitude):
     """Fill attitude, heading and velocity relative to the air, m/s in level axes, of this instant.
 
     y (5,) and attitude (3,) rad as measured.
     """
     alpha, beta, V = y[ALPHA], y[BETA], y[AIRSPEED]
-    level_axes(attitude[0], attitude[1], air.memory.level_to_body)
+    fill_level_axes(attitude[0], attitude[1], air.memory.level_to_body)
     air.memory.heading = attitude[2]
     u, v, w = V * np.cos(alpha) * np.cos(beta), V * np.sin(beta), V * np.sin(alpha) * np.cos(beta)
     for i in range(3):
@@ -156,12 +155,12 @@ def advance_axes(air, y, attitude):
 
 
 @kernel
-def start(air, y, attitude):
+def start_gust_estimate(air, y, attitude):
     """Start at the first frame of a diagnosis: the estimated gust is zero.
 
     If the diagnosis begins in flight, a gust may be present already; it counts as unmeasured and decays.
     """
-    advance_axes(air, y, attitude)
+    measure_air_velocity(air, y, attitude)
     update_gust_axes(air, 0.0, 1.0)
     air.memory.gust[:] = 0.0
     air.memory.started, air.memory.lost_share = 0, 0.0
@@ -243,7 +242,7 @@ def update_gust(air, y, attitude, dt):
         pulled[1] * cos - pulled[0] * sin,
     )
     air.memory.acceleration_before[2] = pulled[2]
-    advance_axes(air, y, attitude)
+    measure_air_velocity(air, y, attitude)
     update_speed(air, ahead, right, down, y[AIRSPEED], dt)
     V = air.output.speed
     update_gust_axes(air, sin, cos)
@@ -288,25 +287,25 @@ def update_speed(air, ahead, right, down, V, dt):
 
 
 @kernel
-def set_intensity(air, altitude):
+def set_gust_intensity(air, altitude):
     """Fill the intensity of turbulence at this altitude, m as measured."""
-    height = least_height(altitude, air.config.altitude_error, air.config.altitude_slope)
+    height = lowest_height(altitude, air.config.altitude_error, air.config.altitude_slope)
     air.memory.intensity[0] = max(air.config.intensity_aloft[0], air.config.intensity_at_1_m[0] / height**1.5)
     for g in range(1, 3):
         air.memory.intensity[g] = max(air.config.intensity_aloft[g], air.config.intensity_at_1_m[g] / height)
 
 
 @kernel
-def update(air, y, attitude, dt, k):
+def update_gust_estimate(air, y, attitude, dt, k):
     """Start at frame k = 0, and update the gust at later frames; arguments as in `update_gust`."""
     if k > 0:
         update_gust(air, y, attitude, dt)
     else:
-        start(air, y, attitude)
+        start_gust_estimate(air, y, attitude)
 
 
 @kernel
-def fill_effect(air, design, x, y, u):
+def fill_gust_effect(air, design, x, y, u):
     """Fill `acceleration` (3,) rad/s2, the effect of the gust from this instant on, and `force`, m/s2.
 
     x (3,) rad/s and y (5,) as measured; u (n,) rad: positions of healthy surfaces.
@@ -317,7 +316,7 @@ def fill_effect(air, design, x, y, u):
         air.memory.force[0] = air.memory.force[1] = 0.0
         air.memory.force[2] = -air.config.gravity / max(air.memory.level_to_body[2, 2], MIN_BANK_COSINE)
     else:
-        specific_force(air, x, y, u, air.memory.force)
+        fill_specific_force(air, x, y, u, air.memory.force)
     rate_damping(design, x, y, u, air.memory.scratch, air.output.damping)
     for i in range(3):
         known = air.output.axes[i, 1] * air.memory.gust[1] + air.output.axes[i, 2] * air.memory.gust[2]
@@ -332,27 +331,27 @@ def fill_effect(air, design, x, y, u):
 
 
 @kernel
-def begin_sums(air, V, dt):
+def begin_gust_sums(air, V, dt):
     """Start the sums over the next frame's instants, dt s apart, with this instant; V m/s."""
     air.memory.acceleration_sum[:] = air.output.acceleration
-    add_axes_turn(air, V, dt)
+    add_axes_turn_variance(air, V, dt)
 
 
 @kernel
-def accumulate_substep(air, design, x, y, u, attitude, dt):
+def accumulate_gust_substep(air, design, x, y, u, attitude, dt):
     """Update gust and sums for an instant inside a frame, dt s after the instant before.
 
-    Arguments as in `fill_effect`; attitude (3,) rad.
+    Arguments as in `fill_gust_effect`; attitude (3,) rad.
     """
     update_gust(air, y, attitude, dt)
-    fill_effect(air, design, x, y, u)
+    fill_gust_effect(air, design, x, y, u)
     for i in range(3):
         air.memory.acceleration_sum[i] += air.output.acceleration[i]
-    add_axes_turn(air, y[AIRSPEED], dt)
+    add_axes_turn_variance(air, y[AIRSPEED], dt)
 
 
 @kernel
-def take_accelerometers(air, force):
+def store_accelerometers(air, force):
     """Keep the reading of the accelerometers, force (3,) m/s2."""
     air.memory.measured[:] = force
 
@@ -376,10 +375,10 @@ def stop_accelerometers(air):
         for i in range(3):
             for j in range(3):
                 air.memory.turn_variance_now[i, j] += (
-                    pitching * air.memory.intensity[1] * joint_gain(air, air.output.axes, i, j, 1)
+                    pitching * air.memory.intensity[1] * effect_product(air, air.output.axes, i, j, 1)
                 )
                 air.memory.turn_variance_now[i, j] += (
-                    yawing * air.memory.intensity[2] * joint_gain(air, air.output.axes, i, j, 2)
+                    yawing * air.memory.intensity[2] * effect_product(air, air.output.axes, i, j, 2)
                 )
         air.memory.turn_frames = 3
 
@@ -405,7 +404,7 @@ def unmeasured_share(air, g):
 
 
 @kernel
-def slow_power_ratio(air, g):
+def low_frequency_power_ratio(air, g):
     """Power of the gust about axis g at low frequency, over that with the return length of the rolling gust.
 
     It is 1 if vanes measure the gust: the spectrum of the unmeasured rest is not known.
@@ -420,16 +419,16 @@ def return_length(air, g):
 
 
 @kernel
-def unmeasured_drift(air, V, i, j, slow=False):
+def unmeasured_gust_drift(air, V, i, j, slow=False):
     """Intensity, (rad/s2)2/s, of the drift of accelerations i and j by the unmeasured rotation; V m/s.
 
     slow: that of a gust with the return length of the rolling gust and equal power at low frequency.
     """
     total = 0.0
     for g in range(3):
-        share = slow_power_ratio(air, g) if slow else 1.0
+        share = low_frequency_power_ratio(air, g) if slow else 1.0
         total += (
-            joint_gain(air, air.output.axes, i, j, g)
+            effect_product(air, air.output.axes, i, j, g)
             * unmeasured_share(air, g)
             * air.memory.intensity[g]
             * share
@@ -438,7 +437,7 @@ def unmeasured_drift(air, V, i, j, slow=False):
 
 
 @kernel
-def add_axes_turn(air, V, dt):
+def add_axes_turn_variance(air, V, dt):
     """Add to `turn_variance_now` the effect of the turn of the gusts' axes in dt s; V m/s."""
     if not air.memory.axes_turn_fast:
         return
@@ -449,15 +448,15 @@ def add_axes_turn(air, V, dt):
     for i in range(3):
         for j in range(3):
             roll, yaw = (
-                joint_gain(air, air.memory.axes_rate, i, j, 0),
-                joint_gain(air, air.memory.axes_rate, i, j, 2),
+                effect_product(air, air.memory.axes_rate, i, j, 0),
+                effect_product(air, air.memory.axes_rate, i, j, 2),
             )
             air.memory.turn_variance_now[i, j] += dt * V * (rolling * roll + yawing * yaw)
     air.memory.turn_frames = 3
 
 
 @kernel
-def average_frame(air, share):
+def average_gust_frame(air, share):
     """Fill `mean` and `turn_variance` for the elapsed frame; share: one over its number of instants.
 
     Axes may turn in the middle of a frame. A part of the effect is then in this frame and the rest in the
@@ -479,7 +478,7 @@ def average_frame(air, share):
 
 
 @kernel
-def full_drift(air, V, sensitivity, gust_on_forces):
+def full_gust_drift(air, V, sensitivity, gust_on_forces):
     """Intensity, (rad/s2)2/s, of the drift by the whole rotation of the air, for a view without vanes.
 
     sensitivity, by_forces (3,) 1/s: gust sensitivity of the rates and of the forces, about the body axes.
@@ -502,7 +501,7 @@ def full_drift(air, V, sensitivity, gust_on_forces):
 
 
 @kernel
-def remaining_drift(air, V, gust_on_rates, gust_on_forces):
+def remaining_gust_drift(air, V, gust_on_rates, gust_on_forces):
     """Intensity, (rad/s2)2/s, of the drift that remains with the gust estimate subtracted from the rates.
 
     gust_on_rates, gust_on_forces (3,) 1/s: gust sensitivities about the body axes. On the forces the whole
@@ -524,7 +523,7 @@ def project_on_axis(sensitivity, axes, g):
 
 
 @kernel
-def joint_gain(air, axes, i, j, g):
+def effect_product(air, axes, i, j, g):
     """Product of the effects of the gust about axis g on accelerations i and j, per (rad/s)2.
 
     axes (3, 3): of the gusts, giving 1/s2; or their rate, 1/s, giving 1/s4.
@@ -536,7 +535,7 @@ def joint_gain(air, axes, i, j, g):
     return on_i * on_j
 
 
-def set_up_air(air: np.void, declared: Declared, mass: MassProperties) -> None:
+def configure_gusts(air: np.void, declared: Declared, mass: MassProperties) -> None:
     """Fill the record with the declared turbulence, for an aircraft of this mass."""
     turbulence, errors, aircraft = declared.air, declared.sensors, declared.aircraft
     span_m = aircraft.geometry.span_m
@@ -568,7 +567,7 @@ def set_up_air(air: np.void, declared: Declared, mass: MassProperties) -> None:
     air["config"]["rolling_length"] = rotation_lengths(span_m)[0]
 
 
-def set_up_jitter(
+def add_gust_jitter(
     statistical: np.void, errors: SensorErrors, design: np.void, y: np.ndarray, u: np.ndarray, dt_s: float
 ) -> None:
     """Add the noise of the gust estimate to the jitter of the detector.
@@ -576,18 +575,18 @@ def set_up_jitter(
     It is the noise of the vanes and of the force that predicts the velocity; for the estimate without vanes
     that of the forces as well. y, u: in trim.
     """
-    flow, span_m = flow_noise(errors, y[AIRSPEED]), float(statistical["air"]["config"]["span"])
+    flow, span_m = flow_angle_noise(errors, y[AIRSPEED]), float(statistical["air"]["config"]["span"])
     if statistical["forces"]["known"] or statistical["air"]["output"]["uses_accelerometers"]:
         flow += TWO_STEP_NOISE * errors.each("random", ("az", "ay")) * dt_s / y[AIRSPEED]
     if statistical["forces"]["known"]:
         forces = statistical["forces"]["component"][::-1]  # normal to the body, and across
         by_force = np.sqrt(forces["accelerometer_variance"]) / np.abs(forces["vane"][:, 1])
-        statistical["forces"]["gust_noise"] = jitter(by_force, design, y, u, span_m)
+        statistical["forces"]["gust_noise"] = gust_estimate_noise(by_force, design, y, u, span_m)
     for name in ("own_jitter", "jitter"):
-        statistical["noise"][name] += jitter(flow, design, y, u, span_m) ** 2
+        statistical["noise"][name] += gust_estimate_noise(flow, design, y, u, span_m) ** 2
 
 
-def set_up_speed(air: np.void, declared: Declared, level: float, airspeed_mps: float) -> None:
+def configure_speed_error(air: np.void, declared: Declared, level: float, airspeed_mps: float) -> None:
     """Fill the decay rate of the gust velocity and the error variance of the speed; airspeed_mps: in trim.
 
     level: of the alarm, standard deviations. An acceleration error b, m/s2, gives the sum, of
@@ -598,12 +597,14 @@ def set_up_speed(air: np.void, declared: Declared, level: float, airspeed_mps: f
     if not (air["output"]["moving"] and air["output"]["measures_gust"]):
         return
     return_rate, V = airspeed_mps / SCALE_M, errors["V"]
-    drift = 2.0 * EARTH_RATE_RAD_S * airspeed_mps + SLOPE_RAD * FALLING_M_S2  # Coriolis; gravity with place
+    drift = (
+        2.0 * EARTH_RATE_RAD_S * airspeed_mps + MAX_PATH_SLOPE_RAD * EARTH_ACCELERATION_M_S2
+    )  # Coriolis; gravity with place
     drift += GRAVITY_MPS2 * (errors["phi"].steady + errors["theta"].steady)
     if air["output"]["uses_accelerometers"]:
-        drift += errors["ax"].steady + GRAVITY_MPS2 * DRAG * errors["ax"].slope
+        drift += errors["ax"].steady + GRAVITY_MPS2 * MAX_DRAG_OVER_WEIGHT * errors["ax"].slope
     else:
-        drift += GRAVITY_MPS2 * DRAG * (declared.coefficients.largest + MASS_TOLERANCE)
+        drift += GRAVITY_MPS2 * MAX_DRAG_OVER_WEIGHT * (declared.coefficients.largest + MASS_TOLERANCE)
     decay_rate = (2.0 * drift**2 * return_rate / sigma**2) ** (1.0 / 3.0)
     air["config"]["gust_variance"], air["config"]["max_gust"], air["config"]["decay_rate"] = (
         sigma**2,

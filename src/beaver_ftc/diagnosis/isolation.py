@@ -1,11 +1,13 @@
-"""The fault isolation estimators (FIE), started at detection, and the decision among them.
+"""The fault isolation estimators (FIE), their sets of parameters, and the decision among them.
+
+The estimators start at detection:
 
     xhats' = -Lambdas (xhats - x) + f + G u + base + Zs ths + Oms ths'
     Oms' = -Lambdas Oms + Zs,  Oms(Td) = 0
 
 [Zhang2005, sec. IV]. In discrete time, with Omega[k+1] = a Omega[k] + dt Z[k] and the estimate's step
 multiplied by Omega[k+1], the residual of the true estimator is exactly Omega (theta - thetahat) plus the
-filtered uncertainty, whatever the estimate does.
+filtered uncertainty, for any course of the estimate.
 
 Every hypothesis is linear in one unknown parameter per axis, phi_i = base_i + theta_i Z_i:
 
@@ -16,8 +18,20 @@ LOSS on aileron, elevator and rudder is the published class. POSITION states onl
 follow its command. Its parameter, the deflection in rad, may change in any way, so it covers every fault of
 the surface. Both together are `fdi.fault_class: all`; types/ decides which type of fault it is.
 
-The sharpened tests (bank.py, membership.py) exclude as well, each by its own switch. The first test that
-fails excludes a fault.
+Set membership: the parameters theta of a fault that are consistent with the innovation nu on axis i,
+
+    |nu_i - base_i - theta Z_i| <= eta_bar_i
+
+nu, base, Z and eta_bar are in rad/s2 (Z per unit of theta). One surface has one parameter, so one theta must
+be consistent on all axes. For a parameter that may change in any way, no test frame by frame is sharper. For
+a constant parameter (`fdi.fault_profile: abrupt`) the sets of all frames since the alarm are intersected.
+
+Likelihood ratios exclude a loss of the published class, or confirm it. A confirmed loss is never excluded by
+likelihood. A loss that only the end of an undetected earlier loss could explain is weakly excluded: it is not
+isolated.
+
+The sharpened tests (detection/filters.py, set membership) exclude as well, each by its own switch. The first
+test that fails excludes a fault.
 """
 
 from math import exp
@@ -26,22 +40,190 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import kernel, record, sized
-from beaver_ftc.diagnosis.detection.bank import explains, remember
-from beaver_ftc.diagnosis.detection.thresholds import bound_step, interval, noise_step, published
-from beaver_ftc.diagnosis.isolation import membership
+from beaver_ftc.diagnosis.bounds import level_covering, travel_share_used
+from beaver_ftc.diagnosis.detection import statistical
+from beaver_ftc.diagnosis.detection.filters import (
+    advance_reach,
+    bound_step,
+    interval_limits,
+    noise_step,
+    norm_limits,
+    reach_explains,
+)
 from beaver_ftc.diagnosis.state import (
-    BESIDE_DAMAGE,
-    CONSTANT,
-    INTERVAL,
+    CONSTANT_THRESHOLD,
+    DAMAGE_POSSIBLE,
+    INTERVAL_THRESHOLD,
     LOSS,
     NOT_ISOLATED,
     PITCH,
     POSITION,
-    PUBLISHED,
+    PUBLISHED_THRESHOLD,
     UNANTICIPATED,
 )
 from beaver_ftc.scenario.diagnosis import MAX_POLES
 from beaver_ftc.scenario.schema import Scenario
+
+EMPTY_SET = (1.0, -1.0)
+SEARCH_ROUNDS = 4  # each round reduces the remaining travel to the share of it that the tolerance is
+
+
+@kernel
+def is_healthy(innovation, bound):
+    """True if the admitted uncertainty alone explains an innovation (3,): |nu| <= bound (3,), rad/s2."""
+    within = True
+    for i in range(3):
+        within = within and abs(innovation[i]) <= bound[i]
+    return within
+
+
+@kernel
+def consistent_parameters(value, bound, slope, low, high):
+    """The theta of [low, high] with |value - theta slope| <= bound, as (low, high); low > high if none."""
+    if slope == 0.0:
+        return (low, high) if abs(value) <= bound else EMPTY_SET
+    one, other = (value - bound) / slope, (value + bound) / slope
+    return max(low, min(one, other)), min(high, max(one, other))
+
+
+@kernel
+def consistent_on_axis(innovation, bound, fie, effect, i):
+    """The interval of theta that is consistent with an innovation (3,) rad/s2 on axis i.
+
+    It is the whole known set if the axis is ignored. bound (3,) rad/s2: on the innovation without a fault;
+    effect: acceleration by the fault, of dtype EFFECT.
+    """
+    if fie.ignored_axes[i]:
+        return fie.low, fie.high
+    value, room = innovation[i] - effect.offset[i], bound[i] + effect.spread[i]
+    return consistent_parameters(value, room, effect.Z[i], fie.low, fie.high)
+
+
+@kernel
+def largest_axis(Z):
+    """The axis on which a regressor Z (3,) is largest."""
+    axis = 0
+    for i in range(1, 3):
+        if abs(Z[i]) > abs(Z[axis]):
+            axis = i
+    return axis
+
+
+@kernel
+def widen_by_own_errors(fie, bound, innovation, instants):
+    """Widen the tolerance of a position by the errors of the surface's own terms at that position.
+
+    eta_bar contains these errors at the commanded position. They grow with the distance from neutral. How far
+    the surface can have been follows from the frame itself, in a few rounds from its travel inwards; every
+    round gives a valid bound. If a frame has several instants, the surface may still be where it was a frame
+    before at the first of them. The same holds for a map of the model's error, which is for healthy surfaces.
+    """
+    s, effect = fie.surface, fie.effect
+    axis = largest_axis(effect.Z)
+    before, reach = fie.furthest, max(abs(fie.low), abs(fie.high))
+    room, mapped, where = effect.spread[axis], bound.error_map, (fie.low, fie.high)
+    level = map_level(mapped, fie, where, instants)
+    value = innovation[axis] - effect.offset[axis]
+    earlier = 2.0 * before / instants if instants > 1 else 0.0
+    for _ in range(SEARCH_ROUNDS):
+        own = max(bound.own_per_rad[axis, s] * (reach + earlier) - bound.own[axis, s], 0.0)
+        own += bound.beyond[level, axis]
+        low, high = consistent_parameters(
+            value, bound.frame[axis] + room + own, effect.Z[axis], fie.low, fie.high
+        )
+        if low > high:
+            break
+        reach, where = min(reach, max(abs(low), abs(high))), (low, high)
+        level = map_level(mapped, fie, where, instants)
+    fie.furthest = reach
+    if mapped.anywhere:
+        fie.used = travel_share_used(mapped, s, where, fie.used, instants)
+    for i in range(3):
+        effect.spread[i] += max(bound.own_per_rad[i, s] * (reach + earlier) - bound.own[i, s], 0.0)
+        effect.spread[i] += bound.beyond[level, i]
+
+
+@kernel
+def map_level(mapped, fie, where, instants):
+    """The level of the error map that covers a surface at a mean position within `where`, (low, high) rad.
+
+    It is 0 without a map.
+    """
+    if not mapped.anywhere:
+        return 0
+    return level_covering(mapped, travel_share_used(mapped, fie.surface, where, fie.used, instants))
+
+
+@kernel
+def is_consistent(fie, innovation, frame_bound):
+    """True if one theta, or no fault at all, is consistent with the elapsed frame on every axis."""
+    if is_healthy(innovation, frame_bound):
+        return True
+    low, high = fie.low, fie.high
+    for i in range(3):
+        axis_low, axis_high = consistent_on_axis(innovation, frame_bound, fie, fie.effect, i)
+        low, high = max(low, axis_low), min(high, axis_high)
+    return low <= high
+
+
+@kernel
+def start_sets(fie, unprojected):
+    """Start with the known set of theta on every axis, or, if `unprojected`, without limits."""
+    fie.theta_low[:], fie.theta_high[:] = fie.low, fie.high
+    if unprojected:
+        fie.theta_low[:], fie.theta_high[:] = -np.inf, np.inf
+
+
+@kernel
+def intersect_sets(fie, i, interval, shared):
+    """Intersect the set of theta on axis i, or on every axis if `shared`, with `interval`."""
+    low, high = interval
+    for j in range(3):
+        if shared or j == i:
+            fie.theta_low[j] = max(fie.theta_low[j], low)
+            fie.theta_high[j] = min(fie.theta_high[j], high)
+
+
+@kernel
+def narrow_sets(fie, innovation, frame_bound, shared):
+    """Intersect the set of a constant theta with those of frame and filtered residual; false if it is empty.
+
+    Filtered: eps + Omega thetahat = Omega theta + filtered uncertainty, for any course of the estimate.
+    """
+    for i in range(3):
+        frame = consistent_on_axis(innovation, frame_bound, fie, fie.effect, i)
+        intersect_sets(fie, i, frame, shared)
+        filtered = fie.residual[i] + fie.omega[i] * fie.theta[i]
+        intersect_sets(
+            fie, i, consistent_parameters(filtered, fie.bound[i], fie.omega[i], fie.low, fie.high), shared
+        )
+    left = True
+    for i in range(3):
+        left = left and fie.theta_low[i] <= fie.theta_high[i]
+    return left
+
+
+@kernel
+def set_spread(effect, spread, s):
+    """Fill the spread of a fault's effect by that of its surface s; spread (3, n) rad/s2."""
+    for i in range(3):
+        effect.spread[i] = spread[i, s]
+
+
+@kernel
+def clear_mean_effect(mean):
+    """Begin the mean of a fault's effect over a block of frames (dtype EFFECT)."""
+    mean.offset[:], mean.Z[:], mean.spread[:] = 0.0, 0.0, 0.0
+
+
+@kernel
+def add_to_mean_effect(mean, effect, share):
+    """Add the effect of a frame, a `share` of the block, to the mean over the block."""
+    for i in range(3):
+        mean.offset[i] += share * effect.offset[i]
+        mean.Z[i] += share * effect.Z[i]
+        mean.spread[i] += share * effect.spread[i]
+
 
 # Acceleration by a fault, rad/s2: offset + theta Z, within +/- spread.
 EFFECT = record(offset=3, Z=3, spread=3)
@@ -50,11 +232,11 @@ ESTIMATOR = record(
     kind=int, surface=int,
     low=float, high=float,  # the known set of theta
     excluded=int, excluded_at_s=float, ignored_axes=(int, 3), xhat=3, residual=3, lower=3, upper=3,
-    confirmed=int, weakly_excluded=int, excluded_by_likelihood=int,  # by_chance.py
+    confirmed=int, weakly_excluded=int, excluded_by_likelihood=int,  # by likelihood ratios
     omega=3, rise=3, fall=3, bound=3, bound_eta=3, bound_noise=3, theta=3, covariance=3,
     effect=EFFECT, block_effect=EFFECT,  # of the frame; mean over a block
     furthest=float, used=float,  # rad from neutral, share of its travel, where it can have been in the frame
-    # what bank.py and membership.py keep
+    # reach in the bank (filters.py), and sets
     across=3, reach_low=(MAX_POLES, 4), reach_high=(MAX_POLES, 4), theta_low=3, theta_high=3,
 )  # fmt: skip
 
@@ -72,9 +254,9 @@ def isolation_dtype(surfaces: int) -> np.dtype:
     return record(config=config, estimator=(ESTIMATOR, 2 * surfaces))
 
 
-PATIENCE_S = 4.0  # in still air what damage left over was excluded within 3.2 s, in 210 flights
+NAMING_DELAY_S = 4.0  # in still air what damage left over was excluded within 3.2 s, in 210 flights
 PARAMETER_SET = {LOSS: (-1.0, 0.0)}
-_THRESHOLDS = {"interval": INTERVAL, "published": PUBLISHED}
+_THRESHOLDS = {"interval": INTERVAL_THRESHOLD, "published": PUBLISHED_THRESHOLD}
 
 Member = tuple[str, int, int]  # of a fault class: name, kind and surface of its estimator
 
@@ -98,7 +280,7 @@ def estimator_names(fault_class: str, aircraft: Aircraft) -> tuple[str, ...]:
     return tuple(name for name, _, _ in members_of(fault_class, aircraft))
 
 
-def configure(
+def configure_isolation(
     isolation: np.void, scenario: Scenario, members: tuple[Member, ...], travel: np.ndarray
 ) -> None:
     """Fill in the estimators and how the decision among them is sharpened; travel (2, n) rad."""
@@ -120,15 +302,15 @@ def configure(
             fie["ignored_axes"] = (1, 0, 1) if aircraft.dominant_axis[surface] == PITCH else (0, 1, 0)
     # Damage is outside the class: what is merely left when chance has excluded the others is not yet at
     # fault.
-    doubted = BESIDE_DAMAGE if config.weighs_chance and aircraft.damage else 0
+    doubted = DAMAGE_POSSIBLE if config.weighs_chance and aircraft.damage else 0
     isolation["estimator"]["weakly_excluded"] = doubted
-    isolation["config"]["patience_s"] = PATIENCE_S if aircraft.damage else 0.0
+    isolation["config"]["patience_s"] = NAMING_DELAY_S if aircraft.damage else 0.0
     lost = {surface for case in aircraft.damage.values() for surface in case.takes}
     isolation["config"]["taken"] = [surface in lost for surface in aircraft.surfaces]
 
 
 @kernel
-def hypothesis(kind, surface, G, Gu, base, Z):
+def fill_hypothesis(kind, surface, G, Gu, base, Z):
     """Fill base (3,) rad/s2 and the regressor Z (3,) rad/s2 per unit of theta, for one fault of `surface`.
 
     G (3, 4) rad/s2 per rad; Gu (3, 4) rad/s2, the acceleration each commanded surface would give if healthy.
@@ -148,12 +330,12 @@ def update_hypothesis(isolation, fie, bank, bound, config, G, Gu, spread):
     rad/s2: error of the mean if a fault changes within the frame.
     """
     effect = fie.effect
-    hypothesis(fie.kind, fie.surface, G, Gu, effect.offset, effect.Z)
-    membership.set_spread(effect, spread, fie.surface)
+    fill_hypothesis(fie.kind, fie.surface, G, Gu, effect.offset, effect.Z)
+    set_spread(effect, spread, fie.surface)
     if (bound.own_errors or bound.error_map.anywhere) and fie.kind == POSITION:
-        membership.allow_for_own_errors(fie, bound, bank.output.innovation, config.instants)
+        widen_by_own_errors(fie, bound, bank.output.innovation, config.instants)
     if isolation.config.memory:
-        remember(bank, fie, config.dt)
+        advance_reach(bank, fie, config.dt)
 
 
 @kernel
@@ -165,7 +347,7 @@ def update_hypotheses(isolation, bank, bound, config, detected, G, Gu, spread):
 
 
 @kernel
-def start(isolation, noise, x):
+def start_estimators(isolation, noise, x):
     """Start every estimator at the measured x (3,) rad/s, without residual and with the prior of theta.
 
     noise (3,) rad/s: bound on the change of the gyros' errors.
@@ -173,62 +355,60 @@ def start(isolation, noise, x):
     for fie in isolation.estimator[: isolation.config.n]:
         fie.xhat[:], fie.bound_noise[:] = x, noise
         fie.covariance[:] = (fie.high - fie.low) ** 2 / 12.0  # of a uniform distribution
-        membership.start(fie, isolation.config.unprojected)
+        start_sets(fie, isolation.config.unprojected)
 
 
 @kernel
-def within_limits(fie, thresholds, x):
+def update_residual(fie, thresholds, x):
     """Form the residual and its thresholds; true if it is within them on every axis that counts."""
     within = True
     for i in range(3):
         fie.residual[i] = x[i] - fie.xhat[i]
         low, high, omega, theta, bound = fie.low, fie.high, fie.omega[i], fie.theta[i], fie.bound[i]
-        if thresholds == INTERVAL:
-            limits = interval(low, high, fie.rise[i], fie.fall[i], omega, theta, bound)
-        elif thresholds == CONSTANT:
+        if thresholds == INTERVAL_THRESHOLD:
+            limits = interval_limits(low, high, fie.rise[i], fie.fall[i], omega, theta, bound)
+        elif thresholds == CONSTANT_THRESHOLD:
             limits = -bound, bound
         else:
-            limits = published(low, high, omega, theta, bound)
+            limits = norm_limits(low, high, omega, theta, bound)
         fie.lower[i], fie.upper[i] = limits
         within = within and (fie.lower[i] <= fie.residual[i] <= fie.upper[i] or fie.ignored_axes[i])
     return within
 
 
 @kernel
-def possible(isolation, fie, bank, frame_bound, abrupt, x, started):
+def is_possible(isolation, fie, bank, frame_bound, abrupt, x, started):
     """True if no test that is switched on excludes the fault of estimator fie.
 
     frame_bound (3,) rad/s2: on the innovation of a healthy frame; abrupt: a fault is declared to stay as it
     is; x (3,) rad/s: measured; started: the isolation started a frame or more ago.
     """
-    can_be = within_limits(fie, isolation.config.thresholds, x)
+    can_be = update_residual(fie, isolation.config.thresholds, x)
     if isolation.config.memory:
-        can_be = can_be and explains(bank, fie, isolation.config.shared)
+        can_be = can_be and reach_explains(bank, fie, isolation.config.shared)
     if (isolation.config.shared or fie.kind == POSITION) and (started or isolation.config.memory):
-        can_be = can_be and membership.agree(fie, bank.output.innovation, frame_bound)
+        can_be = can_be and is_consistent(fie, bank.output.innovation, frame_bound)
     if isolation.config.membership and abrupt and started and fie.kind == LOSS:
-        can_be = can_be and membership.narrow(
-            fie, bank.output.innovation, frame_bound, isolation.config.shared
-        )
+        can_be = can_be and narrow_sets(fie, bank.output.innovation, frame_bound, isolation.config.shared)
     return can_be
 
 
 @kernel
-def hold_thresholds(isolation, constant):
+def hold_isolation_thresholds(isolation, constant):
     """Replace the adaptive thresholds by a constant, rad/s."""
     for fie in isolation.estimator[: isolation.config.n]:
         fie.bound[:] = constant
 
 
 @kernel
-def exclude(fie, t):
+def exclude_fault(fie, t):
     """Exclude a fault from t s on."""
     if not fie.excluded:
         fie.excluded, fie.excluded_at_s = 1, t
 
 
 @kernel
-def decide(isolation, t):
+def decide_isolation(isolation, t):
     """The fault isolated by the generalised observer scheme: the one estimator that is not excluded.
 
     NOT_ISOLATED if several are left; UNANTICIPATED if none is left: the fault is outside the class. A weakly
@@ -248,14 +428,14 @@ def decide(isolation, t):
 
 
 @kernel
-def take_estimate(isolation, isolated, theta):
+def take_plugin_estimate(isolation, isolated, theta):
     """Replace theta of the isolated estimator, where there is one, by the estimate of a plug-in."""
     if isolated >= 0:
         isolation.estimator[isolated].theta[:] = theta
 
 
 @kernel
-def correct(fie, i, residual, forgetting, low, high):
+def least_squares_step(fie, i, residual, forgetting, low, high):
     """One least-squares step of thetahat_i on a residual, projected onto [low, high]; returns the step.
 
     The gain is covariance Omega / (noise + Omega^2 covariance). The noise is the square of the bound on the
@@ -274,7 +454,7 @@ def correct(fie, i, residual, forgetting, low, high):
 
 
 @kernel
-def descend(fie, i, gain, dt):
+def gradient_step(fie, i, gain, dt):
     """thetahat' = P{gain Omega eps}, by a step of dt s [Zhang2005, sec. IV]; returns the step."""
     before = fie.theta[i]
     moved = before + dt * gain * fie.omega[i] * fie.residual[i]
@@ -283,7 +463,7 @@ def descend(fie, i, gain, dt):
 
 
 @kernel
-def adapt_jointly(fie, forgetting):
+def joint_least_squares_step(fie, forgetting):
     """The same for one theta shared by the axes: each axis corrects what the axes before left."""
     total = 0.0
     for i in range(3):
@@ -291,14 +471,14 @@ def adapt_jointly(fie, forgetting):
             fie.theta[i], fie.covariance[i] = fie.theta[i - 1], fie.covariance[i - 1]
         if fie.effect.Z[i] != 0.0:
             left = fie.residual[i] - fie.omega[i] * total
-            total += correct(fie, i, left, forgetting, fie.theta_low[i], fie.theta_high[i])
+            total += least_squares_step(fie, i, left, forgetting, fie.theta_low[i], fie.theta_high[i])
             forgetting = 1.0  # once a frame
     fie.theta[:], fie.covariance[:] = fie.theta[2], fie.covariance[2]
     return total
 
 
 @kernel
-def predict(isolation, fie, bound, x, believed, dt):
+def predict_estimator(isolation, fie, bound, x, believed, dt):
     """Advance one estimator by a frame.
 
     x (3,) rad/s: at the start of the frame; believed (3,) rad/s2: mean of f + G u over the frame; fie.effect
@@ -307,7 +487,7 @@ def predict(isolation, fie, bound, x, believed, dt):
     for i in range(3):
         base, Z, theta, a = fie.effect.offset[i], fie.effect.Z[i], fie.theta[i], isolation.config.decay[i]
         fie.xhat[i] = x[i] + dt * (believed[i] + base + Z * theta) + a * (fie.xhat[i] - x[i])
-    adapt(isolation, fie, dt)
+    adapt_estimate(isolation, fie, dt)
     for i in range(3):
         Z, a = fie.effect.Z[i], isolation.config.decay[i]
         fie.rise[i] = a * fie.rise[i] + dt * max(Z, 0.0)
@@ -318,16 +498,16 @@ def predict(isolation, fie, bound, x, believed, dt):
 
 
 @kernel
-def adapt(isolation, fie, dt):
+def adapt_estimate(isolation, fie, dt):
     """Correct the estimate by the residual at the start of the frame, and the prediction by Omega[k+1]."""
-    joint = adapt_jointly(fie, isolation.config.forgetting) if isolation.config.shared else 0.0
+    joint = joint_least_squares_step(fie, isolation.config.forgetting) if isolation.config.shared else 0.0
     for i in range(3):
         if isolation.config.by_gradient:
-            step = descend(fie, i, isolation.config.gradient, dt)
+            step = gradient_step(fie, i, isolation.config.gradient, dt)
         elif isolation.config.shared:
             step = joint
         else:
-            step = correct(
+            step = least_squares_step(
                 fie, i, fie.residual[i], isolation.config.forgetting, fie.theta_low[i], fie.theta_high[i]
             )
         fie.omega[i] = isolation.config.decay[i] * fie.omega[i] + dt * fie.effect.Z[i]
@@ -335,7 +515,30 @@ def adapt(isolation, fie, dt):
 
 
 @kernel
-def predict_all(isolation, bound, x, believed, dt):
-    """Advance the estimators by a frame; arguments as in `predict`."""
+def predict_estimators(isolation, bound, x, believed, dt):
+    """Advance the estimators by a frame; arguments as in `predict_estimator`."""
     for fie in isolation.estimator[: isolation.config.n]:
-        predict(isolation, fie, bound, x, believed, dt)
+        predict_estimator(isolation, fie, bound, x, believed, dt)
+
+
+@kernel
+def update_likelihood_exclusion(fie, tests, blocks, isolation, loss_of, abrupt, hidden):
+    """Fill `excluded_by_likelihood` of estimator fie; update its `confirmed` and `weakly_excluded`.
+
+    hidden: a gust may hide an error of a vane from the sensor monitor. An exclusion may then be the effect of
+    that error, so all estimators become weakly excluded. loss_of (n,): the estimator of each surface's loss;
+    abrupt: a fault is declared to stay as it is.
+    """
+    others, s = isolation.estimator, fie.surface
+    fie.excluded_by_likelihood = 0
+    if not fie.confirmed and (fie.weakly_excluded or not abrupt):
+        fie.confirmed = statistical.confirms_loss(
+            tests, blocks, others, loss_of, s
+        )  # what follows later may be its end
+    if fie.confirmed or not statistical.excludes_loss(tests, blocks, others, loss_of, s, False, abrupt):
+        return
+    fie.excluded_by_likelihood = statistical.excludes_loss(tests, blocks, others, loss_of, s, True, abrupt)
+    fie.weakly_excluded = max(fie.weakly_excluded, 1)
+    if fie.excluded_by_likelihood and hidden:
+        for other in others[: isolation.config.n]:
+            other.weakly_excluded = max(other.weakly_excluded, 1)

@@ -1,24 +1,25 @@
-"""What can be seen at all: the clairvoyant test, which is told the fault and the instant it strikes.
+"""The informed test, which knows the fault and its onset: no test detects the fault more often.
 
-With all that is declared taken as Gaussian, a Kalman filter makes of the measurements, as they are shown to
-plug-ins, independent innovations of covariance S. A fault phi, rad/s2, adds to them a known signature s, and
-the likelihood ratio of "this fault, since then" against "none" has the deflection
+All that is declared is taken as Gaussian. A Kalman filter turns the measurements that plug-ins are given into
+independent innovations of covariance S. A fault phi, rad/s2, adds a known signature s to them. The likelihood
+ratio of "this fault since its onset" against "no fault" has the deflection
 
     d^2 = sum s' S^-1 s,        s = H delta,  delta[k+1] = F (1 - K H) delta[k] + dt phi[k]
 
-so that at a false-alarm probability of alpha it finds the fault with probability Phi(d - Phi^-1(1 - alpha))
-[Kay1998, sec. 4.4], and nothing finds it more often from these measurements. Made once every T seconds, at r
-false alarms per hour, alpha = r T / 3600.
+At a false-alarm probability alpha it detects the fault with probability Phi(d - Phi^-1(1 - alpha)), and no
+test of these measurements detects it more often [Kay1998, sec. 4.4]. If the test is made once every T seconds
+with r false alarms per hour, alpha = r T / 3600.
 
 Errors that are constant but unknown, c normal of standard deviation sigma, times known regressors, pass
-through the same filter as R c. What they can explain of the fault is no evidence [Kay1998, sec. 10.5]:
+through the same filter as R c. The part of the fault that they can explain is no evidence [Kay1998, sec.
+10.5]:
 
     d^2 = s' s - s' R (R' R + diag(1 / sigma^2))^-1 R' s,
 
-with s and R scaled by S^-1/2, the frames one below the other.
+with s and R scaled by S^-1/2 and the frames stacked.
 
 The unexplained acceleration of the published bound is a sinusoid of unknown frequency; here it is a
-first-order process of the same power and UNEXPLAINED_S of memory.
+first-order process of the same power with a memory of UNEXPLAINED_S.
 """
 
 from collections.abc import Mapping
@@ -32,14 +33,14 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft, Term
 from beaver_ftc.design.context import Context
 from beaver_ftc.design.model import inertia_coefficients
-from beaver_ftc.diagnosis.belief.air import UNMEASURED_SHARES
+from beaver_ftc.diagnosis.gusts import UNMEASURED_SHARES
 
 UNEXPLAINED_S = 0.1
 LEAST_RATE_RAD_S = 1e-5  # what perfect instruments are taken for
 _SETTLING_FRAMES = 400
 
 
-Flown = Mapping[str, np.ndarray]  # columns of a log, (frames,) each
+FlightColumns = Mapping[str, np.ndarray]  # columns of a log, (frames,) each
 
 
 class Whitening:
@@ -93,7 +94,7 @@ class Whitening:
         return float(np.sqrt(max(d2, 0.0)))
 
 
-def aware_of_the_air(context: Context, noise_rad_s2: np.ndarray) -> Context:
+def with_measured_gust(context: Context, noise_rad_s2: np.ndarray) -> Context:
     """What is declared to one who is shown the gusts the vanes see, with their noise (3,) rad/s2."""
     declared = context.declared
     if not declared.air:
@@ -106,7 +107,7 @@ def aware_of_the_air(context: Context, noise_rad_s2: np.ndarray) -> Context:
     return replace(context, declared=seen)
 
 
-def chance(d: float, within_s: float, per_h: float) -> float:
+def detection_probability(d: float, within_s: float, per_h: float) -> float:
     """Probability of detection by that test, made once every within_s, at so many false alarms per hour."""
     normal = NormalDist()
     if per_h <= 0.0:
@@ -114,7 +115,7 @@ def chance(d: float, within_s: float, per_h: float) -> float:
     return normal.cdf(d - normal.inv_cdf(1.0 - min(per_h * within_s / 3600.0, 0.5)))
 
 
-def healthy(context: Context, kept: Flown, surface: str) -> np.ndarray:
+def healthy_positions(context: Context, kept: FlightColumns, surface: str) -> np.ndarray:
     """Where a healthy surface would have been under the commands of a flight, (frames,) rad."""
     s, command = context.surfaces.index(surface), kept[f"{surface}_cmd_rad"]
     bandwidth, rate = context.declared.bandwidth_rad_s[s], context.declared.rate_limit_rad_s[s]
@@ -128,8 +129,8 @@ def healthy(context: Context, kept: Flown, surface: str) -> np.ndarray:
     return places
 
 
-def accelerations(
-    aircraft: Aircraft, term: Term, kept: Flown, deflection_rad: np.ndarray | None
+def term_accelerations(
+    aircraft: Aircraft, term: Term, kept: FlightColumns, deflection_rad: np.ndarray | None
 ) -> np.ndarray:
     """What a coefficient's term of value one does, (frames, 3) rad/s2; deflection_rad: of its surface."""
     V, size, i = kept["airspeed_mps"], aircraft.geometry, inertia_coefficients(aircraft.mass)

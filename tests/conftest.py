@@ -62,7 +62,7 @@ LONGEST = (
     "results/test_flight.py",
     "studies/mismatch/test_command.py", "assurance/certificates/test_certificates.py", "loop/test_loop.py",
     "aircraft/test_engines.py", "logs/test_check.py", "aircraft/derive/test_derived_document.py",
-    "studies/sweep/test_campaign.py", "studies/sweep/test_ray.py", "studies/power/test_survey.py",
+    "studies/sweep/test_campaign.py", "studies/power/test_survey.py",
     "live/page/test_page.py", "live/page/test_server.py", "compiled/test_strangers.py",
     "scenario/test_new_sensor.py", "plugins/test_plugins.py", "studies/reproduce/test_reproduce.py",
     "control/test_power.py", "results/test_report.py", "recorded/test_benchmark.py", "sitl/test_endpoint.py",

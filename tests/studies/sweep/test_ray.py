@@ -8,11 +8,10 @@ from beaver_ftc.studies.sweep.campaign import Options, run_sweep
 
 from .conftest import sweep_of
 
-ray = pytest.importorskip("ray", reason="Ray is not installed: pip install 'beaver-ftc[ray]'")
-
 
 @pytest.fixture(scope="module")
 def cluster():
+    ray = pytest.importorskip("ray", reason="Ray is not installed: pip install 'beaver-ftc[ray]'")
     from ray.cluster_utils import Cluster
 
     head = {"num_cpus": 2, "include_dashboard": False}
@@ -38,6 +37,8 @@ def test_a_cluster_gives_the_table_of_local_processes(cluster, local, tmp_path):
 
 
 def test_flights_of_a_node_that_is_lost_are_flown_again(cluster, local, tmp_path):
+    import ray
+
     extra = cluster.add_node(num_cpus=2)
     patience = time.monotonic() + 30
     while ray.cluster_resources().get("CPU", 0) < 4 and time.monotonic() < patience:

@@ -119,7 +119,7 @@ def test_a_bar_shows_once_it_is_waited_for(monkeypatch, clock):
     ],
 )
 def test_an_error_is_a_line_and_a_status(monkeypatch, capsys, error, says, status):
-    monkeypatch.delenv("BEAVER_FTC_DEBUG", raising=False)
+    monkeypatch.setenv("BEAVER_FTC_DEBUG", "")
     failure = shared.failure_of(error)
     assert (failure is error) == isinstance(error, BeaverFtcError)
     assert failure.__cause__ is (None if failure is error else error)

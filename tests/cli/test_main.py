@@ -81,6 +81,12 @@ def test_which_commands_fly(changed):
         flies, examples = "plugin" in [each.name for each in command.params], command.epilog or ""
         package = commands.registered()[name].partition(".")[0]
         found.setdefault(package, {})[name] = [flies, *examples.splitlines()[2:]]
+    whole = typer.main.get_command(command_line.app)
+    below = {name: each.commands for name, each in whole.commands.items() if name in commands.groups()}
+    assert {*whole.commands} == {name.partition(" ")[0] for name in commands.registered()}
+    assert {f"{group} {name}" for group, names in below.items() for name in names} == {
+        name for name in commands.registered() if " " in name
+    }
     for package, commands_of_it in found.items():
         assert not changed(commands_of_it, part=package)
 

@@ -15,6 +15,8 @@ import pytest
 
 import commands
 import needs
+from beaver_ftc.aircraft import loading
+from beaver_ftc.aircraft.loading import imported_folder
 from beaver_ftc.cli import catalogue
 from beaver_ftc.cli.main import Row
 from beaver_ftc.commands import registered
@@ -408,6 +410,17 @@ def test_what_there_is_to_choose_from(beaver, changed):
     assert names[2] == "gtm"
     derived = {entry["description"].partition("package")[2] for entry in document["aircraft"][3:]}
     assert derived <= {", derived", ": derived at first use"}
+
+
+def test_an_aircraft_is_there_once_its_file_is(monkeypatch, tmp_path):
+    """A folder alone is none; of JSBSim's aircraft each says of itself whether it is derived."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    imported_folder("gtm").mkdir(parents=True)
+    monkeypatch.setattr(loading, "is_derived", lambda name: name == "c172x")
+    listed = dict(catalogue._aircraft())
+    assert listed["gtm"].startswith("not here yet: after ")
+    assert listed["jsbsim:c172x"] == "of the jsbsim package, derived"
+    assert listed["jsbsim:c172p"] == "of the jsbsim package: derived at first use"
 
 
 def test_schemas_of_both_kinds_of_file(beaver):

@@ -205,3 +205,21 @@ def test_public_names_are_found_where_they_are_said_to_be():
     with pytest.raises(AttributeError, match="module 'beaver_ftc' has no attribute 'flight'"):
         bf.flight  # noqa: B018
     assert set(dir(bf)) >= set(bf.__all__)
+
+
+def test_a_folder_is_the_last_place_to_find_a_plug_in_in(tmp_path, monkeypatch):
+    """Nothing there can take the place of an installed module, and it is added once."""
+    (tmp_path / "their_detector.py").write_text(
+        "class RollWatch:\n def reset(self, context): pass\n def step(self, measured, command): pass\n"
+    )
+    (tmp_path / "json.py").write_text("raise RuntimeError\n")
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    monkeypatch.chdir(tmp_path)
+    for given, name in (
+        ("their_detector:RollWatch", "roll-watch"),
+        ("mine=their_detector:RollWatch", "mine"),
+    ):
+        found = plugins._read(given)
+        assert (found.group, found.name) == (plugins.DETECTORS, name)
+        assert sys.path[-1] == str(tmp_path)
+    assert sys.path.count(str(tmp_path)) == 1

@@ -1,10 +1,14 @@
 """The adapter: names are checked, nothing is printed or written, a start is the state it was given."""
 
+import shutil
+
 import jsbsim
 import pytest
 
+from beaver_ftc.aircraft import load
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFailed
 from beaver_ftc.plant.adapter import Plant, UnknownProperty
+from beaver_ftc.plant.addresses import available
 from beaver_ftc.plant.state import FlightState
 
 STATE = FlightState(
@@ -43,6 +47,12 @@ WHERE = {
     "engine_rpm": ("engine/speed-rpm", 1),
     "manifold_pressure_inhg": ("engine/manifold-pressure-inhg", 1),
 }
+
+
+def test_a_strangers_model_of_our_aircraft_is_not_run_by_compiled_code(tmp_path):
+    own = shutil.copytree(load().folder, tmp_path / "own") / load().jsbsim.name
+    assert Plant(100).native is available()
+    assert not Plant(100, model=own).native
 
 
 def test_a_start_is_the_state_it_was_given():

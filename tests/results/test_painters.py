@@ -5,9 +5,11 @@ import signal
 import sys
 import threading
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
+from beaver_ftc.results import figures
 from beaver_ftc.results import painters as module
 from beaver_ftc.results.figures import pictures_of, write_figures
 from beaver_ftc.results.metrics import measure
@@ -82,3 +84,12 @@ def test_nobody_is_begun_beside_another_thread():
     finally:
         done.set()
         other.join()
+
+
+def test_figures_are_drawn_anew_into_a_folder_that_is_there(tmp_path, monkeypatch):
+    pictures, saved = [SimpleNamespace(path=tmp_path / "figures" / "one.png")], []
+    monkeypatch.setattr(figures, "pictures_of", lambda *of: pictures)
+    monkeypatch.setattr(figures, "save", saved.append)
+    for times in (1, 2):
+        assert figures.write_figures(None, None, tmp_path / "figures") == [pictures[0].path]
+        assert saved == pictures * times

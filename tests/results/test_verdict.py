@@ -244,7 +244,11 @@ def test_stays_outside_the_envelope_are_counted_from_the_first():
     ],
 )
 def test_the_size_of_an_instruments_fault_is_in_the_instruments_unit(fault, said):
-    assert verdict._sizes(DeclaredFault.of(fault)) == said
+    declared = DeclaredFault.of(fault | {"at_s": 2.0, "end_s": 5.0})
+    assert verdict._sizes(declared) == said
+    size = f" ({said[0]})" if said else ""
+    expected = f"sensor {fault['sensor']} {fault['type']}{size} at 2.00 s to 5.00 s"
+    assert verdict._fault(declared) == expected
 
 
 @pytest.mark.parametrize(

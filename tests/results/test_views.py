@@ -359,3 +359,6 @@ def test_a_window_without_a_fault():
     )))  # fmt: skip
     assert [mark.name for mark in lost] == ["departure"]
     assert closeup_window(lost) == (14.0, 16.5)
+    late = marks(measure(Flight(detection_time_s=12.25, isolation_time_s=22.5, departure=(29.0, "beta"))))
+    assert closeup_window(late) == (11.5, 24.0)  # ten seconds of events are enough to look at closely
+    assert closeup_window([one for one in late if one.name != "isolation"]) == (11.5, 14.25)

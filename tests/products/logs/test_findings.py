@@ -55,6 +55,16 @@ def test_three_seconds_are_not_brief(count, brief):
     assert lasting(events) == events  # where every one is brief they are all there is to say
 
 
+def test_what_is_estimated_in_health_parts_no_event():
+    """Four seconds between two events, in which estimates change: long enough to part the events."""
+    still, changing = (
+        events_of(small.rows([(10, *HALF), (4, "", one), (4, "", other), (10, *HALF)]), NAMES)
+        for one, other in (([1.0, 1.0], [1.0, 1.0]), ([0.97, 0.9], [0.99, 0.95]))
+    )
+    assert still == changing
+    assert len(still) == 2
+
+
 WORLD = {
     "wing": (small.model(settings={"power": 0.8, "levels": {"left": [0.4]}}), {}),
     "tail": (

@@ -218,6 +218,18 @@ def test_the_map_covers_the_envelope_and_names_the_reason(monkeypatch, tmp_path)
         assert len(list(csv.DictReader(file))) == 12
 
 
+def test_a_flight_is_told_how_far_it_has_come(monkeypatch, tmp_path):
+    def fly(of, log, progress):
+        progress(0.25)
+        raise BadInput("enough")
+
+    told = []
+    monkeypatch.setattr(study, "fly", fly)
+    with pytest.raises(BadInput, match="enough"):
+        study.run_mismatch(scenario(), tmp_path, progress=told.append)
+    assert told == [0.25]
+
+
 def test_where_there_is_no_trim_the_map_says_so(monkeypatch, tmp_path):
     def refuses(case):
         raise BadInput("no trim")

@@ -1,8 +1,11 @@
 """The mismatch in words: each sentence and cell of a small document made by hand."""
 
+import json
+
 import pytest
 
 from beaver_ftc.aircraft import AXES
+from beaver_ftc.studies.mismatch import tables as module
 from beaver_ftc.studies.mismatch.tables import comparison_text, findings, percent, tables
 
 
@@ -106,3 +109,18 @@ def test_runs_stand_side_by_side(found):
 )  # fmt: skip
 def test_a_share_has_two_digits_or_whole_per_cents(share, said):
     assert percent(share) == said
+
+
+def test_the_section_of_a_report_has_words_tables_and_pictures_in_this_order(found, tmp_path, monkeypatch):
+    """A picture that is not there is left out; whatever a picture says is text."""
+    monkeypatch.setattr(module, "PICTURES", {"one": '<a> "q" & more', "none": "not drawn"})
+    (tmp_path / "figures").mkdir()
+    (tmp_path / "figures" / "one.png").write_bytes(b"a picture")
+    (tmp_path / "mismatch.json").write_text(json.dumps(found))
+    section = module.mismatch_section(tmp_path)
+    says = "&lt;a&gt; &quot;q&quot; &amp; more"
+    assert f'alt="{says}" src="data:image/png;base64,YSBwaWN0dXJl"' in section
+    assert f"<figcaption>{says}</figcaption>" in section
+    assert "not drawn" not in section
+    places = [section.index(part) for part in ("dominant", "<table", "modes at trim", "<figure")]
+    assert places == sorted(places)

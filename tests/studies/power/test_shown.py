@@ -202,7 +202,8 @@ def test_an_answer_is_a_line_for_each_size():
         "0.5": {"value": 0.25, "low": 0.03, "high": 0.65},
         "1": {"value": 1.0, "low": 0.63, "high": 1.0},
     }
-    document = {"cells": [cell | {"excitation_deg_s": 3.0, "magnitude": 0.4, "within": within}]}
+    cell |= {"excitation_deg_s": 3.0, "magnitude": 0.4, "within": within}
+    document = {"cells": [cell, cell | {"scheme": "worst-case"}, cell | {"surface": "elevator"}]}
     assert answers(document, "rudder") == [
         "ideal sensors, still air, 3 deg/s: a loss of rudder of 40% is found within 0.5 s in 25% (3 to 65%), "
         "within 1 s in 100% (63 to 100%) of 8 flights",

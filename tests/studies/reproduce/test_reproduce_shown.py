@@ -339,3 +339,14 @@ def test_the_paper_does_better_where_a_reader_would_see_it():
             found = beside._better([row(**{key: paper}), row(**{key: known})])
             assert [(one["paper"], one["ours"]) for one in found] == ([(paper, known)] if better else [])
             assert beside._better([row(departed=True, **{key: paper}), row(**{key: known})]) == []
+
+
+def test_the_slower_of_the_others_is_what_an_exclusion_lags_by(flights):
+    """Beyond 0.004, 0.005, 0.006 rad/s a residual leaves its bounds: each exclusion is held against that."""
+    log = {name: column.copy() for name, column in flights["elevator"].log.items()}
+    for surface, beyond_s in (("aileron", 12.2), ("rudder", 12.27)):
+        log[f"fie_{surface}_q_residual_rad_s"] = 0.02 * (log["t_s"] >= beyond_s - 1e-9)
+        for axis in "pr":
+            log[f"fie_{surface}_{axis}_residual_rad_s"] *= 0.0
+    found = Flown(flights["elevator"].metrics, log)
+    assert measures.exclusion_lag({"elevator": found}, "elevator") == pytest.approx(5.0)  # 0.05 s, not 0.03

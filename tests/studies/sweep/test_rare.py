@@ -2,6 +2,7 @@
 
 import json
 import math
+from statistics import NormalDist
 
 import numpy as np
 import pytest
@@ -149,6 +150,10 @@ def test_flights_give_a_number_an_interval_and_the_likeliest_of_them(drift, tmp_
     assert json.loads((folder / "rare.json").read_text())["probability"] == document["probability"]
     assert 0.0 < document["probability"] < 0.3
     assert document["low"] < document["high"]
+    nearest = document["likeliest"]
+    bias_deg, airspeed_mps = nearest["values"].values()  # normal, and uniform from 40 to 50
+    across = NormalDist().inv_cdf((airspeed_mps - 40) / 10)
+    assert nearest["distance"] == pytest.approx(math.hypot(bias_deg, across), rel=1e-6)
     assert document["flights"] == int(said[-1].split(": ")[1].split()[0])
     again = fly(str(folder / "flight.yaml"))
     missed = {one.name for one in again.expectations if not one.passed}

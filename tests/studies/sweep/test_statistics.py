@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from beaver_ftc.scenario.sweeps import SweepExpect, load_sweep_text
+from beaver_ftc.scenario.sweeps import Level, SweepExpect, load_sweep_text
 from beaver_ftc.studies.sweep import summary_page as words
 from beaver_ftc.studies.sweep.outcomes import replay_command, worst_flights
-from beaver_ftc.studies.sweep.summary import evaluate, summarise
+from beaver_ftc.studies.sweep.summary import estimate_of, evaluate, summarise
 
 from .counted import ROWS, SWEEP, detected, flights_of
 
@@ -56,6 +56,14 @@ def test_false_alarms_are_per_hour_without_a_fault(summary):
     assert found["hours"] == pytest.approx(hours)
     assert found["per_hour"] == pytest.approx(1 / hours)
     assert found["high"] == pytest.approx(5.572 / hours, rel=1e-3)
+
+
+def test_a_rate_of_false_alarms_is_told_by_every_flight_that_has_metrics(flights):
+    """Eleven of twelve: also by those without a fault, and by the one that alarms too early."""
+    told, rate, bound = estimate_of(flights, "false_alarms_per_h", Level.model_construct())
+    hours = (9 * 12.0 + 3.0 + 30.0) / 3600
+    assert (told, rate) == (11, pytest.approx(1 / hours))
+    assert bound(0.975, upper=True) == pytest.approx(5.572 / hours, rel=1e-3)
 
 
 def test_a_broken_guarantee_is_seen(summary):

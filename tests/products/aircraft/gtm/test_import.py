@@ -1,5 +1,7 @@
 """`beaver-ftc import gtm`: what it refuses, and the folder it writes."""
 
+from xml.etree import ElementTree
+
 import numpy as np
 import pytest
 import yaml
@@ -9,7 +11,7 @@ from tools.gtm.specification import DATABASE
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.aircraft import UnknownAircraft, imported_folder
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_aircraft.gtm import conversion, elements, folder
+from beaver_ftc_aircraft.gtm import conversion, elements, folder, systems
 from beaver_ftc_aircraft.gtm.database import read
 from beaver_ftc_aircraft.gtm.parameters import cases, parameters
 from beaver_ftc_aircraft.gtm.steady import Steady
@@ -172,3 +174,17 @@ def test_what_was_imported_before_is_replaced_and_nothing_else(tmp_path, monkeyp
         with pytest.raises(BadInput, match=says):
             conversion.convert(tmp_path / "database", tmp_path)
         assert (tmp_path / "gtm" / "mine.txt").exists()
+
+
+def test_a_line_of_samples_hands_each_on_before_it_takes_the_next():
+    """The oldest is written first: else a command would run through the whole line at once."""
+    text = '<channel name="x"><fcs name="fcs/flap-demand-rad"><property> fcs/flap-cmd-rad </property></fcs>'
+    made = ElementTree.fromstring(f"<s>{systems._delayed(text, 'flap')}</channel></s>")
+    names = [part.get("name") for part in made[0]]
+    n = systems._SAMPLES
+    assert names == [*(f"fcs/flap-cmd-{i}-ago-rad" for i in reversed(range(n))), "fcs/flap-cmd-late-rad"]
+    read = [[each.text.strip() for each in part.iter("property")] for part in made[0]]
+    for place, i in enumerate(reversed(range(n))):
+        assert read[place][-1] == names[place]  # kept where no sample is due
+        before = names[place + 1] if i else "fcs/flap-cmd-rad"
+        assert before in read[place]

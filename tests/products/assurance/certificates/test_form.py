@@ -2,11 +2,14 @@
 
 import copy
 from math import radians
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
-from beaver_ftc_assurance.certificates import check_certificate
+from beaver_ftc_assurance.certificates import chance, check_certificate
 from beaver_ftc_assurance.certificates.check_certificate import Refused, check_declared, check_statement_form
+from telling import numbers
 
 EVENT = {"what": "flap", "column": "fie_flap_excluded", "frame": 44}
 TERM = {
@@ -140,3 +143,32 @@ def test_what_a_scenario_declares_from_a_row_on():
     assert changed.from_row == 101
     assert changed.gyros["q"][:2] == pytest.approx((radians(0.4 + 0.5 + 0.02), radians(0.5)))
     assert check_certificate.declared_in(scenario, 150).from_row == 150
+
+
+@pytest.mark.parametrize("pace", [1e-3, 1e9])
+@pytest.mark.parametrize("keep", [1.0, 0.9])
+def test_writer_and_checker_follow_the_same_filter(pace, keep):
+    """Of two axes with everything: sums, and the room of a bounded drift, by its pace or as it swings."""
+    n, count, dt, first = 2, 6, 0.02, 3
+    nu = numbers(first + count, 3, seed=1)
+    lists = {
+        "signature": numbers(count, n, seed=2), "jitter": abs(numbers(count, n, seed=3)) * 1e-4,
+        "drift": [np.diag(row) for row in abs(numbers(count, n, seed=4)) * 1e-3],
+        "bounded": abs(numbers(count, n, seed=5)), "foreseen": numbers(count, n, seed=6),
+        "known": numbers(count, 1, n, seed=7), "air": numbers(count, n, seed=8) * 0.1,
+    }  # fmt: skip
+    frames = [
+        {name: np.asarray(of[k]).tolist() for name, of in lists.items()} | {"pace": pace, "keep": keep}
+        for k in range(count)
+    ]
+    half = numbers(4, 4, seed=9)
+    said = {
+        "axes": [0, 2], "first": first, "tolerance": [0.3], "frames": frames, "R": [0.5, 0.7],
+        "P": (half @ half.T).tolist(), "Y": numbers(4, 3, seed=10).tolist(),
+    }  # fmt: skip
+    history = SimpleNamespace(dt=dt, innovation=lambda rows: nu[rows])
+    ours = chance._followed(said, chance._frames(said, history), *chance._variances(said))
+    sums, room = check_certificate.whitened(said, SimpleNamespace(dt=dt, nu=nu))
+    np.testing.assert_allclose(sums, [*ours.of, ours.foreseen], rtol=1e-7)
+    assert room == pytest.approx(min(ours.swings, ours.drifts), rel=1e-6)
+    assert (ours.drifts < ours.swings) == (pace < 1.0)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from beaver_ftc_assurance.certificates import inequality
 from beaver_ftc_assurance.certificates.inequality import ROUNDING_RAD_S2, DeclaredErrors, History
 from telling import apart, numbers
 
@@ -66,3 +67,31 @@ def test_what_is_always_off_counts_on_the_axes_that_are_looked_at(history):
     asked = history.asking(np.array([0.0, 1.0, 0.0]))
     assert asked.declared.gyro_steady_rad_s.tolist() == [0.0, 0.02, 0.0]
     np.testing.assert_allclose(asked.noise - history.noise, np.full((4, 3), [0.01, 0.0, 0.04]))
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "slopes", "constant", "said", "most"),
+    [
+        (-1.0, 0.0, (0.5, 0.25), True, {"Z": False, "least": False, "most": False}, 0.0),
+        (-1.0, 0.0, (-0.5, -0.25), True, {"Z": True, "least": True, "most": False}, 2.0),
+        (-0.25, 0.5, (0.5, 0.25), True, {"Z": True, "least": False, "most": True}, 1.0),
+        (-0.25, 0.5, (0.5, -0.25), True, {"Z": True, "least": False, "most": False}, 0.0),
+        (-0.25, 0.5, (0.5, 0.25), False, {"Z": True, "least": True, "most": False}, 0.0),
+    ],
+)
+def test_an_inequality_has_the_numbers_that_decide_it(monkeypatch, low, high, slopes, constant, said, most):
+    """Two terms, of weights 2 and 4: the end of theta that allows most, and no slope that allows nothing."""
+
+    def term(which, of, history):
+        return {"weight": 2.0 + 2.0 * which, "slope": slopes[which], "value": 3.0 + which, "Z": [1.0],
+                "limit": 5.0 + which, "decides": {"least": which == 1, "most": False}}  # fmt: skip
+
+    monkeypatch.setattr(inequality, "_term", term)
+    zero = np.zeros((1, 3))
+    of = inequality.Hypothesis(0, zero, zero, zero, low, high, constant)
+    found = inequality.written([0, 1], of, None)
+    assert found["sides"] == pytest.approx([2 * 3 + 4 * 4, 2 * 5 + 4 * 6 + most])
+    ends = {"least": low, "most": high}
+    assert {end: found[end] for end in ends if end in found} == {e: v for e, v in ends.items() if said[e]}
+    assert ["Z" in one for one in found["terms"]] == [said["Z"]] * 2
+    assert found["theta"] == ("constant" if constant else "any")

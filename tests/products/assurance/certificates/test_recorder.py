@@ -63,6 +63,16 @@ def test_what_is_kept_is_what_the_log_has_to_the_last_frame_of_a_long_flight():
     assert kept.alarm.k == alarm + 1
 
 
+def test_of_chance_more_frames_before_the_alarm_are_kept():
+    """An onset may be long before: of the worst case the frames are those that a filter remembers."""
+    for fdi, before in (({}, tape.BEFORE), ({"statistical": {}}, tape.BEFORE_CHANCE)):
+        scenario = bf.load({"name": "x", "fdi": fdi})
+        recorder = tape.Recorder(scenario)
+        recorder.begin(Loop(scenario).frames)
+        assert recorder._ring.shape == (1 + before, len(recorder._early.words))
+        assert len(recorder._kept) > len(recorder._ring)
+
+
 def test_a_run_with_a_certificate_flies_once_and_writes_what_another_flight_would(tmp_path, monkeypatch):
     flights, begin = [], Loop.__init__
 

@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import common
 from tools.autopilots.small import Small, Told
 
 import beaver_ftc as bf
+from beaver_ftc.aircraft import load
 from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc_links.sitl import failures
 from beaver_ftc_links.sitl.link import COUNTED, Link, Times
@@ -233,3 +234,20 @@ def test_no_delay_is_promised_of_what_broke_before_the_diagnosis_began(from_s, a
     Endpoint._note_silence(flight, found)
     assert found["detection"]["guaranteed_delay_s"] == delay_s
     assert said == ["the diagnosis never began: near the ground nothing is diagnosed"] * (from_s is None)
+
+
+def test_a_failure_is_of_one_output_of_all_or_of_the_instruments_that_are_there():
+    """A surface that two outputs move fails with either."""
+
+    def mixed(*channels):
+        return [SimpleNamespace(channel=channel) for channel in channels]
+
+    channels = SimpleNamespace(surfaces={"aileron": mixed(1, 4), "elevator": mixed(2), "flap": mixed(4)})
+    sim = SimpleNamespace(airframe=load())
+    for which, names in (
+        (0, ("aileron", "elevator", "flap")), (1, ("aileron",)), (2, ("elevator",)),
+        (4, ("aileron", "flap")), (3, ()),
+    ):  # fmt: skip
+        assert failures._places(failures.SERVO, which, sim, channels) == names
+    assert failures._places(0, 7, sim, channels) == ("p", "q", "r")
+    assert failures._places(99, 0, sim, channels) == ()

@@ -82,3 +82,39 @@ def test_what_an_answer_takes_is_charged_less_the_wait_for_others(monkeypatch, c
     assert stranger._answer(pilot.COMMAND, 8, 2.0, charged) == b"8 bytes."
     assert stranger._allowance.left_s == pytest.approx(left_s)
     assert stranger._deadline == float("inf")
+
+
+@pytest.mark.parametrize(
+    ("said", "text", "kind", "says"),
+    [
+        (pilot.REFUSED, b"opens a file", line.Barred, "tried what is not allowed: opens a file at 2.5 s"),
+        (pilot.ERROR, b"KeyError: 3", line.Mistake, "KeyError: 3 at 2.5 s"),
+        (pilot.ERROR, b"MemoryError", line.Mistake, "MemoryError (the limit is 1024 MiB) at 2.5 s"),
+    ],
+)
+def test_what_ends_a_submission_is_said_with_its_limit(said, text, kind, says, monkeypatch):
+    stranger = object.__new__(line.SubmittedCode)
+    monkeypatch.setattr(line.SubmittedCode, "_when", lambda self: " at 2.5 s")
+    with pytest.raises(kind) as ended:
+        stranger._refuse(said, text)
+    assert str(ended.value) == says
+
+
+def test_putting_up_the_walls_costs_a_submission_nothing(monkeypatch):
+    """Loading its code does."""
+    asked = []
+
+    def answer(self, kind, length, within_s, charged=True):
+        asked.append((kind, length, within_s, charged))
+        return b"files, calls" if kind == pilot.WALLS else b"fault-tolerant law:Mine"
+
+    for name in ("end", "_send", "_watch"):
+        monkeypatch.setattr(line.SubmittedCode, name, lambda *of: None)
+    monkeypatch.setattr(line.SubmittedCode, "_answer", answer)
+    monkeypatch.setattr(line.subprocess, "Popen", lambda *of, **how: SimpleNamespace(pid=None))
+    monkeypatch.setattr(line, "_Accounts", lambda pid: None)
+    code = line.SubmittedCode("source", "name", line.Allowance(10.0))
+    code._start(None)
+    assert asked == [(pilot.WALLS, None, line.START_S, False), (pilot.READY, None, line.LOAD_S, True)]
+    assert (code.walls, code.kind, code.class_name) == ("files, calls", "fault-tolerant law", "Mine")
+    assert code.fault_tolerant

@@ -15,7 +15,7 @@ import pytest
 
 import commands
 import needs
-from beaver_ftc.aircraft import loading
+from beaver_ftc.aircraft import aircraft as of_aircraft
 from beaver_ftc.cli import catalogue
 from beaver_ftc.cli.main import Row
 from beaver_ftc.commands import registered
@@ -414,8 +414,8 @@ def test_what_there_is_to_choose_from(beaver, changed):
 def test_an_aircraft_is_there_once_its_file_is(monkeypatch, tmp_path):
     """A folder alone is none; of JSBSim's aircraft each says of itself whether it is derived."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    loading.imported_folder("gtm").mkdir(parents=True)
-    monkeypatch.setattr(loading, "is_derived", lambda name: name == "c172x")
+    of_aircraft.imported_folder("gtm").mkdir(parents=True)
+    monkeypatch.setattr(of_aircraft, "is_derived", lambda name: name == "c172x")
     listed = dict(catalogue._aircraft())
     assert listed["gtm"].startswith("not here yet: after ")
     assert listed["jsbsim:c172x"] == "of the jsbsim package, derived"

@@ -120,13 +120,3 @@ def test_two_faults_are_no_single_one_and_the_aircraft_is_kept():
     assert flight.isolated == "unanticipated"
     assert flight.isolation_time_s >= 20.0
     assert flight.departure is None
-
-
-@pytest.mark.parametrize("at_s", [0.0, 0.2125, 0.225])
-def test_what_changes_nothing_inside_a_frame_leaves_the_flight_as_it_was(at_s):
-    """A quarter, a half of a frame of four: JSBSim's frames inside it are flown once, not once more."""
-    given = {"duration_s": 0.5, "rate_hz": 20, "substeps": 4, "fdi": {"scheme": "none"}}
-    nothing = {"type": "rate_limit", "actuator": "flap", "scale": 1.0, "at_s": at_s}
-    (_, without), (_, broken) = flown(faults=[], **given), flown(faults=[nothing], **given)
-    for name in ("t_s", "q_rad_s", "north_m", "elevator_cmd_rad"):
-        assert np.array_equal(without[name], broken[name]), name

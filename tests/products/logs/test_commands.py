@@ -173,3 +173,13 @@ def test_a_spoilt_log_is_one_line_and_nothing_is_written(folder, tmp_path, chang
     assert says in str(error.value)
     assert len(str(error.value).splitlines()) == 1
     assert [entry.name for entry in tmp_path.iterdir()] == ["spoilt.csv"]
+
+
+def test_what_is_missing_is_named_the_vehicle_first():
+    for given, missing in (
+        ([], "--vehicle"),
+        (["--out", "m.json"], "--vehicle"),
+        (["--vehicle", "alfa"], "--out"),
+    ):
+        with pytest.raises(BadInput, match=f"^identify: {missing} is missing, allowed: --vehicle FILE --out"):
+            run("identify", "flight.csv", *given)

@@ -165,3 +165,17 @@ def test_a_colour_is_no_likelier_by_the_size_that_filtering_gives_a_sample(monke
     square = np.einsum("na,ab,nb->n", white, np.linalg.inv(noise), white)
     student = -0.5 * ((7.0 + 3.0) * np.log1p(square / 7.0) + np.log(np.linalg.det(noise)))
     np.testing.assert_allclose(found[1], np.where(known, 0.4 * student, 0.0))
+
+
+def test_evidence_is_the_log_of_a_likelihood_ratio():
+    """Two of three levels are faults; what a change at random brings is no evidence."""
+    bank = SimpleNamespace(
+        faults=np.array([False, True, True]), change=0.1, start=np.array([0.8, 0.15, 0.05]),
+        weight=np.array([3.0, 1.0, 2.0]),
+    )  # fmt: skip
+    fault = np.array([0.3, 0.6, 0.45])
+    posterior = np.column_stack([1 - fault, 0.25 * fault, 0.75 * fault])
+    before = [0.2, 0.9 * 0.3 + 0.1 * 0.5, 0.9 * 0.6 + 0.1 * 0.5]
+    expected = [np.log(p / (1 - p)) - np.log(q / (1 - q)) for p, q in zip(fault, before, strict=True)]
+    assert filtering.evidence(posterior, bank) == pytest.approx(expected)
+    assert np.isfinite(filtering.evidence(np.array([[0.0, 0.5, 0.5], [1.0, 0.0, 0.0]]), bank)).all()

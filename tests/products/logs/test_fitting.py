@@ -348,3 +348,19 @@ def test_what_one_step_prediction_explains(stretches):
         assert found["residual_rad_s"][name] == pytest.approx(residual[:, axis].std())
     nothing = Stretch(samples, np.zeros(len(use), dtype=bool))
     assert fitting.prediction(MODEL, nothing) == {"samples": 0}
+
+
+def test_each_part_left_out_is_held_against_what_the_others_ask_for(monkeypatch):
+    """Thresholds by what is left: a peak as high as its threshold alarms."""
+    parts = [
+        (np.array(peaks), minutes) for peaks, minutes in (([1.0, 5.0], 3.0), ([2.0], 4.0), ([3.0, 9.0], 5.0))
+    ]
+    monkeypatch.setattr(fitting.extremes, "tail_of", lambda of: [peaks.max() for peaks, _ in of])
+    monkeypatch.setattr(fitting, "_threshold", lambda tail, per_hour, model: sum(tail) / per_hour)
+    monkeypatch.setattr(fitting, "_minutes", lambda of: sum(minutes for _, minutes in of))
+    # at two an hour: 2 + 9, 5 + 9, 5 + 2 over two
+    found = fitting._alone(parts, 2.0, None)
+    assert found == {"parts": 3, "minutes": 12.0, "alarmed": 1, "alarms": 1}
+    parts[0] = (np.array([5.5, 5.0]), 3.0)
+    assert fitting._alone(parts, 2.0, None)["alarmed"] == 2
+    assert fitting._alone(parts, None, None) == fitting._alone(parts[:1], 2.0, None) == {}

@@ -71,6 +71,19 @@ def test_under_other_laws_each_surface_has_its_own_power_of_the_airspeed():
         small.vehicle(airspeed_powers={"fin": 1})
 
 
+def test_the_reference_is_the_median_of_all_airspeeds_that_are_known(monkeypatch):
+    flights = [
+        replace(small.flight(MODEL, 4), airspeed=np.array(speeds))
+        for speeds in ([np.nan, 10.0, 12.0, 90.0], [11.0, np.nan, 13.0, 30.0])
+    ]
+    asked = []
+    monkeypatch.setattr(identification, "with_pressure", lambda one, mps, powers: asked.append(mps) or one)
+    monkeypatch.setattr(identification, "_criterion", lambda flown, of: 0.0)
+    its = MODEL.vehicle.model_copy(update={"airspeed": "V"})
+    assert by_pressure(flights, its) == (flights, its)
+    assert asked == [12.5, 12.5]
+
+
 def test_where_the_airspeed_is_unknown_commands_count_as_they_are():
     flight = replace(small.flight(MODEL, 100), airspeed=np.where(np.arange(100) < 50, np.nan, 10.0))
     found = with_pressure(flight, 20.0)

@@ -6,6 +6,7 @@ import sys
 import numpy as np
 import pyarrow as pa
 import pytest
+from pyarrow import parquet
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.readers import alfa, ardupilot, read_flight, table, text
@@ -242,3 +243,13 @@ def test_what_is_said_after_a_dataflash_log_is_heard_again(capfd):
         os.write(2, b"within, ")
     os.write(2, b"after")
     assert capfd.readouterr().err == "before, after"
+
+
+def test_of_a_stored_table_the_numbers_that_are_asked_for_count(tmp_path, monkeypatch):
+    path, seen = tmp_path / "x.parquet", []
+    columns = {"t": [0.0], "a": [1.0], "words": ["x"], "lists": [[1.0, 2.0]], "b": [3]}
+    parquet.write_table(pa.table(columns), path)
+    monkeypatch.setattr(table, "_check_size", lambda path, footer, names: seen.append(names))
+    for asked in (None, {"t", "b", "words"}):
+        assert table._stored(path, asked) == (list(columns), ["t", "a", "b"])
+    assert seen == [["t", "a", "b"], ["t", "b"]]

@@ -1,6 +1,7 @@
 """A model is believed where it was fitted, and silent elsewhere."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -403,3 +404,28 @@ def test_what_each_column_brings_to_the_axes_of_others():
             brought = rates[k - 1, i] * past[i] + rates[k - 2, i] * past[3 + i]
             np.testing.assert_allclose(found[k, i], np.where(np.arange(3) == i, 0.0, brought))
         np.testing.assert_allclose(found[k, 3], flown.signals[k - 1, 0] * past[6])
+
+
+@pytest.mark.parametrize(
+    ("most", "least", "moved", "says"),
+    [
+        (-0.31, -0.5, 1.0, "sign"), (-0.3, -0.5, 1.0, ""), (0.19, 0.0, 3.1, "at most 0.19"),
+        (0.19, 0.0, 3.0, ""), (0.2, 0.0, 3.1, ""), (9.0, 5.1, 0.3, "at least 5.1"), (9.0, 5.0, 0.3, ""),
+        (9.0, 5.1, 0.34, ""), (9.0, 5.1, 0.0, ""),  # how far it moves in the model's flights is not known
+    ],
+)  # fmt: skip
+def test_an_answer_is_wrong_in_its_sign_or_by_its_unit(monkeypatch, most, least, moved, says):
+    """A unit shows where the command moves otherwise by as much as the rates answer otherwise."""
+    monkeypatch.setattr(trust, "_moved", lambda samples, model, group: moved)
+    model = SimpleNamespace(groups=[["right", "left"]])
+    found = trust._InAll([most], [least], {"V": 0.5, "p": 0.6}, 1.0, np.zeros(4))
+    wrong = trust._wrong_answers(None, model, found)
+    if not says:
+        assert wrong == {}
+        return
+    ((what, line),) = wrong.items()
+    assert what == ("sign right+left" if says == "sign" else "unit right+left")
+    assert says == "sign" or (says in line and f"moves {moved:.3g} times" in line)
+    faint = trust._wrong_answers(None, model, found._replace(columns={"V": 0.49, "p": 0.5}))
+    assert list(faint) == [what, "columns"]
+    assert "answer to V is not" in faint["columns"]

@@ -50,6 +50,11 @@ RULES = {
     "an offset that shrinks": (courses._growing, [0.4, 0.0], [9.0, 0.2], Found(
         range(1), 1, [(0.4, 0.0), (0.4, 0.2), (0.4, -1.0), (1.0, 0.2), (11.0, 10.0)], {"stops": [-1.0, 1.0]},
     )),
+    "an offset that shrinks after one of the other sign": (
+        courses._growing, [-0.2, NOTHING, 0.4, NOTHING], [9.0, -0.3, 9.0, 0.2],
+        Found(range(2, 3), 3, [(0.4, 0.0), (0.4, 0.2), (0.4, -1.0), (1.0, 0.2), (13.0, 12.0)],
+              {"stops": [-1.0, 1.0]}),
+    ),
     "an offset that grows": (courses._growing, [0.0, 0.4], [0.2, 9.0], None),
     "behind its pace": (courses._runaway, [0.2] * 3, [9.0, 9.0, 0.35], Found(
         range(1), 2, [(1.0, 0.35), (12.0, 10.0), (0.4, 0.35)], {"stops": [1.0], "pace_rad_s": 2.0},

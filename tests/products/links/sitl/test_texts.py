@@ -13,6 +13,8 @@ from tools.autopilots.small import Small, Told
 import beaver_ftc as bf
 from beaver_ftc.aircraft import load
 from beaver_ftc.diagnosis.base import Verdict
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc_links.commands import address
 from beaver_ftc_links.sitl import failures
 from beaver_ftc_links.sitl.link import COUNTED, Link, Times
 from beaver_ftc_links.sitl.mavlink import Mavlink
@@ -251,3 +253,18 @@ def test_a_failure_is_of_one_output_of_all_or_of_the_instruments_that_are_there(
         assert failures._places(failures.SERVO, which, sim, channels) == names
     assert failures._places(0, 7, sim, channels) == ("p", "q", "r")
     assert failures._places(99, 0, sim, channels) == ()
+
+
+@pytest.mark.parametrize(
+    ("given", "found"),
+    [
+        (None, None), ("host:14550", ("host", 14550)), ("[::1]:1", ("[::1]", 1)), ("h:65535", ("h", 65535)),
+        *((wrong, BadInput) for wrong in ("h:65536", "h:0", "h:-1", "h:x", ":14550", "host", "")),
+    ],
+)  # fmt: skip
+def test_an_address_is_a_host_and_a_port(given, found):
+    if found is BadInput:
+        with pytest.raises(BadInput, match=r"^--mavlink: .* is no address, allowed: HOST:PORT"):
+            address(given)
+    else:
+        assert address(given) == found

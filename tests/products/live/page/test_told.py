@@ -12,6 +12,7 @@ import beaver_ftc as bf
 from beaver_ftc.aircraft import load
 from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc_live.commands import live as live_command
 from beaver_ftc_live.page import messages, reports
 from beaver_ftc_live.page.session import Session, as_live, changes_of, fault_types
 
@@ -312,3 +313,14 @@ def test_a_report_that_cannot_be_drawn_leaves_the_folder_as_it_was(tmp_path, mon
     with pytest.raises(SystemExit, match=r"report.html could not be written: .*log.parquet"):
         reports.draw()
     assert [path.name for path in tmp_path.iterdir()] == ["metrics.json"]
+
+
+def test_another_aircraft_has_none_of_the_errors_that_the_scenario_gives_its_own():
+    name = next(name for name in bf.scenarios() if bf.load(name).uncertainty.inertia_coupling.p)
+    given = bf.load(name)
+    for same in (None, str(given.aircraft)):
+        assert live_command._with(same, name) == given
+    healthy = next(name for name in bf.scenarios() if not bf.load(name).faults)
+    other = live_command._with("beaver-split", healthy)
+    assert (other.airframe.name, other.duration_s) == ("beaver-split", bf.load(healthy).duration_s)
+    assert other.uncertainty == bf.load({"name": "x"}).uncertainty

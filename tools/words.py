@@ -1,7 +1,8 @@
 """`python -m tools.words`: avoided terms in identifiers, docstrings, comments, messages and pages.
 
-The table *Avoided terms* of WORDS.md is what is looked for, the table *Exceptions* where a term may stand. A
-term of several words is looked for in text alone. Exit status 1 if there is a finding.
+The table *Avoided terms* of WORDS.md is what is looked for, the table *Exceptions* where a term may stand.
+The table *Avoided in a folder* has terms that are looked for there alone. A term of several words is looked
+for in text alone. Exit status 1 if there is a finding.
 """
 
 import io
@@ -37,9 +38,20 @@ def _terms(cell: str) -> list[str]:
 def table(text: str) -> tuple[dict[str, re.Pattern[str]], list[tuple[str, str]]]:
     """By each avoided term what finds it, and (term, file pattern) of each exception."""
     avoided = [term for avoid, *_ in rows("Avoided terms", text) for term in _terms(avoid)]
-    letters = {term: re.escape(term).replace(r"\*", "[a-z]*") for term in avoided}
-    found = {term: re.compile(rf"\b{of}\b", re.IGNORECASE) for term, of in letters.items()}
-    return found, [(term, place) for term, where, _ in rows("Exceptions", text) for place in _terms(where)]
+    return _patterns(avoided), [
+        (term, place) for term, where, _ in rows("Exceptions", text) for place in _terms(where)
+    ]
+
+
+def _patterns(terms: list[str]) -> dict[str, re.Pattern[str]]:
+    letters = {term: re.escape(term).replace(r"\*", "[a-z]*") for term in terms}
+    return {term: re.compile(rf"\b{of}\b", re.IGNORECASE) for term, of in letters.items()}
+
+
+@cache
+def of_folders(text: str) -> tuple[tuple[str, dict[str, re.Pattern[str]]], ...]:
+    """(file pattern, what finds each term that is avoided there)."""
+    return tuple((where, _patterns(_terms(avoid))) for avoid, where, _ in rows("Avoided in a folder", text))
 
 
 def _code(text: str) -> Iterator[tuple[int, str]]:
@@ -62,6 +74,9 @@ def findings(name: str, text: str, words: str) -> list[str]:
     avoided, exceptions = table(words)
     allowed = {term for term, place in exceptions if fnmatchcase(name, place)}
     wanted = {term: pattern for term, pattern in avoided.items() if term not in allowed}
+    for where, patterns in of_folders(words):
+        if fnmatchcase(name, where):
+            wanted |= patterns
     read = _code if name.endswith(".py") else _page
     return list(
         dict.fromkeys(

@@ -188,8 +188,8 @@ def _is_excluded(one: Candidate, diagnosis: DiagnosisReadout) -> bool:
     """Whether a candidate is excluded."""
     estimators, layout = diagnosis.estimators, diagnosis.layout
     if not diagnosis.every_type:
-        return estimators[layout.loss_of[one.surface]].excluded
-    surface = estimators[layout.position_of[one.surface]].excluded
+        return estimators[layout.loss_estimator[one.surface]].excluded
+    surface = estimators[layout.position_estimator[one.surface]].excluded
     return surface or bool(diagnosis.surfaces[one.surface].excluded[one.kind])
 
 
@@ -264,10 +264,10 @@ def _left(tape: Tape) -> Iterator[tuple[int, int]]:
     estimators, layout = diagnosis.estimators, diagnosis.layout
     for s, surface in enumerate(diagnosis.surfaces):
         if not diagnosis.every_type:
-            e = layout.loss_of[s]
+            e = layout.loss_estimator[s]
             if e >= 0 and not estimators[e].excluded:
                 yield s, CONSTANT_LOSS
-        elif not estimators[layout.position_of[s]].excluded:
+        elif not estimators[layout.position_estimator[s]].excluded:
             yield from ((s, kind) for kind in CONSTANT if not surface.excluded[kind])
 
 
@@ -277,7 +277,7 @@ def open_courses(tape: Tape, names: Sequence[str]) -> list[str]:
     if not diagnosis.every_type:
         return []
     for s, surface in enumerate(diagnosis.surfaces):
-        if not diagnosis.estimators[diagnosis.layout.position_of[s]].excluded:
+        if not diagnosis.estimators[diagnosis.layout.position_estimator[s]].excluded:
             kinds = np.flatnonzero(~surface.excluded)
             found += [f"{names[s]} {NAMES[k]}" for k in kinds if k not in CONSTANT]
     return sorted(set(found))

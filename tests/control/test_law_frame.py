@@ -120,7 +120,7 @@ def test_what_is_done_about_each_kind_of_fault(measure):
     surface["feasible"]["excluded"] = [other != kind for other in range(N_TYPES)]
     surface["feasible"]["low"][kind], surface["feasible"]["high"][kind] = 0.1, 0.2
     surface["elapsed"]["command"], surface["elapsed"]["low"], surface["elapsed"]["high"] = 0.05, 0.3, 0.34
-    loss = fdi["layout"]["loss_of"][RUDDER]
+    loss = fdi["layout"]["loss_estimator"][RUDDER]
     fdi["isolation"]["estimator"][int(loss)]["theta"] = -0.3
     surfaces = accommodated(frame)
     target = {SCALE_COMMAND: 0.7, GIVE_UP: 0.0}.get(measure, 1.0)
@@ -147,7 +147,7 @@ def test_when_it_has_long_been_open_whether_elevator_or_flap(
     frame = new_frame(name)
     fdi = frame["fdi"]
     types, fdi["config"]["every_type"] = fdi["types"], every_type
-    types["config"]["patience"], types["surface"]["evidence"]["frames"] = 4, 0
+    types["config"]["half_cycle_frames"], types["surface"]["evidence"]["frames"] = 4, 0
     types["surface"]["evidence"]["frames"][ELEVATOR] = evidence
     fdi["verdict"]["detected"], fdi["verdict"]["isolated"] = detected, isolated
     frame["control"]["probe"]["config"]["frames"], frame["control"]["probe"]["memory"]["from_s"] = 8, -1.0

@@ -21,7 +21,9 @@ def test_readings_without_errors_give_the_truths_dpt():
 @pytest.mark.parametrize("grade", ["tactical-grade", "consumer-grade"])
 def test_no_admitted_error_of_the_readings_is_beyond_the_bound(grade):
     scenario = load({"name": "x", "fdi": {"bounds": {"sensors": grade}}})
-    admitted = configure_design(scenario, TRAVEL_RAD)["fdi"]["bound"]["admitted"][0].view(np.recarray)
+    declared_errors = configure_design(scenario, TRAVEL_RAD)["fdi"]["bound"]["declared_errors"][0].view(
+        np.recarray
+    )
     at_most = [
         4.0 * noise + abs(bias) + quantum / 2
         for noise, bias, quantum in (
@@ -38,7 +40,7 @@ def test_no_admitted_error_of_the_readings_is_beyond_the_bound(grade):
         y = np.zeros(8)
         y[2:5] = reading[2], reading[3], measured_slipstream(*reading)
         error = abs(y[4] - measured_slipstream(*true))
-        largest = max(largest, error / slipstream_error(admitted, y))
+        largest = max(largest, error / slipstream_error(declared_errors, y))
     assert 0.3 < largest <= 1.0
 
 

@@ -159,7 +159,7 @@ class DesignPlant:
 
     def position_excluded(self, surface):
         """Whether the estimator of a surface that may be anywhere has been excluded."""
-        return self.excluded(int(self.fdi["layout"]["position_of"][surface]))
+        return self.excluded(int(self.fdi["layout"]["position_estimator"][surface]))
 
 
 def _random(plant, bound, phi):

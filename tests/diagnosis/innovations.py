@@ -137,7 +137,7 @@ def filter_all(block, innovations, dt, out):
 
 
 @kernel
-def weigh_all(block, innovations, signatures, regressors, first, keep, tolerated, dt):
+def weigh_all(block, innovations, signatures, regressors, first, keep, has_tolerances, dt):
     """Show a block frames `first` onwards: innovations (k, n), signatures (k, h, 2), regressors (k, j, 2)."""
     for k in range(len(innovations)):
         if keep == 1.0:
@@ -151,7 +151,7 @@ def weigh_all(block, innovations, signatures, regressors, first, keep, tolerated
             )
         for h in range(block.n_hypotheses):
             block.hypothesis[h].signature[:] = signatures[k, h]
-        likelihood.accumulate_evidence(block, tolerated, dt, keep)
+        likelihood.accumulate_evidence(block, has_tolerances, dt, keep)
         likelihood.evaluate_hypotheses(block)
 
 

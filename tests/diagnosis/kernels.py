@@ -59,15 +59,17 @@ _ACTUATOR = (
     "travel_low", "travel_high", "reach_low", "reach_high", "least_runaway_rate", "approach", "step",
     "slowest_step",
 )  # fmt: skip
+_OBSERVED = ("command", "low", "high", "anomalous", "effectiveness_variation", "stop_hides")
+_EVIDENCE = ("rest_frames", "unhidden_frames", "started_at", "start_low", "start_high")
 OF_SURFACE = {
     **{name: ("actuator", name) for name in _ACTUATOR},
-    **{name: ("elapsed", name) for name in ("command", "low", "high", "wrong", "uneven", "hides")},
-    **{f"{name}_then": ("judged", name) for name in ("command", "low", "high", "wrong", "uneven", "hides")},
-    **{f"{name}_before": ("earlier", name) for name in ("low", "high", "wrong")},
+    **{name: ("elapsed", name) for name in _OBSERVED},
+    **{f"{name}_then": ("judged", name) for name in _OBSERVED},
+    **{f"{name}_before": ("earlier", name) for name in ("low", "high", "anomalous")},
     "evidence": ("evidence", "frames"),
-    **{name: ("evidence", name) for name in ("quiet", "unhidden", "started_at", "start_low", "start_high")},
-    "absent": ("accommodation", "absent"),
-    "in_question": ("status", "is_candidate"), "standing": ("status", "source"),
+    **{name: ("evidence", name) for name in _EVIDENCE},
+    "frames_absent": ("accommodation", "frames_absent"),
+    "in_question": ("status", "is_candidate"), "standing": ("status", "decided_by"),
     **{name: ("status", name) for name in ("named", "named_at_s", "type", "type_at_s")},
 }  # fmt: skip
 

@@ -67,18 +67,24 @@ class Statistical:
     def shows(fdi, surface):
         tests, blocks = fdi["statistical"]["tests"], fdi["statistical"]["block"]
         return statistical.confirms_loss(
-            tests, blocks, fdi["isolation"]["estimator"], fdi["layout"]["loss_of"], surface
+            tests, blocks, fdi["isolation"]["estimator"], fdi["layout"]["loss_estimator"], surface
         )
 
     @staticmethod
     def excludes(fdi, surface, ends):
-        tests, blocks, loss_of = (
+        tests, blocks, loss_estimator = (
             fdi["statistical"]["tests"],
             fdi["statistical"]["block"],
-            fdi["layout"]["loss_of"],
+            fdi["layout"]["loss_estimator"],
         )
         return statistical.excludes_loss(
-            tests, blocks, fdi["isolation"]["estimator"], loss_of, surface, ends, fdi["config"]["abrupt"]
+            tests,
+            blocks,
+            fdi["isolation"]["estimator"],
+            loss_estimator,
+            surface,
+            ends,
+            fdi["config"]["abrupt"],
         )
 
 
@@ -120,7 +126,7 @@ class Across:
         views, tests = views_of(record), record["tests"]
         parity.update_directions(views, record["forces"], record["air"], bound, G, Gu)
         parts = (record[name] for name in ("noise", "block", "forces", "air", "inertial_air"))
-        parity.project_innovation(views, int(tests["tolerated"]), *parts, innovation, y[2])
+        parity.project_innovation(views, int(tests["has_tolerances"]), *parts, innovation, y[2])
         parity.update_views(views, tests, record["tone_config"], y, fdi["config"]["dt"], frame, latched)
 
     @staticmethod
@@ -141,7 +147,7 @@ class Across:
     def excludes(fdi, s):
         record, column = (
             fdi["statistical"],
-            fdi["isolation"]["estimator"]["effect"]["Z"][fdi["layout"]["position_of"][s]],
+            fdi["isolation"]["estimator"]["effect"]["Z"][fdi["layout"]["position_estimator"][s]],
         )
         views = views_of(record)
         return parity.excludes_surface(views, record["tests"], record["forces"], record["air"], s, column)

@@ -179,8 +179,8 @@ def test_losses_of_the_leading_surfaces_come_first_then_the_others_and_every_pos
     assert fies["surface"].tolist() == [0, 1, 2, 3] * 2
     assert fies["low"].tolist() == [-1.0] * 4 + TRAVEL[0].tolist()
     assert fies["high"].tolist() == [0.0] * 4 + TRAVEL[1].tolist()
-    assert frame["fdi"]["layout"]["loss_of"].tolist() == [0, 1, 2, 3]
-    assert frame["fdi"]["layout"]["position_of"].tolist() == [4, 5, 6, 7]
+    assert frame["fdi"]["layout"]["loss_estimator"].tolist() == [0, 1, 2, 3]
+    assert frame["fdi"]["layout"]["position_estimator"].tolist() == [4, 5, 6, 7]
 
 
 def test_in_pairs_each_plane_is_asked_for_itself():

@@ -63,8 +63,8 @@ def test_the_diagnosis_is_read_as_the_log_has_it(flown):
     for s, name in enumerate(aircraft.surfaces):
         stops, actuator = aircraft.travel[name], diagnosis.surfaces[s].actuator
         assert (actuator.travel_low_rad, actuator.travel_high_rad) == (stops.min_rad, stops.max_rad)
-        assert names[diagnosis.layout.position_of[s]] == f"{name}_position"
-        assert names[diagnosis.layout.loss_of[s]] == name
+        assert names[diagnosis.layout.position_estimator[s]] == f"{name}_position"
+        assert names[diagnosis.layout.loss_estimator[s]] == name
         assert diagnosis.layout.dominant_axis[s] == aircraft.dominant_axis[s]
 
 
@@ -78,7 +78,7 @@ def test_the_statistical_detector_and_the_sensor_monitor_are_read_as_the_log_has
         assert block.lanes.score.shape[0] == len(block.hypotheses)
         assert len(block.axes) in (1, 2)
     assert monitor.enabled
-    assert (monitor.share, monitor.furthest) == (row["watch_share"], row["watch_test"])
+    assert (monitor.share, monitor.largest_test) == (row["watch_share"], row["watch_test"])
     assert len(monitor.predicted) == len(SENSORS)
 
 

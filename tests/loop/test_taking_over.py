@@ -121,12 +121,12 @@ def test_a_diagnosis_begun_anew_keeps_what_healthy_flight_has_shown():
     frame, new = _frame("nominal"), _frame("nominal")
     frame["fdi"]["bank"]["output"]["closest"], frame["fdi"]["statistical"]["alarm"]["closest"] = 0.5, 0.75
     for same in (True, False):
-        new["fdi"]["bank"]["output"]["closest"], new["fdi"]["sensor_monitor"]["memory"]["past"] = 0.0, 3
+        new["fdi"]["bank"]["output"]["closest"], new["fdi"]["sensor_monitor"]["memory"]["substep"] = 0.0, 3
         new["fdi"]["bank"]["config"]["n"] = frame["fdi"]["bank"]["config"]["n"] + (not same)
         then = frame.copy()
         take_diagnosis(then, new, 77)
         assert then["since"] == 77
-        assert then["fdi"]["sensor_monitor"]["memory"]["past"] == 0
+        assert then["fdi"]["sensor_monitor"]["memory"]["substep"] == 0
         assert then["fdi"]["statistical"]["alarm"]["closest"] == 0.75
         assert set(then["fdi"]["bank"]["output"]["closest"]) == {0.5 if same else 0.0}
 

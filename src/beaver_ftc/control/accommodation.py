@@ -82,7 +82,7 @@ def reported(output, assessment, faults, s, u, informed):
 def start_of(output, assessment, s, informed):
     """Effectiveness of surface s from which this frame's step begins. A jam bypasses the rate limit, as does
     an effectiveness that is well known."""
-    jumps = assessment.at_once[s] and not informed
+    jumps = assessment.apply_immediately[s] and not informed
     return assessment.effectiveness[s] if jumps else output.effectiveness[s]
 
 
@@ -121,7 +121,7 @@ def park_failed_surfaces(output, assessment, faults, informed):
     shows. From then on the reference is governed."""
     for s in range(output.parked.size):
         immovable = informed and faults.immovable[s]
-        fixed = assessment.measure[s] == GIVE_UP and output.effectiveness[s] == 0.0
+        fixed = assessment.accommodation_mode[s] == GIVE_UP and output.effectiveness[s] == 0.0
         output.parked[s] = immovable or output.given_up[s] or fixed
         if output.parked[s]:
             output.authority_lost = 1

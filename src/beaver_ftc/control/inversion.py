@@ -22,7 +22,7 @@ def prepare(control, assessment, belief, mode, t):
     at_once = is_governed(control) or (remains < least and assessment.every_type)
     allocation.hand_over_pitch(control.allocation, reallocated, at_once, remains, least)
     if control.probe.config.frames > 0:
-        wanted = assessment.pitch_is_open and config.uses_verdict and not config.informed
+        wanted = assessment.pitch_undecided and config.uses_verdict and not config.informed
         allocation.advance_probe(control.probe, wanted, t)
 
 

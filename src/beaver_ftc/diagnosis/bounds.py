@@ -18,9 +18,9 @@ A derived aircraft declares a map of its model's error. The map has a few boxes 
 other. Each box has the largest error found in it for surfaces within a share of their travel (stand-ins:
 within less). Healthy surfaces are where their commands put them, and a surface that has lost effectiveness
 acts like one with a smaller deflection: the bound is that of the share of travel in use. A stuck surface may
-be anywhere: the further error of its share, `beyond`, belongs to the hypothesis that it is off its command
-(isolation.py). If two surfaces may be off, the bound itself takes the whole travel. Outside all boxes nothing
-has been measured, so nothing is concluded.
+be anywhere: the additional error of its share, `further_error`, belongs to the hypothesis that it is off its
+command (isolation.py). If two surfaces may be off, the bound itself takes the whole travel. Outside all boxes
+nothing has been measured, so nothing is concluded.
 
 Variances: for plug-ins, and for the filters and tests of the statistical detector.
 """
@@ -58,15 +58,15 @@ _LEAST_AIRSPEED_SHARE = 0.1
 # more, 1e-10: the Earth's rate squared, 5e-9, covers that.
 ROUNDING_RAD_S2 = 1e-11
 UNKNOWN_RAD_S2 = 1e6  # terms fitted near trim are off by thousands at 0.5 rad
-# The same to filters that carry a covariance, beside noise of 1e-4: more than any aircraft does, and no more.
+# The same for filters with a covariance, whose noise is 1e-4: above the acceleration of any aircraft.
 UNKNOWN_IN_FILTERS_RAD_S2 = 100.0
 _ROUNDING = 1e-9
 N_PLACES = 3 + N_Y  # rates, then y with the density of the air in place of dynamic pressure
 
 
 @sized
-def admitted_dtype(n: int) -> np.dtype:
-    """What else than the published bound is admitted, for an aircraft with n surfaces."""
+def declared_errors_dtype(n: int) -> np.dtype:
+    """The declared errors beyond the published bound, of an aircraft with n surfaces."""
     return record(
         any=int,
         tolerance=MAX_TERMS,  # of each moment coefficient, as the design model has them
@@ -78,8 +78,9 @@ def admitted_dtype(n: int) -> np.dtype:
         # far the reading of the altitude can be off, m, and as a share
         gust_aloft=float, gust_low=float, altitude_off=float, altitude_slope=float,
         engine=int, engine_kw=float, thin_air_kw=float,  # of dpt: see `slipstream_error`
-        # scratch: magnitudes as measured, and the furthest they can be from there
-        near_x=3, near_y=N_Y, near_u=n, far_x=3, far_y=N_Y, far_u=n, far_aero=3, signal=N_SIGNALS,
+        # scratch: magnitudes as measured, and as large as they can be
+        measured_x=3, measured_y=N_Y, measured_u=n, largest_x=3, largest_y=N_Y, largest_u=n, largest_aero=3,
+        signal=N_SIGNALS,
         near=MAX_MONOMIALS, far=MAX_MONOMIALS, per_rad=(3, n), moment=3, slack=3,
     )  # fmt: skip
 
@@ -104,9 +105,9 @@ def bound_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
     errors of n surfaces' own terms, per rad of deflection and at the command, means over the frame. beyond:
     by how much the map's error with a surface at each share of its travel exceeds that in eta_bar."""
     return record(
-        inertia=3, constant=3, earth_rate=float, admitted=admitted_dtype(n),
-        error_map=error_map_dtype(n, boxes), eta_bar=3, eta_bar_now=3, noise=3, noise_then=3, frame=3,
-        own_errors=int, own_per_rad=(3, n), own=(3, n), beyond=(MAX_LEVELS, 3),
+        inertia=3, constant=3, earth_rate=float, declared_errors=declared_errors_dtype(n),
+        error_map=error_map_dtype(n, boxes), eta_bar=3, eta_bar_now=3, noise=3, noise_before=3, frame=3,
+        has_surface_errors=int, surface_error_per_rad=(3, n), own=(3, n), further_error=(MAX_LEVELS, 3),
     )  # fmt: skip
 
 
@@ -131,69 +132,79 @@ def fill_error_map(error_map: np.void, aircraft: Aircraft, anywhere: bool, whole
 
 
 @kernel
-def reading_error(admitted, i, reading):
+def reading_error(declared_errors, i, reading):
     """How far the truth of signal i can be from its reading."""
-    return (admitted.offset[i] + admitted.slope[i] * abs(reading)) / (1.0 - admitted.slope[i])
+    return (declared_errors.offset[i] + declared_errors.slope[i] * abs(reading)) / (
+        1.0 - declared_errors.slope[i]
+    )
 
 
 @kernel
-def changing_gyro_error(admitted, i, reading):
+def changing_gyro_error(declared_errors, i, reading):
     """How far gyro i can be off, rad/s, but for a constant: noise, resolution, slope times the true rate."""
-    changing = admitted.offset[i] - admitted.steady[i]
-    return changing + admitted.slope[i] * (abs(reading) + reading_error(admitted, i, reading))
+    changing = declared_errors.offset[i] - declared_errors.steady[i]
+    return changing + declared_errors.slope[i] * (abs(reading) + reading_error(declared_errors, i, reading))
 
 
 @kernel
-def slipstream_error(admitted, y):
+def slipstream_error(declared_errors, y):
     """How far dpt can be off that is worked out from the engine's instruments and the air data.
 
     dpt = a + b P / (qdyn V) [FDC]: the power's error, by the instruments engine_kw and by the density
     thin_air_kw for all of it; and the share that dynamic pressure and airspeed are off.
     """
-    pressure = reading_error(admitted, _AIR_DATA + QDYN, y[QDYN]) / y[QDYN]
-    speed = reading_error(admitted, _AIR_DATA + AIRSPEED, y[AIRSPEED]) / y[AIRSPEED]
+    pressure = reading_error(declared_errors, _AIR_DATA + QDYN, y[QDYN]) / y[QDYN]
+    speed = reading_error(declared_errors, _AIR_DATA + AIRSPEED, y[AIRSPEED]) / y[AIRSPEED]
     stretch = 1.0 / ((1.0 - min(pressure, 0.9)) * (1.0 - min(speed, 0.9)))
     density = (1.0 + pressure) / (1.0 - min(speed, 0.9)) ** 2 - 1.0
-    power_kw = admitted.engine_kw + admitted.thin_air_kw * density * density_ratio(y)
+    power_kw = declared_errors.engine_kw + declared_errors.thin_air_kw * density * density_ratio(y)
     return stretch * KW_TO_DPT * power_kw / (y[QDYN] * y[AIRSPEED]) + (stretch - 1.0) * abs(y[DPT] - DPT_0)
 
 
 @kernel
-def fill_magnitudes(admitted, x, y, u):
+def fill_magnitudes(declared_errors, x, y, u):
     """Fill the scratch with |signal| as measured and as large as it may be; for airspeed, as small."""
     for i in range(3):
-        admitted.near_x[i] = abs(x[i])
-        admitted.far_x[i] = abs(x[i]) + reading_error(admitted, i, x[i])
-        admitted.far_aero[i] = admitted.far_x[i] + admitted.gust[i]
+        declared_errors.measured_x[i] = abs(x[i])
+        declared_errors.largest_x[i] = abs(x[i]) + reading_error(declared_errors, i, x[i])
+        declared_errors.largest_aero[i] = declared_errors.largest_x[i] + declared_errors.gust[i]
     for i in range(DPT):
-        admitted.near_y[i] = abs(y[i])
-        admitted.far_y[i] = abs(y[i]) + reading_error(admitted, _AIR_DATA + i, y[i])
+        declared_errors.measured_y[i] = abs(y[i])
+        declared_errors.largest_y[i] = abs(y[i]) + reading_error(declared_errors, _AIR_DATA + i, y[i])
     for i in range(DPT, y.size):
-        admitted.near_y[i] = admitted.far_y[i] = abs(y[i])
-    if admitted.engine:
-        admitted.far_y[DPT] += slipstream_error(admitted, y)
+        declared_errors.measured_y[i] = declared_errors.largest_y[i] = abs(y[i])
+    if declared_errors.engine:
+        declared_errors.largest_y[DPT] += slipstream_error(declared_errors, y)
     for s in range(u.size):
-        admitted.near_u[s] = abs(u[s])
-        admitted.far_u[s] = abs(u[s]) + admitted.deflection
+        declared_errors.measured_u[s] = abs(u[s])
+        declared_errors.largest_u[s] = abs(u[s]) + declared_errors.deflection
     V = y[AIRSPEED]
-    admitted.far_y[AIRSPEED] = max(2.0 * V - admitted.far_y[AIRSPEED], _LEAST_AIRSPEED_SHARE * V)
+    declared_errors.largest_y[AIRSPEED] = max(
+        2.0 * V - declared_errors.largest_y[AIRSPEED], _LEAST_AIRSPEED_SHARE * V
+    )
 
 
 @kernel
-def fill_moments(admitted, design):
+def fill_moments(declared_errors, design):
     """Fill moment (3,), the sum of the magnitudes of a moment's terms, and slack (3,), their error; N m."""
-    near_q, far_q = admitted.near_y[QDYN], admitted.far_y[QDYN]
+    near_q, far_q = declared_errors.measured_y[QDYN], declared_errors.largest_y[QDYN]
     table = design.moments
     for i in range(3):
         near, far = 0.0, 0.0
         for k in range(table.free_from[i], table.surface_to[i]):
             size, s = abs(table.value[k]), table.surface[k]
-            near += size * admitted.near[table.monomial[k]] * (admitted.near_u[s] if s >= 0 else 1.0)
-            largest = admitted.far[table.monomial[k]] * (admitted.far_u[s] if s >= 0 else 1.0)
-            far += (size + admitted.tolerance[k]) * largest
+            near += (
+                size
+                * declared_errors.near[table.monomial[k]]
+                * (declared_errors.measured_u[s] if s >= 0 else 1.0)
+            )
+            largest = declared_errors.far[table.monomial[k]] * (
+                declared_errors.largest_u[s] if s >= 0 else 1.0
+            )
+            far += (size + declared_errors.tolerance[k]) * largest
         arm = design.S * (design.c if i == 1 else design.b)
-        admitted.moment[i] = arm * near_q * near
-        admitted.slack[i] = arm * (far_q * far - near_q * near)
+        declared_errors.moment[i] = arm * near_q * near
+        declared_errors.slack[i] = arm * (far_q * far - near_q * near)
 
 
 @kernel
@@ -203,43 +214,43 @@ def product_error(size, tolerance, near, far):
 
 
 @kernel
-def moment_error(admitted, i, size, tolerance):
+def moment_error(declared_errors, i, size, tolerance):
     """Error of an inertia coefficient times moment i."""
-    near = admitted.moment[i]
-    return product_error(size, tolerance, near, near + admitted.slack[i])
+    near = declared_errors.moment[i]
+    return product_error(size, tolerance, near, near + declared_errors.slack[i])
 
 
 @kernel
-def rate_product_error(admitted, i, j, size, tolerance):
+def rate_product_error(declared_errors, i, j, size, tolerance):
     """Error of an inertia coefficient times rates i and j."""
-    near, far = admitted.near_x, admitted.far_x
+    near, far = declared_errors.measured_x, declared_errors.largest_x
     return product_error(size, tolerance, near[i] * near[j], far[i] * far[j])
 
 
 @kernel
-def moment_per_rad(admitted, design, i, s):
+def moment_per_rad(declared_errors, design, i, s):
     """Of moment i, what surface s adds per rad: its magnitude, and with all errors; N m."""
     near, far = 0.0, 0.0
     table = design.moments
     for k in range(table.free_to[i], table.surface_to[i]):
         if table.surface[k] == s:
             size = abs(table.value[k])
-            near += size * admitted.near[table.monomial[k]]
-            far += (size + admitted.tolerance[k]) * admitted.far[table.monomial[k]]
+            near += size * declared_errors.near[table.monomial[k]]
+            far += (size + declared_errors.tolerance[k]) * declared_errors.far[table.monomial[k]]
     arm = design.S * (design.c if i == 1 else design.b)
-    return arm * admitted.near_y[QDYN] * near, arm * admitted.far_y[QDYN] * far
+    return arm * declared_errors.measured_y[QDYN] * near, arm * declared_errors.largest_y[QDYN] * far
 
 
 @kernel
-def fill_error_per_rad(admitted, design, s):
+def fill_error_per_rad(declared_errors, design, s):
     """Fill per_rad (3, s) rad/s2 per rad: what the declared errors can do to the effect of surface s.
 
     The bound is affine in |u_s|; this is its slope. `add_declared_errors` comes first.
     """
-    t, per_rad = admitted.inertia, admitted.per_rad
-    roll, roll_far = moment_per_rad(admitted, design, 0, s)
-    pitch, pitch_far = moment_per_rad(admitted, design, 1, s)
-    yaw, yaw_far = moment_per_rad(admitted, design, 2, s)
+    t, per_rad = declared_errors.inertia, declared_errors.per_rad
+    roll, roll_far = moment_per_rad(declared_errors, design, 0, s)
+    pitch, pitch_far = moment_per_rad(declared_errors, design, 1, s)
+    yaw, yaw_far = moment_per_rad(declared_errors, design, 2, s)
     per_rad[0, s] = product_error(design.Pl, t[2], roll, roll_far)
     per_rad[0, s] += product_error(design.Pn, t[3], yaw, yaw_far)
     per_rad[1, s] = product_error(design.Qm, t[7], pitch, pitch_far)
@@ -248,28 +259,32 @@ def fill_error_per_rad(admitted, design, s):
 
 
 @kernel
-def add_declared_errors(admitted, design, x, y, u, eta_bar):
+def add_declared_errors(declared_errors, design, x, y, u, eta_bar):
     """Add to eta_bar (3,) rad/s2 what the declared errors can do; x (3,), y, u (surfaces,) as measured."""
-    fill_magnitudes(admitted, x, y, u)
-    signals(design.moments, admitted.near_x, admitted.near_y, admitted.signal)
-    monomials(design.moments, admitted.signal, admitted.near)
-    signals(design.moments, admitted.far_aero, admitted.far_y, admitted.signal)
-    monomials(design.moments, admitted.signal, admitted.far)
-    fill_moments(admitted, design)
-    t = admitted.inertia
-    eta_bar[0] += moment_error(admitted, 0, design.Pl, t[2]) + moment_error(admitted, 2, design.Pn, t[3])
-    eta_bar[0] += rate_product_error(admitted, 0, 1, design.Ppq, t[0]) + rate_product_error(
-        admitted, 1, 2, design.Pqr, t[1]
+    fill_magnitudes(declared_errors, x, y, u)
+    signals(design.moments, declared_errors.measured_x, declared_errors.measured_y, declared_errors.signal)
+    monomials(design.moments, declared_errors.signal, declared_errors.near)
+    signals(design.moments, declared_errors.largest_aero, declared_errors.largest_y, declared_errors.signal)
+    monomials(design.moments, declared_errors.signal, declared_errors.far)
+    fill_moments(declared_errors, design)
+    t = declared_errors.inertia
+    eta_bar[0] += moment_error(declared_errors, 0, design.Pl, t[2]) + moment_error(
+        declared_errors, 2, design.Pn, t[3]
     )
-    eta_bar[1] += moment_error(admitted, 1, design.Qm, t[7]) + rate_product_error(
-        admitted, 0, 2, design.Qpr, t[5]
+    eta_bar[0] += rate_product_error(declared_errors, 0, 1, design.Ppq, t[0]) + rate_product_error(
+        declared_errors, 1, 2, design.Pqr, t[1]
     )
-    eta_bar[1] += rate_product_error(admitted, 0, 0, design.Qpp, t[4]) + rate_product_error(
-        admitted, 2, 2, design.Qrr, t[6]
+    eta_bar[1] += moment_error(declared_errors, 1, design.Qm, t[7]) + rate_product_error(
+        declared_errors, 0, 2, design.Qpr, t[5]
     )
-    eta_bar[2] += moment_error(admitted, 0, design.Rl, t[10]) + moment_error(admitted, 2, design.Rn, t[11])
-    eta_bar[2] += rate_product_error(admitted, 0, 1, design.Rpq, t[8]) + rate_product_error(
-        admitted, 1, 2, design.Rqr, t[9]
+    eta_bar[1] += rate_product_error(declared_errors, 0, 0, design.Qpp, t[4]) + rate_product_error(
+        declared_errors, 2, 2, design.Qrr, t[6]
+    )
+    eta_bar[2] += moment_error(declared_errors, 0, design.Rl, t[10]) + moment_error(
+        declared_errors, 2, design.Rn, t[11]
+    )
+    eta_bar[2] += rate_product_error(declared_errors, 0, 1, design.Rpq, t[8]) + rate_product_error(
+        declared_errors, 1, 2, design.Rqr, t[9]
     )
 
 
@@ -415,16 +430,16 @@ def earth_rotation_bound(earth_rate, rates, share):
 @kernel
 def lowest_height(altitude, off, slope):
     """The least height, m, that a measured altitude leaves: off by so much and by a share. The ground is at
-    sea level; turbulence knows no height below LEAST_HEIGHT_M."""
+    sea level; the model of turbulence has no height below LEAST_HEIGHT_M."""
     return max(altitude - (off + slope * abs(altitude)) / (1.0 - slope), LEAST_HEIGHT_M)
 
 
 @kernel
-def set_gust_bound(admitted, altitude):
+def set_gust_bound(declared_errors, altitude):
     """Bring the bound on the air's rotation to this altitude, m as measured."""
-    if admitted.gust_low > 0.0:
-        height = lowest_height(altitude, admitted.altitude_off, admitted.altitude_slope)
-        admitted.gust[:] = max(admitted.gust_aloft, admitted.gust_low / np.sqrt(height))
+    if declared_errors.gust_low > 0.0:
+        height = lowest_height(altitude, declared_errors.altitude_off, declared_errors.altitude_slope)
+        declared_errors.gust[:] = max(declared_errors.gust_aloft, declared_errors.gust_low / np.sqrt(height))
 
 
 @kernel
@@ -432,15 +447,15 @@ def fill_bound_now(bound, design, measured, u):
     """Fill eta_bar_now (3,) rad/s2, the bound on the uncertainty at this instant; u (n,) rad."""
     x, y = measured.x, measured.y
     bound.eta_bar_now[:] = 0.0
-    if bound.admitted.any:
-        set_gust_bound(bound.admitted, measured.altitude)
-        add_declared_errors(bound.admitted, design, x, y, u, bound.eta_bar_now)
-        if bound.own_errors:
+    if bound.declared_errors.any:
+        set_gust_bound(bound.declared_errors, measured.altitude)
+        add_declared_errors(bound.declared_errors, design, x, y, u, bound.eta_bar_now)
+        if bound.has_surface_errors:
             for s in range(u.size):
-                fill_error_per_rad(bound.admitted, design, s)
+                fill_error_per_rad(bound.declared_errors, design, s)
     if bound.error_map.n_boxes > 0:
         add_map_error(bound.error_map, x, y, u, bound.eta_bar_now)
-    far = bound.admitted.far_x if bound.admitted.any else x
+    far = bound.declared_errors.largest_x if bound.declared_errors.any else x
     add_published_bound(far, design, bound.inertia, bound.constant, bound.earth_rate, bound.eta_bar_now)
 
 
@@ -477,32 +492,40 @@ def configure_bound(bound: np.void, scenario: "Scenario", declared: Declared, de
     fill_error_map(bound["error_map"], aircraft, every_type, whole=every_type and config.pairs)
     if aircraft.file.model_error_map is None:
         bound["constant"] += aircraft.model_error_rad_s2
-    admitted = bound["admitted"]
-    fill_declared_errors(admitted, declared, design, mass_of(scenario.design_model, aircraft))
-    fill_declared_engine_errors(admitted, scenario, declared)
-    bound["own_errors"] = admitted["any"] and every_type
+    declared_errors = bound["declared_errors"]
+    fill_declared_errors(declared_errors, declared, design, mass_of(scenario.design_model, aircraft))
+    fill_declared_engine_errors(declared_errors, scenario, declared)
+    bound["has_surface_errors"] = declared_errors["any"] and every_type
 
 
 def fill_declared_errors(
-    admitted: np.void, declared: Declared, design: np.void, mass: MassProperties
+    declared_errors: np.void, declared: Declared, design: np.void, mass: MassProperties
 ) -> None:
     """Fill the record; the design record and mass are the designer's."""
     tolerance = declared.coefficients.absolute(declared.aircraft.moments, design["moments"]["value"])
-    admitted["tolerance"][: tolerance.size] = tolerance
-    admitted["inertia"] = inertia_coefficient_errors(declared.inertia, mass)
-    admitted["deflection"] = declared.actuators.deflection_rad
+    declared_errors["tolerance"][: tolerance.size] = tolerance
+    declared_errors["inertia"] = inertia_coefficient_errors(declared.inertia, mass)
+    declared_errors["deflection"] = declared.actuators.deflection_rad
     errors, air, span_m = declared.sensors, declared.air, declared.aircraft.geometry.span_m
-    admitted["gust_aloft"] = GUST_LIMIT_SIGMA * air.rotation_limit_rad_s(span_m)
-    admitted["gust_low"] = GUST_LIMIT_SIGMA * air.low_rotation_limit_rad_s(span_m)
-    admitted["gust"] = admitted["gust_aloft"]
-    admitted["altitude_off"], admitted["altitude_slope"] = errors["altitude"].worst, errors["altitude"].slope
-    admitted["offset"], admitted["slope"] = errors.each("worst"), errors.each("slope")
-    admitted["steady"] = errors.each("steady", AXES)
-    parts = (admitted["tolerance"], admitted["inertia"], admitted["deflection"], admitted["gust"])
-    admitted["any"] = any(np.any(part) for part in parts) or not errors.is_ideal
+    declared_errors["gust_aloft"] = GUST_LIMIT_SIGMA * air.rotation_limit_rad_s(span_m)
+    declared_errors["gust_low"] = GUST_LIMIT_SIGMA * air.low_rotation_limit_rad_s(span_m)
+    declared_errors["gust"] = declared_errors["gust_aloft"]
+    declared_errors["altitude_off"], declared_errors["altitude_slope"] = (
+        errors["altitude"].worst,
+        errors["altitude"].slope,
+    )
+    declared_errors["offset"], declared_errors["slope"] = errors.each("worst"), errors.each("slope")
+    declared_errors["steady"] = errors.each("steady", AXES)
+    parts = (
+        declared_errors["tolerance"],
+        declared_errors["inertia"],
+        declared_errors["deflection"],
+        declared_errors["gust"],
+    )
+    declared_errors["any"] = any(np.any(part) for part in parts) or not errors.is_ideal
 
 
-def fill_declared_engine_errors(admitted: np.void, scenario: "Scenario", declared: Declared) -> None:
+def fill_declared_engine_errors(declared_errors: np.void, scenario: "Scenario", declared: Declared) -> None:
     """Admit errors of dpt where those are declared of which it is worked out.
 
     The engine may be set anywhere between here and its highest manifold pressure.
@@ -515,8 +538,10 @@ def fill_declared_engine_errors(admitted: np.void, scenario: "Scenario", declare
     highest = declared.aircraft.engine.settings["manifold_pressure_inhg"].range[1]
     largest = dict(zip(ENGINE, (initial.engine_rpm, highest), strict=True))
     errors = [sensors[name].of_reading(most) for name, most in largest.items()]
-    admitted["engine"] = 1
-    admitted["engine_kw"], admitted["thin_air_kw"] = power_error_kw(initial.engine_rpm, highest, *errors)
+    declared_errors["engine"] = 1
+    declared_errors["engine_kw"], declared_errors["thin_air_kw"] = power_error_kw(
+        initial.engine_rpm, highest, *errors
+    )
 
 
 def poles_for_noise(sensors: SensorErrors, constant_rad_s2: float) -> tuple[float, ...]:

@@ -134,8 +134,9 @@ def assessment_dtype(n: int) -> np.dtype:
     pitch_is_open: elevator or flap is at fault, and it has long been open which.
     """
     return record(
-        detected=int, unknown=int, every_type=int, named=int, surface_lags=int, measure=(int, n),
-        effectiveness=n, at_once=(int, n), offset=n, lag=n, unknown_acceleration=3, pitch_is_open=int,
+        detected=int, unknown=int, every_type=int, named=int, surface_lags=int, accommodation_mode=(int, n),
+        effectiveness=n, apply_immediately=(int, n), offset=n, lag=n, unknown_acceleration=3,
+        pitch_undecided=int,
     )  # fmt: skip
 
 
@@ -145,19 +146,19 @@ def assess_surfaces(assessment, config, conclusion, types, layout, estimators, s
     every_type, named = config.every_type, isolated_surface(conclusion, estimators)
     assessment.detected, assessment.every_type = conclusion.detected, every_type
     assessment.named, assessment.surface_lags, assessment.unknown = named, 0, cause_is_unknown(conclusion)
-    for s in range(assessment.measure.size):
-        assessment.measure[s] = types.surface[s].accommodation.mode if every_type else -1
-        assessment.effectiveness[s], assessment.at_once[s] = 1.0, 0
+    for s in range(assessment.accommodation_mode.size):
+        assessment.accommodation_mode[s] = types.surface[s].accommodation.mode if every_type else -1
+        assessment.effectiveness[s], assessment.apply_immediately[s] = 1.0, 0
         assessment.offset[s], assessment.lag[s] = 0.0, 0.0
         if conclusion.estimates and conclusion.detected:
             assessment.effectiveness[s] = conclusion.effectiveness[s]
-        elif assessment.measure[s] >= 0:
+        elif assessment.accommodation_mode[s] >= 0:
             assess_surface_at_fault(assessment, types, layout, estimators, s)
         elif s == named and not every_type:
             likely = uses_statistical_estimates(statistics.tests, config.authority)
             sure = likely and statistical.estimated_loss(statistics.block, s)[1] > SURE_INFORMATION
             theta = isolated_theta(config, conclusion, layout, estimators, statistics, s)
-            assessment.effectiveness[s], assessment.at_once[s] = 1.0 + theta, sure
+            assessment.effectiveness[s], assessment.apply_immediately[s] = 1.0 + theta, sure
 
 
 @kernel
@@ -168,7 +169,7 @@ def assess_surface_at_fault(assessment, types, layout, estimators, s):
     if mode == SCALE_COMMAND:
         assessment.effectiveness[s] = verdict.effectiveness_left(types, layout, estimators, s)
     elif mode == GIVE_UP:
-        assessment.effectiveness[s], assessment.at_once[s] = 0.0, 1
+        assessment.effectiveness[s], assessment.apply_immediately[s] = 0.0, 1
         assessment.offset[s] = surface.elapsed.command + verdict.deflection_error(surface, at_fault)
     elif mode == SUBTRACT_OFFSET:
         assessment.offset[s] = verdict.deflection_error(surface, at_fault)
@@ -205,5 +206,5 @@ def assess_unknown_acceleration(assessment, config, conclusion, types, layout, s
     elif conclusion.detected and not lags:
         filters.fdae_unknown_acceleration(detector, bound.noise, unknown)
     is_not_excluded = every_type and conclusion.detected and conclusion.isolated == NOT_ISOLATED
-    long = types.surface[layout.main[PITCH]].evidence.frames >= types.config.patience
-    assessment.pitch_is_open = is_not_excluded and long
+    long = types.surface[layout.main[PITCH]].evidence.frames >= types.config.half_cycle_frames
+    assessment.pitch_undecided = is_not_excluded and long

@@ -25,7 +25,7 @@ from beaver_ftc.scenario.schema import Scenario
 def sums_dtype(n: int) -> np.dtype:
     """Sums over the instants of a frame, n surfaces: f, G, G u and bounds; own errors as in bounds.py."""
     return record(
-        f=3, G=(3, n), Gu=(3, n), eta_bar=3, own_per_rad=(3, n), own=(3, n),
+        f=3, G=(3, n), Gu=(3, n), eta_bar=3, surface_error_per_rad=(3, n), own=(3, n),
         Gu_first=(3, n),  # of the first instant alone
         G_least=n, G_most=n,  # on each surface's dominant axis
         u_least=n, u_most=n,  # rad
@@ -54,9 +54,9 @@ def belief_dtype(n: int) -> np.dtype:
         design=design_dtype(n), actuators=actuators_dtype(n),
         share=float,  # one over the number of instants in a frame
         commanded=n,
-        u=n, u_then=n,  # positions of healthy surfaces under the command: now, and an instant before
+        u=n, u_before=n,  # positions of healthy surfaces under the command: now, and an instant before
         f=3, G=(3, n),  # at this instant
-        x_then=3,  # rates measured at the start of the elapsed frame
+        x_before=3,  # rates measured at the start of the elapsed frame
         sums=sums_dtype(n), means=means_dtype(n),
         expected=3,  # mean acceleration of the elapsed frame, known faults included
         innovation_after_known_faults=3,  # measured minus expected mean acceleration
@@ -93,13 +93,13 @@ def add_instant_to_sums(belief, bound, layout, every_type):
         for s in range(u.size):
             total.G[i, s] += G[i, s]
             total.Gu[i, s] += G[i, s] * u[s]
-            if bound.own_errors:
-                total.own_per_rad[i, s] += bound.admitted.per_rad[i, s]
-                total.own[i, s] += bound.admitted.per_rad[i, s] * abs(u[s])
+            if bound.has_surface_errors:
+                total.surface_error_per_rad[i, s] += bound.declared_errors.per_rad[i, s]
+                total.own[i, s] += bound.declared_errors.per_rad[i, s] * abs(u[s])
     if bound.error_map.anywhere:
         for j in range(bound.error_map.n_levels):
             for i in range(3):
-                bound.beyond[j, i] += belief.share * further_map_error(bound.error_map, j, i)
+                bound.further_error[j, i] += belief.share * further_map_error(bound.error_map, j, i)
     if every_type:
         for s, axis in enumerate(layout.dominant_axis):
             now = G[axis, s]
@@ -122,8 +122,8 @@ def fill_frame_means(belief, bound):
         bound.eta_bar[i] = share * total.eta_bar[i]
     mean.G_least[:], mean.G_most[:] = total.G_least, total.G_most
     mean.u_least[:], mean.u_most[:] = total.u_least, total.u_most
-    if bound.own_errors:
-        bound.own_per_rad[:] = share * total.own_per_rad
+    if bound.has_surface_errors:
+        bound.surface_error_per_rad[:] = share * total.surface_error_per_rad
         bound.own[:] = share * total.own
     if share < 1.0:
         fill_effect_spread(belief)
@@ -160,9 +160,9 @@ def evaluate_frame(belief, bound, measured, k, dt):
     bound.error_map.time_s = k * dt
     fill_bound_now(bound, belief.design, measured, belief.u)
     bound.eta_bar[:] = bound.eta_bar_now
-    if bound.admitted.any:
+    if bound.declared_errors.any:
         for i in range(3):
-            bound.noise[i] = changing_gyro_error(bound.admitted, i, measured.x[i])
+            bound.noise[i] = changing_gyro_error(bound.declared_errors, i, measured.x[i])
     if k > 0:
         fill_frame_means(belief, bound)
 
@@ -170,16 +170,16 @@ def evaluate_frame(belief, bound, measured, k, dt):
 @kernel
 def begin_sums(belief, bound, layout, every_type, measured):
     """Start the next frame's sums with this instant, at which the old command is still in effect."""
-    belief.x_then[:] = measured.x
-    bound.noise_then[:] = bound.noise
+    belief.x_before[:] = measured.x
+    bound.noise_before[:] = bound.noise
     total = belief.sums
     total.f[:], total.eta_bar[:] = 0.0, 0.0
     total.G[:], total.Gu[:] = 0.0, 0.0
     total.G_least[:], total.G_most[:] = np.inf, -np.inf
     total.u_least[:], total.u_most[:] = np.inf, -np.inf
-    if bound.own_errors:
-        total.own_per_rad[:], total.own[:] = 0.0, 0.0
-    bound.beyond[:] = 0.0
+    if bound.has_surface_errors:
+        total.surface_error_per_rad[:], total.own[:] = 0.0, 0.0
+    bound.further_error[:] = 0.0
     add_instant_to_sums(belief, bound, layout, every_type)
     total.Gu_first[:] = total.Gu
 
@@ -216,7 +216,7 @@ def predict_acceleration(belief, known, effectiveness, offset, offsets_count):
 def form_innovation(belief, x, dt):
     """Fill `innovation_after_known_faults` (3,) rad/s2 of the elapsed frame, of dt s; x (3,) rad/s: now."""
     for i in range(3):
-        belief.innovation_after_known_faults[i] = (x[i] - belief.x_then[i]) / dt - belief.expected[i]
+        belief.innovation_after_known_faults[i] = (x[i] - belief.x_before[i]) / dt - belief.expected[i]
 
 
 @kernel
@@ -224,5 +224,5 @@ def move_healthy_surfaces(belief, command):
     """Move the healthy surfaces by one JSBSim frame towards the new command (n,) rad."""
     for s in range(command.size):
         belief.commanded[s] = command[s]
-    belief.u_then[:] = belief.u
+    belief.u_before[:] = belief.u
     move(belief.actuators, belief.commanded, belief.u)

@@ -11,10 +11,10 @@ this velocity would change in still air. The difference is the change of the gus
 varies across the span, cannot be measured.
 
 If the design model has no forces (as that of the GTM), the accelerometers supply them. Without either, a
-change of the aircraft's own velocity cannot be told from a gust; no gust estimate is then subtracted from the
-rates. A coarse estimate, for which lift balances the weight, is still computed. A law that uses the vanes
-moves the surfaces with the gust, which looks like a loss; the detector corrects its evidence by the coarse
-estimate (likelihood.py).
+change of the aircraft's own velocity cannot be distinguished from a gust; no gust estimate is then subtracted
+from the rates. A coarse estimate, for which lift balances the weight, is still computed. A law that uses the
+vanes moves the surfaces with the gust, which looks like a loss; the detector corrects its evidence by the
+coarse estimate (likelihood.py).
 
 V is the speed relative to the field of gusts. The mean wind carries that field [MIL-F-8785C, 3.7.1], so V is
 the speed relative to the mean air. The airspeed differs from V by the gust itself. The gust velocity is the

@@ -1,4 +1,4 @@
-"""The informed test, which knows the fault and its onset: no test detects the fault more often.
+"""The informed test, which is given the fault and its onset: no test detects the fault more often.
 
 All that is declared is taken as Gaussian. A Kalman filter turns the measurements that plug-ins are given into
 independent innovations of covariance S. A fault phi, rad/s2, adds a known signature s to them. The likelihood
@@ -84,9 +84,11 @@ class Whitening:
         """d after each frame, (n,), of a fault phi (n, 3) rad/s2 that begins with the first of them."""
         return np.sqrt(np.cumsum(np.square(self.respond(phi)).sum(axis=1)))
 
-    def deflection_beside(self, phi: np.ndarray, regressors: np.ndarray, sigma: np.ndarray) -> float:
-        """d of a fault phi (n, 3) rad/s2 beside unknown constants of standard deviation sigma (m,) > 0 times
-        regressors (n, 3, m), from all frames."""
+    def deflection_with_unknowns(self, phi: np.ndarray, regressors: np.ndarray, sigma: np.ndarray) -> float:
+        """d of a fault phi (n, 3) rad/s2 with unknown constants in all frames.
+
+        The constants, of standard deviation sigma (m,) > 0, multiply regressors (n, 3, m).
+        """
         s = self.respond(phi).ravel()
         R = self.respond(regressors).reshape(s.size, sigma.size) * sigma
         explained = R.T @ s

@@ -70,7 +70,7 @@ SEARCH_ROUNDS = 4  # each round reduces the remaining travel to the share of it 
 
 @kernel
 def is_healthy(innovation, bound):
-    """True if the admitted uncertainty alone explains an innovation (3,): |nu| <= bound (3,), rad/s2."""
+    """True if the declared uncertainty alone explains an innovation (3,): |nu| <= bound (3,), rad/s2."""
     within = True
     for i in range(3):
         within = within and abs(innovation[i]) <= bound[i]
@@ -120,38 +120,38 @@ def widen_by_own_errors(fie, bound, innovation, instants):
     """
     s, effect = fie.surface, fie.effect
     axis = largest_axis(effect.Z)
-    before, reach = fie.furthest, max(abs(fie.low), abs(fie.high))
+    before, reach = fie.largest_deflection, max(abs(fie.low), abs(fie.high))
     room, mapped, where = effect.spread[axis], bound.error_map, (fie.low, fie.high)
-    level = map_level(mapped, fie, where, instants)
+    level = level_at_position(mapped, fie, where, instants)
     value = innovation[axis] - effect.offset[axis]
     earlier = 2.0 * before / instants if instants > 1 else 0.0
     for _ in range(SEARCH_ROUNDS):
-        own = max(bound.own_per_rad[axis, s] * (reach + earlier) - bound.own[axis, s], 0.0)
-        own += bound.beyond[level, axis]
+        own = max(bound.surface_error_per_rad[axis, s] * (reach + earlier) - bound.own[axis, s], 0.0)
+        own += bound.further_error[level, axis]
         low, high = consistent_parameters(
             value, bound.frame[axis] + room + own, effect.Z[axis], fie.low, fie.high
         )
         if low > high:
             break
         reach, where = min(reach, max(abs(low), abs(high))), (low, high)
-        level = map_level(mapped, fie, where, instants)
-    fie.furthest = reach
+        level = level_at_position(mapped, fie, where, instants)
+    fie.largest_deflection = reach
     if mapped.anywhere:
-        fie.used = travel_share_used(mapped, s, where, fie.used, instants)
+        fie.travel_share = travel_share_used(mapped, s, where, fie.travel_share, instants)
     for i in range(3):
-        effect.spread[i] += max(bound.own_per_rad[i, s] * (reach + earlier) - bound.own[i, s], 0.0)
-        effect.spread[i] += bound.beyond[level, i]
+        effect.spread[i] += max(bound.surface_error_per_rad[i, s] * (reach + earlier) - bound.own[i, s], 0.0)
+        effect.spread[i] += bound.further_error[level, i]
 
 
 @kernel
-def map_level(mapped, fie, where, instants):
+def level_at_position(mapped, fie, where, instants):
     """The level of the error map that covers a surface at a mean position within `where`, (low, high) rad.
 
     It is 0 without a map.
     """
     if not mapped.anywhere:
         return 0
-    return level_covering(mapped, travel_share_used(mapped, fie.surface, where, fie.used, instants))
+    return level_covering(mapped, travel_share_used(mapped, fie.surface, where, fie.travel_share, instants))
 
 
 @kernel
@@ -233,11 +233,11 @@ ESTIMATOR = record(
     low=float, high=float,  # the known set of theta
     excluded=int, excluded_at_s=float, ignored_axes=(int, 3), xhat=3, residual=3, lower=3, upper=3,
     confirmed=int, weakly_excluded=int, excluded_by_likelihood=int,  # by likelihood ratios
-    omega=3, rise=3, fall=3, bound=3, bound_eta=3, bound_noise=3, theta=3, covariance=3,
+    omega=3, positive_Z=3, negative_Z=3, bound=3, bound_eta=3, bound_noise=3, theta=3, covariance=3,
     effect=EFFECT, block_effect=EFFECT,  # of the frame; mean over a block
-    furthest=float, used=float,  # rad from neutral, share of its travel, where it can have been in the frame
+    largest_deflection=float, travel_share=float,  # that it can have had: rad; share of its travel
     # reach in the bank (filters.py), and sets
-    across=3, reach_low=(MAX_POLES, 4), reach_high=(MAX_POLES, 4), theta_low=3, theta_high=3,
+    parity_direction=3, reach_low=(MAX_POLES, 4), reach_high=(MAX_POLES, 4), theta_low=3, theta_high=3,
 )  # fmt: skip
 
 
@@ -300,10 +300,10 @@ def configure_isolation(
         fie["low"], fie["high"] = PARAMETER_SET[kind] if kind == LOSS else reach[:, surface]
         if config.pairs:  # each plane by itself: pitch by its two surfaces, roll and yaw by theirs
             fie["ignored_axes"] = (1, 0, 1) if aircraft.dominant_axis[surface] == PITCH else (0, 1, 0)
-    # Damage is outside the class: what is merely left when chance has excluded the others is not yet at
-    # fault.
-    doubted = DAMAGE_POSSIBLE if config.weighs_chance and aircraft.damage else 0
-    isolation["estimator"]["weakly_excluded"] = doubted
+    # Damage is outside the class: with declared damage, the last fault left after statistical exclusion is
+    # not isolated yet.
+    weakly_excluded = DAMAGE_POSSIBLE if config.weighs_chance and aircraft.damage else 0
+    isolation["estimator"]["weakly_excluded"] = weakly_excluded
     isolation["config"]["patience_s"] = NAMING_DELAY_S if aircraft.damage else 0.0
     lost = {surface for case in aircraft.damage.values() for surface in case.takes}
     isolation["config"]["taken"] = [surface in lost for surface in aircraft.surfaces]
@@ -332,7 +332,7 @@ def update_hypothesis(isolation, fie, bank, bound, config, G, Gu, spread):
     effect = fie.effect
     fill_hypothesis(fie.kind, fie.surface, G, Gu, effect.offset, effect.Z)
     set_spread(effect, spread, fie.surface)
-    if (bound.own_errors or bound.error_map.anywhere) and fie.kind == POSITION:
+    if (bound.has_surface_errors or bound.error_map.anywhere) and fie.kind == POSITION:
         widen_by_own_errors(fie, bound, bank.output.innovation, config.instants)
     if isolation.config.memory:
         advance_reach(bank, fie, config.dt)
@@ -366,7 +366,7 @@ def update_residual(fie, thresholds, x):
         fie.residual[i] = x[i] - fie.xhat[i]
         low, high, omega, theta, bound = fie.low, fie.high, fie.omega[i], fie.theta[i], fie.bound[i]
         if thresholds == INTERVAL_THRESHOLD:
-            limits = interval_limits(low, high, fie.rise[i], fie.fall[i], omega, theta, bound)
+            limits = interval_limits(low, high, fie.positive_Z[i], fie.negative_Z[i], omega, theta, bound)
         elif thresholds == CONSTANT_THRESHOLD:
             limits = -bound, bound
         else:
@@ -394,7 +394,7 @@ def is_possible(isolation, fie, bank, frame_bound, abrupt, x, started):
 
 
 @kernel
-def hold_isolation_thresholds(isolation, constant):
+def set_isolation_thresholds(isolation, constant):
     """Replace the adaptive thresholds by a constant, rad/s."""
     for fie in isolation.estimator[: isolation.config.n]:
         fie.bound[:] = constant
@@ -478,22 +478,22 @@ def joint_least_squares_step(fie, forgetting):
 
 
 @kernel
-def predict_estimator(isolation, fie, bound, x, believed, dt):
+def predict_estimator(isolation, fie, bound, x, predicted_acceleration, dt):
     """Advance one estimator by a frame.
 
-    x (3,) rad/s: at the start of the frame; believed (3,) rad/s2: mean of f + G u over the frame; fie.effect
-    must be that of this frame.
+    x (3,) rad/s: at the start of the frame; predicted_acceleration (3,) rad/s2: mean of f + G u over
+    the frame; fie.effect must be that of this frame.
     """
     for i in range(3):
         base, Z, theta, a = fie.effect.offset[i], fie.effect.Z[i], fie.theta[i], isolation.config.decay[i]
-        fie.xhat[i] = x[i] + dt * (believed[i] + base + Z * theta) + a * (fie.xhat[i] - x[i])
+        fie.xhat[i] = x[i] + dt * (predicted_acceleration[i] + base + Z * theta) + a * (fie.xhat[i] - x[i])
     adapt_estimate(isolation, fie, dt)
     for i in range(3):
         Z, a = fie.effect.Z[i], isolation.config.decay[i]
-        fie.rise[i] = a * fie.rise[i] + dt * max(Z, 0.0)
-        fie.fall[i] = a * fie.fall[i] + dt * min(Z, 0.0)
+        fie.positive_Z[i] = a * fie.positive_Z[i] + dt * max(Z, 0.0)
+        fie.negative_Z[i] = a * fie.negative_Z[i] + dt * min(Z, 0.0)
         fie.bound_eta[i] = bound_step(fie.bound_eta[i], bound.eta_bar[i] + fie.effect.spread[i], a, dt)
-        fie.bound_noise[i] = noise_step(fie.bound_noise[i], bound.noise_then[i], a)
+        fie.bound_noise[i] = noise_step(fie.bound_noise[i], bound.noise_before[i], a)
         fie.bound[i] = fie.bound_eta[i] + fie.bound_noise[i] + bound.noise[i]
 
 
@@ -515,14 +515,14 @@ def adapt_estimate(isolation, fie, dt):
 
 
 @kernel
-def predict_estimators(isolation, bound, x, believed, dt):
+def predict_estimators(isolation, bound, x, predicted_acceleration, dt):
     """Advance the estimators by a frame; arguments as in `predict_estimator`."""
     for fie in isolation.estimator[: isolation.config.n]:
-        predict_estimator(isolation, fie, bound, x, believed, dt)
+        predict_estimator(isolation, fie, bound, x, predicted_acceleration, dt)
 
 
 @kernel
-def update_likelihood_exclusion(fie, tests, blocks, isolation, loss_of, abrupt, hidden):
+def update_likelihood_exclusion(fie, tests, blocks, isolation, loss_estimator, abrupt, hidden):
     """Fill `excluded_by_likelihood` of estimator fie; update its `confirmed` and `weakly_excluded`.
 
     hidden: a gust may hide an error of a vane from the sensor monitor. An exclusion may then be the effect of
@@ -533,11 +533,15 @@ def update_likelihood_exclusion(fie, tests, blocks, isolation, loss_of, abrupt, 
     fie.excluded_by_likelihood = 0
     if not fie.confirmed and (fie.weakly_excluded or not abrupt):
         fie.confirmed = statistical.confirms_loss(
-            tests, blocks, others, loss_of, s
+            tests, blocks, others, loss_estimator, s
         )  # what follows later may be its end
-    if fie.confirmed or not statistical.excludes_loss(tests, blocks, others, loss_of, s, False, abrupt):
+    if fie.confirmed or not statistical.excludes_loss(
+        tests, blocks, others, loss_estimator, s, False, abrupt
+    ):
         return
-    fie.excluded_by_likelihood = statistical.excludes_loss(tests, blocks, others, loss_of, s, True, abrupt)
+    fie.excluded_by_likelihood = statistical.excludes_loss(
+        tests, blocks, others, loss_estimator, s, True, abrupt
+    )
     fie.weakly_excluded = max(fie.weakly_excluded, 1)
     if fie.excluded_by_likelihood and hidden:
         for other in others[: isolation.config.n]:

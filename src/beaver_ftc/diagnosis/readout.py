@@ -17,8 +17,8 @@ class Estimator(NamedTuple):
     """An isolation estimator, of the hypothesis that one surface has lost effectiveness (kind LOSS) or is at
     a position (kind POSITION).
 
-    low, high: known set of its parameter. axes: those on which its residuals count. across (3,): direction in
-    which no effect of the fault shows, zero where it is not used.
+    low, high: known set of its parameter. axes: those on which its residuals count. parity_direction (3,):
+    direction in which the fault has no effect, zero where it is not used.
     """
 
     kind: int
@@ -26,7 +26,7 @@ class Estimator(NamedTuple):
     high: float
     excluded: bool
     axes: tuple[int, ...]
-    across: np.ndarray
+    parity_direction: np.ndarray
 
 
 class Layout(NamedTuple):
@@ -34,22 +34,22 @@ class Layout(NamedTuple):
     position, -1 where there is none."""
 
     dominant_axis: tuple[int, ...]
-    loss_of: tuple[int, ...]
-    position_of: tuple[int, ...]
+    loss_estimator: tuple[int, ...]
+    position_estimator: tuple[int, ...]
 
 
 class TypesConfig(NamedTuple):
     """How fault types are examined.
 
     single_instant: a frame, or block, shows one instant. instants: JSBSim frames in a frame. returns: a
-    surface let go comes back by its actuator. patience: blocks in half of the slowest oscillation.
+    released surface returns by its actuator. half_cycle_frames: blocks in half of the slowest oscillation.
     block_frames: frames in a block, 1 where every frame is examined by itself; block_s: its duration.
     """
 
     single_instant: bool
     instants: int
     returns: bool
-    patience: int
+    half_cycle_frames: int
     block_frames: int
     block_s: float
     dt_s: float
@@ -77,7 +77,7 @@ class SurfaceTypes(NamedTuple):
 
 
 class Bound(NamedTuple):
-    """The admitted uncertainty, by axis (3,).
+    """The declared uncertainty, by axis (3,).
 
     eta_bar_rad_s2: bound on the model's error over the frame; noise_rad_s: change of a rate's reading by
     errors of its gyro. inertia: share of the inertial coupling; constant_rad_s2; earth_rate_rad_s. Of gyros:
@@ -154,7 +154,7 @@ class SensorTest(NamedTuple):
     """One redundancy test of the sensor monitor.
 
     residual, of the elapsed step; filtered and bound (poles,): through the filters. rate, noise: part of the
-    bound that grows with time (per s) and that does not; air: share of `gusts` in it.
+    bound that grows with time (per s) and that does not; air: share of `gust_change_bound` in it.
     """
 
     residual: float
@@ -168,7 +168,7 @@ class SensorTest(NamedTuple):
 class SensorMonitor(NamedTuple):
     """The sensor monitor. enabled; alarmed: an alarm of its own stands.
 
-    furthest: number of the test nearest its bound, share: how near, 1 at the bound; test: its numbers.
+    largest_test: number of the test nearest its bound, share: how near, 1 at the bound; test: its numbers.
     named: number of the sensor that is named, -1 for none; replaced (sensors,): readings not used any more.
     step_s; gusts (poles,): a gust's changes through the filters. predicted, error (sensors,): readings as
     redundancy predicts them, and how far off each may be. engine (2,): speed rpm, manifold pressure inHg, as
@@ -177,7 +177,7 @@ class SensorMonitor(NamedTuple):
 
     enabled: bool
     alarmed: bool
-    furthest: int
+    largest_test: int
     share: float
     test: SensorTest
     named: int
@@ -245,8 +245,9 @@ class DiagnosisReadout:
         """How fault types are examined."""
         config = self._fdi["types"]["config"]
         return TypesConfig(
-            bool(config["whole"]), int(config["instants"]), bool(config["returns"]), int(config["patience"]),
-            int(config["length"]), float(config["span_s"]), float(config["dt"]),
+            bool(config["whole"]), int(config["instants"]), bool(config["released_returns"]),
+            int(config["half_cycle_frames"]),
+            int(config["length"]), float(config["block_s"]), float(config["dt"]),
         )  # fmt: skip
 
     @cached_property
@@ -261,12 +262,13 @@ class DiagnosisReadout:
 
     @cached_property
     def bound(self) -> Bound:
-        """The admitted uncertainty."""
+        """The declared uncertainty."""
         bound = self._fdi["bound"]
-        admitted = bound["admitted"]
-        known = bool(admitted["any"])
+        declared_errors = bound["declared_errors"]
+        known = bool(declared_errors["any"])
         offset, steady, slope = (
-            admitted[name][:3].copy() if known else np.zeros(3) for name in ("offset", "steady", "slope")
+            declared_errors[name][:3].copy() if known else np.zeros(3)
+            for name in ("offset", "steady", "slope")
         )
         return Bound(
             eta_bar_rad_s2=bound["eta_bar"].copy(), noise_rad_s=bound["noise"].copy(),
@@ -342,9 +344,9 @@ def recorded_always(fdi: np.void, n: int, every_type: bool) -> dict[str, np.ndar
         "types": surfaces["feasible"]["excluded"],
     }  # fmt: skip
     if every_type:
-        orders = surfaces["orders"]
-        views |= {"told_least": orders["low"], "told_most": orders["high"]}
-        views |= {name: orders[name] for name in ("least", "greatest")}
+        commands = surfaces["commands"]
+        views |= {"command_low": commands["low"], "command_high": commands["high"]}
+        views |= {name: commands[name] for name in ("least", "greatest")}
     return views
 
 
@@ -381,7 +383,7 @@ def alarm_flags(fdi: np.void) -> tuple[np.int64, np.int64]:
 def _estimator(fie: np.void) -> Estimator:
     axes = tuple(np.flatnonzero(fie["ignored_axes"] == 0).tolist())
     ends = float(fie["low"]), float(fie["high"])
-    return Estimator(int(fie["kind"]), *ends, bool(fie["excluded"]), axes, fie["across"].copy())
+    return Estimator(int(fie["kind"]), *ends, bool(fie["excluded"]), axes, fie["parity_direction"].copy())
 
 
 def _surface(surface: np.void) -> SurfaceTypes:
@@ -409,13 +411,13 @@ def _hypothesis(one: np.void) -> Hypothesis:
 def read_sensor_monitor(monitor: np.void) -> SensorMonitor:
     """The sensor monitor, of its record (dtype `SENSOR_MONITOR`)."""
     output, config, memory = monitor["output"], monitor["step"]["config"], monitor["step"]["memory"]
-    furthest = int(output["largest_test"])
-    test = monitor["step"]["test"][furthest]
+    largest_test = int(output["largest_test"])
+    test = monitor["step"]["test"][largest_test]
     residual, rate, noise, air = (float(test[name]) for name in ("residual", "rate", "noise", "air"))
     of_test = SensorTest(residual, rate, noise, air, test["filtered"].copy(), test["bound"].copy())
     return SensorMonitor(
-        bool(monitor["config"]["enabled"]), bool(output["alarmed"]), furthest, float(output["share"]),
+        bool(monitor["config"]["enabled"]), bool(output["alarmed"]), largest_test, float(output["share"]),
         of_test, int(output["named"]),
-        output["replaced"].astype(bool), float(config["h"]), config["gusts"].copy(),
+        output["replaced"].astype(bool), float(config["h"]), config["gust_change_bound"].copy(),
         memory["predicted"].copy(), memory["error"].copy(), memory["command"].copy(),
     )  # fmt: skip

@@ -14,7 +14,7 @@ from beaver_ftc.plugins import DETECTORS, compiled_rows
 from beaver_ftc.scenario.schema import Scenario
 
 NOT_ISOLATED, UNANTICIPATED = -1, -2
-DAMAGE_POSSIBLE = 2  # an estimator doubted for the damage that the aircraft declares
+DAMAGE_POSSIBLE = 2  # value of `weakly_excluded`: declared damage may have excluded the others
 INTERVAL_THRESHOLD, PUBLISHED_THRESHOLD, CONSTANT_THRESHOLD = 0, 1, 2  # thresholds
 EITHER_DETECTOR, WORST_CASE_DETECTOR, STATISTICAL_DETECTOR = 0, 1, 2  # whose alarms count
 _AUTHORITIES = {
@@ -24,7 +24,7 @@ _AUTHORITIES = {
 }
 LOSS, POSITION = 0, 1  # kinds of hypothesis: isolation.py
 PITCH_GROUP, LATERAL_GROUP = 0, 1  # groups of surfaces
-ROLL, PITCH, YAW, SIDE_FORCE, NORMAL_FORCE = range(5)  # axes, and the accelerometers beside them: forces.py
+ROLL, PITCH, YAW, SIDE_FORCE, NORMAL_FORCE = range(5)  # axes, and components of the force: forces.py
 
 
 @sized
@@ -38,8 +38,8 @@ def layout_dtype(n: int) -> np.dtype:
     """Axis and group of each of n surfaces, the other one of a group of two, or -1; the main surface of each
     axis; the estimators of a surface's loss and position, or -1."""
     return record(
-        dominant_axis=(int, n), group=(int, n), partner=(int, n), main=(int, 3), loss_of=(int, n),
-        position_of=(int, n),
+        dominant_axis=(int, n), group=(int, n), partner=(int, n), main=(int, 3), loss_estimator=(int, n),
+        position_estimator=(int, n),
     )  # fmt: skip
 
 
@@ -67,13 +67,13 @@ def configure_layout(layout: np.void, members: Sequence[tuple[str, int, int]], a
     layout["main"] = leading_surfaces(aircraft)
     layout["dominant_axis"] = aircraft.dominant_axis
     layout["group"] = [PITCH_GROUP if axis == PITCH else LATERAL_GROUP for axis in aircraft.dominant_axis]
-    layout["partner"] = layout["loss_of"] = layout["position_of"] = -1
+    layout["partner"] = layout["loss_estimator"] = layout["position_estimator"] = -1
     for names in aircraft.groups.values():
         if len(names) == 2:
             one, other = (index[name] for name in names)
             layout["partner"][one], layout["partner"][other] = other, one
     for e, (_, kind, surface) in enumerate(members):
-        layout["loss_of" if kind == LOSS else "position_of"][surface] = e
+        layout["loss_estimator" if kind == LOSS else "position_estimator"][surface] = e
 
 
 def leading_surfaces(aircraft: Aircraft) -> list[int]:

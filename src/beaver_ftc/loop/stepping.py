@@ -81,7 +81,7 @@ def hold(frames):
     belief = frame.belief
     frame.held = 1
     belief.commanded[:] = frame.held_rad
-    belief.u[:] = belief.u_then
+    belief.u[:] = belief.u_before
     move(belief.actuators, belief.commanded, belief.u)
     hand_over(frame.truth, belief.commanded, frame.control.power.output)
 

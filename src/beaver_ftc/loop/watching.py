@@ -77,17 +77,17 @@ def news(frames, known):
         for plane in range(fdi.types.pair.alarmed.size):
             changed |= replace(known, 5 + plane, fdi.types.pair.alarmed[plane])
         for s in range(fdi.types.surface.size):
-            changed |= news_of(fdi.types.surface[s], fdi.types.config.patience, known[8 + 5 * s :])
+            changed |= news_of(fdi.types.surface[s], fdi.types.config.half_cycle_frames, known[8 + 5 * s :])
     return changed
 
 
 @kernel
-def news_of(surface, patience, known):
+def news_of(surface, half_cycle_frames, known):
     """The same of one surface, where every type is asked for; known (5 and more,): its own."""
     bits = 0
     for kind in range(surface.feasible.excluded.size):
         bits = 2 * bits + surface.feasible.excluded[kind]
-    early = surface.evidence.frames - surface.evidence.quiet < patience
+    early = surface.evidence.frames - surface.evidence.rest_frames < half_cycle_frames
     changed = replace(known, 0, surface.status.named) | replace(known, 1, surface.status.source)
     changed |= replace(known, 2, surface.status.type) | replace(known, 3, bits)
     return changed | replace(known, 4, 1 if early else 0)

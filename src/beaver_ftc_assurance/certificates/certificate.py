@@ -383,7 +383,7 @@ def _of_exclusion(scenario: Scenario, tape: Tape, history: History, e: int, alar
         asked=asked,
     )  # fmt: skip
     since_alarm = ([Term(d, config.isolation_pole_per_s, alarm, k)] for d in directions(asked) if k > alarm)
-    filtered = _filtered(scenario, tape, e, estimator.across, asked, k)
+    filtered = _filtered(scenario, tape, e, estimator.parity_direction, asked, k)
     found = _first_violated(chain(of_one_frame(k, of), filtered, since_alarm), of, history, tape)
     if found is not None:
         return found

@@ -16,7 +16,7 @@ from beaver_ftc.diagnosis.detection import (
     CHANCE,
     advance_block,
     filter_block,
-    reach_of_block,
+    response_of_block,
     slot_to_reset,
     whiten_frame,
 )
@@ -285,7 +285,7 @@ def follow(blocks, inputs, drift, of_frame, states, sums, room, dt):
             for j in range(block.n):
                 block.P_dd[i, j] += drift[k, i, j]
         advance_block(block, dt)
-        reach_of_block(block, given[BOUNDED], dt)
+        response_of_block(block, given[BOUNDED], dt)
         for c in range(len(states)):
             whiten_frame(block, states[c], inputs[k, c], dt, g[c])
         room[2] = 0.0

@@ -131,7 +131,7 @@ def _swing(seen: Seen, actuator: Actuator, config: TypesConfig) -> Iterator[Foun
     """On one side for longer than half of the slowest oscillation."""
     for axis, low in enumerate(seen.least.T):
         begins = seen.since(seen.wrong & (low > seen.command + _LEAST))
-        for k in np.flatnonzero(np.arange(len(begins)) - begins > config.patience)[:1].tolist():
+        for k in np.flatnonzero(np.arange(len(begins)) - begins > config.half_cycle_frames)[:1].tolist():
             run = range(int(begins[k]), k + 1)
             slowest = pi / seen.slowest_rad_s / config.dt_s
             pairs = [(k - run[0], slowest), *_beyond(low - seen.command, run)]
@@ -199,7 +199,7 @@ def _seen(
     slope = of.slope[here]
     commands = -sign * of.offset[here] / np.where(slope == 0.0, np.inf, slope)
     command = commands[:, np.abs(slope).sum(axis=0).argmax()]
-    told = tape.told_most if sign > 0 else -tape.told_least
+    told = tape.command_high if sign > 0 else -tape.command_low
     reach = np.column_stack([tape.least[here, s, 0], tape.greatest[here, s, 0]])[:, ::sign] * sign
     room = np.maximum(0.0, (command[:, None] - reach) * (1.0, -1.0)) * (not whole)
     actuator = tape.last.diagnosis.surfaces[s].actuator

@@ -26,7 +26,7 @@ def of_alarm(monitor: SensorMonitor) -> Document:
 
     monitor: at the alarm.
     """
-    number, failed = monitor.furthest, monitor.share > 1.0
+    number, failed = monitor.largest_test, monitor.share > 1.0
     if failed and number >= N_COMPUTED:
         return {"because": NOT_COMPUTED}
     if failed:
@@ -53,7 +53,7 @@ def as_logged(said: Document, rows: Mapping[str, np.ndarray]) -> Document:
 def _looks(monitor: SensorMonitor) -> Iterator[list[float]]:
     """Reading, its prediction, and by how much sound instruments may differ: of the last look; and what the
     filter and its bound keep of those before."""
-    test, number = monitor.test, monitor.furthest
+    test, number = monitor.test, monitor.largest_test
     if number >= RPM:
         predicted = float(monitor.engine[number - RPM])
         within = float(monitor.error[ENGINE_SPEED + number - RPM]) + 1e-6

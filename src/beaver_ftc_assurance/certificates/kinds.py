@@ -36,7 +36,7 @@ def excluded_types(tape: Tape) -> Iterator[tuple[int, int, int]]:
     """(surface, type, frame) of each type excluded on a surface that can be at fault."""
     layout = tape.alarm.diagnosis.layout
     for s, kinds in enumerate(tape.types[-1]):
-        if tape.excluded[-1][layout.position_of[s]]:
+        if tape.excluded[-1][layout.position_estimator[s]]:
             continue
         for kind in np.flatnonzero(kinds):
             yield s, int(kind), tape.first + int(np.argmax(tape.types[:, s, kind] > 0))
@@ -69,7 +69,7 @@ def row_of(tape: Tape, s: int, kind: int) -> int:
 def hypothesis(tape: Tape, s: int, kind: int) -> Hypothesis:
     """What a fault of this type on surface s adds to the innovation."""
     diagnosis = tape.alarm.diagnosis
-    e = diagnosis.layout.position_of[s]
+    e = diagnosis.layout.position_estimator[s]
     Gu, G, spread = -tape.offset[:, e], tape.slope[:, e], tape.spread[:, e]
     asked = diagnosis.estimators[e].axes
     if diagnosis.types_config.block_frames > 1:  # blocks: the axis on which no effect changes its sign

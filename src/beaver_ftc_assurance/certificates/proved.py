@@ -64,7 +64,7 @@ def _log(frames: np.ndarray, flown: Iterable[int], scenario: Scenario, recorder:
             shares = chance.shares(diagnosis, surfaces)
         if diagnosis.sensor_monitor.enabled:
             monitor = diagnosis.sensor_monitor
-            shares |= {"watch_share": monitor.share, "watch_test": monitor.furthest}
+            shares |= {"watch_share": monitor.share, "watch_test": monitor.largest_test}
         values = [frame.alarmed, *diagnosis.excluded, *shares.values()]  # as in a log of ours
         rows.append(np.concatenate([[k / scenario.rate_hz], *of_frame, values]))
     log.open([*columns, *shares])

@@ -317,7 +317,7 @@ class TestVerdict:
     )  # fmt: skip
     def test_what_may_be_of_no_use(self, frame, every_type, measure, target, surface, doubtful):
         control, assessment = frame["control"], frame["assessment"]
-        assessment["every_type"], assessment["measure"][surface] = every_type, measure
+        assessment["every_type"], assessment["accommodation_mode"][surface] = every_type, measure
         parts = assessment, control["rejecting"]["memory"]["sums"], control["layout"]
         assert bool(rejecting.is_doubtful(*parts, surface, target, 0.1)) is doubtful
 
@@ -328,7 +328,7 @@ class TestVerdict:
         out["command"], out["saturated"], surfaces["effectiveness"] = 0.3, 1, 1.0
         frame["faults"]["immovable"][RUDDER] = 1  # which only the oracle may know
         surfaces["given_up"][RUDDER] = why == "withdrawn"
-        assessment["measure"], assessment["measure"][RUDDER] = -1, GIVE_UP
+        assessment["accommodation_mode"], assessment["accommodation_mode"][RUDDER] = -1, GIVE_UP
         surfaces["effectiveness"][RUDDER] = 0.0 if why == "fixed" else 0.5
         accommodation.park_failed_surfaces(surfaces, assessment, frame["faults"], why == "truth")
         allocation.park(out, control["layout"], surfaces["parked"])

@@ -84,7 +84,7 @@ def test_a_loss_that_changed_inside_the_frame_stays_within_the_extremes(n, momen
         belief["means"]["Gu"][0, 0],
         belief["means"]["Gu_spread"][0, 0],
     )
-    fie["across"][0] = 1.0
+    fie["parity_direction"][0] = 1.0
     effect = (theta0 * moment0 + (n - 1) * theta * moment) / n
     for low, high in limits(frames, 0):
         assert low - 1e-12 <= effect <= high + 1e-12

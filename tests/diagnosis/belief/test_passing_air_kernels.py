@@ -7,7 +7,7 @@ from beaver_ftc.aircraft import load
 from beaver_ftc.design.dryden import Dryden
 from beaver_ftc.diagnosis import bounds, gusts
 from beaver_ftc.diagnosis import bounds as admitting
-from beaver_ftc.diagnosis.bounds import admitted_dtype
+from beaver_ftc.diagnosis.bounds import declared_errors_dtype
 from beaver_ftc.scenario.diagnosis import Bounds
 from flying import declared_in
 
@@ -113,13 +113,17 @@ def test_turbulence_is_as_strong_as_the_standard_has_it_at_a_height_and_no_less_
     by_gusts = [rolling, vertical * (np.pi / 4 / SPAN_M) ** 2, vertical * (np.pi / 3 / SPAN_M) ** 2]
     assert record["memory"]["intensity"] == pytest.approx(by_gusts)
 
-    admitted = record_of(admitted_dtype(4))
-    admitted["gust_aloft"] = admitting.GUST_LIMIT_SIGMA * Dryden(turbulence).rotation_limit_rad_s(SPAN_M)
-    admitted["gust_low"] = admitting.GUST_LIMIT_SIGMA * Dryden(turbulence).low_rotation_limit_rad_s(SPAN_M)
-    admitted["altitude_off"], admitted["altitude_slope"] = 0.7, 0.02
-    bounds.set_gust_bound(admitted, reading)
+    declared_errors = record_of(declared_errors_dtype(4))
+    declared_errors["gust_aloft"] = admitting.GUST_LIMIT_SIGMA * Dryden(turbulence).rotation_limit_rad_s(
+        SPAN_M
+    )
+    declared_errors["gust_low"] = admitting.GUST_LIMIT_SIGMA * Dryden(turbulence).low_rotation_limit_rad_s(
+        SPAN_M
+    )
+    declared_errors["altitude_off"], declared_errors["altitude_slope"] = 0.7, 0.02
+    bounds.set_gust_bound(declared_errors, reading)
     sigma = max(1.9 * LOW[turbulence] / np.sqrt(h * b), 1.9 * HIGH[turbulence] / np.sqrt(1750.0 * b))
-    assert admitted["gust"] == pytest.approx(6.0 * sigma)
+    assert declared_errors["gust"] == pytest.approx(6.0 * sigma)
 
 
 def test_below_2000_ft_the_lateral_gust_and_the_layer_between_are_weaker_than_reckoned_with():

@@ -263,7 +263,7 @@ def test_the_unknown_is_larger_than_what_terms_give_far_from_where_they_were_fit
 def new_detector(**fields):
     fdi = new_fdi()
     record = fdi["statistical"]
-    record["tests"]["share"], record["noise"]["rapidity"] = 0.25, 2.0
+    record["tests"]["share"], record["noise"]["walk_intensity"] = 0.25, 2.0
     record["noise"]["jitter"], record["noise"]["deflection"] = (0.1, 0.2, 0.3), (0.01, 0.02, 0.03)
     for block, axes in zip(record["block"], ((1,), (0, 2), (0, 2)), strict=True):
         block["n"], block["axis"][: len(axes)], block["drift_scale"] = len(axes), axes, 1.0
@@ -312,7 +312,7 @@ def test_where_nothing_is_bounded_a_little_is_reckoned_with():
 
 def test_regressors_are_what_each_coefficient_multiplies():
     """Coefficients times regressors give f + G u without its inertia coupling, here at no rates."""
-    fdi, record, design = new_detector(share=1.0, tolerated=1)
+    fdi, record, design = new_detector(share=1.0, has_tolerances=1)
     record["block"]["regressor"] = 9.0
     x = np.zeros(3)
     Statistical.prepare(record, fdi, design, x, Y, U)
@@ -330,7 +330,7 @@ def test_regressors_are_what_each_coefficient_multiplies():
 
 
 def test_instants_inside_a_frame_add_to_the_mean():
-    fdi, record, design = new_detector(tolerated=1)
+    fdi, record, design = new_detector(has_tolerances=1)
     Statistical.prepare(record, fdi, design, X, Y, U)
     once = record["block"]["regressor"].copy()
     for _ in range(3):
@@ -354,7 +354,7 @@ def test_what_is_known_of_a_fault_is_expected(offsets_count):
     off = mean["G"] @ offset if offsets_count else 0.0
     expected = mean["acceleration"] + mean["Gu"] @ (effectiveness - 1.0) + off
     assert belief["expected"] == pytest.approx(expected)
-    belief["x_then"], x = (0.1, 0.2, 0.3), np.array([0.3, 0.1, 0.3])
+    belief["x_before"], x = (0.1, 0.2, 0.3), np.array([0.3, 0.1, 0.3])
     expectation.form_innovation(belief, x, 0.5)
     innovation = np.array([0.4, -0.2, 0.0]) - expected
     assert belief["innovation_after_known_faults"] == pytest.approx(innovation)

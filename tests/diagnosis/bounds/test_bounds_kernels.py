@@ -9,7 +9,7 @@ from beaver_ftc.aircraft import load
 from beaver_ftc.design.context import SIGNALS
 from beaver_ftc.design.model import design_record, inertia_coefficients
 from beaver_ftc.diagnosis import bounds as bound_kernels
-from beaver_ftc.diagnosis.bounds import admitted_dtype
+from beaver_ftc.diagnosis.bounds import declared_errors_dtype
 from beaver_ftc.scenario.declared import SensorErrors
 from beaver_ftc.scenario.schema import load as scenario
 from flying import declared_in
@@ -42,7 +42,7 @@ def test_no_inertia_within_its_tolerance_changes_a_coefficient_by_more():
 
 def admit(**bounds):
     fdi = scenario({"name": "x", "fdi": {"bounds": bounds}}).fdi
-    record = np.zeros(1, admitted_dtype(4))[0]
+    record = np.zeros(1, declared_errors_dtype(4))[0]
     bound_kernels.fill_declared_errors(
         record, declared_in(fdi.bounds, AIRCRAFT), design_record()[0], AIRCRAFT.mass
     )

@@ -46,7 +46,7 @@ def bound(x, y, u, **bounds):
     scenario = Scenario.model_validate({"name": "x", "fdi": {"bounds": bounds}})
     frame = configure_design(scenario, TRAVEL_RAD)[0]
     out = np.zeros(3)
-    add_declared_errors(frame["fdi"]["bound"]["admitted"], frame["belief"]["design"], x, y, u, out)
+    add_declared_errors(frame["fdi"]["bound"]["declared_errors"], frame["belief"]["design"], x, y, u, out)
     return out
 
 
@@ -85,8 +85,8 @@ def test_no_admitted_error_exceeds_the_bound(seed, at_the_corner):
     ym[3] = y[3] * (1 + within(0.01)) + within(20.0)
     moved = u + np.radians([within(deflection_deg) for _ in range(4)])
     error = acceleration(x, y, moved, scale=scale) - acceleration(xm, ym, u)
-    admitted = bound(xm, ym, u, coefficients=tolerance, sensors=SENSORS, deflection_deg=deflection_deg)
-    assert (np.abs(error) <= admitted * (1 + 1e-9)).all()
+    declared_errors = bound(xm, ym, u, coefficients=tolerance, sensors=SENSORS, deflection_deg=deflection_deg)
+    assert (np.abs(error) <= declared_errors * (1 + 1e-9)).all()
 
 
 def test_one_coefficient_alone_attains_its_bound():
@@ -163,8 +163,10 @@ def test_a_surfaces_own_share_of_the_bound_is_its_slope(seed, surface):
     further = u.copy()
     further[surface] = np.sign(u[surface]) * (abs(u[surface]) + 1.0)
     frame = configure_design(Scenario.model_validate({"name": "x", "fdi": {"bounds": bounds}}), TRAVEL_RAD)[0]
-    add_declared_errors(frame["fdi"]["bound"]["admitted"], frame["belief"]["design"], x, y, u, np.zeros(3))
-    fill_error_per_rad(frame["fdi"]["bound"]["admitted"], frame["belief"]["design"], surface)
+    add_declared_errors(
+        frame["fdi"]["bound"]["declared_errors"], frame["belief"]["design"], x, y, u, np.zeros(3)
+    )
+    fill_error_per_rad(frame["fdi"]["bound"]["declared_errors"], frame["belief"]["design"], surface)
     rise = bound(x, y, further, **bounds) - bound(x, y, u, **bounds)
-    assert frame["fdi"]["bound"]["admitted"]["per_rad"][:, surface] == pytest.approx(rise, abs=1e-9)
+    assert frame["fdi"]["bound"]["declared_errors"]["per_rad"][:, surface] == pytest.approx(rise, abs=1e-9)
     assert rise.max() > 0.1

@@ -30,7 +30,7 @@ def fdi(rng):
     """A diagnosis with its views, something in every place that the kernels look at, and air that moves."""
     fdi = new_fdi()
     statistical = fdi["statistical"]
-    statistical["tests"]["keep"], statistical["noise"]["rapidity"] = 0.9, 2.0
+    statistical["tests"]["keep"], statistical["noise"]["walk_intensity"] = 0.9, 2.0
     statistical["noise"]["jitter"], statistical["noise"]["bounded"] = (1e-6, 4e-6, 9e-6), (0.02, 0.03, 0.05)
     for block, n, regressors in zip(statistical["block"], (1, 2, 2), (3, 4, 4), strict=True):
         block["n_regressors"], block["level"] = regressors, 5.0
@@ -48,7 +48,10 @@ def fdi(rng):
     for name in ("damping", "axes", "axes_rate", "turn_variance"):
         holder(air, name)[name] = rng.normal(size=(3, 3))
     air["output"]["turn_variance"] = air["output"]["turn_variance"] @ air["output"]["turn_variance"].T
-    fdi["bound"]["own_per_rad"], fdi["bound"]["own_errors"] = rng.uniform(0.1, 0.4, (3, 4)), 1
+    fdi["bound"]["surface_error_per_rad"], fdi["bound"]["has_surface_errors"] = (
+        rng.uniform(0.1, 0.4, (3, 4)),
+        1,
+    )
     return fdi
 
 
@@ -86,7 +89,7 @@ def declared_along(statistical, m):
         walk += 0.5 * longest_s**2 * turned @ np.diag(air["memory"]["intensity"]) @ turned.T
     moves = float(air["output"]["moving"])
     size = max(bound, LEAST_UNCERTAINTY_RAD_S2)
-    drift = statistical["noise"]["rapidity"] * size**2 + moves * V * m @ walk @ m
+    drift = statistical["noise"]["walk_intensity"] * size**2 + moves * V * m @ walk @ m
     jitter = (np.abs(m) @ np.sqrt(statistical["noise"]["jitter"])) ** 2
     return m**2 @ noise, jitter, bound, drift, moves * m @ air["output"]["turn_variance"] @ m
 
@@ -143,21 +146,25 @@ def test_what_constants_multiply_is_that_of_the_axes_along_the_direction(fdi):
     assert not before.any()
 
 
-@pytest.mark.parametrize(("size", "own_errors"), [(2.0, 1), (2.0, 0), (0.3, 1)])
-def test_of_what_goes_along_a_column_that_may_be_turned_a_share_shows_across(fdi, size, own_errors):
+@pytest.mark.parametrize(("size", "has_surface_errors"), [(2.0, 1), (2.0, 0), (0.3, 1)])
+def test_of_what_goes_along_a_column_that_may_be_turned_a_share_shows_across(fdi, size, has_surface_errors):
     """The column g + e, |e| up to the tolerance of either axis: the most, by its corners, of e across over
     what is left of g + e along; where little is left, a tenth of the column is."""
     view = fdi["statistical"]["views"][PAST_AILERON]
     G, innovation = np.zeros((3, 4)), np.array([0.7, 5.0, -0.4])
-    G[0, AILERON], G[2, AILERON], fdi["bound"]["own_errors"] = 0.8 * size, 0.6 * size, own_errors
+    G[0, AILERON], G[2, AILERON], fdi["bound"]["has_surface_errors"] = (
+        0.8 * size,
+        0.6 * size,
+        has_surface_errors,
+    )
     Across.regress(fdi, view, innovation, Across.turn(fdi, view, G))
     m = view["direction"][[0, 2]]
     along = np.array([m[1], -m[0]])
-    e = fdi["bound"]["own_per_rad"][[0, 2], AILERON]
+    e = fdi["bound"]["surface_error_per_rad"][[0, 2], AILERON]
     corners = [e * (s, t) for s in (-1, 1) for t in (-1, 1)]
     most = max(abs(m @ c) for c in corners)
     least = max(size - max(abs(along @ c) for c in corners), parity.MIN_COLUMN_LENGTH * size)
-    shown = own_errors * most / least * (along @ innovation[[0, 2]])
+    shown = has_surface_errors * most / least * (along @ innovation[[0, 2]])
     n = int(fdi["statistical"]["block"][1]["n_regressors"])
     assert view["block"]["regressor"][n, 0] == pytest.approx(shown)
 
@@ -193,7 +200,7 @@ def test_a_fault_shows_along_every_axis_that_its_column_moves(fdi, axis):
 def test_a_fault_of_any_course_shows_nothing_where_its_surface_moves_nothing(fdi, surface, blind):
     G = np.array([[-9.0, 0.0, 1.2, 0.0], [0.0, -8.0, 0.0, -1.5], [-0.4, 0.0, -3.0, 0.0]])
     statistical, course = fdi["statistical"], np.cumsum(np.random.default_rng(surface).normal(size=20))
-    statistical["n_views"], statistical["tests"]["tolerated"] = 5, 0
+    statistical["n_views"], statistical["tests"]["has_tolerances"] = 5, 0
     for k in range(20):
         Across.observe(fdi, course[k] * G[:, surface], G, 0.05 * G, FLOW, k, False)
     for v, view in enumerate(statistical["views"][:5]):
@@ -202,11 +209,11 @@ def test_a_fault_of_any_course_shows_nothing_where_its_surface_moves_nothing(fdi
         assert (np.abs(view["block"]["lanes"]["correlation"]).max() > 1e-6) == felt
 
 
-@pytest.mark.parametrize(("latched", "tolerated", "frame"), [(False, 1, 6), (True, 1, 6), (False, 0, 7)])
-def test_a_frame_is_seen_along_every_direction(fdi, rng, latched, tolerated, frame):
+@pytest.mark.parametrize(("latched", "has_tolerances", "frame"), [(False, 1, 6), (True, 1, 6), (False, 0, 7)])
+def test_a_frame_is_seen_along_every_direction(fdi, rng, latched, has_tolerances, frame):
     """Each view as a block of its own that is given what matrices say of the frame."""
     statistical = fdi["statistical"]
-    statistical["tests"]["tolerated"], G, Gu = tolerated, *rng.normal(0.0, 3.0, (2, 3, 4))
+    statistical["tests"]["has_tolerances"], G, Gu = has_tolerances, *rng.normal(0.0, 3.0, (2, 3, 4))
     innovation = rng.normal(size=3)
     alone, statistical["n_views"] = [], 2  # enough: the first, and one across a column
     statistical["views"][1] = statistical["views"][PAST_AILERON].copy()
@@ -221,13 +228,13 @@ def test_a_frame_is_seen_along_every_direction(fdi, rng, latched, tolerated, fra
         share = Across.turn(fdi, own, G) if own["surface"] >= 0 else 0.0
         block = own["block"]
         Across.blur(own, statistical, V)
-        if tolerated:
+        if has_tolerances:
             Across.regress(fdi, own, innovation, share)
         Across.sign(fdi, own, Gu)
         block["scratch"][0] = own["direction"][:3] @ innovation
         if not latched:
             likelihood.reset_onset(block, likelihood.slot_to_reset(frame))
-        likelihood.update_block(block, own["bounded"], tolerated, DT, 0.9 if latched else 1.0)
+        likelihood.update_block(block, own["bounded"], has_tolerances, DT, 0.9 if latched else 1.0)
         for name in NAMES:
             assert view["block"][name] == pytest.approx(block[name], rel=1e-12), name
         for name in ("correlation", "information", "overlap", "coefficient_part", "score"):
@@ -245,7 +252,7 @@ def test_views_that_are_not_there_are_not_asked(fdi, rng):
 
 def test_any_hypothesis_beyond_the_level_excludes_whom_it_is_not_felt_of(fdi):
     statistical = fdi["statistical"]
-    statistical["tests"]["alarm_level"], fdi["layout"]["position_of"] = 5.0, range(4)
+    statistical["tests"]["alarm_level"], fdi["layout"]["position_estimator"] = 5.0, range(4)
     statistical["tests"]["enabled"] = fdi["config"]["every_type"] = 1
     for s, fie in enumerate(fdi["isolation"]["estimator"][:4]):
         fie["kind"], fie["surface"], fie["effect"]["Z"] = POSITION, s, np.eye(3, 4)[:, s]

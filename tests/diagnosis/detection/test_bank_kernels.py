@@ -17,7 +17,7 @@ def test_a_filter_and_its_bound_are_convolutions_of_what_went_in():
     believed, eta = rng.normal(size=(frames, 3)), rng.uniform(0.1, 1.0, (frames, 3))
     noise = rng.uniform(0.1, 1.0, (frames + 1, 3))
     for k in range(frames):
-        fdi["bound"]["eta_bar"], fdi["bound"]["noise_then"] = eta[k], noise[k]
+        fdi["bound"]["eta_bar"], fdi["bound"]["noise_before"] = eta[k], noise[k]
         fdi["bound"]["noise"] = noise[k + 1]
         on(filters.update_bank, fdi, x[k + 1], x[k], believed[k])
     innovation = np.diff(x, axis=0) / DT - believed
@@ -73,17 +73,17 @@ def test_the_direction_across_a_fault_is_of_unit_length_and_sees_nothing_of_it()
     fdi["isolation"]["config"]["n"] = 2
     fdi["isolation"]["estimator"]["surface"][:2] = 2, 1
     G = np.array([[0, 0, 3.0, 0], [0, 5.0, 0, 0], [0, 0, -4.0, 0]])
-    on(filters.fix_parity_directions, fdi, G)
-    assert fdi["isolation"]["estimator"]["across"][0] == pytest.approx([-0.8, 0.0, -0.6])
-    assert fdi["isolation"]["estimator"]["across"][0] @ G[:, 2] == pytest.approx(0.0)
-    assert not fdi["isolation"]["estimator"]["across"][1].any()
+    on(filters.set_parity_directions, fdi, G)
+    assert fdi["isolation"]["estimator"]["parity_direction"][0] == pytest.approx([-0.8, 0.0, -0.6])
+    assert fdi["isolation"]["estimator"]["parity_direction"][0] @ G[:, 2] == pytest.approx(0.0)
+    assert not fdi["isolation"]["estimator"]["parity_direction"][1].any()
 
 
 def reach_of(offset, Z, spread, low=-1.0, high=0.5, across=(0.6, 0.0, -0.8)):
     fdi = new_fdi()
     fie = estimator(fdi, low=low, high=high)
     fie["effect"]["offset"], fie["effect"]["Z"], fie["effect"]["spread"] = offset, Z, spread
-    fie["across"] = across
+    fie["parity_direction"] = across
     return fdi, fie
 
 
@@ -94,7 +94,7 @@ def test_what_a_fault_can_have_done_is_the_filtered_extreme_of_what_it_does(seed
     fdi, fie = reach_of(0.2 * rng.normal(size=3), rng.normal(size=3), rng.uniform(0, 0.3, 3))
     for _ in range(3):
         on(filters.advance_reach, fdi, fie)
-    effect, across = fie["effect"], np.vstack([np.eye(3), fie["across"]])
+    effect, across = fie["effect"], np.vstack([np.eye(3), fie["parity_direction"]])
     at_ends = [effect["offset"] + theta * effect["Z"] for theta in (-1.0, 0.5)]
     does = np.array([*at_ends, np.zeros(3)]) @ across.T
     spread = np.abs(across) @ effect["spread"]
@@ -129,7 +129,9 @@ def test_across_its_direction_a_shared_parameter_confines_it_too(side):
     fdi["bank"]["output"]["threshold"][:3] = 0.1
     limit = (0.3 if side > 0 else -0.2) + side * (0.6 + 0.8) * 0.1
     for beyond, within in ((-1e-9, True), (1e-9, False)):
-        fdi["bank"]["output"]["residual"][1] = (limit + side * beyond) * fie["across"]  # a unit vector
+        fdi["bank"]["output"]["residual"][1] = (limit + side * beyond) * fie[
+            "parity_direction"
+        ]  # a unit vector
         assert bool(on(filters.reach_explains, fdi, fie, True)) == within
         assert on(filters.reach_explains, fdi, fie, False)
 
@@ -157,10 +159,10 @@ def test_across_a_fault_is_square_to_its_column_in_roll_and_yaw(size):
     fdi, G = new_fdi(), np.zeros((3, 4))
     fie = estimator(fdi)
     G[:, 0] = size * np.array([0.8, 5.0, -0.6])
-    on(filters.fix_parity_directions, fdi, G)
-    assert fie["across"] == pytest.approx([-0.6, 0.0, -0.8])
-    on(filters.fix_parity_directions, fdi, np.zeros((3, 4)))
-    assert fie["across"] == pytest.approx([-0.6, 0.0, -0.8]), "what moves neither has no direction"
+    on(filters.set_parity_directions, fdi, G)
+    assert fie["parity_direction"] == pytest.approx([-0.6, 0.0, -0.8])
+    on(filters.set_parity_directions, fdi, np.zeros((3, 4)))
+    assert fie["parity_direction"] == pytest.approx([-0.6, 0.0, -0.8]), "what moves neither has no direction"
 
 
 @pytest.mark.parametrize("noisy", [False, True])

@@ -121,7 +121,7 @@ def test_the_detection_estimator_and_its_threshold_are_convolutions(detected):
     x, believed = rng.normal(size=(frames, 3)), rng.normal(size=(frames, 3))
     eta, noise = rng.uniform(0.1, 0.3, (frames, 3)), rng.uniform(0.1, 0.3, (frames + 1, 3))
     for k in range(frames):
-        fdi["bound"]["eta_bar"], fdi["bound"]["noise_then"] = eta[k], noise[k]
+        fdi["bound"]["eta_bar"], fdi["bound"]["noise_before"] = eta[k], noise[k]
         fdi["bound"]["noise"], record["output"]["residual"] = noise[k + 1], 99.0
         on(detection_filters.predict_fdae, fdi, x[k], believed[k], False)
     w = decay ** np.arange(frames)[::-1, None]
@@ -158,21 +158,23 @@ def instants(count, seed=5):
 
 
 @pytest.mark.parametrize("count", [1, 4])
-@pytest.mark.parametrize("own_errors", [0, 1])
-def test_means_over_a_frame_are_of_its_instants(count, own_errors):
+@pytest.mark.parametrize("has_surface_errors", [0, 1])
+def test_means_over_a_frame_are_of_its_instants(count, has_surface_errors):
     fdi, record = new_fdi(), new_belief(1.0 / count)
-    fdi["bound"]["own_errors"], fdi["config"]["every_type"] = own_errors, 1
+    fdi["bound"]["has_surface_errors"], fdi["config"]["every_type"] = has_surface_errors, 1
     fdi["layout"]["dominant_axis"] = 0, 1, 2, 1
     record["sums"]["f"] = record["sums"]["G"] = record["sums"]["Gu"] = 99.0  # of an earlier frame
     record["sums"]["eta_bar"] = 99.0
-    record["sums"]["own"], record["sums"]["own_per_rad"] = (99.0, 99.0) if own_errors else (0.0, 0.0)
+    record["sums"]["own"], record["sums"]["surface_error_per_rad"] = (
+        (99.0, 99.0) if has_surface_errors else (0.0, 0.0)
+    )
     fdi["bound"]["noise"] = 0.1, 0.2, 0.3
     measured = np.zeros(1, [("x", "f8", (3,))]).view(np.recarray)[0]
     measured["x"] = 1.0, 2.0, 3.0
     seen = instants(count)
     for k, (f, G, u, eta_bar, per_rad) in enumerate(seen):
         record["f"], record["G"], record["u"] = f, G, u
-        fdi["bound"]["eta_bar_now"], fdi["bound"]["admitted"]["per_rad"] = eta_bar, np.abs(per_rad)
+        fdi["bound"]["eta_bar_now"], fdi["bound"]["declared_errors"]["per_rad"] = eta_bar, np.abs(per_rad)
         if k == 0:
             beliefs.begin_sums(record, fdi["bound"], fdi["layout"], fdi["config"]["every_type"], measured)
         else:
@@ -180,16 +182,16 @@ def test_means_over_a_frame_are_of_its_instants(count, own_errors):
     beliefs.fill_frame_means(record, fdi["bound"])
     Gu = np.array([G * u for _, G, u, _, _ in seen])
     mean = record["means"]
-    assert record["x_then"] == pytest.approx([1.0, 2.0, 3.0])
-    assert fdi["bound"]["noise_then"] == pytest.approx([0.1, 0.2, 0.3])
+    assert record["x_before"] == pytest.approx([1.0, 2.0, 3.0])
+    assert fdi["bound"]["noise_before"] == pytest.approx([0.1, 0.2, 0.3])
     assert mean["G"] == pytest.approx(np.mean([G for _, G, *_ in seen], axis=0))
     assert mean["Gu"] == pytest.approx(Gu.mean(axis=0))
     assert mean["acceleration"] == pytest.approx(np.mean([f + G @ u for f, G, u, *_ in seen], axis=0))
     assert fdi["bound"]["eta_bar"] == pytest.approx(np.mean([eta for *_, eta, _ in seen], axis=0))
     own = np.mean([np.abs(per_rad) for *_, per_rad in seen], axis=0)
     at_command = np.mean([np.abs(per_rad * u) for _, _, u, _, per_rad in seen], axis=0)
-    assert fdi["bound"]["own_per_rad"] == pytest.approx(own if own_errors else 0.0)
-    assert fdi["bound"]["own"] == pytest.approx(at_command if own_errors else 0.0)
+    assert fdi["bound"]["surface_error_per_rad"] == pytest.approx(own if has_surface_errors else 0.0)
+    assert fdi["bound"]["own"] == pytest.approx(at_command if has_surface_errors else 0.0)
     spread = np.abs(Gu[0] - Gu[1:].mean(axis=0)) / count if count > 1 else 0.0
     assert mean["Gu_spread"] == pytest.approx(spread)
     own_axis = np.array([G[(0, 1, 2, 1), range(4)] for _, G, *_ in seen])
@@ -205,7 +207,7 @@ def test_a_command_is_followed_by_surfaces_that_were_where_they_were():
     record["u"], record["actuators"]["approach"] = (0.1, 0.2, 0.3, 0.0), 1.0
     record["actuators"]["step"], record["actuators"]["low"], record["actuators"]["high"] = np.inf, -1.0, 1.0
     beliefs.move_healthy_surfaces(record, np.array([0.4, 0.5, -0.6, 0.2]))
-    assert record["u_then"] == pytest.approx([0.1, 0.2, 0.3, 0.0])
+    assert record["u_before"] == pytest.approx([0.1, 0.2, 0.3, 0.0])
     assert record["u"] == pytest.approx(record["commanded"])
     assert record["commanded"] == pytest.approx([0.4, 0.5, -0.6, 0.2])
 

@@ -37,11 +37,11 @@ def measured(x=X, y=Y, force=(0.5, 0.3, -9.5), attitude=(0.2, 0.15)):
     return record
 
 
-def felt(bounds=None, **admitted):
+def felt(bounds=None, **declared_errors):
     """A diagnosis whose forces are set up at X, Y, U; admitted: errors of what the engine is told."""
     fdi = new_fdi()
-    for name, value in admitted.items():
-        fdi["bound"]["admitted"][name] = value
+    for name, value in declared_errors.items():
+        fdi["bound"]["declared_errors"][name] = value
     statistical = fdi["statistical"]
     air = statistical["air"]
     fill_table(air["memory"]["force_table"], AIRCRAFT, AIRCRAFT.measurable_forces, FORCES)
@@ -189,8 +189,8 @@ def test_noise_of_the_pressure_is_jitter_as_the_innovation_moves_with_it():
 def test_noise_of_accelerometers_is_jitter_that_the_pressure_does_not_scale():
     """Against a draw, at the trim's pressure and at twice as much; and how far it lets the angle wander."""
     sensors, rng = {"ay": {"noise_std_mps2": 0.04}, "az": {"noise_std_mps2": 0.07}}, np.random.default_rng(8)
-    for strength in (1.0, 2.0):
-        fdi, y = felt(Bounds(sensors=sensors)), Y * (1.0, 1.0, 1.0, strength, 1.0)
+    for pressure_ratio in (1.0, 2.0):
+        fdi, y = felt(Bounds(sensors=sensors)), Y * (1.0, 1.0, 1.0, pressure_ratio, 1.0)
         record, drawn = fdi["statistical"]["forces"], []
         for noise in rng.normal(0.0, (0.04, 0.07), (1500, 2)):
             update_forces(
@@ -200,7 +200,10 @@ def test_noise_of_accelerometers_is_jitter_that_the_pressure_does_not_scale():
         for inertial in range(2):
             jitter = record["component"]["jitter"][:, inertial]
             assert np.sqrt(jitter) == pytest.approx(np.std(drawn, axis=0), rel=0.06)
-    more = record["component"]["wander"] - felt()["statistical"]["forces"]["component"]["wander"]
+    more = (
+        record["component"]["drift_intensity"]
+        - felt()["statistical"]["forces"]["component"]["drift_intensity"]
+    )
     walked = [(0.04, 0.07)[f] / Y[2] * np.sqrt(DT) for f in (SIDE, NORMAL)]
     assert np.sqrt(more) == pytest.approx(np.abs(record["component"]["vane"][:, 1]) * walked)
 
@@ -347,11 +350,13 @@ def test_the_angle_followed_drifts_by_gyros_and_by_gravity_s_share(bounds, side,
 
 def test_in_turbulence_gusts_turn_the_flow():
     """By a walk of 3 sigma^2 / (L V) [MIL-F-8785C, 3.7], against a draw of Dryden's vertical gust."""
-    wander = [
+    drift_intensity = [
         felt(Bounds(turbulence=air))["statistical"]["forces"]["component"] for air in ("none", "moderate")
     ]
     sigma, L, V, dt, rng = 10.6 * 0.3048, 533.4, 46.0, 0.01, np.random.default_rng(2)
-    more = np.sqrt(wander[1]["wander"] - wander[0]["wander"]) / np.abs(wander[1]["vane"][:, 1])
+    more = np.sqrt(drift_intensity[1]["drift_intensity"] - drift_intensity[0]["drift_intensity"]) / np.abs(
+        drift_intensity[1]["vane"][:, 1]
+    )
     tau, n = L / V, 40_000  # (1 + sqrt(3) tau s) / (1 + tau s)^2, of white noise of intensity sigma^2 tau
     noise, one, two, gust = rng.normal(0.0, sigma * np.sqrt(tau / dt), n), 0.0, 0.0, np.empty(n)
     for k in range(n):
@@ -374,7 +379,7 @@ def viewed():
     configure_tones(statistical["tone_config"], 1e-8, 45.0, 15.0, DT)
     for _ in range(2):
         update_forces(statistical["forces"], statistical["air"], measured(), U, DT)
-    fdi["layout"]["position_of"] = range(4)
+    fdi["layout"]["position_estimator"] = range(4)
     return fdi
 
 
@@ -383,7 +388,7 @@ def test_a_force_is_off_by_what_it_changes_in_two_milliseconds(before, begun, ex
     force = new_fdi()["statistical"]["forces"]["component"][0]
     force["model"] = 1.6
     forces.fill_lag_error(force, before, begun, 0.004)
-    assert force["unsettled"] == pytest.approx(expected)
+    assert force["lag_error"] == pytest.approx(expected)
 
 
 def test_what_a_force_is_off_widens_what_is_merely_bounded(viewed):
@@ -391,7 +396,7 @@ def test_what_a_force_is_off_widens_what_is_merely_bounded(viewed):
     view["direction"] = 0.0, 0.6, 0.0, 0.0, -0.8
     Across.blur(view, statistical, 45.0)
     before = float(view["bounded"][0])
-    statistical["forces"]["component"]["unsettled"][NORMAL] = 0.5
+    statistical["forces"]["component"]["lag_error"][NORMAL] = 0.5
     Across.blur(view, statistical, 45.0)
     assert view["bounded"][0] == pytest.approx(before + 0.8 * 0.5)
 
@@ -404,7 +409,7 @@ def test_how_fast_a_force_changes_is_told_from_one_instant_to_the_next(viewed):
     update_forces(statistical["forces"], statistical["air"], seen, U, DT)
     changed = np.abs(component["model"] - then)
     assert changed[SIDE] > 0.01
-    assert component["unsettled"] == pytest.approx(forces.MODEL_LAG_S * changed / DT)
+    assert component["lag_error"] == pytest.approx(forces.MODEL_LAG_S * changed / DT)
 
 
 def test_each_surface_is_looked_past_in_the_axis_it_leads_and_its_force(viewed):
@@ -597,7 +602,11 @@ def test_a_loss_signs_with_the_force_it_takes(viewed):
 @pytest.mark.parametrize("v", [ELEVATOR_VIEW, UP_VIEW, RUDDER_VIEW])
 def test_what_is_declared_of_rate_and_force_is_seen_along_a_direction(viewed, v):
     statistical, rng = viewed["statistical"], np.random.default_rng(6)
-    statistical["noise"]["jitter"], statistical["noise"]["bounded"], statistical["noise"]["rapidity"] = (
+    (
+        statistical["noise"]["jitter"],
+        statistical["noise"]["bounded"],
+        statistical["noise"]["walk_intensity"],
+    ) = (
         (1e-6, 4e-6, 9e-6),
         0.02,
         2.0,
@@ -610,7 +619,7 @@ def test_what_is_declared_of_rate_and_force_is_seen_along_a_direction(viewed, v)
     )
     air["memory"]["intensity"] = 1e-5, 2e-5, 3e-5
     component["jitter"], component["deflection"] = ((2e-6, 1e-7), (3e-5, 2e-5)), (0.001, 0.002)
-    component["wander"], statistical["forces"]["strength"] = (1e-4, 2e-4), 1.2
+    component["drift_intensity"], statistical["forces"]["pressure_ratio"] = (1e-4, 2e-4), 1.2
     for name in ("moving", "damping", "axes", "intensity"):
         holder(statistical["inertial_air"], name)[name] = holder(air, name)[name]
     air["memory"]["unmeasured_share"], statistical["inertial_air"]["memory"]["unmeasured_share"] = (
@@ -630,20 +639,20 @@ def test_what_is_declared_of_rate_and_force_is_seen_along_a_direction(viewed, v)
     assert block["jitter"][0] == pytest.approx((np.abs(m) @ sizes) ** 2)
     bound = np.abs(m) @ [0.02, 0.02, 0.02, 0.0012, 0.0024]
     assert view["bounded"][0] == pytest.approx(bound)
-    wander = 1.2**2 * view["inertial"] * m[3:] ** 2 @ component["wander"]
-    assert block["drift"][0, 0] == pytest.approx(gusts + wander + 2.0 * max(bound, 1e-3) ** 2)
+    drift_intensity = 1.2**2 * view["inertial"] * m[3:] ** 2 @ component["drift_intensity"]
+    assert block["drift"][0, 0] == pytest.approx(gusts + drift_intensity + 2.0 * max(bound, 1e-3) ** 2)
 
 
-@pytest.mark.parametrize("strength", [1.0, 2.5])
-def test_noise_and_slopes_of_forces_go_with_the_pressure(strength):
+@pytest.mark.parametrize("pressure_ratio", [1.0, 2.5])
+def test_noise_and_slopes_of_forces_go_with_the_pressure(pressure_ratio):
     """A dive at more than its trim's pressure: as if trimmed there."""
     sensors = {"alpha": {"noise_std_deg": 0.03}, "beta": {"noise_std_deg": 0.02}}
-    fdi, fast = felt(Bounds(sensors=sensors)), Y * (1.0, 1.0, 1.0, strength, 1.0)
+    fdi, fast = felt(Bounds(sensors=sensors)), Y * (1.0, 1.0, 1.0, pressure_ratio, 1.0)
     record = fdi["statistical"]["forces"]
     update_forces(record, fdi["statistical"]["air"], measured(y=fast), U, DT)
-    slopes = strength * record["component"]["vane"][:, 1]
+    slopes = pressure_ratio * record["component"]["vane"][:, 1]
     noise = np.radians([0.02, 0.03])
-    assert record["strength"] == pytest.approx(strength)
+    assert record["pressure_ratio"] == pytest.approx(pressure_ratio)
     assert record["component"]["jitter"][:, 0] == pytest.approx((slopes * noise) ** 2, rel=0.01)
     assert record["component"]["angle_sensitivity"] == pytest.approx(DT * slopes)
 

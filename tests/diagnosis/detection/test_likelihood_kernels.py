@@ -321,7 +321,7 @@ def test_a_share_is_in_standard_deviations_or_of_what_uncertainty_and_chance_all
     assert against_chance_alone == pytest.approx(4.0)  # never more than that
 
 
-def judged(kind=LOSS, tolerated=False, memory=0.0, rooms=(0.0, 0.0), at_most=0.0):
+def judged(kind=LOSS, has_tolerances=False, memory=0.0, rooms=(0.0, 0.0), at_most=0.0):
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), kind, tolerance=(0.1, 0.2))
     block["level"], block["noise_share"] = 1.0, 0.5
     onsets, lanes, overlap = [1, 5], block["lanes"][0], block["overlap"][0]
@@ -330,7 +330,7 @@ def judged(kind=LOSS, tolerated=False, memory=0.0, rooms=(0.0, 0.0), at_most=0.0
     overlap[:2, 1], overlap[:2, 5], lanes["constant_part"][onsets] = (1.0, -2.0), (-3.0, 4.0), rooms
     hypothesis = block["hypothesis"][0]
     hypothesis["score"], hypothesis["min_llr"], hypothesis["max_llr"] = 99.0, 99.0, at_most
-    if tolerated:
+    if has_tolerances:
         likelihood.accumulate_overlap(block, lanes, overlap, N_SLOTS, 1.0)
     likelihood.evaluate_hypotheses(block, memory)
     return hypothesis
@@ -345,7 +345,7 @@ def test_a_hypothesis_is_worth_its_best_onset():
 
 
 def test_what_errors_of_coefficients_explain_is_taken_off_and_may_be_added():
-    hypothesis = judged(tolerated=True)  # slack 0.5 and 1.1
+    hypothesis = judged(has_tolerances=True)  # slack 0.5 and 1.1
     assert hypothesis["score"] == pytest.approx(max(2.5 / 2.0, 3.9 / 4.0))
     assert hypothesis["min_llr"] == pytest.approx(max(2.5**2 / 8.0, 3.9**2 / 32.0))
     assert hypothesis["max_llr"] == pytest.approx(max(3.5**2 / 8.0, 6.1**2 / 32.0))
@@ -445,7 +445,7 @@ def contested(loss=1.0, step=0.0, other=0.0, growing=0.0, ending=0.0, pitch=(0.0
     """Whether a loss of the rudder (2) is excluded, by log likelihood ratios in roll and yaw; in pitch by
     those of (a step, a loss, its end). Naming level 4."""
     fdi, record = detector()
-    fdi["layout"]["loss_of"] = 0, -1, 1, -1
+    fdi["layout"]["loss_estimator"] = 0, -1, 1, -1
     fdi["isolation"]["estimator"]["excluded"][0] = keys.get("other_excluded", 0)
     fdi["config"]["abrupt"], record["tests"]["share"] = keys.get("abrupt", 0), 1.0 / keys.get("instants", 1)
     for b, values in ((1, (loss, step, other, growing, ending)), (2, (99.0, 0.0, 0.0, 0.0, 0.0))):
@@ -499,7 +499,7 @@ def test_in_pitch_an_end_counts_where_it_is_asked_for():
 )
 def test_a_loss_shows_where_it_explains_better_than_all_else_by_the_naming_level(at_least, shown):
     fdi, record = detector()
-    fdi["layout"]["loss_of"] = -1, -1, 0, -1
+    fdi["layout"]["loss_estimator"] = -1, -1, 0, -1
     for b in range(3):
         record["block"][b]["n_hypotheses"] = 0
     block = record["block"][1]
@@ -539,12 +539,12 @@ def test_what_the_beliefs_leave_unexplained_is_followed_by_the_drift(b):
 
 def test_a_loss_is_open_until_its_estimator_is_excluded():
     fdi, _ = detector()
-    estimators, loss_of = fdi["isolation"]["estimator"], np.array([-1, 1, -1, -1])
+    estimators, loss_estimator = fdi["isolation"]["estimator"], np.array([-1, 1, -1, -1])
     estimators["excluded"][:2] = 1, 0
-    assert statistical.is_not_excluded(estimators, loss_of, 1)
-    assert statistical.is_not_excluded(estimators, loss_of, 3)
+    assert statistical.is_not_excluded(estimators, loss_estimator, 1)
+    assert statistical.is_not_excluded(estimators, loss_estimator, 3)
     estimators["excluded"][1] = 1
-    assert not statistical.is_not_excluded(estimators, loss_of, 1)
+    assert not statistical.is_not_excluded(estimators, loss_estimator, 1)
 
 
 def test_what_is_just_as_much_excludes_nothing():

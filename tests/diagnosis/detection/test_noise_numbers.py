@@ -83,8 +83,8 @@ def test_a_bound_of_zero_is_reckoned_with_as_a_small_one():
 
 def returning(rapidity, moving=1, rolling=200.0, rate_hz=50.0):
     record = np.zeros(1, statistical_dtype())[0]
-    record["noise"]["rapidity"], record["tests"]["alarm_level"] = rapidity, 6.0
-    return noise_model.returning_length(record, V, rate_hz, moving * rolling)
+    record["noise"]["walk_intensity"], record["tests"]["alarm_level"] = rapidity, 6.0
+    return noise_model.drift_return_length(record, V, rate_hz, moving * rolling)
 
 
 def test_a_drift_returns_so_soon_that_a_swing_takes_half_the_level():
@@ -178,7 +178,7 @@ def test_the_second_view_returns_with_a_gust_as_strong_where_it_is_slow(alone):
     rolling = sqrt(0.3048 * 1750.0 * SPAN_M) / 2.6
     assert air["config"]["rolling_length"] == pytest.approx(rolling)
     assert last["return_length"] == pytest.approx(
-        noise_model.returning_length(alone.detector, V, 50.0, rolling)
+        noise_model.drift_return_length(alone.detector, V, 50.0, rolling)
     )
     assert last["drift_scale"] == pytest.approx((rolling / last["return_length"]) ** 2)
     assert [float(block["drift_scale"]) for block in alone.blocks[:-1]] == [1.0, 1.0]
@@ -249,12 +249,12 @@ def test_inertia_scales_every_term_by_the_worst_of_its_own_axes():
 
 def test_blocks_get_the_tolerances_of_their_axes():
     alone = Detector(50.0, bounds={"coefficients": 0.1})
-    assert alone.detector["tests"]["tolerated"] == 1
+    assert alone.detector["tests"]["has_tolerances"] == 1
     for block, axes in zip(alone.blocks, ((1,), (0, 2), (0, 2)), strict=True):
         of_it = SIZE[np.isin(AXIS, axes)]
         assert block["n_regressors"] == of_it.size
         assert block["tolerance"][: of_it.size] == pytest.approx(0.1 * of_it)
-    assert Detector(50.0).detector["tests"]["tolerated"] == 0
+    assert Detector(50.0).detector["tests"]["has_tolerances"] == 0
 
 
 def test_the_noise_of_vanes_and_airspeed_turns_the_gust_they_see():
@@ -309,7 +309,7 @@ def test_the_walk_is_that_of_the_largest_bound_and_the_noisiest_gyro():
     expected = noise_model.walk_intensity(
         0.05, 15.0, radians(0.2), float(record["tests"]["alarm_level"]), 0.02
     )
-    assert record["noise"]["rapidity"] == pytest.approx(expected)
+    assert record["noise"]["walk_intensity"] == pytest.approx(expected)
 
 
 def test_vanes_and_airspeed_err_together_in_the_gust_they_see():

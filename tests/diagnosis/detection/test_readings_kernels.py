@@ -55,10 +55,10 @@ def at(state, **bounds):
 @pytest.mark.parametrize("state", STATES)
 def test_a_steady_error_is_a_constant_times_what_it_moves_now(state):
     alone, design, flown_there = at(state, sensors=BIASES)
-    admitted = alone.fdi["bound"]["admitted"]
+    declared_errors = alone.fdi["bound"]["declared_errors"]
     for which in range(N_READINGS):
-        found = moved(design, *flown_there, which, float(admitted["thin_air_kw"]))
-        error = STEADY[which] if which < POWER else float(admitted["engine_kw"])
+        found = moved(design, *flown_there, which, float(declared_errors["thin_air_kw"]))
+        error = STEADY[which] if which < POWER else float(declared_errors["engine_kw"])
         for block in alone.blocks:
             n, axes = int(block["n_regressors"]) - N_READINGS + which, block["axis"][: block["n"]]
             assert block["tolerance"][n] == pytest.approx(error)
@@ -68,7 +68,7 @@ def test_a_steady_error_is_a_constant_times_what_it_moves_now(state):
 @pytest.mark.parametrize("state", STATES)
 def test_noise_is_jitter_as_large_as_it_is_now(state):
     alone, design, flown_there = at(state, sensors="tactical-grade")
-    thin, detector = float(alone.fdi["bound"]["admitted"]["thin_air_kw"]), alone.detector
+    thin, detector = float(alone.fdi["bound"]["declared_errors"]["thin_air_kw"]), alone.detector
     expected = detector["noise"]["own_jitter"].copy()
     for which in range(N_READINGS):
         expected += (moved(design, *flown_there, which, thin) * detector["noise"]["reading"][which]) ** 2
@@ -81,12 +81,12 @@ def test_noise_is_jitter_as_large_as_it_is_now(state):
 def test_without_errors_of_the_air_data_nothing_is_read():
     alone = Detector(100.0, bounds={"coefficients": 0.05})
     assert alone.detector["noise"]["read"] == 0
-    assert Detector(100.0).detector["tests"]["tolerated"] == 0
+    assert Detector(100.0).detector["tests"]["has_tolerances"] == 0
     gyros = Bounds.model_validate({"sensors": {"p": {"noise_std_deg_s": 0.1}}}).sensors
     record = alone.detector
-    admitted = alone.fdi["bound"]["admitted"]
+    declared_errors = alone.fdi["bound"]["declared_errors"]
     before = record["block"]["n_regressors"].copy()
-    noise_model.configure_readings(record, SensorErrors(gyros), admitted)
+    noise_model.configure_readings(record, SensorErrors(gyros), declared_errors)
     assert list(record["block"]["n_regressors"]) == list(before)
     assert gyros.p.random_error == pytest.approx(np.radians(0.1))
 

@@ -42,12 +42,12 @@ def tone_config():
     return tone_config
 
 
-def listen(view, tone_config, samples, regressors=None, heard=True, tolerated=False, alarm_level=6.0):
+def listen(view, tone_config, samples, regressors=None, heard=True, has_tolerances=False, alarm_level=6.0):
     for k, sample in enumerate(samples):
         view["block"]["innovation"][0] = sample
         if regressors is not None:
             view["block"]["regressor_response"][:3, 0] = regressors[k]
-        tones.update_tones(view, tone_config, alarm_level, heard, tolerated, DT)
+        tones.update_tones(view, tone_config, alarm_level, heard, has_tolerances, DT)
 
 
 def resonance(samples):
@@ -63,7 +63,7 @@ def as_complex(pair):
 
 def test_what_is_heard_is_a_sum_that_fades_over_the_whitened_frames(view, tone_config, rng):
     samples, regressors = rng.normal(size=60), rng.normal(size=(60, 3))
-    listen(view, tone_config, samples, regressors, tolerated=True)
+    listen(view, tone_config, samples, regressors, has_tolerances=True)
     found = view["tones"]
     assert as_complex(found["tone"]) == pytest.approx(resonance(2.0 * samples))
     for j in range(3):

@@ -29,18 +29,18 @@ def run_estimator(shared, theta, kind=LOSS, frames=25, eta_share=1.0, seed=0):
     fdi["isolation"]["config"]["shared"], x = shared, rng.normal(size=3)
     fdi["bound"]["noise"] = 0.004, 0.005, 0.006
     on(isolation.start_estimators, fdi, x)
-    fed = {name: [] for name in ("Z", "eta", "eta_bar", "noise_then", "spread")}
+    fed = {name: [] for name in ("Z", "eta", "eta_bar", "noise_before", "spread")}
     for _ in range(frames):
-        Z, eta_bar, noise_then = rng.normal(size=3), rng.uniform(0.1, 0.3, 3), rng.uniform(0.01, 0.02, 3)
+        Z, eta_bar, noise_before = rng.normal(size=3), rng.uniform(0.1, 0.3, 3), rng.uniform(0.01, 0.02, 3)
         eta, believed, spread = eta_bar * rng.uniform(-1, 1, 3), rng.normal(size=3), rng.uniform(0, 0.1, 3)
         eta *= eta_share
         offset = rng.normal(size=3)
         fie["effect"]["Z"], fie["effect"]["offset"], fie["effect"]["spread"] = Z, offset, spread
-        fdi["bound"]["eta_bar"], fdi["bound"]["noise_then"] = eta_bar, noise_then
+        fdi["bound"]["eta_bar"], fdi["bound"]["noise_before"] = eta_bar, noise_before
         isolation.update_residual(fie, fdi["isolation"]["config"]["thresholds"], x)
         on(isolation.predict_estimators, fdi, x, believed)
         x = x + DT * (believed + offset + theta * Z + eta)
-        for name, value in zip(fed, (Z, eta, eta_bar, noise_then, spread), strict=True):
+        for name, value in zip(fed, (Z, eta, eta_bar, noise_before, spread), strict=True):
             fed[name].append(value)
     within = isolation.update_residual(fie, fdi["isolation"]["config"]["thresholds"], x)
     return fdi, fie, {name: np.array(value) for name, value in fed.items()}, within
@@ -56,11 +56,11 @@ def test_the_residual_is_omega_times_the_error_and_the_filtered_uncertainty(shar
     uncertainty = DT * (w * fed["eta"]).sum(axis=0)
     assert fie["omega"] == pytest.approx(omega)
     assert fie["residual"] == pytest.approx(omega * (theta - fie["theta"]) + uncertainty, abs=1e-12)
-    assert fie["rise"] == pytest.approx(DT * (w * np.maximum(fed["Z"], 0)).sum(axis=0))
-    assert fie["fall"] == pytest.approx(DT * (w * np.minimum(fed["Z"], 0)).sum(axis=0))
+    assert fie["positive_Z"] == pytest.approx(DT * (w * np.maximum(fed["Z"], 0)).sum(axis=0))
+    assert fie["negative_Z"] == pytest.approx(DT * (w * np.minimum(fed["Z"], 0)).sum(axis=0))
     eta = DT * (w * (fed["eta_bar"] + fed["spread"])).sum(axis=0)
     left = fdi["isolation"]["config"]["decay"] ** frames * np.array([0.004, 0.005, 0.006])
-    noise = left + ((1.0 - fdi["isolation"]["config"]["decay"]) * w * fed["noise_then"]).sum(axis=0)
+    noise = left + ((1.0 - fdi["isolation"]["config"]["decay"]) * w * fed["noise_before"]).sum(axis=0)
     assert fie["bound_eta"] == pytest.approx(eta)
     assert fie["bound_noise"] == pytest.approx(noise)
     assert fie["bound"] == pytest.approx(eta + noise + [0.004, 0.005, 0.006])
@@ -132,7 +132,7 @@ def test_a_residual_at_its_limit_is_within_and_beyond_it_is_not(thresholds, axis
         fdi = new_fdi()
         fie = estimator(fdi, low=-0.9, high=0.2)
         fdi["isolation"]["config"]["thresholds"] = thresholds
-        fie["rise"], fie["fall"], fie["bound"], fie["theta"] = 0.5, -0.2, 0.03, -0.3
+        fie["positive_Z"], fie["negative_Z"], fie["bound"], fie["theta"] = 0.5, -0.2, 0.03, -0.3
         fie["omega"], fie["ignored_axes"][axis] = 0.3, ignored_axes
         lower, upper = -0.9 * 0.5 - 0.2 * 0.2, 0.2 * 0.5 + 0.9 * 0.2
         limits = (lower + 0.09 - 0.03, upper + 0.09 + 0.03)
@@ -167,7 +167,7 @@ def excludes(fdi, row, x=0.0):
 def test_who_excludes_a_fault_beyond_its_worst_case(row, x, excluded):
     fdi = new_fdi()
     fdi["isolation"]["config"]["n"], fdi["statistical"]["alarm"]["detected_at_s"] = 1, -1.0
-    fdi["layout"]["position_of"], fdi["layout"]["loss_of"] = range(4), range(4)
+    fdi["layout"]["position_estimator"], fdi["layout"]["loss_estimator"] = range(4), range(4)
     assert excludes(fdi, row, x) == excluded
 
 
@@ -326,7 +326,11 @@ def test_errors_of_a_surfaces_own_terms_widen_the_room_of_its_position(kind, err
     rng, fdi = np.random.default_rng(6), new_fdi()
     fie = estimator(fdi, kind, surface=2, low=-0.5, high=0.5)
     G, Gu = rng.normal(size=(2, 3, 4))
-    fdi["bound"]["own_errors"], fdi["bound"]["own_per_rad"], fdi["bound"]["frame"] = errors, 0.3, 1.0
+    fdi["bound"]["has_surface_errors"], fdi["bound"]["surface_error_per_rad"], fdi["bound"]["frame"] = (
+        errors,
+        0.3,
+        1.0,
+    )
     fdi["config"]["instants"] = 1
     on(isolation.update_hypothesis, fdi, fie, G, Gu, np.full((3, 4), 0.1))
     assert (fie["effect"]["spread"] > 0.1).tolist() == [wider] * 3
@@ -364,12 +368,12 @@ def test_the_row_of_a_fault_class_follows_from_the_detectors_in_authority():
 def test_a_frame_is_shown_to_every_type_alone_or_in_its_block(length, started, memory, frame, filled):
     fdi = new_fdi()
     fdi["isolation"]["config"]["memory"] = memory
-    fdi["types"]["config"]["length"], fdi["types"]["config"]["span_s"] = length, 0.1
-    fdi["layout"]["position_of"], fdi["layout"]["loss_of"] = range(4), range(4)
+    fdi["types"]["config"]["length"], fdi["types"]["config"]["block_s"] = length, 0.1
+    fdi["layout"]["position_estimator"], fdi["layout"]["loss_estimator"] = range(4), range(4)
     fdi["layout"]["dominant_axis"] = (0, 1, 2, 1)
     (
         fdi["isolation"]["config"]["n"],
-        fdi["types"]["config"]["patience"],
+        fdi["types"]["config"]["half_cycle_frames"],
         fdi["config"]["instants"],
         fdi["types"]["config"]["whole"],
     ) = 4, 9, 1, 1

@@ -80,16 +80,19 @@ def test_how_far_a_surface_can_have_been_is_narrowed_round_by_round(instants):
         (0.0, 0.9, 0.0),
         0.05,
     )
-    fdi["bound"]["own_per_rad"][:, 1], fdi["bound"]["own"][:, 1] = (0.1, 0.4, 0.2), (0.01, 0.02, 0.2)
+    fdi["bound"]["surface_error_per_rad"][:, 1], fdi["bound"]["own"][:, 1] = (
+        (0.1, 0.4, 0.2),
+        (0.01, 0.02, 0.2),
+    )
     fie["effect"]["Z"], fie["effect"]["offset"], fie["effect"]["spread"] = (0.1, 5.0, 1.0), -0.1, 0.01
-    fie["furthest"] = 0.3
+    fie["largest_deflection"] = 0.3
     earlier = 2.0 * 0.3 / instants if instants > 1 else 0.0
     reach = 0.6
     for _ in range(isolation.SEARCH_ROUNDS):
         room = 0.05 + 0.01 + max(0.4 * (reach + earlier) - 0.02, 0.0)
         reach = min(reach, (1.0 + room) / 5.0)
     on(isolation.widen_by_own_errors, fdi, fie)
-    assert fie["furthest"] == pytest.approx(reach)
+    assert fie["largest_deflection"] == pytest.approx(reach)
     own = np.maximum(np.array([0.1, 0.4, 0.2]) * (reach + earlier) - [0.01, 0.02, 0.2], 0.0)
     assert fie["effect"]["spread"] == pytest.approx(0.01 + own)
 
@@ -102,8 +105,8 @@ def test_where_no_position_agrees_the_whole_travel_stays_possible():
         (0.0, 9.0, 0.0),
         0.05,
     )
-    fdi["bound"]["own_per_rad"][:, 1] = 0.1
+    fdi["bound"]["surface_error_per_rad"][:, 1] = 0.1
     fie["effect"]["Z"] = 0.1, 5.0, 1.0
     on(isolation.widen_by_own_errors, fdi, fie)
-    assert fie["furthest"] == 0.6
+    assert fie["largest_deflection"] == 0.6
     assert fie["effect"]["spread"] == pytest.approx([0.06] * 3)

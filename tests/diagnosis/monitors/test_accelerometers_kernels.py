@@ -46,7 +46,7 @@ def new_watch(lead=ALPHA_FLOW, bound=1e-3):
     step = monitor["step"]
     step["config"]["h"], step["config"]["decay"] = H, (0.0, 0.9, 0.99)
     step["test"]["bound"] = bound
-    step["memory"]["then"] = monitor["memory"]["earlier"] = level()
+    step["memory"]["previous"] = monitor["memory"]["earlier"] = level()
     return monitor
 
 
@@ -56,8 +56,8 @@ def looks(monitor, readings, residuals):
         monitor["step"]["test"]["residual"][monitor["output"]["lead"]] = residual
         sensor_monitor.count_identical_samples(monitor, signal)
         sensor_monitor.clear_by_sample(monitor, signal)
-        monitor["memory"]["earlier"] = monitor["step"]["memory"]["then"]
-        monitor["step"]["memory"]["then"] = signal
+        monitor["memory"]["earlier"] = monitor["step"]["memory"]["previous"]
+        monitor["step"]["memory"]["previous"] = signal
 
 
 def cleared(monitor):
@@ -95,7 +95,7 @@ def test_a_reading_that_is_the_same_is_counted_until_it_is_not():
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_what_comes_at_once_and_is_in_the_reading_is_no_accelerometer_s(lead, sign):
     """A jump by more than an accelerometer makes up in a look; one by less may be either's."""
-    least = 1e-3 + sensor_monitor.LEAP_M_S2 * H * UNIT[lead]
+    least = 1e-3 + sensor_monitor.MAX_FORCE_JUMP_M_S2 * H * UNIT[lead]
     for size, leaps in ((1.01, True), (0.99, False)):
         jump = sign * size * least
         monitor = new_watch(lead)
@@ -113,12 +113,12 @@ def test_where_an_accelerometer_has_leapt_the_reading_s_own_says_nothing(sensor)
     for ago in (0, 40):
         for share, leaps in ((0.99, True), (1.01, False)):
             monitor = new_watch(bound=1.0)
-            monitor["step"]["memory"]["then"][sensor] += share * 0.5 * jump / (1.5 * H / V) / 0.995**ago
+            monitor["step"]["memory"]["previous"][sensor] += share * 0.5 * jump / (1.5 * H / V) / 0.995**ago
             looks(monitor, course(ALPHA, np.zeros(ago) + 1e-9 * np.arange(ago)), np.zeros(ago))
             monitor["step"]["test"]["bound"] = 1e-3
             (signal,) = course(ALPHA, [jump])
             signal[list(FORCES)] = (
-                monitor["step"]["memory"]["then"][list(FORCES)] if ago else level()[list(FORCES)] + 1e-9
+                monitor["step"]["memory"]["previous"][list(FORCES)] if ago else level()[list(FORCES)] + 1e-9
             )
             looks(monitor, [signal], [jump])
             assert (AZ in cleared(monitor)) == leaps
@@ -129,7 +129,7 @@ def test_what_accelerometers_have_leapt_is_forgotten_in_two_seconds_at_any_rate(
         monitor = new_watch()
         monitor["step"]["config"]["h"], monitor["memory"]["largest_jump"] = h, 3.0
         for _ in range(round(2.0 / h)):
-            sensor_monitor.count_identical_samples(monitor, monitor["step"]["memory"]["then"].copy())
+            sensor_monitor.count_identical_samples(monitor, monitor["step"]["memory"]["previous"].copy())
         assert monitor["memory"]["largest_jump"] == pytest.approx(3.0 * np.exp(-1.0), rel=0.02)
 
 
@@ -267,7 +267,7 @@ def test_the_axis_of_the_velocity_made_up_is_that_of_the_accelerometer(i, flow):
     """By turning a step along a body axis into speed, incidence and sideslip."""
     alpha, beta = flow
     monitor = new_watch()
-    monitor["step"]["memory"]["then"] = level(alpha, beta)
+    monitor["step"]["memory"]["previous"] = level(alpha, beta)
     v = V * np.array([np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)])
     moved = v + 1e-4 * np.eye(3)[i]
     speed = np.linalg.norm(moved)
@@ -278,7 +278,7 @@ def test_the_axis_of_the_velocity_made_up_is_that_of_the_accelerometer(i, flow):
     assert monitor["memory"]["spurious_velocity"] == pytest.approx(1e-4 * np.eye(3)[i], abs=1e-8)
     assert np.flatnonzero(monitor["output"]["suspect"]).tolist() == [AX + i]
     for doubt, all_of_them in ((0.49e-4, False), (0.51e-4, True)):
-        monitor["memory"]["sound_sum"] = doubt, 0.0, 0.0
+        monitor["memory"]["bound_sum"] = doubt, 0.0, 0.0
         sensor_monitor.suspect_accelerometers(monitor, False)
         assert bool(monitor["output"]["suspect"][AX:].all()) == all_of_them
     sensor_monitor.suspect_accelerometers(monitor, True)
@@ -305,7 +305,11 @@ def test_none_is_used_once_one_may_be_broken(fields, used):
 def test_what_a_reading_may_be_off_covers_two_steps(steady, changing):
     """1.5 a - 0.5 a_then, at its worst: a bias, and noise that changes sides."""
     step = new_watch()["step"]
-    step["config"]["steady"][AX], step["memory"]["error_then"][AX], step["memory"]["error_before"][AX] = (
+    (
+        step["config"]["steady"][AX],
+        step["memory"]["previous_error"][AX],
+        step["memory"]["earlier_error"][AX],
+    ) = (
         steady,
         steady + changing,
         steady + changing,

@@ -49,8 +49,8 @@ def new_step():
         step["config"]["h"],
         step["config"]["gravity"],
         step["config"]["drift"],
-        step["config"]["gust"],
-        step["config"]["swift"],
+        step["config"]["max_gust_speed"],
+        step["config"]["max_airspeed"],
     ) = H, GRAVITY, DRIFT, GUST, 80.0
     return step
 
@@ -69,17 +69,19 @@ def test_a_look_keeps_attitude_velocity_and_acceleration(seed):
         attitude=rng.uniform(-1.2, 1.2, 3), alpha=rng.uniform(-0.3, 0.3), beta=rng.uniform(-0.3, 0.3)
     )
     step, force = new_step(), rng.normal(size=3)
-    step["memory"]["error"], step["memory"]["error_then"] = 0.2, 0.1
+    step["memory"]["error"], step["memory"]["previous_error"] = 0.2, 0.1
     redundancy.store_sample(step, signal, force)
     rotation = as_rotation(signal[PHI : PHI + 3])
-    kept = Rotation.from_quat([*step["memory"]["turned"][1:], step["memory"]["turned"][0]])
+    kept = Rotation.from_quat(
+        [*step["memory"]["previous_attitude"][1:], step["memory"]["previous_attitude"][0]]
+    )
     acceleration = force + rotation.inv().apply([0, 0, GRAVITY])
     assert (kept.inv() * rotation).magnitude() < 1e-14
-    assert step["memory"]["then"] == pytest.approx(signal)
+    assert step["memory"]["previous"] == pytest.approx(signal)
     assert step["memory"]["velocity"] == pytest.approx(velocity_of(signal), rel=1e-12)
     assert step["memory"]["acceleration"] == pytest.approx(acceleration, rel=1e-12)
-    assert (step["memory"]["error_then"] == 0.2).all()
-    assert (step["memory"]["error_before"] == 0.1).all()
+    assert (step["memory"]["previous_error"] == 0.2).all()
+    assert (step["memory"]["earlier_error"] == 0.1).all()
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -89,12 +91,12 @@ def test_a_prediction_turns_attitude_and_velocity_by_the_rates(seed):
     signal = reading(attitude=rng.uniform(-1.0, 1.0, 3), rates=rng.uniform(-0.5, 0.5, 3))
     step, before = new_step(), rng.normal(size=3)
     redundancy.store_sample(step, signal, rng.normal(size=3))
-    step["memory"]["acceleration_then"], now = before, step["memory"]["acceleration"].copy()
-    step["memory"]["size"], step["memory"]["sizes_before"] = 3.0, (2.0, 1.0)
+    step["memory"]["previous_acceleration"], now = before, step["memory"]["acceleration"].copy()
+    step["memory"]["size"], step["memory"]["earlier_sizes"] = 3.0, (2.0, 1.0)
     redundancy.predict_readings(step)
     assert step["memory"]["size"] == pytest.approx(np.linalg.norm(1.5 * now - 0.5 * before))
-    assert step["memory"]["sizes_before"].tolist() == [3.0, 2.0]
-    assert step["memory"]["size_then"] == pytest.approx(np.linalg.norm(before))
+    assert step["memory"]["earlier_sizes"].tolist() == [3.0, 2.0]
+    assert step["memory"]["previous_size"] == pytest.approx(np.linalg.norm(before))
     size = np.linalg.norm(signal[:3])
     by = Rotation.from_rotvec(signal[:3] / size * 2.0 * np.arctan(0.5 * H * size))
     attitude = (as_rotation(signal[PHI : PHI + 3]) * by).as_euler("ZYX")[::-1]
@@ -102,7 +104,7 @@ def test_a_prediction_turns_attitude_and_velocity_by_the_rates(seed):
     predicted = step["memory"]["predicted"]
     assert predicted[PHI : PHI + 3] == pytest.approx(attitude, abs=1e-13)
     assert step["memory"]["velocity"] == pytest.approx(v, rel=1e-12)
-    assert step["memory"]["acceleration_then"] == pytest.approx(by.inv().apply(now), rel=1e-12)
+    assert step["memory"]["previous_acceleration"] == pytest.approx(by.inv().apply(now), rel=1e-12)
     assert predicted[AIRSPEED] == pytest.approx(np.linalg.norm(v))
     assert predicted[ALPHA] == pytest.approx(np.arctan(v[2] / v[0]))
     assert predicted[BETA] == pytest.approx(np.arcsin(v[1] / np.linalg.norm(v)))
@@ -114,7 +116,7 @@ def test_a_prediction_turns_attitude_and_velocity_by_the_rates(seed):
 def test_what_each_angle_turns_the_axes_by(i):
     """By a small step of the angle, as a rotation vector in body axes."""
     step, angles, small = new_step(), np.array([0.4, -0.3, 2.0]), 1e-6
-    step["memory"]["then"][PHI : PHI + 3] = angles
+    step["memory"]["previous"][PHI : PHI + 3] = angles
     moved = angles + small * (np.arange(3) == i)
     one, other = (Rotation.from_euler("ZYX", of[::-1]) for of in (angles, moved))
     turned = (one.inv() * other).as_rotvec() / small
@@ -132,14 +134,14 @@ def test_axes_that_do_not_turn_leave_a_vector_as_it_is():
 def compared(now, signal, predicted, then):
     step = new_step()
     redundancy.fill_quaternion(*now, step["memory"]["now"])
-    step["memory"]["predicted"], step["memory"]["then"] = predicted, then
+    step["memory"]["predicted"], step["memory"]["previous"] = predicted, then
     redundancy.fill_residuals(step, signal)
     return step["test"]["residual"].copy()
 
 
 def test_residuals_are_readings_less_predictions():
-    now, turned = np.array([0.4, 0.25, -1.1]), Rotation.from_rotvec([1e-4, -2e-4, 3e-4])
-    attitude = (as_rotation(now) * turned).as_euler("ZYX")[::-1]
+    now, previous_attitude = np.array([0.4, 0.25, -1.1]), Rotation.from_rotvec([1e-4, -2e-4, 3e-4])
+    attitude = (as_rotation(now) * previous_attitude).as_euler("ZYX")[::-1]
     signal, predicted, then = reading(attitude=attitude), reading(), reading()
     predicted[[AIRSPEED, ALPHA, BETA, ALTITUDE]] -= 0.3, 0.01, -0.02, 4.0
     predicted[PHI : PHI + 3] = now + 2.0 * np.pi * np.array([0, 0, 1])
@@ -206,9 +208,9 @@ def three_looks(seed):
 def residuals(looks):
     """The record after three looks, and the residuals (RPM,) of the last."""
     step = new_step()
-    step["config"]["drift"] = step["config"]["gust"] = 0.0
+    step["config"]["drift"] = step["config"]["max_gust_speed"] = 0.0
     redundancy.store_sample(step, looks[0], looks[0, AX:])
-    step["memory"]["acceleration_then"] = step["memory"]["acceleration"]
+    step["memory"]["previous_acceleration"] = step["memory"]["acceleration"]
     redundancy.predict_readings(step)
     redundancy.store_sample(step, looks[1], looks[1, AX:])
     redundancy.predict_readings(step)
@@ -219,7 +221,7 @@ def residuals(looks):
 def allowed(step, signal, sensor, steady, changing):
     """(rate, noise) (RPM,) where these errors of one sensor are declared."""
     step["config"]["steady"], step["memory"]["changing"] = 0.0, 0.0
-    for name in ("error", "error_then", "error_before"):
+    for name in ("error", "previous_error", "earlier_error"):
         step["memory"][name] = 0.0
         step["memory"][name][sensor] = steady + changing
     step["config"]["steady"][sensor], step["memory"]["changing"][sensor] = steady, changing
@@ -281,7 +283,7 @@ def test_filters_sum_what_was_with_what_each_pole_keeps():
     rng, frames = np.random.default_rng(2), 30
     test, step = np.zeros(1, TEST)[0], new_step()
     step["config"]["decay"] = keep = np.array([0.0, 0.8, 0.97])
-    step["config"]["gusts"], test["air"] = [0.1, 0.2, 0.3], 0.5
+    step["config"]["gust_change_bound"], test["air"] = [0.1, 0.2, 0.3], 0.5
     residual, rate, noise = rng.normal(size=frames), rng.uniform(1, 2, frames), rng.uniform(1, 2, frames)
     for k in range(frames):
         test["residual"], test["rate"], test["noise"] = residual[k], rate[k], noise[k]
@@ -293,7 +295,7 @@ def test_filters_sum_what_was_with_what_each_pole_keeps():
     assert test["filtered"] == pytest.approx(filtered)
     assert test["bound"] == pytest.approx(bound)
     assert test["share"] == pytest.approx(np.max(np.abs(filtered) / bound))
-    assert test["noise_then"] == noise[-1]
+    assert test["noise_before"] == noise[-1]
 
 
 @pytest.mark.parametrize("engine", [False, True])
@@ -379,7 +381,7 @@ def test_sound_instruments_stay_within_every_bound(seed, h):
         3e-3 * side[2] * (np.abs(np.arange(N_SENSORS) - 8) <= 1),
     )
     noise = rng.choice([0.0, 0.2, 1.0], N_SENSORS) * UNITS
-    step["config"]["h"], step["config"]["decay"], step["config"]["gust"] = (
+    step["config"]["h"], step["config"]["decay"], step["config"]["max_gust_speed"] = (
         h,
         np.exp(-h * np.array([1e6, 10.0, 1.0])),
         0.0,
@@ -424,7 +426,7 @@ def test_the_bound_of_a_climb_knows_the_hardest_of_three_pulls_whichever_it_was(
     def rate(*pulled):
         step, signal = new_step(), reading()
         redundancy.store_sample(step, signal, np.array([0.0, 0.0, -GRAVITY]))
-        step["memory"]["size"], step["memory"]["sizes_before"] = 1.0, pulled
+        step["memory"]["size"], step["memory"]["earlier_sizes"] = 1.0, pulled
         redundancy.bound_residuals(step, signal)
         return step["test"]["rate"][CLIMB]
 

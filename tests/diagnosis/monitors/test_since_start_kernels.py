@@ -89,7 +89,7 @@ def new_watch(h):
         np.exp([-1e6 * h, -10.0 * h, -h]),
         GRAVITY,
     )
-    step["config"]["rising"], step["config"]["swift"] = 1.0, 80.0
+    step["config"]["max_vertical_wind"], step["config"]["max_airspeed"] = 1.0, 80.0
     step["config"]["offset"][:3], step["config"]["steady"][:3] = 2e-4, 1e-4
     step["config"]["offset"][[ALPHA, BETA, PHI, THETA]] = 5e-4
     step["config"]["offset"][AIRSPEED], step["config"]["offset"][QDYN], step["config"]["offset"][ALTITUDE] = (
@@ -109,14 +109,14 @@ def looks(signal, h):
     """Each look's number and the monitor, all that was beyond its bound by then noted as fired."""
     monitor = new_watch(h)
     redundancy.begin_tests(monitor["step"], signal[0], signal[0, AX:])
-    initial_errors.begin_initial_errors(monitor["since"], signal[0])
+    initial_errors.begin_initial_errors(monitor["initial"], signal[0])
     redundancy.store_sample(monitor["step"], signal[0], signal[0, AX:])
     fired = np.zeros(N_TESTS, int)
     for k in range(1, len(signal)):
         redundancy.run_tests(monitor["step"], signal[k], 0)
-        initial_errors.update_initial_errors(monitor["step"], monitor["since"], signal[k])
+        initial_errors.update_initial_errors(monitor["step"], monitor["initial"], signal[k])
         fired |= monitor["step"]["test"]["share"] > 1.0
-        initial_errors.record_refuted(monitor["step"], monitor["since"], fired)
+        initial_errors.record_refuted(monitor["step"], monitor["initial"], fired)
         yield k, monitor, fired
         redundancy.store_sample(monitor["step"], signal[k], signal[k, AX:])
 
@@ -135,10 +135,13 @@ def test_what_is_broken_from_the_start_is_never_refuted(seed, h, swiftly, i, kin
         off = abs(sizes(i, broken[:, READING[i]], true[:, READING[i]]))
         moved = set()
         for k, monitor, _ in looks(broken, h):
-            since = monitor["since"]
-            assert off[k] <= (since["off"][i] + since["changed"][i]) * (1.0 + 1e-9), (size, k)
-            moved |= set(np.flatnonzero(since["refuted"][i]).tolist())
-        assert all(initial_errors.moves_with(i, t) for t in moved), (size, moved)
+            initial = monitor["initial"]
+            assert off[k] <= (initial["error_bound"][i] + initial["change_bound"][i]) * (1.0 + 1e-9), (
+                size,
+                k,
+            )
+            moved |= set(np.flatnonzero(initial["refuted"][i]).tolist())
+        assert all(initial_errors.test_moves_with_error(i, t) for t in moved), (size, moved)
         assert kind != "constant" or not moved
 
 
@@ -147,10 +150,10 @@ def test_a_sound_flight_shows_each_reading_to_be_sound():
     as the density of the air says from the first look on."""
     for k, monitor, fired in looks(flight(5, 0.01, True), 0.01):
         assert not fired.any(), k
-        since = monitor["since"]
+        initial = monitor["initial"]
     for i, little in SHOWN.items():
-        assert since["off"][i] < little < since["first"][i], NAMES[i]
-    assert since["off"][AIRSPEED_ERROR] < 0.2
+        assert initial["error_bound"][i] < little < initial["initial_bound"][i], NAMES[i]
+    assert initial["error_bound"][AIRSPEED_ERROR] < 0.2
 
 
 def test_in_steady_flight_nothing_shows_the_sideslip_or_the_airspeed():
@@ -165,7 +168,7 @@ def test_in_steady_flight_nothing_shows_the_sideslip_or_the_airspeed():
     signal[:, ALTITUDE] -= 0.01 * down * np.arange(LOOKS)
     for _, monitor, fired in looks(signal, 0.01):
         assert not fired.any()
-        off, first = monitor["since"]["off"], monitor["since"]["first"]
+        off, first = monitor["initial"]["error_bound"], monitor["initial"]["initial_bound"]
     assert off[BETA_ERROR] == first[BETA_ERROR]
     assert off[AIRSPEED_ERROR] == first[AIRSPEED_ERROR]
     assert max(off[PHI_ERROR], off[THETA_ERROR]) < 0.06
@@ -185,17 +188,17 @@ def test_in_steady_flight_nothing_shows_the_sideslip_or_the_airspeed():
     ],
 )  # fmt: skip
 def test_tests_that_show_its_moves_do_not_speak_against_a_first_error(i, lead, by, explained):
-    since = new_watch(0.01)["since"]
-    since["refuted"][i, list(by)] = 1
-    assert initial_errors.initial_error_explains(since, i, lead) == explained
+    initial = new_watch(0.01)["initial"]
+    initial["refuted"][i, list(by)] = 1
+    assert initial_errors.initial_error_explains(initial, i, lead) == explained
 
 
 def test_what_the_airspeed_may_be_off_by_follows_from_the_dynamic_pressure():
     """At 1000 m of the standard the density is 1.1116 kg/m3; a quarter more or less is the weather."""
     for V, true in ((45.0, 45.0), (20.0, 45.0), (90.0, 45.0)):
-        signal, since = np.zeros(N_SENSORS), new_watch(0.01)["since"]
+        signal, initial = np.zeros(N_SENSORS), new_watch(0.01)["initial"]
         signal[[AIRSPEED, ALTITUDE, QDYN, ALPHA]] = V, 1000.0, 0.5 * 1.1116 * true**2, -0.2
-        initial_errors.begin_initial_errors(since, signal)
+        initial_errors.begin_initial_errors(initial, signal)
         ends = V / true * np.sqrt(1.25) - 1.0, 1.0 - V / true * np.sqrt(0.75)
-        assert since["off"][AIRSPEED_ERROR] == pytest.approx(max(ends), rel=1e-3)
-        assert since["off"][ALPHA_ERROR] == pytest.approx(2.0 * np.sin(0.45))
+        assert initial["error_bound"][AIRSPEED_ERROR] == pytest.approx(max(ends), rel=1e-3)
+        assert initial["error_bound"][ALPHA_ERROR] == pytest.approx(2.0 * np.sin(0.45))

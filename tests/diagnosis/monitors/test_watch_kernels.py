@@ -55,7 +55,7 @@ def new_watch(**fields):
         monitor["config"]["enabled"],
         monitor["config"]["instants"],
         monitor["output"]["named"],
-        monitor["config"]["follows"],
+        monitor["config"]["attitude_correction_share"],
     ) = 1, 4, NO_SENSOR, 1.0
     monitor["step"]["config"]["h"], monitor["step"]["config"]["decay"], monitor["output"]["alarmed_at_s"] = (
         H,
@@ -65,7 +65,7 @@ def new_watch(**fields):
     (
         monitor["step"]["test"]["bound"],
         monitor["config"]["longest_identical"],
-        monitor["step"]["config"]["swift"],
+        monitor["step"]["config"]["max_airspeed"],
     ) = (
         1.0,
         3,
@@ -90,12 +90,12 @@ def with_shares(shares, **fields):
 
 
 @pytest.mark.parametrize(
-    ("shares", "past", "furthest"),
+    ("shares", "substep", "furthest"),
     [({}, 0, (0, 0.0)), ({3: 1.1, 7: 1.3, 9: 1.2}, 0, (7, 1.3)), ({0: 2.0}, 0, (0, 2.0)),
      ({12: 2.0}, 1, (12, 2.0)), ({3: 0.4}, 1, (5, 0.7)), ({3: 0.4}, 0, (3, 0.4))],
 )  # fmt: skip
-def test_of_the_looks_of_a_frame_the_test_furthest_towards_its_bound_is_kept(shares, past, furthest):
-    monitor = with_shares(shares, largest_test=5, share=0.7, past=past)
+def test_of_the_looks_of_a_frame_the_test_furthest_towards_its_bound_is_kept(shares, substep, furthest):
+    monitor = with_shares(shares, largest_test=5, share=0.7, substep=substep)
     watching.find_largest_share(monitor)
     assert (monitor["output"]["largest_test"], monitor["output"]["share"]) == furthest
 
@@ -163,8 +163,8 @@ def test_an_airspeed_as_wrong_as_the_density_has_it_would_show_in_its_own_test(a
     """0.5 V ln(density ratio) against twice the bound of the airspeed's test, 2."""
     monitor = with_shares({DENSITY: 0.2})
     monitor["step"]["test"]["share"][DENSITY] = 2.0
-    monitor["step"]["memory"]["then"][AIRSPEED], monitor["output"]["lead"] = airspeed, DENSITY
-    monitor["since"]["refuted"] = 1
+    monitor["step"]["memory"]["previous"][AIRSPEED], monitor["output"]["lead"] = airspeed, DENSITY
+    monitor["initial"]["refuted"] = 1
     assert watching.airspeed_error_would_show(monitor) == (who == {QDYN})
     watching.find_suspects(monitor)
     assert set(np.flatnonzero(monitor["output"]["suspect"]).tolist()) == who
@@ -186,19 +186,19 @@ def test_an_angle_shows_what_the_axis_furthest_beyond_its_bound_does():
 
 
 @pytest.mark.parametrize("known", [0, 1])
-@pytest.mark.parametrize("no_gyro", [0, 1])
-@pytest.mark.parametrize("blurred", [0, 1])
-def test_a_surface_may_be_named_where_no_gyro_can_be_it(known, no_gyro, blurred):
-    fields = {"no_gyro": no_gyro, "blurred": blurred}
+@pytest.mark.parametrize("gyros_excluded", [0, 1])
+@pytest.mark.parametrize("noisy_attitude", [0, 1])
+def test_a_surface_may_be_named_where_no_gyro_can_be_it(known, gyros_excluded, noisy_attitude):
+    fields = {"gyros_excluded": gyros_excluded, "noisy_attitude": noisy_attitude}
     assert watching.allows_isolation(new_watch(enabled=0, **fields), known)
-    clear = bool(known and (no_gyro or not blurred))
+    clear = bool(known and (gyros_excluded or not noisy_attitude))
     assert bool(watching.allows_isolation(new_watch(**fields), known)) == clear
 
 
 @pytest.mark.parametrize(("detected_at_s", "early"), [(2.5, True), (3.49, True), (3.51, False)])
 def test_an_alarm_of_the_first_second_may_be_an_instruments_first_error(detected_at_s, early):
-    assert watching.alarm_is_at_start(new_watch(begun_at_s=2.5), detected_at_s) == early
-    assert not watching.alarm_is_at_start(new_watch(enabled=0, begun_at_s=2.5), detected_at_s)
+    assert watching.alarm_is_at_start(new_watch(started_at_s=2.5), detected_at_s) == early
+    assert not watching.alarm_is_at_start(new_watch(enabled=0, started_at_s=2.5), detected_at_s)
 
 
 @pytest.mark.parametrize(
@@ -211,7 +211,7 @@ def test_an_alarm_of_the_first_second_may_be_an_instruments_first_error(detected
 def test_how_much_of_the_flow_a_gyro_may_move_unseen(flow, gyro, share, less):
     """Twice what its own test leaves, by the kinematics of a flow at 0.2 rad and -0.3 rad."""
     monitor = new_watch()
-    monitor["step"]["memory"]["then"][[ALPHA, BETA]] = 0.2, -0.3
+    monitor["step"]["memory"]["previous"][[ALPHA, BETA]] = 0.2, -0.3
     monitor["step"]["test"]["bound"][TURN + gyro] = 40.0
     own = (flow, gyro) in ((ALPHA_FLOW, 1), (BETA_FLOW, 2))
     monitor["step"]["test"]["filtered"][flow] = -less * (80.0 * share + (2.0 if own else 1.0))
@@ -222,12 +222,16 @@ def test_how_much_of_the_flow_a_gyro_may_move_unseen(flow, gyro, share, less):
 def test_no_surface_is_named_while_a_reading_of_the_flow_stands_still(name):
     """Whatever moves the aircraft moves it; but a sideslip of zero may stay one."""
     i = SENSORS.index(name)
-    monitor = new_watch(blurred=0)
-    monitor["config"]["longest_identical"], monitor["step"]["memory"]["then"] = 3, 0.1
+    monitor = new_watch(noisy_attitude=0)
+    monitor["config"]["longest_identical"], monitor["step"]["memory"]["previous"] = 3, 0.1
     for still, value, clear in ((2, 0.1, True), (3, 0.1, False), (3, 0.0, True)):
-        monitor["memory"]["identical"][i], monitor["step"]["memory"]["then"][i] = still, value
+        monitor["memory"]["identical"][i], monitor["step"]["memory"]["previous"][i] = still, value
         assert bool(watching.allows_isolation(monitor, 1)) == clear
-    monitor["step"]["memory"]["then"], monitor["memory"]["identical"], monitor["memory"]["identical"][0] = (
+    (
+        monitor["step"]["memory"]["previous"],
+        monitor["memory"]["identical"],
+        monitor["memory"]["identical"][0],
+    ) = (
         0.1,
         0,
         9,
@@ -256,7 +260,7 @@ def test_an_alarm_voids_what_a_moment_ago_was_made_of_it(isolated):
     on(watching.raise_alarm, fdi, monitor, 10.0)
     assert monitor["output"]["alarmed"]
     assert monitor["output"]["alarmed_at_s"] == 9.6  # the same fault, seen first in the rates
-    assert monitor["output"]["misnamed"] == (isolated >= 0)
+    assert monitor["output"]["surface_was_isolated"] == (isolated >= 0)
     assert not monitor["output"]["keeps_surface"]
     frame.reset_surface_diagnosis(fdi)
     verdict = fdi["verdict"]
@@ -286,7 +290,7 @@ def test_with_nothing_found_before_the_alarm_is_of_now():
     on(watching.raise_alarm, fdi, monitor, 10.0)
     assert monitor["output"]["alarmed_at_s"] == 10.0
     assert not monitor["output"]["keeps_surface"]
-    assert not monitor["output"]["misnamed"]
+    assert not monitor["output"]["surface_was_isolated"]
 
 
 def test_an_instrument_without_a_reading_is_named_at_once():
@@ -327,7 +331,10 @@ def asked(
     error=(0.0, 0.0, 0.0), then=(0.0, 0.0, 0.0), innovation=(0.0, 0.0, 0.0), noise=0.0, spike=0.0, **fields
 ):
     """What the rates say by axis; by default the bound of a frame is 1 rad/s2."""
-    monitor, fdi = new_watch(gyro_error=error, gyro_error_then=then, spike_before=spike, **fields), new_fdi()
+    monitor, fdi = (
+        new_watch(gyro_error=error, previous_gyro_error=then, earlier_spike=spike, **fields),
+        new_fdi(),
+    )
     fdi["bank"]["output"]["innovation"], fdi["bound"]["frame"] = innovation, 1.0
     fdi["bank"]["output"]["threshold"][:3] = 1.0
     monitor["step"]["test"]["noise"] = noise
@@ -387,9 +394,9 @@ def test_what_the_rates_have_said_stays_said():
 @pytest.mark.parametrize(("first", "say"), [(1.0, UNDECIDED), (0.5, UNDECIDED), (0.2, NO)])
 def test_a_first_error_of_a_gyro_need_not_be_in_the_filter(first, say):
     """An error there from the first look on, which brought no innovation: 0.7 of it is within the bound."""
-    monitor = new_watch(begun=1, past=0, gyro_error=(first, -first, 2.0 * first))
-    for past in (0, 1, 2, 3):
-        monitor["memory"]["past"] = past
+    monitor = new_watch(begun=1, substep=0, gyro_error=(first, -first, 2.0 * first))
+    for substep in (0, 1, 2, 3):
+        monitor["memory"]["substep"] = substep
         watching.allow_for_first_errors(monitor)
     assert monitor["memory"]["begun"] == 2
     assert monitor["memory"]["W_bound"].tolist() == [first, first, 2.0 * first], (
@@ -402,7 +409,7 @@ def test_a_first_error_of_a_gyro_need_not_be_in_the_filter(first, say):
 @pytest.mark.parametrize(("begun", "asked"), [(1, False), (2, False), (3, True)])
 def test_the_first_whole_frame_shows_no_jump(begun, asked):
     monitor, fdi = (
-        with_shares({TURN: 2.0, ANGLE: 1.5}, past=0, gyro_error=(0, 0.3, 0), begun=begun),
+        with_shares({TURN: 2.0, ANGLE: 1.5}, substep=0, gyro_error=(0, 0.3, 0), begun=begun),
         new_fdi(),
     )
     fdi["bank"]["output"]["threshold"], fdi["bound"]["frame"] = 1.0, 1.0
@@ -410,11 +417,11 @@ def test_the_first_whole_frame_shows_no_jump(begun, asked):
     assert (monitor["memory"]["rates_confirm"][1] == NO) == asked
 
 
-@pytest.mark.parametrize("quiet", ["error", "then", "spike_then"])
+@pytest.mark.parametrize("quiet", ["error", "then", "previous_spike"])
 def test_what_comes_again_within_a_frame_is_not_gone(quiet):
-    given = {"error": (0, 0, 0), "then": (0, 0, 0), "spike_then": 0.0}
+    given = {"error": (0, 0, 0), "then": (0, 0, 0), "previous_spike": 0.0}
     assert asked(spike=1.0, W_bound=(1, 1, 1), **given)[0] == NO
-    given[quiet] = 0.004 if quiet == "spike_then" else (0.004, 0, 0)
+    given[quiet] = 0.004 if quiet == "previous_spike" else (0.004, 0, 0)
     assert asked(spike=1.0, W_bound=(1, 1, 1), **given)[0] == UNDECIDED
 
 
@@ -453,31 +460,34 @@ def test_what_no_gyro_can_be_is_further_from_w_than_all_bounds(size, clear):
     limit = 0.02 + H * (0.3 + watching.DAMPING_TOLERANCE * 0.5)
     test["residual"][TURN + 1] = size * limit + H * 0.5
     watching.exclude_gyros(monitor)
-    assert monitor["memory"]["no_gyro"] == clear
-    assert monitor["memory"]["apart"][1] == pytest.approx([size * limit] * 3)
+    assert monitor["memory"]["gyros_excluded"] == clear
+    assert monitor["memory"]["rate_difference"][1] == pytest.approx([size * limit] * 3)
     watching.exclude_gyros(monitor)
-    assert monitor["memory"]["apart"][1] == pytest.approx(size * limit * (1.0 + np.array([0.0, 0.9, 0.99])))
-    assert monitor["memory"]["apart_bound"][1] == pytest.approx(H * 0.4 * (1.0 + np.array([0.0, 0.9, 0.99])))
+    kept = 1.0 + np.array([0.0, 0.9, 0.99])
+    assert monitor["memory"]["rate_difference"][1] == pytest.approx(size * limit * kept)
+    assert monitor["memory"]["rate_difference_bound"][1] == pytest.approx(
+        H * 0.4 * (1.0 + np.array([0.0, 0.9, 0.99]))
+    )
 
 
 def test_a_watch_begins_with_its_first_look():
-    monitor = new_watch(past=3)
+    monitor = new_watch(substep=3)
     measured = np.zeros(1, [("signal", "f8", (N_SENSORS,)), ("force", "f8", (3,))]).view(np.recarray)[0]
     measured["signal"][AIRSPEED], measured["signal"][QDYN], measured["force"] = 45.0, 1000.0, (1.0, 2.0, -9.0)
     monitor["step"]["config"]["gravity"], monitor["step"]["config"]["offset"][ALTITUDE] = 9.8, 0.7
-    monitor["step"]["config"]["drift"], monitor["step"]["config"]["swift"] = 2e-3, 80.0
+    monitor["step"]["config"]["drift"], monitor["step"]["config"]["max_airspeed"] = 2e-3, 80.0
     watching.begin_monitor(monitor, measured, 5.0)
     step = monitor["step"]
-    assert (monitor["memory"]["begun"], monitor["memory"]["past"]) == (1, 0)
-    assert step["memory"]["error_then"][[PHI, ALTITUDE]] == pytest.approx(
+    assert (monitor["memory"]["begun"], monitor["memory"]["substep"]) == (1, 0)
+    assert step["memory"]["previous_error"][[PHI, ALTITUDE]] == pytest.approx(
         [0.01, 0.7]
     )  # drifted since the flight began
-    assert (step["memory"]["error_before"] == step["memory"]["error_then"]).all()
-    assert step["memory"]["then"][AIRSPEED] == 45.0
-    assert step["memory"]["acceleration_then"] == pytest.approx([1.0, 2.0, 0.8])
-    assert step["test"]["noise_then"][CLIMB] == pytest.approx(0.7)
+    assert (step["memory"]["earlier_error"] == step["memory"]["previous_error"]).all()
+    assert step["memory"]["previous"][AIRSPEED] == 45.0
+    assert step["memory"]["previous_acceleration"] == pytest.approx([1.0, 2.0, 0.8])
+    assert step["test"]["noise_before"][CLIMB] == pytest.approx(0.7)
     assert step["test"]["bound_noise"][CLIMB] == pytest.approx([0.7] * 3)
-    assert step["test"]["noise_then"].shape == (N_TESTS,)
+    assert step["test"]["noise_before"].shape == (N_TESTS,)
 
 
 def stood_in(i, signal=(), **fields):
@@ -485,12 +495,17 @@ def stood_in(i, signal=(), **fields):
     belief = np.zeros(1, belief_dtype(4)).view(np.recarray)[0]
     step = monitor["step"]
     step["memory"]["predicted"], step["memory"]["command"] = np.arange(N_SENSORS) / 10.0, (1800.0, 20.0)
-    step["memory"]["then"][[QDYN, AIRSPEED]] = 1000.0, 40.0
-    step["memory"]["then"][:3], monitor["config"]["trim"] = (0.1, 0.2, 0.3), 7.0
+    step["memory"]["previous"][[QDYN, AIRSPEED]] = 1000.0, 40.0
+    step["memory"]["previous"][:3], monitor["config"]["trim"] = (0.1, 0.2, 0.3), 7.0
     values = np.zeros(N_SENSORS)
     for sensor, value in dict(signal).items():
         values[sensor] = value
-    belief["f"], belief["G"], belief["u"], belief["u_then"] = (1, 2, 3), 0.5, (0.1, 0.2, 0, 0), (0.7, 0, 0, 0)
+    belief["f"], belief["G"], belief["u"], belief["u_before"] = (
+        (1, 2, 3),
+        0.5,
+        (0.1, 0.2, 0, 0),
+        (0.7, 0, 0, 0),
+    )
     step["test"]["residual"][:3], step["test"]["filtered"][:3, 1] = (0.01, 0.02, 0.03), (0.4, 0.5, 0.6)
     return float(watching.substitute_of(monitor, belief, values, i)), monitor
 
@@ -515,19 +530,19 @@ def test_attitude_and_altitude_are_predicted_and_the_engine_is_as_commanded():
 
 
 @pytest.mark.parametrize("gyro", GYROS)
-@pytest.mark.parametrize("past", [0, 1])
-def test_a_rate_is_what_the_attitude_shows_and_the_models_change_since(gyro, past):
-    value, monitor = stood_in(gyro, past=past)
-    u_sum = 0.7 if past == 0 else 0.3
+@pytest.mark.parametrize("substep", [0, 1])
+def test_a_rate_is_what_the_attitude_shows_and_the_models_change_since(gyro, substep):
+    value, monitor = stood_in(gyro, substep=substep)
+    u_sum = 0.7 if substep == 0 else 0.3
     acceleration = (1, 2, 3)[gyro] + 0.5 * u_sum
     assert value == pytest.approx((0.1, 0.2, 0.3)[gyro] + (0.01, 0.02, 0.03)[gyro] / H + H * acceleration)
-    assert monitor["memory"]["taken_over"][gyro]
+    assert monitor["memory"]["rate_replaced"][gyro]
 
 
 def test_where_the_attitude_is_noisy_a_rate_follows_it_slowly_after_one_step():
-    value, _ = stood_in(1, follows=0.1)
+    value, _ = stood_in(1, attitude_correction_share=0.1)
     assert value == pytest.approx(0.2 + 10.0 * 0.5 + H * 2.35)
-    value, _ = stood_in(1, follows=0.1, taken_over=(0, 1, 0))
+    value, _ = stood_in(1, attitude_correction_share=0.1, rate_replaced=(0, 1, 0))
     assert value == pytest.approx(0.2 + 0.1 * 0.02 / H + H * 2.35)
 
 
@@ -543,16 +558,16 @@ def looked(monitor, fdi, **signal):
 
 
 def test_looks_of_a_frame_follow_one_another():
-    monitor, fdi = new_watch(past=3), new_fdi()
+    monitor, fdi = new_watch(substep=3), new_fdi()
     fdi["bank"]["output"]["threshold"], fdi["bound"]["frame"] = 1.0, 1.0
     monitor["step"]["config"]["gravity"] = monitor["step"]["config"]["offset"] = 0.0
     monitor["step"]["config"]["offset"][:] = 1.0
     fdi["bank"]["output"]["innovation"] = 0.5, 0.0, 0.0
     looked(monitor, fdi)
-    assert (monitor["memory"]["begun"], monitor["memory"]["past"]) == (1, 0)
+    assert (monitor["memory"]["begun"], monitor["memory"]["substep"]) == (1, 0)
     for k in range(4):
         looked(monitor, fdi, phi=1e-3 * (k % 2))
-        assert monitor["memory"]["past"] == (k + 1) % 4
+        assert monitor["memory"]["substep"] == (k + 1) % 4
     assert monitor["memory"]["W"][0] == pytest.approx(0.5 * DT)  # once a frame
     # the gyro's error as the frame began, and the largest inside it: the attitude moved, the rates did not
     assert monitor["memory"]["gyro_error"] == pytest.approx(np.zeros(3), abs=1e-12)
@@ -560,9 +575,9 @@ def test_looks_of_a_frame_follow_one_another():
     before = monitor["memory"]["spike"].copy()
     looked(monitor, fdi, phi=2e-3)
     assert monitor["memory"]["gyro_error"][0] == pytest.approx(-1e-3 / H, rel=1e-2)
-    assert monitor["memory"]["spike_then"] == pytest.approx(before)
+    assert monitor["memory"]["previous_spike"] == pytest.approx(before)
     assert not monitor["memory"]["spike"].any()
-    assert monitor["memory"]["gyro_error_then"] == pytest.approx(np.zeros(3), abs=1e-12)
+    assert monitor["memory"]["previous_gyro_error"] == pytest.approx(np.zeros(3), abs=1e-12)
     assert monitor["memory"]["W"][0] == pytest.approx(2 * 0.5 * DT)
 
 
@@ -578,10 +593,12 @@ def test_a_broken_altimeter_is_named_and_replaced_from_then_on():
     assert abs(measured["altitude"]) < 0.1
 
 
-@pytest.mark.parametrize(("past", "asked"), [(0, True), (1, False)])
-def test_the_rates_are_asked_once_a_frame(past, asked):
+@pytest.mark.parametrize(("substep", "asked"), [(0, True), (1, False)])
+def test_the_rates_are_asked_once_a_frame(substep, asked):
     monitor, fdi = (
-        with_shares({TURN: 2.0, ANGLE: 1.5}, past=past, gyro_error=(0, 0.3, 0), begun=watching.RUNNING),
+        with_shares(
+            {TURN: 2.0, ANGLE: 1.5}, substep=substep, gyro_error=(0, 0.3, 0), begun=watching.MONITOR_RUNNING
+        ),
         new_fdi(),
     )
     fdi["bank"]["output"]["threshold"], fdi["bound"]["frame"] = 1.0, 1.0
@@ -605,7 +622,7 @@ def test_what_is_replaced_is_shared_out_and_the_slipstream_is_that_of_what_it_is
     monitor, measured = new_watch(engine=engine), np.zeros(1, MEASURED).view(np.recarray)[0]
     belief = np.zeros(1, belief_dtype(4)).view(np.recarray)[0]
     monitor["step"]["memory"]["predicted"], monitor["step"]["memory"]["command"] = 0.1, (1800.0, 20.0)
-    monitor["step"]["memory"]["then"][[QDYN, AIRSPEED]] = 1000.0, 44.0
+    monitor["step"]["memory"]["previous"][[QDYN, AIRSPEED]] = 1000.0, 44.0
     measured["signal"], measured["y"], measured["attitude"] = 0.3, 9.0, 9.0
     measured["signal"][[AIRSPEED, QDYN, ENGINE_SPEED, MANIFOLD]] = 45.0, 1036.0, 1900.0, 21.0
     for i in broken:
@@ -629,7 +646,7 @@ def test_at_its_bound_a_test_is_within_it():
     at_first = {ALPHA, BETA, AIRSPEED, PHI, THETA}  # nothing is beyond what a first error may have done
     assert suspects({TURN: 1.0, TURN + 1: 1.0}, lead=TURN) == {0, 1, 2, PSI} | at_first
     assert suspects({ANGLE: 2.0, ANGLE + 1: 1.0}) == {0, 1, 2, PHI}
-    assert suspects({TURN: 100.0, TURN + 1: 100.0 * watching.INVOLVED}) == {0}
+    assert suspects({TURN: 100.0, TURN + 1: 100.0 * watching.INVOLVED_SHARE}) == {0}
     assert suspects({SPEED: 1.0, DENSITY: 1.0}, lead=DENSITY) == {QDYN} | at_first
 
 
@@ -668,7 +685,11 @@ def test_suspicions_of_the_frame_before_are_gone():
 def test_an_alarm_on_roll_counts_as_one():
     """The first axis of the bank has number 0, and no axis is -1."""
     monitor, fdi = new_watch(gyro_error=(0.0, 0.3, 0.0), W_bound=(9.0, 9.0, 9.0)), new_fdi()
-    fdi["bound"]["frame"], fdi["bank"]["output"]["threshold"][:3], monitor["memory"]["gyro_error_then"] = (
+    (
+        fdi["bound"]["frame"],
+        fdi["bank"]["output"]["threshold"][:3],
+        monitor["memory"]["previous_gyro_error"],
+    ) = (
         1.0,
         1.0,
         (0.0, 0.3, 0.0),
@@ -688,9 +709,9 @@ def test_what_is_named_is_replaced_and_flags_are_one():
 
 
 def test_where_the_attitude_is_blurred_a_look_asks_whether_any_gyro_can_be_it():
-    for blurred in (0, 1):
-        monitor, fdi = new_watch(blurred=blurred, begun=1, past=1), new_fdi()
+    for noisy_attitude in (0, 1):
+        monitor, fdi = new_watch(noisy_attitude=noisy_attitude, begun=1, substep=1), new_fdi()
         monitor["memory"]["W"], fdi["bank"]["output"]["threshold"] = (0.5, 0.0, 0.0), 1.0
         monitor["step"]["config"]["offset"][:] = 1.0
         looked(monitor, fdi)
-        assert bool(monitor["memory"]["apart"].any()) == bool(blurred)
+        assert bool(monitor["memory"]["rate_difference"].any()) == bool(noisy_attitude)

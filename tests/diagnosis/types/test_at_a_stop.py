@@ -43,15 +43,15 @@ def trim_deg(surface):
     return degrees(bf.trim("fault-free").surfaces_rad[surface])
 
 
-def flown(surface, orders, fault, rate_hz=50, substeps=1, sensors="ideal", bounds=None, room_deg=(-1, 2),
+def flown(surface, commands, fault, rate_hz=50, substeps=1, sensors="ideal", bounds=None, room_deg=(-1, 2),
           actuators=None):  # fmt: skip
     axis, at = SURFACES[surface], trim_deg(surface)
     stops = [at + room_deg[0], at + room_deg[1]]
     if axis is None:  # nobody commands it: it stays where it is, at this stop or that
-        stops = [0.0, 4.0] if orders == "one stop" else [-4.0, 0.0]
+        stops = [0.0, 4.0] if commands == "one stop" else [-4.0, 0.0]
     return bf.fly({
         "name": "at-a-stop", "duration_s": 11.0, "rate_hz": rate_hz, "substeps": substeps, "sensors": sensors,
-        "reference": {axis: ORDERS[orders]} if axis else {},
+        "reference": {axis: ORDERS[commands]} if axis else {},
         "actuators": {**(actuators or {}), surface: {"travel_deg": stops, **(actuators or {})}},
         "fdi": {"fault_class": "all", "bounds": bounds or {}, "slowest_rate_deg_s": 0.5},
         "faults": [{"actuator": surface, "at_s": 2.0, **FAULTS[fault]}],
@@ -68,10 +68,10 @@ def is_possible(flight, surface, kind):
     return surface in said.candidates or f"{surface}:{kind}" in said.candidates
 
 
-@pytest.mark.parametrize("orders", ORDERS)
+@pytest.mark.parametrize("commands", ORDERS)
 @pytest.mark.parametrize("fault", FAULTS)
-def test_the_true_surface_and_type_stay_possible(fault, orders):
-    flights = {surface: flown(surface, orders, fault) for surface in SURFACES}
+def test_the_true_surface_and_type_stay_possible(fault, commands):
+    flights = {surface: flown(surface, commands, fault) for surface in SURFACES}
     assert any(flight.metrics["saturation_s"][surface] > 1.0 for surface, flight in flights.items())
     for surface, flight in flights.items():
         assert not flight.false_alarm

@@ -33,13 +33,13 @@ class RealPlant(DesignPlant):
         if noisy:
             bounds["sensors"] = {axis: {"noise_std_deg_s": NOISE_DEG_S} for axis in "pqr"}
         super().__init__(seed=seed, bounds=bounds, fault_class="all", **keys)
-        wrong = {name: 1 + TOLERANCE * self.rng.choice([-1, 1]) for name in NAMES}
-        self.truth = design_record(scale=wrong)[0]
-        self.furthest = 4 * np.deg2rad(NOISE_DEG_S) * noisy
+        anomalous = {name: 1 + TOLERANCE * self.rng.choice([-1, 1]) for name in NAMES}
+        self.truth = design_record(scale=anomalous)[0]
+        self.largest_deflection = 4 * np.deg2rad(NOISE_DEG_S) * noisy
 
     def _step(self, uncertainty):
         frame = self.frame
-        seen = self.x + self.rng.choice([-1, 1], 3) * self.furthest
+        seen = self.x + self.rng.choice([-1, 1], 3) * self.largest_deflection
         frame["k"], frame["t"] = self.k, self.k * self.dt
         belief, y = frame["belief"], self.condition()
         frame["measured"]["x"], frame["measured"]["y"] = seen, y
@@ -94,7 +94,7 @@ def test_blocks_see_what_frames_do_not():
     plant = fly(4, True, "bias", 2, 30, 0.9, 600)
     known, estimator = (
         plant.fdi["types"]["surface"][2],
-        plant.fdi["isolation"]["estimator"][plant.fdi["layout"]["position_of"][2]],
+        plant.fdi["isolation"]["estimator"][plant.fdi["layout"]["position_estimator"][2]],
     )
     of_a_frame = 2 * plant.fdi["bound"]["frame"][2] / abs(estimator["effect"]["Z"][2])
     assert known["elapsed"]["high"] - known["elapsed"]["low"] < 0.5 * of_a_frame

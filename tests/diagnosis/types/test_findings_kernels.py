@@ -22,13 +22,13 @@ def new(left=None, detected=1, pairs=0, verdict=NOT_ISOLATED, **fields):
     fdi = np.zeros(1, diagnosis_dtype(4))[0]
     fdi["verdict"]["detected"], fdi["verdict"]["isolated"], fdi["verdict"]["type"] = detected, verdict, -1
     fdi["verdict"]["isolated_at_s"], fdi["types"]["pair"]["enabled"] = 12.5, pairs
-    fdi["layout"]["position_of"], fdi["isolation"]["estimator"]["surface"][4:8] = POSITION_OF, range(4)
+    fdi["layout"]["position_estimator"], fdi["isolation"]["estimator"]["surface"][4:8] = POSITION_OF, range(4)
     fdi["layout"]["group"] = 1 - PITCH_GROUP
     fdi["layout"]["group"][[ELEVATOR, FLAP]] = PITCH_GROUP
-    fdi["types"]["surface"]["refuted"], fdi["types"]["surface"]["feasible"]["excluded"] = 1, 1
+    fdi["types"]["surface"]["estimator_excluded"], fdi["types"]["surface"]["feasible"]["excluded"] = 1, 1
     fdi["types"]["surface"]["status"]["type"], fdi["types"]["surface"]["status"]["type_at_s"] = -1, -1.0
     for s, kinds in (left or {}).items():
-        fdi["types"]["surface"]["refuted"][s] = 0
+        fdi["types"]["surface"]["estimator_excluded"][s] = 0
         fdi["types"]["surface"]["feasible"]["excluded"][s][list(kinds)] = 0
     put(fdi, **fields)
     return fdi
@@ -68,14 +68,14 @@ def test_a_surface_is_possible_until_it_is_excluded_or_ruled_out(named, standing
     fdi = new({RUDDER: [STUCK]})
     (
         fdi["types"]["surface"]["status"]["named"][RUDDER],
-        fdi["types"]["surface"]["status"]["source"][RUDDER],
+        fdi["types"]["surface"]["status"]["decided_by"][RUDDER],
     ) = named, standing
-    fdi["types"]["surface"]["refuted"][RUDDER] = excluded
+    fdi["types"]["surface"]["estimator_excluded"][RUDDER] = excluded
     assert (f"rudder:{NAMES[STUCK]}" in verdict.fault_findings(fdi, SURFACES)["candidates"]) == possible
 
 
 @pytest.mark.parametrize(
-    ("constant", "evidence", "own_errors", "kept"),
+    ("constant", "evidence", "has_surface_errors", "kept"),
     [
         (BIAS, 30, 0, {VARYING_LOSS, SLOW}), (BIAS, 50, 0, set()), (BIAS, 51, 0, set()),
         (STUCK, 30, 0, {VARYING_LOSS, SLOW}), (STUCK, 50, 0, {SLOW}), (FLOAT, 51, 0, {SLOW}),
@@ -84,16 +84,16 @@ def test_a_surface_is_possible_until_it_is_excluded_or_ruled_out(named, standing
     ],
 )  # fmt: skip
 def test_what_any_course_explains_counts_only_until_a_constant_has_been_seen_for_long(
-    constant, evidence, own_errors, kept
+    constant, evidence, has_surface_errors, kept
 ):
     """But where a surface stands still, a slow one may stand until it is excluded."""
     constants = set() if constant is None else {constant}
-    fdi = new({RUDDER: {VARYING_LOSS, SLOW} | constants}, patience=40)
+    fdi = new({RUDDER: {VARYING_LOSS, SLOW} | constants}, half_cycle_frames=40)
     (
         fdi["types"]["surface"]["evidence"]["frames"][RUDDER],
-        fdi["types"]["surface"]["evidence"]["quiet"][RUDDER],
+        fdi["types"]["surface"]["evidence"]["rest_frames"][RUDDER],
     ) = evidence, 10
-    fdi["types"]["config"]["own_errors"] = own_errors
+    fdi["types"]["config"]["has_surface_errors"] = has_surface_errors
     types = verdict._types_left(fdi, RUDDER)
     assert set(types) == set(said(*constants, *kept))
     assert len(types) == len(set(types))

@@ -115,9 +115,13 @@ def test_the_room_of_a_position_is_that_of_where_it_can_have_been():
         SHARE,
     )
     bound["error_map"]["travel_low"], bound["error_map"]["travel_high"] = -0.5, 0.5
-    bound["beyond"][:3], bound["frame"], fdi["bank"]["output"]["innovation"] = ERROR, 0.1, (0.0, 1.0, 0.0)
+    bound["further_error"][:3], bound["frame"], fdi["bank"]["output"]["innovation"] = (
+        ERROR,
+        0.1,
+        (0.0, 1.0, 0.0),
+    )
     fie["effect"]["Z"], fdi["config"]["instants"] = (0.0, 20.0, 0.0), 1
     # 1.0 +- 0.1 +- 3.0 over 20: within 0.205 of 0.5 rad, the second level; then 1.4 / 20, the first
     on(isolation.widen_by_own_errors, fdi, fie)
     assert fie["effect"]["spread"] == pytest.approx(ERROR[0])
-    assert fie["used"] == pytest.approx(1.13 / 20 / 0.5)
+    assert fie["travel_share"] == pytest.approx(1.13 / 20 / 0.5)

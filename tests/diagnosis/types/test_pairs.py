@@ -102,7 +102,7 @@ def test_ailerons_and_rudder_were_where_two_equations_put_them(off_a, off_r, siz
     Z = np.array([[-9.0, 0.6], [-0.3, -2.1]])  # of roll and yaw, by ailerons and rudder
     frame, spread = np.array(sizes[:2]) + 0.01, np.array(sizes[2:]).reshape(2, 2)
     for column, s in enumerate((AILERON, RUDDER)):
-        effect = fdi["isolation"]["estimator"][fdi["layout"]["position_of"][s]]["effect"]
+        effect = fdi["isolation"]["estimator"][fdi["layout"]["position_estimator"][s]]["effect"]
         effect["Z"][[0, 2]], effect["spread"][[0, 2]] = Z[:, column], spread[:, column]
         fdi["types"]["surface"][s]["elapsed"]["command"] = 0.02
     fdi["bound"]["frame"][[0, 2]] = frame
@@ -125,7 +125,7 @@ def test_ailerons_and_rudder_were_where_two_equations_put_them(off_a, off_r, siz
         assert surface["elapsed"]["high"] == pytest.approx(
             min(surface["actuator"]["travel_high"], 0.02 + ends.max()), abs=1e-9
         )
-        assert surface["elapsed"]["wrong"] == (ends.min() > 0 or ends.max() < 0)
+        assert surface["elapsed"]["anomalous"] == (ends.min() > 0 or ends.max() < 0)
 
 
 @pytest.mark.parametrize("thresholds", ["published", "interval"])

@@ -68,7 +68,7 @@ def test_a_return_does_not_move_the_jam(case, surface, at, lasting, share, uncer
     plant = fly(case, surface, fault, uncertainty, frames=at + lasting + int(3 * case["rate_hz"]))
     low, high = TRAVEL_RAD[:, surface]
     known = plant.fdi["types"]["surface"][surface]
-    healthy = not (known["elapsed"]["wrong"] or known["judged"]["wrong"])
+    healthy = not (known["elapsed"]["anomalous"] or known["judged"]["anomalous"])
     if healthy:
         assert (
             known["feasible"]["low"][fault_kinds.STUCK]

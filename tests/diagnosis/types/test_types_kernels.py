@@ -32,8 +32,8 @@ ALL = set(range(N_TYPES))
 def new_surface(left=ALL, low=-0.01, high=0.01, command=0.0, **fields):
     """(fdi, surface 0) with only these types left; low to high: where it was in the judged frame, rad."""
     fdi = new_fdi()
-    put(fdi, whole=1, patience=20, instants=1)
-    fdi["types"]["config"]["length"], fdi["types"]["config"]["span_s"], fdi["types"]["frame"] = 1, DT, 10
+    put(fdi, whole=1, half_cycle_frames=20, instants=1)
+    fdi["types"]["config"]["length"], fdi["types"]["config"]["block_s"], fdi["types"]["frame"] = 1, DT, 10
     surface = fdi["types"]["surface"][0]
     (
         surface["actuator"]["travel_low"],
@@ -62,13 +62,17 @@ def restored(surface):
 
 def test_what_is_known_of_a_surface_as_it_begins():
     _, surface = new_surface(left=())
-    surface["evidence"]["frames"], surface["evidence"]["quiet"], surface["evidence"]["started_at"] = 3, 4, 5
+    surface["evidence"]["frames"], surface["evidence"]["rest_frames"], surface["evidence"]["started_at"] = (
+        3,
+        4,
+        5,
+    )
     surface["elapsed"]["low"], surface["elapsed"]["high"] = 0.1, 0.2
     examine.restart_surface(surface)
     assert not surface["feasible"]["excluded"].any()
     assert (
         surface["evidence"]["frames"],
-        surface["evidence"]["quiet"],
+        surface["evidence"]["rest_frames"],
         surface["evidence"]["started_at"],
     ) == (0, 0, -1)
     assert (surface["elapsed"]["low"], surface["elapsed"]["high"]) == (LOW, HIGH)
@@ -108,8 +112,8 @@ def test_a_constant_loss_keeps_the_shares_that_explain_the_frame(low, high, comm
 def test_over_a_block_in_which_the_command_swings_any_mean_may_be_a_varying_loss():
     for least, greatest, excluded in ((-0.1, 0.2, 0), (0.0, 0.2, 1), (-0.1, 0.0, 1)):
         fdi, surface = new_surface(low=0.11, high=0.2, command=0.1)
-        fdi["types"]["config"]["length"], surface["orders"]["least"][1] = 5, least
-        surface["orders"]["greatest"][1] = greatest
+        fdi["types"]["config"]["length"], surface["commands"]["least"][1] = 5, least
+        surface["commands"]["greatest"][1] = greatest
         judged(commanded_surface.judge_varying_loss, fdi, surface, VARYING_LOSS, 5)
         assert surface["feasible"]["excluded"][VARYING_LOSS] == excluded
 
@@ -167,12 +171,12 @@ def test_no_offset_takes_a_surface_beyond_its_stops(low, high):
 def test_within_what_is_seen_at_once_a_stop_may_have_been_met_at_its_furthest_order(length):
     fdi, surface = new_surface(low=0.2, high=0.25, command=0.1)
     fdi["types"]["config"]["length"] = length
-    surface["orders"]["least"][1], surface["orders"]["greatest"][1] = -0.4, 0.34
+    surface["commands"]["least"][1], surface["commands"]["greatest"][1] = -0.4, 0.34
     # the lowest it was: 0.2 - (0.1 + 0.4) = -0.3; the highest: 0.25 + 0.24 = 0.49, below 0.5
     assert commanded_surface.judged_offset(surface) == pytest.approx((0.1, 0.15))
-    surface["orders"]["greatest"][1] = 0.36
+    surface["commands"]["greatest"][1] = 0.36
     assert commanded_surface.judged_offset(surface)[1] == np.inf
-    surface["orders"]["least"][1] = -0.51
+    surface["commands"]["least"][1] = -0.51
     assert commanded_surface.judged_offset(surface)[0] == -np.inf
 
 
@@ -186,10 +190,13 @@ def test_a_bias_keeps_the_offsets_that_explain_every_frame():
     )
     surface["elapsed"]["command"] = 0.05
     assert on(commanded_surface.bias_deflection, fdi, surface, BIAS) == pytest.approx((-0.12, -0.1))
-    orders, surface["elapsed"]["command"] = surface["orders"], -0.2
-    orders["least"][0], orders["greatest"][0] = -0.24, -0.1  # where it was meanwhile: to -0.41 and to -0.25
+    commands, surface["elapsed"]["command"] = surface["commands"], -0.2
+    commands["least"][0], commands["greatest"][0] = (
+        -0.24,
+        -0.1,
+    )  # where it was meanwhile: to -0.41 and to -0.25
     assert on(commanded_surface.bias_deflection, fdi, surface, BIAS) == pytest.approx((LOW, -0.35))
-    orders["least"][0] = orders["greatest"][0] = 0.0
+    commands["least"][0] = commands["greatest"][0] = 0.0
     assert commanded_surface.bias_interval(fdi, 0, BIAS) == pytest.approx((-0.17, -0.15))
     assert contract.set_middle_of(fdi, 0, BIAS) == pytest.approx(-0.16)
     surface["feasible"]["high"][BIAS] = np.inf
@@ -250,10 +257,10 @@ def test_of_several_instants_a_mean_may_be_that_of_the_last():
         assert surface["growing_bias"]["ran"][1] == ran
 
 
-def slow_run(places, orders=(0.0, 0.0), whole=1, frames=None, slowest_step=0.0):
+def slow_run(places, commands=(0.0, 0.0), whole=1, frames=None, slowest_step=0.0):
     fdi, surface = new_surface(slowest_step=slowest_step)
     fdi["types"]["config"]["whole"] = whole
-    surface["orders"]["low"], surface["orders"]["high"] = orders[0], orders[1]
+    surface["commands"]["low"], surface["commands"]["high"] = commands[0], commands[1]
     for k, place in enumerate(places):
         surface["judged"]["low"], surface["judged"]["high"] = place - 0.01, place + 0.01
         judged(commanded_surface.judge_rate_limit, fdi, surface, SLOW, (frames or range(99))[k])
@@ -266,7 +273,7 @@ def test_a_slow_surface_never_moves_away_from_its_command():
     assert not slow_run([0.2, 0.215])  # within what is known of it
     assert slow_run([-0.2, -0.25])
     assert not slow_run([-0.3, -0.2])
-    assert not slow_run([0.2, 0.25], orders=(0.0, 0.3))  # it was told to
+    assert not slow_run([0.2, 0.25], commands=(0.0, 0.3))  # it was told to
     assert not slow_run([0.2, 0.25], frames=[3, 5])  # a frame between them is not known
     assert slow_run([0.25, 0.2, 0.23])
     assert not slow_run([0.2, -0.2, -0.15])
@@ -288,20 +295,20 @@ def test_a_slow_surface_that_stands_off_its_command_comes_nearer_by_its_least_ra
 
 def test_which_side_of_its_orders_a_surface_stands_on():
     fdi, surface = new_surface(low=0.1, high=0.2)
-    orders = surface["orders"]
+    commands = surface["commands"]
     for newest, whole in ((1, 0), (2, 1)):
         fdi["types"]["config"]["whole"] = whole
         for low, high, side in ((-0.1, 0.05, 1), (0.25, 0.3, -1), (0.05, 0.15, 0), (0.15, 0.3, 0)):
-            orders["low"], orders["high"] = 9.0, -9.0
-            orders["low"][newest], orders["high"][newest] = low, high
-            orders["low"][2] = min(orders["low"][2], low)
-            orders["high"][2] = max(orders["high"][2], high)
+            commands["low"], commands["high"] = 9.0, -9.0
+            commands["low"][newest], commands["high"][newest] = low, high
+            commands["low"][2] = min(commands["low"][2], low)
+            commands["high"][2] = max(commands["high"][2], high)
             assert on(commanded_surface.side_of_command, fdi, surface) == side
 
 
-def swung(signs, patience=20):
+def swung(signs, half_cycle_frames=20):
     fdi, surface = new_surface()
-    fdi["types"]["config"]["patience"] = patience
+    fdi["types"]["config"]["half_cycle_frames"] = half_cycle_frames
     for frame, sign in enumerate(signs):
         fdi["types"]["frame"] = frame + 1
         surface["judged"]["low"], surface["judged"]["high"] = 0.1 * sign - 0.02, 0.1 * sign + 0.02
@@ -376,25 +383,25 @@ def test_what_holds_a_surface_is_excluded_where_it_is_not(kind, inside, outside)
 
 
 @pytest.mark.parametrize(
-    ("whole", "hides", "excluded"),
+    ("whole", "stop_hides", "excluded"),
     [(1, (0, 0), 1), (0, (0, 0), 1), (1, (0, 1), 1), (0, (0, 1), 0), (0, (1, 0), 1)],
 )
-def test_at_a_stop_the_mean_of_a_quick_swing_keeps_its_sign(whole, hides, excluded):
+def test_at_a_stop_the_mean_of_a_quick_swing_keeps_its_sign(whole, stop_hides, excluded):
     fdi, surface = new_surface(low=-0.2, high=-0.1, command=0.1)  # below its command all the time
-    fdi["types"]["config"]["whole"], surface["judged"]["hides"] = whole, hides
+    fdi["types"]["config"]["whole"], surface["judged"]["stop_hides"] = whole, stop_hides
     for frame in range(30):
         judged(commanded_surface.judge_oscillation, fdi, surface, OSCILLATORY, frame)
     assert surface["feasible"]["excluded"][OSCILLATORY] == excluded
 
 
-@pytest.mark.parametrize(("least", "greatest", "hides"), [
+@pytest.mark.parametrize(("least", "greatest", "stop_hides"), [
     (-0.3, 0.4, [0, 0]), (-0.31, 0.3, [1, 0]), (0.0, 0.41, [0, 1]), (-0.35, 0.45, [1, 1]), (LOW, LOW, [1, 0]),
 ])  # fmt: skip
-def test_a_stop_hides_what_is_no_wider_than_the_interval_of_a_deflection(least, greatest, hides):
+def test_a_stop_hides_what_is_no_wider_than_the_interval_of_a_deflection(least, greatest, stop_hides):
     _, surface = new_surface()
-    surface["orders"]["least"][0], surface["orders"]["greatest"][0] = least, greatest
+    surface["commands"]["least"][0], surface["commands"]["greatest"][0] = least, greatest
     contract.record_hiding_stops(surface, 0.0999)
-    assert surface["elapsed"]["hides"].tolist() == hides
+    assert surface["elapsed"]["stop_hides"].tolist() == stop_hides
 
 
 def test_a_jam_narrows_to_where_it_is_seen():
@@ -428,12 +435,12 @@ def test_where_types_have_a_surface():
 
 def released(low=0.2, high=0.3, order=0.0, judged=(-1.0, 1.0), instants=1, **fields):
     fdi, surface = new_surface(low=judged[0], high=judged[1], **fields)
-    fdi["types"]["config"]["returns"], fdi["types"]["config"]["instants"] = 1, instants
-    surface["orders"]["given"][1] = order
-    for which in (held_surface.EARLIER, held_surface.LATER):
+    fdi["types"]["config"]["released_returns"], fdi["types"]["config"]["instants"] = 1, instants
+    surface["commands"]["given"][1] = order
+    for which in (held_surface.EARLIER_RELEASE, held_surface.LATER_RELEASE):
         held_surface.clear_releases(surface, which, STUCK)
-    surface["release"]["low"][held_surface.LATER, STUCK] = low
-    surface["release"]["high"][held_surface.LATER, STUCK] = high
+    surface["release"]["low"][held_surface.LATER_RELEASE, STUCK] = low
+    surface["release"]["high"][held_surface.LATER_RELEASE, STUCK] = high
     return fdi, surface
 
 
@@ -459,7 +466,7 @@ def test_what_a_frame_shows_of_a_return_is_weighted_by_the_effectiveness_then(G,
     for _ in range(G.size - 1):
         path.append(path[-1] + np.clip(0.5 * (order - path[-1]), -0.1, 0.1))
     shown = np.sum(G * path) / np.sum(G)
-    surface["judged"]["uneven"] = 0.25 * (G.max() - G.min()) / G.mean()
+    surface["judged"]["effectiveness_variation"] = 0.25 * (G.max() - G.min()) / G.mean()
     mean, _, room = on(held_surface.mean_return_position, fdi, surface, held)
     assert abs(shown - mean) <= room + 1e-15
     surface["judged"]["command"], surface["judged"]["low"], surface["judged"]["high"] = (
@@ -478,7 +485,7 @@ def test_a_return_keeps_where_it_agrees_and_ends_where_it_does_not():
     for judged in ((0.31, 0.4), (0.1, 0.19)):
         fdi, surface = released(judged=judged)
         assert not on(held_surface.return_explains, fdi, surface, STUCK)
-        assert not held_surface.has_release(surface, held_surface.LATER, STUCK)
+        assert not held_surface.has_release(surface, held_surface.LATER_RELEASE, STUCK)
     fdi, surface = released(low=0.1, high=0.1, judged=(0.0, 0.2), command=0.1)
     assert not on(
         held_surface.return_explains, fdi, surface, STUCK
@@ -496,7 +503,7 @@ def test_a_return_has_the_room_that_an_uneven_effectiveness_gives_it(length, ins
             1.0,
             0.05,
         )
-        surface["judged"]["uneven"] = 0.2
+        surface["judged"]["effectiveness_variation"] = 0.2
         assert on(held_surface.return_explains, fdi, surface, STUCK) == there
 
 
@@ -510,25 +517,25 @@ def test_what_is_let_go_joins_the_later_releases_and_is_carried_on():
     held["released"][STUCK] = 1
     held_surface.add_release(surface, STUCK, -0.4, 0.5)
     assert (held["low"][1, STUCK], held["high"][1, STUCK]) == (0.1, 0.3)
-    surface["judged"]["wrong"] = 1
+    surface["judged"]["anomalous"] = 1
     on(held_surface.propagate_returns, fdi, surface, STUCK)
     assert (held["low"][1, STUCK], held["high"][1, STUCK]) == pytest.approx((0.05, 0.2))
     assert held["released"][STUCK] == 1
-    surface["judged"]["wrong"] = 0
+    surface["judged"]["anomalous"] = 0
     on(held_surface.propagate_returns, fdi, surface, STUCK)
     assert held["released"][STUCK] == 0
 
 
-@pytest.mark.parametrize("returns", [0, 1])
-def test_a_type_that_no_longer_holds_is_excluded_unless_a_return_explains_it(returns):
+@pytest.mark.parametrize("released_returns", [0, 1])
+def test_a_type_that_no_longer_holds_is_excluded_unless_a_return_explains_it(released_returns):
     fdi, surface = released(judged=(0.2, 0.3))
-    fdi["types"]["config"]["returns"] = returns
-    elsewhere = held_surface.RETURNING if returns else held_surface.REFUTED
+    fdi["types"]["config"]["released_returns"] = released_returns
+    elsewhere = held_surface.RETURNING if released_returns else held_surface.REFUTED
     judged(held_surface.hold_or_return_explains, fdi, surface, STUCK, -0.1, 0.1)
-    assert surface["feasible"]["excluded"][STUCK] == (not returns)
-    assert surface["release"]["released"][STUCK] == returns
+    assert surface["feasible"]["excluded"][STUCK] == (not released_returns)
+    assert surface["release"]["released"][STUCK] == released_returns
     fdi, surface = released(judged=(0.2, 0.3))
-    fdi["types"]["config"]["returns"] = returns
+    fdi["types"]["config"]["released_returns"] = released_returns
     assert on(held_surface.hold_status, fdi, surface, STUCK, 0.3, 0.4) == held_surface.HELD
     assert on(held_surface.hold_status, fdi, surface, STUCK, 0.1, 0.2) == held_surface.HELD
     surface["release"]["released"][STUCK] = 1
@@ -551,8 +558,8 @@ def test_from_where_each_type_lets_go(kind):
         held_surface.clear_releases(surface, which, kind)
     if kind == STUCK:
         (
-            surface["release"]["low"][held_surface.EARLIER, STUCK],
-            surface["release"]["high"][held_surface.EARLIER, STUCK],
+            surface["release"]["low"][held_surface.EARLIER_RELEASE, STUCK],
+            surface["release"]["high"][held_surface.EARLIER_RELEASE, STUCK],
         ) = 0.0, 0.1
     on(TYPES[kind].on_release, fdi, surface, kind)
     held = surface["release"]
@@ -572,7 +579,7 @@ def test_within_a_frame_of_several_instants_a_runaway_may_be_let_go_further_on(k
 
 
 def test_a_jam_that_may_have_let_go_returns_to_what_was_known_before():
-    _, surface = released(low=0.2, high=0.3, wrong_then=0)
+    _, surface = released(low=0.2, high=0.3, anomalous_then=0)
     surface["stuck"]["kept_low"], surface["stuck"]["kept_high"] = (0.0, 0.1), (0.2, 0.4)
     surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK] = 0.25, 0.26
     restored(surface)
@@ -580,32 +587,32 @@ def test_a_jam_that_may_have_let_go_returns_to_what_was_known_before():
     held_surface.promote_kept_sets(surface, STUCK)  # no earlier release: the later are the earlier ones now
     held = surface["release"]
     assert (held["low"][0, STUCK], held["high"][0, STUCK]) == (0.2, 0.3)
-    assert not held_surface.has_release(surface, held_surface.LATER, STUCK)
+    assert not held_surface.has_release(surface, held_surface.LATER_RELEASE, STUCK)
     assert (surface["stuck"]["kept_low"].tolist(), surface["stuck"]["kept_high"].tolist()) == (
         [0.1, 0.1],
         [0.4, 0.4],
     )
     restored(surface)
     assert (surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK]) == (0.1, 0.4)
-    surface["judged"]["wrong"], surface["feasible"]["low"][STUCK] = 1, 0.3
+    surface["judged"]["anomalous"], surface["feasible"]["low"][STUCK] = 1, 0.3
     restored(surface)
     assert surface["feasible"]["low"][STUCK] == 0.3
 
 
-def within_block(orders, held=(0.2, 0.3), judged=(-1.0, 1.0)):
+def within_block(commands, held=(0.2, 0.3), judged=(-1.0, 1.0)):
     """A block of frames in which the surface may be let go at any instant."""
-    fdi, surface = released(low=np.inf, high=-np.inf, judged=judged, wrong_then=1)
-    fdi["types"]["config"]["length"] = len(orders)
-    surface["orders"]["given"][1, : len(orders)] = orders
+    fdi, surface = released(low=np.inf, high=-np.inf, judged=judged, anomalous_then=1)
+    fdi["types"]["config"]["length"] = len(commands)
+    surface["commands"]["given"][1, : len(commands)] = commands
     surface["release"]["held_low"][STUCK], surface["release"]["held_high"][STUCK] = held
-    surface["judged"]["uneven"] = UNEVEN
+    surface["judged"]["effectiveness_variation"] = UNEVEN
     return fdi, surface
 
 
-def way(start, orders):
+def way(start, commands):
     """Where the actuator brings a surface, from `start` on: half of what is left, 0.1 rad at most."""
     places = [start]
-    for order in orders:
+    for order in commands:
         places.append(places[-1] + np.clip(0.5 * (order - places[-1]), -0.1, 0.1))
     return np.array(places)
 
@@ -662,11 +669,11 @@ def test_after_a_block_releases_within_it_join_the_later_ones(joined):
     on(held_surface.propagate_returns, fdi, surface, STUCK)
     low, high = (on(held_surface.mean_return_position, fdi, surface, *of)[1] for of in ((0.2, -1), (0.3, 1)))
     assert (held["low"][1, STUCK], held["high"][1, STUCK]) == pytest.approx((low, high))
-    assert not held_surface.has_release(surface, held_surface.EARLIER, STUCK)
+    assert not held_surface.has_release(surface, held_surface.EARLIER_RELEASE, STUCK)
     fdi["types"]["config"]["length"], before = 1, held["high"][1, STUCK].copy()
-    held_surface.clear_releases(surface, held_surface.LATER, STUCK)
+    held_surface.clear_releases(surface, held_surface.LATER_RELEASE, STUCK)
     on(held_surface.propagate_returns, fdi, surface, STUCK)
-    assert not held_surface.has_release(surface, held_surface.LATER, STUCK), (
+    assert not held_surface.has_release(surface, held_surface.LATER_RELEASE, STUCK), (
         "in one frame nothing is let go within"
     )
     assert before == pytest.approx(high)
@@ -676,9 +683,9 @@ def test_after_a_block_releases_within_it_join_the_later_ones(joined):
 @pytest.mark.parametrize("inside", [True, False])
 def test_where_the_effectiveness_changes_a_return_has_a_share_of_its_way_as_room(side, inside):
     fdi, surface = released(low=0.2, high=0.3, command=-0.2)
-    fdi["types"]["config"]["length"], surface["orders"]["given"][1, :4] = 4, ORDERS
+    fdi["types"]["config"]["length"], surface["commands"]["given"][1, :4] = 4, ORDERS
     held, start = surface["release"], 0.2 if side == "low" else 0.3
-    surface["judged"]["uneven"], path = UNEVEN, way(start, ORDERS)
+    surface["judged"]["effectiveness_variation"], path = UNEVEN, way(start, ORDERS)
     mean = path[:-1].mean()
     assert on(held_surface.mean_return_position, fdi, surface, start) == pytest.approx(
         (mean, path[-1], UNEVEN * np.ptp(path[:-1]))
@@ -687,7 +694,7 @@ def test_where_the_effectiveness_changes_a_return_has_a_share_of_its_way_as_room
     sign = -1.0 if side == "low" else 1.0
     beyond = mean + sign * (room + (-1e-6 if inside else 1e-6))
     surface["judged"]["low"], surface["judged"]["high"] = (-1.0, beyond) if side == "low" else (beyond, 1.0)
-    assert on(held_surface.narrow_return, fdi, surface, held_surface.LATER, STUCK) == inside
+    assert on(held_surface.narrow_return, fdi, surface, held_surface.LATER_RELEASE, STUCK) == inside
     if inside:  # nearly all that could have been let go is left out; but the ends may not pass
         assert held["low"][1, STUCK] <= held["high"][1, STUCK]
         kept = held["low" if side == "low" else "high"][1, STUCK]
@@ -705,7 +712,7 @@ def test_a_jam_let_go_without_an_earlier_release_is_the_earlier_one_then():
 
 
 def test_a_jam_that_looks_healthy_is_what_it_was_before():
-    _, surface = released(low=0.2, high=0.3, wrong_then=0)
+    _, surface = released(low=0.2, high=0.3, anomalous_then=0)
     surface["stuck"]["kept_low"], surface["stuck"]["kept_high"] = (0.0, 0.1), (0.2, 0.4)
     surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK] = 0.25, 0.26
     restored(surface)

@@ -10,7 +10,7 @@ from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, UNANTICIPATED,
 from beaver_ftc.diagnosis.types import contract, examine, pairs, verdict
 from beaver_ftc.diagnosis.types.contract import GIVE_UP, SCALE_COMMAND, SUBTRACT_OFFSET, WAIT_FOR_SURFACE
 from beaver_ftc.diagnosis.types.registry import N_TYPES
-from beaver_ftc.diagnosis.types.verdict import BY_DEDUCTION, NO_SURFACE, RULED_OUT, SEVERAL
+from beaver_ftc.diagnosis.types.verdict import BY_DEDUCTION, NO_SURFACE, RULED_OUT, SEVERAL_SURFACES
 from fault_kinds import (
     BIAS,
     CONSTANT_LOSS,
@@ -39,15 +39,15 @@ def new_case(**left):
     """Four surfaces, of which each has these types left: by default all; none: it cannot be at fault."""
     fdi = new_fdi()
     (
-        fdi["types"]["config"]["patience"],
+        fdi["types"]["config"]["half_cycle_frames"],
         fdi["types"]["config"]["whole"],
         fdi["config"]["every_type"],
         fdi["types"]["config"]["instants"],
     ) = PATIENCE, 1, 1, 1
     fdi["isolation"]["config"]["n"] = 8
-    fdi["types"]["config"]["length"], fdi["types"]["config"]["span_s"] = 1, DT
+    fdi["types"]["config"]["length"], fdi["types"]["config"]["block_s"] = 1, DT
     layout = fdi["layout"]
-    layout["loss_of"], layout["position_of"] = range(4), range(4, 8)
+    layout["loss_estimator"], layout["position_estimator"] = range(4), range(4, 8)
     layout["dominant_axis"], layout["main"] = (ROLL, PITCH, YAW, PITCH), (AILERON, ELEVATOR, RUDDER)
     layout["group"], layout["partner"] = (1, 0, 1, 0), (RUDDER, FLAP, AILERON, ELEVATOR)
     fdi["isolation"]["estimator"]["surface"][:8], fdi["isolation"]["estimator"]["kind"][:8] = (
@@ -57,7 +57,7 @@ def new_case(**left):
     (
         fdi["types"]["surface"]["status"]["is_candidate"],
         fdi["types"]["surface"]["evidence"]["frames"],
-        fdi["types"]["surface"]["evidence"]["unhidden"],
+        fdi["types"]["surface"]["evidence"]["unhidden_frames"],
     ) = 1, 99, 99
     fdi["types"]["surface"]["actuator"]["travel_low"], fdi["types"]["surface"]["actuator"]["travel_high"] = (
         -0.4,
@@ -71,7 +71,7 @@ def new_case(**left):
     for s, name in enumerate(("aileron", "elevator", "rudder", "flap")):
         kinds = left.get(name, ALL)
         if kinds is None:
-            fdi["types"]["surface"]["refuted"][s] = 1
+            fdi["types"]["surface"]["estimator_excluded"][s] = 1
         else:
             leave(fdi["types"]["surface"][s], *kinds)
     return fdi
@@ -79,7 +79,7 @@ def new_case(**left):
 
 def locate(fdi, s, innovation, bound, effect):
     """`contract.locate_surface` for surface s, with its estimator and its axis."""
-    fie = fdi["isolation"]["estimator"][fdi["layout"]["position_of"][s]]
+    fie = fdi["isolation"]["estimator"][fdi["layout"]["position_estimator"][s]]
     axis = fdi["layout"]["dominant_axis"][s]
     config, surface = fdi["types"]["config"], fdi["types"]["surface"][s]
     contract.shift_observations(surface)
@@ -140,11 +140,11 @@ def test_questions_about_the_types_left(kinds, constant, explained):
 )
 def test_what_kind_of_fault_it_may_be(kinds, fixed, one_type, sole_type):
     _, surface = one(*kinds)
-    same_name = verdict.FAMILY[sole_type] if sole_type >= 0 else -1
+    same_name = verdict.FIRST_OF_NAME[sole_type] if sole_type >= 0 else -1
     assert (verdict.accommodation_mode(surface) == GIVE_UP) == fixed
     assert verdict.sole_constant_type(surface) == one_type
     found = verdict.sole_type(surface)
-    assert (verdict.FAMILY[found] if found >= 0 else -1) == same_name
+    assert (verdict.FIRST_OF_NAME[found] if found >= 0 else -1) == same_name
 
 
 def test_a_surface_is_possible_by_its_estimator_or_by_deduction():
@@ -155,7 +155,7 @@ def test_a_surface_is_possible_by_its_estimator_or_by_deduction():
         False,
         True,
     ]
-    fdi["types"]["surface"]["status"]["source"] = RULED_OUT, BY_DEDUCTION, BY_DEDUCTION, 0
+    fdi["types"]["surface"]["status"]["decided_by"] = RULED_OUT, BY_DEDUCTION, BY_DEDUCTION, 0
     assert [bool(verdict.can_be_at_fault(fdi["types"]["surface"][s])) for s in range(4)] == [
         False,
         True,
@@ -165,36 +165,36 @@ def test_a_surface_is_possible_by_its_estimator_or_by_deduction():
 
 
 def test_the_sole_surface_that_is_possible():
-    assert on(verdict.sole_surface, new_case(), False) == SEVERAL
+    assert on(verdict.sole_surface, new_case(), False) == SEVERAL_SURFACES
     assert on(verdict.sole_surface, new_case(**NOBODY_ELSE), False) == RUDDER
     assert on(verdict.sole_surface, new_case(rudder=None, **NOBODY_ELSE), False) == NO_SURFACE
     only = new_case(aileron=COURSES, elevator=COURSES, flap=COURSES, rudder=(STUCK,))
     assert on(verdict.sole_surface, only, True) == RUDDER
-    assert on(verdict.sole_surface, only, False) == SEVERAL
+    assert on(verdict.sole_surface, only, False) == SEVERAL_SURFACES
     only["types"]["surface"]["status"]["is_candidate"] = 0, 0, 0, 1
     assert on(verdict.sole_surface, only, False) == FLAP
     assert on(verdict.sole_surface, only, True) == NO_SURFACE
 
 
 @pytest.mark.parametrize(
-    ("evidence", "quiet", "slow"), [(19, 0, True), (20, 0, False), (30, 11, True), (30, 10, False)]
+    ("evidence", "rest_frames", "slow"), [(19, 0, True), (20, 0, False), (30, 11, True), (30, 10, False)]
 )
-def test_what_looks_like_a_jam_may_be_slow_until_it_has_stood_off_for_long(evidence, quiet, slow):
-    fdi, surface = one(STUCK, SLOW, evidence=evidence, quiet=quiet)
-    assert bool(on(verdict.may_hide_at_rest, fdi, surface)) == slow
-    assert not on(verdict.may_hide_at_rest, *one(STUCK, evidence=evidence, quiet=quiet))
-    assert not on(verdict.may_hide_at_rest, *one(SLOW, evidence=evidence, quiet=quiet))
+def test_what_looks_like_a_jam_may_be_slow_until_it_has_stood_off_for_long(evidence, rest_frames, slow):
+    fdi, surface = one(STUCK, SLOW, evidence=evidence, rest_frames=rest_frames)
+    assert bool(on(verdict.can_hide_at_rest, fdi, surface)) == slow
+    assert not on(verdict.can_hide_at_rest, *one(STUCK, evidence=evidence, rest_frames=rest_frames))
+    assert not on(verdict.can_hide_at_rest, *one(SLOW, evidence=evidence, rest_frames=rest_frames))
 
 
 def looked_like_by(kind):
     """The constant types that are not named while `kind` is left."""
     constant = set(ALL) - set(COURSES)
-    return {other for other in constant if verdict.may_be_mistaken(one(other, kind)[1], other, True)}
+    return {other for other in constant if verdict.can_be_another_type(one(other, kind)[1], other, True)}
 
 
 def test_what_stands_still_may_be_slow_until_that_is_excluded():
     assert looked_like_by(SLOW) == {STUCK, FLOAT, UP, DOWN}
-    assert not verdict.may_be_mistaken(one(STUCK)[1], STUCK, True)
+    assert not verdict.can_be_another_type(one(STUCK)[1], STUCK, True)
     assert on(verdict.type_at_fault, *one(STUCK)) == STUCK
     assert on(verdict.type_at_fault, *one(STUCK, SLOW)) == -1
     assert on(verdict.type_at_fault, *one(BIAS, SLOW)) == BIAS
@@ -202,15 +202,15 @@ def test_what_stands_still_may_be_slow_until_that_is_excluded():
 
 def test_a_bias_that_grows_may_look_like_a_jam_or_a_loss():
     assert looked_like_by(GROWING_BIAS) == {CONSTANT_LOSS, STUCK, FLOAT, UP, DOWN}
-    assert not verdict.may_be_mistaken(one(STUCK)[1], STUCK, True)
+    assert not verdict.can_be_another_type(one(STUCK)[1], STUCK, True)
     for direction, stop in ((UP, 1), (DOWN, 0)):  # what has run to the stop has not come there by and by
         _, surface = one(direction, GROWING_BIAS)
         surface["growing_bias"]["ran"][stop] = 1
-        assert not verdict.may_be_mistaken(surface, direction, True)
+        assert not verdict.can_be_another_type(surface, direction, True)
         surface["growing_bias"]["ran"][:] = 1 - surface["growing_bias"]["ran"]
-        assert verdict.may_be_mistaken(surface, direction, True)
-    assert not verdict.may_be_mistaken(one(STUCK, SLOW)[1], STUCK, False)  # it follows the command
-    assert verdict.may_be_mistaken(one(STUCK, GROWING_BIAS)[1], STUCK, False)
+        assert verdict.can_be_another_type(surface, direction, True)
+    assert not verdict.can_be_another_type(one(STUCK, SLOW)[1], STUCK, False)  # it follows the command
+    assert verdict.can_be_another_type(one(STUCK, GROWING_BIAS)[1], STUCK, False)
 
 
 @pytest.mark.parametrize(
@@ -240,23 +240,23 @@ def test_a_bias_that_grows_may_look_like_a_jam_or_a_loss():
 )
 def test_a_type_is_named_once_it_is_the_only_one(kinds, evidence, half_cycles, found, in_coarse_sets):
     """In sets that errors declared of our own make coarse, a constant proves nothing: one type of all."""
-    fdi, surface = one(*kinds, evidence=evidence, unhidden=evidence)
+    fdi, surface = one(*kinds, evidence=evidence, unhidden_frames=evidence)
     surface["oscillatory"]["half_cycles"] = half_cycles
     assert on(verdict.type_at_fault, fdi, surface) == found
-    fdi["types"]["config"]["own_errors"] = 1
+    fdi["types"]["config"]["has_surface_errors"] = 1
     assert on(verdict.type_at_fault, fdi, surface) == in_coarse_sets
 
 
 @pytest.mark.parametrize("kind", [STUCK, VARYING_LOSS, GROWING_BIAS])
 def test_what_a_stop_may_have_hidden_is_waited_for(kind):
-    fdi, surface = one(kind, OSCILLATORY, evidence=99, unhidden=2 * PATIENCE - 1)
+    fdi, surface = one(kind, OSCILLATORY, evidence=99, unhidden_frames=2 * PATIENCE - 1)
     assert on(verdict.type_at_fault, fdi, surface) == -1
     leave(surface, kind)  # an oscillation that has been excluded is not
     assert on(verdict.type_at_fault, fdi, surface) == kind
 
 
 @pytest.mark.parametrize(
-    ("kinds", "measure"),
+    ("kinds", "accommodation_mode"),
     [
         ((STUCK,), GIVE_UP), ((UP,), GIVE_UP), ((SLOW,), WAIT_FOR_SURFACE), ((OSCILLATORY,), SUBTRACT_OFFSET),
         ((SLOW, BIAS), SUBTRACT_OFFSET),
@@ -267,8 +267,8 @@ def test_what_a_stop_may_have_hidden_is_waited_for(kind):
         ((GROWING_BIAS,), SUBTRACT_OFFSET), ((FLOAT, CONSTANT_LOSS), SCALE_COMMAND),
     ],
 )  # fmt: skip
-def test_what_is_done_about_a_surface(kinds, measure):
-    assert verdict.accommodation_mode(one(*kinds)[1]) == measure
+def test_what_is_done_about_a_surface(kinds, accommodation_mode):
+    assert verdict.accommodation_mode(one(*kinds)[1]) == accommodation_mode
 
 
 def test_the_surface_at_fault():
@@ -283,7 +283,7 @@ def test_the_surface_at_fault():
 
 
 @pytest.mark.parametrize(
-    ("flap", "evidence", "own_errors", "refuted"),
+    ("flap", "evidence", "has_surface_errors", "estimator_excluded"),
     [
         ((), PATIENCE, 0, True), ((), PATIENCE - 1, 0, False), ((SLOW,), PATIENCE, 0, True),
         ((OSCILLATORY,), 2 * PATIENCE - 1, 0, False), ((OSCILLATORY,), 2 * PATIENCE, 0, True),
@@ -292,16 +292,18 @@ def test_the_surface_at_fault():
         (None, PATIENCE, 0, True),
     ],
 )  # fmt: skip
-def test_of_elevator_and_flap_the_one_a_constant_explains(flap, evidence, own_errors, refuted):
+def test_of_elevator_and_flap_the_one_a_constant_explains(
+    flap, evidence, has_surface_errors, estimator_excluded
+):
     fdi = new_case(elevator=(STUCK,), aileron=None, rudder=None, flap=flap)
-    fdi["types"]["surface"]["evidence"]["frames"][ELEVATOR], fdi["types"]["config"]["own_errors"] = (
+    fdi["types"]["surface"]["evidence"]["frames"][ELEVATOR], fdi["types"]["config"]["has_surface_errors"] = (
         evidence,
-        own_errors,
+        has_surface_errors,
     )
-    fdi["types"]["surface"]["evidence"]["unhidden"][FLAP] = evidence
-    assert bool(on(verdict.others_refuted, fdi, ELEVATOR)) == refuted
+    fdi["types"]["surface"]["evidence"]["unhidden_frames"][FLAP] = evidence
+    assert bool(on(verdict.others_refuted, fdi, ELEVATOR)) == estimator_excluded
     if flap is not None:
-        assert on(verdict.surface_at_fault, fdi) == (ELEVATOR if refuted else NOT_ISOLATED)
+        assert on(verdict.surface_at_fault, fdi) == (ELEVATOR if estimator_excluded else NOT_ISOLATED)
     fdi["types"]["surface"]["status"]["is_candidate"][FLAP] = 0
     assert bool(on(verdict.others_refuted, fdi, ELEVATOR)) == (evidence >= PATIENCE)
 
@@ -329,7 +331,7 @@ def test_a_decision_notes_when_surface_and_type_became_certain():
     assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_at_s"]) == (3.0, 4.0)
     conclude(fdi, verdict.decide_surface_and_type, 5.0)
     assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_at_s"]) == (3.0, 4.0)
-    fdi["types"]["surface"]["refuted"][RUDDER] = 1
+    fdi["types"]["surface"]["estimator_excluded"][RUDDER] = 1
     conclude(fdi, verdict.decide_surface_and_type, 6.0)
     assert fdi["verdict"]["isolated"] == UNANTICIPATED
     assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_at_s"]) == (6.0, 6.0)
@@ -376,13 +378,13 @@ def test_the_lead_is_taken_on_one_surface_while_its_fault_shows():
     assert surface["accommodation"]["mode"] == -1
     surface["elapsed"]["low"] = 0.1
     take_lead(fdi, verdict.choose_lead, fdi["verdict"]["isolated"])
-    assert (surface["accommodation"]["absent"], fdi["verdict"]["lead"]) == (0, RUDDER)
+    assert (surface["accommodation"]["frames_absent"], fdi["verdict"]["lead"]) == (0, RUDDER)
     assert on(verdict.fault_is_present, fdi, surface, SCALE_COMMAND, True)
 
 
 @pytest.mark.parametrize("dt", [0.01, 0.002, 0.05])
 def test_a_fault_that_has_gone_is_let_go_after_a_fifth_of_a_second_at_any_rate(dt):
-    fdi, surface = one(STUCK, command=0.3, low=0.29, high=0.31, absent=0)
+    fdi, surface = one(STUCK, command=0.3, low=0.29, high=0.31, frames_absent=0)
     fdi["types"]["config"]["dt"] = dt
     surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK] = 0.1, 0.2
     there = [bool(on(verdict.fault_is_present, fdi, surface, GIVE_UP, True)) for _ in range(round(0.3 / dt))]
@@ -429,32 +431,33 @@ def test_orders_are_kept_for_the_frames_before():
             means["G_least"], means["G_most"] = -1.0 - order, 2.0 - k
             means["u_least"], means["u_most"] = order - 0.01, order + 0.02
             on(examine.record_commands, fdi, np.full(4, order), means)
-    orders = fdi["types"]["surface"][0]["orders"]
-    assert orders["given"][:, :2] == pytest.approx(
+    commands = fdi["types"]["surface"][0]["commands"]
+    assert commands["given"][:, :2] == pytest.approx(
         np.array([[0.5, 0.0], [0.3, -0.1], [0.1, 0.2]])
     )  # within the travel
-    assert orders["low"] == pytest.approx([0.0, -0.1, 0.1])
-    assert orders["high"] == pytest.approx([0.5, 0.3, 0.2])
+    assert commands["low"] == pytest.approx([0.0, -0.1, 0.1])
+    assert commands["high"] == pytest.approx([0.5, 0.3, 0.2])
     assert (
-        fdi["types"]["surface"][0]["orders"]["G_least"],
-        fdi["types"]["surface"][0]["orders"]["G_most"],
+        fdi["types"]["surface"][0]["commands"]["G_least"],
+        fdi["types"]["surface"][0]["commands"]["G_most"],
     ) == (
         -1.9,
         2.0,
     )  # of the last block
-    assert orders["least"] == pytest.approx([-0.01, -0.11])  # of a healthy one
-    assert orders["greatest"] == pytest.approx([0.92, 0.32])
+    assert commands["least"] == pytest.approx([-0.01, -0.11])  # of a healthy one
+    assert commands["greatest"] == pytest.approx([0.92, 0.32])
 
 
 def test_what_the_effectiveness_varies_by_is_a_share_of_its_mean():
     fdi = new_case()
     effect, surface = fdi["isolation"]["estimator"][4 + RUDDER]["effect"], fdi["types"]["surface"][RUDDER]
-    effect["Z"], surface["elapsed"]["uneven"] = (0.5, 0.0, -2.0), 0.07
-    surface["orders"]["G_least"], surface["orders"]["G_most"] = -2.1, -1.8
+    effect["Z"], surface["elapsed"]["effectiveness_variation"] = (0.5, 0.0, -2.0), 0.07
+    surface["commands"]["G_least"], surface["commands"]["G_most"] = -2.1, -1.8
     locate(fdi, RUDDER, np.zeros(3), np.zeros(3), effect)
-    assert (surface["elapsed"]["uneven"], surface["judged"]["uneven"]) == pytest.approx(
-        (0.25 * 0.3 / 2.0, 0.07)
-    )
+    assert (
+        surface["elapsed"]["effectiveness_variation"],
+        surface["judged"]["effectiveness_variation"],
+    ) == pytest.approx((0.25 * 0.3 / 2.0, 0.07))
 
 
 def test_a_surface_is_where_the_innovation_puts_it():
@@ -486,25 +489,29 @@ def test_wrong_frames_are_remembered_for_two_more():
     fdi, bound = new_case(), np.full(3, 0.1)
     for innovation in (0.2, 0.05, 0.2):
         on(examine.observe_frame, fdi, np.array([0.0, innovation, 0.0]), bound)
-    assert fdi["types"]["surface"]["elapsed"]["wrong"].tolist() == [1] * 4
-    assert fdi["types"]["surface"]["judged"]["wrong"].tolist() == [0] * 4
-    assert fdi["types"]["surface"]["earlier"]["wrong"].tolist() == [1] * 4
+    assert fdi["types"]["surface"]["elapsed"]["anomalous"].tolist() == [1] * 4
+    assert fdi["types"]["surface"]["judged"]["anomalous"].tolist() == [0] * 4
+    assert fdi["types"]["surface"]["earlier"]["anomalous"].tolist() == [1] * 4
 
 
 @pytest.mark.parametrize(
-    ("whole", "wrong", "judged"),
+    ("whole", "anomalous", "judged"),
     [
         (0, (0, 1, 1), False), (0, (1, 1, 1), True), (0, (1, 1, 0), False), (0, (1, 0, 1), False),
         (1, (0, 1, 1), True), (1, (1, 1, 1), True), (1, (1, 1, 0), True), (1, (1, 0, 1), False),
     ],
 )  # fmt: skip
-def test_a_frame_next_to_a_healthy_one_is_judged_only_if_faults_begin_between_frames(whole, wrong, judged):
+def test_a_frame_next_to_a_healthy_one_is_judged_only_if_faults_begin_between_frames(
+    whole, anomalous, judged
+):
     fdi = new_case()
     fdi["types"]["config"]["whole"], fdi["types"]["frame"] = whole, 7
     surface = fdi["types"]["surface"][RUDDER]
     examine.restart_surface(surface)
     surface["evidence"]["frames"], surface["accommodation"]["mode"] = 5, -1
-    surface["earlier"]["wrong"], surface["judged"]["wrong"], surface["elapsed"]["wrong"] = wrong
+    surface["earlier"]["anomalous"], surface["judged"]["anomalous"], surface["elapsed"]["anomalous"] = (
+        anomalous
+    )
     surface["judged"]["low"], surface["judged"]["high"] = 0.1, 0.2
     on(examine.judge_frame, fdi)
     assert surface["evidence"]["frames"] == (6 if judged else 5)
@@ -522,10 +529,10 @@ def test_evidence_counts_for_a_swing_since_a_stop_could_last_hide_one():
     examine.restart_surface(surface)
     counted = []
     for hides in ((0, 0), (0, 0), (0, 1), (0, 0), (1, 0), (0, 0), (0, 0), (0, 0)):
-        surface["judged"]["wrong"], surface["judged"]["hides"] = 1, hides
+        surface["judged"]["anomalous"], surface["judged"]["stop_hides"] = 1, hides
         surface["judged"]["low"], surface["judged"]["high"] = 0.1, 0.2
         on(examine.judge_frame, fdi)
-        counted.append(int(surface["evidence"]["unhidden"]))
+        counted.append(int(surface["evidence"]["unhidden_frames"]))
     assert counted == [1, 2, 0, 1, 0, 1, 2, 3]
     assert surface["evidence"]["frames"] == 8
 
@@ -535,10 +542,10 @@ def test_where_a_stop_is_follows_the_surface_by_a_frame():
     surface, effect = fdi["types"]["surface"][RUDDER], fdi["isolation"]["estimator"][4 + RUDDER]["effect"]
     effect["Z"], effect["spread"], bound = (0.5, 0.0, -2.0), (9.0, 9.0, 0.02), np.array([9.0, 9.0, 0.08])
     for at, now in ((0.41, 1), (0.39, 0)):  # 2 (0.08 + 0.02) / 2 is 0.1 rad, the stop at 0.5
-        surface["orders"]["greatest"][0], then = at, surface["elapsed"]["hides"].copy()
+        surface["commands"]["greatest"][0], then = at, surface["elapsed"]["stop_hides"].copy()
         locate(fdi, RUDDER, np.zeros(3), bound, effect)
-        assert surface["elapsed"]["hides"].tolist() == [0, now]
-        assert surface["judged"]["hides"].tolist() == then.tolist()
+        assert surface["elapsed"]["stop_hides"].tolist() == [0, now]
+        assert surface["judged"]["stop_hides"].tolist() == then.tolist()
 
 
 def test_a_frame_that_puts_a_surface_nowhere_judges_nothing():
@@ -550,7 +557,7 @@ def test_a_frame_that_puts_a_surface_nowhere_judges_nothing():
     assert surface["evidence"]["started_at"] == -1
 
 
-def quiet(low=0.1, high=0.2, frames=1, **fields):
+def rest_frames(low=0.1, high=0.2, frames=1, **fields):
     fdi = new_case()
     surface = fdi["types"]["surface"][RUDDER]
     surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK] = 0.15, 0.3
@@ -563,15 +570,15 @@ def quiet(low=0.1, high=0.2, frames=1, **fields):
 
 
 def test_a_quiet_surface_given_up_does_not_swing():
-    fdi, surface = quiet()
+    fdi, surface = rest_frames()
     assert fdi["types"]["surface"]["evidence"]["frames"].tolist() == [1] * 4
-    assert surface["evidence"]["quiet"] == 1
-    assert quiet(low=0.31, high=0.4)[1]["evidence"]["quiet"] == 0
-    assert quiet(low=0.0, high=0.14)[1]["evidence"]["quiet"] == 0
-    assert not quiet(frames=PATIENCE)[1]["feasible"]["excluded"][OSCILLATORY]
-    assert quiet(frames=PATIENCE + 1)[1]["feasible"]["excluded"][OSCILLATORY]
-    assert not quiet(frames=PATIENCE + 1, own_errors=1)[1]["feasible"]["excluded"][OSCILLATORY]
-    fdi, surface = quiet()
+    assert surface["evidence"]["rest_frames"] == 1
+    assert rest_frames(low=0.31, high=0.4)[1]["evidence"]["rest_frames"] == 0
+    assert rest_frames(low=0.0, high=0.14)[1]["evidence"]["rest_frames"] == 0
+    assert not rest_frames(frames=PATIENCE)[1]["feasible"]["excluded"][OSCILLATORY]
+    assert rest_frames(frames=PATIENCE + 1)[1]["feasible"]["excluded"][OSCILLATORY]
+    assert not rest_frames(frames=PATIENCE + 1, has_surface_errors=1)[1]["feasible"]["excluded"][OSCILLATORY]
+    fdi, surface = rest_frames()
     fdi["types"]["surface"]["status"]["is_candidate"] = 1, 1, 0, 1
     on(examine.count_rest, fdi, RUDDER)
     assert fdi["types"]["surface"]["evidence"]["frames"].tolist() == [
@@ -596,12 +603,12 @@ def test_a_surface_given_up_is_quiet_where_nothing_is_wrong_and_a_fault_stays(ab
     )
     fdi["types"]["surface"][RUDDER]["accommodation"]["mode"] = GIVE_UP
     on(examine.judge_frame, fdi)
-    assert fdi["types"]["surface"]["evidence"]["quiet"].tolist() == [0, 0, abrupt, 0]
+    assert fdi["types"]["surface"]["evidence"]["rest_frames"].tolist() == [0, 0, abrupt, 0]
 
 
 def test_a_block_is_the_mean_of_its_frames_with_the_noise_of_its_ends():
     rng, fdi, length = np.random.default_rng(6), new_case(), 4
-    fdi["types"]["config"]["length"], fdi["types"]["config"]["span_s"] = length, length * DT
+    fdi["types"]["config"]["length"], fdi["types"]["config"]["block_s"] = length, length * DT
     fdi["types"]["block"]["innovation"], fdi["types"]["block"]["bound"] = 9.0, 9.0
     innovation, eta = rng.normal(size=(length, 3)), rng.uniform(0.1, 0.2, (length, 3))
     noise = rng.uniform(0.01, 0.02, (length + 1, 3))
@@ -610,7 +617,7 @@ def test_a_block_is_the_mean_of_its_frames_with_the_noise_of_its_ends():
     Z[:, :, YAW] += 5.0
     for k in range(length):
         fdi["bank"]["output"]["innovation"], fdi["bound"]["eta_bar"] = innovation[k], eta[k]
-        fdi["bound"]["noise_then"], fdi["bound"]["noise"] = noise[k], noise[k + 1]
+        fdi["bound"]["noise_before"], fdi["bound"]["noise"] = noise[k], noise[k + 1]
         fdi["isolation"]["estimator"]["effect"]["Z"][:8] = Z[k]
         fdi["isolation"]["estimator"]["effect"]["offset"][:8] = offset[k]
         fdi["isolation"]["estimator"]["effect"]["spread"][:8] = spread[k]
@@ -708,7 +715,7 @@ def test_a_surface_off_its_command_is_within_its_travel():
     surface = new_case()["types"]["surface"][RUDDER]
     surface["elapsed"]["command"] = 0.1
     assert contract.set_deflection(surface, 0.2, 0.05)
-    assert (surface["elapsed"]["low"], surface["elapsed"]["high"], surface["elapsed"]["wrong"]) == (
+    assert (surface["elapsed"]["low"], surface["elapsed"]["high"], surface["elapsed"]["anomalous"]) == (
         pytest.approx(0.25),
         pytest.approx(0.35),
         1,
@@ -719,9 +726,9 @@ def test_a_surface_off_its_command_is_within_its_travel():
     assert contract.set_deflection(surface, -0.49, 0.05)
     assert surface["elapsed"]["low"] == -0.4
     contract.set_deflection(surface, 0.04, 0.05)
-    assert surface["elapsed"]["wrong"] == 0
+    assert surface["elapsed"]["anomalous"] == 0
     contract.set_deflection(surface, 0.05, 0.05)
-    assert surface["elapsed"]["wrong"] == 0
+    assert surface["elapsed"]["anomalous"] == 0
 
 
 def test_whereabouts_cover_every_constant_type_left():
@@ -763,16 +770,16 @@ def test_beside_the_first_pitch_fault_the_second_is_where_the_rest_puts_it():
     assert (flap["elapsed"]["low"], flap["elapsed"]["high"]) == pytest.approx(
         (0.05 + 0.2 - 0.13, 0.05 + 0.2 + 0.13)
     )
-    assert flap["elapsed"]["wrong"] == 1
-    assert elevator["elapsed"]["wrong"] == 0
+    assert flap["elapsed"]["anomalous"] == 1
+    assert elevator["elapsed"]["anomalous"] == 0
     assert (elevator["elapsed"]["low"], elevator["elapsed"]["high"]) == (0.1, 0.14)
     fdi["bank"]["output"]["innovation"][PITCH] = 9.0
     on(pairs.solve_pitch, fdi)
-    assert flap["status"]["source"] == RULED_OUT
+    assert flap["status"]["decided_by"] == RULED_OUT
 
 
-@pytest.mark.parametrize(("innovation", "wrong"), [(0.03, 0), (0.031, 1), (-0.031, 1)])
-def test_before_that_pitch_shows_a_fault_or_not(innovation, wrong):
+@pytest.mark.parametrize(("innovation", "anomalous"), [(0.03, 0), (0.031, 1), (-0.031, 1)])
+def test_before_that_pitch_shows_a_fault_or_not(innovation, anomalous):
     fdi = new_case()
     fdi["types"]["pair"]["first"], fdi["bound"]["frame"], fdi["bank"]["output"]["innovation"] = (
         NO_SURFACE,
@@ -780,7 +787,7 @@ def test_before_that_pitch_shows_a_fault_or_not(innovation, wrong):
         innovation,
     )
     on(pairs.solve_pitch, fdi)
-    assert fdi["types"]["surface"]["elapsed"]["wrong"].tolist() == [0, wrong, 0, wrong]
+    assert fdi["types"]["surface"]["elapsed"]["anomalous"].tolist() == [0, anomalous, 0, anomalous]
 
 
 def test_what_is_known_of_the_first_is_kept_once_it_has_settled():
@@ -796,9 +803,9 @@ def test_what_is_known_of_the_first_is_kept_once_it_has_settled():
     elevator["feasible"]["excluded"][STUCK], elevator["feasible"]["low"][STUCK] = 1, 0.12
     for k in range(PATIENCE - 1):
         on(pairs.store_first_fault, fdi, ELEVATOR)
-        assert (known["low"][STUCK], fdi["types"]["pair"]["unsettled"]) == (0.1, k + 1)
+        assert (known["low"][STUCK], fdi["types"]["pair"]["frames_since_change"]) == (0.1, k + 1)
     on(pairs.store_first_fault, fdi, ELEVATOR)
-    assert (known["low"][STUCK], fdi["types"]["pair"]["unsettled"]) == (0.12, 0)
+    assert (known["low"][STUCK], fdi["types"]["pair"]["frames_since_change"]) == (0.12, 0)
 
 
 def test_a_second_begins_with_what_was_known_of_the_first():
@@ -807,21 +814,25 @@ def test_a_second_begins_with_what_was_known_of_the_first():
     fdi["types"]["pair"]["first"], elevator["known"]["low"], elevator["known"]["high"] = ELEVATOR, 0.1, 0.14
     elevator["known"]["excluded"] = [kind != STUCK for kind in range(N_TYPES)]
     for frame in ("elapsed", "judged", "earlier"):
-        fdi["types"]["surface"][frame]["wrong"] = 1
-    assert on(pairs.two_in_pitch, fdi)
+        fdi["types"]["surface"][frame]["anomalous"] = 1
+    assert on(pairs.has_second_fault_in_pitch, fdi)
     assert verdict.sole_constant_type(elevator) == STUCK
     assert (elevator["feasible"]["low"][STUCK], elevator["feasible"]["high"][STUCK]) == (0.1, 0.14)
     assert not flap["feasible"]["excluded"].any()
     for surface in (elevator, flap):
-        assert (surface["status"]["is_candidate"], surface["status"]["source"]) == (0, BY_DEDUCTION)
-        assert (surface["elapsed"]["wrong"], surface["judged"]["wrong"], surface["earlier"]["wrong"]) == (
+        assert (surface["status"]["is_candidate"], surface["status"]["decided_by"]) == (0, BY_DEDUCTION)
+        assert (
+            surface["elapsed"]["anomalous"],
+            surface["judged"]["anomalous"],
+            surface["earlier"]["anomalous"],
+        ) == (
             0,
             0,
             0,
         )
     assert fdi["types"]["surface"]["status"]["is_candidate"][[AILERON, RUDDER]].tolist() == [1, 1]
-    assert not on(pairs.two_in_pitch, _first(new_case(elevator=(STUCK,)), ELEVATOR))
-    assert not on(pairs.two_in_pitch, _first(new_case(elevator=()), NO_SURFACE))
+    assert not on(pairs.has_second_fault_in_pitch, _first(new_case(elevator=(STUCK,)), ELEVATOR))
+    assert not on(pairs.has_second_fault_in_pitch, _first(new_case(elevator=()), NO_SURFACE))
 
 
 def _first(fdi, surface):
@@ -838,7 +849,10 @@ def _first(fdi, surface):
     ],
 )  # fmt: skip
 def test_when_a_first_fault_in_pitch_is_known_well_enough(kinds, evidence, patient):
-    assert bool(on(pairs.has_waited, *one(*kinds, evidence=evidence, unhidden=evidence))) == patient
+    assert (
+        bool(on(pairs.evidence_is_long_enough, *one(*kinds, evidence=evidence, unhidden_frames=evidence)))
+        == patient
+    )
 
 
 def test_in_pitch_a_jam_stays_open_as_the_other_may_be_off_by_a_constant():
@@ -888,18 +902,18 @@ def test_without_an_alarm_in_pitch_nobody_is_named_there():
     fdi = decided(alarmed=(0, 1), elevator=(CONSTANT_LOSS,), flap=None, aileron=None, rudder=None)
     conclude(fdi, pairs.decide_pairs, 3.0)
     assert not fdi["types"]["surface"]["status"]["named"][ELEVATOR]
-    assert not on(pairs.is_acted_upon, fdi, ELEVATOR)
+    assert not on(pairs.law_acts_on, fdi, ELEVATOR)
 
 
 def test_the_likeliest_in_pitch_is_acted_upon_until_one_is_named():
     fdi = decided()
-    assert [bool(on(pairs.is_acted_upon, fdi, s)) for s in range(4)] == [False, True, False, False]
+    assert [bool(on(pairs.law_acts_on, fdi, s)) for s in range(4)] == [False, True, False, False]
     only_flap = decided(aileron=None, rudder=None, elevator=COURSES)
-    assert [bool(on(pairs.is_acted_upon, only_flap, s)) for s in range(4)] == [False, False, False, True]
-    assert not on(pairs.named_in_pitch, fdi)
+    assert [bool(on(pairs.law_acts_on, only_flap, s)) for s in range(4)] == [False, False, False, True]
+    assert not on(pairs.is_named_in_pitch, fdi)
     fdi["types"]["surface"]["status"]["named"] = 1, 0, 0, 1
-    assert on(pairs.named_in_pitch, fdi)
-    assert [bool(on(pairs.is_acted_upon, fdi, s)) for s in range(4)] == [True, False, False, True]
+    assert on(pairs.is_named_in_pitch, fdi)
+    assert [bool(on(pairs.law_acts_on, fdi, s)) for s in range(4)] == [True, False, False, True]
 
 
 def test_the_verdict_is_that_of_the_first_named():
@@ -909,15 +923,15 @@ def test_the_verdict_is_that_of_the_first_named():
         fdi["types"]["surface"]["status"]["type_at_s"][RUDDER],
         fdi["types"]["surface"]["status"]["named_at_s"][RUDDER],
     ) = 2.0, 1.5
-    conclude(fdi, pairs.summary_of, RUDDER, False, 3.0, lead=(NO_SURFACE, -1))
+    conclude(fdi, pairs.first_fault_finding, RUDDER, False, 3.0, lead=(NO_SURFACE, -1))
     found = fdi["verdict"]
     assert (found["isolated"], found["type"], found["type_at_s"]) == (4 + RUDDER, STUCK, 2.0)
     assert found["isolated_at_s"] == 1.5
-    conclude(fdi, pairs.summary_of, NO_SURFACE, True, 4.0, lead=(NO_SURFACE, -1))
+    conclude(fdi, pairs.first_fault_finding, NO_SURFACE, True, 4.0, lead=(NO_SURFACE, -1))
     assert (found["isolated"], found["type"], found["isolated_at_s"]) == (UNANTICIPATED, -1, 4.0)
-    conclude(fdi, pairs.summary_of, NO_SURFACE, True, 5.0, lead=(NO_SURFACE, -1))
+    conclude(fdi, pairs.first_fault_finding, NO_SURFACE, True, 5.0, lead=(NO_SURFACE, -1))
     assert found["isolated_at_s"] == 4.0
-    conclude(fdi, pairs.summary_of, NO_SURFACE, False, 6.0, lead=(NO_SURFACE, -1))
+    conclude(fdi, pairs.first_fault_finding, NO_SURFACE, False, 6.0, lead=(NO_SURFACE, -1))
     assert (found["isolated"], found["isolated_at_s"]) == (NOT_ISOLATED, 6.0)
 
 
@@ -943,18 +957,23 @@ def test_the_law_acts_on_all_that_are_named_and_the_lead_is_the_first():
 
 
 @pytest.mark.parametrize(
-    ("kinds", "measure", "lead"),
+    ("kinds", "accommodation_mode", "lead"),
     [
         ((STUCK,), GIVE_UP, ELEVATOR),
         ((CONSTANT_LOSS,), SCALE_COMMAND, ELEVATOR),
         ((BIAS,), SUBTRACT_OFFSET, AILERON),
     ],
 )
-def test_an_elevator_that_is_replaced_comes_first(kinds, measure, lead):
+def test_an_elevator_that_is_replaced_comes_first(kinds, accommodation_mode, lead):
     fdi = acted(aileron=(CONSTANT_LOSS,), elevator=kinds, rudder=None, flap=None)
     fdi["types"]["surface"]["status"]["named"] = 1, 1, 0, 0
     take_lead(fdi, pairs.choose_accommodation)
-    assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [SCALE_COMMAND, measure, -1, -1]
+    assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [
+        SCALE_COMMAND,
+        accommodation_mode,
+        -1,
+        -1,
+    ]
     assert fdi["verdict"]["lead"] == lead
 
 
@@ -976,7 +995,7 @@ def test_a_surface_acted_upon_that_cannot_be_at_fault_is_shifted_as_it_shows():
     (
         fdi["types"]["surface"]["elapsed"]["low"],
         fdi["types"]["surface"]["elapsed"]["high"],
-        fdi["types"]["surface"]["accommodation"]["absent"],
+        fdi["types"]["surface"]["accommodation"]["frames_absent"],
     ) = (
         0.3,
         0.4,
@@ -1017,7 +1036,7 @@ def test_two_equations_say_where_ailerons_and_rudder_were(seed):
 def test_a_second_pitch_fault_is_named_once_it_shows():
     fdi = decided(elevator=(BIAS,), flap=(STUCK,), aileron=None, rudder=None)
     fdi["types"]["pair"]["first"], fdi["types"]["surface"]["status"]["is_candidate"] = ELEVATOR, (1, 0, 1, 0)
-    fdi["types"]["surface"]["status"]["source"] = 0, BY_DEDUCTION, 0, BY_DEDUCTION
+    fdi["types"]["surface"]["status"]["decided_by"] = 0, BY_DEDUCTION, 0, BY_DEDUCTION
     (
         fdi["types"]["surface"]["status"]["type"][ELEVATOR],
         fdi["types"]["surface"]["evidence"]["frames"][FLAP],
@@ -1028,14 +1047,14 @@ def test_a_second_pitch_fault_is_named_once_it_shows():
     on(pairs.decide_pitch, fdi, 5.0)
     assert fdi["types"]["surface"]["status"]["named"].tolist() == [0, 1, 0, 1]
     assert fdi["types"]["surface"]["status"]["type"].tolist()[1::2] == [BIAS, STUCK]
-    fdi["types"]["surface"]["status"]["source"][FLAP] = RULED_OUT
+    fdi["types"]["surface"]["status"]["decided_by"][FLAP] = RULED_OUT
     on(pairs.decide_pitch, fdi, 6.0)
     assert fdi["types"]["surface"]["status"]["named"].tolist() == [0, 1, 0, 0]
 
 
 def test_the_first_named_is_the_one_the_verdict_is_about():
     fdi = decided(alarmed=(0, 1), aileron=(BIAS,), rudder=(BIAS,), elevator=None, flap=None)
-    fdi["types"]["surface"]["refuted"][[AILERON, RUDDER]] = 1
+    fdi["types"]["surface"]["estimator_excluded"][[AILERON, RUDDER]] = 1
     fdi["types"]["surface"]["status"]["named"], fdi["types"]["surface"]["status"]["named_at_s"] = (
         (1, 0, 1, 0),
         (2.0, 0.0, 1.0, 0.0),
@@ -1074,7 +1093,7 @@ def test_without_anybody_to_act_upon_there_is_no_lead():
 
 def test_the_first_surface_is_named_where_a_constant_explains_it_alone():
     fdi = new_case(aileron=(CONSTANT_LOSS,), elevator=(VARYING_LOSS,), rudder=None, flap=None)
-    assert on(verdict.sole_surface, fdi, False) == SEVERAL
+    assert on(verdict.sole_surface, fdi, False) == SEVERAL_SURFACES
     assert on(verdict.surface_at_fault, fdi) == AILERON
 
 
@@ -1088,7 +1107,7 @@ def test_of_two_faults_the_verdict_is_on_the_first_named(s, outside):
         4.0,
         3.0,
     )
-    conclude(fdi, pairs.summary_of, s, outside, 5.0, lead=(NO_SURFACE, -1))
+    conclude(fdi, pairs.first_fault_finding, s, outside, 5.0, lead=(NO_SURFACE, -1))
     found = fdi["verdict"]
     if s < 0:
         assert (found["isolated"], found["type"]) == (UNANTICIPATED if outside else NOT_ISOLATED, -1)

@@ -290,7 +290,7 @@ def test_where_the_flight_ends_is_what_its_record_says_of_the_frame_just_flown()
     two readings a frame apart."""
     record = bf.Simulation(ambiguous(substeps=2))._loop.frames
     frame = fill(record.copy()[0], seed=1)
-    frame["fdi"]["bound"]["admitted"]["any"], frame["fdi"]["types"]["config"]["length"] = 1, 1
+    frame["fdi"]["bound"]["declared_errors"]["any"], frame["fdi"]["types"]["config"]["length"] = 1, 1
     bound, design, means = frame["fdi"]["bound"], frame["belief"]["design"], frame["belief"]["means"]
     x, y, actuators = frame["measured"]["x"], frame["measured"]["y"], frame["belief"]["actuators"]
     apart(eta_bar=bound["eta_bar"], noise=bound["noise"], inertia=bound["inertia"], G=means["G"], x=x)

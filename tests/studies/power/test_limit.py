@@ -74,10 +74,10 @@ def test_beside_unknown_constants_as_in_the_whole_flight_at_once(context):
     C, R = C.reshape(3 * (before + n), -1), R.reshape(-1, 2)
     expected = np.sqrt(late.ravel() @ np.linalg.solve(C + R @ R.T, late.ravel()))
     whitening = Whitening(context)
-    found = whitening.deflection_beside(phi, regressors, sigma)
+    found = whitening.deflection_with_unknowns(phi, regressors, sigma)
     assert found == pytest.approx(expected, rel=0.01)
     assert found < 0.98 * whitening.deflection(phi)[-1]
-    nothing = whitening.deflection_beside(phi, regressors[..., :0], sigma[:0])
+    nothing = whitening.deflection_with_unknowns(phi, regressors[..., :0], sigma[:0])
     assert nothing == pytest.approx(whitening.deflection(phi)[-1])
 
 

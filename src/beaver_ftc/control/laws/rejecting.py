@@ -97,7 +97,7 @@ def accommodate(control, assessment, faults, belief, measured):
         start = start_of(surfaces.output, assessment, s, False)
         if assessment.unknown and memory.estimator.active:
             target = effectiveness_of(memory.estimator, s)
-        elif assessment.measure[s] != GIVE_UP:
+        elif assessment.accommodation_mode[s] != GIVE_UP:
             target = clamp_to_observer_estimate(memory.sums, layout, s, target, least)
         named = assessment.detected and s == assessment.named
         suspected = named and is_doubtful(assessment, memory.sums, layout, s, target, least)
@@ -202,7 +202,7 @@ def is_doubtful(assessment, sums, layout, s, target, least):
     its effectiveness `target` below `least`, and the observer does not see it act either."""
     if is_replaced(layout, s):
         return True
-    is_open = assessment.every_type and assessment.measure[s] < 0
+    is_open = assessment.every_type and assessment.accommodation_mode[s] < 0
     useless = is_open or target < least
     return useless and not is_effective(sums, layout.main, s, least)
 

@@ -61,7 +61,7 @@ def noise_step(noise, nbar, decay):
 
 
 @kernel
-def interval_limits(low, high, rise, fall, omega, theta, bound):
+def interval_limits(low, high, positive_Z, negative_Z, omega, theta, bound):
     """The signed interval (lower, upper), rad/s, that holds the residual of the true estimator.
 
     The parameter may move anywhere within [low, high] at every instant, so an incipient or intermittent
@@ -69,8 +69,8 @@ def interval_limits(low, high, rise, fall, omega, theta, bound):
     and fall filter the positive and the negative part of Z. The residual is that integral less omega
     thetahat, widened by the bound on the uncertainty.
     """
-    lower = low * rise + high * fall - omega * theta - bound
-    upper = high * rise + low * fall - omega * theta + bound
+    lower = low * positive_Z + high * negative_Z - omega * theta - bound
+    upper = high * positive_Z + low * negative_Z - omega * theta + bound
     return lower, upper
 
 
@@ -113,13 +113,13 @@ def begin_bank(bank, noise):
 
 
 @kernel
-def hold_bank_threshold(bank, constant):
+def set_bank_threshold(bank, constant):
     """Replace the threshold of the published filter by a constant, rad/s."""
     bank.output.threshold[0] = constant
 
 
 @kernel
-def fix_parity_directions(isolation, G):
+def set_parity_directions(isolation, G):
     """Fix, once, the direction along which each fault has least effect; G (3, n) at the start of the flight.
 
     Unit length, in the roll-yaw plane, whose two axes are the only ones that one surface moves together.
@@ -130,23 +130,23 @@ def fix_parity_directions(isolation, G):
         p, r = G[0, fie.surface], G[2, fie.surface]
         length = np.hypot(p, r)
         if length > 0.0:
-            fie.across[0], fie.across[2] = r / length, -p / length
+            fie.parity_direction[0], fie.parity_direction[2] = r / length, -p / length
 
 
 @kernel
-def update_bank(bank, bound, x, x_then, believed, dt):
+def update_bank(bank, bound, x, x_before, predicted_acceleration, dt):
     """Form the innovation of the elapsed frame and pass it through the bank.
 
-    x, x_then (3,) rad/s: measured now and a frame ago; believed (3,) rad/s2: f + G u of the healthy
-    aircraft, mean over the frame. bound: of `bound_dtype`; dt s.
+    x, x_before (3,) rad/s: measured now and a frame ago; predicted_acceleration (3,) rad/s2: f + G u of the
+    healthy aircraft, mean over the frame. bound: of `bound_dtype`; dt s.
     """
     for i in range(3):
-        bank.output.innovation[i] = (x[i] - x_then[i]) / dt - believed[i]
-        bound.frame[i] = bound.eta_bar[i] + (bound.noise[i] + bound.noise_then[i]) / dt
+        bank.output.innovation[i] = (x[i] - x_before[i]) / dt - predicted_acceleration[i]
+        bound.frame[i] = bound.eta_bar[i] + (bound.noise[i] + bound.noise_before[i]) / dt
         for m, a in enumerate(bank.config.decay[: bank.config.n]):
             bank.output.residual[m, i] = a * bank.output.residual[m, i] + dt * bank.output.innovation[i]
             bank.memory.eta[m, i] = bound_step(bank.memory.eta[m, i], bound.eta_bar[i], a, dt)
-            bank.memory.noise[m, i] = noise_step(bank.memory.noise[m, i], bound.noise_then[i], a)
+            bank.memory.noise[m, i] = noise_step(bank.memory.noise[m, i], bound.noise_before[i], a)
             bank.output.threshold[m, i] = bank.memory.eta[m, i] + bank.memory.noise[m, i] + bound.noise[i]
 
 
@@ -206,19 +206,19 @@ def effect_extremes(fie, i):
 
 @kernel
 def parity_effect_extremes(fie):
-    """The same along `fie.across` (3,), across the fault's own direction: there it can do little."""
+    """The same along `fie.parity_direction` (3,), in which the fault has little effect."""
     effect, base, slope, spread = fie.effect, 0.0, 0.0, 0.0
     for i in range(3):
-        spread += abs(fie.across[i]) * effect.spread[i]
-        base += fie.across[i] * effect.offset[i]
-        slope += fie.across[i] * effect.Z[i]
+        spread += abs(fie.parity_direction[i]) * effect.spread[i]
+        base += fie.parity_direction[i] * effect.offset[i]
+        slope += fie.parity_direction[i] * effect.Z[i]
     one, other = base + fie.low * slope, base + fie.high * slope
     return min(0.0, one, other) - spread, max(0.0, one, other) + spread
 
 
 @kernel
 def advance_reach(bank, fie, dt):
-    """Advance the reach of the fault in each filter since the flight began; channel 3 is along `across`."""
+    """Advance the reach of the fault in each filter since the flight began; channel 3: `parity_direction`."""
     for channel in range(4):
         low, high = effect_extremes(fie, channel) if channel < 3 else parity_effect_extremes(fie)
         for m, a in enumerate(bank.config.decay[: bank.config.n]):
@@ -230,7 +230,7 @@ def advance_reach(bank, fie, dt):
 def reach_explains(bank, fie, shared):
     """True if the residuals are within the reach of the fault, for any course of it since the flight began.
 
-    shared: the axes share one parameter; the residual along `across` is then tested as well.
+    shared: the axes share one parameter; the residual along `parity_direction` is then tested as well.
     """
     for m in range(bank.config.n):
         residual, bound = 0.0, 0.0
@@ -238,8 +238,8 @@ def reach_explains(bank, fie, shared):
             r, b = bank.output.residual[m, i], bank.output.threshold[m, i]
             if not fie.reach_low[m, i] - b <= r <= fie.reach_high[m, i] + b and not fie.ignored_axes[i]:
                 return False
-            residual += fie.across[i] * r
-            bound += abs(fie.across[i]) * b
+            residual += fie.parity_direction[i] * r
+            bound += abs(fie.parity_direction[i]) * b
         if shared and not fie.reach_low[m, 3] - bound <= residual <= fie.reach_high[m, 3] + bound:
             return False
     return True
@@ -356,7 +356,7 @@ def begin_fdae(fdae, noise, x):
 
 
 @kernel
-def hold_fdae_threshold(fdae, constant):
+def set_fdae_threshold(fdae, constant):
     """Replace the threshold by a constant, rad/s."""
     fdae.output.threshold[:] = constant
 
@@ -393,20 +393,20 @@ def alarm_axis(bank, authority, statistical_alarm):
 
 
 @kernel
-def predict_fdae(fdae, bound, x, believed, detected, leaking, dt):
+def predict_fdae(fdae, bound, x, predicted_acceleration, detected, leaking, dt):
     """Advance the FDAE and its threshold by one frame; once `detected`, the network learns what exceeds the
     threshold.
 
-    x (3,) rad/s; `believed` (3,) rad/s2 is f + G u, with the isolated fault once there is one.
+    x (3,) rad/s; predicted_acceleration (3,) rad/s2 is f + G u, with the isolated fault once there is one.
     """
     if detected:
         train_network(fdae.network, fdae.output.residual, fdae.output.threshold, leaking, dt)
     for i in range(3):
-        rate, decay = believed[i] + fdae.network.output[i], fdae.config.decay[i]
+        rate, decay = predicted_acceleration[i] + fdae.network.output[i], fdae.config.decay[i]
         fdae.memory.xhat[i] = x[i] + dt * rate + decay * (fdae.memory.xhat[i] - x[i])
         fdae.memory.threshold_eta[i] = bound_step(fdae.memory.threshold_eta[i], bound.eta_bar[i], decay, dt)
         fdae.memory.threshold_noise[i] = noise_step(
-            fdae.memory.threshold_noise[i], bound.noise_then[i], decay
+            fdae.memory.threshold_noise[i], bound.noise_before[i], decay
         )
         fdae.output.threshold[i] = (
             fdae.memory.threshold_eta[i] + fdae.memory.threshold_noise[i] + bound.noise[i]
@@ -415,7 +415,7 @@ def predict_fdae(fdae, bound, x, believed, detected, leaking, dt):
 
 @kernel
 def fdae_unknown_acceleration(fdae, noise, out):
-    """Fill out (3,) rad/s2 with what the FDAE believes beyond the model: learnt, and about to be learnt.
+    """Fill out (3,) rad/s2 with the acceleration that the FDAE estimates in addition to the model.
 
     The residual settles at (phi - fhat) / Lambda0, so Lambda0 eps0 is the part of the fault not yet in the
     weights, at the bandwidth of the estimator. What the gyro's noise (3,) rad/s alone explains stays out of

@@ -46,21 +46,22 @@ FORCE = record(
     innovation=float,  # e at the start of the elapsed frame, rad/s2
     # e at the flow angle from inertial motion; that angle, rad; bound on its drift, rad/s; integral of the
     # force's slope, e per rad/s of drift; intensity of the drift of e by errors and gusts, (rad/s2)2/s
-    inertial=float, angle=float, drift=float, angle_sensitivity=float, wander=float,
+    inertial=float, angle=float, drift=float, angle_sensitivity=float, drift_intensity=float,
     # of each surface: e per rad, now and with the readings before; e at the command; error of e per rad
     column=MAX_SURFACES, column_predicted=MAX_SURFACES, effect=MAX_SURFACES, column_error=MAX_SURFACES,
     # of an error of the vane, per rad: angular acceleration and e, angular acceleration in roll
     vane=2, vane_roll=float,
     trim_variance=2, jitter=2,  # variance of e in trim and now: with the vane, without it; (rad/s2)2
     damping=3, deflection=float,  # e per rad/s of rotation of the air; bound by errors of deflections
-    model=float, unsettled=float,  # e of the model; bound on its error by a time lag, rad/s2
+    model=float, lag_error=float,  # e of the model; bound on its error by a time lag, rad/s2
     accelerometer_variance=float,  # of e, by noise of the accelerometer; independent of the pressure
     n=int, tolerance=MAX_ERRORS, regressor=MAX_ERRORS,
 )  # fmt: skip
 MEASURED_FORCES = record(
-    known=int, per_m=float, gravity=float, span=float,  # whether forces are used; one over the chord; m/s2; m
+    known=int, per_chord=float,  # whether forces are used; one over the chord, 1/m
+    gravity=float, span=float,  # m/s2; m
     pressure=float, pressure_noise=float,  # Pa: in trim, and noise of its reading
-    strength=float,  # dynamic pressure over that in trim: forces scale with it
+    pressure_ratio=float,  # dynamic pressure over that in trim: forces scale with it
     # coefficient of the rate of sideslip; rates of sideslip and incidence of the instant before, rad/s
     sideslip_rate_coefficient=float, rate=2, n_updates=int,  # updates so far, up to SETTLED
     gust_noise=3,  # noise of the gust estimate from forces, rad/s2
@@ -77,7 +78,7 @@ def update_forces(forces, air, measured, u, dt):
     if forces.n_updates == 0:
         fill_flow_rates(forces, measured)
     evaluate(air.memory.force_table, measured.x, measured.y)
-    forces.strength = measured.y[QDYN] / forces.pressure
+    forces.pressure_ratio = measured.y[QDYN] / forces.pressure
     for f in range(2):
         before = forces.component[f].model
         update_force(forces, air, f, measured, u)
@@ -89,8 +90,8 @@ def update_forces(forces, air, measured, u, dt):
 
 @kernel
 def fill_lag_error(force, before, begun, dt):
-    """Fill `unsettled` from the change of the model's e since `before`: force and flow differ in time."""
-    force.unsettled = MODEL_LAG_S * abs(force.model - before) / dt if begun else 0.0
+    """Fill `lag_error` from the change of the model's e since `before`: force and flow differ in time."""
+    force.lag_error = MODEL_LAG_S * abs(force.model - before) / dt if begun else 0.0
 
 
 @kernel
@@ -104,7 +105,7 @@ def fill_readings_without_vanes(forces, rotation, y):
         force, place, damped = forces.component[f], BETA if f == SIDE else ALPHA, 0.0
         for k in range(3):
             damped += force.damping[k] * rotation[k]
-        forces.y[place] -= (force.innovation / forces.strength + damped) / force.vane[1]
+        forces.y[place] -= (force.innovation / forces.pressure_ratio + damped) / force.vane[1]
 
 
 @kernel
@@ -118,7 +119,7 @@ def stop_forces(forces, air, inertial_air):
 @kernel
 def integrate_flow_angle(forces, force, f, y, dt):
     """Integrate the flow angle of a vane from inertial motion, and fill the force's innovation at it."""
-    reading, slope = y[BETA if f == SIDE else ALPHA], force.vane[1] * forces.strength
+    reading, slope = y[BETA if f == SIDE else ALPHA], force.vane[1] * forces.pressure_ratio
     force.angle = force.angle + dt * forces.rate[f] if forces.n_updates else reading
     force.angle_sensitivity += dt * slope
     force.inertial = force.innovation - slope * (reading - force.angle)
@@ -129,7 +130,7 @@ def update_force(forces, air, f, measured, u):
     """Update one force: its innovation e, the effects of surfaces, and the regressors of its errors."""
     table, force = air.memory.force_table, forces.component[f]
     first, last = table.free_from[CY + f], table.surface_to[CY + f]
-    scale, whole = measured.y[QDYN] * air.config.area_per_mass * forces.per_m, 0.0
+    scale, whole = measured.y[QDYN] * air.config.area_per_mass * forces.per_chord, 0.0
     force.column_predicted[:] = force.column
     force.column[:], force.column_error[:] = 0.0, 0.0
     for k in range(first, last):
@@ -155,11 +156,11 @@ def update_force(forces, air, f, measured, u):
         force.column_predicted[:] = force.column
     for s in range(u.size):
         force.effect[s] = force.column_predicted[s] * u[s]
-    force.innovation = measured.force[1 + f] * forces.per_m - whole
+    force.innovation = measured.force[1 + f] * forces.per_chord - whole
     by_pressure = whole * forces.pressure_noise / measured.y[QDYN]
     for k in range(2):
         force.jitter[k] = (
-            force.trim_variance[k] * forces.strength**2
+            force.trim_variance[k] * forces.pressure_ratio**2
             + by_pressure * by_pressure
             + force.accelerometer_variance
         )
@@ -198,40 +199,42 @@ def configure_forces(fdi: np.void, declared: Declared, trim: Trim, along_y: np.n
     """
     y, statistical, aircraft, sensors = trim[1], fdi["statistical"], declared.aircraft, declared.sensors
     forces, air, size = statistical["forces"], statistical["air"], aircraft.geometry
-    forces["per_m"], forces["gravity"] = 1.0 / size.chord_m, air["config"]["gravity"]
+    forces["per_chord"], forces["gravity"] = 1.0 / size.chord_m, air["config"]["gravity"]
     forces["pressure"], forces["pressure_noise"] = y[QDYN], sensors["qdyn"].random
     rates = [t.value for t in aircraft.forces if t.coefficient == "CY" and t.of == ((SIDESLIP_RATE, 1),)]
     forces["span"], forces["sideslip_rate_coefficient"] = size.span_m, sum(rates)
-    scale = y[QDYN] * air["config"]["area_per_mass"] * forces["per_m"]
+    scale = y[QDYN] * air["config"]["area_per_mass"] * forces["per_chord"]
     errors = sensors.each("random", ("alpha", "beta", "V", *AXES))
-    by_airspeed, by_others = _slipstream_noise(y, fdi["bound"]["admitted"], sensors)
+    by_airspeed, by_others = _slipstream_noise(y, fdi["bound"]["declared_errors"], sensors)
     for f, (vane, axis) in enumerate(((BETA, 2), (ALPHA, 1))):
         force, terms = forces["component"][f], force_terms(aircraft, f)
         every = scale * _coefficient_slopes(aircraft, COMPONENTS[f], trim)
         slopes, slipstream = every[:-1], every[-1]
         force["vane"], force["vane_roll"] = (-along_y[axis, vane], -slopes[vane]), -along_y[0, vane]
         force["damping"] = slopes[3:]
-        felt = slopes.copy()
-        felt[AIRSPEED] += slipstream * by_airspeed
-        parts = (felt * errors) ** 2
+        total = slopes.copy()
+        total[AIRSPEED] += slipstream * by_airspeed
+        parts = (total * errors) ** 2
         quiet = parts.sum() + slipstream**2 * by_others
         force["trim_variance"] = quiet, quiet - parts[vane]
         noise = sensors[ACCELEROMETERS[1 + f]].random
-        force["accelerometer_variance"] = (forces["per_m"] * noise) ** 2
-        _configure_force_tolerances(force, declared, terms, y, slopes[vane] / scale, f, forces["per_m"])
+        force["accelerometer_variance"] = (forces["per_chord"] * noise) ** 2
+        _configure_force_tolerances(force, declared, terms, y, slopes[vane] / scale, f, forces["per_chord"])
         turned = scale * sum(abs(term.value) for term in terms if term.surface)
         force["deflection"] = turned * declared.actuators.deflection_rad
         force["drift"] = _angle_drift(sensors, air["config"]["gravity"], y[AIRSPEED], f)
-        wander = (DRIFT_CHANGE_SHARE * force["drift"]) ** 2 + dt_s * (noise / y[AIRSPEED]) ** 2
-        force["wander"] = slopes[vane] ** 2 * (wander + declared.air.angle_walk(y[AIRSPEED]))
+        drift_intensity = (DRIFT_CHANGE_SHARE * force["drift"]) ** 2 + dt_s * (noise / y[AIRSPEED]) ** 2
+        force["drift_intensity"] = slopes[vane] ** 2 * (
+            drift_intensity + declared.air.angle_walk(y[AIRSPEED])
+        )
 
 
-def _slipstream_noise(y: np.ndarray, admitted: np.void, declared: SensorErrors) -> tuple[float, float]:
+def _slipstream_noise(y: np.ndarray, declared_errors: np.void, declared: SensorErrors) -> tuple[float, float]:
     """How dpt moves with the reading of the airspeed, s/m; its variance by those of pressure and power."""
-    if not admitted["engine"]:
+    if not declared_errors["engine"]:
         return 0.0, 0.0
-    by_airspeed, by_pressure, per_kw = slipstream_slopes(y, admitted["thin_air_kw"])
-    power_kw = admitted["engine_kw"] / NOISE_LIMIT_SIGMA
+    by_airspeed, by_pressure, per_kw = slipstream_slopes(y, declared_errors["thin_air_kw"])
+    power_kw = declared_errors["engine_kw"] / NOISE_LIMIT_SIGMA
     return by_airspeed, float((by_pressure * declared["qdyn"].random) ** 2 + (per_kw * power_kw) ** 2)
 
 
@@ -243,20 +246,28 @@ def _angle_drift(errors: SensorErrors, gravity: float, airspeed_mps: float, f: i
     # how far accelerometers can be off across the flow in level flight: that of the axis, and of the one
     # ahead as much as the flow's angle lets it
     own = errors[ACCELEROMETERS[1 + f]]
-    misfelt = (
+    across_flow = (
         own.steady + TYPICAL_SLOPE_RAD * errors["ax"].steady + gravity * (own.slope if f == NORMAL else 0.0)
     )
-    falls = gravity * tilt * (TYPICAL_SLOPE_RAD if f == NORMAL else 1.0) + EARTH_ACCELERATION_M_S2 + misfelt
+    falls = (
+        gravity * tilt * (TYPICAL_SLOPE_RAD if f == NORMAL else 1.0) + EARTH_ACCELERATION_M_S2 + across_flow
+    )
     return float(EARTH_RATE_RAD_S + turning + falls / airspeed_mps)
 
 
 def _configure_force_tolerances(
-    force: np.void, declared: Declared, terms: list[Term], y: np.ndarray, of_vane: float, f: int, per_m: float
+    force: np.void,
+    declared: Declared,
+    terms: list[Term],
+    y: np.ndarray,
+    of_vane: float,
+    f: int,
+    per_chord: float,
 ) -> None:
     """Of each term: that of the coefficients, and what constant errors of vane and pressure do; of the
     accelerometer's bias, m/s2; of the whole."""
     share, errors = declared.coefficients.largest, declared.sensors
-    vane, felt = errors["alpha" if f == NORMAL else "beta"], errors[ACCELEROMETERS[1 + f]]
+    vane, accelerometer = errors["alpha" if f == NORMAL else "beta"], errors[ACCELEROMETERS[1 + f]]
     pressure = errors["qdyn"].steady / y[QDYN] + errors["qdyn"].slope
     for k, term in enumerate(terms):
         force["tolerance"][k] = (share + pressure + vane.slope) * abs(term.value)
@@ -265,9 +276,9 @@ def _configure_force_tolerances(
     n = len(terms)
     if f == SIDE:
         force["tolerance"][n], n = share + RATE_TOLERANCE[declared.air.moves], n + 1
-    if felt.steady:
-        force["tolerance"][n], force["regressor"][n], n = felt.steady, per_m, n + 1
-    force["tolerance"][n], force["n"] = MASS_TOLERANCE + felt.slope, n + 1
+    if accelerometer.steady:
+        force["tolerance"][n], force["regressor"][n], n = accelerometer.steady, per_chord, n + 1
+    force["tolerance"][n], force["n"] = MASS_TOLERANCE + accelerometer.slope, n + 1
 
 
 def _force_coefficient(aircraft: Aircraft, name: str, at: Trim) -> float:

@@ -157,8 +157,8 @@ def block_dtype(capacity: Capacity) -> np.dtype:
         no_gust_filter=FILTER, calm_prediction=2, calm_agreement=float, calm_information=float,
         # whether vanes show a gust roughly; its whitened effect, rad/s; the state of its filter
         has_coarse_gust=int, gust_response=2, gust_state=4,
-        # alarm level, standard deviations; share of it reserved for noise beside a bounded uncertainty; omega
-        # dt of that uncertainty; its responses: see `fill_uncertainty_response`
+        # alarm level, standard deviations; share of it reserved for noise beyond a bounded uncertainty;
+        # omega dt of that uncertainty; its responses: see `fill_uncertainty_response`
         level=float, noise_share=float, pace=float, constant_response=2, transient_response=2,
         n_regressors=int, tolerance=capacity.regressors, regressor=(capacity.regressors, 2),
         regressor_state=(capacity.regressors, 4), regressor_response=(capacity.regressors, 2),
@@ -449,7 +449,7 @@ def accumulate_gust(block, lanes, n, keep):
 
 
 @kernel
-def accumulate_evidence(block, tolerated, dt, keep):
+def accumulate_evidence(block, has_tolerances, dt, keep):
     """Add the frame just whitened to the sums of every hypothesis and onset; earlier sums decay by `keep`."""
     for h in range(block.n_hypotheses):
         shape_signature(block.hypothesis[h], block.lanes[h // PER_GROUP], (h % PER_GROUP) * N_SLOTS)
@@ -458,7 +458,7 @@ def accumulate_evidence(block, tolerated, dt, keep):
         accumulate_correlations(block, lanes, n, dt, keep)
         if block.has_coarse_gust:
             accumulate_gust(block, lanes, n, keep)
-        if tolerated:
+        if has_tolerances:
             accumulate_overlap(block, lanes, block.overlap[g], n, keep)
 
 
@@ -510,7 +510,7 @@ def evaluate_lanes(block, lanes, n, certain, mapped):
     error is mapped; it is then large and lasting, so the bounds on other hypotheses always include it.
     """
     sense, transient0, transient1 = lanes.sense, block.transient_response[0], block.transient_response[1]
-    level, noise_share, doubted = block.level, block.noise_share, 0.0 if certain else 1.0
+    level, noise_share, room_share = block.level, block.noise_share, 0.0 if certain else 1.0
     for k in range(n):
         N, D = lanes.correlation[k], lanes.information[k]
         explained = lanes.coefficient_part[k] + max(sense[k] * lanes.calm_prediction[k], 0.0)
@@ -518,7 +518,7 @@ def evaluate_lanes(block, lanes, n, certain, mapped):
         is_loss, known = sense[k] != 0.0, D > 0.0
         evidence = sense[k] * N if is_loss else abs(N)
         room = uncertainty_part(lanes, k, transient0, transient1)
-        doubt = explained + (room if mapped and not is_loss else doubted * room)
+        doubt = explained + (room if mapped and not is_loss else room_share * room)
         score = normalised_evidence(level, noise_share, evidence - explained, room, D)
         llr = log_likelihood_ratio(is_loss, evidence, D)
         min_llr = log_likelihood_ratio(is_loss, evidence - doubt, D)
@@ -553,10 +553,10 @@ def evaluate_hypotheses(block, memory=0.0, mapped=False):
 
 
 @kernel
-def update_block(block, bounded, tolerated, dt, keep, memory=0.0, mapped=False):
+def update_block(block, bounded, has_tolerances, dt, keep, memory=0.0, mapped=False):
     """Update a block with one frame of the innovation: whiten it and test every hypothesis; dt s.
 
-    The innovation, rad/s2, is in `scratch`. Noise, drift, signatures and, if `tolerated`, regressors must be
+    The innovation, rad/s2, is in `scratch`. Noise, drift, signatures and, if `has_tolerances`, regressors are
     those of the frame. bounded: see `fill_uncertainty_response`; keep: `accumulate_evidence`; memory, mapped:
     `evaluate_hypotheses`.
     """
@@ -568,9 +568,9 @@ def update_block(block, bounded, tolerated, dt, keep, memory=0.0, mapped=False):
         predict_calm_air(block, dt)
     if block.has_coarse_gust:
         whiten(block, block.gust_state, block.gust_response, dt, block.gust_response)
-    if tolerated:
+    if has_tolerances:
         whiten_regressors(block, dt)
-    accumulate_evidence(block, tolerated, dt, keep)
+    accumulate_evidence(block, has_tolerances, dt, keep)
     evaluate_hypotheses(block, memory, mapped)
 
 

@@ -149,7 +149,7 @@ def configure_statistics(
     _set_up_noise(statistical, drift_frequency(given, aircraft), declared, design, start, dt_s)
     tolerance = coefficient_tolerances(declared, design, mass, *start[1:])
     _set_up_tolerances(statistical, aircraft, tolerance)
-    configure_readings(statistical, errors, fdi["bound"]["admitted"])
+    configure_readings(statistical, errors, fdi["bound"]["declared_errors"])
     if across:
         chance = given.false_alarms_per_h / (3600.0 * rate_hz * n_tests)
         configure_tones(statistical["tone_config"], chance, airspeed_mps, pace * rate_hz, dt_s)
@@ -168,7 +168,7 @@ def configure_statistics(
     last, pitch = statistical["block"][-1], statistical["block"][likelihood.PITCH_BLOCK]
     rolling = float(air["config"]["rolling_length"]) if air["output"]["moving"] else 0.0
     gusts_m = rotation_lengths(air["config"]["span"]) if air["config"]["coarse"] else [rolling]
-    last["return_length"] = returning_length(statistical, airspeed_mps, rate_hz, float(min(gusts_m)))
+    last["return_length"] = drift_return_length(statistical, airspeed_mps, rate_hz, float(min(gusts_m)))
     if air["output"]["moving"]:
         # the filters that assume no gust: they start as the others, with a drift in any direction
         for name in ("n", "keep", "noise", "P_xx", "P_dd"):
@@ -176,7 +176,7 @@ def configure_statistics(
         last["drift_scale"] = (rolling / last["return_length"]) ** 2
         if not air["output"]["measures_gust"]:
             pitching = float(rotation_lengths(air["config"]["span"])[1])
-            pitch["return_length"] = returning_length(statistical, airspeed_mps, rate_hz, pitching)
+            pitch["return_length"] = drift_return_length(statistical, airspeed_mps, rate_hz, pitching)
             pitch["drift_scale"] = (pitching / pitch["return_length"]) ** 2
         add_gust_jitter(statistical, errors, design, *start[1:], dt_s)
 
@@ -228,7 +228,7 @@ def drift_frequency(given: Statistical, aircraft: Aircraft) -> float:
 def _set_up_bounded(
     statistical: np.void, config: FdiConfig, declared: Declared, pace: float, dt_s: float
 ) -> None:
-    """What an uncertainty that is bounded may do beside chance. A loss declared constant does not grow."""
+    """Fill level, noise share and pace of the bounded uncertainty. A loss declared constant does not grow."""
     still = declared.is_noise_free
     for block in statistical["block"]:
         block["level"], block["noise_share"] = statistical["tests"]["alarm_level"], 0.0 if still else CHANCE
@@ -247,7 +247,7 @@ def _set_up_noise(
     noise = float(errors[:3].max())
     largest = max(declared.constant_rad_s2)
     level = float(statistical["tests"]["alarm_level"])
-    statistical["noise"]["rapidity"] = walk_intensity(largest, omega, noise, level, dt_s)
+    statistical["noise"]["walk_intensity"] = walk_intensity(largest, omega, noise, level, dt_s)
     _, G, f_x, f_y = jacobian(design, *start)
     statistical["noise"]["own_jitter"] = f_x**2 @ errors[:3] ** 2
     in_trim = (
@@ -262,10 +262,10 @@ def walk_intensity(eta_bar: float, omega: float, noise: float, level: float, dt_
 
     An uncertainty of eta_bar sin(omega t) moves the test for a step by eta_bar omega sqrt(2 sqrt 2 / i w0),
     w0 = (i / n)^(1/4), for a walk of intensity i and gyro noise of density n = noise^2 dt (docs/theory.md).
-    With no noise to speak of w0 is the frame rate. A loss under a moving command grows beside the uncertainty
-    for as long as both go the same way: by eta_bar sqrt(omega / i) times 1.204, the largest value of
-    sin(z) / sqrt(z / 2), z half of omega t. Half the alarm level is left for it: noise alone then takes up no
-    more than the other half. eta_bar rad/s2, omega rad/s, noise rad/s, level in standard deviations.
+    Almost without noise w0 is the frame rate. The evidence for a loss under a moving command grows together
+    with the uncertainty while both have the same sign: by eta_bar sqrt(omega / i) times 1.204, the largest
+    value of sin(z) / sqrt(z / 2), z half of omega t. Half the alarm level is left for it: noise alone then
+    takes up no more than the other half. eta_bar rad/s2; omega, noise rad/s; level in standard deviations.
     """
     eta_bar = max(eta_bar, likelihood.LEAST_UNCERTAINTY_RAD_S2)
     swing = 8.0 * sqrt(2.0) * (eta_bar * omega / level) ** 2  # of i w0
@@ -274,20 +274,20 @@ def walk_intensity(eta_bar: float, omega: float, noise: float, level: float, dt_
     return max(hypot(walk, ramp), swing * dt_s) / eta_bar**2
 
 
-def returning_length(statistical: np.void, airspeed_mps: float, rate_hz: float, gust_m: float) -> float:
-    """Within which distance flown, m, a drift returns beside a gust that returns within gust_m, 0 in still
-    air: that of the second view of roll and yaw, and of pitch where no vane shows its gust.
+def drift_return_length(statistical: np.void, airspeed_mps: float, rate_hz: float, gust_m: float) -> float:
+    """Return length, m, of the drift in the second block of roll and yaw, or of pitch without gust estimate.
 
-    As soon as a bounded uncertainty allows: over the longest window, T, one that swings along with the fault
-    moves a test for a drift of intensity i and lag tau by eta_bar sqrt(T / 2 i) / tau, and half the alarm
-    level is left for it; and no later than the gust does. A gust that returns later is taken for a
-    stronger one, with the same power where it is slow and more where it is fast.
+    gust_m: return length of the gust, m; 0 in still air. The drift returns as soon as a bounded uncertainty
+    permits: over the longest window T an uncertainty that oscillates with the fault moves a test, for a drift
+    of intensity i and lag tau, by eta_bar sqrt(T / 2 i) / tau; half the alarm level is left for this. The
+    drift returns no later than the gust. A gust with a longer return length is represented by a stronger one,
+    of equal power at low frequency and more power at high frequency.
     """
-    if statistical["noise"]["rapidity"] == 0.0:
+    if statistical["noise"]["walk_intensity"] == 0.0:
         return gust_m  # 0 in still air: nothing is declared that drifts, and the two views are one
     longest_s = 2 ** (N_SLOTS - 1) / rate_hz
     level = float(statistical["tests"]["alarm_level"])
-    lag_s = sqrt(2.0 * longest_s / statistical["noise"]["rapidity"]) / level
+    lag_s = sqrt(2.0 * longest_s / statistical["noise"]["walk_intensity"]) / level
     return min(airspeed_mps * lag_s, gust_m or np.inf)
 
 
@@ -297,26 +297,26 @@ def _set_up_tolerances(statistical: np.void, aircraft: Aircraft, tolerance: np.n
     for block, axes in zip(statistical["block"], (PITCH_AXES, LATERAL_AXES, LATERAL_AXES), strict=True):
         of_it = tolerance[np.isin(axis, axes)]
         block["tolerance"][: of_it.size] = of_it
-    statistical["tests"]["tolerated"] = bool(np.any(tolerance))
+    statistical["tests"]["has_tolerances"] = bool(np.any(tolerance))
 
 
-def configure_readings(statistical: np.void, errors: SensorErrors, admitted: np.void) -> None:
+def configure_readings(statistical: np.void, errors: SensorErrors, declared_errors: np.void) -> None:
     """Add the readings of the air data to the regressors of the blocks."""
     steady, noise = np.zeros(N_READINGS), statistical["noise"]["reading"]
     for name, place in _SENSORS.items():
         steady[place], noise[place] = errors[name].steady, errors[name].random
-    steady[_POWER] = admitted["engine_kw"]  # all of it: so many standard deviations are part of that
-    noise[_POWER] = admitted["engine_kw"] / NOISE_LIMIT_SIGMA
+    steady[_POWER] = declared_errors["engine_kw"]  # all of it: so many standard deviations are part of that
+    noise[_POWER] = declared_errors["engine_kw"] / NOISE_LIMIT_SIGMA
     if not (steady.any() or noise.any()):
         return
-    statistical["noise"]["read"] = statistical["tests"]["tolerated"] = 1
+    statistical["noise"]["read"] = statistical["tests"]["has_tolerances"] = 1
     for block in statistical["block"]:
         n = int(block["n_regressors"])
         block["n_regressors"], block["tolerance"][n : n + N_READINGS] = n + N_READINGS, steady
 
 
 @kernel
-def fill_reading_direction(table, admitted, y, which, direction):
+def fill_reading_direction(table, declared_errors, y, which, direction):
     """Fill direction (N_SIGNALS,) with the change of a table's signals per unit of a reading."""
     direction[:] = 0.0
     if which < AIRSPEED:  # a vane
@@ -324,8 +324,8 @@ def fill_reading_direction(table, admitted, y, which, direction):
     if which == AIRSPEED:
         for k in range(PH, RH + 1):
             direction[k] = -table.signal[k] / y[AIRSPEED]
-    if admitted.engine and which >= AIRSPEED:
-        by_airspeed, by_pressure, per_kw = slipstream_slopes(y, admitted.thin_air_kw)
+    if declared_errors.engine and which >= AIRSPEED:
+        by_airspeed, by_pressure, per_kw = slipstream_slopes(y, declared_errors.thin_air_kw)
         of_power = by_pressure if which == QDYN else per_kw
         direction[_SLIPSTREAM] = by_airspeed if which == AIRSPEED else of_power
 
@@ -346,13 +346,13 @@ def fill_reading_effect(design, y, u, which, slope, out):
 
 
 @kernel
-def add_reading_regressors(share, noise, blocks, admitted, design, y, u):
+def add_reading_regressors(share, noise, blocks, declared_errors, design, y, u):
     """Add this instant, a `share` of the frame, to the readings' regressors, rad/s2 per unit, and fill the
     jitter, rad2/s4, as it is now; `design.moments` is evaluated there."""
     table, out = design.moments, noise.moved
     noise.jitter[:] = noise.own_jitter
     for which in range(N_READINGS):
-        fill_reading_direction(table, admitted, y, which, noise.direction)
+        fill_reading_direction(table, declared_errors, y, which, noise.direction)
         directional(table, table.signal, table.power, noise.direction, noise.slope)
         fill_reading_effect(design, y, u, which, noise.slope, out)
         for i in range(3):

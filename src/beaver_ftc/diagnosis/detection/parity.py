@@ -1,4 +1,4 @@
-"""Parity tests: they exclude a surface, whatever the type and the time history of its fault.
+"""Parity tests: they exclude a surface for any type and time history of its fault.
 
 A fault of surface s accelerates the aircraft along the column g_s of G only, rad/s2 per rad. A projection of
 the innovation nu, rad/s2, on a parity direction m that is orthogonal to that column,
@@ -89,7 +89,7 @@ def view_dtype(capacity: Capacity) -> np.dtype:
         direction=5, column=5,  # m and g / |g|: roll, pitch, yaw, side force, normal force
         plane=(int, 2),  # the two components that the column has
         across_gust=int,  # whether m is orthogonal to the rolling gust as well
-        has_tolerance=int,  # whether regressors count in this view whatever the detector's other blocks do
+        has_tolerance=int,  # whether regressors count in this view even if they do in no other block
         inertial=int,  # whether the force is that at the flow angle from inertial motion
         immune_to_vane=int,  # whether an error of a vane does not appear in this view
         confirmed_by=int,  # force of the views that confirm this one; 0 if no vane is used
@@ -124,7 +124,7 @@ def column_component(view, forces, bound, G, j):
     if i >= SIDE_FORCE:
         force = forces.component[i - SIDE_FORCE]
         return force.column_predicted[s], force.column_error[s]
-    return G[i, s], bound.own_per_rad[i, s] if bound.own_errors else 0.0
+    return G[i, s], bound.surface_error_per_rad[i, s] if bound.has_surface_errors else 0.0
 
 
 @kernel
@@ -202,7 +202,9 @@ def fill_gust_sensitivity(view, forces, damping):
         view.gust_on_rates[k] = roll + pitch + yaw
         view.gust_on_forces[k] = 0.0
         for f in range(2):
-            view.gust_on_forces[k] += m[SIDE_FORCE + f] * forces.component[f].damping[k] * forces.strength
+            view.gust_on_forces[k] += (
+                m[SIDE_FORCE + f] * forces.component[f].damping[k] * forces.pressure_ratio
+            )
 
 
 @kernel
@@ -215,12 +217,12 @@ def set_view_noise(view, noise, blocks, forces, air, inertial_air, V):
         jitter += abs(m[i]) * np.sqrt(noise.jitter[i])
         if view.immune_to_vane:
             jitter += abs(m[i]) * forces.gust_noise[i]
-        bound += abs(m[i]) * (noise.bounded[i] + noise.beyond[i])
+        bound += abs(m[i]) * (noise.bounded[i] + noise.further_error[i])
     for f, force in enumerate(forces.component):
         jitter += abs(m[SIDE_FORCE + f]) * np.sqrt(force.jitter[view.inertial])
         if view.inertial:
-            drift += (m[SIDE_FORCE + f] * forces.strength) ** 2 * force.wander
-        bound += abs(m[SIDE_FORCE + f]) * (force.deflection * forces.strength + force.unsettled)
+            drift += (m[SIDE_FORCE + f] * forces.pressure_ratio) ** 2 * force.drift_intensity
+        bound += abs(m[SIDE_FORCE + f]) * (force.deflection * forces.pressure_ratio + force.lag_error)
     if air.output.moving:
         fill_gust_sensitivity(view, forces, air.output.damping)
         if uses_gust_estimate(view, air):
@@ -234,7 +236,7 @@ def set_view_noise(view, noise, blocks, forces, air, inertial_air, V):
                 block.P_dd[0, 0] += m[i] * m[j] * air.output.turn_variance[i, j]
     size = max(bound, likelihood.LEAST_UNCERTAINTY_RAD_S2)
     block.noise[0], block.jitter[0], view.bounded[0] = variance, jitter * jitter, bound
-    block.drift[0, 0] = drift + noise.rapidity * size * size
+    block.drift[0, 0] = drift + noise.walk_intensity * size * size
 
 
 @kernel
@@ -285,10 +287,10 @@ def update_directions(views, forces, air, bound, G, Gu):
 
 
 @kernel
-def project_innovation(views, tolerated, noise, blocks, forces, air, inertial_air, innovation, V):
+def project_innovation(views, has_tolerances, noise, blocks, forces, air, inertial_air, innovation, V):
     """Project the innovation (3,) rad/s2 on the direction of each view, into `scratch` of its block.
 
-    Noise follows, and if constant errors are `tolerated`, their regressors; V m/s.
+    Noise follows, and if constant errors are `has_tolerances`, their regressors; V m/s.
     """
     for view in views:
         if not view.active:
@@ -299,7 +301,7 @@ def project_innovation(views, tolerated, noise, blocks, forces, air, inertial_ai
         for i in range(m.size):
             if m[i] != 0.0:
                 projected[0] += m[i] * innovation_component(view, forces, air, inertial_air, innovation, i)
-        if tolerated or view.has_tolerance:
+        if has_tolerances or view.has_tolerance:
             fill_view_regressors(view, blocks, forces, air, inertial_air, innovation)
 
 
@@ -314,10 +316,10 @@ def update_views(views, tests, tone_config, y, dt, k, latched):
             continue
         if not latched:
             likelihood.reset_onset(view.block, slot)
-        tolerated = tests.tolerated or view.has_tolerance
-        likelihood.update_block(view.block, view.bounded, tolerated, dt, keep)
+        has_tolerances = tests.has_tolerances or view.has_tolerance
+        likelihood.update_block(view.block, view.bounded, has_tolerances, dt, keep)
         if not view.inertial:  # the error of the integrated angle oscillates with the aircraft's own modes
-            tones.update_tones(view, tone_config, tests.alarm_level, within_envelope, tolerated, dt)
+            tones.update_tones(view, tone_config, tests.alarm_level, within_envelope, has_tolerances, dt)
         view.peak_score = max((1.0 - (1.0 - tests.keep) / PEAK_MEMORY) * view.peak_score, largest_score(view))
 
 

@@ -44,17 +44,17 @@ TESTS = record(
     alarm_level=float, naming_level=float,  # standard deviations; difference of log-likelihood ratios
     keep=float,  # factor by which evidence decays per frame after the alarm
     n_log_columns=int,
-    tolerated=int,  # whether unknown constants have tolerances
+    has_tolerances=int,  # whether unknown constants have tolerances
     share=float,  # one over the number of instants in a frame
     mapped=int,  # whether the model's error is mapped
 )  # fmt: skip
 
 # The noise model: accelerations that are not caused by a fault.
 NOISE = record(
-    rapidity=float,  # intensity of the drift that represents a bounded uncertainty, over bound squared, 1/s
+    walk_intensity=float,  # of the drift that represents a bounded uncertainty, over bound squared, 1/s
     pace=float,  # share of its bound by which the uncertainty changes in a frame if no surface moves
     bounded=3,  # bound on the uncertainty with healthy surfaces, now, rad/s2
-    beyond=3,  # what one surface anywhere in its travel adds to it, rad/s2
+    further_error=3,  # what one surface anywhere in its travel adds to it, rad/s2
     deflection=3,  # share of the bound by errors of the deflections, rad/s2
     jitter=3, own_jitter=3,  # variance by noise of all inputs of the model; without the air data; (rad/s2)2
     read=int, reading=N_READINGS,  # whether errors of the air data count; their noise, units of the readings
@@ -98,7 +98,7 @@ def update_blocks(tests, bounded, blocks, air, innovation, dt, k, latched, ends=
             else:  # without gust both blocks of roll and yaw have the same filter
                 block.no_gust_filter.innovation[:] = blocks[LATERAL].no_gust_filter.innovation
         memory = tests.keep if ends else 0.0
-        likelihood.update_block(block, bounded, tests.tolerated, dt, keep, memory, tests.mapped)
+        likelihood.update_block(block, bounded, tests.has_tolerances, dt, keep, memory, tests.mapped)
 
 
 @kernel
@@ -183,13 +183,13 @@ def log_scores(tests, blocks, views, forces, air, row):
 
 
 @kernel
-def is_not_excluded(estimators, loss_of, surface):
+def is_not_excluded(estimators, loss_estimator, surface):
     """True if a loss of this surface has not been excluded."""
-    return loss_of[surface] < 0 or not estimators[loss_of[surface]].excluded
+    return loss_estimator[surface] < 0 or not estimators[loss_estimator[surface]].excluded
 
 
 @kernel
-def best_alternative_llr(block, estimators, loss_of, surface, every=False):
+def best_alternative_llr(block, estimators, loss_estimator, surface, every=False):
     """The largest lower bound on the log-likelihood ratio of all alternatives to the loss of a surface.
 
     Excluded losses are no alternatives, unless `every`: as evidence decays, an uncertainty that correlates
@@ -201,7 +201,7 @@ def best_alternative_llr(block, estimators, loss_of, surface, every=False):
             continue
         other = hypothesis.surface
         if hypothesis.kind != LOSS or (
-            other != surface and (every or is_not_excluded(estimators, loss_of, other))
+            other != surface and (every or is_not_excluded(estimators, loss_estimator, other))
         ):
             best = max(best, hypothesis.min_llr)
     return best
@@ -221,25 +221,31 @@ def max_llr(block, surface, ending):
 
 
 @kernel
-def confirms_loss(tests, blocks, estimators, loss_of, surface):
+def confirms_loss(tests, blocks, estimators, loss_estimator, surface):
     """True if a loss of this surface explains the data better than all alternatives, by the naming level.
 
     estimators: of the isolation; loss_of (n,): the estimator of each surface's loss, or -1. If the estimator
-    is doubted BESIDE_DAMAGE, excluded losses are alternatives as well: damage may have excluded them.
+    is weakly excluded by DAMAGE_POSSIBLE, excluded losses are alternatives as well.
     """
-    every = loss_of[surface] >= 0 and estimators[loss_of[surface]].weakly_excluded == DAMAGE_POSSIBLE
+    every = (
+        loss_estimator[surface] >= 0
+        and estimators[loss_estimator[surface]].weakly_excluded == DAMAGE_POSSIBLE
+    )
     for block in blocks:
         least = 0.0
         for hypothesis in block.hypothesis[: block.n_hypotheses]:
             if hypothesis.surface == surface and hypothesis.kind in (LOSS, GROWING):
                 least = max(least, hypothesis.min_llr)
-        if least - best_alternative_llr(block, estimators, loss_of, surface, every) > tests.naming_level:
+        if (
+            least - best_alternative_llr(block, estimators, loss_estimator, surface, every)
+            > tests.naming_level
+        ):
             return True
     return False
 
 
 @kernel
-def excludes_loss(tests, blocks, estimators, loss_of, surface, ends, abrupt):
+def excludes_loss(tests, blocks, estimators, loss_estimator, surface, ends, abrupt):
     """True if an alternative explains the data better than a loss of this surface, by the naming level.
 
     Each block of roll and yaw is compared together with that of pitch, because a loss acts on its own axes
@@ -249,12 +255,12 @@ def excludes_loss(tests, blocks, estimators, loss_of, surface, ends, abrupt):
     of a loss in pitch counts only if `ends` is set: a fault outside the class may look like it. Arguments as
     in `confirms_loss`.
     """
-    pitch, at_once = blocks[likelihood.PITCH_BLOCK], tests.share == 1.0
-    part = 1.0 if abrupt and at_once else MIN_CONSTANT_SHARE
-    end_part = 1.0 if at_once else MIN_CONSTANT_SHARE
+    pitch, single_instant = blocks[likelihood.PITCH_BLOCK], tests.share == 1.0
+    part = 1.0 if abrupt and single_instant else MIN_CONSTANT_SHARE
+    end_part = 1.0 if single_instant else MIN_CONSTANT_SHARE
     for lateral in blocks[LATERAL:]:
-        better = best_alternative_llr(pitch, estimators, loss_of, surface)
-        better = max(better, best_alternative_llr(lateral, estimators, loss_of, surface))
+        better = best_alternative_llr(pitch, estimators, loss_estimator, surface)
+        better = max(better, best_alternative_llr(lateral, estimators, loss_estimator, surface))
         worse = max(max_llr(pitch, surface, False), max_llr(lateral, surface, False))
         ended = max_llr(lateral, surface, True)
         if ends:
@@ -289,10 +295,10 @@ def prepare_tests(tests, noise, blocks, air, bound, design, measured, u, dt):
     x, y = measured.x, measured.y
     if air.output.moving:
         gusts.fill_gust_effect(air, design, x, y, u)
-    if tests.tolerated:
+    if tests.has_tolerances:
         for block in blocks:
             block.regressor[:] = 0.0
-        add_regressors(tests.share, noise, blocks, bound.admitted, design, measured, u)
+        add_regressors(tests.share, noise, blocks, bound.declared_errors, design, measured, u)
     fill_drift_and_jitter(noise, blocks, air, bound, design, measured, dt)
     if bound.error_map.n_boxes > 0:
         update_pace(noise, blocks, bound.error_map, u)
@@ -317,18 +323,18 @@ def accumulate_test_substep(tests, noise, blocks, air, bound, design, measured, 
     """Add an instant inside a frame, dt s after the instant before, to gust and regressors."""
     if air.output.moving:
         gusts.accumulate_gust_substep(air, design, measured.x, measured.y, u, measured.attitude, dt)
-    if tests.tolerated:
-        add_regressors(tests.share, noise, blocks, bound.admitted, design, measured, u)
+    if tests.has_tolerances:
+        add_regressors(tests.share, noise, blocks, bound.declared_errors, design, measured, u)
 
 
 @kernel
-def add_regressors(share, noise, blocks, admitted, design, measured, u):
+def add_regressors(share, noise, blocks, declared_errors, design, measured, u):
     """Add this instant, a `share` of the frame, to the regressors of all unknown constants."""
     y = measured.y
     evaluate(design.moments, measured.x, y)
     add_coefficient_regressors(share, noise.terms, blocks, design, y, u)
     if noise.read:
-        noise_model.add_reading_regressors(share, noise, blocks, admitted, design, y, u)
+        noise_model.add_reading_regressors(share, noise, blocks, declared_errors, design, y, u)
 
 
 @kernel
@@ -343,7 +349,7 @@ def fill_drift_and_jitter(noise, blocks, air, bound, design, measured, dt):
         if mapped:
             bounded[i] += min(bound.error_map.now[i], UNKNOWN_IN_FILTERS_RAD_S2)
         if bound.error_map.anywhere:
-            noise.beyond[i] = further_map_error(bound.error_map, bound.error_map.n_levels - 1, i)
+            noise.further_error[i] = further_map_error(bound.error_map, bound.error_map.n_levels - 1, i)
     for b, block in enumerate(blocks):
         for i, axis in enumerate(block.axis[: block.n]):
             for j in range(block.n):
@@ -354,7 +360,7 @@ def fill_drift_and_jitter(noise, blocks, air, bound, design, measured, dt):
                     )
                     block.drift[i, j] = block.drift_scale * moved
             size = max(bounded[axis], likelihood.LEAST_UNCERTAINTY_RAD_S2)
-            walk = noise.rapidity * size * size
+            walk = noise.walk_intensity * size * size
             block.drift[i, i] += walk
             block.no_gust_filter.drift[i, i] = walk
             block.jitter[i] = block.no_gust_filter.jitter[i] = noise.jitter[axis]

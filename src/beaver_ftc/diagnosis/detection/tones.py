@@ -73,14 +73,14 @@ def is_within_envelope(tone_config, y):
 
 
 @kernel
-def update_tones(view, tone_config, alarm_level, within_envelope, tolerated, dt):
+def update_tones(view, tone_config, alarm_level, within_envelope, has_tolerances, dt):
     """Update the tests of a view with one frame, which the view's block has whitened; dt s.
 
     tolerated: true if the block has regressors. Without `within_envelope` the frame counts as zero, so the
     sums decay.
     """
     tones, block = view.tones, view.block
-    n = block.n_regressors if tolerated else 0
+    n = block.n_regressors if has_tolerances else 0
     root = np.sqrt(block.S_inverse[0, 0]) if within_envelope else 0.0
     tones.sum += root * block.innovation[0]
     for j in range(n):

@@ -45,8 +45,8 @@ def configure_engine_monitor(config: np.void, aircraft: Aircraft) -> None:
 
 @kernel
 def disable_if_differential_thrust(engines, levers):
-    """Disable the monitor once a law has moved an engine apart; levers (n and more,): of each, beside the
-    common one."""
+    """Disable the monitor once a law has moved an engine apart; levers (n and more,): of each, in addition
+    to the common one."""
     for e in range(engines.config.n):
         if levers[e] != 0.0:
             engines.memory.disabled = 1

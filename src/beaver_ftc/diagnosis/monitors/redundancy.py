@@ -62,7 +62,7 @@ EQUAL_TOLERANCE = np.array([to.within for _, to in EQUAL], float)
 POLES_PER_S = (1e6, 10.0, 1.0)
 N_POLES = len(POLES_PER_S)
 NO_SENSOR = -1
-MAX_FORCE_JUMP_M_S2 = 8.0  # by which no specific force changes from one look to the next
+MAX_FORCE_JUMP_M_S2 = 8.0  # by which no specific force changes from one sample to the next
 UNDECIDED, YES, NO = 0, 1, 2
 MAX_SPEED_RATIO = 1.4  # than in trim a flight may become
 ATTITUDE_CORRECTION_PER_S = 3.0  # a rate that it replaces, where the attitude's own noise is declared
@@ -76,8 +76,8 @@ ALPHA_ERROR, BETA_ERROR, AIRSPEED_ERROR, PHI_ERROR, THETA_ERROR = range(5)
 N_INITIAL, N_COUPLINGS = 5, 14
 
 TEST = record(
-    residual=float, rate=float, noise=float, noise_then=float,  # of the elapsed step
-    air=float, bound=N_POLES,  # share of `gusts` in it; the whole bound
+    residual=float, rate=float, noise=float, noise_before=float,  # of the elapsed step
+    air=float, bound=N_POLES,  # share of `gust_change_bound` in it; the whole bound
     filtered=N_POLES, bound_rate=N_POLES, bound_noise=N_POLES, share=float,
 )  # fmt: skip
 
@@ -86,20 +86,20 @@ STEP = record(
         h=float, decay=N_POLES, gravity=float,
         # of the declared turbulence: its speed at most, m/s, and what passes each filter of a gust's changes
         # up to an airspeed m/s
-        gust=float, gusts=N_POLES, swift=float,
+        max_gust_speed=float, gust_change_bound=N_POLES, max_airspeed=float,
         low=float,  # height below which a gust changes faster than those of 2000 ft, m
-        rising=float,  # vertical wind at most, m/s
+        max_vertical_wind=float,  # vertical wind at most, m/s
         # declared: the whole error of a reading, and what of it changes; drift of the attitude
         offset=N_SENSORS, slope=N_SENSORS, steady=N_SENSORS, drift=float,
     ),
     memory=record(
         error=N_SENSORS, changing=N_SENSORS,  # how far a reading can be off, and by how much that changes
-        # drift so far, rad; the errors of the look before, and of the one before that
-        drifted=float, error_then=N_SENSORS, error_before=N_SENSORS,
-        # the look before: readings, attitude as a quaternion, velocity, acceleration there and before that
-        then=N_SENSORS, turned=4, velocity=3, acceleration=3, acceleration_then=3,
+        # drift so far, rad; the errors at the sample before, and at the one before that
+        attitude_drift=float, previous_error=N_SENSORS, earlier_error=N_SENSORS,
+        # the sample before: readings, attitude as a quaternion, velocity, acceleration there and before that
+        previous=N_SENSORS, previous_attitude=4, velocity=3, acceleration=3, previous_acceleration=3,
         # m/s2: size of the acceleration of the elapsed step, and of those before it; of acceleration_then
-        size=float, sizes_before=2, size_then=float,
+        size=float, earlier_sizes=2, previous_size=float,
         unknown=float,  # of the acceleration of the first step, for want of the instant before
         predicted=N_SENSORS, scratch=4, now=4,
         command=2,  # engine speed rpm, manifold pressure inHg
@@ -108,49 +108,51 @@ STEP = record(
 )  # fmt: skip
 
 INITIAL_ERRORS = record(
-    # of each hypothesis: how far it can be off, at first, now, at the alarm; what it may have moved by
-    first=N_INITIAL, off=N_INITIAL, held=N_INITIAL, changed=N_INITIAL,
-    reach=(N_INITIAL, RPM), reached=(N_INITIAL, RPM, N_POLES),  # of a unit: in this look, through the filters
-    coupling=N_COUPLINGS, coupled=(N_COUPLINGS, N_POLES),  # the same with its sign
+    # of each hypothesis, bounds on its error: at the first sample, now, at the alarm; on its change
+    initial_bound=N_INITIAL, error_bound=N_INITIAL, bound_at_alarm=N_INITIAL, change_bound=N_INITIAL,
+    # largest effect of a unit of the error on a test: in this sample, through the filters; with its sign
+    unit_effect=(N_INITIAL, RPM), filtered_unit_effect=(N_INITIAL, RPM, N_POLES),
+    coupling=N_COUPLINGS, filtered_coupling=(N_COUPLINGS, N_POLES),
     refuted=(int, N_INITIAL, N_TESTS),  # since the alarm, and by which test
 )  # fmt: skip
 
 MONITOR_CONFIG = record(
     enabled=int, instants=int, engine=int, trim=N_SENSORS,
-    follows=float,  # share of its error a replaced rate makes up a look
-    blurred=int,  # the attitude is noisy: a surface is named only once no gyro can be the cause
-    longest_identical=(int, N_SENSORS),  # how many looks with the very same reading say that it is frozen
+    attitude_correction_share=float,  # share of its error that a replaced rate corrects in one sample
+    noisy_attitude=int,  # the attitude is noisy: a surface is named only once no gyro can be the cause
+    longest_identical=(int, N_SENSORS),  # number of identical samples from which a reading counts as frozen
     damping=(3, 3),
 )  # fmt: skip
 
 MONITOR_MEMORY = record(
-    begun=int, begun_at_s=float, past=int, exceeded=(int, N_TESTS),
+    begun=int, started_at_s=float, substep=int, exceeded=(int, N_TESTS),
     # what tells a gyro from the attitude, by axis
-    gyro_error=3, gyro_error_then=3,  # as each frame began, rad/s
-    spike=3, spike_then=3, spike_before=3, W=3, W_bound=3, W_then=3, before=3,
+    gyro_error=3, previous_gyro_error=3,  # as each frame began, rad/s
+    spike=3, previous_spike=3, earlier_spike=3, W=3, W_bound=3, previous_W_bound=3, before=3,
     # no gyro can be what the rates show: what attitude and W make of that, and how far one gyro goes
     agreed=(int, max(len(EQUAL), 1)),  # whether a sensor has equalled the reading that it should
-    no_gyro=int, apart=(3, N_POLES), apart_bound=(3, N_POLES), rates_confirm=(int, 3), taken_over=(int, 3),
+    gyros_excluded=int, rate_difference=(3, N_POLES), rate_difference_bound=(3, N_POLES),
+    rates_confirm=(int, 3), rate_replaced=(int, 3),
     # accelerometers or flow sensor: number of identical samples; readings two samples ago; sensors cleared
     identical=(int, N_SENSORS), earlier=N_SENSORS, cleared=(int, N_SENSORS),
-    # how far accelerometers have leapt of late. Since the alarm: looks, residuals of speed, incidence and
+    # largest jump of an accelerometer of late. Since the alarm: samples, residuals of speed, incidence and
     # sideslip, how much of them is sound, how much is of a first error; least and most of the readings; the
     # climb that such an incidence makes up; the velocity made up, body axes
-    largest_jump=float, n_summed=int, residual_sum=3, sound_sum=3, first=3, least=3, most=3,
+    largest_jump=float, n_summed=int, residual_sum=3, bound_sum=3, first=3, least=3, most=3,
     climb_error=N_POLES, spurious_velocity=3,
 )  # fmt: skip
 
 MONITOR_OUTPUT = record(
     alarmed=int, alarmed_at_s=float,
     keeps_surface=int,  # a surface was found long before, with sound sensors: it stays found
-    misnamed=int,  # a surface had been named in the moment before the alarm
+    surface_was_isolated=int,  # a surface had been named in the moment before the alarm
     lead=int,  # the test that has raised the alarm
     largest_test=int, share=float,  # of this frame: the test nearest its bound, and how near
     suspect=(int, N_SENSORS), named=int, named_at_s=float, replaced=(int, N_SENSORS),
 )  # fmt: skip
 
 SENSOR_MONITOR = record(
-    config=MONITOR_CONFIG, memory=MONITOR_MEMORY, output=MONITOR_OUTPUT, step=STEP, since=INITIAL_ERRORS
+    config=MONITOR_CONFIG, memory=MONITOR_MEMORY, output=MONITOR_OUTPUT, step=STEP, initial=INITIAL_ERRORS
 )
 
 
@@ -170,7 +172,7 @@ def configure_monitor(
     config["instants"], config["engine"] = scenario.substeps, scenario.airframe.has_engine_instruments
     config["trim"][3:7] = y[:4]
     config["damping"] = gust_effect(DesignFunctions(np.array([design])), y)
-    monitor["memory"]["past"] = scenario.substeps - 1  # the first JSBSim frame ends a frame of the loop
+    monitor["memory"]["substep"] = scenario.substeps - 1  # the first JSBSim frame ends a frame of the loop
     if config["engine"]:
         monitor["step"]["memory"]["command"] = initial.engine_rpm, initial.manifold_pressure_inhg
     configure_step(monitor["step"]["config"], declared, scenario)
@@ -182,9 +184,9 @@ def configure_step(step: np.void, declared: Declared, scenario: Scenario) -> Non
     initial, h = scenario.initial, 1.0 / scenario.rate_hz / scenario.substeps
     step["h"], step["decay"] = h, [exp(-pole * h) for pole in POLES_PER_S]
     step["gravity"] = GRAVITY_MPS2 * (1.0 + initial.altitude_m / EARTH_RADIUS_M) ** -2
-    step["gust"], step["gusts"] = gust_bounds(declared.air, initial.airspeed_mps, h)
-    step["swift"] = MAX_SPEED_RATIO * initial.airspeed_mps
-    step["low"], step["rising"] = declared.air.low_m, declared.vertical_wind_mps
+    step["max_gust_speed"], step["gust_change_bound"] = gust_bounds(declared.air, initial.airspeed_mps, h)
+    step["max_airspeed"] = MAX_SPEED_RATIO * initial.airspeed_mps
+    step["low"], step["max_vertical_wind"] = declared.air.low_m, declared.vertical_wind_mps
 
 
 def configure_readings(monitor: np.void, declared: Declared, h: float) -> None:
@@ -197,8 +199,10 @@ def configure_readings(monitor: np.void, declared: Declared, h: float) -> None:
         drift_rad_s = getattr(getattr(errors.declared, name), "drift_rad_s", 0.0)
         step["drift"] = max(step["drift"], abs(drift_rad_s))
     attitude = slice(PHI, PHI + 3)
-    config["blurred"] = np.any(step["offset"][attitude] > step["steady"][attitude])
-    config["follows"] = min(1.0, h * ATTITUDE_CORRECTION_PER_S) if config["blurred"] else 1.0
+    config["noisy_attitude"] = np.any(step["offset"][attitude] > step["steady"][attitude])
+    config["attitude_correction_share"] = (
+        min(1.0, h * ATTITUDE_CORRECTION_PER_S) if config["noisy_attitude"] else 1.0
+    )
 
 
 def longest_identical(noise: float, quantum: float) -> int:
@@ -279,7 +283,7 @@ def angle_between(one, other, axis):
 @kernel
 def axis_turn_per_angle(step, axis, i):
     """By how much a body axis turns for what angle i changes by."""
-    bank, tilt = step.memory.then[PHI], step.memory.then[THETA]
+    bank, tilt = step.memory.previous[PHI], step.memory.previous[THETA]
     if axis == 0:
         return (1.0, 0.0, -np.sin(tilt))[i]
     if axis == 1:
@@ -310,15 +314,15 @@ def fill_reading_errors(step, signal):
         step.memory.error[i] = whole
         step.memory.changing[i] = whole - step.config.steady[i] + 1e-10 * abs(signal[i])
     for i in range(PHI, PHI + 3):
-        step.memory.error[i] += step.memory.drifted
+        step.memory.error[i] += step.memory.attitude_drift
 
 
 @kernel
 def store_sample(step, signal, force):
-    """Keep this instant for the next look; signal (N_SENSORS,) SI, force (3,) m/s2."""
-    step.memory.then[:], step.memory.error_before[:] = signal, step.memory.error_then
-    step.memory.error_then[:] = step.memory.error
-    fill_quaternion(signal[PHI], signal[THETA], signal[PSI], step.memory.turned)
+    """Store this sample for the next one; signal (N_SENSORS,) SI, force (3,) m/s2."""
+    step.memory.previous[:], step.memory.earlier_error[:] = signal, step.memory.previous_error
+    step.memory.previous_error[:] = step.memory.error
+    fill_quaternion(signal[PHI], signal[THETA], signal[PSI], step.memory.previous_attitude)
     alpha, beta, V = signal[ALPHA], signal[BETA], signal[AIRSPEED]
     step.memory.velocity[0] = V * np.cos(alpha) * np.cos(beta)
     step.memory.velocity[1], step.memory.velocity[2] = V * np.sin(beta), V * np.sin(alpha) * np.cos(beta)
@@ -336,25 +340,33 @@ def vector_length(vector):
 
 @kernel
 def predict_readings(step):
-    """Fill predicted (N_SENSORS,): what the look before says of attitude, flow and altitude now."""
-    rates, h, out, moved = step.memory.then[:3], step.config.h, step.memory.predicted, step.memory.scratch[:3]
-    advance_quaternion(step.memory.turned, rates, h, step.memory.now)
+    """Fill predicted (N_SENSORS,): attitude, flow and altitude now, from the sample before."""
+    rates, h, out, moved = (
+        step.memory.previous[:3],
+        step.config.h,
+        step.memory.predicted,
+        step.memory.scratch[:3],
+    )
+    advance_quaternion(step.memory.previous_attitude, rates, h, step.memory.now)
     a, b, c, d = step.memory.now[0], step.memory.now[1], step.memory.now[2], step.memory.now[3]
     out[PHI] = np.arctan2(2.0 * (a * b + c * d), 1.0 - 2.0 * (b * b + c * c))
     out[THETA] = np.arcsin(min(max(2.0 * (a * c - b * d), -1.0), 1.0))
     out[PSI] = np.arctan2(2.0 * (a * d + b * c), 1.0 - 2.0 * (c * c + d * d))
-    tilt, bank, v = step.memory.then[THETA], step.memory.then[PHI], step.memory.velocity
+    tilt, bank, v = step.memory.previous[THETA], step.memory.previous[PHI], step.memory.velocity
     up = v[0] * np.sin(tilt) - v[1] * np.sin(bank) * np.cos(tilt) - v[2] * np.cos(bank) * np.cos(tilt)
-    out[ALTITUDE] = step.memory.then[ALTITUDE] + h * up
-    step.memory.sizes_before[1], step.memory.sizes_before[0] = step.memory.sizes_before[0], step.memory.size
-    step.memory.size_then = vector_length(step.memory.acceleration_then)
+    out[ALTITUDE] = step.memory.previous[ALTITUDE] + h * up
+    step.memory.earlier_sizes[1], step.memory.earlier_sizes[0] = (
+        step.memory.earlier_sizes[0],
+        step.memory.size,
+    )
+    step.memory.previous_size = vector_length(step.memory.previous_acceleration)
     for i in range(3):
-        moved[i] = 1.5 * step.memory.acceleration[i] - 0.5 * step.memory.acceleration_then[i]
+        moved[i] = 1.5 * step.memory.acceleration[i] - 0.5 * step.memory.previous_acceleration[i]
     step.memory.size = vector_length(moved)
     for i in range(3):
         moved[i] = v[i] + h * moved[i]
     rotate_to_new_axes(rates, h, moved, v)
-    rotate_to_new_axes(rates, h, step.memory.acceleration, step.memory.acceleration_then)
+    rotate_to_new_axes(rates, h, step.memory.acceleration, step.memory.previous_acceleration)
     speed = vector_length(v)
     out[AIRSPEED] = speed
     out[ALPHA], out[BETA] = np.arctan2(v[2], v[0]), np.arcsin(v[1] / max(speed, 1e-3))
@@ -373,7 +385,7 @@ def fill_residuals(step, signal):
     test[BETA_FLOW].residual = signal[BETA] - predicted[BETA]
     dense, dense_then = (
         signal[QDYN] / signal[AIRSPEED] ** 2,
-        step.memory.then[QDYN] / step.memory.then[AIRSPEED] ** 2,
+        step.memory.previous[QDYN] / step.memory.previous[AIRSPEED] ** 2,
     )
     test[DENSITY].residual = np.log(max(dense, 1e-9) / max(dense_then, 1e-9))
     test[CLIMB].residual = signal[ALTITUDE] - predicted[ALTITUDE]
@@ -381,10 +393,10 @@ def fill_residuals(step, signal):
 
 @kernel
 def steepest_pitch_angle(step, signal):
-    """How far from level the nose can have been since the look before, rad."""
+    """How far from level the nose can have been since the sample before, rad."""
     return max(
         abs(signal[THETA]) + step.memory.error[THETA],
-        abs(step.memory.then[THETA]) + step.memory.error_then[THETA],
+        abs(step.memory.previous[THETA]) + step.memory.previous_error[THETA],
     )
 
 
@@ -392,7 +404,7 @@ def steepest_pitch_angle(step, signal):
 def two_step_error(step, i):
     """How far off 3/2 a - 1/2 a_then can be by what reading i is off at the two instants: a constant counts
     once."""
-    return 1.5 * step.memory.error_then[i] + 0.5 * step.memory.error_before[i] - step.config.steady[i]
+    return 1.5 * step.memory.previous_error[i] + 0.5 * step.memory.earlier_error[i] - step.config.steady[i]
 
 
 @kernel
@@ -404,7 +416,7 @@ def acceleration_error(step, turning, rates):
     for i in range(AX, AX + 3):
         felt += two_step_error(step, i) ** 2
         steady += step.config.steady[i]
-    back = step.config.h * (turning * steady + 0.5 * rates * step.memory.size_then)
+    back = step.config.h * (turning * steady + 0.5 * rates * step.memory.previous_size)
     return EARTH_ACCELERATION_M_S2 + step.memory.unknown + g * tilt + np.sqrt(felt) + back
 
 
@@ -415,10 +427,10 @@ def bound_attitude_tests(step, signal, turning, rates):
     A constant error of the attitude turns with the aircraft: in the rates J(phi, theta) (phi', theta', psi')
     it changes J. A momentary error turns an axis when it begins, and back when it ends with another J.
     """
-    test, E, n = step.test, step.memory.error_then, step.memory.changing
+    test, E, n = step.test, step.memory.previous_error, step.memory.changing
     level = 1.0 / np.cos(min(steepest_pitch_angle(step, signal), STEEPEST_RAD))
     tilt, around = E[PHI] + E[THETA] + E[PSI], step.config.h * turning
-    tipped = abs(signal[PHI] - step.memory.then[PHI]) + abs(signal[THETA] - step.memory.then[THETA])
+    tipped = abs(signal[PHI] - step.memory.previous[PHI]) + abs(signal[THETA] - step.memory.previous[THETA])
     momentary = E[THETA] - step.config.steady[THETA] + E[PSI] - step.config.steady[PSI] + n[THETA] + n[PSI]
     for i in range(3):
         by_attitude = turning * (tilt + level * E[THETA]) + tipped * momentary / step.config.h
@@ -436,10 +448,10 @@ def bound_attitude_tests(step, signal, turning, rates):
 
 @kernel
 def lowest_sample_height(step, signal):
-    """The least height of the two looks, m, that the altimeter leaves."""
+    """The least height of the two samples, m, within the altimeter's error."""
     now, then = (
         signal[ALTITUDE] - step.memory.error[ALTITUDE],
-        step.memory.then[ALTITUDE] - step.memory.error_then[ALTITUDE],
+        step.memory.previous[ALTITUDE] - step.memory.previous_error[ALTITUDE],
     )
     return max(min(now, then), LEAST_HEIGHT_M)
 
@@ -447,14 +459,14 @@ def lowest_sample_height(step, signal):
 @kernel
 def bound_flow_tests(step, signal, turning, rates):
     """The same, of flow and climb: slopes of their kinematics with each reading, where they are greatest."""
-    test, e, E, n = step.test, step.memory.error, step.memory.error_then, step.memory.changing
-    slow = max(min(signal[AIRSPEED] - e[AIRSPEED], step.memory.then[AIRSPEED] - E[AIRSPEED]), 1.0)
-    slip = max(abs(signal[BETA]) + e[BETA], abs(step.memory.then[BETA]) + E[BETA])
+    test, e, E, n = step.test, step.memory.error, step.memory.previous_error, step.memory.changing
+    slow = max(min(signal[AIRSPEED] - e[AIRSPEED], step.memory.previous[AIRSPEED] - E[AIRSPEED]), 1.0)
+    slip = max(abs(signal[BETA]) + e[BETA], abs(step.memory.previous[BETA]) + E[BETA])
     aslant, vanes = 1.0 / np.cos(min(slip, STEEPEST_RAD)), E[ALPHA] + E[BETA]
     off = acceleration_error(step, turning, rates)
     pull, coarse = step.memory.size + off, 1.0 + step.config.h * (2.0 * step.memory.size / slow + turning)
     gusty = np.sqrt(
-        max(signal[AIRSPEED] / step.config.swift, 1.0)
+        max(signal[AIRSPEED] / step.config.max_airspeed, 1.0)
         * max(step.config.low / lowest_sample_height(step, signal), 1.0)
     )
     flow = aslant**2 * ((off + pull * (vanes + E[AIRSPEED] / slow)) / slow + turning * vanes) + aslant * rates
@@ -462,17 +474,22 @@ def bound_flow_tests(step, signal, turning, rates):
     test[SPEED].rate = off + coarse * pull * vanes + step.config.h * (pull / slow) ** 2 * E[AIRSPEED]
     for c, vane in ((ALPHA_FLOW, ALPHA), (BETA_FLOW, BETA)):
         test[c].air, test[c].noise, test[c].rate = gusty * aslant / slow, n[vane], coarse * flow
-    tilt, hardest = E[PHI] + E[THETA], max(pull, step.memory.sizes_before[0], step.memory.sizes_before[1])
-    climb = (step.memory.then[AIRSPEED] + E[AIRSPEED]) * (tilt + vanes) + E[AIRSPEED]
-    test[CLIMB].rate = step.config.rising + step.config.gust + climb + 4.0 / 3.0 * step.config.h * hardest
+    tilt, hardest = E[PHI] + E[THETA], max(pull, step.memory.earlier_sizes[0], step.memory.earlier_sizes[1])
+    climb = (step.memory.previous[AIRSPEED] + E[AIRSPEED]) * (tilt + vanes) + E[AIRSPEED]
+    test[CLIMB].rate = (
+        step.config.max_vertical_wind
+        + step.config.max_gust_speed
+        + climb
+        + 4.0 / 3.0 * step.config.h * hardest
+    )
     test[CLIMB].noise = n[ALTITUDE]
 
 
 @kernel
 def log_change_error(step, signal, i):
     """How far the logarithm of a quantity can seem to move, the reading of which is off by a constant."""
-    least = max(min(signal[i], step.memory.then[i]), 1.0)
-    moved = step.config.steady[i] * abs(1.0 / max(signal[i], 1.0) - 1.0 / max(step.memory.then[i], 1.0))
+    least = max(min(signal[i], step.memory.previous[i]), 1.0)
+    moved = step.config.steady[i] * abs(1.0 / max(signal[i], 1.0) - 1.0 / max(step.memory.previous[i], 1.0))
     return moved / max(1.0 - step.config.steady[i] / least, 0.01)
 
 
@@ -481,7 +498,10 @@ def bound_density_test(step, signal):
     """The same, of the logarithm of the density."""
     test, e, n = step.test[DENSITY], step.memory.error, step.memory.changing
     fastest = (
-        step.memory.then[AIRSPEED] + step.memory.error_then[AIRSPEED] + step.config.rising + step.config.gust
+        step.memory.previous[AIRSPEED]
+        + step.memory.previous_error[AIRSPEED]
+        + step.config.max_vertical_wind
+        + step.config.max_gust_speed
     )
     seems = log_change_error(step, signal, QDYN) + 2.0 * log_change_error(step, signal, AIRSPEED)
     test.rate = fastest / DENSITY_SCALE_HEIGHT_M + seems / step.config.h
@@ -493,12 +513,14 @@ def bound_density_test(step, signal):
 def bound_residuals(step, signal):
     """Fill what sound instruments with the declared errors may add to each residual: per second, at all.
 
-    What was predicted is off by the errors of the readings it was predicted from (E, of the look before),
+    The prediction is off by the errors of the readings from which it was made (E, of the sample before),
     what it is held against by those of now.
     """
-    E = step.memory.error_then
+    E = step.memory.previous_error
     rates = E[P] + E[Q] + E[R]
-    turning = abs(step.memory.then[P]) + abs(step.memory.then[Q]) + abs(step.memory.then[R]) + rates
+    turning = (
+        abs(step.memory.previous[P]) + abs(step.memory.previous[Q]) + abs(step.memory.previous[R]) + rates
+    )
     bound_attitude_tests(step, signal, turning, rates)
     bound_flow_tests(step, signal, turning, rates)
     bound_density_test(step, signal)
@@ -511,19 +533,19 @@ def filter_test(step, test):
     for m, a in enumerate(step.config.decay):
         test.filtered[m] = a * test.filtered[m] + test.residual
         test.bound_rate[m] = bound_step(test.bound_rate[m], test.rate, a, step.config.h)
-        test.bound_noise[m] = noise_step(test.bound_noise[m], test.noise_then, a)
+        test.bound_noise[m] = noise_step(test.bound_noise[m], test.noise_before, a)
         noise = test.bound_noise[m] + test.noise
-        test.bound[m] = test.bound_rate[m] + noise + test.air * step.config.gusts[m]
+        test.bound[m] = test.bound_rate[m] + noise + test.air * step.config.gust_change_bound[m]
         test.share = max(test.share, abs(test.filtered[m]) / test.bound[m])
-    test.noise_then = test.noise
+    test.noise_before = test.noise
 
 
 @kernel
 def start_test(test):
-    """Begin a test with this look: there is nothing in its filters yet, and all of the noise to come."""
+    """Begin a test with this sample: its filters are empty, and all of the noise may still appear."""
     test.share = test.residual = 0.0
     test.filtered[:], test.bound_rate[:], test.bound_noise[:] = 0.0, 0.0, test.noise
-    test.noise_then = test.noise
+    test.noise_before = test.noise
 
 
 @kernel
@@ -553,14 +575,14 @@ def test_equal_sensors(step, signal, fresh):
 
 @kernel
 def begin_tests(step, signal, force):
-    """The first look: what was before it is not known."""
+    """Begin with the first sample: the readings before it are not known."""
     fill_reading_errors(step, signal)
     store_sample(step, signal, force)
-    step.memory.error_before[:], step.memory.acceleration_then[:] = (
-        step.memory.error_then,
+    step.memory.earlier_error[:], step.memory.previous_acceleration[:] = (
+        step.memory.previous_error,
         step.memory.acceleration,
     )
-    step.memory.size = step.memory.sizes_before[0] = (
+    step.memory.size = step.memory.earlier_sizes[0] = (
         vector_length(step.memory.acceleration) + MAX_FORCE_JUMP_M_S2
     )
     step.memory.unknown = 0.5 * MAX_FORCE_JUMP_M_S2
@@ -571,8 +593,8 @@ def begin_tests(step, signal, force):
 
 @kernel
 def run_tests(step, signal, engine):
-    """Hold this instant's readings (N_SENSORS,) against the look before; engine: it has instruments."""
-    step.memory.drifted += step.config.h * step.config.drift
+    """Compare this sample of the readings (N_SENSORS,) with the one before; engine: it has instruments."""
+    step.memory.attitude_drift += step.config.h * step.config.drift
     fill_reading_errors(step, signal)
     predict_readings(step)
     fill_residuals(step, signal)
@@ -591,4 +613,4 @@ def run_tests(step, signal, engine):
 @kernel
 def set_drift(step, t):
     """Fill the bound on the attitude's drift by t s, which begins with the flight."""
-    step.memory.drifted = step.config.drift * t
+    step.memory.attitude_drift = step.config.drift * t

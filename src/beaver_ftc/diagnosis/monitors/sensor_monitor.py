@@ -107,7 +107,7 @@ def is_flow_test(test):
 def count_identical_samples(monitor, signal):
     """Count the samples for which each reading (N_SENSORS,) has been the very same, and find the largest jump
     of an accelerometer from one sample to the next, m/s2, which fades within CALMED_S."""
-    memory, before = monitor.memory, monitor.step.memory.then
+    memory, before = monitor.memory, monitor.step.memory.previous
     memory.largest_jump *= 1.0 - monitor.step.config.h / JUMP_MEMORY_S
     for i in range(N_SENSORS):
         memory.identical[i] = memory.identical[i] + 1 if signal[i] == before[i] else 0
@@ -151,9 +151,9 @@ def reading_jumped(monitor, signal):
     """Whether the residual exceeds any jump of an accelerometer in one sample, and the flow sensor's reading
     jumps with it."""
     i, step = flow_sensor_of(monitor.output.lead), monitor.step
-    per_m_s = 1.0 if monitor.output.lead == SPEED else 1.0 / max(step.memory.then[AIRSPEED], 1.0)
+    per_m_s = 1.0 if monitor.output.lead == SPEED else 1.0 / max(step.memory.previous[AIRSPEED], 1.0)
     test, per_m_s2 = step.test[monitor.output.lead], step.config.h * per_m_s
-    second = signal[i] - 2.0 * step.memory.then[i] + monitor.memory.earlier[i]
+    second = signal[i] - 2.0 * step.memory.previous[i] + monitor.memory.earlier[i]
     half, theirs = 0.5 * abs(test.residual), 1.5 * monitor.memory.largest_jump * per_m_s2
     return 2.0 * half > test.bound[0] + MAX_FORCE_JUMP_M_S2 * per_m_s2 and abs(second) >= half > theirs
 
@@ -167,18 +167,20 @@ def sum_residuals(monitor, signal):
         i, test = flow_sensor_of(SPEED + j), step.test[SPEED + j]
         if monitor.memory.n_summed == 0:
             monitor.memory.least[j] = monitor.memory.most[j] = signal[i]
-            monitor.memory.sound_sum[j] = 2.0 * test.noise + test.air * step.config.gust
+            monitor.memory.bound_sum[j] = 2.0 * test.noise + test.air * step.config.max_gust_speed
             continue
         monitor.memory.residual_sum[j] += test.residual
         of = hypothesis_of(SPEED + j)
-        monitor.memory.sound_sum[j] += step.config.h * test.rate
-        monitor.memory.first[j] += monitor.since.held[of] * monitor.since.reach[of, SPEED + j]
+        monitor.memory.bound_sum[j] += step.config.h * test.rate
+        monitor.memory.first[j] += (
+            monitor.initial.bound_at_alarm[of] * monitor.initial.unit_effect[of, SPEED + j]
+        )
         monitor.memory.least[j], monitor.memory.most[j] = (
             min(monitor.memory.least[j], signal[i]),
             max(monitor.memory.most[j], signal[i]),
         )
     excess = np.sign(monitor.memory.residual_sum[1]) * max(
-        abs(monitor.memory.residual_sum[1]) - monitor.memory.sound_sum[1] - monitor.memory.first[1], 0.0
+        abs(monitor.memory.residual_sum[1]) - monitor.memory.bound_sum[1] - monitor.memory.first[1], 0.0
     )
     fallen = step.config.h * signal[AIRSPEED] * excess * np.cos(signal[PHI]) * np.cos(signal[PHI + 1])
     for m in range(step.config.decay.size):
@@ -191,7 +193,7 @@ def residual_keeps_growing(monitor):
     """Whether the residuals add up to more than an error of a flow sensor whose reading has this range."""
     j = monitor.output.lead - SPEED
     moved = monitor.memory.most[j] - monitor.memory.least[j]
-    sound = monitor.memory.sound_sum[j] + monitor.memory.first[j]
+    sound = monitor.memory.bound_sum[j] + monitor.memory.first[j]
     return moved > 0.0 and abs(monitor.memory.residual_sum[j]) > GROWTH_FACTOR * moved + CLEAR_EXCESS * sound
 
 
@@ -208,9 +210,9 @@ def error_would_show_elsewhere(monitor, signal):
         error, speed = abs(monitor.memory.climb_error[m]), step.test[SPEED]
         if monitor.output.lead == SPEED:
             error = 2.0 * (abs(speed.filtered[m]) - speed.bound[m]) / max(signal[AIRSPEED], 1.0)
-            error *= 1.0 - min(monitor.since.held[of], 1.0)
+            error *= 1.0 - min(monitor.initial.bound_at_alarm[of], 1.0)
         if error > CLEAR_EXCESS * (
-            step.test[elsewhere].bound[m] + held_error_part(monitor.since, of, elsewhere, m)
+            step.test[elsewhere].bound[m] + held_error_part(monitor.initial, of, elsewhere, m)
         ):
             return True
     return False
@@ -221,7 +223,11 @@ def suspect_accelerometers(monitor, shown):
     """Suspect the accelerometers along whose axis most of the spurious velocity is; shown: a gyro explains
     it."""
     step, who = monitor.step, monitor.output.suspect
-    alpha, beta, V = step.memory.then[ALPHA], step.memory.then[BETA], max(step.memory.then[AIRSPEED], 1.0)
+    alpha, beta, V = (
+        step.memory.previous[ALPHA],
+        step.memory.previous[BETA],
+        max(step.memory.previous[AIRSPEED], 1.0),
+    )
     faster, down, aside = (
         monitor.memory.residual_sum[0],
         V * np.cos(beta) * monitor.memory.residual_sum[1],
@@ -235,7 +241,7 @@ def suspect_accelerometers(monitor, shown):
     velocity[0] = np.cos(alpha) * ahead - np.sin(alpha) * down
     velocity[1] = np.sin(beta) * faster + np.cos(beta) * aside
     velocity[2] = np.sin(alpha) * ahead + np.cos(alpha) * down
-    doubt = monitor.memory.sound_sum[0] + V * (monitor.memory.sound_sum[1] + monitor.memory.sound_sum[2])
+    doubt = monitor.memory.bound_sum[0] + V * (monitor.memory.bound_sum[1] + monitor.memory.bound_sum[2])
     frozen = -1
     for i in range(3):
         size = max(size, abs(velocity[i]))
@@ -253,8 +259,10 @@ def discard_accelerometers(monitor, measured):
             measured.inertial = 0
 
 
-INVOLVED = 0.03  # share of the largest residual of its kind: less is the effect of an error on its neighbours
-RUNNING = 3  # `begun`: after the first sample 1, with the first whole frame 2, from the next one on 3
+INVOLVED_SHARE = (
+    0.03  # share of the largest residual of its kind: less is the effect of an error on its neighbours
+)
+MONITOR_RUNNING = 3  # `begun`: after the first sample 1, with the first whole frame 2, from the next one on 3
 KEPT_SURFACE_S = 0.5  # before the alarm: a surface detected earlier was detected with sound sensors
 SETTLED_S = 1.0  # after the monitor has begun: an earlier alarm of the surfaces may be a sensor's
 DAMPING_TOLERANCE = 0.2  # tolerance of the damping, away from trim
@@ -274,37 +282,37 @@ def monitor_sensors(monitor, belief, measured, conclusion, bank, bound, dt, t):
     if not monitor.memory.begun:
         begin_monitor(monitor, measured, t)
         return
-    if monitor.memory.past == 0:
+    if monitor.memory.substep == 0:
         update_rate_filter(monitor, bank.output.innovation, bound.eta_bar, dt)
     redundancy.run_tests(step, signal, monitor.config.engine)
     if N_TESTS > N_COMPUTED:
         redundancy.test_equal_sensors(step, signal, measured.fresh)
         record_agreement(monitor, measured.fresh)
-    initial_errors.update_initial_errors(step, monitor.since, signal)
+    initial_errors.update_initial_errors(step, monitor.initial, signal)
     count_identical_samples(monitor, signal)
-    if monitor.memory.past == 0:
-        monitor.memory.gyro_error_then[:], monitor.memory.spike_before[:] = (
+    if monitor.memory.substep == 0:
+        monitor.memory.previous_gyro_error[:], monitor.memory.earlier_spike[:] = (
             monitor.memory.gyro_error,
-            monitor.memory.spike_then,
+            monitor.memory.previous_spike,
         )
-        monitor.memory.spike_then[:] = monitor.memory.spike
+        monitor.memory.previous_spike[:] = monitor.memory.spike
         monitor.memory.spike[:] = 0.0
     for i in range(3):
         error = -step.test[TURN + i].residual / step.config.h
-        if monitor.memory.past == 0:
+        if monitor.memory.substep == 0:
             monitor.memory.gyro_error[i] = error
         else:
             monitor.memory.spike[i] = max(monitor.memory.spike[i], abs(error))
-    if monitor.memory.begun < RUNNING:
+    if monitor.memory.begun < MONITOR_RUNNING:
         allow_for_first_errors(monitor)
-    if monitor.config.blurred:
+    if monitor.config.noisy_attitude:
         exclude_gyros(monitor)
     decide_sensor(monitor, measured, conclusion, bank, bound, dt, t)
     replace_readings(monitor, belief, measured)
     discard_accelerometers(monitor, measured)
-    monitor.memory.earlier[:] = step.memory.then
+    monitor.memory.earlier[:] = step.memory.previous
     redundancy.store_sample(step, signal, measured.force)
-    monitor.memory.past = (monitor.memory.past + 1) % monitor.config.instants
+    monitor.memory.substep = (monitor.memory.substep + 1) % monitor.config.instants
 
 
 @kernel
@@ -316,21 +324,21 @@ def set_expected_manifold_pressure(monitor, manifold_pressure_inhg):
 @kernel
 def begin_monitor(monitor, measured, t):
     """Take the first sample, at t s: there is none to compare it with."""
-    monitor.memory.begun, monitor.memory.begun_at_s = 1, t
+    monitor.memory.begun, monitor.memory.started_at_s = 1, t
     redundancy.set_drift(monitor.step, t)
     redundancy.begin_tests(monitor.step, measured.signal, measured.force)
-    initial_errors.begin_initial_errors(monitor.since, measured.signal)
-    monitor.memory.earlier[:] = monitor.step.memory.then
-    monitor.memory.past = (monitor.memory.past + 1) % monitor.config.instants
+    initial_errors.begin_initial_errors(monitor.initial, measured.signal)
+    monitor.memory.earlier[:] = monitor.step.memory.previous
+    monitor.memory.substep = (monitor.memory.substep + 1) % monitor.config.instants
 
 
 @kernel
 def allow_for_first_errors(monitor):
     """Widen the bound on W by a gyro's error of the first sample, which has caused no innovation. The first
     frame shows no change of an error."""
-    if monitor.memory.past == 0:
+    if monitor.memory.substep == 0:
         monitor.memory.begun += 1
-    if monitor.memory.begun == RUNNING - 1 and monitor.memory.past == 0:
+    if monitor.memory.begun == MONITOR_RUNNING - 1 and monitor.memory.substep == 0:
         for i in range(3):
             monitor.memory.W_bound[i] += abs(monitor.memory.gyro_error[i])
 
@@ -339,16 +347,16 @@ def allow_for_first_errors(monitor):
 def update_rate_filter(monitor, innovation, eta_bar, dt):
     """Bring W (3,) rad/s and its bound to the frame whose innovation is there."""
     W, bound, D = monitor.memory.W, monitor.memory.W_bound, monitor.config.damping
-    monitor.memory.W_then[:] = bound
+    monitor.memory.previous_W_bound[:] = bound
     before = monitor.memory.before
     before[:] = W
     for i in range(3):
         lost, spread = 0.0, 0.0
         for j in range(3):
             lost += D[i, j] * before[j]
-            spread += (-D[i, j] if i == j else abs(D[i, j])) * monitor.memory.W_then[j]
+            spread += (-D[i, j] if i == j else abs(D[i, j])) * monitor.memory.previous_W_bound[j]
         W[i] += dt * (innovation[i] - lost)
-        bound[i] = max(monitor.memory.W_then[i] + dt * (eta_bar[i] + spread), 0.0)
+        bound[i] = max(monitor.memory.previous_W_bound[i] + dt * (eta_bar[i] + spread), 0.0)
 
 
 @kernel
@@ -364,14 +372,17 @@ def exclude_gyros(monitor):
             monitor.memory.W_bound[i] + DAMPING_TOLERANCE * abs(monitor.memory.W[i]),
         )
         for m, a in enumerate(step.config.decay):
-            monitor.memory.apart[i, m] = (
-                a * monitor.memory.apart[i, m] + test.residual + step.config.h * monitor.memory.W[i]
+            monitor.memory.rate_difference[i, m] = (
+                a * monitor.memory.rate_difference[i, m] + test.residual + step.config.h * monitor.memory.W[i]
             )
-            monitor.memory.apart_bound[i, m] = bound_step(
-                monitor.memory.apart_bound[i, m], rate, a, step.config.h
+            monitor.memory.rate_difference_bound[i, m] = bound_step(
+                monitor.memory.rate_difference_bound[i, m], rate, a, step.config.h
             )
-            if abs(monitor.memory.apart[i, m]) > monitor.memory.apart_bound[i, m] + test.bound[m]:
-                monitor.memory.no_gyro = 1
+            if (
+                abs(monitor.memory.rate_difference[i, m])
+                > monitor.memory.rate_difference_bound[i, m] + test.bound[m]
+            ):
+                monitor.memory.gyros_excluded = 1
 
 
 @kernel
@@ -389,9 +400,9 @@ def decide_sensor(monitor, measured, conclusion, bank, bound, dt, t):
     if monitor.output.share > 1.0 and not monitor.output.alarmed:
         raise_alarm(monitor, conclusion, t)
         monitor.output.lead = monitor.output.largest_test
-        initial_errors.hold_errors_at_alarm(monitor.since)
+        initial_errors.hold_errors_at_alarm(monitor.initial)
     if monitor.output.alarmed:
-        if monitor.memory.past == 0 and monitor.memory.begun == RUNNING:
+        if monitor.memory.substep == 0 and monitor.memory.begun == MONITOR_RUNNING:
             compare_rates_with_dynamics(monitor, bank, bound, dt)
         record_exceeded_tests(monitor)
         clear_by_sample(monitor, measured.signal)
@@ -407,7 +418,7 @@ def decide_sensor(monitor, measured, conclusion, bank, bound, dt, t):
 @kernel
 def find_largest_share(monitor):
     """Find the test with the largest share of its bound, of the samples of this frame."""
-    if monitor.memory.past == 0:
+    if monitor.memory.substep == 0:
         monitor.output.largest_test, monitor.output.share = 0, 0.0
     for c in range(N_TESTS):
         if monitor.step.test[c].share > monitor.output.share:
@@ -426,7 +437,7 @@ def raise_alarm(monitor, conclusion, t):
         return
     if conclusion.detected:
         monitor.output.alarmed_at_s = conclusion.detected_at_s  # the same fault, seen first in the rates
-    monitor.output.misnamed = conclusion.isolated >= 0
+    monitor.output.surface_was_isolated = conclusion.isolated >= 0
 
 
 @kernel
@@ -450,9 +461,11 @@ def compare_rates_with_dynamics(monitor, bank, bound, dt):
             continue
         error, jump = (
             monitor.memory.gyro_error[i],
-            (monitor.memory.gyro_error[i] - monitor.memory.gyro_error_then[i]) / dt,
+            (monitor.memory.gyro_error[i] - monitor.memory.previous_gyro_error[i]) / dt,
         )
-        own = CROSS_DAMPING_PER_S * max(abs(error), abs(monitor.memory.gyro_error_then[i])) + 0.1 * abs(jump)
+        own = CROSS_DAMPING_PER_S * max(abs(error), abs(monitor.memory.previous_gyro_error[i])) + 0.1 * abs(
+            jump
+        )
         blur = (
             4.0 * monitor.step.test[TURN + i].noise / monitor.step.config.h
         )  # of `error`, by the attitude's noise
@@ -463,8 +476,8 @@ def compare_rates_with_dynamics(monitor, bank, bound, dt):
             or abs(monitor.memory.W[i]) > monitor.memory.W_bound[i] + 1e-6
         )
         spike, left = (
-            monitor.memory.spike_before[i],
-            max(abs(monitor.memory.gyro_error_then[i]), monitor.memory.spike_then[i], abs(error)),
+            monitor.memory.earlier_spike[i],
+            max(abs(monitor.memory.previous_gyro_error[i]), monitor.memory.previous_spike[i], abs(error)),
         )
         sudden = left < GONE_SHARE * spike and spike > 2.0 * blur
         explained = abs(innovation[i] - jump) <= most + own + blur / dt
@@ -483,7 +496,7 @@ def is_involved(monitor, c, first):
     for i in range(3):
         size = max(size, abs(monitor.step.test[first + i].filtered[0]))
     test = monitor.step.test[c]
-    return test.share > 1.0 and abs(test.filtered[0]) > INVOLVED * size
+    return test.share > 1.0 and abs(test.filtered[0]) > INVOLVED_SHARE * size
 
 
 @kernel
@@ -494,7 +507,7 @@ def record_exceeded_tests(monitor):
         beyond = is_involved(monitor, c, triple) if c < SPEED else monitor.step.test[c].share > 1.0
         if beyond:
             monitor.memory.exceeded[c] = 1
-    initial_errors.record_refuted(monitor.step, monitor.since, monitor.memory.exceeded)
+    initial_errors.record_refuted(monitor.step, monitor.initial, monitor.memory.exceeded)
 
 
 @kernel
@@ -503,7 +516,7 @@ def find_suspects(monitor):
     who, lead, fired = monitor.output.suspect, monitor.output.lead, monitor.memory.exceeded
     who[:] = 0
     if lead >= N_COMPUTED:
-        suspect_unequal(monitor, lead - N_COMPUTED)
+        suspect_unequal_sensors(monitor, lead - N_COMPUTED)
         return
     if lead < SPEED:
         suspect_attitude(monitor)
@@ -518,9 +531,9 @@ def find_suspects(monitor):
     suspect_vane(monitor, BETA, BETA_FLOW, 2)
     who[ALTITUDE] = lead == CLIMB and is_only_exceeded(monitor, CLIMB)
     who[ENGINE_SPEED], who[MANIFOLD] = lead == RPM, lead == PRESSURE
-    frozen = a_suspect_is_frozen(monitor)
+    frozen = any_suspect_frozen(monitor)
     for i in range(N_INITIAL):
-        if not frozen and initial_errors.initial_error_explains(monitor.since, i, lead):
+        if not frozen and initial_errors.initial_error_explains(monitor.initial, i, lead):
             who[(ALPHA, BETA, AIRSPEED, PHI, THETA)[i]] = 1
 
 
@@ -534,7 +547,7 @@ def record_agreement(monitor, fresh):
 
 
 @kernel
-def suspect_unequal(monitor, k):
+def suspect_unequal_sensors(monitor, k):
     """Suspect a sensor, or the reading that it no longer equals: the reading if its own test shows an error,
     the sensor if an error of the reading of this size would have shown there, both if neither is certain.
 
@@ -561,11 +574,11 @@ def is_only_exceeded(monitor, test):
 
 
 @kernel
-def a_suspect_is_frozen(monitor):
+def any_suspect_frozen(monitor):
     """Whether a suspect is frozen, which an error of another sensor from the start does not explain. A sound
     sensor may read zero."""
     for i in range(N_SENSORS):
-        if monitor.output.suspect[i] and monitor.step.memory.then[i] != 0.0 and is_frozen(monitor, i):
+        if monitor.output.suspect[i] and monitor.step.memory.previous[i] != 0.0 and is_frozen(monitor, i):
             return True
     return False
 
@@ -589,9 +602,9 @@ def suspect_vane(monitor, vane, flow, gyro):
 def gyro_may_be_hidden(monitor, flow, i, own):
     """Whether an error of gyro i explains the test of the flow, and stays within the bound of the test of its
     axis; own: all of its error turns the flow. Of another gyro's error a share does, by kinematics."""
-    step, alpha = monitor.step, monitor.step.memory.then[ALPHA]
+    step, alpha = monitor.step, monitor.step.memory.previous[ALPHA]
     along = np.cos(alpha) if i == 0 else np.sin(alpha)
-    share = abs(np.tan(step.memory.then[BETA]) * along) if flow == ALPHA_FLOW else abs(np.sin(alpha))
+    share = abs(np.tan(step.memory.previous[BETA]) * along) if flow == ALPHA_FLOW else abs(np.sin(alpha))
     test, turn = step.test[flow], step.test[TURN + i]
     for m in range(test.filtered.size):
         room = 2.0 * test.bound[m] if own else test.bound[m]
@@ -604,12 +617,12 @@ def gyro_may_be_hidden(monitor, flow, i, own):
 def airspeed_error_would_show(monitor):
     """Whether the airspeed error that the density shows would exceed the bound of the airspeed's own test."""
     density, speed = monitor.step.test[DENSITY], monitor.step.test[SPEED]
-    most = 1.0 + monitor.since.held[AIRSPEED_ERROR]
+    most = 1.0 + monitor.initial.bound_at_alarm[AIRSPEED_ERROR]
     for m in range(density.filtered.size):
         shown = abs(density.filtered[m]) - initial_errors.held_error_part(
-            monitor.since, AIRSPEED_ERROR, DENSITY, m
+            monitor.initial, AIRSPEED_ERROR, DENSITY, m
         )
-        if 0.5 * monitor.step.memory.then[AIRSPEED] * shown > 2.0 * most * speed.bound[m]:
+        if 0.5 * monitor.step.memory.previous[AIRSPEED] * shown > 2.0 * most * speed.bound[m]:
             return True
     return False
 
@@ -639,7 +652,9 @@ def no_other_angle_moved(monitor, i):
     """Whether no test of another angle shows an error that one of angle i from the start does not explain."""
     for j in range(3):
         shown = (
-            monitor.memory.exceeded[ANGLE + j] if i == 2 else monitor.since.refuted[PHI_ERROR + i, ANGLE + j]
+            monitor.memory.exceeded[ANGLE + j]
+            if i == 2
+            else monitor.initial.refuted[PHI_ERROR + i, ANGLE + j]
         )
         if j != i and shown:
             return False
@@ -656,7 +671,7 @@ def angle_explains(monitor, i):
         for m in range(step.config.decay.size):
             most = abs(angle.filtered[m]) + angle.bound[m]
             hidden = (
-                initial_errors.held_error_part(monitor.since, PHI_ERROR + i, TURN + j, m) if i < 2 else 0.0
+                initial_errors.held_error_part(monitor.initial, PHI_ERROR + i, TURN + j, m) if i < 2 else 0.0
             )
             if (
                 monitor.memory.exceeded[TURN + j]
@@ -683,7 +698,7 @@ def allows_isolation(monitor, known):
         return True
     return (
         known == 1
-        and (monitor.memory.no_gyro == 1 or not monitor.config.blurred)
+        and (monitor.memory.gyros_excluded == 1 or not monitor.config.noisy_attitude)
         and not flow_is_frozen(monitor)
     )
 
@@ -692,7 +707,7 @@ def allows_isolation(monitor, known):
 def alarm_is_at_start(monitor, detected_at_s):
     """Whether the alarm of the surfaces is so early that an error which a flow sensor has had from the start
     may have caused it: the design model uses its reading from the first frame on."""
-    return monitor.config.enabled and detected_at_s < monitor.memory.begun_at_s + SETTLED_S
+    return monitor.config.enabled and detected_at_s < monitor.memory.started_at_s + SETTLED_S
 
 
 @kernel
@@ -700,7 +715,7 @@ def flow_is_frozen(monitor):
     """Whether a flow sensor is frozen: a surface that moves the aircraft moves its reading. In symmetric
     flight a sideslip of zero stays zero."""
     for i in (ALPHA, BETA, AIRSPEED, QDYN):
-        if monitor.step.memory.then[i] != 0.0 and is_frozen(monitor, i):
+        if monitor.step.memory.previous[i] != 0.0 and is_frozen(monitor, i):
             return True
     return False
 
@@ -738,7 +753,7 @@ def substitute_of(monitor, belief, signal, i):
         return step.memory.predicted[i] + step.config.h / FORGETTING_S * (
             monitor.config.trim[i] - step.memory.predicted[i]
         )
-    density = 2.0 * step.memory.then[QDYN] / step.memory.then[AIRSPEED] ** 2
+    density = 2.0 * step.memory.previous[QDYN] / step.memory.previous[AIRSPEED] ** 2
     if i == AIRSPEED:
         return np.sqrt(max(2.0 * signal[QDYN] / density, 1.0))
     if i == QDYN:
@@ -755,13 +770,13 @@ def rate_from_attitude(monitor, belief, i):
     The rate itself is used for the next sample: its own error shows there.
     """
     step = monitor.step
-    u = belief.u_then if monitor.memory.past == 0 else belief.u
+    u = belief.u_before if monitor.memory.substep == 0 else belief.u
     acceleration = belief.f[i]
     for s in range(u.size):
         acceleration += belief.G[i, s] * u[s]
-    shown = monitor.config.follows * step.test[TURN + i].residual
-    if not monitor.memory.taken_over[i] and monitor.config.follows < 1.0:
+    shown = monitor.config.attitude_correction_share * step.test[TURN + i].residual
+    if not monitor.memory.rate_replaced[i] and monitor.config.attitude_correction_share < 1.0:
         shown = step.config.h * QUICK_PER_S * step.test[TURN + i].filtered[1]
-    monitor.memory.taken_over[i] = 1
-    known = step.memory.then[i] + shown / step.config.h
+    monitor.memory.rate_replaced[i] = 1
+    known = step.memory.previous[i] + shown / step.config.h
     return known + step.config.h * acceleration

@@ -61,7 +61,7 @@ def configure_diagnosis(fdi: np.void, belief: np.void, scenario: Scenario, trave
     if config.is_published:
         published.configure_published(fdi, scenario, travel)
     registry.configure_types(fdi["types"], fdi["layout"], belief["actuators"], scenario, travel)
-    fdi["types"]["config"]["own_errors"] = fdi["bound"]["own_errors"]
+    fdi["types"]["config"]["has_surface_errors"] = fdi["bound"]["has_surface_errors"]
     conclusions.configure_conclusion(fdi["verdict"])
 
 
@@ -77,7 +77,7 @@ def restart_diagnosis(fdi: np.void, before: np.void, in_flight: bool) -> None:
         fdi["bank"]["output"]["closest"] = before["bank"]["output"]["closest"]
     for air in ("air", "inertial_air"):
         fdi["statistical"][air]["config"]["in_flight"] = in_flight
-    fdi["sensor_monitor"]["memory"]["past"] = 0
+    fdi["sensor_monitor"]["memory"]["substep"] = 0
 
 
 def _check_pairs(scenario: Scenario) -> None:
@@ -99,18 +99,18 @@ def record_named_surfaces(fdi, t):
 
 
 @kernel
-def built_in_statistic(bank, alarm, authority, likely):
+def built_in_statistic(bank, alarm, authority, uses_estimates):
     """The largest share of its threshold that the built-in detection reaches at this frame; alarm: `ALARM` of
     the statistical detector; likely: whether its estimates count.
 
     Of two detectors, the worst-case one counts beyond its bound only: it has no rate of false alarms that a
     lower level could trade for power.
     """
-    score = alarm.score if likely else 0.0
+    score = alarm.score if uses_estimates else 0.0
     if authority == STATISTICAL_DETECTOR:
         return score
     certain = largest_share(bank)
-    return max(score, certain) if certain > 1.0 or not likely else score
+    return max(score, certain) if certain > 1.0 or not uses_estimates else score
 
 
 def _scheme(place: str) -> CompiledScheme:

@@ -74,7 +74,7 @@ def likelihood_excludes(fdi, fie):
         return False
     hidden = fdi.sensor_monitor.config.enabled and detector.air.output.moving
     isolation.update_likelihood_exclusion(
-        fie, detector.tests, detector.block, fdi.isolation, fdi.layout.loss_of, config.abrupt, hidden
+        fie, detector.tests, detector.block, fdi.isolation, fdi.layout.loss_estimator, config.abrupt, hidden
     )
     return fie.excluded_by_likelihood == 1
 
@@ -82,7 +82,7 @@ def likelihood_excludes(fdi, fie):
 @kernel
 def parity_excludes(fdi, fie):
     """Whether a parity view shows motion that the surface of estimator fie cannot cause."""
-    detector, position = fdi.statistical, fdi.layout.position_of[fie.surface]
+    detector, position = fdi.statistical, fdi.layout.position_estimator[fie.surface]
     views, column = detector.views[: detector.n_views], fdi.isolation.estimator[position].effect.Z
     return parity.excludes_surface(views, detector.tests, detector.forces, detector.air, fie.surface, column)
 
@@ -195,7 +195,7 @@ isolate_class = one_of([row.isolate for row in FAULT_CLASSES.values()])
 
 
 def fault_class_number(config: FdiConfig) -> int:
-    """The place of a diagnosis' row. The worst case excludes types of fault whatever the authority is."""
+    """The place of a diagnosis' row. The worst case excludes types of fault for any authority."""
     authority = config.authority if config.weighs_chance else "worst-case"
     if config.fault_class == "all" and authority == "statistical":
         authority = "either"
@@ -218,7 +218,15 @@ def update_statistical_tests(fdi, belief, measured, k, t):
     statistical.update_blocks(tests, bounded, blocks, gust, innovation, dt, k, latched, ends)
     parity.update_directions(views, force_record, gust, fdi.bound, mean.G_predicted, mean.Gu_predicted)
     parity.project_innovation(
-        views, tests.tolerated, detector.noise, blocks, force_record, gust, inertial, innovation, y[AIRSPEED]
+        views,
+        tests.has_tolerances,
+        detector.noise,
+        blocks,
+        force_record,
+        gust,
+        inertial,
+        innovation,
+        y[AIRSPEED],
     )
     parity.update_views(views, tests, detector.tone_config, y, dt, k, latched)
     known = fdi.bound.error_map.outside == 0
@@ -240,7 +248,7 @@ def prepare_statistical(fdi, belief, measured, k):
 
 @apart
 def accumulate_statistical(fdi, belief, measured):
-    """Take in the gust that the vanes measure inside a frame, and what it does to the aircraft."""
+    """Add an instant inside a frame to the gust that the vanes measure, and to its effect on the aircraft."""
     detector, dt = fdi.statistical, belief.share * fdi.config.dt
     tests, noise, gust = detector.tests, detector.noise, detector.air
     statistical.accumulate_test_substep(
@@ -250,7 +258,7 @@ def accumulate_statistical(fdi, belief, measured):
 
 @kernel
 def update_gusts(gust, inertial, force_record, belief, measured, k, dt):
-    """Take in the air as the vanes see it, and what the accelerometers say of it (forces.py)."""
+    """Update the gust estimate from vanes and accelerometers, and the innovations of the forces."""
     if gust.output.moving:
         gusts.set_gust_intensity(gust, measured.altitude)
         gusts.update_gust_estimate(gust, measured.y, measured.attitude, belief.share * dt, k)
@@ -264,7 +272,7 @@ def update_gusts(gust, inertial, force_record, belief, measured, k, dt):
 
 @kernel
 def update_inertial_gusts(gust, inertial, force_record, belief, measured, k, dt):
-    """Take in what the accelerometers say, and the air as it follows from them without the vanes."""
+    """Update the innovations of the forces, and the gust estimate from accelerometers without vanes."""
     forces.update_forces(force_record, gust, measured, belief.u, dt)
     if inertial.output.moving:
         forces.fill_readings_without_vanes(force_record, inertial.memory.rotation, measured.y)
@@ -279,20 +287,20 @@ def update_inertial_gusts(gust, inertial, force_record, belief, measured, k, dt)
 def begin(fdi, belief, measured):
     """Begin the filters, and fix the parity direction of each fault (contract.CompiledScheme)."""
     contract.begin_filters(fdi, measured.x)
-    filters.fix_parity_directions(fdi.isolation, belief.G)
+    filters.set_parity_directions(fdi.isolation, belief.G)
 
 
 @apart
 def predict(fdi, belief, measured, k, t):
     """Bring bank, likelihoods, isolation and FDAE to this frame (contract.CompiledScheme)."""
     found, bound, dt = fdi.verdict, fdi.bound, fdi.config.dt
-    filters.update_bank(fdi.bank, bound, measured.x, belief.x_then, belief.means.acceleration, dt)
+    filters.update_bank(fdi.bank, bound, measured.x, belief.x_before, belief.means.acceleration, dt)
     if fdi.statistical.tests.enabled:
         update_statistical_tests(fdi, belief, measured, k, t)
     contract.update_estimators(fdi, belief)
     observe_class(fdi.config.fault_class, fdi, belief)
     leaking = found.isolated >= 0 or found.lead >= 0
-    filters.predict_fdae(fdi.fdae, bound, belief.x_then, belief.expected, found.detected, leaking, dt)
+    filters.predict_fdae(fdi.fdae, bound, belief.x_before, belief.expected, found.detected, leaking, dt)
 
 
 @apart

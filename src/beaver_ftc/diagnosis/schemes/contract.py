@@ -17,7 +17,7 @@ class CompiledScheme(NamedTuple):
     predict(fdi, belief, measured, k, t): bring the estimators from the frame before to frame k at t s.
     conclude(fdi, belief, measured, t): from residuals to the alarm, and from then on to a verdict.
     prepare(fdi, belief, measured, k): prepare the estimators for the next frame.
-    accumulate(fdi, belief, measured): take in one JSBSim frame inside the next frame.
+    accumulate(fdi, belief, measured): add one JSBSim frame inside the next frame.
     """
 
     begin: Callable[..., None]
@@ -61,7 +61,7 @@ def update_estimators(fdi, belief):
     known = fdi.verdict.detected
     isolation.update_hypotheses(records, fdi.bank, bound, config, known, mean.G, mean.Gu, mean.Gu_spread)
     if known:
-        isolation.predict_estimators(records, bound, belief.x_then, mean.acceleration, config.dt)
+        isolation.predict_estimators(records, bound, belief.x_before, mean.acceleration, config.dt)
 
 
 @apart

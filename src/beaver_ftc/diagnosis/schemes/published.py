@@ -139,7 +139,7 @@ def train_state_network(network, signal, dt):
 def train_fdae_network(published, fdae, detected, dt):
     """The FDAE's network learns from the residual the frame began with, once a fault is detected.
 
-    Without the dead zone it learns from the first frame on, whatever the residual.
+    Without the dead zone it learns from the first frame on, with any residual.
     """
     outside = False
     for i in range(3):
@@ -168,20 +168,20 @@ def fdae_alarm_axis(fdae):
 def predict(fdi, belief, measured, k, t):
     """Bring isolation, FDAE and its network to this frame (contract.CompiledScheme)."""
     published, bound, dt = fdi.published, fdi.bound, fdi.config.dt
-    filters.update_bank(fdi.bank, bound, measured.x, belief.x_then, belief.means.acceleration, dt)
+    filters.update_bank(fdi.bank, bound, measured.x, belief.x_before, belief.means.acceleration, dt)
     contract.update_estimators(fdi, belief)
     train_fdae_network(published, fdi.fdae, fdi.verdict.detected, dt)
-    filters.predict_fdae(fdi.fdae, bound, belief.x_then, belief.means.acceleration, False, False, dt)
+    filters.predict_fdae(fdi.fdae, bound, belief.x_before, belief.means.acceleration, False, False, dt)
     if published.config.constant > 0.0:
-        hold_all_thresholds(fdi, published.config.constant)
+        set_all_thresholds(fdi, published.config.constant)
 
 
 @kernel
-def hold_all_thresholds(fdi, constant):
+def set_all_thresholds(fdi, constant):
     """Replace all adaptive thresholds by a constant, rad/s."""
-    filters.hold_fdae_threshold(fdi.fdae, constant)
-    filters.hold_bank_threshold(fdi.bank, constant)
-    isolation.hold_isolation_thresholds(fdi.isolation, constant)
+    filters.set_fdae_threshold(fdi.fdae, constant)
+    filters.set_bank_threshold(fdi.bank, constant)
+    isolation.set_isolation_thresholds(fdi.isolation, constant)
 
 
 @apart

@@ -204,9 +204,11 @@ def restore_known_sets(surface):
 
 
 # command: where a healthy surface was; low, high: where this one can have been; wrong: whether more than the
-# admitted uncertainty was at work; uneven: a quarter of what its effectiveness varied by, in means; hides:
+# declared uncertainty was at work; effectiveness_variation: a quarter of its change, in means; stop_hides:
 # whether the lower and the upper stop can cut a deflection off unseen.
-OBSERVATION = record(command=float, low=float, high=float, wrong=int, uneven=float, hides=(int, 2))
+OBSERVATION = record(
+    command=float, low=float, high=float, anomalous=int, effectiveness_variation=float, stop_hides=(int, 2)
+)
 
 
 @kernel
@@ -225,8 +227,14 @@ def shift_observations(surface):
 @kernel
 def copy_observation(to, of):
     """Copy one observation to another."""
-    to.command, to.low, to.high, to.wrong, to.uneven = of.command, of.low, of.high, of.wrong, of.uneven
-    to.hides[:] = of.hides
+    to.command, to.low, to.high, to.anomalous, to.effectiveness_variation = (
+        of.command,
+        of.low,
+        of.high,
+        of.anomalous,
+        of.effectiveness_variation,
+    )
+    to.stop_hides[:] = of.stop_hides
 
 
 @kernel
@@ -236,9 +244,9 @@ def locate_surface(config, surface, fie, axis, innovation, bound, effect):
     fie: its estimator of a position; axis: on which it has most effect; effect: what that supposes of the
     same frame or block, dtype EFFECT.
     """
-    seen, orders = surface.elapsed, surface.orders
+    seen, commands = surface.elapsed, surface.commands
     seen.command = -effect.offset[axis] / effect.Z[axis]
-    seen.uneven = 0.25 * (orders.G_most - orders.G_least) / abs(effect.Z[axis])
+    seen.effectiveness_variation = 0.25 * (commands.G_most - commands.G_least) / abs(effect.Z[axis])
     seen.low, seen.high = fie.low, fie.high
     for i in range(3):
         if config.length > 1 and i != axis and effect.Z[i] != 0.0:
@@ -252,8 +260,8 @@ def locate_surface(config, surface, fie, axis, innovation, bound, effect):
 def record_hiding_stops(surface, width):
     """Which stops can cut a deflection off unseen: those nearer to a healthy surface than `width` (rad), that
     of the interval which holds the true deflection."""
-    surface.elapsed.hides[0] = surface.orders.least[0] - surface.actuator.travel_low < width
-    surface.elapsed.hides[1] = surface.actuator.travel_high - surface.orders.greatest[0] < width
+    surface.elapsed.stop_hides[0] = surface.commands.least[0] - surface.actuator.travel_low < width
+    surface.elapsed.stop_hides[1] = surface.actuator.travel_high - surface.commands.greatest[0] < width
 
 
 @kernel
@@ -262,7 +270,7 @@ def set_deflection(surface, middle, slack):
     seen, actuator = surface.elapsed, surface.actuator
     seen.low = max(actuator.reach_low, seen.command + middle - slack)
     seen.high = min(actuator.reach_high, seen.command + middle + slack)
-    seen.wrong = abs(middle) > slack
+    seen.anomalous = abs(middle) > slack
     record_hiding_stops(surface, 2.0 * slack)
     return seen.low <= seen.high
 
@@ -270,19 +278,19 @@ def set_deflection(surface, middle, slack):
 @kernel
 def set_known_deflection(surface, low, high):
     """A surface whose fault is known was between low and high (rad): that explains what was wrong."""
-    surface.elapsed.low, surface.elapsed.high, surface.elapsed.wrong = low, high, 0
+    surface.elapsed.low, surface.elapsed.high, surface.elapsed.anomalous = low, high, 0
 
 
 @kernel
-def set_anomalous(surface, wrong):
+def set_anomalous(surface, anomalous):
     """Replace whether something was wrong in the elapsed frame."""
-    surface.elapsed.wrong = wrong
+    surface.elapsed.anomalous = anomalous
 
 
 @kernel
 def clear_anomalies(surface):
     """Nothing has been wrong so far."""
-    surface.elapsed.wrong = surface.judged.wrong = surface.earlier.wrong = 0
+    surface.elapsed.anomalous = surface.judged.anomalous = surface.earlier.anomalous = 0
 
 
 @kernel

@@ -25,7 +25,7 @@ from beaver_ftc.diagnosis.types import contract
 from beaver_ftc.diagnosis.types.contract import GIVE_UP, REST_AGREES, REST_EXCLUDES
 from beaver_ftc.diagnosis.types.registry import (
     AT_REST,
-    HISTORY,
+    N_KEPT_BLOCKS,
     N_TYPES,
     begin_each,
     fill_each,
@@ -52,7 +52,7 @@ def restart_surface(surface):
     fill_each(surface)
     contract.begin_observation(surface)
     surface.evidence.started_at = -1
-    surface.evidence.frames = surface.evidence.quiet = surface.evidence.unhidden = 0
+    surface.evidence.frames = surface.evidence.rest_frames = surface.evidence.unhidden_frames = 0
     begin_each(surface)
 
 
@@ -63,22 +63,22 @@ def record_commands(types, commanded, means):
     """
     length = types.config.length
     for s, surface in enumerate(types.surface):
-        orders = surface.orders
+        commands = surface.commands
         if types.block.filled == 0:
-            for age in range(HISTORY - 1, 0, -1):
-                orders.given[age, :length] = orders.given[age - 1, :length]
-                orders.low[age], orders.high[age] = orders.low[age - 1], orders.high[age - 1]
-            orders.low[0], orders.high[0] = np.inf, -np.inf
-            orders.least[1], orders.greatest[1] = orders.least[0], orders.greatest[0]
-            orders.least[0], orders.greatest[0] = np.inf, -np.inf
-            orders.G_least, orders.G_most = np.inf, -np.inf
+            for age in range(N_KEPT_BLOCKS - 1, 0, -1):
+                commands.given[age, :length] = commands.given[age - 1, :length]
+                commands.low[age], commands.high[age] = commands.low[age - 1], commands.high[age - 1]
+            commands.low[0], commands.high[0] = np.inf, -np.inf
+            commands.least[1], commands.greatest[1] = commands.least[0], commands.greatest[0]
+            commands.least[0], commands.greatest[0] = np.inf, -np.inf
+            commands.G_least, commands.G_most = np.inf, -np.inf
         order = min(max(commanded[s], surface.actuator.travel_low), surface.actuator.travel_high)
-        orders.given[0, types.block.filled] = order
-        orders.low[0], orders.high[0] = min(orders.low[0], order), max(orders.high[0], order)
-        orders.least[0] = min(orders.least[0], means.u_least[s])
-        orders.greatest[0] = max(orders.greatest[0], means.u_most[s])
-        orders.G_least = min(orders.G_least, means.G_least[s])
-        orders.G_most = max(orders.G_most, means.G_most[s])
+        commands.given[0, types.block.filled] = order
+        commands.low[0], commands.high[0] = min(commands.low[0], order), max(commands.high[0], order)
+        commands.least[0] = min(commands.least[0], means.u_least[s])
+        commands.greatest[0] = max(commands.greatest[0], means.u_most[s])
+        commands.G_least = min(commands.G_least, means.G_least[s])
+        commands.G_most = max(commands.G_most, means.G_most[s])
 
 
 @kernel
@@ -87,11 +87,11 @@ def observe_frame(types, layout, estimators, innovation, bound):
 
     bound (3,): on its innovation (3,) without a fault, rad/s2.
     """
-    wrong = not isolation.is_healthy(innovation, bound)
+    anomalous = not isolation.is_healthy(innovation, bound)
     for s, surface in enumerate(types.surface):
         contract.shift_observations(surface)
-        contract.set_anomalous(surface, wrong)
-        fie, axis = estimators[layout.position_of[s]], layout.dominant_axis[s]
+        contract.set_anomalous(surface, anomalous)
+        fie, axis = estimators[layout.position_estimator[s]], layout.dominant_axis[s]
         effect = fie.block_effect if types.config.length > 1 else fie.effect
         contract.locate_surface(types.config, surface, fie, axis, innovation, bound, effect)
 
@@ -100,7 +100,7 @@ def observe_frame(types, layout, estimators, innovation, bound):
 def count_evidence(surface):
     """Count a frame as evidence, and as evidence since a stop could last hide a swing (`judge_frame`)."""
     surface.evidence.frames += 1
-    surface.evidence.unhidden += 1
+    surface.evidence.unhidden_frames += 1
 
 
 @kernel
@@ -120,26 +120,28 @@ def judge_frame(types):
     config, k = types.config, types.frame - 1
     for s, surface in enumerate(types.surface):
         on_frame_each(config, surface)
-        if config.returns and types.frame > 0:
+        if config.released_returns and types.frame > 0:
             on_release_each(config, surface, k)
-        if config.abrupt and surface.accommodation.mode == GIVE_UP and not surface.judged.wrong:
+        if config.abrupt and surface.accommodation.mode == GIVE_UP and not surface.judged.anomalous:
             count_rest(types, s)
-        elif surface.judged.wrong and (config.whole or (surface.earlier.wrong and surface.elapsed.wrong)):
+        elif surface.judged.anomalous and (
+            config.whole or (surface.earlier.anomalous and surface.elapsed.anomalous)
+        ):
             count_evidence(surface)
             judge_surface(config, surface, k)
         else:
             on_skipped_frame_each(config, surface, k)
-        if config.returns and types.frame > 0:
+        if config.released_returns and types.frame > 0:
             restore_each(surface)
             propagate_release_each(config, surface)
-        if surface.judged.hides[0] or surface.judged.hides[1]:
-            surface.evidence.unhidden = 0
+        if surface.judged.stop_hides[0] or surface.judged.stop_hides[1]:
+            surface.evidence.unhidden_frames = 0
     types.frame += 1
 
 
 @kernel
 def examine_frame(types, layout, estimators, innovation, bound):
-    """Take in the elapsed frame, and judge the one before: it, or the block that it completes."""
+    """Observe the elapsed frame, or the block that it completes, and judge the one before."""
     if types.config.length > 1:
         examine_block(types, layout, estimators, innovation, bound)
         return
@@ -148,12 +150,12 @@ def examine_frame(types, layout, estimators, innovation, bound):
 
 
 @kernel
-def begin_block(types, layout, estimators, noise_then):
+def begin_block(types, layout, estimators, noise_before):
     """Begin a block with the elapsed frame; noise_then (3,): as it began."""
     block = types.block
     block.innovation[:], block.bound[:] = 0.0, 0.0
-    block.noise[:] = noise_then
-    for e in layout.position_of:
+    block.noise[:] = noise_before
+    for e in layout.position_estimator:
         isolation.clear_mean_effect(estimators[e].block_effect)
 
 
@@ -164,23 +166,23 @@ def add_to_block(types, layout, estimators, innovation, eta_bar):
     for i in range(3):
         block.innovation[i] += share * innovation[i]
         block.bound[i] += share * eta_bar[i]
-    for e in layout.position_of:
+    for e in layout.position_estimator:
         isolation.add_to_mean_effect(estimators[e].block_effect, estimators[e].effect, share)
 
 
 @kernel
 def examine_block(types, layout, estimators, innovation, bound):
-    """Take in the elapsed frame; with the last one of a block, take in the block and judge the one before."""
+    """Add the elapsed frame to its block; with the last frame, observe the block and judge the one before."""
     config, block = types.config, types.block
     if block.filled == 0:
-        begin_block(types, layout, estimators, bound.noise_then)
+        begin_block(types, layout, estimators, bound.noise_before)
     add_to_block(types, layout, estimators, innovation, bound.eta_bar)
     block.filled += 1
     if block.filled < config.length:
         return
     block.filled = 0
     for i in range(3):
-        block.bound[i] += (block.noise[i] + bound.noise[i]) / config.span_s
+        block.bound[i] += (block.noise[i] + bound.noise[i]) / config.block_s
     observe_frame(types, layout, estimators, block.innovation, block.bound)
     judge_frame(types)
 
@@ -198,8 +200,8 @@ def count_rest(types, s):
     for i, other in enumerate(types.surface):
         if i == s or (surface.status.is_candidate and other.status.is_candidate):
             count_evidence(other)
-    surface.evidence.quiet += 1
-    if surface.evidence.quiet > types.config.patience and not types.config.own_errors:
+    surface.evidence.rest_frames += 1
+    if surface.evidence.rest_frames > types.config.half_cycle_frames and not types.config.has_surface_errors:
         for kind in range(N_TYPES):
             if AT_REST[kind] == REST_EXCLUDES:
                 contract.exclude_type(surface, kind)

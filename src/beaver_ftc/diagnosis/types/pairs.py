@@ -41,7 +41,10 @@ def solve_roll_and_yaw(types, layout, estimators, innovation, frame_bound):
     """Where ailerons and rudder were in the elapsed frame: nu = G (p - u) + eta solved for p; nu: innovation
     (3,), |eta| <= frame_bound (3,) rad/s2."""
     a, b = layout.main[ROLL], layout.main[YAW]
-    one, other = estimators[layout.position_of[a]].effect, estimators[layout.position_of[b]].effect
+    one, other = (
+        estimators[layout.position_estimator[a]].effect,
+        estimators[layout.position_estimator[b]].effect,
+    )
     a_p, a_r, r_p, r_r = one.Z[ROLL], one.Z[YAW], other.Z[ROLL], other.Z[YAW]
     p, r = innovation[ROLL], innovation[YAW]
     slack_p = frame_bound[ROLL] + one.spread[ROLL] + other.spread[ROLL]
@@ -70,7 +73,7 @@ def deflection_range(config, surface, k):
 
 @kernel
 def solve_pitch(types, layout, estimators, innovation, frame_bound):
-    """Whether pitch shows a fault; once a second one has begun beside one that was named, where it was."""
+    """Whether pitch shows a fault; after the begin of a second fault, where the second surface was."""
     first = types.pair.first
     if first != NO_SURFACE and not types.surface[first].status.is_candidate:
         solve_second_in_pitch(types, layout, estimators, innovation, frame_bound)
@@ -85,8 +88,8 @@ def solve_second_in_pitch(types, layout, estimators, innovation, frame_bound):
     """Where the second surface was, given what is known of the first."""
     first = types.pair.first
     second = layout.partner[first]
-    known = estimators[layout.position_of[first]].effect
-    other = estimators[layout.position_of[second]].effect
+    known = estimators[layout.position_estimator[first]].effect
+    other = estimators[layout.position_estimator[second]].effect
     surface = types.surface[first]
     low, high = deflection_range(types.config, surface, types.frame)
     contract.set_known_deflection(surface, low, high)
@@ -95,12 +98,12 @@ def solve_second_in_pitch(types, layout, estimators, innovation, frame_bound):
     slack = abs(Z_known) * 0.5 * (high - low)
     slack += frame_bound[PITCH] + known.spread[PITCH] + other.spread[PITCH]
     if not contract.set_deflection(types.surface[second], (innovation[PITCH] - share) / Z, slack / abs(Z)):
-        types.surface[second].status.source = verdict.RULED_OUT
+        types.surface[second].status.decided_by = verdict.RULED_OUT
 
 
 @kernel
 def examine_pairs(types, layout, estimators, bank, frame_bound):
-    """Take in the elapsed frame, plane by plane, and judge the one before; frame_bound (3,): of its own."""
+    """Observe the elapsed frame, plane by plane, and judge the one before; frame_bound (3,): bound on it."""
     record_plane_alarms(types.pair, bank)
     frames.observe_frame(types, layout, estimators, bank.output.innovation, frame_bound)
     solve_roll_and_yaw(types, layout, estimators, bank.output.innovation, frame_bound)
@@ -146,42 +149,42 @@ def store_first_fault(types, s):
     known = surface.known
     for kind in range(N_CONSTANT):
         changed = changed or surface.feasible.excluded[kind] != known.excluded[kind]
-    pair.unsettled = pair.unsettled + 1 if changed else 0
-    if pair.first != s or pair.unsettled >= types.config.patience:
-        pair.first, pair.unsettled = s, 0
+    pair.frames_since_change = pair.frames_since_change + 1 if changed else 0
+    if pair.first != s or pair.frames_since_change >= types.config.half_cycle_frames:
+        pair.first, pair.frames_since_change = s, 0
         known.low[:], known.high[:] = surface.feasible.low, surface.feasible.high
         known.excluded[:] = 1
         known.excluded[:N_CONSTANT] = surface.feasible.excluded[:N_CONSTANT]
 
 
 @kernel
-def begin_second(types, layout):
-    """The one known pitch fault no longer explains the flight: there is another beside it."""
+def begin_second_fault(types, layout):
+    """The one known pitch fault no longer explains the flight: there is a second fault."""
     first, second = types.surface[types.pair.first], types.surface[layout.partner[types.pair.first]]
     contract.restore_known_sets(first)
     frames.restart_surface(second)
     for surface in (first, second):
-        surface.status.is_candidate, surface.status.source = 0, verdict.BY_DEDUCTION
+        surface.status.is_candidate, surface.status.decided_by = 0, verdict.BY_DEDUCTION
         contract.clear_anomalies(surface)
 
 
 @kernel
-def has_waited(config, surface):
+def evidence_is_long_enough(config, surface):
     """Whether a slow oscillation, a slow surface or a growing bias would have shown by now."""
-    growing = verdict.may_be_mistaken(surface, verdict.sole_constant_type(surface), False)
-    open_yet = growing or verdict.may_hide_at_rest(config, surface)
-    long = surface.evidence.frames >= config.patience
-    return long and verdict.others_would_have_shown(config, surface) and not open_yet
+    growing = verdict.can_be_another_type(surface, verdict.sole_constant_type(surface), False)
+    open_yet = growing or verdict.can_hide_at_rest(config, surface)
+    long = surface.evidence.frames >= config.half_cycle_frames
+    return long and verdict.types_would_have_shown(config, surface) and not open_yet
 
 
 @kernel
-def two_in_pitch(types, layout):
-    """Whether a second pitch fault has shown beside one that was known."""
+def has_second_fault_in_pitch(types, layout):
+    """Whether a second pitch fault has shown in addition to the known one."""
     if types.pair.first == NO_SURFACE or layout.partner[types.pair.first] < 0:
         return False
     surface = types.surface[types.pair.first]
     if surface.status.is_candidate and not (can_be_at_fault(surface) and any_constant_type_left(surface)):
-        begin_second(types, layout)
+        begin_second_fault(types, layout)
     return not surface.status.is_candidate
 
 
@@ -198,33 +201,33 @@ def type_in_pitch(config, surface):
 @kernel
 def decide_pitch(types, layout, t):
     """Which surface of pitch is at fault, if any."""
-    if two_in_pitch(types, layout):
+    if has_second_fault_in_pitch(types, layout):
         first, s = types.surface[types.pair.first], layout.partner[types.pair.first]
         second = types.surface[s]
         set_named(first, 1, first.status.type, t)
         shows = second.evidence.frames > 0 and can_be_at_fault(second) and verdict.is_explained(second)
         set_named(second, shows, verdict.type_at_fault(types.config, second), t)
         return
-    s = one_in_pitch(types, layout)
+    s = sole_fault_in_pitch(types, layout)
     for member, surface in enumerate(types.surface):
         if layout.group[member] == PITCH_GROUP:
             set_named(surface, member == s, type_in_pitch(types.config, surface) if member == s else -1, t)
 
 
 @kernel
-def one_in_pitch(types, layout):
+def sole_fault_in_pitch(types, layout):
     """The surface of pitch at fault if a constant explains everything on it, or NO_SURFACE."""
     s = verdict.surface_at_fault(types, layout) if types.pair.alarmed[PITCH_GROUP] else NO_SURFACE
     if s < 0 or not any_constant_type_left(types.surface[s]):
         return NO_SURFACE
-    if has_waited(types.config, types.surface[s]):
+    if evidence_is_long_enough(types.config, types.surface[s]):
         store_first_fault(types, s)
     return s
 
 
 @kernel
 def decide_pairs(types, conclusion, layout, t):
-    """Name surfaces and types plane by plane; t s. Returns the finding as `conclusion.note_type` takes it:
+    """Name surfaces and types plane by plane; t s. Returns the finding for `conclusion.record_finding`:
     `isolated` is the one named first, the law acts on all. conclusion: that of the frame before."""
     outside = decide_roll_and_yaw(types, layout, t)
     decide_pitch(types, layout, t)
@@ -233,13 +236,15 @@ def decide_pairs(types, conclusion, layout, t):
         status, first = surface.status, types.surface[max(earliest, 0)].status
         if status.named and (earliest < 0 or status.named_at_s < first.named_at_s):
             earliest = s
-    isolated, isolated_at_s, kind, type_at_s = summary_of(types, conclusion, layout, earliest, outside, t)
+    isolated, isolated_at_s, kind, type_at_s = first_fault_finding(
+        types, conclusion, layout, earliest, outside, t
+    )
     lead, lead_kind = choose_accommodation(types, layout)
     return isolated, isolated_at_s, kind, type_at_s, lead, lead_kind
 
 
 @kernel
-def summary_of(types, conclusion, layout, s, outside, t):
+def first_fault_finding(types, conclusion, layout, s, outside, t):
     """The finding on surface s, the first named, as that of a single fault: estimator, its instant, type, its
     instant. NO_SURFACE: none is named, and the fault of roll and yaw may be `outside` the class."""
     if s >= 0:
@@ -252,7 +257,7 @@ def summary_of(types, conclusion, layout, s, outside, t):
 
 
 @kernel
-def named_in_pitch(types, layout):
+def is_named_in_pitch(types, layout):
     """Whether a surface of pitch is named."""
     for s, surface in enumerate(types.surface):
         if layout.group[s] == PITCH_GROUP and surface.status.named:
@@ -261,11 +266,15 @@ def named_in_pitch(types, layout):
 
 
 @kernel
-def is_acted_upon(types, layout, s):
+def law_acts_on(types, layout, s):
     """Whether the law acts on surface s: it is named, or the likeliest in pitch."""
     if types.surface[s].status.named:
         return True
-    if layout.group[s] != PITCH_GROUP or named_in_pitch(types, layout) or not types.pair.alarmed[PITCH_GROUP]:
+    if (
+        layout.group[s] != PITCH_GROUP
+        or is_named_in_pitch(types, layout)
+        or not types.pair.alarmed[PITCH_GROUP]
+    ):
         return False
     likeliest = verdict.sole_surface(types.surface, True)
     return s == (likeliest if likeliest >= 0 else layout.main[PITCH])
@@ -278,7 +287,7 @@ def choose_accommodation(types, layout):
     lead, lead_kind = NO_SURFACE, -1
     for s, surface in enumerate(types.surface):
         verdict.set_mode(surface, -1)
-        if is_acted_upon(types, layout, s):
+        if law_acts_on(types, layout, s):
             at_fault = surface.status.named == 1 or can_be_at_fault(surface)
             mode = verdict.accommodation_mode(surface) if at_fault else SUBTRACT_OFFSET
             if verdict.fault_is_present(types.config, surface, mode, at_fault):

@@ -18,7 +18,9 @@ from beaver_ftc.diagnosis.types.contract import EMPTY_SET, OBSERVATION, FaultTyp
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 
-BLOCK_S = 0.2  # to be examined at once where gyros are noisy: short beside the slowest half-cycle, 3.1 s
+BLOCK_S = (
+    0.2  # of frames examined together where gyros are noisy: much less than the slowest half-cycle, 3.1 s
+)
 RUNAWAY_RATE_RAD_S = pi / 3.0  # of an actuator with no declared rate limit: the aircraft's default
 
 
@@ -59,7 +61,7 @@ FOLLOWS_COMMAND = _column("follows_command")
 MUST_SHOW = np.array([row.has_shown is not None for row in TYPES])
 MISTAKEN_FOR = np.array([[_looks_like(row, other) for other in TYPES] for row in TYPES])
 SERVES = np.array([[mode == row.accommodation or mode in row.also for row in TYPES] for mode in range(4)])
-# Types that say how far a surface is off its command, the one with the first say first.
+# Types that give the deflection error of a surface, in the order in which they are used.
 ERROR_ORDER = np.array(sorted(_parts("expected_error"), key=lambda kind: TYPES[kind].error_rank), dtype=int)
 LIMIT = np.array([NAMES.index(row.limit) if row.limit else -1 for row in TYPES])
 
@@ -123,11 +125,11 @@ deflection = _call_one("deflection", _FRAME, EMPTY_SET)
 expected_error = _call_one("expected_error", "surface, kind", np.nan)
 
 MAX_BLOCK = 256  # frames of a block: examine.py
-HISTORY = 3  # frames, or blocks, of which the orders are kept: the elapsed one and two before it
+N_KEPT_BLOCKS = 3  # frames, or blocks, of which the orders are kept: the elapsed one and two before it
 
 # Orders to one surface, rad; [0] belongs to the elapsed frame or block, [1] to the one before: examine.py.
 COMMANDS = record(
-    given=(HISTORY, MAX_BLOCK), low=HISTORY, high=HISTORY,
+    given=(N_KEPT_BLOCKS, MAX_BLOCK), low=N_KEPT_BLOCKS, high=N_KEPT_BLOCKS,
     least=2, greatest=2,  # where a healthy surface was within it
     G_least=float, G_most=float,  # its effectiveness within the elapsed frame or block
 )  # fmt: skip
@@ -144,16 +146,18 @@ FEASIBLE = record(low=N_TYPES, high=N_TYPES, excluded=(int, N_TYPES))
 
 # Frames in which something was wrong, and of them those in which a surface that was given up was quiet, and
 # those since a stop could last hide something; the first, and where the surface was in it: examine.py.
-EVIDENCE = record(frames=int, quiet=int, unhidden=int, started_at=int, start_low=float, start_high=float)
+EVIDENCE = record(
+    frames=int, rest_frames=int, unhidden_frames=int, started_at=int, start_low=float, start_high=float
+)
 
 # Whether the surface may be the one at fault by itself, and what decides whether it can be (verdict.py);
 # whether it is named, of which type, -1 if open, and since when, s: pairs.py.
-STATUS = record(is_candidate=int, source=int, named=int, named_at_s=float, type=int, type_at_s=float)
+STATUS = record(is_candidate=int, decided_by=int, named=int, named_at_s=float, type=int, type_at_s=float)
 
 # The mode of accommodation, -1 for none; frames since the fault last showed: verdict.py.
-ACCOMMODATED = record(mode=int, absent=int)
+ACCOMMODATED = record(mode=int, frames_absent=int)
 
-# Where a surface that a type has held and let go can be, rad: table/held_surface.py.
+# Where a surface can be that a type has held and released, rad: table/held_surface.py.
 RELEASE = record(
     low=(2, N_TYPES), high=(2, N_TYPES), released=(int, N_TYPES),
     held_low=N_TYPES, held_high=N_TYPES,  # where it is held by then
@@ -166,12 +170,13 @@ KNOWN = record(low=N_TYPES, high=N_TYPES, excluded=(int, N_TYPES))
 # actuator, frames of half of the slowest oscillation, whether a fault is declared to stay as it is and errors
 # of the surfaces' own terms are; frames of a block and its duration; dt s.
 TYPES_CONFIG = record(
-    whole=int, instants=int, returns=int, patience=int, abrupt=int, own_errors=int, length=int, span_s=float,
+    whole=int, instants=int, released_returns=int, half_cycle_frames=int, abrupt=int,
+    has_surface_errors=int, length=int, block_s=float,
     dt=float,
 )  # fmt: skip
 
 # Two faults at once: pairs.py; alarms of the groups, and what is known of the first fault in pitch.
-PAIR = record(enabled=int, alarmed=(int, 2), no_lateral_pair=int, first=int, unsettled=int)
+PAIR = record(enabled=int, alarmed=(int, 2), no_lateral_pair=int, first=int, frames_since_change=int)
 
 # Blocks of frames: examine.py.
 FRAME_BLOCK = record(filled=int, innovation=3, bound=3, noise=3)
@@ -183,9 +188,9 @@ def surface_dtype() -> np.dtype:
     what is concluded. refuted: its estimator is excluded (verdict.py)."""
     own = {row.record: row.memory for row in TYPES if row.memory}
     return record(
-        actuator=ACTUATOR, orders=COMMANDS, elapsed=OBSERVATION, judged=OBSERVATION, earlier=OBSERVATION,
+        actuator=ACTUATOR, commands=COMMANDS, elapsed=OBSERVATION, judged=OBSERVATION, earlier=OBSERVATION,
         evidence=EVIDENCE, feasible=FEASIBLE, release=RELEASE, **own,
-        refuted=int, status=STATUS, accommodation=ACCOMMODATED, known=KNOWN,
+        estimator_excluded=int, status=STATUS, accommodation=ACCOMMODATED, known=KNOWN,
     )  # fmt: skip
 
 
@@ -198,12 +203,12 @@ def types_dtype(n: int) -> np.dtype:
 def configure_types(
     types: np.void, layout: np.void, actuators: np.void, scenario: Scenario, travel: np.ndarray
 ) -> None:
-    """Fill in what the types go by, and what they know of each surface's actuator; travel (2, n) rad."""
+    """Fill the configuration of the types and the actuator of each surface; travel (2, n) rad: the stops."""
     config, shared, dt = scenario.fdi, types["config"], 1.0 / scenario.rate_hz
     shared["length"] = block = ceil(BLOCK_S / dt) if Declared.of(scenario).sensors.declared.gyros_vary else 1
-    shared["whole"], shared["span_s"] = scenario.substeps == 1 and block == 1, block * dt
-    shared["patience"] = ceil(pi / config.slowest_oscillation_rad_s / (block * dt))
-    shared["instants"], shared["returns"], shared["dt"] = scenario.substeps, actuators["real"], dt
+    shared["whole"], shared["block_s"] = scenario.substeps == 1 and block == 1, block * dt
+    shared["half_cycle_frames"] = ceil(pi / config.slowest_oscillation_rad_s / (block * dt))
+    shared["instants"], shared["released_returns"], shared["dt"] = scenario.substeps, actuators["real"], dt
     shared["abrupt"] = config.fault_profile == "abrupt"
     types["pair"]["first"], types["pair"]["enabled"] = -1, config.pairs
     surfaces, instant_s = scenario.airframe.surfaces, dt / scenario.substeps

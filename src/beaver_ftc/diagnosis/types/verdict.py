@@ -46,11 +46,11 @@ from beaver_ftc.diagnosis.types.registry import (
     has_shown,
 )
 
-NO_SURFACE, SEVERAL = -1, -2
+NO_SURFACE, SEVERAL_SURFACES = -1, -2
 OPEN, NO_TYPE = -1, -2  # the type of a fault of which more than one type is left, or none
 # What decides whether a surface can be at fault: its estimator, or what is known of the other (pairs.py).
 BY_ESTIMATOR, BY_DEDUCTION, RULED_OUT = range(3)
-ABSENT_S = 0.2  # a fault that has not shown for so long is taken for gone
+ABSENCE_LIMIT_S = 0.2  # a fault that has not shown for so long is taken for gone
 _ROUNDING = 1e-9
 
 
@@ -58,15 +58,15 @@ _ROUNDING = 1e-9
 def record_refuted(surfaces, layout, estimators):
     """Keep for every surface whether its estimator is excluded."""
     for s, surface in enumerate(surfaces):
-        surface.refuted = estimators[layout.position_of[s]].excluded
+        surface.estimator_excluded = estimators[layout.position_estimator[s]].excluded
 
 
 @kernel
 def can_be_at_fault(surface):
     """Whether anything on a surface can be the fault."""
-    if surface.status.source != BY_ESTIMATOR:
-        return surface.status.source == BY_DEDUCTION
-    return not surface.refuted
+    if surface.status.decided_by != BY_ESTIMATOR:
+        return surface.status.decided_by == BY_DEDUCTION
+    return not surface.estimator_excluded
 
 
 @kernel
@@ -97,10 +97,13 @@ def is_explained(surface):
 
 
 @kernel
-def others_would_have_shown(config, surface):
+def types_would_have_shown(config, surface):
     """Whether each type that must show itself is excluded, or has had the time to, hidden by no stop."""
     for kind in range(N_TYPES):
-        if is_left(surface, kind) and surface.evidence.unhidden < SHOWS_WITHIN[kind] * config.patience:
+        if (
+            is_left(surface, kind)
+            and surface.evidence.unhidden_frames < SHOWS_WITHIN[kind] * config.half_cycle_frames
+        ):
             return False
     return True
 
@@ -125,18 +128,18 @@ def sole_constant_type(surface):
 
 @kernel
 def sole_type(surface):
-    """The one type left whatever its course, or OPEN: in coarse sets a constant proves nothing."""
+    """The one type left, constant or varying, or OPEN: in coarse sets a constant proves nothing."""
     found = sole_type_among(surface, N_TYPES)
     return found if found >= 0 and has_shown(surface, found) else OPEN
 
 
 @kernel
-def may_hide_at_rest(config, surface):
+def can_hide_at_rest(config, surface):
     """Whether what a constant explains may be a type that does not show in a surface at rest, such as a slow
     surface that has come to where it is commanded: it has not stood off its command for long."""
     if (
         not any_constant_type_left(surface)
-        or surface.evidence.frames - surface.evidence.quiet >= config.patience
+        or surface.evidence.frames - surface.evidence.rest_frames >= config.half_cycle_frames
     ):
         return False
     for kind in range(N_TYPES):
@@ -146,7 +149,7 @@ def may_hide_at_rest(config, surface):
 
 
 @kernel
-def may_look_like(surface, kind, found):
+def can_be_confused_with(surface, kind, found):
     """Whether a fault of type `kind` may look like one of the type `found`, or of another type left of that
     name and of constant parameter."""
     for other in range(N_CONSTANT):
@@ -161,13 +164,13 @@ def may_look_like(surface, kind, found):
 
 
 @kernel
-def may_be_mistaken(surface, found, whatever):
-    """Whether what looks like the constant type `found` may be another type that is left; unless `whatever`,
+def can_be_another_type(surface, found, any_type):
+    """Whether what looks like the constant type `found` may be another type that is left; unless `any_type`,
     one that does not follow the command."""
     if found >= 0:
         for kind in range(N_CONSTANT, N_TYPES):
-            counts = is_left(surface, kind) and (whatever or not FOLLOWS_COMMAND[kind])
-            if counts and may_look_like(surface, kind, found):
+            counts = is_left(surface, kind) and (any_type or not FOLLOWS_COMMAND[kind])
+            if counts and can_be_confused_with(surface, kind, found):
                 return True
     return False
 
@@ -182,7 +185,7 @@ def sole_surface(surfaces, constant):
             and can_be_at_fault(surface)
             and (any_constant_type_left(surface) or not constant)
         ):
-            found = s if found == NO_SURFACE else SEVERAL
+            found = s if found == NO_SURFACE else SEVERAL_SURFACES
     return found
 
 
@@ -213,42 +216,42 @@ def others_refuted(types, chosen):
     config, half_cycles = types.config, 1
     for s, surface in enumerate(types.surface):
         if s != chosen and surface.status.is_candidate and can_be_at_fault(surface):
-            if config.own_errors and any_type_left(surface):
+            if config.has_surface_errors and any_type_left(surface):
                 return False
-            if not others_would_have_shown(config, surface):
+            if not types_would_have_shown(config, surface):
                 return False
             for kind in range(N_TYPES):
                 if is_left(surface, kind):
                     if not FOLLOWS_COMMAND[kind]:
                         return False
                     half_cycles = max(half_cycles, HALF_CYCLES[kind])
-    return types.surface[chosen].evidence.frames >= half_cycles * config.patience
+    return types.surface[chosen].evidence.frames >= half_cycles * config.half_cycle_frames
 
 
 @kernel
 def type_at_fault(config, surface):
     """The type of the fault on a surface, taken to be at fault; OPEN while more than one fits or one may yet
     show itself."""
-    if surface.evidence.frames < config.patience or may_hide_at_rest(config, surface):
+    if surface.evidence.frames < config.half_cycle_frames or can_hide_at_rest(config, surface):
         return OPEN
-    if config.own_errors:
+    if config.has_surface_errors:
         return sole_type(surface)
-    patient = others_would_have_shown(config, surface)
+    waited = types_would_have_shown(config, surface)
     if any_constant_type_left(surface):
         found = sole_constant_type(surface)
-        return found if patient and not may_be_mistaken(surface, found, True) else OPEN
-    return varying_type_at_fault(surface, patient)
+        return found if waited and not can_be_another_type(surface, found, True) else OPEN
+    return varying_type_at_fault(surface, waited)
 
 
 @kernel
-def varying_type_at_fault(surface, patient):
+def varying_type_at_fault(surface, waited):
     """The same when no constant explains it: the one type left that need not show itself; else the one that
     has."""
     found = sole_varying_type(surface, False)
     if found == NO_TYPE:
         found = sole_varying_type(surface, True)
         return found if found >= 0 and has_shown(surface, found) else OPEN
-    if found < 0 or not patient:
+    if found < 0 or not waited:
         return OPEN
     for kind in range(N_CONSTANT, N_TYPES):
         if is_left(surface, kind) and MISTAKEN_FOR[kind, found]:
@@ -271,7 +274,7 @@ def sole_varying_type(surface, must_show):
 
 @kernel
 def decide_surface_and_type(types, conclusion, layout, estimators, t):
-    """The finding on the surface and, when it is certain, on the type, as `conclusion.note_type` takes it.
+    """The finding on the surface and, when it is certain, on the type, for `conclusion.record_finding`.
 
     conclusion: that of the frame before, which gives the instants of what has not changed; t s.
     """
@@ -289,7 +292,11 @@ def decide_surface_and_type(types, conclusion, layout, estimators, t):
 @kernel
 def estimator_of_fault(layout, s, kind):
     """The estimator that stands for a fault of this type (OPEN if open) on surface s."""
-    return layout.loss_of[s] if kind >= 0 and ACCOMMODATION[kind] == SCALE_COMMAND else layout.position_of[s]
+    return (
+        layout.loss_estimator[s]
+        if kind >= 0 and ACCOMMODATION[kind] == SCALE_COMMAND
+        else layout.position_estimator[s]
+    )
 
 
 @kernel
@@ -383,8 +390,8 @@ def fault_is_present(config, surface, mode, at_fault):
     seen, accommodation = surface.elapsed, surface.accommodation
     deflection = deflection_error(surface, at_fault) + seen.command
     there = seen.low <= deflection <= seen.high or mode == SCALE_COMMAND
-    accommodation.absent = 0 if there else accommodation.absent + 1
-    return accommodation.absent * config.dt < ABSENT_S - _ROUNDING
+    accommodation.frames_absent = 0 if there else accommodation.frames_absent + 1
+    return accommodation.frames_absent * config.dt < ABSENCE_LIMIT_S - _ROUNDING
 
 
 @kernel
@@ -405,14 +412,14 @@ def deflection_error(surface, at_fault):
 def effectiveness_left(types, layout, estimators, s):
     """What surface s has left of its effectiveness.
 
-    The estimator fits both axes of a surface, so beside another fault the set of a constant loss says it.
+    The estimator fits both axes of a surface, so with a second fault the set of a constant loss is used.
     """
     surface = types.surface[s]
     if types.pair.enabled and can_be_at_fault(surface):
         for kind in range(N_CONSTANT):
             if ACCOMMODATION[kind] == SCALE_COMMAND and is_left(surface, kind):
                 return set_middle(surface, kind)
-    return 1.0 + estimators[layout.loss_of[s]].theta[layout.dominant_axis[s]]
+    return 1.0 + estimators[layout.loss_estimator[s]].theta[layout.dominant_axis[s]]
 
 
 Findings = dict[str, Any]
@@ -499,9 +506,9 @@ def _of_type(kind: int, what: str, *arguments: Any) -> Any:
 
 def _can_be_at_fault(fdi: np.void, s: int) -> bool:
     surface = fdi["types"]["surface"][s]
-    if surface["status"]["named"] or surface["status"]["source"] == BY_DEDUCTION:
+    if surface["status"]["named"] or surface["status"]["decided_by"] == BY_DEDUCTION:
         return True
-    return not (surface["status"]["source"] == RULED_OUT or surface["refuted"])
+    return not (surface["status"]["decided_by"] == RULED_OUT or surface["estimator_excluded"])
 
 
 def _types_left(fdi: np.void, s: int) -> list[str]:
@@ -517,12 +524,12 @@ def _types_left(fdi: np.void, s: int) -> list[str]:
         if _can_be_at_fault(fdi, s) and not out
     ]
     constant = [kind for kind in left if kind < registry.N_CONSTANT]
-    if constant and not fdi["types"]["config"]["own_errors"]:
-        evidence, patience = surface["evidence"], fdi["types"]["config"]["patience"]
-        early = evidence["frames"] - evidence["quiet"] < patience
+    if constant and not fdi["types"]["config"]["has_surface_errors"]:
+        evidence, half_cycle_frames = surface["evidence"], fdi["types"]["config"]["half_cycle_frames"]
+        early = evidence["frames"] - evidence["rest_frames"] < half_cycle_frames
         left = [kind for kind in left if kind in constant or early or _is_open(kind, constant)]
-    beside_another = fdi["types"]["pair"]["enabled"] and fdi["layout"]["group"][s] == PITCH_GROUP
-    if beside_another and any(registry.ACCOMMODATION[kind] == GIVE_UP for kind in constant):
+    second_is_possible = fdi["types"]["pair"]["enabled"] and fdi["layout"]["group"][s] == PITCH_GROUP
+    if second_is_possible and any(registry.ACCOMMODATION[kind] == GIVE_UP for kind in constant):
         # if the other surface is off as well, each constant may be one of another type
         left += sorted(
             range(registry.N_CONSTANT), key=lambda kind: registry.ACCOMMODATION[kind] == SCALE_COMMAND
@@ -531,7 +538,7 @@ def _types_left(fdi: np.void, s: int) -> list[str]:
 
 
 def _is_open(kind: int, constant: list[int]) -> bool:
-    """Whether a type that varies counts beside these constant ones: it may yet show itself, or looks like
+    """Whether a varying type counts together with these constant ones: it may yet show itself, or looks like
     one of them."""
     return bool(registry.MUST_SHOW[kind] or registry.MISTAKEN_FOR[kind, constant].any())
 

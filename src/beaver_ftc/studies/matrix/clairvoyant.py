@@ -50,7 +50,7 @@ def seen_when_told(scenario: "Scenario", kept: Columns, surface: str) -> Documen
     regressors = [term_accelerations(aircraft, t, kept, kept.get(f"{t.surface}_cmd_rad")) for t, _ in unknown]
     sigma = np.array([c for _, c in unknown]) / sqrt(3.0)
     beside = np.stack(regressors, axis=-1) if unknown else np.zeros((*phi.shape, 0))
-    d = Whitening(context).deflection_beside(phi, beside, sigma)
+    d = Whitening(context).deflection_with_unknowns(phi, beside, sigma)
     rate = scenario.fdi.statistical.false_alarms_per_h
     return {"told_deflection": d, "told_chance": detection_probability(d, scenario.duration_s - at_s, rate)}
 

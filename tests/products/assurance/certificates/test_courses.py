@@ -30,7 +30,13 @@ def seen(low, high, wrong=None, ordered=0.1, command=0.0):
 
 ACTUATOR = Actuator(-1.0, 1.0, least_runaway_rad_s=2.0, slowest_step_rad=0.025, approach=0.5)
 CONFIG = TypesConfig(
-    single_instant=True, instants=2, returns=False, patience=2, block_frames=1, block_s=0.05, dt_s=0.5
+    single_instant=True,
+    instants=2,
+    returns=False,
+    half_cycle_frames=2,
+    block_frames=1,
+    block_s=0.05,
+    dt_s=0.5,
 )
 RULES = {
     # What comes nearer by 0.05 rad a frame at least, and more slowly within 0.05 rad of what was ordered.
@@ -101,7 +107,7 @@ def tape(travel=(-0.2, 0.7), blocks=1):
     offset, slope, spread = numbers(3, 5, 4, 3)
     actuator = Actuator(*travel, 0.1, 0.2, 0.3)
     diagnosis = SimpleNamespace(
-        layout=SimpleNamespace(position_of=(0, 2, 3), dominant_axis=(0, 1, 2)),
+        layout=SimpleNamespace(position_estimator=(0, 2, 3), dominant_axis=(0, 1, 2)),
         estimators=[SimpleNamespace(axes=(e,)) for e in "abcd"],
         surfaces=[None, SimpleNamespace(actuator=actuator), None],
         types_config=CONFIG._replace(block_frames=blocks),

@@ -1,1 +1,1 @@
-"""The fault types, a file a type, or the two types of one name: contract.py says what is in a row."""
+"""The rows of the fault types: surfaces held in place, surfaces that follow their command wrongly."""

@@ -69,18 +69,18 @@ def loss_deflection(config, surface, kind, k):
 def judge_varying_loss(config, surface, kind, k):
     """Some effectiveness explains this frame; over a block in which the command changes sign, any mean."""
     low, high = consistent_effectiveness(surface)
-    swung = config.length > 1 and surface.orders.least[1] < 0.0 < surface.orders.greatest[1]
+    swung = config.length > 1 and surface.commands.least[1] < 0.0 < surface.commands.greatest[1]
     return EMPTY_SET if low > high and not swung else UNLIMITED_SET
 
 
 def loss_estimate(fdi: np.void, s: int, kind: int) -> float | None:
-    """theta; beside another fault the estimator, which fits all axes of its surface, is not asked."""
+    """theta; with a second fault present the estimator, which fits all axes of its surface, is not used."""
     return set_middle_of(fdi, s, kind) - 1.0 if fdi["types"]["pair"]["enabled"] else fitted_loss(fdi, s, kind)
 
 
 def fitted_loss(fdi: np.void, s: int, kind: int) -> float:
     """theta as the estimator of a loss has it."""
-    estimator = fdi["isolation"]["estimator"][int(fdi["layout"]["loss_of"][s])]
+    estimator = fdi["isolation"]["estimator"][int(fdi["layout"]["loss_estimator"][s])]
     return float(estimator["theta"][int(fdi["layout"]["dominant_axis"][s])])
 
 
@@ -111,10 +111,10 @@ def judged_offset(surface):
     A surface at its stop may be off by more than it shows; so may one that was there at an instant of it.
     Nothing but a loss takes it beyond.
     """
-    low, high, u, orders = surface.judged.low, surface.judged.high, surface.judged.command, surface.orders
+    low, high, u, commands = surface.judged.low, surface.judged.high, surface.judged.command, surface.commands
     if high < surface.actuator.travel_low or low > surface.actuator.travel_high:
         return isolation.EMPTY_SET
-    least, greatest = low - max(u - orders.least[1], 0.0), high + max(orders.greatest[1] - u, 0.0)
+    least, greatest = low - max(u - commands.least[1], 0.0), high + max(commands.greatest[1] - u, 0.0)
     off_low = low - u if least > surface.actuator.travel_low else -np.inf
     return off_low, high - u if greatest < surface.actuator.travel_high else np.inf
 
@@ -135,15 +135,15 @@ def bias_error(surface, kind):
 @kernel
 def bias_deflection(config, surface, kind, k):
     """The command and the offset, cut off by the stops."""
-    low = limited_deflection(surface, surface.feasible.low[kind], surface.orders.least[0])
-    return low, limited_deflection(surface, surface.feasible.high[kind], surface.orders.greatest[0])
+    low = limited_deflection(surface, surface.feasible.low[kind], surface.commands.least[0])
+    return low, limited_deflection(surface, surface.feasible.high[kind], surface.commands.greatest[0])
 
 
 @kernel
 def limited_deflection(surface, off, extreme):
     """Where an offset (rad) takes a surface in the mean; if a stop is met at an instant, at the `extreme`."""
-    orders, actuator, mean = surface.orders, surface.actuator, surface.elapsed.command + off
-    met = orders.least[0] + off < actuator.travel_low or orders.greatest[0] + off > actuator.travel_high
+    commands, actuator, mean = surface.commands, surface.actuator, surface.elapsed.command + off
+    met = commands.least[0] + off < actuator.travel_low or commands.greatest[0] + off > actuator.travel_high
     return within_travel(surface, extreme + off) if met else mean
 
 
@@ -171,7 +171,7 @@ def clear_offset_range(grown):
 @kernel
 def growth_per_frame(config, surface):
     """How far one that is slower than a runaway moves from one judged frame to the next, rad at most."""
-    return RUNAWAY_RATE_RATIO * surface.actuator.least_runaway_rate * config.span_s
+    return RUNAWAY_RATE_RATIO * surface.actuator.least_runaway_rate * config.block_s
 
 
 @kernel
@@ -245,7 +245,7 @@ GROWING_BIAS = FaultType(
         # between what a slower one lies, rad; whether it has certainly run as fast as a runaway, down and up
         least=float, greatest=float, ran=(int, 2),
     ),
-    # in the end an offset that grows is as good as a constant one, whatever the commands
+    # an offset that grows ends as good as constant, with any commands
     follows_command=False,
     # as the command happens to go it looks like a jam or a loss; come to the stop by and by, like a runaway
     mistaken_for=("loss_of_effectiveness", "stuck", "float", "hardover"), differs=ran_to_stop,
@@ -279,13 +279,13 @@ def judge_oscillation(config, surface, kind, k):
     swing = surface.oscillatory
     low, high = surface.judged.low - surface.judged.command, surface.judged.high - surface.judged.command
     sign = 1 if low > 0.0 else (-1 if high < 0.0 else 0)
-    if sign == 0 or (not config.whole and surface.judged.hides[0 if sign > 0 else 1]):
+    if sign == 0 or (not config.whole and surface.judged.stop_hides[0 if sign > 0 else 1]):
         swing.steady_since = k + 1
         return UNLIMITED_SET
     if sign != swing.sign:
         end_half_cycle(swing, k)
         swing.sign, swing.steady_since = sign, k
-    return EMPTY_SET if k - swing.steady_since > config.patience else UNLIMITED_SET
+    return EMPTY_SET if k - swing.steady_since > config.half_cycle_frames else UNLIMITED_SET
 
 
 @kernel
@@ -323,7 +323,7 @@ def oscillation_frequency_rad_s(fdi: np.void, s: int, kind: int) -> float | None
     """From the half-cycles counted."""
     swing = fdi["types"]["surface"][s]["oscillatory"]
     half_cycles, frames = int(swing["half_cycles"]) - 1, int(swing["last_end"] - swing["first_end"])
-    return half_cycles * pi / (float(fdi["types"]["config"]["span_s"]) * frames)
+    return half_cycles * pi / (float(fdi["types"]["config"]["block_s"]) * frames)
 
 
 OSCILLATORY = FaultType(
@@ -380,9 +380,9 @@ def narrow_by_least_rate(config, surface, run, sign):
 @kernel
 def command_range(config, surface):
     """The least and greatest order that moved it towards and within the judged frame, rad."""
-    orders = surface.orders
+    commands = surface.commands
     newest = 2 if config.whole else 1
-    return min(orders.low[2], orders.low[newest]), max(orders.high[2], orders.high[newest])
+    return min(commands.low[2], commands.low[newest]), max(commands.high[2], commands.high[newest])
 
 
 @kernel

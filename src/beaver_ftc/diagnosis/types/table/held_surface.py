@@ -41,7 +41,7 @@ from beaver_ftc.diagnosis.types.contract import (
     within_travel,
 )
 
-EARLIER, LATER = 0, 1
+EARLIER_RELEASE, LATER_RELEASE = 0, 1
 HELD, RETURNING, REFUTED = range(3)
 # A surface nearer than this to a healthy one counts as healthy: its effect is below the rounding bound.
 RETURNED_WITHIN_RAD = 1e-14
@@ -62,14 +62,14 @@ def has_release(surface, which, kind):
 @kernel
 def start_releases(surface, kind):
     """Allow a release before the alarm, from anywhere in the travel."""
-    clear_releases(surface, EARLIER, kind)
-    surface.release.low[LATER, kind] = surface.actuator.travel_low
-    surface.release.high[LATER, kind] = surface.actuator.travel_high
-    clear_held(surface, kind)
+    clear_releases(surface, EARLIER_RELEASE, kind)
+    surface.release.low[LATER_RELEASE, kind] = surface.actuator.travel_low
+    surface.release.high[LATER_RELEASE, kind] = surface.actuator.travel_high
+    clear_held_range(surface, kind)
 
 
 @kernel
-def clear_held(surface, kind):
+def clear_held_range(surface, kind):
     """This type does not hold the surface in the judged frame: the empty interval."""
     surface.release.held_low[kind], surface.release.held_high[kind] = np.inf, -np.inf
 
@@ -84,7 +84,7 @@ def mean_return_position(config, surface, held, side=0):
     """
     total, count, a, least, greatest = 0.0, 0, held, held, held
     for k in range(config.length):
-        order = surface.orders.given[1, k]
+        order = surface.commands.given[1, k]
         for _ in range(config.instants):
             total += a
             count += 1
@@ -92,7 +92,7 @@ def mean_return_position(config, surface, held, side=0):
             a = nearer(a, order, surface.actuator.approach, surface.actuator.step)
             if side != 0:
                 a = min(a, held) if side < 0 else max(a, held)
-    return total / count, a, surface.judged.uneven * (greatest - least)
+    return total / count, a, surface.judged.effectiveness_variation * (greatest - least)
 
 
 @kernel
@@ -111,8 +111,8 @@ def return_explains(config, surface, kind):
     """Whether a return after this type explains the judged frame; forget the releases that do not."""
     left = block_release_explains(config, surface, kind)
     if not left:
-        clear_held(surface, kind)
-    for which in (EARLIER, LATER):
+        clear_held_range(surface, kind)
+    for which in (EARLIER_RELEASE, LATER_RELEASE):
         if has_release(surface, which, kind):
             if narrow_return(config, surface, which, kind):
                 left = True
@@ -145,8 +145,11 @@ def narrow_return(config, surface, which, kind):
 def promote_later_releases(surface, kind):
     """Take the later releases for the earlier ones, when no earlier one is possible any more."""
     held = surface.release
-    held.low[EARLIER, kind], held.high[EARLIER, kind] = held.low[LATER, kind], held.high[LATER, kind]
-    clear_releases(surface, LATER, kind)
+    held.low[EARLIER_RELEASE, kind], held.high[EARLIER_RELEASE, kind] = (
+        held.low[LATER_RELEASE, kind],
+        held.high[LATER_RELEASE, kind],
+    )
+    clear_releases(surface, LATER_RELEASE, kind)
 
 
 @kernel
@@ -159,7 +162,7 @@ def set_release_interval(held, which, kind, low, high):
 def hold_status(config, surface, kind, least, greatest):
     """Whether a type holds the surface between least and greatest (rad) in the judged frame: HELD; or has
     released it, and the actuator may be bringing it back: RETURNING; or neither explains it: REFUTED."""
-    returning = config.returns and return_explains(config, surface, kind)
+    returning = config.released_returns and return_explains(config, surface, kind)
     released = surface.release.released
     if least <= surface.judged.high and greatest >= surface.judged.low and not released[kind]:
         return HELD
@@ -191,20 +194,20 @@ def position_at_frame_start(config, surface, k):
 def add_release(surface, kind, low, high):
     """Add a release from between low and high (rad), where a type may hold the surface, if low <= high."""
     held = surface.release
-    clear_held(surface, kind)
+    clear_held_range(surface, kind)
     if low <= high and not held.released[kind]:
         held.held_low[kind], held.held_high[kind] = low, high
-        held.low[LATER, kind] = min(held.low[LATER, kind], low)
-        held.high[LATER, kind] = max(held.high[LATER, kind], high)
+        held.low[LATER_RELEASE, kind] = min(held.low[LATER_RELEASE, kind], low)
+        held.high[LATER_RELEASE, kind] = max(held.high[LATER_RELEASE, kind], high)
 
 
 @kernel
 def propagate_returns(config, surface, kind):
     """Carry the intervals of returns to the next frame; a surface that looks healthy may be held again."""
     held = surface.release
-    if not surface.judged.wrong:
+    if not surface.judged.anomalous:
         held.released[kind] = 0
-    for which in (EARLIER, LATER):
+    for which in (EARLIER_RELEASE, LATER_RELEASE):
         if has_release(surface, which, kind):
             _, low, _ = mean_return_position(config, surface, held.low[which, kind])
             _, high, _ = mean_return_position(config, surface, held.high[which, kind])
@@ -212,8 +215,8 @@ def propagate_returns(config, surface, kind):
     if config.length > 1 and held.held_low[kind] <= held.held_high[kind]:
         _, low, _ = mean_return_position(config, surface, held.held_low[kind], -1)
         _, high, _ = mean_return_position(config, surface, held.held_high[kind], 1)
-        held.low[LATER, kind] = min(held.low[LATER, kind], low)
-        held.high[LATER, kind] = max(held.high[LATER, kind], high)
+        held.low[LATER_RELEASE, kind] = min(held.low[LATER_RELEASE, kind], low)
+        held.high[LATER_RELEASE, kind] = max(held.high[LATER_RELEASE, kind], high)
 
 
 @kernel
@@ -250,9 +253,15 @@ def on_release_stuck(config, surface, kind, k):
 def promote_kept_sets(surface, kind):
     """When no earlier release is possible any more, the later ones are the earlier ones."""
     jam = surface.stuck
-    if not has_release(surface, EARLIER, kind):
-        jam.kept_low[EARLIER], jam.kept_high[EARLIER] = jam.kept_low[LATER], jam.kept_high[LATER]
-        jam.kept_low[LATER], jam.kept_high[LATER] = surface.feasible.low[kind], surface.feasible.high[kind]
+    if not has_release(surface, EARLIER_RELEASE, kind):
+        jam.kept_low[EARLIER_RELEASE], jam.kept_high[EARLIER_RELEASE] = (
+            jam.kept_low[LATER_RELEASE],
+            jam.kept_high[LATER_RELEASE],
+        )
+        jam.kept_low[LATER_RELEASE], jam.kept_high[LATER_RELEASE] = (
+            surface.feasible.low[kind],
+            surface.feasible.high[kind],
+        )
         promote_later_releases(surface, kind)
 
 
@@ -260,8 +269,8 @@ def promote_kept_sets(surface, kind):
 def restored_set(surface, kind):
     """Where the surface looks healthy the jam may take hold again: its set as it was before the earliest
     release still possible."""
-    if not surface.judged.wrong:
-        for which in (EARLIER, LATER):
+    if not surface.judged.anomalous:
+        for which in (EARLIER_RELEASE, LATER_RELEASE):
             if has_release(surface, which, kind):
                 return surface.stuck.kept_low[which], surface.stuck.kept_high[which]
     return surface.feasible.low[kind], surface.feasible.high[kind]
@@ -337,7 +346,7 @@ def runaway_travel(config, surface, k):
     elapsed = k - surface.evidence.started_at
     if config.length > 1:
         elapsed = max(elapsed - 1, 0)
-    return surface.actuator.least_runaway_rate * config.span_s * elapsed
+    return surface.actuator.least_runaway_rate * config.block_s * elapsed
 
 
 @kernel

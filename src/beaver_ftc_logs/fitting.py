@@ -7,10 +7,10 @@ flights the fit did not see. One flight is cut in two halves of what is known of
 out in turn.
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import groupby, pairwise
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,12 +93,26 @@ _WANTED = 0.93
 """Coverage the bounds aim at: 90 % and some of what another day takes away."""
 
 
+Found = TypeVar("Found")
+
+
 @dataclass(frozen=True)
 class Stretch:
-    """A flight and which of its samples may be fitted."""
+    """A flight and which of its samples may be fitted; known: what was made of it and others already."""
 
     samples: Samples
     use: NDArray[np.bool_]
+    known: dict[tuple[object, ...], tuple[object, object]] = field(
+        default_factory=dict, repr=False, compare=False
+    )
+
+
+def _once(stretches: Sequence[Stretch], what: tuple[object, ...], make: Callable[[], Found]) -> Found:
+    """What is made of these very stretches, once: every test of a model asks for the same fits to parts."""
+    memory, key = stretches[0].known, (*what, *map(id, stretches))
+    if key not in memory:
+        memory[key] = (tuple(stretches), make())  # held: an id is of one object while this lives
+    return memory[key][1]  # type: ignore[return-value]
 
 
 def stretches_of(flights: Sequence[Samples]) -> list[Stretch]:
@@ -192,6 +206,11 @@ def _columns(vehicle: Vehicle, history: int, lags: int) -> list[int]:
 
 def fit_order(stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags: int) -> regression.Fit:
     """Least squares of given order over all stretches."""
+    what = ("order", vehicle.model_dump_json(), history, lags)
+    return _once(stretches, what, lambda: _fit_order(stretches, vehicle, history, lags))
+
+
+def _fit_order(stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags: int) -> regression.Fit:
     x, y, run = stacked(stretches, vehicle, history, lags)
     if len(y) < 10 * x.shape[1]:
         raise BadInput(
@@ -227,6 +246,11 @@ def stacked(
 
 
 def _model(stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags: int) -> Model:
+    what = ("model", vehicle.model_dump_json(), history, lags)
+    return _once(stretches, what, lambda: _fit_model(stretches, vehicle, history, lags))
+
+
+def _fit_model(stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags: int) -> Model:
     fit = fit_order(stretches, vehicle, history, lags)
     names, groups = list(vehicle.surfaces), regression.groups_of(vehicle)
     first = len(fit.coefficients) - len(groups) * lags
@@ -427,11 +451,16 @@ def folds(stretches: Sequence[Stretch]) -> list[tuple[list[Stretch], Stretch, st
         rest = [[other for other in stretches if other is not kept] for kept in stretches]
         return [(fitted, kept, kept.samples.name) for fitted, kept in zip(rest, stretches, strict=True)]
     (only,) = stretches
+    first, second = _once(stretches, ("halves",), lambda: _halves(only))
+    return [([first], second, "second half"), ([second], first, "first half")]
+
+
+def _halves(only: Stretch) -> tuple[Stretch, Stretch]:
+    """What is known of a flight in two halves."""
     known = np.flatnonzero(only.use)
     middle = int(known[len(known) // 2]) if len(known) else 0
     early = np.arange(len(only.use)) < middle
-    first, second = (replace(only, use=only.use & half) for half in (early, ~early))
-    return [([first], second, "second half"), ([second], first, "first half")]
+    return Stretch(only.samples, only.use & early), Stretch(only.samples, only.use & ~early)
 
 
 def trusted(stretches: Sequence[Stretch], model: Model) -> Model:

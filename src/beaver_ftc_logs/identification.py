@@ -308,7 +308,7 @@ def summary(model: Model) -> str:
         *(f"  {line}" for line in found.get("assumed", [])),
         *(f"  together, not distinguishable: {', '.join(g)}" for g in model.groups if len(g) > 1),
         *_pressure_lines(model),
-        *(
+        *dict.fromkeys(
             f"  noise of the colour {', '.join(f'{c:.3g}' for c in one.average)}: {one.wider:.2g} times as "
             "wide, in squares, as gains of 10 s left out differ, and other laws may"
             for one in model.colours

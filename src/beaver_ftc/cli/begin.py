@@ -1,6 +1,7 @@
 """Where the installed command begins: Ctrl-C ends it without a traceback, while it imports too."""
 
 import gc
+import os
 import signal
 import sys
 from typing import NoReturn
@@ -11,8 +12,10 @@ COLLECTED_EVERY = 50_000
 
 
 def main() -> NoReturn:
-    """Run the command line."""
+    """Run the command line. With one thread for linear algebra, unless the environment says otherwise: of
+    small matrices threads wait for one another, and sums in another order have other last digits."""
     gc.set_threshold(COLLECTED_EVERY, 20, 100)
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         from beaver_ftc.cli.main import main as run
     except KeyboardInterrupt:

@@ -5,8 +5,7 @@ import pytest
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.context import Declared
-from beaver_ftc.design.dryden import GUST_FT_S, SCALE_FT, Dryden
-from beaver_ftc.diagnosis.bounds import gust_effect
+from beaver_ftc.design.dryden import Dryden
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.studies.compare.replay import Recorder, record
 from flying import scenario
@@ -56,15 +55,6 @@ def test_one_coefficient_off_gives_its_own_share_of_the_acceleration():
     assert declared.coefficients == pytest.approx(wanted)
 
 
-def test_errors_of_air_data_add_by_their_squares():
-    both = told(fdi={"bounds": {"sensors": {"alpha": {"noise_std_deg": 0.3}, "beta": {"bias_deg": 0.4}}}})
-    alpha = told(fdi={"bounds": {"sensors": {"alpha": {"noise_std_deg": 0.3}}}})
-    beta = told(fdi={"bounds": {"sensors": {"beta": {"bias_deg": 0.4}}}})
-    assert alpha.model_rad_s2[1] > 10 * alpha.model_rad_s2[0]
-    assert beta.model_rad_s2[0] > 10 * beta.model_rad_s2[1]
-    assert both.model_rad_s2 == pytest.approx(np.hypot(alpha.model_rad_s2, beta.model_rad_s2))
-
-
 @pytest.mark.parametrize("severity", ["light", "moderate"])
 def test_the_turbulence_told_is_the_one_flown(severity):
     """What the model does not explain of a flight in JSBSim's turbulence has the size and the memory told."""
@@ -96,39 +86,3 @@ def test_the_air_rolls_more_than_it_pitches_or_yaws_and_faster_flight_meets_it_s
     assert slow[0] == pytest.approx(fast[0])
     assert slow[1] == pytest.approx(1.25 * fast[1])
     assert Dryden("moderate").rotation(40.0, 14.63)[0] == pytest.approx(10.6 / 7.4 * slow[0])
-
-
-def test_the_slopes_of_the_gusts_have_the_variance_of_drydens_spectrum():
-    """sigma^2 of s / V / (1 + tau s) behind Dryden's vertical gusts, by numerical integration."""
-    V, L, sigma = 45.0, 1750 * 0.3048, 7.4 * 0.3048
-    rotation, time_s = Dryden("light").rotation(V, 14.63)
-    omega = np.linspace(0.0, 4000.0, 4_000_001)
-    gust = sigma**2 * L / (np.pi * V) * (1 + 3 * (L * omega / V) ** 2) / (1 + (L * omega / V) ** 2) ** 2
-    for axis in (1, 2):
-        slope = gust * (omega / V) ** 2 / (1 + (time_s[axis] * omega) ** 2)
-        assert rotation[axis] ** 2 == pytest.approx(np.trapezoid(slope, omega), rel=2e-3)
-
-
-@pytest.mark.parametrize("severity", ["light", "severe"])
-def test_gusts_turn_the_air_as_drydens_spectra_say(severity):
-    """The variance of each rotation is the integral of its spectrum [MIL-F-8785C], by quadrature."""
-    V, b, L = 45.0, 14.6, SCALE_FT * 0.3048
-    deviation, time_s = Dryden(severity).rotation(V, b)
-    sigma = GUST_FT_S[severity] * 0.3048
-    w = np.concatenate(([0.0], np.geomspace(1e-6, 1e6, 400_001)))
-    across = sigma**2 * L / (np.pi * V) * (1.0 + 3.0 * (L * w / V) ** 2) / (1.0 + (L * w / V) ** 2) ** 2
-    for axis, length in ((1, 4.0 * b / np.pi), (2, 3.0 * b / np.pi)):
-        turning = across * (w / V) ** 2 / (1.0 + (length * w / V) ** 2)
-        assert deviation[axis] ** 2 == pytest.approx(np.trapezoid(turning, w), rel=2e-3)
-        assert time_s[axis] == pytest.approx(length / V)
-    assert time_s[0] == pytest.approx(np.sqrt(L * b) / 2.6 / V)
-
-
-def test_rotating_air_does_what_the_opposite_rates_would():
-    A = np.array([[-5.0, 0.1, 2.0], [0.0, -3.0, -0.3], [-0.9, 0.2, -0.5]])
-
-    class Linear:
-        def f(self, x, y):
-            return A @ x + y
-
-    assert gust_effect(Linear(), np.array([0.4, -0.2, 0.1])) == pytest.approx(-A, abs=1e-9)

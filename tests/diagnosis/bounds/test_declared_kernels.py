@@ -101,12 +101,13 @@ def test_a_tolerance_is_a_share_of_each_coefficient(design):
     assert told.coefficients == pytest.approx([0.1 * abs(term.value) for term in AIRCRAFT.moments])
 
 
+@pytest.mark.parametrize(("severity", "feet_a_s"), [("light", 7.4), ("severe", 23.6)])
 @pytest.mark.parametrize("b", [14.6, 60.0])
-def test_gusts_turn_the_air_as_their_spectra_say(b):
+def test_gusts_turn_the_air_as_their_spectra_say(b, severity, feet_a_s):
     """Pitch and yaw: the variance of a lagged slope behind Dryden's gusts, by quadrature in u = arctan of
     the frequency; roll: 1.9 sigma / sqrt(L b), and its lag sqrt(L b) / 2.6 V [Yeager1998]."""
-    V, L, sigma = 45.0, SCALE_FT * 0.3048, 7.4 * 0.3048
-    rotation, time_s = Dryden("light").rotation(V, b)
+    V, L, sigma = 45.0, SCALE_FT * 0.3048, feet_a_s * 0.3048
+    rotation, time_s = Dryden(severity).rotation(V, b)
     nodes, weights = np.polynomial.legendre.leggauss(400)
     u = 0.25 * np.pi * (nodes + 1.0)
     w, dw = np.tan(u) * V / L, 0.25 * np.pi * weights / np.cos(u) ** 2 * V / L
@@ -120,10 +121,11 @@ def test_gusts_turn_the_air_as_their_spectra_say(b):
 
 
 def test_rotating_air_shows_by_a_central_difference():
-    """A cube adds step^2 to a slope taken on both sides, and nothing else."""
+    """Of the opposite rates. A cube adds step^2 to a slope taken on both sides, and nothing else."""
+    A = np.array([[-5.0, 0.1, 2.0], [0.0, -3.0, -0.3], [-0.9, 0.2, -0.5]])
 
     class Cubic:
         def f(self, x, y):
-            return 2.0 * x + x**2 + 1e6 * x**3
+            return A @ x + x**2 + 1e6 * x**3
 
-    assert gust_effect(Cubic(), Y) == pytest.approx(-np.eye(3) * (2.0 + 1e6 * 1e-8), abs=1e-9)
+    assert gust_effect(Cubic(), Y) == pytest.approx(-A - np.eye(3) * 1e6 * 1e-8, abs=1e-9)

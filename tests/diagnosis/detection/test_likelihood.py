@@ -206,50 +206,6 @@ def test_there_is_always_an_onset_of_about_every_age():
     assert ages.max() < 2 * oldest
 
 
-def test_a_loss_is_no_gain_and_a_step_may_go_either_way():
-    frames = 50
-    signatures = np.ones((frames, 2, 1)) * np.sin(0.3 * np.arange(frames))[:, None, None]
-    for theta in (-0.8, 0.8):
-        block = _shown(_block("one axis", LOSS, STEP), theta * signatures[:, 0], signatures)
-        loss, step = block["hypothesis"][0], block["hypothesis"][1]
-        assert step["score"] > 1.0
-        assert step["theta"] == pytest.approx(theta, abs=1e-9)
-        assert loss["score"] == (pytest.approx(step["score"]) if theta < 0 else 0.0)
-        assert loss["max_llr"] == (0.0 if theta > 0 else pytest.approx(loss["min_llr"]))
-
-
-@given(st.floats(-200, 200), st.floats(0.01, 100))
-def test_the_likelihood_of_a_loss_is_greatest_within_its_set(evidence, information):
-    """By search over theta in [-1, 0] instead of cases; evidence is that for a loss."""
-    theta = np.linspace(0, 1, 4001)
-    best = np.max(theta * evidence - 0.5 * theta**2 * information)
-    found = likelihood.log_likelihood_ratio(True, evidence, information)
-    assert found == pytest.approx(best, rel=1e-5, abs=1e-4 * information)
-
-
-def test_the_estimate_of_a_loss_knows_that_it_is_one():
-    """With no information it is in the middle; with much of it, what was seen."""
-    assert likelihood.estimate_theta(LOSS, 0.0, 0.0) == -0.5
-    assert likelihood.estimate_theta(LOSS, -0.4e6, 1e6) == pytest.approx(-0.4, abs=1e-4)
-    assert likelihood.estimate_theta(LOSS, -5e6, 1e6) == -1.0
-    assert likelihood.estimate_theta(LOSS, 5e6, 1e6) == 0.0
-
-
-def test_from_the_alarm_on_old_evidence_is_forgotten():
-    """By least squares with weights: each frame counts `keep` times what the next one counts."""
-    frames, keep = 200, 0.95
-    signatures = np.ones((frames, 1, 1)) * np.cos(0.2 * np.arange(frames))[:, None, None]
-    nu = -0.5 * signatures[:, 0]
-    nu[frames // 2 :] = -0.9 * signatures[frames // 2 :, 0]
-    block = _shown(_block("one axis", LOSS), nu, signatures, keep=keep)
-    forever = _shown(_block("one axis", STEP), nu, signatures)
-    recent, of_all = (
-        by_onset(of, "correlation")[-1, 0] / by_onset(of, "information")[-1, 0] for of in (block, forever)
-    )
-    assert recent == pytest.approx(-0.9, abs=0.02)
-    assert of_all > -0.85
-
-
 def test_each_frame_counts_keep_times_what_the_next_one_counts():
     """Of the evidence, of the information, and of what the tolerances are multiplied with."""
     frames, keep, rng = 12, 0.8, np.random.default_rng(6)

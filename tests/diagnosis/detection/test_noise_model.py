@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from innovations import LEVEL_FLIGHT, Detector, gust_jitter, misread, surfaces_at_work
+from innovations import LEVEL_FLIGHT, Detector, misread, surfaces_at_work
 from scipy.stats import norm
 
 from beaver_ftc.aircraft import load
@@ -182,20 +182,6 @@ def test_tolerances_of_coefficients_and_inertia_add_up():
     i, size = aircraft.index("Cm_de"), abs(aircraft.terms["Cm_de"].value)
     assert (tolerance - inertia)[i] == pytest.approx(0.1 * size)
     assert inertia[i] >= 0.05 / 1.05 * size
-
-
-@pytest.mark.parametrize(("vane", "axis", "lag"), [("alpha", 1, 4.0), ("beta", 2, 3.0)])
-def test_noise_of_a_vane_is_a_gust_that_rotates_by_its_slope(vane, axis, lag):
-    """pi V / 4b for pitch and pi V / 3b for yaw [MIL-F-8785C], through what a rotation of the air does."""
-    design, span_m, size = design_record()[0], 14.63, np.deg2rad(0.2)
-    sensors = Bounds.model_validate({"sensors": {vane: {"noise_std_deg": 0.2}}}).sensors
-    _, y, u = LEVEL_FLIGHT
-    turning, h = np.zeros(3), 1e-6
-    turning[axis] = h
-    damping = (_rates(design, turning, y, u) - _rates(design, np.zeros(3), y, u)) / h
-    expected = np.abs(damping) * size * np.pi * y[2] / (lag * span_m)
-    found = gust_jitter(sensors, design, span_m)
-    assert found == pytest.approx(expected, rel=1e-3, abs=1e-6)
 
 
 def test_noise_of_other_sensors_and_of_deflections_is_part_of_the_noise():

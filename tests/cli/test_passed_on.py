@@ -380,6 +380,8 @@ def test_the_picture_beside_a_page_is_renewed(beaver, tmp_path):
     (tmp_path / "images").mkdir()
     beaver("compare --flights recorded --leaderboard page.md", **COMPARE)
     assert (tmp_path / "images" / "recorded-flights.png").read_bytes() == b"picture"
+    answered = json.loads(beaver("compare --flights recorded --format json --out other", **COMPARE)[1])
+    assert answered["folder"] == str(Path("other") / "recorded-flights")
 
 
 def test_a_trim_as_a_table(beaver, changed):

@@ -1,5 +1,7 @@
 """What is fitted, of which order, and how it is tested elsewhere: on flights of models that are known."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -364,3 +366,35 @@ def test_each_part_left_out_is_held_against_what_the_others_ask_for(monkeypatch)
     parts[0] = (np.array([5.5, 5.0]), 3.0)
     assert fitting._alone(parts, 2.0, None)["alarmed"] == 2
     assert fitting._alone(parts, None, None) == fitting._alone(parts[:1], 2.0, None) == {}
+
+
+def test_a_model_is_trusted_as_far_as_its_worst_parts_allow(monkeypatch):
+    """The noisiest of all parts, and of the first four the one that is read wrongly most easily."""
+    noise, misread = {1: 0.7, 2: 2.5, 3: 1.4, 4: 1.1, 5: 0.9}, {1: 0.2, 2: 0.6, 3: 0.1, 4: 0.3, 5: 9.0}
+    left_out = [("half", [1, 2]), ("other", [3, 4, 5])]
+    monkeypatch.setattr(fitting, "_left_out", lambda *of: left_out)
+    monkeypatch.setattr(fitting, "_in_health", lambda tested, one: (noise[one], (np.array([1.0]), one / 60)))
+    monkeypatch.setattr(fitting, "_misread", lambda tested, one: misread[one])
+    monkeypatch.setattr(fitting, "_minutes", lambda parts: 60 * sum(hours for _, hours in parts))
+    monkeypatch.setattr(fitting, "fit_order", lambda *of: "fit")
+    monkeypatch.setattr(fitting, "gain_sd", lambda fit, model: 0.25)
+    monkeypatch.setattr(fitting.trust, "tied", lambda used, model: np.zeros(2))
+
+    def fitted_on(used, model, sd, scale):
+        return SimpleNamespace(model_copy=lambda update: update | {"of": (sd, scale)})
+
+    monkeypatch.setattr(fitting.trust, "fitted_on", fitted_on)
+    monkeypatch.setattr(fitting.extremes, "tail_of", lambda parts: None)
+    vehicle = SimpleNamespace(false_alarms_per_hour=None, other_laws=False)
+    settings = SimpleNamespace(levels={"left": [0.5]}, model_copy=lambda update: update)
+    model = SimpleNamespace(
+        vehicle=vehicle, history=2, lags=3, settings=settings, model_copy=lambda update: update
+    )
+    found = fitting.trusted([], model)
+    assert found["fitted"] == {"tail": None, "misread": 0.6, "of": (0.25, 2.5)}
+    assert found["settings"] == {"false_alarms_per_hour": None, "threshold": None}
+    assert found["identified"] == {}
+    vehicle.false_alarms_per_hour = 0.5
+    more = fitting.extremes.SHOWN * 120 - 15
+    with pytest.raises(BadInput, match=f"_per_hour 0.5: 15.0 min .* allowed: {more:.0f} min more"):
+        fitting.trusted([], model)

@@ -1,5 +1,6 @@
 """`beaver-ftc import gtm`: what it refuses, and the folder it writes."""
 
+from collections import defaultdict
 from xml.etree import ElementTree
 
 import numpy as np
@@ -11,7 +12,7 @@ from tools.gtm.specification import DATABASE
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.aircraft import UnknownAircraft, imported_folder
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_aircraft.gtm import conversion, elements, folder, systems
+from beaver_ftc_aircraft.gtm import aerodynamics, conversion, elements, folder, systems
 from beaver_ftc_aircraft.gtm.database import read
 from beaver_ftc_aircraft.gtm.parameters import cases, parameters
 from beaver_ftc_aircraft.gtm.steady import Steady
@@ -188,3 +189,14 @@ def test_a_line_of_samples_hands_each_on_before_it_takes_the_next():
         assert read[place][-1] == names[place]  # kept where no sample is due
         before = names[place + 1] if i else "fcs/flap-cmd-rad"
         assert before in read[place]
+
+
+def test_a_fault_that_nobody_anticipates_adds_a_pitching_moment_on_alpha_cubed(monkeypatch):
+    """Of data of nothing it is all that there is: a factor, and three angles of attack."""
+    for part in ("flow", "static", "elevator", "ailerons", "rudder", "spoilers", "flaps", "rates"):
+        monkeypatch.setattr(aerodynamics, f"_{part}", lambda *of: None)
+    made = ElementTree.fromstring(aerodynamics.aerodynamics(defaultdict(lambda: None)))
+    (product,) = (of for of in made.iter("product") if "Cm-alpha3" in ElementTree.tostring(of, "unicode"))
+    factors = [of.text.strip() for of in product.iter("property")]
+    assert factors == ["failures/unanticipated/Cm-alpha3", *["aero/alpha-rad"] * 3]
+    assert [of.get("name") for of in made.iter("function")].count("aero/coefficient/Cm") == 1

@@ -1,8 +1,12 @@
 """Modes, zeros and responses against systems whose answers are written down."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from beaver_ftc.aircraft import M_PER_FT
+from beaver_ftc.plant import linear
 from beaver_ftc.studies.linear_systems import (
     MODES,
     Mode,
@@ -13,6 +17,7 @@ from beaver_ftc.studies.linear_systems import (
     response,
     zeros,
 )
+from telling import numbers
 
 
 def test_python_control_gives_the_same():
@@ -105,3 +110,25 @@ def test_after_a_pulse_a_decay_has_risen_and_falls():
     found = pulse_response(np.array([[-2.0]]), np.array([3.0]), 0, t, 1.0)
     rising, falling = 1.5 * (1 - np.exp(-2 * t)), 1.5 * (1 - np.exp(-2.0)) * np.exp(-2 * (t - 1.0))
     np.testing.assert_allclose(found, np.where(t <= 1.0 + 1e-9, rising, falling), atol=1e-12)
+
+
+def test_the_flow_turns_as_its_components_do(monkeypatch):
+    """V, alpha and beta of a velocity, and their rates by differences; all other rates are read."""
+    rates = numbers(3, seed=1)
+    (u, v, w), named = np.abs(numbers(3, seed=2)) * [30, 5, 7], iter(numbers(7, seed=3))
+    ft = {f"velocities/{axis}-fps": of / M_PER_FT for axis, of in zip("uvw", (u, v, w), strict=True)}
+    ft |= {f"accelerations/{axis}dot-ft_sec2": of / M_PER_FT for axis, of in zip("uvw", rates, strict=True)}
+    of = {f"accelerations/{axis}dot-rad_sec2": next(named) for axis in "pqr"}
+    of |= {f"velocities/{angle}dot-rad_sec": next(named) for angle in ("phi", "theta", "psi")}
+    of |= {"velocities/h-dot-fps": next(named) / M_PER_FT}
+    plant = SimpleNamespace(start=lambda state: None, read=(ft | of).__getitem__)
+
+    def flow(at):
+        x, y, z = np.array([u, v, w]) + at * rates
+        speed = np.sqrt(x * x + y * y + z * z)
+        return np.array([speed, np.arctan2(z, x), np.arcsin(y / speed)])
+
+    found = linear._derivative(plant, None)
+    assert found[:3] == pytest.approx((flow(1e-5) - flow(-1e-5)) / 2e-5, rel=1e-6)
+    assert found[3:9] == pytest.approx([*of.values()][:6])
+    assert found[9] == pytest.approx(of["velocities/h-dot-fps"] * M_PER_FT)

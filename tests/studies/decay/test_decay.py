@@ -14,8 +14,8 @@ from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.model import Metrics
 from beaver_ftc.scenario.declared import undeclared
-from beaver_ftc.studies.decay.errors import errors_of
-from beaver_ftc.studies.decay.shown import as_text, sentences
+from beaver_ftc.studies.decay.errors import Error, changes_of, errors_of
+from beaver_ftc.studies.decay.shown import _interval, as_text, sentences
 from beaver_ftc.studies.decay.survey import (
     FACTORS,
     TOGETHER,
@@ -187,3 +187,24 @@ def test_what_the_rows_say():
 def test_a_scenario_without_a_diagnosis_is_refused(tmp_path):
     with pytest.raises(BadInput, match="scheme: none diagnoses nothing"):
         run_decay(tmp_path, bf.load(SHORT | {"fdi": {"scheme": "none"}}))
+
+
+def test_errors_left_out_leave_the_signs_of_the_others_and_intervals_are_in_the_unit_asked():
+    """A sign is drawn for every error, whether it is made or not."""
+    errors = [
+        Error(name, "", lambda factor, draws, name=name: {name: factor * draws.choice([-1.0, 1.0])})
+        for name in "abcdefgh"
+    ]
+
+    def made(*names):
+        return changes_of(errors, dict.fromkeys(names, 2.0), np.random.default_rng(3))
+
+    whole = made(*"abcdefgh")
+    assert {abs(whole[name]) for name in "abcdefgh"} == {2.0}
+    assert {whole[name] for name in "abcdefgh"} == {-2.0, 2.0}
+    nothing = {"uncertainty": {}, "sensors": "ideal", "environment": {}}
+    assert made("c", "h") == nothing | {name: whole[name] for name in "ch"}
+    found = {"value": 0.25, "low": 0.125, "high": None}
+    assert _interval(found, 100.0) == "25 (12.5 to never)"
+    assert _interval(found | {"low": 0.25, "high": 0.25}, 10.0) == "2.5"
+    assert _interval(found | {"value": None}) == "never"

@@ -12,7 +12,7 @@ from tools.gtm.specification import DATABASE
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.aircraft import UnknownAircraft, imported_folder
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_aircraft.gtm import aerodynamics, conversion, elements, folder, systems
+from beaver_ftc_aircraft.gtm import aerodynamics, conversion, elements, folder, masses, systems
 from beaver_ftc_aircraft.gtm.database import read
 from beaver_ftc_aircraft.gtm.parameters import cases, parameters
 from beaver_ftc_aircraft.gtm.steady import Steady
@@ -200,3 +200,18 @@ def test_a_fault_that_nobody_anticipates_adds_a_pitching_moment_on_alpha_cubed(m
     factors = [of.text.strip() for of in product.iter("property")]
     assert factors == ["failures/unanticipated/Cm-alpha3", *["aero/alpha-rad"] * 3]
     assert [of.get("name") for of in made.iter("function")].count("aero/coefficient/Cm") == 1
+
+
+@pytest.mark.parametrize("case", range(1, len(cases()) + 1))
+@pytest.mark.parametrize("gear_down", [False, True])
+def test_small_masses_make_of_the_whole_aircraft_what_a_case_leaves(case, gear_down):
+    """Weights, places and inertia added up, all about the centre of gravity that the case has."""
+    whole, wanted = masses.mass_of(), masses.mass_of(case, gear_down)
+    small = masses.small_masses_lbf(case, gear_down)
+    weights = np.array([whole.weight_lbf, *small])
+    places = np.vstack([whole.cg_ft, whole.cg_ft + masses._PLACES])
+    assert weights.sum() == pytest.approx(wanted.weight_lbf)
+    assert weights @ places / weights.sum() == pytest.approx(wanted.cg_ft, abs=1e-9)
+    off = places - wanted.cg_ft
+    each = [w / 32.174049 * (r @ r * np.eye(3) - np.outer(r, r)) for w, r in zip(weights, off, strict=True)]
+    assert whole.inertia + sum(each) == pytest.approx(wanted.inertia, abs=1e-9)

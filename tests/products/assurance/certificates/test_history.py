@@ -95,3 +95,19 @@ def test_an_inequality_has_the_numbers_that_decide_it(monkeypatch, low, high, sl
     assert {end: found[end] for end in ends if end in found} == {e: v for e, v in ends.items() if said[e]}
     assert ["Z" in one for one in found["terms"]] == [said["Z"]] * 2
     assert found["theta"] == ("constant" if constant else "any")
+
+
+@pytest.mark.parametrize(
+    ("pole", "since", "known", "constant", "first"),
+    [
+        (np.inf, 10, 0, False, 100),  # the frame's own innovation
+        (1.0, 10, 0, False, 85), (1.0, 90, 0, False, 91), (1.0, 10, 95, False, 96),
+        (1.0, 10, 0, True, 11), (64.0, 10, 0, True, 89), (64.0, 10, 0, False, 89), (1e4, 10, 0, False, 100),
+    ],
+)  # fmt: skip
+def test_from_which_frame_on_an_inequality_is_written_out(pole, since, known, constant, first):
+    """16 frames, of a constant all since the filter began; none older than 16 time constants, at 0.02 s."""
+    term = inequality.Term(np.zeros(3), pole, since, 100, known_from=known)
+    zero = np.zeros((1, 3))
+    of = inequality.Hypothesis(0, zero, zero, zero, 0.0, 1.0, constant)
+    assert inequality._first(term, of, 0.02) == first

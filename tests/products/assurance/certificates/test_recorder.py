@@ -8,7 +8,7 @@ import beaver_ftc as bf
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.results.log import MemoryLog
 from beaver_ftc.results.writer import run
-from beaver_ftc_assurance.certificates import tape
+from beaver_ftc_assurance.certificates import certificate, tape
 from beaver_ftc_assurance.certificates.certificate import as_text
 from flying import SINES
 
@@ -85,3 +85,14 @@ def test_a_run_with_a_certificate_flies_once_and_writes_what_another_flight_woul
     run(scenario, tmp_path, report=False, certified=True)
     assert len(flights) == 1
     assert (tmp_path / "test/certificate.json").read_text() == as_text(bf.fly(scenario).certificate())
+
+
+def test_a_certificate_is_of_the_file_beside_the_log(tmp_path, monkeypatch):
+    """Of an aircraft of one's own that file names a copy: its text is another than the scenario's own."""
+    (tmp_path / "scenario.yaml").write_text("name: as it lies there\n", encoding="utf-8")
+    asked = []
+    monkeypatch.setattr(certificate, "StoredLog", lambda path: path)
+    monkeypatch.setattr(certificate, "certificate", lambda *of: asked.append(of) or ({"a": 1}, {}))
+    certificate.write("scenario", "recorder", tmp_path)
+    assert asked == [("scenario", tmp_path / "log.parquet", "recorder", "name: as it lies there\n")]
+    assert (tmp_path / "certificate.json").read_text() == '{"a":1}\n'

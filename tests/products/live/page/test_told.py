@@ -140,12 +140,16 @@ def test_words_of_what_is_asked(session, tmp_path):
     assert asked(session, do="aim", altitude_m=1850.5, heading_deg=20) == "altitude_m 1850.5, heading_deg 20"
     assert asked(session, do="blow", velocity_mps=[1, 0, -2.5]) == "gust"
     assert asked(session, do="change", sensors="ideal") == "sensors ideal"
+    assert asked(session, do="change", law="lqr", scheme="none") == "law lqr, scheme none"
+    hello = session.hello()  # of whoever comes now
+    assert (hello["law"], hello["scheme"]) == ("lqr", "none")
     assert asked(session, do="stick", rates_deg_s=[0, 0, 0]) == ""
     says = [(event["kind"], event["says"]) for event in session.events][1:]
     assert says == [
         ("autopilot", "altitude_m 1850.5, heading_deg 20"),
         ("gust", "1, 0, -2.5 m/s (north, east, down)"),
         ("changed", "sensors ideal"),
+        ("changed", "law lqr, scheme none"),
     ]
     assert session.stick.rates_deg_s == (0, 0, 0)
     assert asked(session, do="fresh", scenario="fault-free") == "new flight"

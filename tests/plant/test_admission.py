@@ -62,3 +62,16 @@ def test_it_is_tried_once_for_each_state_of_the_files(trainer, monkeypatch):
     change(trainer / "trainer.xml", "<fdm_config", "<!-- another state --><fdm_config")
     admission.admit.__wrapped__(read(trainer))
     assert len(tried) == 2
+
+
+def test_an_admission_is_of_the_models_and_the_file_by_name_and_content(trainer):
+    """Another file's content is another aircraft, a note beside them is not."""
+    seen = [admission.digest_of(trainer)]
+    (trainer / "notes.txt").write_text("not read")
+    assert admission.digest_of(trainer) == seen[0]
+    for name in ("aircraft.yaml", "trainer.xml"):
+        (trainer / name).write_text((trainer / name).read_text() + "\n")
+        seen.append(admission.digest_of(trainer))
+    (trainer / "trainer.xml").rename(trainer / "other.xml")
+    seen.append(admission.digest_of(trainer))
+    assert len(set(seen)) == 4

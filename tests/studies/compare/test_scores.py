@@ -6,7 +6,7 @@ from math import inf
 
 import pytest
 
-from beaver_ftc.studies.compare import trial
+from beaver_ftc.studies.compare import scores, trial
 from beaver_ftc.studies.compare.replay import Trace
 from beaver_ftc.studies.compare.scores import (
     line_of,
@@ -152,3 +152,18 @@ def test_flights_without_a_number_on_either_side_give_no_ratio():
     line = line_of(ENTRY, mine, [*oracle, _result(error="lost", rms_deg_s=2.0), *oracle[:2]])
     assert (line["ratio_median"], line["ratio_90"]) == (3.0, 3.0)
     assert (line["flights"], line["failed"]) == (4, 2)
+
+
+def test_better_is_more_of_rates_and_less_of_all_else_by_more_than_rounding():
+    """Nothing is worse than any number, and no number is no claim."""
+    ours = {"detection_rate": 0.5, "median_delay_s": 0.25, "rms": None}
+    words = {"detection_rate": "rate", "median_delay_s": "delay", "rms": "error"}
+    for row, said in (
+        ({"detection_rate": 0.5 + 5e-10, "median_delay_s": 0.25 - 5e-10, "rms": None}, []),
+        ({"detection_rate": 0.25, "median_delay_s": 0.5}, []),
+        ({"detection_rate": 0.75}, ["x has the better rate: 0.75 against 0.5"]),
+        ({"median_delay_s": 0.125, "rms": 9.0}, [
+            "x has the better delay: 0.125 against 0.25", "x has the better error: 9 against never",
+        ]),
+    ):  # fmt: skip
+        assert list(scores._better(row, ours, words, "x")) == said

@@ -77,6 +77,7 @@ def test_a_damaged_identity_loses_nothing(store, short, text, capsys):
         store.begin(identity_of(short), resume=True)
         assert (store.folder / "parts.damaged" / "000000.parquet").read_bytes() == flown
         assert store.landed(0, range(3)) is None
+        assert not [path for path in store.folder.iterdir() if "lock" in path.name and "damaged" in path.name]
     assert "set aside as parts.damaged; what was in it is flown again" in capsys.readouterr().err
     with store:  # and may be resumed
         store.begin(identity_of(short), resume=True)

@@ -1,5 +1,6 @@
 """`beaver-ftc import gtm`: what it refuses, and the folder it writes."""
 
+import re
 from collections import defaultdict
 from xml.etree import ElementTree
 
@@ -215,3 +216,20 @@ def test_small_masses_make_of_the_whole_aircraft_what_a_case_leaves(case, gear_d
     off = places - wanted.cg_ft
     each = [w / 32.174049 * (r @ r * np.eye(3) - np.outer(r, r)) for w, r in zip(weights, off, strict=True)]
     assert whole.inertia + sum(each) == pytest.approx(wanted.inertia, abs=1e-9)
+
+
+@pytest.mark.parametrize("surface", parameters()["surfaces"])
+def test_an_actuator_has_its_servo_in_radians_unless_it_is_set_on_the_ground(surface):
+    """Of the servo the source has a bandwidth, and a rate in degrees a second."""
+    of, servo = parameters()["surfaces"][surface], parameters()["servo"]
+    text = systems._surface(surface, of)
+    numbers = {
+        name: float(number)
+        for number, name in re.findall(rf'<property value="(\S+?)"> (actuators/{surface}/\S+) ', text)
+    }
+    moves = of["kind"] != "stabiliser"
+    rate = numbers[f"actuators/{surface}/rate-limit-rad_sec"]
+    assert rate == pytest.approx(np.pi / 180 * servo["rate_limit_deg_s"] if moves else 0.0)
+    assert numbers[f"actuators/{surface}/bandwidth-rad_sec"] == (servo["bandwidth_rad_s"] if moves else 0.0)
+    assert (f"fcs/{surface}-cmd-late-rad" in text) == moves
+    assert ("stabiliser-stands" in text) == (not moves)

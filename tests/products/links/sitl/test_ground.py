@@ -199,6 +199,34 @@ def test_an_aircraft_that_knows_no_ground_does_not_stand():
 def test_a_diagnosis_that_begins_again_is_said_to_run_since_it_first_did(monkeypatch, broken):
     """The sensor monitor is enabled where an instrument has been broken meanwhile."""
     taken, watched = [], []
+    monkeypatch.setattr(
+        vehicle_module, "take_diagnosis", lambda frame, fresh, n: taken.append((frame, fresh, n))
+    )
+    monkeypatch.setattr(vehicle_module, "diagnosis_record", lambda fresh: f"record of {fresh}")
+    loop = SimpleNamespace(sensor_schedule=SimpleNamespace(any=broken), scenario="case")
+    loop.enable_sensor_monitor = lambda record, of: watched.append((record, of))
+    flown = SimpleNamespace(
+        _loop=loop, _fresh=["fresh"], _frame="frame", _diagnoses=False, listens_from_s=None
+    )
+    for flown._now_s, flown._next in (3.0, 300), (9.0, 900):
+        Flown._begin_diagnosis(flown)
+    assert (flown.listens_from_s, flown._diagnoses) == (3.0, True)
+    assert taken == [("frame", "fresh", 300), ("frame", "fresh", 900)]
+    assert watched == [("record of fresh", "case")] * (2 * broken)
+
+
+@pytest.mark.parametrize(
+    ("diagnoses", "height_m", "airspeed_mps", "alarmed", "becomes"),
+    [
+        (True, 1.99, 30.0, False, False), (True, 2.0, 30.0, False, True), (True, 2.0, 5.0, True, True),
+        (False, 5.0, 30.0, False, False), (False, 5.01, 30.0, False, True),
+        (False, 5.01, 20.0, False, False), (False, 5.01, 30.0, True, False),
+    ],
+)  # fmt: skip
+def test_a_diagnosis_ends_two_metres_up_and_begins_again_at_five(
+    monkeypatch, diagnoses, height_m, airspeed_mps, alarmed, becomes
+):
+    """Of wheels 1.5 m below what is measured, flying faster than the slowest that the envelope has."""
     now = SimpleNamespace(height_m=height_m + 1.5, airspeed_mps=airspeed_mps)
     monkeypatch.setattr(vehicle_module, "FrameReadout", lambda frame: now)
     made = SimpleNamespace(

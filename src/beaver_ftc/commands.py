@@ -70,6 +70,7 @@ COMMANDS = {
     "power": "beaver_ftc.studies.power.shown:Power",
     "smallest": "beaver_ftc.studies.smallest.survey:Smallest",
     "decay": "beaver_ftc.studies.decay.survey:Decay",
+    "mechanisms": "beaver_ftc.studies.mechanisms.command:Mechanisms",
     "bench": "beaver_ftc.studies.bench.measure:Bench",
     "verify": "beaver_ftc.studies.verify:Verify",
     "detectability": "beaver_ftc.studies.detectability:Detectability",

@@ -226,6 +226,11 @@ DECAY = {
     "studies__decay__survey__as_text": "d",
     "studies__engine__workers__cores": 7,
 }
+MECHANISMS = {
+    "studies__mechanisms__command__run_mechanisms": {"folder": "f", "passed": False},
+    "studies__mechanisms__command__as_text": "m",
+    "studies__engine__workers__cores": 7,
+}
 EVIDENCE = RUN | {
     "beaver_ftc_assurance__evidence__plan__load_plan": lambda name: SimpleNamespace(
         name=name, file=SimpleNamespace(name="of-" + name)
@@ -274,6 +279,8 @@ ASKED = [
     ("smallest rudder-stuck --surface flap --within 2 --seed 3 --workers 2 --out o --format json", SMALLEST),
     ("decay fault-free", DECAY),
     ("decay rudder-stuck --flights 3 --seed 2 --workers 2 --out o --format json", DECAY),
+    ("mechanisms", MECHANISMS),
+    ("mechanisms --draws 2 --seed 3 --workers 2 --out o --format json", MECHANISMS),
     ("evidence flight-controls", EVIDENCE),
     ("evidence flight-controls --workers 2 --out o --format json --junit j.xml", EVIDENCE),
     ("evidence flight-controls --replay one", EVIDENCE),

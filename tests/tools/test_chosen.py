@@ -4,7 +4,15 @@ import re
 from pathlib import Path
 
 import pytest
-from tools.docs.tables.chosen import HEAD, _said, choices, chosen, draws_of
+from tools.docs.tables.chosen import (
+    CONSTANT_HEAD,
+    _said,
+    choices,
+    chosen_constants,
+    chosen_flights,
+    chosen_results,
+    draws_of,
+)
 
 from beaver_ftc.studies.reproduce.cases import PUBLISHED, keys_of
 from beaver_ftc.studies.reproduce.choices import scenario
@@ -15,24 +23,24 @@ ROOT = Path(__file__).parents[2]
 CHOICES = choices()
 
 
-@pytest.mark.parametrize("choice", CHOICES, ids=lambda choice: choice["what"])
+@pytest.mark.parametrize("choice", CHOICES, ids=lambda choice: choice["constant"])
 def test_no_claim_is_of_flights_that_a_constant_was_chosen_on(choice):
-    on, claimed = draws_of(choice["flights"]), draws_of(choice["claims"])
+    on, claimed = draws_of(choice["flights"]), draws_of(choice["results"])
     assert not on & claimed
     assert bool(on) == bool(claimed)
 
 
-@pytest.mark.parametrize("choice", CHOICES, ids=lambda choice: choice["what"])
+@pytest.mark.parametrize("choice", CHOICES, ids=lambda choice: choice["constant"])
 def test_what_was_chosen_is_where_the_table_says(choice):
     file = ROOT / choice["where"]
     text = file.read_text()
-    for name in re.findall(r"`([A-Za-z_]+)`", choice["what"]):
+    for name in re.findall(r"`([A-Za-z_]+)`", choice["constant"]):
         assert name in text, name
 
 
 def test_the_sets_of_the_benchmark_are_read_and_apart():
     tuned = CHOICES[0]
-    seeds = [seed for _, seed in sorted(draws_of(tuned["claims"]))]
+    seeds = [seed for _, seed in sorted(draws_of(tuned["results"]))]
     assert len(seeds) > 15
     assert {seed for _, seed in draws_of(tuned["flights"])} == {*range(201, 206), *range(211, 217)}
 
@@ -55,9 +63,15 @@ def test_no_flight_of_the_reproduction_is_one_that_its_gains_were_chosen_on():
     assert not {airspeed for airspeed, *_ in tried} & {airspeed for airspeed, *_ in flown}
 
 
-def test_a_row_says_its_seeds():
-    head, _, first, *_ = chosen().splitlines()
-    assert head == "| " + " | ".join(HEAD) + " |"
-    assert "| 201 to 205, 211 to 216 |" in first
+def test_a_row_says_its_constant_its_flights_and_its_results():
+    """Under the same number in each of the three tables."""
+    head, _, first, *_ = chosen_constants().splitlines()
+    assert head == "| " + " | ".join(CONSTANT_HEAD) + " |"
+    assert first.startswith("| 1 | all values in `grades` |")
+    assert "| 201 to 205, 211 to 216 |" in chosen_flights().splitlines()[2]
+    assert "| 101 to 111, 301 to 312 |" in chosen_results().splitlines()[2]
+    assert (
+        len({len(table().splitlines()) for table in (chosen_constants, chosen_flights, chosen_results)}) == 1
+    )
     assert _said({"drawn_by": "x", "seeds": [3, 1, 2, 9]}) == "1 to 3, 9"
     assert _said({"says": "none"}) == "-"

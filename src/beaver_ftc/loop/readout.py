@@ -195,6 +195,15 @@ def stop_diagnosis(frame: np.void) -> None:
     of_diagnosis.disable(frame["fdi"])
 
 
+WITHHELD = {"verdict": ("uses_verdict", "reallocates"), "stand-in": ("reallocates",)}
+
+
+def withhold_from_law(frame: np.void, what: str) -> None:
+    """Fly on with a law that makes no use of the verdict, or of a stand-in for another surface (WITHHELD)."""
+    for name in WITHHELD[what]:
+        frame["control"]["config"][name] = 0
+
+
 def set_ground(frame: np.void, ground_m: float, slow_mps: float) -> None:
     """Put the ground at this height above sea level; below slow_mps on it the flight is over."""
     frame["truth"]["ground_m"], frame["truth"]["slow_mps"] = ground_m, slow_mps

@@ -1,5 +1,6 @@
-"""The table of docs/results/choices.md: the constants chosen by flights, those flights, and the claims."""
+"""Tables of docs/results/choices.md: constants chosen by flights, those flights, and those of the results."""
 
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -12,27 +13,42 @@ Document = dict[str, Any]
 FILE = Path(__file__).parents[1] / "chosen.yaml"
 BENCHMARK = Path(__file__).parents[3] / "scenarios" / "benchmark"
 COMPARED = "compared"  # every set of the benchmark but those that rivals are tuned on
-HEAD = ("constant", "file", "chosen by", "chosen on", "seeds of these", "results", "seeds of the results")
+CONSTANT_HEAD = ("row", "constant", "sets", "file", "chosen by")
+FLIGHT_HEAD = ("row", "flights that chose the constant", "their seeds")
+RESULT_HEAD = ("row", "page", "flights of the results", "their seeds")
 
 
-def chosen() -> str:
-    """A row a choice."""
-    return markdown_table(HEAD, [_row(choice) for choice in choices()])
+def chosen_constants() -> str:
+    """The constants, in rows with a number."""
+    return _table(CONSTANT_HEAD, lambda choice: (choice["constant"], choice["sets"], *_where(choice)))
+
+
+def chosen_flights() -> str:
+    """Of each row, the flights that chose the constant."""
+    return _table(FLIGHT_HEAD, lambda choice: (choice["flights"]["says"], _said(choice["flights"])))
+
+
+def chosen_results() -> str:
+    """Of each row, the results that depend on the constant, and their flights."""
+    return _table(RESULT_HEAD, lambda choice: _result(choice["results"]))
+
+
+def _table(head: tuple[str, ...], cells: Callable[[Document], tuple[str, ...]]) -> str:
+    return markdown_table(head, [(str(row), *cells(choice)) for row, choice in enumerate(choices(), 1)])
+
+
+def _where(choice: Document) -> tuple[str, str]:
+    return f"`{choice['where']}`", f"`{choice['command']}`" if choice["command"] else "by hand"
+
+
+def _result(results: Document) -> tuple[str, str, str]:
+    return results["page"], results["says"], _said(results)
 
 
 def choices() -> list[Document]:
     """Every constant that was chosen by flights."""
     found: list[Document] = parse(FILE.read_text(encoding="utf-8")).data
     return found
-
-
-def _row(choice: Document) -> tuple[str, ...]:
-    flights, claims = choice["flights"], choice["claims"]
-    command = f"`{choice['command']}`" if choice["command"] else "by hand"
-    return (
-        choice["what"], f"`{choice['where']}`", command, flights["says"], _said(flights),
-        claims["says"], _said(claims),
-    )  # fmt: skip
 
 
 def draws_of(flights: Document) -> set[tuple[str, int]]:

@@ -1,0 +1,1 @@
+"""Which mechanism of adaptive diagnosis and accommodation improves a verdict or a flight."""

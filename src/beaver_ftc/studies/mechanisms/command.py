@@ -1,0 +1,68 @@
+"""The command `mechanisms`: what each mechanism of diagnosis and accommodation is worth."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from beaver_ftc.results.metrics import versions
+from beaver_ftc.results.model import Document
+from beaver_ftc.studies.engine.command import Reporter, StudyCommand, WorkersOption
+from beaver_ftc.studies.engine.study import Progress, Study, run_study
+from beaver_ftc.studies.mechanisms.effects import document_of
+from beaver_ftc.studies.mechanisms.shown import FILES, NAME, as_text
+from beaver_ftc.studies.mechanisms.survey import DRAWS, cases_of, fly_one, margin_cells, margins_row
+
+
+def run_mechanisms(
+    out: Path, draws: int = DRAWS, seed: int = 1, workers: int = 1, progress: Progress | None = None
+) -> Document:
+    """Write `out/mechanisms/`; return the document."""
+
+    def document(rows: Sequence[Document]) -> Document:
+        margins = [margins_row(cell) for cell in margin_cells()]
+        return document_of(seed, draws, rows, margins) | {"versions": dict(versions())}
+
+    study = Study(NAME, cases_of(draws), partial(fly_one, seed), document, FILES, follows_from=seed)
+    found: Document = run_study(study, out, workers, progress)
+    return found | {"folder": str(out / NAME)}
+
+
+@dataclass(frozen=True)
+class Mechanisms(StudyCommand):
+    """Measure which mechanisms of diagnosis and accommodation help.
+
+    Two systems, the published one and the default one, fly the same draws with all of their mechanisms and
+    without each of them: adaptive thresholds, adaptation, networks, hand-over, bank of poles, memory,
+    sharpened tests, statistics. Draws vary fault, bandwidth, undeclared error and instruments. For each
+    mechanism the command prints the net share of flights that are worse without it, by false alarms, late
+    alarms, names and tracking, each with its 95 % interval. Every false alarm of a worst-case detector gets
+    its reason; of the default scheme, its certificate.
+
+    Exit status 1 if such a false alarm has no reason.
+
+    The same command resumes an interrupted run.
+
+    draws: Draws of each combination of fault, bandwidth, error and instruments.
+    seed: Of everything drawn.
+    out: Folder for the results: `mechanisms` in it, with a page, a figure, CSV and JSON.
+    """
+
+    draws: Annotated[int, typer.Option(min=1, max=1000)] = DRAWS
+    seed: Annotated[int, typer.Option(min=0)] = 1
+    workers: WorkersOption = None
+    out: Path = Path("runs")
+
+    FILES = FILES
+    PLUGINS = False
+
+    def run(self, reporter: Reporter) -> Document:
+        """Fly every draw."""
+        return run_mechanisms(self.out, self.draws, self.seed, self.processes, reporter.progress)
+
+    def as_text(self, document: Document, colour: bool) -> str:
+        """Findings and tables, and where the files are."""
+        return f"{as_text(document)}\n\nresults: {document['folder']}"

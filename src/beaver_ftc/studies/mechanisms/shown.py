@@ -1,0 +1,247 @@
+"""What mechanisms are worth, as sentences, tables, a figure and files."""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from beaver_ftc.results.model import Document
+from beaver_ftc.studies.mechanisms.systems import DEFAULT, PAPER
+from beaver_ftc.studies.present.figures import GRID, SERIES, label_edges, panels
+from beaver_ftc.studies.present.page import Heading, Makers, Part, Pictures, Table, as_html, versions_line
+from beaver_ftc.studies.present.tables import Rows, aligned, as_csv, number
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+NAME = "mechanisms"
+CRITERIA = {  # of effects.py, in the words of tables
+    "false_alarms": "false alarms",
+    "late": "late alarms",
+    "names": "lost names",
+    "tracking": "worse tracking",
+}
+NET_HEAD = ("mechanism", *(f"{words}, %" for words in CRITERIA.values()))
+SAME_HEAD = ("mechanism", "flights", "same verdict", "same tracking")
+MEDIAN_HEAD = ("mechanism", "delay with, s", "delay without, s", "error with, deg/s", "error without, deg/s",
+               "error ratio")  # fmt: skip
+SYSTEM_HEAD = ("system", "flights", "false alarms, %", "detected, %", "named rightly, %", "lost, %",
+               "error, deg/s")  # fmt: skip
+ALARM_HEAD = ("flown", "false alarms", "with an undeclared error", "certified", "unexplained")
+MARGIN_HEAD = ("system", "bandwidth", "instruments", "gain margin, dB", "phase margin, deg")
+
+
+CAPTIONS = (
+    "Both systems with all of their mechanisms; in parentheses 95 % intervals.",
+    "Net share of flights that are worse without the mechanism, % (95 % interval).",
+    "Pairs of flights with the same alarm, name and time of both, and with the same tracking error.",
+    "Medians with and without the mechanism; error ratio: without over with (95 % interval).",
+    "False alarms, and how many of them are explained.",
+)
+
+
+def as_text(document: Document) -> str:
+    """The findings, and the tables."""
+    shown = (
+        f"{caption}\n{aligned([head, *rows])}"
+        for caption, (head, rows) in zip(CAPTIONS, tables(document), strict=True)
+    )
+    return "\n\n".join(["\n".join(sentences(document)), *shown])
+
+
+def tables(document: Document) -> Iterator[tuple[Sequence[str], Rows]]:
+    """Head and rows of a table for each of CAPTIONS."""
+    yield SYSTEM_HEAD, system_rows(document)
+    for head, row_of in ((NET_HEAD, net_row), (SAME_HEAD, same_row), (MEDIAN_HEAD, median_row)):
+        yield head, [row_of(row) for row in document["mechanisms"]]
+    yield ALARM_HEAD, alarm_rows(document)
+
+
+def sentences(document: Document) -> Iterator[str]:
+    """What was flown, what each mechanism improves or worsens, and whether false alarms have a reason."""
+    names = " x ".join(f"{len(values)} {_FACTOR_WORDS[name]}" for name, values in document["factors"].items())
+    yield f"{document['draws']} draws over {names}, each flown with and without every mechanism."
+    yield from (finding(row) for row in document["mechanisms"])
+    yield alarms_sentence(document)
+
+
+_FACTOR_WORDS = {
+    "fault": "faults", "bandwidth": "bandwidths", "error": "undeclared errors", "instruments": "instruments",
+}  # fmt: skip
+
+
+def label(row: Document) -> str:
+    """A mechanism with its system."""
+    return f"{row['mechanism']} ({row['system']})"
+
+
+def finding(row: Document) -> str:
+    """What the removal of a mechanism changes, beyond chance."""
+    if row["same_verdict"] == row["same_tracking"] == row["flights"]:
+        return f"{label(row)}: without it all {row['flights']} flights are the same."
+    certain = {name: row[name] for name in CRITERIA if row[name]["low"] > 0.0 or row[name]["high"] < 0.0}
+    if not certain:
+        same = f"{row['same_verdict']} of {row['flights']} verdicts are the same without it"
+        return f"{label(row)}: no effect beyond chance; {same}."
+    said = (f"{CRITERIA[name]} in {_more_or_less(found)}" for name, found in certain.items())
+    return f"{label(row)}: without it {', '.join(said)} of the flights."
+
+
+def _more_or_less(found: Document) -> str:
+    return f"{abs(100 * found['value']):.1f} % {'more' if found['value'] > 0 else 'fewer'}"
+
+
+def alarms_sentence(document: Document) -> str:
+    """Whether each false alarm of a worst-case detector has its reason."""
+    rows = [row for row in document["false_alarms"] if row["worst_case"]]
+    total, without = (sum(row[key] for row in rows) for key in ("count", "unexplained"))
+    certified, certifiable = (sum(row[key] for row in rows) for key in ("certified", "certifiable"))
+    return (
+        f"In all of these flights worst-case detectors raise {total} false alarms; {total - without} of "
+        f"them have an undeclared error as their reason, and {certified} of {certifiable} of the default "
+        f"scheme have a certificate."
+    )
+
+
+def net_row(row: Document) -> tuple[str, ...]:
+    """A mechanism's row for NET_HEAD."""
+    return label(row), *(net_cell(row[name]) for name in CRITERIA)
+
+
+def net_cell(found: Document) -> str:
+    """A net share with its interval, %."""
+    value, low, high = (100.0 * found[key] for key in ("value", "low", "high"))
+    return f"{value:+.1f} ({low:+.1f} to {high:+.1f})".replace("+0.0 (", "0.0 (").replace("-0.0 (", "0.0 (")
+
+
+def same_row(row: Document) -> tuple[str, ...]:
+    """A mechanism's row for SAME_HEAD."""
+    return label(row), str(row["flights"]), str(row["same_verdict"]), str(row["same_tracking"])
+
+
+def median_row(row: Document) -> tuple[str, ...]:
+    """A mechanism's row for MEDIAN_HEAD."""
+    medians = [row[of][which]["value"] for of in ("delay_s", "tracking_deg_s") for which in _BOTH]
+    return (
+        label(row),
+        *(number(value, none="never") for value in medians),
+        interval_cell(row["tracking_ratio"]),
+    )
+
+
+_BOTH = ("with", "without")
+
+
+def interval_cell(found: Document) -> str:
+    """A median with its interval."""
+    value, low, high = (number(found[key], none="never") for key in ("value", "low", "high"))
+    return f"{value} ({low} to {high})"
+
+
+def system_rows(document: Document) -> Rows:
+    """A row a system for SYSTEM_HEAD."""
+    return [
+        (
+            system, str(row["flights"]),
+            *(_percent(row[name]) for name in ("false_alarms", "detected", "named", "lost")),
+            interval_cell(row["tracking_deg_s"]),
+        )
+        for system, row in document["systems"].items()
+    ]  # fmt: skip
+
+
+def _percent(rate: Document) -> str:
+    value, low, high = (100.0 * rate[key] for key in ("value", "low", "high"))
+    return f"{value:.0f} ({low:.0f} to {high:.0f})"
+
+
+def alarm_rows(document: Document) -> Rows:
+    """A row of what was flown for ALARM_HEAD."""
+    return [
+        (
+            row["flown"], str(row["count"]), str(row["undeclared"]),
+            str(row["certified"]) if row["certifiable"] or not row["count"] else "-",
+            str(row["unexplained"]) if row["worst_case"] else "-",
+        )
+        for row in document["false_alarms"]
+    ]  # fmt: skip
+
+
+def margin_rows(document: Document) -> Rows:
+    """A row a system, bandwidth and instruments for MARGIN_HEAD."""
+    return [
+        (row["system"], row["bandwidth"], row["instruments"], number(row["gain_margin_db"], none="none"),
+         number(row["phase_margin_deg"], none="none"))
+        for row in document["margins"]
+    ]  # fmt: skip
+
+
+def level_head(document: Document, factor: str) -> tuple[str, ...]:
+    """The head of `level_rows`: a column a level of a factor."""
+    return ("mechanism", *(_level(factor, value) for value in document["factors"][factor]))
+
+
+def _level(factor: str, value: Any) -> str:
+    return f"error {100 * value:g} %" if factor == "error" else str(value)
+
+
+def level_rows(document: Document, factor: str, criterion: str, serves: str) -> Rows:
+    """By level of a factor, the net share by a criterion, of the mechanisms that serve diagnosis or law."""
+    return [
+        (label(row), *(net_cell(found[criterion]) for found in row["by"][factor].values()))
+        for row in document["mechanisms"]
+        if row["serves"] == serves
+    ]
+
+
+def figure_of(document: Document) -> "Figure":
+    """A panel a criterion, a dot a mechanism with its interval; to the right of 0 the mechanism helps."""
+    rows = document["mechanisms"]
+    figure, grid = panels(1, len(CRITERIA), 13.0, 0.28 * len(rows) + 1.4, sharey=True)
+    for panel, (name, words) in zip(grid[0], CRITERIA.items(), strict=True):
+        for place, row in enumerate(rows):
+            _dot(panel, place, row[name], SERIES[(PAPER, DEFAULT).index(row["system"])])
+        panel.axvline(0.0, color="#444444", linewidth=0.8)
+        panel.grid(axis="x", color=GRID, linewidth=0.6)
+        panel.set_title(words, fontsize=9)
+        panel.tick_params(labelsize=8)
+    grid[0][0].set_yticks(range(len(rows)), [label(row) for row in rows], fontsize=8)
+    grid[0][0].invert_yaxis()
+    label_edges(grid, "net share without it, %")
+    return figure
+
+
+def _dot(panel: Any, place: int, found: Mapping[str, float], colour: str) -> None:
+    value, low, high = (100.0 * found[key] for key in ("value", "low", "high"))
+    panel.errorbar(
+        [value], [place], xerr=[[value - low], [high - value]], fmt="o", markersize=4, capsize=2,
+        linewidth=1.2, color=colour,
+    )  # fmt: skip
+
+
+def page_of(document: Document, folder: Path) -> str:
+    """The sentences, the figure and the tables."""
+    shown = zip(CAPTIONS, tables(document), strict=True)
+    parts: list[Part] = [
+        *sentences(document), Pictures([(CAPTIONS[1], NAME)]),
+        *(part for caption, (head, rows) in shown for part in (Heading(caption), Table(head, rows))),
+        Heading("Margins of the healthy loop, the least"), Table(MARGIN_HEAD, margin_rows(document)),
+        versions_line(document["versions"]),
+    ]  # fmt: skip
+    return as_html("What each mechanism is worth", parts, {NAME: folder / f"{NAME}.png"})
+
+
+def _flat(row: Document) -> Document:
+    """A row of the CSV file: all pairs of a mechanism."""
+    flat: Document = {key: value for key, value in row.items() if not isinstance(value, dict)}
+    for name in CRITERIA:
+        flat |= {f"{name}_{key}": value for key, value in row[name].items()}
+    return flat | {f"tracking_ratio_{key}": value for key, value in row["tracking_ratio"].items()}
+
+
+FILES: Makers = {
+    f"{NAME}.json": lambda document: json.dumps(document, indent=1) + "\n",
+    f"{NAME}.csv": lambda document: as_csv([_flat(row) for row in document["mechanisms"]]),
+    f"{NAME}.png": figure_of,
+    f"{NAME}.html": lambda document: lambda folder: page_of(document, folder),
+}

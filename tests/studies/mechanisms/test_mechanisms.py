@@ -11,7 +11,7 @@ from beaver_ftc.cli.main import app
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
 from beaver_ftc.results.metrics import measure
-from beaver_ftc.scenario.undeclared import undeclared
+from beaver_ftc.scenario.declared import undeclared
 from beaver_ftc.studies.mechanisms import command, effects, survey
 from beaver_ftc.studies.mechanisms.effects import CRITERIA, document_of, effect_of, net
 from beaver_ftc.studies.mechanisms.shown import finding, sentences

@@ -8,9 +8,9 @@ from typing import Annotated
 
 import typer
 
+from beaver_ftc.commands import Reporter, StudyCommand, WorkersOption
 from beaver_ftc.results.metrics import versions
 from beaver_ftc.results.model import Document
-from beaver_ftc.studies.engine.command import Reporter, StudyCommand, WorkersOption
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.mechanisms.effects import document_of
 from beaver_ftc.studies.mechanisms.shown import FILES, NAME, as_text

@@ -20,9 +20,9 @@ from beaver_ftc.loop.readout import withhold_from_law
 from beaver_ftc.results.log import Columns, MemoryLog
 from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.model import Document, Metrics
-from beaver_ftc.scenario.environment import air_of
+from beaver_ftc.scenario.airframe import air_of
+from beaver_ftc.scenario.declared import undeclared
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.scenario.undeclared import undeclared
 from beaver_ftc.studies.compare.margins_in_flight import margins_of
 from beaver_ftc.studies.mechanisms.systems import (
     CONSTANT,

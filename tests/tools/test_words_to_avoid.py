@@ -12,6 +12,12 @@ TABLE = """
 | foretell*, foretold | predict | archaic |
 | told apart | distinguished | idiom |
 
+## Avoided in a folder
+
+| avoid | where | use |
+|---|---|---|
+| beside, doubt* | src/detectors/* | with |
+
 ## Exceptions
 
 | term | where | reason |
@@ -31,6 +37,8 @@ TABLE = """
         ("src/a.py", "x = 1  # is predicted\nforest = unforetold = 2\n", []),
         ("src/contract/a.py", 'key = "foretold"\nforetell = 1\n', [2]),
         ("docs/a.md", "One.\nIt is told apart.\n", [2]),
+        ("src/detectors/a.py", "doubtful = 1\nx = 2  # beside\n", [1, 2]),
+        ("src/laws/a.py", "x = 2  # beside\n", []),
     ],
 )
 def test_where_a_term_is_found(name, text, lines):

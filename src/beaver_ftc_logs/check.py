@@ -51,7 +51,7 @@ _HINTS = {"rad_s": "rad/s", "rad/s": "rad/s", "deg_s": "deg/s", "deg/s": "deg/s"
 _PWM = (700.0, 2300.0)
 _FAST_RAD_S = 12.0
 _AGREE = 0.7
-_MOST_COMMANDS, _MOST_READ = 8, 60
+_MAX_COMMANDS, _MAX_COLUMNS = 8, 60
 _RATE_HZ = (4.0, 2000.0)
 
 
@@ -181,7 +181,7 @@ def _candidates(names: Iterable[str]) -> list[str]:
     """Columns of a table that may be something: a wide one is not read whole."""
     pattern = "|".join(f"({one})" for one in _NAMES.values())
     known = [name for name in names if re.fullmatch(pattern, _spelled(name)) or _may_command(name)]
-    return known[:_MOST_READ]
+    return known[:_MAX_COLUMNS]
 
 
 def _may_command(name: str) -> bool:
@@ -202,7 +202,7 @@ def _first(pattern: str, names: Sequence[str]) -> str | None:
 
 def _commands(names: Sequence[str], found: dict[str, str | None]) -> list[str]:
     taken = set(found.values())
-    return [name for name in names if _may_command(name) and name not in taken][:_MOST_COMMANDS]
+    return [name for name in names if _may_command(name) and name not in taken][:_MAX_COMMANDS]
 
 
 def _time(path: Path, lines: list[str]) -> tuple[str, str]:

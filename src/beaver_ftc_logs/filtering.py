@@ -50,7 +50,7 @@ def posterior_of(samples: Samples, model: Model, bank: Bank) -> tuple[Floats, Fl
     if model.colours and not samples.colour:
         return _by_colours(samples, model, bank)
     own, delays_s = model.with_noise_model(samples.colour), model.settings.delays_s
-    runs = [_filtered(_later(samples, delay_s), own, bank) for delay_s in delays_s]
+    runs = [_filtered(_with_delay(samples, delay_s), own, bank) for delay_s in delays_s]
     return _mean(_weights([run[3] for run in runs], model.rate_hz), runs)
 
 
@@ -113,7 +113,7 @@ def accumulated(gained, most):
     return found
 
 
-def _later(samples: Samples, delay_s: float) -> Samples:
+def _with_delay(samples: Samples, delay_s: float) -> Samples:
     """The flight with commands that act by so much later, less than a sample, than the model says.
 
     Sooner takes from the command of the same sample, which is known; never from a later one: a command enters

@@ -346,7 +346,7 @@ def dispersion(stretches: Sequence[Stretch], model: Model) -> float:
         for one in kept:
             x, e = _answers(tested, one)
             x = x.sum(axis=3)[:, :, told].reshape(e.size, -1)
-            farther, rank = _farther(x, e.ravel(), _between(tested, told))
+            farther, rank = _farther(x, e.ravel(), _gain_covariance(tested, told))
             squares, number = squares + farther, number + rank
     return squares / number
 
@@ -359,7 +359,7 @@ def _widened(stretches: Sequence[Stretch], model: Model) -> Model:
     found: dict[tuple[float, ...], list[float]] = {}
     for tested, kept in _left_out(stretches, model, trust.tied(whole, model).tolist()):
         told = np.array(trust.claimed(tested))
-        between: Floats = np.asarray(np.kron(_between(tested, told), np.ones((3, 3))), dtype=float)
+        between: Floats = np.asarray(np.kron(_gain_covariance(tested, told), np.ones((3, 3))), dtype=float)
         for one in kept:
             x, e = _answers(tested, one)
             x = x[:, :, told].reshape(*e.shape, -1)
@@ -381,7 +381,7 @@ def _of_gyros(colour: Sequence[float]) -> bool:
     return len(colour) > 1 and colour[1] < 0.0
 
 
-def _between(model: Model, told: NDArray[np.bool_]) -> Floats:
+def _gain_covariance(model: Model, told: NDArray[np.bool_]) -> Floats:
     """Covariance of the gains of groups told that the filter leaves free."""
     free = adaptation_of(model).covariance[3:, 3:]
     return np.asarray(free[0, 0] + np.diag(np.diag(free)[1:][told]))
@@ -400,7 +400,7 @@ def _farther(x: Floats, e: Floats, between: Floats) -> tuple[float, int]:
 def _answers(model: Model, kept: Stretch) -> tuple[Floats, Floats]:
     """What each axis of each group's answer does to the residuals (n, 3) of a part, (n, 3, G, 3), both in sd
     of the noise, without means."""
-    _, residual, answers = left_white(model, kept)
+    _, residual, answers = whitened_residual(model, kept)
     whiten = np.linalg.inv(np.linalg.cholesky(np.array(model.with_noise_model(kept.samples.colour).noise))).T
     x, e = np.einsum("nga,ab->nbga", answers, whiten), residual @ whiten
     return x - x.mean(axis=0), e - e.mean(axis=0)
@@ -416,7 +416,7 @@ def _drift(stretches: Sequence[Stretch], model: Model) -> list[float]:
     for fitted, kept in _parts(stretches):
         like = fit_like(fitted, model)
         for one in kept:
-            rows, residual, _ = left_white(like, one)
+            rows, residual, _ = whitened_residual(like, one)
             noise = np.array(like.with_noise_model(one.samples.colour).noise)
             white = residual / np.sqrt(np.maximum(np.diag(noise), TINY))
             for begin, end in _runs(rows):
@@ -627,7 +627,7 @@ def prediction(model: Model, kept: Stretch) -> Document:
     }
 
 
-def left_white(model: Model, kept: Stretch) -> tuple[NDArray[np.int64], Floats, Floats]:
+def whitened_residual(model: Model, kept: Stretch) -> tuple[NDArray[np.int64], Floats, Floats]:
     """Places (n,) of the samples in use, the unpredicted part of the residual (n, 3), and answers
     (n, G, 3) as they show in it."""
     ok, unexplained, answers = regression.in_white(kept.samples, model, scaled=True)

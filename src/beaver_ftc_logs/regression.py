@@ -172,7 +172,7 @@ def _newey_west(z: Floats, e: Floats, inverse: Floats, run: NDArray[np.int64], r
     return np.sqrt(np.maximum(np.diag(inverse @ middle @ inverse), 0.0))
 
 
-def at_most(x: Floats, y: Floats, power: float) -> tuple[Floats, Floats]:
+def coefficient_bounds(x: Floats, y: Floats, power: float) -> tuple[Floats, Floats]:
     """Least squares of y (n,) on x (n, m): what each coefficient surely does not exceed, (m,), which is much
     where columns make one another up; and squares of what is left (n,). power: as in `Settings`."""
     size = np.maximum(np.sqrt((x**2).mean(axis=0)), TINY)

@@ -16,7 +16,7 @@ from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.loop import FLOW, Diagnosis
 from beaver_ftc_logs.diagnose import UNKNOWN, Rows
 from beaver_ftc_logs.recording import TINY, Floats
-from beaver_ftc_logs.regression import at_most, quarters
+from beaver_ftc_logs.regression import coefficient_bounds, quarters
 
 LOSS = "loss_of_effectiveness"
 STANDS_S = 1.0
@@ -79,7 +79,7 @@ def _gains(innovation: Floats, expected: Floats) -> Floats:
     x = np.concatenate([np.broadcast_to(np.eye(3), (len(expected), 3, 3)), expected / white[:, None]], axis=2)
     y, found = innovation / white, np.full(expected.shape[2], -np.inf)
     for part in parts:
-        theta, _ = at_most(x[part].reshape(3 * len(part), -1), y[part].ravel(), _POWER)
+        theta, _ = coefficient_bounds(x[part].reshape(3 * len(part), -1), y[part].ravel(), _POWER)
         found = np.maximum(found, 1.0 + theta[3:])
     return found
 

@@ -293,7 +293,7 @@ def _likely_in_parts(samples: Samples, model: Model) -> tuple[Floats, float] | N
     rows = np.flatnonzero(ok)
     if (parts := regression.quarters(rows[:: max(len(rows) // _ENOUGH, 1)])) is None:
         return None
-    noises = [_noise(regression.at_most(*_stacked(part, unexplained, answers, whiten), power)[1])
+    noises = [_noise(regression.coefficient_bounds(*_stacked(part, unexplained, answers, whiten), power)[1])
               for part in parts]  # fmt: skip
     return -size - 1.5 * np.log(noises), power * min(map(len, parts))
 
@@ -333,9 +333,9 @@ def _in_all_parts(samples: Samples, model: Model) -> _InAll | None:
     noises, both = [], np.concatenate([answers, columns], axis=1)
     for part in parts:
         flat, y = _stacked(part, unexplained, both, whiten)
-        gain, square = regression.at_most(flat[:, : 3 + groups], y, power)
-        less, _ = regression.at_most(-flat[:, : 3 + groups], y, power)
-        share, _ = regression.at_most(flat, y, power)
+        gain, square = regression.coefficient_bounds(flat[:, : 3 + groups], y, power)
+        less, _ = regression.coefficient_bounds(-flat[:, : 3 + groups], y, power)
+        share, _ = regression.coefficient_bounds(flat, y, power)
         gains, least = np.maximum(gains, gain[3:]), np.minimum(least, -less[3:])
         shares = np.maximum(shares, 1.0 + share[3 + groups :])  # what the past does is taken off already
         noises.append(_noise(square))

@@ -89,7 +89,7 @@ def of(surface, *names):
 def of_stages(fdi, kernel):
     """What the arguments of kernels are called, of the stages of one diagnosis."""
     types, whole = fdi["types"], kernel.__module__.startswith("beaver_ftc.diagnosis.types")
-    later = kernel.__name__ in ("whereabouts",) or kernel.__name__.startswith("deflection")
+    later = "deflection" in kernel.__name__
     return {
         "config": types["config"] if whole else fdi["config"], "types": types, "surfaces": types["surface"],
         "pair": types["pair"], "conclusion": fdi["verdict"], "layout": fdi["layout"],

@@ -65,7 +65,7 @@ from beaver_ftc.scenario.diagnosis import MAX_POLES
 from beaver_ftc.scenario.schema import Scenario
 
 EMPTY_SET = (1.0, -1.0)
-SEARCH_ROUNDS = 4  # each round reduces the remaining travel to the share of it that the tolerance is
+N_SEARCH_ROUNDS = 4  # each round reduces the remaining travel to the share of it that the tolerance is
 
 
 @kernel
@@ -125,7 +125,7 @@ def widen_by_own_errors(fie, bound, innovation, instants):
     level = level_at_position(mapped, fie, where, instants)
     value = innovation[axis] - effect.offset[axis]
     earlier = 2.0 * before / instants if instants > 1 else 0.0
-    for _ in range(SEARCH_ROUNDS):
+    for _ in range(N_SEARCH_ROUNDS):
         own = max(bound.surface_error_per_rad[axis, s] * (reach + earlier) - bound.own[axis, s], 0.0)
         own += bound.further_error[level, axis]
         low, high = consistent_parameters(
@@ -522,11 +522,11 @@ def predict_estimators(isolation, bound, x, predicted_acceleration, dt):
 
 
 @kernel
-def update_likelihood_exclusion(fie, tests, blocks, isolation, loss_estimator, abrupt, hidden):
+def update_likelihood_exclusion(fie, tests, blocks, isolation, loss_estimator, abrupt, vane_error_can_hide):
     """Fill `excluded_by_likelihood` of estimator fie; update its `confirmed` and `weakly_excluded`.
 
-    hidden: a gust may hide an error of a vane from the sensor monitor. An exclusion may then be the effect of
-    that error, so all estimators become weakly excluded. loss_of (n,): the estimator of each surface's loss;
+    vane_error_can_hide: a gust may hide an error of a vane from the sensor monitor. An exclusion may then be
+    the effect of that error, so all estimators become weakly excluded. loss_estimator (n,): of each surface;
     abrupt: a fault is declared to stay as it is.
     """
     others, s = isolation.estimator, fie.surface
@@ -543,6 +543,6 @@ def update_likelihood_exclusion(fie, tests, blocks, isolation, loss_estimator, a
         tests, blocks, others, loss_estimator, s, True, abrupt
     )
     fie.weakly_excluded = max(fie.weakly_excluded, 1)
-    if fie.excluded_by_likelihood and hidden:
+    if fie.excluded_by_likelihood and vane_error_can_hide:
         for other in others[: isolation.config.n]:
             other.weakly_excluded = max(other.weakly_excluded, 1)

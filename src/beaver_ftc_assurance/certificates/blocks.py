@@ -1,4 +1,4 @@
-"""Blocks of frames, which types are held against where gyros are noisy (diagnosis/types/examine.py): to every
+"""Blocks of frames, by which types are tested where gyros are noisy (diagnosis/types/registry.py): to every
 rule a block is a frame of several instants, whose bound has the noise of its two ends alone.
 """
 

@@ -98,25 +98,25 @@ def on(day: Day, samples: Samples, past: Floats, noise: Floats) -> Samples:
     """The flight as it might have been on that day. past (3 h, 3) and noise (3, 3) of its model."""
     rng = np.random.default_rng(20)
     effectiveness = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
-    commands = _later(samples.commands, day.late_s / samples.dt_s)
-    slow = _slow(commands, round(_SLOW_S / samples.dt_s))
+    commands = _shifted(samples.commands, day.late_s / samples.dt_s)
+    slow = _running_mean(commands, round(_SLOW_S / samples.dt_s))
     commands = slow + day.excitation * (commands - slow) / (day.gain * day.own)
     wander = day.drift * _wander(rng, commands.shape, 300.0 / samples.dt_s)
     commands = commands + day.neutral + (day.trim + wander) / effectiveness
-    mean = _slow(samples.rates, round(_SLOW_S / samples.dt_s))
+    mean = _running_mean(samples.rates, round(_SLOW_S / samples.dt_s))
     rates = mean + day.excitation * (samples.rates - mean)
     extra = np.sqrt(max(day.noise**2 - min(day.excitation, 1.0) ** 2, 0.0))
     rates = rates + extra * _air(rng, past, noise, len(rates))
     return replace(samples, commands=commands, rates=rates)
 
 
-def _later(values: Floats, length: float) -> Floats:
+def _shifted(values: Floats, length: float) -> Floats:
     """Values that act `length` samples later than these: logged earlier by as much, (n, S)."""
     at = np.arange(len(values)) + length
     return np.column_stack([np.interp(at, np.arange(len(values)), column) for column in values.T])
 
 
-def _slow(values: Floats, length: int) -> Floats:
+def _running_mean(values: Floats, length: int) -> Floats:
     """Centred running mean, (n, S)."""
     from scipy.ndimage import uniform_filter1d
 

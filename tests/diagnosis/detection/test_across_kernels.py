@@ -7,7 +7,7 @@ from kernels import DT, holder, new_fdi
 from statistics_of import Across
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.diagnosis.detection import likelihood, parity, tones
+from beaver_ftc.diagnosis.detection import likelihood, parity
 from beaver_ftc.diagnosis.detection.likelihood import LEAST_UNCERTAINTY_RAD_S2, STEP
 from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, USUAL_SIZE, configure_views
 from beaver_ftc.diagnosis.schemes.adaptive_estimators import parity_excludes
@@ -38,7 +38,7 @@ def fdi(rng):
         block["regressor"] = rng.normal(size=block["regressor"].shape)
         block["tolerance"][:regressors] = rng.uniform(0.1, 0.2, regressors)
     configure_views(statistical, load())
-    tones.configure_tones(statistical["tone_config"], 1e-8, V, 15.0, DT)
+    parity.configure_tones(statistical["tone_config"], 1e-8, V, 15.0, DT)
     air = statistical["air"]
     air["output"]["moving"], air["config"]["rolling_length"], air["memory"]["intensity"] = (
         1,

@@ -10,9 +10,8 @@ from kernels import DT, new_fdi
 from statistics_of import Across
 
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA
-from beaver_ftc.diagnosis.detection import likelihood, parity, tones
-from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, VANE_VIEW
-from beaver_ftc.diagnosis.detection.tones import FREQUENCIES_RAD_S, MEMORY_S, N_TONES
+from beaver_ftc.diagnosis.detection import likelihood, parity
+from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, FREQUENCIES_RAD_S, MEMORY_S, N_TONES, VANE_VIEW
 from beaver_ftc.diagnosis.state import PITCH, SIDE_FORCE, YAW
 
 CHANCE, PACE, V = 1e-11, 15.0, 45.0
@@ -38,7 +37,7 @@ def view(rng):
 @pytest.fixture
 def tone_config():
     tone_config = new_fdi()["statistical"]["tone_config"]
-    tones.configure_tones(tone_config, CHANCE, V, PACE, DT)
+    parity.configure_tones(tone_config, CHANCE, V, PACE, DT)
     return tone_config
 
 
@@ -47,7 +46,7 @@ def listen(view, tone_config, samples, regressors=None, heard=True, has_toleranc
         view["block"]["innovation"][0] = sample
         if regressors is not None:
             view["block"]["regressor_response"][:3, 0] = regressors[k]
-        tones.update_tones(view, tone_config, alarm_level, heard, has_tolerances, DT)
+        parity.update_tones(view, tone_config, alarm_level, heard, has_tolerances, DT)
 
 
 def resonance(samples):
@@ -104,7 +103,7 @@ def test_the_filter_lets_pass_of_a_tone_what_it_does_when_run(view, K_x, K_d, ke
     )
     amplitude = np.hypot(*shares)
     angle = frequency_rad_s * DT
-    found = tones.whitening_gain(K_x, K_d, keep, np.cos(angle), np.sin(angle), DT)
+    found = parity.whitening_gain(K_x, K_d, keep, np.cos(angle), np.sin(angle), DT)
     assert found == pytest.approx(amplitude, rel=1e-9)
 
 
@@ -114,11 +113,11 @@ def test_room_is_what_a_bounded_uncertainty_adds_summed_as_the_tone_is(view, ton
         view["bounded"] = bound
         listen(view, tone_config, np.zeros(EVERY))
     angle = FREQUENCIES_RAD_S * DT
-    passed = np.array([tones.whitening_gain(0.3, 0.8, 1.0, np.cos(a), np.sin(a), DT) for a in angle])
+    passed = np.array([parity.whitening_gain(0.3, 0.8, 1.0, np.cos(a), np.sin(a), DT) for a in angle])
     age_s = EVERY * DT * np.arange(len(bounds))[::-1]
     faded = EVERY * np.exp(-age_s / MEMORY_S) * bounds
     beat = np.abs(np.exp(np.multiply.outer(2j * FREQUENCIES_RAD_S, age_s)) @ faded)
-    mean = tones.bounded_gain_at(FREQUENCIES_RAD_S, PACE)
+    mean = parity.bounded_gain_at(FREQUENCIES_RAD_S, PACE)
     assert view["tones"]["uncertainty_part"] == pytest.approx(2.0 * passed * mean * (faded.sum() + beat))
 
 
@@ -142,7 +141,7 @@ def test_of_a_bounded_uncertainty_no_more_is_heard_than_of_the_steepest_wave(x, 
     triangle = np.arcsin(np.cos(phase))  # of slope one
     wave = np.clip(triangle / x, -1.0, 1.0) if steep else triangle / x
     assert np.mean(np.cos(phase) * wave) == pytest.approx(
-        tones.bounded_gain_at(np.array([x]), 1.0)[0], rel=1e-6
+        parity.bounded_gain_at(np.array([x]), 1.0)[0], rel=1e-6
     )
 
 
@@ -156,7 +155,7 @@ def test_no_periodic_uncertainty_of_that_pace_is_heard_louder(steps, x):
     )  # slopes within 1 / x, whatever the mean was
     wave -= 0.5 * (wave.max() + wave.min())
     wave /= max(1.0, np.abs(wave).max())
-    most = tones.bounded_gain_at(np.array([x]), 1.0)[0]
+    most = parity.bounded_gain_at(np.array([x]), 1.0)[0]
     assert abs(np.mean(np.exp(1j * phase) * wave)) <= most * (1.0 + 1e-3)
 
 
@@ -164,7 +163,7 @@ def test_no_periodic_uncertainty_of_that_pace_is_heard_louder(steps, x):
 def test_the_slack_of_one_coefficient_is_its_magnitude_and_at_most_a_twelfth_more(parts):
     record = new_fdi()["statistical"]["views"][0]["tones"]
     record["overlap"][0, :, 4], size = parts, np.hypot(*parts)
-    tones.fill_coefficient_part(record, np.array([0.3]), 1)
+    parity.fill_coefficient_part(record, np.array([0.3]), 1)
     assert 0.3 * size * (1.0 - 1e-12) <= record["coefficient_part"][4] <= 0.3 * 1.0825 * size + 1e-300
     assert record["coefficient_part"][5] == 0.0
 
@@ -173,7 +172,7 @@ def test_slacks_of_several_coefficients_add_up_and_only_of_those_there_are(view,
     record = view["tones"]
     record["overlap"][:] = 9.0
     record["overlap"][:2, 0], record["overlap"][:2, 1], record["coefficient_part"] = -3.0, 0.0, 7.0
-    tones.fill_coefficient_part(record, np.array([0.1, 0.2, 0.4]), 2)
+    parity.fill_coefficient_part(record, np.array([0.1, 0.2, 0.4]), 2)
     assert record["coefficient_part"] == pytest.approx(np.full(N_TONES, 0.9))
 
 
@@ -193,14 +192,14 @@ def test_the_score_is_that_of_the_loudest_beyond_what_is_explained(view, tone_co
     record = view["tones"]
     record["information"], record["tone"][0, 3], record["tone"][1, 3] = 100.0, 60.0, 80.0
     record["coefficient_part"][3], record["tone"][0, 7], tone_config["noise_variance"][:] = 10.0, 12.0, 0.6
-    tones.fill_score(record, tone_config, 6.0)
+    parity.fill_score(record, tone_config, 6.0)
     root = sqrt(100.0 * tone_config["noise_variance"][3])
     assert record["score"] == pytest.approx(90.0 / root * 6.0 / LEVEL)
     record["uncertainty_part"][3] = 200.0
-    tones.fill_score(record, tone_config, 6.0)
+    parity.fill_score(record, tone_config, 6.0)
     assert record["score"] == pytest.approx(90.0 / (200.0 / LEVEL + 0.5 * root) * 6.0 / LEVEL)
     record["tone"][:] = 0.0
-    tones.fill_score(record, tone_config, 6.0)
+    parity.fill_score(record, tone_config, 6.0)
     assert record["score"] == 0.0
 
 
@@ -219,7 +218,7 @@ def test_an_aircraft_that_has_all_but_stopped_or_tumbles_is_not_listened_to(tone
         y[AIRSPEED] = V
         for place, value in changed.items():
             y[{"V": AIRSPEED, "alpha": ALPHA, "beta": BETA}[place]] = value
-        return tones.is_within_envelope(tone_config, y)
+        return parity.is_within_envelope(tone_config, y)
 
     assert flow()
     assert flow(V=23.0)

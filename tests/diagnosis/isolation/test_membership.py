@@ -88,7 +88,7 @@ def test_how_far_a_surface_can_have_been_is_narrowed_round_by_round(instants):
     fie["largest_deflection"] = 0.3
     earlier = 2.0 * 0.3 / instants if instants > 1 else 0.0
     reach = 0.6
-    for _ in range(isolation.SEARCH_ROUNDS):
+    for _ in range(isolation.N_SEARCH_ROUNDS):
         room = 0.05 + 0.01 + max(0.4 * (reach + earlier) - 0.02, 0.0)
         reach = min(reach, (1.0 + room) / 5.0)
     on(isolation.widen_by_own_errors, fdi, fie)

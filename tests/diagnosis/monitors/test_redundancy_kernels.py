@@ -14,7 +14,7 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     BETA_FLOW,
     CLIMB,
     DENSITY,
-    PRESSURE,
+    MANIFOLD_PRESSURE,
     QDYN,
     RPM,
     SPEED,
@@ -312,9 +312,11 @@ def test_a_whole_look_finds_sound_instruments_sound_and_a_wrong_one_wrong(engine
     redundancy.run_tests(step, signal, engine)
     assert (step["test"]["share"][:CLIMB] < 1.0).all()
     # 100 rpm too fast where 10 are declared, 0.5 inHg too low where a quarter is
-    shares = step["test"]["share"][[RPM, PRESSURE]]
+    shares = step["test"]["share"][[RPM, MANIFOLD_PRESSURE]]
     assert shares == pytest.approx([10.0, 2.0] if engine else [0.0, 0.0], rel=1e-5)
-    assert step["test"]["residual"][[RPM, PRESSURE]] == pytest.approx([100.0, -0.5] if engine else [0, 0])
+    assert step["test"]["residual"][[RPM, MANIFOLD_PRESSURE]] == pytest.approx(
+        [100.0, -0.5] if engine else [0, 0]
+    )
 
 
 def test_a_reading_that_jumps_fails_its_own_test():

@@ -17,10 +17,10 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     BETA_FLOW,
     CLIMB,
     DENSITY,
+    MANIFOLD_PRESSURE,
     N_TESTS,
     NO,
     NO_SENSOR,
-    PRESSURE,
     PSI,
     QDYN,
     RPM,
@@ -118,7 +118,7 @@ def suspects(shares, lead=None, **fields):
         ({CLIMB: 3.0, SPEED: 2.0}, set()),  # the altitude is in no other test
         ({DENSITY: 3.0, CLIMB: 2.0}, {AIRSPEED}),  # nor is the dynamic pressure
         ({RPM: 2.0}, {ENGINE_SPEED}),
-        ({PRESSURE: 2.0}, {MANIFOLD}),
+        ({MANIFOLD_PRESSURE: 2.0}, {MANIFOLD}),
         ({ALPHA_FLOW: 5.0}, {ALPHA, *FORCES}),
         ({BETA_FLOW: 5.0}, {BETA, *FORCES}),
         ({ALPHA_FLOW: 2.0}, {ALPHA, 1, *FORCES}),  # its gyro need not show yet: within twice both bounds

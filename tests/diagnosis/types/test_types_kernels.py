@@ -6,12 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from kernels import new_fdi, on, put, put_on
 
-from beaver_ftc.diagnosis.types import contract, examine
+from beaver_ftc.diagnosis.types import contract, registry
 from beaver_ftc.diagnosis.types.registry import N_TYPES, TYPES
-from beaver_ftc.diagnosis.types.table import (
-    commanded_surface,
-    held_surface,
-)
+from beaver_ftc.diagnosis.types.table import commanded_surface, held_surface
 from fault_kinds import (
     BIAS,
     CONSTANT_LOSS,
@@ -42,7 +39,7 @@ def new_surface(left=ALL, low=-0.01, high=0.01, command=0.0, **fields):
         surface["actuator"]["step"],
     ) = LOW, HIGH, 0.5, 0.1
     surface["actuator"]["reach_low"], surface["actuator"]["reach_high"] = min(LOW, 0.0), max(HIGH, 0.0)
-    examine.restart_surface(surface)
+    registry.restart_surface(surface)
     surface["feasible"]["low"][BIAS], surface["feasible"]["high"][BIAS] = -np.inf, np.inf
     surface["judged"]["low"], surface["judged"]["high"], surface["judged"]["command"] = low, high, command
     surface["feasible"]["excluded"] = [kind not in left for kind in range(N_TYPES)]
@@ -68,7 +65,7 @@ def test_what_is_known_of_a_surface_as_it_begins():
         5,
     )
     surface["elapsed"]["low"], surface["elapsed"]["high"] = 0.1, 0.2
-    examine.restart_surface(surface)
+    registry.restart_surface(surface)
     assert not surface["feasible"]["excluded"].any()
     assert (
         surface["evidence"]["frames"],
@@ -143,7 +140,7 @@ def test_a_surface_stands_nowhere_once_where_it_was_contradicts_itself(interval,
     assert surface["feasible"]["excluded"][STUCK]
     for place in (-0.1, 0.02, 0.15, 0.19, 0.45):
         surface["judged"]["low"], surface["judged"]["high"] = place - 1e-3, place + 1e-3
-        assert examine.agrees_with_rest(surface) == (stands and 0.0 <= place <= 0.2), place
+        assert registry.agrees_with_rest(surface) == (stands and 0.0 <= place <= 0.2), place
 
 
 def test_an_offset_is_unlimited_at_a_stop():
@@ -353,12 +350,15 @@ def test_a_runaway_has_gone_at_least_its_way(length, ways):
     fdi["types"]["config"]["length"] = length
     for frame, way in zip((3, 4, 8), ways, strict=True):
         assert on(held_surface.runaway_travel, fdi, surface, frame) == pytest.approx(way)
-        assert on(held_surface.least_up, fdi, surface, frame) == pytest.approx(0.1 + way)
-        assert on(held_surface.least_down, fdi, surface, frame) == pytest.approx(0.2 - way)
-    assert on(held_surface.least_up, fdi, surface, 99) == HIGH
-    assert on(held_surface.least_down, fdi, surface, 99) == LOW
+        assert on(held_surface.least_upward_deflection, fdi, surface, frame) == pytest.approx(0.1 + way)
+        assert on(held_surface.least_downward_deflection, fdi, surface, frame) == pytest.approx(0.2 - way)
+    assert on(held_surface.least_upward_deflection, fdi, surface, 99) == HIGH
+    assert on(held_surface.least_downward_deflection, fdi, surface, 99) == LOW
     surface["evidence"]["started_at"] = -1
-    assert (on(held_surface.least_up, fdi, surface, 9), on(held_surface.least_down, fdi, surface, 9)) == (
+    assert (
+        on(held_surface.least_upward_deflection, fdi, surface, 9),
+        on(held_surface.least_downward_deflection, fdi, surface, 9),
+    ) == (
         LOW,
         HIGH,
     )
@@ -423,8 +423,8 @@ def test_where_types_have_a_surface():
     assert on(held_surface.float_deflection, fdi, surface, FLOAT) == (0.1, 0.1)
     assert held_surface.neutral_deflection(fdi, 0, FLOAT) == 0.1
     surface["actuator"]["travel_low"] = LOW
-    assert on(held_surface.deflection_up, fdi, surface, UP) == pytest.approx((0.14, HIGH))
-    assert on(held_surface.deflection_down, fdi, surface, DOWN) == pytest.approx((LOW, 0.16))
+    assert on(held_surface.hardover_up_deflection, fdi, surface, UP) == pytest.approx((0.14, HIGH))
+    assert on(held_surface.hardover_down_deflection, fdi, surface, DOWN) == pytest.approx((LOW, 0.16))
     assert [TYPES[kind].estimate(fdi, 0, kind) for kind in (FLOAT, UP, DOWN)] == [
         0.0,
         HIGH,

@@ -7,7 +7,7 @@ from kernels import new_fdi, on, put, put_on
 from beaver_ftc.diagnosis import conclusion
 from beaver_ftc.diagnosis.expectation import means_dtype
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, UNANTICIPATED, YAW
-from beaver_ftc.diagnosis.types import contract, examine, pairs, verdict
+from beaver_ftc.diagnosis.types import contract, pairs, registry, verdict
 from beaver_ftc.diagnosis.types.contract import GIVE_UP, SCALE_COMMAND, SUBTRACT_OFFSET, WAIT_FOR_SURFACE
 from beaver_ftc.diagnosis.types.registry import N_TYPES
 from beaver_ftc.diagnosis.types.verdict import BY_DEDUCTION, NO_SURFACE, RULED_OUT, SEVERAL_SURFACES
@@ -112,10 +112,10 @@ NOBODY_ELSE = {"aileron": None, "elevator": None, "flap": None}
 )
 def test_questions_about_the_types_left(kinds, constant, explained):
     _, surface = one(*kinds)
-    assert sum(map(bool, (verdict.is_left(surface, kind) for kind in ALL))) == len(kinds)
-    assert all(verdict.is_left(surface, kind) for kind in kinds)
-    assert bool(verdict.any_constant_type_left(surface)) == constant
-    assert bool(verdict.any_type_left(surface)) == (kinds != ())
+    assert sum(map(bool, (verdict.type_remains(surface, kind) for kind in ALL))) == len(kinds)
+    assert all(verdict.type_remains(surface, kind) for kind in kinds)
+    assert bool(verdict.any_constant_type_remains(surface)) == constant
+    assert bool(verdict.any_type_remains(surface)) == (kinds != ())
     for k, half_cycles in enumerate((2, 3)):
         surface["oscillatory"]["half_cycles"] = half_cycles
         assert bool(verdict.is_explained(surface)) == explained[k]
@@ -365,19 +365,19 @@ def test_the_lead_is_taken_on_one_surface_while_its_fault_shows():
     )
     surface["elapsed"]["low"], surface["elapsed"]["high"] = 0.1, 0.2
     fdi["types"]["surface"]["accommodation"]["mode"] = 3
-    take_lead(fdi, verdict.choose_lead, fdi["verdict"]["isolated"])
+    take_lead(fdi, verdict.choose_accommodated_surface, fdi["verdict"]["isolated"])
     assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (RUDDER, GIVE_UP)
     assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [-1, -1, GIVE_UP, -1]
     surface["elapsed"]["low"], surface["elapsed"]["high"] = 0.25, 0.35  # it follows its command again
     fdi["types"]["config"]["dt"] = 0.01
     for _ in range(19):
-        take_lead(fdi, verdict.choose_lead, fdi["verdict"]["isolated"])
+        take_lead(fdi, verdict.choose_accommodated_surface, fdi["verdict"]["isolated"])
     assert fdi["verdict"]["lead"] == RUDDER
-    take_lead(fdi, verdict.choose_lead, fdi["verdict"]["isolated"])
+    take_lead(fdi, verdict.choose_accommodated_surface, fdi["verdict"]["isolated"])
     assert fdi["verdict"]["lead"] == NO_SURFACE
     assert surface["accommodation"]["mode"] == -1
     surface["elapsed"]["low"] = 0.1
-    take_lead(fdi, verdict.choose_lead, fdi["verdict"]["isolated"])
+    take_lead(fdi, verdict.choose_accommodated_surface, fdi["verdict"]["isolated"])
     assert (surface["accommodation"]["frames_absent"], fdi["verdict"]["lead"]) == (0, RUDDER)
     assert on(verdict.fault_is_present, fdi, surface, SCALE_COMMAND, True)
 
@@ -430,7 +430,7 @@ def test_orders_are_kept_for_the_frames_before():
             fdi["types"]["config"]["length"], fdi["types"]["block"]["filled"] = 2, k
             means["G_least"], means["G_most"] = -1.0 - order, 2.0 - k
             means["u_least"], means["u_most"] = order - 0.01, order + 0.02
-            on(examine.record_commands, fdi, np.full(4, order), means)
+            on(registry.record_commands, fdi, np.full(4, order), means)
     commands = fdi["types"]["surface"][0]["commands"]
     assert commands["given"][:, :2] == pytest.approx(
         np.array([[0.5, 0.0], [0.3, -0.1], [0.1, 0.2]])
@@ -488,7 +488,7 @@ def test_a_surface_is_where_the_innovation_puts_it():
 def test_wrong_frames_are_remembered_for_two_more():
     fdi, bound = new_case(), np.full(3, 0.1)
     for innovation in (0.2, 0.05, 0.2):
-        on(examine.observe_frame, fdi, np.array([0.0, innovation, 0.0]), bound)
+        on(registry.observe_frame, fdi, np.array([0.0, innovation, 0.0]), bound)
     assert fdi["types"]["surface"]["elapsed"]["anomalous"].tolist() == [1] * 4
     assert fdi["types"]["surface"]["judged"]["anomalous"].tolist() == [0] * 4
     assert fdi["types"]["surface"]["earlier"]["anomalous"].tolist() == [1] * 4
@@ -507,13 +507,13 @@ def test_a_frame_next_to_a_healthy_one_is_judged_only_if_faults_begin_between_fr
     fdi = new_case()
     fdi["types"]["config"]["whole"], fdi["types"]["frame"] = whole, 7
     surface = fdi["types"]["surface"][RUDDER]
-    examine.restart_surface(surface)
+    registry.restart_surface(surface)
     surface["evidence"]["frames"], surface["accommodation"]["mode"] = 5, -1
     surface["earlier"]["anomalous"], surface["judged"]["anomalous"], surface["elapsed"]["anomalous"] = (
         anomalous
     )
     surface["judged"]["low"], surface["judged"]["high"] = 0.1, 0.2
-    on(examine.judge_frame, fdi)
+    on(registry.judge_frame, fdi)
     assert surface["evidence"]["frames"] == (6 if judged else 5)
     assert surface["evidence"]["started_at"] == (6 if judged else -1)
     assert (surface["evidence"]["start_low"], surface["evidence"]["start_high"]) == (
@@ -526,12 +526,12 @@ def test_a_frame_next_to_a_healthy_one_is_judged_only_if_faults_begin_between_fr
 def test_evidence_counts_for_a_swing_since_a_stop_could_last_hide_one():
     fdi = new_case()
     surface = fdi["types"]["surface"][RUDDER]
-    examine.restart_surface(surface)
+    registry.restart_surface(surface)
     counted = []
     for hides in ((0, 0), (0, 0), (0, 1), (0, 0), (1, 0), (0, 0), (0, 0), (0, 0)):
         surface["judged"]["anomalous"], surface["judged"]["stop_hides"] = 1, hides
         surface["judged"]["low"], surface["judged"]["high"] = 0.1, 0.2
-        on(examine.judge_frame, fdi)
+        on(registry.judge_frame, fdi)
         counted.append(int(surface["evidence"]["unhidden_frames"]))
     assert counted == [1, 2, 0, 1, 0, 1, 2, 3]
     assert surface["evidence"]["frames"] == 8
@@ -551,9 +551,9 @@ def test_where_a_stop_is_follows_the_surface_by_a_frame():
 def test_a_frame_that_puts_a_surface_nowhere_judges_nothing():
     fdi = new_case()
     surface = fdi["types"]["surface"][RUDDER]
-    examine.restart_surface(surface)
+    registry.restart_surface(surface)
     surface["judged"]["low"], surface["judged"]["high"] = 0.2, 0.1
-    on(examine.judge_surface, fdi, surface, 6)
+    on(registry.judge_surface, fdi, surface, 6)
     assert surface["evidence"]["started_at"] == -1
 
 
@@ -565,7 +565,7 @@ def rest_frames(low=0.1, high=0.2, frames=1, **fields):
     fdi["types"]["surface"]["evidence"]["frames"] = 0
     put(fdi, **fields)
     for _ in range(frames):
-        on(examine.count_rest, fdi, RUDDER)
+        on(registry.count_rest, fdi, RUDDER)
     return fdi, surface
 
 
@@ -580,7 +580,7 @@ def test_a_quiet_surface_given_up_does_not_swing():
     assert not rest_frames(frames=PATIENCE + 1, has_surface_errors=1)[1]["feasible"]["excluded"][OSCILLATORY]
     fdi, surface = rest_frames()
     fdi["types"]["surface"]["status"]["is_candidate"] = 1, 1, 0, 1
-    on(examine.count_rest, fdi, RUDDER)
+    on(registry.count_rest, fdi, RUDDER)
     assert fdi["types"]["surface"]["evidence"]["frames"].tolist() == [
         1,
         1,
@@ -602,7 +602,7 @@ def test_a_surface_given_up_is_quiet_where_nothing_is_wrong_and_a_fault_stays(ab
         abrupt,
     )
     fdi["types"]["surface"][RUDDER]["accommodation"]["mode"] = GIVE_UP
-    on(examine.judge_frame, fdi)
+    on(registry.judge_frame, fdi)
     assert fdi["types"]["surface"]["evidence"]["rest_frames"].tolist() == [0, 0, abrupt, 0]
 
 
@@ -621,7 +621,7 @@ def test_a_block_is_the_mean_of_its_frames_with_the_noise_of_its_ends():
         fdi["isolation"]["estimator"]["effect"]["Z"][:8] = Z[k]
         fdi["isolation"]["estimator"]["effect"]["offset"][:8] = offset[k]
         fdi["isolation"]["estimator"]["effect"]["spread"][:8] = spread[k]
-        on(examine.examine_block, fdi)
+        on(registry.examine_block, fdi)
         assert fdi["types"]["block"]["filled"] == (k + 1) % length
         assert fdi["types"]["frame"] == (k + 1 == length)
     assert fdi["types"]["block"]["innovation"] == pytest.approx(innovation.mean(axis=0))
@@ -1086,7 +1086,7 @@ def test_without_anybody_to_act_upon_there_is_no_lead():
     fdi = new_case(aileron=None, elevator=None, rudder=None, flap=None)
     fdi["verdict"]["isolated"] = UNANTICIPATED
     fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"] = 2, 2
-    take_lead(fdi, verdict.choose_lead, fdi["verdict"]["isolated"])
+    take_lead(fdi, verdict.choose_accommodated_surface, fdi["verdict"]["isolated"])
     assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (NO_SURFACE, -1)
     assert (fdi["types"]["surface"]["accommodation"]["mode"] == -1).all()
 

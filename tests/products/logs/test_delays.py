@@ -22,7 +22,7 @@ MODEL = small.model(
 def test_commands_that_act_sooner_or_later(delay_s, share, later):
     """So much of the command of the sample before, or of the one after; the ends repeated."""
     samples = small.flight(MODEL, 12)
-    found = filtering._later(samples, delay_s).commands
+    found = filtering._with_delay(samples, delay_s).commands
     at = np.clip(np.arange(12) + (-1 if later else 1), 0, 11)
     np.testing.assert_allclose(
         found, (1 - share) * samples.commands + share * samples.commands[at], atol=1e-15
@@ -31,7 +31,7 @@ def test_commands_that_act_sooner_or_later(delay_s, share, later):
 
 def test_no_delay_changes_nothing():
     samples = small.flight(MODEL, 12)
-    assert filtering._later(samples, 0.0) is samples
+    assert filtering._with_delay(samples, 0.0) is samples
 
 
 def test_delays_are_weighed_by_the_evidence_of_ten_minutes():
@@ -51,7 +51,7 @@ def test_what_all_delays_say_together(changed):
     """The mean of what each alone does, by its weight, sample by sample."""
     samples, bank = small.flight(MODEL, 150, lost=((1, 50, 150, 0.4),)), bank_of(MODEL)
     together = filtering.posterior_of(samples, MODEL, bank)
-    runs = [filtering._filtered(filtering._later(samples, delay_s), MODEL, bank) for delay_s in DELAYS_S]
+    runs = [filtering._filtered(filtering._with_delay(samples, delay_s), MODEL, bank) for delay_s in DELAYS_S]
     weights = filtering._weights([run[3] for run in runs], 10.0)
     for part, found in enumerate(together):
         each = np.stack([run[part] for run in runs])

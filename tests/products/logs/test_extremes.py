@@ -97,7 +97,7 @@ def test_a_drift_of_the_trim_is_told_from_noise(monkeypatch):
     series = np.column_stack([white[:, 0], coloured[:, 1], white[:, 2] + 0.05 * walk[:, 2]])
     series = series * np.sqrt(np.diag(np.array(model.noise)))
     monkeypatch.setattr(fitting, "fit_like", lambda fitted, like: like)
-    monkeypatch.setattr(fitting, "left_white", lambda like, kept: (np.arange(n), series, None))
+    monkeypatch.setattr(fitting, "whitened_residual", lambda like, kept: (np.arange(n), series, None))
     stretches = fitting.stretches_of([small.flight(model, 60)])
     found = fitting._drift(stretches, model)
     assert max(found[:2]) < 0.01

@@ -8,7 +8,7 @@ import pytest
 
 from beaver_ftc_logs import filtering
 from beaver_ftc_logs.bank import Noise, adaptation_of, bank_of
-from beaver_ftc_logs.filtering import _later, _update, _weights, posterior_of
+from beaver_ftc_logs.filtering import _update, _weights, _with_delay, posterior_of
 from beaver_ftc_logs.samples import load_flights
 from products.logs import synthetic
 from telling import apart
@@ -25,7 +25,7 @@ def delays_of(samples, model):
     bank = bank_of(model)
     from beaver_ftc_logs.filtering import _filtered
 
-    evidence = [_filtered(_later(samples, d), model, bank)[3] for d in model.settings.delays_s]
+    evidence = [_filtered(_with_delay(samples, d), model, bank)[3] for d in model.settings.delays_s]
     return _weights(evidence, model.rate_hz)
 
 

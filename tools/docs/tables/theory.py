@@ -4,7 +4,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import aircraft
 from beaver_ftc.diagnosis import bounds
-from beaver_ftc.diagnosis.detection import likelihood, noise_model, statistical, tones
+from beaver_ftc.diagnosis.detection import likelihood, noise_model, parity, statistical
 from beaver_ftc.diagnosis.monitors import redundancy
 from beaver_ftc.plant import instruments
 from beaver_ftc.scenario.diagnosis import Bounds, FdiConfig, Statistical
@@ -22,9 +22,9 @@ CONSTANTS = (  # (section, meaning, module, name there, unit)
     (7, "share of the level reserved for noise", noise_model, "CHANCE", ""),
     (7, "rate of the signature of a growing loss", noise_model, "GROWTH_PER_S", "1/s"),
     (7, "least share of the best ratio that a constant loss explains", statistical, "MIN_CONSTANT_SHARE", ""),
-    (7, "number of frequencies of the oscillation tests", tones, "N_TONES", ""),
-    (7, "range of these frequencies", tones, "FREQUENCIES_RAD_S", "rad/s"),
-    (7, "memory of the oscillation tests", tones, "MEMORY_S", "s"),
+    (7, "number of frequencies of the oscillation tests", parity, "N_TONES", ""),
+    (7, "range of these frequencies", parity, "FREQUENCIES_RAD_S", "rad/s"),
+    (7, "memory of the oscillation tests", parity, "MEMORY_S", "s"),
     (9, "poles of the filters", redundancy, "POLES_PER_S", "1/s"),
     (9, "rotation and curvature of the Earth", redundancy, "EARTH_TURN_RAD_S", "rad/s"),
     (

@@ -260,7 +260,7 @@ def _configure_force_tolerances(
     declared: Declared,
     terms: list[Term],
     y: np.ndarray,
-    of_vane: float,
+    vane_slope: float,
     f: int,
     per_chord: float,
 ) -> None:
@@ -272,7 +272,7 @@ def _configure_force_tolerances(
     for k, term in enumerate(terms):
         force["tolerance"][k] = (share + pressure + vane.slope) * abs(term.value)
         if term.is_constant:
-            force["tolerance"][k] += vane.steady * abs(of_vane)
+            force["tolerance"][k] += vane.steady * abs(vane_slope)
     n = len(terms)
     if f == SIDE:
         force["tolerance"][n], n = share + RATE_TOLERANCE[declared.air.moves], n + 1

@@ -30,8 +30,14 @@ from beaver_ftc.diagnosis.detection.likelihood import (
     N_SLOTS,
     STEP,
 )
-from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, Direction, configure_views, views_of
-from beaver_ftc.diagnosis.detection.tones import N_TONES, configure_tones
+from beaver_ftc.diagnosis.detection.parity import (
+    AXIS_VIEW,
+    N_TONES,
+    Direction,
+    configure_tones,
+    configure_views,
+    views_of,
+)
 from beaver_ftc.diagnosis.gusts import (
     FORCE_ERROR_SHARE,
     UNMEASURED_SHARES,

@@ -24,8 +24,7 @@ from beaver_ftc.diagnosis.detection.likelihood import (
     N_READINGS,
     block_dtype,
 )
-from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE, RecordSize, view_dtype
-from beaver_ftc.diagnosis.detection.tones import TONE_CONFIG
+from beaver_ftc.diagnosis.detection.parity import TONE_CONFIG, USUAL_SIZE, RecordSize, view_dtype
 from beaver_ftc.diagnosis.gusts import GUST_RECORD
 from beaver_ftc.diagnosis.state import DAMAGE_POSSIBLE, LOSS
 
@@ -224,7 +223,7 @@ def max_llr(block, surface, ending):
 def confirms_loss(tests, blocks, estimators, loss_estimator, surface):
     """True if a loss of this surface explains the data better than all alternatives, by the naming level.
 
-    estimators: of the isolation; loss_of (n,): the estimator of each surface's loss, or -1. If the estimator
+    estimators: of the isolation; loss_estimator (n,): that of each surface's loss, or -1. If the estimator
     is weakly excluded by DAMAGE_POSSIBLE, excluded losses are alternatives as well.
     """
     every = (

@@ -69,7 +69,9 @@ COUPLING_SHARE = (
 SLOWEST_POLE = 2  # of monitor.POLES_PER_S
 
 # Couplings that are followed with their sign
-Q_TURNS, R_TURNS, G_DOWN, G_ASIDE, G_AHEAD, CLIMBS, ROLLS, YAWS, ALPHA_REMAINDER, BETA_REMAINDER = range(10)
+Q_TURNS, R_TURNS, G_DOWN, G_ASIDE, G_AHEAD, CLIMBS, ROLLS, YAWS, ALPHA_COUPLING_ERROR, BETA_COUPLING_ERROR = (
+    range(10)
+)
 PULLS, PUSHES, FASTER, HEADS = range(10, 14)
 
 
@@ -198,8 +200,8 @@ def fill_flow_reach(step, initial, V, p, q, r):
     )
     c[CLIMBS] = h * V * cb * flat * np.cos(min(steep, 0.5 * np.pi))
     c[ROLLS], c[YAWS] = h * roll, h * yaw
-    c[ALPHA_REMAINDER] = h * abs(sb) * pull / V
-    c[BETA_REMAINDER] = h * np.sin(min(wide, 0.5 * np.pi)) * aslant * aslant_true * abs(normal) / V
+    c[ALPHA_COUPLING_ERROR] = h * abs(sb) * pull / V
+    c[BETA_COUPLING_ERROR] = h * np.sin(min(wide, 0.5 * np.pi)) * aslant * aslant_true * abs(normal) / V
     c[PULLS], c[PUSHES] = h * normal * aslant / V, h * aside / V
 
 
@@ -290,14 +292,16 @@ def tighten_errors(step, initial):
 def tighten_vanes(step, initial, m):
     """The same of incidence and sideslip."""
     c, half = initial.filtered_coupling[:, m], 0.5 * angle_of_chord(initial.error_bound[ALPHA_ERROR])
-    rolled = np.cos(half) * abs(c[ROLLS]) - np.sin(half) * abs(c[YAWS]) - c[ALPHA_REMAINDER]
+    rolled = np.cos(half) * abs(c[ROLLS]) - np.sin(half) * abs(c[YAWS]) - c[ALPHA_COUPLING_ERROR]
     tighten_error_bound(
         initial, ALPHA_ERROR, current_error_part(step, initial, ALPHA_ERROR, CLIMB, m), c[CLIMBS]
     )
     tighten_error_bound(
         initial, ALPHA_ERROR, current_error_part(step, initial, ALPHA_ERROR, BETA_FLOW, m), rolled
     )
-    rolled = np.cos(0.5 * angle_of_chord(initial.error_bound[BETA_ERROR])) * abs(c[ROLLS]) - c[BETA_REMAINDER]
+    rolled = (
+        np.cos(0.5 * angle_of_chord(initial.error_bound[BETA_ERROR])) * abs(c[ROLLS]) - c[BETA_COUPLING_ERROR]
+    )
     tighten_error_bound(
         initial, BETA_ERROR, current_error_part(step, initial, BETA_ERROR, ALPHA_FLOW, m), rolled
     )

@@ -42,7 +42,17 @@ from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sensors import N_IN_EQUATIONS, ROWS, frames_apart, sensor_words
 
-TURN, ANGLE, SPEED, ALPHA_FLOW, BETA_FLOW, DENSITY, CLIMB, RPM, PRESSURE = 0, 3, 6, 7, 8, 9, 10, 11, 12
+TURN, ANGLE, SPEED, ALPHA_FLOW, BETA_FLOW, DENSITY, CLIMB, RPM, MANIFOLD_PRESSURE = (
+    0,
+    3,
+    6,
+    7,
+    8,
+    9,
+    10,
+    11,
+    12,
+)
 N_COMPUTED = 13  # tests with an equation; then those of sensors that should equal another reading
 EQUAL = tuple((SENSORS.index(row.name), row.equal) for row in ROWS if row.equal is not None)
 N_TESTS = N_COMPUTED + len(EQUAL)
@@ -51,7 +61,7 @@ TESTS = {
     "roll": TURN, "pitch": TURN + 1, "yaw": TURN + 2,
     "bank angle": ANGLE, "pitch angle": ANGLE + 1, "heading": ANGLE + 2,
     "speed": SPEED, "incidence": ALPHA_FLOW, "sideslip": BETA_FLOW, "density": DENSITY, "climb": CLIMB,
-    "engine speed": RPM, "manifold pressure": PRESSURE,
+    "engine speed": RPM, "manifold pressure": MANIFOLD_PRESSURE,
 }  # fmt: skip
 # Of each sensor that should equal another reading: its place, that of the reading, the test in which the
 # reading's own errors appear, and by how much the quantities may differ, SI.

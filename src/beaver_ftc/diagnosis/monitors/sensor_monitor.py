@@ -45,6 +45,7 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     EQUAL_READING,
     EQUAL_READING_TEST,
     EQUAL_SENSOR,
+    MANIFOLD_PRESSURE,
     MAX_FORCE_JUMP_M_S2,
     N_COMPUTED,
     N_INITIAL,
@@ -53,7 +54,6 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     NO,
     NO_SENSOR,
     PHI_ERROR,
-    PRESSURE,
     QDYN,
     RPM,
     SPEED,
@@ -530,7 +530,7 @@ def find_suspects(monitor):
     suspect_vane(monitor, ALPHA, ALPHA_FLOW, 1)
     suspect_vane(monitor, BETA, BETA_FLOW, 2)
     who[ALTITUDE] = lead == CLIMB and is_only_exceeded(monitor, CLIMB)
-    who[ENGINE_SPEED], who[MANIFOLD] = lead == RPM, lead == PRESSURE
+    who[ENGINE_SPEED], who[MANIFOLD] = lead == RPM, lead == MANIFOLD_PRESSURE
     frozen = any_suspect_frozen(monitor)
     for i in range(N_INITIAL):
         if not frozen and initial_errors.initial_error_explains(monitor.initial, i, lead):

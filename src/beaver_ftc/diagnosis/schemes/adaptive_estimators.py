@@ -27,7 +27,7 @@ from beaver_ftc.diagnosis.monitors import engine_symmetry, sensor_monitor
 from beaver_ftc.diagnosis.schemes import contract
 from beaver_ftc.diagnosis.schemes.contract import CompiledScheme
 from beaver_ftc.diagnosis.state import UNANTICIPATED, YAW
-from beaver_ftc.diagnosis.types import examine, pairs, verdict
+from beaver_ftc.diagnosis.types import pairs, registry, verdict
 from beaver_ftc.scenario.diagnosis import FdiConfig
 
 
@@ -54,10 +54,10 @@ def isolate_fault(fdi, measured, t, known):
     row, monitor = fdi.config.fault_class, fdi.sensor_monitor
     if not known:
         isolation.start_estimators(fdi.isolation, fdi.bound.noise, measured.x)
-        begin_class(row, fdi)
+        begin_by_class(row, fdi)
     sound = not sensor_monitor.alarm_is_at_start(monitor, fdi.verdict.detected_at_s)
     if sound and sensor_monitor.allows_isolation(monitor, known) and not fdi.engines.output.failed:
-        isolate_class(row, fdi, measured, t, known)
+        isolate_by_class(row, fdi, measured, t, known)
 
 
 @kernel
@@ -72,9 +72,15 @@ def likelihood_excludes(fdi, fie):
     detector, config = fdi.statistical, fdi.config
     if detector.alarm.detected_at_s < 0.0:
         return False
-    hidden = fdi.sensor_monitor.config.enabled and detector.air.output.moving
+    vane_error_can_hide = fdi.sensor_monitor.config.enabled and detector.air.output.moving
     isolation.update_likelihood_exclusion(
-        fie, detector.tests, detector.block, fdi.isolation, fdi.layout.loss_estimator, config.abrupt, hidden
+        fie,
+        detector.tests,
+        detector.block,
+        fdi.isolation,
+        fdi.layout.loss_estimator,
+        config.abrupt,
+        vane_error_can_hide,
     )
     return fie.excluded_by_likelihood == 1
 
@@ -154,7 +160,7 @@ def decide_type(fdi, t, started):
         conclusion.record_finding(found, pairs.decide_pairs(types, found, layout, t))
         return
     if started or fdi.isolation.config.memory:
-        examine.examine_frame(types, layout, records, bank.output.innovation, bound)
+        registry.examine_frame(types, layout, records, bank.output.innovation, bound)
     conclusion.record_finding(found, verdict.decide_surface_and_type(types, found, layout, records, t))
 
 
@@ -166,7 +172,7 @@ def begin_losses(fdi):
 @apart
 def begin_types(fdi):
     """Start the feasible sets of all types (FaultClass)."""
-    examine.restart_types(fdi.types)
+    registry.restart_types(fdi.types)
 
 
 @apart
@@ -177,7 +183,7 @@ def observe_losses(fdi, belief):
 @apart
 def observe_types(fdi, belief):
     """Record the orders to each surface (FaultClass)."""
-    examine.record_commands(fdi.types, belief.commanded, belief.means)
+    registry.record_commands(fdi.types, belief.commanded, belief.means)
 
 
 FAULT_CLASSES = {
@@ -189,9 +195,9 @@ FAULT_CLASSES = {
 }
 PUBLISHED_CLASS = 0  # the place of the published class without statistics
 
-begin_class = one_of([row.begin for row in FAULT_CLASSES.values()])
-observe_class = one_of([row.observe for row in FAULT_CLASSES.values()])
-isolate_class = one_of([row.isolate for row in FAULT_CLASSES.values()])
+begin_by_class = one_of([row.begin for row in FAULT_CLASSES.values()])
+observe_by_class = one_of([row.observe for row in FAULT_CLASSES.values()])
+isolate_by_class = one_of([row.isolate for row in FAULT_CLASSES.values()])
 
 
 def fault_class_number(config: FdiConfig) -> int:
@@ -298,7 +304,7 @@ def predict(fdi, belief, measured, k, t):
     if fdi.statistical.tests.enabled:
         update_statistical_tests(fdi, belief, measured, k, t)
     contract.update_estimators(fdi, belief)
-    observe_class(fdi.config.fault_class, fdi, belief)
+    observe_by_class(fdi.config.fault_class, fdi, belief)
     leaking = found.isolated >= 0 or found.lead >= 0
     filters.predict_fdae(fdi.fdae, bound, belief.x_before, belief.expected, found.detected, leaking, dt)
 

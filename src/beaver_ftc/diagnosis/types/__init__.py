@@ -21,7 +21,7 @@ constant while it is there, is never excluded, and so never misnamed. What canno
 candidate.
 
 Each type is a row of a file under table/. contract.py says what is in a row, and has feasible sets and
-observations of a surface; registry.py reads the rows into arrays and records. Each frame examine.py finds
+observations of a surface; registry.py reads the rows into arrays and records. Each frame it also finds
 where each surface was and tests every type; verdict.py and pairs.py conclude.
 """
 

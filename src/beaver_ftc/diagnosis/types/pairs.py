@@ -20,10 +20,15 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis import state
 from beaver_ftc.diagnosis.state import LATERAL_GROUP, PITCH, PITCH_GROUP, ROLL, YAW
 from beaver_ftc.diagnosis.types import contract, verdict
-from beaver_ftc.diagnosis.types import examine as frames
+from beaver_ftc.diagnosis.types import registry as frames
 from beaver_ftc.diagnosis.types.contract import GIVE_UP, SCALE_COMMAND, SUBTRACT_OFFSET
 from beaver_ftc.diagnosis.types.registry import ACCOMMODATION, N_CONSTANT, deflection
-from beaver_ftc.diagnosis.types.verdict import NO_SURFACE, any_constant_type_left, can_be_at_fault, is_left
+from beaver_ftc.diagnosis.types.verdict import (
+    NO_SURFACE,
+    any_constant_type_remains,
+    can_be_at_fault,
+    type_remains,
+)
 
 
 @kernel
@@ -64,7 +69,7 @@ def deflection_range(config, surface, k):
     of a constant that are left."""
     least, greatest = np.inf, -np.inf
     for kind in range(N_CONSTANT):
-        if is_left(surface, kind):
+        if type_remains(surface, kind):
             low, high = deflection(config, surface, kind, k)
             least, greatest = min(least, low), max(greatest, high)
     low, high = surface.actuator.reach_low, surface.actuator.reach_high
@@ -130,7 +135,9 @@ def decide_roll_and_yaw(types, layout, t):
     one, other = types.surface[layout.main[ROLL]], types.surface[layout.main[YAW]]
     one_left, other_left = can_be_at_fault(one), can_be_at_fault(other)
     both = not one_left and not other_left
-    no_pair = pair.no_lateral_pair == 1 or not verdict.any_type_left(one) or not verdict.any_type_left(other)
+    no_pair = (
+        pair.no_lateral_pair == 1 or not verdict.any_type_remains(one) or not verdict.any_type_remains(other)
+    )
     outside = both and no_pair
     open_yet = both and not (verdict.is_explained(one) and verdict.is_explained(other))
     certain = pair.alarmed[LATERAL_GROUP] == 1 and not (outside or open_yet)
@@ -183,7 +190,7 @@ def has_second_fault_in_pitch(types, layout):
     if types.pair.first == NO_SURFACE or layout.partner[types.pair.first] < 0:
         return False
     surface = types.surface[types.pair.first]
-    if surface.status.is_candidate and not (can_be_at_fault(surface) and any_constant_type_left(surface)):
+    if surface.status.is_candidate and not (can_be_at_fault(surface) and any_constant_type_remains(surface)):
         begin_second_fault(types, layout)
     return not surface.status.is_candidate
 
@@ -195,7 +202,7 @@ def type_in_pitch(config, surface):
     A jam may as well be a trailing surface or one at its stop, if the other surface is off by a constant.
     """
     kind = verdict.type_at_fault(config, surface)
-    return verdict.OPEN if kind >= 0 and ACCOMMODATION[kind] == GIVE_UP else kind
+    return verdict.TYPE_OPEN if kind >= 0 and ACCOMMODATION[kind] == GIVE_UP else kind
 
 
 @kernel
@@ -218,7 +225,7 @@ def decide_pitch(types, layout, t):
 def sole_fault_in_pitch(types, layout):
     """The surface of pitch at fault if a constant explains everything on it, or NO_SURFACE."""
     s = verdict.surface_at_fault(types, layout) if types.pair.alarmed[PITCH_GROUP] else NO_SURFACE
-    if s < 0 or not any_constant_type_left(types.surface[s]):
+    if s < 0 or not any_constant_type_remains(types.surface[s]):
         return NO_SURFACE
     if evidence_is_long_enough(types.config, types.surface[s]):
         store_first_fault(types, s)

@@ -1,6 +1,23 @@
-"""The rows of the table, as arrays over types; the kernels that call a part of every row; and the records.
+"""The rows of the fault types as arrays, their records, and the examination of a frame by every type.
 
-Every file under `table/` is read, in the order of its name: a new type is one more file.
+Every file under `table/` is read, in the order of its name: a new type is one more row.
+
+*Examination.* In each frame, or block of frames: where was each surface, and was anything wrong? A frame is
+judged one frame later: with several JSBSim frames in one of ours a fault may begin or end within a frame,
+which then shows a part of it; such a frame, next to a healthy one, is skipped.
+
+Where the noise of a gyro makes single frames uninformative, frames are examined in blocks. Summed over a
+block the innovation holds the noise of its two ends alone, n[k+N] - n[k]. So the mean over N frames has the
+bound
+
+    mean eta_bar + (nbar[k] + nbar[k+N]) / (N dt)
+
+which gives the mean position of the surface, weighted by its effectiveness G, whose sign stays. The weighted
+mean of a constant position, offset or effectiveness is exact; that of a varying one lies between its
+extremes. To the types a block is like a frame that consists of several JSBSim frames: a block next to a
+healthy one is skipped.
+
+types: of `types_dtype`. estimators: those of the isolation, by the layout. bound: of `bound_dtype`.
 """
 
 import pkgutil
@@ -12,9 +29,18 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.compiled import kernel, record, sized
+from beaver_ftc.diagnosis import isolation
 from beaver_ftc.diagnosis.state import PITCH_GROUP
 from beaver_ftc.diagnosis.types import contract, table
-from beaver_ftc.diagnosis.types.contract import EMPTY_SET, OBSERVATION, FaultType, Kernel
+from beaver_ftc.diagnosis.types.contract import (
+    EMPTY_SET,
+    GIVE_UP,
+    OBSERVATION,
+    REST_AGREES,
+    REST_EXCLUDES,
+    FaultType,
+    Kernel,
+)
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 
@@ -60,10 +86,12 @@ SHOWS_WITHIN, HALF_CYCLES = _column("shows_within"), _column("half_cycles")
 FOLLOWS_COMMAND = _column("follows_command")
 MUST_SHOW = np.array([row.has_shown is not None for row in TYPES])
 MISTAKEN_FOR = np.array([[_looks_like(row, other) for other in TYPES] for row in TYPES])
-SERVES = np.array([[mode == row.accommodation or mode in row.also for row in TYPES] for mode in range(4)])
+SERVES_TYPE = np.array(
+    [[mode == row.accommodation or mode in row.also for row in TYPES] for mode in range(4)]
+)
 # Types that give the deflection error of a surface, in the order in which they are used.
 ERROR_ORDER = np.array(sorted(_parts("expected_error"), key=lambda kind: TYPES[kind].error_rank), dtype=int)
-LIMIT = np.array([NAMES.index(row.limit) if row.limit else -1 for row in TYPES])
+LIMIT_TYPE = np.array([NAMES.index(row.limit) if row.limit else -1 for row in TYPES])
 
 
 def kind_of(name: str, *, constant: bool = True, direction: int = 0) -> int:
@@ -124,10 +152,10 @@ differs = _call_one("differs", "surface, direction", False)
 deflection = _call_one("deflection", _FRAME, EMPTY_SET)
 expected_error = _call_one("expected_error", "surface, kind", np.nan)
 
-MAX_BLOCK = 256  # frames of a block: examine.py
+MAX_BLOCK = 256  # frames of a block
 N_KEPT_BLOCKS = 3  # frames, or blocks, of which the orders are kept: the elapsed one and two before it
 
-# Orders to one surface, rad; [0] belongs to the elapsed frame or block, [1] to the one before: examine.py.
+# Commands to one surface, rad; [0] belongs to the elapsed frame or block, [1] to the one before.
 COMMANDS = record(
     given=(N_KEPT_BLOCKS, MAX_BLOCK), low=N_KEPT_BLOCKS, high=N_KEPT_BLOCKS,
     least=2, greatest=2,  # where a healthy surface was within it
@@ -145,7 +173,7 @@ ACTUATOR = record(
 FEASIBLE = record(low=N_TYPES, high=N_TYPES, excluded=(int, N_TYPES))
 
 # Frames in which something was wrong, and of them those in which a surface that was given up was quiet, and
-# those since a stop could last hide something; the first, and where the surface was in it: examine.py.
+# those since a stop could last hide something; the first, and where the surface was in it.
 EVIDENCE = record(
     frames=int, rest_frames=int, unhidden_frames=int, started_at=int, start_low=float, start_high=float
 )
@@ -164,7 +192,7 @@ RELEASE = record(
 )  # fmt: skip
 
 # What was known of the first of two faults when it was named: pairs.py.
-KNOWN = record(low=N_TYPES, high=N_TYPES, excluded=(int, N_TYPES))
+FIRST_FAULT_SETS = record(low=N_TYPES, high=N_TYPES, excluded=(int, N_TYPES))
 
 # What the types go by: whether a frame shows one instant, instants in it, whether a surface returns by its
 # actuator, frames of half of the slowest oscillation, whether a fault is declared to stay as it is and errors
@@ -176,9 +204,9 @@ TYPES_CONFIG = record(
 )  # fmt: skip
 
 # Two faults at once: pairs.py; alarms of the groups, and what is known of the first fault in pitch.
-PAIR = record(enabled=int, alarmed=(int, 2), no_lateral_pair=int, first=int, frames_since_change=int)
+FAULT_PAIR = record(enabled=int, alarmed=(int, 2), no_lateral_pair=int, first=int, frames_since_change=int)
 
-# Blocks of frames: examine.py.
+# Blocks of frames.
 FRAME_BLOCK = record(filled=int, innovation=3, bound=3, noise=3)
 
 
@@ -190,14 +218,16 @@ def surface_dtype() -> np.dtype:
     return record(
         actuator=ACTUATOR, commands=COMMANDS, elapsed=OBSERVATION, judged=OBSERVATION, earlier=OBSERVATION,
         evidence=EVIDENCE, feasible=FEASIBLE, release=RELEASE, **own,
-        estimator_excluded=int, status=STATUS, accommodation=ACCOMMODATED, known=KNOWN,
+        estimator_excluded=int, status=STATUS, accommodation=ACCOMMODATED, known=FIRST_FAULT_SETS,
     )  # fmt: skip
 
 
 @sized
 def types_dtype(n: int) -> np.dtype:
     """Faults of every type on n surfaces: types/."""
-    return record(config=TYPES_CONFIG, frame=int, pair=PAIR, block=FRAME_BLOCK, surface=(surface_dtype(), n))
+    return record(
+        config=TYPES_CONFIG, frame=int, pair=FAULT_PAIR, block=FRAME_BLOCK, surface=(surface_dtype(), n)
+    )
 
 
 def configure_types(
@@ -221,3 +251,183 @@ def configure_types(
         actuator["slowest_step"] = min(radians(config.slowest_rate_deg_s) * instant_s, actuator["step"])
         place["status"]["is_candidate"] = not config.pairs or layout["group"][s] == PITCH_GROUP
         place["accommodation"]["mode"] = place["status"]["type"] = -1
+
+
+@kernel
+def restart_types(types):
+    """Nothing is known of any surface yet."""
+    for surface in types.surface:
+        restart_surface(surface)
+
+
+@kernel
+def restart_surface(surface):
+    """Nothing is known of this surface yet."""
+    contract.begin_sets(surface)
+    fill_each(surface)
+    contract.begin_observation(surface)
+    surface.evidence.started_at = -1
+    surface.evidence.frames = surface.evidence.rest_frames = surface.evidence.unhidden_frames = 0
+    begin_each(surface)
+
+
+@kernel
+def record_commands(types, commanded, means):
+    """Add a frame to the orders of the surfaces: commanded (n,) rad; positions of healthy surfaces and their
+    least and greatest effectiveness within it: means of a `belief.means_dtype`.
+    """
+    length = types.config.length
+    for s, surface in enumerate(types.surface):
+        commands = surface.commands
+        if types.block.filled == 0:
+            for age in range(N_KEPT_BLOCKS - 1, 0, -1):
+                commands.given[age, :length] = commands.given[age - 1, :length]
+                commands.low[age], commands.high[age] = commands.low[age - 1], commands.high[age - 1]
+            commands.low[0], commands.high[0] = np.inf, -np.inf
+            commands.least[1], commands.greatest[1] = commands.least[0], commands.greatest[0]
+            commands.least[0], commands.greatest[0] = np.inf, -np.inf
+            commands.G_least, commands.G_most = np.inf, -np.inf
+        order = min(max(commanded[s], surface.actuator.travel_low), surface.actuator.travel_high)
+        commands.given[0, types.block.filled] = order
+        commands.low[0], commands.high[0] = min(commands.low[0], order), max(commands.high[0], order)
+        commands.least[0] = min(commands.least[0], means.u_least[s])
+        commands.greatest[0] = max(commands.greatest[0], means.u_most[s])
+        commands.G_least = min(commands.G_least, means.G_least[s])
+        commands.G_most = max(commands.G_most, means.G_most[s])
+
+
+@kernel
+def observe_frame(types, layout, estimators, innovation, bound):
+    """Find where each surface was in the elapsed frame, or block, if it alone is at fault.
+
+    bound (3,): on its innovation (3,) without a fault, rad/s2.
+    """
+    anomalous = not isolation.is_healthy(innovation, bound)
+    for s, surface in enumerate(types.surface):
+        contract.shift_observations(surface)
+        contract.set_anomalous(surface, anomalous)
+        fie, axis = estimators[layout.position_estimator[s]], layout.dominant_axis[s]
+        effect = fie.block_effect if types.config.length > 1 else fie.effect
+        contract.locate_surface(types.config, surface, fie, axis, innovation, bound, effect)
+
+
+@kernel
+def count_evidence(surface):
+    """Count a frame as evidence, and as evidence since a stop could last hide a swing (`judge_frame`)."""
+    surface.evidence.frames += 1
+    surface.evidence.unhidden_frames += 1
+
+
+@kernel
+def judge_surface(config, surface, k):
+    """Hold every type of one surface against the frame before the elapsed one: something was wrong in it."""
+    evidence, seen = surface.evidence, surface.judged
+    if seen.low > seen.high:
+        return
+    if evidence.started_at < 0:
+        evidence.started_at, evidence.start_low, evidence.start_high = k, seen.low, seen.high
+    judge_each(config, surface, k)
+
+
+@kernel
+def judge_frame(types):
+    """Judge the frame before the elapsed one."""
+    config, k = types.config, types.frame - 1
+    for s, surface in enumerate(types.surface):
+        on_frame_each(config, surface)
+        if config.released_returns and types.frame > 0:
+            on_release_each(config, surface, k)
+        if config.abrupt and surface.accommodation.mode == GIVE_UP and not surface.judged.anomalous:
+            count_rest(types, s)
+        elif surface.judged.anomalous and (
+            config.whole or (surface.earlier.anomalous and surface.elapsed.anomalous)
+        ):
+            count_evidence(surface)
+            judge_surface(config, surface, k)
+        else:
+            on_skipped_frame_each(config, surface, k)
+        if config.released_returns and types.frame > 0:
+            restore_each(surface)
+            propagate_release_each(config, surface)
+        if surface.judged.stop_hides[0] or surface.judged.stop_hides[1]:
+            surface.evidence.unhidden_frames = 0
+    types.frame += 1
+
+
+@kernel
+def examine_frame(types, layout, estimators, innovation, bound):
+    """Observe the elapsed frame, or the block that it completes, and judge the one before."""
+    if types.config.length > 1:
+        examine_block(types, layout, estimators, innovation, bound)
+        return
+    observe_frame(types, layout, estimators, innovation, bound.frame)
+    judge_frame(types)
+
+
+@kernel
+def begin_block(types, layout, estimators, noise_before):
+    """Begin a block with the elapsed frame; noise_before (3,): as it began."""
+    block = types.block
+    block.innovation[:], block.bound[:] = 0.0, 0.0
+    block.noise[:] = noise_before
+    for e in layout.position_estimator:
+        isolation.clear_mean_effect(estimators[e].block_effect)
+
+
+@kernel
+def add_to_block(types, layout, estimators, innovation, eta_bar):
+    """Add the elapsed frame to the means over the block."""
+    block, share = types.block, 1.0 / types.config.length
+    for i in range(3):
+        block.innovation[i] += share * innovation[i]
+        block.bound[i] += share * eta_bar[i]
+    for e in layout.position_estimator:
+        isolation.add_to_mean_effect(estimators[e].block_effect, estimators[e].effect, share)
+
+
+@kernel
+def examine_block(types, layout, estimators, innovation, bound):
+    """Add the elapsed frame to its block; with the last frame, observe the block and judge the one before."""
+    config, block = types.config, types.block
+    if block.filled == 0:
+        begin_block(types, layout, estimators, bound.noise_before)
+    add_to_block(types, layout, estimators, innovation, bound.eta_bar)
+    block.filled += 1
+    if block.filled < config.length:
+        return
+    block.filled = 0
+    for i in range(3):
+        block.bound[i] += (block.noise[i] + bound.noise[i]) / config.block_s
+    observe_frame(types, layout, estimators, block.innovation, block.bound)
+    judge_frame(types)
+
+
+@kernel
+def count_rest(types, s):
+    """A surface given up, and commanded to where it happens to be, shows by its quiet that it does not swing.
+
+    That is evidence against the other surfaces too, as far as only one of them all is in question. It takes a
+    fault that is declared to stay: of one that may go, the quiet may be that of health.
+    """
+    surface = types.surface[s]
+    if not agrees_with_rest(surface):
+        return
+    for i, other in enumerate(types.surface):
+        if i == s or (surface.status.is_candidate and other.status.is_candidate):
+            count_evidence(other)
+    surface.evidence.rest_frames += 1
+    if surface.evidence.rest_frames > types.config.half_cycle_frames and not types.config.has_surface_errors:
+        for kind in range(N_TYPES):
+            if AT_REST[kind] == REST_EXCLUDES:
+                contract.exclude_type(surface, kind)
+
+
+@kernel
+def agrees_with_rest(surface):
+    """Whether the judged frame agrees with where the surface is known to stand."""
+    for kind in range(N_TYPES):
+        low, high = surface.feasible.low[kind], surface.feasible.high[kind]
+        apart = surface.judged.low > high or surface.judged.high < low
+        if AT_REST[kind] == REST_AGREES and apart:
+            return False
+    return True

@@ -34,12 +34,12 @@ from beaver_ftc.diagnosis.types.registry import (
     FIRST_OF_NAME,
     FOLLOWS_COMMAND,
     HALF_CYCLES,
-    LIMIT,
+    LIMIT_TYPE,
     MISTAKEN_FOR,
     MUST_SHOW,
     N_CONSTANT,
     N_TYPES,
-    SERVES,
+    SERVES_TYPE,
     SHOWS_WITHIN,
     differs,
     expected_error,
@@ -47,7 +47,7 @@ from beaver_ftc.diagnosis.types.registry import (
 )
 
 NO_SURFACE, SEVERAL_SURFACES = -1, -2
-OPEN, NO_TYPE = -1, -2  # the type of a fault of which more than one type is left, or none
+TYPE_OPEN, NO_TYPE = -1, -2  # the type of a fault of which more than one type is left, or none
 # What decides whether a surface can be at fault: its estimator, or what is known of the other (pairs.py).
 BY_ESTIMATOR, BY_DEDUCTION, RULED_OUT = range(3)
 ABSENCE_LIMIT_S = 0.2  # a fault that has not shown for so long is taken for gone
@@ -70,19 +70,19 @@ def can_be_at_fault(surface):
 
 
 @kernel
-def is_left(surface, kind):
+def type_remains(surface, kind):
     """Whether a type is not excluded."""
     return not surface.feasible.excluded[kind]
 
 
 @kernel
-def any_constant_type_left(surface):
+def any_constant_type_remains(surface):
     """Whether a type with a constant parameter is left."""
     return not np.all(surface.feasible.excluded[:N_CONSTANT])
 
 
 @kernel
-def any_type_left(surface):
+def any_type_remains(surface):
     """Whether any type is left."""
     return not np.all(surface.feasible.excluded)
 
@@ -91,7 +91,7 @@ def any_type_left(surface):
 def is_explained(surface):
     """Whether some type explains the flight: it is left, and if it must show itself it has."""
     for kind in range(N_TYPES):
-        if is_left(surface, kind) and has_shown(surface, kind):
+        if type_remains(surface, kind) and has_shown(surface, kind):
             return True
     return False
 
@@ -101,7 +101,7 @@ def types_would_have_shown(config, surface):
     """Whether each type that must show itself is excluded, or has had the time to, hidden by no stop."""
     for kind in range(N_TYPES):
         if (
-            is_left(surface, kind)
+            type_remains(surface, kind)
             and surface.evidence.unhidden_frames < SHOWS_WITHIN[kind] * config.half_cycle_frames
         ):
             return False
@@ -111,11 +111,11 @@ def types_would_have_shown(config, surface):
 @kernel
 def sole_type_among(surface, n):
     """The one of the first n types that is left, or OPEN; of one name, such as a runaway's two, the first."""
-    found = OPEN
+    found = TYPE_OPEN
     for kind in range(n):
-        if is_left(surface, kind):
+        if type_remains(surface, kind):
             if found >= 0 and FIRST_OF_NAME[kind] != FIRST_OF_NAME[found]:
-                return OPEN
+                return TYPE_OPEN
             found = kind if found < 0 else found
     return found
 
@@ -130,7 +130,7 @@ def sole_constant_type(surface):
 def sole_type(surface):
     """The one type left, constant or varying, or OPEN: in coarse sets a constant proves nothing."""
     found = sole_type_among(surface, N_TYPES)
-    return found if found >= 0 and has_shown(surface, found) else OPEN
+    return found if found >= 0 and has_shown(surface, found) else TYPE_OPEN
 
 
 @kernel
@@ -138,12 +138,12 @@ def can_hide_at_rest(config, surface):
     """Whether what a constant explains may be a type that does not show in a surface at rest, such as a slow
     surface that has come to where it is commanded: it has not stood off its command for long."""
     if (
-        not any_constant_type_left(surface)
+        not any_constant_type_remains(surface)
         or surface.evidence.frames - surface.evidence.rest_frames >= config.half_cycle_frames
     ):
         return False
     for kind in range(N_TYPES):
-        if AT_REST[kind] == REST_HIDES and is_left(surface, kind):
+        if AT_REST[kind] == REST_HIDES and type_remains(surface, kind):
             return True
     return False
 
@@ -156,7 +156,7 @@ def can_be_confused_with(surface, kind, found):
         alike = (
             FIRST_OF_NAME[other] == FIRST_OF_NAME[found]
             and MISTAKEN_FOR[kind, other]
-            and is_left(surface, other)
+            and type_remains(surface, other)
         )
         if alike and not differs(surface, DIRECTION[other], kind):
             return True
@@ -169,7 +169,7 @@ def can_be_another_type(surface, found, any_type):
     one that does not follow the command."""
     if found >= 0:
         for kind in range(N_CONSTANT, N_TYPES):
-            counts = is_left(surface, kind) and (any_type or not FOLLOWS_COMMAND[kind])
+            counts = type_remains(surface, kind) and (any_type or not FOLLOWS_COMMAND[kind])
             if counts and can_be_confused_with(surface, kind, found):
                 return True
     return False
@@ -183,7 +183,7 @@ def sole_surface(surfaces, constant):
         if (
             surface.status.is_candidate
             and can_be_at_fault(surface)
-            and (any_constant_type_left(surface) or not constant)
+            and (any_constant_type_remains(surface) or not constant)
         ):
             found = s if found == NO_SURFACE else SEVERAL_SURFACES
     return found
@@ -216,12 +216,12 @@ def others_refuted(types, chosen):
     config, half_cycles = types.config, 1
     for s, surface in enumerate(types.surface):
         if s != chosen and surface.status.is_candidate and can_be_at_fault(surface):
-            if config.has_surface_errors and any_type_left(surface):
+            if config.has_surface_errors and any_type_remains(surface):
                 return False
             if not types_would_have_shown(config, surface):
                 return False
             for kind in range(N_TYPES):
-                if is_left(surface, kind):
+                if type_remains(surface, kind):
                     if not FOLLOWS_COMMAND[kind]:
                         return False
                     half_cycles = max(half_cycles, HALF_CYCLES[kind])
@@ -233,13 +233,13 @@ def type_at_fault(config, surface):
     """The type of the fault on a surface, taken to be at fault; OPEN while more than one fits or one may yet
     show itself."""
     if surface.evidence.frames < config.half_cycle_frames or can_hide_at_rest(config, surface):
-        return OPEN
+        return TYPE_OPEN
     if config.has_surface_errors:
         return sole_type(surface)
     waited = types_would_have_shown(config, surface)
-    if any_constant_type_left(surface):
+    if any_constant_type_remains(surface):
         found = sole_constant_type(surface)
-        return found if waited and not can_be_another_type(surface, found, True) else OPEN
+        return found if waited and not can_be_another_type(surface, found, True) else TYPE_OPEN
     return varying_type_at_fault(surface, waited)
 
 
@@ -250,12 +250,12 @@ def varying_type_at_fault(surface, waited):
     found = sole_varying_type(surface, False)
     if found == NO_TYPE:
         found = sole_varying_type(surface, True)
-        return found if found >= 0 and has_shown(surface, found) else OPEN
+        return found if found >= 0 and has_shown(surface, found) else TYPE_OPEN
     if found < 0 or not waited:
-        return OPEN
+        return TYPE_OPEN
     for kind in range(N_CONSTANT, N_TYPES):
-        if is_left(surface, kind) and MISTAKEN_FOR[kind, found]:
-            return OPEN
+        if type_remains(surface, kind) and MISTAKEN_FOR[kind, found]:
+            return TYPE_OPEN
     return found
 
 
@@ -265,10 +265,10 @@ def sole_varying_type(surface, must_show):
     that need not; NO_TYPE, or OPEN if there are several."""
     found = NO_TYPE
     for kind in range(N_CONSTANT, N_TYPES):
-        if is_left(surface, kind) and MUST_SHOW[kind] == must_show:
-            found = kind if found == NO_TYPE else OPEN
-            if found == OPEN:
-                return OPEN
+        if type_remains(surface, kind) and MUST_SHOW[kind] == must_show:
+            found = kind if found == NO_TYPE else TYPE_OPEN
+            if found == TYPE_OPEN:
+                return TYPE_OPEN
     return found
 
 
@@ -285,7 +285,7 @@ def decide_surface_and_type(types, conclusion, layout, estimators, t):
     isolated_at_s = t if s != before else conclusion.isolated_at_s
     type_at_s = t if kind != conclusion.type else conclusion.type_at_s
     isolated = estimator_of_fault(layout, s, kind) if s >= 0 else s
-    lead, lead_kind = choose_lead(types, isolated, layout, estimators)
+    lead, lead_kind = choose_accommodated_surface(types, isolated, layout, estimators)
     return isolated, isolated_at_s, kind, type_at_s, lead, lead_kind
 
 
@@ -306,7 +306,7 @@ def accommodation_mode(surface):
     SHIFTED subtracts what the last frame shows to be off: that is right for a bias and an oscillation, serves
     a loss of effectiveness meanwhile, and moves the command so that a jam shows in the next frame.
     """
-    constant = any_constant_type_left(surface)
+    constant = any_constant_type_remains(surface)
     for mode in (GIVE_UP, SCALE_COMMAND, WAIT_FOR_SURFACE):
         if constant and serves_all_constant_types(surface, mode):
             return mode
@@ -321,10 +321,14 @@ def serves_all_constant_types(surface, mode):
     """Whether a mode is that of some type of constant parameter left, and serves all of them."""
     suits = False
     for kind in range(N_CONSTANT):
-        if is_left(surface, kind):
+        if type_remains(surface, kind):
             suits = suits or ACCOMMODATION[kind] == mode
-            at_limit = LIMIT[kind] >= 0 and is_left(surface, LIMIT[kind]) and SERVES[mode, LIMIT[kind]]
-            if not (SERVES[mode, kind] or at_limit):
+            at_limit = (
+                LIMIT_TYPE[kind] >= 0
+                and type_remains(surface, LIMIT_TYPE[kind])
+                and SERVES_TYPE[mode, LIMIT_TYPE[kind]]
+            )
+            if not (SERVES_TYPE[mode, kind] or at_limit):
                 return False
     return suits
 
@@ -333,7 +337,7 @@ def serves_all_constant_types(surface, mode):
 def suits_a_varying_type(surface, mode):
     """Whether a mode is that of some type left whose parameter varies."""
     for kind in range(N_CONSTANT, N_TYPES):
-        if is_left(surface, kind) and ACCOMMODATION[kind] == mode:
+        if type_remains(surface, kind) and ACCOMMODATION[kind] == mode:
             return True
     return False
 
@@ -370,7 +374,7 @@ def clear_modes(surfaces):
 
 
 @kernel
-def choose_lead(types, isolated, layout, estimators):
+def choose_accommodated_surface(types, isolated, layout, estimators):
     """The surface on which the law acts, or NO_SURFACE, and how; isolated: an estimator, if any."""
     s = presumed_surface(types, isolated, layout, estimators)
     clear_modes(types.surface)
@@ -400,7 +404,7 @@ def deflection_error(surface, at_fault):
     shows it."""
     if at_fault:
         for kind in ERROR_ORDER:
-            if is_left(surface, kind):
+            if type_remains(surface, kind):
                 error = expected_error(surface, kind)
                 if np.isfinite(error):
                     return error
@@ -417,7 +421,7 @@ def effectiveness_left(types, layout, estimators, s):
     surface = types.surface[s]
     if types.pair.enabled and can_be_at_fault(surface):
         for kind in range(N_CONSTANT):
-            if ACCOMMODATION[kind] == SCALE_COMMAND and is_left(surface, kind):
+            if ACCOMMODATION[kind] == SCALE_COMMAND and type_remains(surface, kind):
                 return set_middle(surface, kind)
     return 1.0 + estimators[layout.loss_estimator[s]].theta[layout.dominant_axis[s]]
 

@@ -119,10 +119,12 @@ def _fresh_kernel_modules(kernel: Callable[[Kernel], Kernel]) -> Iterator[None]:
         for name, module in sys.modules.items()
         if name.startswith("beaver_ftc.") and module is not compiled and getattr(module, "kernel", 0) is usual
     }
-    for name in modules:
-        package, _, leaf = name.rpartition(".")
+    packages = {
+        name: sys.modules[name.rpartition(".")[0]] for name in modules
+    }  # some have kernels themselves
+    for name, package in packages.items():
         del sys.modules[name]
-        delattr(sys.modules[package], leaf)
+        vars(package).pop(name.rpartition(".")[2], None)
     compiled.kernel = kernel
     try:
         yield
@@ -130,5 +132,4 @@ def _fresh_kernel_modules(kernel: Callable[[Kernel], Kernel]) -> Iterator[None]:
         compiled.kernel = usual
         for name, module in modules.items():
             sys.modules[name] = module
-            package, _, leaf = name.rpartition(".")
-            setattr(sys.modules[package], leaf, module)
+            setattr(packages[name], name.rpartition(".")[2], module)

@@ -122,7 +122,7 @@ def test_a_wander_of_its_length():
 @pytest.mark.parametrize("length", [0.4, -0.4, 0.0])
 def test_commands_that_act_later_were_logged_earlier(length):
     values = np.column_stack([np.arange(6.0), np.arange(6.0) ** 2])
-    found = other_days._later(values, length)
+    found = other_days._shifted(values, length)
     at = np.clip(np.arange(6) + length, 0, 5)
     np.testing.assert_allclose(found[:, 0], at)
     np.testing.assert_allclose(found[:, 1], np.interp(at, np.arange(6), values[:, 1]))

@@ -350,7 +350,7 @@ def runaway_travel(config, surface, k):
 
 
 @kernel
-def least_up(config, surface, k):
+def least_upward_deflection(config, surface, k):
     """How far up a runaway has come by a frame, at least: rad, the stop at most."""
     if surface.evidence.started_at < 0:
         return surface.actuator.travel_low
@@ -358,7 +358,7 @@ def least_up(config, surface, k):
 
 
 @kernel
-def least_down(config, surface, k):
+def least_downward_deflection(config, surface, k):
     """How far down one has come: rad, the stop at most."""
     if surface.evidence.started_at < 0:
         return surface.actuator.travel_high
@@ -366,71 +366,73 @@ def least_down(config, surface, k):
 
 
 @kernel
-def judge_up(config, surface, kind, k):
+def judge_hardover_up(config, surface, kind, k):
     """It is beyond where its least rate takes it, or at the stop."""
     return hold_or_return_explains(
-        config, surface, kind, least_up(config, surface, k), surface.actuator.travel_high
+        config, surface, kind, least_upward_deflection(config, surface, k), surface.actuator.travel_high
     )
 
 
 @kernel
-def judge_down(config, surface, kind, k):
+def judge_hardover_down(config, surface, kind, k):
     """The same downwards."""
     return hold_or_return_explains(
-        config, surface, kind, surface.actuator.travel_low, least_down(config, surface, k)
+        config, surface, kind, surface.actuator.travel_low, least_downward_deflection(config, surface, k)
     )
 
 
 @kernel
-def on_release_up(config, surface, kind, k):
+def on_release_hardover_up(config, surface, kind, k):
     """It may be released on its way; within a frame of several instants, further on."""
     low, high, shown = position_at_frame_start(config, surface, k)
-    low = max(low, least_up(config, surface, shown))
+    low = max(low, least_upward_deflection(config, surface, shown))
     if not config.whole and low <= high:
         high = surface.actuator.travel_high
     add_release(surface, kind, low, high)
 
 
 @kernel
-def on_release_down(config, surface, kind, k):
+def on_release_hardover_down(config, surface, kind, k):
     """The same downwards."""
     low, high, shown = position_at_frame_start(config, surface, k)
-    high = min(high, least_down(config, surface, shown))
+    high = min(high, least_downward_deflection(config, surface, shown))
     if not config.whole and low <= high:
         low = surface.actuator.travel_low
     add_release(surface, kind, low, high)
 
 
 @kernel
-def deflection_up(config, surface, kind, k):
+def hardover_up_deflection(config, surface, kind, k):
     """Between its least way and the stop."""
-    return least_up(config, surface, k), surface.actuator.travel_high
+    return least_upward_deflection(config, surface, k), surface.actuator.travel_high
 
 
 @kernel
-def deflection_down(config, surface, kind, k):
+def hardover_down_deflection(config, surface, kind, k):
     """The same downwards."""
-    return surface.actuator.travel_low, least_down(config, surface, k)
+    return surface.actuator.travel_low, least_downward_deflection(config, surface, k)
 
 
-def upper_stop(fdi: np.void, s: int, kind: int) -> float | None:
+def upper_stop_rad(fdi: np.void, s: int, kind: int) -> float | None:
     """Deflection, rad."""
     return float(fdi["types"]["surface"][s]["actuator"]["travel_high"])
 
 
-def lower_stop(fdi: np.void, s: int, kind: int) -> float | None:
+def lower_stop_rad(fdi: np.void, s: int, kind: int) -> float | None:
     """Deflection, rad."""
     return float(fdi["types"]["surface"][s]["actuator"]["travel_low"])
 
 
 HARDOVER_UP = FaultType(
     name="hardover", words="hardover up", constant=True, rank=4,
-    begin=start_releases, judge=judge_up, on_release=on_release_up, propagate_release=propagate_returns,
-    deflection=deflection_up, direction=1, accommodation=GIVE_UP, estimate=upper_stop,
+    begin=start_releases, judge=judge_hardover_up, on_release=on_release_hardover_up,
+    propagate_release=propagate_returns, deflection=hardover_up_deflection, direction=1,
+    accommodation=GIVE_UP, estimate=upper_stop_rad,
 )  # fmt: skip
 HARDOVER_DOWN = FaultType(
     name="hardover", words="hardover down", constant=True, rank=5,
-    begin=start_releases, judge=judge_down, on_release=on_release_down, propagate_release=propagate_returns,
-    deflection=deflection_down, direction=-1, accommodation=GIVE_UP, estimate=lower_stop,
+    begin=start_releases, judge=judge_hardover_down, on_release=on_release_hardover_down,
+    propagate_release=propagate_returns, deflection=hardover_down_deflection, direction=-1,
+    accommodation=GIVE_UP, estimate=lower_stop_rad,
 )  # fmt: skip
 TYPES = STUCK, FLOAT, HARDOVER_UP, HARDOVER_DOWN

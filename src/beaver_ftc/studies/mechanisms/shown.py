@@ -84,7 +84,7 @@ def finding(row: Document) -> str:
         same = f"{row['same_verdict']} of {row['flights']} verdicts are the same without it"
         return f"{label(row)}: no effect beyond chance; {same}."
     said = (f"{CRITERIA[name]} in {_more_or_less(found)}" for name, found in certain.items())
-    return f"{label(row)}: without it {', '.join(said)} of the flights."
+    return f"{label(row)}: without it there are {', '.join(said)} of the flights."
 
 
 def _more_or_less(found: Document) -> str:

@@ -167,7 +167,7 @@ def headline(document: Document) -> str:
     return (
         f"Of {tested['statements']} testable statements {tested['hold']} hold, {tested['elsewhere']} of them "
         f"also in {settings} settings that the paper did not fly; {tested['do_not']} do not, and "
-        f"{tested['unsettled']} hold without the mechanism that they speak of as well. Of "
+        f"{tested['unsettled']} also hold when the mechanism that the statement credits is removed. Of "
         f"{built['statements']} statements that the code makes true by its construction {built['hold']} "
         f"hold; {document['background']} give nothing to measure."
     )

@@ -16,9 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.plant.adapter import Plant
+from beaver_ftc.plant.adapter import FlightState, Plant
 from beaver_ftc.plant.model_file import with_systems
-from beaver_ftc.plant.state import FlightState
 from beaver_ftc.plant.trim import trim
 from beaver_ftc.studies.bench.contenders import interleave, quartiles
 

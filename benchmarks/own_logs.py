@@ -34,8 +34,7 @@ from benchmarks.unknown_instant import Whitener, fitted
 
 import beaver_ftc as bf
 from beaver_ftc.design.context import DesignFunctions
-from beaver_ftc.design.model import design_record
-from beaver_ftc.design.terms import N_Y
+from beaver_ftc.design.model import N_Y, design_record
 from beaver_ftc.results.exports import RECORDINGS
 from beaver_ftc.results.writer import run
 from beaver_ftc.studies.present.tables import markdown_table

@@ -36,7 +36,7 @@ BESIDE = {
 FLOORS = (
     {"public"},
     {"documents"},
-    {"choice", "commands", "compiled", "extensions", "plugins"},
+    {"commands", "compiled", "extensions", "plugins"},
     {"aircraft"},
     {"design"},
     {"scenario"},

@@ -12,8 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from beaver_ftc.plant.adapter import FT_PER_M, Plant
-from beaver_ftc.plant.state import FlightState
+from beaver_ftc.plant.adapter import FT_PER_M, FlightState, Plant
 
 M_PER_FT = 1.0 / FT_PER_M
 SAMPLE_S = 0.05

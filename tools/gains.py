@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.design.model import ALPHA, QDYN, unanticipated_pitch
-from beaver_ftc.design.variants import design_of
+from beaver_ftc.design.model import ALPHA, QDYN, design_of, unanticipated_pitch
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plugins import DETECTORS, LAWS, settings
 from beaver_ftc.results.log import Columns

@@ -5,9 +5,8 @@ from math import prod, sin
 
 import pytest
 
-from beaver_ftc.design.engine import engine_power_kw, slipstream
 from beaver_ftc.design.fdc import COEFFICIENTS, GEOMETRY, MASS, TERMS
-from beaver_ftc.design.model import inertia_coefficients
+from beaver_ftc.design.model import engine_power_kw, inertia_coefficients, slipstream
 
 AXES = "pqr"
 

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from beaver_ftc.compiled import cache, interrupts
+from beaver_ftc.compiled import cache
 
 
 @pytest.fixture
@@ -26,7 +26,7 @@ def handled():
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_it_is_handled_once_and_afterwards(handled, number):
-    with interrupts.held():
+    with cache.held():
         for _ in range(2):
             os.kill(os.getpid(), number)
         assert handled == []
@@ -40,10 +40,10 @@ def test_a_signal_that_ends_the_process_stays_so_and_other_threads_hold_nothing(
     seen = []
 
     def look():
-        with interrupts.held():
+        with cache.held():
             seen.append(signal.getsignal(signal.SIGTERM))
 
-    with interrupts.held():
+    with cache.held():
         assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
     other = threading.Thread(target=look)
     other.start()

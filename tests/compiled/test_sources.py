@@ -11,8 +11,8 @@ import pytest
 
 import beaver_ftc
 from beaver_ftc import compiled
-from beaver_ftc.compiled import records, sources, target
-from beaver_ftc.compiled.sources import digest_of
+from beaver_ftc.compiled import cache, records, target
+from beaver_ftc.compiled.cache import digest_of
 
 SOLE = """
 from enum import IntEnum
@@ -142,7 +142,7 @@ NAMES = (BuiltinFunctionType, FunctionType, ModuleType)  # of a library, or foll
 
 def test_all_that_kernels_of_the_package_name_is_followed(monkeypatch):
     """By its contents; of a value of any other kind, an instance of a class, only its name would count."""
-    value, other, kernels = sources._value, set(), 0
+    value, other, kernels = cache._value, set(), 0
 
     def noted(found, seen):
         plain = getattr(found, "py_func", found)
@@ -152,7 +152,7 @@ def test_all_that_kernels_of_the_package_name_is_followed(monkeypatch):
             other.add(f"{type(found).__qualname__} {getattr(found, '__name__', found)}")
         yield from value(found, seen)
 
-    monkeypatch.setattr(sources, "_value", noted)
+    monkeypatch.setattr(cache, "_value", noted)
     for module in walk_packages(beaver_ftc.__path__, "beaver_ftc."):
         for made in vars(import_module(module.name)).values():
             if isinstance(made, target.Kernel) and made.py_func.__module__ == module.name:

@@ -6,12 +6,12 @@ import sys
 
 import pytest
 
-from beaver_ftc.compiled import library, trial
+from beaver_ftc.compiled import library
 
 
 def outcome(before=""):
-    command = [sys.executable, "-c", before + trial.CODE]
-    environment = {**os.environ, trial.VARIABLE: "trial"}
+    command = [sys.executable, "-c", before + library.CODE]
+    environment = {**os.environ, library.VARIABLE: "trial"}
     return subprocess.run(command, env=environment, capture_output=True, check=False).returncode
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.control import allocation, power, reference
+from beaver_ftc.control import allocation, engines, laws
 from beaver_ftc.design.model import AIRSPEED, DPT, QDYN
 from law_records import fields, new_control, put
 
@@ -15,7 +15,7 @@ def control():
     control, rng = new_control(main=(0, 1, 2), stand_in=FLAP, dt=DT), np.random.default_rng(2)
     put(control, law="fault-tolerant", effectiveness=1.0, least_effectiveness=0.1)
     model = fields(control["reference"])
-    model["A"], model["B"] = reference.discretise(8.0, 0.7, DT)
+    model["A"], model["B"] = laws.discretise(8.0, 0.7, DT)
     for name in ("governed_rate", "governed_acceleration", "model_rate", "model_acceleration"):
         model[name] = rng.normal(0, 0.1, 3)
     put(control, scale=(0.9, 0.5, 0.02), shortfall=(0.2, -0.4, 0.3))
@@ -33,13 +33,13 @@ def control():
 
 def is_lost(control):
     parts = control["layout"], control["surfaces"], control["allocation"]["output"]["saturated"]
-    return power.pitch_is_lost(*parts, control["axes"]["shortfall"])
+    return engines.pitch_is_lost(*parts, control["axes"]["shortfall"])
 
 
 def steer(control, x, y, known):
     """A frame of the law, at 1 s; known: there is an alarm."""
     watched = known or control["config"]["informed"]
-    power.steer(control["power"], control["reference"], x, y, watched, is_lost(control), 1.0)
+    engines.steer_by_power(control["power"], control["reference"], x, y, watched, is_lost(control), 1.0)
 
 
 def seen(V=46.0, dpt=0.4, q=0.05):
@@ -53,10 +53,10 @@ def test_the_reference_waits_for_what_was_not_given_and_is_scaled(control, steer
     model, wanted = fields(put(control, steered=steered)["reference"]), np.array([0.1, -0.2, 0.3])
     scale, short = model["scale"].copy(), control["axes"]["shortfall"].copy()
     state = np.array([model["governed_rate"], model["governed_acceleration"]])
-    reference.govern(control["reference"], wanted, short, True)
+    laws.govern(control["reference"], wanted, short, True)
     if not steered:
-        scale = scale - DT * np.abs(short) / reference.MISSED_RAD_S
-        scale = np.maximum(scale + DT / reference.RECOVERY_S * (1.0 - scale), 0.0)
+        scale = scale - DT * np.abs(short) / laws.MISSED_RAD_S
+        scale = np.maximum(scale + DT / laws.RECOVERY_S * (1.0 - scale), 0.0)
         assert scale[2] == 0.0
     rate, acceleration = model["A"] @ state + np.outer(model["B"], scale * wanted)
     assert model["scale"] == pytest.approx(scale)
@@ -66,7 +66,7 @@ def test_the_reference_waits_for_what_was_not_given_and_is_scaled(control, steer
 
 def test_without_a_loss_the_reference_is_the_models(control):
     model = fields(control["reference"])
-    reference.govern(control["reference"], np.ones(3), control["axes"]["shortfall"], False)
+    laws.govern(control["reference"], np.ones(3), control["axes"]["shortfall"], False)
     assert model["governed_rate"].tolist() == model["model_rate"].tolist()
     assert model["governed_acceleration"].tolist() == model["model_acceleration"].tolist()
     assert model["scale"].tolist() == [0.9, 0.5, 0.02]
@@ -90,13 +90,13 @@ def test_what_holds_the_rates_is_within_reach_up_to_its_ends(control):
 def test_speed_and_attitude_missed_are_followed_and_speed_begins_with_what_is_flown(control):
     (x, y), parts = seen(), (control["power"]["config"], control["power"]["memory"], control["reference"])
     engine, fields(control["reference"])["governed_rate"] = fields(control["power"]), (9.0, 0.02, 9.0)
-    power.follow(*parts, x, y)
+    engines.follow(*parts, x, y)
     speed = 44.0 + 0.1 * 2.0
     assert engine["speed"] == pytest.approx(speed)
     assert engine["usual_speed"] == pytest.approx(43.0 + 0.02 * (speed - 43.0))
     assert engine["attitude"] == pytest.approx(0.03 + DT * 0.03 - 0.01 * 0.03)
     engine["usual_speed"] = 0.0
-    power.follow(*parts, x, y)
+    engines.follow(*parts, x, y)
     assert engine["speed"] == engine["usual_speed"] == 46.0
 
 
@@ -105,19 +105,19 @@ def test_the_pressure_is_that_of_the_law_within_its_limits(control, engaged):
     engine, (_, y) = fields(control["power"]), seen()
     engine["engaged"] = engaged
     expected = 20.0 - 0.4 * 1.0 + 6.0 * 0.03 if engaged else 20.0
-    assert power.wanted(control["power"], y) == pytest.approx(expected)
+    assert engines.wanted(control["power"], y) == pytest.approx(expected)
     for attitude, limit in ((9.0, 28.0), (-9.0, 12.0)):
         engine["attitude"] = attitude
-        assert power.wanted(control["power"], y) == (limit if engaged else 20.0)
+        assert engines.wanted(control["power"], y) == (limit if engaged else 20.0)
 
 
 def test_the_ceiling_is_where_the_slipstream_would_be_the_highest(control):
     """dpt is affine in the pressure, by dpt_factor / 2 q V."""
     engine, (_, y) = fields(control["power"]), seen()
-    inhg = power.ceiling(control["power"], y, 0.9)
+    inhg = engines.ceiling(control["power"], y, 0.9)
     assert y[DPT] + (inhg - 20.0) * 40.0 / (2.0 * y[QDYN] * y[AIRSPEED]) == pytest.approx(0.9)
     engine["engaged"], engine["attitude"], engine["highest_dpt"] = 1, 9.0, 0.401
-    assert power.wanted(control["power"], y) == pytest.approx(power.ceiling(control["power"], y, 0.401))
+    assert engines.wanted(control["power"], y) == pytest.approx(engines.ceiling(control["power"], y, 0.401))
 
 
 @pytest.mark.parametrize(
@@ -145,26 +145,26 @@ def test_power_takes_over_after_a_while_and_hands_back_after_another(control):
     engine, control["surfaces"]["output"]["effectiveness"][[1, FLAP]] = fields(control["power"]), 0.0
     engaged = []
     for k in range(4):
-        power.watch(control["power"], is_lost(control), 0.1 * k)
+        engines.watch(control["power"], is_lost(control), 0.1 * k)
         engaged.append(int(engine["engaged"]))
     assert engaged == [0, 0, 1, 1]  # 0.4, 0.8, 1, 1
     assert (engine["from_s"], engine["attitude"], engine["lost"]) == (pytest.approx(0.2), 0.0, 1.0)
     engine["attitude"], control["surfaces"]["output"]["effectiveness"][1] = 0.3, 1.0
     for lost, on in ((0.75, 1), (0.5, 1), (0.25, 1), (0.0, 0), (0.0, 0)):
-        power.watch(control["power"], is_lost(control), 1.0)
+        engines.watch(control["power"], is_lost(control), 1.0)
         assert (engine["lost"], engine["engaged"], engine["attitude"]) == (lost, on, 0.3)
     control["surfaces"]["output"]["effectiveness"][1] = 0.0
     for _ in range(3):
-        power.watch(control["power"], is_lost(control), 2.0)
+        engines.watch(control["power"], is_lost(control), 2.0)
     assert (engine["engaged"], engine["from_s"]) == (1, pytest.approx(0.2)), "the first time is told"
 
 
 def test_a_flight_that_begins_without_pitch_says_so_from_its_first_frame(control):
     engine, control["surfaces"]["output"]["effectiveness"][[1, FLAP]] = fields(control["power"]), 0.0
     engine["lost"] = 1.0
-    power.watch(control["power"], is_lost(control), 0.0)
+    engines.watch(control["power"], is_lost(control), 0.0)
     engine["engaged"] = 0
-    power.watch(control["power"], is_lost(control), 5.0)
+    engines.watch(control["power"], is_lost(control), 5.0)
     assert engine["from_s"] == 0.0
 
 
@@ -239,7 +239,7 @@ def test_a_probe_ends_with_the_movement_in_which_the_doubt_ends(doubt, frames):
 def test_the_reference_model_keeps_what_was_commanded_and_goes_a_frame_on(control):
     model, wanted = fields(control["reference"]), np.array([0.1, -0.2, 0.3])
     state = np.array([model["model_rate"], model["model_acceleration"]])
-    reference.follow(control["reference"]["config"], control["reference"]["output"], wanted)
+    laws.follow(control["reference"]["config"], control["reference"]["output"], wanted)
     assert model["commanded_rate"].tolist() == wanted.tolist()
     after = model["A"] @ state + np.outer(model["B"], wanted)
     assert np.array([model["model_rate"], model["model_acceleration"]]) == pytest.approx(after)

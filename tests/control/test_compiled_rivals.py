@@ -5,11 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from beaver_ftc.control.accommodation import MODE_NOMINAL
 from beaver_ftc.control.base import Reference
-from beaver_ftc.control.rivals import compiled_rivals
+from beaver_ftc.control.laws import compiled_rivals
 from beaver_ftc.control.rivals.indi import IncrementalInversion
 from beaver_ftc.control.rivals.lqr import FixedGainLqr
-from beaver_ftc.control.supervisor import MODE_NOMINAL
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.base import Measured, Verdict
 from law_records import fields, new_control

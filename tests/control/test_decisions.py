@@ -4,12 +4,8 @@ import numpy as np
 import pytest
 
 import law_records
-from beaver_ftc.control import accommodation, allocation, supervisor
-from beaver_ftc.control.laws import gains, rejecting
-from beaver_ftc.control.laws.effectiveness_estimator import OBSERVER_ERROR, observer_response
-from beaver_ftc.control.laws.gains import N_POINTS
-from beaver_ftc.control.laws.rejecting import rejecting_dtype
-from beaver_ftc.control.supervisor import (
+from beaver_ftc.control import accommodation, allocation
+from beaver_ftc.control.accommodation import (
     MAX_EVENTS,
     MODE_ADAPTIVE,
     MODE_NOMINAL,
@@ -17,6 +13,9 @@ from beaver_ftc.control.supervisor import (
     MODE_UNANTICIPATED,
     SUPERVISOR,
 )
+from beaver_ftc.control.laws import gains, rejecting
+from beaver_ftc.control.laws.gains import N_POINTS
+from beaver_ftc.control.laws.rejecting import OBSERVER_ERROR, observer_response, rejecting_dtype
 from beaver_ftc.design.model import design_record, unanticipated_pitch
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.diagnosis.types.contract import GIVE_UP, SCALE_COMMAND, SUBTRACT_OFFSET, WAIT_FOR_SURFACE
@@ -73,16 +72,16 @@ def new_faults(**fields):
 
 def test_every_change_of_mode_is_noted_and_of_too_many_the_latest():
     state = record(SUPERVISOR)
-    supervisor.supervise(state, MODE_NOMINAL, 0.0)
-    supervisor.supervise(state, MODE_NOMINAL, 1.0)
-    supervisor.supervise(state, MODE_REALLOCATED, 2.0)
-    supervisor.supervise(state, MODE_REALLOCATED, 3.0)
+    accommodation.supervise(state, MODE_NOMINAL, 0.0)
+    accommodation.supervise(state, MODE_NOMINAL, 1.0)
+    accommodation.supervise(state, MODE_REALLOCATED, 2.0)
+    accommodation.supervise(state, MODE_REALLOCATED, 3.0)
     assert state["n_modes"] == 3
     assert state["mode_is"][:3].tolist() == [MODE_NOMINAL, MODE_ADAPTIVE, MODE_REALLOCATED]
     assert state["mode_at_s"][:3].tolist() == [0.0, 2.0, 3.0]
     assert state["mode"] == MODE_REALLOCATED
     for k in range(MAX_EVENTS):
-        supervisor.supervise(state, MODE_ADAPTIVE if k % 2 == 0 else MODE_UNANTICIPATED, 10.0 + k)
+        accommodation.supervise(state, MODE_ADAPTIVE if k % 2 == 0 else MODE_UNANTICIPATED, 10.0 + k)
     assert state["n_modes"] == 3 + MAX_EVENTS
     assert state["mode_at_s"][-1] == 9.0 + MAX_EVENTS
     assert state["mode_is"][-1] == MODE_UNANTICIPATED
@@ -123,7 +122,7 @@ def asked_for(frame):
     """The mode that the diagnosis asks for."""
     whole.assess_faults(frame)
     config, layout = frame["control"]["config"], frame["control"]["layout"]
-    return supervisor.mode_from(config, layout, frame["fdi"]["verdict"], frame["assessment"])
+    return accommodation.mode_from(config, layout, frame["fdi"]["verdict"], frame["assessment"])
 
 
 @pytest.mark.parametrize(
@@ -138,7 +137,7 @@ def asked_for(frame):
     ],
 )  # fmt: skip
 def test_the_oracles_mode_is_that_of_the_true_fault(faults, mode):
-    assert supervisor.true_mode(ELEVATOR, new_faults(**faults)) == mode
+    assert accommodation.true_mode(ELEVATOR, new_faults(**faults)) == mode
 
 
 def test_the_oracle_takes_each_surface_for_what_it_is():

@@ -7,7 +7,7 @@ Fig. 7]; a detector that knows names a true loss and takes the name back.
 import numpy as np
 import pytest
 
-from beaver_ftc.control.supervisor import MODE_UNANTICIPATED, MODES
+from beaver_ftc.control.accommodation import MODE_UNANTICIPATED, MODES
 from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.results.metrics import metrics

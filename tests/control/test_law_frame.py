@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.control.laws import published
-from beaver_ftc.control.laws.rows import row_of
-from beaver_ftc.control.rivals import compiled_rivals
-from beaver_ftc.control.supervisor import MODE_ADAPTIVE
+from beaver_ftc.control.accommodation import MODE_ADAPTIVE
+from beaver_ftc.control.base import row_of
+from beaver_ftc.control.laws import compiled_rivals, published
 from beaver_ftc.diagnosis.schemes import adaptive_estimators
 from beaver_ftc.diagnosis.state import LOSS, NOT_ISOLATED, WORST_CASE_DETECTOR
 from beaver_ftc.diagnosis.types.contract import GIVE_UP, SCALE_COMMAND, SUBTRACT_OFFSET, WAIT_FOR_SURFACE

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
-from beaver_ftc.control import allocation, least_squares
-from beaver_ftc.control.least_squares import problem_dtype
+from beaver_ftc.control import allocation
+from beaver_ftc.control.allocation import problem_dtype
 from beaver_ftc.diagnosis.expectation import belief_dtype
 from law_records import new_control
 from samples import samples
@@ -46,7 +46,7 @@ def cost(problem, B, demand, u):
 def test_it_is_the_minimum_that_scipy_finds(n, seed, size):
     rng = np.random.default_rng(seed)
     problem, B, demand = problem_of(n, rng, rng.integers(-1, 2, n)), columns(n, rng), rng.normal(0, size, 3)
-    least_squares.solve(problem, B, demand)
+    allocation.solve(problem, B, demand)
     other = by_scipy(problem, B, demand)
     ours, theirs = cost(problem, B, demand, problem["u"]), cost(problem, B, demand, other)
     assert ours <= theirs * (1.0 + 1e-6) + 1e-9
@@ -61,9 +61,9 @@ def test_what_can_be_given_is_given(n, seed):
     rng = np.random.default_rng(seed)
     problem, B = problem_of(n, rng), columns(n, rng, gone=0.0)
     before = rng.normal(0, 30, 3)
-    least_squares.solve(problem, B, before)
+    allocation.solve(problem, B, before)
     inside = rng.uniform(0.9 * problem["low"], 0.9 * problem["high"])
-    least_squares.solve(problem, B, B @ inside)
+    allocation.solve(problem, B, B @ inside)
     assert B @ problem["u"] == pytest.approx(B @ inside, abs=1e-4)
 
 
@@ -72,9 +72,9 @@ def test_what_can_be_given_is_given(n, seed):
 def test_started_from_its_own_solution_one_system_is_solved(n, seed):
     rng = np.random.default_rng(seed)
     problem, B, demand = problem_of(n, rng), columns(n, rng), rng.normal(0, 5, 3)
-    least_squares.solve(problem, B, demand)
+    allocation.solve(problem, B, demand)
     found = problem["u"].copy()
-    least_squares.solve(problem, B, demand)
+    allocation.solve(problem, B, demand)
     assert problem["steps"] == 1
     assert problem["u"] == pytest.approx(found, abs=1e-9)
 
@@ -82,14 +82,14 @@ def test_started_from_its_own_solution_one_system_is_solved(n, seed):
 def test_with_nothing_left_every_surface_stays_where_it_is_preferred():
     problem = problem_of(5, np.random.default_rng(1))
     problem["u_preferred"] = np.clip(problem["u_preferred"], problem["low"], problem["high"])
-    least_squares.solve(problem, np.zeros((3, 5)), np.array([1.0, -2.0, 3.0]))
+    allocation.solve(problem, np.zeros((3, 5)), np.array([1.0, -2.0, 3.0]))
     assert problem["u"] == pytest.approx(problem["u_preferred"])
 
 
 def test_an_unweight_surface_does_not_move():
     problem, B = problem_of(4, np.random.default_rng(2)), columns(4, np.random.default_rng(3), 0.0)
     problem["weight"][2], problem["u_preferred"][2] = 0.0, 0.03
-    least_squares.solve(problem, B, np.array([0.2, 0.1, -0.1]))
+    allocation.solve(problem, B, np.array([0.2, 0.1, -0.1]))
     assert problem["u"][2] == pytest.approx(0.03)
 
 

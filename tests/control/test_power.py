@@ -10,7 +10,7 @@ from scipy.linalg import expm
 
 import beaver_ftc as bf
 from beaver_ftc.aircraft import load
-from beaver_ftc.control import power
+from beaver_ftc.control import engines
 from beaver_ftc.design import fdc
 from beaver_ftc.design.fdc import value
 from beaver_ftc.design.model import ELEVATOR, FLAP, RUDDER
@@ -46,13 +46,13 @@ def lose_pitch(control):
 
 def is_lost(control):
     parts = control["layout"], control["surfaces"], control["allocation"]["output"]["saturated"]
-    return power.pitch_is_lost(*parts, control["axes"]["shortfall"])
+    return engines.pitch_is_lost(*parts, control["axes"]["shortfall"])
 
 
 def steer(control, x, y, known, t):
     """A frame of the law; known: there is an alarm."""
     watched = known or control["config"]["informed"]
-    power.steer(control["power"], control["reference"], x, y, watched, is_lost(control), t)
+    engines.steer_by_power(control["power"], control["reference"], x, y, watched, is_lost(control), t)
 
 
 def steered(control, frames, V=lambda t: 45.0, q=lambda t: 0.0):
@@ -77,11 +77,11 @@ class TestWhen:
     def test_what_attitude_was_missed_before_is_not_its_business(self):
         control = control_record(patience_s=0.1)
         control["power"]["memory"]["attitude"] = 0.3
-        power.watch(control["power"], is_lost(control), 0.0)
+        engines.watch(control["power"], is_lost(control), 0.0)
         assert control["power"]["memory"]["attitude"] == 0.3
         lose_pitch(control)
         for k in range(20):
-            power.watch(control["power"], is_lost(control), k * DT)
+            engines.watch(control["power"], is_lost(control), k * DT)
             if not control["power"]["memory"]["engaged"]:
                 control["power"]["memory"]["attitude"] = 0.3
         assert control["power"]["memory"]["engaged"]

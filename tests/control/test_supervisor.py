@@ -4,7 +4,7 @@ import itertools
 
 import pytest
 
-from beaver_ftc.control.supervisor import MODES, mode_of, next_mode
+from beaver_ftc.control.accommodation import MODES, mode_of, next_mode
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from law_records import new_control
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from beaver_ftc.design.actuators import actuators_dtype, move, nearer
+from beaver_ftc.design.model import actuators_dtype, move, nearer
 
 LOW, HIGH = np.array([-0.5, -0.4, -0.3, -0.1]), np.array([0.5, 0.4, 0.3, 1.0])
 anywhere = st.lists(st.floats(-1.5, 1.5), min_size=4, max_size=4).map(np.array)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.design import engine, fdc, model, variants
+from beaver_ftc.design import fdc, model
 from beaver_ftc.design.context import Context, Declared
 from beaver_ftc.scenario.schema import load as load_scenario
 from kept import in_short, of_record
@@ -34,13 +34,13 @@ def test_the_published_equations(changed):
 def test_the_engine_and_its_slipstream(changed):
     y = Y.copy()
     assert not changed({
-        "power": [engine.engine_power_kw(*of) for of in ((1800.0, 20.0, 1.225), (2100.0, 30.0, 0.9))],
-        "slipstream": engine.slipstream(150.0, 1.1, 42.0),
-        "measured": engine.measured_slipstream(1900.0, 22.0, 47.0, 1100.0),
-        "density": engine.density_ratio(y), "slopes": engine.slipstream_slopes(y, 130.0),
-        "errors": [engine.power_error_kw(rpm, 22.0, 15.0, 0.2) for rpm in (1900.0, 4500.0)],
+        "power": [model.engine_power_kw(*of) for of in ((1800.0, 20.0, 1.225), (2100.0, 30.0, 0.9))],
+        "slipstream": model.slipstream(150.0, 1.1, 42.0),
+        "measured": model.measured_slipstream(1900.0, 22.0, 47.0, 1100.0),
+        "density": model.density_ratio(y), "slopes": model.slipstream_slopes(y, 130.0),
+        "errors": [model.power_error_kw(rpm, 22.0, 15.0, 0.2) for rpm in (1900.0, 4500.0)],
     })  # fmt: skip
-    assert engine.power_error_kw(4500.0, 22.0, 15.0, 0.2)[1] == 0.0  # so fast no chart goes
+    assert model.power_error_kw(4500.0, 22.0, 15.0, 0.2)[1] == 0.0  # so fast no chart goes
 
 
 MODELS = {
@@ -56,20 +56,20 @@ MODELS = {
 @pytest.mark.parametrize("of", MODELS)
 def test_what_a_designer_believes(of, changed):
     believed = load_scenario({"design_model": MODELS[of]}).design_model
-    design = variants.design_of(believed)[0]
+    design = model.design_of(believed)[0]
     trim_y = np.array([0.09, 0.01, 45.0, 1020.0, 0.45])
-    variants.anchor(design, 0.1 * X, trim_y, SURFACES)
+    model.anchor(design, 0.1 * X, trim_y, SURFACES)
     f, G = np.zeros(3), np.zeros((3, 4))
-    variants.response(design, X, Y, f, G)
+    model.response(design, X, Y, f, G)
     each, slopes = np.zeros((2, 3)), np.zeros((3, 4))
-    variants.responses(design, np.array([X, -X]), Y, each, slopes)
+    model.responses(design, np.array([X, -X]), Y, each, slopes)
     found = {
-        "record": of_record(design), "f": f, "G": G, "each": each, "mass": vars(variants.mass_of(believed)),
-        "effectiveness": variants.effectiveness(design, Y), "damping": variants.own_damping(design, Y),
+        "record": of_record(design), "f": f, "G": G, "each": each, "mass": vars(model.mass_of(believed)),
+        "effectiveness": model.effectiveness(design, Y), "damping": model.own_damping(design, Y),
     }  # fmt: skip
     if of in ("table", "wrong"):
-        jacobian = variants.jacobian(design, X, Y, SURFACES)
-        found |= {"jacobian": jacobian, "slopes": variants.coefficient_slopes(design, X, Y, SURFACES)}
+        jacobian = model.jacobian(design, X, Y, SURFACES)
+        found |= {"jacobian": jacobian, "slopes": model.coefficient_slopes(design, X, Y, SURFACES)}
         damping = np.zeros((3, 3))
         model.rate_damping(design, X, Y, SURFACES, np.zeros(64), damping)
         found |= {"rates": damping, "unanticipated": model.unanticipated_pitch(design, Y, 10.0)}
@@ -80,8 +80,8 @@ def test_what_a_designer_believes(of, changed):
 def test_of_another_aircraft(changed):
     """One whose coefficients have other terms, no slipstream and three surfaces."""
     aircraft = trainer()
-    design = variants.design_of(load_scenario({}).design_model, aircraft)[0]
-    jacobian = variants.jacobian(design, X, Y[:4], SURFACES[:3])
+    design = model.design_of(load_scenario({}).design_model, aircraft)[0]
+    jacobian = model.jacobian(design, X, Y[:4], SURFACES[:3])
     assert not changed(
         {"record": of_record(design), "jacobian": list(map(in_short, jacobian)), "f_y": jacobian[3]}
     )

@@ -11,10 +11,15 @@ from hypothesis import strategies as st
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_TERMS
 from beaver_ftc.design import model
-from beaver_ftc.design.engine import engine_power_kw, slipstream
-from beaver_ftc.design.model import both_responses, design_record
-from beaver_ftc.design.terms import evaluate, regressors
-from beaver_ftc.design.variants import coefficient_slopes
+from beaver_ftc.design.model import (
+    both_responses,
+    coefficient_slopes,
+    design_record,
+    engine_power_kw,
+    evaluate,
+    regressors,
+    slipstream,
+)
 
 REFERENCE = Path(__file__).parents[1] / "data" / "fdc_state_derivatives.csv"
 

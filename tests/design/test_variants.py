@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.design.model import design_record
-from beaver_ftc.design.variants import anchor, design_of, jacobian, response
+from beaver_ftc.design.model import anchor, design_of, design_record, jacobian, response
 from beaver_ftc.scenario.schema import DesignModel
 
 X0, Y0 = np.array([0.02, -0.03, 0.01]), np.array([0.14, -0.014, 45.0, 1036.0, 2.4])

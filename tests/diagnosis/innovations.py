@@ -11,8 +11,8 @@ from scipy.signal import lfilter
 from statistics_of import Statistical
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.design.engine import DPT_0, KW_TO_DPT, SEA_LEVEL_DENSITY_KG_M3
 from beaver_ftc.design.fdc import MASS
+from beaver_ftc.design.model import DPT_0, KW_TO_DPT, SEA_LEVEL_DENSITY_KG_M3
 from beaver_ftc.diagnosis import bounds
 from beaver_ftc.diagnosis.detection import likelihood, noise_model, statistical
 from beaver_ftc.diagnosis.detection.likelihood import (

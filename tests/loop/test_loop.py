@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from beaver_ftc.control.supervisor import MAX_EVENTS
+from beaver_ftc.control.accommodation import MAX_EVENTS
 from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.loop import accounts, assembly, frame, loop, outcome

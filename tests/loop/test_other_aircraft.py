@@ -13,8 +13,7 @@ from beaver_ftc.design.context import DesignFunctions
 from beaver_ftc.design.model import design_record
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
-from beaver_ftc.plant.adapter import Plant
-from beaver_ftc.plant.state import FlightState
+from beaver_ftc.plant.adapter import FlightState, Plant
 from beaver_ftc.plant.trim import trim
 from beaver_ftc.plugins import DETECTORS, LAWS, registered
 from beaver_ftc.results.exports import write_acmi

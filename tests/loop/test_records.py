@@ -6,11 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from beaver_ftc.design.dryden import Dryden
+from beaver_ftc.design.air import Dryden
 from beaver_ftc.diagnosis.bounds import GUST_LIMIT_SIGMA
 from beaver_ftc.diagnosis.monitors import redundancy
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.loop import cockpit, instrument_records, memory
+from beaver_ftc.loop import assembly
 from beaver_ftc.loop.assembly import lay_out, y_places
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.loop.plugin_frame import context_of, measured_of
@@ -72,7 +72,7 @@ def test_what_is_read_logged_and_told_of_the_start(loop, changed):
         "truth": {name: truth[name].item() for name in fixed}, "factor": truth["factor"][: truth["n"]],
         "start": loop.start[:40], "logged": of_record(frame["logged"]), "columns": loop.columns,
         "places": y_places(frame), "frames": loop.n_frames, "rows": len(loop.log),
-        "travel": cockpit.travel_rad(loop.plant),
+        "travel": assembly.travel_rad(loop.plant),
     })  # fmt: skip
 
 
@@ -121,12 +121,12 @@ def test_when_the_instruments_are_watched(monitor, scheme, breaks, watched):
     fdi = {"scheme": scheme, "sensor_monitor": monitor}
     flown = _scenario(fdi=fdi, faults=[fault] if breaks else [])
     assert Declared.of(flown).monitors_sensors is watched
-    assert instrument_records.breaks_instruments(flown) is breaks
-    assert instrument_records.are_ever_monitored(flown) is watched
+    assert assembly.breaks_instruments(flown) is breaks
+    assert assembly.are_ever_monitored(flown) is watched
     later = _scenario(
         fdi={**fdi, "scheme": "none"}, faults=flown.faults, changes=[{"at_s": 2, "scheme": scheme}]
     )
-    assert instrument_records.are_ever_monitored(later) is watched
+    assert assembly.are_ever_monitored(later) is watched
 
 
 @pytest.mark.parametrize(
@@ -141,9 +141,9 @@ def test_when_the_instruments_are_watched(monitor, scheme, breaks, watched):
 )  # fmt: skip
 def test_what_is_read_of_the_truth(keys, engine, read):
     flown = _scenario(**keys)
-    assert instrument_records.has_real_engine(flown) is engine
-    usual = len(instrument_records.truth_read(_scenario()))
-    assert (len(instrument_records.truth_read(flown)) > usual) is bool(read)
+    assert assembly.has_real_engine(flown) is engine
+    usual = len(assembly.truth_read(_scenario()))
+    assert (len(assembly.truth_read(flown)) > usual) is bool(read)
 
 
 @pytest.mark.parametrize(("delay_s", "samples"), [(0.0, 0), (0.004, 2), (0.01, 3), (0.025, 4), (1.0, 102)])
@@ -161,12 +161,12 @@ def test_as_long_a_line_as_is_needed():
     def line(*delays_s, **more):
         given = dict(zip(("p", "q", "r", "alpha", "beta", "V"), delays_s, strict=False))
         sensors = {name: {"delay_s": delay_s} for name, delay_s in given.items()}
-        return instrument_records.line_for(_scenario(sensors=sensors, **more))
+        return assembly.line_for(_scenario(sensors=sensors, **more))
 
     assert line(*[1.0] * 5) == 512  # 510 of them
-    assert line(*[1.0] * 5, 0.01) == instrument_records.MOST_LINE  # 513
+    assert line(*[1.0] * 5, 0.01) == assembly.MOST_LINE  # 513
     assert line(*[1.0] * 5, 0.001) == 512
-    assert line(*[1.0] * 3, substeps=2) == instrument_records.MOST_LINE
+    assert line(*[1.0] * 3, substeps=2) == assembly.MOST_LINE
 
 
 def test_a_delay_has_a_thousand_frames_of_jsbsim_at_most():
@@ -184,7 +184,7 @@ def test_a_delay_has_a_thousand_frames_of_jsbsim_at_most():
 def test_random_numbers_begin_with_the_seed_each_counter_apart():
     records = [{"random": None} for _ in range(2)]
     for number, record in enumerate(records):
-        instrument_records.seed(record, number)
+        assembly.seed(record, number)
     first, second = (record["random"].tolist() for record in records)
     assert first == [0, 0xD1B54A32D192ED03, 0x8CB92BA72F3D8DD7, 0xA0761D6478BD642F, 0xE7037ED1A0B428DB]
     assert second == [number ^ 1 for number in first]
@@ -205,7 +205,7 @@ def test_where_the_ground_is(gear, told, altitude_m, ground_m):
         read=lambda name: 0.5 if "lat" in name else 0.25, has=lambda name: gear, aircraft=what
     )
     truth = {}
-    cockpit.set_origin(truth, plant, altitude_m)
+    assembly.set_origin(truth, plant, altitude_m)
     assert truth["ground_m"] == pytest.approx(ground_m)
     assert (truth["latitude_0"], truth["longitude_0"]) == (0.5, 0.25)
     assert truth["radius_m"] == pytest.approx(6_371_000.0 + altitude_m)
@@ -237,10 +237,10 @@ def test_the_command_and_the_engine_are_handed_over_through_python():
 @pytest.mark.parametrize("how", HOLDING)
 def test_which_surfaces_stand_still_is_noted(surface, how):
     names = ("aileron", "elevator", "rudder", "flap")
-    on = {f"failures/{names[surface]}/{how}": 1.0, cockpit.UNANTICIPATED: 10.0}
+    on = {f"failures/{names[surface]}/{how}": 1.0, assembly.UNANTICIPATED: 10.0}
     plant = SimpleNamespace(read=lambda name: on.get(name, 0.0), aircraft=SimpleNamespace(surfaces=names))
     truth = {}
-    cockpit.note_failures(truth, plant)
+    assembly.note_failures(truth, plant)
     assert truth["immovable"] == [s == surface for s in range(4)]
     assert truth["Cm_alpha3"] == 10.0
 
@@ -259,21 +259,21 @@ def test_columns_of_what_a_flight_has():
 
 @pytest.fixture
 def spare(monkeypatch):
-    monkeypatch.setattr(memory, "_spare", kept := [])
+    monkeypatch.setattr(assembly, "_spare", kept := [])
     return kept
 
 
 def test_memory_is_given_back_once_and_of_a_few_flights(spare):
-    arrays = [memory.taken((n,)) for n in (30, 10, 20, 50, 40)]
+    arrays = [assembly.taken((n,)) for n in (30, 10, 20, 50, 40)]
     for array in arrays:
-        memory.give_back(array[1:])
-        memory.give_back(array)
+        assembly.give_back(array[1:])
+        assembly.give_back(array)
     assert [block.size for block in spare] == [80, 160, 240, 400]
-    small = memory.taken((2, 10))
+    small = assembly.taken((2, 10))
     assert (small.base.size, len(spare)) == (160, 3)  # the least that is large enough
-    assert memory.taken((60,)).base.size == 480
-    assert memory.taken((10,), np.uint8).base.size == 80
+    assert assembly.taken((60,)).base.size == 480
+    assert assembly.taken((10,), np.uint8).base.size == 80
     assert [block.size for block in spare] == [240, 400]
-    memory.give_back(np.zeros(7))
-    memory.give_back(np.zeros(7, np.uint8))
+    assembly.give_back(np.zeros(7))
+    assembly.give_back(np.zeros(7, np.uint8))
     assert len(spare) == 3

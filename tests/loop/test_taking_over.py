@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import beaver_ftc as bf
-from beaver_ftc.control.laws.rows import row_of
+from beaver_ftc.control.base import row_of
 from beaver_ftc.design.model import N_Y
 from beaver_ftc.loop import stream
 from beaver_ftc.loop.assembly import Trim, assemble

@@ -19,8 +19,7 @@ from beaver_ftc.diagnosis.expectation import belief_dtype
 from beaver_ftc.diagnosis.schemes import diagnosis_dtype
 from beaver_ftc.loop.accounts import true_faults_dtype
 from beaver_ftc.loop.loop import Loop
-from beaver_ftc.plant.instruments import MEASURED
-from beaver_ftc.plant.sensing import truth_dtype
+from beaver_ftc.plant.sensing import MEASURED, truth_dtype
 from beaver_ftc.scenario.schema import load
 
 PROGRAM = """

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.design.dryden import Dryden
+from beaver_ftc.design.air import Dryden
 from beaver_ftc.plant.adapter import Plant
-from beaver_ftc.plant.configure import NEVER, GustSchedule, configure, take_off, trim_of
+from beaver_ftc.plant.trim import NEVER, GustSchedule, configure, take_off, trim_of
 from beaver_ftc.scenario.airframe import Gust
 from beaver_ftc.scenario.schema import Scenario
 

@@ -3,20 +3,20 @@
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.plant import addresses, conditions, reuse
+from beaver_ftc.plant import adapter, conditions
 from beaver_ftc.plant.adapter import Plant
-from beaver_ftc.plant.reuse import borrowed, give_back
+from beaver_ftc.plant.conditions import borrowed, give_back
 from beaver_ftc.scenario.schema import load
 
 
 @pytest.fixture(autouse=True)
 def none_is_free(monkeypatch):
-    monkeypatch.setattr(reuse, "_free", {})
+    monkeypatch.setattr(conditions, "_free", {})
     monkeypatch.setattr(conditions, "_trims", {})
 
 
 def free():
-    return sum(map(len, reuse._free.values()))
+    return sum(map(len, conditions._free.values()))
 
 
 def test_what_is_given_back_is_lent_again_once_and_no_more_than_eight_are_kept():
@@ -41,7 +41,7 @@ def test_what_was_written_is_written_back_and_the_gust_blows_over():
     noted = {}
     write = plant.write
     plant.write = lambda name, value: (noted.update({name: value}), write(name, value))
-    reuse.renew(plant, 50.0, 1)
+    conditions.renew(plant, 50.0, 1)
     gust = "atmosphere/cosine-gust"
     assert noted == {
         f"{gust}/startup-duration-sec": 1e-9, f"{gust}/steady-duration-sec": 1e-9,
@@ -57,7 +57,7 @@ def test_an_aircraft_with_engines_is_not_kept():
     give_back(plant)
     assert free() == 0
     plant.run()
-    reuse.renew(plant, 50.0, 1)  # nor made as new
+    conditions.renew(plant, 50.0, 1)  # nor made as new
     assert plant.rate_hz == 100.0
     assert plant.read("simulation/sim-time-sec") > 0.0
 
@@ -67,11 +67,11 @@ def test_files_of_a_model_are_looked_at_once_a_second(tmp_path):
     (tmp_path / "Systems").mkdir()
     (tmp_path / "Systems" / "s.xml").write_text("")
     model.write_text("")
-    found = reuse._last_written_ns(model, 1)
+    found = conditions._last_written_ns(model, 1)
     assert found == tuple(path.stat().st_mtime_ns for path in (model, tmp_path / "Systems" / "s.xml"))
     model.touch()
-    assert reuse._last_written_ns(model, 1) == found
-    assert reuse._last_written_ns(model, 2) == (model.stat().st_mtime_ns, found[1])
+    assert conditions._last_written_ns(model, 1) == found
+    assert conditions._last_written_ns(model, 2) == (model.stat().st_mtime_ns, found[1])
 
 
 def test_a_trim_is_searched_for_once(monkeypatch):
@@ -111,12 +111,12 @@ def test_an_executive_is_run_by_its_address_where_that_is_known(monkeypatch):
     plant = Plant(100.0)
     plant.start(conditions.trim())
     before_s = plant.read("simulation/sim-time-sec")
-    found = addresses.executive_address(plant.fdm)
-    if addresses.available():
+    found = adapter.executive_address(plant.fdm)
+    if adapter.available():
         assert found > 0
         assert plant.read("simulation/sim-time-sec") == pytest.approx(before_s + 0.01)
-    monkeypatch.setattr(addresses, "LAYOUT", addresses.LAYOUT._replace(executive_size=48))
-    assert addresses.executive_address(plant.fdm) == 0
+    monkeypatch.setattr(adapter, "LAYOUT", adapter.LAYOUT._replace(executive_size=48))
+    assert adapter.executive_address(plant.fdm) == 0
 
 
 @pytest.mark.parametrize(("native", "jit", "wanted"), [
@@ -124,18 +124,18 @@ def test_an_executive_is_run_by_its_address_where_that_is_known(monkeypatch):
     ("2", "0", True),
 ])  # fmt: skip
 def test_nodes_are_read_by_address_unless_that_is_not_wanted(monkeypatch, native, jit, wanted):
-    monkeypatch.setattr(addresses, "is_proved", lambda layout: True)
+    monkeypatch.setattr(adapter, "is_proved", lambda layout: True)
     for name, value in (("BEAVER_FTC_NATIVE", native), ("NUMBA_DISABLE_JIT", jit)):
         if value is None:
             monkeypatch.delenv(name, raising=False)
         else:
             monkeypatch.setenv(name, value)
-    assert addresses.available() is wanted
+    assert adapter.available() is wanted
 
 
 def test_an_address_that_there_is_not_is_zero():
-    assert addresses.address("_ZNoSuchThing") == 0
-    assert len({addresses.address(one) for one in (addresses.GETTER, addresses.SETTER, addresses.RUN)}) == 3
-    nodes = addresses._trial_nodes("abc")
+    assert adapter.address("_ZNoSuchThing") == 0
+    assert len({adapter.address(one) for one in (adapter.GETTER, adapter.SETTER, adapter.RUN)}) == 3
+    nodes = adapter._trial_nodes("abc")
     assert [node.get_name() for node in nodes] == ["a", "b", "c"]
-    assert len({addresses.pointer(node) for node in nodes}) == 3
+    assert len({adapter.pointer(node) for node in nodes}) == 3

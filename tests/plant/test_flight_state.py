@@ -1,7 +1,7 @@
 """A flight condition has what it is given; what is left out is neutral, or as usual."""
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.plant.state import FlightState, neutral
+from beaver_ftc.plant.adapter import FlightState, neutral
 
 
 def test_what_is_left_out_is_neutral_or_usual_whatever_else_is_given():

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 import needs
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import Loop
-from beaver_ftc.plant import conditions, reuse
+from beaver_ftc.plant import conditions
 from beaver_ftc.plant.conditions import ready
-from beaver_ftc.plant.configure import take_off
+from beaver_ftc.plant.trim import take_off
 from beaver_ftc.scenario.schema import load
 from samples import samples
 
@@ -86,7 +86,7 @@ def flown(scenario):
 
 def flown_in_a_fresh_one(scenario, monkeypatch):
     with monkeypatch.context() as patch:
-        patch.setattr(reuse, "_free", {})
+        patch.setattr(conditions, "_free", {})
         patch.setattr(conditions, "_trims", {})
         return flown(scenario)
 
@@ -115,12 +115,12 @@ def test_nor_does_a_lost_aircraft_leave_a_trace(monkeypatch):
 def test_nor_do_numbers_that_are_none(monkeypatch):
     healthy = scenario_of({"faults": []})
     expected = flown_in_a_fresh_one(healthy, monkeypatch)
-    plant = reuse.borrowed(100.0, 1, healthy.airframe)
+    plant = conditions.borrowed(100.0, 1, healthy.airframe)
     for name in ("fcs/elevator-cmd-rad", "uncertainty/Cm_0-scale", "atmosphere/gust-north-fps"):
         plant.write(name, np.nan)
     plant.run()
     assert np.isnan(plant.read("accelerations/qdot-rad_sec2"))
-    reuse.give_back(plant)
+    conditions.give_back(plant)
     loop = Loop(healthy)
     assert loop.plant is plant
     np.testing.assert_array_equal(np.concatenate([rows.copy() for rows in loop.chunks()]), expected)
@@ -143,7 +143,7 @@ def differing(one, other):
 def test_every_property_of_jsbsim_is_as_in_a_fresh_one(monkeypatch):
     scenario = scenario_of({"faults": []})
     with monkeypatch.context() as patch:
-        patch.setattr(reuse, "_free", {})
+        patch.setattr(conditions, "_free", {})
         fresh, trim = ready(scenario)
         take_off(fresh, scenario, trim)
         expected = readable(fresh)
@@ -189,10 +189,10 @@ def test_an_aircraft_that_somebody_prepared_is_not_flown_again():
 
 def test_a_changed_model_is_loaded_anew(tmp_path, monkeypatch):
     aircraft = scenario_of({"faults": []}).airframe
-    plant = reuse.borrowed(100.0, 1, aircraft)
-    reuse.give_back(plant)
-    monkeypatch.setattr(reuse, "_last_written_ns", lambda model, second: (1,))
-    assert reuse.borrowed(100.0, 1, aircraft) is not plant
+    plant = conditions.borrowed(100.0, 1, aircraft)
+    conditions.give_back(plant)
+    monkeypatch.setattr(conditions, "_last_written_ns", lambda model, second: (1,))
+    assert conditions.borrowed(100.0, 1, aircraft) is not plant
 
 
 @pytest.mark.parametrize("file", ["mine.xml", "Systems/a.xml", "Systems/b.xml"])
@@ -200,30 +200,30 @@ def test_every_file_of_a_model_is_looked_at(tmp_path, file):
     (tmp_path / "Systems").mkdir()
     for name in ("mine.xml", "Systems/a.xml", "Systems/b.xml"):
         (tmp_path / name).write_text("<x/>")
-    before = reuse._last_written_ns(tmp_path / "mine.xml", 1)
+    before = conditions._last_written_ns(tmp_path / "mine.xml", 1)
     os.utime(tmp_path / file, ns=(1, 1))
-    assert reuse._last_written_ns(tmp_path / "mine.xml", 1) == before  # within the same second
-    assert reuse._last_written_ns(tmp_path / "mine.xml", 2) != before
+    assert conditions._last_written_ns(tmp_path / "mine.xml", 1) == before  # within the same second
+    assert conditions._last_written_ns(tmp_path / "mine.xml", 2) != before
 
 
 def test_a_trim_that_is_known_is_the_one_that_would_be_found(monkeypatch):
     scenario = scenario_of({"faults": [], "initial": {"airspeed_mps": 41.5}})
     plant, first = ready(scenario)
-    reuse.give_back(plant)
+    conditions.give_back(plant)
     flown(scenario_of({"faults": [], "initial": {"airspeed_mps": 50.0}}))
     monkeypatch.setattr(conditions, "_trims", {})
     plant, again = ready(scenario)
-    reuse.give_back(plant)
+    conditions.give_back(plant)
     assert first == again
 
 
 def test_what_cannot_be_trimmed_leaves_the_aircraft_to_others():
-    plant = reuse.borrowed(100.0, 1, scenario_of({"faults": []}).airframe)
-    reuse.give_back(plant)
+    plant = conditions.borrowed(100.0, 1, scenario_of({"faults": []}).airframe)
+    conditions.give_back(plant)
     for _ in range(3):
         with pytest.raises(BadInput, match="airspeed"):
             ready(scenario_of({"faults": [], "initial": {"airspeed_mps": 9.0}}))
-    assert reuse.borrowed(100.0, 1, plant.aircraft) is plant
+    assert conditions.borrowed(100.0, 1, plant.aircraft) is plant
 
 
 @needs.service("derive")

@@ -12,10 +12,9 @@ import beaver_ftc as bf
 from beaver_ftc.aircraft import Travel, load
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.plant import trim as steps
-from beaver_ftc.plant.adapter import Plant
+from beaver_ftc.plant.adapter import FlightState, Plant
 from beaver_ftc.plant.conditions import trimmed
 from beaver_ftc.plant.linear import LinearModel, differences, engine_slope, own
-from beaver_ftc.plant.state import FlightState
 from beaver_ftc.plant.trim import TrimPoint, trim
 from beaver_ftc.scenario.schema import load as load_scenario
 from trainer import trainer

@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
-from beaver_ftc.loop.cockpit import Cockpit
+from beaver_ftc.loop.assembly import Cockpit
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plant import channels
-from beaver_ftc.plant.adapter import Plant, _Errors, bare, body_axes, translated
-from beaver_ftc.plant.configure import NEVER, GustSchedule, configure, take_off, trim_of
+from beaver_ftc.plant.adapter import FlightState, Plant, _Errors, bare, body_axes, translated
 from beaver_ftc.plant.model_file import copy_of, package
-from beaver_ftc.plant.state import FlightState
 from beaver_ftc.plant.trial import probe
+from beaver_ftc.plant.trim import NEVER, GustSchedule, configure, take_off, trim_of
 from beaver_ftc.scenario.airframe import Gust
 from beaver_ftc.scenario.schema import load
 from trainer import FOLDER, trainer

@@ -6,7 +6,7 @@ import pytest
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario import interventions as done
 from beaver_ftc.scenario.interventions import StickTrack
-from beaver_ftc.scenario.schema import load
+from beaver_ftc.scenario.schema import load, stages
 
 LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4}
 STUCK = {"type": "stuck", "actuator": "rudder", "position_deg": 3}
@@ -111,7 +111,7 @@ def test_stages_keep_the_options_of_what_the_scenario_begins_with():
     found = [
         (change.at_s, now.control.law, now.control.options, now.fdi.scheme, now.fdi.options,
          now.sensors.is_ideal, now.fdi.bounds.sensors.is_ideal)
-        for change, now in done.stages(scenario)
+        for change, now in stages(scenario)
     ]  # fmt: skip
     assert found == [
         (1, "nominal", {}, "rls-monitor", {"b": 2.0}, False, True),

@@ -162,7 +162,7 @@ def test_tests_of_a_module_without_functions_are_those_of_what_imports_it():
         "src/beaver_ftc/diagnosis/monitors/redundancy.py",
         "src/beaver_ftc/diagnosis/schemes/__init__.py",
     )
-    lines = {user: {"1": [], "150": ["b"]}, "src/beaver_ftc/design/terms.py": {"20": ["a"]}}
+    lines = {user: {"1": [], "150": ["b"]}, "src/beaver_ftc/design/model.py": {"20": ["a"]}}
     found = reach.Reach([{"seconds": {}, "left_out": {}, "lines": lines}])
     assert found.of(watch, (60, 40)) == {"b"}
 

@@ -137,7 +137,7 @@ class Known:
     def columns(self) -> tuple[str, ...]:
         """Of a log with everything in it, of every built-in aircraft."""
         from beaver_ftc.aircraft import builtin_names, load
-        from beaver_ftc.control.outer.state import COLUMNS
+        from beaver_ftc.control.autopilot import COLUMNS
         from beaver_ftc.diagnosis.isolation import estimator_names
         from beaver_ftc.plant.channels import log_columns
 

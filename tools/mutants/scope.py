@@ -28,9 +28,7 @@ MODES = {KERNELS: (PLAIN,), GLUE: (PLAIN, COMPILED)}
 # Compiled modules that plain Python reaches in a second.
 QUICK = ("design", "diagnosis", "control")
 APART = {
-    "beaver_ftc/compiled/interrupts.py": GLUE,
     "beaver_ftc/compiled/records.py": GLUE,
-    "beaver_ftc/compiled/sources.py": GLUE,
     "beaver_ftc/compiled": "compile",
     "beaver_ftc/results/style.py": "looks",
 }

@@ -1,17 +1,23 @@
 """How this package compiles its per-frame maths: once per machine, by fixed floating-point rules.
 
-Division by zero gives inf or nan, as in NumPy and JSBSim: the loop looks for non-finite values once a frame
-instead of every operation doing so. No fast-math: the same flight gives the same bits.
+Division by zero gives inf or nan, as in NumPy and JSBSim: the loop looks for non-finite values once a
+frame instead of every operation doing so. No fast-math: the same flight gives the same bits.
 
 Compiled code is kept in the user's cache, each kernel under what its code follows from: an edit compiles
-again what it changes. It also works where the package is read-only. Nobody else may write there: what is kept
-is run.
+again what it changes. It also works where the package is read-only. Nobody else may write there: what is
+kept is run.
 
 target.py says how much is borrowed of which version of Numba. Flights are the same with any.
+
+One of several kernels by its number: how compiled code calls a row of a table.
+
+Compiled code calls only kernels that it can name. `one_of` names each row's kernel in turn, so the
+caller's code does not depend on how many rows there are. Give it lazy kernels (compiled.py): a flight then
+compiles the rows that it uses.
 """
 
-# mypy: disable-error-code="attr-defined,method-assign,assignment"
 import functools
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
@@ -21,10 +27,13 @@ import numba
 import numpy as np
 from numba.extending import overload
 
+from beaver_ftc.compiled.cache import BY_ADDRESS
 from beaver_ftc.compiled.records import record, sized
-from beaver_ftc.compiled.sources import BY_ADDRESS
 from beaver_ftc.documents.errors import say_once
 from beaver_ftc.documents.files import cache_of_version, digest_of_files
+
+# mypy: disable-error-code="attr-defined,method-assign,assignment"
+
 
 __all__ = ["apart", "direct", "kernel", "plain", "record", "row_of", "sized"]
 
@@ -55,7 +64,7 @@ def apart(function):
     called = kernel(function)
     if numba.config.DISABLE_JIT or not borrows():
         return called
-    from beaver_ftc.compiled.by_address import stub
+    from beaver_ftc.compiled.target import stub
 
     tag = called.folder.name if called.folder else ""
     caller = stub((function.__module__, function.__qualname__, tag), called)
@@ -216,3 +225,33 @@ def _with_attributes(argument):
         if of.names and of.type is not _Record:
             return argument.view(_attributed(of))
     return argument
+
+
+Kernel = Callable[..., None]
+
+
+def one_of(kernels: Sequence[Kernel]) -> Kernel:
+    """A kernel (place, *arguments) that calls the kernel at that place with these arguments.
+
+    place: 0 for the first kernel; a place beyond the last calls the last. The kernels return nothing.
+    """
+    first, others = kernels[0], kernels[1:]
+
+    if not others:
+
+        @kernel
+        def last(place: int, *arguments: Any) -> None:
+            first(*arguments)
+
+        return last
+
+    rest = one_of(others)
+
+    @kernel
+    def either(place: int, *arguments: Any) -> None:
+        if place == 0:
+            first(*arguments)
+        else:
+            rest(place - 1, *arguments)
+
+    return either

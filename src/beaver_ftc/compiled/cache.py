@@ -1,7 +1,21 @@
-"""Compiled code on the disk, a file a kernel and set of argument types: written once, loaded by all.
+"""Compiled code on the disk: what it follows from, how it is kept and loaded, and signals meanwhile.
 
-It is loaded without making Numba's compiler ready, which takes 0.25 s. It is pickled machine code, which runs
-when it is loaded: a file that another user can write is not loaded.
+Signals that arrive while LLVM calls Python.
+
+LLVM asks for kept machine code by a Python function. A signal's handler that raises there, as that of
+Ctrl-C does, raises inside of a call from C: the exception is lost, LLVM goes on without the code, and the
+process crashes.
+
+What machine code follows from: a kernel's instructions, its constants, and all that its names stand for.
+
+Compiled code is kept under this digest, so an edit compiles again what it changes and nothing else.
+Comments, docstrings and line numbers change no code. What is compiled by means of its own, an intrinsic,
+is as its whole file.
+
+Compiled code on the disk, a file a kernel and set of argument types: written once, loaded by all.
+
+It is loaded without making Numba's compiler ready, which takes 0.25 s. It is pickled machine code, which
+runs when it is loaded: a file that another user can write is not loaded.
 """
 
 import atexit
@@ -11,19 +25,123 @@ import gc
 import hashlib
 import os
 import pickle
+import signal
 import sys
 import threading
 from collections.abc import Iterator
+from enum import EnumMeta
 from pathlib import Path
+from types import CodeType, FunctionType, ModuleType
+from typing import Any
 
 import numba
+import numpy as np
 from numba.core import serialize
 from numba.core.compiler import CompileResult
 
-from beaver_ftc.compiled import interrupts
-from beaver_ftc.compiled.sources import digest_of
 from beaver_ftc.documents.errors import say_once
-from beaver_ftc.documents.files import read_own
+from beaver_ftc.documents.files import digest_of_files, read_own
+
+_HELD = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+
+
+@contextlib.contextmanager
+def held() -> Iterator[None]:
+    """Handle signals when this is over; what is done meanwhile lasts milliseconds, or cannot be interrupted.
+
+    Python handles signals in the main thread alone. A signal that ends the process at once still does.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    arrived: list[int] = []
+    handlers = {number: signal.getsignal(number) for number in _HELD}
+    handlers = {number: handler for number, handler in handlers.items() if callable(handler)}
+    for number in handlers:
+        signal.signal(number, lambda number, _: arrived.append(number))
+    try:
+        yield
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+        for number in arrived[:1]:
+            signal.raise_signal(number)
+
+
+BY_ADDRESS = "called_by_address"  # an attribute of a kernel that its callers look up by name when they run
+
+
+def digest_of(function: FunctionType) -> str:
+    """A name for what a kernel's machine code follows from beside its arguments' types: its instructions,
+    the constants in it, and what its names stand for now, kernels it calls included."""
+    digest = hashlib.sha256()
+    for part in _parts(function, {}):
+        digest.update(part.encode() + b"\0")
+    return digest.hexdigest()
+
+
+def _parts(function: FunctionType, seen: dict[int, int]) -> Iterator[str]:
+    if id(function) in seen:
+        yield f"as before, {seen[id(function)]}"
+        return
+    seen[id(function)] = len(seen)
+    cells = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
+    known = {**function.__globals__, **{name: cell.cell_contents for name, cell in cells}}
+    yield from _value(function.__defaults__ or (), seen)
+    for code in _codes(function.__code__):
+        yield code.co_code.hex()
+        constants = code.co_consts[1:] if code.co_consts[:1] == (function.__doc__,) else code.co_consts
+        yield from _value([each for each in constants if not isinstance(each, CodeType)], seen)
+        for name in (*code.co_names, *code.co_freevars):
+            yield name
+            if name in known:
+                yield from _named(known[name], code.co_names, seen, set())
+
+
+def _named(value: Any, names: tuple[str, ...], seen: dict[int, int], passed: set[int]) -> Iterator[str]:
+    """A value, and of a module whatever these names may stand for in it: a constant, a kernel, a module."""
+    yield from _value(value, seen)
+    if isinstance(value, ModuleType) and not _is_numeric(value.__name__) and id(value) not in passed:
+        for below in names:
+            yield from _named(vars(value).get(below), names, seen, passed | {id(value)})
+
+
+def _is_numeric(module: str) -> bool:
+    """Whether what is in a module belongs to a version that code is kept under anyhow."""
+    return module.partition(".")[0] in ("math", "numba", "numpy")
+
+
+def _codes(code: CodeType) -> Iterator[CodeType]:
+    yield code
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _codes(constant)
+
+
+def _value(value: Any, seen: dict[int, int]) -> Iterator[str]:
+    plain = getattr(value, "py_func", value)
+    defined_by = getattr(value, "_defn", None)  # of an intrinsic: what gives its instructions
+    if hasattr(value, BY_ADDRESS):
+        yield getattr(value, BY_ADDRESS)
+    elif isinstance(value, EnumMeta):
+        yield repr([*value])
+    elif isinstance(defined_by, FunctionType):
+        yield digest_of_files(Path(sys.modules[defined_by.__module__].__file__ or ""))
+    elif isinstance(value, np.ndarray):
+        yield f"{value.dtype} {value.shape} {value.tobytes().hex()}"
+    elif isinstance(value, tuple | list):
+        yield f"{len(value)}"
+        for each in value:
+            yield from _value(each, seen)
+    elif isinstance(value, frozenset):
+        yield repr(sorted(map(repr, value)))
+    elif isinstance(value, bool | int | float | complex | str | bytes | np.generic | np.dtype | None):
+        yield repr(value)
+    elif isinstance(plain, FunctionType) and not _is_numeric(plain.__module__):
+        yield from _parts(plain, seen)
+    else:
+        yield f"{type(value).__qualname__} {getattr(value, '__name__', '')}"
+
 
 COMPILING = "compiling the flight code, once on this machine: some 20 s on an idle one"
 MORE = "compiling what this flight is the first to use, once on this machine: 10 s to a minute on an idle one"
@@ -102,7 +220,7 @@ class CodeCache:
                 f"a file of compiled code in {self._folder} is not run: {why_refused}; it is compiled again"
             )
             return None
-        with interrupts.held():
+        with held():
             return CompileResult._rebuild(context, *pickle.loads(content))
 
     def save(self, types, result) -> None:

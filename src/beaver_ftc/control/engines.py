@@ -1,56 +1,342 @@
-"""Engines as effectors: each turns the aircraft by its arms, and takes what surfaces no longer reach.
+"""Engine power and engines as effectors: what thrust does along the path, power on pitch, each engine by its
+arms.
 
-A surface about an axis that is given up or at its stop leaves a part of the demand, the shortfall e. What the
-engines are to give is its integral,
+What engine power does along the path, and the power that does so much.
+
+Of a piston engine whose slipstream is among the forces, the slope where it is now; of any other, a table
+of steady thrust over airspeed and power, as the aircraft's file has it. Power is in the units of its
+setting.
+
+Engine power: its command, in the units of its setting; and the Beaver's on pitch, the last that acts there
+when neither elevator nor flap does.
+
+    pz = pz_trim - k_V (V - Vbar) + k_att att,    T_V Vbar' = V - Vbar,    att' = q - q_ref - att / T_att
+
+Airspeed fed back to power damps the phugoid, as when an airliner was flown on its engines alone
+[Burcham1997]. Washed out, so that power does not fight the airspeed to which a jammed elevator trims the
+aircraft: it has not the moment for that. att is what the pitch rate has missed of late: nose too high, and
+more power lowers it, Cm_dpt being negative.
+
+Power has little moment and a right-half-plane zero from there to the attitude: it can steady the aircraft,
+not make it follow a pitch rate.
+
+Engines as effectors: each turns the aircraft by its arms, and takes what surfaces no longer reach.
+
+A surface about an axis that is given up or at its stop leaves a part of the demand, the shortfall e. What
+the engines are to give is its integral,
 
     w' = e / T,   T = 2 lag            over the engines' own lag: w / demand = 1 / (T s (lag s + 1) + 1)
 
-which is damped by 0.7: they take the slow part; the fast one, which they could only answer late, is left to
-the aircraft's own damping [Burcham1997]. What they give is in the design model, by the moments of the engines
-among its signals, or the law's observer finds it: e is then what is left. Once the surfaces reach, w fades.
+which is damped by 0.7: they take the slow part; the fast one, which they could only answer late, is left
+to the aircraft's own damping [Burcham1997]. What they give is in the design model, by the moments of the
+engines among its signals, or the law's observer finds it: e is then what is left. Once the surfaces reach,
+w fades.
 
-Which engine gives what is constrained least squares (least_squares.py) over the accelerations u (m/s2 of the
-whole aircraft's thrust over mass) that the power left above and below the common lever gives; B has
+Which engine gives what is constrained least squares (allocation.py) over the accelerations u (m/s2 of
+the whole aircraft's thrust over mass) that the power left above and below the common lever gives; B has
 
     share mass (0, down / Iy, -right / Iz)                       of a force along the body's x axis
 
-with the inertia's coupling of yaw into roll. The lever that gives u is found in the table of thrust. Roll is
-not asked of them: they roll by sideslip, which the outer loops ask for.
+with the inertia's coupling of yaw into roll. The lever that gives u is found in the table of thrust. Roll
+is not asked of them: they roll by sideslip, which the outer loops ask for.
 """
+
+from math import exp, radians
+from typing import Any
 
 import numpy as np
 
-from beaver_ftc.aircraft.schema import MAX_EFFECTORS
+from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.aircraft.schema import MAX_EFFECTORS, MAX_LEVERS, MAX_THRUST
 from beaver_ftc.compiled import apart, kernel, record
-from beaver_ftc.control import least_squares
-from beaver_ftc.control.allocation import remaining
-from beaver_ftc.control.laws.rows import row_of
-from beaver_ftc.control.least_squares import problem_dtype
-from beaver_ftc.control.outer.thrust import ENGINE, gained, power_for, set_up_engine
-from beaver_ftc.control.outer.thrust import look_up as at_airspeed
-from beaver_ftc.control.power import WHOLE_RANGE_S
-from beaver_ftc.design.model import inertia_coefficients
+from beaver_ftc.control import allocation
+from beaver_ftc.control.allocation import problem_dtype, remaining
+from beaver_ftc.control.base import row_of
+from beaver_ftc.design.model import AIRSPEED, DPT, QDYN, engine_power_kw, inertia_coefficients, slipstream
 from beaver_ftc.diagnosis.state import PITCH, YAW
 from beaver_ftc.scenario.schema import Scenario
+
+LEAST_PUSH = 1e-3  # m/s2 per inHg
+LEAST_RISE = 1e-4  # m/s2 from one setting to the next, so that each has its own
+
+# Settings and airspeeds (m/s) there are, thrust over mass (m/s2) at these, and at the airspeed of the frame.
+ENGINE = record(
+    settings=int, airspeeds=int, setting=MAX_THRUST, airspeed=MAX_THRUST, table=(MAX_THRUST, MAX_THRUST),
+    now=MAX_THRUST,
+)  # fmt: skip
+
+
+def set_up_engine(engine: np.void, thrust: Any, mass_kg: float) -> None:
+    """Fill the record (dtype ENGINE) from a file's `engine.thrust`; None leaves it empty."""
+    if thrust is None:
+        return
+    m, n = len(thrust.airspeed_mps), len(thrust.setting)
+    engine["airspeeds"], engine["settings"] = m, n
+    engine["airspeed"][:m], engine["setting"][:n] = thrust.airspeed_mps, thrust.setting
+    engine["table"][:m, :n] = np.array(thrust.force_n) / mass_kg + LEAST_RISE * np.arange(n)
+
+
+@kernel
+def between(at, n, x, y):
+    """y (n,) at `at`, linear between the rising x (n,); beyond its ends the nearest."""
+    k = 0
+    while k < n - 2 and at > x[k + 1]:
+        k += 1
+    part = min(max((at - x[k]) / (x[k + 1] - x[k]), 0.0), 1.0)
+    return y[k] + part * (y[k + 1] - y[k])
+
+
+@kernel
+def look_up(engine, airspeed):
+    """Fill engine.now for an airspeed, m/s."""
+    for j in range(engine.settings):
+        engine.now[j] = between(airspeed, engine.airspeeds, engine.airspeed, engine.table[:, j])
+
+
+@kernel
+def thrust_per_inhg(thrust, alpha, airspeed, power, y):
+    """Acceleration along the path per inHg of manifold pressure, m/s2; thrust (2,): of the slipstream."""
+    dpt_per_inhg = power.config.dpt_factor / (2.0 * y[QDYN] * airspeed)
+    slope = thrust[0] + 2.0 * thrust[1] * alpha * y[DPT]
+    return max(y[QDYN] * slope * dpt_per_inhg, LEAST_PUSH)
+
+
+@kernel
+def gained(engine, push, trim, power):
+    """The acceleration by which a power exceeds that in trim, m/s2; push: its slope if there is no table."""
+    if engine.settings == 0:
+        return push * (power - trim)
+    there = between(power, engine.settings, engine.setting, engine.now)
+    return there - between(trim, engine.settings, engine.setting, engine.now)
+
+
+@kernel
+def power_for(engine, push, trim, acceleration):
+    """The power whose acceleration exceeds that in trim by so much, m/s2: the inverse of `gained`."""
+    if engine.settings == 0:
+        return trim + acceleration / push
+    wanted = acceleration + between(trim, engine.settings, engine.setting, engine.now)
+    return between(wanted, engine.settings, engine.now, engine.setting)
+
+
+LEAST_LACK_RAD_S2 = 0.05  # of pitch acceleration: what 2 to 3 inHg give
+WHOLE_RANGE_S = 5.0  # in which a lever goes from stop to stop
+YAW_SHARE = 0.5  # of the rudder, that engine power may claim: the rest is there to fly with
+
+# impatience, forgiveness: shares a frame; speed_gain inHg per m/s, attitude_gain inHg per rad; smoothing,
+# washout, leak: shares a frame; trim, low, high, step: in the units of the setting, as is the command.
+POWER_CONFIG = record(
+    enabled=int, impatience=float, forgiveness=float, speed_gain=float, attitude_gain=float,
+    smoothing=float, washout=float, leak=float, trim=float, low=float, high=float, step=float,
+    dpt_factor=float, highest_dpt=float,
+)  # fmt: skip
+# base: the setting unless engaged, in trim or by the autopilot.
+SETPOINT = record(base=float)
+POWER_MEMORY = record(lost=float, engaged=int, moved=int, speed=float, usual_speed=float, attitude=float)
+# command: of all engines, then what each that is an effector has beside it (engines.py); in_use: whether the
+# levers are commanded; what is reported: since when and how long engaged, the lowest and highest setting.
+POWER_OUTPUT = record(command=MAX_LEVERS, in_use=int, from_s=float, frames=int, least=float, greatest=float)
+POWER = record(config=POWER_CONFIG, setpoint=SETPOINT, memory=POWER_MEMORY, output=POWER_OUTPUT)
+
+
+def is_at_hand(scenario: Scenario) -> bool:
+    """Whether the built-in law of a scenario may use the engine."""
+    law = row_of(scenario.control.law)
+    every_type = scenario.fdi.fault_class == "all" and law.pitch_by_power
+    wanted = scenario.control.power.enabled and (law.informed or (law.reallocates and every_type))
+    return wanted and _has_piston_engine(scenario.airframe)
+
+
+def _has_piston_engine(aircraft: Aircraft) -> bool:
+    """Whether the power law knows the engine: manifold pressure is what it moves, at a known engine speed."""
+    return aircraft.power_setting == "manifold_pressure_inhg" and aircraft.has_engine_instruments
+
+
+def configure_power(power: np.void, layout: np.void, scenario: Scenario) -> None:
+    """Fill the record (dtype POWER); layout: of the surfaces."""
+    settings, dt, config = scenario.control.power, 1.0 / scenario.rate_hz, power["config"]
+    initial: Any = scenario.initial  # its engine's keys are the aircraft's
+    config["enabled"], power["output"]["from_s"] = is_at_hand(scenario), -1.0
+    config["impatience"], config["forgiveness"] = dt / settings.patience_s, dt / settings.release_s
+    config["speed_gain"] = settings.speed_gain_inhg_per_mps
+    config["attitude_gain"] = settings.attitude_gain_inhg_per_deg / radians(1.0)
+    lags_s = {
+        "smoothing": settings.smoothing_s,
+        "washout": settings.washout_s,
+        "leak": settings.attitude_memory_s,
+    }
+    for name, lag_s in lags_s.items():
+        config[name] = 1.0 - exp(-dt / lag_s)
+    named = scenario.airframe.file.power_setting
+    if named is None:
+        return
+    name, setting = named
+    trim = getattr(initial, name)
+    config["trim"] = power["setpoint"]["base"] = power["output"]["command"][0] = trim
+    power["output"]["least"] = power["output"]["greatest"] = trim
+    config["low"], config["high"] = low, high = setting.range
+    per_s = (high - low) / WHOLE_RANGE_S
+    if _has_piston_engine(scenario.airframe):
+        config["low"], config["high"] = min(settings.lowest_inhg, trim), max(settings.highest_inhg, trim)
+        config["dpt_factor"], config["highest_dpt"] = _slipstream_limits(scenario, layout)
+        per_s = settings.rate_inhg_s
+    config["step"] = per_s * dt
+
+
+def _slipstream_limits(scenario: Scenario, layout: np.void) -> tuple[float, float]:
+    """rho V^3 d dpt / d pz of the engine [FDC], kg/(m3) (m/s)^3 per inHg; and the dpt at which holding the
+    propeller's yawing moment takes YAW_SHARE of the rudder's travel."""
+    initial: Any = scenario.initial
+    aircraft, rudder = scenario.airframe, layout["main"][YAW]
+    rpm, terms = initial.engine_rpm, aircraft.terms.values()
+    rudders = {s for s, axis in zip(aircraft.surfaces, aircraft.dominant_axis, strict=True) if axis == YAW}
+    per_rad = sum(t.value for t in terms if t.coefficient == "Cn" and not t.of and t.surface in rudders)
+    of_slipstream = sum(t.value for t in terms if t.coefficient == "Cn" and t.of == (("dpt", 3),))
+    kw_per_inhg = engine_power_kw(rpm, 1.0, 1.0) - engine_power_kw(rpm, 0.0, 1.0)
+    rudder_rad = min(-layout["low"][rudder], layout["high"][rudder])
+    dpt3 = YAW_SHARE * per_rad * rudder_rad / of_slipstream if of_slipstream else np.inf
+    return slipstream(kw_per_inhg, 1.0, 1.0) - slipstream(0.0, 1.0, 1.0), max(dpt3, 0.0) ** (1.0 / 3.0)
+
+
+@kernel
+def unable(surfaces, saturated, s):
+    """Whether surface s is given up or stands at a stop."""
+    given_up = surfaces.output.effectiveness[s] < surfaces.config.least_effectiveness
+    return given_up or saturated[s] == 1
+
+
+@kernel
+def pitch_is_lost(layout, surfaces, saturated, shortfall):
+    """Whether elevator and flap are given up, or cannot between them give what pitch demands.
+
+    A flap that can still act is asked for what the elevator lacks, so a lack says that it has nothing left.
+    shortfall (3,) rad/s2; saturated (n,).
+    """
+    effectiveness, elevator = surfaces.output.effectiveness, layout.main[PITCH]
+    most = remaining(layout, effectiveness, PITCH)
+    for s in range(effectiveness.size):
+        if layout.is_backup[s]:
+            most = max(most, effectiveness[s])
+    lacking = unable(surfaces, saturated, elevator) and abs(shortfall[PITCH]) > LEAST_LACK_RAD_S2
+    return most < surfaces.config.least_effectiveness or lacking
+
+
+@kernel
+def watch(power, is_lost, t):
+    """Take over once pitch has been lost for a while, hand back once it has not been for longer. t s.
+
+    lost counts up while it is and down while it is not, between 0 and 1: swings past zero keep what they add.
+    """
+    config, memory, output = power.config, power.memory, power.output
+    change = config.impatience if is_lost else -config.forgiveness
+    memory.lost = min(max(memory.lost + change, 0.0), 1.0)
+    if memory.lost == 1.0 and not memory.engaged:
+        memory.engaged, memory.attitude = 1, 0.0
+        if output.from_s < 0.0:
+            output.from_s = t
+    elif memory.lost == 0.0:
+        memory.engaged = 0
+
+
+@kernel
+def follow(config, memory, reference, x, y):
+    """Bring airspeed, its slow mean and the attitude missed to this frame; x (3,) rad/s, y (5,)."""
+    if memory.usual_speed == 0.0:
+        memory.speed = memory.usual_speed = y[AIRSPEED]
+    memory.speed += config.smoothing * (y[AIRSPEED] - memory.speed)
+    memory.usual_speed += config.washout * (memory.speed - memory.usual_speed)
+    error = x[PITCH] - reference.output.governed_rate[PITCH]
+    memory.attitude += reference.config.dt * error - config.leak * memory.attitude
+
+
+@kernel
+def ceiling(power, y, highest_dpt):
+    """Highest manifold pressure (inHg) whose slipstream leaves the rudder enough to fly with; y (5,).
+
+    The propeller yaws with dpt^3: slow and at full power, more than the rudder can hold. No limit where
+    nothing is known of a slipstream.
+    """
+    if power.config.dpt_factor == 0.0:
+        return np.inf
+    per_inhg = power.config.dpt_factor / (2.0 * y[QDYN] * y[AIRSPEED])
+    return power.output.command[0] + (highest_dpt - y[DPT]) / per_inhg
+
+
+@kernel
+def wanted(power, y):
+    """The law: manifold pressure, inHg, within its limits; the set one unless engaged."""
+    config, memory = power.config, power.memory
+    if not memory.engaged:
+        return power.setpoint.base
+    deviation = memory.speed - memory.usual_speed
+    pressure = power.setpoint.base - config.speed_gain * deviation + config.attitude_gain * memory.attitude
+    return max(min(pressure, ceiling(power, y, config.highest_dpt), config.high), config.low)
+
+
+@kernel
+def steer_by_power(power, reference, x, y, watched, is_lost, t):
+    """Move the manifold pressure by one frame; x (3,) rad/s, y (5,), t s.
+
+    watched: whether it may take over, since there is an alarm; is_lost: `pitch_is_lost` now.
+    """
+    memory, output = power.memory, power.output
+    follow(power.config, memory, reference, x, y)
+    if watched:
+        watch(power, is_lost, t)
+    output.command[0] = moved(output.command[0], wanted(power, y), power.config.step)
+    output.in_use = memory.engaged or memory.moved
+    memory.moved = output.command[0] != power.setpoint.base
+    if output.in_use:
+        output.frames += memory.engaged
+        output.least = min(output.least, output.command[0])
+        output.greatest = max(output.greatest, output.command[0])
+
+
+@kernel
+def moved(before, wanted, step):
+    """The setting `wanted`, as far as one `step` of a frame reaches from `before`."""
+    return min(max(wanted, before - step), before + step)
+
+
+@kernel
+def follow_autopilot(power, setting, airspeed):
+    """Take the setting that the autopilot asks for, and the airspeed (m/s) to hold while power stands in for
+    a lost pitch: this law has an airspeed loop of its own."""
+    power.output.in_use, power.setpoint.base = 1, setting
+    if power.memory.engaged:
+        power.memory.usual_speed = airspeed
+    if not power.config.enabled:
+        power.output.command[0] = moved(power.output.command[0], setting, power.config.step)
+
+
+@kernel
+def move_differences(power, difference, n, step):
+    """Move what each of n engines has beside the common lever towards `difference` (n,), by at most a
+    step."""
+    output = power.output
+    for e in range(n):
+        output.command[1 + e] = moved(output.command[1 + e], difference[e], step)
+        output.in_use = output.in_use or output.command[1 + e] != 0.0
+
 
 LEAST_LAG_S, RELEASE_S = 0.5, 20.0
 
 # n: how many; low, high: of the setting, step: in a frame; part, release: shares a frame. B (3, n) rad/s2 per
 # m/s2.
-CONFIG = record(
+ENGINES_CONFIG = record(
     n=int, low=float, high=float, step=float, part=float, release=float, B=(3, MAX_EFFECTORS)
 )  # fmt: skip
 # serving: rows of B of the axes they serve now; wanted (3,) rad/s2: w; from_s: since when they turn.
-MEMORY = record(
+ENGINES_MEMORY = record(
     thrust=ENGINE, serving=(3, MAX_EFFECTORS), wanted=3, problem=problem_dtype(MAX_EFFECTORS), from_s=float,
 )  # fmt: skip
 # difference: of each engine's setting from the common lever; authority (2, 3) rad/s2: the least and the
 # greatest that all give about each axis.
-OUTPUT = record(difference=MAX_EFFECTORS, authority=(2, 3))
-ENGINES = record(config=CONFIG, memory=MEMORY, output=OUTPUT)
+ENGINES_OUTPUT = record(difference=MAX_EFFECTORS, authority=(2, 3))
+ENGINES = record(config=ENGINES_CONFIG, memory=ENGINES_MEMORY, output=ENGINES_OUTPUT)
 
 
-def configure(engines: np.void, scenario: Scenario) -> None:
+def configure_engines(engines: np.void, scenario: Scenario) -> None:
     """Fill the record (dtype ENGINES); it stays empty where no engine is an effector, or none may be used."""
     aircraft, dt, config = scenario.airframe, 1.0 / scenario.rate_hz, engines["config"]
     named, thrust = aircraft.file.power_setting, aircraft.engine.thrust
@@ -74,7 +360,7 @@ def configure(engines: np.void, scenario: Scenario) -> None:
 def effects_of(scenario: Scenario) -> np.ndarray:
     """B (3, engines): rad/s2 about each axis per m/s2 of each engine that is an effector; of none (3, 0)."""
     engines = np.zeros(1, ENGINES)[0]
-    configure(engines, scenario)
+    configure_engines(engines, scenario)
     return np.array(engines["config"]["B"][:, : engines["config"]["n"]])
 
 
@@ -114,14 +400,14 @@ def limit(config, memory, authority, base):
 
 
 @apart
-def steer(engines, power, axes, layout, saturated, surfaces, airspeed):
+def steer_by_engines(engines, power, axes, layout, saturated, surfaces, airspeed):
     """Fill output.difference, the setting of each engine beside the common lever; airspeed m/s."""
     config, memory, output = engines.config, engines.memory, engines.output
-    at_airspeed(memory.thrust, airspeed)
+    look_up(memory.thrust, airspeed)
     base = power.output.command[0]
     limit(config, memory, output.authority, base)
     want(config, memory, axes, layout, saturated, surfaces)
-    least_squares.solve(memory.problem, memory.serving, memory.wanted)
+    allocation.solve(memory.problem, memory.serving, memory.wanted)
     memory.wanted[:] = 0.0  # what cannot be given is not integrated
     for e in range(config.n):
         u = memory.problem.u[e]

@@ -1,21 +1,30 @@
 """The control stage: the records of its parts, how they are filled from a scenario, and what a change of law
-keeps of them."""
+keeps of them.
+
+The compiled laws are a table: the kernels that each row of plugins.yaml names. A new law is its own file and
+a row; nothing else names it.
+"""
+
+from importlib import import_module
 
 import numpy as np
 
-from beaver_ftc.compiled import record, sized
-from beaver_ftc.control import accommodation, allocation, engines, power, reference
+from beaver_ftc.compiled import one_of, record, sized
+from beaver_ftc.control import accommodation, allocation, engines, laws
 from beaver_ftc.control.accommodation import surfaces_dtype
 from beaver_ftc.control.allocation import PROBE, allocation_dtype, axes_dtype, layout_dtype
-from beaver_ftc.control.base import CompiledLaw
-from beaver_ftc.control.engines import ENGINES
-from beaver_ftc.control.laws.rows import row_of
-from beaver_ftc.control.laws.table import FILES
-from beaver_ftc.control.power import POWER
-from beaver_ftc.control.reference import REFERENCE
+from beaver_ftc.control.base import MODULES, CompiledLaw, file_of, row_of
+from beaver_ftc.control.engines import ENGINES, POWER
+from beaver_ftc.control.laws import REFERENCE
 from beaver_ftc.scenario.schema import Scenario
 
-# law: place of its file in laws/table.py; what the law is given: see plugins.yaml.
+FILES: dict[str, CompiledLaw] = {file_of(module): import_module(module).LAW for module in MODULES}
+
+accommodate = one_of([law.accommodate or accommodation.accommodate for law in FILES.values()])
+command = one_of([law.command for law in FILES.values()])
+
+
+# law: place of its file in FILES; what the law is given: see plugins.yaml.
 CONFIG = record(law=int, uses_verdict=int, reallocates=int, informed=int)
 
 # What a law takes over from the one before: how the reference stands, what is known of the surfaces, where
@@ -40,12 +49,12 @@ def configure(control: np.void, scenario: Scenario, travel: np.ndarray) -> None:
     """Fill the records that all laws share; travel (2, n) rad: the stops. The law's own: `configure_law`."""
     config, dt, row = scenario.control, 1.0 / scenario.rate_hz, row_of(scenario.control.law)
     control["config"] = row.place, row.uses_verdict, row.reallocates, row.informed
-    reference.configure(control["reference"], config, dt)
+    laws.configure_reference(control["reference"], config, dt)
     accommodation.configure(control["surfaces"], config, row.informed, dt)
     allocation.configure(control, config, travel, scenario.airframe)
     allocation.configure_probe(control["probe"], scenario.fdi.probing, dt)
-    power.configure(control["power"], control["layout"], scenario)
-    engines.configure(control["engines"], scenario)
+    engines.configure_power(control["power"], control["layout"], scenario)
+    engines.configure_engines(control["engines"], scenario)
 
 
 def configure_law(control: np.void, belief: np.void, scenario: Scenario, y: np.ndarray) -> None:

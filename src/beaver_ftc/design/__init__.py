@@ -5,9 +5,8 @@ from typing import TYPE_CHECKING
 from beaver_ftc.public import lazily
 
 if TYPE_CHECKING:
-    from beaver_ftc.design.atmosphere import standard_air
+    from beaver_ftc.design.air import standard_air
     from beaver_ftc.design.context import Context, Declared, DesignFunctions
-    from beaver_ftc.design.model import AXES, design_record, inertia_coefficients, inertial
-    from beaver_ftc.design.terms import N_Y
+    from beaver_ftc.design.model import AXES, N_Y, design_record, inertia_coefficients, inertial
 else:
     __getattr__, __dir__ = lazily(__name__)

@@ -13,7 +13,7 @@ class DesignFunctions:
     """The design model as two functions, xdot = f(x, y) + G(y) u (see design/model.py for the order of y)."""
 
     def __init__(self, record: np.ndarray) -> None:
-        from beaver_ftc.design.variants import responses  # compiled: nothing for those who only list plug-ins
+        from beaver_ftc.design.model import responses  # compiled: nothing for those who only list plug-ins
 
         self._record, self._fill = record[0], responses
 

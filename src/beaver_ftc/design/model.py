@@ -1,28 +1,294 @@
-"""The design model: what the diagnosis and the laws believe of the (p, q, r) dynamics.
+"""The design model, from its terms up: coefficients, actuators, engine, the dynamics, and models that are
+wrong on purpose.
+
+The one evaluator of an aircraft's coefficients: sums of terms, by looping over their table.
+
+A term is a value times a monomial of dimensionless signals and, if it has a surface, times that surface's
+deflection. The monomials form a chain: each is an earlier one times one signal, so it costs one
+multiplication. From the same table come the sums without surfaces (f), the slopes per rad of each surface
+(G), what each value multiplies, and the derivative of everything along a signal.
+
+The table holds three coefficients: Cl, Cm, Cn of the design model, or CX, CY, CZ. Its terms are sorted by
+coefficient, of each first those without a surface.
+
+What the diagnosis believes of the actuators: the aircraft's own first-order lag, rate limit and stops.
+
+    u[k+1] = u[k] + limited((command - u[k]) (1 - exp(-bandwidth dt))),   |limited| <= rate dt
+
+the discretisation of aircraft/actuator.xml, one step a JSBSim frame, so that a healthy surface is where
+the model has it.
+
+The R-985 Wasp Junior and its slipstream, as FDC has them [FDC, Power].
+
+The design model: what the diagnosis and the laws believe of the (p, q, r) dynamics.
 
     xdot = f(x, y) + G(y) u     x = (p, q, r), y = (alpha, beta, V, qdyn, declared signals), u: the surfaces
 
 [Zhang2005, eq. (2)] with the moment terms of the aircraft's file. The moment coefficients are linear in
-their values, so they are kept as a table (terms.py): a bound on a coefficient is then a bound on an
+their values, so they are kept as a table: a bound on a coefficient is then a bound on an
 acceleration. What multiplies rate products and moments in the accelerations [FDC]:
 
     pdot = Ppq p q + Pqr q r + Pn N + Pl L          Ir = Ix Iz - Jxz^2
     qdot = Qpp p^2 + Qpr p r + Qrr r^2 + Qm M
     rdot = Rpq p q + Rqr q r + Rn N + Rl L
 
-Sign conventions: body axes X forward, Y right, Z down; positive moments right wing down, nose up, nose right.
+Sign conventions: body axes X forward, Y right, Z down; positive moments right wing down, nose up, nose
+right.
+
+Design models that are wrong on purpose: what a designer may have simplified or mistaken.
+
+    engine terms neglected, other coefficients, another mass or inertia     only other numbers in the record
+    frozen alpha                f(x, y0) and G(y0) with alpha held at its trim value, all else as measured
+    linearised about trim       f = f0 + f_x (x - x0) + f_y (y - y0), G = G0
+
+The linear model is that of f + G u at (x0, y0, u0): the surfaces' moments vary with y too, so f_y holds
+d(G u0)/dy, and f0 + G0 u0 is the acceleration in trim.
 """
 
 from collections import namedtuple
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from beaver_ftc.aircraft import AXES, Aircraft, MassProperties, load
+from beaver_ftc.aircraft import AXES, Aircraft, MassProperties, Term, load
 from beaver_ftc.aircraft.aircraft import MOMENTS
-from beaver_ftc.compiled import kernel, record, sized
-from beaver_ftc.design import terms
-from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, DPT, N_Y, PH, QDYN, RH
+from beaver_ftc.aircraft.schema import FLOW_SIGNALS, MAX_MONOMIALS, MAX_SIGNALS, MAX_TERMS
+from beaver_ftc.compiled import kernel, plain, record, sized
+
+ALPHA, BETA, AIRSPEED, QDYN, DPT = range(5)  # places in y; declared signals begin at the last
+N_Y = 4 + MAX_SIGNALS
+N_SIGNALS = len(FLOW_SIGNALS) + MAX_SIGNALS
+PH, QH, RH = (FLOW_SIGNALS.index(name) for name in ("ph", "qh", "rh"))
+_DECLARED = len(FLOW_SIGNALS)  # where declared signals begin among the signals
+
+TABLE = record(
+    span=float, chord=float, n_declared=int,
+    # monomial k is monomial parent[k] times signal factor[k]; the first is 1
+    n_monomials=int, parent=("u8", MAX_MONOMIALS), factor=("u8", MAX_MONOMIALS),
+    # of each coefficient the terms without a surface, and those with one
+    n_terms=int, free_from=(int, 3), free_to=(int, 3), surface_to=(int, 3), value=MAX_TERMS,
+    monomial=("u8", MAX_TERMS), surface=(int, MAX_TERMS),
+    # scratch: signals and monomials of the state last evaluated
+    signal=N_SIGNALS, power=MAX_MONOMIALS,
+)  # fmt: skip
+
+
+def fill_table(
+    table: np.void,
+    aircraft: Aircraft,
+    terms: Sequence[Term],
+    coefficients: Sequence[str],
+    scale: Mapping[str, float] | None = None,
+) -> None:
+    """Write terms, sorted as `Aircraft.moments` are, into a record; `scale` multiplies single values."""
+    scale = scale or {}
+    table["span"], table["chord"] = aircraft.geometry.span_m, aircraft.geometry.chord_m
+    table["n_declared"], table["n_terms"] = len(aircraft.signals), len(terms)
+    chain = _chain(_monomial(term, aircraft) for term in terms)
+    table["n_monomials"] = len(chain)
+    for k, monomial in enumerate(chain[1:], start=1):
+        table["parent"][k], table["factor"][k] = chain.index(monomial[:-1]), monomial[-1]
+    for k, term in enumerate(terms):
+        table["value"][k] = term.value * scale.get(term.name, 1.0)
+        table["monomial"][k] = chain.index(_monomial(term, aircraft))
+        table["surface"][k] = aircraft.surfaces.index(term.surface) if term.surface else -1
+    first = 0
+    for i, coefficient in enumerate(coefficients):
+        of_it = [term for term in terms if term.coefficient == coefficient]
+        table["free_from"][i] = first
+        table["free_to"][i] = first + sum(term.surface is None for term in of_it)
+        first = table["surface_to"][i] = first + len(of_it)
+
+
+def _monomial(term: Term, aircraft: Aircraft) -> tuple[int, ...]:
+    """The signals a term multiplies, one entry a power, in a fixed order."""
+    return tuple(sorted(aircraft.signal_names.index(name) for name, power in term.of for _ in range(power)))
+
+
+def _chain(wanted: Iterable[tuple[int, ...]]) -> list[tuple[int, ...]]:
+    """Monomials, each one factor longer than an earlier one, that contain all wanted ones."""
+    chain: list[tuple[int, ...]] = [()]
+    for monomial in wanted:
+        for length in range(1, len(monomial) + 1):
+            if monomial[:length] not in chain:
+                chain.append(monomial[:length])
+    if len(chain) > MAX_MONOMIALS:
+        raise ValueError(f"{len(chain)} monomials, allowed: at most {MAX_MONOMIALS}")
+    return chain
+
+
+@kernel
+def signals(table, x, y, out):
+    """Fill out (N_SIGNALS,): alpha, beta rad, ph, qh, rh, declared ones. x (3,) rad/s; y (4 + declared,)."""
+    V = y[AIRSPEED]
+    out[0], out[1] = y[ALPHA], y[BETA]
+    out[2] = x[0] * table.span / (2 * V)
+    out[3] = x[1] * table.chord / V
+    out[4] = x[2] * table.span / (2 * V)
+    for k in range(table.n_declared):
+        out[_DECLARED + k] = y[DPT + k]
+
+
+@kernel
+def monomials(table, signal, out):
+    """Fill out (MAX_MONOMIALS,) with the products of powers that the terms multiply."""
+    parent, factor = table.parent, table.factor
+    out[0] = 1.0
+    for k in range(1, table.n_monomials):
+        out[k] = out[parent[k]] * signal[factor[k]]
+
+
+@kernel
+def slopes(table, signal, power, along, out):
+    """Fill out (MAX_MONOMIALS,) with the derivatives of the monomials `power` with signal `along`."""
+    parent, factor = table.parent, table.factor
+    out[0] = 0.0
+    for k in range(1, table.n_monomials):
+        out[k] = out[parent[k]] * signal[factor[k]]
+        if factor[k] == along:
+            out[k] += power[parent[k]]
+
+
+@kernel
+def directional(table, signal, power, direction, out):
+    """Fill out (MAX_MONOMIALS,) with what the monomials `power` change by as signals go in a direction."""
+    parent, factor = table.parent, table.factor
+    out[0] = 0.0
+    for k in range(1, table.n_monomials):
+        out[k] = out[parent[k]] * signal[factor[k]] + power[parent[k]] * direction[factor[k]]
+
+
+@kernel
+def evaluate(table, x, y):
+    """Bring the table's own signals and monomials to a state; x (3,) rad/s, y (4 + declared,)."""
+    signals(table, x, y, table.signal)
+    monomials(table, table.signal, table.power)
+
+
+@kernel
+def free_sum(table, i, power):
+    """Coefficient i at neutral surfaces, from the monomials."""
+    value, monomial = table.value, table.monomial
+    total = 0.0 * power[0]
+    for k in range(table.free_from[i], table.free_to[i]):
+        total += value[k] * power[monomial[k]]
+    return total
+
+
+@kernel
+def surface_sums(table, power, out):
+    """Fill out (3, surfaces) with each coefficient's slope per rad of each surface."""
+    value, monomial, surface = table.value, table.monomial, table.surface
+    for i in range(3):
+        for s in range(out.shape[1]):
+            out[i, s] = 0.0
+        for k in range(table.free_to[i], table.surface_to[i]):
+            out[i, surface[k]] += value[k] * power[monomial[k]]
+
+
+@kernel
+def whole_sum(table, i, power, u):
+    """Coefficient i with surfaces at u (surfaces,) rad, from the monomials or their derivatives."""
+    value, monomial, surface = table.value, table.monomial, table.surface
+    total = free_sum(table, i, power)
+    for k in range(table.free_to[i], table.surface_to[i]):
+        total += value[k] * power[monomial[k]] * u[surface[k]]
+    return total
+
+
+@kernel
+def regressors(table, power, u, out):
+    """Fill out (MAX_TERMS,) with what each value multiplies, from the monomials; u (surfaces,) rad."""
+    monomial, surface = table.monomial, table.surface
+    for k in range(table.n_terms):
+        out[k] = power[monomial[k]] * (u[surface[k]] if surface[k] >= 0 else 1.0)
+
+
+@sized
+def actuators_dtype(n: int) -> np.dtype:
+    """The actuators of n surfaces."""
+    return record(
+        real=int,
+        approach=n,  # share of the way to the command in one JSBSim frame; 1 without lag
+        step=n,  # rad, the furthest in one JSBSim frame
+        low=n, high=n,
+    )  # fmt: skip
+
+
+@kernel
+def nearer(u, wanted, approach, step):
+    """Where a surface at u (rad) is one JSBSim frame later; it rises with u, and never passes `wanted`."""
+    return u + min(max((wanted - u) * approach, -step), step)
+
+
+@kernel
+def move(actuators, command, u):
+    """Move the surfaces u (n,) rad by one JSBSim frame towards command (n,) rad."""
+    if not actuators.real:
+        u[:] = command
+        return
+    for s in range(u.size):
+        wanted = min(max(command[s], actuators.low[s]), actuators.high[s])
+        there = nearer(u[s], wanted, actuators.approach[s], actuators.step[s])
+        u[s] = min(max(there, actuators.low[s]), actuators.high[s])
+
+
+SEA_LEVEL_DENSITY_KG_M3 = 1.225
+DPT_0, KW_TO_DPT = 0.08696, 191.18  # dpt = DPT_0 + KW_TO_DPT P / (qdyn V)
+
+
+def engine_power_kw(engine_rpm: float, manifold_pressure_inhg: float, density_kg_m3: float) -> float:
+    """Shaft power from the engine's chart fit: kW from rpm, inHg and kg/m3."""
+    thin_air = (408.0 - 0.0965 * engine_rpm) * (1.0 - density_kg_m3 / SEA_LEVEL_DENSITY_KG_M3)
+    return 0.7355 * (-326.5 + 0.00412 * (manifold_pressure_inhg + 7.4) * (engine_rpm + 2010.0) + thin_air)
+
+
+def slipstream(power_kw: float, density_kg_m3: float, airspeed_mps: float) -> float:
+    """dpt, the dimensionless total pressure rise across the propeller: power in kW, not W."""
+    return DPT_0 + KW_TO_DPT * 2.0 * power_kw / (density_kg_m3 * airspeed_mps**3)
+
+
+_power_kw = kernel(engine_power_kw)
+
+
+@kernel
+def measured_slipstream(engine_rpm, manifold_pressure_inhg, airspeed_mps, qdyn_pa):
+    """dpt from the engine's instruments and the air data, whose density is 2 qdyn / V^2."""
+    power_kw = _power_kw(engine_rpm, manifold_pressure_inhg, 2.0 * qdyn_pa / airspeed_mps**2)
+    return DPT_0 + KW_TO_DPT * power_kw / (qdyn_pa * airspeed_mps)
+
+
+@kernel
+def density_ratio(y):
+    """Density over that at sea level, from the air data in y."""
+    return 2.0 * y[QDYN] / y[AIRSPEED] ** 2 / SEA_LEVEL_DENSITY_KG_M3
+
+
+@kernel
+def slipstream_slopes(y, thin_air_kw):
+    """What dpt changes by per unit of airspeed, s/m, of dynamic pressure, 1/Pa, and of the power, 1/kW, from
+    which it is worked out; thin_air_kw: of that for the whole of the density."""
+    V, qdyn = y[AIRSPEED], y[QDYN]
+    per_kw = KW_TO_DPT / (qdyn * V)
+    thin = per_kw * thin_air_kw * density_ratio(y)
+    return (2.0 * thin - (y[DPT] - DPT_0)) / V, -(thin + y[DPT] - DPT_0) / qdyn, per_kw
+
+
+def power_error_kw(
+    engine_rpm: float, manifold_pressure_inhg: float, rpm_error: float, inhg_error: float
+) -> tuple[float, float]:
+    """How far the power can be off, kW: for errors of the instruments, and for the whole of the density.
+
+    The readings are within the errors of what is given, the density within that at sea level.
+    """
+    rpm, pressure = engine_rpm + rpm_error, manifold_pressure_inhg + 7.4 + inhg_error
+    by_chart = 0.00412 * (pressure * rpm_error + (rpm + 2010.0) * inhg_error)
+    by_air = 408.0 - 0.0965 * (engine_rpm - rpm_error)
+    return 0.7355 * (by_chart + 0.0965 * rpm_error), 0.7355 * max(by_air, 0.0)
+
 
 # The built-in aircraft's surfaces, for what does not yet look them up in the aircraft.
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)
@@ -63,8 +329,8 @@ def inertial(inertia: InertiaCoefficients, x: np.ndarray) -> np.ndarray:
 def design_dtype(n: int) -> np.dtype:
     """The design model of an aircraft with n surfaces."""
     return record(
-        **dict.fromkeys(InertiaCoefficients._fields, float), S=float, b=float, c=float, moments=terms.TABLE,
-        # of a linearised or frozen model: see variants.py
+        **dict.fromkeys(InertiaCoefficients._fields, float), S=float, b=float, c=float, moments=TABLE,
+        # of a linearised or frozen model: see `responses`
         linearised=int, frozen_alpha=int, x0=3, y0=N_Y, f0=3, f_x=(3, 3), f_y=(3, N_Y), G0=(3, n),
     )  # fmt: skip
 
@@ -91,7 +357,7 @@ def design_record(
     for term in aircraft.moments:
         if not engine_terms and any(signal in aircraft.signals for signal, _ in term.of):
             ratio[term.name] = 0.0
-    terms.fill_table(design["moments"][0], aircraft, aircraft.moments, MOMENTS, ratio)
+    fill_table(design["moments"][0], aircraft, aircraft.moments, MOMENTS, ratio)
     return design
 
 
@@ -120,12 +386,12 @@ def both_responses(design, x, y, f, G):
     """Fill f (3,) rad/s2, the angular acceleration at neutral surfaces, and G (3, surfaces) rad/s2 per rad,
     that of each surface, whatever the rates. x (3,) rad/s, y (4 + declared,)."""
     table, power = design.moments, design.moments.power
-    terms.evaluate(table, x, y)
+    evaluate(table, x, y)
     lateral, longitudinal = y[QDYN] * design.S * design.b, y[QDYN] * design.S * design.c
-    Cl, Cn = terms.free_sum(table, 0, power), terms.free_sum(table, 2, power)
-    Cm = terms.free_sum(table, 1, power)
+    Cl, Cn = free_sum(table, 0, power), free_sum(table, 2, power)
+    Cm = free_sum(table, 1, power)
     accelerations_of_moments(design, x, lateral * Cl, longitudinal * Cm, lateral * Cn, f)
-    terms.surface_sums(table, power, G)
+    surface_sums(table, power, G)
     accelerations_per_rad(design, y, G)
 
 
@@ -134,14 +400,14 @@ def rate_damping(design, x, y, u, scratch, out):
     """Fill out (3, 3) 1/s: what the aerodynamic moments' accelerations change by per rate of the aircraft
     against the air. x (3,) rad/s, y (4 + declared,), u (surfaces,) rad; scratch (MAX_MONOMIALS,)."""
     table = design.moments
-    terms.evaluate(table, x, y)
+    evaluate(table, x, y)
     lateral, longitudinal = y[QDYN] * design.S * design.b, y[QDYN] * design.S * design.c
     for j in range(3):
-        terms.slopes(table, table.signal, table.power, PH + j, scratch)
+        slopes(table, table.signal, table.power, PH + j, scratch)
         per_rate = design.c / y[AIRSPEED] if j == 1 else design.b / (2 * y[AIRSPEED])
-        L = lateral * terms.whole_sum(table, 0, scratch, u) * per_rate
-        M = longitudinal * terms.whole_sum(table, 1, scratch, u) * per_rate
-        N = lateral * terms.whole_sum(table, 2, scratch, u) * per_rate
+        L = lateral * whole_sum(table, 0, scratch, u) * per_rate
+        M = longitudinal * whole_sum(table, 1, scratch, u) * per_rate
+        N = lateral * whole_sum(table, 2, scratch, u) * per_rate
         out[0, j] = design.Pl * L + design.Pn * N
         out[1, j] = design.Qm * M
         out[2, j] = design.Rl * L + design.Rn * N
@@ -163,3 +429,151 @@ def acceleration(f, G, u, out):
 
 
 assert (PH, RH) == (2, 4)  # rates are neighbours among the signals: see rate_damping
+
+
+_STEP = 1e-30  # of a complex step: far below rounding, so the derivative is exact to rounding
+
+
+def design_of(model: Any, aircraft: Aircraft | None = None) -> np.ndarray:
+    """The design record (1,) of a scenario's `design_model`: what the designer leaves out or gets wrong.
+
+    One that is tied to the trim wants `anchor` as well.
+    """
+    mass = mass_of(model, aircraft)
+    design = design_record(aircraft, engine_terms=model.engine_terms, scale=model.coefficients, mass=mass)
+    design["linearised"], design["frozen_alpha"] = model.linearised, model.frozen_alpha
+    return design
+
+
+def mass_of(model: Any, aircraft: Aircraft | None = None) -> MassProperties:
+    """What a scenario's `design_model` takes for mass and inertia; a heavier aircraft of the same shape has
+    its inertia in proportion."""
+    nominal, inertia = (aircraft or load()).mass, {}
+    for name in ("Ix", "Iy", "Iz", "Jxz"):
+        own = getattr(nominal, f"{name}_kg_m2")
+        inertia[f"{name}_kg_m2"] = own * model.mass * getattr(model.inertia, name)
+    return replace(nominal, mass_kg=nominal.mass_kg * model.mass, **inertia)
+
+
+def anchor(design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndarray) -> None:
+    """Fix the point a model is linearised about or frozen at: x (3,) rad/s, y, u rad in trim."""
+    if not (design["linearised"] or design["frozen_alpha"]):
+        return
+    f, G, f_x, f_y = jacobian(design, x, y, u)
+    if design["frozen_alpha"]:
+        f_y[:, ALPHA] = 0.0
+    design["x0"], design["y0"][: y.size] = x, y
+    design["f0"], design["G0"], design["f_x"], design["f_y"][:, : y.size] = f, G, f_x, f_y
+
+
+class Anchored(NamedTuple):
+    """How a design model is tied to a trim: linearised about it, or with its angle of attack frozen there.
+
+    x0 (3,) rad/s, y0: the trim. f0 (3,) rad/s2, G0 (3, surfaces) rad/s2 per rad, f_x (3, 3), f_y: the model
+    and its derivatives there; zero where it is not tied.
+    """
+
+    linearised: bool
+    frozen_alpha: bool
+    x0: np.ndarray
+    y0: np.ndarray
+    f0: np.ndarray
+    G0: np.ndarray
+    f_x: np.ndarray
+    f_y: np.ndarray
+
+
+def anchored(design: np.void) -> Anchored:
+    """How this design model is tied to a trim; of a record of `design_dtype`."""
+    arrays = {name: design[name].copy() for name in Anchored._fields[2:]}
+    return Anchored(bool(design["linearised"]), bool(design["frozen_alpha"]), **arrays)
+
+
+def jacobian(
+    design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """f (3,), G (3, n) and the derivatives of f + G u with x (3, 3) and with y (3, y.size): complex steps."""
+    steps = 1j * _STEP * np.eye(3 + y.size)  # a column is a direction
+    f, G = _split(design, x[:, None] + steps[:3], y[:, None] + steps[3:])
+    along = (f + np.einsum("isk,s->ik", G, u)).imag / _STEP
+    return f[:, 0].real, G[:, :, 0].real, along[:, :3], along[:, 3:]
+
+
+def _split(design: np.void, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The nonlinear f (3, ...) and G (3, n, ...) by the evaluator's plain functions, which take complex
+    numbers and any number of states at once: x (3, ...), y (4 + declared, ...)."""
+    record, table = _fields(design), _fields(design["moments"])
+    states = np.broadcast_shapes(x.shape[1:], y.shape[1:])
+    f, G = np.zeros((3, *states), complex), np.zeros((*record.G0.shape, *states), complex)
+    signal, power = np.zeros((N_SIGNALS, *states), complex), np.zeros((MAX_MONOMIALS, *states), complex)
+    plain(signals)(table, x, y, signal)
+    plain(monomials)(table, signal, power)
+    arms = [y[QDYN] * record.S * length for length in (record.b, record.c, record.b)]
+    moments = [arm * plain(free_sum)(table, i, power) for i, arm in enumerate(arms)]
+    plain(accelerations_of_moments)(record, x, *moments, f)
+    plain(surface_sums)(table, power, G)
+    plain(accelerations_per_rad)(record, y, G)
+    return f, G
+
+
+def _fields(record: np.void) -> SimpleNamespace:
+    """A record's fields as attributes; NumPy's own records take ten times as long to find one."""
+    return SimpleNamespace(**{name: record[name] for name in record.dtype.names or ()})
+
+
+def coefficient_slopes(design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """d(Cl, Cm, Cn) / d signals, (3, N_SIGNALS), with the surfaces at u rad, by complex steps."""
+    table = _fields(design["moments"])
+    signal, power = np.zeros(N_SIGNALS, complex), np.zeros((MAX_MONOMIALS, N_SIGNALS), complex)
+    plain(signals)(table, x, y, signal)
+    plain(monomials)(table, signal[:, None] + 1j * _STEP * np.eye(N_SIGNALS), power)
+    per_rad = np.zeros((3, u.size, N_SIGNALS), complex)
+    plain(surface_sums)(table, power, per_rad)
+    free = np.array([plain(free_sum)(table, i, power) for i in range(3)])
+    return (free + np.einsum("isk,s->ik", per_rad, u)).imag / _STEP
+
+
+def effectiveness(design: np.void, y: np.ndarray) -> np.ndarray:
+    """G (3, 4) rad/s2 per rad at y (5,), without compiled code."""
+    return design["G0"].copy() if design["linearised"] else _split(design, np.zeros(3), y)[1].real
+
+
+def own_damping(design: np.void, y: np.ndarray) -> np.ndarray:
+    """d f_i / d x_i (3,) 1/s at y and no rate, surfaces neutral: each rate's effect on its own axis."""
+    if design["linearised"]:
+        return np.diag(design["f_x"]).copy()
+    f, _ = _split(design, 1j * _STEP * np.eye(3), y[:, None] + 0j)
+    return np.diag(f).imag / _STEP
+
+
+@kernel
+def response(design, x, y, f, G):
+    """Fill f (3,) rad/s2 and G (3, n) rad/s2 per rad with what the designer believes at x (3,) and y."""
+    if design.linearised:
+        linear_response(design, x, y, f, G)
+    elif design.frozen_alpha:
+        frozen = y.copy()
+        frozen[ALPHA] = design.y0[ALPHA]
+        both_responses(design, x, frozen, f, G)
+    else:
+        both_responses(design, x, y, f, G)
+
+
+@kernel
+def responses(design, x, y, f, G):
+    """The same at each of x (n, 3), into f (n, 3); G is that of y."""
+    for i in range(x.shape[0]):
+        response(design, x[i], y, f[i], G)
+
+
+@kernel
+def linear_response(design, x, y, f, G):
+    """Fill f and G with the linear model about (x0, y0)."""
+    for i in range(3):
+        f[i] = design.f0[i]
+        for j in range(3):
+            f[i] += design.f_x[i, j] * (x[j] - design.x0[j])
+        for j in range(y.size):
+            f[i] += design.f_y[i, j] * (y[j] - design.y0[j])
+        for s in range(G.shape[1]):
+            G[i, s] = design.G0[i, s]

@@ -37,12 +37,28 @@ from beaver_ftc.aircraft import AXES, Aircraft, MassProperties, Term
 from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S, MOMENTS
 from beaver_ftc.aircraft.schema import MAX_AGES, MAX_BOXES, MAX_LEVELS, MAX_MONOMIALS, MAX_TERMS, RATE_SIGNALS
 from beaver_ftc.compiled import kernel, record, sized
+from beaver_ftc.design.air import LEAST_HEIGHT_M
 from beaver_ftc.design.context import DeclaredErrors, DesignFunctions
-from beaver_ftc.design.dryden import LEAST_HEIGHT_M
-from beaver_ftc.design.engine import DPT_0, KW_TO_DPT, density_ratio, power_error_kw
-from beaver_ftc.design.model import inertia_coefficients
-from beaver_ftc.design.terms import AIRSPEED, DPT, N_SIGNALS, N_Y, PH, QDYN, QH, RH, monomials, signals
-from beaver_ftc.design.variants import coefficient_slopes, jacobian, mass_of
+from beaver_ftc.design.model import (
+    AIRSPEED,
+    DPT,
+    DPT_0,
+    KW_TO_DPT,
+    N_SIGNALS,
+    N_Y,
+    PH,
+    QDYN,
+    QH,
+    RH,
+    coefficient_slopes,
+    density_ratio,
+    inertia_coefficients,
+    jacobian,
+    mass_of,
+    monomials,
+    power_error_kw,
+    signals,
+)
 from beaver_ftc.plant.faults import OF_THE_SLIPSTREAM
 from beaver_ftc.scenario.airframe import Actuators
 from beaver_ftc.scenario.declared import Declared, SensorErrors

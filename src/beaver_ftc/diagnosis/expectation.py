@@ -14,9 +14,7 @@ from math import exp, radians
 import numpy as np
 
 from beaver_ftc.compiled import kernel, record, sized
-from beaver_ftc.design.actuators import actuators_dtype, move
-from beaver_ftc.design.model import design_dtype
-from beaver_ftc.design.variants import design_of, response
+from beaver_ftc.design.model import actuators_dtype, design_dtype, design_of, move, response
 from beaver_ftc.diagnosis.bounds import changing_gyro_error, fill_bound_now, further_map_error
 from beaver_ftc.scenario.schema import Scenario
 

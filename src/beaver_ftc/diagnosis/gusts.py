@@ -36,12 +36,21 @@ from beaver_ftc.aircraft import MassProperties
 from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S, FORCES, GRAVITY_MPS2
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.design.dryden import SCALE_M, rotation_lengths
-from beaver_ftc.design.model import rate_damping
-from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, QDYN, TABLE, evaluate, fill_table, whole_sum
+from beaver_ftc.design.air import SCALE_M, rotation_lengths
+from beaver_ftc.design.model import (
+    AIRSPEED,
+    ALPHA,
+    BETA,
+    QDYN,
+    TABLE,
+    evaluate,
+    fill_table,
+    rate_damping,
+    whole_sum,
+)
 from beaver_ftc.diagnosis.bounds import flow_angle_noise, gust_estimate_noise, lowest_height
 from beaver_ftc.diagnosis.monitors.redundancy import EARTH_ACCELERATION_M_S2
-from beaver_ftc.plant.instruments import wrapped
+from beaver_ftc.plant.sensing import wrapped
 from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
 
 # Share of the intensity of the rolling, pitching and yawing gust that remains unmeasured with vanes. With

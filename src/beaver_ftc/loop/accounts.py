@@ -9,7 +9,7 @@ The effect phi is the truth's, so this is an analyst's figure: the diagnosis nev
 import numpy as np
 
 from beaver_ftc.compiled import kernel, record, sized
-from beaver_ftc.control.supervisor import MAX_EVENTS
+from beaver_ftc.control.accommodation import MAX_EVENTS
 from beaver_ftc.design.model import unanticipated_pitch
 from beaver_ftc.diagnosis.bounds import N_PLACES, is_outside_all_boxes, time_row
 from beaver_ftc.diagnosis.state import PITCH

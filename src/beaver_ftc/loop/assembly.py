@@ -1,4 +1,4 @@
-"""Turns a scenario into the frame record that the compiled loop works on.
+"""From a scenario to the frame record that the compiled loop works on, and the wires from it to the plant.
 
 A stage is configured at one of two instants, each of which is one function here:
 
@@ -8,33 +8,269 @@ A stage is configured at one of two instants, each of which is one function here
                        statistical detector, the sensor monitor.
 
 `assemble` does both. A change in flight assembles the record of its scenario from the same trim.
+
+Before that stand the memory of flights that are over (fresh pages of a record and a log cost 0.3 ms), what
+joins one plant and one frame record, and the record of the instruments.
 """
 
+from math import exp
 from typing import NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from beaver_ftc.aircraft.aircraft import EARTH_RADIUS_M
 from beaver_ftc.compiled import record, sized
 from beaver_ftc.control import state as control
-from beaver_ftc.control.outer.setup import set_up_autopilot
-from beaver_ftc.control.outer.state import AUTOPILOT, COLUMNS
-from beaver_ftc.control.supervisor import SUPERVISOR
-from beaver_ftc.design.variants import anchor, mass_of
+from beaver_ftc.control.accommodation import SUPERVISOR
+from beaver_ftc.control.autopilot import AUTOPILOT, COLUMNS
+from beaver_ftc.control.profile import set_up_autopilot
+from beaver_ftc.design.model import anchor, mass_of
 from beaver_ftc.diagnosis import expectation, schemes
 from beaver_ftc.diagnosis.conclusion import assessment_dtype
 from beaver_ftc.diagnosis.detection import noise_model
 from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE, RecordSize, size_for
 from beaver_ftc.diagnosis.isolation import estimator_names
 from beaver_ftc.diagnosis.monitors import redundancy
-from beaver_ftc.loop import instrument_records, memory
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.accounts import accounts_dtype, true_faults_dtype
 from beaver_ftc.plant import channels as ch
-from beaver_ftc.plant.instruments import MEASURED, N_SAMPLED, USUAL_LINE, instruments_dtype
-from beaver_ftc.plant.native import RUNNING
-from beaver_ftc.plant.sensing import truth_dtype
+from beaver_ftc.plant.adapter import GETTER, RUN, SETTER, Plant, address
+from beaver_ftc.plant.channels import RUNNING, NodeBank
+from beaver_ftc.plant.faults import OF_THE_SLIPSTREAM
+from beaver_ftc.plant.sensing import (
+    LONGEST_DELAY,
+    MEASURED,
+    MOST_LINE,
+    N_SAMPLED,
+    SENSORS,
+    USUAL_LINE,
+    instruments_dtype,
+    truth_dtype,
+)
 from beaver_ftc.scenario.builtin import texts_of
 from beaver_ftc.scenario.declared import Declared
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.faults import HOLDING, of_a_sensor
+from beaver_ftc.scenario.schema import Scenario, stages
+from beaver_ftc.scenario.sensors import N_IN_EQUATIONS, ROWS, frames_apart
+
+_MOST = 4  # kept: more flights are hardly ever in progress at the same time
+_spare: list[np.ndarray] = []
+
+
+def taken(shape: tuple[int, ...], dtype: np.dtype | type = np.float64) -> np.ndarray:
+    """An array of this shape and type, C-ordered, of whatever is in that memory.
+
+    On a buffer, not as a view: of a record's bytes NumPy would look for objects, field by field.
+    """
+    kind = np.dtype(dtype)
+    n_bytes = kind.itemsize * int(np.prod(shape))
+    for i, memory in enumerate(_spare):
+        if memory.size >= n_bytes:
+            return np.ndarray(shape, kind, _spare.pop(i))
+    return np.ndarray(shape, kind, np.empty(n_bytes, np.uint8))
+
+
+def taken_empty(shape: tuple[int, ...], dtype: np.dtype | type = np.float64) -> np.ndarray:
+    """The same, every byte of it zero."""
+    array = taken(shape, dtype)
+    assert array.base is not None
+    array.base[:] = 0
+    return array
+
+
+def copied(record: np.ndarray) -> np.ndarray:
+    """A copy of what `taken` gave, byte by byte: field by field it takes a hundred times as long."""
+    copy = taken(record.shape, record.dtype)
+    assert copy.base is not None
+    assert record.base is not None
+    copy.base[: record.nbytes] = record.base[: record.nbytes]
+    return copy
+
+
+def give_back(array: np.ndarray) -> None:
+    """Return the buffer to the pool; no view of it may be used afterwards."""
+    memory = array
+    while isinstance(memory.base, np.ndarray):
+        memory = memory.base
+    if len(_spare) < _MOST and memory.dtype == np.uint8 and all(memory is not other for other in _spare):
+        _spare.append(memory)
+        _spare.sort(key=len)
+
+
+UNANTICIPATED = "failures/unanticipated/Cm-alpha3"
+LEAST_HEIGHT_M = 500.0  # above the ground at the start; the ground is at sea level, or lower if need be
+
+# Of aircraft that are flown again.
+_banks_of: "WeakKeyDictionary[Plant, dict[int, tuple[NodeBank, ...]]]" = WeakKeyDictionary()
+
+
+class Cockpit:
+    """The wires between one plant and one frame record: which nodes are read and written, natively or
+    through Python."""
+
+    def __init__(self, plant: Plant, frames: np.ndarray) -> None:
+        self._frames, self._plant = frames, plant  # whose executive tied properties read from
+        truth, running = frames["truth"][0], frames["running"][0]
+        n, banks = int(truth["n"]), _banks_of.setdefault(plant, {})
+        if n not in banks:
+            banks[n] = _banks(plant, n)
+        self._read, self._write, self._engine, self._air = banks[n]
+        self.native = plant.native
+        truth["native"] = self.native
+        truth["getter"], truth["setter"] = address(GETTER), address(SETTER)
+        truth["read_pointers"][: truth["n"]] = self._read.pointers
+        truth["write_pointers"] = self._write.pointers
+        truth["levers"] = len(self._engine.nodes)
+        truth["lever_pointers"][: truth["levers"]] = self._engine.pointers
+        running["run"], running["executive"] = address(RUN), plant.executive
+        running["getter"], running["setter"] = truth["getter"], truth["setter"]
+        running["heading_pointer"], running["axes_pointer"] = self._air.pointers
+
+    def read(self) -> None:
+        """Bring the truth into the frame record, through Python."""
+        truth = self._frames["truth"][0]
+        self._read.read(truth["value"][: truth["n"]])
+
+    def write(self) -> None:
+        """Hand the command over, through Python."""
+        self._write.write(self._frames["belief"]["commanded"][0])
+        power = self._frames["control"]["power"]["output"]
+        if power["in_use"][0]:
+            self._engine.write(power["command"][0, : len(self._engine.nodes)])
+
+    def turn_air(self) -> None:
+        """Turn the turbulence with the aircraft's heading, as its spectra are meant [MIL-F-8785C, 3.7.1].
+
+        JSBSim keeps it in axes along the wind, and without one along whatever direction it met first: a
+        rolling gust would pitch an aircraft that flies across. `psiw` turns them the other way round.
+        """
+        heading, axes = self._air.nodes
+        axes.set_double_value(-heading.get_double_value())
+
+
+def _banks(plant: Plant, n: int) -> tuple[NodeBank, ...]:
+    """What is read of the truth, n channels; where the command goes, and the engines'; heading and axes of
+    the turbulence."""
+    aircraft = plant.aircraft
+    differences = [effector.throttle for effector in aircraft.effectors.values()]
+    channels = (*ch.truth_channels(aircraft), *ch.further_channels(aircraft))[:n]
+    return (
+        NodeBank([plant.node(name) for _, name, _ in channels]),
+        NodeBank([plant.input(name) for name in ch.command_properties(aircraft)]),
+        NodeBank([plant.input(name) for name in (aircraft.trim.throttle, *differences)]),
+        NodeBank([plant.node("attitude/psi-rad"), plant.input("atmosphere/psiw-rad")]),
+    )
+
+
+def travel_rad(plant: Plant) -> np.ndarray:
+    """Lower and upper stops of the surfaces, (2, 4) rad."""
+    surfaces, ends = plant.aircraft.surfaces, ("min", "max")
+    return np.array([[plant.read(f"actuators/{s}/position-{end}-rad") for s in surfaces] for end in ends])
+
+
+def set_origin(truth: np.void, plant: Plant, altitude_m: float) -> None:
+    """Where the flight starts, and where the ground is."""
+    truth["latitude_0"] = plant.read(ch.FIXED[ch.LATITUDE][1])
+    truth["longitude_0"] = plant.read(ch.FIXED[ch.LONGITUDE][1])
+    has_gear = plant.has("gear/unit[0]/WOW") and plant.aircraft.file.ground is None
+    wheels_m = plant.aircraft.geometry.span_m if has_gear else 0.0  # height at which it is down
+    truth["ground_m"] = min(wheels_m, altitude_m - LEAST_HEIGHT_M)
+    truth["radius_m"] = EARTH_RADIUS_M + altitude_m
+    truth["parallel_radius_m"] = truth["radius_m"] * np.cos(truth["latitude_0"])
+
+
+def note_failures(truth: np.void, plant: Plant) -> None:
+    """Which surfaces cannot move now, and the unanticipated fault, for the oracle and the accounts."""
+    truth["immovable"] = [
+        any(plant.read(f"failures/{s}/{how}") for how in HOLDING) for s in plant.aircraft.surfaces
+    ]
+    truth["Cm_alpha3"] = plant.read(UNANTICIPATED)
+
+
+# What sets the counters of random numbers apart: OF_THE_FIRST, OF_THE_FURTHER, OF_FAULTS, OF_FORCES,
+# OF_THE_SAMPLED.
+COUNTERS = (0, 0xD1B54A32D192ED03, 0x8CB92BA72F3D8DD7, 0xA0761D6478BD642F, 0xE7037ED1A0B428DB)
+
+
+def breaks_instruments(scenario: Scenario) -> bool:
+    """Whether an instrument fails in this flight."""
+    return any(of_a_sensor(fault) for fault in scenario.faults)
+
+
+def are_ever_monitored(scenario: Scenario) -> bool:
+    """Whether they are at some time of the flight."""
+    flown = (scenario, *(then for _, then in stages(scenario)))
+    return any(Declared.of(then).monitors_sensors for then in flown)
+
+
+def columns_of_the_monitor(scenario: Scenario) -> int:
+    """How many the log has: none, share and test, and of flights in which readings go missing, which."""
+    lost = any(fault.type == "lost" for fault in scenario.faults)
+    return are_ever_monitored(scenario) * (3 if lost else 2)
+
+
+def has_real_engine(scenario: Scenario) -> bool:
+    """Whether dpt is to be worked out from readings that can be wrong from the start."""
+    real = any(not getattr(scenario.sensors, name).is_ideal for name in OF_THE_SLIPSTREAM)
+    return real and scenario.airframe.has_engine_instruments
+
+
+def truth_read(scenario: Scenario) -> tuple[ch.Channel, ...]:
+    """What is read from the truth in this flight."""
+    usual = ch.truth_channels(scenario.airframe)
+    return (*usual, *ch.further_channels(scenario.airframe)) if reads_further(scenario) else usual
+
+
+def reads_further(scenario: Scenario) -> bool:
+    """Whether accelerometers, the engine's instruments and what the monitor alone compares are read."""
+    declared = Declared.of(scenario)
+    accelerometers = declared.uses_accelerometers or declared.follows_gusts_by_accelerometers
+    fails = breaks_instruments(scenario) or has_real_engine(scenario)
+    sampled = any(not getattr(scenario.sensors, row.name).is_ideal for row in ROWS[N_IN_EQUATIONS:])
+    return declared.monitors_sensors or accelerometers or fails or sampled
+
+
+def configure(instruments: np.void, scenario: Scenario, dt: float) -> None:
+    """Fill the instruments' record; dt: seconds between samples, which is a JSBSim frame."""
+    instruments["real"] = not scenario.sensors.is_ideal
+    instruments["engine"] = has_real_engine(scenario)
+    for i, name in enumerate(SENSORS):
+        sensor = getattr(scenario.sensors, name)
+        instruments["noise"][i], instruments["bias"][i], instruments["quantum"][i] = sensor.noise_bias_quantum
+        instruments["gain"][i], instruments["dropout"][i] = 1.0 + sensor.scale_error, sensor.dropout_share
+        instruments["drift"][i] = getattr(sensor, "drift_rad_s", 0.0) * dt
+        instruments["keep"][i] = exp(-sensor.bandwidth_rad_s * dt) if sensor.bandwidth_rad_s else 0.0
+        instruments["delay"][i] = sensor.delay_s / dt
+        instruments["length"][i] = _samples(sensor.delay_s / dt)
+        instruments["every"][i] = frames_apart(i, dt)
+        if sensor.delay_s / dt > LONGEST_DELAY:
+            raise BadInput(
+                f"{scenario.name}: sensors.{name}.delay_s is {sensor.delay_s:g} s, "
+                f"allowed: {LONGEST_DELAY} JSBSim frames, {LONGEST_DELAY * dt:g} s here"
+            )
+
+    instruments["first"] = np.cumsum(instruments["length"]) - instruments["length"]
+
+
+def line_for(scenario: Scenario) -> int:
+    """How many samples the delay lines of a flight keep: as many as most flights', or as any's."""
+    instant_s, flown = 1.0 / scenario.rate_hz / scenario.substeps, [scenario]
+    flown += [then for _, then in stages(scenario)]
+    delays = [[getattr(then.sensors, name).delay_s / instant_s for name in SENSORS] for then in flown]
+    needed = [sum(_samples(delay) for delay in of_it) for of_it in delays]
+    return USUAL_LINE if max(needed) <= USUAL_LINE else MOST_LINE
+
+
+def _samples(delay: float) -> int:
+    """What a line of this delay, in JSBSim frames, keeps."""
+    return int(delay) + 2 if delay else 0
+
+
+def seed(instruments: np.void, number: int) -> None:
+    """Let the random numbers of all instruments, further ones and faults, begin with a seed."""
+    instruments["random"] = np.uint64(number) ^ np.array(COUNTERS, np.uint64)
+
 
 # How many columns the log has for estimators, the sensor monitor, sensors with rates of their own, the
 # engine, statistical tests.
@@ -82,15 +318,15 @@ def assemble(scenario: Scenario, trim: Trim, travel: np.ndarray) -> np.ndarray:
 def configure_design(scenario: Scenario, travel: np.ndarray) -> np.ndarray:
     """A record in which every stage that needs no trim is configured: a copy of that of its design."""
     initial = tuple(scenario.initial.model_dump(exclude={"airspeed_mps"}).values())
-    rates, failing = (scenario.rate_hz, scenario.substeps), instrument_records.breaks_instruments(scenario)
-    line = instrument_records.line_for(scenario)
+    rates, failing = (scenario.rate_hz, scenario.substeps), breaks_instruments(scenario)
+    line = line_for(scenario)
     key = scenario.airframe, texts_of(scenario, _DESIGN), rates, failing, line, initial, travel.tobytes()
     if key not in _designs:
         if len(_designs) >= _MOST_DESIGNS:
             _designs.clear()
         _designs[key] = _assemble_design(scenario, travel, line)
-    frames = memory.copied(_designs[key])
-    instrument_records.seed(frames[0]["instruments"], scenario.seed)
+    frames = copied(_designs[key])
+    seed(frames[0]["instruments"], scenario.seed)
     return frames
 
 
@@ -119,13 +355,13 @@ def configure_diagnosis_at_trim(frame: np.void, scenario: Scenario, trim: Trim) 
 def _assemble_design(scenario: Scenario, travel: np.ndarray, line: int) -> np.ndarray:
     """The record of a design, made again."""
     aircraft, dt = scenario.airframe, 1.0 / scenario.rate_hz
-    frames = memory.taken_empty((1,), frame_dtype(aircraft.n, size_for(aircraft), line))
+    frames = taken_empty((1,), frame_dtype(aircraft.n, size_for(aircraft), line))
     frame, instant_s = frames[0], dt / scenario.substeps
     frame["dt"], frame["accounts"]["guarantee"]["certain_after_s"] = dt, -1.0
-    truth, channels = frame["truth"], instrument_records.truth_read(scenario)
+    truth, channels = frame["truth"], truth_read(scenario)
     truth["n"], truth["declared"] = len(channels), len(aircraft.signals)
     truth["factor"][: len(channels)] = [factor for _, _, factor in channels]
-    instrument_records.configure(frame["instruments"], scenario, instant_s)
+    configure(frame["instruments"], scenario, instant_s)
     expectation.configure(frame["belief"], scenario, travel)
     schemes.configure_diagnosis(frame["fdi"], frame["belief"], scenario, travel)
     control.configure(frame["control"], scenario, travel)
@@ -144,8 +380,8 @@ def lay_out(frame: np.void, scenario: Scenario, diagnoses_itself: bool) -> tuple
     aircraft, tests = scenario.airframe, fdi["statistical"]["tests"]
     estimators = estimator_names(scenario.fdi.fault_class, aircraft) if diagnoses_itself else ()
     logged["estimators"] = fdi["isolation"]["config"]["n"] if diagnoses_itself else 0
-    watched = logged["sensor_monitor"] = instrument_records.columns_of_the_monitor(scenario)
-    sampled = instrument_records.reads_further(scenario)
+    watched = logged["sensor_monitor"] = columns_of_the_monitor(scenario)
+    sampled = reads_further(scenario)
     logged["sampled"] = N_SAMPLED if sampled else 0
     moved = frame["control"]["power"]["config"]["enabled"] or (profile and aircraft.airspeed_by == "power")
     moved |= bool(frame["control"]["engines"]["config"]["n"])

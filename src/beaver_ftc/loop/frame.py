@@ -2,26 +2,27 @@
 
     measure     plant/sensing.py          the truth, and what the instruments make of it
     diagnose    diagnosis/                what is believed of the aircraft, and whether it still holds
-    decide      control/supervisor.py     the mode
+    decide      control/accommodation.py  the mode
     command     control/                  the surfaces, and the engine
-    outer loops control/outer/            the reference of the next frame, if a profile is to be flown
-    record      accounts.py, log_row.py   the metrics' sums, a row of the log
+    outer loops control/autopilot.py      the reference of the next frame, if a profile is to be flown
+    record      accounts.py, frame.py     the metrics' sums, a row of the log
 
-Each stage has records of its own; what a flight remembers is all of them in one (assembly.py), which only the
-kernels of this file see whole. Python calls them through stepping.py. The command computed in a frame is in
-effect from the next on.
+Each stage has records of its own; what a flight remembers is all of them in one (assembly.py), which only
+the kernels of this file see whole. Python calls them through stepping.py. The command computed in a frame
+is in effect from the next on. In a row of the log, what is not there, or has not begun, is left as the row is
+given: not a number.
 """
 
 import numpy as np
 
 from beaver_ftc.compiled import apart, kernel
-from beaver_ftc.control import allocation, power, reference, supervisor
-from beaver_ftc.control.laws import table
-from beaver_ftc.control.outer.autopilot import judge, steer
+from beaver_ftc.control import accommodation, allocation, engines, laws, state
+from beaver_ftc.control.autopilot import SPEED, judge, steer
 from beaver_ftc.diagnosis import conclusion, schemes
 from beaver_ftc.diagnosis import conclusion as assessed
 from beaver_ftc.diagnosis.conclusion import assess_surfaces, assess_unknown_acceleration
 from beaver_ftc.diagnosis.detection import filters, statistical
+from beaver_ftc.diagnosis.detection.filters import nearest_filter
 from beaver_ftc.diagnosis.expectation import (
     accumulate_substep,
     begin_sums,
@@ -34,10 +35,117 @@ from beaver_ftc.diagnosis.monitors import engine_symmetry, sensor_monitor
 from beaver_ftc.diagnosis.schemes import record_named_surfaces
 from beaver_ftc.diagnosis.state import PITCH
 from beaver_ftc.diagnosis.types import verdict
-from beaver_ftc.loop import accounts, log_row
-from beaver_ftc.loop.log_row import put
+from beaver_ftc.loop import accounts
 from beaver_ftc.plant import channels as ch
-from beaver_ftc.plant.sensing import NOT_FINITE, flight_status, hand_over, measure
+from beaver_ftc.plant.sensing import (
+    NOT_FINITE,
+    effective,
+    first_signal,
+    flight_status,
+    hand_over,
+    measure,
+    position,
+)
+
+PER_ESTIMATOR = 10  # columns
+
+
+@kernel
+def put(row, column, values):
+    """Write values into row from column on; returns the next column."""
+    for i in range(values.size):
+        row[column + i] = values[i]
+    return column + values.size
+
+
+@kernel
+def record_truth(truth, t, row):
+    """The first columns: time and the truth. Returns the next column."""
+    value = truth.value
+    row[0] = t
+    row[1], row[2], row[3] = value[ch.AIRSPEED], value[ch.ALPHA], value[ch.BETA]
+    column = put(row, 4, value[0:3])
+    column = put(row, column, value[ch.PHI : ch.PHI + 3])
+    row[column] = (value[ch.LATITUDE] - truth.latitude_0) * truth.radius_m
+    row[column + 1] = (value[ch.LONGITUDE] - truth.longitude_0) * truth.parallel_radius_m
+    row[column + 2] = value[ch.ALTITUDE]
+    column = put(row, column + 3, value[ch.PDOT : ch.PDOT + 3])
+    row[column] = value[ch.QDYN]
+    first = first_signal(truth)
+    column = put(row, column + 1, value[first : first + truth.declared])
+    row[column] = value[ch.ENVELOPE]
+    return column + 1
+
+
+@kernel
+def record_surfaces(truth, commanded, saturated, row, column):
+    """Command in effect, position and effective deflection of each surface; then which are saturated."""
+    for s in range(commanded.size):
+        row[column] = commanded[s]
+        row[column + 1] = position(truth, s)
+        row[column + 2] = effective(truth, s)
+        column += 3
+    return put(row, column, saturated)
+
+
+@kernel
+def record_estimator(fie, started, row, column):
+    """Residuals between their limits, once the estimators have started; and whether the fault is excluded."""
+    if started:
+        for i in range(3):
+            row[column + 3 * i], row[column + 3 * i + 1] = fie.residual[i], fie.lower[i]
+            row[column + 3 * i + 2] = fie.upper[i]
+    row[column + PER_ESTIMATOR - 1] = fie.excluded
+
+
+@kernel
+def record_alarm(bank, row, column):
+    """Residual and threshold of what raises the alarm: on each axis the filter nearest to its bound."""
+    for i in range(3):
+        m = nearest_filter(bank, i)
+        row[column + i], row[column + 3 + i] = bank.output.residual[m, i], bank.output.threshold[m, i]
+    return column + 6
+
+
+@kernel
+def record_used(effectiveness, used, row, column):
+    """What the law takes the effectiveness of each surface for: 1 if it makes no use of it. Returns the next
+    column."""
+    for s in range(effectiveness.size):
+        row[column + s] = effectiveness[s] if used else 1.0
+    return column + effectiveness.size
+
+
+@kernel
+def record_sensor_monitor(monitor, missing, row, column, columns):
+    """How near a test between the instruments came to its bound in this frame, and which; of three `columns`
+    the first instrument that gives no reading, missing (N_SENSORS,). Returns the next column."""
+    if monitor.config.enabled and monitor.memory.begun:
+        row[column], row[column + 1] = monitor.output.share, monitor.output.largest_test
+    if columns > 2:
+        for i in range(missing.size - 1, -1, -1):
+            if missing[i]:
+                row[column + 2] = i
+    return column + columns
+
+
+@kernel
+def record_sampled(signal, row, column, columns):
+    """The readings of the last `columns` sensors, those with rates of their own. Returns the next column."""
+    first = signal.size - columns
+    for i in range(columns):
+        row[column + i] = signal[first + i]
+    return column + columns
+
+
+@kernel
+def record_profile(autopilot, row, column):
+    """The commanded profile, of the channels that are flown, and the airspeed of it that can be held."""
+    for c in range(autopilot.command.size):
+        if autopilot.commanded[c]:
+            row[column + c] = autopilot.command[c]
+    if autopilot.commanded[SPEED]:
+        row[column + autopilot.command.size] = autopilot.held
 
 
 @apart
@@ -152,17 +260,17 @@ def decide(frame):
     control, layout, informed = frame.control, frame.control.layout, frame.control.config.informed
     accounts.share_faults(frame.truth, frame.faults, informed)
     if informed:
-        wanted = supervisor.true_mode(layout.main[PITCH], frame.faults)
+        wanted = accommodation.true_mode(layout.main[PITCH], frame.faults)
     else:
-        wanted = supervisor.mode_from(control.config, layout, frame.fdi.verdict, frame.assessment)
-    supervisor.supervise(frame.supervisor, wanted, frame.t)
+        wanted = accommodation.mode_from(control.config, layout, frame.fdi.verdict, frame.assessment)
+    accommodation.supervise(frame.supervisor, wanted, frame.t)
 
 
 @kernel
 def accommodate(frame):
     """How effective the law takes each surface to be."""
     law, belief = frame.control.config.law, frame.belief
-    table.accommodate(law, frame.control, frame.assessment, frame.faults, belief, frame.measured)
+    state.accommodate(law, frame.control, frame.assessment, frame.faults, belief, frame.measured)
 
 
 @kernel
@@ -180,7 +288,7 @@ def command(frame):
         take_command(frame, frame.held_rad)
         return
     accommodate(frame)
-    table.command(
+    state.command(
         control.config.law, control, frame.assessment, frame.faults, frame.belief, frame.measured, mode,
         frame.t,
     )  # fmt: skip
@@ -195,7 +303,7 @@ def fly_profile(frame, commanded):
         unexplained /= belief.G[PITCH, elevator]  # rad of the elevator
     steer(autopilot, control, belief.u, frame.measured, unexplained, frame.t)
     if autopilot.sets_power:
-        power.follow_autopilot(control.power, autopilot.setting, autopilot.power_airspeed)
+        engines.follow_autopilot(control.power, autopilot.setting, autopilot.power_airspeed)
     judge(autopilot, value[ch.ALTITUDE], value[ch.AIRSPEED], value[ch.PHI + 2], value[ch.PHI], frame.t)
     for i in range(3):
         commanded[i] += autopilot.rates[i]
@@ -223,12 +331,12 @@ def record(frame, commanded, row):
     control, fdi, belief, logged = frame.control, frame.fdi, frame.belief, frame.logged
     saturated, effectiveness = control.allocation.output.saturated, control.surfaces.output.effectiveness
     row[:] = np.nan
-    column = log_row.record_truth(frame.truth, frame.t, row)
+    column = record_truth(frame.truth, frame.t, row)
     column = put(row, column, frame.measured.x)
     column = put(row, column, commanded)
     column = put(row, column, control.reference.output.model_rate)
-    column = log_row.record_surfaces(frame.truth, belief.commanded, saturated, row, column)
-    column = log_row.record_alarm(fdi.bank, row, column)
+    column = record_surfaces(frame.truth, belief.commanded, saturated, row, column)
+    column = record_alarm(fdi.bank, row, column)
     column = put(row, column, fdi.fdae.output.residual)
     column = put(row, column, fdi.fdae.output.threshold)
     column = put(row, column, fdi.bound.eta_bar)
@@ -236,19 +344,19 @@ def record(frame, commanded, row):
     column = put(row, column, belief.means.acceleration)
     for e in range(logged.estimators):
         if e < fdi.isolation.config.n:  # else another diagnosis has taken their place
-            log_row.record_estimator(fdi.isolation.estimator[e], fdi.verdict.detected, row, column)
-        column += log_row.PER_ESTIMATOR
+            record_estimator(fdi.isolation.estimator[e], fdi.verdict.detected, row, column)
+        column += PER_ESTIMATOR
     column = put(row, column, frame.assessment.effectiveness)
-    column = log_row.record_used(effectiveness, control.config.uses_verdict, row, column)
+    column = record_used(effectiveness, control.config.uses_verdict, row, column)
     monitor, missing = fdi.sensor_monitor, frame.measured.missing
     row[column], row[column + 1] = frame.supervisor.mode, fdi.verdict.detected or monitor.output.alarmed
     column += 2
     if logged.sensor_monitor:
-        column = log_row.record_sensor_monitor(monitor, missing, row, column, logged.sensor_monitor)
-    column = log_row.record_sampled(frame.measured.signal, row, column, logged.sampled)
+        column = record_sensor_monitor(monitor, missing, row, column, logged.sensor_monitor)
+    column = record_sampled(frame.measured.signal, row, column, logged.sampled)
     column = put(row, column, control.power.output.command[: logged.power])
     if frame.autopilot.enabled:
-        log_row.record_profile(frame.autopilot, row, column)
+        record_profile(frame.autopilot, row, column)
     detector = fdi.statistical
     if logged.tests and detector.tests.enabled:
         views = detector.views[: detector.n_views]
@@ -263,9 +371,9 @@ def finish(frame, commanded, row):
         fly_profile(frame, commanded)
     account(frame)
     record(frame, commanded, row)
-    reference.follow(control.reference.config, control.reference.output, commanded)
+    laws.follow(control.reference.config, control.reference.output, commanded)
     authority_lost = control.surfaces.output.authority_lost
-    reference.govern(control.reference, commanded, control.axes.shortfall, authority_lost)
+    laws.govern(control.reference, commanded, control.axes.shortfall, authority_lost)
     move_healthy_surfaces(belief, control.allocation.output.command)
     hand_over(frame.truth, belief.commanded, control.power.output)
     advance_clock(frame)

@@ -11,19 +11,26 @@ from beaver_ftc.compiled import direct
 from beaver_ftc.diagnosis.gusts import stop_accelerometers
 from beaver_ftc.diagnosis.monitors import redundancy
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
-from beaver_ftc.loop import memory, stepping
-from beaver_ftc.loop.assembly import Trim, configure_at_trim, configure_design, lay_out, y_places
-from beaver_ftc.loop.cockpit import Cockpit, note_failures, set_origin, travel_rad
+from beaver_ftc.loop import assembly, stepping
+from beaver_ftc.loop.assembly import (
+    Cockpit,
+    Trim,
+    configure_at_trim,
+    configure_design,
+    lay_out,
+    note_failures,
+    set_origin,
+    travel_rad,
+    y_places,
+)
 from beaver_ftc.loop.outcome import Landing, landing_of
 from beaver_ftc.loop.stepping import fly_frame, fly_on, hold, sense_inside
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.adapter import Plant, translated
-from beaver_ftc.plant.conditions import ready
-from beaver_ftc.plant.configure import GustSchedule, take_off
+from beaver_ftc.plant.conditions import give_back, ready
 from beaver_ftc.plant.faults import FaultSchedule, SensorFaultSchedule
-from beaver_ftc.plant.instruments import AX, ENGINE_SPEED, N_SAMPLED
-from beaver_ftc.plant.reuse import give_back
-from beaver_ftc.plant.sensing import FLYING, NOT_FINITE
+from beaver_ftc.plant.sensing import AX, ENGINE_SPEED, FLYING, N_SAMPLED, NOT_FINITE
+from beaver_ftc.plant.trim import GustSchedule, take_off
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import sample_frames
@@ -98,7 +105,7 @@ class Loop:
         self.plugin_frame = self._with_plugins(detector, law)
         diagnoses_itself = self.plugin_frame is None or self.plugin_frame.detector is None
         self.columns = lay_out(self.frames[0], scenario, diagnoses_itself)
-        self.log = memory.taken((min(CHUNK_ROWS, self.n_frames), len(self.columns)))
+        self.log = assembly.taken((min(CHUNK_ROWS, self.n_frames), len(self.columns)))
         self.references = np.empty((len(self.log), 3))
         self._order = np.zeros(2, np.int64)
         self._inside = 0  # JSBSim frames of the coming frame that have been flown already
@@ -154,8 +161,8 @@ class Loop:
         if self._may_fly_again:
             self._may_fly_again, self.changing = False, None  # which refers back: a collector's work
             give_back(self.plant)
-            memory.give_back(self.frames)
-            memory.give_back(self.log)
+            assembly.give_back(self.frames)
+            assembly.give_back(self.log)
 
     def hold(self, deflections: np.ndarray | None) -> None:
         """Command (n,) rad in the law's place, from the frame just flown on; None gives it back."""

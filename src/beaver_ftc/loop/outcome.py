@@ -1,20 +1,23 @@
 """What a flight has yielded, read off its frame record: the verdict, the accounts, the promise of detection.
 
 The instant from which detection was certain is found by accounts.py for the worst-case filters of the
-diagnosis in charge. It binds nobody where those filters raise no alarm (a plug-in, or the statistical test in
-sole authority), where they were not asked any more (an alarm before the fault, or of the watch over the
+diagnosis in charge. It binds nobody where those filters raise no alarm (a plug-in, or the statistical test
+in sole authority), where they were not asked any more (an alarm before the fault, or of the watch over the
 instruments), and where what they are told is off by more than is declared (a broken instrument, undeclared
 errors). Then nothing is said.
+
+And in what share of its frames the diagnosis could conclude nothing, and why.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from math import degrees, isfinite
 from typing import Any
 
 import numpy as np
 
-from beaver_ftc.control.outer.state import (
+from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.control.autopilot import (
     AT_ONE_INSTANT,
     BANK_LIMIT,
     CHANNELS,
@@ -24,21 +27,85 @@ from beaver_ftc.control.outer.state import (
     SLOWEST,
     SPEED,
 )
+from beaver_ftc.design.air import altitude_of
 from beaver_ftc.design.model import AXES
 from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.diagnosis.monitors.redundancy import sensor_finding
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, STATISTICAL_DETECTOR, UNANTICIPATED, YAW
 from beaver_ftc.diagnosis.types.verdict import estimate_of, fault_findings
 from beaver_ftc.loop.frame import isolated_theta
-from beaver_ftc.loop.inconclusive import inconclusive_of
-from beaver_ftc.plant.channels import AIRSPEED, ALTITUDE
+from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.sensing import DEPARTURE_SIGNALS
 from beaver_ftc.scenario.declared import undeclared
 from beaver_ftc.scenario.diagnosis import MODES
 from beaver_ftc.scenario.faults import of_a_sensor
-from beaver_ftc.scenario.interventions import stages
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.schema import Scenario, stages
 from beaver_ftc.scenario.signals import TIME_TOLERANCE_S
+from beaver_ftc.scenario.warnings import (
+    ALTITUDE,
+    BETWEEN,
+    LATE,
+    Span,
+    as_altitudes,
+    lies_outside,
+    measured_spans,
+    outside,
+    quantities,
+)
+
+SCHEME, NO_DIAGNOSIS = "scheme", "no diagnosis ran: fdi.scheme is none"
+Reason = dict[str, Any]
+
+
+def inconclusive_of(frame: np.void, aircraft: Aircraft) -> dict[str, Any] | None:
+    """share: of all frames; from_s: the first of them; reasons: each with its share, which may overlap, with
+    the span that was measured and that flown outside of it. None if there was no such frame."""
+    counted = frame["accounts"]["inconclusive"]
+    if not counted["frames"]:
+        return None
+    watched = int(counted["watched"])
+    reasons = sorted(_reasons(counted, aircraft, float(frame["t"])), key=lambda reason: -reason["share"])
+    for reason in reasons:
+        reason["share"] /= watched
+    share = int(counted["frames"]) / watched
+    return {"share": share, "from_s": float(counted["from_s"]), "reasons": reasons}
+
+
+def _reasons(counted: np.void, aircraft: Aircraft, end_s: float) -> Iterator[Reason]:
+    """Each reason that was one; share: still the number of frames."""
+    spans = measured_spans(aircraft)
+    if counted["undiagnosed"]:
+        yield {**_reason(SCHEME, int(counted["undiagnosed"]), None, None), "says": NO_DIAGNOSIS}
+    if counted["late"]:
+        yield _reason(LATE, int(counted["late"]), spans[LATE], (spans[LATE][1], end_s))
+    for i, name in enumerate(quantities(aircraft)):
+        if counted["beyond"][i]:
+            flown = float(counted["least"][i]), float(counted["greatest"][i])
+            flown = as_altitudes(flown) if name == ALTITUDE else flown
+            yield _reason(name, int(counted["beyond"][i]), spans[name], flown)
+    if counted["between"]:
+        yield _reason(BETWEEN, int(counted["between"]), None, None)
+
+
+def _reason(quantity: str, frames: int, measured: Span | None, flown: Span | None) -> Reason:
+    return {
+        "quantity": quantity, "share": frames, "measured": measured, "flown": flown,
+        "says": outside(quantity, measured),
+    }  # fmt: skip
+
+
+def inconclusive_now(frame: np.void, aircraft: Aircraft) -> str:
+    """Why the built-in diagnosis can conclude nothing at the frame just flown; empty if it can."""
+    error_map = frame["fdi"]["bound"]["error_map"]
+    if not frame["fdi"]["config"]["enabled"]:
+        return NO_DIAGNOSIS
+    if not error_map["n_boxes"] or not error_map["outside"]:
+        return ""
+    spans, names = measured_spans(aircraft), quantities(aircraft)
+    place = dict(zip(names, error_map["place"].tolist(), strict=False)) | {LATE: float(error_map["time_s"])}
+    place[ALTITUDE] = altitude_of(place[ALTITUDE])
+    why = [outside(name, spans[name]) for name in lies_outside(place, spans)]
+    return "; ".join(why) or outside(BETWEEN, None)
 
 
 @dataclass(frozen=True)
@@ -68,7 +135,7 @@ class Landing:
     why, and whether it is in force at the end. changes: what was changed in flight: time_s; law and
     scheme, None for what was not; sensors, True or False; and of a diagnosis that was replaced
     detection_time_s and isolated. The verdict above is the last diagnosis'. inconclusive: in what share of
-    the frames the built-in diagnosis could conclude nothing, and why, as in inconclusive.py; else None.
+    the frames the built-in diagnosis could conclude nothing, and why, as in `inconclusive_of`; else None.
     """
 
     scenario: Scenario
@@ -403,7 +470,7 @@ def landing_of(
         exits=int(envelope["n_exits"]),
         outside_s=int(envelope["outside_frames"]) * dt,
         outside_at_end=bool(envelope["outside"]),
-        end=(float(frame["truth"]["value"][AIRSPEED]), float(frame["truth"]["value"][ALTITUDE])),
+        end=(float(frame["truth"]["value"][ch.AIRSPEED]), float(frame["truth"]["value"][ch.ALTITUDE])),
         departure=(float(frame["t"]), DEPARTURE_SIGNALS[departed // 10]) if departed else None,
         saturation_s={s: int(n) * dt for s, n in zip(surfaces, accounts["saturated_frames"], strict=True)},
         worst_residual_ratio=max(*closest, float(fdi["statistical"]["alarm"]["closest"])),

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.compiled import direct
-from beaver_ftc.control.base import Law, Reference
-from beaver_ftc.control.laws.rows import has_kernels, row_of
+from beaver_ftc.control.base import Law, Reference, has_kernels, row_of
 from beaver_ftc.design.context import Context, DesignFunctions
 from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
 from beaver_ftc.diagnosis.bounds import variances_of

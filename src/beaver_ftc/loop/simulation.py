@@ -11,16 +11,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from beaver_ftc.control.outer.setup import set_up_profile
+from beaver_ftc.control.profile import set_up_profile
 from beaver_ftc.documents.errors import BadInput, suggestion
-from beaver_ftc.loop.inconclusive import inconclusive_now
 from beaver_ftc.loop.loop import CHUNK_ROWS, FLYING, ONE_FLIES, LogSink, Loop
-from beaver_ftc.loop.outcome import Landing, verdict_of
+from beaver_ftc.loop.outcome import Landing, inconclusive_now, verdict_of
 from beaver_ftc.loop.plugin_frame import measured_of
 from beaver_ftc.loop.readout import FrameReadout
 from beaver_ftc.plant.adapter import Plant, UnknownProperty
-from beaver_ftc.plant.configure import GustSchedule
 from beaver_ftc.plant.faults import is_there
+from beaver_ftc.plant.trim import GustSchedule
 from beaver_ftc.scenario import interventions
 from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.diagnosis import MODES
@@ -75,7 +74,7 @@ class Stepping:
     def reset(self, *, seed: int | None = None) -> None:
         """Put the aircraft back into trim, nothing broken, the log empty: the same scenario, or a seed of it.
 
-        It is not loaded again, and flies as a freshly loaded one does, to the bit: see plant/reuse.py.
+        It is not loaded again, and flies as a freshly loaded one does, to the bit: see plant/conditions.py.
         """
         if seed is not None:
             self._given = self._given.with_({"seed": seed})

@@ -7,13 +7,13 @@ frames (1,): of `frame_dtype` (assembly.py).
 """
 
 from beaver_ftc.compiled import apart, kernel, row_of
-from beaver_ftc.design.actuators import move
+from beaver_ftc.design.model import move
 from beaver_ftc.diagnosis.conclusion import uses_statistical_estimates
 from beaver_ftc.diagnosis.monitors import sensor_monitor
 from beaver_ftc.diagnosis.schemes import built_in_statistic as largest_statistic
 from beaver_ftc.loop import frame as whole
 from beaver_ftc.loop.accounts import add_effect
-from beaver_ftc.plant.native import advance
+from beaver_ftc.plant.channels import advance
 from beaver_ftc.plant.sensing import FLYING, NOT_FINITE, hand_over, sample_forces
 
 

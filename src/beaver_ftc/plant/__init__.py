@@ -5,9 +5,8 @@ from typing import TYPE_CHECKING
 from beaver_ftc.public import lazily
 
 if TYPE_CHECKING:
-    from beaver_ftc.plant.adapter import PA_PER_PSF, Plant, bare, translated
+    from beaver_ftc.plant.adapter import PA_PER_PSF, FlightState, Plant, bare, translated
     from beaver_ftc.plant.admission import digest_of as digest_of_aircraft
-    from beaver_ftc.plant.configure import DELAY as ACTUATOR_DELAY
     from beaver_ftc.plant.ground import lay as lay_ground
     from beaver_ftc.plant.ground import stand as stand_on_ground
     from beaver_ftc.plant.instrumented import (
@@ -24,10 +23,10 @@ if TYPE_CHECKING:
     from beaver_ftc.plant.instrumented import instrument as instrument_model
     from beaver_ftc.plant.instrumented import is_told as is_known_to_jsbsim
     from beaver_ftc.plant.instrumented import source_of as source_of_jsbsim
-    from beaver_ftc.plant.instruments import AX, ENGINE_SPEED, SENSORS
     from beaver_ftc.plant.model_file import check_model_has_no_side_effects, copy_of
-    from beaver_ftc.plant.state import FlightState
+    from beaver_ftc.plant.sensing import AX, ENGINE_SPEED, SENSORS
     from beaver_ftc.plant.trial import failure as failure_of_trial
+    from beaver_ftc.plant.trim import DELAY as ACTUATOR_DELAY
     from beaver_ftc.plant.trim import TrimPoint
     from beaver_ftc.plant.trim import trim as trim_plant
 else:

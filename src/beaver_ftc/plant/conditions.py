@@ -1,13 +1,105 @@
-"""A trimmed flight condition and the truth linearised about it, from what a scenario says of them."""
+"""Flight conditions to fly from: an aircraft that is loaded once and flown many times, trimmed as a scenario
+says, and the truth linearised there.
 
+Aircraft loaded once and flown many times, each time as freshly loaded, to the bit.
+
+What a flight leaves behind in JSBSim (1.3.3), and what takes it away:
+
+    initial conditions   the attitude and the wind keep a rounding remainder of all that was set before;
+                         `run_ic` and a reset leave them alone. A file that states everything: at_rest.xml,
+                         short, for it is read twice a flight.
+    the models           integrators, controls, turbulence, time: `reset_to_initial_conditions`.
+    a gust               its direction, until it has blown over; no reset clears it. It is let blow over.
+    settings             written back; a property that is written through the plant is remembered.
+    random numbers       a flight in turbulence seeds its own.
+
+Aircraft with engines are loaded again: what their engines remember is more than this.
+
+A trimmed flight condition and the truth linearised about it, from what a scenario says of them.
+"""
+
+import os
+from functools import lru_cache
+from pathlib import Path
+from time import monotonic
+from typing import TYPE_CHECKING
+
+from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.plant.adapter import Plant
-from beaver_ftc.plant.configure import configure, trim_of
-from beaver_ftc.plant.linear import LinearModel, differences
-from beaver_ftc.plant.reuse import borrowed, give_back
-from beaver_ftc.plant.trim import TrimPoint
+from beaver_ftc.plant.adapter import Plant, executive_address
+from beaver_ftc.plant.trim import TrimPoint, configure, trim_of
 from beaver_ftc.scenario.builtin import texts_of
 from beaver_ftc.scenario.schema import Scenario, ScenarioLike, load
+
+if TYPE_CHECKING:
+    from beaver_ftc.plant.linear import LinearModel
+
+
+_MODELS_ONLY = 2  # of `reset_to_initial_conditions`: initialise every model, do not run
+_GUST = "atmosphere/cosine-gust"
+_SHORTEST_S = 1e-9
+_MOST = 8  # kept of one aircraft: more than this are hardly ever in the air at the same time
+
+_free: dict[object, list[Plant]] = {}
+
+
+def borrowed(rate_hz: float, substeps: int, aircraft: Aircraft) -> Plant:
+    """An aircraft as freshly loaded: one that was given back, or a new one.
+
+    Loaded again, within a second, when one of its files has changed.
+    """
+    origin = aircraft, _last_written_ns(aircraft.jsbsim, int(monotonic()))
+    try:
+        plant = _free.get(origin, []).pop()
+    except IndexError:
+        plant = Plant(rate_hz, substeps, aircraft)
+        plant.origin = origin
+        if plant.native and not plant.n_engines:
+            plant.executive = executive_address(plant.fdm)
+    renew(plant, rate_hz, substeps)
+    return plant
+
+
+def give_back(plant: Plant) -> None:
+    """Return it to the pool; nothing that reads or writes its properties may be used afterwards."""
+    if plant.origin is None or plant.n_engines:
+        return
+    others = _free.setdefault(plant.origin, [])
+    if len(others) < _MOST and plant not in others:
+        others.append(plant)
+
+
+def renew(plant: Plant, rate_hz: float, substeps: int) -> None:
+    """Take every trace of flying out of an aircraft without engines."""
+    if plant.n_engines:
+        return
+    plant.fdm.reset_to_initial_conditions(_MODELS_ONLY)
+    if f"{_GUST}/start" in plant.as_loaded:
+        _blow_over(plant)
+        plant.fdm.reset_to_initial_conditions(_MODELS_ONLY)
+    for name, value in plant.as_loaded.items():
+        if not name.startswith(("ic/", _GUST)):
+            plant.write(name, value)
+    plant.set_rate(rate_hz, substeps)
+
+
+def _blow_over(plant: Plant) -> None:
+    """Let a gust of hardly any duration begin and end."""
+    for part in ("startup", "steady", "end"):
+        plant.write(f"{_GUST}/{part}-duration-sec", _SHORTEST_S)
+    plant.write(f"{_GUST}/start", 1.0)
+    plant.run()
+
+
+@lru_cache(maxsize=32)
+def _last_written_ns(model: Path, second: int) -> tuple[int, ...]:
+    """When the model and its systems were last written, as looked at in this second: looking takes time."""
+    return tuple(os.stat(file).st_mtime_ns for file in _files_of(model))
+
+
+@lru_cache(maxsize=32)
+def _files_of(model: Path) -> tuple[str, ...]:
+    return tuple(map(str, (model, *sorted((model.parent / "Systems").glob("*.xml")))))
 
 
 def trim(scenario: ScenarioLike | None = None, **initial: float) -> TrimPoint:
@@ -20,11 +112,13 @@ def trim(scenario: ScenarioLike | None = None, **initial: float) -> TrimPoint:
     return trimmed(_condition(scenario, initial))[1]
 
 
-def linearise(scenario: ScenarioLike | None = None, **initial: float) -> LinearModel:
+def linearise(scenario: ScenarioLike | None = None, **initial: float) -> "LinearModel":
     """The truth about the trimmed flight that `trim` finds: xdot = A x + B u, ten states, the surfaces.
 
     `.state_space()` gives it as python-control has it. Raises BadInput as `trim` does.
     """
+    from beaver_ftc.plant.linear import differences
+
     return differences(*trimmed(_condition(scenario, initial)))
 
 

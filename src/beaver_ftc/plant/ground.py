@@ -7,8 +7,7 @@ from math import radians
 import numpy as np
 
 from beaver_ftc.documents.errors import SimulationFailed
-from beaver_ftc.plant.adapter import FT_PER_M, Plant
-from beaver_ftc.plant.state import FlightState
+from beaver_ftc.plant.adapter import FT_PER_M, FlightState, Plant
 
 _AT_REST = ("accelerations/wdot-ft_sec2", "accelerations/qdot-rad_sec2")
 _AIR = ("atmosphere/turb-type", *(f"atmosphere/gust-{axis}-fps" for axis in ("north", "east", "down")))

@@ -23,10 +23,9 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.aircraft import EARTH_RADIUS_M, M_PER_FT
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
-from beaver_ftc.plant.adapter import Plant
-from beaver_ftc.plant.configure import configure
+from beaver_ftc.plant.adapter import FlightState, Plant
 from beaver_ftc.plant.model_file import copy_of
-from beaver_ftc.plant.state import FlightState
+from beaver_ftc.plant.trim import configure
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario

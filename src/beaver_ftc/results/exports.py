@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from beaver_ftc.aircraft import Aircraft, load
 from beaver_ftc.aircraft.aircraft import EARTH_RADIUS_M
-from beaver_ftc.plant.state import START_LATITUDE_DEG
+from beaver_ftc.plant.adapter import START_LATITUDE_DEG
 from beaver_ftc.results import log
 from beaver_ftc.results.model import Metrics
 from beaver_ftc.results.style import marks

@@ -15,8 +15,8 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft, Term
 from beaver_ftc.aircraft.aircraft import AXES, MOMENTS
+from beaver_ftc.design.air import Dryden
 from beaver_ftc.design.context import SIGNALS
-from beaver_ftc.design.dryden import Dryden
 from beaver_ftc.scenario.diagnosis import FdiConfig
 from beaver_ftc.scenario.faults import of_a_sensor
 from beaver_ftc.scenario.sensors import NOISE_LIMIT_SIGMA, PRESETS, Sensors

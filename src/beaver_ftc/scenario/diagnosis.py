@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field, Strict, field_validator, model_validator
 
-from beaver_ftc.design.dryden import Severity
+from beaver_ftc.design.air import Severity
 from beaver_ftc.documents.document import Conflict, Section, deny, entry, number, refuse
 from beaver_ftc.documents.errors import suggestion
 from beaver_ftc.plugins import DETECTORS, LAWS, refusal, wrong_options

@@ -491,3 +491,31 @@ def is_of_a_sweep(data: dict[str, Any]) -> bool:
 def validate_scenario(document: Document, source: str = "", folder: Path | None = None) -> Scenario:
     """The scenario in a document; without a source its error lines begin with the key."""
     return validate(Scenario, document, source, folder, conflicts)
+
+
+def stages(scenario: Scenario) -> Iterator[tuple[Change, Scenario]]:
+    """(change, the scenario as it is from then on) for each change, in order.
+
+    Options belong to the law or scheme that the scenario begins with: another one has its defaults.
+    """
+    now = scenario
+    for change in scenario.changes:
+        now = _as_changed(now, change, scenario)
+        yield change, now
+
+
+def _as_changed(now: Scenario, change: Change, given: Scenario) -> Scenario:
+    changes: dict[str, Any] = {}
+    if change.law is not None:
+        options = given.control.options if change.law == given.control.law else {}
+        changes["control"] = now.control.model_copy(update={"law": change.law, "options": options})
+    fdi = now.fdi
+    if change.scheme is not None:
+        options = given.fdi.options if change.scheme == given.fdi.scheme else {}
+        fdi = fdi.with_scheme(change.scheme, options)
+    if change.declared_sensors is not None:
+        bounds = fdi.bounds.model_copy(update={"sensors": change.declared_sensors})
+        fdi = fdi.model_copy(update={"bounds": bounds})
+    if change.sensors is not None:
+        changes["sensors"] = change.sensors
+    return now.model_copy(update={**changes, "fdi": fdi})

@@ -13,7 +13,7 @@ from math import degrees, inf, pi
 from typing import Any
 
 from beaver_ftc.aircraft import AXES, Aircraft
-from beaver_ftc.design.atmosphere import altitude_of
+from beaver_ftc.design.air import altitude_of
 from beaver_ftc.scenario.declared import undeclared
 from beaver_ftc.scenario.diagnosis import failing, of_several
 from beaver_ftc.scenario.faults import UNANTICIPATED

@@ -28,8 +28,7 @@ import numpy as np
 from beaver_ftc.aircraft import load
 from beaver_ftc.commands import AirspeedsOption, AltitudesOption, Reporter, ScenarioArgument, StudyCommand
 from beaver_ftc.control.engines import effects_of as effects_of_engines
-from beaver_ftc.design.model import AXES, N_Y, both_responses
-from beaver_ftc.design.variants import design_of
+from beaver_ftc.design.model import AXES, N_Y, both_responses, design_of
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.plant.instrumented import ENGINE_SIGNALS

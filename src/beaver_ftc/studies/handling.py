@@ -16,9 +16,9 @@ import numpy as np
 
 from beaver_ftc.aircraft.aircraft import GRAVITY_MPS2
 from beaver_ftc.documents.errors import SimulationFailed
+from beaver_ftc.plant.adapter import FlightState
 from beaver_ftc.plant.conditions import trimmed
 from beaver_ftc.plant.linear import LinearModel, differences
-from beaver_ftc.plant.state import FlightState
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.linear_systems import CLASSICAL, Mode, modes
 from beaver_ftc.studies.present.tables import aligned, finite, number

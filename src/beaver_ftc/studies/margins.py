@@ -19,12 +19,11 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.aircraft import AXES
+from beaver_ftc.control.base import flown_by
 from beaver_ftc.control.laws.gains import margins
 from beaver_ftc.control.laws.rejecting import STAND_IN
-from beaver_ftc.control.laws.rows import flown_by
 from beaver_ftc.control.readout import Schedule
-from beaver_ftc.design.model import QDYN
-from beaver_ftc.design.variants import jacobian
+from beaver_ftc.design.model import QDYN, jacobian
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import Loop

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.control.laws import effectiveness_estimator
-from beaver_ftc.control.laws.effectiveness_estimator import estimator_dtype
+from beaver_ftc.control.laws import rejecting
+from beaver_ftc.control.laws.rejecting import estimator_dtype
 from beaver_ftc.design.model import ALPHA, BETA
 
 N, DT, FRAMES = 6, 0.02, 200
@@ -49,7 +49,7 @@ def flown(seed=1, tied=0.0):
 def listened(given, signals, missed, believed=None, airframe=True, forgets=True):
     """The record after all frames; believed (N,): the effectiveness that the observer assumed with."""
     record = np.zeros(1, estimator_dtype(N)).view(np.recarray)[0]
-    effectiveness_estimator.begin(record, np.zeros(3), np.zeros(3), DT)
+    rejecting.begin_estimator(record, np.zeros(3), np.zeros(3), DT)
     record.unsure[:] *= forgets
     if not airframe:
         record.P[N:, N:] = record.unsure[N:] = 0.0
@@ -57,7 +57,7 @@ def listened(given, signals, missed, believed=None, airframe=True, forgets=True)
     y = np.zeros(8)
     for moments, signal, off in zip(given, signals, missed, strict=True):
         y[ALPHA], y[BETA] = signal[:2]
-        effectiveness_estimator.estimate(record, off, PULL, INTO, DT, signal[2:], y, effectiveness, moments)
+        rejecting.estimate(record, off, PULL, INTO, DT, signal[2:], y, effectiveness, moments)
     return record
 
 
@@ -94,7 +94,7 @@ def test_it_is_least_squares_over_the_whole_past():
 def test_each_surface_is_found_while_the_airframe_has_changed(seed):
     record = listened(*flown(seed))
     assert [1.0 + theta for theta in record.found[:N]] == pytest.approx(1.0 + THETA, abs=0.1)
-    assert effectiveness_estimator.effectiveness_of(record, 0) == pytest.approx(0.1, abs=0.1)
+    assert rejecting.effectiveness_of(record, 0) == pytest.approx(0.1, abs=0.1)
 
 
 def test_without_the_airframe_a_surface_is_blamed_for_what_it_answers():

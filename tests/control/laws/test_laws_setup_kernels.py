@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.control import reference, state
+from beaver_ftc.control import laws, state
 from beaver_ftc.control.laws import gains
 from beaver_ftc.control.laws.gains import N_POINTS
-from beaver_ftc.design.model import AIRSPEED, QDYN, design_record
-from beaver_ftc.design.variants import response
+from beaver_ftc.design.model import AIRSPEED, QDYN, design_record, response
 from beaver_ftc.diagnosis.expectation import belief_dtype
 from beaver_ftc.scenario.schema import Scenario
 from law_records import fields, new_control
@@ -119,6 +118,6 @@ def test_a_laws_record_is_what_its_scenario_says_frame_by_frame():
     assert probe["amplitude"] == pytest.approx(np.radians(4.0))
     assert probe["step"] == pytest.approx(2.0 * np.pi * 1.25 * 0.02)
     assert (probe["frames"], probe["from_s"], probe["to_s"]) == (120, -1.0, -1.0)
-    A, B = reference.discretise(9.0, 0.6, 0.02)
+    A, B = laws.discretise(9.0, 0.6, 0.02)
     assert model["A"] == pytest.approx(np.array(A))
     assert model["B"] == pytest.approx(np.array(B))

@@ -5,14 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from beaver_ftc.control import accommodation, allocation, inversion, reference
+from beaver_ftc.control import accommodation, allocation, laws
+from beaver_ftc.control.accommodation import MODE_ADAPTIVE, MODE_NOMINAL, MODE_REALLOCATED, MODE_UNANTICIPATED
 from beaver_ftc.control.laws import rejecting
-from beaver_ftc.control.supervisor import (
-    MODE_ADAPTIVE,
-    MODE_NOMINAL,
-    MODE_REALLOCATED,
-    MODE_UNANTICIPATED,
-)
 from beaver_ftc.diagnosis.state import NOT_ISOLATED
 from beaver_ftc.diagnosis.types.contract import GIVE_UP, SCALE_COMMAND, SUBTRACT_OFFSET, WAIT_FOR_SURFACE
 from beaver_ftc.loop import frame as whole
@@ -32,7 +27,7 @@ def record(seed=0):
     control["layout"]["low"], control["layout"]["high"] = TRAVEL
     put(control, effectiveness=rng.uniform(0.2, 1.0, 4), offset=rng.normal(0, 0.02, 4))
     model = fields(control["reference"])
-    model["A"], model["B"] = reference.discretise(10.0, 1.0, DT)
+    model["A"], model["B"] = laws.discretise(10.0, 1.0, DT)
     for name in ("governed_rate", "governed_acceleration", "commanded_rate", "scale"):
         model[name] = rng.normal(0, 0.1, 3)
     config, law = control["rejecting"]["config"], control["rejecting"]
@@ -247,7 +242,7 @@ def test_pitch_is_handed_over_by_steps_and_back(mode, every_type, hedging, left,
     control["surfaces"]["output"]["effectiveness"][ELEVATOR] = left
     control["allocation"]["output"]["lost_share"], assessment = 0.3, frame["assessment"]
     assessment["every_type"] = every_type
-    inversion.prepare(control, assessment, frame["belief"], mode, 0.0)
+    laws.prepare(control, assessment, frame["belief"], mode, 0.0)
     assert control["allocation"]["output"]["hand_over"] == pytest.approx(after)
     now = 1.0 - left if left >= 0.1 else 1.0
     lost = now if mode == MODE_REALLOCATED else 0.3

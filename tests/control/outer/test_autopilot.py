@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from beaver_ftc.control import profile as setup
+from beaver_ftc.control.autopilot import ALTITUDE, AUTOPILOT, BANK, HEADING, SPEED, advance, to_body
 from beaver_ftc.control.laws.gains import margins
-from beaver_ftc.control.outer import setup
-from beaver_ftc.control.outer.autopilot import advance, to_body
-from beaver_ftc.control.outer.state import ALTITUDE, AUTOPILOT, BANK, HEADING, SPEED
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.scenario.schema import Scenario

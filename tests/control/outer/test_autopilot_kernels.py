@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import law_records
-from beaver_ftc.control.outer import autopilot as loops
-from beaver_ftc.control.outer.state import ALTITUDE, AUTOPILOT, BANK, HEADING, N_CHANNELS, SPEED
-from beaver_ftc.control.power import follow_autopilot
+from beaver_ftc.control import autopilot as loops
+from beaver_ftc.control.autopilot import ALTITUDE, AUTOPILOT, BANK, HEADING, N_CHANNELS, SPEED
+from beaver_ftc.control.engines import follow_autopilot
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, DPT, QDYN
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 from law_records import put

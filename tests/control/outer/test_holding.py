@@ -6,9 +6,9 @@ import pytest
 import beaver_ftc as bf
 from beaver_ftc.aircraft import load
 from beaver_ftc.control import allocation
-from beaver_ftc.control.outer import holding
-from beaver_ftc.control.outer.setup import elevator_needed
-from beaver_ftc.control.outer.state import AUTOPILOT, FASTEST, SPEED
+from beaver_ftc.control import autopilot as holding
+from beaver_ftc.control.autopilot import AUTOPILOT, FASTEST, SPEED
+from beaver_ftc.control.profile import elevator_needed
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import measure, metrics
 from beaver_ftc.results.verdict import facts

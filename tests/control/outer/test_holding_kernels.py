@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.control.outer import holding
-from beaver_ftc.control.outer.state import AUTOPILOT, BANK_LIMIT, FASTEST, SLOWEST, SPEED
+from beaver_ftc.control import autopilot
+from beaver_ftc.control.autopilot import AUTOPILOT, BANK_LIMIT, FASTEST, SLOWEST, SPEED
 from beaver_ftc.design.model import AIRSPEED, QDYN
 from law_records import new_control, put
 
@@ -47,7 +47,7 @@ def test_what_acts_is_averaged_from_the_first_frame_on(unexplained):
     hold = new()[0]["holding"]
     commands = np.random.default_rng(1).uniform(-0.2, 0.2, 40)
     for command in commands:
-        holding.watch(hold, DT, 0.02, 0.6 * command, unexplained)
+        autopilot.watch(hold, DT, 0.02, 0.6 * command, unexplained)
     assert hold["frames"] == 40
     assert hold["acting"] == pytest.approx(0.02 + 0.6 * commands.mean() + unexplained)
     assert hold["centre"] == pytest.approx(0.6 * commands.mean())
@@ -57,7 +57,7 @@ def test_later_it_follows_within_four_seconds():
     hold = new()[0]["holding"]
     hold["frames"], hold["acting"], hold["centre"] = 10_000, 0.3, 0.4
     for _ in range(80):
-        holding.watch(hold, DT, 0.02, 0.6 * 0.1, 0.0)
+        autopilot.watch(hold, DT, 0.02, 0.6 * 0.1, 0.0)
     left = (1.0 - DT / 4.0) ** 80
     assert hold["acting"] == pytest.approx(0.08 + left * (0.3 - 0.08))
     assert hold["centre"] == pytest.approx(0.06 + left * (0.4 - 0.06))
@@ -77,7 +77,7 @@ def test_the_airspeeds_are_those_of_flap_and_elevator_at_their_ends(flap_left, u
     surfaces["output"]["offset"][FLAP] = 0.12
     hold = pilot["holding"]
     hold["acting"], hold["centre"] = -0.03, 0.005
-    holding.find(pilot["holding"], layout, surfaces, y)
+    autopilot.find(pilot["holding"], layout, surfaces, y)
     assert hold["fastest"] == pytest.approx(at(-0.035 + 0.05 * 0.3, up), abs=0.05)
     slowest = at(-0.035 - 0.05 * 0.4, down)
     in_table = slowest * np.sqrt(DENSITY) > 30.0
@@ -89,7 +89,7 @@ def test_a_lost_flap_stands_within_its_travel(offset, stands):
     pilot, layout, surfaces, y = new(effectiveness=(1.0, 0.0, 1.0, 0.0))
     surfaces["output"]["offset"][FLAP] = offset
     pilot["holding"]["acting"] = needed(40.0, stands)
-    holding.find(pilot["holding"], layout, surfaces, y)
+    autopilot.find(pilot["holding"], layout, surfaces, y)
     assert pilot["holding"]["fastest"] == pytest.approx(40.0 / np.sqrt(DENSITY), abs=0.05)
     assert pilot["holding"]["slowest"] == pytest.approx(40.0 / np.sqrt(DENSITY), abs=0.05)
 
@@ -101,7 +101,7 @@ def test_the_table_is_straight_between_its_columns_and_goes_on_beyond_them(flap)
     k = min(max(np.searchsorted(hold["flap"], flap) - 1, 0), hold["flap"].size - 2)
     low, high = hold["flap"][k : k + 2]
     expected = 4.0 + low**2 + (flap - low) * (high + low)
-    assert holding.needed(hold, 4, flap) == pytest.approx(expected)
+    assert autopilot.needed(hold, 4, flap) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(
@@ -115,7 +115,7 @@ def test_the_table_is_straight_between_its_columns_and_goes_on_beyond_them(flap)
 def test_only_a_pitch_that_is_not_whole_is_watched(effectiveness, stand_in, known, watched):
     pilot, layout, surfaces, y = new(effectiveness=effectiveness, stand_in=stand_in)
     pilot["holding"]["known"], pilot["holding"]["frames"] = known, 3
-    holding.protect(pilot, layout, surfaces, np.zeros(4), 0.0, y, 1.0)
+    autopilot.protect(pilot, layout, surfaces, np.zeros(4), 0.0, y, 1.0)
     assert pilot["holding"]["frames"] == (4 if watched else 0)
     assert pilot["held"] == 45.0
 
@@ -125,7 +125,7 @@ def test_nothing_is_concluded_within_the_first_half_second():
     surfaces["output"]["offset"][[ELEVATOR, FLAP]] = needed(40.0, 0.2), 0.2
     fastest = []
     for k in range(12):
-        holding.protect(pilot, layout, surfaces, np.zeros(4), 0.0, y, k * DT)
+        autopilot.protect(pilot, layout, surfaces, np.zeros(4), 0.0, y, k * DT)
         fastest.append(float(pilot["holding"]["fastest"]))
     assert fastest[:10] == [np.inf] * 10
     assert fastest[10:] == pytest.approx([40.0 / np.sqrt(DENSITY)] * 2, abs=0.05)
@@ -138,7 +138,7 @@ def noted(command=45.0, fastest=np.inf, slowest=0.0, commanded=1, effectiveness=
     hold = pilot["holding"]
     hold["fastest"], hold["slowest"], pilot["commanded"][SPEED] = fastest, slowest, commanded
     pilot["bank_limit"] = limit
-    holding.announce(pilot, layout["main"], surfaces["output"]["effectiveness"], 7.0)
+    autopilot.announce(pilot, layout["main"], surfaces["output"]["effectiveness"], 7.0)
     return hold
 
 
@@ -167,7 +167,7 @@ def test_a_bank_limit_is_announced_as_it_has_been_on_average(surface):
     pilot, layout, surfaces, _ = new(effectiveness=effectiveness)
     pilot["bank_limit"] = 0.1
     for k in range(6):
-        holding.announce(pilot, layout["main"], surfaces["output"]["effectiveness"], float(k))
+        autopilot.announce(pilot, layout["main"], surfaces["output"]["effectiveness"], float(k))
     assert pilot["holding"]["in_force"][BANK_LIMIT] == 1
     assert pilot["holding"]["from_s"][BANK_LIMIT] == 4.0
     left = 0.1 + 0.4 * (1.0 - DT / 4.0) ** 6
@@ -179,17 +179,17 @@ def test_what_is_held_comes_within_both_limits_at_its_pace():
     pilot, *_ = new()
     hold, pilot["held"] = pilot["holding"], 45.0
     hold["fastest"], hold["slowest"] = np.inf, 45.02
-    holding.approach(pilot)
+    autopilot.approach(pilot)
     assert (pilot["held"], pilot["held_moving"]) == pytest.approx((45.02, 0.02 / DT))
     assert hold["limiting"] == 1
     hold["slowest"], hold["fastest"] = 0.0, 44.0
-    holding.approach(pilot)
+    autopilot.approach(pilot)
     assert (pilot["held"], pilot["held_moving"]) == pytest.approx((45.02 - DT, -1.0))
     hold["slowest"], hold["fastest"] = 47.0, 46.0  # nothing can be held: the faster of both ends gives way
     for _ in range(40):
-        holding.approach(pilot)
+        autopilot.approach(pilot)
     assert pilot["held"] == 46.0
     pilot["moving"][SPEED], hold["slowest"], hold["fastest"] = 0.3, 0.0, np.inf
     for _ in range(40):
-        holding.approach(pilot)
+        autopilot.approach(pilot)
     assert (pilot["held"], pilot["held_moving"], hold["limiting"]) == (45.0, 0.3, 0)

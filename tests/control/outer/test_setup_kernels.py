@@ -8,8 +8,8 @@ import pytest
 from scipy.optimize import root
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.control.outer import setup
-from beaver_ftc.control.outer.state import AUTOPILOT, GAIN, N_FLAP, N_QDYN
+from beaver_ftc.control import profile
+from beaver_ftc.control.autopilot import AUTOPILOT, GAIN, N_FLAP, N_QDYN
 from beaver_ftc.control.state import control_dtype
 from beaver_ftc.scenario.schema import Scenario
 
@@ -30,7 +30,7 @@ def set_up(stand_in=3, autopilot=LEGS, **keys):
     control["layout"]["low"], control["layout"]["high"] = (-0.5, -0.4, -0.3, -0.1), (0.5, 0.4, 0.3, 1.0)
     control["power"]["config"]["trim"], control["power"]["config"]["low"] = 20.0, 12.0
     control["power"]["config"]["high"], control["power"]["config"]["step"] = 28.0, 0.5
-    setup.set_up_autopilot(pilot, control, Scenario.model_validate(given))
+    profile.set_up_autopilot(pilot, control, Scenario.model_validate(given))
     return pilot, control
 
 
@@ -80,7 +80,7 @@ def test_a_loop_that_integrates_what_is_missing_does_not_overshoot_by_it(filled,
 def test_an_engine_that_lags_slows_its_loop_down_and_nothing_else(filled, by, slower):
     """3 s of the loop and 1.5 of the engine in a row: k by 1.5, k_i by its square, so that it damps alike."""
     engine = SimpleNamespace(thrust=SimpleNamespace(lag_s=1.5))
-    lagging = setup._gains(SimpleNamespace(engine=engine, airspeed_by=by))
+    lagging = profile._gains(SimpleNamespace(engine=engine, airspeed_by=by))
     usual = {name: float(filled[0]["gain"][name]) for name in GAIN.names}
     assert lagging["speed"] == pytest.approx(usual["speed"] / slower)
     damping = [gain["speed"] / np.sqrt(gain["speed_i"]) for gain in (lagging, usual)]
@@ -176,7 +176,7 @@ def test_the_table_is_that_of_level_flight_between_the_ends_of_speed_and_flap(fi
 def test_what_takes_more_thrust_or_incidence_than_there_is_cannot_be_held(qdyn_pa, flap_rad, held):
     """Too much flap for the speed, or too slow for what flap there is; each beside one that is held."""
     wanted = (("Cm_alpha", 1.2),), (qdyn_pa, 900.0), (0.3, flap_rad)
-    needed = setup.elevator_needed(AIRCRAFT, ("elevator", "flap"), 1.1 * AIRCRAFT.mass.mass_kg, *wanted)
+    needed = profile.elevator_needed(AIRCRAFT, ("elevator", "flap"), 1.1 * AIRCRAFT.mass.mass_kg, *wanted)
     expected = level(qdyn_pa, flap_rad) if held else np.nan
     assert needed[0, 1] == pytest.approx(expected, abs=1e-7, nan_ok=True)
     assert needed[1, 0] == pytest.approx(level(900.0, 0.3), abs=1e-7)
@@ -206,15 +206,15 @@ def made_up(terms, **autopilot):
 
 def test_an_aircraft_that_hardly_rolls_by_sideslip_is_not_flown_by_it():
     pilot = np.zeros(1, AUTOPILOT)[0]
-    setup._know(pilot, made_up({}))
+    profile._know(pilot, made_up({}))
     assert not pilot["thrust"].any()
     assert pilot["dihedral"] == pytest.approx(0.01 * 2.0 / 10.0)
     assert pilot["weathercock"] == inf  # no power yaws it
     unstable = {"Cn_dpt3": -0.1, "Cn_beta": -0.2, "Cl_beta": -0.3, "Cl_p": -0.5}
-    setup._know(pilot, made_up(unstable))
+    profile._know(pilot, made_up(unstable))
     assert pilot["weathercock"] == 0.0
     assert pilot["dihedral"] == pytest.approx(0.6 * 2.0 / 10.0)
-    setup._know(pilot, made_up(unstable | {"Cn_beta": 0.2, "Cn_beta3": 1.0}))
+    profile._know(pilot, made_up(unstable | {"Cn_beta": 0.2, "Cn_beta3": 1.0}))
     assert pilot["weathercock"] == pytest.approx((0.2 * 0.2 + 0.2**3) / 0.1)
 
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from beaver_ftc.aircraft.schema import ThrustSection
-from beaver_ftc.control.outer.thrust import ENGINE, between, gained, look_up, power_for, set_up_engine
+from beaver_ftc.control.engines import ENGINE, between, gained, look_up, power_for, set_up_engine
 
 MASS_KG = 500.0
 SECTION = {"airspeed_mps": [20.0, 30.0, 60.0], "setting": [0.0, 0.25, 1.0], "lag_s": 0.8,

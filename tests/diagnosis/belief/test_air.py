@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.design.dryden import Dryden, rotation_lengths
+from beaver_ftc.design.air import Dryden, rotation_lengths
 from beaver_ftc.design.fdc import MASS
 from beaver_ftc.diagnosis import gusts
 from beaver_ftc.diagnosis.gusts import GUST_RECORD

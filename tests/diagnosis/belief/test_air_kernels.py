@@ -7,9 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.aircraft import FORCES
-from beaver_ftc.design.model import design_record
-from beaver_ftc.design.terms import fill_table
-from beaver_ftc.design.variants import response
+from beaver_ftc.design.model import design_record, fill_table, response
 from beaver_ftc.diagnosis import bounds, gusts
 from beaver_ftc.diagnosis.gusts import GUST_RECORD
 from beaver_ftc.scenario.declared import SensorErrors

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.design.dryden import Dryden
+from beaver_ftc.design.air import Dryden
 from beaver_ftc.diagnosis import bounds, gusts
 from beaver_ftc.diagnosis import bounds as admitting
 from beaver_ftc.diagnosis.bounds import declared_errors_dtype

@@ -10,9 +10,7 @@ from statistics_of import Statistical, put
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.aircraft import FORCES
-from beaver_ftc.design.model import design_record
-from beaver_ftc.design.terms import fill_table, regressors
-from beaver_ftc.design.variants import response
+from beaver_ftc.design.model import design_record, fill_table, regressors, response
 from beaver_ftc.diagnosis import bounds, conclusion, expectation, gusts, isolation, schemes
 from beaver_ftc.diagnosis.bounds import error_map_dtype
 from beaver_ftc.diagnosis.detection import filters, statistical

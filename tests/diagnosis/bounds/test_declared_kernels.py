@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.design.dryden import SCALE_FT, Dryden
+from beaver_ftc.design.air import SCALE_FT, Dryden
 from beaver_ftc.design.model import design_record
 from beaver_ftc.diagnosis.bounds import gust_effect, model_error_deviation, variances_of
 from beaver_ftc.scenario.airframe import Actuators

@@ -7,16 +7,13 @@ from scipy.stats import norm
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.schema import MAX_TERMS
-from beaver_ftc.design.engine import KW_TO_DPT
 from beaver_ftc.design.fdc import MASS
-from beaver_ftc.design.model import AXES, design_record
-from beaver_ftc.design.terms import evaluate, regressors
-from beaver_ftc.design.variants import response
+from beaver_ftc.design.model import AXES, KW_TO_DPT, design_record, evaluate, regressors, response
 from beaver_ftc.diagnosis import bounds as bound_kernels
 from beaver_ftc.diagnosis.detection import noise_model
 from beaver_ftc.diagnosis.detection.likelihood import N_SLOTS, PITCH_BLOCK
 from beaver_ftc.diagnosis.state import LOSS
-from beaver_ftc.plant.instruments import SIGNALS
+from beaver_ftc.plant.sensing import SIGNALS
 from beaver_ftc.scenario.diagnosis import Bounds
 from beaver_ftc.studies.engine.statistics import poisson
 from flying import declared_in

@@ -8,10 +8,9 @@ import pytest
 from innovations import LEVEL_FLIGHT, TRAVEL_RAD, Detector, by_onset, gust_jitter
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.design.dryden import Dryden, rotation_lengths
+from beaver_ftc.design.air import Dryden, rotation_lengths
 from beaver_ftc.design.fdc import MASS
-from beaver_ftc.design.model import design_record, inertia_coefficients
-from beaver_ftc.design.variants import coefficient_slopes, jacobian
+from beaver_ftc.design.model import coefficient_slopes, design_record, inertia_coefficients, jacobian
 from beaver_ftc.diagnosis import bounds as bound_kernels
 from beaver_ftc.diagnosis import gusts
 from beaver_ftc.diagnosis.bounds import error_map_dtype, inertia_coefficient_errors

@@ -5,8 +5,7 @@ import pytest
 from innovations import Detector, misread
 from statistics_of import Statistical
 
-from beaver_ftc.design.engine import KW_TO_DPT
-from beaver_ftc.design.variants import response
+from beaver_ftc.design.model import KW_TO_DPT, response
 from beaver_ftc.diagnosis.detection import noise_model
 from beaver_ftc.diagnosis.detection.likelihood import N_READINGS
 from beaver_ftc.scenario.declared import SensorErrors

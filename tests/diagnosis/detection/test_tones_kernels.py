@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from kernels import DT, new_fdi
 from statistics_of import Across
 
-from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA
+from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA
 from beaver_ftc.diagnosis.detection import likelihood, parity
 from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, FREQUENCIES_RAD_S, MEMORY_S, N_TONES, VANE_VIEW
 from beaver_ftc.diagnosis.state import PITCH, SIDE_FORCE, YAW

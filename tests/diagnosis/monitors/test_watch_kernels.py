@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from kernels import DT, fill, new_fdi, on
 
-from beaver_ftc.design.engine import measured_slipstream
-from beaver_ftc.design.model import DPT
+from beaver_ftc.design.model import DPT, measured_slipstream
 from beaver_ftc.diagnosis.expectation import belief_dtype
 from beaver_ftc.diagnosis.monitors import sensor_monitor as watching
 from beaver_ftc.diagnosis.monitors.redundancy import (
@@ -33,16 +32,7 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
 )
 from beaver_ftc.diagnosis.state import NOT_ISOLATED
 from beaver_ftc.loop import frame
-from beaver_ftc.plant.instruments import (
-    ALTITUDE,
-    AX,
-    ENGINE_SPEED,
-    MANIFOLD,
-    MEASURED,
-    N_SENSORS,
-    PHI,
-    SENSORS,
-)
+from beaver_ftc.plant.sensing import ALTITUDE, AX, ENGINE_SPEED, MANIFOLD, MEASURED, N_SENSORS, PHI, SENSORS
 
 H = 0.005
 MISSING = np.dtype([("missing", "i8", (N_SENSORS,)), ("signal", "f8", (N_SENSORS,))], align=True)

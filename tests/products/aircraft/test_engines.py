@@ -11,7 +11,7 @@ import yaml
 import beaver_ftc as bf
 from beaver_ftc.aircraft.aircraft import read
 from beaver_ftc.control import engines
-from beaver_ftc.control.power import POWER, move_differences
+from beaver_ftc.control.engines import POWER, move_differences
 from beaver_ftc.control.state import control_dtype
 from beaver_ftc.diagnosis.monitors import engine_symmetry
 from beaver_ftc.diagnosis.monitors.engine_symmetry import ENGINES
@@ -60,7 +60,7 @@ def test_the_column_is_arm_times_thrust_over_inertia(jet):
     """As JSBSim turns: the thrust of each engine is read at its place, not from our signals."""
     aircraft = read(jet / "aircraft" / "737")
     plant, record = Plant(100, aircraft=aircraft), np.zeros(1, engines.ENGINES)[0]
-    engines.configure(record, scenario(jet))
+    engines.configure_engines(record, scenario(jet))
     point = trim(aircraft.usual_airspeed_mps, 1500.0, plant=plant, throttle=0.6)
     seen = []
     for difference in (0.0, 0.15):
@@ -81,7 +81,7 @@ def test_the_column_is_arm_times_thrust_over_inertia(jet):
 def records(jet, lag_s):
     """What the law of the jet keeps, its rudder given up; the engines' table is a straight line."""
     control = np.zeros(1, control_dtype(3)).view(np.recarray)[0]
-    engines.configure(control["engines"], scenario(jet, rate_hz=100))
+    engines.configure_engines(control["engines"], scenario(jet, rate_hz=100))
     control["engines"]["config"]["part"] = DT / (2.0 * lag_s)
     control["power"] = np.zeros(1, POWER)[0]
     control["power"]["output"]["command"][0] = 0.5
@@ -99,7 +99,7 @@ def answer(control, demand, lag_s, frames):
     saturated, config = control["allocation"]["output"]["saturated"], control["engines"]["config"]
     for k in range(frames):
         control["axes"]["shortfall"][YAW] = demand - given
-        engines.steer(
+        engines.steer_by_engines(
             parts, power, control["axes"], control["layout"], saturated, control["surfaces"], 139.0,
         )  # fmt: skip
         move_differences(power, parts["output"]["difference"], config["n"], config["step"])
@@ -132,7 +132,7 @@ def test_what_they_cannot_give_is_not_integrated(jet):
 
 def test_without_engines_as_effectors_nothing_is_moved():
     record = np.zeros(1, engines.ENGINES)[0]
-    engines.configure(record, bf.load("fault-free"))
+    engines.configure_engines(record, bf.load("fault-free"))
     assert record["config"]["n"] == 0
     assert not record["config"]["B"].any()
 

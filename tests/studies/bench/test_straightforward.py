@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S
-from beaver_ftc.control.reference import discretise
+from beaver_ftc.control.laws import discretise
 from beaver_ftc.design.fdc import MASS
 from beaver_ftc.design.model import both_responses, design_record, inertia_coefficients
 from beaver_ftc.loop.loop import fly

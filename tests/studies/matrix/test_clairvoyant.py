@@ -8,8 +8,7 @@ import pytest
 from beaver_ftc import load as load_scenario
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.context import DesignFunctions
-from beaver_ftc.design.model import inertia_coefficients, inertial
-from beaver_ftc.design.variants import design_of
+from beaver_ftc.design.model import design_of, inertia_coefficients, inertial
 from beaver_ftc.diagnosis.informed_test import healthy_positions, term_accelerations
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.loop.readout import FrameReadout

@@ -10,8 +10,8 @@ import pytest
 
 from beaver_ftc.design import fdc
 from beaver_ftc.documents.errors import SimulationFailed
+from beaver_ftc.plant.adapter import FlightState
 from beaver_ftc.plant.linear import own
-from beaver_ftc.plant.state import FlightState
 from beaver_ftc.studies.linear_systems import (
     CLASSICAL,
     MODES,

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from beaver_ftc.design.fdc import MASS
-from beaver_ftc.design.model import inertia_coefficients
-from beaver_ftc.design.variants import anchor, anchored, design_of, response
+from beaver_ftc.design.model import anchor, anchored, design_of, inertia_coefficients, response
 from beaver_ftc.studies.mismatch import models
 from beaver_ftc.studies.mismatch.models import Belief, designed_moments
 from beaver_ftc.studies.mismatch.sources import (

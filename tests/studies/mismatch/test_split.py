@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from beaver_ftc.plant import conditions
-from beaver_ftc.plant.adapter import Plant
-from beaver_ftc.plant.configure import configure
-from beaver_ftc.plant.state import FlightState
+from beaver_ftc.plant.adapter import FlightState, Plant
+from beaver_ftc.plant.trim import configure
 from beaver_ftc.scenario.builtin import builtin_names
 from beaver_ftc.scenario.schema import load_scenario
 from beaver_ftc.studies.mismatch.sources import SOURCES

@@ -8,7 +8,7 @@ from pathlib import Path
 import yaml
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.control.outer.state import COLUMNS as PROFILE
+from beaver_ftc.control.autopilot import COLUMNS as PROFILE
 from beaver_ftc.diagnosis.isolation import estimator_names
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.channels import log_columns

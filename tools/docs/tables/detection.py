@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from scipy.signal import lfilter
 
 import beaver_ftc as bf
-from beaver_ftc.design.variants import design_of, response
+from beaver_ftc.design.model import design_of, response
 from beaver_ftc.results.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION
 from beaver_ftc.scenario.diagnosis import DEADBEAT_PER_S
 from beaver_ftc.studies.present.tables import markdown_table

@@ -1,1 +1,172 @@
-"""The control laws of ours, one a file; table.py lists them."""
+"""The control laws of ours, one a file, and what they share: the reference they follow, and the inversion of
+the design model. `control/state.py` has their table.
+
+The reference that a law follows: a model of the wanted response, bent to what the surfaces can give.
+
+    xm'' = wn^2 (ref - xm) - 2 zeta wn xm'
+
+Second order, so that xm' needs no differentiation; discretised exactly for a reference held over the
+frame.
+
+Once authority is lost, two things happen to it. It is hedged [Johnson2000]: what was demanded and could
+not be given is taken off the model's acceleration, so that model and integrator wait for the aircraft
+instead of winding up. And it is scaled: following only the half of a swing that is within reach would
+ratchet the attitude, so what is missed on one side is asked for on neither.
+
+What the laws that invert the design model have in common: which surfaces carry pitch, from a demand to the
+command, and what is missing then.
+
+    prepare -> the law's own demand -> command_surfaces -> the law's own integrators -> complete
+"""
+
+import numpy as np
+
+from beaver_ftc.compiled import apart, kernel, record
+from beaver_ftc.control import accommodation, allocation, engines
+from beaver_ftc.control.accommodation import MODE_REALLOCATED
+from beaver_ftc.design.model import AIRSPEED
+from beaver_ftc.diagnosis.state import PITCH
+from beaver_ftc.scenario.diagnosis import ControlConfig
+
+MISSED_RAD_S = 0.1  # a rate missed in all by this much: the reference is given up
+RECOVERY_S = 30.0  # and asked for again within this time: several periods of a slow reference
+
+# The model A, B over dt s; steered: whether outer loops ask for the rates.
+REFERENCE_CONFIG = record(dt=float, A=(2, 2), B=2, steered=int)
+# active: whether the reference is governed, from the first loss of authority on; scale: of what is commanded.
+GOVERNOR = record(active=int, scale=3)
+# The commanded rate, the model's answer to it and the governed one that the law follows: rad/s, rad/s2.
+REFERENCE_OUTPUT = record(
+    commanded_rate=3, model_rate=3, model_acceleration=3, governed_rate=3, governed_acceleration=3
+)
+REFERENCE = record(config=REFERENCE_CONFIG, memory=GOVERNOR, output=REFERENCE_OUTPUT)
+
+
+def configure_reference(reference: np.void, config: ControlConfig, dt_s: float) -> None:
+    """Fill the record (dtype REFERENCE) for frames of dt_s seconds."""
+    reference["config"]["dt"], reference["memory"]["scale"] = dt_s, 1.0
+    reference["config"]["A"], reference["config"]["B"] = discretise(
+        config.reference_natural_frequency_rad_s, config.reference_damping, dt_s
+    )
+
+
+def discretise(wn: float, zeta: float, dt: float) -> tuple[np.ndarray, np.ndarray]:
+    """State transition A (2, 2) and input B (2,) of (xm, xm') over dt (s) under a held reference; wn in
+    rad/s.
+
+    Cayley-Hamilton for a 2 x 2 matrix: exp(F dt) = e^{-s dt} (c I + d (F + s I)) with s = zeta wn, and c, d
+    the (hyperbolic) cosine and sine of m dt, m^2 = s^2 - wn^2. The input follows from the equilibrium (ref,
+    0).
+    """
+    s = zeta * wn
+    m = np.sqrt(complex(s * s - wn * wn))
+    c = np.cosh(m * dt).real
+    d = (np.sinh(m * dt) / m).real if abs(m) * dt > 1e-8 else dt
+    A = np.exp(-s * dt) * np.array([[c + s * d, d], [-wn * wn * d, c - s * d]])
+    return A, np.array([1.0 - A[0, 0], -A[1, 0]])
+
+
+@kernel
+def advance(config, rate, acceleration, wanted):
+    """Rate (rad/s) and acceleration (rad/s2) of the model a frame on, `wanted` (rad/s) held."""
+    A, B = config.A, config.B
+    following = A[0, 0] * rate + A[0, 1] * acceleration + B[0] * wanted
+    return following, A[1, 0] * rate + A[1, 1] * acceleration + B[1] * wanted
+
+
+@kernel
+def follow(config, output, commanded):
+    """Advance the model by one frame towards `commanded` (3,) rad/s."""
+    output.commanded_rate[:] = commanded
+    for i in range(3):
+        rate, acceleration = output.model_rate[i], output.model_acceleration[i]
+        rate, acceleration = advance(config, rate, acceleration, commanded[i])
+        output.model_rate[i], output.model_acceleration[i] = rate, acceleration
+
+
+@kernel
+def govern(reference, commanded, shortfall, authority_lost):
+    """Bring what the law follows to the next frame.
+
+    commanded (3,) rad/s; shortfall (3,) rad/s2: what was demanded and not given. authority_lost: whether a
+    surface is slow or parked now: from then on the reference is governed.
+    """
+    config, governor, output = reference.config, reference.memory, reference.output
+    if authority_lost:
+        governor.active = 1
+    if not governor.active:
+        output.governed_rate[:] = output.model_rate
+        output.governed_acceleration[:] = output.model_acceleration
+        return
+    dt = config.dt
+    for i in range(3):
+        scale = governor.scale[i] - dt * abs(shortfall[i]) / MISSED_RAD_S
+        if not config.steered:  # outer loops ask again for what was missed
+            governor.scale[i] = max(scale + dt / RECOVERY_S * (1.0 - scale), 0.0)
+        rate, acceleration = output.governed_rate[i], output.governed_acceleration[i]
+        rate, acceleration = advance(config, rate, acceleration, governor.scale[i] * commanded[i])
+        output.governed_rate[i] = rate - dt * shortfall[i]
+        output.governed_acceleration[i] = acceleration
+
+
+@apart
+def prepare(control, assessment, belief, mode, t):
+    """Bring the effectiveness matrix, the hand-over of pitch and the probe to this frame, t s. mode: the
+    supervisor's."""
+    surfaces, config = control.surfaces, control.config
+    allocation.form_effectiveness_matrix(control.axes, belief.G, surfaces, config.uses_verdict)
+    remains = allocation.remaining(control.layout, surfaces.output.effectiveness, PITCH)
+    least, reallocated = surfaces.config.least_effectiveness, mode == MODE_REALLOCATED
+    at_once = is_governed(control) or (remains < least and assessment.every_type)
+    allocation.hand_over_pitch(control.allocation, reallocated, at_once, remains, least)
+    if control.probe.config.frames > 0:
+        wanted = assessment.pitch_undecided and config.uses_verdict and not config.informed
+        allocation.advance_probe(control.probe, wanted, t)
+
+
+@kernel
+def is_governed(control):
+    """Whether the reference is governed from this frame on: authority has been lost."""
+    return control.reference.memory.active or control.surfaces.output.authority_lost
+
+
+@apart
+def command_surfaces(control, demand, hold, disturbance, assessment, faults, belief, by_observer):
+    """From the law's demand to the command of each surface; demand, hold, disturbance (3,) rad/s2: see
+    `allocation.form_demand`.
+
+    by_observer: whether the law's observer finds what a surface does not do; the stand-in then carries what
+    the main surface has lost, and the flap takes what an elevator at its stop leaves.
+    """
+    axes, layout, surfaces, out = control.axes, control.layout, control.surfaces, control.allocation.output
+    uses_verdict, effectiveness = control.config.uses_verdict, surfaces.output.effectiveness
+    allocation.form_demand(axes, demand, hold, disturbance, surfaces.output.offset, belief.G, uses_verdict)
+    share = out.transfer_share if by_observer else allocation.smooth(out.hand_over)
+    probe = control.probe.memory.deflection
+    if layout.general:
+        allocation.allocate_generally(axes, control.allocation, layout, effectiveness, belief, share, probe)
+    else:
+        allocation.allocate(axes, out, layout, effectiveness, share, probe)
+    if not layout.general and by_observer and uses_verdict and assessment.detected:
+        allocation.spill_to_flap(axes, out, layout)
+    accommodation.park_failed_surfaces(surfaces.output, assessment, faults, control.config.informed)
+    allocation.park(out, layout, surfaces.output.parked)
+
+
+@apart
+def complete(control, assessment, faults, measured, t):
+    """Note whether the demand is met; what is missing in pitch and yaw is left to the engines, at t s."""
+    detected, out, surfaces = assessment.detected, control.allocation.output, control.surfaces
+    axes, layout, lever, engine = control.axes, control.layout, control.power, control.engines
+    used = detected and (lever.config.enabled or engine.config.n > 0)
+    if faults.present or is_governed(control) or used:
+        lag, by_engines = surfaces.output.lag, engine.output.authority
+        allocation.note_shortfall(axes, out.command, layout, lag, by_engines)
+    if lever.config.enabled:
+        watched = detected or control.config.informed
+        lost = watched and engines.pitch_is_lost(layout, surfaces, out.saturated, axes.shortfall)
+        engines.steer_by_power(lever, control.reference, measured.x, measured.y, watched, lost, t)
+    if engine.config.n > 0 and detected:
+        engines.steer_by_engines(engine, lever, axes, layout, out.saturated, surfaces, measured.y[AIRSPEED])
+        engines.move_differences(lever, engine.output.difference, engine.config.n, engine.config.step)
+        engines.note_use(engine, lever.output, t)

@@ -19,8 +19,7 @@ from math import exp, hypot, inf, pi, radians, sqrt
 
 import numpy as np
 
-from beaver_ftc.design.model import AIRSPEED, QDYN
-from beaver_ftc.design.variants import effectiveness, own_damping
+from beaver_ftc.design.model import AIRSPEED, QDYN, effectiveness, own_damping
 from beaver_ftc.diagnosis.state import PITCH
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sensors import RateGyro

@@ -9,7 +9,7 @@ in the effectiveness in G and in who carries the demand: plugins.yaml says what 
 import numpy as np
 
 from beaver_ftc.compiled import apart, kernel, record, sized
-from beaver_ftc.control import inversion
+from beaver_ftc.control import laws
 from beaver_ftc.control.base import CompiledLaw
 from beaver_ftc.scenario.schema import Scenario
 
@@ -36,19 +36,17 @@ def command(control, assessment, faults, belief, measured, mode, t):
     """From what is measured to the command of each surface (base.CompiledLaw)."""
     law, reference, unknown = control.published, control.reference, control.surfaces.output.unknown
     out = law.output
-    inversion.prepare(control, assessment, belief, mode, t)
+    laws.prepare(control, assessment, belief, mode, t)
     demand(law, reference.output, measured.x, belief.f, unknown)
-    inversion.command_surfaces(
-        control, out.demand, out.hold, out.disturbance, assessment, faults, belief, False
-    )
+    laws.command_surfaces(control, out.demand, out.hold, out.disturbance, assessment, faults, belief, False)
     integrate(law, control.axes, reference, control.allocation.output.command, measured.x)
-    inversion.complete(control, assessment, faults, measured, t)
+    laws.complete(control, assessment, faults, measured, t)
 
 
 @kernel
 def demand(law, reference, x, f, fhat):
     """Fill the law's demand and hold (3,) rad/s2. x (3,) rad/s; f, fhat (3,) rad/s2: the model's acceleration
-    and what is unknown beside it; reference: the Output of reference.py."""
+    and what is unknown beside it; reference: the Output of laws/__init__.py."""
     config, output = law.config, law.output
     for i in range(3):
         error = reference.governed_rate[i] - x[i]

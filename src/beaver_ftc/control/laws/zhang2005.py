@@ -11,13 +11,13 @@ The paper leaves the design to its reference [11]; this is its pattern. With v =
 Gamma, z = (int e, e), falls along these two laws if s is the second row of P z, where A' P + P A = -Q for the
 error's A. For Q = diag(1, q), that row is, but for a factor, e + c int e with c = Kp / (q Ki + 1). There is
 no feedback of the FDAE's residual beside the two. From Tisol on the flap takes over from an elevator that is
-isolated (supervisor.py, allocation.py); the structure of the law stays.
+isolated (accommodation.py, allocation.py); the structure of the law stays.
 """
 
 import numpy as np
 
 from beaver_ftc.compiled import apart, kernel, record, sized
-from beaver_ftc.control import inversion
+from beaver_ftc.control import laws
 from beaver_ftc.control.accommodation import approach, begin_frame
 from beaver_ftc.control.base import CompiledLaw
 from beaver_ftc.control.laws import published
@@ -101,14 +101,12 @@ def adapt(law, surfaces, main, saturated, error, G, u, dt):
 def command(control, assessment, faults, belief, measured, mode, t):
     """From what is measured to the command of each surface (base.CompiledLaw)."""
     law, reference, out = control.zhang2005, control.reference, control.zhang2005.feedback.output
-    inversion.prepare(control, assessment, belief, mode, t)
+    laws.prepare(control, assessment, belief, mode, t)
     published.demand(law.feedback, reference.output, measured.x, belief.f, law.network.output)
-    inversion.command_surfaces(
-        control, out.demand, out.hold, out.disturbance, assessment, faults, belief, False
-    )
+    laws.command_surfaces(control, out.demand, out.hold, out.disturbance, assessment, faults, belief, False)
     u = control.allocation.output.command
     published.integrate(law.feedback, control.axes, reference, u, measured.x)
-    inversion.complete(control, assessment, faults, measured, t)
+    laws.complete(control, assessment, faults, measured, t)
 
 
 def unexplained(control: np.void) -> np.ndarray:

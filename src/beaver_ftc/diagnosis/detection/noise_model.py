@@ -14,10 +14,19 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES, Aircraft, MassProperties
 from beaver_ftc.compiled import kernel
-from beaver_ftc.design.dryden import rotation_lengths
-from beaver_ftc.design.engine import slipstream_slopes
-from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, PH, QDYN, RH, directional, whole_sum
-from beaver_ftc.design.variants import jacobian
+from beaver_ftc.design.air import rotation_lengths
+from beaver_ftc.design.model import (
+    AIRSPEED,
+    ALPHA,
+    BETA,
+    PH,
+    QDYN,
+    RH,
+    directional,
+    jacobian,
+    slipstream_slopes,
+    whole_sum,
+)
 from beaver_ftc.diagnosis.bounds import axis_of_term, coefficient_tolerances
 from beaver_ftc.diagnosis.detection import likelihood
 from beaver_ftc.diagnosis.detection.forces import configure_forces
@@ -46,7 +55,7 @@ from beaver_ftc.diagnosis.gusts import (
     configure_speed_error,
 )
 from beaver_ftc.diagnosis.state import LOSS, SIDE_FORCE
-from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
+from beaver_ftc.plant.sensing import NOISE_LIMIT_SIGMA
 from beaver_ftc.scenario.declared import Declared, SensorErrors
 from beaver_ftc.scenario.diagnosis import FdiConfig, Statistical
 

@@ -59,7 +59,7 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.schema import MAX_TERMS_OF_ONE
 from beaver_ftc.compiled import kernel, record, sized
-from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA
+from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA
 from beaver_ftc.diagnosis.bounds import axis_of_term
 from beaver_ftc.diagnosis.detection import forces, likelihood
 from beaver_ftc.diagnosis.detection.forces import COMPONENTS, NORMAL, SETTLED_UPDATES, SIDE, force_terms

@@ -11,7 +11,7 @@ import numpy as np
 
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_TERMS
 from beaver_ftc.compiled import kernel, record, sized
-from beaver_ftc.design.terms import AIRSPEED, N_SIGNALS, QDYN, evaluate, regressors
+from beaver_ftc.design.model import AIRSPEED, N_SIGNALS, QDYN, evaluate, regressors
 from beaver_ftc.diagnosis import gusts
 from beaver_ftc.diagnosis.bounds import UNKNOWN_IN_FILTERS_RAD_S2, add_published_bound, further_map_error
 from beaver_ftc.diagnosis.detection import likelihood, noise_model, parity

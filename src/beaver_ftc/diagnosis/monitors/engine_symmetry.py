@@ -15,7 +15,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.design.terms import DPT
+from beaver_ftc.design.model import DPT
 
 THRUST, YAWING = "thrust", "engines_n"  # signals: CT and Cn
 OFF_CENTRE_M = 0.05

@@ -23,11 +23,11 @@ import numpy as np
 
 from beaver_ftc.aircraft.aircraft import EARTH_RADIUS_M, GRAVITY_MPS2
 from beaver_ftc.compiled import kernel, record
+from beaver_ftc.design.air import LEAST_HEIGHT_M, Dryden
 from beaver_ftc.design.context import DesignFunctions
-from beaver_ftc.design.dryden import LEAST_HEIGHT_M, Dryden
 from beaver_ftc.diagnosis.bounds import GUST_LIMIT_SIGMA, gust_effect
 from beaver_ftc.diagnosis.detection.filters import bound_step, noise_step
-from beaver_ftc.plant.instruments import (
+from beaver_ftc.plant.sensing import (
     ALTITUDE,
     AX,
     ENGINE_SPEED,

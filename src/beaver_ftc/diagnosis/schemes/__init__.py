@@ -10,8 +10,7 @@ from importlib import import_module
 
 import numpy as np
 
-from beaver_ftc.choice import one_of
-from beaver_ftc.compiled import kernel, record, sized
+from beaver_ftc.compiled import kernel, one_of, record, sized
 from beaver_ftc.diagnosis import bounds, isolation, state
 from beaver_ftc.diagnosis import conclusion as conclusions
 from beaver_ftc.diagnosis.bounds import bound_dtype

@@ -16,8 +16,7 @@ The isolation depends on the fault class and on the detectors in authority; a ro
 from collections.abc import Callable
 from typing import NamedTuple
 
-from beaver_ftc.choice import one_of
-from beaver_ftc.compiled import apart, kernel
+from beaver_ftc.compiled import apart, kernel, one_of
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, unanticipated_pitch
 from beaver_ftc.diagnosis import conclusion, gusts, isolation
 from beaver_ftc.diagnosis.detection import filters, forces, parity, statistical

@@ -15,8 +15,7 @@ from beaver_ftc.design.fdc import SURFACES
 from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plant import channels as ch
-from beaver_ftc.plant.adapter import Plant
-from beaver_ftc.plant.state import FlightState
+from beaver_ftc.plant.adapter import FlightState, Plant
 from beaver_ftc.scenario.schema import Scenario
 
 

@@ -8,7 +8,7 @@ the modules of the loop have the sources.
 import numpy as np
 
 from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S
-from beaver_ftc.control.reference import discretise
+from beaver_ftc.control.laws import discretise
 from beaver_ftc.design.fdc import GEOMETRY, MASS, SURFACES, TERMS
 from beaver_ftc.design.model import inertia_coefficients
 from beaver_ftc.diagnosis.detection.filters import ALPHA_CENTRES, BETA_CENTRES, N_BASIS

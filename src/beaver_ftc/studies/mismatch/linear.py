@@ -11,12 +11,10 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.design import fdc
-from beaver_ftc.design.engine import engine_power_kw, slipstream
-from beaver_ftc.design.model import ALPHA
-from beaver_ftc.design.variants import design_of, jacobian
+from beaver_ftc.design.model import ALPHA, design_of, engine_power_kw, jacobian, slipstream
+from beaver_ftc.plant.adapter import FlightState
 from beaver_ftc.plant.conditions import trimmed
 from beaver_ftc.plant.linear import LinearModel, differences, own
-from beaver_ftc.plant.state import FlightState
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.linear_systems import CHANNELS, CLASSICAL, MODES, Mode, deviation, modes, zeros
 

@@ -13,8 +13,17 @@ import numpy as np
 from beaver_ftc.aircraft import AXES, Term
 from beaver_ftc.aircraft.aircraft import MOMENTS
 from beaver_ftc.design.fdc import GEOMETRY, MASS, SURFACES, TERMS
-from beaver_ftc.design.model import ALPHA, InertiaCoefficients, inertia_coefficients, inertial
-from beaver_ftc.design.variants import Anchored, anchor, anchored, design_of, mass_of
+from beaver_ftc.design.model import (
+    ALPHA,
+    Anchored,
+    InertiaCoefficients,
+    anchor,
+    anchored,
+    design_of,
+    inertia_coefficients,
+    inertial,
+    mass_of,
+)
 from beaver_ftc.scenario.schema import Scenario
 
 MOMENT_TERMS: dict[str, Term] = {name: term for name, term in TERMS.items() if term.coefficient in MOMENTS}

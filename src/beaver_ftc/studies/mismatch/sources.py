@@ -49,7 +49,7 @@ from beaver_ftc.aircraft.aircraft import EARTH_RADIUS_M, EARTH_RATE_RAD_S
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.fdc import GEOMETRY, SURFACES, TRAVEL
 from beaver_ftc.design.model import InertiaCoefficients, inertial
-from beaver_ftc.plant.state import START_LATITUDE_DEG
+from beaver_ftc.plant.adapter import START_LATITUDE_DEG
 from beaver_ftc.scenario.airframe import ActuatorDynamics
 from beaver_ftc.scenario.faults import UNANTICIPATED, place_of
 from beaver_ftc.scenario.schema import Scenario

@@ -8,7 +8,7 @@ import pytest
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
-from beaver_ftc.plant.state import FlightState
+from beaver_ftc.plant.adapter import FlightState
 from beaver_ftc.plant.trim import TrimPoint
 from beaver_ftc_aircraft.derive import outline
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from beaver_ftc.plant.state import FlightState
+from beaver_ftc.plant.adapter import FlightState
 from beaver_ftc_aircraft.derive.sample import Tanks
 
 FULL_LBS = {"propulsion/tank[0]/contents-lbs": 300.0, "propulsion/tank[1]/contents-lbs": 100.0}

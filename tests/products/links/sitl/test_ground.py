@@ -10,9 +10,8 @@ from tools.autopilots.small import Circuit
 import beaver_ftc as bf
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
-from beaver_ftc.plant.adapter import Plant
+from beaver_ftc.plant.adapter import FlightState, Plant
 from beaver_ftc.plant.ground import lay
-from beaver_ftc.plant.state import FlightState
 from beaver_ftc_links.sitl import vehicle as vehicle_module
 from beaver_ftc_links.sitl.ardupilot import Ardupilot
 from beaver_ftc_links.sitl.link import Link

@@ -26,7 +26,7 @@ the set before the earliest return still possible is kept, and is restored when 
 import numpy as np
 
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.design.actuators import nearer
+from beaver_ftc.design.model import nearer
 from beaver_ftc.diagnosis.types.contract import (
     EMPTY_SET,
     GIVE_UP,

@@ -14,9 +14,9 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.aircraft import GRAVITY_MPS2, THRUST_TERM
-from beaver_ftc.control.outer.state import CHANNELS, GAINS, N_FLAP, N_QDYN, NOT_JUDGED
-from beaver_ftc.control.outer.thrust import set_up_engine
-from beaver_ftc.design.engine import SEA_LEVEL_DENSITY_KG_M3
+from beaver_ftc.control.autopilot import CHANNELS, GAINS, N_FLAP, N_QDYN, NOT_JUDGED
+from beaver_ftc.control.engines import set_up_engine
+from beaver_ftc.design.model import SEA_LEVEL_DENSITY_KG_M3
 from beaver_ftc.diagnosis.state import PITCH
 from beaver_ftc.scenario.schema import Scenario
 

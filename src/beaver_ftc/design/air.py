@@ -1,18 +1,50 @@
-"""Turbulence by Dryden's spectra: its speed [MIL-F-8785C, 3.7] and its rotation [Yeager1998].
+"""The air as the designer knows it: the standard atmosphere, and turbulence in it.
 
-The vertical gust has standard deviation sigma_w and scale L, the lateral gust is its like, both functions of
-height. Above 2000 ft they are constant; below 1000 ft sigma_w is a tenth of the wind at 20 ft and L is the
-height; between the two heights both go from the one to the other, and what follows from them is below the
-values above 2000 ft.
+The standard atmosphere up to 20 km [ISA].
+
+Turbulence by Dryden's spectra: its speed [MIL-F-8785C, 3.7] and its rotation [Yeager1998].
+
+The vertical gust has standard deviation sigma_w and scale L, the lateral gust is its like, both functions
+of height. Above 2000 ft they are constant; below 1000 ft sigma_w is a tenth of the wind at 20 ft and L is
+the height; between the two heights both go from the one to the other, and what follows from them is below
+the values above 2000 ft.
 """
 
 from dataclasses import dataclass
-from math import pi, sqrt
+from math import exp, log, pi, sqrt
 from typing import Literal
 
 import numpy as np
 
-from beaver_ftc.aircraft.aircraft import M_PER_FT
+from beaver_ftc.aircraft.aircraft import GRAVITY_MPS2, M_PER_FT
+
+T0_K, LAPSE_K_M, P0_HPA, SCALE, STRATOSPHERE_M = 288.15, 0.0065, 1013.25, 5.2558797, 11000.0
+R_AIR, PA_PER_HPA, KELVIN_AT_0_C = 287.05287, 100.0, 273.15
+
+
+def standard_air(altitude_m: float) -> tuple[float, float]:
+    """Pressure, hPa, and temperature, deg C."""
+    low_m = min(altitude_m, STRATOSPHERE_M)
+    kelvin = T0_K - LAPSE_K_M * low_m
+    pressure = P0_HPA * (kelvin / T0_K) ** SCALE
+    return pressure * exp(-GRAVITY_MPS2 * (altitude_m - low_m) / (R_AIR * kelvin)), kelvin - KELVIN_AT_0_C
+
+
+def standard_density(altitude_m: float) -> float:
+    """Density of the air, kg/m3."""
+    pressure_hpa, celsius = standard_air(altitude_m)
+    return PA_PER_HPA * pressure_hpa / (R_AIR * (celsius + KELVIN_AT_0_C))
+
+
+def altitude_of(density_kg_m3: float) -> float:
+    """The altitude at which the air has this density, m: the inverse of `standard_density`."""
+    tropopause = standard_density(STRATOSPHERE_M)
+    if density_kg_m3 >= tropopause:
+        share = density_kg_m3 / standard_density(0.0)
+        return T0_K / LAPSE_K_M * (1.0 - share ** (1.0 / (SCALE - 1.0)))
+    scale_m = R_AIR * (T0_K - LAPSE_K_M * STRATOSPHERE_M) / GRAVITY_MPS2
+    return STRATOSPHERE_M + scale_m * log(tropopause / density_kg_m3)
+
 
 Severity = Literal["none", "light", "moderate", "severe"]
 SEVERITIES: tuple[Severity, ...] = ("none", "light", "moderate", "severe")

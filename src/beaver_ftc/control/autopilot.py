@@ -1,4 +1,18 @@
-"""The autopilot: where each channel of the commanded profile should be now, from the legs of the scenario;
+"""Outer loops: altitude, airspeed, heading and bank by body rates and engine power.
+
+What the autopilot keeps: the profile to fly, its limits, its memory, and how far it was off.
+
+Envelope protection: what can still be held with what is left of the surfaces.
+
+Level flight takes an elevator that depends on dynamic pressure and flap (profile.py). What acts like the
+elevator now is estimated from the balance of the pitch moments,
+
+    acting = offset + left u + d / G,    d: what the law's observer finds unexplained
+
+so a jam is known where it stands before its type is. The speeds at which the flap, less a reserve to fly
+with, makes up for the rest are those that can be held; the commanded airspeed is brought among them.
+
+The autopilot: where each channel of the commanded profile should be now, from the legs of the scenario;
 and body-rate references and an engine setting for that.
 
     climb    gamma_c = (h' + k (hc - h)) / V + what was found missing,   theta_c = gamma_c + alpha (smoothed)
@@ -16,15 +30,206 @@ the airspeed is kept. Where the ailerons no longer act, the roll is flown by sid
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.control.allocation import attainable, remaining
-from beaver_ftc.control.outer.holding import protect
-from beaver_ftc.control.outer.state import ALTITUDE, BANK, HEADING, N_CHANNELS, SPEED
-from beaver_ftc.control.outer.thrust import gained, look_up, power_for, thrust_per_inhg
-from beaver_ftc.control.power import ceiling
-from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA
+from beaver_ftc.control.engines import ENGINE, ceiling, gained, look_up, power_for, thrust_per_inhg
+from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, QDYN
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 from beaver_ftc.scenario.signals import MEAN_S, TIME_TOLERANCE_S
+
+ALTITUDE, SPEED, HEADING, BANK = range(4)
+N_CHANNELS = 4
+MAX_LEGS = 100
+CHANNELS = ("altitude_m", "airspeed_mps", "heading_deg", "bank_deg")
+NOT_JUDGED = -1.0  # a deviation that no frame has counted for
+AT_ONE_INSTANT = "airspeed_at_one_instant_mps"  # the largest deviation, where `airspeed_mps` is of the mean
+LIMITED = "airspeed_limited_mps"  # the commanded one, as far as it can be held
+COLUMNS = (
+    "altitude_command_m", "airspeed_command_mps", "heading_command_rad", "bank_command_rad", LIMITED,
+)  # fmt: skip
+
+# Of each loop, 1/s and of what it finds missing 1/s2; smoothing, s; and what bounds the demands. Attitudes a
+# fifth as fast as the inner loops, the path a quarter of that: gusts set the pace, not comfort.
+GAINS = {
+    "altitude": 0.8, "altitude_i": 0.04, "attitude": 3.0, "speed": 0.3, "speed_i": 0.015,
+    "bank": 1.0, "bank_i": 0.2, "heading": 0.25, "heading_i": 0.004,
+    "sideslip": 0.5,  # the yaw damper's part beside the rate loop
+    "alpha_s": 2.0, "airspeed_s": 3.0,  # against noise and gusts
+    "jammed_s": 1.0,  # rolling is handed to the rudder within about so long
+    "authority_s": 1.0,  # a rate is asked for only if it can be had, and ended, within this time
+    "bank_s": 6.0,  # and a bank only if it can be left within this time
+    "spare_mps": 2.0, "path_per_mps": 0.02,  # airspeed off before height goes for it, and how much path, rad
+    "loose": 0.4,  # share of the heading loop left when nothing acts in yaw: the turn is then slow to follow
+    "protection": 2.0,  # 1/s: how fast the angle of attack may close on its limit
+}  # fmt: skip
+GAIN = record(**dict.fromkeys(GAINS, float))
+
+# What can be held: the elevator that level flight takes, over dynamic pressure and flap (rad);
+# what acts like the elevator and what of it is commanded, smoothed (rad); the airspeeds between which level
+# flight can be held (m/s); and of each limit since when it has bitten (s), and its value at last (SI).
+FASTEST, SLOWEST, BANK_LIMIT = range(3)
+N_QDYN, N_FLAP = 12, 5
+HOLDING = record(
+    known=int, limiting=int, frames=int, reserve=float, pace=float, qdyn=N_QDYN, flap=N_FLAP,
+    elevator=(N_QDYN, N_FLAP), acting=float, centre=float, fastest=float, slowest=float, bank=float,
+    in_force=(int, 3), from_s=3, value=3,
+)  # fmt: skip
+
+# A leg: from when on, to which value (not a number: hold what is), how fast. SI and rad.
+AUTOPILOT = record(
+    enabled=int, flying=int, dt=float,
+    legs=(int, N_CHANNELS), leg=(int, N_CHANNELS),  # how many, and which is next
+    at_s=(N_CHANNELS, MAX_LEGS), value=(N_CHANNELS, MAX_LEGS), speed=(N_CHANNELS, MAX_LEGS),
+    commanded=(int, N_CHANNELS),  # whether the channel is flown by now
+    goal=N_CHANNELS, command=N_CHANNELS, pace=N_CHANNELS,
+    moving=N_CHANNELS,  # per second, of the command at this instant
+    changed_at_s=N_CHANNELS,
+    # what is known of the aircraft
+    gravity=float, thrust=2,  # m/s2 per dpt and Pa: at no alpha, and per alpha
+    engine=ENGINE, glides=int,  # what else is known of it; whether pitch holds the airspeed
+    trim_power=float, low_power=float, high_power=float,  # in the units of its setting
+    climb_in_trim=float,  # rad, with the engine as trimmed
+    dihedral=float,  # roll rate per sideslip and airspeed, 1/m
+    full_power=float, allowed_power=float,  # the highest there is now, and that the rudder allows
+    weathercock=float,  # cube of the dpt whose yawing moment the largest sideslip accepted holds
+    slowest_mps=float, steepest_alpha=float,
+    most=3,  # rad/s, of the rates asked for with all surfaces healthy
+    limit=3, most_bank=float, bank_limit=float,
+    # memory
+    alpha=float, airspeed=float,  # smoothed, rad and m/s
+    usual=float,  # airspeed of late, m/s
+    drift=float,  # rad/s of turning found missing
+    lift=float,  # rad of path angle found missing
+    throttle=float, rolled=float,  # m/s2, rad/s: found missing
+    jammed=float,  # share of roll that rudder and dihedral carry
+    loose=float,  # 1: nothing acts in yaw
+    by_power=float,  # share of the time of late in which engines alone act there
+    rates=3, gain=GAIN,
+    sets_power=int, setting=float,  # whether the engine is set by now, and to what
+    power_airspeed=float,  # m/s, to hold while power stands in for a lost pitch
+    held=float, held_moving=float, holding=HOLDING,  # airspeed to fly, m/s, and its change
+    # how far off, at most; and the mean deviation of late, from what is commanded and, airspeed, held
+    # `worst` is NOT_JUDGED until a channel is: of angles that takes SETTLED_S
+    mean_off=N_CHANNELS, held_off=float, held_worst=float, worst=N_CHANNELS,
+    largest_off=float,  # m/s, of the airspeed from what is commanded, at one instant
+)  # fmt: skip
+
+
+ACTING_S = 4.0  # over which the balance is averaged: gusts pitch within a second
+HOLD_SETTLED_S = 0.5  # and before which nothing is concluded from it
+NOTED_MPS, NOTED_RAD = 0.5, 0.02  # a limit that bites by so much is announced
+
+
+@kernel
+def protect(autopilot, layout, surfaces, u, unexplained, y, t):
+    """Bring autopilot.held, the airspeed to fly, to this frame: the commanded one where it can be held.
+
+    u (n,) rad: where the surfaces are. unexplained rad: the elevator that would give what the law's observer
+    finds in pitch.
+    """
+    hold, e, f = autopilot.holding, layout.main[PITCH], layout.stand_in
+    hold.fastest, hold.slowest = np.inf, 0.0
+    effectiveness, offset = surfaces.output.effectiveness, surfaces.output.offset
+    left = effectiveness[e]
+    whole = left >= 1.0 and (f < 0 or effectiveness[f] >= 1.0)
+    if whole or not hold.known:
+        hold.frames = 0
+    else:
+        watch(hold, autopilot.dt, offset[e], left * u[e], unexplained)
+        if hold.frames * autopilot.dt > HOLD_SETTLED_S:
+            find(hold, layout, surfaces, y)
+    approach(autopilot)
+    announce(autopilot, layout.main, effectiveness, t)
+
+
+@kernel
+def watch(hold, dt, offset, commanded, unexplained):
+    """Average the elevator that would account for the pitch moments there are, rad: it is off by `offset`,
+    what is left of it gives `commanded`."""
+    acting = offset + commanded + unexplained
+    hold.frames += 1
+    weight = max(dt / ACTING_S, 1.0 / hold.frames)
+    hold.acting += weight * (acting - hold.acting)
+    hold.centre += weight * (commanded - hold.centre)
+
+
+@kernel
+def find(hold, layout, surfaces, y):
+    """The fastest and the slowest airspeed that can be held, m/s."""
+    e, f = layout.main[PITCH], layout.stand_in
+    left, effectiveness = surfaces.output.effectiveness[e], surfaces.output.effectiveness[f]
+    least = hold.acting - hold.centre + left * layout.low[e]
+    greatest = hold.acting - hold.centre + left * layout.high[e]
+    up, down = layout.low[f] + hold.reserve, layout.high[f] - hold.reserve
+    if effectiveness < surfaces.config.least_effectiveness:
+        up = down = min(max(surfaces.output.offset[f], layout.low[f]), layout.high[f])
+    per_pa = 2.0 * y[QDYN] / y[AIRSPEED] ** 2
+    hold.fastest = np.sqrt(2.0 * limit_of(hold, up, greatest, True) / per_pa)
+    hold.slowest = np.sqrt(2.0 * limit_of(hold, down, least, False) / per_pa)
+
+
+@kernel
+def limit_of(hold, flap, elevator, highest):
+    """The highest (or lowest) dynamic pressure, Pa, of level flight with flap and elevator (rad): where the
+    elevator it takes is the one there is. Infinite (or zero) where the table does not bound it."""
+    before = needed(hold, 0, flap)
+    if before > elevator:
+        return hold.qdyn[0] if highest else 0.0
+    for j in range(1, N_QDYN):
+        after = needed(hold, j, flap)
+        if after > elevator:
+            part = (elevator - before) / (after - before)
+            return hold.qdyn[j - 1] + part * (hold.qdyn[j] - hold.qdyn[j - 1])
+        before = after
+    return np.inf if highest else hold.qdyn[N_QDYN - 1]
+
+
+@kernel
+def needed(hold, j, flap):
+    """Elevator for level flight at dynamic pressure j of the table and flap rad, between its columns."""
+    k = 0
+    while k < N_FLAP - 2 and flap > hold.flap[k + 1]:
+        k += 1
+    part = (flap - hold.flap[k]) / (hold.flap[k + 1] - hold.flap[k])
+    return hold.elevator[j, k] + part * (hold.elevator[j, k + 1] - hold.elevator[j, k])
+
+
+@kernel
+def approach(autopilot):
+    """Bring the airspeed to fly towards the nearest to the commanded one that can be held, without a bump."""
+    hold, command = autopilot.holding, autopilot.command[SPEED]
+    wanted = min(max(command, hold.slowest), hold.fastest)
+    if wanted == command and not hold.limiting:
+        autopilot.held, autopilot.held_moving = command, autopilot.moving[SPEED]
+        return
+    most = hold.pace * autopilot.dt
+    step = min(max(wanted - autopilot.held, -most), most)
+    autopilot.held += step
+    autopilot.held_moving = step / autopilot.dt
+    hold.limiting = autopilot.held != command
+
+
+@kernel
+def announce(autopilot, main, effectiveness, t):
+    """Note since when a limit has bitten, and what it is at last; main (3,): who leads each axis."""
+    hold, command = autopilot.holding, autopilot.command[SPEED]
+    if autopilot.commanded[SPEED]:
+        note(hold, FASTEST, hold.fastest, hold.fastest < command - NOTED_MPS, t)
+        note(hold, SLOWEST, hold.slowest, hold.slowest > command + NOTED_MPS, t)
+    if effectiveness[main[ROLL]] < 1.0 or effectiveness[main[YAW]] < 1.0:
+        hold.bank += autopilot.dt / ACTING_S * (autopilot.bank_limit - hold.bank)
+        note(hold, BANK_LIMIT, hold.bank, hold.bank < autopilot.most_bank - NOTED_RAD, t)
+
+
+@kernel
+def note(hold, kind, value, bites, t):
+    """Keep a limit that bites now."""
+    hold.in_force[kind] = bites
+    if bites:
+        if hold.from_s[kind] < 0.0:
+            hold.from_s[kind] = t
+        hold.value[kind] = value
+
 
 MOST_PATH_RAD = 0.15
 MOST_SIDESLIP_RAD = 0.14

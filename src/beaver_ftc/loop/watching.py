@@ -88,7 +88,7 @@ def news_of(surface, half_cycle_frames, known):
     for kind in range(surface.feasible.excluded.size):
         bits = 2 * bits + surface.feasible.excluded[kind]
     early = surface.evidence.frames - surface.evidence.rest_frames < half_cycle_frames
-    changed = replace(known, 0, surface.status.named) | replace(known, 1, surface.status.source)
+    changed = replace(known, 0, surface.status.named) | replace(known, 1, surface.status.decided_by)
     changed |= replace(known, 2, surface.status.type) | replace(known, 3, bits)
     return changed | replace(known, 4, 1 if early else 0)
 

@@ -117,13 +117,13 @@ def test_python_calls_it_like_any_kernel_and_has_its_plain_form(made):
 
 
 FLIGHTS = """
-from beaver_ftc.compiled import by_address
+from beaver_ftc.compiled import target
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.schema import Scenario
 for fault_class in ("published", "all"):
     loss = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.4, "at_s": 0.5}
     fly(Scenario(name="short", duration_s=1, faults=[loss], fdi={"fault_class": fault_class}))
-    print(*(f"{name[0].rpartition('.')[2]}.{name[1]}" for name, _ in by_address._found))
+    print(*(f"{name[0].rpartition('.')[2]}.{name[1]}" for name, _ in target._found))
 """
 
 
@@ -131,15 +131,15 @@ for fault_class in ("published", "all"):
 OF_A_FLIGHT = {"stepping.fly_one"}
 OF_A_FLIGHT |= {f"adaptive_estimators.{step}" for step in ("begin", "predict", "conclude", "prepare")}
 OF_A_FLIGHT |= {"rejecting.accommodate", "rejecting.command"}
-OF_A_FLIGHT |= {f"inversion.{step}" for step in ("prepare", "command_surfaces", "complete")}
+OF_A_FLIGHT |= {f"laws.{step}" for step in ("prepare", "command_surfaces", "complete")}
 
 
 def test_a_flight_asks_for_what_it_uses_and_for_nothing_else():
     done = subprocess.run([sys.executable, "-c", FLIGHTS], capture_output=True, text=True, check=True)
     published, every_type = (set(line.split()) for line in done.stdout.splitlines()[-2:])
     of_class = [
-        {f"fault_classes.{step}" for step in (f"begin_{what}", f"observe_{what}", f"isolate_{what}")}
-        for what in ("loss", "type")
+        {f"adaptive_estimators.{step}" for step in (f"begin_{them}", f"observe_{them}", f"isolate_{one}")}
+        for one, them in (("loss", "losses"), ("type", "types"))
     ]
     assert published == OF_A_FLIGHT | of_class[0]
     assert every_type == OF_A_FLIGHT | of_class[0] | of_class[1]

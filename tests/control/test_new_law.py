@@ -27,7 +27,7 @@ SLIDING = '''
 import numpy as np
 
 from beaver_ftc.compiled import apart, kernel, record, sized
-from beaver_ftc.control import inversion
+from beaver_ftc.control import laws
 from beaver_ftc.control.base import CompiledLaw
 
 CONFIG = record(slope=float, reach=float, layer=float)
@@ -47,12 +47,12 @@ def configure(law, control, belief, scenario, y):
 @apart
 def command(control, assessment, faults, belief, measured, mode, t):
     law, out = control.sliding, control.sliding.output
-    inversion.prepare(control, assessment, belief, mode, t)
+    laws.prepare(control, assessment, belief, mode, t)
     slide(law, control.reference, measured.x, belief.f)
-    inversion.command_surfaces(
+    laws.command_surfaces(
         control, out.demand, out.hold, out.disturbance, assessment, faults, belief, False
     )
-    inversion.complete(control, assessment, faults, measured, t)
+    laws.complete(control, assessment, faults, measured, t)
 
 
 @kernel

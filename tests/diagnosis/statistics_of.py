@@ -4,7 +4,7 @@ import numpy as np
 
 from beaver_ftc.diagnosis.detection import parity, statistical
 from beaver_ftc.diagnosis.detection.parity import fill_block_signatures, fill_view_signatures
-from beaver_ftc.plant.sensing import MEASURED
+from beaver_ftc.plant.instruments import MEASURED
 
 
 def views_of(record):

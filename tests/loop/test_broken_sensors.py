@@ -5,7 +5,7 @@ import pytest
 
 import beaver_ftc as bf
 from beaver_ftc.loop.loop import Loop
-from beaver_ftc.plant.sensing import AX, SENSORS
+from beaver_ftc.plant.instruments import AX, SENSORS
 from beaver_ftc.scenario.schema import load
 
 MOVING = {

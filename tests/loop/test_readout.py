@@ -6,7 +6,7 @@ import pytest
 import beaver_ftc as bf
 from beaver_ftc.diagnosis.readout import OF_BLOCK
 from beaver_ftc.loop import Stepping, recorded_always, recorded_until_alarm
-from beaver_ftc.plant.sensing import SENSORS
+from beaver_ftc.plant.instruments import SENSORS
 
 FLIGHT = {
     "name": "read", "duration_s": 3.0, "sensors": "consumer-grade",

@@ -19,7 +19,8 @@ from beaver_ftc.diagnosis.expectation import belief_dtype
 from beaver_ftc.diagnosis.schemes import diagnosis_dtype
 from beaver_ftc.loop.accounts import true_faults_dtype
 from beaver_ftc.loop.loop import Loop
-from beaver_ftc.plant.sensing import MEASURED, truth_dtype
+from beaver_ftc.plant.instruments import MEASURED
+from beaver_ftc.plant.sensing import truth_dtype
 from beaver_ftc.scenario.schema import load
 
 PROGRAM = """
@@ -106,7 +107,7 @@ def test_no_kernel_is_given_the_truth(calls, folder):
 
 def test_what_is_meant_to_see_the_truth_does(calls):
     """The watch would notice: sensing, accounts and the log are given the record."""
-    for name in ("plant.sensing.measure", "loop.accounts.track", "loop.log_row.record_truth"):
+    for name in ("plant.sensing.measure", "loop.accounts.track", "loop.frame.record_truth"):
         assert ["truth", "record"] in calls[f"beaver_ftc.{name}"]
 
 

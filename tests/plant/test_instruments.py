@@ -5,7 +5,7 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.assembly import configure_design
-from beaver_ftc.plant.sensing import (
+from beaver_ftc.plant.instruments import (
     AX,
     N_SENSORS,
     NOISE_LIMIT_SIGMA,

@@ -106,8 +106,8 @@ def test_a_missing_function_is_recognised(monkeypatch):
 
 FLIGHT = """
 import hashlib, sys
-from beaver_ftc.plant import addresses
-addresses.LAYOUT = addresses.LAYOUT._replace(**LAYOUT)
+from beaver_ftc.plant import adapter
+adapter.LAYOUT = adapter.LAYOUT._replace(**LAYOUT)
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.scenario.schema import load
 loop = Loop(load({"name": "run", "duration_s": 2.0, "substeps": 2, "sensors": "consumer-grade"}))

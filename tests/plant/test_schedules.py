@@ -13,7 +13,7 @@ from beaver_ftc.plant.faults import (
     frame_of,
     is_there,
 )
-from beaver_ftc.plant.sensing import SENSORS, instruments_dtype
+from beaver_ftc.plant.instruments import SENSORS, instruments_dtype
 from beaver_ftc.scenario.faults import HEALTHY
 from beaver_ftc.scenario.schema import load
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.plant.faults import NEVER, SensorFaultSchedule
-from beaver_ftc.plant.sensing import N_SENSORS, SENSORS, break_all, instruments_dtype
+from beaver_ftc.plant.instruments import N_SENSORS, SENSORS, break_all, instruments_dtype
 from beaver_ftc.scenario.schema import load
 from beaver_ftc.scenario.sensors import N_IN_EQUATIONS, QUANTITIES, ROWS, Sensors
 

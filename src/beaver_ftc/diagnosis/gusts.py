@@ -50,7 +50,7 @@ from beaver_ftc.design.model import (
 )
 from beaver_ftc.diagnosis.bounds import flow_angle_noise, gust_estimate_noise, lowest_height
 from beaver_ftc.diagnosis.monitors.redundancy import EARTH_ACCELERATION_M_S2
-from beaver_ftc.plant.sensing import wrapped
+from beaver_ftc.plant.instruments import wrapped
 from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
 
 # Share of the intensity of the rolling, pitching and yawing gust that remains unmeasured with vanes. With

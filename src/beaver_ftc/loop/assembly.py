@@ -38,7 +38,7 @@ from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.adapter import GETTER, RUN, SETTER, Plant, address
 from beaver_ftc.plant.channels import RUNNING, NodeBank
 from beaver_ftc.plant.faults import OF_THE_SLIPSTREAM
-from beaver_ftc.plant.sensing import (
+from beaver_ftc.plant.instruments import (
     LONGEST_DELAY,
     MEASURED,
     MOST_LINE,
@@ -46,8 +46,8 @@ from beaver_ftc.plant.sensing import (
     SENSORS,
     USUAL_LINE,
     instruments_dtype,
-    truth_dtype,
 )
+from beaver_ftc.plant.sensing import truth_dtype
 from beaver_ftc.scenario.builtin import texts_of
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.faults import HOLDING, of_a_sensor

@@ -16,7 +16,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.loop.plugin_frame import PluginFrame, named_detector, named_law, plugged
 from beaver_ftc.plant.faults import NEVER
-from beaver_ftc.plant.sensing import take_configuration
+from beaver_ftc.plant.instruments import take_configuration
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Change, Scenario, stages
 from beaver_ftc.scenario.signals import frame_of

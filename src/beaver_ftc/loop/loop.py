@@ -29,7 +29,8 @@ from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.adapter import Plant, translated
 from beaver_ftc.plant.conditions import give_back, ready
 from beaver_ftc.plant.faults import FaultSchedule, SensorFaultSchedule
-from beaver_ftc.plant.sensing import AX, ENGINE_SPEED, FLYING, N_SAMPLED, NOT_FINITE
+from beaver_ftc.plant.instruments import AX, ENGINE_SPEED, N_SAMPLED
+from beaver_ftc.plant.sensing import FLYING, NOT_FINITE
 from beaver_ftc.plant.trim import GustSchedule, take_off
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled
 from beaver_ftc.scenario.schema import Scenario

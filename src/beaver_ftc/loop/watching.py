@@ -9,7 +9,7 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.conclusion import isolated_surface
 from beaver_ftc.diagnosis.expectation import evaluate_design, evaluate_frame, move_healthy_surfaces
 from beaver_ftc.loop.frame import accommodate, advance_clock, isolated_theta, start_clock
-from beaver_ftc.plant.sensing import take_sample
+from beaver_ftc.plant.instruments import take_sample
 
 MEMORY = 8 + 5 * 8  # of the verdict's words: `news`
 

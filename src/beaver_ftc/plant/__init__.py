@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from beaver_ftc.plant.instrumented import instrument as instrument_model
     from beaver_ftc.plant.instrumented import is_told as is_known_to_jsbsim
     from beaver_ftc.plant.instrumented import source_of as source_of_jsbsim
+    from beaver_ftc.plant.instruments import AX, ENGINE_SPEED, SENSORS
     from beaver_ftc.plant.model_file import check_model_has_no_side_effects, copy_of
-    from beaver_ftc.plant.sensing import AX, ENGINE_SPEED, SENSORS
     from beaver_ftc.plant.trial import failure as failure_of_trial
     from beaver_ftc.plant.trim import DELAY as ACTUATOR_DELAY
     from beaver_ftc.plant.trim import TrimPoint

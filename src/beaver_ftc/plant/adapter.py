@@ -151,9 +151,9 @@ def _is_proved_in_a_child(layout: Layout) -> bool:
     build = f"{sys.implementation.cache_tag} {library} {status.st_size} {status.st_mtime_ns} "
     build += digest_of_files(Path(__file__))
     code = (
-        "from beaver_ftc.aircraft import load; from beaver_ftc.plant import addresses, adapter; "
-        f"addresses.LAYOUT = addresses.{layout}; "
-        "raise SystemExit(0 if addresses.holds(adapter.bare(load().jsbsim)) else 3)"
+        "from beaver_ftc.aircraft import load; from beaver_ftc.plant import adapter; "
+        f"adapter.LAYOUT = adapter.{layout}; "
+        "raise SystemExit(0 if adapter.holds(adapter.bare(load().jsbsim)) else 3)"
     )
     return passes("jsbsim", build, code, {"BEAVER_FTC_NATIVE": "0"})
 

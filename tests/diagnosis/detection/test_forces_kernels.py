@@ -13,7 +13,7 @@ from beaver_ftc.diagnosis.detection import forces, parity, statistical
 from beaver_ftc.diagnosis.detection.forces import NORMAL, SIDE, configure_forces, update_forces
 from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, VANE_VIEW, configure_tones, configure_views
 from beaver_ftc.diagnosis.state import NORMAL_FORCE, PITCH, ROLL, SIDE_FORCE, YAW
-from beaver_ftc.plant.sensing import MEASURED
+from beaver_ftc.plant.instruments import MEASURED
 from beaver_ftc.scenario.diagnosis import Bounds
 from flying import declared_in
 from telling import apart

@@ -13,7 +13,7 @@ from beaver_ftc.diagnosis import bounds as bound_kernels
 from beaver_ftc.diagnosis.detection import noise_model
 from beaver_ftc.diagnosis.detection.likelihood import N_SLOTS, PITCH_BLOCK
 from beaver_ftc.diagnosis.state import LOSS
-from beaver_ftc.plant.sensing import SIGNALS
+from beaver_ftc.plant.instruments import SIGNALS
 from beaver_ftc.scenario.diagnosis import Bounds
 from beaver_ftc.studies.engine.statistics import poisson
 from flying import declared_in

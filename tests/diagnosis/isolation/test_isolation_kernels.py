@@ -16,7 +16,7 @@ from beaver_ftc.diagnosis.state import (
     PUBLISHED_THRESHOLD,
     UNANTICIPATED,
 )
-from beaver_ftc.plant.sensing import MEASURED
+from beaver_ftc.plant.instruments import MEASURED
 from beaver_ftc.scenario.diagnosis import FdiConfig
 
 EITHER = 0

@@ -19,7 +19,7 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     SPEED,
     P,
 )
-from beaver_ftc.plant.sensing import ALTITUDE, AX, MEASURED, N_SENSORS, PHI
+from beaver_ftc.plant.instruments import ALTITUDE, AX, MEASURED, N_SENSORS, PHI
 
 H, V, INCIDENCE = 0.01, 45.0, 0.12
 AY, AZ = AX + 1, AX + 2

@@ -23,7 +23,7 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     THETA,
     TURN,
 )
-from beaver_ftc.plant.sensing import ALTITUDE, AX, ENGINE_SPEED, MANIFOLD, N_SENSORS, PHI
+from beaver_ftc.plant.instruments import ALTITUDE, AX, ENGINE_SPEED, MANIFOLD, N_SENSORS, PHI
 
 H, GRAVITY, DRIFT, GUST = 0.02, 9.8, 2e-4, 0.7
 FLOWS = (ALPHA_FLOW, BETA_FLOW)

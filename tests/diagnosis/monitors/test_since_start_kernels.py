@@ -28,7 +28,7 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     THETA_ERROR,
     TURN,
 )
-from beaver_ftc.plant.sensing import ALTITUDE, AX, N_SENSORS, PHI
+from beaver_ftc.plant.instruments import ALTITUDE, AX, N_SENSORS, PHI
 
 GRAVITY, LOOKS = 9.8, 100
 READING = {ALPHA_ERROR: ALPHA, BETA_ERROR: BETA, AIRSPEED_ERROR: AIRSPEED, PHI_ERROR: PHI, THETA_ERROR: THETA}

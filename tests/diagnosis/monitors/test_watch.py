@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.diagnosis.monitors.redundancy import NAMING_LIMIT_S, SENSOR_MONITOR, sensor_finding
-from beaver_ftc.plant.sensing import SENSORS
+from beaver_ftc.plant.instruments import SENSORS
 from beaver_ftc.scenario.sensors import sensor_words
 
 

@@ -32,7 +32,16 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
 )
 from beaver_ftc.diagnosis.state import NOT_ISOLATED
 from beaver_ftc.loop import frame
-from beaver_ftc.plant.sensing import ALTITUDE, AX, ENGINE_SPEED, MANIFOLD, MEASURED, N_SENSORS, PHI, SENSORS
+from beaver_ftc.plant.instruments import (
+    ALTITUDE,
+    AX,
+    ENGINE_SPEED,
+    MANIFOLD,
+    MEASURED,
+    N_SENSORS,
+    PHI,
+    SENSORS,
+)
 
 H = 0.005
 MISSING = np.dtype([("missing", "i8", (N_SENSORS,)), ("signal", "f8", (N_SENSORS,))], align=True)

@@ -6,14 +6,14 @@ from beaver_ftc.aircraft import aircraft
 from beaver_ftc.diagnosis import bounds
 from beaver_ftc.diagnosis.detection import likelihood, noise_model, parity, statistical
 from beaver_ftc.diagnosis.monitors import redundancy
-from beaver_ftc.plant import sensing
+from beaver_ftc.plant import instruments
 from beaver_ftc.scenario.diagnosis import Bounds, FdiConfig, Statistical
 from beaver_ftc.studies.present.tables import markdown_table
 
 CONSTANTS = (  # (section, meaning, module, name there, unit)
     (2, "rate of the Earth", aircraft, "EARTH_RATE_RAD_S", "rad/s"),
     (2, "allowance for rounding", bounds, "ROUNDING_RAD_S2", "rad/s2"),
-    (2, "limit of instrument noise, in standard deviations", sensing, "NOISE_LIMIT_SIGMA", ""),
+    (2, "limit of instrument noise, in standard deviations", instruments, "NOISE_LIMIT_SIGMA", ""),
     (2, "limit of gusts, in standard deviations", bounds, "GUST_LIMIT_SIGMA", ""),
     (2, "bound where the error of a derived model was not measured", bounds, "UNKNOWN_RAD_S2", "rad/s2"),
     (3, "delays for which poles are chosen", bounds, "DESIGN_DELAYS_S", "s"),

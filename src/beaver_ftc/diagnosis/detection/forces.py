@@ -24,7 +24,7 @@ from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, DPT, N_Y, QDYN, evaluate, slipstream_slopes
 from beaver_ftc.diagnosis.gusts import stop_accelerometers, stop_gust_filter
 from beaver_ftc.diagnosis.monitors.redundancy import EARTH_ACCELERATION_M_S2
-from beaver_ftc.plant.sensing import NOISE_LIMIT_SIGMA
+from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
 from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
 from beaver_ftc.scenario.sensors import ACCELEROMETERS
 

@@ -55,7 +55,7 @@ from beaver_ftc.diagnosis.gusts import (
     configure_speed_error,
 )
 from beaver_ftc.diagnosis.state import LOSS, SIDE_FORCE
-from beaver_ftc.plant.sensing import NOISE_LIMIT_SIGMA
+from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
 from beaver_ftc.scenario.declared import Declared, SensorErrors
 from beaver_ftc.scenario.diagnosis import FdiConfig, Statistical
 

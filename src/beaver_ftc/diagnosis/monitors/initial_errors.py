@@ -58,7 +58,7 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     TURN,
     steepest_pitch_angle,
 )
-from beaver_ftc.plant.sensing import ALTITUDE, PHI
+from beaver_ftc.plant.instruments import ALTITUDE, PHI
 
 MAX_FLOW_ANGLE_RAD = 0.7  # no aircraft whose attitude and flow are followed flies at more, to either side
 MAX_READING_RATIO = 10.0  # what is read may be so many times the truth, or a part of it

@@ -27,7 +27,7 @@ from beaver_ftc.design.air import LEAST_HEIGHT_M, Dryden
 from beaver_ftc.design.context import DesignFunctions
 from beaver_ftc.diagnosis.bounds import GUST_LIMIT_SIGMA, gust_effect
 from beaver_ftc.diagnosis.detection.filters import bound_step, noise_step
-from beaver_ftc.plant.sensing import (
+from beaver_ftc.plant.instruments import (
     ALTITUDE,
     AX,
     ENGINE_SPEED,

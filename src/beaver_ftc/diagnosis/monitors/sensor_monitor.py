@@ -62,7 +62,7 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     UNDECIDED,
     YES,
 )
-from beaver_ftc.plant.sensing import (
+from beaver_ftc.plant.instruments import (
     ALTITUDE,
     AX,
     ENGINE_SPEED,

@@ -46,7 +46,7 @@ PARTS: dict[str, dict[str, Kernel]] = {
     "reading": {"plant.sensing.measure": nothing, "plant.sensing.flight_status": flying},
     # the design model, the detection estimator and its bank of filters
     "fdae": {
-        "design.variants.response": nothing, "loop.accounts.effect_of_faults": nothing,
+        "design.model.response": nothing, "loop.accounts.effect_of_faults": nothing,
         "diagnosis.expectation.evaluate_frame": nothing, "loop.frame.diagnose": nothing,
     },
     # the isolation estimators, and the decision among them
@@ -71,9 +71,9 @@ PARTS: dict[str, dict[str, Kernel]] = {
     # who is in charge
     "supervisor": {"loop.frame.decide": nothing},
     # the command, into the aircraft's properties
-    "writing": {"plant.native.write_nodes": nothing},
+    "writing": {"plant.channels.write_nodes": nothing},
     # reference model, feedback linearisation, accommodation, allocation, anti-windup
-    "law": {"loop.frame.command": nothing, "control.reference.follow": nothing},
+    "law": {"loop.frame.command": nothing, "control.laws.follow": nothing},
     # every column of the log, and the sums of the metrics
     "logging": {"loop.frame.record": nothing, "loop.frame.account": nothing},
 }  # fmt: skip

@@ -21,7 +21,7 @@ import beaver_ftc as bf
 from beaver_ftc.cli.main import main
 from beaver_ftc.diagnosis.monitors.redundancy import SENSOR_MONITOR
 from beaver_ftc.diagnosis.readout import read_sensor_monitor
-from beaver_ftc.plant.sensing import SENSORS
+from beaver_ftc.plant.instruments import SENSORS
 from beaver_ftc.results import writer
 from beaver_ftc_assurance.certificates import certificate as certificate_module
 from beaver_ftc_assurance.certificates import chance, check_certificate, instruments_say

@@ -463,8 +463,8 @@ def _too_small(scenario: "Scenario", found: Metrics) -> str:
     if detection.inconclusive:  # which has a line of its own
         return ""
     return (
-        "no alarm, and none was certain: the effect of the fault stayed within the uncertainty that "
-        "fdi.bounds declares; a larger fault, a stronger reference or tighter bounds would show it"
+        "no alarm, and no alarm was guaranteed: the effect of the fault stayed within the uncertainty that "
+        "fdi.bounds declares; a larger fault, a stronger reference or tighter bounds would make it detectable"
     )
 
 
@@ -475,7 +475,7 @@ def _in_one_frame(scenario: "Scenario", found: Metrics) -> str:
         return ""
     return (
         f"the alarm came within one frame ({frame_s:.2g} s): sensors exact, servos ideal, the air "
-        "is still, and no error is undeclared"
+        "is still, and all errors are declared"
     )
 
 
@@ -491,12 +491,10 @@ def _on_the_bound(flight: "Landing") -> str:
     used = max(flight.closest_approach, default=0.0)
     if not ON_THE_BOUND <= used <= 1.0:
         return ""
-    reached = f"already reaches {math.floor(1000.0 * used) / 10.0:g} % of its threshold, so that"
-    if not flight.scenario.faults:
-        return f"the residual {reached} an error a little larger than flown here would raise a false alarm"
+    before = " before the fault" if flight.scenario.faults else ""
     return (
-        f"the residual of the healthy flight {reached} this scenario's own uncertainty decides how soon a "
-        "small fault is detected"
+        f"the residual already reaches {math.floor(1000.0 * used) / 10.0:g} % of its threshold{before}: a "
+        "slightly larger error would raise a false alarm"
     )
 
 

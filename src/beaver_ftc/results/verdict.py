@@ -192,7 +192,7 @@ _FLAGS = {  # what is said of true, and of false
 }  # fmt: skip
 _NAMES = {
     "isolated_as": "isolated fault", "isolated_type": "fault type",
-    "candidate_type": "fault type still possible",
+    "candidate_type": "possible fault types include",
 }  # fmt: skip
 
 

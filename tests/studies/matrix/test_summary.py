@@ -148,5 +148,5 @@ def test_where_a_told_test_sees_nothing_it_says_so():
     plain = as_text(document_of([row(fault, s, 45.0) for fault, _ in FAULTS for s in SURFACES]))
     assert "informed test" not in plain
     n = len(FAULTS) * len(SURFACES)
-    none = "0 named wrongly, 0 false alarms, 0 lost that the oracle kept"
+    none = "0 named wrongly, 0 false alarms, 0 aircraft lost although the law oracle kept it"
     assert plain.endswith(f"{n} faults flown: {none}")

@@ -148,8 +148,8 @@ def test_both_schemes_and_both_designs_in_rows():
 
 def test_the_outcome_in_a_sentence():
     assert words.headline(DOCUMENT) == (
-        "Of 5 testable statements 2 hold, 1 of them also in 2 settings that the paper did not fly; 2 do not, "
-        "and 1 also hold when the mechanism that the statement credits is removed. "
+        "Of 5 testable statements 2 hold, 1 of them also in 2 settings that the paper did not fly. 2 do not "
+        "hold. 1 hold, but also when the mechanism that the statement credits is removed. "
         "Of 7 statements that the code makes "
         "true by its construction 6 hold; 11 give nothing to measure."
     )

@@ -70,8 +70,8 @@ def _summary(document: Document) -> str:
     lost = len(document["lost_though_the_oracle_was_not"])
     return (
         f"{len(document['flights'])} faults flown: {document['wrong']} named wrongly, "
-        f"{document['false_alarms']} false alarms, {lost} lost that the oracle kept. Half of {len(delays)} "
-        f"alarms came within {median(delays):.2f} s."
+        f"{document['false_alarms']} false alarms, {lost} aircraft lost although the law oracle kept it. "
+        f"Half of {len(delays)} alarms came within {median(delays):.2f} s."
     )
 
 

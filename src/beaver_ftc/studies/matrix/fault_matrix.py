@@ -339,7 +339,7 @@ def as_text(document: Document) -> str:
     totals = (
         f"{len(document['flights'])} faults flown: {document['wrong']} named wrongly, "
         f"{document['false_alarms']} false alarms, "
-        f"{len(document['lost_though_the_oracle_was_not'])} lost that the oracle kept"
+        f"{len(document['lost_though_the_oracle_was_not'])} aircraft lost although the law oracle kept it"
     )
     told = document.get("told")
     legend, share = (LEGEND + TOLD_LEGEND, [_told(told)]) if told else (LEGEND, [])

@@ -166,8 +166,8 @@ def headline(document: Document) -> str:
     settings = len(document["sensitivity"])
     return (
         f"Of {tested['statements']} testable statements {tested['hold']} hold, {tested['elsewhere']} of them "
-        f"also in {settings} settings that the paper did not fly; {tested['do_not']} do not, and "
-        f"{tested['unsettled']} also hold when the mechanism that the statement credits is removed. Of "
+        f"also in {settings} settings that the paper did not fly. {tested['do_not']} do not hold. "
+        f"{tested['unsettled']} hold, but also when the mechanism that the statement credits is removed. Of "
         f"{built['statements']} statements that the code makes true by its construction {built['hold']} "
         f"hold; {document['background']} give nothing to measure."
     )

@@ -171,11 +171,13 @@ def test_what_the_rows_say():
     )
     says = {error.name: error.says for error in errors} | {TOGETHER: "all that are declared"}
     sound = [
-        f"{name} ({of}): no false alarm and no wrong name up to 4 times this size."
+        f"{name} ({of}): no false alarm and no wrong name up to 4 times the declared size."
+        if not of.startswith("none")
+        else f"{name} (not declared{of[4:]}): no false alarm and no wrong name up to 4 times the unit."
         for name, of in says.items()
     ]
-    counts = "1 of 4 flights have a false alarm and 2 of 4 a wrong name."
-    found = f"inertia coupling (0.25): at 2 times this size, {counts}"
+    counts = "gives a false alarm in 1 of 4 flights and a wrong name in 2 of 4."
+    found = f"inertia coupling (0.25): an error of 2 times the declared size {counts}"
     assert others == [found if line.startswith("inertia coupling") else line for line in sound]
     lines = as_text(document).splitlines()
     (line,) = (line for line in lines if re.match(r"inertia coupling +0.25 +2 ", line))

@@ -243,7 +243,7 @@ def test_findings_in_sentences(few_cells):
     )
     row = document["mechanisms"][0] | {"names": {"value": -0.12, "low": -0.2, "high": -0.04}}
     assert finding(row | {"same_verdict": 1}).endswith(
-        "(published): without it there are lost names in 12.0 % fewer of the flights."
+        "(published): without it, 12.0 % fewer flights have lost names."
     )
 
 

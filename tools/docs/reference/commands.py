@@ -50,5 +50,5 @@ def statuses_page() -> str:
         if isinstance(error, type) and issubclass(error, errors.BeaverFtcError)
     }
     rows = [(f"`{status}`", means, raised.get(int(status), "")) for status, means in found]
-    rows.append(("`128 + N`", "ended by signal N; nothing is left half written", ""))
+    rows.append(("`128 + N`", "ended by signal N; each result file is complete or absent", ""))
     return f"# Exit statuses\n\n{says}\n\n{markdown_table(('status', 'means', 'in Python'), rows)}\n"

@@ -23,7 +23,7 @@ def _live() -> list[tuple[str, str]]:
     return [
         ("1a", f"on {found.axis}, after {found.delay_s:.2f} s; {weak.isolation.fault}; {modes}"),
         ("1b", f"{jam.isolation.fault}, {jam.isolation.type}, after {jam.isolation.delay_s:.2f} s"),
-        ("1c", f"{trailing.isolation.fault}; left: {left or trailing.isolation.type}"),
+        ("1c", f"{trailing.isolation.fault}; remaining types: {left or trailing.isolation.type}"),
     ]
 
 
@@ -37,7 +37,7 @@ def _paper() -> list[tuple[str, str]]:
     )
     delay_s = published.detection.delay_s
     return [
-        ("2a", f"{errors[0]:.2f} deg/s under the nominal law, {errors[1]:.2f} with the hand-over"),
+        ("2a", f"{errors[0]:.2f} deg/s under the nominal law, {errors[1]:.2f} when the flap takes over"),
         ("2b", f"{threshold:.4f} rad/s at the last frame of the log"),
         ("2c", f"alarm after {delay_s:.2f} s, named {published.isolation.fault}"),
     ]

@@ -53,7 +53,7 @@ def _answers(scenario: Any) -> Iterator[tuple[str, str, str]]:
         f"still: turbulence `{scenario.environment.turbulence}`, no wind, no gust",
         "environment",
     )
-    yield "is the design model wrong?", "no: it is the aircraft that flies", "uncertainty"
+    yield "does the design model differ from the simulated aircraft?", "no", "uncertainty"
     yield "which law?", f"`{scenario.control.law}`", "control.law"
     yield "which diagnosis?", f"`{fdi.scheme}`, looking for the fault class `{fdi.fault_class}`", "fdi.scheme"
     constant, share = bounds.constant_rad_s2.q, bounds.inertia_coupling.q
@@ -108,8 +108,8 @@ def _surface(name: str) -> dict[str, str]:
         "lower stop, deg": f"{low:.1f}",
         "upper stop, deg": f"{high:.1f}",
         "a positive deflection": up if term.value > 0 else down,
-        "by the term": f"`{term.name}`",
-        "of, 1/rad": f"{term.value:g}",
+        "deciding term": f"`{term.name}`",
+        "value, 1/rad": f"{term.value:g}",
     }
 
 

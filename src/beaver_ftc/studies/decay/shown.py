@@ -56,14 +56,17 @@ def _count(row: Document, name: str) -> str:
 def _onset(rows: Sequence[Document]) -> str:
     """The least factor with a false alarm or a wrong name, of one error."""
     what, declared = rows[0]["error"], rows[0]["declared"]
+    unknown = declared.startswith("none; ")
+    size = "the unit" if unknown else "the declared size"
+    head = f"{what} ({declared.replace('none', 'not declared', 1)})" if unknown else f"{what} ({declared})"
     broken = next((row for row in rows if row["false_alarm"]["count"] or row["misnamed"]["count"]), None)
     if broken is None:
         most = rows[-1]["factor"]
-        return f"{what} ({declared}): no false alarm and no wrong name up to {most:g} times this size."
+        return f"{head}: no false alarm and no wrong name up to {most:g} times {size}."
     alarms, misnamed = (_count(broken, name) for name in ("false_alarm", "misnamed"))
     return (
-        f"{what} ({declared}): at {broken['factor']:g} times this size, {alarms} flights have a false alarm "
-        f"and {misnamed} a wrong name."
+        f"{head}: an error of {broken['factor']:g} times {size} gives a false alarm in {alarms} flights "
+        f"and a wrong name in {misnamed}."
     )
 
 

@@ -83,8 +83,8 @@ def finding(row: Document) -> str:
     if not certain:
         same = f"{row['same_verdict']} of {row['flights']} verdicts are the same without it"
         return f"{label(row)}: no effect beyond chance; {same}."
-    said = (f"{CRITERIA[name]} in {_more_or_less(found)}" for name, found in certain.items())
-    return f"{label(row)}: without it there are {', '.join(said)} of the flights."
+    said = (f"{_more_or_less(found)} flights have {CRITERIA[name]}" for name, found in certain.items())
+    return f"{label(row)}: without it, {'; '.join(said)}."
 
 
 def _more_or_less(found: Document) -> str:

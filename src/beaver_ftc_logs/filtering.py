@@ -51,7 +51,7 @@ def posterior_of(samples: Samples, model: Model, bank: Bank) -> tuple[Floats, Fl
         return _by_colours(samples, model, bank)
     own, delays_s = model.with_noise_model(samples.colour), model.settings.delays_s
     runs = [_filtered(_with_delay(samples, delay_s), own, bank) for delay_s in delays_s]
-    return _mean(_weights([run[3] for run in runs], model.rate_hz), runs)
+    return _mean(list(_weights([run[3] for run in runs], model.rate_hz)), runs)
 
 
 def _by_colours(samples: Samples, model: Model, bank: Bank) -> tuple[Floats, Floats, Floats]:
@@ -60,14 +60,14 @@ def _by_colours(samples: Samples, model: Model, bank: Bank) -> tuple[Floats, Flo
     flights = [(whitened(samples, one.average), model.alone_with(one)) for one in model.colours]
     likely = [_likelihood(flight, of, of.colours[0]) for flight, of in flights]
     weights = _weights(likely, model.rate_hz)
-    weights = np.where(weights < _LEAST_WEIGHT, 0.0, weights)
-    weights /= weights.sum(axis=0)
-    last = [int(np.flatnonzero(weight).max(initial=-1)) + 1 for weight in weights]
+    kept = np.where(np.asarray(weights) < _LEAST_WEIGHT, 0.0, weights)
+    kept /= kept.sum(axis=0)
+    last = [int(np.flatnonzero(weight).max(initial=-1)) + 1 for weight in kept]
     runs = [
         _filtered(first(flight, count), of.with_noise_model(flight.colour), bank)
         for (flight, of), count in zip(flights, last, strict=True) if count
     ]  # fmt: skip
-    return _mean([weight for weight, count in zip(weights, last, strict=True) if count], runs)
+    return _mean([weight for weight, count in zip(kept, last, strict=True) if count], runs)
 
 
 def _mean(weights: Sequence[Floats], runs: Sequence[Run]) -> tuple[Floats, Floats, Floats]:

@@ -217,12 +217,13 @@ def check_columns(samples: Samples, model: Model) -> None:
     if not read:
         return
     flight, likeliest = max(read, key=lambda one: one[1][0].mean())[0]
-    if (found := _in_all_parts(flight, likeliest)) is None:
+    in_all = _in_all_parts(flight, likeliest)
+    if in_all is None:
         return
-    wrong = _wrong_answers(samples, model, found)
+    wrong = _wrong_answers(samples, model, in_all)
     for colour in NOISE_COLOURS if wrong else ():
         other = _in_all_parts(whitened(samples, colour), model)
-        if other is not None and other.likely.mean() > found.likely.mean():
+        if other is not None and other.likely.mean() > in_all.likely.mean():
             still = _wrong_answers(samples, model, other)
             wrong = {what: says for what, says in wrong.items() if what in still}
     says = next(iter(wrong.values()), None) or _likelier(flight, likeliest)

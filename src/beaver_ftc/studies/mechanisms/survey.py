@@ -75,7 +75,7 @@ class Flight(NamedTuple):
 
 def cases_of(draws: int) -> list[Flight]:
     """Every draw of every cell."""
-    return [Flight(*cell, run) for cell in product(*FACTORS.values()) for run in range(draws)]
+    return [Flight._make((*cell, run)) for cell in product(*FACTORS.values()) for run in range(draws)]
 
 
 def surface_of(flight: Flight) -> str:
@@ -133,7 +133,8 @@ def _errors(coupling: float, swing_rad_s2: float, draws: np.random.Generator) ->
     """Errors of the model somewhere within what is declared."""
     thetas = draws.uniform(-coupling, coupling, len(AXES)).tolist()
     sizes = draws.uniform(0.0, swing_rad_s2, len(AXES)).tolist()
-    swings = np.exp(draws.uniform(*np.log(SWINGS_RAD_S), len(AXES))).tolist()
+    slowest, fastest = np.log(SWINGS_RAD_S)
+    swings = np.exp(draws.uniform(slowest, fastest, len(AXES))).tolist()
     return {
         "uncertainty.inertia_coupling": dict(zip(AXES, thetas, strict=True)),
         "uncertainty.sinusoid": {

@@ -72,7 +72,7 @@ def heat_map(
     from matplotlib.patches import Rectangle
 
     for row, column in [place for place in labels if hatched and np.isnan(np.asarray(values)[place])]:
-        look = {"facecolor": GRID, "edgecolor": "white", "hatch": "////", "linewidth": 0.0}
+        look: dict[str, Any] = {"facecolor": GRID, "edgecolor": "white", "hatch": "////", "linewidth": 0.0}
         axes.add_patch(Rectangle((column - 0.5, row - 0.5), 1.0, 1.0, **look))
     for (row, column), (text, ink) in labels.items():
         axes.text(column, row, text, ha="center", va="center", fontsize=fontsize, color=ink, zorder=3)

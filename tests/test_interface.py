@@ -20,9 +20,10 @@ ROOT = Path(__file__).parents[1]
 
 
 def documented():
-    """The first Python text of docs/reference/python.md, whose elisions stand for nothing."""
+    """The Python texts of the first section of docs/reference/python.md, whose elisions stand for nothing."""
     text = (ROOT / "docs/reference/python.md").read_text(encoding="utf-8")
-    code = re.search(r"```python\n(.*?)```", text, re.DOTALL).group(1)
+    section = text.partition("## At a glance")[2].partition("\n## ")[0]
+    code = "".join(re.findall(r"```python\n(.*?)```", section, re.DOTALL))
     return code.replace("fdi={...}", "fdi={}").replace("(...)", "()")
 
 

@@ -93,9 +93,9 @@ EXPECTED = {
     "accounts.guarantee.certain_after_s": -1.0,
     "fdi.layout.main": (AILERON, ELEVATOR, RUDDER), "fdi.layout.dominant_axis": (0, 1, 2, 1),
     "fdi.layout.partner": (RUDDER, FLAP, AILERON, ELEVATOR),
-    "fdi.config.every_type": 1, "fdi.types.config.length": 1, "fdi.types.config.span_s": DT,
+    "fdi.config.every_type": 1, "fdi.types.config.length": 1, "fdi.types.config.block_s": DT,
     "fdi.types.config.whole": 0, "fdi.config.instants": 2,
-    "fdi.types.config.returns": 1, "fdi.types.config.patience": 131,  # half a cycle at 1.2 rad/s is 2.618 s
+    "fdi.types.config.released_returns": 1, "fdi.types.config.half_cycle_frames": 131,  # of 2.618 s
     "fdi.types.pair.enabled": 0, "fdi.types.pair.first": -1,
     "fdi.types.surface.0.actuator.travel_low": -0.5, "fdi.types.surface.3.actuator.travel_high": 1.0,
     "fdi.types.surface.1.accommodation.mode": -1,

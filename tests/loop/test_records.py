@@ -11,6 +11,7 @@ from beaver_ftc.diagnosis.bounds import GUST_LIMIT_SIGMA
 from beaver_ftc.diagnosis.monitors import redundancy
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop import assembly
+from beaver_ftc.loop import loop as cockpit
 from beaver_ftc.loop.assembly import lay_out, y_places
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.loop.plugin_frame import context_of, measured_of
@@ -72,7 +73,7 @@ def test_what_is_read_logged_and_told_of_the_start(loop, changed):
         "truth": {name: truth[name].item() for name in fixed}, "factor": truth["factor"][: truth["n"]],
         "start": loop.start[:40], "logged": of_record(frame["logged"]), "columns": loop.columns,
         "places": y_places(frame), "frames": loop.n_frames, "rows": len(loop.log),
-        "travel": assembly.travel_rad(loop.plant),
+        "travel": cockpit.travel_rad(loop.plant),
     })  # fmt: skip
 
 
@@ -205,7 +206,7 @@ def test_where_the_ground_is(gear, told, altitude_m, ground_m):
         read=lambda name: 0.5 if "lat" in name else 0.25, has=lambda name: gear, aircraft=what
     )
     truth = {}
-    assembly.set_origin(truth, plant, altitude_m)
+    cockpit.set_origin(truth, plant, altitude_m)
     assert truth["ground_m"] == pytest.approx(ground_m)
     assert (truth["latitude_0"], truth["longitude_0"]) == (0.5, 0.25)
     assert truth["radius_m"] == pytest.approx(6_371_000.0 + altitude_m)
@@ -237,10 +238,10 @@ def test_the_command_and_the_engine_are_handed_over_through_python():
 @pytest.mark.parametrize("how", HOLDING)
 def test_which_surfaces_stand_still_is_noted(surface, how):
     names = ("aileron", "elevator", "rudder", "flap")
-    on = {f"failures/{names[surface]}/{how}": 1.0, assembly.UNANTICIPATED: 10.0}
+    on = {f"failures/{names[surface]}/{how}": 1.0, cockpit.UNANTICIPATED: 10.0}
     plant = SimpleNamespace(read=lambda name: on.get(name, 0.0), aircraft=SimpleNamespace(surfaces=names))
     truth = {}
-    assembly.note_failures(truth, plant)
+    cockpit.note_failures(truth, plant)
     assert truth["immovable"] == [s == surface for s in range(4)]
     assert truth["Cm_alpha3"] == 10.0
 

@@ -7,7 +7,8 @@ import pytest
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFailed
-from beaver_ftc.plant.adapter import FlightState, Plant, UnknownProperty, available
+from beaver_ftc.plant.adapter import FlightState, Plant, UnknownProperty
+from beaver_ftc.plant.addresses import available
 
 STATE = FlightState(
     airspeed_mps=41.0,

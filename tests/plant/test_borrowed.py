@@ -3,7 +3,7 @@
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.plant import adapter, conditions
+from beaver_ftc.plant import addresses, conditions
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.conditions import borrowed, give_back
 from beaver_ftc.scenario.schema import load
@@ -111,12 +111,12 @@ def test_an_executive_is_run_by_its_address_where_that_is_known(monkeypatch):
     plant = Plant(100.0)
     plant.start(conditions.trim())
     before_s = plant.read("simulation/sim-time-sec")
-    found = adapter.executive_address(plant.fdm)
-    if adapter.available():
+    found = addresses.executive_address(plant.fdm)
+    if addresses.available():
         assert found > 0
         assert plant.read("simulation/sim-time-sec") == pytest.approx(before_s + 0.01)
-    monkeypatch.setattr(adapter, "LAYOUT", adapter.LAYOUT._replace(executive_size=48))
-    assert adapter.executive_address(plant.fdm) == 0
+    monkeypatch.setattr(addresses, "LAYOUT", addresses.LAYOUT._replace(executive_size=48))
+    assert addresses.executive_address(plant.fdm) == 0
 
 
 @pytest.mark.parametrize(("native", "jit", "wanted"), [
@@ -124,18 +124,18 @@ def test_an_executive_is_run_by_its_address_where_that_is_known(monkeypatch):
     ("2", "0", True),
 ])  # fmt: skip
 def test_nodes_are_read_by_address_unless_that_is_not_wanted(monkeypatch, native, jit, wanted):
-    monkeypatch.setattr(adapter, "is_proved", lambda layout: True)
+    monkeypatch.setattr(addresses, "is_proved", lambda layout: True)
     for name, value in (("BEAVER_FTC_NATIVE", native), ("NUMBA_DISABLE_JIT", jit)):
         if value is None:
             monkeypatch.delenv(name, raising=False)
         else:
             monkeypatch.setenv(name, value)
-    assert adapter.available() is wanted
+    assert addresses.available() is wanted
 
 
 def test_an_address_that_there_is_not_is_zero():
-    assert adapter.address("_ZNoSuchThing") == 0
-    assert len({adapter.address(one) for one in (adapter.GETTER, adapter.SETTER, adapter.RUN)}) == 3
-    nodes = adapter._trial_nodes("abc")
+    assert addresses.address("_ZNoSuchThing") == 0
+    assert len({addresses.address(one) for one in (addresses.GETTER, addresses.SETTER, addresses.RUN)}) == 3
+    nodes = addresses._trial_nodes("abc")
     assert [node.get_name() for node in nodes] == ["a", "b", "c"]
-    assert len({adapter.pointer(node) for node in nodes}) == 3
+    assert len({addresses.pointer(node) for node in nodes}) == 3

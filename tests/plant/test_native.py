@@ -6,7 +6,7 @@ import pytest
 
 from beaver_ftc.documents import files
 from beaver_ftc.loop.loop import Loop
-from beaver_ftc.plant import adapter, channels
+from beaver_ftc.plant import addresses, channels
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.channels import NodeBank
 from beaver_ftc.scenario.schema import load
@@ -22,7 +22,7 @@ READ = [
 ]
 WRITTEN = ["fcs/aileron-cmd-rad", "fcs/elevator-cmd-rad", "fcs/rudder-cmd-rad", "failures/flap/effectiveness"]
 
-needs_native = pytest.mark.skipif(not adapter.available(), reason="this build of JSBSim has another layout")
+needs_native = pytest.mark.skipif(not addresses.available(), reason="this build of JSBSim has another layout")
 
 
 @needs_native
@@ -30,7 +30,7 @@ def test_reads_agree_to_the_bit_along_a_flight(beaver):
     bank, found = NodeBank([beaver.node(name) for name in READ], owner=beaver), np.empty(len(READ))
     for _ in range(50):
         beaver.run()
-        channels.read_nodes(adapter.address(adapter.GETTER), bank.pointers, found)
+        channels.read_nodes(addresses.address(addresses.GETTER), bank.pointers, found)
         assert found.tolist() == [beaver.read(name) for name in READ]
 
 
@@ -40,7 +40,7 @@ def test_writes_agree_to_the_bit(beaver):
         NodeBank([beaver.node(name) for name in WRITTEN], owner=beaver),
         np.array([0.1, -0.2, 1 / 3, 0.7]),
     )
-    channels.write_nodes(adapter.address(adapter.SETTER), bank.pointers, values)
+    channels.write_nodes(addresses.address(addresses.SETTER), bank.pointers, values)
     assert [beaver.read(name) for name in WRITTEN] == values.tolist()
 
 
@@ -52,7 +52,7 @@ def test_usable_inside_another_kernel(beaver):
         return out[0] + out[1]
 
     bank = NodeBank([beaver.node(name) for name in READ[:2]], owner=beaver)
-    total = first_plus_second(adapter.address(adapter.GETTER), bank.pointers, np.empty(2))
+    total = first_plus_second(addresses.address(addresses.GETTER), bank.pointers, np.empty(2))
     assert total == beaver.read(READ[0]) + beaver.read(READ[1])
 
 
@@ -60,7 +60,7 @@ def test_the_plain_path_gives_the_same(beaver, monkeypatch):
     native_bank, out = NodeBank([beaver.node(name) for name in READ], owner=beaver), np.empty(len(READ))
     native_bank.read(out)
     monkeypatch.setenv("BEAVER_FTC_NATIVE", "0")
-    assert not adapter.available()
+    assert not addresses.available()
     plain_bank, plain = NodeBank([beaver.node(name) for name in READ], owner=beaver), np.empty(len(READ))
     plain_bank.read(plain)
     assert plain.tolist() == out.tolist()
@@ -95,19 +95,19 @@ WRONG = {
 @pytest.mark.parametrize("wrong", WRONG.values(), ids=list(WRONG))
 def test_another_layout_is_recognised_without_a_crash(monkeypatch, tmp_path, wrong):
     monkeypatch.setattr(files, "cache_base", lambda: tmp_path)
-    assert not adapter.is_proved.__wrapped__(adapter.LAYOUT._replace(**wrong))
+    assert not addresses.is_proved.__wrapped__(addresses.LAYOUT._replace(**wrong))
 
 
 @needs_native
 def test_a_missing_function_is_recognised(monkeypatch):
-    monkeypatch.setattr(adapter, "GETTER", "_ZNK9NoSuchName")
-    assert not adapter._sizes_fit(adapter.LAYOUT)
+    monkeypatch.setattr(addresses, "GETTER", "_ZNK9NoSuchName")
+    assert not addresses._sizes_fit(addresses.LAYOUT)
 
 
 FLIGHT = """
 import hashlib, sys
-from beaver_ftc.plant import adapter
-adapter.LAYOUT = adapter.LAYOUT._replace(**LAYOUT)
+from beaver_ftc.plant import addresses
+addresses.LAYOUT = addresses.LAYOUT._replace(**LAYOUT)
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.scenario.schema import load
 loop = Loop(load({"name": "run", "duration_s": 2.0, "substeps": 2, "sensors": "consumer-grade"}))
@@ -138,6 +138,6 @@ def test_jsbsim_run_by_compiled_code_is_the_same_flight(air, substeps):
 @needs_native
 def test_an_executive_that_is_not_where_it_is_expected_is_run_through_python(monkeypatch):
     plant = Plant(rate_hz=100)
-    monkeypatch.setattr(adapter, "is_proved", lambda layout: True)
-    monkeypatch.setattr(adapter, "LAYOUT", adapter.LAYOUT._replace(executive_base=32))  # a dictionary
-    assert adapter.executive_address(plant.fdm) == 0
+    monkeypatch.setattr(addresses, "is_proved", lambda layout: True)
+    monkeypatch.setattr(addresses, "LAYOUT", addresses.LAYOUT._replace(executive_base=32))  # a dictionary
+    assert addresses.executive_address(plant.fdm) == 0

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
-from beaver_ftc.loop.assembly import Cockpit
-from beaver_ftc.loop.loop import Loop
+from beaver_ftc.loop.loop import Cockpit, Loop
 from beaver_ftc.plant import channels
 from beaver_ftc.plant.adapter import FlightState, Plant, _Errors, bare, body_axes, translated
 from beaver_ftc.plant.model_file import copy_of, package

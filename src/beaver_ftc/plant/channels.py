@@ -10,7 +10,7 @@ Many properties in one compiled call, and JSBSim's own frame from compiled code.
 
 A property read through JSBSim's Python binding costs about 0.1 us; a frame reads and writes some forty.
 The binding exports the C++ accessors of a property node, so a compiled kernel can call them on the node's
-own address: 0.01 us each. That rests on how one build of the binding is laid out, so adapter.py has it
+own address: 0.01 us each. That rests on how one build of the binding is laid out, so addresses.py has it
 proved in a child process before it is used. The environment variable BEAVER_FTC_NATIVE=0 turns it off; the
 caller reads and writes through Python then.
 
@@ -35,7 +35,7 @@ from beaver_ftc.aircraft import AXES, Aircraft, load
 from beaver_ftc.aircraft.aircraft import M_PER_FT
 from beaver_ftc.aircraft.schema import MAX_SIGNALS
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.plant.adapter import available, pointer
+from beaver_ftc.plant.addresses import available, pointer
 from beaver_ftc.scenario.sensors import N_IN_EQUATIONS, ROWS
 
 if TYPE_CHECKING:

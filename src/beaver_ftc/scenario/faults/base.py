@@ -1,8 +1,8 @@
 """The faults of an aircraft: a class a type, which is its row in every table.
 
 It says its parameters with unit and range, what it does to the aircraft's failure properties, and how it
-is shown to people. First stands what all types have, then the faults of surfaces and of the aerodynamics,
-then damage: a part of the aircraft is gone, with its forces, its mass and the surfaces on it. What the
+is shown to people. First stands what all types have, then damage (a part of the aircraft is gone, with its
+forces, its mass and the surfaces on it), then the faults of surfaces and of the aerodynamics. What the
 diagnosis makes of a type stands in diagnosis/types/table/.
 """
 
@@ -140,6 +140,32 @@ def growing(**in_words: Callable[[Any], str]) -> InWords:
 
 
 _ROUNDED = 1e-4  # of a stop in degrees as people write it
+
+
+def _wrong(case: str) -> str | None:
+    """What is wrong with the name of a case."""
+    aircraft = checked_aircraft()
+    if not aircraft.damage:
+        return f"{aircraft.name} declares no damage, allowed: an aircraft that does"
+    if case in aircraft.damage:
+        return None
+    return f"{case[:100]!r} is not known{suggestion(case, tuple(aircraft.damage))}"
+
+
+class Damage(Switched):
+    """A case of damage that the aircraft declares: it acts on aerodynamics and mass, and takes surfaces.
+
+    case: which, by its name in the aircraft's file
+    """
+
+    adds = False
+    in_words = constant(case=lambda case: case.replace("-", " "))
+
+    type: Literal["damage"]
+    case: Annotated[str, named(_wrong)] = entry(..., examples=["left-wing-tip-off"])
+
+    def strike(self, of: Properties, share: float, past: Past) -> None:
+        of[self.case] = 1.0
 
 
 class LossOfEffectiveness(Gradual):
@@ -307,29 +333,3 @@ class Unanticipated(Gradual):
 
     def strike(self, of: Properties, share: float, past: Past) -> None:
         of["Cm-alpha3"] += share * self.Cm_alpha3
-
-
-def _wrong(case: str) -> str | None:
-    """What is wrong with the name of a case."""
-    aircraft = checked_aircraft()
-    if not aircraft.damage:
-        return f"{aircraft.name} declares no damage, allowed: an aircraft that does"
-    if case in aircraft.damage:
-        return None
-    return f"{case[:100]!r} is not known{suggestion(case, tuple(aircraft.damage))}"
-
-
-class Damage(Switched):
-    """A case of damage that the aircraft declares: it acts on aerodynamics and mass, and takes surfaces.
-
-    case: which, by its name in the aircraft's file
-    """
-
-    adds = False
-    in_words = constant(case=lambda case: case.replace("-", " "))
-
-    type: Literal["damage"]
-    case: Annotated[str, named(_wrong)] = entry(..., examples=["left-wing-tip-off"])
-
-    def strike(self, of: Properties, share: float, past: Past) -> None:
-        of[self.case] = 1.0

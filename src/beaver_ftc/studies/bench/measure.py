@@ -15,7 +15,7 @@ import typer
 
 from beaver_ftc.commands import Reporter, StudyCommand
 from beaver_ftc.loop.loop import Loop, fly
-from beaver_ftc.plant import adapter, conditions
+from beaver_ftc.plant import addresses, conditions
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.model import Document
@@ -73,7 +73,7 @@ def machine() -> Document:
         "cores": cores(),
         "python": platform.python_version(),
         **{package: version(package) for package in ("jsbsim", "numba", "numpy")},
-        "native_properties": adapter.available(),
+        "native_properties": addresses.available(),
     }
 
 

@@ -68,13 +68,15 @@ def test_reproduction_page_counts_every_statement_and_shows_what_it_promises():
     assert tested + counts["built"] + counts["background"] == len(CLAIMS)
     parts = {head: part for head, _, part in (s.partition("\n") for s in text.split("\n## "))}
     shown = {head: [c for c in CLAIMS if c.statement.rstrip(".") in part] for head, part in parts.items()}
-    not_borne_out = [claim for claim in shown["Not borne out"] if claim.because]
+    not_borne_out = [claim for claim in shown["Statements that do not hold"] if claim.because]
     assert len(not_borne_out) == counts["do not"]
-    assert all(claim.because in parts["Not borne out"] for claim in not_borne_out)
-    assert len(shown["Borne out without the mechanism, too"]) == counts["unsettled"]
-    assert len(shown["Borne out, but not everywhere"]) == counts["hold"] - counts["elsewhere"]
-    assert 5 < len(shown["Borne out, elsewhere too"]) < counts["elsewhere"]  # those read off a figure alone
-    assert all(claim.where.startswith("Fig.") for claim in shown["Borne out, elsewhere too"])
+    assert all(claim.because in parts["Statements that do not hold"] for claim in not_borne_out)
+    assert len(shown["Statements that hold without the mechanism"]) == counts["unsettled"]
+    assert len(shown["Statements that hold in some settings"]) == counts["hold"] - counts["elsewhere"]
+    assert (
+        5 < len(shown["Statements that hold in every setting"]) < counts["elsewhere"]
+    )  # those read off a figure alone
+    assert all(claim.where.startswith("Fig.") for claim in shown["Statements that hold in every setting"])
     for view, _, _ in FIGURES:
         assert f"../images/reproduction/{view.name}.png" in text
 

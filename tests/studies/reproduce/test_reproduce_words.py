@@ -82,7 +82,7 @@ def test_numbers_have_three_digits_and_shares_are_in_percent(value, unit, said):
 def test_each_statement_is_a_row_of_the_verdict():
     assert words.verdict_rows(DOCUMENT) == [
         (
-            "Fig. 2", "The alarm is early.", "elevator, q: delay 0.247 s", "at most 1: the paper's own",
+            "Fig. 2", "The alarm is early.", "elevator, q: delay 0.247 s", "at most 1 s: the paper's own",
             "the alarm: never", "borne out, elsewhere too", "",
         ),
         (

@@ -33,6 +33,7 @@ HIDDEN = (
 )  # the yardsticks, and parts of ours
 PROBED = ("published", "air-light")
 NO_SCHEME = "none"
+_RATIO = "Tracking error divided by the oracle's in the same flight, median; below 1: better than the oracle"
 ALONE = f"{LAW}, no scheme"  # our law without any diagnosis
 PASSIVE_LAWS = (PASSIVE, "lqr", "indi", ALONE)  # fixed gains, and nothing from a diagnosis
 
@@ -69,10 +70,10 @@ def _tables(document: Document) -> str:
         _block(5, "Median delay of the alarm, s", schemes, "delay_median_s", _seconds, more=False),
         _block(6, "Upper 95 % limit of that median, s", schemes, "delay_median_high_s", _seconds, None),
         _alarms(7, _schemes(sets)),
-        _block(8, "Median of the tracking error over the oracle's", laws, "ratio_median", _ratio, more=False),
+        _block(8, _RATIO, laws, "ratio_median", _ratio, more=False),
         _block(9, "Lower 95 % limit of that median", laws, "ratio_median_low", _ratio, None),
         _block(10, "Upper 95 % limit of that median", laws, "ratio_median_high", _ratio, None),
-        _block(11, "The same error, not exceeded in 90 % of flights", laws, "ratio_90", _ratio, more=False),
+        _block(11, "The same ratio, not exceeded in 90 % of flights", laws, "ratio_90", _ratio, more=False),
     ])  # fmt: skip
 
 
@@ -147,9 +148,9 @@ def _better(rows: Rows, key: str, more: bool) -> str:
         if where:
             found.append(f"`{rival}` in {', '.join(where)}")
     return (
-        f"These are better than `{ours}`: {'; '.join(found)}."
+        f"Rivals with a better number than `{ours}`, significant or not: {'; '.join(found)}."
         if found
-        else f"No rival is better than `{ours}` here."
+        else f"No rival has a better number than `{ours}` here."
     )
 
 
@@ -164,16 +165,15 @@ def _rates(number: int, sets: dict[str, Document]) -> str:
     """What the numbers of flights say of a rate."""
     counts = sorted({part["lines"][0]["faults"] for part in sets.values()})
     rows = [(str(n), *(_interval(n, share) for share in (1.0, 0.75, 0.5))) for n in counts]
-    head = ("flights", "of 100 %, from", "of 75 %, from", "to", "of 50 %, from", "to")
-    cells = [(n, high.split()[0], *three.split(), *half.split()) for n, high, three, half in rows]
+    head = ("faulted flights", "measured 100 %", "measured 75 %", "measured 50 %")
     return "\n\n".join(
-        [_caption(number, "Wilson 95 % intervals of such rates, %"), markdown_table(head, cells)]
+        [_caption(number, "Wilson 95 % intervals of such shares, %"), markdown_table(head, rows)]
     )
 
 
 def _interval(n: int, share: float) -> str:
     found = wilson(round(share * n), n)
-    return f"{100 * found.low:.0f} {100 * found.high:.0f}"
+    return f"{100 * found.low:.0f} to {100 * found.high:.0f}"
 
 
 def _alarms(number: int, rows: Rows) -> str:

@@ -25,7 +25,7 @@ NET_HEAD = ("mechanism", *(f"{words}, %" for words in CRITERIA.values()))
 SAME_HEAD = ("mechanism", "flights", "same verdict", "same tracking")
 MEDIAN_HEAD = ("mechanism", "delay with, s", "delay without, s", "error with, deg/s", "error without, deg/s",
                "error ratio")  # fmt: skip
-SYSTEM_HEAD = ("system", "flights", "false alarms, %", "detected, %", "named rightly, %", "lost, %",
+SYSTEM_HEAD = ("system", "flights", "false alarms, %", "detected, %", "named rightly, %", "aircraft lost, %",
                "error, deg/s")  # fmt: skip
 ALARM_HEAD = ("flown", "false alarms", "with an undeclared error", "certified", "unexplained")
 MARGIN_HEAD = ("system", "bandwidth", "instruments", "gain margin, dB", "phase margin, deg")

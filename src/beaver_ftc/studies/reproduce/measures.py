@@ -189,7 +189,7 @@ def generalised(flights: Flights, *names: str) -> float:
     )
 
 
-@_measure("a known fault is named", "s in all")
+@_measure("a known fault is named", "s in total")
 def named(flights: Flights, name: str) -> float:
     """For how long a known fault was the only one left, none of them being there."""
     return round(sum(flights[name].named_s(estimator) for estimator in ESTIMATORS), 9)
@@ -246,7 +246,7 @@ def outside(flights: Flights, *names: str) -> float:
     return float(np.nanmax(np.maximum(effectiveness - 1.0, -effectiveness).clip(0.0)))
 
 
-@_measure("uncertainty beyond the bound", "millionths of it")
+@_measure("model error beyond the bound", "millionths of the bound")
 def unbounded(flights: Flights, name: str) -> float:
     """How far what the design model does not explain before the fault exceeds the bound of the paper: our
     thresholds add what the Earth's rotation and rounding do, which it does not have."""

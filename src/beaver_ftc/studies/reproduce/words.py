@@ -51,7 +51,7 @@ def ours(claim: Document) -> str:
 def limit(claim: Document) -> str:
     """The limit that the number must keep."""
     share = claim["unit"].startswith("of ")
-    said = f"{100 * claim['limit']:.0f} %" if share else tables.number(claim["limit"])
+    said = f"{100 * claim['limit']:.0f} %" if share else tables.number(claim["limit"], claim["unit"])
     return f"{'at least' if claim['at_least'] else 'at most'} {said}"
 
 

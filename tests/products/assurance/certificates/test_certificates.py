@@ -627,7 +627,7 @@ def test_an_alarm_of_instruments_adds_up_to_its_test_whatever_is_declared(turned
     test = step["test"][TESTS.index("alpha")]
     test["filtered"], test["bound"] = turned * np.array([3.0, 8.0, 5.5]), (2.9, 4.7, 5.1)
     test["residual"] = turned * 0.9
-    apart(looked=[config["h"], test["rate"], test["noise"], test["air"], *config["gusts"]])
+    apart(looked=[config["h"], test["rate"], test["noise"], test["air"], *config["gust_change_bound"]])
     said = instruments_say.of_alarm(read_sensor_monitor(watch))
     (now, then, most), (before, nothing, most_before) = said["looks"]
     foretold = float(step["memory"]["predicted"][SENSORS.index("alpha")])
@@ -635,7 +635,7 @@ def test_an_alarm_of_instruments_adds_up_to_its_test_whatever_is_declared(turned
     assert sorted([now, then]) == pytest.approx(sorted([foretold + turned * 0.9, foretold]))
     assert now - then == pytest.approx(0.9)
     assert most == pytest.approx(
-        config["h"] * test["rate"] + test["noise"] + test["air"] * config["gusts"][1]
+        config["h"] * test["rate"] + test["noise"] + test["air"] * config["gust_change_bound"][1]
     )
     assert before - nothing == pytest.approx(8.0 - 0.9)
     assert most_before == pytest.approx(4.7 - most)

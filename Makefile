@@ -88,9 +88,12 @@ nightly: $(VENV)/.dev
 	$(BIN)/python -m tools.drawn
 	$(BIN)/python -m tools.mutants --seed $(SEED)
 
+OF_THE_CORE = $(filter-out tests/products/%,$(PLAIN))
+
 # The core knows none of the products beside it: its tests pass in a copy that has them not.
 core-test: $(VENV)/.dev
-	$(BIN)/python -m tools.core_alone -n $(WORKERS) --dist loadfile -m "not nightly"
+	NUMBA_DISABLE_JIT=1 $(BIN)/python -m tools.core_alone -n $(WORKERS) --dist loadfile -m "not nightly" $(OF_THE_CORE)
+	$(BIN)/python -m tools.core_alone -n $(WORKERS) --dist loadfile -m "not nightly" $(addprefix --ignore=,$(OF_THE_CORE))
 
 check: $(VENV)/.dev
 	$(BIN)/python -m tools.check

@@ -12,6 +12,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+import needs
 from beaver_ftc import __version__, commands, plugins
 from beaver_ftc.cli import main as command_line
 from beaver_ftc.cli.shared import as_typer_reads, complete_names
@@ -91,6 +92,7 @@ def test_which_commands_fly(changed):
         assert not changed(commands_of_it, part=package)
 
 
+@needs.command("check")
 def test_what_a_result_folder_may_hold(changed):
     """All names that commands declare: a folder that holds another is not replaced."""
     assert not changed(sorted({*files_of_commands()} | FILES_OF_A_RUN))

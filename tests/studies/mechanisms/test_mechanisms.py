@@ -7,6 +7,7 @@ import pytest
 from scipy.stats import beta
 from typer.testing import CliRunner
 
+import needs
 from beaver_ftc.cli.main import app
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
@@ -138,6 +139,7 @@ def test_isolation_without_adaptation_gives_the_same_verdicts():
         assert both[0]["delay_s"] is not None
 
 
+@needs.service("proof")
 def test_a_false_alarm_has_its_certificate_and_its_reason():
     wrong = scenario_of(ELEVATOR._replace(error=0.05), 7, DEFAULT)
     outcome = outcome_of(wrong)
@@ -247,6 +249,7 @@ def test_findings_in_sentences(few_cells):
     )
 
 
+@needs.service("proof")
 def test_a_document_and_its_files(tmp_path, monkeypatch, few_cells):
     monkeypatch.setattr(command, "margin_cells", lambda: [(DEFAULT, "high", "exact sensors")])
     line = ["mechanisms", "--draws", "2", "--workers", "1", "--out", str(tmp_path), "--format", "json"]

@@ -61,16 +61,17 @@ def _bare(line: str) -> str:
 
 def yaml_blocks(page: str) -> list[str]:
     """The YAML that a page shows, in its order."""
-    return _blocks(ROOT / page, "yaml")
+    return _blocks((ROOT / page).read_text(encoding="utf-8"), "yaml")
 
 
-def python_blocks(page: Path) -> list[str]:
-    """The Python that a page shows, in its order."""
-    return _blocks(page, "python")
+def python_blocks(page: Path, without: str = "\0") -> list[str]:
+    """The Python that a page shows, in its order, but for the section with this heading."""
+    before, _, after = page.read_text(encoding="utf-8").partition(without)
+    return _blocks(before + after.partition("\n## ")[2], "python")
 
 
-def _blocks(page: Path, kind: str) -> list[str]:
-    return [block[2] for block in _FENCED.finditer(page.read_text(encoding="utf-8")) if block[1] == kind]
+def _blocks(text: str, kind: str) -> list[str]:
+    return [block[2] for block in _FENCED.finditer(text) if block[1] == kind]
 
 
 def named_files(text: str) -> dict[str, str]:

@@ -4,10 +4,10 @@ import pytest
 
 from .documents import PAGES, python_blocks
 
-ELLIPSIS = "fdi={...}"  # the overview of every name, which tests/test_interface.py runs
+OVERVIEW = "## At a glance"  # its texts belong together: tests/test_interface.py runs them
 # A tutorial's Python needs the files before it (test_tutorials.py).
 ALONE = [page for page in PAGES if page.parent.name != "tutorials"]
-BLOCKS = [block for page in ALONE for block in python_blocks(page) if ELLIPSIS not in block]
+BLOCKS = [block for page in ALONE for block in python_blocks(page, without=OVERVIEW)]
 
 
 def test_the_pages_show_flights_plug_ins_and_environments():

@@ -128,10 +128,10 @@ def assessment_dtype(n: int) -> np.dtype:
     """The assessment of n surfaces.
 
     detected: a fault; unknown: no surface is isolated or leads; named: the isolated surface, -1 for none.
-    surface_lags: a surface follows its command late. measure: accommodation mode of each, -1 where open,
-    or where faults of every type are not diagnosed; effectiveness; at_once: whether the law applies it at
-    once, not gradually; offset, lag rad. unknown_acceleration (3,) rad/s2: explained by no known fault.
-    pitch_is_open: elevator or flap is at fault, and it has long been open which.
+    surface_lags: a surface follows its command late. accommodation_mode: of each surface, -1 where open, or
+    where faults of every type are not diagnosed; effectiveness; apply_immediately: whether the law applies it
+    at once, not gradually; offset, lag rad. unknown_acceleration (3,) rad/s2: explained by no known fault.
+    pitch_undecided: elevator or flap is at fault, and it has long been open which.
     """
     return record(
         detected=int, unknown=int, every_type=int, named=int, surface_lags=int, accommodation_mode=(int, n),
@@ -194,7 +194,7 @@ def uses_statistical_estimates(tests, authority):
 
 @kernel
 def assess_unknown_acceleration(assessment, config, conclusion, types, layout, statistics, detector, bound):
-    """Fill unknown_acceleration and pitch_is_open; detector: the FDAE's record; bound: what is declared.
+    """Fill unknown_acceleration and pitch_undecided; detector: the FDAE's record; bound: what is declared.
 
     No acceleration is asked for what a slow surface lags: it would only wind the command up.
     """

@@ -148,7 +148,7 @@ def _better(rows: Rows, key: str, more: bool) -> str:
         if where:
             found.append(f"`{rival}` in {', '.join(where)}")
     return (
-        f"Rivals with a better number than `{ours}`, significant or not: {'; '.join(found)}."
+        f"These rivals have a better number than `{ours}`, significant or not: {'; '.join(found)}."
         if found
         else f"No rival has a better number than `{ours}` here."
     )

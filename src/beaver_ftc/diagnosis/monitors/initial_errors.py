@@ -230,7 +230,7 @@ def largest_error_part(step, t, m):
 @kernel
 def current_error_part(step, initial, i, t, m):
     """What the error that hypothesis i has now has added to test t through filter m, at most: what is there,
-    and what the error was less or more by while the filter residual_sum it."""
+    and what the error was less or more by while the filter summed it."""
     return (
         largest_error_part(step, t, m) + 2.0 * initial.change_bound[i] * initial.filtered_unit_effect[i, t, m]
     )

@@ -33,7 +33,7 @@ def run_mechanisms(
 
 @dataclass(frozen=True)
 class Mechanisms(StudyCommand):
-    """Measure which mechanisms of diagnosis and accommodation help.
+    """Measure which mechanisms of diagnosis and law help.
 
     Two systems, the published one and the default one, fly the same draws with all of their mechanisms and
     without each of them: adaptive thresholds, adaptation, networks, hand-over, bank of poles, memory,

@@ -32,9 +32,14 @@ TABLE = (
         "in a checkout: sets up from the package index; make test runs this very suite",
     ),
     Exempt(
-        r"beaver-ftc (derive AIRCRAFT .*|mismatch SCENARIO)",
+        r"beaver-ftc (derive AIRCRAFT|mismatch SCENARIO)\b.*",
         "names the arguments",
-        r"beaver-ftc derive --help",
+        "beaver-ftc derive --help && beaver-ftc mismatch --help",
+    ),
+    Exempt(
+        r"beaver-ftc mechanisms .*",
+        "flies for minutes; the study's own tests fly a few draws",
+        "beaver-ftc mechanisms --help",
     ),
     Exempt(
         r"beaver-ftc sweep my-sweep\.yaml --rare no_departure",

@@ -6,10 +6,10 @@ from importlib.util import find_spec
 
 import pytest
 
-from beaver_ftc import commands, extensions
+from beaver_ftc import commands, plugins
 from beaver_ftc.documents.errors import BadInput
 
-OURS = (commands.GROUP, commands.GROUPS, extensions.SERVICES, extensions.WHEN_IMPORTED)
+OURS = (commands.GROUP, commands.GROUPS, plugins.SERVICES, plugins.WHEN_IMPORTED)
 METADATA = """[console_scripts]
 other = other:main
 
@@ -36,26 +36,26 @@ def package(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "path", [*sys.path, str(tmp_path)])
     monkeypatch.delitem(sys.modules, "gymnasium.envs.registration", raising=False)  # named in it for good
     monkeypatch.setattr(sys, "meta_path", list(sys.meta_path))
-    extensions._all_entries.cache_clear()
+    plugins._all_entries.cache_clear()
     yield tmp_path
-    extensions._all_entries.cache_clear()
+    plugins._all_entries.cache_clear()
     for name in ("counting", "waited_for"):
         sys.modules.pop(name, None)
 
 
 @pytest.mark.parametrize("group", OURS)
 def test_it_finds_what_the_standard_library_finds(group):
-    found = extensions.entries(group)
+    found = plugins.entries(group)
     listed = {point.name: point.value for point in entry_points(group=group)}
     assert found == {name: target for name, target in listed.items() if find_spec(target.partition(".")[0])}
     assert list(found) == sorted(found)
     for target in found.values():
-        assert extensions.loaded(target)
+        assert plugins.loaded(target)
 
 
 def test_a_service_of_another_package_is_called_by_its_name(package):
-    assert extensions.required("count", "--count")(1, 2, 3) == 3
-    assert extensions.offered("count")() == 0
+    assert plugins.required("count", "--count")(1, 2, 3) == 3
+    assert plugins.offered("count")() == 0
 
 
 def test_of_two_of_a_name_the_first_on_the_path_is_taken(package):
@@ -64,21 +64,21 @@ def test_of_two_of_a_name_the_first_on_the_path_is_taken(package):
         "[beaver_ftc.services]\ncount = counting:note\n"
     )
     sys.path.append(str(package / "later"))
-    extensions._all_entries.cache_clear()
-    assert extensions.entries(extensions.SERVICES)["count"] == "counting:count"
+    plugins._all_entries.cache_clear()
+    assert plugins.entries(plugins.SERVICES)["count"] == "counting:count"
 
 
 def test_what_nobody_offers_or_whose_package_is_gone_is_refused_in_a_line(package):
-    assert extensions.offered("gone") is None
+    assert plugins.offered("gone") is None
     with pytest.raises(BadInput) as caught:
-        extensions.required("gone", "--gone")
+        plugins.required("gone", "--gone")
     assert str(caught.value) == (
         "--gone: no installed package offers 'gone', allowed: with all of `pip install beaver-ftc`"
     )
 
 
 def test_a_function_is_called_once_its_module_is_imported(package):
-    extensions.watch_imports()
+    plugins.watch_imports()
     assert "counting" not in sys.modules
     import waited_for  # noqa: F401
 
@@ -88,12 +88,12 @@ def test_a_function_is_called_once_its_module_is_imported(package):
 def test_of_a_module_that_is_there_already_it_is_called_at_once(package):
     import waited_for  # noqa: F401
 
-    extensions.watch_imports()
+    plugins.watch_imports()
     assert sys.modules["counting"].seen == [7]
 
 
 def test_the_folders_of_those_who_offer_something():
-    found = extensions.folders(extensions.SERVICES)
-    named = {target.partition(".")[0] for target in extensions.entries(extensions.SERVICES).values()}
+    found = plugins.folders(plugins.SERVICES)
+    named = {target.partition(".")[0] for target in plugins.entries(plugins.SERVICES).values()}
     assert {folder.name for folder in found} == named
     assert all((folder / "__init__.py").is_file() for folder in found)

@@ -17,9 +17,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from beaver_ftc import compiled
-from beaver_ftc.compiled import direct, kernel, plain, record, sized, sized_types
+from beaver_ftc.compiled import direct, kernel, plain, record, sized, target
 from beaver_ftc.compiled.records import Room, shape_of
-from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE, Capacity, RecordSize
+from beaver_ftc.diagnosis.detection.parity import USUAL_RECORD_SIZE, Capacity, StatisticalRecordSize
 from beaver_ftc.loop.assembly import frame_dtype
 
 of_known = pytest.mark.skipif(
@@ -228,9 +228,11 @@ def test_records_that_change_in_size_stand_in_a_row():
 @of_known
 def test_flights_of_all_sizes_have_one_type():
     """Surfaces, terms of the model, boxes of its error map, delays: none makes another."""
-    kind_of = sized_types.kind_of
-    large = RecordSize(Capacity(105, 62), Capacity(108, 21), 47, 20)
-    sizes = [(n, size, line) for n in (3, 4, 17, 20) for size in (USUAL_SIZE, large) for line in (512, 9000)]
+    kind_of = target.kind_of
+    large = StatisticalRecordSize(Capacity(105, 62), Capacity(108, 21), 47, 20)
+    sizes = [
+        (n, size, line) for n in (3, 4, 17, 20) for size in (USUAL_RECORD_SIZE, large) for line in (512, 9000)
+    ]
     assert {kind_of(frame_dtype(*of), 1) for of in sizes} == {kind_of(frame_dtype(4), 1)}
 
 

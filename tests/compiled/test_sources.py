@@ -21,6 +21,7 @@ import sole_folder.inner
 from beaver_ftc.compiled import apart, kernel
 from sole_intrinsic import loaded
 from sole_folder import inner
+from sole_folder.here import far
 
 SCALE, TABLE = 2.0, (np.array([1.0, 2.0]), 3)
 
@@ -54,7 +55,7 @@ def above(record, x):
     if x > SCALE:
         rare(record)
     part_of_it = below(x) + TABLE[0][1] + TABLE[1] + Kind.LOST + half(x) + third(x) + part(x)
-    return part_of_it + inner.A + sole_folder.inner.B + loaded(x) + 6.0
+    return part_of_it + inner.A + sole_folder.inner.B + loaded(x) + far(x) + 6.0
 """
 INTRINSIC = """
 from numba import types
@@ -64,7 +65,11 @@ from numba.extending import intrinsic
 def loaded(typingctx, x):
     return types.float64(x), lambda context, builder, signature, args: args[0]
 """
-FILES = {"sole.py": SOLE, "sole_intrinsic.py": INTRINSIC, "sole_folder/inner.py": "A = 7.0\nB = 8.0\n"}
+FAR = "from beaver_ftc.compiled import kernel\n\n@kernel\ndef far(x):\n    return 7.0 * x\n"
+FILES = {
+    "sole.py": SOLE, "sole_intrinsic.py": INTRINSIC, "sole_folder/inner.py": "A = 7.0\nB = 8.0\n",
+    "sole_folder/here.py": FAR, "sole_folder/elsewhere.py": FAR,
+}  # fmt: skip
 
 
 @pytest.fixture
@@ -78,7 +83,7 @@ def digest(tmp_path, monkeypatch):
         assert before in FILES[file]
         for name, text in FILES.items():
             (tmp_path / name).write_text(text.replace(before, after) if name == file and before else text)
-        for name in ("sole", "sole_intrinsic", "sole_folder.inner", "sole_folder"):
+        for name in ("sole", "sole_intrinsic", "sole_folder.inner", "sole_folder.here", "sole_folder"):
             sys.modules.pop(name, None)
         return digest_of(import_module("sole").above.py_func)
 
@@ -102,6 +107,7 @@ def digest(tmp_path, monkeypatch):
         ("sole_intrinsic.py", "args[0]", "args[-1]"),
         ("sole_folder/inner.py", "7.0", "7.5"),
         ("sole_folder/inner.py", "8.0", "8.5"),
+        ("sole.py", "sole_folder.here", "sole_folder.elsewhere"),  # kept code imports the modules it is from
     ],
 )
 def test_what_changes_its_code_makes_another_name(digest, file, before, after):

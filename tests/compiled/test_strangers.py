@@ -5,6 +5,11 @@ import subprocess
 import sys
 from functools import cache
 
+import numba
+import numpy as np
+
+from beaver_ftc.compiled import compile_into
+
 PROGRAM = '''
 import itertools, json, re, sys
 import numba
@@ -134,3 +139,14 @@ CPUCodeLibrary.finalize = lambda library: usual(library)
 
 def test_a_replaced_part_would_be_seen():
     assert outcome()["seen"] == ["numba.core.codegen.CPUCodeLibrary.finalize"]
+
+
+def test_both_find_their_own_implementation_of_a_function_of_numpy_in_any_order():
+    """Numba notes one for all targets, that of whoever asked last; each type of number is compiled anew."""
+
+    def total(values):
+        return values.sum()
+
+    compilers = [lambda function: compile_into(None, function), numba.njit]
+    for n, kind in enumerate(("i1", "i2", "u1", "u2", "u4", "f4")):
+        assert compilers[n % 2](total)(np.full(3, 2, kind)) == 6

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from beaver_ftc.diagnosis.base import Verdict
+from beaver_ftc.diagnosis import Verdict
 
 
 class Silent:
@@ -59,27 +59,6 @@ class NotAVerdict(Silent):
         return True
 
 
-class UnknownSurface(Silent):
-    """Names a surface there is not."""
-
-    def step(self, measured, command):
-        return Verdict(True, "q", "canard")
-
-
-class NanEstimate(Silent):
-    """Estimates nothing."""
-
-    def step(self, measured, command):
-        return Verdict(True, "q", "elevator", "loss_of_effectiveness", float("nan"))
-
-
-class ThreeEffectivenesses(Silent):
-    """Forgets the flap."""
-
-    def step(self, measured, command):
-        return Verdict(True, "q", effectiveness=np.ones(3))
-
-
 class Hold:
     """A law that leaves the surfaces in trim."""
 
@@ -116,13 +95,6 @@ class RaisingLaw(Hold):
 
     def step(self, measured, reference, verdict):
         raise IndexError("no such layer")
-
-
-class WrongAxis(Silent):
-    """Names an axis there is not."""
-
-    def step(self, measured, command):
-        return Verdict(True, "yaw")
 
 
 class NoStep:

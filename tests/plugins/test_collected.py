@@ -6,8 +6,11 @@ import pytest
 
 from beaver_ftc import pytest_plugin as plugin
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.pytest_plugin import ExpectationItem, ExpectationMissed, ScenarioFile, SweepFile
+from beaver_ftc.pytest_plugin import ExpectationItem, ExpectationMissed, Flown, ScenarioFile, SweepFile
+from beaver_ftc.results.model import Expectation, Judged
 
+TOLD = Expectation("pass_rate.at_least", True, "≥ 0.5", "1 of 2 flights")
+VERDICT = Judged("many", True, (TOLD,))
 SCENARIO, SWEEP = "name: one\nduration_s: 1\n", "name: many\nbase: fault-free\nruns: 3\n"
 
 
@@ -65,19 +68,17 @@ def test_only_yaml_is_looked_at(tmp_path):
     assert plugin.pytest_collect_file(file(tmp_path, "a.yaml", "- a\n"), parent) is None
 
 
-def item(document, name="isolated_as"):
-    """An expectation of a file whose flight came to this document, as pytest would make it."""
+def item(flown, name="isolated_as"):
+    """An expectation of a file of which this came, as pytest would make it."""
     made = object.__new__(ExpectationItem)
     made.name, made.user_properties, made.path = name, [], "a.yaml"
-    made.parent = SimpleNamespace(flown=lambda: document, name_flown="one")
+    made.parent = SimpleNamespace(flown=lambda: flown, name_flown="one")
     return made
 
 
 def expected(**passed):
-    told = [
-        {"name": name, "passed": ok, "expected": "rudder", "actual": "flap"} for name, ok in passed.items()
-    ]
-    return {"folder": "tmp/one", "expectations": told}
+    told = tuple(Expectation(name, ok, "rudder", "flap") for name, ok in passed.items())
+    return Flown(told, "tmp/one")
 
 
 def test_an_item_holds_its_own_expectation_alone():
@@ -96,21 +97,21 @@ def test_a_file_is_flown_once_whatever_came_of_it(tmp_path):
     """What went wrong is said again to each of its items."""
     flights = []
 
-    class Flown(plugin.FlownFile):
+    class Once(plugin.FlownFile):
         def _fly(self, out):
             flights.append(out)
             if self.name_flown == "bad":
                 raise BadInput("no")
-            return {"folder": str(out)}
+            return Flown((), str(out))
 
     for name in ("good", "bad"):
-        made = object.__new__(Flown)
+        made = object.__new__(Once)
         made.name_flown = name
         factory = SimpleNamespace(mktemp=lambda called: tmp_path / called)
         made.config = SimpleNamespace(_tmp_path_factory=factory)
         for _ in range(2):
             if name == "good":
-                assert made.flown() == {"folder": str(tmp_path / "beaver-ftc")}
+                assert made.flown() == Flown((), str(tmp_path / "beaver-ftc"))
                 continue
             with pytest.raises(BadInput, match="no"):
                 made.flown()
@@ -125,11 +126,11 @@ def test_of_a_scenario_that_fails_the_figures_are_kept(monkeypatch, tmp_path, pa
         saved.append((out, report))
         return out / "one"
 
-    flight = SimpleNamespace(passed=passed, metrics={"expectations": []}, save=save)
+    flight = SimpleNamespace(passed=passed, expectations=(TOLD,), save=save)
     monkeypatch.setattr("beaver_ftc.results.flight.fly", lambda scenario: flight)
     made = object.__new__(ScenarioFile)
     made.scenario = None
-    assert made._fly(tmp_path) == {"expectations": [], "folder": str(tmp_path / "one")}
+    assert made._fly(tmp_path) == Flown((TOLD,), str(tmp_path / "one"))
     assert saved == [(tmp_path, not passed)]
 
 
@@ -142,9 +143,9 @@ def test_of_a_sweep_that_fails_a_page_is_made_and_nothing_flown_again(monkeypatc
         return {"passed": passed}
 
     monkeypatch.setattr("beaver_ftc.studies.sweep.campaign.run_sweep", run_sweep)
-    monkeypatch.setattr("beaver_ftc.studies.sweep.summary_page.verdict", lambda summary: {"told": summary})
+    monkeypatch.setattr("beaver_ftc.studies.sweep.summary_page.verdict", lambda summary: VERDICT)
     made = object.__new__(SweepFile)
     made.sweep, made.path = SimpleNamespace(name="many"), "many.yaml"
-    assert made._fly(tmp_path) == {"told": {"passed": passed}, "folder": str(tmp_path / "many")}
+    assert made._fly(tmp_path) == Flown((TOLD,), str(tmp_path / "many"))
     again = [] if passed else [(tmp_path, True, True, "many.yaml")]
     assert runs == [(tmp_path, False, False, "many.yaml"), *again]

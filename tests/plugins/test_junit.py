@@ -6,6 +6,7 @@ from xml.etree import ElementTree
 import pytest
 
 from beaver_ftc.results.junit import write_junit
+from beaver_ftc.results.model import Expectation, Judged
 from commands import beaver
 
 
@@ -15,26 +16,28 @@ def _attributes(element, *names):
 
 def test_expectations_become_cases_and_failures_say_both_values(tmp_path):
     runs = [
-        {
-            "scenario": "a",
-            "expectations": [
-                {"name": "no_departure", "passed": True, "expected": True, "actual": True},
-                {"name": "isolated_as", "passed": False, "expected": "rudder", "actual": None},
-            ],
-        },
-        {"scenario": "b", "expectations": []},
-        {"scenario": "c", "error": 'c: not finite at 3 s: "q" & <r>'},
+        Judged(
+            "a",
+            expectations=(
+                Expectation("no_departure", True, True, True),
+                Expectation("isolated_as", False, "rudder", None),
+                Expectation("isolated_as", False, ("rudder",), (), reason="too early"),
+            ),
+        ),
+        Judged("b"),
+        Judged("c", error='c: not finite at 3 s: "q" & <r>'),
     ]
     write_junit(runs, tmp_path / "deep" / "j.xml")
     suites = list(ElementTree.parse(tmp_path / "deep" / "j.xml").getroot())
     assert [_attributes(s, "name", "tests", "failures", "errors") for s in suites] == [
-        ("a", "2", "1", "0"),
+        ("a", "3", "2", "0"),
         ("b", "1", "0", "0"),
         ("c", "1", "0", "1"),
     ]
     failure = suites[0][1].find("failure")
     assert failure.get("message") == "expected rudder, actual None"
-    assert suites[2][0].find("error").get("message") == runs[2]["error"]
+    assert suites[0][2].find("failure").get("message") == "expected ['rudder'], actual []: too early"
+    assert suites[2][0].find("error").get("message") == runs[2].error
 
 
 def test_the_command_line_writes_it_whatever_the_verdict(tmp_path):
@@ -97,10 +100,8 @@ def test_a_sweep_that_cannot_be_flown_is_an_error_in_it(tmp_path):
 
 def test_what_xml_cannot_hold_is_escaped(tmp_path):
     said = "plug-in x: \x00 \x1b[31mred \ufffe \udcff\nsecond line"
-    missed = {"name": "isolated_as", "passed": False, "expected": "a\x07b", "actual": None}
-    write_junit(
-        [{"scenario": "a", "error": said}, {"scenario": "b", "expectations": [missed]}], tmp_path / "j"
-    )
+    missed = Expectation("isolated_as", False, "a\x07b", None)
+    write_junit([Judged("a", error=said), Judged("b", expectations=(missed,))], tmp_path / "j")
     message = ElementTree.parse(tmp_path / "j").find(".//error").get("message")
     assert message == r"plug-in x: \x00 \x1b[31mred \ufffe \udcff" + "\nsecond line"
     assert (

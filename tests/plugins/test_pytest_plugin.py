@@ -7,6 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from commands import beaver, run_pytest
+
+pytestmark = pytest.mark.usefixtures("figures_in_short")
+
 MEETS = """
 name: meets
 duration_s: 4
@@ -23,10 +27,13 @@ runs: 3
 vary: {initial.airspeed_mps: {uniform: [40, 45]}}
 expect: {departure_rate: {at_most: 0, at_least: 1}, pass_rate: {at_least: 1}}
 """
-BEAVER = Path(sys.executable).with_name("beaver-ftc")
 
 
 def _pytest(folder, *arguments):
+    return run_pytest(*arguments, cwd=folder)
+
+
+def _pytest_alone(folder, *arguments):
     command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "--basetemp", "tmp", *arguments]
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, timeout=300)
 
@@ -59,7 +66,7 @@ def test_marked_files_are_collected_by_themselves_and_what_expects_nothing_must_
 
 @pytest.mark.parametrize("workers", [(), ("-n", "2", "--dist", "loadgroup")], ids=["one", "two workers"])
 def test_a_missed_expectation_is_one_item_with_both_values_and_the_result_is_kept(folder, workers):
-    done = _pytest(folder, "--beaver", ".", *workers)
+    done = (_pytest_alone if workers else _pytest)(folder, "--beaver", ".", *workers)
     assert done.returncode == 1
     assert "7 passed" in done.stdout
     assert "1 failed" in done.stdout
@@ -79,7 +86,7 @@ def _collected(folder, *arguments):
 def test_result_folders_are_not_collected_unless_a_file_in_one_is_named(folder):
     before = _collected(folder, "--beaver", ".")
     for command in (("run", "meets.scenario.yaml"), ("sweep", "many.yaml", "--keep-logs", "1")):
-        subprocess.run([BEAVER, *command, "--no-report"], cwd=folder, check=False)
+        beaver(*command, "--no-report", cwd=folder)
     assert (folder / "runs" / "meets" / "scenario.yaml").is_file()
     assert list((folder / "runs" / "many" / "flights").glob("*/scenario.yaml"))
     assert _collected(folder, "--beaver", ".")[:-1] == before[:-1]  # the last line has the time it took
@@ -155,9 +162,9 @@ def test_unused_it_imports_nothing_of_the_testbed(folder):
         "    ours = {m for m in sys.modules if m.startswith('beaver_ftc')}\n"
         "    plugin = 'beaver_ftc.pytest_plugin'\n"
         "    light = {'beaver_ftc', 'beaver_ftc.documents', 'beaver_ftc.documents.errors'}\n"
-        "    light |= {'beaver_ftc.extensions', 'beaver_ftc.public'}\n"
+        "    light |= {'beaver_ftc.plugins', 'beaver_ftc.public'}\n"
         "    assert ours <= light | {'beaver_ftc.integrations', plugin}\n"
         "    assert not {'numpy', 'pydantic', 'numba', 'jsbsim'} & set(sys.modules)\n"
     )
-    done = _pytest(folder, "test_nothing.py", "-p", "no:hypothesispytest")
+    done = _pytest_alone(folder, "test_nothing.py", "-p", "no:hypothesispytest")
     assert done.returncode == 0, done.stdout

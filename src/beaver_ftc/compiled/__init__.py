@@ -71,6 +71,7 @@ def apart(function):
     compiled = compile_into(called.folder, caller)
     compiled.py_func = function
     setattr(compiled, BY_ADDRESS, f"{function.__module__}.{function.__qualname__}")
+    compiled.called = called
     return functools.update_wrapper(compiled, function)
 
 

@@ -1,21 +1,22 @@
-"""Compiled code on the disk: what it follows from, how it is kept and loaded, and signals meanwhile.
+"""Compiled code on the disk: what it follows from, how it is kept and loaded, and what is compiled ahead.
 
-Signals that arrive while LLVM calls Python.
+What machine code follows from is a kernel's instructions, its constants, and all that its names stand for.
+Compiled code is kept under the digest of these, so an edit compiles again what it changes and nothing else.
+Comments, docstrings and line numbers change no code. What is compiled by means of its own, an intrinsic, is
+as its whole file.
 
-LLVM asks for kept machine code by a Python function. A signal's handler that raises there, as that of
-Ctrl-C does, raises inside of a call from C: the exception is lost, LLVM goes on without the code, and the
-process crashes.
+Each kernel and set of argument types has a file: written once, loaded by all. It is loaded without making
+Numba's compiler ready, which takes 0.25 s. It is pickled machine code, which runs when it is loaded: a file
+that another user can write is not loaded.
 
-What machine code follows from: a kernel's instructions, its constants, and all that its names stand for.
+LLVM asks for kept machine code by a Python function. A signal's handler that raises there, as that of Ctrl-C
+does, raises inside of a call from C: the exception is lost, LLVM goes on without the code, and the process
+crashes. So signals wait meanwhile.
 
-Compiled code is kept under this digest, so an edit compiles again what it changes and nothing else.
-Comments, docstrings and line numbers change no code. What is compiled by means of its own, an intrinsic,
-is as its whole file.
-
-Compiled code on the disk, a file a kernel and set of argument types: written once, loaded by all.
-
-It is loaded without making Numba's compiler ready, which takes 0.25 s. It is pickled machine code, which
-runs when it is loaded: a file that another user can write is not loaded.
+A flight says what it will call (`expect`) and compiles nothing as long as all of it is kept. The first kernel
+that is missing compiles all that are: here and in a second process, which is forked for it. Each takes the
+next kernel that nobody else compiles, and both keep their code in the same folder. A second process that
+fails, or that there is not, costs time alone.
 """
 
 import atexit
@@ -28,11 +29,13 @@ import pickle
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from enum import EnumMeta
+from multiprocessing import parent_process
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -74,10 +77,12 @@ BY_ADDRESS = "called_by_address"  # an attribute of a kernel that its callers lo
 def digest_of(function: FunctionType) -> str:
     """A name for what a kernel's machine code follows from beside its arguments' types: its instructions,
     the constants in it, and what its names stand for now, kernels it calls included."""
-    digest = hashlib.sha256()
-    for part in _parts(function, {}):
-        digest.update(part.encode() + b"\0")
-    return digest.hexdigest()
+    return hashlib.sha256(what_follows(function)).hexdigest()
+
+
+def what_follows(function: FunctionType) -> bytes:
+    """All that the digest is of. Its length says roughly how long it takes to compile."""
+    return b"".join(part.encode() + b"\0" for part in _parts(function, {}))
 
 
 def _parts(function: FunctionType, seen: dict[int, int]) -> Iterator[str]:
@@ -85,6 +90,7 @@ def _parts(function: FunctionType, seen: dict[int, int]) -> Iterator[str]:
         yield f"as before, {seen[id(function)]}"
         return
     seen[id(function)] = len(seen)
+    yield str(function.__module__)  # which the kept code imports
     cells = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
     known = {**function.__globals__, **{name: cell.cell_contents for name, cell in cells}}
     yield from _value(function.__defaults__ or (), seen)
@@ -143,8 +149,8 @@ def _value(value: Any, seen: dict[int, int]) -> Iterator[str]:
         yield f"{type(value).__qualname__} {getattr(value, '__name__', '')}"
 
 
-COMPILING = "compiling the flight code, once on this machine: some 20 s on an idle one"
-MORE = "compiling what this flight is the first to use, once on this machine: 10 s to a minute on an idle one"
+COMPILING = "compiling flight code that is new to this machine, once: about {:.0f} s on an idle one"
+PER_S = 17_000  # characters of `what_follows` compiled in a second: 11000 to 25000, by the kernel
 PATIENCE_S = 1.0  # what takes less needs no word
 
 MOST_BYTES = 500_000_000  # of code kept in a folder: some hundred versions of the flight code
@@ -154,31 +160,41 @@ _LOCK = "lock"
 
 
 @contextlib.contextmanager
-def locked(folder: Path | None) -> Iterator[None]:
-    """Wait until no other process compiles into this folder: it may be the very same."""
+def locked(folder: Path | None, place: int, wait: bool = True) -> Iterator[bool]:
+    """Keep other processes from compiling the same kernel into this folder; place: its byte in the file that
+    is locked. Whether it is locked: not, without waiting, while another process is at it."""
     with contextlib.ExitStack() as held:
+        mine = True
         if folder is not None:
-            with contextlib.suppress(OSError, ImportError):  # no lock: then several may compile
+            with contextlib.suppress(ImportError, OSError):  # no lock: then several may compile
                 import fcntl
 
                 folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-                fcntl.flock(held.enter_context((folder / _LOCK).open("w")), fcntl.LOCK_EX)
-        yield
+                file = held.enter_context((folder / _LOCK).open("w"))
+                try:
+                    fcntl.lockf(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB), 1, place)
+                except (BlockingIOError, PermissionError):
+                    mine = False
+        yield mine
 
 
-@functools.cache
-def _say_compiling(folder: Path | None) -> None:
-    """A word a process: of all the flight code, or of the part that earlier flights have had no use for."""
-    kept = folder is not None and any(path.name != _LOCK for path in folder.glob("*"))
-    say_once(MORE if kept else COMPILING)
+_announcing: list[float] = []
 
 
 @contextlib.contextmanager
-def announced(folder: Path | None) -> Iterator[None]:
-    """Say what takes so long, if it does. Garbage is not looked for meanwhile, nor soon in what the compiler
-    leaves: there is little, and looking costs a quarter of its time."""
-    saying = threading.Timer(PATIENCE_S, _say_compiling, [folder])
+def announced(size: float) -> Iterator[None]:
+    """Say what takes so long, if it does; size: characters that the code to compile follows from.
+
+    Garbage is not looked for meanwhile, nor soon in what the compiler leaves: there is little, and looking
+    costs a quarter of its time.
+    """
+    if _announcing:  # inside of what is announced already
+        yield
+        return
+    says = COMPILING.format(max(size / PER_S, 1.0))
+    saying = threading.Timer(PATIENCE_S, say_once, [says])
     saying.start()
+    _announcing.append(size)
     gc.disable()
     try:
         yield
@@ -186,6 +202,7 @@ def announced(folder: Path | None) -> Iterator[None]:
         gc.freeze()
         gc.unfreeze()  # into the oldest generation
         gc.enable()
+        _announcing.pop()
         saying.cancel()
         atexit.register(gc.freeze)  # nor when the process ends
 
@@ -205,6 +222,14 @@ class CodeCache:
     def _path(self, types, codegen) -> Path:
         key = repr((*self._of, types, codegen.magic_tuple()))
         return self._folder / f"{self._name.rpartition('.')[2]}-{hashlib.sha256(key.encode()).hexdigest()}"
+
+    def place(self, types, codegen) -> int:
+        """The place of this code among all: see `locked`."""
+        return int(self._path(types, codegen).name[-12:], 16)
+
+    def has(self, types, codegen) -> bool:
+        """Whether something is kept: `load` says whether it is sound."""
+        return self._path(types, codegen).exists()
 
     def load(self, types, context):
         """What was kept, ready to run; None if there is nothing that is as this user has written it."""
@@ -258,3 +283,105 @@ def _statuses(folder: Path) -> Iterator[tuple[Path, os.stat_result]]:
         with contextlib.suppress(FileNotFoundError):  # another process has removed it
             if path.is_file():
                 yield path, path.stat()
+
+
+class Wanted(NamedTuple):
+    """A kernel and the types of its arguments."""
+
+    kernel: Any
+    kinds: tuple[Any, ...]
+
+    @classmethod
+    def of(cls, kernel: Any, kinds: tuple[Any, ...]) -> "Wanted":
+        """A kernel as it is named: of one that is called by its address, the code at that address."""
+        return cls(getattr(kernel, "called", kernel), kinds)
+
+    @property
+    def is_missing(self) -> bool:
+        return not self.kernel.is_kept(self.kinds)
+
+    def compile(self) -> None:
+        """Compile it, unless it is there or another process is at it."""
+        self.kernel.compile_unless_taken(self.kinds)
+
+
+_expected: list[Callable[[], Iterable[Wanted]]] = []  # of the flight in progress, until they are compiled
+
+
+def expect(wanted: Callable[[], Iterable[Wanted]] | None) -> None:
+    """From now on the first kernel that is not kept has these compiled too, longest first; None: nothing."""
+    _expected[:] = [] if wanted is None else [wanted]
+
+
+def compile_expected() -> None:
+    """Compile what the flight in progress is expected to call; nothing if that was done."""
+    if _expected:
+        compile_missing(_expected.pop()())
+
+
+def compile_missing(wanted: Iterable[Wanted]) -> int:
+    """Compile those that are not kept; returns how many those were."""
+    missing = [each for each in wanted if each.is_missing]
+    if not missing:
+        return 0
+    kept = all(each.kernel.folder for each in missing)  # else the second process could not hand over
+    helper = _fork(missing) if kept and len(missing) > 1 and can_fork() else None
+    try:
+        with announced(sum(each.kernel.size for each in missing) / (1.0 if helper is None else 1.7)):
+            for each in missing:
+                each.compile()
+            _wait(helper)
+    except BaseException:
+        _end(helper)
+        raise
+    return len(missing)
+
+
+def can_fork() -> bool:
+    """Whether a second process is of use: two processors, and no thread that could hold a lock."""
+    if sys.platform != "linux" or parent_process() is not None or threading.active_count() > 1:
+        return False  # a worker has others beside it, which compile too
+    return len(os.sched_getaffinity(0)) > 1
+
+
+def _fork(missing: Sequence[Wanted]) -> int | None:
+    """Start the second process; None where that is refused."""
+    parent = os.getpid()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # Python's, of threads: a library's own know of a fork
+            helper = os.fork()
+    except OSError:
+        return None
+    if helper == 0:
+        _help(missing, parent)
+    return helper
+
+
+def _help(missing: Sequence[Wanted], parent: int) -> None:
+    """Be the second process: silent, ended by any signal, and not without the first."""
+    try:
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, signal.SIG_DFL)
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, 1)
+        os.dup2(nowhere, 2)
+        for each in missing:
+            if os.getppid() != parent:
+                break
+            each.compile()
+    finally:
+        os._exit(0)
+
+
+def _wait(helper: int | None) -> None:
+    if helper is not None:
+        with contextlib.suppress(ChildProcessError):  # who ignores SIGCHLD has no child to wait for
+            os.waitpid(helper, 0)
+
+
+def _end(helper: int | None) -> None:
+    if helper is not None:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(helper, signal.SIGKILL)
+        _wait(helper)

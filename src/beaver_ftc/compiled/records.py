@@ -2,7 +2,7 @@
 
 What has the same size in each comes first in such a record, always in the same places. Behind it is what has
 not: where each part begins and how long it is follows from the record's NumPy type. Compiled code asks for
-these numbers (`places`) when Python calls it, and is the same for all sizes: compiled/sized_types.py.
+these numbers (`places`) when Python calls it, and is the same for all sizes: compiled/target.py.
 """
 
 import functools
@@ -58,7 +58,13 @@ class Shape(NamedTuple):
 
     @property
     def digest(self) -> str:
-        return hashlib.sha256(repr(self).encode()).hexdigest()[:16]
+        return _digest_of(self)
+
+
+@functools.cache
+def _digest_of(shape: Shape) -> str:
+    """2 ms for a large record, and asked for at each use of one while code is compiled."""
+    return hashlib.sha256(repr(shape).encode()).hexdigest()[:16]
 
 
 _shapes: dict[np.dtype, Shape] = {}

@@ -4,32 +4,57 @@ Numba knows its targets by registries [numba.core.target_extension]: a class of 
 its functions, and the contexts in which they are typed and translated. Ours inherit from those of Numba's
 CPU target. Nothing of Numba is replaced: a function that somebody else compiles never comes here.
 
-Of a version of Numba in `KNOWN` more is borrowed: records have a size (sized_types.py), and what only some
-flights want is called by its address. With any other version each aircraft has code of its
-own, all of it, which takes longer. library.py serves other versions too, if it passes a trial in a process
-of its own.
+Machine code. Numba optimises a function again at each level of calls. Here a kernel that another one calls
+is only translated; the outermost one is optimised once, with all that it calls (`Library`). This is
+borrowed from inside the versions of Numba in `KNOWN`. Another version is tried in a process of its own,
+because what is borrowed from inside it may end a process instead of raising; it is used if it passes the
+trial.
 
-Kernels that are called by their address, each compiled by itself when a flight first calls it.
+Of a version in `KNOWN` more is borrowed: records have types that are the same for all sizes, and kernels that
+only some flights call are called by their address, each compiled by itself when a flight first calls it. The
+caller holds the address, zero at first; then Python finds or compiles the code. So a flight compiles what it
+uses, and kernels that call the same one share its code. With any other version each aircraft has code of its
+own, all of it, which takes longer.
 
-The caller holds the address, zero at first; then Python finds or compiles the code. So a flight compiles
-what it uses, and kernels that call the same one share its code.
+To compiled code a record with room is its memory and the places in it (records.py): a row of numbers, found
+by the record's own NumPy type each time that Python calls compiled code. So a copy of a record, one from a
+file or another process brings its places along, and what has none is refused. They never change: LLVM is told
+so, and need not look again after a write. Kernels of ours alone see such a type. To anybody else's `@njit`
+the same record is what it is to Numba.
+
+All that is borrowed from inside Numba is in this file: a version without those parts cannot import it, and
+kernels are then compiled by Numba's own means.
 """
 
 import functools
 import hashlib
+import operator
 import os
 import pickle
+import sys
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import llvmlite
 import numba
+import numpy as np
 from llvmlite import ir
 from numba.core import cgutils, serialize, sigutils, types, typing
+from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.cpu import CPUContext
+from numba.core.datamodel import models
+from numba.core.imputils import (
+    RefType,
+    impl_ret_borrowed,
+    iternext_impl,
+    lower_getattr_generic,
+    lower_setattr_generic,
+)
+from numba.core.pythonapi import NativeValue
 from numba.core.registry import CPUDispatcher, CPUTarget, cpu_target
 from numba.core.runtime import rtsys
 from numba.core.target_extension import (
@@ -40,15 +65,489 @@ from numba.core.target_extension import (
     target_registry,
 )
 from numba.core.types import unliteral
+from numba.core.typing.templates import AttributeTemplate, infer_getattr, signature
 from numba.core.utils import threadsafe_cached_property
-from numba.extending import intrinsic, overload
+from numba.extending import (
+    intrinsic,
+    lower_builtin,
+    overload,
+    overload_attribute,
+    register_model,
+    unbox,
+)
+from numba.np.arrayobj import make_array, populate_array
 
 from beaver_ftc.compiled import cache
-from beaver_ftc.compiled import library as trial
 from beaver_ftc.compiled.cache import CodeCache, announced, locked
-from beaver_ftc.compiled.library import Codegen, Inner, compiling
-from beaver_ftc.compiled.sized_types import kind_of, type_of
+from beaver_ftc.compiled.records import Part, Shape, places, shape_of
 from beaver_ftc.documents.errors import say_once
+from beaver_ftc.documents.files import digest_of_files
+from beaver_ftc.documents.files import passes as passes_in_a_child
+
+# mypy: disable-error-code="call-arg,override"
+
+
+_BYTE, _WORD = ir.IntType(8), ir.IntType(64)
+_MEMORY, _PLACES = types.CPointer(types.uint8), types.CPointer(types.int64)
+
+
+class SizedRecord(types.Type):
+    """A record of this shape, whatever its size."""
+
+    mutable = True
+
+    def __init__(self, shape: Shape) -> None:
+        self.shape = shape
+        super().__init__(f"{type(self).__name__}({shape.digest})")
+
+    def part(self, name: str) -> tuple[int, Part] | None:
+        """The part of this name, and which of the places is its first."""
+        first = 0
+        for part in self.shape.parts:
+            if part.name == name:
+                return first, part
+            first += part.n_places
+        return None
+
+    def typeof(self, name: str) -> Any:
+        """The type of a field; None if there is none of this name."""
+        found = self.part(name)
+        if found is None:
+            return fixed_part(self).fields[name].type if name in (self.shape.fixed.names or ()) else None
+        part = found[1]
+        if isinstance(part.of, Shape):
+            return (SizedRecords if part.dims else SizedRecord)(part.of)
+        return types.Array(numba.from_dtype(part.of), len(part.dims), "C")
+
+
+class SizedRecords(types.IterableType):
+    """Records of this shape one behind the other, all of one size."""
+
+    mutable = True
+
+    def __init__(self, shape: Shape) -> None:
+        self.shape = shape
+        super().__init__(f"{type(self).__name__}({shape.digest})")
+
+    @property
+    def iterator_type(self) -> "SizedRecordsIterator":
+        return SizedRecordsIterator(self.shape)
+
+
+class SizedRecordsIterator(types.SimpleIteratorType):
+    def __init__(self, shape: Shape) -> None:
+        self.shape = shape
+        super().__init__(f"{type(self).__name__}({shape.digest})", SizedRecord(shape))
+
+
+@functools.cache
+def fixed_part(record: SizedRecord) -> Any:
+    """Numba's own type of what is the same in all sizes."""
+    return numba.from_dtype(record.shape.fixed)
+
+
+def type_of(argument: Any) -> Any:
+    """The type of a record or a row of records that have a size; None of anything else."""
+    if isinstance(argument, np.void):
+        return kind_of(argument.dtype, 0)
+    if isinstance(argument, np.ndarray) and argument.flags.writeable:
+        return kind_of(argument.dtype, argument.ndim)
+    return None
+
+
+def kind_of(dtype: np.dtype, dimensions: int) -> Any:
+    """The type of a record, dimensions 0, or of a row of them; None if they have but one size."""
+    shape = shape_of(dtype)
+    return (SizedRecord, SizedRecords)[dimensions](shape) if shape and dimensions < 2 else None
+
+
+@register_model(SizedRecord)
+class _RecordModel(models.StructModel):
+    def __init__(self, manager: Any, kind: Any) -> None:
+        super().__init__(manager, kind, [("memory", _MEMORY), ("places", _PLACES)])
+
+
+@register_model(SizedRecords)
+class _RecordsModel(models.StructModel):
+    def __init__(self, manager: Any, kind: Any) -> None:
+        members = [("memory", _MEMORY), ("places", _PLACES), ("count", types.intp), ("apart", types.intp)]
+        super().__init__(manager, kind, members)
+
+
+@register_model(SizedRecordsIterator)
+class _IteratorModel(models.StructModel):
+    def __init__(self, manager: Any, kind: Any) -> None:
+        members = [("next", types.EphemeralPointer(types.intp)), ("records", SizedRecords(kind.shape))]
+        super().__init__(manager, kind, members)
+
+
+def _struct(context: Any, builder: Any, kind: Any, value: Any = None) -> Any:
+    return cgutils.create_struct_proxy(kind)(context, builder, value=value)
+
+
+def _place(builder: Any, record: Any, k: int) -> Any:
+    """Number k of the places."""
+    found = builder.load(builder.gep(record.places, [_WORD(k)], inbounds=True))
+    found.set_metadata("invariant.load", builder.module.add_metadata([]))
+    return found
+
+
+@infer_getattr
+class _Fields(AttributeTemplate):
+    key = SizedRecord
+
+    def generic_resolve(self, record: Any, name: str) -> Any:
+        return record.typeof(name)
+
+
+@lower_getattr_generic(SizedRecord)
+def _get(context: Any, builder: Any, kind: Any, value: Any, name: str) -> Any:
+    record, found = _struct(context, builder, kind, value), kind.part(name)
+    if found is None:
+        fixed = fixed_part(kind)
+        there = builder.bitcast(record.memory, context.get_value_type(fixed))
+        return context.get_getattr(fixed, name)(context, builder, fixed, there, name)
+    first, part = found
+    memory = builder.gep(record.memory, [_place(builder, record, first)], inbounds=True)
+    wanted = kind.typeof(name)
+    if isinstance(part.of, Shape):
+        within = _struct(context, builder, wanted)
+        within.memory, rest = memory, first + 1
+        if part.dims:
+            within.count, within.apart = (_place(builder, record, first + k) for k in (1, 2))
+            rest = first + 3
+        within.places = builder.gep(record.places, [_WORD(rest)], inbounds=True)
+        return within._getvalue()
+    return _array(context, builder, wanted, memory, list(_sizes(builder, record, part, first + 1)))
+
+
+def _sizes(builder: Any, record: Any, part: Part, k: int) -> Iterator[Any]:
+    for size in part.dims:
+        yield _place(builder, record, k) if size is None else _WORD(size)
+        k += size is None
+
+
+def _array(context: Any, builder: Any, kind: Any, memory: Any, sizes: list[Any]) -> Any:
+    """An array in a record, C-ordered, that nobody counts the users of."""
+    data_type = context.get_data_type(kind.dtype)
+    step = _WORD(context.get_abi_sizeof(data_type))
+    item = step
+    steps: list[Any] = []
+    for size in reversed(sizes):
+        steps.insert(0, step)
+        step = builder.mul(step, size, flags=["nsw"])
+    array = make_array(kind)(context, builder)
+    data = builder.bitcast(memory, data_type.as_pointer())
+    populate_array(array, data, sizes, steps, item, meminfo=None)
+    return array._getvalue()
+
+
+@lower_setattr_generic(SizedRecord)
+def _set(context: Any, builder: Any, sig: Any, args: Any, name: str) -> None:
+    kind, given = sig.args
+    fixed = fixed_part(kind)
+    if name not in fixed.fields:
+        raise NotImplementedError(f"{name} cannot be assigned to: assign to its elements")
+    record = _struct(context, builder, kind, args[0])
+    there = builder.bitcast(record.memory, context.get_value_type(fixed))
+    assign = context.get_setattr(name, signature(types.void, fixed, given))
+    assign(builder, (there, args[1]))
+
+
+def _at(context: Any, builder: Any, kind: Any, records: Any, i: Any) -> Any:
+    record = _struct(context, builder, SizedRecord(kind.shape))
+    record.memory = builder.gep(records.memory, [builder.mul(i, records.apart)], inbounds=True)
+    record.places = records.places
+    return record._getvalue()
+
+
+@intrinsic
+def _record_at(typingctx: Any, records: Any, i: Any) -> Any:
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return _at(context, builder, records, _struct(context, builder, records, args[0]), args[1])
+
+    return SizedRecord(records.shape)(records, types.intp), codegen
+
+
+@intrinsic
+def _some_of(typingctx: Any, records: Any, first: Any, count: Any) -> Any:
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        some = _struct(context, builder, records, args[0])
+        some.memory = builder.gep(some.memory, [builder.mul(args[1], some.apart)], inbounds=True)
+        some.count = args[2]
+        return some._getvalue()
+
+    return records(records, types.intp, types.intp), codegen
+
+
+@intrinsic
+def _count(typingctx: Any, records: Any) -> Any:
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return _struct(context, builder, records, args[0]).count
+
+    return types.intp(records), codegen
+
+
+def _counted(records):
+    return _count(records)
+
+
+@overload(len)
+def _length(records):
+    return _counted if isinstance(records, SizedRecords) else None
+
+
+@overload_attribute(SizedRecords, "size")
+def _size(records):
+    return _counted
+
+
+@overload(operator.getitem)
+def _item(records, index):
+    if not isinstance(records, SizedRecords):
+        return None
+    if isinstance(index, types.Integer):
+        return lambda records, index: _record_at(records, index + (_count(records) if index < 0 else 0))
+    if index == types.slice2_type:
+        return _slice
+    return None
+
+
+def _slice(records, index):
+    first, last, _ = index.indices(_count(records))
+    return _some_of(records, first, max(last - first, 0))
+
+
+@lower_builtin("getiter", SizedRecords)
+def _iterator(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    iterator = _struct(context, builder, sig.return_type)
+    iterator.next = cgutils.alloca_once_value(builder, context.get_constant(types.intp, 0))
+    iterator.records = args[0]
+    return impl_ret_borrowed(context, builder, sig.return_type, iterator._getvalue())
+
+
+@lower_builtin("iternext", SizedRecordsIterator)
+@iternext_impl(RefType.BORROWED)
+def _next(context: Any, builder: Any, sig: Any, args: Any, result: Any) -> None:
+    (kind,) = sig.args
+    iterator, of = _struct(context, builder, kind, args[0]), SizedRecords(kind.shape)
+    records = _struct(context, builder, of, iterator.records)
+    i = builder.load(iterator.next)
+    valid = builder.icmp_signed("<", i, records.count)
+    result.set_valid(valid)
+    with builder.if_then(valid):
+        result.yield_(_at(context, builder, of, records, i))
+        builder.store(builder.add(i, _WORD(1), flags=["nsw"]), iterator.next)
+
+
+_kept: dict[np.dtype, tuple[str, np.ndarray]] = {}  # for as long as the process: compiled code points there
+
+
+def _places_of(digest: str, argument: Any) -> int:
+    """Where the places of a record or records of this shape lie."""
+    dtype = argument.dtype
+    if dtype not in _kept:
+        shape = shape_of(dtype)
+        _kept[dtype] = shape.digest if shape else "", np.fromiter(places(dtype) if shape else (), np.int64)
+    of, found = _kept[dtype]
+    if of != digest:
+        raise TypeError("a record of another shape than this code was compiled for")
+    address: int = found.ctypes.data
+    return address
+
+
+def _ask(c: Any, kind: Any, argument: Any) -> tuple[Any, Any]:
+    """Code that finds the places, and whether that failed."""
+    found, builder, python = cgutils.alloca_once_value(c.builder, _WORD(0)), c.builder, c.pyapi
+    asked = _held(c, functools.partial(_places_of, kind.shape.digest))
+    answer = python.call_function_objargs(asked, (argument,))
+    failed = cgutils.is_null(builder, answer)
+    with cgutils.if_likely(builder, builder.not_(failed)):
+        builder.store(python.long_as_longlong(answer), found)
+        python.decref(answer)
+    return builder.inttoptr(builder.load(found), _WORD.as_pointer()), failed
+
+
+def _held(c: Any, function: Callable[..., Any]) -> Any:
+    """Code that has a function of Python ready to be called, made the first time and kept."""
+    builder, python = c.builder, c.pyapi
+    place = cgutils.add_global_variable(builder.module, python.pyobj, f"held{len(builder.module.globals)}")
+    place.linkage, place.initializer = "internal", ir.Constant(python.pyobj, None)
+    with cgutils.if_unlikely(builder, cgutils.is_null(builder, builder.load(place))):
+        builder.store(python.unserialize(python.serialize_object(function)), place)
+    return builder.load(place)
+
+
+@unbox(SizedRecord)
+def _unbox_record(kind: Any, given: Any, c: Any) -> NativeValue:
+    record, buffer = _struct(c.context, c.builder, kind), c.pyapi.alloca_buffer()
+    record.memory = c.pyapi.extract_record_data(given, buffer)
+    no_data = cgutils.is_null(c.builder, record.memory)
+    record.places, failed = _ask(c, kind, given)
+    return NativeValue(
+        record._getvalue(),
+        cleanup=lambda: c.pyapi.release_buffer(buffer),
+        is_error=c.builder.or_(no_data, failed),
+    )
+
+
+@unbox(SizedRecords)
+def _unbox_records(kind: Any, given: Any, c: Any) -> NativeValue:
+    records, builder, bytes_of = (
+        _struct(c.context, c.builder, kind),
+        c.builder,
+        types.Array(types.uint8, 1, "A"),
+    )
+    array = make_array(bytes_of)(c.context, builder)
+    there = builder.bitcast(array._getpointer(), c.pyapi.voidptr)
+    code = c.pyapi.nrt_adapt_ndarray_from_python(given, there)
+    records.memory = array.data
+    (count,), (apart,) = (cgutils.unpack_tuple(builder, of, 1) for of in (array.shape, array.strides))
+    records.count, records.apart = count, apart
+    records.places, failed = _ask(c, kind, given)
+    return NativeValue(
+        records._getvalue(),
+        cleanup=lambda: c.context.nrt.decref(builder, bytes_of, array._getvalue()),
+        is_error=builder.or_(cgutils.is_not_null(builder, code), failed),
+    )
+
+
+# mypy: disable-error-code="attr-defined,misc"
+
+
+compiling: list[object] = []  # kernels being compiled, each called by the one before; under Numba's lock
+
+
+class Inner:
+    """Stands for the machine code of a function that is compiled as a part of others only."""
+
+
+class Library(JITCodeLibrary):
+    """The code of one function. That of an inner one is only translated, for others to link in."""
+
+    only_translated = False
+
+    def finalize(self) -> None:
+        """Optimise the code with all that it calls, unless it is a part of another."""
+        self._raise_if_finalized()
+        self.only_translated = self._finalized = len(compiling) > 1
+        if self.only_translated:
+            return
+        self._codegen._check_llvm_bugs()
+        own = {function.name for function in _defined(self._final_module)}
+        for called in _all_called(self):
+            self._reload_init.update(called._reload_init)
+            self._final_module.link_in(called._get_module_for_linking(), preserve=True)
+        for function in _defined(self._final_module):
+            if function.name not in own:
+                function.linkage = "internal"  # what is called in one place is then put there, however long
+        self._optimize_final_module()
+        self._final_module.verify()
+        with cache.held():
+            self._finalize_final_module()
+
+    def _get_module_for_linking(self) -> Any:
+        """The module; with every function of one that was only translated, wanted so far or not."""
+        if not self.only_translated:
+            return super()._get_module_for_linking()
+        module = self._final_module.clone()
+        for function in _defined(module):
+            function.linkage = "weak_odr"
+        return module
+
+
+def _defined(module: Any) -> list[Any]:
+    return [function for function in module.functions if not function.is_declaration]
+
+
+def _all_called(library: Any) -> list[Any]:
+    """The libraries that this one calls, directly or through libraries that were only translated.
+
+    A caller precedes what it calls, because LLVM links from a compiled library only the functions that are
+    referenced by then.
+    """
+    found: dict[int, Any] = {}
+
+    def visit(caller: Any) -> None:
+        for called in caller._linking_libraries:
+            if id(called) not in found:
+                if getattr(called, "only_translated", False):
+                    visit(called)
+                found[id(called)] = called
+
+    visit(library)
+    return list(reversed(found.values()))
+
+
+class Codegen(JITCPUCodegen):
+    _library_class = Library
+
+
+CODE = (
+    "from beaver_ftc.compiled import compile_into; from beaver_ftc.compiled.target import is_right; "
+    "raise SystemExit(0 if is_right(compile_into) else 3)"
+)
+
+
+def passes() -> bool:
+    """Whether kernels compiled so are right, as found now or by an earlier process."""
+    files = sorted(Path(__file__).parent.glob("*.py"))
+    versions = numba.__version__, llvmlite.__version__, sys.implementation.cache_tag, digest_of_files(*files)
+    return passes_in_a_child("numba", str(versions), CODE, {VARIABLE: "trial"})
+
+
+def is_right(compile_into: Callable[[None, Callable[..., Any]], Callable[..., Any]]) -> bool:
+    """Whether kernels that call one another can be compiled, and return the same as their plain form.
+
+    compile_into: as in `beaver_ftc.compiled`, which imports this module.
+    """
+    try:
+        return _returns_the_same(compile_into)
+    except Exception:  # whatever a part does that is not as we have found it
+        return False
+
+
+def _returns_the_same(compile_into) -> bool:
+    import numpy as np
+
+    def scale(x, by):
+        x[:] = x / by
+
+    def weigh(record, x):
+        scaled(x, record.level)
+        return np.sqrt(x[0] * x[1]) + record.state.sum()
+
+    def total(records, x):
+        found = 0.0
+        for record in records:
+            for i in range(2):
+                found += weighed(record, x[i]) + max(x[i, 0], found)
+        return found
+
+    def refuse(x):
+        scaled(x[:2], x[1])
+        if x[0] > 0.0:
+            raise ValueError("greater than zero")
+        return x[0]
+
+    compiled = [compile_into(None, function) for function in (scale, weigh, total, refuse)]
+    scaled, weighed, totalled, refused = compiled
+    records = np.ones(2, [("level", "f8"), ("state", "f8", (2, 3))])
+    records["level"] = 2.0, 0.0
+    x = np.arange(1.0, 5.0).reshape(2, 2)
+    again = x.copy()
+    first = totalled(records, x), weighed(records[0], x[0]), refused(np.array([-1.0, 2.0]))
+    scaled, weighed = scale, weigh
+    with np.errstate(all="ignore"):
+        second = total(records.view(np.recarray), again), weigh(records.view(np.recarray)[0], again[0]), -0.5
+    try:
+        refused(np.array([1.0, 1.0]))
+    except ValueError as error:
+        return str(error) == "greater than zero" and np.array_equal(
+            [*first, *x[0]], [*second, *again[0]], True
+        )
+    return False
+
 
 __all__ = ["stub"]
 
@@ -160,8 +659,8 @@ def borrows() -> bool:
 
 @functools.cache
 def optimises_once() -> bool:
-    """Whether library.py makes the machine code: where this version is known, or has passed a trial."""
-    return borrows() or os.environ.get(VARIABLE) == "trial" or trial.passes()
+    """Whether `Library` makes the machine code: where this version is known, or has passed a trial."""
+    return borrows() or os.environ.get(VARIABLE) == "trial" or passes()
 
 
 class _Context(CPUContext):
@@ -186,6 +685,12 @@ class _Context(CPUContext):
         """
         return super().mangler(name, (_digest_of(tuple(types)),), abi_tags=abi_tags, uid=uid)
 
+    def get_function(self, fn: Any, sig: Any, _firstcall: bool = True) -> Any:
+        """The implementation of a function for a signature."""
+        if isinstance(fn, types.Function):
+            self.typing_context.take_implementation(fn, sig)
+        return super().get_function(fn, sig, _firstcall)
+
     def get_executable(self, library: Any, fndesc: Any, env: Any) -> Any:
         """What Python calls; of an inner function what stands for it."""
         library._ensure_finalized()
@@ -204,6 +709,7 @@ class _TypingContext(typing.Context):
     def init(self) -> None:
         super().init()
         self._resolved: dict[Any, Any] = {}
+        self._implementations: dict[Any, Any] = {}
 
     def resolve_function_type(self, func: Any, args: Any, kws: Any) -> Any:
         """The signature of a function for these types. Numba tries all its definitions at each call."""
@@ -212,8 +718,18 @@ class _TypingContext(typing.Context):
             return super().resolve_function_type(func, args, kws)
         key = func, tuple(args)
         if key not in self._resolved:
-            self._resolved[key] = super().resolve_function_type(func, args, kws)
+            found = super().resolve_function_type(func, args, kws)
+            self._resolved[key] = found
+            if found is not None and isinstance(func, types.Function):
+                self._implementations[func, found.args] = func._impl_keys.get(found.args)
         return self._resolved[key]
+
+    def take_implementation(self, func: Any, signature: Any) -> None:
+        """Let a function name the implementation that was compiled for our target: it names one for all
+        targets, that of the last target that asked."""
+        found = self._implementations.get((func, signature.args))
+        if found is not None:
+            func._impl_keys[signature.args] = found
 
 
 class _TargetOfKernels(CPUTarget):
@@ -289,12 +805,40 @@ class Kernel(Dispatcher):
         self.targetctx.insert_user_function(found.entry_point, found.fndesc, [found.library])
         return self._offered(args, found)
 
+    def is_kept(self, args: tuple[Any, ...]) -> bool:
+        """Whether nothing needs to be compiled for arguments of these types."""
+        cached = self._cached
+        return args in self.overloads or (
+            isinstance(cached, CodeCache) and cached.has(args, self.targetctx.codegen())
+        )
+
+    @property
+    def size(self) -> int:
+        """How much its code follows from, in characters."""
+        function: Any = self.py_func
+        return len(cache.what_follows(function))
+
+    def compile_unless_taken(self, args: tuple[Any, ...]) -> None:
+        """Compile and keep the code, unless it is kept or another process compiles it now."""
+        with global_compiler_lock, self._compiling_counter, self._alone(args, wait=False) as mine:
+            if mine and not self.is_kept(args):
+                self._compile_and_keep(args)
+
+    def _alone(self, args: tuple[Any, ...], wait: bool = True) -> Any:
+        """Keep other processes from compiling the same meanwhile: see `locked`."""
+        place = self._cached.place(args, self.targetctx.codegen()) if self._cached else 0
+        return locked(self.folder, place, wait)
+
     def _compiled(self, args: tuple[Any, ...]) -> Any:
         """Compile, one process at a time, and keep the code."""
-        with locked(self.folder), announced(self.folder):
-            if entry_point := self._loaded(args):
-                return entry_point  # another process came first
+        cache.compile_expected()
+        with self._alone(args):
+            return self._loaded(args) or self._compile_and_keep(args)  # another process may have come first
+
+    def _compile_and_keep(self, args: tuple[Any, ...]) -> Any:
+        with announced(self.size):
             _say_slower()
+            self.targetctx.refresh()
             result = self._translated(args, {"no_cfunc_wrapper": True})
             if self._cached:
                 self._cached.save(args, result)

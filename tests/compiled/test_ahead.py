@@ -1,0 +1,148 @@
+"""Kernels that a flight will call are compiled together, by two processes into one folder."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from beaver_ftc import compiled
+from beaver_ftc.compiled import cache
+from beaver_ftc.compiled.cache import Wanted
+from beaver_ftc.compiled.target import array_type
+
+KINDS = (array_type(np.dtype(float), 1),)
+BODIES = ("return 2.0 * x[0]", "return x[0] - 1.0", "return x[0] * x[0]", "return x[0] + x[1]")
+
+
+def kernels(folder):
+    """Four kernels that are kept in this folder, and their plain forms."""
+    found = []
+    for i, body in enumerate(BODIES):
+        space = {"__name__": __name__}
+        exec(f"def kernel_{i}(x):\n    {body}\n", space)
+        found.append(compiled.compile_into(folder, space[f"kernel_{i}"]))
+    return found
+
+
+def wanted_of(folder):
+    return [Wanted.of(kernel, KINDS) for kernel in kernels(folder)]
+
+
+def agree(folder):
+    x = np.array([3.0, 0.25])
+    return all(kernel(x) == kernel.py_func(x) for kernel in kernels(folder))
+
+
+def kept(folder):
+    return sorted(path.name.partition("-")[0] for path in folder.glob("kernel_*"))
+
+
+ALL = [f"kernel_{i}" for i in range(len(BODIES))]
+
+
+@pytest.fixture(params=["two processes", "a second that fails", "a second that is refused", "one process"])
+def how(request, monkeypatch):
+    """How the kernels are compiled."""
+
+    def refused():
+        raise OSError("no more processes")
+
+    monkeypatch.setattr(cache, "can_fork", lambda: request.param != "one process")
+    if request.param == "a second that is refused":
+        monkeypatch.setattr(os, "fork", refused)
+    if request.param == "a second that fails":
+        monkeypatch.setattr(cache, "_help", lambda *_: os._exit(3))
+    return request.param
+
+
+def test_all_are_compiled_and_kept_however_the_second_process_fares(tmp_path, monkeypatch, how):
+    fork, second = os.fork, []
+    monkeypatch.setattr(os, "fork", lambda: second.append(fork()) or second[-1])
+    assert cache.compile_missing(wanted_of(tmp_path)) == len(BODIES)
+    assert kept(tmp_path) == ALL
+    assert cache.compile_missing(wanted_of(tmp_path)) == 0
+    assert agree(tmp_path)
+    for each in second:
+        with pytest.raises(ChildProcessError):  # no zombie
+            os.waitpid(each, os.WNOHANG)
+
+
+def test_each_is_compiled_by_one_of_both(tmp_path, monkeypatch):
+    """The first process takes none that the second is at; here it waits until the second has done all."""
+    monkeypatch.setattr(cache, "can_fork", lambda: True)
+    first, wanted = os.getpid(), wanted_of(tmp_path)
+    compile_it = Wanted.compile
+
+    def after_the_second(each):
+        deadline = time.monotonic() + 60.0
+        while os.getpid() == first and kept(tmp_path) != ALL and time.monotonic() < deadline:
+            time.sleep(0.01)
+        compile_it(each)
+
+    monkeypatch.setattr(Wanted, "compile", after_the_second)
+    cache.compile_missing(wanted)
+    assert kept(tmp_path) == ALL
+    assert not any(each.kernel.overloads for each in wanted), "the first process has compiled nothing"
+    assert agree(tmp_path)
+
+
+def test_the_first_missing_kernel_compiles_all_that_are_expected(tmp_path, monkeypatch):
+    monkeypatch.setattr(cache, "can_fork", lambda: False)
+    wanted = wanted_of(tmp_path)
+    cache.expect(lambda: wanted[1:])
+    assert wanted[0].kernel(np.array([3.0])) == 6.0
+    assert kept(tmp_path) == ALL
+
+
+def test_one_that_another_process_compiles_is_left_to_it(tmp_path):
+    """Another process holds the lock of a kernel: nobody else compiles it, and whoever calls it waits."""
+    pytest.importorskip("fcntl")
+    (each,) = wanted_of(tmp_path)[:1]
+    place = each.kernel._cached.place(KINDS, each.kernel.targetctx.codegen())
+    holder = (
+        f"from pathlib import Path; from beaver_ftc.compiled.cache import locked\n"
+        f"with locked(Path({str(tmp_path)!r}), {place}):\n    print('held', flush=True); input()"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", holder], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    assert process.stdout.readline() == "held\n"
+    each.compile()
+    with cache.locked(tmp_path, place, wait=False) as mine, cache.locked(tmp_path, place + 1) as other:
+        assert (mine, other) == (False, True)
+    assert kept(tmp_path) == []
+    process.communicate("\n")
+    each.compile()
+    assert kept(tmp_path) == ALL[:1]
+
+
+INTERRUPTED = """
+import os, signal, sys, time
+from beaver_ftc.compiled import cache
+class Slow:
+    folder, size = "somewhere", 1
+    def is_kept(self, kinds): return False
+    def compile_unless_taken(self, kinds):
+        os.write(1, f"{os.getpid()}\\n".encode())
+        time.sleep(60)
+cache.can_fork = lambda: True
+cache.os.dup2 = lambda *_: None
+cache.compile_missing([cache.Wanted(Slow(), ()), cache.Wanted(Slow(), ())])
+"""
+
+
+def test_an_interrupt_of_the_first_process_ends_both():
+    process = subprocess.Popen(
+        [sys.executable, "-c", INTERRUPTED], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    )
+    numbers = {int(process.stdout.readline()) for _ in range(2)}
+    assert process.pid in numbers
+    process.send_signal(signal.SIGINT)
+    process.wait(10.0)
+    (second,) = numbers - {process.pid}
+    with pytest.raises(ProcessLookupError):
+        os.kill(second, 0)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from beaver_ftc.control.base import row_of
+from beaver_ftc.control import row_of
 from beaver_ftc.control.state import control_dtype
 
 # Their fields have names of other stages' too: filled by `fields`.

@@ -5,13 +5,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from beaver_ftc.control import Reference
 from beaver_ftc.control.accommodation import MODE_NOMINAL
-from beaver_ftc.control.base import Reference
 from beaver_ftc.control.laws import compiled_rivals
 from beaver_ftc.control.rivals.indi import IncrementalInversion
 from beaver_ftc.control.rivals.lqr import FixedGainLqr
 from beaver_ftc.design.context import Context
-from beaver_ftc.diagnosis.base import Measured, Verdict
+from beaver_ftc.diagnosis import Measured, Verdict
 from law_records import fields, new_control
 
 DT = 0.02
@@ -46,13 +46,13 @@ def test_both_command_the_same_within_the_travel_and_at_the_stops(rival, most):
     control["layout"]["trim"] = TRIM
     control["layout"]["low"], control["layout"]["high"] = -most, 0.8 * most
     law.compile_into(control["compiled_rivals"])
-    means = SimpleNamespace(Gu=np.zeros((3, 4)))
-    frame = SimpleNamespace(G=G, means=means), SimpleNamespace(x=None)
+    frame_means = SimpleNamespace(Gu=np.zeros((3, 4)))
+    frame = SimpleNamespace(G=G, frame_means=frame_means), SimpleNamespace(x=None)
     stops = 0
     for k in range(40):
         x, rate, acceleration = 0.02 * rng.normal(size=(3, 3))
-        means.Gu = 0.1 * rng.normal(size=(3, 4))
-        seen = Measured(k * DT, x, np.zeros(5), np.zeros(3), means.Gu, np.zeros(3))
+        frame_means.Gu = 0.1 * rng.normal(size=(3, 4))
+        seen = Measured(k * DT, x, np.zeros(5), np.zeros(3), frame_means.Gu, np.zeros(3))
         wanted = law.step(seen, Reference(rate, rate, acceleration), Verdict())
         reference, out = fields(control["reference"]), control["allocation"]["output"]
         reference["model_rate"], reference["model_acceleration"], frame[1].x = rate, acceleration, x

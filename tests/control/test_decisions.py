@@ -13,15 +13,14 @@ from beaver_ftc.control.accommodation import (
     MODE_UNANTICIPATED,
     SUPERVISOR,
 )
-from beaver_ftc.control.laws import gains, rejecting
-from beaver_ftc.control.laws.gains import N_POINTS
-from beaver_ftc.control.laws.rejecting import OBSERVER_ERROR, observer_response, rejecting_dtype
+from beaver_ftc.control.laws import rejecting
+from beaver_ftc.control.laws.rejecting import N_POINTS, OBSERVER_ERROR, observer_response, rejecting_dtype
 from beaver_ftc.design.model import design_record, unanticipated_pitch
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
-from beaver_ftc.diagnosis.types.contract import GIVE_UP, SCALE_COMMAND, SUBTRACT_OFFSET, WAIT_FOR_SURFACE
+from beaver_ftc.diagnosis.types import GIVE_UP, SCALE_COMMAND, SUBTRACT_OFFSET, WAIT_FOR_SURFACE
 from beaver_ftc.loop import frame as whole
-from beaver_ftc.loop.accounts import true_faults_dtype
 from beaver_ftc.loop.assembly import frame_dtype
+from beaver_ftc.loop.frame import true_faults_dtype
 from law_records import put
 
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)
@@ -89,7 +88,7 @@ def test_every_change_of_mode_is_noted_and_of_too_many_the_latest():
 
 
 @pytest.mark.parametrize(
-    ("every_type", "isolated", "lead", "lead_kind", "stand_in", "mode"),
+    ("diagnoses_all_types", "isolated", "lead", "accommodation_mode", "stand_in", "mode"),
     [
         (0, 5, -1, -1, FLAP, MODE_REALLOCATED), (0, 5, -1, -1, -1, MODE_ADAPTIVE),
         (0, 6, -1, -1, FLAP, MODE_ADAPTIVE), (0, UNANTICIPATED, -1, -1, FLAP, MODE_UNANTICIPATED),
@@ -102,16 +101,26 @@ def test_every_change_of_mode_is_noted_and_of_too_many_the_latest():
         (1, NOT_ISOLATED, ELEVATOR, GIVE_UP, FLAP, MODE_REALLOCATED),
     ],
 )  # fmt: skip
-def test_the_mode_that_the_diagnosis_asks_for(every_type, isolated, lead, lead_kind, stand_in, mode):
+def test_the_mode_that_the_diagnosis_asks_for(
+    diagnoses_all_types, isolated, lead, accommodation_mode, stand_in, mode
+):
     frame = new_frame(stand_in=stand_in)
     fdi = frame["fdi"]
-    fdi["config"]["every_type"], fdi["isolation"]["estimator"]["surface"][4:8] = every_type, range(4)
+    fdi["config"]["diagnoses_all_types"], fdi["isolation"]["estimator"]["surface"][4:8] = (
+        diagnoses_all_types,
+        range(4),
+    )
     verdict = fdi["verdict"]
-    verdict["detected"], verdict["isolated"], verdict["lead"], verdict["lead_kind"] = (
+    (
+        verdict["detected"],
+        verdict["isolated_estimator"],
+        verdict["accommodated_surface"],
+        verdict["accommodation_mode"],
+    ) = (
         1,
         isolated,
         lead,
-        lead_kind,
+        accommodation_mode,
     )
     assert asked_for(frame) == mode
     verdict["detected"] = 0
@@ -151,13 +160,13 @@ def test_the_oracle_takes_each_surface_for_what_it_is():
     assert output["offset"][0] == 0.0
 
 
-def compensated(law, detected=1, lead=-1, lead_kind=-1):
+def compensated(law, detected=1, lead=-1, accommodation_mode=-1):
     frame = new_frame({"Cm_alpha3": 0.5}, law=law, fhat=9.0)
-    fdi, belief, measured = frame["fdi"], frame["belief"], frame["measured"]
-    belief["design"], measured["y"][:5] = design_record()[0], (0.2, 0.0, 45.0, 1000.0, 0.3)
+    fdi, prediction, measured = frame["fdi"], frame["prediction"], frame["measured"]
+    prediction["design"], measured["y"][:5] = design_record()[0], (0.2, 0.0, 45.0, 1000.0, 0.3)
     fdi["verdict"]["detected"], fdi["fdae"]["network"]["output"] = detected, (0.1, 0.2, 0.3)
-    fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"] = lead, lead_kind
-    expected = unanticipated_pitch(belief["design"], measured["y"], 0.5)
+    fdi["verdict"]["accommodated_surface"], fdi["verdict"]["accommodation_mode"] = lead, accommodation_mode
+    expected = unanticipated_pitch(prediction["design"], measured["y"], 0.5)
     return accommodated(frame)["unknown"].tolist(), float(expected)
 
 
@@ -165,11 +174,11 @@ def test_what_the_law_takes_the_unknown_for():
     assert compensated("adaptive")[0] == pytest.approx([0.1, 0.2, 0.3])
     assert compensated("adaptive", detected=0)[0] == [0.0] * 3
     assert compensated("nominal")[0] == [0.0] * 3
-    assert compensated("adaptive", lead=ELEVATOR, lead_kind=WAIT_FOR_SURFACE)[0] == [0.0] * 3
-    assert compensated("adaptive", lead=ELEVATOR, lead_kind=SUBTRACT_OFFSET)[0] == pytest.approx(
+    assert compensated("adaptive", lead=ELEVATOR, accommodation_mode=WAIT_FOR_SURFACE)[0] == [0.0] * 3
+    assert compensated("adaptive", lead=ELEVATOR, accommodation_mode=SUBTRACT_OFFSET)[0] == pytest.approx(
         [0.1, 0.2, 0.3]
     )
-    assert compensated("adaptive", lead=AILERON, lead_kind=WAIT_FOR_SURFACE)[0] == [0.0] * 3
+    assert compensated("adaptive", lead=AILERON, accommodation_mode=WAIT_FOR_SURFACE)[0] == [0.0] * 3
     known, expected = compensated("oracle-published")
     assert known == [0.0, expected, 0.0]
     assert expected != 0.0
@@ -181,7 +190,7 @@ def test_a_surface_given_up_goes_to_its_trim(which):
     control, fdi = frame["control"], frame["fdi"]
     control["layout"]["trim"], out = 0.3, control["allocation"]["output"]
     surfaces = control["surfaces"]["output"]
-    out["command"], out["saturated"], fdi["config"]["every_type"] = 0.1, 1, 1
+    out["command"], out["saturated"], fdi["config"]["diagnoses_all_types"] = 0.1, 1, 1
     if "jam" in which:
         fdi["types"]["surface"]["accommodation"]["mode"][RUDDER] = GIVE_UP
         surfaces["effectiveness"][RUDDER] = 0.0 if which == "jammed" else 0.5
@@ -209,7 +218,7 @@ def lost_rudder(theta, believed=1.0, frames=400, noise=0.0):
     control, rng = new_control(), np.random.default_rng(2)
     law, observer = control["rejecting"], record(OBSERVER_ERROR)
     config, memory = law["config"], law["memory"]
-    memory["L_rate"], memory["L_disturbance"], config["fading"] = 0.3, 2.0, gains.fading(DT)
+    memory["L_rate"], memory["L_disturbance"], config["fading"] = 0.3, 2.0, rejecting.derive_fading(DT)
     for k in range(frames):
         given = np.zeros((3, 4))
         given[2, RUDDER] = 0.5 * np.sin(0.2 * k)
@@ -226,7 +235,9 @@ def test_what_is_left_is_found_by_least_squares(theta, believed):
     found = lost_rudder(theta, believed)
     assert found["product"][2] == pytest.approx(theta * found["square"][2], rel=1e-6)
     assert found["innovation"][2] == pytest.approx(theta**2 * found["square"][2], rel=1e-6)
-    assert found["frames"][2] == pytest.approx((1 - (1 - gains.fading(DT)) ** 400) / gains.fading(DT))
+    assert found["frames"][2] == pytest.approx(
+        (1 - (1 - rejecting.derive_fading(DT)) ** 400) / rejecting.derive_fading(DT)
+    )
     prior = found["innovation"][2] / found["frames"][2] / 0.2**2
     share = prior / (prior + found["square"][2])
     expected = 1.0 + (1 - share) * theta + share * -0.5
@@ -273,8 +284,8 @@ def test_the_schedule_has_the_fastest_loop_of_each_point_and_its_observer():
         qdyn / 500,
     )
     approach = np.array([0.3, 0.3, 0.3, 0.05])
-    gyros = [gains.Gyro(), gains.Gyro(1e-3), gains.Gyro(1e-3, 0.01, 0.2)]
-    gains.set_up(
+    gyros = [rejecting.Gyro(), rejecting.Gyro(1e-3), rejecting.Gyro(1e-3, 0.01, 0.2)]
+    rejecting.set_up(
         law, dt_s=DT, substeps=4, approach=approach, speed_rad_s=np.full(4, 0.05), gyros=gyros,
         margin=(6.0, 45.0), qdyn=qdyn, G=G, carriers=[(0, AILERON), (1, ELEVATOR), (2, RUDDER), (1, FLAP)],
     )  # fmt: skip
@@ -285,9 +296,9 @@ def test_the_schedule_has_the_fastest_loop_of_each_point_and_its_observer():
     assert law["fading"] == pytest.approx(1.0 - np.exp(-DT / 5.0))
     for row, (axis, surface) in enumerate([(0, AILERON), (1, ELEVATOR), (2, RUDDER), (1, FLAP)]):
         gyro = gyros[axis]
-        loop = gains.Loop(DT, 0.25, whole[surface], min(1 / whole[surface], 4.0), gyro.delay_s, gyro.keep)
+        loop = rejecting.Loop(DT, 0.25, whole[surface], min(1 / whole[surface], 4.0), gyro.delay_s, gyro.keep)
         for j in range(N_POINTS):
-            s = gains.fastest(loop, (6.0, 45.0), gyro.noise_rad_s, G[j, axis, surface], 0.05)
+            s = rejecting.fastest(loop, (6.0, 45.0), gyro.noise_rad_s, G[j, axis, surface], 0.05)
             assert law["Kp_at"][row, j] == pytest.approx(s)
             pole = np.exp(-6.5 * s * DT)
             assert law["L_rate_at"][row, j] == pytest.approx(1.0 - pole**2)
@@ -309,15 +320,15 @@ def test_only_what_may_still_act_is_taken_for_what_the_observer_sees(law, fixed,
     true = {"present": 1, "effectiveness": (0.2, 1.0, 1.0, 1.0)}
     frame = new_frame(true, law=law, effectiveness_step=1.0)
     fdi, control = frame["fdi"], frame["control"]
-    fdi["verdict"]["detected"], fdi["verdict"]["isolated"] = 1, 0
+    fdi["verdict"]["detected"], fdi["verdict"]["isolated_estimator"] = 1, 0
     fdi["isolation"]["estimator"]["surface"][:4], fdi["isolation"]["estimator"]["theta"][0] = range(4), -0.9
-    fdi["types"]["surface"]["accommodation"]["mode"][AILERON], fdi["config"]["every_type"] = (
+    fdi["types"]["surface"]["accommodation"]["mode"][AILERON], fdi["config"]["diagnoses_all_types"] = (
         GIVE_UP if fixed else -1,
         fixed,
     )
     found = control["rejecting"]["memory"]["sums"]
     found["named"], found["frames"], found["square"], found["product"] = 1, 1.0, 2.0, -1.0
-    frame["belief"]["design"], frame["measured"]["y"][:4] = design_record()[0], (0.2, 0.0, 45.0, 1000.0)
+    frame["prediction"]["design"], frame["measured"]["y"][:4] = design_record()[0], (0.2, 0.0, 45.0, 1000.0)
     surfaces = accommodated(frame)
     assert surfaces["target"] == pytest.approx([kept, 1.0, 1.0, 1.0])
     assert surfaces["effectiveness"] == pytest.approx(surfaces["target"])
@@ -327,7 +338,7 @@ def test_only_what_may_still_act_is_taken_for_what_the_observer_sees(law, fixed,
 def test_what_no_verdict_names_is_whole_and_a_plug_ins_estimates_count_from_its_alarm_on():
     frame = new_frame(target=0.3, offset=0.2, lag=0.1, effectiveness_step=0.25)
     verdict = frame["fdi"]["verdict"]
-    verdict["isolated"], verdict["estimates"] = NOT_ISOLATED, 1
+    verdict["isolated_estimator"], verdict["has_effectiveness"] = NOT_ISOLATED, 1
     verdict["effectiveness"] = 0.9, 0.4, 1.0, 0.8
     surfaces = accommodated(frame)
     assert surfaces["target"].tolist() == [1.0] * 4

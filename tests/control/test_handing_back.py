@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.control.accommodation import MODE_UNANTICIPATED, MODES
-from beaver_ftc.diagnosis.base import Verdict
+from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.studies.reproduce.choices import scenario

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from beaver_ftc.control import row_of
 from beaver_ftc.control.accommodation import MODE_ADAPTIVE
-from beaver_ftc.control.base import row_of
 from beaver_ftc.control.laws import compiled_rivals, published
 from beaver_ftc.diagnosis.schemes import adaptive_estimators
 from beaver_ftc.diagnosis.state import LOSS, NOT_ISOLATED, WORST_CASE_DETECTOR
-from beaver_ftc.diagnosis.types.contract import GIVE_UP, SCALE_COMMAND, SUBTRACT_OFFSET, WAIT_FOR_SURFACE
+from beaver_ftc.diagnosis.types import GIVE_UP, SCALE_COMMAND, SUBTRACT_OFFSET, WAIT_FOR_SURFACE
 from beaver_ftc.diagnosis.types.registry import N_TYPES
 from beaver_ftc.loop import frame as whole
 from beaver_ftc.loop.assembly import Trim, assemble
@@ -27,7 +27,11 @@ def new_frame(law_name="adaptive", **fdi):
     keys = {"rate_hz": 100, "control": {"law": law_name}, "fdi": fdi}
     frame = assemble(Scenario.model_validate({"name": "x", **keys}), TRIM, TRAVEL_RAD).view(np.recarray)[0]
     frame["measured"]["x"], frame["measured"]["y"][:5] = X, (0.1, 0.02, 45.0, 1036.0, 0.3)
-    frame["belief"]["f"], frame["belief"]["G"], frame["control"]["layout"]["trim"] = (0.3, -0.2, 0.1), G, 0.01
+    frame["prediction"]["f"], frame["prediction"]["G"], frame["control"]["layout"]["trim"] = (
+        (0.3, -0.2, 0.1),
+        G,
+        0.01,
+    )
     return frame
 
 
@@ -52,7 +56,7 @@ def test_the_published_law_inverts_the_model_and_integrates(name):
     """G u = xm' + Kp (xm - x) + Ki int - f, the flap in trim; within the travel nothing is taken back."""
     frame = new_frame(name)
     control = put(frame["control"], governed_rate=0.01, governed_acceleration=0.02)
-    feedback, out, f = fields(control["published"]), control["allocation"]["output"], frame["belief"]["f"]
+    feedback, out, f = fields(control["published"]), control["allocation"]["output"], frame["prediction"]["f"]
     feedback["integral"] = 0.003
     before = feedback["integral"].copy()
     commanded(frame)
@@ -71,15 +75,15 @@ def test_the_rejecting_law_has_no_integral_and_begins_with_what_is_measured():
     assert control["rejecting"]["observer"]["begun"] == 1
     assert control["rejecting"]["observer"]["rate"] == pytest.approx(X)
     assert not control["published"]["memory"]["integral"].any()
-    assert control["axes"]["hold"] == pytest.approx(-frame["belief"]["f"])
+    assert control["axes"]["hold"] == pytest.approx(-frame["prediction"]["f"])
 
 
 def believed(frame, surface, theta=-0.6, detected=1):
     """The isolated loss of a surface, by its estimator."""
     fdi = frame["fdi"]
-    estimators = fdi["isolation"]["estimator"][: int(fdi["isolation"]["config"]["n"])]
+    estimators = fdi["isolation"]["estimator"][: int(fdi["isolation"]["config"]["n_estimators"])]
     place = estimators["surface"].tolist().index(surface)
-    fdi["verdict"]["detected"], fdi["verdict"]["isolated"] = detected, place
+    fdi["verdict"]["detected"], fdi["verdict"]["isolated_estimator"] = detected, place
     fdi["isolation"]["estimator"][place]["theta"] = theta
     return fdi
 
@@ -93,7 +97,7 @@ def test_an_isolated_loss_scales_its_own_surface_alone():
     assert surfaces["effectiveness"][RUDDER] == pytest.approx(expected)
     assert surfaces["effectiveness"][AILERON] == 1.0
     assert not surfaces["offset"].any()
-    fdi["verdict"]["estimates"], fdi["verdict"]["effectiveness"] = 1, (0.9, 0.8, 0.7, 0.6)
+    fdi["verdict"]["has_effectiveness"], fdi["verdict"]["effectiveness"] = 1, (0.9, 0.8, 0.7, 0.6)
     assert accommodated(frame)["target"] == pytest.approx([0.9, 0.8, 0.7, 0.6])
 
 
@@ -101,7 +105,7 @@ def test_the_oracle_knows_and_no_other_law_looks():
     true = {"present": 1, "effectiveness": (0.5, 1, 1, 1), "effective": 0.1}
     for name, target in (("oracle-published", 0.5), ("fault-tolerant-published", 1.0)):
         frame = new_frame(name)
-        frame["belief"]["u"] = 0.1
+        frame["prediction"]["u"] = 0.1
         surfaces = accommodated(frame, **true)
         assert surfaces["target"][AILERON] == target
         assert surfaces["offset"][AILERON] == pytest.approx(0.1 - 0.05 if target == 0.5 else 0.0)
@@ -116,9 +120,13 @@ def test_what_is_done_about_each_kind_of_fault(measure):
         measure
     ]
     fdi["types"]["surface"]["accommodation"]["mode"], surface["accommodation"]["mode"] = -1, measure
-    surface["feasible"]["excluded"] = [other != kind for other in range(N_TYPES)]
-    surface["feasible"]["low"][kind], surface["feasible"]["high"][kind] = 0.1, 0.2
-    surface["elapsed"]["command"], surface["elapsed"]["low"], surface["elapsed"]["high"] = 0.05, 0.3, 0.34
+    surface["feasible_sets"]["excluded"] = [other != kind for other in range(N_TYPES)]
+    surface["feasible_sets"]["low"][kind], surface["feasible_sets"]["high"][kind] = 0.1, 0.2
+    (
+        surface["last_observation"]["healthy_position"],
+        surface["last_observation"]["position_low"],
+        surface["last_observation"]["position_high"],
+    ) = 0.05, 0.3, 0.34
     loss = fdi["layout"]["loss_estimator"][RUDDER]
     fdi["isolation"]["estimator"][int(loss)]["theta"] = -0.3
     surfaces = accommodated(frame)
@@ -132,7 +140,7 @@ def test_what_is_done_about_each_kind_of_fault(measure):
 
 
 @pytest.mark.parametrize(
-    ("every_type", "detected", "isolated", "evidence", "name", "doubt"),
+    ("diagnoses_all_types", "detected", "isolated", "evidence", "name", "doubt"),
     [
         (1, 1, NOT_ISOLATED, 99, "adaptive", True), (0, 1, NOT_ISOLATED, 99, "adaptive", False),
         (1, 0, NOT_ISOLATED, 99, "adaptive", False), (1, 1, 2, 99, "adaptive", False),
@@ -141,14 +149,14 @@ def test_what_is_done_about_each_kind_of_fault(measure):
     ],
 )  # fmt: skip
 def test_when_it_has_long_been_open_whether_elevator_or_flap(
-    every_type, detected, isolated, evidence, name, doubt
+    diagnoses_all_types, detected, isolated, evidence, name, doubt
 ):
     frame = new_frame(name)
     fdi = frame["fdi"]
-    types, fdi["config"]["every_type"] = fdi["types"], every_type
-    types["config"]["half_cycle_frames"], types["surface"]["evidence"]["frames"] = 4, 0
-    types["surface"]["evidence"]["frames"][ELEVATOR] = evidence
-    fdi["verdict"]["detected"], fdi["verdict"]["isolated"] = detected, isolated
+    types, fdi["config"]["diagnoses_all_types"] = fdi["types"], diagnoses_all_types
+    types["config"]["slowest_half_cycle_frames"], types["surface"]["evidence"]["n_anomalous_frames"] = 4, 0
+    types["surface"]["evidence"]["n_anomalous_frames"][ELEVATOR] = evidence
+    fdi["verdict"]["detected"], fdi["verdict"]["isolated_estimator"] = detected, isolated
     frame["control"]["probe"]["config"]["frames"], frame["control"]["probe"]["memory"]["from_s"] = 8, -1.0
     commanded(frame)
     assert (frame["control"]["probe"]["memory"]["from_s"] == 1.0) == doubt
@@ -163,13 +171,13 @@ def alarmed(known=0, speaks=0, score=2.0):
     fdi["bank"]["output"]["residual"][0, 1] = 0.1 * score
     fdi["fdae"]["network"]["memory"]["weights"], fdi["fdae"]["network"]["output"] = 1.0, 0.0
     fdi["isolation"]["estimator"]["xhat"] = 9.0
-    adaptive_estimators.conclude(fdi, frame["belief"], frame["measured"], 5.0)
+    adaptive_estimators.conclude(fdi, frame["prediction"], frame["measured"], 5.0)
     return fdi
 
 
 def test_the_alarm_starts_the_estimators_once_and_the_network_answers():
     fdi = alarmed()
-    first = int(fdi["isolation"]["config"]["n"])
+    first = int(fdi["isolation"]["config"]["n_estimators"])
     assert fdi["verdict"]["detected"] == 1
     assert fdi["isolation"]["estimator"]["xhat"][:first] == pytest.approx(np.tile(X, (first, 1)))
     assert fdi["fdae"]["network"]["output"].all()
@@ -224,7 +232,7 @@ def test_a_compiled_rival_commands_by_itself(incremental):
         rival["K"], rival["B_inverse"], rival["A"] = 0.1, np.eye(3) * 0.2, np.eye(3)
         rival["Kp"], rival["Ki"], rival["keep"], rival["surface_filter"] = 2.0, 1.0, 0.5, 0.01
     given, told = commanded(frame), alone["control"]
-    parts = alone["assessment"], alone["faults"], alone["belief"], alone["measured"]
+    parts = alone["assessment"], alone["faults"], alone["prediction"], alone["measured"]
     compiled_rivals.command(told, *parts, MODE_ADAPTIVE, 1.0)
     command = given["allocation"]["output"]["command"]
     assert command.tolist() == told["allocation"]["output"]["command"].tolist()

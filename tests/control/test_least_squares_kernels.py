@@ -8,7 +8,7 @@ from scipy.optimize import lsq_linear
 
 from beaver_ftc.control import allocation
 from beaver_ftc.control.allocation import problem_dtype
-from beaver_ftc.diagnosis.expectation import belief_dtype
+from beaver_ftc.diagnosis.model_prediction import prediction_dtype
 from law_records import new_control
 from samples import samples
 
@@ -104,9 +104,9 @@ def beaver_law(left=1.0):
     layout["trim"], layout["low"], layout["high"] = TRIM, LOWEST, HIGHEST
     control["surfaces"]["output"]["effectiveness"] = (1.0, left, 1.0, 1.0)
     control["axes"]["G"] = G * control["surfaces"]["output"]["effectiveness"]
-    belief = np.zeros(1, belief_dtype(4)).view(np.recarray)[0]
-    belief["share"], belief["actuators"]["step"] = 1.0, np.inf
-    return control, belief
+    prediction = np.zeros(1, prediction_dtype(4)).view(np.recarray)[0]
+    prediction["frame_share_per_instant"], prediction["actuators"]["step"] = 1.0, np.inf
+    return control, prediction
 
 
 def published(demand, left, share, probe=0.0):
@@ -118,12 +118,12 @@ def published(demand, left, share, probe=0.0):
 
 
 def generally(demand, left, share, probe=0.0, at=None, step=np.inf):
-    control, belief = beaver_law(left)
-    control["axes"]["demand"], belief["actuators"]["step"] = demand, step
-    belief["u"] = TRIM if at is None else at
+    control, prediction = beaver_law(left)
+    control["axes"]["demand"], prediction["actuators"]["step"] = demand, step
+    prediction["u"] = TRIM if at is None else at
     effectiveness = control["surfaces"]["output"]["effectiveness"]
     parts = control["axes"], control["allocation"], control["layout"], effectiveness
-    allocation.allocate_generally(*parts, belief, share, probe)
+    allocation.allocate_generally(*parts, prediction, share, probe)
     return control["allocation"]["output"]
 
 
@@ -169,13 +169,13 @@ def test_no_surface_goes_further_than_its_rate_lets_it():
 
 def test_both_elevator_and_ailerons_gone_the_rest_gives_what_it_can():
     """No surface that is left moves pitch or roll but flap and rudder."""
-    control, belief = beaver_law()
+    control, prediction = beaver_law()
     control["axes"]["G"] = G * (0.0, 0.0, 1.0, 1.0)
     control["surfaces"]["output"]["effectiveness"] = (0.0, 0.0, 1.0, 1.0)
-    control["axes"]["demand"], belief["u"] = (0.0, 0.5, 0.3), TRIM
+    control["axes"]["demand"], prediction["u"] = (0.0, 0.5, 0.3), TRIM
     effectiveness = control["surfaces"]["output"]["effectiveness"]
     parts = control["axes"], control["allocation"], control["layout"], effectiveness
-    allocation.allocate_generally(*parts, belief, 0.0, 0.0)
+    allocation.allocate_generally(*parts, prediction, 0.0, 0.0)
     given_ = control["axes"]["G"] @ control["allocation"]["output"]["command"]
     assert given_[1] == pytest.approx(0.5, abs=1e-3)
     assert control["allocation"]["output"]["command"][:2] == pytest.approx(TRIM[:2])

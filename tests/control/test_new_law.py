@@ -28,7 +28,7 @@ import numpy as np
 
 from beaver_ftc.compiled import apart, kernel, record, sized
 from beaver_ftc.control import laws
-from beaver_ftc.control.base import CompiledLaw
+from beaver_ftc.control import CompiledLaw
 
 CONFIG = record(slope=float, reach=float, layer=float)
 MEMORY = record(integral=3, frames=int)
@@ -40,17 +40,17 @@ def sliding_dtype(n):
     return record(config=CONFIG, memory=MEMORY, output=OUTPUT, travelled=n)
 
 
-def configure(law, control, belief, scenario, y):
+def configure(law, control, prediction, scenario, y):
     law["config"] = scenario.control.proportional_per_s, 0.1, 0.05
 
 
 @apart
-def command(control, assessment, faults, belief, measured, mode, t):
+def command(control, assessment, faults, prediction, measured, mode, t):
     law, out = control.sliding, control.sliding.output
-    laws.prepare(control, assessment, belief, mode, t)
-    slide(law, control.reference, measured.x, belief.f)
+    laws.prepare(control, assessment, prediction, mode, t)
+    slide(law, control.reference, measured.x, prediction.f)
     laws.command_surfaces(
-        control, out.demand, out.hold, out.disturbance, assessment, faults, belief, False
+        control, out.demand, out.hold, out.disturbance, assessment, faults, prediction, False
     )
     laws.complete(control, assessment, faults, measured, t)
 
@@ -114,7 +114,7 @@ print(json.dumps({
 def copy(tmp_path_factory):
     """A copy of the package with the law; returns its folder."""
     root = tmp_path_factory.mktemp("copy") / "beaver_ftc"
-    shutil.copytree(SOURCE, root, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(SOURCE, root)
     for folder in ("aircraft", "scenarios"):
         if not (root / "data" / folder).exists():
             shutil.copytree(data_root() / folder, root / "data" / folder)

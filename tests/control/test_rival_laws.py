@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.control.base import Reference
+from beaver_ftc.control import Reference
 from beaver_ftc.control.rivals.indi import IncrementalInversion, LowPass
 from beaver_ftc.control.rivals.l1 import Predictor
 from beaver_ftc.control.rivals.lqr import FixedGainLqr, gains
 from beaver_ftc.design.context import Context
-from beaver_ftc.diagnosis.base import Measured, Verdict
+from beaver_ftc.diagnosis import Measured, Verdict
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plugins import LAWS, plugin_class
 from flying import Memory, loss, scenario

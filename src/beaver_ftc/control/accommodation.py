@@ -1,17 +1,13 @@
 """Accommodation of a fault: the mode that the law is in, and how effective it takes each surface to be.
 
-The reconfiguration supervisor: which mode the law is in [Zhang2005, sec. VI].
+*Mode* [Zhang2005, sec. VI]. nominal until detection; adaptive until isolation, compensating an unknown fault;
+then reallocated (elevator, whose demand the flap can take over), or still adaptive with the isolated estimate
+(aileron, rudder: no second surface), or unanticipated (no known fault fits).
 
-nominal until detection; adaptive until isolation, compensating an unknown fault; then reallocated
-(elevator, whose demand the flap can take over), or still adaptive with the isolated estimate (aileron,
-rudder: no second surface), or unanticipated (no known fault fits).
-
-How effective the law takes each surface to be: effectiveness, offset and lag, moved smoothly.
-
-From the diagnosis (diagnosis/assessment.py): an isolated loss scales the command, a surface that does not
-follow its command is parked, an offset is subtracted, a slow surface is left to its pace. The oracle is
-informed of the truth instead: the loop fills in the true faults of the instant (loop/accounts.py), and no
-other law reads them.
+*Surfaces.* Effectiveness, offset and lag of each, moved smoothly. From the diagnosis
+(diagnosis/conclusion.py): an isolated loss scales the command, a surface that does not follow its command is
+parked, an offset is subtracted, a slow surface is left to its pace. The oracle is informed of the truth
+instead: the loop fills in the true faults of the instant (loop/frame.py), and no other law reads them.
 
 The laws divide by the effectiveness in `output`. It is rate limited, so that a decision never kicks the
 surfaces, and projected: a surface weaker than `least_effectiveness` is given up.
@@ -22,7 +18,7 @@ import numpy as np
 from beaver_ftc.compiled import apart, kernel, record, sized
 from beaver_ftc.design.model import unanticipated_pitch
 from beaver_ftc.diagnosis.state import PITCH, UNANTICIPATED
-from beaver_ftc.diagnosis.types.contract import GIVE_UP, SCALE_COMMAND
+from beaver_ftc.diagnosis.types import GIVE_UP, SCALE_COMMAND
 from beaver_ftc.scenario.diagnosis import MODES, ControlConfig
 
 MODE_NOMINAL, MODE_ADAPTIVE, MODE_REALLOCATED, MODE_UNANTICIPATED = range(len(MODES))
@@ -61,12 +57,12 @@ def mode_of(config, detected, isolated, relieved):
 def mode_from(config, layout, verdict, assessment):
     """The mode that the diagnosis asks for; verdict: what it concludes; config: as in `mode_of`."""
     elevator, relievable = layout.main[PITCH], layout.stand_in >= 0
-    if not assessment.every_type:
-        relieved = assessment.named == elevator and relievable
-        return mode_of(config, verdict.detected, verdict.isolated, relieved)
-    replaced = verdict.lead_kind in (SCALE_COMMAND, GIVE_UP)
-    relieved = replaced and verdict.lead == elevator and relievable
-    isolated = verdict.lead if replaced else min(verdict.isolated, 0)
+    if not assessment.diagnoses_all_types:
+        relieved = assessment.isolated_surface == elevator and relievable
+        return mode_of(config, verdict.detected, verdict.isolated_estimator, relieved)
+    replaced = verdict.accommodation_mode in (SCALE_COMMAND, GIVE_UP)
+    relieved = replaced and verdict.accommodated_surface == elevator and relievable
+    isolated = verdict.accommodated_surface if replaced else min(verdict.isolated_estimator, 0)
     return mode_of(config, verdict.detected, isolated, relieved)
 
 
@@ -123,22 +119,22 @@ def configure(surfaces: np.void, config: ControlConfig, informed: bool, dt_s: fl
 
 
 @apart
-def accommodate(control, assessment, faults, belief, measured):
+def accommodate(control, assessment, faults, prediction, measured):
     """Bring the estimates of all surfaces and of the unknown acceleration to this frame
     (base.CompiledLaw)."""
     surfaces, informed = control.surfaces, control.config.informed
     begin_frame(surfaces.output, assessment, informed)
     for s in range(surfaces.output.target.size):
-        target = reported(surfaces.output, assessment, faults, s, belief.u[s], informed)
+        target = reported(surfaces.output, assessment, faults, s, prediction.u[s], informed)
         approach(surfaces, s, start_of(surfaces.output, assessment, s, informed), target, False)
-    estimate_unknown(surfaces.output, control.config, assessment, faults, belief, measured.y)
+    estimate_unknown(surfaces.output, control.config, assessment, faults, prediction, measured.y)
 
 
 @kernel
 def begin_frame(output, assessment, informed):
     """Nothing is given up or parked yet; a slow surface has lost authority."""
     output.given_up[:], output.parked[:] = 0, 0
-    output.authority_lost = assessment.surface_lags and not informed
+    output.authority_lost = assessment.any_surface_lags and not informed
 
 
 @kernel
@@ -146,7 +142,7 @@ def reported(output, assessment, faults, s, u, informed):
     """Take offset and lag of surface s from the diagnosis, from the truth if the law is `informed`; returns
     its effectiveness, 0 if it does not move. u rad: where it would be if healthy."""
     if not informed:
-        output.offset[s], output.lag[s] = assessment.offset[s], assessment.lag[s]
+        output.offset[s], output.lag[s] = assessment.deflection_offset[s], assessment.deflection_lag[s]
         return assessment.effectiveness[s]
     effectiveness = 0.0 if faults.immovable[s] else faults.effectiveness[s]
     output.offset[s], output.lag[s] = 0.0, 0.0
@@ -175,12 +171,12 @@ def approach(surfaces, s, start, target, given_up):
 
 
 @kernel
-def estimate_unknown(output, config, assessment, faults, belief, y):
+def estimate_unknown(output, config, assessment, faults, prediction, y):
     """Fill output.unknown (3,) rad/s2: the truth's pitching moment for an informed law, the diagnosis'
     estimate for others that use the verdict."""
     output.unknown[:] = 0.0
     if config.informed:
-        output.unknown[PITCH] = unanticipated_pitch(belief.design, y, faults.Cm_alpha3)
+        output.unknown[PITCH] = unanticipated_pitch(prediction.design, y, faults.Cm_alpha3)
     elif config.uses_verdict:
         output.unknown[:] = assessment.unknown_acceleration
 

@@ -1,4 +1,8 @@
-"""Allocation to any number of surfaces: constrained least squares, started from the frame before.
+"""Allocation: the surfaces that give the demanded angular accelerations, and what they can give at all.
+
+An aircraft with one surface an axis and a stand-in needs a few lines: the lateral pair, the elevator, and the
+hand-over from elevator to flap. Any other number of surfaces is allocated by constrained least squares,
+started from the frame before; the hand-over is there a matter of each surface's weight.
 
     min  |B u - d|^2 + slack sum (u - p)^2 / v        low <= u <= high        [Harkegard2002, Bodson2002]
 
@@ -14,18 +18,12 @@ a system of three equations,
 and y is the multiplier as well: a surface at its limit stays there while (u - p) / v - B' y pushes
 outwards. The set of the frame before is tried first: as a rule it is right, and one system is solved.
 
-From demanded angular accelerations to surfaces: lateral pair, elevator, the hand-over from elevator to
-flap, the probe that moves both against each other; and what the surfaces can give at all.
+The attainable moment set is the image of the travels under G, with what is given up and what is off already
+in it [Durham1993]; here the interval it spans on each axis. A demand outside it no law can meet.
 
-The attainable moment set is the image of the travels under G, with what is given up and what is off
-already in it [Durham1993]; here the interval it spans on each axis. A demand outside it no law can meet.
-
-Where more surfaces move than one an axis and a stand-in, least squares with limits and rates take the
-place of these few lines; the hand-over is there a matter of each surface's weight.
-
-The probe is active diagnosis: a healthy aircraft feels nothing of it. The flap goes down and back by (1 -
-cos) / 2; the allocation gives the elevator what the flap does not leave. A surface that does not follow
-then shows.
+The probe is active diagnosis: it moves flap and elevator against each other, and a healthy aircraft feels
+nothing of it. The flap goes down and back by (1 - cos) / 2; the allocation gives the elevator what the flap
+does not leave. A surface that does not follow then shows.
 """
 
 from math import pi, radians, sqrt
@@ -35,7 +33,7 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import apart, kernel, record, sized
 from beaver_ftc.control.accommodation import usable_effectiveness
-from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW, leading_surfaces
+from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW, main_surfaces
 from beaver_ftc.scenario.diagnosis import ControlConfig, Probing
 
 LOW, FREE, HIGH = -1, 0, 1
@@ -206,7 +204,7 @@ def configure(control: np.void, config: ControlConfig, travel: np.ndarray, aircr
     """Fill `layout` and `allocation` of a law's record; travel (2, n) rad."""
     layout = control["layout"]
     layout["low"], layout["high"] = travel
-    layout["main"], layout["stand_in"] = leading_surfaces(aircraft), _stand_in(aircraft)
+    layout["main"], layout["stand_in"] = main_surfaces(aircraft), _stand_in(aircraft)
     layout["is_backup"] = [surface in aircraft.stand_ins for surface in aircraft.surfaces]
     layout["authority"], layout["general"] = _authority(aircraft, layout), _is_general(aircraft)
     step = control["reference"]["config"]["dt"] / config.hand_over_s
@@ -341,16 +339,16 @@ def allocate(axes, output, layout, effectiveness, share, probe):
 
 
 @kernel
-def set_problem(problem, G, layout, effectiveness, belief, share, probe):
+def set_problem(problem, G, layout, effectiveness, prediction, share, probe):
     """Set the limits of the surfaces within a frame, where each of them prefers to be, and the weight with
     which it leaves that; G (3, n); effectiveness (n,); share, probe: as in `pitch`.
 
     A backup gives `share` of what pitch demands beyond the trimmed moments: of two that move pitch alone
     that is the published hand-over. A probe is held, and the others give what it does not leave.
     """
-    own, waiting, u = 0.0, 0.0, belief.u
+    own, waiting, u = 0.0, 0.0, prediction.u
     for s in range(u.size):
-        reach = belief.actuators.step[s] / belief.share
+        reach = prediction.actuators.step[s] / prediction.frame_share_per_instant
         half, left = 0.5 * (layout.high[s] - layout.low[s]), effectiveness[s]
         hold = layout.trim[s] / left if left > 0.0 else layout.trim[s]
         problem.u_preferred[s] = min(max(hold, layout.low[s]), layout.high[s])
@@ -370,7 +368,7 @@ def set_problem(problem, G, layout, effectiveness, belief, share, probe):
 
 
 @apart
-def allocate_generally(axes, allocation, layout, effectiveness, belief, share, probe):
+def allocate_generally(axes, allocation, layout, effectiveness, prediction, share, probe):
     """Fill the command (n,) rad for any number of surfaces, within stops and rates, by least squares.
 
     effectiveness (n,); share, probe: as in `pitch`. With several elevators the backups take over no more than
@@ -383,7 +381,7 @@ def allocate_generally(axes, allocation, layout, effectiveness, belief, share, p
     )
     if layout.authority[PITCH, layout.main[PITCH]] < 1.0:
         share = min(share, 1.0 - left)
-    set_problem(problem, axes.G, layout, effectiveness, belief, share, probe)
+    set_problem(problem, axes.G, layout, effectiveness, prediction, share, probe)
     solve(problem, axes.G, axes.demand)
     for s in range(output.command.size):
         output.command[s], at = problem.u[s], problem.at[s]

@@ -1,19 +1,7 @@
 """Outer loops: altitude, airspeed, heading and bank by body rates and engine power.
 
-What the autopilot keeps: the profile to fly, its limits, its memory, and how far it was off.
-
-Envelope protection: what can still be held with what is left of the surfaces.
-
-Level flight takes an elevator that depends on dynamic pressure and flap (profile.py). What acts like the
-elevator now is estimated from the balance of the pitch moments,
-
-    acting = offset + left u + d / G,    d: what the law's observer finds unexplained
-
-so a jam is known where it stands before its type is. The speeds at which the flap, less a reserve to fly
-with, makes up for the rest are those that can be held; the commanded airspeed is brought among them.
-
-The autopilot: where each channel of the commanded profile should be now, from the legs of the scenario;
-and body-rate references and an engine setting for that.
+The autopilot computes where each channel of the commanded profile should be now, from the legs of the
+scenario, and body-rate references and an engine setting for that.
 
     climb    gamma_c = (h' + k (hc - h)) / V + what was found missing,   theta_c = gamma_c + alpha (smoothed)
              theta' = k (theta_c - theta)
@@ -23,18 +11,49 @@ and body-rate references and an engine setting for that.
     turn     psi' = g tan phi / V: coordinated [Etkin1996, sec. 7.6]; and the body rates of these angles'
              rates, with sideslip washed out by the rudder
 
-Every demand is limited, and what a limit cut off is not integrated. The limits on rates and bank shrink
-with what the surfaces that are left can give; climb and descent are bounded by the power there is, so that
-the airspeed is kept. Where the ailerons no longer act, the roll is flown by sideslip: rudder and dihedral.
+Every demand is limited, and what a limit cut off is not integrated. The limits on rates and bank shrink with
+what the surfaces that are left can give; climb and descent are bounded by the power there is, so that the
+airspeed is kept. Where the ailerons no longer act, the roll is flown by sideslip: rudder and dihedral.
+
+Envelope protection computes what can still be held with the remaining authority of the surfaces. Level flight
+of the design model takes an elevator that depends on dynamic pressure and flap:
+
+    qdyn S CX = m g sin alpha,   qdyn S CZ + m g cos alpha = 0,   Cm = 0
+
+in angle of attack, slipstream and elevator: wings level, no rates, no sideslip, the engine free. What acts
+like the elevator now is estimated from the balance of the pitch moments,
+
+    acting = offset + left u + d / G,    d: what the law's observer finds unexplained
+
+so a jam is known where it stands before its type is. The speeds at which the flap, less a reserve to fly
+with, makes up for the rest are those that can be held; the commanded airspeed is brought among them. A speed
+for which the elevator, or what is left of it, does not suffice cannot be held by any law.
+
+The autopilot's record keeps the profile to fly, its limits, its memory, and how far it was off;
+`set_up_autopilot` fills it from the scenario's `autopilot`.
 """
+
+from functools import lru_cache
+from math import inf, nan, radians
 
 import numpy as np
 
+from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.aircraft.aircraft import GRAVITY_MPS2, THRUST_TERM
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.control.allocation import attainable, remaining
-from beaver_ftc.control.engines import ENGINE, ceiling, gained, look_up, power_for, thrust_per_inhg
-from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, QDYN
+from beaver_ftc.control.engines import (
+    ENGINE,
+    ceiling,
+    gained,
+    look_up,
+    power_for,
+    set_up_engine,
+    thrust_per_inhg,
+)
+from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, QDYN, SEA_LEVEL_DENSITY_KG_M3
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
+from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import MEAN_S, TIME_TOLERANCE_S
 
 ALTITUDE, SPEED, HEADING, BANK = range(4)
@@ -49,7 +68,7 @@ COLUMNS = (
 )  # fmt: skip
 
 # Of each loop, 1/s and of what it finds missing 1/s2; smoothing, s; and what bounds the demands. Attitudes a
-# fifth as fast as the inner loops, the path a quarter of that: gusts set the pace, not comfort.
+# fifth as fast as the inner loops, the path a quarter of that: gusts set the gains, not comfort.
 GAINS = {
     "altitude": 0.8, "altitude_i": 0.04, "attitude": 3.0, "speed": 0.3, "speed_i": 0.015,
     "bank": 1.0, "bank_i": 0.2, "heading": 0.25, "heading_i": 0.004,
@@ -70,8 +89,9 @@ GAIN = record(**dict.fromkeys(GAINS, float))
 FASTEST, SLOWEST, BANK_LIMIT = range(3)
 N_QDYN, N_FLAP = 12, 5
 HOLDING = record(
-    known=int, limiting=int, frames=int, reserve=float, pace=float, qdyn=N_QDYN, flap=N_FLAP,
-    elevator=(N_QDYN, N_FLAP), acting=float, centre=float, fastest=float, slowest=float, bank=float,
+    known=int, limiting=int, frames=int, reserve=float, max_airspeed_rate_mps2=float,
+    qdyn=N_QDYN, flap=N_FLAP, elevator=(N_QDYN, N_FLAP), acting=float, centre=float,
+    fastest=float, slowest=float, bank=float,
     in_force=(int, 3), from_s=3, value=3,
 )  # fmt: skip
 
@@ -81,7 +101,7 @@ AUTOPILOT = record(
     legs=(int, N_CHANNELS), leg=(int, N_CHANNELS),  # how many, and which is next
     at_s=(N_CHANNELS, MAX_LEGS), value=(N_CHANNELS, MAX_LEGS), speed=(N_CHANNELS, MAX_LEGS),
     commanded=(int, N_CHANNELS),  # whether the channel is flown by now
-    goal=N_CHANNELS, command=N_CHANNELS, pace=N_CHANNELS,
+    goal=N_CHANNELS, command=N_CHANNELS, max_command_rate=N_CHANNELS,
     moving=N_CHANNELS,  # per second, of the command at this instant
     changed_at_s=N_CHANNELS,
     # what is known of the aircraft
@@ -97,7 +117,7 @@ AUTOPILOT = record(
     limit=3, most_bank=float, bank_limit=float,
     # memory
     alpha=float, airspeed=float,  # smoothed, rad and m/s
-    usual=float,  # airspeed of late, m/s
+    recent_airspeed_mps=float,  # averaged over RECENT_AIRSPEED_S
     drift=float,  # rad/s of turning found missing
     lift=float,  # rad of path angle found missing
     throttle=float, rolled=float,  # m/s2, rad/s: found missing
@@ -202,7 +222,7 @@ def approach(autopilot):
     if wanted == command and not hold.limiting:
         autopilot.held, autopilot.held_moving = command, autopilot.moving[SPEED]
         return
-    most = hold.pace * autopilot.dt
+    most = hold.max_airspeed_rate_mps2 * autopilot.dt
     step = min(max(wanted - autopilot.held, -most), most)
     autopilot.held += step
     autopilot.held_moving = step / autopilot.dt
@@ -235,10 +255,12 @@ MOST_PATH_RAD = 0.15
 MOST_SIDESLIP_RAD = 0.14
 MOST_MISSING = 0.1  # rad of path angle, and times gravity of acceleration
 MOST_DRIFT_RAD_S = 0.1  # of turning that a bank without a turn stands for
-USUAL_S, USUAL_MPS = 20.0, 3.0  # airspeed that power alone can hold: within so much of what it has been
+RECENT_AIRSPEED_S = 20.0  # over which the recent airspeed is averaged
+MAX_FROM_RECENT_MPS = 3.0  # power alone can hold an airspeed within so much of the recent one
 CUT_INHG_S, RAISE_INHG_S = 8.0, 1.0  # about as fast as the engine follows; and slower than a gust lasts
 KEPT_ASIDE = 0.15  # of the power's range at either end, for engines that alone yaw the aircraft
-PACE_BY_POWER, BY_POWER_S = 0.25, 5.0  # of the loops of bank and heading there, and since when it counts
+LOOP_GAIN_SHARE_BY_POWER = 0.25  # of the loops of bank and heading where engines alone yaw the aircraft
+BY_POWER_S = 5.0  # since when that counts
 SETTLED_S = 30.0  # after a change of heading
 
 
@@ -268,7 +290,7 @@ def begin_leg(autopilot, c, now, t):
         away = value - autopilot.command[c]
         autopilot.goal[c] += turn(away) if c == HEADING else away
         autopilot.changed_at_s[c] = t
-    autopilot.pace[c] = autopilot.speed[c, j]
+    autopilot.max_command_rate[c] = autopilot.speed[c, j]
 
 
 @kernel
@@ -281,7 +303,10 @@ def advance(autopilot, measured, t):
         ):
             begin_leg(autopilot, c, measured[c], t)
         if autopilot.commanded[c]:
-            away, most = autopilot.goal[c] - autopilot.command[c], autopilot.pace[c] * autopilot.dt
+            away, most = (
+                autopilot.goal[c] - autopilot.command[c],
+                autopilot.max_command_rate[c] * autopilot.dt,
+            )
             step = min(max(away, -most), most)
             autopilot.command[c] += step
             autopilot.moving[c] = step / autopilot.dt if most < np.inf else 0.0
@@ -290,7 +315,7 @@ def advance(autopilot, measured, t):
 @kernel
 def steer(autopilot, control, u, measured, unexplained, t):
     """One frame, at t s: fill autopilot.rates (3,) rad/s, and the engine setting where an airspeed is
-    commanded. control: the records of the law (control/state.py). u, unexplained: see `holding.protect`.
+    commanded. control: the records of the law (control/state.py). u, unexplained: see `protect`.
     """
     layout, surfaces, saturated = control.layout, control.surfaces, control.allocation.output.saturated
     axes, power, by_engines = control.axes, control.power, control.engines.output.authority
@@ -317,7 +342,7 @@ def take_over(autopilot, y, attitude):
     """In trim: smoothed signals and the engine as they are."""
     autopilot.flying = 1
     autopilot.alpha, autopilot.airspeed = y[ALPHA], y[AIRSPEED]
-    autopilot.usual = y[AIRSPEED]
+    autopilot.recent_airspeed_mps = y[AIRSPEED]
     autopilot.climb_in_trim = attitude[PITCH] - y[ALPHA]
 
 
@@ -455,23 +480,27 @@ def pitching(autopilot, y, attitude, path):
 @kernel
 def rolling(autopilot, attitude):
     """The rate of the bank angle, rad/s; slower where engines alone yaw and roll."""
-    pace = 1.0 - autopilot.jammed * autopilot.by_power * (1.0 - PACE_BY_POWER)
+    loop_gain_share = 1.0 - autopilot.jammed * autopilot.by_power * (1.0 - LOOP_GAIN_SHARE_BY_POWER)
     if autopilot.commanded[HEADING]:
         error = turn(autopilot.command[HEADING] - attitude[YAW])
         left = 1.0 - autopilot.loose * (1.0 - autopilot.gain.loose)
         found = autopilot.drift + autopilot.dt * autopilot.loose * autopilot.gain.heading_i * error
         autopilot.drift = autopilot.loose * clamp(found, MOST_DRIFT_RAD_S)
-        turning = pace * left * autopilot.gain.heading * error + autopilot.moving[HEADING] + autopilot.drift
+        turning = (
+            loop_gain_share * left * autopilot.gain.heading * error
+            + autopilot.moving[HEADING]
+            + autopilot.drift
+        )
         bank = autopilot.airspeed / autopilot.gravity * turning
     elif autopilot.commanded[BANK]:
         bank = autopilot.command[BANK]
     else:
         return 0.0
     away = clamp(bank, autopilot.bank_limit) - attitude[ROLL]
-    wanted = pace * autopilot.gain.bank * away + autopilot.jammed * autopilot.rolled
+    wanted = loop_gain_share * autopilot.gain.bank * away + autopilot.jammed * autopilot.rolled
     rate = clamp(wanted, autopilot.limit[ROLL])
     if rate == wanted:
-        autopilot.rolled += autopilot.jammed * autopilot.dt * pace * autopilot.gain.bank_i * away
+        autopilot.rolled += autopilot.jammed * autopilot.dt * loop_gain_share * autopilot.gain.bank_i * away
     return rate
 
 
@@ -501,10 +530,14 @@ def throttle(autopilot, power, y, path, push):
     """Set the power; while power stands in for a lost pitch, also the airspeed for its law and the
     acceleration that the path takes: that law has an airspeed loop of its own."""
     error = autopilot.held - autopilot.airspeed
-    autopilot.usual += autopilot.dt / USUAL_S * (autopilot.airspeed - autopilot.usual)
+    autopilot.recent_airspeed_mps += (
+        autopilot.dt / RECENT_AIRSPEED_S * (autopilot.airspeed - autopilot.recent_airspeed_mps)
+    )
     along = autopilot.held_moving + autopilot.throttle
     if power.memory.engaged:
-        autopilot.power_airspeed = autopilot.usual + clamp(autopilot.held - autopilot.usual, USUAL_MPS)
+        autopilot.power_airspeed = autopilot.recent_airspeed_mps + clamp(
+            autopilot.held - autopilot.recent_airspeed_mps, MAX_FROM_RECENT_MPS
+        )
         error = autopilot.power_airspeed - autopilot.airspeed
     else:
         along += autopilot.gain.speed * error
@@ -538,3 +571,133 @@ def judge(autopilot, altitude_m, airspeed_mps, heading, bank, t):
             autopilot.held_worst = max(autopilot.held_worst, abs(autopilot.held_off))
         if c in (ALTITUDE, SPEED) or t >= autopilot.changed_at_s[c] + SETTLED_S:
             autopilot.worst[c] = max(autopilot.worst[c], abs(away))
+
+
+THRUST = "dpt"  # the signal that stands for the engine
+STEP = 1e-30  # of a complex step
+ITERATIONS, CLOSE = 12, 1e-9
+STEEPEST_RAD, MOST_THRUST = 0.5, 3.0  # beyond, the polynomials have solutions that no aircraft flies
+PER_FLAP, GUESS = -0.12, (0.1, 0.5, 0.0)  # alpha over flap, and alpha, slipstream, elevator without it
+MOST_DEG_S = (12.0, 6.0, 10.0)  # asked of a healthy aircraft: a transport's manoeuvres
+MOST_BANK_DEG = 30.0
+STEEPEST_ALPHA_DEG = 15.0
+SPARE_ALPHA_DEG = 1.0, 2.0  # at least and at most, below the highest at which the model is valid
+SPARE_MPS, SPARE_SHARE = 2.0, 0.2  # above the validated airspeeds' end; at most this share of them
+POWER_SIDESLIP_RAD = 0.2  # that full power may lead to with a rudder that is lost; 0.6 is a departure
+# Of 0, 0.7, 1.5 and 3 deg kept of the flap at the end of the airspeeds that can be held, the one with which
+# most jams were kept; and how fast a limit moves the command: about as fast as drag slows the aircraft down.
+FLAP_RESERVE_DEG, MAX_AIRSPEED_RATE_MPS2 = 0.7, 1.0
+LEAST_DIHEDRAL = 0.01  # of an aircraft that hardly rolls by sideslip: it is then not flown by it
+_UNIT = dict(zip(CHANNELS, (1.0, 1.0, radians(1.0), radians(1.0)), strict=True))
+
+
+def set_up_autopilot(autopilot: np.void, control: np.void, scenario: Scenario) -> None:
+    """Fill the record (dtype AUTOPILOT); control: the law's, already assembled."""
+    profile = scenario.autopilot
+    if profile is None or not profile.channels:
+        return
+    autopilot["enabled"], autopilot["dt"] = 1, 1.0 / scenario.rate_hz
+    set_up_profile(autopilot, scenario)
+    autopilot["changed_at_s"], autopilot["worst"] = -inf, NOT_JUDGED
+    autopilot["gain"] = tuple(_gains(scenario.airframe).values())
+    autopilot["gravity"] = GRAVITY_MPS2
+    _set_up_aircraft_values(autopilot, scenario)
+    less, more = (scenario.airframe.envelope.alpha_deg[1] - spare for spare in SPARE_ALPHA_DEG)
+    autopilot["steepest_alpha"] = radians(min(less, max(STEEPEST_ALPHA_DEG, more)))
+    autopilot["most"], autopilot["most_bank"] = np.radians(MOST_DEG_S), radians(MOST_BANK_DEG)
+    for name in ("trim", "low", "high"):
+        autopilot[f"{name}_power"] = control["power"]["config"][name]
+    autopilot["allowed_power"] = control["power"]["config"]["high"]
+    control["reference"]["config"]["steered"] = 1
+    _set_up_level_flight_table(autopilot["holding"], control["layout"], scenario)
+
+
+def _gains(aircraft: Aircraft) -> dict[str, float]:
+    """The gains; those of the airspeed slower by what the engine lags, which its loop has beside its own."""
+    thrust = aircraft.engine.thrust
+    slower = 1.0 + (thrust.lag_s if thrust and aircraft.airspeed_by == "power" else 0.0) / GAINS["airspeed_s"]
+    return GAINS | {"speed": GAINS["speed"] / slower, "speed_i": GAINS["speed_i"] / slower**2}
+
+
+def set_up_profile(autopilot: np.void, scenario: Scenario) -> None:
+    """Fill in the legs; in flight too, where those that have been begun are the same as before."""
+    for c, (name, unit) in enumerate(_UNIT.items()):
+        legs = getattr(scenario.autopilot, name)
+        autopilot["legs"][c] = len(legs)
+        for j, leg in enumerate(legs):
+            autopilot["at_s"][c, j] = leg.at_s
+            autopilot["value"][c, j] = nan if leg.value is None else leg.value * unit
+            autopilot["speed"][c, j] = getattr(leg, "climb_mps", getattr(leg, "change_mps2", inf))
+
+
+def _set_up_aircraft_values(autopilot: np.void, scenario: Scenario) -> None:
+    """What the loops take from the aircraft: thrust, roll by sideslip, slowest airspeed."""
+    aircraft = scenario.airframe
+    terms = {name: term.value for name, term in aircraft.terms.items()}
+    mass_kg = aircraft.mass.mass_kg * scenario.design_model.mass
+    per_mass = aircraft.geometry.wing_area_m2 / mass_kg
+    autopilot["thrust"] = per_mass * np.array([terms.get(THRUST_TERM, 0.0), terms.get("CX_adpt2", 0.0)])
+    autopilot["glides"] = aircraft.airspeed_by == "pitch"
+    if aircraft.airspeed_by == "power" and THRUST_TERM not in terms:
+        set_up_engine(autopilot["engine"], aircraft.engine.thrust, mass_kg)
+    by_sideslip = terms.get("Cl_beta", 0.0) / terms.get("Cl_p", -1.0)
+    autopilot["dihedral"] = max(by_sideslip, LEAST_DIHEDRAL) * 2.0 / aircraft.geometry.span_m
+    autopilot["weathercock"] = inf
+    if terms.get("Cn_dpt3"):
+        beta = POWER_SIDESLIP_RAD
+        held = terms.get("Cn_beta", 0.0) * beta + terms.get("Cn_beta3", 0.0) * beta**3
+        autopilot["weathercock"] = max(held / abs(terms["Cn_dpt3"]), 0.0)
+    slowest, fastest = aircraft.envelope.airspeed_mps
+    autopilot["slowest_mps"] = slowest + min(SPARE_MPS, SPARE_SHARE * (fastest - slowest))
+
+
+def _set_up_level_flight_table(holding: np.void, layout: np.void, scenario: Scenario) -> None:
+    """The table of level flight, where the aircraft's file has forces and a flap for the elevator."""
+    aircraft, flap = scenario.airframe, int(layout["stand_in"])
+    holding["from_s"], holding["bank"], holding["fastest"] = -1.0, radians(MOST_BANK_DEG), inf
+    if flap < 0 or not aircraft.forces or THRUST not in aircraft.signals:
+        return
+    speeds_mps = np.linspace(*aircraft.envelope.airspeed_mps, N_QDYN)
+    holding["qdyn"] = 0.5 * SEA_LEVEL_DENSITY_KG_M3 * speeds_mps**2
+    holding["flap"] = np.linspace(layout["low"][flap], layout["high"][flap], N_FLAP)
+    surfaces = aircraft.surfaces[layout["main"][PITCH]], aircraft.surfaces[flap]
+    model = scenario.design_model
+    mass_kg, scale = aircraft.mass.mass_kg * model.mass, tuple(model.coefficients.items())
+    qdyn_pa, flap_rad = tuple(holding["qdyn"]), tuple(holding["flap"])
+    needed = elevator_needed(aircraft, surfaces, mass_kg, scale, qdyn_pa, flap_rad)
+    holding["known"], holding["elevator"] = bool(np.isfinite(needed).all()), needed
+    holding["max_airspeed_rate_mps2"], holding["reserve"] = MAX_AIRSPEED_RATE_MPS2, radians(FLAP_RESERVE_DEG)
+
+
+@lru_cache(maxsize=32)
+def elevator_needed(
+    aircraft: Aircraft,
+    surfaces: tuple[str, str],
+    mass_kg: float,
+    scale: tuple[tuple[str, float], ...],
+    qdyn_pa: tuple[float, ...],
+    flap_rad: tuple[float, ...],
+) -> np.ndarray:
+    """Deflection (n, m) rad for level flight at qdyn (n,) and flap (m,); not a number where there is none.
+
+    surfaces: elevator and flap of this aircraft. scale: what the designer multiplies single terms by.
+    """
+    q, flap = (values.ravel() for values in np.meshgrid(qdyn_pa, flap_rad, indexing="ij"))
+    load = mass_kg * GRAVITY_MPS2 / (q * aircraft.geometry.wing_area_m2)
+    neutral = {factor: 0.0 for term in aircraft.terms.values() for factor in term.factors}
+    ratio = dict(scale)
+
+    def imbalance(unknown: np.ndarray) -> np.ndarray:
+        alpha, thrust, elevator = unknown.T
+        of = neutral | {"alpha": alpha, THRUST: thrust, surfaces[0]: elevator, surfaces[1]: flap}
+        CX, CZ, Cm = (aircraft.coefficient(name, of, ratio) for name in ("CX", "CZ", "Cm"))
+        return np.stack([CX - load * np.sin(alpha), CZ + load * np.cos(alpha), Cm], -1)
+
+    unknown = np.tile(GUESS, (q.size, 1))
+    unknown[:, 0] += PER_FLAP * flap
+    for _ in range(ITERATIONS):
+        slopes = [imbalance(unknown + 1j * STEP * e).imag / STEP for e in np.eye(3)]
+        unknown = unknown - np.linalg.solve(np.stack(slopes, -1), imbalance(unknown)[..., None])[..., 0]
+    solved = np.abs(imbalance(unknown)).max(axis=1) < CLOSE
+    flyable = (np.abs(unknown[:, 0]) < STEEPEST_RAD) & (np.abs(unknown[:, 1]) < MOST_THRUST)
+    return np.where(solved & flyable, unknown[:, 2], np.nan).reshape(len(qdyn_pa), len(flap_rad))

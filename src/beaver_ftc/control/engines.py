@@ -1,44 +1,36 @@
-"""Engine power and engines as effectors: what thrust does along the path, power on pitch, each engine by its
-arms.
+"""Engines in control: thrust along the path, power as the last means on pitch, engines as effectors.
 
-What engine power does along the path, and the power that does so much.
+*Thrust.* Of a piston engine whose slipstream is among the forces, the slope of thrust over power where it is
+now; of any other, a table of steady thrust over airspeed and power, as the aircraft's file has it. Power is
+in the units of its setting.
 
-Of a piston engine whose slipstream is among the forces, the slope where it is now; of any other, a table
-of steady thrust over airspeed and power, as the aircraft's file has it. Power is in the units of its
-setting.
-
-Engine power: its command, in the units of its setting; and the Beaver's on pitch, the last that acts there
-when neither elevator nor flap does.
+*Power on pitch.* The Beaver's power acts on pitch when neither elevator nor flap does.
 
     pz = pz_trim - k_V (V - Vbar) + k_att att,    T_V Vbar' = V - Vbar,    att' = q - q_ref - att / T_att
 
 Airspeed fed back to power damps the phugoid, as when an airliner was flown on its engines alone
-[Burcham1997]. Washed out, so that power does not fight the airspeed to which a jammed elevator trims the
-aircraft: it has not the moment for that. att is what the pitch rate has missed of late: nose too high, and
-more power lowers it, Cm_dpt being negative.
+[Burcham1997]. It is washed out, so that power does not fight the airspeed to which a jammed elevator trims
+the aircraft: it has not the moment for that. att is what the pitch rate has missed of late: nose too high,
+and more power lowers it, Cm_dpt being negative. Power has little moment and a right-half-plane zero from
+there to the attitude: it can steady the aircraft, not make it follow a pitch rate.
 
-Power has little moment and a right-half-plane zero from there to the attitude: it can steady the aircraft,
-not make it follow a pitch rate.
-
-Engines as effectors: each turns the aircraft by its arms, and takes what surfaces no longer reach.
-
-A surface about an axis that is given up or at its stop leaves a part of the demand, the shortfall e. What
-the engines are to give is its integral,
+*Effectors.* Each engine turns the aircraft by its arms, and takes what surfaces no longer reach. A surface
+about an axis that is given up or at its stop leaves a part of the demand, the shortfall e. What the engines
+are to give is its integral,
 
     w' = e / T,   T = 2 lag            over the engines' own lag: w / demand = 1 / (T s (lag s + 1) + 1)
 
-which is damped by 0.7: they take the slow part; the fast one, which they could only answer late, is left
-to the aircraft's own damping [Burcham1997]. What they give is in the design model, by the moments of the
-engines among its signals, or the law's observer finds it: e is then what is left. Once the surfaces reach,
-w fades.
+which is damped by 0.7: they take the slow part; the fast one, which they could only answer late, is left to
+the aircraft's own damping [Burcham1997]. What they give is in the design model, by the moments of the engines
+among its signals, or the law's observer finds it: e is then what is left. Once the surfaces reach, w fades.
 
-Which engine gives what is constrained least squares (allocation.py) over the accelerations u (m/s2 of
-the whole aircraft's thrust over mass) that the power left above and below the common lever gives; B has
+Which engine gives what is constrained least squares (allocation.py) over the accelerations u (m/s2 of the
+whole aircraft's thrust over mass) that the power left above and below the common lever gives; B has
 
     share mass (0, down / Iy, -right / Iz)                       of a force along the body's x axis
 
-with the inertia's coupling of yaw into roll. The lever that gives u is found in the table of thrust. Roll
-is not asked of them: they roll by sideslip, which the outer loops ask for.
+with the inertia's coupling of yaw into roll. The lever that gives u is found in the table of thrust. Roll is
+not asked of them: they roll by sideslip, which the outer loops ask for.
 """
 
 from math import exp, radians
@@ -49,9 +41,8 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.schema import MAX_EFFECTORS, MAX_LEVERS, MAX_THRUST
 from beaver_ftc.compiled import apart, kernel, record
-from beaver_ftc.control import allocation
+from beaver_ftc.control import allocation, row_of
 from beaver_ftc.control.allocation import problem_dtype, remaining
-from beaver_ftc.control.base import row_of
 from beaver_ftc.design.model import AIRSPEED, DPT, QDYN, engine_power_kw, inertia_coefficients, slipstream
 from beaver_ftc.diagnosis.state import PITCH, YAW
 from beaver_ftc.scenario.schema import Scenario
@@ -142,8 +133,8 @@ POWER = record(config=POWER_CONFIG, setpoint=SETPOINT, memory=POWER_MEMORY, outp
 def is_at_hand(scenario: Scenario) -> bool:
     """Whether the built-in law of a scenario may use the engine."""
     law = row_of(scenario.control.law)
-    every_type = scenario.fdi.fault_class == "all" and law.pitch_by_power
-    wanted = scenario.control.power.enabled and (law.informed or (law.reallocates and every_type))
+    diagnoses_all_types = scenario.fdi.fault_class == "all" and law.pitch_by_power
+    wanted = scenario.control.power.enabled and (law.informed or (law.reallocates and diagnoses_all_types))
     return wanted and _has_piston_engine(scenario.airframe)
 
 

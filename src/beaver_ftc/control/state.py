@@ -10,10 +10,9 @@ from importlib import import_module
 import numpy as np
 
 from beaver_ftc.compiled import one_of, record, sized
-from beaver_ftc.control import accommodation, allocation, engines, laws
+from beaver_ftc.control import MODULES, CompiledLaw, accommodation, allocation, engines, file_of, laws, row_of
 from beaver_ftc.control.accommodation import surfaces_dtype
 from beaver_ftc.control.allocation import PROBE, allocation_dtype, axes_dtype, layout_dtype
-from beaver_ftc.control.base import MODULES, CompiledLaw, file_of, row_of
 from beaver_ftc.control.engines import ENGINES, POWER
 from beaver_ftc.control.laws import REFERENCE
 from beaver_ftc.scenario.schema import Scenario
@@ -57,12 +56,12 @@ def configure(control: np.void, scenario: Scenario, travel: np.ndarray) -> None:
     engines.configure_engines(control["engines"], scenario)
 
 
-def configure_law(control: np.void, belief: np.void, scenario: Scenario, y: np.ndarray) -> None:
+def configure_law(control: np.void, prediction: np.void, scenario: Scenario, y: np.ndarray) -> None:
     """Fill the record of the law in charge, which may derive its gains at the trim; y: the measured signals
     there."""
     row = row_of(scenario.control.law)
     if (law := FILES[row.file]).configure is not None:
-        law.configure(control[row.file], control, belief, scenario, y)
+        law.configure(control[row.file], control, prediction, scenario, y)
 
 
 def take_over(new: np.void, before: np.void, learnt: np.ndarray) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from beaver_ftc.control.laws.gains import (
+from beaver_ftc.control.laws.rejecting import (
     RATIO,
     Loop,
     candidates,

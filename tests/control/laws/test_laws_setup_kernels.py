@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from beaver_ftc.control import laws, state
-from beaver_ftc.control.laws import gains
-from beaver_ftc.control.laws.gains import N_POINTS
+from beaver_ftc.control.laws import rejecting
+from beaver_ftc.control.laws.rejecting import N_POINTS
 from beaver_ftc.design.model import AIRSPEED, QDYN, design_record, response
-from beaver_ftc.diagnosis.expectation import belief_dtype
+from beaver_ftc.diagnosis.model_prediction import prediction_dtype
 from beaver_ftc.scenario.schema import Scenario
 from law_records import fields, new_control
 from telling import apart
@@ -30,12 +30,12 @@ def asked(monkeypatch):
 
     def ask(scenario, stand_in=3):
         found = {}
-        monkeypatch.setattr(gains, "set_up", lambda config, **of: found.update(of))
+        monkeypatch.setattr(rejecting, "set_up", lambda config, **of: found.update(of))
         control = new_control(main=(0, 1, 2), stand_in=stand_in)
-        belief = np.zeros(1, belief_dtype(4))[0]
-        belief["design"] = design_record()[0]
-        belief["actuators"]["approach"] = (0.2, 0.3, 0.4, 0.05)
-        state.configure_law(control, belief, scenario, Y)
+        prediction = np.zeros(1, prediction_dtype(4))[0]
+        prediction["design"] = design_record()[0]
+        prediction["actuators"]["approach"] = (0.2, 0.3, 0.4, 0.05)
+        state.configure_law(control, prediction, scenario, Y)
         return found
 
     return ask

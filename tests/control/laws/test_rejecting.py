@@ -91,7 +91,8 @@ class TestTheDiagnosisIsNotDisturbed:
         for rows in loop.chunks():
             memory.write(rows)
             behind = np.abs(
-                loop.frames[0]["belief"]["u_before"] - loop.frames[0]["truth"]["value"][ch.POS : ch.POS + 4]
+                loop.frames[0]["prediction"]["u_before"]
+                - loop.frames[0]["truth"]["value"][ch.POS : ch.POS + 4]
             )
         assert behind.max() < 1e-9
 

@@ -9,7 +9,7 @@ from beaver_ftc.control import accommodation, allocation, laws
 from beaver_ftc.control.accommodation import MODE_ADAPTIVE, MODE_NOMINAL, MODE_REALLOCATED, MODE_UNANTICIPATED
 from beaver_ftc.control.laws import rejecting
 from beaver_ftc.diagnosis.state import NOT_ISOLATED
-from beaver_ftc.diagnosis.types.contract import GIVE_UP, SCALE_COMMAND, SUBTRACT_OFFSET, WAIT_FOR_SURFACE
+from beaver_ftc.diagnosis.types import GIVE_UP, SCALE_COMMAND, SUBTRACT_OFFSET, WAIT_FOR_SURFACE
 from beaver_ftc.loop import frame as whole
 from beaver_ftc.loop.assembly import configure_design
 from flying import scenario
@@ -171,13 +171,13 @@ def test_the_demand_is_that_of_its_equation(seed):
     """demand = xm' + Kp (xm - x+) - f - d, xm and x+ when the command acts."""
     control, rng = record(seed)
     frames = configure_design(scenario(), TRAVEL).view(np.recarray)
-    belief, measured, law = frames[0]["belief"], frames[0]["measured"], control["rejecting"]
+    prediction, measured, law = frames[0]["prediction"], frames[0]["measured"], control["rejecting"]
     f, G, u = rng.normal(0, 1, 3), rng.normal(0, 5, (3, 4)), rng.normal(0, 0.1, 4)
-    belief["f"], belief["G"], belief["u"] = f, G, u
+    prediction["f"], prediction["G"], prediction["u"] = f, G, u
     measured["x"], measured["y"][3] = rng.normal(0, 0.1, 3), 900.0
     axes, model, surfaces = law["output"], fields(control["reference"]), control["surfaces"]["output"]
     main = control["layout"]["main"]
-    rejecting.demand(law, control["reference"], surfaces, main, 0.0, belief, measured)  # begins with x
+    rejecting.demand(law, control["reference"], surfaces, main, 0.0, prediction, measured)  # begins with x
     share, d, x = law["config"]["share"], law["observer"]["disturbance"], measured["x"]
     assert axes["disturbance"].tolist() == d.tolist()
     ahead = x + share * DT * (f + d + G @ (surfaces["effectiveness"] * u + surfaces["offset"]))
@@ -223,7 +223,7 @@ def test_handed_back_the_share_of_the_stand_in_leaps_by_no_more_than_its_step(gi
 
 
 @pytest.mark.parametrize(
-    ("mode", "every_type", "hedging", "left", "before", "after"),
+    ("mode", "diagnoses_all_types", "hedging", "left", "before", "after"),
     [
         (MODE_REALLOCATED, 0, 0, 0.6, 0.2, 0.3),
         (MODE_REALLOCATED, 0, 0, 0.6, 0.95, 1.0),
@@ -236,13 +236,13 @@ def test_handed_back_the_share_of_the_stand_in_leaps_by_no_more_than_its_step(gi
         (MODE_UNANTICIPATED, 0, 1, 0.6, 1.0, 0.9),
     ],
 )
-def test_pitch_is_handed_over_by_steps_and_back(mode, every_type, hedging, left, before, after):
+def test_pitch_is_handed_over_by_steps_and_back(mode, diagnoses_all_types, hedging, left, before, after):
     frame = configure_design(scenario(), TRAVEL).view(np.recarray)[0]
     control = put(frame["control"], hand_over=before, hand_over_step=0.1, hedging=hedging)
     control["surfaces"]["output"]["effectiveness"][ELEVATOR] = left
     control["allocation"]["output"]["lost_share"], assessment = 0.3, frame["assessment"]
-    assessment["every_type"] = every_type
-    laws.prepare(control, assessment, frame["belief"], mode, 0.0)
+    assessment["diagnoses_all_types"] = diagnoses_all_types
+    laws.prepare(control, assessment, frame["prediction"], mode, 0.0)
     assert control["allocation"]["output"]["hand_over"] == pytest.approx(after)
     now = 1.0 - left if left >= 0.1 else 1.0
     lost = now if mode == MODE_REALLOCATED else 0.3
@@ -277,8 +277,8 @@ class TestVerdict:
 
     def test_of_a_plug_ins_estimates_once_it_has_detected(self, frame):
         verdict = frame["fdi"]["verdict"]
-        verdict["estimates"], verdict["effectiveness"] = 1, [0.9, 0.4, 1.0, 0.7]
-        verdict["isolated"] = NOT_ISOLATED
+        verdict["has_effectiveness"], verdict["effectiveness"] = 1, [0.9, 0.4, 1.0, 0.7]
+        verdict["isolated_estimator"] = NOT_ISOLATED
         assert list(self.taken(frame)["target"]) == [1.0] * 4
         verdict["detected"] = 1
         assert list(self.taken(frame)["target"]) == [0.9, 0.4, 1.0, 0.7]
@@ -290,29 +290,32 @@ class TestVerdict:
         faults["present"] = 1
         faults["effectiveness"], faults["effective"] = [1.0, effectiveness, 1.0, 1.0], [0.1, 0.2, 0.3, 0.4]
         faults["immovable"][FLAP] = 1
-        frame["belief"]["u"] = [0.1, 0.25, 0.3, 0.05]
+        frame["prediction"]["u"] = [0.1, 0.25, 0.3, 0.05]
         surfaces = self.taken(frame)
         assert surfaces["target"] == pytest.approx([1.0, effectiveness, 1.0, 0.0])
         assert surfaces["offset"] == pytest.approx([0.0, 0.2 - effectiveness * 0.25, 0.0, 0.4])
 
     def test_a_slow_surface_is_left_to_its_pace(self, frame):
-        surface, frame["fdi"]["config"]["every_type"] = frame["fdi"]["types"]["surface"][RUDDER], 1
-        surface["accommodation"]["mode"], elapsed = WAIT_FOR_SURFACE, surface["elapsed"]
-        elapsed["command"], elapsed["low"], elapsed["high"] = 0.1, 0.02, 0.06
+        surface, frame["fdi"]["config"]["diagnoses_all_types"] = frame["fdi"]["types"]["surface"][RUDDER], 1
+        surface["accommodation"]["mode"], elapsed = WAIT_FOR_SURFACE, surface["last_observation"]
+        elapsed["healthy_position"], elapsed["position_low"], elapsed["position_high"] = 0.1, 0.02, 0.06
         assert self.taken(frame)["lag"] == pytest.approx([0, 0, 0.04 - 0.1, 0])
         assert frame["control"]["surfaces"]["output"]["authority_lost"] == 1
 
     @pytest.mark.parametrize(
-        ("every_type", "measure", "target", "surface", "doubtful"),
+        ("diagnoses_all_types", "measure", "target", "surface", "doubtful"),
         [
             (1, -1, 1.0, RUDDER, True), (1, SCALE_COMMAND, 1.0, RUDDER, False), (0, -1, 1.0, RUDDER, False),
             (0, -1, 0.05, RUDDER, True), (0, -1, 0.1, RUDDER, False), (0, -1, 1.0, ELEVATOR, True),
             (1, SUBTRACT_OFFSET, 0.5, AILERON, False),
         ],
     )  # fmt: skip
-    def test_what_may_be_of_no_use(self, frame, every_type, measure, target, surface, doubtful):
+    def test_what_may_be_of_no_use(self, frame, diagnoses_all_types, measure, target, surface, doubtful):
         control, assessment = frame["control"], frame["assessment"]
-        assessment["every_type"], assessment["accommodation_mode"][surface] = every_type, measure
+        assessment["diagnoses_all_types"], assessment["accommodation_mode"][surface] = (
+            diagnoses_all_types,
+            measure,
+        )
         parts = assessment, control["rejecting"]["memory"]["sums"], control["layout"]
         assert bool(rejecting.is_doubtful(*parts, surface, target, 0.1)) is doubtful
 

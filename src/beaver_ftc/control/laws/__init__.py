@@ -110,14 +110,14 @@ def govern(reference, commanded, shortfall, authority_lost):
 
 
 @apart
-def prepare(control, assessment, belief, mode, t):
+def prepare(control, assessment, prediction, mode, t):
     """Bring the effectiveness matrix, the hand-over of pitch and the probe to this frame, t s. mode: the
     supervisor's."""
     surfaces, config = control.surfaces, control.config
-    allocation.form_effectiveness_matrix(control.axes, belief.G, surfaces, config.uses_verdict)
+    allocation.form_effectiveness_matrix(control.axes, prediction.G, surfaces, config.uses_verdict)
     remains = allocation.remaining(control.layout, surfaces.output.effectiveness, PITCH)
     least, reallocated = surfaces.config.least_effectiveness, mode == MODE_REALLOCATED
-    at_once = is_governed(control) or (remains < least and assessment.every_type)
+    at_once = is_governed(control) or (remains < least and assessment.diagnoses_all_types)
     allocation.hand_over_pitch(control.allocation, reallocated, at_once, remains, least)
     if control.probe.config.frames > 0:
         wanted = assessment.pitch_undecided and config.uses_verdict and not config.informed
@@ -131,7 +131,7 @@ def is_governed(control):
 
 
 @apart
-def command_surfaces(control, demand, hold, disturbance, assessment, faults, belief, by_observer):
+def command_surfaces(control, demand, hold, disturbance, assessment, faults, prediction, by_observer):
     """From the law's demand to the command of each surface; demand, hold, disturbance (3,) rad/s2: see
     `allocation.form_demand`.
 
@@ -140,11 +140,15 @@ def command_surfaces(control, demand, hold, disturbance, assessment, faults, bel
     """
     axes, layout, surfaces, out = control.axes, control.layout, control.surfaces, control.allocation.output
     uses_verdict, effectiveness = control.config.uses_verdict, surfaces.output.effectiveness
-    allocation.form_demand(axes, demand, hold, disturbance, surfaces.output.offset, belief.G, uses_verdict)
+    allocation.form_demand(
+        axes, demand, hold, disturbance, surfaces.output.offset, prediction.G, uses_verdict
+    )
     share = out.transfer_share if by_observer else allocation.smooth(out.hand_over)
     probe = control.probe.memory.deflection
     if layout.general:
-        allocation.allocate_generally(axes, control.allocation, layout, effectiveness, belief, share, probe)
+        allocation.allocate_generally(
+            axes, control.allocation, layout, effectiveness, prediction, share, probe
+        )
     else:
         allocation.allocate(axes, out, layout, effectiveness, share, probe)
     if not layout.general and by_observer and uses_verdict and assessment.detected:

@@ -6,8 +6,8 @@ The surfaces that lead roll, pitch and yaw move; the others stay in trim.
 import numpy as np
 
 from beaver_ftc.compiled import apart, kernel, record, sized
+from beaver_ftc.control import CompiledLaw
 from beaver_ftc.control.allocation import form_demand, take_command
-from beaver_ftc.control.base import CompiledLaw
 
 # Filled by `compile_into` of the rival's class. incremental: whether it is incremental inversion, else the
 # regulator. The regulator: gains on error and integral, the linear model, its inverse, the trim. Incremental
@@ -30,14 +30,14 @@ def rival_dtype(n: int) -> np.dtype:
 
 
 @apart
-def command(control, assessment, faults, belief, measured, mode, t):
+def command(control, assessment, faults, prediction, measured, mode, t):
     """From what is measured to the command of each surface (base.CompiledLaw)."""
     law, reference, layout, x = control.compiled_rivals, control.reference, control.layout, measured.x
     memory, out, allocated = law.memory, law.output, control.allocation.output
     out.command[:] = layout.trim
     if law.config.incremental:
-        increment(law, reference, layout.main, belief, x)
-        form_demand(control.axes, out.demand, out.zero, out.zero, out.zero, belief.G, False)
+        increment(law, reference, layout.main, prediction, x)
+        form_demand(control.axes, out.demand, out.zero, out.zero, out.zero, prediction.G, False)
     else:
         regulate(law, reference, layout.main, x)
     take_command(allocated, layout, out.command)
@@ -71,7 +71,7 @@ def regulate(law, reference, main, x):
 
 
 @kernel
-def increment(law, reference, main, belief, x):
+def increment(law, reference, main, prediction, x):
     """G^-1 (nu - xdot0 + G u0), into the output's command; nu - xdot0 into its demand (3,) rad/s2."""
     config, memory, demand = law.config, law.memory, law.output.demand
     for i in range(3):
@@ -80,10 +80,12 @@ def increment(law, reference, main, belief, x):
         if memory.begun:
             change = (x[i] - memory.x_before[i]) / reference.config.dt
             xdot0 = smooth(memory.rate_filter, i, change, config.keep)
-            given = smooth(memory.surface_filter, i, given_by(belief.means.Gu, main, i), config.keep)
+            given = smooth(
+                memory.surface_filter, i, given_by(prediction.frame_means.Gu, main, i), config.keep
+            )
         nu = reference.output.model_acceleration[i] + config.Kp * error + config.Ki * memory.integral[i]
         demand[i] = nu - xdot0 + given
-    solve(belief.G, main, demand, law.output.command)
+    solve(prediction.G, main, demand, law.output.command)
     for i in range(3):
         demand[i] -= memory.surface_filter[1, i]
     memory.begun, memory.x_before[:] = 1, x

@@ -9,8 +9,7 @@ in the effectiveness in G and in who carries the demand: plugins.yaml says what 
 import numpy as np
 
 from beaver_ftc.compiled import apart, kernel, record, sized
-from beaver_ftc.control import laws
-from beaver_ftc.control.base import CompiledLaw
+from beaver_ftc.control import CompiledLaw, laws
 from beaver_ftc.scenario.schema import Scenario
 
 CONFIG = record(Kp=float, Ki=float)  # gains 1/s, 1/s2
@@ -25,20 +24,22 @@ def published_dtype(n: int) -> np.dtype:
     return FEEDBACK
 
 
-def configure(law: np.void, control: np.void, belief: np.void, scenario: Scenario, y: np.ndarray) -> None:
+def configure(law: np.void, control: np.void, prediction: np.void, scenario: Scenario, y: np.ndarray) -> None:
     """Fill the gains (base.CompiledLaw)."""
     config = scenario.control
     law["config"]["Kp"], law["config"]["Ki"] = config.proportional_per_s, config.integral_per_s2
 
 
 @apart
-def command(control, assessment, faults, belief, measured, mode, t):
+def command(control, assessment, faults, prediction, measured, mode, t):
     """From what is measured to the command of each surface (base.CompiledLaw)."""
     law, reference, unknown = control.published, control.reference, control.surfaces.output.unknown
     out = law.output
-    laws.prepare(control, assessment, belief, mode, t)
-    demand(law, reference.output, measured.x, belief.f, unknown)
-    laws.command_surfaces(control, out.demand, out.hold, out.disturbance, assessment, faults, belief, False)
+    laws.prepare(control, assessment, prediction, mode, t)
+    demand(law, reference.output, measured.x, prediction.f, unknown)
+    laws.command_surfaces(
+        control, out.demand, out.hold, out.disturbance, assessment, faults, prediction, False
+    )
     integrate(law, control.axes, reference, control.allocation.output.command, measured.x)
     laws.complete(control, assessment, faults, measured, t)
 

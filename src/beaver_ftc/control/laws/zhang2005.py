@@ -17,13 +17,12 @@ isolated (accommodation.py, allocation.py); the structure of the law stays.
 import numpy as np
 
 from beaver_ftc.compiled import apart, kernel, record, sized
-from beaver_ftc.control import laws
+from beaver_ftc.control import CompiledLaw, laws
 from beaver_ftc.control.accommodation import approach, begin_frame
-from beaver_ftc.control.base import CompiledLaw
 from beaver_ftc.control.laws import published
 from beaver_ftc.control.laws.published import FEEDBACK
 from beaver_ftc.diagnosis.schemes.published import (
-    STATE_NETWORK,
+    STATE_NETWORK_RECORD,
     configure_network,
     evaluate_state_network,
     train_state_network,
@@ -40,14 +39,14 @@ MEMORY = record(signal=3)  # -s, rad/s, that both parts learn from
 @sized
 def zhang2005_dtype(n: int) -> np.dtype:
     """The law's records: its own, and those of the feedback and of the network, the second part."""
-    return record(config=CONFIG, memory=MEMORY, feedback=FEEDBACK, network=STATE_NETWORK)
+    return record(config=CONFIG, memory=MEMORY, feedback=FEEDBACK, network=STATE_NETWORK_RECORD)
 
 
-def configure(law: np.void, control: np.void, belief: np.void, scenario: Scenario, y: np.ndarray) -> None:
+def configure(law: np.void, control: np.void, prediction: np.void, scenario: Scenario, y: np.ndarray) -> None:
     """Fill the law's configuration (base.CompiledLaw)."""
     settled, config = scenario.control, law["config"]
     option = settings(LAWS, settled.law, settled.options)
-    published.configure(law["feedback"], control, belief, scenario, y)
+    published.configure(law["feedback"], control, prediction, scenario, y)
     if not option["hand_over"]:
         control["config"]["reallocates"] = 0
     config["adapts"], config["networks"] = option["adaptation"], option["network"]
@@ -64,15 +63,15 @@ def configure(law: np.void, control: np.void, belief: np.void, scenario: Scenari
 
 
 @apart
-def accommodate(control, assessment, faults, belief, measured):
+def accommodate(control, assessment, faults, prediction, measured):
     """Bring both parts to this frame: what surfaces and the unknown are taken for (base.CompiledLaw)."""
     law, surfaces, main, x = control.zhang2005, control.surfaces, control.layout.main, measured.x
     begin_frame(surfaces.output, assessment, True)
     if assessment.detected and law.config.adapts:
         saturated, reference = control.allocation.output.saturated, control.reference
         error = reference.output.governed_rate - x
-        adapt(law, surfaces, main, saturated, error, belief.G, belief.u, reference.config.dt)
-    evaluate_state_network(law.network, main, x, measured.y, belief.u)
+        adapt(law, surfaces, main, saturated, error, prediction.G, prediction.u, reference.config.dt)
+    evaluate_state_network(law.network, main, x, measured.y, prediction.u)
 
 
 @kernel
@@ -98,12 +97,14 @@ def adapt(law, surfaces, main, saturated, error, G, u, dt):
 
 
 @apart
-def command(control, assessment, faults, belief, measured, mode, t):
+def command(control, assessment, faults, prediction, measured, mode, t):
     """From what is measured to the command of each surface (base.CompiledLaw)."""
     law, reference, out = control.zhang2005, control.reference, control.zhang2005.feedback.output
-    laws.prepare(control, assessment, belief, mode, t)
-    published.demand(law.feedback, reference.output, measured.x, belief.f, law.network.output)
-    laws.command_surfaces(control, out.demand, out.hold, out.disturbance, assessment, faults, belief, False)
+    laws.prepare(control, assessment, prediction, mode, t)
+    published.demand(law.feedback, reference.output, measured.x, prediction.f, law.network.output)
+    laws.command_surfaces(
+        control, out.demand, out.hold, out.disturbance, assessment, faults, prediction, False
+    )
     u = control.allocation.output.command
     published.integrate(law.feedback, control.axes, reference, u, measured.x)
     laws.complete(control, assessment, faults, measured, t)

@@ -12,10 +12,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from beaver_ftc.control.base import Reference
+from beaver_ftc.control import Reference
 from beaver_ftc.control.rivals.tracking import GAINS, Rival, with_others
 from beaver_ftc.design.context import Context
-from beaver_ftc.diagnosis.base import Measured, Verdict
+from beaver_ftc.diagnosis import Measured, Verdict
 
 
 class Predictor:

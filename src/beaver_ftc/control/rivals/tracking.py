@@ -11,10 +11,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from beaver_ftc.control.base import Reference
+from beaver_ftc.control import Reference
 from beaver_ftc.design.context import Context
-from beaver_ftc.diagnosis.base import Measured
-from beaver_ftc.diagnosis.rivals import options_of
+from beaver_ftc.diagnosis import Measured
+from beaver_ftc.diagnosis.rivals import rival_options
 
 GAINS = {"proportional_per_s": 2.0, "integral_per_s2": 1.0}
 
@@ -28,7 +28,7 @@ class Rival:
 
     def begin(self, context: Context) -> None:
         """Before a flight: nothing missed yet."""
-        self.context, self.option = context, options_of(self.name, self.defaults, context)
+        self.context, self.option = context, rival_options(self.name, self.defaults, context)
         self.integral, self.saturated = np.zeros(3), False
 
     def missed(self, measured: Measured, reference: Reference) -> np.ndarray:

@@ -84,7 +84,7 @@ def test_it_takes_over_in_trim():
     loops.take_over(pilot, new_y(), np.array([0.0, 0.13, 0.0]))
     assert pilot["flying"] == 1
     assert pilot["alpha"] == 0.1
-    assert pilot["airspeed"] == pilot["usual"] == 46.0
+    assert pilot["airspeed"] == pilot["recent_airspeed_mps"] == 46.0
     assert pilot["climb_in_trim"] == pytest.approx(0.03)
 
 
@@ -283,7 +283,10 @@ def test_upside_down_the_turn_stays_finite():
 
 
 def throttled(path=0.03, y=None, power=(), rudder=1.0, **fields):
-    pilot, control = new_autopilot(SPEED, **{"usual": 43.0, "throttle": 0.05, **fields}), new_control()
+    pilot, control = (
+        new_autopilot(SPEED, **{"recent_airspeed_mps": 43.0, "throttle": 0.05, **fields}),
+        new_control(),
+    )
     pilot["held"], pilot["held_moving"], pilot["weathercock"] = 45.0, 0.04, 0.2
     control["surfaces"]["output"]["effectiveness"][RUDDER] = rudder
     control["power"]["output"]["command"][0] = 21.0
@@ -303,7 +306,7 @@ def test_power_holds_the_airspeed_and_carries_the_climb():
     assert power["base"] == pytest.approx(wanted)
     assert power["in_use"] == 1
     assert pilot["throttle"] == pytest.approx(0.05 + DT * 0.015 * 1.0)
-    assert pilot["usual"] == pytest.approx(43.0 + DT / 20.0 * 1.0)
+    assert pilot["recent_airspeed_mps"] == pytest.approx(43.0 + DT / 20.0 * 1.0)
     assert power["command"][0] == 21.5  # half an inHg a frame
 
 
@@ -339,7 +342,7 @@ def test_while_power_stands_in_for_pitch_it_gets_the_airspeed_to_hold():
     usual = 43.0 + DT / 20.0
     assert power["usual_speed"] == pytest.approx(45.0)
     assert power["base"] == pytest.approx(20.0 + (0.04 + 0.05 + G * 0.02) / PUSH)
-    _, power = throttled(power={"engaged": 1}, usual=38.0)
+    _, power = throttled(power={"engaged": 1}, recent_airspeed_mps=38.0)
     usual = 38.0 + DT / 20.0 * (V - 38.0)
     assert power["usual_speed"] == pytest.approx(usual + 3.0)
 

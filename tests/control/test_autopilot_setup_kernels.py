@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import root
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.control import profile
+from beaver_ftc.control import autopilot as profile
 from beaver_ftc.control.autopilot import AUTOPILOT, GAIN, N_FLAP, N_QDYN
 from beaver_ftc.control.state import control_dtype
 from beaver_ftc.scenario.schema import Scenario
@@ -158,7 +158,7 @@ def test_the_table_is_that_of_level_flight_between_the_ends_of_speed_and_flap(fi
     expected = [[level(q, flap) for flap in hold["flap"]] for q in hold["qdyn"]]
     assert hold["elevator"] == pytest.approx(np.array(expected), abs=1e-7)
     assert hold["known"] == 1
-    assert (hold["pace"], hold["reserve"]) == pytest.approx((1.0, radians(0.7)))
+    assert (hold["max_airspeed_rate_mps2"], hold["reserve"]) == pytest.approx((1.0, radians(0.7)))
     assert (hold["from_s"] == -1.0).all()
     assert (hold["bank"], hold["fastest"]) == (pytest.approx(radians(30.0)), inf)
 
@@ -206,15 +206,15 @@ def made_up(terms, **autopilot):
 
 def test_an_aircraft_that_hardly_rolls_by_sideslip_is_not_flown_by_it():
     pilot = np.zeros(1, AUTOPILOT)[0]
-    profile._know(pilot, made_up({}))
+    profile._set_up_aircraft_values(pilot, made_up({}))
     assert not pilot["thrust"].any()
     assert pilot["dihedral"] == pytest.approx(0.01 * 2.0 / 10.0)
     assert pilot["weathercock"] == inf  # no power yaws it
     unstable = {"Cn_dpt3": -0.1, "Cn_beta": -0.2, "Cl_beta": -0.3, "Cl_p": -0.5}
-    profile._know(pilot, made_up(unstable))
+    profile._set_up_aircraft_values(pilot, made_up(unstable))
     assert pilot["weathercock"] == 0.0
     assert pilot["dihedral"] == pytest.approx(0.6 * 2.0 / 10.0)
-    profile._know(pilot, made_up(unstable | {"Cn_beta": 0.2, "Cn_beta3": 1.0}))
+    profile._set_up_aircraft_values(pilot, made_up(unstable | {"Cn_beta": 0.2, "Cn_beta3": 1.0}))
     assert pilot["weathercock"] == pytest.approx((0.2 * 0.2 + 0.2**3) / 0.1)
 
 

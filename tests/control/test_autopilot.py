@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from beaver_ftc.control import profile as setup
+from beaver_ftc.control import autopilot as setup
 from beaver_ftc.control.autopilot import ALTITUDE, AUTOPILOT, BANK, HEADING, SPEED, advance, to_body
-from beaver_ftc.control.laws.gains import margins
+from beaver_ftc.control.laws.rejecting import margins
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.scenario.schema import Scenario
@@ -31,7 +31,7 @@ def flown(duration_s=60.0, autopilot=None, **keys):
     return fly(Scenario.model_validate(given), memory), memory
 
 
-def altitude_off(log):
+def altitude_error_bound_m(log):
     return log["altitude_m"] - log["altitude_command_m"]
 
 
@@ -125,7 +125,7 @@ class TestFlights:
             "heading_deg": [{"at_s": 0, "hold": True}, {"at_s": 20, "value": 60}],
         }
         flight, log = flown(110.0, profile, actuators="servo")
-        assert np.abs(altitude_off(log)).max() < 5.0
+        assert np.abs(altitude_error_bound_m(log)).max() < 5.0
         assert flight.profile["airspeed_mps"] < 1.5
         assert np.abs(heading_off(log)[5500:]).max() < 1.0
         assert np.degrees(np.abs(log["beta_rad"][500:])).max() < 2.5  # coordinated

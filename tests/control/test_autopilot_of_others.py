@@ -12,7 +12,7 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.schema import Scenario
 from flying import Memory
 
-EXAMPLES = Path(__file__).parents[3] / "examples" / "outer-loops"
+EXAMPLES = Path(__file__).parents[2] / "examples" / "outer-loops"
 
 pytestmark = needs.service("derive")
 

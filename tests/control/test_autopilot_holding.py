@@ -7,8 +7,7 @@ import beaver_ftc as bf
 from beaver_ftc.aircraft import load
 from beaver_ftc.control import allocation
 from beaver_ftc.control import autopilot as holding
-from beaver_ftc.control.autopilot import AUTOPILOT, FASTEST, SPEED
-from beaver_ftc.control.profile import elevator_needed
+from beaver_ftc.control.autopilot import AUTOPILOT, FASTEST, SPEED, elevator_needed
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import measure, metrics
 from beaver_ftc.results.verdict import facts
@@ -71,7 +70,7 @@ def test_the_limits_are_where_the_elevator_there_is_just_suffices(elevator_deg, 
 def test_a_limit_moves_the_command_at_its_pace_and_lets_it_go_again():
     autopilot = table()
     record = autopilot.view(np.recarray)[0]
-    record.dt, record.holding.pace, record.command[SPEED] = 0.1, 1.0, 45.0
+    record.dt, record.holding.max_airspeed_rate_mps2, record.command[SPEED] = 0.1, 1.0, 45.0
     record.holding.fastest = np.inf
     holding.approach(record)
     assert record.held == 45.0

@@ -28,7 +28,7 @@ def new(command=45.0, **fields):
     speeds = np.linspace(30.0, 55.0, hold["qdyn"].size)
     hold["qdyn"], hold["flap"] = 0.5 * speeds**2, np.linspace(-0.1, 1.0, hold["flap"].size)
     hold["elevator"] = [[needed(V, flap) for flap in hold["flap"]] for V in speeds]
-    hold["known"], hold["pace"], hold["reserve"], hold["from_s"] = 1, 1.0, 0.05, -1.0
+    hold["known"], hold["max_airspeed_rate_mps2"], hold["reserve"], hold["from_s"] = 1, 1.0, 0.05, -1.0
     pilot["dt"], pilot["command"][SPEED], pilot["commanded"][SPEED] = DT, command, 1
     pilot["most_bank"] = pilot["bank_limit"] = hold["bank"] = 0.5
     control = new_control(main=(0, 1, 2), stand_in=FLAP, least_effectiveness=0.1)
